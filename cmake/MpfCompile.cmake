@@ -5,6 +5,9 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
+# All programs stand in one place, where the demo, the tests and `make bench` find them.
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
+
 # Sources say #include <mpf/shm/window.h>, in this tree and in programs that use the installed one.
 set(MPF_INCLUDE_ROOT "${CMAKE_BINARY_DIR}/include")
 file(MAKE_DIRECTORY "${MPF_INCLUDE_ROOT}/mpf")
@@ -14,3 +17,16 @@ endforeach()
 
 add_library(mpf_warnings INTERFACE)
 target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Werror)
+
+set(MPF_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
+if(MPF_SANITIZE)
+  add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -O1)
+  add_link_options(-fsanitize=${MPF_SANITIZE})
+  # g++ warns that ThreadSanitizer does not model std::atomic_thread_fence; the tests tell whether it matters.
+  target_compile_options(mpf_warnings INTERFACE $<$<STREQUAL:${MPF_SANITIZE},thread>:-Wno-tsan>)
+endif()
+
+find_program(MPF_CCACHE ccache)
+if(MPF_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${MPF_CCACHE}")
+endif()

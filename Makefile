@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+# The front door: each target does everything it needs, set-up included. The work is in CMakeLists.txt and CMakePresets.json.
+#
+#   JOBS=n      parallel jobs (default: all processors)
+#   PREFIX=dir  where `make install` puts the tree (default /usr/local)
+#   TESTS=regex only the tests whose name matches
+
+JOBS ?= $(shell nproc)
+PREFIX ?= /usr/local
+CTEST_FLAGS ?= --parallel $(JOBS)
+PRESETS := release debug asan tsan
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test bench install format format-check tidy clean $(PRESETS) $(PRESETS:%=test-%)
+
+help: ## this list
+	@sed -nE 's/^([a-z][a-z-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
+
+setup: ## install what is missing from Debian packages (every other target calls it)
+	@scripts/setup
+
+demo: release ## a client, shared memory, a serial server on a terminal line, and what a crash does
+	./demo/run build/release
+
+test: test-debug ## build with debug information and run every test
+
+bench: release ## how fast, beside the physical floors and other message systems
+	build/release/bin/mpf bench local
+
+install: release ## install headers, libraries, programs and man pages under PREFIX
+	cmake --install build/release --prefix "$(PREFIX)"
+
+format: setup ## format all sources
+	git ls-files -z --cached --others --exclude-standard '*.h' '*.cpp' | xargs -0 --no-run-if-empty clang-format-19 -i
+
+format-check: setup ## name the sources that `make format` would change
+	git ls-files -z --cached --others --exclude-standard '*.h' '*.cpp' | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
+
+tidy: debug ## clang-tidy over the sources that changed since the last clean run
+	scripts/tidy build/debug $(JOBS)
+
+clean: ## remove build/
+	$(RM) -r build
+
+# make release, debug, asan, tsan: build with that preset. make test-asan: and run its tests.
+$(PRESETS): setup
+	@test -f build/$@/build.ninja || cmake --preset $@
+	cmake --build --preset $@ --parallel $(JOBS)
+
+$(PRESETS:%=test-%): test-%: %
+	ctest --preset $* $(CTEST_FLAGS) $(if $(TESTS),--tests-regex '$(TESTS)')
