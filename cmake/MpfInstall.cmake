@@ -1,0 +1,126 @@
+# The installed tree: one library, its headers, mpf::mpf, pkg-config mpf, the programs and their man pages.
+include(CMakePackageConfigHelpers)
+
+# The libraries that other repositories link, as one archive libmpf.a: no link order to know, one name to write.
+set(publicLibraries mpf_base mpf_schema mpf_shm mpf_client mpf_server mpf_drivers_serial)
+set(publicFolders base schema shm client server drivers)
+
+# What those may link from outside, and how a consumer finds it: target, find_package() arguments, pkg-config name ("-": none needed).
+set(outsideTargets Threads::Threads Boost::headers CapnProto::capnp CapnProto::kj fmt::fmt spdlog::spdlog)
+set(outsidePackages Threads "Boost 1.74" CapnProto CapnProto fmt spdlog)
+set(outsideModules - - capnp kj fmt spdlog)
+
+# ---- the library
+
+set(objects "")
+set(links "")
+foreach(library IN LISTS publicLibraries)
+  if(NOT TARGET ${library})
+    continue()
+  endif()
+  get_target_property(type ${library} TYPE)
+  set(property INTERFACE_LINK_LIBRARIES)
+  if(type STREQUAL STATIC_LIBRARY)
+    list(APPEND objects $<TARGET_OBJECTS:${library}>)
+    set(property LINK_LIBRARIES)
+  endif()
+  get_target_property(libraryLinks ${library} ${property})
+  if(libraryLinks)
+    list(APPEND links ${libraryLinks})
+  endif()
+endforeach()
+list(REMOVE_DUPLICATES links)
+list(FILTER links EXCLUDE REGEX "^mpf_")
+
+set(requiredModules "")
+set(findDependencies "")
+foreach(link IN LISTS links)
+  list(FIND outsideTargets "${link}" at)
+  if(at LESS 0)
+    message(FATAL_ERROR "A public library links ${link}: say in cmake/MpfInstall.cmake how a consumer finds it")
+  endif()
+  list(GET outsidePackages ${at} package)
+  list(GET outsideModules ${at} module)
+  string(APPEND findDependencies "find_dependency(${package})\n")
+  if(NOT module STREQUAL "-")
+    string(APPEND requiredModules " ${module}")
+  endif()
+endforeach()
+
+set(pkgConfigLibrary "")
+if(objects)
+  set(pkgConfigLibrary "-lmpf")
+  add_library(mpf_all STATIC ${objects})
+  set_target_properties(mpf_all PROPERTIES LINKER_LANGUAGE CXX)
+else()
+  add_library(mpf_all INTERFACE)
+endif()
+set_target_properties(mpf_all PROPERTIES EXPORT_NAME mpf OUTPUT_NAME mpf)
+target_link_libraries(mpf_all INTERFACE ${links})
+target_compile_features(mpf_all INTERFACE cxx_std_20)
+target_include_directories(mpf_all INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+
+# ---- headers and packages
+
+foreach(folder IN LISTS publicFolders)
+  foreach(origin "${CMAKE_SOURCE_DIR}/${folder}/" "${CMAKE_BINARY_DIR}/generated/mpf/${folder}/")
+    install(DIRECTORY "${origin}" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mpf/${folder} OPTIONAL
+      FILES_MATCHING PATTERN "*.h" PATTERN "*.capnp" PATTERN programs EXCLUDE)
+  endforeach()
+endforeach()
+
+set(packageFolder ${CMAKE_INSTALL_LIBDIR}/cmake/mpf)
+install(TARGETS mpf_all EXPORT mpfTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT mpfTargets NAMESPACE mpf:: DESTINATION ${packageFolder})
+configure_package_config_file(cmake/mpfConfig.cmake.in mpfConfig.cmake INSTALL_DESTINATION ${packageFolder})
+write_basic_package_version_file(mpfConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES "${CMAKE_BINARY_DIR}/mpfConfig.cmake" "${CMAKE_BINARY_DIR}/mpfConfigVersion.cmake" DESTINATION ${packageFolder})
+
+file(RELATIVE_PATH upToPrefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
+configure_file(cmake/mpf.pc.in mpf.pc @ONLY)
+install(FILES "${CMAKE_BINARY_DIR}/mpf.pc" DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# ---- programs and man pages: every executable of these folders
+
+# Appends to `out` the executables that the CMakeLists of `folder` and below define.
+function(mpf_find_programs out folder)
+  get_property(targets DIRECTORY "${folder}" PROPERTY BUILDSYSTEM_TARGETS)
+  get_property(subfolders DIRECTORY "${folder}" PROPERTY SUBDIRECTORIES)
+  foreach(target IN LISTS targets)
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL EXECUTABLE)
+      list(APPEND ${out} ${target})
+    endif()
+  endforeach()
+  foreach(subfolder IN LISTS subfolders)
+    mpf_find_programs(${out} "${subfolder}")
+  endforeach()
+  set(${out} "${${out}}" PARENT_SCOPE)
+endfunction()
+
+set(programs "")
+foreach(folder client server tools)
+  if(EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
+    mpf_find_programs(programs "${CMAKE_SOURCE_DIR}/${folder}")
+  endif()
+endforeach()
+if(programs)
+  install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+
+find_program(MPF_HELP2MAN help2man)
+if(MPF_BUILD_MAN_PAGES AND MPF_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
+  set(pages "")
+  foreach(program IN LISTS programs)
+    set(page "${CMAKE_BINARY_DIR}/man/$<TARGET_FILE_NAME:${program}>.1")
+    add_custom_command(OUTPUT "${page}" DEPENDS ${program} "${CMAKE_SOURCE_DIR}/cmake/make-man-page"
+      COMMAND "${CMAKE_SOURCE_DIR}/cmake/make-man-page" $<TARGET_FILE:${program}> "${page}" "MPF ${PROJECT_VERSION}"
+      COMMENT "Man page of ${program}" VERBATIM)
+    list(APPEND pages "${page}")
+  endforeach()
+  add_custom_target(mpf_man_pages ALL DEPENDS ${pages})
+  if(pages)
+    install(FILES ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  endif()
+endif()
