@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""check_sources TOP: the rules of the house that no compiler checks. Prints file:line: complaint; exits 1 if there is one.
+
+A rule is a function of all files ({path: text}) that yields (path, line, complaint); self_test.py shows that each one can fail.
+"""
+import os
+import re
+import subprocess
+import sys
+
+# Which folders a folder may include directly; what those may include comes with them. Call order is dependency order.
+MAY_INCLUDE = {
+    "base": [],
+    "schema": ["base"],
+    "shm": ["base"],
+    "router": ["schema", "shm"],
+    "server": ["schema", "shm"],
+    "server/programs": ["server", "drivers"],
+    "client": ["schema", "shm"],
+    "client/programs": ["client"],
+    "drivers": ["base"],
+    "epics": ["client"],
+    "crate": ["base"],
+    "benchmarks": ["client", "server"],
+    "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
+}
+MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "demo", "examples")
+
+MAX_LINES = 400
+PAIR_REACH = 3  # lines above an ordered access in which its PAIR line stands
+
+ORDERED = re.compile(r"\bmemory_order(_|::)(acquire|release|acq_rel|seq_cst|consume)\b|\.load\(\)")
+PAIR = re.compile(r"\bPAIR\(([\w-]+)\)")
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+
+
+def is_cpp(path):
+    return path.endswith((".h", ".cpp"))
+
+
+def is_source(path):
+    name = os.path.basename(path)
+    return is_cpp(path) or path.endswith((".py", ".sh", ".capnp", ".cmake")) or name in ("CMakeLists.txt", "Makefile")
+
+
+def lines(text):
+    return enumerate(text.splitlines(), start=1)
+
+
+def line_of(text, offset):
+    return text.count("\n", 0, offset) + 1
+
+
+def layer(path):
+    """The longest key of MAY_INCLUDE that is a folder of `path`, or None."""
+    fitting = [folder for folder in MAY_INCLUDE if path.startswith(folder + "/")]
+    return max(fitting, key=len, default=None)
+
+
+def reachable(folder):
+    found = {folder}
+    for allowed in MAY_INCLUDE[folder]:
+        found |= reachable(allowed)
+    return found
+
+
+def include_directions(files):
+    for path, text in files.items():
+        if not is_cpp(path):
+            continue
+        for match in INCLUDE.finditer(text):
+            included = match[1]
+            at = line_of(text, match.start())
+            if ".." in included.split("/"):
+                yield path, at, f"includes {included}: write <mpf/folder/file.h>"
+            elif included.startswith("mpf/") and not path.startswith(tuple(f"{folder}/" for folder in MAY_INCLUDE_ANYTHING)):
+                source, target = layer(path), layer(included.removeprefix("mpf/"))
+                if source is None or target is None:
+                    yield path, at, f"includes {included}: a folder that the table of layers does not have"
+                elif target not in reachable(source):
+                    yield path, at, f"{source} may not include {target}"
+
+
+def pairs(files):
+    """Each tag stands at both ends of its happens-before edge."""
+    places = {}
+    for path, text in files.items():
+        if is_cpp(path):
+            for number, line in lines(text):
+                for tag in PAIR.findall(line):
+                    places.setdefault(tag, []).append((path, number))
+    for tag, found in places.items():
+        if len(found) == 1:
+            yield *found[0], f"PAIR({tag}) has no other end"
+
+
+def ordered_accesses(files):
+    for path, text in files.items():
+        if not (is_cpp(path) and path.startswith("shm/")):
+            continue
+        above = []
+        for number, line in lines(text):
+            above = [*above[-PAIR_REACH:], line]
+            if ORDERED.search(line.split("//")[0]) and not any(PAIR.search(near) for near in above):
+                yield path, number, f"ordered atomic access without a PAIR line within {PAIR_REACH} lines above"
+
+
+def licences(files):
+    for path, text in files.items():
+        first = text.splitlines()[:2] if text.startswith("#!") else text.splitlines()[:1]
+        if (is_cpp(path) or text.startswith("#!")) and not any("SPDX-License-Identifier: MIT" in line for line in first):
+            yield path, 1, "does not begin with its SPDX line"
+
+
+def sizes(files):
+    for path, text in files.items():
+        count = len(text.splitlines())
+        if count > MAX_LINES and (is_source(path) or text.startswith("#!")):
+            yield path, count, f"{count} lines: more than {MAX_LINES}"
+
+
+def unfinished(files):
+    mark = re.compile(r"\b(T[O]DO|F[I]XME|X[X]X)\b")
+    for path, text in files.items():
+        for number, line in lines(text):
+            if match := mark.search(line):
+                yield path, number, f"{match[0]}: do it, or put it into an issue"
+
+
+def machine_paths(files):
+    """Nothing depends on where somebody keeps the tree or gets packages from."""
+    place = re.compile(r"(?<![\w.$}-])/(work|root|home/\w+)/[\w.]|\b(pypi|debian|npmjs|docker|ghcr)\.(org|com|io)\b/(?!doc)|\bdeb\.debian\.org\b")
+    for path, text in files.items():
+        for number, line in lines(text):
+            if match := place.search(line):
+                yield path, number, f"names a place of somebody's machine or a package host: {match[0]}"
+
+
+RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, machine_paths)
+
+
+def read_tree(top):
+    """Tracked files, and new ones that are not ignored."""
+    listed = subprocess.run(["git", "-C", top, "ls-files", "-z", "--cached", "--others", "--exclude-standard"], check=True, capture_output=True)
+    files = {}
+    for path in filter(None, listed.stdout.decode().split("\0")):
+        try:
+            with open(os.path.join(top, path), encoding="utf-8") as file:
+                files[path] = file.read()
+        except (FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
+            pass  # deleted but still tracked; a folder of another repository; binary
+    return files
+
+
+def main(top):
+    files = read_tree(top)
+    complaints = [complaint for rule in RULES for complaint in rule(files)]
+    for path, number, what in complaints:
+        print(f"{path}:{number}: {what}")
+    print(f"{len(files)} files, {len(RULES)} rules, {len(complaints)} complaints")
+    return 1 if complaints or not files else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Each rule of check_sources refuses a bad sample, at the right line, and passes a good one."""
+import unittest
+
+import check_sources as check
+
+SPDX = "// SPDX-License-Identifier: MIT\n"
+ACQUIRE = "a.load(std::memory_order_acquire);\n"
+UNFINISHED = "TO" + "DO"  # in pieces, so that this file passes
+
+
+class Rules(unittest.TestCase):
+    def refuses(self, rule, files, *places):
+        """`rule` complains at exactly these (path, line)."""
+        self.assertEqual([(path, line) for path, line, _ in rule(files)], list(places))
+
+    def passes(self, rule, files):
+        self.refuses(rule, files)
+
+    def test_every_rule_has_a_test(self):
+        tested = " ".join(name for name in dir(self) if name.startswith("test_"))
+        for rule in check.RULES:
+            self.assertIn(f"test_{rule.__name__}", tested)
+
+    def test_include_directions(self):
+        rule = check.include_directions
+        self.refuses(rule, {"shm/ring.h": SPDX + "#include <mpf/schema/int32.h>\n"}, ("shm/ring.h", 2))
+        self.refuses(rule, {"client/c.cpp": '#include "mpf/server/server.h"\n'}, ("client/c.cpp", 1))
+        self.refuses(rule, {"server/s.cpp": "#include <mpf/drivers/serial/port.h>\n"}, ("server/s.cpp", 1))
+        self.refuses(rule, {"server/s.cpp": "#include <mpf/server/programs/options.h>\n"}, ("server/s.cpp", 1))
+        self.refuses(rule, {"drivers/serial/p.cpp": "#  include <mpf/shm/ring.h>\n"}, ("drivers/serial/p.cpp", 1))
+        self.refuses(rule, {"shm/ring.h": '#include "../base/clock.h"\n'}, ("shm/ring.h", 1))
+        self.refuses(rule, {"shm/ring.h": "#include <mpf/attic/clock.h>\n"}, ("shm/ring.h", 1))
+        self.passes(rule, {"client/c.cpp": "#include <mpf/base/clock.h>\n#include <mpf/client/c.h>\n#include <vector>\n"})
+        self.passes(rule, {"server/programs/p.cpp": "#include <mpf/drivers/serial/port.h>\n#include <mpf/server/s.h>\n"})
+        self.passes(rule, {"tests/shm/t.cpp": "#include <mpf/server/s.h>\n"})
+
+    def test_pairs(self):
+        self.refuses(check.pairs, {"shm/a.h": "\n// PAIR(slot-filled): why\n"}, ("shm/a.h", 2))
+        self.passes(check.pairs, {"shm/a.h": "// PAIR(slot-filled): why\n", "shm/b.h": "// PAIR(slot-filled): because\n"})
+
+    def test_ordered_accesses(self):
+        rule = check.ordered_accesses
+        self.refuses(rule, {"shm/a.h": ACQUIRE}, ("shm/a.h", 1))
+        self.refuses(rule, {"shm/a.h": "// PAIR(x)\n\n\n\n" + ACQUIRE}, ("shm/a.h", 5))
+        self.refuses(rule, {"shm/a.h": "a.load();\n"}, ("shm/a.h", 1))
+        self.refuses(rule, {"shm/a.h": "a.store(1, std::memory_order::release);\n"}, ("shm/a.h", 1))
+        self.passes(rule, {"shm/a.h": "// PAIR(x)\n\n\n" + ACQUIRE})
+        self.passes(rule, {"shm/a.h": "a.load(std::memory_order_relaxed);  // not memory_order_acquire\n"})
+
+    def test_licences(self):
+        self.refuses(check.licences, {"shm/a.h": "#pragma once\n" + SPDX}, ("shm/a.h", 1))
+        self.refuses(check.licences, {"demo/run": "#!/bin/sh\ntrue\n"}, ("demo/run", 1))
+        self.passes(check.licences, {"shm/a.h": SPDX, "demo/run": "#!/bin/sh\n# SPDX-License-Identifier: MIT\n", "README.md": "# MPF\n"})
+
+    def test_sizes(self):
+        self.refuses(check.sizes, {"shm/a.cpp": "\n" * 401}, ("shm/a.cpp", 401))
+        self.passes(check.sizes, {"shm/a.cpp": "\n" * 400, "docs/long.md": "\n" * 900})
+
+    def test_unfinished(self):
+        self.refuses(check.unfinished, {"shm/a.cpp": f"\n// {UNFINISHED}: later\n"}, ("shm/a.cpp", 2))
+        self.passes(check.unfinished, {"shm/a.cpp": 'mkstemp("fileXXXXXX");\n'})
+
+    def test_machine_paths(self):
+        rule = check.machine_paths
+        self.refuses(rule, {"Makefile": "\ncd /wo" + "rk/mpf\n"}, ("Makefile", 2))
+        self.refuses(rule, {"scripts/x": "apt http://deb.debian" + ".org/debian\n"}, ("scripts/x", 1))
+        self.passes(rule, {"README.md": "see framework/work/items and ${top}/work/x\n"})
+
+
+if __name__ == "__main__":
+    unittest.main()
