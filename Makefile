@@ -9,9 +9,11 @@ JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
 CTEST_FLAGS ?= --parallel $(JOBS)
 PRESETS := release debug asan tsan
+TESTED := debug asan tsan
+SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test bench install format format-check tidy clean $(PRESETS) $(PRESETS:%=test-%)
+.PHONY: help setup demo test bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## this list
 	@sed -nE 's/^([a-z][a-z-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
@@ -31,10 +33,10 @@ install: release ## install headers, libraries, programs and man pages under PRE
 	cmake --install build/release --prefix "$(PREFIX)"
 
 format: setup ## format all sources
-	git ls-files -z --cached --others --exclude-standard '*.h' '*.cpp' | xargs -0 --no-run-if-empty clang-format-19 -i
+	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 -i
 
 format-check: setup ## name the sources that `make format` would change
-	git ls-files -z --cached --others --exclude-standard '*.h' '*.cpp' | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
+	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
 
 tidy: debug ## clang-tidy over the sources that changed since the last clean run
 	scripts/tidy build/debug $(JOBS)
@@ -47,5 +49,5 @@ $(PRESETS): setup
 	@test -f build/$@/build.ninja || cmake --preset $@
 	cmake --build --preset $@ --parallel $(JOBS)
 
-$(PRESETS:%=test-%): test-%: %
+$(TESTED:%=test-%): test-%: %
 	ctest --preset $* $(CTEST_FLAGS) $(if $(TESTS),--tests-regex '$(TESTS)')

@@ -142,7 +142,7 @@ RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinishe
 
 def read_tree(top):
     """Tracked files, and new ones that are not ignored."""
-    listed = subprocess.run(["git", "-C", top, "ls-files", "-z", "--cached", "--others", "--exclude-standard"], check=True, capture_output=True)
+    listed = subprocess.run(["git", "-c", "safe.directory=*", "-C", top, "ls-files", "-z", "--cached", "--others", "--exclude-standard"], check=True, capture_output=True)
     files = {}
     for path in filter(None, listed.stdout.decode().split("\0")):
         try:
