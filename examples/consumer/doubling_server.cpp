@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // doubling_server: waits for SIGTERM.
-#include <mpf/base/clock.h>
-
 #include <csignal>
+
+#include <mpf/base/clock.h>
 
 int main() {
   sigset_t ends;
