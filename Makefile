@@ -46,7 +46,7 @@ clean: ## remove build/
 
 # make release, debug, asan, tsan: build with that preset. make test-asan: and run its tests.
 $(PRESETS): setup
-	@test -f build/$@/build.ninja || cmake --preset $@
+	@cmake --preset $@ --log-level=NOTICE
 	cmake --build --preset $@ --parallel $(JOBS)
 
 $(TESTED:%=test-%): test-%: %

@@ -77,6 +77,7 @@ write_basic_package_version_file(mpfConfigVersion.cmake COMPATIBILITY SameMinorV
 install(FILES "${CMAKE_BINARY_DIR}/mpfConfig.cmake" "${CMAKE_BINARY_DIR}/mpfConfigVersion.cmake" DESTINATION ${packageFolder})
 
 file(RELATIVE_PATH upToPrefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
+string(REGEX REPLACE "/$" "" upToPrefix "${upToPrefix}")
 configure_file(cmake/mpf.pc.in mpf.pc @ONLY)
 install(FILES "${CMAKE_BINARY_DIR}/mpf.pc" DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
