@@ -114,7 +114,11 @@ find_program(MPF_HELP2MAN help2man)
 if(MPF_BUILD_MAN_PAGES AND MPF_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
   set(pages "")
   foreach(program IN LISTS programs)
-    set(page "${CMAKE_BINARY_DIR}/man/$<TARGET_FILE_NAME:${program}>.1")
+    get_target_property(name ${program} OUTPUT_NAME)
+    if(NOT name)
+      set(name ${program})
+    endif()
+    set(page "${CMAKE_BINARY_DIR}/man/${name}.1")
     add_custom_command(OUTPUT "${page}" DEPENDS ${program} "${CMAKE_SOURCE_DIR}/cmake/make-man-page"
       COMMAND "${CMAKE_SOURCE_DIR}/cmake/make-man-page" $<TARGET_FILE:${program}> "${page}" "MPF ${PROJECT_VERSION}"
       COMMENT "Man page of ${program}" VERBATIM)
