@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+// cpuRelax: what a spinning loop does between two looks.
+#pragma once
+
+namespace mpf {
+
+inline void cpuRelax() noexcept {
+#if defined(__x86_64__) || defined(__i386__)
+  __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  asm volatile("yield");
+#endif
+}
+
+}  // namespace mpf

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/doorbell.h>
+
+#include <fcntl.h>
+#include <linux/futex.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <array>
+
+#include <mpf/base/system_call.h>
+#include <mpf/shm/segment.h>
+
+namespace mpf::doorbell {
+
+void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) noexcept {
+  timespec until{};
+  until.tv_sec = deadline.ns() / 1'000'000'000;
+  until.tv_nsec = deadline.ns() % 1'000'000'000;
+  // FUTEX_WAIT_BITSET: an absolute CLOCK_MONOTONIC deadline, so that restarts after signals do not stretch the wait.
+  ::syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET, seen, deadline.isNever() ? nullptr : &until, nullptr, FUTEX_BITSET_MATCH_ANY);
+}
+
+void ring(layout::Word32& bell) noexcept {
+  bell.fetch_add(1, std::memory_order_relaxed);
+  ::syscall(SYS_futex, &bell, FUTEX_WAKE, 1, nullptr, nullptr, 0);
+}
+
+FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t group) {
+  const auto path = segments::path(name);
+  checkCall(::mkfifo(path.c_str(), 0600), "create", path);
+  // Open for both directions: the read end never sees an end of file while peers come and go.
+  FileDescriptor fifo(checkCall(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", path));
+  if (group != ~std::uint32_t{0}) checkCall(::fchown(fifo.get(), static_cast<uid_t>(-1), group), "change the group of", path);
+  checkCall(::fchmod(fifo.get(), mode), "change the rights of", path);
+  return fifo;
+}
+
+FileDescriptor tryOpenFifo(const std::string& name) noexcept {
+  return FileDescriptor(::open(segments::path(name).c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
+}
+
+void ringFifo(const FileDescriptor& fifo) noexcept {
+  const char one = 1;
+  // A full FIFO is readable already.
+  [[maybe_unused]] const auto written = ::write(fifo.get(), &one, 1);
+}
+
+void drainFifo(const FileDescriptor& fifo) noexcept {
+  std::array<char, 256> discarded;
+  while (::read(fifo.get(), discarded.data(), discarded.size()) > 0) {
+  }
+}
+
+}  // namespace mpf::doorbell

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Doorbell: how a window's owner sleeps and how its peers wake it.
+//
+//   owner   announce (sleeping = 1) ─ fence ─ look again ─ sleep on the bell ─ withdraw (sleeping = 0)
+//   peer    publish a message       ─ fence ─ sleeping? ─ change the bell, wake
+//
+// Of the two fences at least one side sees the other: either the owner finds the message or the peer finds the sleeper.
+//
+// Threads  one owner thread; any number of ringers in any process.
+// Crash    a ringer killed between message and wake leaves a message that its death notice makes the owner look for.
+// Trust    the bell may be rung for nothing; it cannot be kept from ringing by anyone but the one who rings.
+#pragma once
+
+#include <atomic>
+#include <string>
+
+#include <mpf/base/clock.h>
+#include <mpf/base/file_descriptor.h>
+#include <mpf/shm/layout.h>
+
+namespace mpf::doorbell {
+
+// Orders our stores before it with our loads after it. One half of PAIR(sleep-fence) and PAIR(watch-fence).
+inline void fence() noexcept { std::atomic_thread_fence(std::memory_order_seq_cst); }
+
+// Sleeps while `bell` still has the value `seen`, until rung or until `deadline`. Returns early when a signal handler ran.
+void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) noexcept;
+
+// Changes the bell and wakes who sleeps on it.
+void ring(layout::Word32& bell) noexcept;
+
+// The descriptor form: a FIFO in /dev/shm, readable when it was rung.
+FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t group);
+FileDescriptor tryOpenFifo(const std::string& name) noexcept;
+void ringFifo(const FileDescriptor& fifo) noexcept;
+void drainFifo(const FileDescriptor& fifo) noexcept;
+
+}  // namespace mpf::doorbell

@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/endpoint.h>
+
+#include <sched.h>
+
+#include <bit>
+
+#include <mpf/shm/cpu_relax.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::uint32_t kCoolAfter = 4096;      // looks in vain before a link is no longer polled
+constexpr std::uint32_t kReplaceAfter = 64;     // looks in vain before a busier link may take its place
+constexpr std::uint32_t kHintsEvery = 16;       // messages of busy links between looks at the hints
+constexpr std::uint32_t kClockEvery = 64;       // spins between looks at the clock
+constexpr std::uint32_t kYieldEvery = 1u << 14;  // spins between offers of the CPU, for peers that share it
+constexpr std::int64_t kLookAtAllNs = 100'000'000;
+
+}  // namespace
+
+Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights, WaitMode mode,
+                   const std::function<void(layout::SegmentHeader&)>& describe)
+    : backplane_(std::move(backplane)), window_(backplane_.name(), kind, name, rights, [&](layout::SegmentHeader& header) {
+        header.waitMode = static_cast<std::uint32_t>(mode);
+        describe(header);
+      }), mode_(mode) {}
+
+Endpoint::~Endpoint() {
+  for (const auto& [name, peer] : peers_) backplane_.watcher().forget(peer.token);
+}
+
+std::optional<std::uint32_t> Endpoint::tryReserve() noexcept {
+  if (!freeIndices_.empty()) {
+    const auto index = freeIndices_.back();
+    freeIndices_.pop_back();
+    return index;
+  }
+  if (links_.size() >= layout::kMaxLinks) return std::nullopt;
+  links_.push_back(nullptr);
+  return static_cast<std::uint32_t>(links_.size() - 1);
+}
+
+void Endpoint::attach(std::uint32_t index, Link& link) {
+  links_[index] = &link;
+  control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  setReadyBit(index);
+}
+
+void Endpoint::detach(std::uint32_t index) noexcept {
+  for (std::size_t position = 0; position < hotCount_; ++position) {
+    if (hot_[position].index == index) cool(position);
+  }
+  if (links_[index] != nullptr) {
+    control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
+  }
+  links_[index] = nullptr;
+  freeIndices_.push_back(index);
+}
+
+std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::SegmentKind kind) {
+  dropPeers();
+  if (const auto found = peers_.find(name); found != peers_.end()) {
+    if (auto window = found->second.window.lock(); window && !window->isDead() && !window->isClosed()) return window;
+    backplane_.watcher().forget(found->second.token);
+    peers_.erase(found);
+  }
+  auto window = PeerWindow::tryOpen(name, kind);
+  if (!window || window->isClosed()) return nullptr;
+  peers_[name] = {window, backplane_.watcher().watchPeer(window, [this] { interrupt(); })};
+  return window;
+}
+
+void Endpoint::dropPeers() noexcept {
+  for (auto peer = peers_.begin(); peer != peers_.end();) {
+    if (!peer->second.window.expired()) {
+      ++peer;
+      continue;
+    }
+    backplane_.watcher().forget(peer->second.token);
+    peer = peers_.erase(peer);
+  }
+}
+
+std::optional<std::uint32_t> Endpoint::next() noexcept {
+  if (armed_) disarm();
+  for (std::size_t looked = 0; looked < hotCount_; ++looked) {
+    cursor_ = cursor_ + 1 < hotCount_ ? cursor_ + 1 : 0;
+    auto& hot = hot_[cursor_];
+    if (!hot.link->hasMessage()) {
+      if (++hot.misses >= kCoolAfter) {
+        const auto index = hot.index;
+        cool(cursor_);
+        if (links_[index]->hasMessage()) return index;
+        break;
+      }
+      continue;
+    }
+    hot.misses = 0;
+    if (++sinceHints_ < kHintsEvery) return hot.index;
+    sinceHints_ = 0;
+    const auto index = hot.index;
+    const auto ready = nextReady();
+    return ready ? ready : index;
+  }
+  return nextReady();
+}
+
+std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
+  if (revisit_) {
+    if (links_[*revisit_] != nullptr && links_[*revisit_]->hasMessage()) setReadyBit(*revisit_);
+    revisit_.reset();
+  }
+  auto& hints = window_.hints();
+  constexpr auto kWords = layout::kMaxLinks / 64;
+  for (std::size_t summary = 0; summary < hints.readyWords.size(); ++summary) {
+    if (hints.readyWords[summary].load(std::memory_order_relaxed) == 0) continue;
+    // Start behind the last one, so that low numbers do not starve high ones.
+    for (std::size_t looked = 0; looked < kWords; ++looked) {
+      const auto word = (readyCursor_ / 64 + looked) % kWords;
+      if (const auto index = takeReadyBit(word)) return index;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
+  auto& hints = window_.hints();
+  const auto wordBit = std::uint64_t{1} << (word % 64);
+  if ((hints.readyWords[word / 64].load(std::memory_order_relaxed) & wordBit) == 0) return std::nullopt;
+  // PAIR(ready-word): withdrawn before the bits are read; a peer that sets a bit later sets this one again.
+  hints.readyWords[word / 64].fetch_and(~wordBit, std::memory_order_acq_rel);
+  const auto bits = hints.readyBits[word].load(std::memory_order_relaxed);
+  if (bits == 0) return std::nullopt;
+  const auto start = readyCursor_ / 64 == word ? readyCursor_ % 64 : 0;
+  const auto rotated = std::rotr(bits, static_cast<int>(start));
+  const auto bit = (static_cast<std::uint32_t>(std::countr_zero(rotated)) + start) % 64;
+  // PAIR(ready-bit): withdrawn before the link is looked at.
+  const auto left = hints.readyBits[word].fetch_and(~(std::uint64_t{1} << bit), std::memory_order_acq_rel) & ~(std::uint64_t{1} << bit);
+  // PAIR(ready-word): the others are still to come.
+  if (left != 0) hints.readyWords[word / 64].fetch_or(wordBit, std::memory_order_release);
+  const auto index = static_cast<std::uint32_t>(word * 64 + bit);
+  readyCursor_ = (index + 1) % layout::kMaxLinks;
+  if (index >= links_.size() || links_[index] == nullptr) return std::nullopt;
+  heat(index);
+  return index;
+}
+
+void Endpoint::heat(std::uint32_t index) noexcept {
+  for (std::size_t position = 0; position < hotCount_; ++position) {
+    if (hot_[position].index == index) return;
+  }
+  for (std::size_t position = 0; position < hotCount_ && hotCount_ == kHotLinks; ++position) {
+    if (hot_[position].misses >= kReplaceAfter) cool(position);
+  }
+  if (hotCount_ == kHotLinks) {
+    revisit_ = index;
+    return;
+  }
+  hot_[hotCount_++] = {index, 0, links_[index]};
+  links_[index]->setWatched(true);
+}
+
+void Endpoint::cool(std::size_t position) noexcept {
+  const auto hot = hot_[position];
+  hot_[position] = hot_[--hotCount_];
+  hot.link->setWatched(false);
+  if (hot.link->hasMessage()) setReadyBit(hot.index);
+}
+
+void Endpoint::coolAll() noexcept {
+  while (hotCount_ != 0) cool(hotCount_ - 1);
+}
+
+void Endpoint::setReadyBit(std::uint32_t index) noexcept {
+  auto& hints = window_.hints();
+  const auto word = index / 64;
+  hints.readyBits[word].fetch_or(std::uint64_t{1} << (index % 64), std::memory_order_relaxed);
+  // PAIR(ready-word): after its bit.
+  hints.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
+}
+
+std::optional<std::uint64_t> Endpoint::takeKnock() noexcept {
+  auto& hints = window_.hints();
+  // PAIR(knocked): after it, the knocks that it counts.
+  const auto knocked = hints.knocked.load(std::memory_order_acquire);
+  if (knocked != knockedSeen_) {
+    knockedSeen_ = knocked;
+    knockCursor_ = 0;
+  }
+  for (; knockCursor_ < layout::kKnocks; ++knockCursor_) {
+    auto& knock = hints.knocks[knockCursor_];
+    if (knock.load(std::memory_order_relaxed) == 0) continue;
+    // PAIR(knock): the link has its name by now.
+    if (const auto incarnation = knock.exchange(0, std::memory_order_acq_rel); incarnation != 0) return incarnation;
+  }
+  return std::nullopt;
+}
+
+bool Endpoint::takeRescan() noexcept {
+  auto& rescan = window_.hints().rescan;
+  return rescan.load(std::memory_order_relaxed) != 0 && rescan.exchange(0, std::memory_order_relaxed) != 0;
+}
+
+bool Endpoint::takeLocalNews() noexcept {
+  if (localNews_.load(std::memory_order_relaxed) == 0) return false;
+  // PAIR(local-news): what happened before it was told.
+  return localNews_.exchange(0, std::memory_order_acquire) != 0;
+}
+
+void Endpoint::interrupt() noexcept {
+  // PAIR(local-news): after what happened.
+  localNews_.store(1, std::memory_order_release);
+  window_.ring();
+}
+
+bool Endpoint::hasHints() const noexcept {
+  const auto& hints = window_.hints();
+  for (const auto& word : hints.readyWords) {
+    if (word.load(std::memory_order_relaxed) != 0) return true;
+  }
+  return hints.knocked.load(std::memory_order_relaxed) != knockedSeen_ || hints.rescan.load(std::memory_order_relaxed) != 0 ||
+         localNews_.load(std::memory_order_relaxed) != 0;
+}
+
+bool Endpoint::hasNews() const noexcept {
+  for (std::size_t position = 0; position < hotCount_; ++position) {
+    if (hot_[position].link->hasMessage()) return true;
+  }
+  return hasHints();
+}
+
+bool Endpoint::wait(Deadline deadline) noexcept {
+  slept_ = false;
+  if (spin(deadline)) return true;
+  while (!deadline.hasPassed()) {
+    sleep(deadline);
+    if (hasNews()) return true;
+    lookAtAll();
+    if (hasNews()) return true;
+  }
+  return hasNews();
+}
+
+bool Endpoint::spin(Deadline deadline) noexcept {
+  if (hasNews()) return true;
+  if (mode_ == WaitMode::block) return false;
+  const auto budgetNs = mode_ == WaitMode::spin ? INT64_MAX : (2 * wakeNs_) >> spinShift_;
+  std::int64_t startNs = 0;
+  for (std::uint32_t spins = 1;; ++spins) {
+    cpuRelax();
+    if (hasNews()) return true;
+    if (spins % kClockEvery != 0) continue;
+    const auto nowNs = Clock::nowNs();
+    if (startNs == 0) startNs = nowNs;
+    if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
+    if (spins % kYieldEvery == 0) ::sched_yield();
+  }
+}
+
+void Endpoint::announce(layout::SleepState how) noexcept {
+  coolAll();
+  control().sleeping.store(how, std::memory_order_relaxed);
+  // PAIR(sleep-fence): our announcement before, the last look after.
+  doorbell::fence();
+}
+
+void Endpoint::sleep(Deadline deadline) noexcept {
+  auto& bell = window_.hints().bell;
+  const auto seen = bell.load(std::memory_order_relaxed);
+  announce(layout::SleepState::onFutex);
+  if (!hasNews()) {
+    const auto sleptFrom = mode_ == WaitMode::adaptive ? Clock::nowNs() : 0;
+    doorbell::sleep(bell, seen, deadline);
+    slept_ = true;
+    control().wakes.store(control().wakes.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    if (mode_ == WaitMode::adaptive) {
+      spinShift_ = Clock::nowNs() - sleptFrom < 4 * wakeNs_ ? 0 : std::min(spinShift_ + 1, 5u);
+    }
+  }
+  control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
+}
+
+// A ready bit may have been lost to a peer that scribbles: once in a while, a wake-up without news looks at everything.
+void Endpoint::lookAtAll() noexcept {
+  const auto nowNs = Clock::nowNs();
+  if (nowNs - lookedAtAllNs_ < kLookAtAllNs) return;
+  lookedAtAllNs_ = nowNs;
+  for (std::uint32_t index = 0; index < links_.size(); ++index) {
+    if (links_[index] != nullptr && links_[index]->hasMessage()) setReadyBit(index);
+  }
+}
+
+bool Endpoint::arm() noexcept {
+  doorbell::drainFifo(window_.fifo());
+  announce(layout::SleepState::onDescriptor);
+  armed_ = true;
+  if (!hasNews()) return true;
+  disarm();
+  return false;
+}
+
+void Endpoint::disarm() noexcept {
+  armed_ = false;
+  control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
+}
+
+}  // namespace mpf

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/link.h>
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <bit>
+#include <mutex>
+
+#include <mpf/base/clock.h>
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::uint64_t kSampleEvery = 16;  // one message of so many is timed: a clock call costs as much as a quarter of a round trip
+
+layout::Slot* slotsOf(const Segment& segment, LinkSide producer) {
+  auto* slots = &segment.at<layout::Slot>(layout::kLinkRingsOffset);
+  return producer == LinkSide::client ? slots : slots + segment.header().queueSlots;
+}
+
+std::uint32_t slotCount(const Segment& segment, LinkSide producer) {
+  return producer == LinkSide::client ? segment.header().queueSlots : segment.header().replySlots;
+}
+
+layout::RingControl& ringControl(const Segment& segment, LinkSide producer) {
+  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+  return producer == LinkSide::client ? control.requests : control.replies;
+}
+
+layout::ReturnRing& returnRing(const Segment& segment, LinkSide poolOwner) {
+  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+  return poolOwner == LinkSide::client ? control.requestChunks : control.replyChunks;
+}
+
+LinkSide other(LinkSide side) { return side == LinkSide::client ? LinkSide::server : LinkSide::client; }
+
+PoolPlace poolPlace(const Segment& segment, const std::string& backplane, LinkSide side) {
+  const auto& header = segment.header();
+  return {backplane, header.incarnation, static_cast<std::uint32_t>(side),
+          side == LinkSide::client ? header.clientWindow : header.serverWindow};
+}
+
+void checkGeometry(const layout::SegmentHeader& header, const std::string& name) {
+  const auto isRing = [](std::uint32_t slots) { return std::has_single_bit(slots) && slots >= 16 && slots <= layout::kMaxRingSlots; };
+  if (!isRing(header.queueSlots) || !isRing(header.replySlots) || header.queueSize > header.queueSlots) {
+    throw SegmentError(fmt::format("{}: rings of {} and {} slots for a queue of {} make no sense", segments::path(name), header.queueSlots,
+                                   header.replySlots, header.queueSize));
+  }
+}
+
+}  // namespace
+
+void SpinLock::lock() noexcept {
+  // PAIR(spin-lock): see what the last holder did.
+  while (locked_.test_and_set(std::memory_order_acquire)) ::sched_yield();
+}
+
+std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
+                                   std::shared_ptr<PeerWindow> server) {
+  const auto& offer = server->header();
+  checkGeometry(offer, server->name());
+  const Rights rights{offer.linkMode & 0666, offer.linkGroup};
+  auto segment = Segment::create(layout::linkBytes(offer.queueSlots, offer.replySlots), layout::SegmentKind::link, backplane, rights);
+  auto& header = segment.sharedHeader();
+  header.ownerWindow = own.header().incarnation;
+  header.clientWindow = own.header().incarnation;
+  header.clientIndex = index;
+  header.serverWindow = offer.incarnation;
+  header.location = offer.location;
+  header.name = offer.name;
+  header.queueSlots = offer.queueSlots;
+  header.replySlots = offer.replySlots;
+  header.queueSize = offer.queueSize;
+  header.maxOutstanding = offer.maxOutstanding;
+  header.maxMessageBytes = offer.maxMessageBytes;
+  header.maxPoolBytes = offer.maxPoolBytes;
+  header.linkMode = offer.linkMode;
+  header.linkGroup = offer.linkGroup;
+  header.ringBytesOffset = layout::kLinkControlOffset;
+  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+  control.clientState.store(layout::LinkState::open, std::memory_order_relaxed);
+  control.requests.unwatched.store(1, std::memory_order_relaxed);
+  control.replies.unwatched.store(1, std::memory_order_relaxed);
+  if (!segment.tryPublish(SegmentName::link(backplane, offer.incarnation, header.incarnation))) {
+    throw SegmentError("an incarnation number came twice");
+  }
+  segment.closeFile();
+  auto link = std::unique_ptr<Link>(new Link(std::move(segment), backplane, LinkSide::client, rights));
+  link->attachPeer(std::move(server), 0);
+  return link;
+}
+
+std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::string& name, const OwnWindow& own) {
+  auto segment = Segment::tryOpen(name, layout::SegmentKind::link, Segment::Access::readWrite);
+  if (!segment) return nullptr;
+  const auto& header = segment->header();
+  const auto& offer = own.header();
+  checkGeometry(header, name);
+  if (header.queueSlots != offer.queueSlots || header.replySlots != offer.replySlots || header.serverWindow != offer.incarnation ||
+      segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+    throw SegmentError(fmt::format("{}: not a link that this server offers", segments::path(name)));
+  }
+  segment->closeFile();
+  return std::unique_ptr<Link>(new Link(std::move(*segment), backplane, LinkSide::server, own.rights()));
+}
+
+Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights)
+    : segment_(std::move(segment)),
+      backplane_(backplane),
+      side_(side),
+      outControl_(ringControl(segment_, side)),
+      out_(slotsOf(segment_, side), slotCount(segment_, side), outControl_),
+      in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)), ringControl(segment_, other(side))),
+      pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group}, segment_.header().maxPoolBytes,
+            returnRing(segment_, side)),
+      borrowed_(poolPlace(segment_, backplane, other(side)), returnRing(segment_, other(side))) {}
+
+Link::~Link() {
+  if (side_ == LinkSide::client) segments::remove(segment_.name());
+}
+
+void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept {
+  peer_ = std::move(peer);
+  peerIndex_ = peerIndex;
+}
+
+void Link::setState(layout::LinkState state) noexcept {
+  auto& own = side_ == LinkSide::client ? control().clientState : control().serverState;
+  // PAIR(link-state): what was prepared before the state.
+  own.store(state, std::memory_order_release);
+}
+
+layout::LinkState Link::peerState() const noexcept {
+  const auto& peers = side_ == LinkSide::client ? control().serverState : control().clientState;
+  // PAIR(link-state): what the peer prepared.
+  return peers.load(std::memory_order_acquire);
+}
+
+void Link::notifyPeer() noexcept {
+  if (peer_) peer_->notify(peerIndex_);
+}
+
+LinkSend Link::trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept {
+  if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
+  const std::lock_guard lock(sendLock_);
+  if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting && out_.waiting() >= limits.waiting) return LinkSend::full;
+  if ((out_.messages() & (kSampleEvery - 1)) == 0) envelope.sentTick = static_cast<std::uint32_t>(Clock::nowNs() >> 4) | 1u;
+  envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
+
+  const auto slots = slotsFor(body.size());
+  // Every message that the queue may still take needs one slot; only what is left over may be spent on longer ones.
+  const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
+  const auto needed = limits.reserve + (limits.waiting > queued + 1 && slots > 1 ? limits.waiting - queued - 1 : 0);
+  if (body.size() <= layout::kInlineBodyBytes && out_.tryPush(envelope, body, needed)) {
+    afterPush();
+    return LinkSend::sent;
+  }
+  if (slots == 1 || !out_.hasFree(1 + limits.reserve)) return LinkSend::full;
+
+  auto own = pool_.tryFind(body.data());
+  const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
+  if (!own && !foreign) {
+    const auto chunk = pool_.tryAlloc(body.size());
+    if (!chunk) return LinkSend::noMemory;
+    std::memcpy(chunk->data, body.data(), body.size());
+    own = chunk->ref;
+  }
+  if (own) pool_.lend(*own);
+  envelope.flags |= layout::kSlotChunk;
+  const auto ref = own ? *own : *foreign;
+  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve)) return LinkSend::full;  // hasFree() said that it fits
+  afterPush();
+  return LinkSend::sent;
+}
+
+void Link::afterPush() noexcept {
+  sent_.store(out_.messages(), std::memory_order_relaxed);
+  // PAIR(watch-fence): our message before, the peer's word on whether it polls after.
+  doorbell::fence();
+  if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
+}
+
+bool Link::isTaken(std::uint64_t ordinal) noexcept {
+  const std::lock_guard lock(sendLock_);
+  return out_.isTaken(ordinal);
+}
+
+std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept {
+  const std::lock_guard lock(sendLock_);
+  return pool_.tryAlloc(bytes);
+}
+
+void Link::release(const std::byte* data) noexcept {
+  const std::lock_guard lock(sendLock_);
+  if (const auto own = pool_.tryFind(data)) {
+    pool_.free(*own);
+  } else if (const auto foreign = borrowed_.tryFind(data)) {
+    borrowed_.giveBack(*foreign);
+  }
+}
+
+std::optional<Chunk> Link::tryChunk(const Envelope& envelope) noexcept {
+  layout::ChunkRef ref{};
+  if (inlineCapacity() == 0) return std::nullopt;
+  copyBody(std::as_writable_bytes(std::span(&ref, 1)));
+  const std::lock_guard lock(sendLock_);
+  auto chunk = ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : borrowed_.tryBorrow(ref);
+  if (!chunk || envelope.bodyBytes > chunk->capacity) return std::nullopt;
+  return chunk;
+}
+
+void Link::setWatched(bool watched) noexcept {
+  in_.control().unwatched.store(watched ? 0 : 1, std::memory_order_relaxed);
+  // PAIR(watch-fence): our word before, the look for messages that the caller does next after.
+  doorbell::fence();
+}
+
+}  // namespace mpf

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// Link: the private segment of one client-server pair, from one side: a ring out, a ring in, a pool of our own, the peer's.
+//
+//   client side ── requests ring, client's pool ──► server side
+//               ◄── replies ring, server's pool ──
+//
+// Threads  one thread receives (begin, copyBody, chunk, end); any thread sends, allocates and frees; a spin lock joins them.
+// Crash    the client owns the segment; a server removes it once the client's window is ownerless.
+// Trust    the peer may write every byte; geometry was copied and checked at the start, the rest is checked at use.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <mpf/shm/pool.h>
+#include <mpf/shm/ring.h>
+#include <mpf/shm/window.h>
+
+namespace mpf {
+
+enum class LinkSide : std::uint32_t { client = 0, server = 1 };
+
+// Why a message was not sent; the caller keeps it.
+enum class LinkSend { sent, full, tooLarge, noMemory, closed };
+
+// In-process lock of a few instructions' length.
+class SpinLock {
+ public:
+  void lock() noexcept;
+  void unlock() noexcept {
+    // PAIR(spin-lock): what was done under the lock before the next one gets it.
+    locked_.clear(std::memory_order_release);
+  }
+
+ private:
+  std::atomic_flag locked_;
+};
+
+class Link {
+ public:
+  // A new link of ours to `server`, not yet accepted. `index` is its bit in our own window.
+  //   throws  std::system_error (no memory, no right), SegmentError (the server's window offers nonsense)
+  static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own, std::uint32_t index, std::shared_ptr<PeerWindow> server);
+  // Maps a link that a client made for us; nullptr when it is gone.
+  //   throws  SegmentError, std::system_error: the link is not usable, ignore it
+  static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name, const OwnWindow& own);
+  ~Link();
+
+  [[nodiscard]] LinkSide side() const noexcept { return side_; }
+  [[nodiscard]] const layout::SegmentHeader& header() const noexcept { return segment_.header(); }
+  [[nodiscard]] layout::LinkControl& control() const noexcept { return segment_.at<layout::LinkControl>(layout::kLinkControlOffset); }
+  [[nodiscard]] const std::string& name() const noexcept { return segment_.name(); }
+
+  [[nodiscard]] const std::shared_ptr<PeerWindow>& peer() const noexcept { return peer_; }
+  void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
+  void setPeerIndex(std::uint32_t peerIndex) noexcept { peerIndex_ = peerIndex; }
+
+  // Our half of the state, and the peer's as it says.
+  void setState(layout::LinkState state) noexcept;
+  [[nodiscard]] layout::LinkState peerState() const noexcept;
+  // Tells the peer to look at this link, whether it polls it or not.
+  void notifyPeer() noexcept;
+
+  // --- sending ---
+  struct Limits {
+    std::uint32_t waiting;  // longest queue of messages that the peer has not taken; 0: only what the ring holds
+    std::uint32_t reserve;  // slots to leave free
+  };
+  // Sends a body: in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
+  LinkSend trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept;
+  // Number of the last message sent, from 1.
+  [[nodiscard]] std::uint64_t sentMessages() const noexcept { return sent_.load(std::memory_order_relaxed); }
+  // Whether the peer has taken message number `ordinal`.
+  [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept;
+
+  // A chunk to build a body in; nullopt when there is no memory for it.
+  std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
+  // Frees a chunk of ours or gives back a borrowed one; `data` points to its start.
+  void release(const std::byte* data) noexcept;
+
+  // --- receiving ---
+  [[nodiscard]] bool hasMessage() const noexcept { return in_.hasMessage(); }
+  [[nodiscard]] Envelope begin() noexcept { return in_.begin(); }
+  [[nodiscard]] std::size_t inlineCapacity() const noexcept { return in_.inlineCapacity(); }
+  void copyBody(std::span<std::byte> body) const noexcept { in_.copyBody(body); }
+  // The chunk of a kSlotChunk message begun: borrowed, or our own come back. nullopt: nonsense.
+  std::optional<Chunk> tryChunk(const Envelope& envelope) noexcept;
+  void end() noexcept { in_.end(); }
+  [[nodiscard]] std::uint64_t receivedMessages() const noexcept { return in_.messages(); }
+
+  // While not watched, the peer sets our ready bit with each message.
+  void setWatched(bool watched) noexcept;
+
+  // Largest body that may be sent.
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return segment_.header().maxMessageBytes; }
+
+ private:
+  Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
+  void afterPush() noexcept;
+
+  Segment segment_;
+  std::string backplane_;
+  LinkSide side_;
+  std::shared_ptr<PeerWindow> peer_;
+  std::uint32_t peerIndex_ = 0;
+  SpinLock sendLock_;
+  std::atomic<std::uint64_t> sent_{0};
+  const layout::RingControl& outControl_;
+  RingProducer out_;
+  RingConsumer in_;
+  PoolOwner pool_;
+  PoolBorrower borrowed_;
+};
+
+}  // namespace mpf

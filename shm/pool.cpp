@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/pool.h>
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::uint32_t kMaxBulks = 256;  // bulk segments of one side of a link
+
+// A power of two of elements plus room for the header of a message, so that 1 MiB of data does not need 2 MiB.
+std::size_t chunkBytesFor(std::size_t bytes) {
+  constexpr std::size_t kHeaderRoom = 128;
+  const auto power = std::bit_ceil(std::max<std::size_t>(bytes, 512 + kHeaderRoom) - kHeaderRoom);
+  return power + kHeaderRoom;
+}
+
+std::uint32_t chunkCountFor(std::size_t chunkBytes) {
+  constexpr std::size_t kBulkBytes = 256 * 1024;
+  constexpr std::size_t kHugeBytes = 16 * 1024 * 1024;
+  if (chunkBytes > kHugeBytes) return 1;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(kBulkBytes / chunkBytes, 2, 32));
+}
+
+}  // namespace
+
+PoolOwner::PoolOwner(PoolPlace place, Rights rights, std::uint64_t maxBytes, layout::ReturnRing& returns)
+    : place_(std::move(place)), rights_(rights), maxBytes_(maxBytes), returns_(&returns) {}
+
+PoolOwner::~PoolOwner() {
+  for (const auto& bulk : bulks_) segments::remove(bulk.segment.name());
+}
+
+std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
+  collectReturned();
+  if (inUse_ >= layout::kReturnSlots) return std::nullopt;
+  const auto chunkBytes = chunkBytesFor(bytes);
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
+      auto& bulk = bulks_[segment];
+      if (bulk.chunkBytes != chunkBytes || bulk.free.empty()) continue;
+      const auto index = bulk.free.back();
+      bulk.free.pop_back();
+      bulk.states[index] = ChunkState::held;
+      ++inUse_;
+      return Chunk{bulk.chunk(index), chunkBytes, {segment, index, place_.side, 0}};
+    }
+    if (!addBulk(chunkBytes)) break;
+  }
+  return std::nullopt;
+}
+
+bool PoolOwner::addBulk(std::size_t chunkBytes) try {
+  const auto count = chunkCountFor(chunkBytes);
+  const auto bytes = layout::kBulkChunksOffset + count * chunkBytes;
+  if (bulks_.size() >= kMaxBulks || bytes_ + bytes > maxBytes_) return false;
+  auto segment = Segment::create(bytes, layout::SegmentKind::bulk, place_.backplane, rights_);
+  auto& header = segment.sharedHeader();
+  header.ownerWindow = place_.ownerWindow;
+  header.chunkBytes = chunkBytes;
+  header.chunkCount = count;
+  header.bulkSide = place_.side;
+  if (!segment.tryPublish(SegmentName::bulk(place_.backplane, place_.link, place_.side, static_cast<std::uint32_t>(bulks_.size())))) {
+    return false;
+  }
+  segment.closeFile();
+  bytes_ += bytes;
+  Bulk bulk{std::move(segment), chunkBytes, std::vector<ChunkState>(count, ChunkState::free), {}};
+  for (auto index = count; index-- > 0;) bulk.free.push_back(index);
+  bulks_.push_back(std::move(bulk));
+  return true;
+} catch (const std::exception&) {
+  return false;  // no memory left in /dev/shm: the caller refuses the message
+}
+
+bool PoolOwner::isState(const layout::ChunkRef& ref, ChunkState state) const noexcept {
+  return ref.side == place_.side && ref.segment < bulks_.size() && ref.chunk < bulks_[ref.segment].states.size() &&
+         bulks_[ref.segment].states[ref.chunk] == state;
+}
+
+void PoolOwner::lend(const layout::ChunkRef& ref) noexcept {
+  bulks_[ref.segment].states[ref.chunk] = ChunkState::lent;
+}
+
+std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noexcept {
+  if (!isState(ref, ChunkState::lent)) return std::nullopt;
+  auto& bulk = bulks_[ref.segment];
+  bulk.states[ref.chunk] = ChunkState::held;
+  return Chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
+}
+
+void PoolOwner::free(const layout::ChunkRef& ref) noexcept {
+  auto& bulk = bulks_[ref.segment];
+  bulk.states[ref.chunk] = ChunkState::free;
+  bulk.free.push_back(ref.chunk);
+  --inUse_;
+}
+
+void PoolOwner::collectReturned() noexcept {
+  // PAIR(chunk-returned): the borrower has finished with the chunk.
+  const auto returned = returns_->returned.load(std::memory_order_acquire);
+  const auto end = std::min(returned, collected_ + layout::kReturnSlots);  // more is nonsense
+  for (; collected_ < end; ++collected_) {
+    const auto packed = returns_->chunks[collected_ % layout::kReturnSlots].load(std::memory_order_relaxed);
+    const layout::ChunkRef ref{static_cast<std::uint32_t>(packed >> 32), static_cast<std::uint32_t>(packed), place_.side, 0};
+    if (tryReceiveBack(ref)) free(ref);
+  }
+}
+
+std::optional<layout::ChunkRef> PoolOwner::tryFind(const std::byte* data) const noexcept {
+  for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
+    const auto& bulk = bulks_[segment];
+    const auto* start = bulk.segment.data() + layout::kBulkChunksOffset;
+    if (data < start || data >= bulk.segment.data() + bulk.segment.bytes()) continue;
+    return layout::ChunkRef{segment, static_cast<std::uint32_t>(static_cast<std::size_t>(data - start) / bulk.chunkBytes), place_.side, 0};
+  }
+  return std::nullopt;
+}
+
+std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) noexcept try {
+  if (ref.segment >= kMaxBulks || ref.side != place_.side) return std::nullopt;
+  if (ref.segment >= bulks_.size()) bulks_.resize(ref.segment + 1);
+  auto& bulk = bulks_[ref.segment];
+  if (!bulk.segment) {
+    auto segment = Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, ref.segment), layout::SegmentKind::bulk,
+                                    Segment::Access::readWrite);
+    if (!segment) return std::nullopt;
+    const auto header = segment->header();
+    const auto room = segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
+    if (header.chunkBytes == 0 || header.chunkCount > room / header.chunkBytes) return std::nullopt;
+    segment->closeFile();
+    bulk = {std::move(*segment), header.chunkBytes, header.chunkCount};
+  }
+  if (ref.chunk >= bulk.chunkCount) return std::nullopt;
+  return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + ref.chunk * bulk.chunkBytes, bulk.chunkBytes, ref};
+} catch (const std::exception&) {
+  return std::nullopt;
+}
+
+void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
+  returns_->chunks[returned_ % layout::kReturnSlots].store(std::uint64_t{ref.segment} << 32 | ref.chunk, std::memory_order_relaxed);
+  // PAIR(chunk-returned): we have finished with the chunk.
+  returns_->returned.store(++returned_, std::memory_order_release);
+}
+
+std::optional<layout::ChunkRef> PoolBorrower::tryFind(const std::byte* data) const noexcept {
+  for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
+    const auto& bulk = bulks_[segment];
+    if (!bulk.segment || data < bulk.segment.data() || data >= bulk.segment.data() + bulk.segment.bytes()) continue;
+    const auto offset = static_cast<std::size_t>(data - bulk.segment.data()) - layout::kBulkChunksOffset;
+    return layout::ChunkRef{segment, static_cast<std::uint32_t>(offset / bulk.chunkBytes), place_.side, 0};
+  }
+  return std::nullopt;
+}
+
+void removeBulk(const std::string& backplane, std::uint64_t link) {
+  for (std::uint32_t side = 0; side < 2; ++side) {
+    for (std::uint32_t segment = 0; segments::remove(SegmentName::bulk(backplane, link, side, segment)); ++segment) {
+    }
+  }
+}
+
+}  // namespace mpf

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// Process: who this process is and whether another one is still the one it was.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/shm/layout.h>
+
+namespace mpf {
+
+struct Process {
+  std::int32_t pid{};
+  std::uint32_t uid{};
+  std::uint64_t startTicks{};    // since boot; with the pid it names a process for good
+  std::uint64_t pidNamespace{};  // inode
+  std::string program;
+
+  // Read anew after a fork.
+  static Process self();
+  void describe(layout::SegmentHeader& header) const;
+
+  // A descriptor that becomes readable when the owner in `header` ends; empty when it cannot be told from here (gone already,
+  // another pid namespace, a pid that somebody else has now).
+  static FileDescriptor openOwner(const layout::SegmentHeader& header);
+};
+
+}  // namespace mpf

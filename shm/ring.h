@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+// Ring: hands messages of 1 to 4 slots from one producer process to one consumer process.
+//
+//   | slot 0 | slot 1 | ... | slot capacity-1 |     first slot = sequence + envelope + 24 bytes, further ones 56 bytes each
+//
+// Threads  one thread pushes, one thread takes.
+// Crash    a producer killed before its release store has pushed nothing; a consumer killed after it counted a message as
+//          taken may or may not have acted on it.
+// Trust    both ends keep positions of their own; what the other side writes is range-checked and costs messages at most.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <span>
+
+#include <mpf/shm/layout.h>
+
+namespace mpf {
+
+// What travels with a body. `type`, `clientType` and `clientExtra` mean nothing here.
+struct Envelope {
+  std::uint16_t type{};
+  std::uint8_t flags{};  // layout::kSlot...
+  std::uint32_t bodyBytes{};
+  std::uint32_t requestId{};
+  std::int32_t clientType{};
+  std::int32_t clientExtra{};
+  std::uint32_t sentTick{};
+  std::int64_t deadlineNs{};
+};
+
+[[nodiscard]] constexpr std::uint32_t slotsFor(std::size_t inlineBytes) noexcept {
+  if (inlineBytes <= layout::kFirstSlotBodyBytes) return 1;
+  const auto more = inlineBytes - layout::kFirstSlotBodyBytes;
+  return 1 + static_cast<std::uint32_t>((more + sizeof(layout::MoreSlot::body) - 1) / sizeof(layout::MoreSlot::body));
+}
+
+// The consumer hands slots back when it has this part of the ring, or all there is.
+inline constexpr std::uint32_t kFreeFraction = 8;
+
+// Slots of a ring in which `messages` one-slot messages always find room.
+[[nodiscard]] constexpr std::uint32_t ringSlotsFor(std::uint32_t messages) noexcept {
+  return std::bit_ceil(std::max(16u, messages + messages / (kFreeFraction - 1) + 1));
+}
+
+class RingProducer {
+ public:
+  RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer) noexcept
+      : slots_(slots), capacity_(capacity), consumer_(consumer) {}
+
+  // Pushes `body` (at most layout::kInlineBodyBytes) and returns true, or changes nothing and returns false when it does not fit
+  // beside `reserve` free slots.
+  [[nodiscard]] bool tryPush(const Envelope& envelope, std::span<const std::byte> body, std::uint32_t reserve = 0) noexcept {
+    const auto count = slotsFor(body.size());
+    if (!hasFree(count + reserve)) return false;
+    auto& first = slot(pushed_);
+    first.type = envelope.type;
+    first.slots = static_cast<std::uint8_t>(count);
+    first.flags = envelope.flags;
+    first.bodyBytes = envelope.bodyBytes;
+    first.requestId = envelope.requestId;
+    first.clientType = envelope.clientType;
+    first.clientExtra = envelope.clientExtra;
+    first.sentTick = envelope.sentTick;
+    first.deadlineNs = envelope.deadlineNs;
+    copyBody(first, body);
+    const auto sequence = pushed_ + 1;
+    pushed_ += count;
+    ++messages_;
+    // PAIR(slot-filled): who sees this sequence sees the message.
+    first.sequence.store(sequence, std::memory_order_release);
+    return true;
+  }
+
+  [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
+  // Messages that the consumer has not taken, never more than were pushed.
+  [[nodiscard]] std::uint64_t waiting() noexcept {
+    // PAIR(message-taken): the consumer counts a message before it looks at it.
+    takenSeen_ = std::clamp(consumer_.taken.load(std::memory_order_acquire), takenSeen_, messages_);
+    return messages_ - takenSeen_;
+  }
+  // As waiting(), from the last look: too many, never too few.
+  [[nodiscard]] std::uint64_t waitingAtMost() const noexcept { return messages_ - takenSeen_; }
+  // Whether message number `ordinal` (the first is 1) has been taken.
+  [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept { return messages_ - waiting() >= ordinal; }
+
+  [[nodiscard]] bool hasFree(std::uint32_t count) noexcept {
+    if (pushed_ + count - freedSeen_ <= capacity_) return true;
+    // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
+    freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
+    return pushed_ + count - freedSeen_ <= capacity_;
+  }
+
+ private:
+  layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & (capacity_ - 1)]; }
+
+  void copyBody(layout::Slot& first, std::span<const std::byte> body) const noexcept {
+    const auto head = std::min(body.size(), first.body.size());
+    if (head != 0) std::memcpy(first.body.data(), body.data(), head);
+    body = body.subspan(head);
+    for (auto position = pushed_ + 1; !body.empty(); ++position) {
+      auto& more = reinterpret_cast<layout::MoreSlot&>(slot(position));
+      const auto part = std::min(body.size(), more.body.size());
+      std::memcpy(more.body.data(), body.data(), part);
+      body = body.subspan(part);
+    }
+  }
+
+  layout::Slot* slots_;
+  std::uint64_t capacity_;
+  const layout::RingControl& consumer_;
+  std::uint64_t pushed_ = 0;     // slots
+  std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
+  std::uint64_t messages_ = 0;
+  std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
+};
+
+class RingConsumer {
+ public:
+  RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own) noexcept
+      : slots_(slots), capacity_(capacity), own_(own) {}
+
+  [[nodiscard]] bool hasMessage() const noexcept {
+    // PAIR(slot-filled): the message is complete.
+    return slot(taken_).sequence.load(std::memory_order_acquire) == taken_ + 1;
+  }
+
+  // Counts the next message as taken and copies its envelope; call only after hasMessage(). From here on the sender knows that
+  // we may have acted on it.
+  [[nodiscard]] Envelope begin() noexcept {
+    ++messages_;
+    // PAIR(message-taken): before we look at the message.
+    own_.taken.store(messages_, std::memory_order_release);
+    const auto& first = slot(taken_);
+    slotsNow_ = first.slots;
+    return {first.type, first.flags, first.bodyBytes, first.requestId, first.clientType, first.clientExtra, first.sentTick, first.deadlineNs};
+  }
+
+  // Bytes that the message begun can hold in line; 0 when its slot count is nonsense.
+  [[nodiscard]] std::size_t inlineCapacity() const noexcept {
+    if (slotsNow_ < 1 || slotsNow_ > layout::kMaxMessageSlots) return 0;
+    return layout::kFirstSlotBodyBytes + (slotsNow_ - 1u) * sizeof(layout::MoreSlot::body);
+  }
+
+  // Copies the body of the message begun; `body` is at most inlineCapacity() long.
+  void copyBody(std::span<std::byte> body) const noexcept {
+    const auto& first = slot(taken_);
+    const auto head = std::min(body.size(), first.body.size());
+    if (head != 0) std::memcpy(body.data(), first.body.data(), head);
+    body = body.subspan(head);
+    for (auto position = taken_ + 1; !body.empty(); ++position) {
+      const auto& more = reinterpret_cast<const layout::MoreSlot&>(slot(position));
+      const auto part = std::min(body.size(), more.body.size());
+      std::memcpy(body.data(), more.body.data(), part);
+      body = body.subspan(part);
+    }
+  }
+
+  // Done with the message begun. Slots go back in batches, or when the ring is empty.
+  void end() noexcept {
+    taken_ += slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u;
+    if (taken_ - freed_ >= capacity_ / kFreeFraction || !hasMessage()) {
+      freed_ = taken_;
+      // PAIR(slot-freed): we have finished reading these slots.
+      own_.freed.store(freed_, std::memory_order_release);
+    }
+  }
+
+  [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
+  [[nodiscard]] layout::RingControl& control() const noexcept { return own_; }
+
+ private:
+  layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & (capacity_ - 1)]; }
+
+  layout::Slot* slots_;
+  std::uint64_t capacity_;
+  layout::RingControl& own_;
+  std::uint64_t taken_ = 0;  // slots
+  std::uint64_t freed_ = 0;  // private copy of own_.freed
+  std::uint64_t messages_ = 0;
+  std::uint8_t slotsNow_ = 0;
+};
+
+}  // namespace mpf

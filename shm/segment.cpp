@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/segment.h>
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+
+#include <boost/interprocess/shared_memory_object.hpp>
+#include <cstring>
+#include <memory>
+
+#include <mpf/base/clock.h>
+#include <mpf/base/system_call.h>
+#include <mpf/shm/process.h>
+
+namespace mpf {
+namespace {
+
+namespace ipc = boost::interprocess;
+
+constexpr const char* kDirectory = "/dev/shm";
+
+// Lets Boost.Interprocess map a file that we opened ourselves.
+class OpenFile {
+ public:
+  explicit OpenFile(int fd) { handle_.handle = fd; }
+  [[nodiscard]] auto get_mapping_handle() const { return handle_; }
+  [[nodiscard]] ipc::mode_t get_mode() const { return ipc::read_write; }
+
+ private:
+  decltype(std::declval<ipc::shared_memory_object>().get_mapping_handle()) handle_{};
+};
+
+struct flock64 wholeFile(short type) {
+  struct flock64 lock {};
+  lock.l_type = type;
+  lock.l_whence = SEEK_SET;
+  return lock;
+}
+
+bool tryLock(int fd) {
+  auto lock = wholeFile(F_WRLCK);
+  return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
+}
+
+FileDescriptor openByName(const std::string& name, int flags) {
+  return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW));
+}
+
+}  // namespace
+
+Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights) {
+  Segment segment;
+  segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600), "create a segment in", kDirectory));
+  const int fd = segment.file_.get();
+  if (rights.group != ~std::uint32_t{0}) {
+    checkCall(::fchown(fd, static_cast<uid_t>(-1), rights.group), "give a segment to group", std::to_string(rights.group));
+  }
+  checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
+  const int shortage = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
+  if (shortage != 0) throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
+  segment.map(Access::readWrite);
+
+  auto& header = segment.sharedHeader();
+  header.magic = layout::kMagic;
+  header.layoutMajor = layout::kMajor;
+  header.layoutMinor = layout::kMinor;
+  header.kind = kind;
+  header.totalBytes = bytes;
+  header.incarnation = segments::newIncarnation();
+  header.ownerWindow = header.incarnation;
+  Process::self().describe(header);
+  header.createdMonotonicNs = Clock::nowNs();
+  timespec wall{};
+  ::clock_gettime(CLOCK_REALTIME, &wall);
+  header.createdRealtimeNs = std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec;
+  backplane.copy(header.backplane.data(), header.backplane.size() - 1);
+  segment.header_ = header;
+  return segment;
+}
+
+void Segment::map(Access access) {
+  const auto mode = access == Access::readOnly ? ipc::read_only : ipc::read_write;
+  region_ = ipc::mapped_region(OpenFile(file_.get()), mode);
+}
+
+void Segment::lockForLife() {
+  if (!tryLock(file_.get())) throwSystemError(errno, "lock the new segment", name_);
+}
+
+bool Segment::tryPublish(const std::string& name) {
+  const auto self = fmt::format("/proc/self/fd/{}", file_.get());
+  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) == 0) {
+    name_ = name;
+    header_ = sharedHeader();
+    return true;
+  }
+  if (errno == EEXIST) return false;
+  throwSystemError(errno, "name a segment", segments::path(name));
+}
+
+std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
+  Segment segment;
+  segment.name_ = name;
+  segment.file_ = openByName(name, access == Access::readOnly ? O_RDONLY : O_RDWR);
+  if (!segment.file_) {
+    if (errno == ENOENT) return std::nullopt;
+    throwSystemError(errno, "open", segments::path(name));
+  }
+  struct stat status {};
+  checkCall(::fstat(segment.file_.get(), &status), "look at", segments::path(name));
+  const auto fileBytes = static_cast<std::size_t>(status.st_size);
+  const auto got = ::pread(segment.file_.get(), &segment.header_, sizeof segment.header_, 0);
+  if (got != static_cast<ssize_t>(sizeof segment.header_)) {
+    throw SegmentError(fmt::format("{}: truncated, {} bytes are too few for a header", segments::path(name), fileBytes));
+  }
+  segments::check(segment.header_, fileBytes, kind, name);
+  segment.map(access);
+  return segment;
+}
+
+namespace segments {
+
+std::string path(const std::string& name) { return fmt::format("{}/{}", kDirectory, name); }
+
+bool remove(const std::string& name) { return ipc::shared_memory_object::remove(name.c_str()); }
+
+void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& name) {
+  if (header.magic != layout::kMagic) throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path(name)));
+  if (header.layoutMajor < layout::kOldestMajor || header.layoutMajor > layout::kMajor) {
+    throw SegmentError(
+        fmt::format("{}: layout {}, this program speaks {}-{}", path(name), header.layoutMajor, layout::kOldestMajor, layout::kMajor));
+  }
+  if (header.kind != kind) {
+    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path(name), static_cast<std::uint32_t>(header.kind),
+                                   static_cast<std::uint32_t>(kind)));
+  }
+  if (header.totalBytes < sizeof(layout::SegmentHeader) || fileBytes < header.totalBytes) {
+    throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", path(name), fileBytes, header.totalBytes));
+  }
+}
+
+Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
+  const auto file = openByName(name, O_RDONLY);
+  if (!file) return errno == ENOENT ? Owner::absent : Owner::alive;  // not ours to judge: it may be somebody's
+  if (incarnation != 0) {
+    std::uint64_t found = 0;
+    const auto got = ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
+    if (got != sizeof found || found != incarnation) return Owner::absent;
+  }
+  auto lock = wholeFile(F_WRLCK);
+  if (::fcntl(file.get(), F_OFD_GETLK, &lock) != 0) return Owner::alive;
+  return lock.l_type == F_UNLCK ? Owner::dead : Owner::alive;
+}
+
+bool removeIfOwnerless(const std::string& name) {
+  const auto file = openByName(name, O_RDWR);
+  if (!file || !tryLock(file.get())) return false;
+  // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
+  struct stat locked {};
+  struct stat named {};
+  if (::fstat(file.get(), &locked) != 0 || ::stat(path(name).c_str(), &named) != 0) return false;
+  return locked.st_ino == named.st_ino && remove(name);
+}
+
+std::vector<std::string> list(const std::string& prefix) {
+  std::vector<std::string> names;
+  const std::unique_ptr<DIR, int (*)(DIR*)> directory(::opendir(kDirectory), [](DIR* open) { return ::closedir(open); });
+  if (!directory) throwSystemError(errno, "list", kDirectory);
+  while (const auto* entry = ::readdir(directory.get())) {
+    if (std::strncmp(entry->d_name, prefix.c_str(), prefix.size()) == 0) names.emplace_back(entry->d_name);
+  }
+  return names;
+}
+
+std::uint64_t newIncarnation() {
+  std::uint64_t incarnation = 0;
+  while (incarnation == 0) {
+    checkCall(retryInterrupted([&] { return ::getrandom(&incarnation, sizeof incarnation, 0); }), "getrandom");
+  }
+  return incarnation;
+}
+
+}  // namespace segments
+}  // namespace mpf

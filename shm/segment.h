@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// Segment: one file in /dev/shm, created, locked, named, mapped, refused and removed.
+//
+//   create ─► (invisible, memory reserved) ─► fill in ─► lockForLife ─► publish under its name
+//
+// A segment gets its name last and at once, so nobody ever sees half of one, and a process killed before that leaves nothing.
+//
+// Threads  one thread creates or opens; the mapping may then be used by any.
+// Crash    the kernel drops the lock of a dead owner; removeIfOwnerless() then removes the file, and only then.
+// Trust    the header is copied and checked before anything else is believed.
+#pragma once
+
+#include <sys/types.h>
+
+#include <boost/interprocess/mapped_region.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/shm/layout.h>
+
+namespace mpf {
+
+// A segment that this program cannot use: foreign, truncated, of another version. The text names it and says why.
+class SegmentError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Who may open what a process creates. Group ~0 is the creator's own.
+struct Rights {
+  mode_t mode = 0600;
+  std::uint32_t group = ~std::uint32_t{0};
+};
+
+class Segment {
+ public:
+  enum class Access { readOnly, readWrite };
+
+  Segment() = default;
+
+  // A zeroed segment of `bytes`, with header fields that are the same for all filled in.
+  //   throws  std::system_error; ENOSPC when /dev/shm has not that much left
+  static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights);
+
+  // Holds the owner's lock until this Segment dies or the process does.
+  void lockForLife();
+  // False when another segment has the name.
+  [[nodiscard]] bool tryPublish(const std::string& name);
+
+  // Maps an existing segment. nullopt when there is none of that name, or its last link is gone.
+  //   throws  SegmentError when it is not what it should be, std::system_error when it may not be opened
+  static std::optional<Segment> tryOpen(const std::string& name, layout::SegmentKind kind, Access access);
+
+  // A private copy, taken and checked when the segment was opened.
+  [[nodiscard]] const layout::SegmentHeader& header() const { return header_; }
+  [[nodiscard]] layout::SegmentHeader& sharedHeader() const { return *reinterpret_cast<layout::SegmentHeader*>(data()); }
+  [[nodiscard]] std::byte* data() const { return static_cast<std::byte*>(region_.get_address()); }
+  [[nodiscard]] std::size_t bytes() const { return region_.get_size(); }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  explicit operator bool() const { return region_.get_address() != nullptr; }
+
+  template <class T>
+  [[nodiscard]] T& at(std::size_t offset) const {
+    return *reinterpret_cast<T*>(data() + offset);
+  }
+
+  // Lets go of the file, not of the mapping. A segment without lock needs it no longer.
+  void closeFile() { file_.reset(); }
+
+ private:
+  void map(Access access);
+  FileDescriptor file_;
+  boost::interprocess::mapped_region region_;
+  layout::SegmentHeader header_{};
+  std::string name_;
+};
+
+namespace segments {
+
+// Removes the name. False when there was none.
+bool remove(const std::string& name);
+
+enum class Owner { alive, dead, absent };
+// Asks the kernel whether somebody holds the owner's lock of a window. With an incarnation: `absent` when the name has
+// another one's window now.
+[[nodiscard]] Owner probeOwner(const std::string& name, std::uint64_t incarnation = 0);
+// Removes a window whose owner is proven dead. Two processes may try at once; a window that was replaced meanwhile stays.
+bool removeIfOwnerless(const std::string& name);
+
+// Names in /dev/shm that start with `prefix`.
+std::vector<std::string> list(const std::string& prefix);
+
+// Path of a segment's file.
+std::string path(const std::string& name);
+
+// 64 random bits, never 0.
+std::uint64_t newIncarnation();
+
+// Throws SegmentError, naming `name`, when `header` (of a file of `fileBytes`) is not a usable one of `kind`.
+void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& name);
+
+}  // namespace segments
+}  // namespace mpf

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/segment_name.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <stdexcept>
+#include <vector>
+
+#include <mpf/shm/layout.h>
+
+namespace mpf {
+namespace {
+
+bool isPlain(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-'; }
+
+// Server names hold brackets, slashes and dots ("serial[0]", "AIM1/1"); file names of this grammar do not.
+std::string encode(std::string_view name) {
+  std::string encoded;
+  for (const char c : name) {
+    if (isPlain(c) || c == '[' || c == ']') {
+      encoded += c;
+    } else {
+      encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    }
+  }
+  return encoded;
+}
+
+std::vector<std::string_view> split(std::string_view name) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const auto dot = name.find('.');
+    parts.push_back(name.substr(0, dot));
+    if (dot == std::string_view::npos) return parts;
+    name.remove_prefix(dot + 1);
+  }
+}
+
+std::optional<std::uint64_t> tryHex(std::string_view text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+void SegmentName::checkBackplane(std::string_view backplane) {
+  if (backplane.empty() || backplane.size() >= layout::kBackplaneChars || !std::all_of(backplane.begin(), backplane.end(), isPlain)) {
+    throw std::invalid_argument(fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -", backplane,
+                                            layout::kBackplaneChars - 1));
+  }
+}
+
+void SegmentName::checkServer(std::string_view server) {
+  const auto isControl = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; };
+  if (server.empty() || server.size() >= layout::kNameChars || std::any_of(server.begin(), server.end(), isControl)) {
+    throw std::invalid_argument(
+        fmt::format("server name \"{}\": use 1 to {} bytes without control characters", server, layout::kNameChars - 1));
+  }
+}
+
+std::string SegmentName::prefix(std::string_view backplane) {
+  return backplane.empty() ? std::string("mpf.") : fmt::format("mpf.{}.", backplane);
+}
+
+std::string SegmentName::serverWindow(std::string_view backplane, std::int32_t location, std::string_view server) {
+  return fmt::format("mpf.{}.s.{}.{}", backplane, location, encode(server));
+}
+
+std::string SegmentName::keyed(std::string_view backplane, NameKind kind, std::uint64_t incarnation) {
+  return fmt::format("mpf.{}.{}.{:x}", backplane, static_cast<char>(kind), incarnation);
+}
+
+std::string SegmentName::linkPrefix(std::string_view backplane, std::uint64_t serverWindow) {
+  return fmt::format("mpf.{}.l.{:x}.", backplane, serverWindow);
+}
+
+std::string SegmentName::link(std::string_view backplane, std::uint64_t serverWindow, std::uint64_t link) {
+  return fmt::format("{}{:x}", linkPrefix(backplane, serverWindow), link);
+}
+
+std::string SegmentName::bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side, std::uint32_t segment) {
+  return fmt::format("mpf.{}.b.{:x}.{}.{}", backplane, link, side, segment);
+}
+
+std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) {
+  const auto parts = split(name);
+  if (parts.size() < 4 || parts[0] != "mpf" || parts[2].size() != 1) return std::nullopt;
+  Parsed parsed;
+  parsed.backplane = parts[1];
+  parsed.kind = static_cast<NameKind>(parts[2][0]);
+  switch (parsed.kind) {
+    case NameKind::serverWindow:
+      return parts.size() == 5 ? std::optional(parsed) : std::nullopt;
+    case NameKind::link: {
+      const auto server = tryHex(parts[3]);
+      const auto link = parts.size() == 5 ? tryHex(parts[4]) : std::nullopt;
+      if (!server || !link) return std::nullopt;
+      parsed.serverWindow = *server;
+      parsed.incarnation = *link;
+      return parsed;
+    }
+    case NameKind::bulk:
+    case NameKind::clientWindow:
+    case NameKind::hints:
+    case NameKind::wish:
+    case NameKind::fifo: {
+      const auto incarnation = tryHex(parts[3]);
+      if (!incarnation || parts.size() != (parsed.kind == NameKind::bulk ? 6u : 4u)) return std::nullopt;
+      parsed.incarnation = *incarnation;
+      return parsed;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace mpf

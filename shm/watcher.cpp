@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/watcher.h>
+
+#include <pthread.h>
+#include <signal.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/inotify.h>
+#include <sys/timerfd.h>
+
+#include <array>
+#include <cstring>
+#include <vector>
+
+#include <mpf/base/system_call.h>
+#include <mpf/shm/process.h>
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+namespace {
+
+constexpr Watcher::Token kStop = 1;
+constexpr Watcher::Token kTimer = 2;
+constexpr Watcher::Token kNames = 3;
+constexpr long kPollNs = 100'000'000;
+
+void add(int epoll, int fd, Watcher::Token token) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = token;
+  checkCall(::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
+}
+
+// Signals belong to the program's own threads.
+class SignalsBlocked {
+ public:
+  SignalsBlocked() {
+    sigset_t all;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsBlocked(const SignalsBlocked&) = delete;
+  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+// Whether an inotify buffer tells of a new server window, or of so many names that some were lost.
+bool tellsOfServer(const char* events, std::size_t bytes) {
+  for (std::size_t at = 0; at < bytes;) {
+    inotify_event event{};
+    std::memcpy(&event, events + at, sizeof event);
+    const auto* name = events + at + sizeof event;
+    if ((event.mask & IN_Q_OVERFLOW) != 0) return true;
+    if (event.len != 0) {
+      const auto parsed = SegmentName::tryParse(name);
+      if (parsed && parsed->kind == NameKind::serverWindow) return true;
+    }
+    at += sizeof event + event.len;
+  }
+  return false;
+}
+
+}  // namespace
+
+Watcher::Watcher()
+    : epoll_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
+      stop_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")),
+      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create")),
+      names_(checkCall(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK), "inotify_init1")) {
+  add(epoll_.get(), stop_.get(), kStop);
+  add(epoll_.get(), timer_.get(), kTimer);
+  add(epoll_.get(), names_.get(), kNames);
+  const SignalsBlocked blocked;
+  thread_ = std::thread([this] { run(); });
+  ::pthread_setname_np(thread_.native_handle(), "mpf-watcher");
+}
+
+Watcher::~Watcher() {
+  ::eventfd_write(stop_.get(), 1);
+  thread_.join();
+}
+
+Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
+  const std::lock_guard lock(mutex_);
+  const auto token = next_++;
+  auto process = Process::openOwner(peer->header());
+  if (process) add(epoll_.get(), process.get(), token);
+  peers_.emplace(token, Peer{std::move(peer), std::move(callback), std::move(process)});
+  updateTimer();
+  return token;
+}
+
+Watcher::Token Watcher::watchNames(Callback callback) {
+  const std::lock_guard lock(mutex_);
+  if (namesWatch_ < 0) namesWatch_ = checkCall(::inotify_add_watch(names_.get(), segments::path("").c_str(), IN_CREATE), "watch /dev/shm");
+  const auto token = next_++;
+  nameCallbacks_.emplace(token, std::move(callback));
+  return token;
+}
+
+void Watcher::forget(Token token) {
+  const std::lock_guard lock(mutex_);
+  peers_.erase(token);
+  if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty()) {
+    ::inotify_rm_watch(names_.get(), namesWatch_);
+    namesWatch_ = -1;
+  }
+  updateTimer();
+}
+
+void Watcher::run() {
+  std::array<epoll_event, 32> events{};
+  for (;;) {
+    const auto count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), -1);
+    for (int i = 0; i < count; ++i) {
+      const auto token = events[static_cast<std::size_t>(i)].data.u64;
+      if (token == kStop) return;
+      const std::lock_guard lock(mutex_);
+      handle(token);
+    }
+  }
+}
+
+void Watcher::handle(Token token) {
+  if (token == kTimer) {
+    poll();
+  } else if (token == kNames) {
+    readNames();
+  } else if (const auto found = peers_.find(token); found != peers_.end()) {
+    if (isGone(found->second)) return report(token);
+    // The process ended, yet the lock is held: a child inherited it. The lock decides, so go on asking for it.
+    found->second.process.reset();
+    updateTimer();
+  }
+}
+
+bool Watcher::isGone(const Peer& peer) const {
+  if (peer.window->isClosed()) return true;
+  return segments::probeOwner(peer.window->name(), peer.window->header().incarnation) != segments::Owner::alive;
+}
+
+void Watcher::report(Token token) {
+  const auto found = peers_.find(token);
+  auto peer = std::move(found->second);
+  peers_.erase(found);
+  updateTimer();
+  peer.window->setDead();
+  peer.callback();
+}
+
+void Watcher::readNames() {
+  alignas(inotify_event) std::array<char, 4096> events;
+  bool news = false;
+  for (ssize_t got; (got = ::read(names_.get(), events.data(), events.size())) > 0;) {
+    news = tellsOfServer(events.data(), static_cast<std::size_t>(got)) || news;
+  }
+  if (!news) return;
+  auto callbacks = nameCallbacks_;  // a callback may forget
+  for (const auto& [token, callback] : callbacks) {
+    if (nameCallbacks_.count(token) != 0) callback();
+  }
+}
+
+void Watcher::poll() {
+  std::uint64_t expirations = 0;
+  [[maybe_unused]] const auto got = ::read(timer_.get(), &expirations, sizeof expirations);
+  std::vector<Token> gone;
+  for (const auto& [token, peer] : peers_) {
+    if (!peer.process && isGone(peer)) gone.push_back(token);
+  }
+  for (const auto token : gone) {
+    if (peers_.count(token) != 0) report(token);
+  }
+}
+
+void Watcher::updateTimer() {
+  bool needed = false;
+  for (const auto& [token, peer] : peers_) needed = needed || !peer.process;
+  itimerspec spec{};
+  if (needed) spec.it_value.tv_nsec = spec.it_interval.tv_nsec = kPollNs;
+  ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
+}
+
+}  // namespace mpf

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// Watcher: one thread of a process that tells when a peer has died and when a server has appeared. It sleeps all the time.
+//
+//   pidfd readable ─► lock of the peer's window free? ─► dead: callback, once
+//   /dev/shm gets a new name of our backplane ─► callback for those who wait for a server
+//
+// Threads  any thread may call; callbacks run on the watcher's thread and must not wait.
+// Crash    what it cannot see by a pidfd (another pid namespace, a pid taken over) it sees by asking for the lock every 100 ms.
+// Trust    a peer's pid is only a hint where to look; the kernel's lock is the proof.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/shm/window.h>
+
+namespace mpf {
+
+class Watcher {
+ public:
+  using Callback = std::function<void()>;
+  using Token = std::uint64_t;
+
+  Watcher();
+  ~Watcher();
+
+  // Calls back once when the owner of `peer` is proven dead (then peer->isDead()) or its window is gone.
+  Token watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
+  // Calls back whenever a server window may have appeared, or links may want to be cleaned up.
+  Token watchNames(Callback callback);
+  // After return the callback does not run and will not run again.
+  void forget(Token token);
+
+ private:
+  struct Peer {
+    std::shared_ptr<PeerWindow> window;
+    Callback callback;
+    FileDescriptor process;  // empty: polled
+  };
+  void run();
+  void handle(Token token);
+  bool isGone(const Peer& peer) const;
+  void report(Token token);
+  void readNames();
+  void poll();
+  void updateTimer();
+
+  FileDescriptor epoll_;
+  FileDescriptor stop_;
+  FileDescriptor timer_;
+  FileDescriptor names_;  // inotify; its watch exists while somebody waits for names
+  int namesWatch_ = -1;
+  std::recursive_mutex mutex_;  // callbacks run under it, so that forget() can promise what it does
+  Token next_ = 16;             // below: our own descriptors
+  std::map<Token, Peer> peers_;
+  std::map<Token, Callback> nameCallbacks_;
+  std::thread thread_;
+};
+
+}  // namespace mpf

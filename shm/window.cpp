@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/window.h>
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include <cstring>
+
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+namespace {
+
+// A reaper holds the lock of a dead window for some microseconds; only one that is held longer has an owner.
+bool isOwnedForLong(const std::string& name) {
+  const auto until = Deadline::after(std::chrono::milliseconds(50));
+  for (;;) {
+    if (segments::probeOwner(name) != segments::Owner::alive) return false;
+    if (until.hasPassed()) return true;
+    ::sched_yield();
+  }
+}
+
+std::string describeOwner(const std::string& name) {
+  try {
+    const auto window = Segment::tryOpen(name, layout::SegmentKind::serverWindow, Segment::Access::readOnly);
+    if (!window) return "another process";
+    const auto& header = window->header();
+    return fmt::format("{} (pid {})", std::string(header.program.data(), ::strnlen(header.program.data(), header.program.size())),
+                       header.ownerPid);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+}  // namespace
+
+OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, std::string name, Rights rights,
+                     const std::function<void(layout::SegmentHeader&)>& describe)
+    : backplane_(backplane), rights_(rights) {
+  window_ = Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
+  window_.lockForLife();
+  auto& header = window_.sharedHeader();
+  header.linkMode = rights.mode;
+  header.linkGroup = rights.group;
+  describe(header);
+  const auto incarnation = header.incarnation;
+  control().state.store(layout::WindowState::open, std::memory_order_relaxed);
+  control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
+
+  hints_ = Segment::create(sizeof(layout::WindowHints), layout::SegmentKind::hints, backplane, rights);
+  hints_.lockForLife();
+  hints_.sharedHeader().ownerWindow = incarnation;
+  if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation))) throw NameInUse("an incarnation number came twice");
+  try {
+    publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : std::move(name));
+  } catch (...) {
+    segments::remove(hints_.name());
+    throw;
+  }
+  fifo_ = doorbell::createFifo(SegmentName::keyed(backplane, NameKind::fifo, incarnation), rights.mode, rights.group);
+}
+
+void OwnWindow::publish(std::string name) {
+  while (!window_.tryPublish(name)) {
+    if (segments::removeIfOwnerless(name)) continue;
+    if (isOwnedForLong(name)) throw NameInUse(fmt::format("{}: in use by {}", segments::path(name), describeOwner(name)));
+  }
+}
+
+OwnWindow::~OwnWindow() {
+  control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
+  segments::remove(hints_.name());
+  segments::remove(window_.name());
+}
+
+void OwnWindow::ring() const noexcept {
+  doorbell::ring(hints().bell);
+  doorbell::ringFifo(fifo_);
+}
+
+std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout::SegmentKind kind) {
+  auto window = Segment::tryOpen(name, kind, Segment::Access::readOnly);
+  if (!window) return nullptr;
+  if (window->bytes() < layout::kWindowBytes) throw SegmentError(fmt::format("{}: truncated", segments::path(name)));
+  const std::string backplane(window->header().backplane.data(),
+                              ::strnlen(window->header().backplane.data(), window->header().backplane.size()));
+  auto hints = Segment::tryOpen(SegmentName::keyed(backplane, NameKind::hints, window->header().incarnation), layout::SegmentKind::hints,
+                                Segment::Access::readWrite);
+  if (!hints) return nullptr;
+  if (hints->bytes() < sizeof(layout::WindowHints)) throw SegmentError(fmt::format("{}: truncated", segments::path(hints->name())));
+  window->closeFile();
+  hints->closeFile();
+  auto peer = std::make_shared<PeerWindow>();
+  peer->window_ = std::move(*window);
+  peer->hints_ = std::move(*hints);
+  return peer;
+}
+
+void PeerWindow::notify(std::uint32_t index) noexcept {
+  auto& hint = hints();
+  index %= layout::kMaxLinks;
+  const auto word = index / 64;
+  // PAIR(ready-bit): who sees the bit sees the news.
+  hint.readyBits[word].fetch_or(std::uint64_t{1} << (index % 64), std::memory_order_release);
+  // PAIR(ready-word): who sees the word's bit sees the bit.
+  hint.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
+  wakeIfAsleep();
+}
+
+void PeerWindow::knock(std::uint64_t incarnation) noexcept {
+  auto& hint = hints();
+  // PAIR(knock): who sees the incarnation finds the link under its name.
+  const auto overwritten = hint.knocks[incarnation % layout::kKnocks].exchange(incarnation, std::memory_order_acq_rel);
+  if (overwritten != 0 && overwritten != incarnation) hint.rescan.store(1, std::memory_order_relaxed);
+  // PAIR(knocked): who sees the new count finds the knock.
+  hint.knocked.fetch_add(1, std::memory_order_release);
+  wakeIfAsleep();
+}
+
+void PeerWindow::wakeIfAsleep() noexcept {
+  // PAIR(sleep-fence): our news before, the owner's announcement after.
+  doorbell::fence();
+  const auto sleeping = control().sleeping.load(std::memory_order_relaxed);
+  if (sleeping == layout::SleepState::awake) return;
+  if (sleeping == layout::SleepState::onFutex) {
+    doorbell::ring(hints().bell);
+    return;
+  }
+  const std::lock_guard lock(fifoMutex_);
+  if (!fifo_) {
+    const auto& header = window_.header();
+    const std::string backplane(header.backplane.data(), ::strnlen(header.backplane.data(), header.backplane.size()));
+    fifo_ = doorbell::tryOpenFifo(SegmentName::keyed(backplane, NameKind::fifo, header.incarnation));
+  }
+  doorbell::ringFifo(fifo_);
+}
+
+}  // namespace mpf

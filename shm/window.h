@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// Window: what a process exposes on the backplane, as a VME board exposed its dual-ported memory.
+//
+//   OwnWindow    window segment (ours to write, locked for life) + hints segment + FIFO for event loops
+//   PeerWindow   the same of another process: window read-only, hints read-write
+//
+// Threads  OwnWindow: one owner thread, but ring() may be called by any thread and by a signal handler. PeerWindow: any thread.
+// Crash    the kernel drops the lock; whoever needs the name removes what is left.
+// Trust    a peer can write hints only.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <mpf/shm/doorbell.h>
+#include <mpf/shm/segment.h>
+
+namespace mpf {
+
+enum class WaitMode : std::uint32_t { spin = 0, adaptive = 1, block = 2 };
+
+// The server or client that a name was wanted for exists already.
+class NameInUse : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class OwnWindow {
+ public:
+  // `describe` fills in name, location and geometry before anybody can see the window.
+  //   name    file name of a server window; empty: a client window, named by its incarnation
+  //   throws  NameInUse, std::system_error
+  OwnWindow(const std::string& backplane, layout::SegmentKind kind, std::string name, Rights rights,
+            const std::function<void(layout::SegmentHeader&)>& describe);
+  ~OwnWindow();
+  OwnWindow(const OwnWindow&) = delete;
+  OwnWindow& operator=(const OwnWindow&) = delete;
+
+  [[nodiscard]] const layout::SegmentHeader& header() const noexcept { return window_.header(); }
+  [[nodiscard]] layout::WindowControl& control() const noexcept { return window_.at<layout::WindowControl>(layout::kWindowControlOffset); }
+  [[nodiscard]] layout::WindowHints& hints() const noexcept { return hints_.at<layout::WindowHints>(0); }
+  [[nodiscard]] Rights rights() const noexcept { return rights_; }
+  [[nodiscard]] const FileDescriptor& fifo() const noexcept { return fifo_; }
+
+  // Wakes the owner. Async-signal-safe.
+  void ring() const noexcept;
+
+ private:
+  void publish(std::string name);
+  std::string backplane_;
+  Rights rights_;
+  Segment window_;
+  Segment hints_;
+  FileDescriptor fifo_;
+};
+
+class PeerWindow {
+ public:
+  // nullptr when there is no such window (any more).
+  //   throws  SegmentError, std::system_error
+  static std::shared_ptr<PeerWindow> tryOpen(const std::string& name, layout::SegmentKind kind);
+
+  [[nodiscard]] const layout::SegmentHeader& header() const noexcept { return window_.header(); }
+  [[nodiscard]] const layout::WindowControl& control() const noexcept {
+    return window_.at<layout::WindowControl>(layout::kWindowControlOffset);
+  }
+  [[nodiscard]] const std::string& name() const noexcept { return window_.name(); }
+
+  // Tells the owner that link `index` has news, and wakes it if it sleeps. The news must have been stored before.
+  void notify(std::uint32_t index) noexcept;
+  // Asks the owner to accept link `incarnation`.
+  void knock(std::uint64_t incarnation) noexcept;
+
+  // Set by the watcher once the owner is proven dead; stays.
+  [[nodiscard]] bool isDead() const noexcept { return dead_.load(std::memory_order_relaxed); }
+  void setDead() noexcept { dead_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] bool isClosed() const noexcept { return control().state.load(std::memory_order_relaxed) == layout::WindowState::closed; }
+
+ private:
+  void wakeIfAsleep() noexcept;
+  [[nodiscard]] layout::WindowHints& hints() const noexcept { return hints_.at<layout::WindowHints>(0); }
+  Segment window_;
+  Segment hints_;
+  std::mutex fifoMutex_;
+  FileDescriptor fifo_;  // opened when the owner first sleeps on its descriptor
+  std::atomic<bool> dead_{false};
+};
+
+}  // namespace mpf
