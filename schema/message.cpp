@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#include <cstdlib>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include <mpf/schema/message.h>
+
+namespace mpf {
+
+namespace {
+
+class HeapLender final : public BodyLender {
+ public:
+  void takeBack(std::byte* data, std::size_t) noexcept override { std::free(data); }
+};
+
+constinit HeapLender theHeap;
+
+}  // namespace
+
+BodyLender& heapLender() noexcept { return theHeap; }
+
+BodyBytes allocateHeapBody(std::size_t bytes) {
+  constexpr std::size_t kAlignment = 64;
+  if (bytes > PTRDIFF_MAX - kAlignment) throw std::bad_alloc();
+  auto* const data = static_cast<std::byte*>(std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment));
+  if (data == nullptr) throw std::bad_alloc();
+  return {.data = data, .size = bytes, .capacity = bytes, .lender = &theHeap};
+}
+
+Message Message::copyOf(MessageType type, std::span<const std::byte> bytes) {
+  if (bytes.size() <= kInlineBytes) return copyInline(type, bytes);
+  const BodyBytes body = allocateHeapBody(bytes.size());
+  std::memcpy(body.data, bytes.data(), bytes.size());
+  return adopt(type, body);
+}
+
+Message Message::duplicate() const {
+  Message copy = copyOf(getType(), body());
+  const BodyLayout layout = layoutOf(getType());
+  if (isSound() && layout.elementBytes != 0) {  // the length that was checked, whatever a peer has written there since
+    std::memcpy(copy.data() + layout.lengthOffset, &state_.length, sizeof state_.length);
+    copy.check();
+  }
+  copy.state_.clientType = state_.clientType;
+  copy.state_.clientExtra = state_.clientExtra;
+  copy.state_.route = state_.route;
+  return copy;
+}
+
+void Message::refuseLength(MessageType type, std::size_t length, std::size_t room) {
+  throw std::length_error(std::string(toString(type)) + ": length " + std::to_string(length) + " was asked for, there is room for " +
+                          std::to_string(room));
+}
+
+}  // namespace mpf
