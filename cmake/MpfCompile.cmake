@@ -11,7 +11,7 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 # Sources say #include <mpf/shm/window.h>, in this tree and in programs that use the installed one.
 set(MPF_INCLUDE_ROOT "${CMAKE_BINARY_DIR}/include")
 file(MAKE_DIRECTORY "${MPF_INCLUDE_ROOT}/mpf")
-foreach(folder base schema shm client server drivers tools tests benchmarks)
+foreach(folder base schema shm channel client server drivers tools tests benchmarks)
   file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${MPF_INCLUDE_ROOT}/mpf/${folder}" SYMBOLIC)
 endforeach()
 

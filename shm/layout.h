@@ -68,7 +68,7 @@ struct SegmentHeader {
   std::array<char, kNameChars> name;  // server window, wish, link: the server; client window: the client's label
   std::array<char, kProgramChars> program;
 
-  // Geometry of rings and pools: a server window offers it, a link has it.
+  // Geometry of rings and pools. A link has all of it; of a server window, the limits and rights are what it offers.
   std::uint32_t queueSlots;      // slots of the request ring, a power of two
   std::uint32_t replySlots;      // slots of the reply ring, a power of two
   std::uint32_t queueSize;       // requests of one client that may wait
@@ -113,6 +113,8 @@ struct WindowControl {
   alignas(kPairBytes) std::atomic<SleepState> sleeping;  // announced before a sleep, withdrawn after it
   alignas(kPairBytes) std::atomic<WindowState> state;
   Word32 linkCount;
+  Word32 queueSize;       // requests of one client that may wait, for links made from now on (server windows)
+  Word32 reserved0;
   Word64 progress;        // grows with every message handled
   Word64 progressAtNs;    // CLOCK_MONOTONIC when `progress` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken

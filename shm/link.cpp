@@ -2,10 +2,8 @@
 #include <mpf/shm/link.h>
 
 #include <fmt/format.h>
-#include <sched.h>
 
 #include <bit>
-#include <mutex>
 
 #include <mpf/base/clock.h>
 #include <mpf/shm/segment_name.h>
@@ -43,8 +41,9 @@ PoolPlace poolPlace(const Segment& segment, const std::string& backplane, LinkSi
 }
 
 void checkGeometry(const layout::SegmentHeader& header, const std::string& name) {
-  const auto isRing = [](std::uint32_t slots) { return std::has_single_bit(slots) && slots >= 16 && slots <= layout::kMaxRingSlots; };
-  if (!isRing(header.queueSlots) || !isRing(header.replySlots) || header.queueSize > header.queueSlots) {
+  const auto expected = LinkGeometry::forQueue(header.queueSize);
+  if (header.queueSize < 1 || header.queueSize > LinkGeometry::kMaxQueueSize || header.queueSlots != expected.queueSlots ||
+      header.replySlots != expected.replySlots || header.maxOutstanding != expected.maxOutstanding) {
     throw SegmentError(fmt::format("{}: rings of {} and {} slots for a queue of {} make no sense", segments::path(name), header.queueSlots,
                                    header.replySlots, header.queueSize));
   }
@@ -52,17 +51,19 @@ void checkGeometry(const layout::SegmentHeader& header, const std::string& name)
 
 }  // namespace
 
-void SpinLock::lock() noexcept {
-  // PAIR(spin-lock): see what the last holder did.
-  while (locked_.test_and_set(std::memory_order_acquire)) ::sched_yield();
+LinkGeometry LinkGeometry::forQueue(std::uint32_t queueSize) noexcept {
+  const auto maxOutstanding = 2 * queueSize;
+  const auto streamed = std::max(16u, queueSize / 8);  // replies beyond the first one of a request
+  return {ringSlotsFor(queueSize), ringSlotsFor(maxOutstanding + streamed), maxOutstanding};
 }
 
 std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
                                    std::shared_ptr<PeerWindow> server) {
   const auto& offer = server->header();
-  checkGeometry(offer, server->name());
+  const auto queueSize = std::clamp(server->control().queueSize.load(std::memory_order_relaxed), 1u, LinkGeometry::kMaxQueueSize);
+  const auto geometry = LinkGeometry::forQueue(queueSize);
   const Rights rights{offer.linkMode & 0666, offer.linkGroup};
-  auto segment = Segment::create(layout::linkBytes(offer.queueSlots, offer.replySlots), layout::SegmentKind::link, backplane, rights);
+  auto segment = Segment::create(layout::linkBytes(geometry.queueSlots, geometry.replySlots), layout::SegmentKind::link, backplane, rights);
   auto& header = segment.sharedHeader();
   header.ownerWindow = own.header().incarnation;
   header.clientWindow = own.header().incarnation;
@@ -70,10 +71,10 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   header.serverWindow = offer.incarnation;
   header.location = offer.location;
   header.name = offer.name;
-  header.queueSlots = offer.queueSlots;
-  header.replySlots = offer.replySlots;
-  header.queueSize = offer.queueSize;
-  header.maxOutstanding = offer.maxOutstanding;
+  header.queueSlots = geometry.queueSlots;
+  header.replySlots = geometry.replySlots;
+  header.queueSize = queueSize;
+  header.maxOutstanding = geometry.maxOutstanding;
   header.maxMessageBytes = offer.maxMessageBytes;
   header.maxPoolBytes = offer.maxPoolBytes;
   header.linkMode = offer.linkMode;
@@ -98,8 +99,7 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   const auto& header = segment->header();
   const auto& offer = own.header();
   checkGeometry(header, name);
-  if (header.queueSlots != offer.queueSlots || header.replySlots != offer.replySlots || header.serverWindow != offer.incarnation ||
-      segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+  if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes || segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
     throw SegmentError(fmt::format("{}: not a link that this server offers", segments::path(name)));
   }
   segment->closeFile();
@@ -144,7 +144,6 @@ void Link::notifyPeer() noexcept {
 
 LinkSend Link::trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept {
   if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
-  const std::lock_guard lock(sendLock_);
   if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting && out_.waiting() >= limits.waiting) return LinkSend::full;
   if ((out_.messages() & (kSampleEvery - 1)) == 0) envelope.sentTick = static_cast<std::uint32_t>(Clock::nowNs() >> 4) | 1u;
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
@@ -161,7 +160,8 @@ LinkSend Link::trySend(Envelope envelope, std::span<const std::byte> body, Limit
 
   auto own = pool_.tryFind(body.data());
   const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
-  if (!own && !foreign) {
+  const bool inPlace = own || foreign;
+  if (!inPlace) {
     const auto chunk = pool_.tryAlloc(body.size());
     if (!chunk) return LinkSend::noMemory;
     std::memcpy(chunk->data, body.data(), body.size());
@@ -172,28 +172,24 @@ LinkSend Link::trySend(Envelope envelope, std::span<const std::byte> body, Limit
   const auto ref = own ? *own : *foreign;
   if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve)) return LinkSend::full;  // hasFree() said that it fits
   afterPush();
-  return LinkSend::sent;
+  return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
 
 void Link::afterPush() noexcept {
-  sent_.store(out_.messages(), std::memory_order_relaxed);
   // PAIR(watch-fence): our message before, the peer's word on whether it polls after.
   doorbell::fence();
   if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
 }
 
 bool Link::isTaken(std::uint64_t ordinal) noexcept {
-  const std::lock_guard lock(sendLock_);
   return out_.isTaken(ordinal);
 }
 
 std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept {
-  const std::lock_guard lock(sendLock_);
   return pool_.tryAlloc(bytes);
 }
 
 void Link::release(const std::byte* data) noexcept {
-  const std::lock_guard lock(sendLock_);
   if (const auto own = pool_.tryFind(data)) {
     pool_.free(*own);
   } else if (const auto foreign = borrowed_.tryFind(data)) {
@@ -205,7 +201,6 @@ std::optional<Chunk> Link::tryChunk(const Envelope& envelope) noexcept {
   layout::ChunkRef ref{};
   if (inlineCapacity() == 0) return std::nullopt;
   copyBody(std::as_writable_bytes(std::span(&ref, 1)));
-  const std::lock_guard lock(sendLock_);
   auto chunk = ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : borrowed_.tryBorrow(ref);
   if (!chunk || envelope.bodyBytes > chunk->capacity) return std::nullopt;
   return chunk;

@@ -4,12 +4,11 @@
 //   client side ── requests ring, client's pool ──► server side
 //               ◄── replies ring, server's pool ──
 //
-// Threads  one thread receives (begin, copyBody, chunk, end); any thread sends, allocates and frees; a spin lock joins them.
+// Threads  one thread receives (hasMessage, begin, copyBody, end). Everything else that is not const is serialised by the caller.
 // Crash    the client owns the segment; a server removes it once the client's window is ownerless.
 // Trust    the peer may write every byte; geometry was copied and checked at the start, the rest is checked at use.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <optional>
 #include <span>
@@ -23,27 +22,24 @@ namespace mpf {
 
 enum class LinkSide : std::uint32_t { client = 0, server = 1 };
 
-// Why a message was not sent; the caller keeps it.
-enum class LinkSend { sent, full, tooLarge, noMemory, closed };
+// Whether a message was sent. `sentInPlace`: the chunk that held the body is the peer's now; after all others the caller keeps it.
+enum class LinkSend { sent, sentInPlace, full, tooLarge, noMemory };
 
-// In-process lock of a few instructions' length.
-class SpinLock {
- public:
-  void lock() noexcept;
-  void unlock() noexcept {
-    // PAIR(spin-lock): what was done under the lock before the next one gets it.
-    locked_.clear(std::memory_order_release);
-  }
-
- private:
-  std::atomic_flag locked_;
+// Sizes of a link that follow from the length of its queue.
+struct LinkGeometry {
+  static constexpr std::uint32_t kMaxQueueSize = 16384;
+  std::uint32_t queueSlots;
+  std::uint32_t replySlots;
+  std::uint32_t maxOutstanding;
+  static LinkGeometry forQueue(std::uint32_t queueSize) noexcept;
 };
 
 class Link {
  public:
   // A new link of ours to `server`, not yet accepted. `index` is its bit in our own window.
   //   throws  std::system_error (no memory, no right), SegmentError (the server's window offers nonsense)
-  static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own, std::uint32_t index, std::shared_ptr<PeerWindow> server);
+  static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
+                                      std::shared_ptr<PeerWindow> server);
   // Maps a link that a client made for us; nullptr when it is gone.
   //   throws  SegmentError, std::system_error: the link is not usable, ignore it
   static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name, const OwnWindow& own);
@@ -72,7 +68,7 @@ class Link {
   // Sends a body: in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
   LinkSend trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept;
   // Number of the last message sent, from 1.
-  [[nodiscard]] std::uint64_t sentMessages() const noexcept { return sent_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t sentMessages() const noexcept { return out_.messages(); }
   // Whether the peer has taken message number `ordinal`.
   [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept;
 
@@ -106,8 +102,6 @@ class Link {
   LinkSide side_;
   std::shared_ptr<PeerWindow> peer_;
   std::uint32_t peerIndex_ = 0;
-  SpinLock sendLock_;
-  std::atomic<std::uint64_t> sent_{0};
   const layout::RingControl& outControl_;
   RingProducer out_;
   RingConsumer in_;

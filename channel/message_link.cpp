@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/channel/message_link.h>
+
+#include <array>
+#include <mutex>
+
+namespace mpf {
+
+MessageLink::Take MessageLink::tryBegin(Envelope& envelope) noexcept {
+  if (!link_->hasMessage()) return Take::nothing;
+  envelope = link_->begin();
+  const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
+  const bool fits = isChunk ? envelope.bodyBytes <= link_->maxMessageBytes() : envelope.bodyBytes <= link_->inlineCapacity();
+  return fits && link_->inlineCapacity() != 0 ? Take::message : Take::nonsense;
+}
+
+Message MessageLink::finish(const Envelope& envelope) noexcept try {
+  const auto type = static_cast<MessageType>(envelope.type);
+  Message message;
+  if ((envelope.flags & layout::kSlotChunk) != 0) {
+    const std::lock_guard guard(*lock_);
+    if (const auto chunk = link_->tryChunk(envelope)) {
+      lendOne();
+      message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
+    }
+  } else if (envelope.bodyBytes <= Message::kInlineBytes) {
+    std::array<std::byte, Message::kInlineBytes> body;
+    link_->copyBody(std::span(body).first(envelope.bodyBytes));
+    message = Message::copyInline(type, std::span(body).first(envelope.bodyBytes));
+  } else {
+    auto body = allocateHeapBody(layout::kInlineBodyBytes);
+    body.size = envelope.bodyBytes;
+    link_->copyBody({body.data, body.size});
+    message = Message::adopt(type, body);
+  }
+  link_->end();
+  message.setClientType(envelope.clientType);
+  message.setClientExtra(envelope.clientExtra);
+  return message;
+} catch (const std::bad_alloc&) {
+  link_->end();
+  return {};
+}
+
+void MessageLink::discard(const Envelope& envelope) noexcept {
+  if ((envelope.flags & layout::kSlotChunk) != 0) {
+    const std::lock_guard guard(*lock_);
+    if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+  }
+  link_->end();
+}
+
+LinkSend MessageLink::trySendLocked(const Envelope& envelope, Message& message, Link::Limits limits) noexcept {
+  const bool ours = message.lender() == this;
+  const auto result = link_->trySend(envelope, message.body(), limits);
+  if (result == LinkSend::sentInPlace) {
+    static_cast<void>(message.releaseBody());
+    if (ours) endLending();
+  } else if (result == LinkSend::sent && ours) {
+    // Copied into the ring: the chunk is free again. Here, because takeBack() would want the lock that the caller holds.
+    const auto body = message.releaseBody();
+    link_->release(body.data);
+    endLending();
+  } else if (result == LinkSend::sent) {
+    message = Message();
+  }
+  return result;
+}
+
+BodyBytes MessageLink::allocate(std::size_t bytes) {
+  {
+    const std::lock_guard guard(*lock_);
+    if (bytes > layout::kInlineBodyBytes) {
+      if (const auto chunk = link_->tryAlloc(bytes)) {
+        lendOne();
+        return {chunk->data, bytes, chunk->capacity, this};
+      }
+    }
+  }
+  return allocateHeapBody(bytes);
+}
+
+void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {
+  std::shared_ptr<MessageLink> last;  // dies after the guard, and may take this object along
+  const auto lock = lock_;
+  const std::lock_guard guard(*lock);
+  link_->release(data);
+  if (lent_ == 1) last = self_;
+  endLending();
+}
+
+void MessageLink::lendOne() noexcept {
+  if (lent_++ == 0) self_ = shared_from_this();
+}
+
+void MessageLink::endLending() noexcept {
+  if (--lent_ == 0) self_.reset();
+}
+
+}  // namespace mpf

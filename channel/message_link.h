@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// MessageLink: messages over a link. What both ends share: taking a Message out of the ring, putting one in, lending pool memory.
+//
+// Threads  one thread takes. trySend, alloc and the return of bodies: any thread, under a lock that the owner gives.
+// Crash    a body stays readable for as long as its handle lives, whatever became of the peer.
+// Trust    a body that does not fit its envelope is nonsense; the owner then closes the link.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <mpf/schema/message.h>
+#include <mpf/channel/spin_lock.h>
+#include <mpf/shm/link.h>
+
+namespace mpf {
+
+class MessageLink final : public BodyLender, public std::enable_shared_from_this<MessageLink> {
+ public:
+  MessageLink(std::unique_ptr<Link> link, std::shared_ptr<SpinLock> lock) : link_(std::move(link)), lock_(std::move(lock)) {}
+
+  [[nodiscard]] Link& link() noexcept { return *link_; }
+  [[nodiscard]] SpinLock& lock() noexcept { return *lock_; }
+
+  enum class Take { nothing, message, nonsense };
+  // Begins the next message: its envelope is copied and it counts as taken. `nothing` changes nothing.
+  Take tryBegin(Envelope& envelope) noexcept;
+  // The body of the message begun, then done with its slots. An empty Message: nonsense.
+  Message finish(const Envelope& envelope) noexcept;
+  // Done with the message begun without looking at its body; a chunk goes back.
+  void discard(const Envelope& envelope) noexcept;
+
+  // Sends, and empties `message`; when it was not sent, `message` is as it was. The caller holds lock().
+  LinkSend trySendLocked(const Envelope& envelope, Message& message, Link::Limits limits) noexcept;
+
+  // Memory of this link to build a body in; the heap's when the link has none for it.
+  //   throws  std::bad_alloc
+  BodyBytes allocate(std::size_t bytes);
+  void takeBack(std::byte* data, std::size_t capacity) noexcept override;
+
+ private:
+  void lendOne() noexcept;
+  void endLending() noexcept;
+
+  std::unique_ptr<Link> link_;
+  std::shared_ptr<SpinLock> lock_;
+  std::uint32_t lent_ = 0;  // bodies out; under lock_
+  std::shared_ptr<MessageLink> self_;  // while bodies are out; under lock_
+};
+
+}  // namespace mpf

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// MessageClient: a client of one server (manual, "Message Client").
+//
+//   mpf::MessageClient client(backplane, [](mpf::Message message) { ... });
+//   client.bind("dac", 0);                                    // never waits; the server may come later, go and come back
+//   client.send(mpf::Int32Message({.address = 3, .value = 100}));
+//
+// The callback gets replies, ConnectMessages (connected, disconnected, queue full) and RequestFateMessages, one at a time, in the
+// order in which things happened. Each request that send() accepted ends in a reply or in exactly one fate.
+//
+// Threads  any thread may bind, send and cancel. Callbacks run on the dispatcher's thread and may send.
+// Crash    a server that dies is reported, its requests get their fates, and the client binds again when it is back.
+// Trust    a server that writes nonsense loses this link and is treated as gone.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <mpf/base/clock.h>
+#include <mpf/client/dispatcher.h>
+#include <mpf/schema/message.h>
+
+namespace mpf {
+
+// What became of a send.
+enum class SendResult { sent, notConnected, queueFull, tooManyOutstanding, tooLarge, noMemory, empty };
+[[nodiscard]] const char* toString(SendResult result) noexcept;
+
+class MessageClient {
+ public:
+  using Callback = std::function<void(Message)>;
+
+  // Callbacks run on the backplane's shared dispatcher thread.
+  MessageClient(const Backplane& backplane, Callback callback);
+  // Callbacks run where `dispatcher` runs, which must outlive the client.
+  MessageClient(Dispatcher& dispatcher, Callback callback);
+  // After return no callback runs. With a dispatcher that has no thread of its own: from the thread that runs it.
+  ~MessageClient();
+  MessageClient(const MessageClient&) = delete;
+  MessageClient& operator=(const MessageClient&) = delete;
+
+  // Binds to `server` at `location`, once in the client's life.
+  //   throws  std::invalid_argument for a name that cannot be one, std::logic_error when bound already
+  void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
+
+  // Sends, and empties `message`; when the result is not `sent`, the message is as it was.
+  //   takeBefore  a request that the server has not taken by then ends as `expired`
+  //   requestId   out, when not null: names the request in cancel() and in its fate
+  [[nodiscard]] SendResult send(Message&& message, Deadline takeBefore = Deadline::never(), std::uint32_t* requestId = nullptr) noexcept;
+
+  // An array message of n elements, in the memory that is shared with the server when there is a connection. Throws std::bad_alloc.
+  template <ArrayBody T>
+  [[nodiscard]] MessageOf<T> alloc(std::size_t n) {
+    return MessageOf<T>::inBuffer(allocate(MessageOf<T>::bytesFor(n)), n);
+  }
+
+  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on it all the same.
+  void cancel(std::uint32_t requestId);
+
+  // Waits until the server is connected. With a dispatcher without thread, runs it meanwhile.
+  [[nodiscard]] bool connectWait(Nanoseconds timeout);
+  [[nodiscard]] bool isConnected() const noexcept;
+  // Why there is no connection, in words; empty when there is one.
+  [[nodiscard]] std::string notConnectedBecause() const;
+
+ private:
+  friend class Dispatcher;
+  BodyBytes allocate(std::size_t bytes);
+  std::shared_ptr<Dispatcher> shared_;  // when the dispatcher is the backplane's
+  std::shared_ptr<class Binding> binding_;
+};
+
+}  // namespace mpf

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// MessageServer: a named server on a backplane (manual, "Message Server").
+//
+//   mpf::MessageServer server(mpf::Backplane::attach(), "dac");
+//   server.on<mpf::Int32>([&](mpf::Int32& request) { request.status = dac.trySetCounts(request.address, request.value) ? 0 : -1; });
+//   return server.runUntilSignal();
+//
+// or by hand, with replies now or later, one or many:
+//
+//   while (server.waitForMessage()) {
+//     while (mpf::Message request = server.receive()) { ...; server.reply(std::move(request)); }
+//   }
+//
+// Threads  one thread waits and receives; reply(), allocReplyMessage() and interrupt() may be called by any.
+// Crash    a client that dies takes nothing along; what this server held of it goes when the handles go.
+// Trust    a client that writes nonsense loses its link; nobody else notices.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include <mpf/base/clock.h>
+#include <mpf/schema/message.h>
+#include <mpf/shm/backplane.h>
+
+namespace mpf {
+
+struct ServerOptions {
+  std::int32_t location = Backplane::defaultLocation();
+  int queueSize = 100;                                   // requests of one client that may wait; 1 to 16384
+  std::uint64_t maxMessageBytes = 64ull << 20;           // largest body, either way
+  std::uint64_t maxPoolBytes = 320ull << 20;             // shared memory for large messages of one client, each way
+  WaitMode waitMode = WaitMode::adaptive;
+  Rights rights{};  // who may bind: mode 0660 and a group let its members in
+};
+
+// What became of a reply.
+enum class ReplyResult { sent, clientGone, queueFull, tooLarge, noMemory };
+[[nodiscard]] const char* toString(ReplyResult result) noexcept;
+
+class MessageServer {
+ public:
+  // Opens the server under `name` at once; requests wait until somebody receives them.
+  //   throws  NameInUse when another process serves that name at that location, std::invalid_argument, std::system_error
+  MessageServer(Backplane backplane, const std::string& name, ServerOptions options = {});
+  ~MessageServer();
+  MessageServer(const MessageServer&) = delete;
+  MessageServer& operator=(const MessageServer&) = delete;
+
+  [[nodiscard]] const std::string& getName() const noexcept;
+  [[nodiscard]] std::int32_t location() const noexcept;
+  // For clients that connect from now on.
+  //   throws  std::invalid_argument outside 1 to 16384
+  void setQueueSize(int size);
+
+  // Waits for a request. False: the deadline passed, or interrupt() was called.
+  bool waitForMessage(Deadline deadline = Deadline::never());
+  // The next request; empty when there is none. A request whose deadline has passed ends as `expired` and is not seen here.
+  // A request that is neither replied to nor kept ends as `refused` when its handle dies.
+  Message receive();
+  // Ends waitForMessage() or run(), now or the next time. Async-signal-safe.
+  void interrupt() noexcept;
+
+  // A reply to `request`, which must still exist: to be sent once, before or after the request itself is replied with.
+  template <ScalarBody T>
+  [[nodiscard]] MessageOf<T> allocReplyMessage(const Message& request) {
+    MessageOf<T> message;
+    address(message, request);
+    return message;
+  }
+  // The same for n elements, in the memory that is shared with the client. Throws std::bad_alloc.
+  template <ArrayBody T>
+  [[nodiscard]] MessageOf<T> allocReplyMessage(const Message& request, std::size_t n) {
+    auto message = MessageOf<T>::inBuffer(allocate(request, MessageOf<T>::bytesFor(n)), n);
+    address(message, request);
+    return message;
+  }
+  // Sends `message` to the client that its request came from, and empties it; if it was not sent, it is as it was.
+  // The first reply ends the request; further ones are refused with queueFull while the client does not take them.
+  ReplyResult reply(Message&& message);
+  // Ends a request without a reply: its client gets the fate `refused`.
+  void refuse(Message&& request);
+
+  // Handles each request of type T in run(). A handler of T& changes the fields, and the message is the reply; one of
+  // MessageOf<T>&& owns the request.
+  template <MessageBody T, class Handler>
+  void on(Handler handler) {
+    setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
+      auto typed = MessageOf<T>::tryFrom(std::move(message));
+      if (!typed) return refuse(std::move(message));
+      if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&&>) {
+        handler(std::move(*typed));
+      } else {
+        handler(**typed);
+        static_cast<void>(reply(std::move(*typed)));
+      }
+    });
+  }
+  // Handles requests until interrupt(). Types without a handler are refused.
+  void run();
+  // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
+  int runUntilSignal();
+  // Handles one request if there is one.
+  bool handleOne();
+
+  // For event loops: poll() the descriptor for reading, then receive() until empty, which arms it again.
+  [[nodiscard]] int descriptor();
+
+  // The manual's `msr`, to stdout.
+  void report() const;
+
+ private:
+  class Impl;
+  void setHandler(MessageType type, std::function<void(Message&&)> handler);
+  BodyBytes allocate(const Message& request, std::size_t bytes);
+  static void address(Message& reply, const Message& request) noexcept;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mpf
