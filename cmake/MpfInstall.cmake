@@ -2,8 +2,8 @@
 include(CMakePackageConfigHelpers)
 
 # The libraries that other repositories link, as one archive libmpf.a: no link order to know, one name to write.
-set(publicLibraries mpf_base mpf_schema mpf_shm mpf_client mpf_server mpf_drivers_serial)
-set(publicFolders base schema shm client server drivers)
+set(publicLibraries mpf_base mpf_schema mpf_shm mpf_channel mpf_client mpf_server mpf_drivers_serial)
+set(publicFolders base schema shm channel client server drivers)
 
 # What those may link from outside, and how a consumer finds it: target, find_package() arguments, pkg-config name ("-": none needed).
 set(outsideTargets Threads::Threads Boost::headers CapnProto::capnp CapnProto::kj fmt::fmt spdlog::spdlog)
