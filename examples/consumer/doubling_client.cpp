@@ -1,11 +1,23 @@
 // SPDX-License-Identifier: MIT
-// doubling_client VALUE: prints twice the value.
+// doubling_client VALUE: asks doubling_server, which may start before or after, and prints the answer.
+#include <chrono>
 #include <cstdlib>
 #include <iostream>
 
-#include <mpf/base/clock.h>
+#include <mpf/client/sync_client.h>
 
 int main(int argc, char** argv) {
-  if (argc != 2 || mpf::Clock::nowNs() == 0) return 1;
-  std::cout << 2 * std::atoi(argv[1]) << '\n';
+  using namespace std::chrono_literals;
+  if (argc != 2) {
+    std::cerr << "usage: doubling_client VALUE\n";
+    return 2;
+  }
+  mpf::SyncClient client(mpf::Backplane::attach(), "doubler");
+  auto answer = client.call(mpf::Int32Message({.value = std::atoi(argv[1])}), 5s);
+  const auto reply = answer.as<mpf::Int32>();
+  if (!reply) {
+    std::cerr << "doubling_client: " << answer.why() << '\n';
+    return 1;
+  }
+  std::cout << (*reply)->value << '\n';
 }

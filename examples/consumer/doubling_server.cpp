@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: MIT
-// doubling_server: waits for SIGTERM.
-#include <csignal>
-
-#include <mpf/base/clock.h>
+// doubling_server: answers each Int32 message with twice its value, until SIGTERM or SIGINT.
+#include <mpf/server/message_server.h>
 
 int main() {
-  sigset_t ends;
-  sigemptyset(&ends);
-  sigaddset(&ends, SIGTERM);
-  sigprocmask(SIG_BLOCK, &ends, nullptr);
-  int signal = 0;
-  return mpf::Clock::nowNs() > 0 ? sigwait(&ends, &signal) : 1;
+  mpf::MessageServer server(mpf::Backplane::attach(), "doubler");
+  server.on<mpf::Int32>([](mpf::Int32& request) { request.value *= 2; });
+  return server.runUntilSignal();
 }
