@@ -51,7 +51,7 @@ class Dispatcher {
   friend class MessageClient;
   friend class Binding;
   class Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<Impl> impl_;
 };
 
 }  // namespace mpf

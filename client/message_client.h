@@ -66,9 +66,10 @@ class MessageClient {
   [[nodiscard]] std::string notConnectedBecause() const;
 
  private:
-  friend class Dispatcher;
+  MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback);
   BodyBytes allocate(std::size_t bytes);
   std::shared_ptr<Dispatcher> shared_;  // when the dispatcher is the backplane's
+  std::shared_ptr<Dispatcher::Impl> dispatcher_;
   std::shared_ptr<class Binding> binding_;
 };
 

@@ -46,6 +46,7 @@ Message Message::duplicate() const {
   copy.state_.clientType = state_.clientType;
   copy.state_.clientExtra = state_.clientExtra;
   copy.state_.route = state_.route;
+  copy.state_.route.keeper = nullptr;  // the first handle stays the one that owes an answer
   return copy;
 }
 

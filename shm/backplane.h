@@ -41,4 +41,7 @@ class Backplane {
   std::shared_ptr<State> state_;
 };
 
+// Removes a window and what hangs on it, if its owner is proven dead.
+void removeDeadWindow(const std::string& backplane, const std::string& name, std::uint64_t incarnation);
+
 }  // namespace mpf

@@ -66,8 +66,12 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
     peers_.erase(found);
   }
   auto window = PeerWindow::tryOpen(name, kind);
-  if (!window || window->isClosed()) return nullptr;
-  peers_[name] = {window, backplane_.watcher().watchPeer(window, [this] { interrupt(); })};
+  if (!window || window->isClosed() || segments::probeOwner(name, window->header().incarnation) != segments::Owner::alive) return nullptr;
+  const auto clean = [this, backplane = backplane_.name(), name, incarnation = window->header().incarnation] {
+    removeDeadWindow(backplane, name, incarnation);
+    interrupt();
+  };
+  peers_[name] = {window, backplane_.watcher().watchPeer(window, clean)};
   return window;
 }
 

@@ -151,7 +151,8 @@ LinkSend Link::trySend(Envelope envelope, std::span<const std::byte> body, Limit
   const auto slots = slotsFor(body.size());
   // Every message that the queue may still take needs one slot; only what is left over may be spent on longer ones.
   const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
-  const auto needed = limits.reserve + (limits.waiting > queued + 1 && slots > 1 ? limits.waiting - queued - 1 : 0);
+  const auto queueLeft = limits.waiting > queued + 1 ? limits.waiting - queued - 1 : 0;
+  const auto needed = slots == 1 ? limits.reserve : std::max(limits.longReserve, queueLeft);
   if (body.size() <= layout::kInlineBodyBytes && out_.tryPush(envelope, body, needed)) {
     afterPush();
     return LinkSend::sent;

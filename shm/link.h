@@ -62,8 +62,9 @@ class Link {
 
   // --- sending ---
   struct Limits {
-    std::uint32_t waiting;  // longest queue of messages that the peer has not taken; 0: only what the ring holds
-    std::uint32_t reserve;  // slots to leave free
+    std::uint32_t waiting = 0;      // longest queue of messages that the peer has not taken; 0: what the ring holds
+    std::uint32_t reserve = 0;      // slots to leave free
+    std::uint32_t longReserve = 0;  // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
   };
   // Sends a body: in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
   LinkSend trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept;

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Binding: what ties one client to one server, through that server's lives.
+//
+//   unbound ─bind─► waiting ─server there─► connecting ─accepted─► connected ─gone─► waiting ...
+//
+// Threads  send, cancel and the getters: any. The rest: the dispatcher's thread.
+// Crash    after the server's death: what it had sent is delivered, then a fate for each request, then the disconnect.
+// Trust    nonsense from the server ends the connection.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <mpf/channel/message_link.h>
+#include <mpf/client/message_client.h>
+#include <mpf/client/request_table.h>
+#include <mpf/shm/endpoint.h>
+
+namespace mpf {
+
+class Binding : public std::enable_shared_from_this<Binding> {
+ public:
+  Binding(Dispatcher::Impl& dispatcher, MessageClient::Callback callback) : dispatcher_(dispatcher), callback_(std::move(callback)) {}
+
+  // --- any thread ---
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t* requestId) noexcept;
+  BodyBytes allocate(std::size_t bytes);
+  [[nodiscard]] bool isConnected() const noexcept { return connected_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::string notConnectedBecause() const;
+  [[nodiscard]] bool isBound() const { return !server_.empty(); }
+  void setServer(const std::string& server, std::int32_t location);
+  bool waitConnected(Deadline deadline);
+
+  // --- dispatcher's thread ---
+  void tryConnect();
+  // One message or change of state of the link. False when there was none.
+  bool takeOne();
+  void disconnect(const std::string& reason);
+  void cancel(std::uint32_t requestId);
+  // No callback after this.
+  void leave();
+  // What is due at a time: expired requests, hints that may have been lost.
+  void onTime(std::int64_t nowNs);
+  [[nodiscard]] std::int64_t dueNs() const noexcept { return dueNs_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool isWaiting() const noexcept { return !channel_ && isBound() && !left_; }
+  [[nodiscard]] bool hasDeadPeer() const noexcept;
+  void tellQueueFull();
+
+ private:
+  void deliver(Message message);
+  void deliverConnect(ConnectStatus status);
+  void deliverFate(Request& request, Fate fate);
+  void deliverReply(const Envelope& envelope);
+  void onLinkState();
+  void wish();
+  void setReason(const std::string& reason);
+  void wakeAt(std::int64_t ns) noexcept;
+  void noteFull() noexcept;
+  void expire(std::int64_t nowNs);
+  void nudge(std::int64_t nowNs);
+
+  Dispatcher::Impl& dispatcher_;
+  MessageClient::Callback callback_;
+  std::string server_;
+  std::int32_t location_ = 0;
+  std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
+  std::shared_ptr<MessageLink> channel_;     // written by the dispatcher's thread under lock_
+  std::unique_ptr<RequestTable> requests_;   // likewise
+  std::atomic<bool> connected_{false};       // under lock_
+  bool fullTold_ = false;                    // under lock_: this run of refusals has been reported
+  std::atomic<std::int64_t> dueNs_{INT64_MAX};
+  std::int64_t knockedNs_ = 0;
+  std::int64_t nudgeEveryNs_ = 0;
+  std::uint32_t index_ = 0;
+  std::uint64_t incarnation_ = 0;  // of the server
+  bool left_ = false;
+  Segment wish_;
+  mutable std::mutex reasonMutex_;
+  std::condition_variable connectedChanged_;
+  std::string reason_ = "not bound to a server yet";
+};
+
+}  // namespace mpf

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/client/dispatcher.h>
+
+#include <pthread.h>
+#include <signal.h>
+
+#include <condition_variable>
+#include <map>
+
+#include <mpf/client/dispatcher_impl.h>
+
+namespace mpf {
+
+Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
+    : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {}, Rights{0666, ~std::uint32_t{0}}, options.waitMode,
+                [&](layout::SegmentHeader& header) { options.label.copy(header.name.data(), header.name.size() - 1); }) {}
+
+Dispatcher::Impl::~Impl() {
+  waitForNames(false);
+  endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+}
+
+void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
+  sigset_t all;
+  sigset_t before;
+  ::sigfillset(&all);
+  // Signals belong to the program's own threads.
+  ::pthread_sigmask(SIG_SETMASK, &all, &before);
+  hasThread_ = true;
+  thread_ = std::thread([self] {
+    ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
+    while (!self->ended_.load(std::memory_order_relaxed)) self->runOnce(Deadline::never());
+  });
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+void Dispatcher::Impl::endThread() {
+  if (!hasThread_) return;
+  ended_.store(true, std::memory_order_relaxed);
+  interrupt();
+  // The last client may be destroyed by a callback: then the thread ends after it.
+  if (isHome()) {
+    thread_.detach();
+  } else {
+    thread_.join();
+  }
+}
+
+void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
+  bindings_.erase(binding);
+  removed_.push_back(binding);
+}
+
+bool Dispatcher::Impl::runOnce(Deadline deadline) {
+  runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
+  for (;;) {
+    if (step()) return true;
+    if (stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed)) return false;
+    while (endpoint_.takeKnock()) {  // nobody has reason to knock at a client
+    }
+    static_cast<void>(endpoint_.takeRescan());
+    if (!endpoint_.wait(std::min(deadline, nextDue())) && !nextDue().hasPassed()) return false;
+  }
+}
+
+bool Dispatcher::Impl::step() {
+  if (!removed_.empty()) removed_.clear();
+  if (endpoint_.takeLocalNews()) handleNews();
+  if (const auto index = endpoint_.next()) {
+    auto* binding = *index < byIndex_.size() ? byIndex_[*index] : nullptr;
+    if (binding != nullptr && binding->takeOne()) return true;
+  }
+  if (dueNs_.load(std::memory_order_relaxed) == INT64_MAX || !nextDue().hasPassed()) return false;
+  handleDue();
+  return true;
+}
+
+void Dispatcher::Impl::interrupt() noexcept {
+  stop_.store(true, std::memory_order_relaxed);
+  endpoint_.interrupt();
+}
+
+int Dispatcher::Impl::descriptor() {
+  hasDescriptor_ = true;
+  static_cast<void>(endpoint_.arm());
+  return endpoint_.descriptor();
+}
+
+void Dispatcher::Impl::runPending() {
+  do {
+    while (step()) {
+    }
+  } while (hasDescriptor_ && !endpoint_.arm());
+}
+
+void Dispatcher::Impl::post(std::function<void()> command) {
+  if (isHome()) return command();
+  postLater(std::move(command));
+}
+
+void Dispatcher::Impl::postLater(std::function<void()> command) {
+  {
+    const std::lock_guard lock(commandMutex_);
+    commands_.push_back(std::move(command));
+    hasCommands_.store(true, std::memory_order_relaxed);
+  }
+  endpoint_.interrupt();
+}
+
+void Dispatcher::Impl::postAndWait(std::function<void()> command) {
+  if (isHome()) return command();
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;
+  post([&] {
+    command();
+    const std::lock_guard lock(mutex);
+    done = true;
+    changed.notify_one();
+  });
+  std::unique_lock lock(mutex);
+  changed.wait(lock, [&] { return done; });
+}
+
+void Dispatcher::Impl::noteDue(std::int64_t ns) noexcept {
+  auto due = dueNs_.load(std::memory_order_relaxed);
+  while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
+  }
+  if (ns < due && std::this_thread::get_id() != runner_.load(std::memory_order_relaxed)) endpoint_.interrupt();
+}
+
+void Dispatcher::Impl::setLink(std::uint32_t index, Binding* binding) {
+  if (index >= byIndex_.size()) byIndex_.resize(index + 1);
+  byIndex_[index] = binding;
+}
+
+void Dispatcher::Impl::waitForNames(bool wait) {
+  auto& watcher = endpoint_.backplane().watcher();
+  if (wait && namesToken_ == 0) {
+    namesToken_ = watcher.watchNames([this] {
+      namesChanged_.store(true, std::memory_order_relaxed);
+      endpoint_.interrupt();
+    });
+    // A server that appeared before the watch began.
+    namesChanged_.store(true, std::memory_order_relaxed);
+    endpoint_.interrupt();
+  } else if (!wait && namesToken_ != 0) {
+    watcher.forget(namesToken_);
+    namesToken_ = 0;
+  }
+}
+
+void Dispatcher::Impl::handleNews() {
+  if (hasCommands_.load(std::memory_order_relaxed)) runCommands();
+  const auto bindings = bindings_;  // a callback may destroy a client
+  for (const auto& binding : bindings) {
+    if (binding->hasDeadPeer()) binding->disconnect("the server's process ended");
+  }
+  if (namesChanged_.exchange(false, std::memory_order_relaxed)) connectWaiting();
+}
+
+void Dispatcher::Impl::connectWaiting() {
+  bool waiting = false;
+  const auto bindings = bindings_;
+  for (const auto& binding : bindings) {
+    if (binding->isWaiting()) binding->tryConnect();
+    waiting = waiting || binding->isWaiting();
+  }
+  waitForNames(waiting);
+}
+
+void Dispatcher::Impl::runCommands() {
+  std::vector<std::function<void()>> commands;
+  {
+    const std::lock_guard lock(commandMutex_);
+    commands.swap(commands_);
+    hasCommands_.store(false, std::memory_order_relaxed);
+  }
+  for (const auto& command : commands) command();
+}
+
+void Dispatcher::Impl::handleDue() {
+  dueNs_.store(INT64_MAX, std::memory_order_relaxed);
+  // PAIR(due): a sender that stored its deadline before we withdrew ours is seen below; a later one lowers ours again.
+  doorbell::fence();
+  const auto nowNs = Clock::nowNs();
+  const auto bindings = bindings_;
+  for (const auto& binding : bindings) {
+    if (binding->dueNs() <= nowNs) binding->onTime(nowNs);
+  }
+  for (const auto& binding : bindings_) noteDue(binding->dueNs());
+}
+
+Dispatcher::Dispatcher(Backplane backplane, DispatcherOptions options) : impl_(std::make_shared<Impl>(std::move(backplane), options)) {}
+Dispatcher::~Dispatcher() { impl_->endThread(); }
+
+std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
+  static std::mutex mutex;
+  static std::map<std::string, std::weak_ptr<Dispatcher>> dispatchers;
+  const std::lock_guard lock(mutex);
+  auto& known = dispatchers[backplane.name()];
+  auto dispatcher = known.lock();
+  if (!dispatcher) {
+    dispatcher = std::make_shared<Dispatcher>(backplane);
+    dispatcher->impl_->startThread(dispatcher->impl_);
+    known = dispatcher;
+  }
+  return dispatcher;
+}
+
+bool Dispatcher::runOnce(Deadline deadline) { return impl_->runOnce(deadline); }
+void Dispatcher::run() {
+  while (impl_->runOnce(Deadline::never())) {
+  }
+}
+void Dispatcher::interrupt() noexcept { impl_->interrupt(); }
+int Dispatcher::descriptor() { return impl_->descriptor(); }
+void Dispatcher::runPending() { impl_->runPending(); }
+Deadline Dispatcher::nextDeadline() const noexcept { return impl_->nextDue(); }
+const Backplane& Dispatcher::backplane() const noexcept { return impl_->endpoint().backplane(); }
+
+}  // namespace mpf

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/client/message_client.h>
+
+#include <mpf/client/binding.h>
+#include <mpf/client/dispatcher_impl.h>
+
+namespace mpf {
+
+const char* toString(SendResult result) noexcept {
+  switch (result) {
+    case SendResult::sent: return "sent";
+    case SendResult::notConnected: return "not connected";
+    case SendResult::queueFull: return "the server's queue is full";
+    case SendResult::tooManyOutstanding: return "too many requests without a reply";
+    case SendResult::tooLarge: return "larger than the server allows";
+    case SendResult::noMemory: return "no shared memory left";
+    case SendResult::empty: return "an empty message";
+  }
+  return "unknown";
+}
+
+MessageClient::MessageClient(const Backplane& backplane, Callback callback)
+    : MessageClient(Dispatcher::shared(backplane), std::move(callback)) {}
+
+MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback) : MessageClient(*shared, std::move(callback)) {
+  shared_ = std::move(shared);
+}
+
+MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
+    : dispatcher_(dispatcher.impl_), binding_(std::make_shared<Binding>(*dispatcher_, std::move(callback))) {
+  dispatcher_->post([dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
+}
+
+MessageClient::~MessageClient() {
+  dispatcher_->postAndWait([&] {
+    binding_->leave();
+    dispatcher_->remove(binding_);
+  });
+}
+
+void MessageClient::bind(const std::string& server, std::int32_t location) {
+  binding_->setServer(server, location);
+  dispatcher_->post([binding = binding_] { binding->tryConnect(); });
+}
+
+SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
+  return binding_->send(message, takeBefore, requestId);
+}
+
+BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
+
+void MessageClient::cancel(std::uint32_t requestId) {
+  dispatcher_->post([binding = binding_, requestId] { binding->cancel(requestId); });
+}
+
+bool MessageClient::isConnected() const noexcept { return binding_->isConnected(); }
+std::string MessageClient::notConnectedBecause() const { return binding_->notConnectedBecause(); }
+
+bool MessageClient::connectWait(Nanoseconds timeout) {
+  const auto deadline = Deadline::after(timeout);
+  if (dispatcher_->isHome()) {
+    while (!isConnected() && !deadline.hasPassed()) dispatcher_->runOnce(deadline);
+    return isConnected();
+  }
+  return binding_->waitConnected(deadline);
+}
+
+}  // namespace mpf

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// RequestTable: the requests of one client that have no reply yet.
+//
+// Threads  add(): one thread at a time, under the client's lock. The rest: the dispatcher's thread.
+#pragma once
+
+#include <atomic>
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+namespace mpf {
+
+struct Request {
+  std::atomic<std::uint32_t> id{0};  // 0: free
+  std::int32_t clientType = 0;
+  std::int32_t clientExtra = 0;
+  std::uint64_t ordinal = 0;  // number of its message on the link
+  std::int64_t deadlineNs = 0;
+};
+
+class RequestTable {
+ public:
+  explicit RequestTable(std::uint32_t maxOutstanding)
+      : size_(std::bit_ceil(maxOutstanding)), max_(maxOutstanding), requests_(std::make_unique<Request[]>(size_)) {}
+
+  [[nodiscard]] std::uint32_t outstanding() const noexcept {
+    return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
+  }
+
+  // A free entry with an id of its own, not yet added; nullptr when max are outstanding.
+  Request* tryReserve(std::uint32_t& id) noexcept {
+    if (outstanding() >= max_) return nullptr;
+    for (;;) {
+      id = ++lastId_;
+      auto& request = requests_[id & (size_ - 1)];
+      // PAIR(request-ended): the dispatcher has finished with the entry.
+      if (id != 0 && request.id.load(std::memory_order_acquire) == 0) return &request;
+    }
+  }
+  void add(Request& request, std::uint32_t id) noexcept {
+    added_.store(added_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    // PAIR(request-added): after its fields.
+    request.id.store(id, std::memory_order_release);
+  }
+
+  // Its message was not sent after all.
+  void takeBack(Request& request) noexcept {
+    added_.store(added_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
+    request.id.store(0, std::memory_order_relaxed);
+  }
+
+  // The request, if it has not ended.
+  Request* find(std::uint32_t id) noexcept {
+    auto& request = requests_[id & (size_ - 1)];
+    // PAIR(request-added): its fields.
+    return id != 0 && request.id.load(std::memory_order_acquire) == id ? &request : nullptr;
+  }
+  void end(Request& request) noexcept {
+    ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    // PAIR(request-ended): we have finished with the entry.
+    request.id.store(0, std::memory_order_release);
+  }
+
+  template <class Visit>
+  void forEach(Visit&& visit) {
+    for (std::uint32_t at = 0; at < size_; ++at) {
+      // PAIR(request-added): its fields.
+      if (requests_[at].id.load(std::memory_order_acquire) != 0) visit(requests_[at]);
+    }
+  }
+
+ private:
+  std::uint32_t size_;
+  std::uint32_t max_;
+  std::unique_ptr<Request[]> requests_;
+  std::uint32_t lastId_ = 0;
+  std::atomic<std::uint32_t> added_{0};
+  std::atomic<std::uint32_t> ended_{0};
+};
+
+}  // namespace mpf

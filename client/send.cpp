@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// Binding, continued: the way out.
+#include <mutex>
+
+#include <mpf/client/binding.h>
+#include <mpf/client/dispatcher_impl.h>
+#include <mpf/shm/histogram.h>
+
+namespace mpf {
+
+SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
+  if (!message) return SendResult::empty;
+  LinkSend sent{};
+  {
+    const std::lock_guard lock(*lock_);
+    if (!isConnected()) return SendResult::notConnected;
+    auto& link = channel_->link();
+    std::uint32_t id = 0;
+    auto* request = requests_->tryReserve(id);
+    if (request == nullptr) {
+      noteFull();
+      return SendResult::tooManyOutstanding;
+    }
+    Envelope envelope;
+    envelope.type = static_cast<std::uint16_t>(message.getType());
+    envelope.requestId = id;
+    envelope.clientType = message.getClientType();
+    envelope.clientExtra = message.getClientExtra();
+    envelope.deadlineNs = takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
+    request->clientType = envelope.clientType;
+    request->clientExtra = envelope.clientExtra;
+    request->ordinal = link.sentMessages() + 1;
+    request->deadlineNs = envelope.deadlineNs;
+    // Before the message goes: its reply may be here before we are.
+    requests_->add(*request, id);
+    sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0, 0});
+    if (sent != LinkSend::sent && sent != LinkSend::sentInPlace) {
+      requests_->takeBack(*request);
+      count(link.control().clientRefused);
+      if (sent == LinkSend::full) noteFull();
+    } else {
+      fullTold_ = false;
+      link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
+      if (requestId != nullptr) *requestId = id;
+    }
+  }
+  switch (sent) {
+    case LinkSend::sent:
+    case LinkSend::sentInPlace: break;
+    case LinkSend::full: return SendResult::queueFull;
+    case LinkSend::tooLarge: return SendResult::tooLarge;
+    case LinkSend::noMemory: return SendResult::noMemory;
+  }
+  if (!takeBefore.isNever()) wakeAt(takeBefore.ns());
+  return SendResult::sent;
+}
+
+// A run of refusals is told once, in its place among the other news.
+void Binding::noteFull() noexcept try {
+  if (fullTold_) return;
+  fullTold_ = true;
+  dispatcher_.postLater([weak = weak_from_this()] {
+    if (const auto self = weak.lock()) self->tellQueueFull();
+  });
+} catch (const std::bad_alloc&) {
+  fullTold_ = false;
+}
+
+BodyBytes Binding::allocate(std::size_t bytes) {
+  std::shared_ptr<MessageLink> channel;
+  {
+    const std::lock_guard lock(*lock_);
+    channel = channel_;
+  }
+  return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
+}
+
+}  // namespace mpf

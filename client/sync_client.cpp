@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/client/sync_client.h>
+
+namespace mpf {
+
+std::string Answer::why() const {
+  if (fate_) return std::string("no reply: ") + std::string(toString(*fate_));
+  if (refusal_) return std::string("not sent: ") + toString(*refusal_);
+  return {};
+}
+
+SyncClient::SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location, WaitMode waitMode)
+    : dispatcher_(backplane, {waitMode, {}}), client_(dispatcher_, [this](Message message) { take(std::move(message)); }) {
+  client_.bind(server, location);
+}
+
+void SyncClient::take(Message message) {
+  if (awaited_ != 0 && message.route().requestId == awaited_) {
+    awaited_ = 0;
+    if (const auto* fate = message.tryAs<RequestFate>()) {
+      answer_.emplace(fate->fate);
+    } else {
+      answer_.emplace(std::move(message));
+    }
+  } else if (message.getType() != MessageType::connect && message.getType() != MessageType::requestFate) {
+    others_.push_back(std::move(message));
+  }
+}
+
+Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
+  const auto deadline = Deadline::after(timeout);
+  if (!client_.isConnected() && !client_.connectWait(timeout)) return Answer(SendResult::notConnected);
+  answer_.reset();
+  // While the message is on its way, no reply to it can be taken: that is this thread's work.
+  if (const auto result = client_.send(std::move(message), deadline, &awaited_); result != SendResult::sent) {
+    awaited_ = 0;
+    return Answer(result);
+  }
+  while (!answer_ && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
+  if (!answer_) {
+    // What the server had not taken has expired by now; what it had taken may yet be done.
+    dispatcher_.runOnce(Deadline::atNs(0));
+    if (!answer_) {
+      client_.cancel(awaited_);
+      answer_.emplace(Fate::outcomeUnknown);
+    }
+  }
+  awaited_ = 0;
+  auto answer = std::move(*answer_);
+  answer_.reset();
+  return answer;
+}
+
+Message SyncClient::receive(Nanoseconds timeout) {
+  const auto deadline = Deadline::after(timeout);
+  while (others_.empty() && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
+  if (others_.empty()) return {};
+  auto message = std::move(others_.front());
+  others_.pop_front();
+  return message;
+}
+
+}  // namespace mpf

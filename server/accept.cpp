@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// ServerCore, continued: clients come and go.
+#include <mutex>
+
+#include <mpf/server/server_core.h>
+#include <mpf/shm/histogram.h>
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+
+void ServerCore::acceptAll() {
+  const auto prefix = SegmentName::linkPrefix(endpoint_.backplane().name(), endpoint_.window().header().incarnation);
+  for (const auto& name : segments::list(prefix)) {
+    if (const auto parsed = SegmentName::tryParse(name)) accept(parsed->incarnation);
+  }
+}
+
+void ServerCore::accept(std::uint64_t incarnation) {
+  if (byLink_.count(incarnation) != 0) return;
+  try {
+    const auto& backplane = endpoint_.backplane().name();
+    const auto name = SegmentName::link(backplane, endpoint_.window().header().incarnation, incarnation);
+    auto link = Link::tryOpen(backplane, name, endpoint_.window());
+    if (!link || link->peerState() != layout::LinkState::open) return;
+    auto client = endpoint_.peer(SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow),
+                                 layout::SegmentKind::clientWindow);
+    if (client) open(std::move(link), std::move(client));
+  } catch (const std::exception&) {
+    // Not a link that we can use. Its client sees that nobody accepts it; we go on.
+    count(endpoint_.control().protocolErrors);
+  }
+}
+
+void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client) {
+  const auto index = endpoint_.tryReserve();
+  link->attachPeer(std::move(client), link->header().clientIndex);
+  if (!index) {
+    link->setState(layout::LinkState::refused);
+    link->notifyPeer();
+    return;
+  }
+  if (*index >= connections_.size()) connections_.resize(*index + 1);
+  if (!connections_[*index]) connections_[*index] = std::make_unique<Connection>();
+  auto& connection = *connections_[*index];
+  auto& opened = *link;
+  {
+    const std::lock_guard lock(*connection.lock);
+    connection.index = *index;
+    connection.timedId = 0;
+    connection.unanswered = std::vector<std::atomic<std::uint32_t>>(std::bit_ceil(opened.header().maxOutstanding));
+    connection.channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
+  }
+  byLink_[opened.header().incarnation] = &connection;
+  endpoint_.attach(*index, opened);
+  count(endpoint_.control().linksOpened);
+  opened.control().serverIndex.store(*index, std::memory_order_relaxed);
+  opened.setState(layout::LinkState::open);
+  opened.notifyPeer();
+}
+
+void ServerCore::closeIfClientDid(Connection& connection) noexcept {
+  auto& link = connection.channel->link();
+  if (link.peerState() != layout::LinkState::open && !link.hasMessage()) close(connection);
+}
+
+void ServerCore::closeDead() {
+  for (const auto& connection : connections_) {
+    if (!connection->channel || !connection->channel->link().peer()->isDead()) continue;
+    count(endpoint_.control().peersDied);
+    // The client owned the link and is proven dead: its names are ours to remove.
+    const auto& link = connection->channel->link();
+    segments::remove(link.name());
+    removeBulk(endpoint_.backplane().name(), link.header().incarnation);
+    close(*connection);
+  }
+}
+
+void ServerCore::close(Connection& connection) noexcept {
+  std::shared_ptr<MessageLink> channel;
+  {
+    const std::lock_guard lock(*connection.lock);
+    channel = std::move(connection.channel);
+    connection.channel.reset();
+    ++connection.generation;
+  }
+  endpoint_.detach(connection.index);
+  byLink_.erase(channel->link().header().incarnation);
+  channel->link().setState(layout::LinkState::closed);
+  channel->link().notifyPeer();
+  count(endpoint_.control().linksClosed);
+}
+
+}  // namespace mpf

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/message_server.h>
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include <mpf/server/server_core.h>
+#include <mpf/server/stop_signals.h>
+
+namespace mpf {
+
+const char* toString(ReplyResult result) noexcept {
+  switch (result) {
+    case ReplyResult::sent: return "sent";
+    case ReplyResult::clientGone: return "client gone";
+    case ReplyResult::queueFull: return "reply queue full";
+    case ReplyResult::tooLarge: return "too large";
+    case ReplyResult::noMemory: return "no shared memory left";
+  }
+  return "unknown";
+}
+
+class MessageServer::Impl {
+ public:
+  Impl(Backplane backplane, const std::string& name, const ServerOptions& options)
+      : core(std::move(backplane), name, options) {}
+
+  ServerCore core;
+  std::map<MessageType, std::function<void(Message&&)>> handlers;
+};
+
+MessageServer::MessageServer(Backplane backplane, const std::string& name, ServerOptions options)
+    : impl_(std::make_unique<Impl>(std::move(backplane), name, options)) {}
+
+MessageServer::~MessageServer() = default;
+
+const std::string& MessageServer::getName() const noexcept { return impl_->core.name(); }
+std::int32_t MessageServer::location() const noexcept { return impl_->core.location(); }
+void MessageServer::setQueueSize(int size) { impl_->core.setQueueSize(size); }
+bool MessageServer::waitForMessage(Deadline deadline) { return impl_->core.wait(deadline); }
+Message MessageServer::receive() { return impl_->core.receive(); }
+void MessageServer::interrupt() noexcept { impl_->core.interrupt(); }
+ReplyResult MessageServer::reply(Message&& message) { return impl_->core.reply(message); }
+void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
+BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request, bytes); }
+int MessageServer::descriptor() { return impl_->core.descriptor(); }
+
+void MessageServer::address(Message& reply, const Message& request) noexcept {
+  auto route = request.route();
+  route.keeper = nullptr;
+  reply.setRoute(route);
+  reply.setClientType(request.getClientType());
+  reply.setClientExtra(request.getClientExtra());
+}
+
+void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) { impl_->handlers[type] = std::move(handler); }
+
+bool MessageServer::handleOne() {
+  auto request = receive();
+  if (!request) return false;
+  const auto handler = impl_->handlers.find(request.getType());
+  if (handler == impl_->handlers.end()) {
+    refuse(std::move(request));
+  } else {
+    handler->second(std::move(request));
+  }
+  return true;
+}
+
+void MessageServer::run() {
+  while (waitForMessage()) {
+    while (handleOne()) {
+    }
+  }
+}
+
+int MessageServer::runUntilSignal() {
+  const StopSignals stop([](void* server) noexcept { static_cast<MessageServer*>(server)->interrupt(); }, this);
+  run();
+  return 0;
+}
+
+void MessageServer::report() const {
+  const auto counts = impl_->core.counts();
+  fmt::print("{}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n", getName(), "queueSize", counts.queueSize, "inQueue", counts.inQueue,
+             "queueRequests", counts.requests, "queueFullResponses", counts.queueFull, "replyRequests", counts.replies);
+}
+
+}  // namespace mpf

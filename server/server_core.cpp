@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/server_core.h>
+
+#include <fmt/format.h>
+
+#include <list>
+#include <mutex>
+#include <stdexcept>
+
+#include <mpf/shm/histogram.h>
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+
+// Handles of requests may outlive their server. Keepers are never freed, only taken over by the next server.
+class ServerCore::Keeper final : public RouteKeeper {
+ public:
+  static Keeper* take(ServerCore& server) {
+    const std::lock_guard lock(mutex());
+    for (auto& keeper : all()) {
+      if (keeper.server_ == nullptr && keeper.handles_ == 0) {
+        keeper.server_ = &server;
+        return &keeper;
+      }
+    }
+    all().emplace_back().server_ = &server;
+    return &all().back();
+  }
+  void leave(std::uint64_t handles) noexcept {
+    const std::lock_guard lock(mutex());
+    server_ = nullptr;
+    handles_ = handles;
+  }
+  void abandoned(const Route& route) noexcept override {
+    const std::lock_guard lock(mutex());
+    if (server_ != nullptr) {
+      server_->abandoned(route);
+    } else if (handles_ != 0) {
+      --handles_;
+    }
+  }
+
+ private:
+  static std::mutex& mutex() {
+    static auto* const theMutex = new std::mutex;
+    return *theMutex;
+  }
+  static std::list<Keeper>& all() {
+    static auto* const keepers = new std::list<Keeper>;
+    return *keepers;
+  }
+  ServerCore* server_ = nullptr;
+  std::uint64_t handles_ = 0;  // of a server that is gone
+};
+
+namespace {
+
+int checkedQueueSize(int size) {
+  if (size < 1 || size > static_cast<int>(LinkGeometry::kMaxQueueSize)) {
+    throw std::invalid_argument(fmt::format("queue size {}: use 1 to {}", size, LinkGeometry::kMaxQueueSize));
+  }
+  return size;
+}
+
+std::string windowName(const Backplane& backplane, const std::string& name, std::int32_t location) {
+  SegmentName::checkServer(name);
+  return SegmentName::serverWindow(backplane.name(), location, name);
+}
+
+}  // namespace
+
+ServerCore::ServerCore(Backplane backplane, const std::string& name, const ServerOptions& options)
+    : name_(name),
+      location_(options.location),
+      endpoint_(backplane, layout::SegmentKind::serverWindow, windowName(backplane, name, options.location), options.rights,
+                options.waitMode, [&](layout::SegmentHeader& header) {
+                  const auto queueSize = static_cast<std::uint32_t>(checkedQueueSize(options.queueSize));
+                  header.location = options.location;
+                  name.copy(header.name.data(), header.name.size() - 1);
+                  header.queueSize = queueSize;
+                  header.maxMessageBytes = options.maxMessageBytes;
+                  header.maxPoolBytes = options.maxPoolBytes;
+                  auto* control = reinterpret_cast<std::byte*>(&header) + layout::kWindowControlOffset;
+                  reinterpret_cast<layout::WindowControl*>(control)->queueSize.store(queueSize, std::memory_order_relaxed);
+                }),
+      keeper_(Keeper::take(*this)) {}
+
+ServerCore::~ServerCore() {
+  std::uint64_t handles = 0;
+  for (const auto& connection : connections_) {
+    for (const auto& id : connection->unanswered) handles += id.load(std::memory_order_relaxed) != 0 ? 1u : 0u;
+  }
+  keeper_->leave(handles);
+  endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  for (const auto& connection : connections_) {
+    if (connection->channel) close(*connection);
+  }
+}
+
+void ServerCore::setQueueSize(int size) {
+  endpoint_.control().queueSize.store(static_cast<std::uint32_t>(checkedQueueSize(size)), std::memory_order_relaxed);
+}
+
+bool ServerCore::wait(Deadline deadline) {
+  if (stop_.exchange(false, std::memory_order_relaxed)) return false;
+  if (!endpoint_.wait(deadline)) return false;
+  return !stop_.exchange(false, std::memory_order_relaxed);
+}
+
+void ServerCore::interrupt() noexcept {
+  stop_.store(true, std::memory_order_relaxed);
+  endpoint_.interrupt();
+}
+
+int ServerCore::descriptor() {
+  hasDescriptor_ = true;
+  static_cast<void>(endpoint_.arm());
+  return endpoint_.descriptor();
+}
+
+void ServerCore::lookAround() {
+  while (const auto incarnation = endpoint_.takeKnock()) accept(*incarnation);
+  if (endpoint_.takeRescan()) acceptAll();
+  if (endpoint_.takeLocalNews()) closeDead();
+}
+
+Message ServerCore::receive() {
+  for (;;) {
+    lookAround();
+    const auto index = endpoint_.next();
+    if (!index) {
+      if (hasDescriptor_ && !endpoint_.arm()) continue;
+      return {};
+    }
+    if (auto message = take(*connections_[*index])) return message;
+  }
+}
+
+Message ServerCore::take(Connection& connection) noexcept {
+  if (!connection.channel) return {};
+  auto& control = endpoint_.control();
+  Envelope envelope;
+  switch (connection.channel->tryBegin(envelope)) {
+    case MessageLink::Take::nothing: closeIfClientDid(connection); return {};
+    case MessageLink::Take::nonsense: count(control.protocolErrors); close(connection); return {};
+    case MessageLink::Take::message: break;
+  }
+  count(control.received);
+  count(control.progress);
+  auto& unanswered = connection.unanswered[envelope.requestId % connection.unanswered.size()];
+  if (envelope.requestId == 0 || unanswered.load(std::memory_order_relaxed) != 0) {
+    count(control.protocolErrors);
+    close(connection);
+    return {};
+  }
+  unanswered.store(envelope.requestId, std::memory_order_relaxed);
+  if (envelope.deadlineNs != 0 && hasExpired(envelope)) {
+    count(control.expired);
+    connection.channel->discard(envelope);
+    sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra, Fate::expired);
+    return {};
+  }
+  auto message = connection.channel->finish(envelope);
+  if (!message) {
+    count(control.protocolErrors);
+    close(connection);
+    return {};
+  }
+  if (envelope.sentTick != 0) noteTimes(connection, envelope);
+  message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId, connection.generation, keeper_});
+  return message;
+}
+
+bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
+  // PAIR(taken-before-clock): the client sees that we counted the request as taken, or we see that its deadline has passed.
+  doorbell::fence();
+  return Clock::nowNs() >= envelope.deadlineNs;
+}
+
+void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noexcept {
+  const auto nowNs = Clock::nowNs();
+  const auto waitedNs = static_cast<std::int64_t>(static_cast<std::uint32_t>(nowNs >> 4) - envelope.sentTick) * 16;
+  record(endpoint_.control().queueWaitNs, waitedNs);
+  if (endpoint_.slept()) endpoint_.noteWake(waitedNs);
+  endpoint_.control().progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);
+  const std::lock_guard lock(*connection.lock);
+  connection.timedId = envelope.requestId;
+  connection.timedFromNs = nowNs;
+}
+
+ReplyResult ServerCore::reply(Message& message) noexcept {
+  if (!message || message.route().link == 0) return ReplyResult::clientGone;
+  auto& connection = connectionOf(message.route());
+  const std::lock_guard lock(*connection.lock);
+  return sendReply(connection, message);
+}
+
+ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noexcept {
+  const auto route = message.route();
+  if (connection.generation != route.flags || !connection.channel) {
+    message = Message();
+    return ReplyResult::clientGone;
+  }
+  auto& unanswered = connection.unanswered[route.requestId % connection.unanswered.size()];
+  const bool first = unanswered.load(std::memory_order_relaxed) == route.requestId;
+  const auto maxOutstanding = connection.channel->link().header().maxOutstanding;
+  Envelope envelope;
+  envelope.type = static_cast<std::uint16_t>(message.getType());
+  envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
+  envelope.requestId = route.requestId;
+  envelope.clientType = message.getClientType();
+  envelope.clientExtra = message.getClientExtra();
+
+  auto unowned = route;
+  unowned.keeper = nullptr;
+  if (first) message.setRoute(unowned);
+  const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
+  const auto result = connection.channel->trySendLocked(envelope, message, limits);
+  if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
+    if (first) unanswered.store(0, std::memory_order_relaxed);
+    count(endpoint_.control().sent);
+    if (route.requestId == connection.timedId && first) {
+      record(endpoint_.control().serviceNs, Clock::nowNs() - connection.timedFromNs);
+      connection.timedId = 0;
+    }
+    return ReplyResult::sent;
+  }
+  if (first) message.setRoute(route);
+  count(endpoint_.control().replyQueueFull);
+  if (result == LinkSend::full) return ReplyResult::queueFull;
+  return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
+}
+
+void ServerCore::sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType, std::int32_t clientExtra,
+                          Fate fate) noexcept {
+  RequestFateMessage message({.fate = fate, .requestId = requestId});
+  message.setClientType(clientType);
+  message.setClientExtra(clientExtra);
+  message.setRoute({reinterpret_cast<std::uint64_t>(&connection), requestId, connection.generation, nullptr});
+  static_cast<void>(reply(message));
+}
+
+void ServerCore::abandoned(const Route& route) noexcept {
+  auto& connection = connectionOf(route);
+  const std::lock_guard lock(*connection.lock);
+  if (connection.generation != route.flags || !connection.channel) return;
+  if (connection.unanswered[route.requestId % connection.unanswered.size()].load(std::memory_order_relaxed) != route.requestId) return;
+  RequestFateMessage message({.fate = Fate::refused, .requestId = route.requestId});
+  message.setRoute({route.link, route.requestId, route.flags, nullptr});
+  if (sendReply(connection, message) == ReplyResult::sent) count(endpoint_.control().refused);
+}
+
+BodyBytes ServerCore::allocate(const Message& request, std::size_t bytes) {
+  std::shared_ptr<MessageLink> channel;
+  if (request.route().link != 0) {
+    auto& connection = connectionOf(request.route());
+    const std::lock_guard lock(*connection.lock);
+    if (connection.generation == request.route().flags) channel = connection.channel;
+  }
+  return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
+}
+
+ServerCore::Counts ServerCore::counts() const {
+  const auto& control = endpoint_.control();
+  Counts counts{control.queueSize.load(std::memory_order_relaxed), 0, control.received.load(std::memory_order_relaxed), 0,
+                control.sent.load(std::memory_order_relaxed)};
+  for (const auto& connection : connections_) {
+    const std::lock_guard lock(*connection->lock);
+    if (!connection->channel) continue;
+    const auto& link = connection->channel->link().control();
+    const auto sent = link.clientSent.load(std::memory_order_relaxed);
+    const auto taken = link.requests.taken.load(std::memory_order_relaxed);
+    counts.inQueue += sent > taken ? sent - taken : 0;
+    counts.queueFull += link.clientRefused.load(std::memory_order_relaxed);
+  }
+  return counts;
+}
+
+}  // namespace mpf

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// ServerCore: what MessageServer does with links: accepts them, takes requests, sends replies, ends what must end.
+//
+// Threads  as MessageServer: one owner thread, replies from any.
+// Crash    a dead client's links are closed and their names removed, here.
+// Trust    nonsense from a client closes its link.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <mpf/channel/message_link.h>
+#include <mpf/schema/message.h>
+#include <mpf/server/message_server.h>
+#include <mpf/shm/endpoint.h>
+
+namespace mpf {
+
+// One client's end at the server. Lives as long as the server and is used again; `generation` tells its lives apart.
+struct Connection {
+  std::shared_ptr<SpinLock> lock = std::make_shared<SpinLock>();
+  std::shared_ptr<MessageLink> channel;  // under lock; empty: free
+  std::uint32_t index = 0;
+  std::uint32_t generation = 0;                          // under lock
+  std::vector<std::atomic<std::uint32_t>> unanswered;    // by id modulo size: ids of requests that owe their first reply
+  std::uint32_t timedId = 0;                             // the request whose service time is measured, under lock
+  std::int64_t timedFromNs = 0;
+};
+
+class ServerCore {
+ public:
+  ServerCore(Backplane backplane, const std::string& name, const ServerOptions& options);
+  ~ServerCore();
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] std::int32_t location() const noexcept { return location_; }
+  void setQueueSize(int size);
+
+  bool wait(Deadline deadline);
+  Message receive();
+  void interrupt() noexcept;
+  ReplyResult reply(Message& message) noexcept;
+  BodyBytes allocate(const Message& request, std::size_t bytes);
+  int descriptor();
+
+  struct Counts {
+    std::uint32_t queueSize;
+    std::uint64_t inQueue, requests, queueFull, replies;
+  };
+  [[nodiscard]] Counts counts() const;
+
+  // Ends a request whose handle died unanswered.
+  void abandoned(const Route& route) noexcept;
+
+ private:
+  class Keeper;
+  static Connection& connectionOf(const Route& route) noexcept { return *reinterpret_cast<Connection*>(route.link); }
+  void lookAround();
+  void accept(std::uint64_t incarnation);
+  void acceptAll();
+  void open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client);
+  void close(Connection& connection) noexcept;
+  void closeDead();
+  void closeIfClientDid(Connection& connection) noexcept;
+  Message take(Connection& connection) noexcept;
+  bool hasExpired(const Envelope& envelope) noexcept;
+  void noteTimes(Connection& connection, const Envelope& envelope) noexcept;
+  ReplyResult sendReply(Connection& connection, Message& message) noexcept;
+  void sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType, std::int32_t clientExtra, Fate fate) noexcept;
+
+  std::string name_;
+  std::int32_t location_;
+  Endpoint endpoint_;
+  Keeper* keeper_;
+  std::vector<std::unique_ptr<Connection>> connections_;  // by index in the window
+  std::map<std::uint64_t, Connection*> byLink_;
+  std::atomic<bool> stop_{false};
+  bool hasDescriptor_ = false;
+};
+
+}  // namespace mpf
