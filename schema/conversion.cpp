@@ -126,8 +126,11 @@ void toWire(const Message& message, capnp::DynamicStruct::Builder envelope, cons
   if (!message.isSound()) throw Refusal{ConversionFault::unsound, "a body of " + std::to_string(message.body().size()) + " bytes is none"};
   const T body = *message.tryAs<T>();
   auto to = envelope.init(wire.member).template as<capnp::DynamicStruct>();
-  std::apply([&, i = std::size_t{0}](const auto&... field) mutable { ((at = field.name, put(to, wire.fields[i++], body, field)), ...); },
-             T::fields());
+  const auto putOne = [&](WireField where, const auto& field) {
+    at = field.name;
+    put(to, where, body, field);
+  };
+  std::apply([&, i = std::size_t{0}](const auto&... field) mutable { (putOne(wire.fields[i++], field), ...); }, T::fields());
   if constexpr (ArrayBody<T>) {
     at = kValueName;
     putValue(to, wire.value(), message.valueAs<T>(), limits);
@@ -139,8 +142,11 @@ Message fromWire(const capnp::DynamicStruct::Reader& envelope, const ConversionL
   const auto& wire = WireOf<T>::get();
   const auto from = envelope.get(wire.member).template as<capnp::DynamicStruct>();
   const auto takeFields = [&](T& body) {
-    std::apply([&, i = std::size_t{0}](const auto&... field) mutable { ((at = field.name, take(from, wire.fields[i++], body, field)), ...); },
-               T::fields());
+    const auto takeOne = [&](WireField where, const auto& field) {
+      at = field.name;
+      take(from, where, body, field);
+    };
+    std::apply([&, i = std::size_t{0}](const auto&... field) mutable { (takeOne(wire.fields[i++], field), ...); }, T::fields());
   };
   if constexpr (ArrayBody<T>) {
     at = kValueName;
@@ -190,7 +196,9 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const C
     std::string_view at;
     return guarded(T::kName, at, ConversionFault::tooLarge, error, [&] { toWire<T>(message, envelope, limits, at); });
   });
-  if (!known) error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is none of ours"};
+  if (!known) {
+    error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is none of ours"};
+  }
   return done;
 }
 

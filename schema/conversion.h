@@ -40,7 +40,8 @@ struct ConversionError {
 };
 
 // Fills `envelope`. False: see `error`; the envelope holds half a message.
-[[nodiscard]] bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const ConversionLimits& limits, ConversionError& error);
+[[nodiscard]] bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const ConversionLimits& limits,
+                             ConversionError& error);
 
 // Makes the message that `envelope` holds; arrays on the heap. nullopt: see `error`. Throws std::bad_alloc.
 [[nodiscard]] std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error);

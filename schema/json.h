@@ -55,8 +55,10 @@ nlohmann::json toJson(std::span<const Number> numbers) {
 }  // namespace detail
 
 [[nodiscard]] inline nlohmann::json toJson(const Message& message) {
-  nlohmann::json json{{"type", toString(message.getType())}, {"clientType", message.getClientType()}, {"clientExtra", message.getClientExtra()}};
-  const bool ours = visitFields(message, [&](std::string_view name, const auto& value) { json[std::string(name)] = detail::toJson(value); });
+  nlohmann::json json{
+      {"type", toString(message.getType())}, {"clientType", message.getClientType()}, {"clientExtra", message.getClientExtra()}};
+  const auto add = [&](std::string_view name, const auto& value) { json[std::string(name)] = detail::toJson(value); };
+  const bool ours = visitFields(message, add);
   if (!ours) json["bytes"] = message.body().size();
   return json;
 }

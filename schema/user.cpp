@@ -26,7 +26,8 @@ UserBuilder::UserBuilder(UserMessage message) : message_(std::move(message)), bu
 
 UserMessage UserBuilder::finish() && {
   const auto words = static_cast<std::uint32_t>(builder_.getSegmentsForOutput()[0].size());
-  const std::array<std::uint8_t, 8> table{0, 0, 0, 0, std::uint8_t(words), std::uint8_t(words >> 8), std::uint8_t(words >> 16), std::uint8_t(words >> 24)};
+  std::array<std::uint8_t, 8> table{};  // one segment (count less one), its words; little-endian
+  for (std::size_t i = 0; i < 4; ++i) table[4 + i] = static_cast<std::uint8_t>(words >> 8 * i);
   std::memcpy(message_.value().data(), table.data(), table.size());
   message_.setSize((words + std::size_t{1}) * sizeof(capnp::word));
   return std::move(message_);

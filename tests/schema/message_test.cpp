@@ -214,7 +214,7 @@ TEST(Message, KeepsTheLengthThatItCheckedWhateverThePeerWritesLater) {
   EXPECT_EQ(message.value().size(), 5U);
   EXPECT_EQ(message->address, 4);
   const Message copy = message.duplicate();
-  EXPECT_TRUE(copy.isSound());
+  ASSERT_TRUE(copy.isSound());
   EXPECT_EQ(copy.valueAs<Int32Array>().size(), 5U);
   EXPECT_EQ(copy.tryAs<Int32Array>()->length, 5U);
 }

@@ -35,13 +35,15 @@ TEST(Text, PrintsOneLineAMessage) {
 
   EXPECT_EQ(print(MessageOf(Connect{.status = ConnectStatus::connectYes, .incarnation = 7})), "connect status=connectYes incarnation=7");
   EXPECT_EQ(print(MessageOf(RequestFate{.fate = Fate{9}, .requestId = 4})), "requestFate fate=9 requestId=4");
-  EXPECT_EQ(print(MessageOf(SerialConfig{.baud = 9600, .parity = 'E'})), "serialConfig baud=9600 stopBits=0 bitsPerChar=0 parity=E flowControl=0");
+  EXPECT_EQ(print(MessageOf(SerialConfig{.baud = 9600, .parity = 'E'})),
+            "serialConfig baud=9600 stopBits=0 bitsPerChar=0 parity=E flowControl=0");
 }
 
 TEST(Text, PrintsBytesAsCStrings) {
   const auto message = parsed<Char8Array>({R"(value=*IDN?\r\n\x00\xfe")", R"(eomString="\r\n")"});
 
-  EXPECT_EQ(print(message), R"(char8Array timeout=0 cmd=0 status=0 address=0 extra=0 numberRetrys=0 eomLen=2 eomString="\r\n" value="*IDN?\r\n\x00\xfe\"")");
+  EXPECT_EQ(print(message),
+            R"(char8Array timeout=0 cmd=0 status=0 address=0 extra=0 numberRetrys=0 eomLen=2 eomString="\r\n" value="*IDN?\r\n\x00\xfe\"")");
 }
 
 TEST(Text, ShortensLongArrays) {
@@ -105,7 +107,9 @@ TEST(Text, RefusesWordsThatAreNotQuiteNumbers) {
   for (const auto* const bad : {"value=", "value=1x", "value= 1", "value=-", "value=0x", "value=--1", "value=1.5", "value=-2147483649"}) {
     EXPECT_NE(refusal(MessageType::int32, {bad}), "") << bad;
   }
-  for (const auto* const bad : {"value=1,,2", "value=1,", "value=,1", "value=1;2"}) EXPECT_NE(refusal(MessageType::int32Array, {bad}), "") << bad;
+  for (const auto* const bad : {"value=1,,2", "value=1,", "value=,1", "value=1;2"}) {
+    EXPECT_NE(refusal(MessageType::int32Array, {bad}), "") << bad;
+  }
   for (const auto* const bad : {"value=", "value=1x", "value=1e999"}) EXPECT_NE(refusal(MessageType::float64, {bad}), "") << bad;
   for (const auto* const bad : {R"(value=\)", R"(value=\q)", R"(value=\x)"}) EXPECT_NE(refusal(MessageType::char8Array, {bad}), "") << bad;
   EXPECT_NE(refusal(MessageType::requestFate, {"requestId=-1"}), "");
@@ -173,7 +177,8 @@ TEST(Json, WritesBytesOneCharacterEach) {
 }
 
 TEST(Json, SaysTheSizeOfABodyThatIsNone) {
-  EXPECT_EQ(toJson(Message::copyOf(MessageType{77}, {})), nlohmann::json::parse(R"({"type":"unknown","clientType":0,"clientExtra":0,"bytes":0})"));
+  EXPECT_EQ(toJson(Message::copyOf(MessageType{77}, {})),
+            nlohmann::json::parse(R"({"type":"unknown","clientType":0,"clientExtra":0,"bytes":0})"));
 }
 
 }  // namespace
