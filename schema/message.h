@@ -190,6 +190,19 @@ class Message {
     alignas(8) std::array<std::byte, kInlineBytes> inside;
     BodyBytes body;
     Where() noexcept : inside{} {}
+    Where(const Where& other) noexcept { copy(other); }
+    Where& operator=(const Where& other) noexcept { return copy(other), *this; }
+
+   private:
+    // Word by word in registers: a wider load would wait for the narrow stores that have just written the fields (store forwarding).
+    void copy(const Where& other) noexcept {
+      for (std::size_t at = 0; at < kInlineBytes; at += sizeof(std::uint32_t)) {
+        std::uint32_t word;
+        std::memcpy(&word, other.inside.data() + at, sizeof word);
+        asm("" : "+r"(word));
+        std::memcpy(inside.data() + at, &word, sizeof word);
+      }
+    }
   };
   struct State {
     Where at;
