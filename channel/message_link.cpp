@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/channel/message_link.h>
 
-#include <array>
 #include <mutex>
 
 namespace mpf {
@@ -14,32 +13,39 @@ MessageLink::Take MessageLink::tryBegin(Envelope& envelope) noexcept {
   return fits && link_->inlineCapacity() != 0 ? Take::message : Take::nonsense;
 }
 
-Message MessageLink::finish(const Envelope& envelope) noexcept try {
+bool MessageLink::tryFinish(const Envelope& envelope, Message& message) noexcept {
+  try {
+    readBody(envelope, message);
+  } catch (const std::bad_alloc&) {
+    message.reset();
+  }
+  link_->end();
+  if (!message) return false;
+  message.setClientType(envelope.clientType);
+  message.setClientExtra(envelope.clientExtra);
+  return true;
+}
+
+void MessageLink::readBody(const Envelope& envelope, Message& message) {
   const auto type = static_cast<MessageType>(envelope.type);
-  Message message;
   if ((envelope.flags & layout::kSlotChunk) != 0) {
+    message.reset();
     const std::lock_guard guard(*lock_);
     if (const auto chunk = link_->tryChunk(envelope)) {
       lendOne();
       message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
     }
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
-    std::array<std::byte, Message::kInlineBytes> body;
-    link_->copyBody(std::span(body).first(envelope.bodyBytes));
-    message = Message::copyInline(type, std::span(body).first(envelope.bodyBytes));
+    message.assignInline(type, envelope.bodyBytes, [&](std::span<std::byte, Message::kInlineBytes> body) {
+      if (envelope.bodyBytes <= layout::kFirstSlotBodyBytes) return link_->copyFirst(body.first<layout::kFirstSlotBodyBytes>());
+      link_->copyBody(body.first(envelope.bodyBytes));
+    });
   } else {
     auto body = allocateHeapBody(layout::kInlineBodyBytes);
     body.size = envelope.bodyBytes;
     link_->copyBody({body.data, body.size});
     message = Message::adopt(type, body);
   }
-  link_->end();
-  message.setClientType(envelope.clientType);
-  message.setClientExtra(envelope.clientExtra);
-  return message;
-} catch (const std::bad_alloc&) {
-  link_->end();
-  return {};
 }
 
 void MessageLink::discard(const Envelope& envelope) noexcept {
@@ -50,7 +56,7 @@ void MessageLink::discard(const Envelope& envelope) noexcept {
   link_->end();
 }
 
-LinkSend MessageLink::trySendLocked(const Envelope& envelope, Message& message, Link::Limits limits) noexcept {
+LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message, Link::Limits limits) noexcept {
   const bool ours = message.lender() == this;
   const auto result = link_->trySend(envelope, message.body(), limits);
   if (result == LinkSend::sentInPlace) {
@@ -62,7 +68,7 @@ LinkSend MessageLink::trySendLocked(const Envelope& envelope, Message& message, 
     link_->release(body.data);
     endLending();
   } else if (result == LinkSend::sent) {
-    message = Message();
+    message.reset();
   }
   return result;
 }

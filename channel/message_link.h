@@ -25,13 +25,13 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   enum class Take { nothing, message, nonsense };
   // Begins the next message: its envelope is copied and it counts as taken. `nothing` changes nothing.
   Take tryBegin(Envelope& envelope) noexcept;
-  // The body of the message begun, then done with its slots. An empty Message: nonsense.
-  Message finish(const Envelope& envelope) noexcept;
+  // The body of the message begun into `message`, then done with its slots. False: nonsense, and `message` is empty.
+  [[nodiscard]] bool tryFinish(const Envelope& envelope, Message& message) noexcept;
   // Done with the message begun without looking at its body; a chunk goes back.
   void discard(const Envelope& envelope) noexcept;
 
   // Sends, and empties `message`; when it was not sent, `message` is as it was. The caller holds lock().
-  LinkSend trySendLocked(const Envelope& envelope, Message& message, Link::Limits limits) noexcept;
+  LinkSend trySendLocked(Envelope& envelope, Message& message, Link::Limits limits) noexcept;
 
   // Memory of this link to build a body in; the heap's when the link has none for it.
   //   throws  std::bad_alloc
@@ -39,6 +39,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
+  void readBody(const Envelope& envelope, Message& message);
   void lendOne() noexcept;
   void endLending() noexcept;
 

@@ -144,8 +144,8 @@ void Binding::deliverReply(const Envelope& envelope) {
     channel_->discard(envelope);  // its request was cancelled
     return;
   }
-  auto message = channel_->finish(envelope);
-  if (!message) {
+  Message message;
+  if (!channel_->tryFinish(envelope, message)) {
     count(control.protocolErrors);
     return disconnect("the server sent nonsense");
   }
@@ -164,7 +164,7 @@ void Binding::deliverReply(const Envelope& envelope) {
   deliver(std::move(message));
 }
 
-void Binding::deliver(Message message) {
+void Binding::deliver(Message&& message) {
   if (!left_) callback_(std::move(message));
 }
 

@@ -51,7 +51,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void tellQueueFull();
 
  private:
-  void deliver(Message message);
+  void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverReply(const Envelope& envelope);

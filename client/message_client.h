@@ -30,7 +30,7 @@ enum class SendResult { sent, notConnected, queueFull, tooManyOutstanding, tooLa
 
 class MessageClient {
  public:
-  using Callback = std::function<void(Message)>;
+  using Callback = std::function<void(Message&&)>;
 
   // Callbacks run on the backplane's shared dispatcher thread.
   MessageClient(const Backplane& backplane, Callback callback);

@@ -10,11 +10,11 @@ std::string Answer::why() const {
 }
 
 SyncClient::SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location, WaitMode waitMode)
-    : dispatcher_(backplane, {waitMode, {}}), client_(dispatcher_, [this](Message message) { take(std::move(message)); }) {
+    : dispatcher_(backplane, {waitMode, {}}), client_(dispatcher_, [this](Message&& message) { take(std::move(message)); }) {
   client_.bind(server, location);
 }
 
-void SyncClient::take(Message message) {
+void SyncClient::take(Message&& message) {
   if (awaited_ != 0 && message.route().requestId == awaited_) {
     awaited_ = 0;
     if (const auto* fate = message.tryAs<RequestFate>()) {

@@ -58,7 +58,7 @@ class SyncClient {
   [[nodiscard]] MessageClient& client() noexcept { return client_; }
 
  private:
-  void take(Message message);
+  void take(Message&& message);
   Dispatcher dispatcher_;
   MessageClient client_;
   std::uint32_t awaited_ = 0;

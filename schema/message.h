@@ -19,6 +19,7 @@
 #include <span>
 #include <utility>
 
+#include <mpf/base/copy_words.h>
 #include <mpf/schema/message_types.h>
 
 namespace mpf {
@@ -146,6 +147,21 @@ class Message {
     message.check();
     return message;
   }
+  // The same in two steps, into this handle, for the path where every copy counts: `fill` gets the kInlineBytes of the handle and
+  // writes `size` of them.
+  template <class Fill>
+  void assignInline(MessageType type, std::size_t size, Fill&& fill) noexcept {
+    reset();
+    state_.type = type;
+    state_.inlineSize = static_cast<std::uint8_t>(size);
+    fill(std::span<std::byte, kInlineBytes>(state_.at.inside));
+    check();
+  }
+  // Empties the handle: the body goes back.
+  void reset() noexcept {
+    giveBack();
+    forget();
+  }
   // Who must get the body back; nullptr when it is inside the handle.
   [[nodiscard]] BodyLender* lender() const noexcept { return state_.outside ? state_.at.body.lender : nullptr; }
   [[nodiscard]] bool isInline() const noexcept { return !state_.outside; }
@@ -190,18 +206,10 @@ class Message {
     alignas(8) std::array<std::byte, kInlineBytes> inside;
     BodyBytes body;
     Where() noexcept : inside{} {}
-    Where(const Where& other) noexcept { copy(other); }
-    Where& operator=(const Where& other) noexcept { return copy(other), *this; }
-
-   private:
-    // Word by word in registers: a wider load would wait for the narrow stores that have just written the fields (store forwarding).
-    void copy(const Where& other) noexcept {
-      for (std::size_t at = 0; at < kInlineBytes; at += sizeof(std::uint32_t)) {
-        std::uint32_t word;
-        std::memcpy(&word, other.inside.data() + at, sizeof word);
-        asm("" : "+r"(word));
-        std::memcpy(inside.data() + at, &word, sizeof word);
-      }
+    Where(const Where& other) noexcept { copyWords<kInlineBytes>(inside.data(), other.inside.data()); }
+    Where& operator=(const Where& other) noexcept {
+      copyWords<kInlineBytes>(inside.data(), other.inside.data());
+      return *this;
     }
   };
   struct State {

@@ -48,6 +48,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
     connection.index = *index;
     connection.timedId = 0;
     connection.unanswered = std::vector<std::atomic<std::uint32_t>>(std::bit_ceil(opened.header().maxOutstanding));
+    connection.unansweredMask = static_cast<std::uint32_t>(connection.unanswered.size() - 1);
     connection.channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
   }
   byLink_[opened.header().incarnation] = &connection;

@@ -102,9 +102,8 @@ void ServerCore::setQueueSize(int size) {
 }
 
 bool ServerCore::wait(Deadline deadline) {
-  if (stop_.exchange(false, std::memory_order_relaxed)) return false;
-  if (!endpoint_.wait(deadline)) return false;
-  return !stop_.exchange(false, std::memory_order_relaxed);
+  const auto stopped = [this] { return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed); };
+  return !stopped() && endpoint_.wait(deadline) && !stopped();
 }
 
 void ServerCore::interrupt() noexcept {
@@ -125,50 +124,50 @@ void ServerCore::lookAround() {
 }
 
 Message ServerCore::receive() {
+  Message message;
   for (;;) {
-    lookAround();
+    if (endpoint_.hasSideNews()) lookAround();
     const auto index = endpoint_.next();
     if (!index) {
       if (hasDescriptor_ && !endpoint_.arm()) continue;
-      return {};
+      return message;
     }
-    if (auto message = take(*connections_[*index])) return message;
+    if (take(*connections_[*index], message)) return message;
   }
 }
 
-Message ServerCore::take(Connection& connection) noexcept {
-  if (!connection.channel) return {};
+bool ServerCore::take(Connection& connection, Message& message) noexcept {
+  if (!connection.channel) return false;
   auto& control = endpoint_.control();
   Envelope envelope;
   switch (connection.channel->tryBegin(envelope)) {
-    case MessageLink::Take::nothing: closeIfClientDid(connection); return {};
-    case MessageLink::Take::nonsense: count(control.protocolErrors); close(connection); return {};
+    case MessageLink::Take::nothing: closeIfClientDid(connection); return false;
+    case MessageLink::Take::nonsense: count(control.protocolErrors); close(connection); return false;
     case MessageLink::Take::message: break;
   }
   count(control.received);
   count(control.progress);
-  auto& unanswered = connection.unanswered[envelope.requestId % connection.unanswered.size()];
+  auto& unanswered = connection.owed(envelope.requestId);
   if (envelope.requestId == 0 || unanswered.load(std::memory_order_relaxed) != 0) {
     count(control.protocolErrors);
     close(connection);
-    return {};
+    return false;
   }
   unanswered.store(envelope.requestId, std::memory_order_relaxed);
   if (envelope.deadlineNs != 0 && hasExpired(envelope)) {
     count(control.expired);
     connection.channel->discard(envelope);
     sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra, Fate::expired);
-    return {};
+    return false;
   }
-  auto message = connection.channel->finish(envelope);
-  if (!message) {
+  if (!connection.channel->tryFinish(envelope, message)) {
     count(control.protocolErrors);
     close(connection);
-    return {};
+    return false;
   }
   if (envelope.sentTick != 0) noteTimes(connection, envelope);
   message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId, connection.generation, keeper_});
-  return message;
+  return true;
 }
 
 bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
@@ -198,10 +197,10 @@ ReplyResult ServerCore::reply(Message& message) noexcept {
 ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noexcept {
   const auto route = message.route();
   if (connection.generation != route.flags || !connection.channel) {
-    message = Message();
+    message.reset();
     return ReplyResult::clientGone;
   }
-  auto& unanswered = connection.unanswered[route.requestId % connection.unanswered.size()];
+  auto& unanswered = connection.owed(route.requestId);
   const bool first = unanswered.load(std::memory_order_relaxed) == route.requestId;
   const auto maxOutstanding = connection.channel->link().header().maxOutstanding;
   Envelope envelope;
@@ -244,7 +243,7 @@ void ServerCore::abandoned(const Route& route) noexcept {
   auto& connection = connectionOf(route);
   const std::lock_guard lock(*connection.lock);
   if (connection.generation != route.flags || !connection.channel) return;
-  if (connection.unanswered[route.requestId % connection.unanswered.size()].load(std::memory_order_relaxed) != route.requestId) return;
+  if (connection.owed(route.requestId).load(std::memory_order_relaxed) != route.requestId) return;
   RequestFateMessage message({.fate = Fate::refused, .requestId = route.requestId});
   message.setRoute({route.link, route.requestId, route.flags, nullptr});
   if (sendReply(connection, message) == ReplyResult::sent) count(endpoint_.control().refused);

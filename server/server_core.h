@@ -25,7 +25,10 @@ struct Connection {
   std::shared_ptr<MessageLink> channel;  // under lock; empty: free
   std::uint32_t index = 0;
   std::uint32_t generation = 0;                          // under lock
-  std::vector<std::atomic<std::uint32_t>> unanswered;    // by id modulo size: ids of requests that owe their first reply
+  std::vector<std::atomic<std::uint32_t>> unanswered;    // a power of two: ids of requests that owe their first reply
+  std::uint32_t unansweredMask = 0;
+
+  [[nodiscard]] std::atomic<std::uint32_t>& owed(std::uint32_t requestId) noexcept { return unanswered[requestId & unansweredMask]; }
   std::uint32_t timedId = 0;                             // the request whose service time is measured, under lock
   std::int64_t timedFromNs = 0;
 };
@@ -65,7 +68,7 @@ class ServerCore {
   void close(Connection& connection) noexcept;
   void closeDead();
   void closeIfClientDid(Connection& connection) noexcept;
-  Message take(Connection& connection) noexcept;
+  bool take(Connection& connection, Message& message) noexcept;
   bool hasExpired(const Envelope& envelope) noexcept;
   void noteTimes(Connection& connection, const Envelope& envelope) noexcept;
   ReplyResult sendReply(Connection& connection, Message& message) noexcept;

@@ -223,8 +223,7 @@ bool Endpoint::hasHints() const noexcept {
   for (const auto& word : hints.readyWords) {
     if (word.load(std::memory_order_relaxed) != 0) return true;
   }
-  return hints.knocked.load(std::memory_order_relaxed) != knockedSeen_ || hints.rescan.load(std::memory_order_relaxed) != 0 ||
-         localNews_.load(std::memory_order_relaxed) != 0;
+  return hasSideNews();
 }
 
 bool Endpoint::hasNews() const noexcept {

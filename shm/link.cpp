@@ -11,7 +11,9 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint64_t kSampleEvery = 16;  // one message of so many is timed: a clock call costs as much as a quarter of a round trip
+// Of messages to a peer that polls, one of so many is timed: a clock call costs as much as a quarter of a round trip. Messages to
+// a peer that must be woken are all timed.
+constexpr std::uint64_t kSampleEvery = 64;
 
 layout::Slot* slotsOf(const Segment& segment, LinkSide producer) {
   auto* slots = &segment.at<layout::Slot>(layout::kLinkRingsOffset);
@@ -142,10 +144,11 @@ void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
-LinkSend Link::trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept {
+LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, Limits limits) noexcept {
   if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
   if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting && out_.waiting() >= limits.waiting) return LinkSend::full;
-  if ((out_.messages() & (kSampleEvery - 1)) == 0) envelope.sentTick = static_cast<std::uint32_t>(Clock::nowNs() >> 4) | 1u;
+  const bool polled = outControl_.unwatched.load(std::memory_order_relaxed) == 0;
+  if (!polled || out_.messages() % kSampleEvery == 0) envelope.sentTick = static_cast<std::uint32_t>(Clock::nowNs() >> 4) | 1u;
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
 
   const auto slots = slotsFor(body.size());

@@ -66,8 +66,8 @@ class Link {
     std::uint32_t reserve = 0;      // slots to leave free
     std::uint32_t longReserve = 0;  // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
   };
-  // Sends a body: in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
-  LinkSend trySend(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept;
+  // Sends a body (its length, sampling and flags are added to `envelope`): in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
+  LinkSend trySend(Envelope& envelope, std::span<const std::byte> body, Limits limits) noexcept;
   // Number of the last message sent, from 1.
   [[nodiscard]] std::uint64_t sentMessages() const noexcept { return out_.messages(); }
   // Whether the peer has taken message number `ordinal`.
@@ -83,6 +83,8 @@ class Link {
   [[nodiscard]] Envelope begin() noexcept { return in_.begin(); }
   [[nodiscard]] std::size_t inlineCapacity() const noexcept { return in_.inlineCapacity(); }
   void copyBody(std::span<std::byte> body) const noexcept { in_.copyBody(body); }
+  // All that the first slot of the message begun may hold.
+  void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept { in_.copyFirst(body); }
   // The chunk of a kSlotChunk message begun: borrowed, or our own come back. nullopt: nonsense.
   std::optional<Chunk> tryChunk(const Envelope& envelope) noexcept;
   void end() noexcept { in_.end(); }

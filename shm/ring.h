@@ -14,6 +14,7 @@
 #include <cstring>
 #include <span>
 
+#include <mpf/base/copy_words.h>
 #include <mpf/shm/layout.h>
 
 namespace mpf {
@@ -96,6 +97,7 @@ class RingProducer {
   layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & (capacity_ - 1)]; }
 
   void copyBody(layout::Slot& first, std::span<const std::byte> body) const noexcept {
+    if (body.size() == layout::kFirstSlotBodyBytes) return copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     const auto head = std::min(body.size(), first.body.size());
     if (head != 0) std::memcpy(first.body.data(), body.data(), head);
     body = body.subspan(head);
@@ -143,6 +145,9 @@ class RingConsumer {
     return layout::kFirstSlotBodyBytes + (slotsNow_ - 1u) * sizeof(layout::MoreSlot::body);
   }
 
+  void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
+    copyWords<layout::kFirstSlotBodyBytes>(body.data(), slot(taken_).body.data());
+  }
   // Copies the body of the message begun; `body` is at most inlineCapacity() long.
   void copyBody(std::span<std::byte> body) const noexcept {
     const auto& first = slot(taken_);
