@@ -67,8 +67,6 @@ LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message, Link::
     const auto body = message.releaseBody();
     link_->release(body.data);
     endLending();
-  } else if (result == LinkSend::sent) {
-    message.reset();
   }
   return result;
 }

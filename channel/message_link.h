@@ -30,7 +30,8 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   // Done with the message begun without looking at its body; a chunk goes back.
   void discard(const Envelope& envelope) noexcept;
 
-  // Sends, and empties `message`; when it was not sent, `message` is as it was. The caller holds lock().
+  // Sends. Afterwards `message` has no body of this link any more; what is left of it the caller destroys without the lock, which
+  // the return of a body would want. When it was not sent, `message` is as it was. The caller holds lock().
   LinkSend trySendLocked(Envelope& envelope, Message& message, Link::Limits limits) noexcept;
 
   // Memory of this link to build a body in; the heap's when the link has none for it.

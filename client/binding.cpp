@@ -103,7 +103,7 @@ bool Binding::takeOne() {
     case MessageLink::Take::message: deliverReply(envelope); return true;
     case MessageLink::Take::nonsense:
       count(dispatcher_.endpoint().control().protocolErrors);
-      disconnect("the server sent nonsense");
+      disconnect("the server sent nonsense", false);
       return true;
     case MessageLink::Take::nothing: break;
   }
@@ -147,7 +147,7 @@ void Binding::deliverReply(const Envelope& envelope) {
   Message message;
   if (!channel_->tryFinish(envelope, message)) {
     count(control.protocolErrors);
-    return disconnect("the server sent nonsense");
+    return disconnect("the server sent nonsense", false);
   }
   if (envelope.sentTick != 0 && dispatcher_.endpoint().slept()) {
     dispatcher_.endpoint().noteWake(static_cast<std::int64_t>(static_cast<std::uint32_t>(Clock::nowNs() >> 4) - envelope.sentTick) * 16);
@@ -181,7 +181,7 @@ void Binding::deliverFate(Request& request, Fate fate) {
 
 bool Binding::hasDeadPeer() const noexcept { return channel_ && channel_->link().peer()->isDead(); }
 
-void Binding::disconnect(const std::string& reason) {
+void Binding::disconnect(const std::string& reason, bool serverTakesNoMore) {
   const auto self = shared_from_this();
   const auto channel = channel_;
   bool wasConnected = false;
@@ -194,7 +194,7 @@ void Binding::disconnect(const std::string& reason) {
   Envelope envelope;
   while (channel_ == channel && channel->tryBegin(envelope) == MessageLink::Take::message) deliverReply(envelope);
   requests_->forEach([&](Request& request) {
-    deliverFate(request, link.isTaken(request.ordinal) ? Fate::outcomeUnknown : Fate::neverTaken);
+    deliverFate(request, serverTakesNoMore && !link.isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
   auto& endpoint = dispatcher_.endpoint();

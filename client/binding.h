@@ -39,7 +39,8 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void tryConnect();
   // One message or change of state of the link. False when there was none.
   bool takeOne();
-  void disconnect(const std::string& reason);
+  // `serverTakesNoMore`: the server is dead or has closed the link, so that what it has not taken it never will.
+  void disconnect(const std::string& reason, bool serverTakesNoMore = true);
   void cancel(std::uint32_t requestId);
   // No callback after this.
   void leave();

@@ -152,9 +152,11 @@ void Dispatcher::Impl::waitForNames(bool wait) {
 
 void Dispatcher::Impl::handleNews() {
   if (hasCommands_.load(std::memory_order_relaxed)) runCommands();
-  const auto bindings = bindings_;  // a callback may destroy a client
-  for (const auto& binding : bindings) {
-    if (binding->hasDeadPeer()) binding->disconnect("the server's process ended");
+  if (endpoint_.takePeerDeath()) {
+    const auto bindings = bindings_;  // a callback may destroy a client
+    for (const auto& binding : bindings) {
+      if (binding->hasDeadPeer()) binding->disconnect("the server's process ended");
+    }
   }
   if (namesChanged_.exchange(false, std::memory_order_relaxed)) connectWaiting();
 }

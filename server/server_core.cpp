@@ -120,7 +120,7 @@ int ServerCore::descriptor() {
 void ServerCore::lookAround() {
   while (const auto incarnation = endpoint_.takeKnock()) accept(*incarnation);
   if (endpoint_.takeRescan()) acceptAll();
-  if (endpoint_.takeLocalNews()) closeDead();
+  if (endpoint_.takeLocalNews() && endpoint_.takePeerDeath()) closeDead();
 }
 
 Message ServerCore::receive() {
@@ -190,14 +190,18 @@ void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noe
 ReplyResult ServerCore::reply(Message& message) noexcept {
   if (!message || message.route().link == 0) return ReplyResult::clientGone;
   auto& connection = connectionOf(message.route());
-  const std::lock_guard lock(*connection.lock);
-  return sendReply(connection, message);
+  ReplyResult result{};
+  {
+    const std::lock_guard lock(*connection.lock);
+    result = sendReply(connection, message);
+  }
+  if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
+  return result;
 }
 
 ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noexcept {
   const auto route = message.route();
   if (connection.generation != route.flags || !connection.channel) {
-    message.reset();
     return ReplyResult::clientGone;
   }
   auto& unanswered = connection.owed(route.requestId);

@@ -66,9 +66,10 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
     peers_.erase(found);
   }
   auto window = PeerWindow::tryOpen(name, kind);
-  if (!window || window->isClosed() || segments::probeOwner(name, window->header().incarnation) != segments::Owner::alive) return nullptr;
+  if (!window || window->isClosed() || !window->hasOwner()) return nullptr;
   const auto clean = [this, backplane = backplane_.name(), name, incarnation = window->header().incarnation] {
     removeDeadWindow(backplane, name, incarnation);
+    peerDied_.store(true, std::memory_order_relaxed);
     interrupt();
   };
   peers_[name] = {window, backplane_.watcher().watchPeer(window, clean)};

@@ -59,6 +59,8 @@ class Endpoint {
   bool takeRescan() noexcept;
   // Something happened in this process: a peer died, a server appeared, interrupt() was called.
   bool takeLocalNews() noexcept;
+  // After local news: a peer died, some links' peer()->isDead().
+  bool takePeerDeath() noexcept { return peerDied_.exchange(false, std::memory_order_relaxed); }
 
   // Waits until one of the four above may have something. False when `deadline` passed first.
   bool wait(Deadline deadline) noexcept;
@@ -112,6 +114,7 @@ class Endpoint {
   std::uint32_t knockedSeen_ = 0;
   std::uint32_t knockCursor_ = layout::kKnocks;
   std::atomic<std::uint32_t> localNews_{0};
+  std::atomic<bool> peerDied_{false};
   bool armed_ = false;
   bool slept_ = false;
   std::int64_t wakeNs_ = 10'000;

@@ -8,6 +8,7 @@
 #include <cerrno>
 
 #include <fstream>
+#include <mutex>
 #include <sstream>
 
 namespace mpf {
@@ -34,7 +35,10 @@ std::uint64_t ownPidNamespace() {
 }  // namespace
 
 Process Process::self() {
-  Process self;
+  static std::mutex mutex;
+  static Process self;
+  const std::lock_guard lock(mutex);
+  if (self.pid == ::getpid()) return self;
   self.pid = ::getpid();
   self.uid = ::getuid();
   self.startTicks = startTicksOf("self");

@@ -17,7 +17,7 @@ struct Process {
   std::uint64_t pidNamespace{};  // inode
   std::string program;
 
-  // Read anew after a fork.
+  // Read once, and again after a fork.
   static Process self();
   void describe(layout::SegmentHeader& header) const;
 

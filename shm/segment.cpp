@@ -45,6 +45,11 @@ bool tryLock(int fd) {
   return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
 }
 
+bool isLocked(int fd) {
+  auto lock = wholeFile(F_WRLCK);
+  return ::fcntl(fd, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;  // a failure proves nothing
+}
+
 FileDescriptor openByName(const std::string& name, int flags) {
   return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW));
 }
@@ -101,14 +106,18 @@ bool Segment::tryPublish(const std::string& name) {
   throwSystemError(errno, "name a segment", segments::path(name));
 }
 
+bool Segment::hasOwner() const noexcept { return isLocked(file_.get()); }
+
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
   Segment segment;
   segment.name_ = name;
-  segment.file_ = openByName(name, access == Access::readOnly ? O_RDONLY : O_RDWR);
-  if (!segment.file_) {
-    if (errno == ENOENT) return std::nullopt;
-    throwSystemError(errno, "open", segments::path(name));
+  auto file = openByName(name, access == Access::readOnly ? O_RDONLY : O_RDWR);
+  if (!file) {
+    const int reason = errno;
+    if (reason == ENOENT) return std::nullopt;
+    throwSystemError(reason, "open", segments::path(name));
   }
+  segment.file_ = std::move(file);
   struct stat status {};
   checkCall(::fstat(segment.file_.get(), &status), "look at", segments::path(name));
   const auto fileBytes = static_cast<std::size_t>(status.st_size);
@@ -150,9 +159,7 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
     const auto got = ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
     if (got != sizeof found || found != incarnation) return Owner::absent;
   }
-  auto lock = wholeFile(F_WRLCK);
-  if (::fcntl(file.get(), F_OFD_GETLK, &lock) != 0) return Owner::alive;
-  return lock.l_type == F_UNLCK ? Owner::dead : Owner::alive;
+  return isLocked(file.get()) ? Owner::alive : Owner::dead;
 }
 
 bool removeIfOwnerless(const std::string& name) {

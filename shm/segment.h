@@ -69,6 +69,8 @@ class Segment {
     return *reinterpret_cast<T*>(data() + offset);
   }
 
+  // Whether somebody holds the owner's lock, whatever became of the name. Needs the file.
+  [[nodiscard]] bool hasOwner() const noexcept;
   // Lets go of the file, not of the mapping. A segment without lock needs it no longer.
   void closeFile() { file_.reset(); }
 

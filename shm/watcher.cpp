@@ -138,8 +138,7 @@ void Watcher::handle(Token token) {
 }
 
 bool Watcher::isGone(const Peer& peer) const {
-  if (peer.window->isClosed()) return true;
-  return segments::probeOwner(peer.window->name(), peer.window->header().incarnation) != segments::Owner::alive;
+  return peer.window->isClosed() || !peer.window->hasOwner();
 }
 
 void Watcher::report(Token token) {

@@ -90,7 +90,6 @@ std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout:
                                 Segment::Access::readWrite);
   if (!hints) return nullptr;
   if (hints->bytes() < sizeof(layout::WindowHints)) throw SegmentError(fmt::format("{}: truncated", segments::path(hints->name())));
-  window->closeFile();
   hints->closeFile();
   auto peer = std::make_shared<PeerWindow>();
   peer->window_ = std::move(*window);

@@ -77,6 +77,8 @@ class PeerWindow {
   // Set by the watcher once the owner is proven dead; stays.
   [[nodiscard]] bool isDead() const noexcept { return dead_.load(std::memory_order_relaxed); }
   void setDead() noexcept { dead_.store(true, std::memory_order_relaxed); }
+  // Asks the kernel: whether the owner is alive.
+  [[nodiscard]] bool hasOwner() const noexcept { return window_.hasOwner(); }
   [[nodiscard]] bool isClosed() const noexcept { return control().state.load(std::memory_order_relaxed) == layout::WindowState::closed; }
 
  private:
