@@ -103,15 +103,15 @@ bool Binding::takeOne() {
     case MessageLink::Take::message: deliverReply(envelope); return true;
     case MessageLink::Take::nonsense:
       count(dispatcher_.endpoint().control().protocolErrors);
-      disconnect("the server sent nonsense", false);
+      disconnect("the server sent nonsense", Ending::nonsense);
       return true;
     case MessageLink::Take::nothing: break;
   }
-  onLinkState();
-  return false;
+  return onLinkState();
 }
 
-void Binding::onLinkState() {
+// True when the state of the link was news.
+bool Binding::onLinkState() {
   auto& link = channel_->link();
   const auto state = link.peerState();
   if (state == layout::LinkState::open && !isConnected()) {
@@ -127,13 +127,18 @@ void Binding::onLinkState() {
     }
     count(dispatcher_.endpoint().control().linksOpened);
     deliverConnect(ConnectStatus::connectYes);
-  } else if (state == layout::LinkState::closed) {
-    if (!link.hasMessage()) disconnect("the server closed the connection");
-  } else if (state == layout::LinkState::refused) {
-    disconnect("the server has no room for another client");
-    deliverConnect(ConnectStatus::connectRefused);
-    wakeAt(Clock::nowNs() + kRetryNs);
+    return true;
   }
+  if (state == layout::LinkState::closed && !link.hasMessage()) {
+    disconnect("the server closed the connection", Ending::serverGone);
+    return true;
+  }
+  if (state == layout::LinkState::refused) {
+    disconnect("the server has no room for another client", Ending::refused);
+    deliverConnect(ConnectStatus::connectRefused);
+    return true;
+  }
+  return false;
 }
 
 void Binding::deliverReply(const Envelope& envelope) {
@@ -147,7 +152,7 @@ void Binding::deliverReply(const Envelope& envelope) {
   Message message;
   if (!channel_->tryFinish(envelope, message)) {
     count(control.protocolErrors);
-    return disconnect("the server sent nonsense", false);
+    return disconnect("the server sent nonsense", Ending::nonsense);
   }
   if (envelope.sentTick != 0 && dispatcher_.endpoint().slept()) {
     dispatcher_.endpoint().noteWake(static_cast<std::int64_t>(static_cast<std::uint32_t>(Clock::nowNs() >> 4) - envelope.sentTick) * 16);
@@ -181,7 +186,7 @@ void Binding::deliverFate(Request& request, Fate fate) {
 
 bool Binding::hasDeadPeer() const noexcept { return channel_ && channel_->link().peer()->isDead(); }
 
-void Binding::disconnect(const std::string& reason, bool serverTakesNoMore) {
+void Binding::disconnect(const std::string& reason, Ending ending) {
   const auto self = shared_from_this();
   const auto channel = channel_;
   bool wasConnected = false;
@@ -194,7 +199,7 @@ void Binding::disconnect(const std::string& reason, bool serverTakesNoMore) {
   Envelope envelope;
   while (channel_ == channel && channel->tryBegin(envelope) == MessageLink::Take::message) deliverReply(envelope);
   requests_->forEach([&](Request& request) {
-    deliverFate(request, serverTakesNoMore && !link.isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
+    deliverFate(request, ending != Ending::nonsense && !link.isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
   auto& endpoint = dispatcher_.endpoint();
@@ -212,7 +217,9 @@ void Binding::disconnect(const std::string& reason, bool serverTakesNoMore) {
     channel_.reset();
   }
   if (wasConnected) deliverConnect(ConnectStatus::connectNo);
-  if (!left_) tryConnect();
+  if (left_) return;
+  if (ending == Ending::serverGone) return tryConnect();
+  wakeAt(Clock::nowNs() + kRetryNs);
 }
 
 void Binding::cancel(std::uint32_t requestId) {
@@ -222,7 +229,7 @@ void Binding::cancel(std::uint32_t requestId) {
 
 void Binding::leave() {
   left_ = true;
-  if (channel_) disconnect("the client ended");
+  if (channel_) disconnect("the client ended", Ending::serverGone);
   if (wish_) segments::remove(wish_.name());
   wish_ = {};
 }

@@ -39,8 +39,12 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void tryConnect();
   // One message or change of state of the link. False when there was none.
   bool takeOne();
-  // `serverTakesNoMore`: the server is dead or has closed the link, so that what it has not taken it never will.
-  void disconnect(const std::string& reason, bool serverTakesNoMore = true);
+  enum class Ending {
+    serverGone,  // dead, or it closed the link: what it has not taken it never will
+    refused,     // it is there and does not want us: ask again later
+    nonsense,    // we end it: the server may go on taking for a while
+  };
+  void disconnect(const std::string& reason, Ending ending);
   void cancel(std::uint32_t requestId);
   // No callback after this.
   void leave();
@@ -56,7 +60,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverReply(const Envelope& envelope);
-  void onLinkState();
+  bool onLinkState();
   void wish();
   void setReason(const std::string& reason);
   void wakeAt(std::int64_t ns) noexcept;

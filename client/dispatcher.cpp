@@ -155,7 +155,7 @@ void Dispatcher::Impl::handleNews() {
   if (endpoint_.takePeerDeath()) {
     const auto bindings = bindings_;  // a callback may destroy a client
     for (const auto& binding : bindings) {
-      if (binding->hasDeadPeer()) binding->disconnect("the server's process ended");
+      if (binding->hasDeadPeer()) binding->disconnect("the server's process ended", Binding::Ending::serverGone);
     }
   }
   if (namesChanged_.exchange(false, std::memory_order_relaxed)) connectWaiting();
