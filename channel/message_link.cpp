@@ -5,47 +5,25 @@
 
 namespace mpf {
 
-MessageLink::Take MessageLink::tryBegin(Envelope& envelope) noexcept {
-  if (!link_->hasMessage()) return Take::nothing;
-  envelope = link_->begin();
-  const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
-  const bool fits = isChunk ? envelope.bodyBytes <= link_->maxMessageBytes() : envelope.bodyBytes <= link_->inlineCapacity();
-  return fits && link_->inlineCapacity() != 0 ? Take::message : Take::nonsense;
-}
-
-bool MessageLink::tryFinish(const Envelope& envelope, Message& message) noexcept {
-  try {
-    readBody(envelope, message);
-  } catch (const std::bad_alloc&) {
-    message.reset();
-  }
-  link_->end();
-  if (!message) return false;
-  message.setClientType(envelope.clientType);
-  message.setClientExtra(envelope.clientExtra);
-  return true;
-}
-
-void MessageLink::readBody(const Envelope& envelope, Message& message) {
+void MessageLink::readBody(const Envelope& envelope, Message& message) noexcept try {
   const auto type = static_cast<MessageType>(envelope.type);
+  message.reset();
   if ((envelope.flags & layout::kSlotChunk) != 0) {
-    message.reset();
     const std::lock_guard guard(*lock_);
     if (const auto chunk = link_->tryChunk(envelope)) {
       lendOne();
       message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
     }
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
-    message.assignInline(type, envelope.bodyBytes, [&](std::span<std::byte, Message::kInlineBytes> body) {
-      if (envelope.bodyBytes <= layout::kFirstSlotBodyBytes) return link_->copyFirst(body.first<layout::kFirstSlotBodyBytes>());
-      link_->copyBody(body.first(envelope.bodyBytes));
-    });
+    message.assignInline(type, envelope.bodyBytes, [&](auto body) { link_->copyBody(body.first(envelope.bodyBytes)); });
   } else {
     auto body = allocateHeapBody(layout::kInlineBodyBytes);
     body.size = envelope.bodyBytes;
     link_->copyBody({body.data, body.size});
     message = Message::adopt(type, body);
   }
+} catch (const std::bad_alloc&) {
+  message.reset();
 }
 
 void MessageLink::discard(const Envelope& envelope) noexcept {

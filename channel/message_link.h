@@ -9,8 +9,8 @@
 #include <memory>
 #include <optional>
 
-#include <mpf/schema/message.h>
 #include <mpf/channel/spin_lock.h>
+#include <mpf/schema/message.h>
 #include <mpf/shm/link.h>
 
 namespace mpf {
@@ -24,9 +24,27 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
 
   enum class Take { nothing, message, nonsense };
   // Begins the next message: its envelope is copied and it counts as taken. `nothing` changes nothing.
-  Take tryBegin(Envelope& envelope) noexcept;
+  Take tryBegin(Envelope& envelope) noexcept {
+    if (!link_->hasMessage()) return Take::nothing;
+    envelope = link_->begin();
+    const auto room = link_->inlineCapacity();
+    const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
+    return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room) ? Take::message : Take::nonsense;
+  }
   // The body of the message begun into `message`, then done with its slots. False: nonsense, and `message` is empty.
-  [[nodiscard]] bool tryFinish(const Envelope& envelope, Message& message) noexcept;
+  [[nodiscard]] bool tryFinish(const Envelope& envelope, Message& message) noexcept {
+    if ((envelope.flags & layout::kSlotChunk) == 0 && envelope.bodyBytes <= layout::kFirstSlotBodyBytes) {
+      message.assignInline(static_cast<MessageType>(envelope.type), envelope.bodyBytes,
+                           [&](auto body) { link_->copyFirst(body.template first<layout::kFirstSlotBodyBytes>()); });
+    } else {
+      readBody(envelope, message);
+    }
+    link_->end();
+    if (!message) return false;
+    message.setClientType(envelope.clientType);
+    message.setClientExtra(envelope.clientExtra);
+    return true;
+  }
   // Done with the message begun without looking at its body; a chunk goes back.
   void discard(const Envelope& envelope) noexcept;
 
@@ -40,7 +58,8 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
-  void readBody(const Envelope& envelope, Message& message);
+  // Of a message that is more than one slot can hold.
+  void readBody(const Envelope& envelope, Message& message) noexcept;
   void lendOne() noexcept;
   void endLending() noexcept;
 

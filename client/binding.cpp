@@ -2,7 +2,6 @@
 #include <mpf/client/binding.h>
 
 #include <fmt/format.h>
-
 #include <mutex>
 
 #include <mpf/client/dispatcher_impl.h>
@@ -100,12 +99,15 @@ bool Binding::takeOne() {
   if (!channel_) return false;
   Envelope envelope;
   switch (channel_->tryBegin(envelope)) {
-    case MessageLink::Take::message: deliverReply(envelope); return true;
+    case MessageLink::Take::message:
+      deliverReply(envelope);
+      return true;
     case MessageLink::Take::nonsense:
       count(dispatcher_.endpoint().control().protocolErrors);
       disconnect("the server sent nonsense", Ending::nonsense);
       return true;
-    case MessageLink::Take::nothing: break;
+    case MessageLink::Take::nothing:
+      break;
   }
   return onLinkState();
 }

@@ -10,6 +10,11 @@
 #include <mpf/client/dispatcher_impl.h>
 
 namespace mpf {
+namespace {
+
+constexpr int kBatch = 16;  // messages of one link before the others have their turn
+
+}  // namespace
 
 Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
     : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {}, Rights{0666, ~std::uint32_t{0}}, options.waitMode,
@@ -68,7 +73,9 @@ bool Dispatcher::Impl::step() {
   if (endpoint_.takeLocalNews()) handleNews();
   if (const auto index = endpoint_.next()) {
     auto* binding = *index < byIndex_.size() ? byIndex_[*index] : nullptr;
-    if (binding != nullptr && binding->takeOne()) return true;
+    int taken = 0;
+    while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;  // a binding that leaves lives until the next step
+    if (taken != 0) return true;
   }
   if (dueNs_.load(std::memory_order_relaxed) == INT64_MAX || !nextDue().hasPassed()) return false;
   handleDue();

@@ -8,13 +8,20 @@ namespace mpf {
 
 const char* toString(SendResult result) noexcept {
   switch (result) {
-    case SendResult::sent: return "sent";
-    case SendResult::notConnected: return "not connected";
-    case SendResult::queueFull: return "the server's queue is full";
-    case SendResult::tooManyOutstanding: return "too many requests without a reply";
-    case SendResult::tooLarge: return "larger than the server allows";
-    case SendResult::noMemory: return "no shared memory left";
-    case SendResult::empty: return "an empty message";
+    case SendResult::sent:
+      return "sent";
+    case SendResult::notConnected:
+      return "not connected";
+    case SendResult::queueFull:
+      return "the server's queue is full";
+    case SendResult::tooManyOutstanding:
+      return "too many requests without a reply";
+    case SendResult::tooLarge:
+      return "larger than the server allows";
+    case SendResult::noMemory:
+      return "no shared memory left";
+    case SendResult::empty:
+      return "an empty message";
   }
   return "unknown";
 }

@@ -46,10 +46,15 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
   }
   switch (sent) {
     case LinkSend::sent:
-    case LinkSend::sentInPlace: message.reset(); break;
-    case LinkSend::full: return SendResult::queueFull;
-    case LinkSend::tooLarge: return SendResult::tooLarge;
-    case LinkSend::noMemory: return SendResult::noMemory;
+    case LinkSend::sentInPlace:
+      message.reset();
+      break;
+    case LinkSend::full:
+      return SendResult::queueFull;
+    case LinkSend::tooLarge:
+      return SendResult::tooLarge;
+    case LinkSend::noMemory:
+      return SendResult::noMemory;
   }
   if (!takeBefore.isNever()) wakeAt(takeBefore.ns());
   return SendResult::sent;

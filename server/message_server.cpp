@@ -2,7 +2,6 @@
 #include <mpf/server/message_server.h>
 
 #include <fmt/format.h>
-
 #include <stdexcept>
 
 #include <mpf/server/server_core.h>
@@ -12,19 +11,23 @@ namespace mpf {
 
 const char* toString(ReplyResult result) noexcept {
   switch (result) {
-    case ReplyResult::sent: return "sent";
-    case ReplyResult::clientGone: return "client gone";
-    case ReplyResult::queueFull: return "reply queue full";
-    case ReplyResult::tooLarge: return "too large";
-    case ReplyResult::noMemory: return "no shared memory left";
+    case ReplyResult::sent:
+      return "sent";
+    case ReplyResult::clientGone:
+      return "client gone";
+    case ReplyResult::queueFull:
+      return "reply queue full";
+    case ReplyResult::tooLarge:
+      return "too large";
+    case ReplyResult::noMemory:
+      return "no shared memory left";
   }
   return "unknown";
 }
 
 class MessageServer::Impl {
  public:
-  Impl(Backplane backplane, const std::string& name, const ServerOptions& options)
-      : core(std::move(backplane), name, options) {}
+  Impl(Backplane backplane, const std::string& name, const ServerOptions& options) : core(std::move(backplane), name, options) {}
 
   ServerCore core;
   std::map<MessageType, std::function<void(Message&&)>> handlers;
@@ -83,8 +86,8 @@ int MessageServer::runUntilSignal() {
 
 void MessageServer::report() const {
   const auto counts = impl_->core.counts();
-  fmt::print("{}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n", getName(), "queueSize", counts.queueSize, "inQueue", counts.inQueue,
-             "queueRequests", counts.requests, "queueFullResponses", counts.queueFull, "replyRequests", counts.replies);
+  fmt::print("{}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n", getName(), "queueSize", counts.queueSize, "inQueue",
+             counts.inQueue, "queueRequests", counts.requests, "queueFullResponses", counts.queueFull, "replyRequests", counts.replies);
 }
 
 }  // namespace mpf

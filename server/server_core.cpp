@@ -2,7 +2,6 @@
 #include <mpf/server/server_core.h>
 
 #include <fmt/format.h>
-
 #include <list>
 #include <mutex>
 #include <stdexcept>
@@ -73,7 +72,8 @@ ServerCore::ServerCore(Backplane backplane, const std::string& name, const Serve
     : name_(name),
       location_(options.location),
       endpoint_(backplane, layout::SegmentKind::serverWindow, windowName(backplane, name, options.location), options.rights,
-                options.waitMode, [&](layout::SegmentHeader& header) {
+                options.waitMode,
+                [&](layout::SegmentHeader& header) {
                   const auto queueSize = static_cast<std::uint32_t>(checkedQueueSize(options.queueSize));
                   header.location = options.location;
                   name.copy(header.name.data(), header.name.size() - 1);
@@ -141,9 +141,15 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   auto& control = endpoint_.control();
   Envelope envelope;
   switch (connection.channel->tryBegin(envelope)) {
-    case MessageLink::Take::nothing: closeIfClientDid(connection); return false;
-    case MessageLink::Take::nonsense: count(control.protocolErrors); close(connection); return false;
-    case MessageLink::Take::message: break;
+    case MessageLink::Take::nothing:
+      closeIfClientDid(connection);
+      return false;
+    case MessageLink::Take::nonsense:
+      count(control.protocolErrors);
+      close(connection);
+      return false;
+    case MessageLink::Take::message:
+      break;
   }
   count(control.received);
   count(control.progress);

@@ -34,7 +34,7 @@ void stop(int) {
 }
 
 void install() {
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = stop;
   ::sigemptyset(&action.sa_mask);
   ::sigaction(SIGINT, &action, &before[0]);

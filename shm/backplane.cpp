@@ -2,10 +2,10 @@
 #include <mpf/shm/backplane.h>
 
 #include <fcntl.h>
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <fmt/format.h>
 #include <set>
 
 #include <mpf/shm/segment_name.h>

@@ -21,10 +21,13 @@ constexpr std::int64_t kLookAtAllNs = 100'000'000;
 
 Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights, WaitMode mode,
                    const std::function<void(layout::SegmentHeader&)>& describe)
-    : backplane_(std::move(backplane)), window_(backplane_.name(), kind, name, rights, [&](layout::SegmentHeader& header) {
-        header.waitMode = static_cast<std::uint32_t>(mode);
-        describe(header);
-      }), mode_(mode) {}
+    : backplane_(std::move(backplane)),
+      window_(backplane_.name(), kind, name, rights,
+              [&](layout::SegmentHeader& header) {
+                header.waitMode = static_cast<std::uint32_t>(mode);
+                describe(header);
+              }),
+      mode_(mode) {}
 
 Endpoint::~Endpoint() {
   for (const auto& [name, peer] : peers_) backplane_.watcher().forget(peer.token);

@@ -24,7 +24,8 @@
 
 namespace mpf::layout {
 
-inline constexpr std::uint64_t kMagic = 0x314e'4957'2d46'504d;  // "MPF-WIN1" as bytes on a little-endian host; another byte order mismatches
+inline constexpr std::uint64_t kMagic =
+    0x314e'4957'2d46'504d;  // "MPF-WIN1" as bytes on a little-endian host; another byte order mismatches
 inline constexpr std::uint16_t kMajor = 1;
 inline constexpr std::uint16_t kMinor = 0;
 inline constexpr std::uint16_t kOldestMajor = 1;  // oldest major version that this code reads

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/link.h>
 
-#include <fmt/format.h>
-
 #include <bit>
+#include <fmt/format.h>
 
 #include <mpf/base/clock.h>
 #include <mpf/shm/segment_name.h>
@@ -101,7 +100,8 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   const auto& header = segment->header();
   const auto& offer = own.header();
   checkGeometry(header, name);
-  if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes || segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+  if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes ||
+      segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
     throw SegmentError(fmt::format("{}: not a link that this server offers", segments::path(name)));
   }
   segment->closeFile();
@@ -185,13 +185,9 @@ void Link::afterPush() noexcept {
   if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
 }
 
-bool Link::isTaken(std::uint64_t ordinal) noexcept {
-  return out_.isTaken(ordinal);
-}
+bool Link::isTaken(std::uint64_t ordinal) noexcept { return out_.isTaken(ordinal); }
 
-std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept {
-  return pool_.tryAlloc(bytes);
-}
+std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
 
 void Link::release(const std::byte* data) noexcept {
   if (const auto own = pool_.tryFind(data)) {

@@ -82,9 +82,7 @@ bool PoolOwner::isState(const layout::ChunkRef& ref, ChunkState state) const noe
          bulks_[ref.segment].states[ref.chunk] == state;
 }
 
-void PoolOwner::lend(const layout::ChunkRef& ref) noexcept {
-  bulks_[ref.segment].states[ref.chunk] = ChunkState::lent;
-}
+void PoolOwner::lend(const layout::ChunkRef& ref) noexcept { bulks_[ref.segment].states[ref.chunk] = ChunkState::lent; }
 
 std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noexcept {
   if (!isState(ref, ChunkState::lent)) return std::nullopt;

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-
 #include <fstream>
 #include <mutex>
 #include <sstream>
@@ -28,7 +27,7 @@ std::uint64_t startTicksOf(const std::string& pid) {
 }
 
 std::uint64_t ownPidNamespace() {
-  struct stat status {};
+  struct stat status{};
   return ::stat("/proc/self/ns/pid", &status) == 0 ? status.st_ino : 0;
 }
 

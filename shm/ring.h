@@ -136,7 +136,8 @@ class RingConsumer {
     own_.taken.store(messages_, std::memory_order_release);
     const auto& first = slot(taken_);
     slotsNow_ = first.slots;
-    return {first.type, first.flags, first.bodyBytes, first.requestId, first.clientType, first.clientExtra, first.sentTick, first.deadlineNs};
+    return {first.type,       first.flags,       first.bodyBytes, first.requestId,
+            first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
   }
 
   // Bytes that the message begun can hold in line; 0 when its slot count is nonsense.

@@ -3,12 +3,12 @@
 
 #include <dirent.h>
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/random.h>
 #include <sys/stat.h>
 
 #include <boost/interprocess/shared_memory_object.hpp>
 #include <cstring>
+#include <fmt/format.h>
 #include <memory>
 
 #include <mpf/base/clock.h>
@@ -34,7 +34,7 @@ class OpenFile {
 };
 
 struct flock64 wholeFile(short type) {
-  struct flock64 lock {};
+  struct flock64 lock{};
   lock.l_type = type;
   lock.l_whence = SEEK_SET;
   return lock;
@@ -118,7 +118,7 @@ std::optional<Segment> Segment::tryOpen(const std::string& name, layout::Segment
     throwSystemError(reason, "open", segments::path(name));
   }
   segment.file_ = std::move(file);
-  struct stat status {};
+  struct stat status{};
   checkCall(::fstat(segment.file_.get(), &status), "look at", segments::path(name));
   const auto fileBytes = static_cast<std::size_t>(status.st_size);
   const auto got = ::pread(segment.file_.get(), &segment.header_, sizeof segment.header_, 0);
@@ -166,8 +166,8 @@ bool removeIfOwnerless(const std::string& name) {
   const auto file = openByName(name, O_RDWR);
   if (!file || !tryLock(file.get())) return false;
   // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
-  struct stat locked {};
-  struct stat named {};
+  struct stat locked{};
+  struct stat named{};
   if (::fstat(file.get(), &locked) != 0 || ::stat(path(name).c_str(), &named) != 0) return false;
   return locked.st_ino == named.st_ino && remove(name);
 }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/segment_name.h>
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <charconv>
+#include <fmt/format.h>
 #include <stdexcept>
 #include <vector>
 
@@ -49,8 +48,8 @@ std::optional<std::uint64_t> tryHex(std::string_view text) {
 
 void SegmentName::checkBackplane(std::string_view backplane) {
   if (backplane.empty() || backplane.size() >= layout::kBackplaneChars || !std::all_of(backplane.begin(), backplane.end(), isPlain)) {
-    throw std::invalid_argument(fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -", backplane,
-                                            layout::kBackplaneChars - 1));
+    throw std::invalid_argument(
+        fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -", backplane, layout::kBackplaneChars - 1));
   }
 }
 

@@ -137,9 +137,7 @@ void Watcher::handle(Token token) {
   }
 }
 
-bool Watcher::isGone(const Peer& peer) const {
-  return peer.window->isClosed() || !peer.window->hasOwner();
-}
+bool Watcher::isGone(const Peer& peer) const { return peer.window->isClosed() || !peer.window->hasOwner(); }
 
 void Watcher::report(Token token) {
   const auto found = peers_.find(token);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/window.h>
 
-#include <fmt/format.h>
 #include <sched.h>
 
 #include <cstring>
+#include <fmt/format.h>
 
 #include <mpf/shm/segment_name.h>
 
