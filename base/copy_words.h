@@ -14,7 +14,7 @@ template <std::size_t bytes>
 inline void copyWords(std::byte* to, const std::byte* from) noexcept {
   static_assert(bytes % sizeof(std::uint32_t) == 0);
   for (std::size_t at = 0; at < bytes; at += sizeof(std::uint32_t)) {
-    std::uint32_t word;
+    std::uint32_t word = 0;
     std::memcpy(&word, from + at, sizeof word);
     asm("" : "+r"(word));
     std::memcpy(to + at, &word, sizeof word);

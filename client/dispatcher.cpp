@@ -200,7 +200,7 @@ void Dispatcher::Impl::handleDue() {
   for (const auto& binding : bindings_) noteDue(binding->dueNs());
 }
 
-Dispatcher::Dispatcher(Backplane backplane, DispatcherOptions options) : impl_(std::make_shared<Impl>(std::move(backplane), options)) {}
+Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& options) : impl_(std::make_shared<Impl>(backplane, options)) {}
 Dispatcher::~Dispatcher() { impl_->endThread(); }
 
 std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {

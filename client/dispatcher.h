@@ -25,7 +25,7 @@ struct DispatcherOptions {
 
 class Dispatcher {
  public:
-  explicit Dispatcher(Backplane backplane, DispatcherOptions options = {});
+  explicit Dispatcher(const Backplane& backplane, const DispatcherOptions& options = {});
   ~Dispatcher();
   Dispatcher(const Dispatcher&) = delete;
   Dispatcher& operator=(const Dispatcher&) = delete;

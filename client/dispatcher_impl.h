@@ -70,7 +70,7 @@ class Dispatcher::Impl {
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
-  std::atomic<std::thread::id> runner_{};
+  std::atomic<std::thread::id> runner_;
   bool hasDescriptor_ = false;
   bool hasThread_ = false;
   std::thread thread_;

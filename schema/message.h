@@ -69,6 +69,7 @@ class Message {
   static constexpr std::size_t kInlineBytes = 32;
 
   Message() noexcept = default;
+  // NOLINTNEXTLINE(performance-move-constructor-init): the state is plain data
   Message(Message&& other) noexcept : state_(other.state_) { other.forget(); }
   Message& operator=(Message&& other) noexcept {
     if (this != &other) {

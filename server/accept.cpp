@@ -16,7 +16,7 @@ void ServerCore::acceptAll() {
 }
 
 void ServerCore::accept(std::uint64_t incarnation) {
-  if (byLink_.count(incarnation) != 0) return;
+  if (byLink_.contains(incarnation)) return;
   try {
     const auto& backplane = endpoint_.backplane().name();
     const auto name = SegmentName::link(backplane, endpoint_.window().header().incarnation, incarnation);

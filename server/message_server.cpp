@@ -27,14 +27,14 @@ const char* toString(ReplyResult result) noexcept {
 
 class MessageServer::Impl {
  public:
-  Impl(Backplane backplane, const std::string& name, const ServerOptions& options) : core(std::move(backplane), name, options) {}
+  Impl(const Backplane& backplane, const std::string& name, const ServerOptions& options) : core(backplane, name, options) {}
 
   ServerCore core;
   std::map<MessageType, std::function<void(Message&&)>> handlers;
 };
 
-MessageServer::MessageServer(Backplane backplane, const std::string& name, ServerOptions options)
-    : impl_(std::make_unique<Impl>(std::move(backplane), name, options)) {}
+MessageServer::MessageServer(const Backplane& backplane, const std::string& name, const ServerOptions& options)
+    : impl_(std::make_unique<Impl>(backplane, name, options)) {}
 
 MessageServer::~MessageServer() = default;
 

@@ -46,7 +46,7 @@ class MessageServer {
  public:
   // Opens the server under `name` at once; requests wait until somebody receives them.
   //   throws  NameInUse when another process serves that name at that location, std::invalid_argument, std::system_error
-  MessageServer(Backplane backplane, const std::string& name, ServerOptions options = {});
+  MessageServer(const Backplane& backplane, const std::string& name, const ServerOptions& options = {});
   ~MessageServer();
   MessageServer(const MessageServer&) = delete;
   MessageServer& operator=(const MessageServer&) = delete;
@@ -91,7 +91,7 @@ class MessageServer {
   void on(Handler handler) {
     setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
       auto typed = MessageOf<T>::tryFrom(std::move(message));
-      if (!typed) return refuse(std::move(message));
+      if (!typed) return refuse(std::move(message));  // NOLINT(bugprone-use-after-move): then it is as it was
       if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&&>) {
         handler(std::move(*typed));
       } else {

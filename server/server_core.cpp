@@ -68,7 +68,7 @@ std::string windowName(const Backplane& backplane, const std::string& name, std:
 
 }  // namespace
 
-ServerCore::ServerCore(Backplane backplane, const std::string& name, const ServerOptions& options)
+ServerCore::ServerCore(const Backplane& backplane, const std::string& name, const ServerOptions& options)
     : name_(name),
       location_(options.location),
       endpoint_(backplane, layout::SegmentKind::serverWindow, windowName(backplane, name, options.location), options.rights,

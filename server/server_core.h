@@ -35,7 +35,7 @@ struct Connection {
 
 class ServerCore {
  public:
-  ServerCore(Backplane backplane, const std::string& name, const ServerOptions& options);
+  ServerCore(const Backplane& backplane, const std::string& name, const ServerOptions& options);
   ~ServerCore();
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
@@ -60,7 +60,10 @@ class ServerCore {
 
  private:
   class Keeper;
-  static Connection& connectionOf(const Route& route) noexcept { return *reinterpret_cast<Connection*>(route.link); }
+  static Connection& connectionOf(const Route& route) noexcept {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): a route is opaque to everybody else
+    return *reinterpret_cast<Connection*>(route.link);
+  }
   void lookAround();
   void accept(std::uint64_t incarnation);
   void acceptAll();

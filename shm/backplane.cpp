@@ -54,7 +54,7 @@ void surveyWindow(const std::string& name, const SegmentName::Parsed& parsed, Su
 bool hasLivingOwner(const std::string& name, layout::SegmentKind kind, const Survey& survey) {
   try {
     const auto segment = Segment::tryOpen(name, kind, Segment::Access::readOnly);
-    return !segment || survey.windows.count(segment->header().ownerWindow) != 0;
+    return !segment || survey.windows.contains(segment->header().ownerWindow);
   } catch (const SegmentError&) {
     return false;  // nobody can use it
   } catch (const std::exception&) {
@@ -73,7 +73,7 @@ void surveyDependent(const std::string& name, const SegmentName::Parsed& parsed,
       if (segments::removeIfOwnerless(name)) survey.removed.push_back(name);
       return;
     case NameKind::fifo:
-      keep = survey.windows.count(parsed.incarnation) != 0;
+      keep = survey.windows.contains(parsed.incarnation);
       break;
     case NameKind::wish:
       keep = hasLivingOwner(name, layout::SegmentKind::wish, survey);
@@ -128,7 +128,7 @@ std::vector<std::string> Backplane::removeDead() const {
   });
   forEach([&](const std::string& segment, const SegmentName::Parsed& parsed) { surveyDependent(segment, parsed, survey); });
   forEach([&](const std::string& segment, const SegmentName::Parsed& parsed) {
-    if (parsed.kind == NameKind::bulk && survey.links.count(parsed.incarnation) == 0 && segments::remove(segment)) {
+    if (parsed.kind == NameKind::bulk && !survey.links.contains(parsed.incarnation) && segments::remove(segment)) {
       survey.removed.push_back(segment);
     }
   });

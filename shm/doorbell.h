@@ -25,8 +25,10 @@ inline void fence() noexcept {
 #ifdef __SANITIZE_THREAD__
   // ThreadSanitizer does not know fences; a locked instruction is one on the hosts that it runs on.
   static std::atomic<std::uint32_t> anywhere{0};
+  // PAIR(sleep-fence), PAIR(watch-fence): as the callers say.
   anywhere.fetch_add(1, std::memory_order_seq_cst);
 #else
+  // PAIR(sleep-fence), PAIR(watch-fence): as the callers say.
   std::atomic_thread_fence(std::memory_order_seq_cst);
 #endif
 }

@@ -119,15 +119,12 @@ std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
     if (links_[*revisit_] != nullptr && links_[*revisit_]->hasMessage()) setReadyBit(*revisit_);
     revisit_.reset();
   }
-  auto& hints = window_.hints();
+  if (!hasReadyWords()) return std::nullopt;
   constexpr auto kWords = layout::kMaxLinks / 64;
-  for (std::size_t summary = 0; summary < hints.readyWords.size(); ++summary) {
-    if (hints.readyWords[summary].load(std::memory_order_relaxed) == 0) continue;
-    // Start behind the last one, so that low numbers do not starve high ones.
-    for (std::size_t looked = 0; looked < kWords; ++looked) {
-      const auto word = (readyCursor_ / 64 + looked) % kWords;
-      if (const auto index = takeReadyBit(word)) return index;
-    }
+  // Start behind the last one, so that low numbers do not starve high ones.
+  for (std::size_t looked = 0; looked < kWords; ++looked) {
+    const auto word = (readyCursor_ / 64 + looked) % kWords;
+    if (const auto index = takeReadyBit(word)) return index;
   }
   return std::nullopt;
 }
@@ -222,13 +219,12 @@ void Endpoint::interrupt() noexcept {
   window_.ring();
 }
 
-bool Endpoint::hasHints() const noexcept {
-  const auto& hints = window_.hints();
-  for (const auto& word : hints.readyWords) {
-    if (word.load(std::memory_order_relaxed) != 0) return true;
-  }
-  return hasSideNews();
+bool Endpoint::hasReadyWords() const noexcept {
+  const auto& words = window_.hints().readyWords;
+  return std::any_of(words.begin(), words.end(), [](const auto& word) { return word.load(std::memory_order_relaxed) != 0; });
 }
+
+bool Endpoint::hasHints() const noexcept { return hasReadyWords() || hasSideNews(); }
 
 bool Endpoint::hasNews() const noexcept {
   for (std::size_t position = 0; position < hotCount_; ++position) {

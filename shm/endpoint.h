@@ -93,6 +93,7 @@ class Endpoint {
   void coolAll() noexcept;
   void setReadyBit(std::uint32_t index) noexcept;
   [[nodiscard]] bool hasNews() const noexcept;
+  [[nodiscard]] bool hasReadyWords() const noexcept;
   [[nodiscard]] bool hasHints() const noexcept;
   bool spin(Deadline deadline) noexcept;
   void announce(layout::SleepState how) noexcept;

@@ -104,7 +104,7 @@ struct Histogram {
   Word64 maxNs;
   std::array<std::uint64_t, 3> reserved;
 };
-static_assert(sizeof(Histogram) == 8 * (kHistogramBuckets + 4));
+static_assert(sizeof(Histogram) == sizeof(std::uint64_t) * (kHistogramBuckets + std::size_t{4}));
 
 enum class WindowState : std::uint32_t { open = 1, closed = 2 };
 enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2 };

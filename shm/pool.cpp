@@ -20,8 +20,8 @@ std::size_t chunkBytesFor(std::size_t bytes) {
 }
 
 std::uint32_t chunkCountFor(std::size_t chunkBytes) {
-  constexpr std::size_t kBulkBytes = 256 * 1024;
-  constexpr std::size_t kHugeBytes = 16 * 1024 * 1024;
+  constexpr std::size_t kBulkBytes = std::size_t{256} * 1024;
+  constexpr std::size_t kHugeBytes = std::size_t{16} * 1024 * 1024;
   if (chunkBytes > kHugeBytes) return 1;
   return static_cast<std::uint32_t>(std::clamp<std::size_t>(kBulkBytes / chunkBytes, 2, 32));
 }

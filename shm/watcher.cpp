@@ -151,13 +151,13 @@ void Watcher::report(Token token) {
 void Watcher::readNames() {
   alignas(inotify_event) std::array<char, 4096> events;
   bool news = false;
-  for (ssize_t got; (got = ::read(names_.get(), events.data(), events.size())) > 0;) {
+  for (ssize_t got = 0; (got = ::read(names_.get(), events.data(), events.size())) > 0;) {
     news = tellsOfServer(events.data(), static_cast<std::size_t>(got)) || news;
   }
   if (!news) return;
   auto callbacks = nameCallbacks_;  // a callback may forget
   for (const auto& [token, callback] : callbacks) {
-    if (nameCallbacks_.count(token) != 0) callback();
+    if (nameCallbacks_.contains(token)) callback();
   }
 }
 
@@ -169,7 +169,7 @@ void Watcher::poll() {
     if (!peer.process && isGone(peer)) gone.push_back(token);
   }
   for (const auto token : gone) {
-    if (peers_.count(token) != 0) report(token);
+    if (peers_.contains(token)) report(token);
   }
 }
 

@@ -35,7 +35,7 @@ std::string describeOwner(const std::string& name) {
 
 }  // namespace
 
-OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, std::string name, Rights rights,
+OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
                      const std::function<void(layout::SegmentHeader&)>& describe)
     : backplane_(backplane), rights_(rights) {
   window_ = Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
@@ -53,7 +53,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, std
   hints_.sharedHeader().ownerWindow = incarnation;
   if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation))) throw NameInUse("an incarnation number came twice");
   try {
-    publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : std::move(name));
+    publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : name);
   } catch (...) {
     segments::remove(hints_.name());
     throw;
@@ -61,7 +61,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, std
   fifo_ = doorbell::createFifo(SegmentName::keyed(backplane, NameKind::fifo, incarnation), rights.mode, rights.group);
 }
 
-void OwnWindow::publish(std::string name) {
+void OwnWindow::publish(const std::string& name) {
   while (!window_.tryPublish(name)) {
     if (segments::removeIfOwnerless(name)) continue;
     if (isOwnedForLong(name)) throw NameInUse(fmt::format("{}: in use by {}", segments::path(name), describeOwner(name)));

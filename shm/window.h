@@ -33,7 +33,7 @@ class OwnWindow {
   // `describe` fills in name, location and geometry before anybody can see the window.
   //   name    file name of a server window; empty: a client window, named by its incarnation
   //   throws  NameInUse, std::system_error
-  OwnWindow(const std::string& backplane, layout::SegmentKind kind, std::string name, Rights rights,
+  OwnWindow(const std::string& backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
             const std::function<void(layout::SegmentHeader&)>& describe);
   ~OwnWindow();
   OwnWindow(const OwnWindow&) = delete;
@@ -49,7 +49,7 @@ class OwnWindow {
   void ring() const noexcept;
 
  private:
-  void publish(std::string name);
+  void publish(const std::string& name);
   std::string backplane_;
   Rights rights_;
   Segment window_;
