@@ -156,9 +156,7 @@ void Binding::deliverReply(const Envelope& envelope) {
     count(control.protocolErrors);
     return disconnect("the server sent nonsense", Ending::nonsense);
   }
-  if (envelope.sentTick != 0 && dispatcher_.endpoint().slept()) {
-    dispatcher_.endpoint().noteWake(static_cast<std::int64_t>(static_cast<std::uint32_t>(Clock::nowNs() >> 4) - envelope.sentTick) * 16);
-  }
+  if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0)) noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, 0, nullptr});
   if (request != nullptr) {
     // A fate that the server sent without knowing them.
@@ -167,8 +165,19 @@ void Binding::deliverReply(const Envelope& envelope) {
       message.setClientExtra(request->clientExtra);
     }
     requests_->end(*request);
+    channel_->link().control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
   }
   deliver(std::move(message));
+}
+
+void Binding::noteTimes(const Envelope& envelope, const Request* request) noexcept {
+  auto& endpoint = dispatcher_.endpoint();
+  const auto nowNs = Clock::nowNs();
+  if (request != nullptr && request->sentNs != 0) record(endpoint.control().serviceNs, nowNs - request->sentNs);
+  if (envelope.sentTick == 0) return;
+  const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
+  record(endpoint.control().queueWaitNs, waitedNs);
+  if (endpoint.slept()) endpoint.noteWake(waitedNs);
 }
 
 void Binding::deliver(Message&& message) {

@@ -60,6 +60,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   void deliverReply(const Envelope& envelope);
+  void noteTimes(const Envelope& envelope, const Request* request) noexcept;
   bool onLinkState();
   void wish();
   void setReason(const std::string& reason);

@@ -18,6 +18,7 @@ struct Request {
   std::int32_t clientExtra = 0;
   std::uint64_t ordinal = 0;  // number of its message on the link
   std::int64_t deadlineNs = 0;
+  std::int64_t sentNs = 0;  // of a timed request; else 0
 };
 
 class RequestTable {

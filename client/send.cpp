@@ -31,6 +31,8 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     request->clientExtra = envelope.clientExtra;
     request->ordinal = link.sentMessages() + 1;
     request->deadlineNs = envelope.deadlineNs;
+    request->sentNs = link.shallBeTimed() ? Clock::nowNs() : 0;
+    if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
     // Before the message goes: its reply may be here before we are.
     requests_->add(*request, id);
     sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0, 0});
@@ -41,6 +43,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     } else {
       fullTold_ = false;
       link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
+      link.control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
       if (requestId != nullptr) *requestId = id;
     }
   }

@@ -184,7 +184,7 @@ bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
 
 void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noexcept {
   const auto nowNs = Clock::nowNs();
-  const auto waitedNs = static_cast<std::int64_t>(static_cast<std::uint32_t>(nowNs >> 4) - envelope.sentTick) * 16;
+  const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
   record(endpoint_.control().queueWaitNs, waitedNs);
   if (endpoint_.slept()) endpoint_.noteWake(waitedNs);
   endpoint_.control().progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);
@@ -220,6 +220,9 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
   envelope.clientType = message.getClientType();
   envelope.clientExtra = message.getClientExtra();
 
+  auto& link = connection.channel->link();
+  if (link.shallBeTimed()) envelope.sentTick = Tick::of(Clock::nowNs());
+
   auto unowned = route;
   unowned.keeper = nullptr;
   if (first) message.setRoute(unowned);
@@ -228,6 +231,7 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
   if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
     if (first) unanswered.store(0, std::memory_order_relaxed);
     count(endpoint_.control().sent);
+    link.control().serverSent.store(link.sentMessages(), std::memory_order_relaxed);
     if (route.requestId == connection.timedId && first) {
       record(endpoint_.control().serviceNs, Clock::nowNs() - connection.timedFromNs);
       connection.timedId = 0;

@@ -206,13 +206,11 @@ enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused =
 struct LinkControl {
   alignas(kPairBytes) std::atomic<LinkState> clientState;  // client
   Word64 clientSent;
-  Word64 clientReceived;
   Word64 clientRefused;     // sends refused: queue full, too large
   Word64 clientUnanswered;  // requests without a reply or fate
   alignas(kPairBytes) std::atomic<LinkState> serverState;  // server
   Word32 serverIndex;       // bit of this link in the server window's ready bits
-  Word32 refusalReason;     // why serverState is refused: RefusalReason
-  Word64 serverReceived;
+  Word32 reserved0;
   Word64 serverSent;
   RingControl requests;  // consumer: server
   RingControl replies;   // consumer: client

@@ -144,11 +144,13 @@ void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
+bool Link::shallBeTimed() const noexcept {
+  return outControl_.unwatched.load(std::memory_order_relaxed) != 0 || out_.messages() % kSampleEvery == 0;
+}
+
 LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, Limits limits) noexcept {
   if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
   if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting && out_.waiting() >= limits.waiting) return LinkSend::full;
-  const bool polled = outControl_.unwatched.load(std::memory_order_relaxed) == 0;
-  if (!polled || out_.messages() % kSampleEvery == 0) envelope.sentTick = static_cast<std::uint32_t>(Clock::nowNs() >> 4) | 1u;
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
 
   const auto slots = slotsFor(body.size());

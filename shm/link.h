@@ -66,8 +66,10 @@ class Link {
     std::uint32_t reserve = 0;      // slots to leave free
     std::uint32_t longReserve = 0;  // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
   };
-  // Sends a body (its length, sampling and flags are added to `envelope`): in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
+  // Sends a body (its length and flags are added to `envelope`): in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
   LinkSend trySend(Envelope& envelope, std::span<const std::byte> body, Limits limits) noexcept;
+  // Whether the next message is one of those that carry their time (Envelope::sentTick).
+  [[nodiscard]] bool shallBeTimed() const noexcept;
   // Number of the last message sent, from 1.
   [[nodiscard]] std::uint64_t sentMessages() const noexcept { return out_.messages(); }
   // Whether the peer has taken message number `ordinal`.

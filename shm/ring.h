@@ -19,6 +19,14 @@
 
 namespace mpf {
 
+// CLOCK_MONOTONIC in units of 16 ns, low 32 bits, never 0: fits a slot and spans a minute.
+struct Tick {
+  [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept { return static_cast<std::uint32_t>(ns >> 4) | 1u; }
+  [[nodiscard]] static std::int64_t nsSince(std::uint32_t tick, std::int64_t nowNs) noexcept {
+    return static_cast<std::int64_t>(of(nowNs) - tick) * 16;
+  }
+};
+
 // What travels with a body. `type`, `clientType` and `clientExtra` mean nothing here.
 struct Envelope {
   std::uint16_t type{};
