@@ -11,32 +11,21 @@
 
 namespace mpf {
 
-// Handles of requests may outlive their server. Keepers are never freed, only taken over by the next server.
+// Handles of requests may outlive their server, so keepers are never freed: some bytes for each server of the process's life.
 class ServerCore::Keeper final : public RouteKeeper {
  public:
-  static Keeper* take(ServerCore& server) {
+  static Keeper* make(ServerCore& server) {
     const std::lock_guard lock(mutex());
-    for (auto& keeper : all()) {
-      if (keeper.server_ == nullptr && keeper.handles_ == 0) {
-        keeper.server_ = &server;
-        return &keeper;
-      }
-    }
     all().emplace_back().server_ = &server;
     return &all().back();
   }
-  void leave(std::uint64_t handles) noexcept {
+  void leave() noexcept {
     const std::lock_guard lock(mutex());
     server_ = nullptr;
-    handles_ = handles;
   }
   void abandoned(const Route& route) noexcept override {
     const std::lock_guard lock(mutex());
-    if (server_ != nullptr) {
-      server_->abandoned(route);
-    } else if (handles_ != 0) {
-      --handles_;
-    }
+    if (server_ != nullptr) server_->abandoned(route);
   }
 
  private:
@@ -49,7 +38,6 @@ class ServerCore::Keeper final : public RouteKeeper {
     return *keepers;
   }
   ServerCore* server_ = nullptr;
-  std::uint64_t handles_ = 0;  // of a server that is gone
 };
 
 namespace {
@@ -83,14 +71,10 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name, cons
                   auto* control = reinterpret_cast<std::byte*>(&header) + layout::kWindowControlOffset;
                   reinterpret_cast<layout::WindowControl*>(control)->queueSize.store(queueSize, std::memory_order_relaxed);
                 }),
-      keeper_(Keeper::take(*this)) {}
+      keeper_(Keeper::make(*this)) {}
 
 ServerCore::~ServerCore() {
-  std::uint64_t handles = 0;
-  for (const auto& connection : connections_) {
-    for (const auto& id : connection->unanswered) handles += id.load(std::memory_order_relaxed) != 0 ? 1u : 0u;
-  }
-  keeper_->leave(handles);
+  keeper_->leave();
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   for (const auto& connection : connections_) {
     if (connection->channel) close(*connection);
