@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include <nlohmann/json.hpp>
+
+#include <mpf/benchmarks/report.h>
+
+namespace mpf::bench {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void addFigures(Json& object, const Result& result) {
+  const auto& latency = result.figures.latency;
+  if (!result.measurement.unit.empty()) {
+    object["value"] = result.figures.value;
+    object["unit"] = result.measurement.unit;
+  } else if (latency.count() != 0) {
+    object["p50_ns"] = latency.percentileNs(50);
+    object["p99_ns"] = latency.percentileNs(99);
+    object["p999_ns"] = latency.percentileNs(99.9);
+    object["max_ns"] = latency.maxNs();
+    if (result.figures.typicalNs > 0) object["typical_ns"] = result.figures.typicalNs;
+    object["mean_ns"] = latency.meanNs();
+    object["samples"] = latency.count();
+  } else {
+    object["per_s"] = result.figures.perSecond;
+    object["samples"] = result.figures.count;
+  }
+}
+
+Json toObject(const Result& result, const Machine& machine, Placement placement) {
+  const auto& what = result.measurement;
+  Json object;
+  object["name"] = what.name;
+  object["question"] = what.question;
+  object["mode"] = toString(what.mode);
+  object["bytes"] = what.bytes;
+  object["touched"] = what.touched;
+  if (!what.detail.empty()) object["detail"] = what.detail;
+  if (!what.skipped.empty()) {
+    object["skipped"] = what.skipped;
+  } else if (!result.error.empty()) {
+    object["error"] = result.error;
+  } else {
+    addFigures(object, result);
+  }
+  object["floor_name"] = what.floorName.empty() ? Json() : Json(what.floorName);
+  object["ratio_to_floor"] = result.ratioToFloor > 0 ? Json(result.ratioToFloor) : Json();
+  object["cpus"] = {placement.server, placement.requester};
+  object["machine"] = {{"cpu", machine.cpu},           {"kernel", machine.kernel},
+                       {"governor", machine.governor}, {"placement", machine.placement},
+                       {"virtual", machine.isVirtual}, {"load", machine.load}};
+  return object;
+}
+
+}  // namespace
+
+std::string toJson(const std::vector<Result>& results, const Machine& machine, Placement placement) {
+  auto list = Json::array();
+  for (const auto& result : results) list.push_back(toObject(result, machine, placement));
+  return list.dump(1) + "\n";
+}
+
+}  // namespace mpf::bench

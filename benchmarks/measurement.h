@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// Measurement: one row of the table, before and after it was taken.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <mpf/benchmarks/mode.h>
+#include <mpf/benchmarks/peer.h>
+#include <mpf/benchmarks/stage.h>
+
+namespace mpf::bench {
+
+struct Measurement {
+  std::string question;  // the heading in the table
+  std::string name;
+  Mode mode = Mode::spin;
+  std::size_t bytes = 0;
+  bool touched = false;
+  std::string detail;      // "100 outstanding"
+  std::string floorName;   // the row that this one is divided by; empty: none
+  std::size_t floorBytes = 0;
+  std::string unit;        // of Figures::value; empty when the row is a latency or a rate
+  std::string skipped;     // why it is not taken
+  double share = 1.0;      // of the time that a row gets
+  std::function<std::unique_ptr<Environment>()> environment;  // rows one after another that name the same one share it
+  std::string environmentName;
+  std::function<Outcome(const Stage&)> run;
+};
+
+struct Result {
+  Measurement measurement;
+  Figures figures;
+  std::string error;
+  double ratioToFloor = 0;  // above 1: slower than the floor. 0: there is none
+
+  [[nodiscard]] bool isGood() const noexcept { return measurement.skipped.empty() && error.empty(); }
+  // Nanoseconds per message, whether latency (typical, or p50 where groups make no sense) or rate; 0 for neither.
+  [[nodiscard]] double costNs() const noexcept;
+};
+
+// Fills in ratioToFloor.
+void divideByFloors(std::vector<Result>& results);
+
+// Everything that `mpf bench local` takes, in order, floors first.
+//   quick     fewer sizes
+//   run name  unique on this host: part of the names of sockets and segments
+[[nodiscard]] std::vector<Measurement> catalogue(bool quick, const std::string& runName);
+
+// The rows of one source file each.
+[[nodiscard]] std::vector<Measurement> floorMeasurements(bool quick);
+[[nodiscard]] std::vector<Measurement> peerMeasurements(bool quick, const std::string& runName);
+[[nodiscard]] std::vector<Measurement> scaleMeasurements(bool quick, const std::string& runName);
+
+inline constexpr const char* kBounce = "cache-line bounce";
+inline constexpr const char* kFutexBounce = "futex bounce";
+inline constexpr const char* kMemcpyBounce = "memcpy bounce";
+inline constexpr const char* kFutexMemcpyBounce = "memcpy bounce, asleep";
+inline constexpr const char* kRing = "bare slot ring";
+
+}  // namespace mpf::bench

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// Ours, through the public API: MessageServer, and MessageClient with its callback, on a dispatcher that the requester runs itself.
+// 4 bytes are an Int32 message; larger ones a Char8Array that the client builds in shared memory and the server replies with.
+#include <mpf/benchmarks/mpf_peer.h>
+
+#include <optional>
+#include <stdexcept>
+
+#include <mpf/benchmarks/peer.h>
+#include <mpf/benchmarks/touch.h>
+#include <mpf/client/message_client.h>
+#include <mpf/server/message_server.h>
+#include <mpf/shm/cpu_relax.h>
+
+namespace mpf::bench {
+namespace {
+
+constexpr const char* kServer = "bench";
+constexpr auto kConnectLimit = std::chrono::seconds(10);
+
+class MpfPeer final : public Peer {
+ public:
+  explicit MpfPeer(PeerOptions options) : options_(std::move(options)) {}
+
+  void serve(const Scene& scene) override {
+    MessageServer server(Backplane::attach(options_.name), kServer, serverOptions(options_.mode));
+    scene.ready();
+    for (bool last = false; !last && server.waitForMessage();) {
+      while (auto request = server.receive()) {
+        last = scene.stopping();
+        if (options_.touch) {
+          const auto value = request.valueAs<Char8Array>();
+          readAll(value.data(), value.size());
+          writeAll(value.data(), value.size());
+        }
+        if (server.reply(std::move(request)) != ReplyResult::sent) throw std::runtime_error("a reply was not sent");
+      }
+    }
+  }
+
+  void connect() override {
+    dispatcher_.emplace(Backplane::attach(options_.name), DispatcherOptions{waitMode(options_.mode), {}});
+    client_.emplace(*dispatcher_, [this](Message&& message) { take(message); });
+    client_->bind(kServer);
+    if (!client_->connectWait(kConnectLimit)) throw std::runtime_error("not connected: " + client_->notConnectedBecause());
+  }
+  void send() override {
+    SendResult result{};
+    if (options_.bytes == 4) {
+      result = client_->send(Int32Message({.address = 3, .value = 100}));
+    } else {
+      auto request = client_->alloc<Char8Array>(options_.bytes);
+      if (options_.touch) writeAll(request.value().data(), options_.bytes);
+      result = client_->send(std::move(request));
+    }
+    if (result != SendResult::sent) throw std::runtime_error(std::string("send: ") + toString(result));
+  }
+  void receive() override {
+    ++awaited_;
+    while (received_ < awaited_) dispatcher_->runOnce();
+  }
+  void roundTrip() override {
+    send();
+    MpfPeer::receive();
+  }
+
+  // One way, the server sends: to one request any number of replies may be sent, and the client takes them in its callback.
+  void sink(const Scene& scene) override {
+    scene.ready();
+    connect();
+    send();
+    for (;;) {
+      dispatcher_->runOnce();
+      if (received_ % 64 == 0) scene.consumed(received_);
+    }
+  }
+  void flood(const std::function<bool()>& goOn) override {
+    MessageServer server(Backplane::attach(options_.name), kServer, serverOptions(options_.mode));
+    Message request;
+    while (!request) {
+      if (!server.waitForMessage(Deadline::after(kConnectLimit))) throw std::runtime_error("no request from the client");
+      request = server.receive();
+    }
+    for (std::int32_t value = 0; goOn();) {
+      for (int i = 0; i < 64; ++i) {
+        auto reply = server.allocReplyMessage<Int32>(request);
+        reply->value = ++value;
+        for (auto result = ReplyResult::queueFull; result != ReplyResult::sent;) {
+          result = server.reply(std::move(reply));
+          if (result == ReplyResult::queueFull) cpuRelax();
+          if (result == ReplyResult::clientGone) throw std::runtime_error("the client is gone");
+        }
+      }
+    }
+  }
+
+  void removeTraces() noexcept override { removeBackplane(options_.name); }
+
+ private:
+  void take(Message& message) {
+    if (message.getType() == MessageType::connect) return;
+    if (options_.bytes == 4) {
+      if (message.tryAs<Int32>() == nullptr) throw std::runtime_error("a reply that is none");
+    } else {
+      const auto value = message.valueAs<Char8Array>();
+      if (value.size() != options_.bytes) throw std::runtime_error("a reply of another size");
+      if (options_.touch) readAll(value.data(), value.size());
+    }
+    ++received_;
+  }
+
+  PeerOptions options_;
+  std::optional<Dispatcher> dispatcher_;
+  std::optional<MessageClient> client_;
+  std::uint64_t received_ = 0;
+  std::uint64_t awaited_ = 0;
+};
+
+}  // namespace
+
+WaitMode waitMode(Mode mode) noexcept {
+  return mode == Mode::spin ? WaitMode::spin : mode == Mode::block ? WaitMode::block : WaitMode::adaptive;
+}
+
+ServerOptions serverOptions(Mode mode) {
+  ServerOptions options;
+  options.queueSize = 256;
+  options.waitMode = waitMode(mode);
+  return options;
+}
+
+// In a process of its own: attaching starts a thread, and the runner has to stay without.
+void removeBackplane(const std::string& name) noexcept try {
+  const auto pid = forkProcess([&] { Backplane::attach(name).removeDead(); });
+  if (!waitUntil([pid] { return hasEnded(pid); }, std::chrono::seconds(10))) killProcess(pid);
+} catch (const std::exception&) {
+  return;  // segments of dead processes are removed by the next program on that backplane
+}
+
+PeerFamily mpfPeer() {
+  PeerFamily family;
+  family.name = kMpf;
+  family.modes = {Mode::spin, Mode::adaptive, Mode::block};
+  family.make = [](const PeerOptions& options) { return std::make_unique<MpfPeer>(options); };
+  family.oneWay = true;
+  return family;
+}
+
+}  // namespace mpf::bench

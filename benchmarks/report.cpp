@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/benchmarks/report.h>
+
+#include <array>
+#include <fmt/format.h>
+
+namespace mpf::bench {
+namespace {
+
+constexpr const char* kRow = "  {:<24} {:<9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>12} {:>9}  {}\n";
+
+std::string rateText(double perSecond) {
+  if (perSecond >= 1e6) return fmt::format("{:.2f} M/s", perSecond / 1e6);
+  if (perSecond >= 1e3) return fmt::format("{:.1f} k/s", perSecond / 1e3);
+  return fmt::format("{:.0f} /s", perSecond);
+}
+
+std::string ratioText(const Result& result) { return result.ratioToFloor > 0 ? fmt::format("{:.2f}", result.ratioToFloor) : ""; }
+
+std::string row(const Result& result) {
+  const auto& what = result.measurement;
+  const auto& latency = result.figures.latency;
+  const auto line = [&](const std::array<std::string, 5>& percentiles, const std::string& rate) {
+    return fmt::format(kRow, what.name, toString(what.mode), percentiles[0], percentiles[1], percentiles[2], percentiles[3], percentiles[4],
+                       rate, ratioText(result), what.floorName);
+  };
+  if (!what.skipped.empty()) return fmt::format("  {:<24} {:<9} left out: {}\n", what.name, toString(what.mode), what.skipped);
+  if (!result.error.empty()) return fmt::format("  {:<24} {:<9} failed: {}\n", what.name, toString(what.mode), result.error);
+  if (!what.unit.empty()) return fmt::format("  {:<24} {:<9} {:.6g} {}\n", what.name, toString(what.mode), result.figures.value, what.unit);
+  if (latency.count() == 0) return line({}, rateText(result.figures.perSecond));
+  const auto at = [&](double percent) { return durationText(static_cast<double>(latency.percentileNs(percent))); };
+  return line({result.figures.typicalNs > 0 ? durationText(result.figures.typicalNs) : "", at(50), at(99), at(99.9),
+               durationText(static_cast<double>(latency.maxNs()))},
+              "");
+}
+
+}  // namespace
+
+std::string durationText(double ns) {
+  if (ns < 100) return fmt::format("{:.1f} ns", ns);
+  if (ns < 10'000) return fmt::format("{:.0f} ns", ns);
+  if (ns < 10'000'000) return fmt::format("{:.1f} us", ns / 1e3);
+  return fmt::format("{:.1f} ms", ns / 1e6);
+}
+
+std::string oneLine(const Result& result) {
+  const auto& what = result.measurement;
+  auto text = what.question + ": " + what.name + ", " + toString(what.mode);
+  if (!what.skipped.empty()) return text + ": left out, " + what.skipped;
+  if (!result.error.empty()) return text + ": FAILED, " + result.error;
+  if (!what.unit.empty()) return text + fmt::format(": {:.6g} {}", result.figures.value, what.unit);
+  if (result.figures.latency.count() == 0) return text + ": " + rateText(result.figures.perSecond);
+  return text + ": " + durationText(result.costNs());
+}
+
+std::string table(const std::vector<Result>& results) {
+  std::string text;
+  std::string question;
+  for (const auto& result : results) {
+    if (result.measurement.question != question) {
+      question = result.measurement.question;
+      text += "\n" + question + "\n";
+      text += fmt::format(kRow, "", "mode", "typical", "p50", "p99", "p99.9", "max", "rate", "x floor", "floor");
+    }
+    // Floors stand for several sizes under one heading.
+    auto shown = result;
+    if (question.starts_with("Floors") && shown.measurement.bytes > 4)
+      shown.measurement.name += fmt::format(" {} KiB", shown.measurement.bytes / 1024);
+    text += row(shown);
+  }
+  return text;
+}
+
+}  // namespace mpf::bench

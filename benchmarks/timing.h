@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// Timing: the loops that the requester runs, the same for floors, peers and ours.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include <mpf/benchmarks/stage.h>
+#include <mpf/benchmarks/stopwatch.h>
+
+namespace mpf::bench {
+
+// The median duration of groups of calls, divided by the calls in a group. The counter of some processors moves in steps of 10 ns, and
+// reading it takes as long: single durations show the spread, groups tell what a call costs.
+template <class RoundTrip>
+double typicalNs(const Stopwatch& watch, Nanoseconds budget, double aboutNs, RoundTrip&& roundTrip) {
+  const auto perGroup = static_cast<std::size_t>(std::clamp(20'000.0 / std::max(aboutNs, 1.0), 1.0, 100.0));
+  std::vector<double> groups;
+  groups.reserve(1u << 16);
+  const auto end = Stopwatch::start() + watch.ticksOf(budget);
+  for (std::uint64_t now = 0; (now < end && groups.size() < groups.capacity()) || groups.empty();) {
+    const auto from = Stopwatch::start();
+    for (std::size_t i = 0; i < perGroup; ++i) roundTrip();
+    now = Stopwatch::stop();
+    groups.push_back(watch.elapsed(from, now) / static_cast<double>(perGroup));
+  }
+  const auto middle = groups.begin() + static_cast<std::ptrdiff_t>(groups.size() / 2);
+  std::nth_element(groups.begin(), middle, groups.end());
+  return *middle;
+}
+
+// Calls `roundTrip` over and over: for half of the time one by one, for the other half in groups.
+template <class RoundTrip>
+void timeEach(const Scene& scene, RoundTrip&& roundTrip) {
+  const Stopwatch watch;
+  const auto warm = Stopwatch::start() + watch.ticksOf(scene.budget().warmUp);
+  do roundTrip();
+  while (Stopwatch::start() < warm);
+
+  LatencyRecorder recorder;  // private: a shared one would be a line that bounces
+  const auto half = scene.budget().measure / 2;
+  const auto end = Stopwatch::start() + watch.ticksOf(half);
+  for (std::uint64_t now = 0; now < end;) {
+    const auto from = Stopwatch::start();
+    roundTrip();
+    now = Stopwatch::stop();
+    recorder.add(watch.elapsedNs(from, now));
+  }
+  scene.figures().typicalNs = typicalNs(watch, half, static_cast<double>(recorder.percentileNs(50)), roundTrip);
+  scene.figures().latency = recorder;
+}
+
+// Calls `step`, which finishes `perStep` messages, over and over; the result is messages a second.
+template <class Step>
+void timeRate(const Scene& scene, std::uint64_t perStep, Step&& step) {
+  const auto warm = Deadline::after(scene.budget().warmUp);
+  do step();
+  while (!warm.hasPassed());
+
+  const auto fromNs = Clock::nowNs();
+  const auto end = Deadline::after(scene.budget().measure);
+  std::uint64_t steps = 0;
+  do {
+    for (int i = 0; i < 16; ++i) step();  // the clock costs 20 ns
+    steps += 16;
+  } while (!end.hasPassed());
+  const auto elapsedNs = Clock::nowNs() - fromNs;
+  scene.figures().count = steps * perStep;
+  scene.figures().perSecond = static_cast<double>(steps * perStep) * 1e9 / static_cast<double>(elapsedNs);
+}
+
+// For one-way traffic: `flood(goOn)` sends while goOn(); what counts is what the other process has taken.
+template <class Flood>
+void timeOneWay(const Scene& scene, Flood&& flood) {
+  std::int64_t fromNs = 0;
+  std::uint64_t fromCount = 0;
+  const auto startNs = Clock::nowNs();
+  const auto warmNs = startNs + scene.budget().warmUp.count();
+  const auto endNs = warmNs + scene.budget().measure.count();
+  flood([&] {
+    const auto nowNs = Clock::nowNs();
+    if (fromNs == 0 && nowNs >= warmNs) {
+      fromNs = nowNs;
+      fromCount = scene.consumedCount();
+    }
+    if (nowNs < endNs || fromNs == 0) return true;
+    if (scene.figures().perSecond == 0) {
+      scene.figures().count = scene.consumedCount() - fromCount;
+      scene.figures().perSecond = static_cast<double>(scene.figures().count) * 1e9 / static_cast<double>(nowNs - fromNs);
+    }
+    return false;
+  });
+}
+
+}  // namespace mpf::bench
