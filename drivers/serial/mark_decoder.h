@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// MarkDecoder: takes the marks out of a terminal's bytes, which PARMRK puts before those that the line damaged (termios(3)).
+//
+//   x            x                      ff 00 x    x, damaged
+//   ff ff        ff                     ff 00 00   a break
+//
+// Threads  one. Marks may be split between calls.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <mpf/drivers/serial/serial_line.h>
+
+namespace mpf {
+
+class MarkDecoder {
+ public:
+  // Appends what `raw` says. The kernel does not tell parity from framing: damaged bytes come as `damage`.
+  void decode(std::span<const std::uint8_t> raw, LineFault damage, std::vector<LineByte>& bytes) {
+    for (const auto value : raw) decode(value, damage, bytes);
+  }
+
+ private:
+  enum class State : std::uint8_t { plain, marked, damaged };
+
+  void decode(std::uint8_t value, LineFault damage, std::vector<LineByte>& bytes) {
+    switch (state_) {
+      case State::plain:
+        if (value == kMark) {
+          state_ = State::marked;
+        } else {
+          bytes.push_back({value, LineFault::none});
+        }
+        return;
+      case State::marked:
+        state_ = value == 0 ? State::damaged : State::plain;
+        if (value != 0) bytes.push_back({value, LineFault::none});
+        return;
+      case State::damaged:
+        state_ = State::plain;
+        bytes.push_back({value, value == 0 ? LineFault::breakSignal : damage});
+        return;
+    }
+  }
+
+  static constexpr std::uint8_t kMark = 0xff;
+  State state_ = State::plain;
+};
+
+}  // namespace mpf

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/serial/port_tasks.h>
+
+#include <sys/eventfd.h>
+
+#include <cstdint>
+#include <utility>
+
+#include <mpf/base/system_call.h>
+
+namespace mpf {
+
+PortTasks::PortTasks() : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {}
+
+void PortTasks::wake() const noexcept {
+  const std::uint64_t one = 1;
+  static_cast<void>(retryInterrupted([&] { return ::write(bell_.get(), &one, sizeof one); }));  // full: it is awake already
+}
+
+void PortTasks::callUntil(const bool& done, std::function<void()> begin) {
+  std::unique_lock lock(mutex_);
+  waiting_.push_back(std::move(begin));
+  wake();
+  finished_.wait(lock, [&] { return done; });
+}
+
+void PortTasks::call(const std::function<void()>& task) {
+  bool done = false;
+  callUntil(done, [&] {
+    task();
+    finish(done);
+  });
+}
+
+void PortTasks::runAll() {
+  std::uint64_t rings = 0;
+  static_cast<void>(retryInterrupted([&] { return ::read(bell_.get(), &rings, sizeof rings); }));  // nothing to read: not rung
+  std::vector<std::function<void()>> tasks;
+  {
+    const std::lock_guard lock(mutex_);
+    tasks.swap(waiting_);
+  }
+  for (const auto& task : tasks) task();
+}
+
+void PortTasks::finish(bool& done) {
+  const std::lock_guard lock(mutex_);  // notified under the lock: `done` lives in the caller's frame, which may go right after
+  done = true;
+  finished_.notify_all();
+}
+
+}  // namespace mpf

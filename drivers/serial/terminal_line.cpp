@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/serial/terminal_line.h>
+
+#include <fcntl.h>
+#include <linux/serial.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <stdexcept>
+#include <utility>
+
+#include <mpf/base/system_call.h>
+#include <mpf/drivers/serial/terminal_settings.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::size_t kReadBytes = 4096;
+constexpr std::chrono::milliseconds kShortestDrainCheck{1};
+constexpr std::chrono::milliseconds kLongestDrainCheck{20};
+constexpr int kFlushOutputQueue = 1;  // TCOFLUSH, which is in <termios.h>
+
+}  // namespace
+
+TerminalLine::TerminalLine(std::string device, const SerialSettings& settings) : device_(std::move(device)), settings_(settings) {
+  if (const auto problem = problemOf(settings); !problem.empty()) throw std::invalid_argument(fmt::format("{}: {}", device_, problem));
+}
+
+SerialLine::OpenState TerminalLine::tryOpen() {
+  fd_.reset(retryInterrupted([&] { return ::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); }));
+  if (!fd_) {
+    problem_ = fmt::format("open {}: {}", device_, errno == EBUSY ? "in use by another program" : std::generic_category().message(errno));
+    return OpenState::failed;
+  }
+  if (const auto reason = tryPrepare(); !reason.empty()) {
+    problem_ = fmt::format("open {}: {}", device_, reason);
+    fd_.reset();
+    return OpenState::failed;
+  }
+  decoder_ = {};
+  seen_ = errorCounts().value_or(ErrorCounts{});
+  return OpenState::open;
+}
+
+// Returns empty or the reason. Nothing is changed on a device that somebody else has.
+std::string TerminalLine::tryPrepare() const {
+  if (::isatty(fd_.get()) == 0) return "not a terminal";
+  if (::flock(fd_.get(), LOCK_EX | LOCK_NB) < 0) return "in use by another program";
+  if (::ioctl(fd_.get(), TIOCEXCL) < 0) return "TIOCEXCL: " + std::generic_category().message(errno);
+  if (auto reason = terminal::tryMakeRaw(fd_.get()); !reason.empty()) return reason;
+  return terminal::tryApply(fd_.get(), settings_);
+}
+
+void TerminalLine::closeDevice() noexcept {
+  if (fd_) ::ioctl(fd_.get(), TIOCNXCL);  // or it would stay exclusive while somebody else has it open; a device that is gone does not mind
+  fd_.reset();
+}
+
+void TerminalLine::note(const char* call, int error) {
+  problem_ = fmt::format("{} {}: {}", call, device_, error == 0 ? "hung up" : std::generic_category().message(error));
+}
+
+bool TerminalLine::tryRead(std::vector<LineByte>& bytes) {
+  std::array<std::uint8_t, kReadBytes> raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
+  const auto length = retryInterrupted([&] { return ::read(fd_.get(), raw.data(), raw.size()); });
+  if (length > 0) {
+    decoder_.decode(std::span(raw).first(static_cast<std::size_t>(length)), takeErrorCounts(), bytes);
+    return true;
+  }
+  if (length < 0 && errno == EAGAIN) return true;
+  note("read", length == 0 ? 0 : errno);
+  return false;
+}
+
+std::optional<std::size_t> TerminalLine::tryWrite(std::span<const std::uint8_t> bytes) {
+  const auto length = retryInterrupted([&] { return ::write(fd_.get(), bytes.data(), bytes.size()); });
+  if (length >= 0) return static_cast<std::size_t>(length);
+  if (errno == EAGAIN) return 0;
+  note("write", errno);
+  return std::nullopt;
+}
+
+std::chrono::milliseconds TerminalLine::timeToSend() const {
+  int unsent = 0;
+  if (::ioctl(fd_.get(), TIOCOUTQ, &unsent) < 0 || unsent <= 0) return {};
+  const auto needed = std::chrono::duration_cast<std::chrono::milliseconds>(terminal::timeFor(fd_.get(), unsent));
+  return std::clamp(needed, kShortestDrainCheck, kLongestDrainCheck);
+}
+
+void TerminalLine::discardUnsent() noexcept { ::ioctl(fd_.get(), TCFLSH, kFlushOutputQueue); }
+
+std::optional<TerminalLine::ErrorCounts> TerminalLine::errorCounts() const noexcept {
+  serial_icounter_struct counts{};
+  if (::ioctl(fd_.get(), TIOCGICOUNT, &counts) < 0) return std::nullopt;
+  return ErrorCounts{static_cast<unsigned>(counts.frame),
+                     static_cast<unsigned>(counts.overrun) + static_cast<unsigned>(counts.buf_overrun)};
+}
+
+// Adds what the driver lost since the last call; returns what has damaged bytes meanwhile, if any are.
+LineFault TerminalLine::takeErrorCounts() noexcept {
+  const bool hasParity = settings_.parity == 'E' || settings_.parity == 'O';
+  const auto counts = errorCounts();
+  if (!counts) return hasParity ? LineFault::parity : LineFault::framing;
+  const auto before = std::exchange(seen_, *counts);
+  overruns_ += counts->overruns - before.overruns;
+  return hasParity && counts->framing == before.framing ? LineFault::parity : LineFault::framing;
+}
+
+std::uint64_t TerminalLine::takeOverruns() noexcept { return std::exchange(overruns_, 0); }
+
+std::string TerminalLine::tryConfigure(const SerialSettings& settings) {
+  auto refused = terminal::tryApply(fd_.get(), settings);
+  if (refused.empty()) settings_ = merged(settings_, settings);
+  return refused;
+}
+
+bool TerminalLine::trySetBreak(bool on) noexcept { return ::ioctl(fd_.get(), on ? TIOCSBRK : TIOCCBRK) == 0; }
+
+}  // namespace mpf
