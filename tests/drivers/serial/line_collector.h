@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// LineCollector: a byte handler as a server would have it: reads end at an end-of-message string. And waits of tests.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <mpf/base/system_call.h>
+#include <mpf/drivers/serial/serial_port.h>
+
+namespace mpf::test {
+
+using std::chrono_literals::operator""ms;
+using std::chrono_literals::operator""s;
+
+constexpr auto kWatchdog = 30s;  // longer than anything takes; what it guards against is a hang
+
+inline Deadline watchdog() { return Deadline::after(kWatchdog); }
+
+inline std::span<const std::uint8_t> bytesOf(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+// A folder of its own for each test, removed at its end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = std::filesystem::temp_directory_path() / "mpf-serial-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] std::string file(std::string_view name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+class LineCollector : public ByteHandler {
+ public:
+  explicit LineCollector(std::string end = "\r\n", std::string error = {}) : end_(std::move(end)), error_(std::move(error)) {}
+
+  ByteHandlerResult byteReceived(std::uint8_t byte) override {
+    const std::lock_guard lock(mutex_);
+    all_ += static_cast<char>(byte);
+    changed_.notify_all();
+    if (!error_.empty() && all_.ends_with(error_)) return ByteHandlerResult::error;
+    return all_.ends_with(end_) ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+  }
+  ByteHandlerResult readBegins() override {
+    const std::lock_guard lock(mutex_);
+    start_ = all_.size();
+    ++readsBegun_;
+    changed_.notify_all();
+    return acceptsEarlier_ && all_.ends_with(end_) ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+  }
+  void readEnds(SerialPortStatus status) override {
+    const std::lock_guard lock(mutex_);
+    answer_ = all_.substr(start_);
+    ends_.push_back(status);
+  }
+
+  // Circular buffer mode: a line that came before the read satisfies it.
+  void acceptEarlier() { acceptsEarlier_ = true; }
+  [[nodiscard]] std::string answer() const { return copyOf(answer_); }
+  [[nodiscard]] std::string all() const { return copyOf(all_); }
+  [[nodiscard]] std::vector<SerialPortStatus> ends() const { return copyOf(ends_); }
+  [[nodiscard]] bool waitForAll(std::string_view text) const {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kWatchdog, [&] { return all_ == text; });
+  }
+  [[nodiscard]] bool waitForRead() const {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kWatchdog, [&] { return readsBegun_ > 0; });
+  }
+
+ private:
+  template <class T>
+  T copyOf(const T& member) const {
+    const std::lock_guard lock(mutex_);
+    return member;
+  }
+  const std::string end_;
+  const std::string error_;
+  bool acceptsEarlier_ = false;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::string all_;
+  std::string answer_;
+  std::size_t start_ = 0;
+  int readsBegun_ = 0;
+  std::vector<SerialPortStatus> ends_;
+};
+
+}  // namespace mpf::test

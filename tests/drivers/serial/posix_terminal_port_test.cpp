@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/serial/posix_terminal_port.h>
+
+#include <future>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdexcept>
+
+#include <mpf/drivers/serial/terminal_settings.h>
+#include <mpf/tests/drivers/serial/line_collector.h>
+#include <mpf/tests/support/instrument.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class PosixTerminalPortTest : public testing::Test {
+ protected:
+  PosixTerminalOptions options() const { return {.device = folder_.file("tty")}; }
+  PosixTerminalOptions optionsWith(const SerialSettings& settings) const { return {.device = folder_.file("tty"), .settings = settings}; }
+
+  TemporaryFolder folder_;
+  Instrument instrument_{folder_.file("tty")};
+  LineCollector collector_;
+};
+
+std::string whyNot(const PosixTerminalOptions& options) {
+  try {
+    const PosixTerminalPort port(options);
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+TEST_F(PosixTerminalPortTest, StartsWithItsSettings) {
+  const PosixTerminalPort port(optionsWith({.baud = 19200, .stopBits = 2, .bitsPerChar = 8, .parity = 'N', .flowControl = 'H'}));
+
+  const auto line = instrument_.settings();
+
+  EXPECT_EQ(::cfgetospeed(&line), speed_t{B19200});
+  EXPECT_TRUE((line.c_cflag & CSTOPB) != 0);
+  EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
+}
+
+TEST_F(PosixTerminalPortTest, NamedSpeedsGoByTheirNames) {
+  PosixTerminalPort port(options());
+  const std::vector<std::pair<int, speed_t>> speeds = {{50, B50},         {110, B110},         {300, B300},         {1200, B1200},
+                                                       {9600, B9600},     {38400, B38400},     {115200, B115200},   {460800, B460800},
+                                                       {921600, B921600}, {1000000, B1000000}, {3000000, B3000000}, {4000000, B4000000}};
+  for (const auto& [baud, constant] : speeds) {
+    EXPECT_EQ(port.config({.baud = baud}), "");
+
+    const auto line = instrument_.settings();
+
+    EXPECT_EQ(::cfgetospeed(&line), constant) << baud;
+  }
+}
+
+TEST_F(PosixTerminalPortTest, TakesSpeedsThatHaveNoName) {
+  PosixTerminalPort port(options());
+
+  EXPECT_EQ(port.config({.baud = 250'000}), "");
+
+  // 100 characters of 10 bits.
+  const FileDescriptor line(::open(folder_.file("tty").c_str(), O_RDWR | O_NOCTTY));
+  if (!line) GTEST_SKIP() << "only root may open an exclusive line to look at it";
+  EXPECT_EQ(terminal::timeFor(line.get(), 100), 4ms);
+}
+
+TEST_F(PosixTerminalPortTest, ZeroLeavesASettingAsItIs) {
+  PosixTerminalPort port(optionsWith({.baud = 19200, .stopBits = 2, .flowControl = 'H'}));
+
+  EXPECT_EQ(port.config({.baud = 4800}), "");
+
+  const auto line = instrument_.settings();
+  EXPECT_EQ(::cfgetospeed(&line), speed_t{B4800});
+  EXPECT_TRUE((line.c_cflag & CSTOPB) != 0);
+  EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
+}
+
+// A pseudo-terminal has 8 bits and no parity, whatever is asked of it, and reports success.
+TEST_F(PosixTerminalPortTest, NamesTheSettingThatTheLineDoesNotAccept) {
+  PosixTerminalPort port(optionsWith({.baud = 9600}));
+
+  EXPECT_THAT(port.config({.baud = 19200, .bitsPerChar = 7}), HasSubstr("does not accept bits per character 7"));
+  EXPECT_THAT(port.config({.baud = 19200, .parity = 'E'}), HasSubstr("does not accept parity E"));
+  EXPECT_THAT(port.config({.parity = 'Q'}), HasSubstr("parity 'Q'"));
+
+  const auto line = instrument_.settings();
+  EXPECT_EQ(::cfgetospeed(&line), speed_t{B9600}) << "all or nothing";
+}
+
+TEST_F(PosixTerminalPortTest, SaysWhyItCannotStart) {
+  EXPECT_THAT(whyNot({.device = folder_.file("absent")}), AllOf(HasSubstr("open"), HasSubstr("absent"), HasSubstr("No such file")));
+  EXPECT_THAT(whyNot({.device = "/dev/null"}), HasSubstr("open /dev/null: not a terminal"));
+  EXPECT_THAT(whyNot(optionsWith({.bitsPerChar = 7})), HasSubstr("does not accept bits per character 7"));
+  EXPECT_THAT(whyNot(optionsWith({.stopBits = 5})), HasSubstr("stop bits 5"));
+}
+
+TEST_F(PosixTerminalPortTest, OpensTheDeviceForItselfAlone) {
+  {
+    const PosixTerminalPort port(options());
+    EXPECT_THAT(whyNot(options()), AllOf(HasSubstr(folder_.file("tty")), HasSubstr("in use by another program")));
+  }
+
+  EXPECT_EQ(whyNot(options()), "");
+}
+
+// The far end takes nothing: the kernel's buffer fills, the rest is late.
+TEST_F(PosixTerminalPortTest, AWriteThatTheFarEndHoldsUpEndsInTimeout) {
+  PosixTerminalPort port(options());
+  const BoundSerialPort line(port, collector_);
+  instrument_.setReading(false);
+  const std::string much(1'000'000, 'x');
+
+  EXPECT_EQ(line->write(bytesOf(much), 50ms), SerialPortStatus::timeout);
+  EXPECT_LT(line->counters().bytesOut, much.size());
+
+  instrument_.setReading(true);
+  EXPECT_EQ(line->writeRead(bytesOf("\n*IDN?\n"), kWatchdog), SerialPortStatus::success);
+}
+
+TEST_F(PosixTerminalPortTest, UnplugFailsTheRequestThatIsOutstanding) {
+  PosixTerminalPort port(options());
+  const BoundSerialPort line(port, collector_);
+  instrument_.behave({.isSilent = true});
+  auto status = std::async(std::launch::async, [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
+  ASSERT_TRUE(instrument_.waitForReceived("*IDN?\n"));
+
+  instrument_.unplug();
+
+  EXPECT_EQ(status.get(), SerialPortStatus::failure);
+  EXPECT_EQ(port.state(), SerialPortState::unplugged);
+  EXPECT_THAT(port.unpluggedBecause(), HasSubstr(folder_.file("tty")));
+  EXPECT_EQ(port.counters().unplugs, 1U);
+}
+
+TEST_F(PosixTerminalPortTest, WhileUnpluggedRequestsAndSettingsFailAtOnce) {
+  PosixTerminalPort port(options());
+  const BoundSerialPort line(port, collector_);
+  instrument_.unplug();
+  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+
+  EXPECT_EQ(line->read(Deadline::never()), SerialPortStatus::failure);
+  EXPECT_THAT(line->config({.baud = 9600}), HasSubstr("unplugged"));
+}
+
+TEST_F(PosixTerminalPortTest, ReturnsWithItsSettings) {
+  PosixTerminalPort port(optionsWith({.baud = 19200, .stopBits = 2}));
+  const BoundSerialPort line(port, collector_);
+  ASSERT_EQ(line->config({.baud = 4800}), "");
+  for (unsigned round = 1; round <= 3; ++round) {
+    instrument_.unplug();
+    ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+
+    instrument_.plugIn();
+
+    ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+    EXPECT_EQ(port.unpluggedBecause(), "");
+    EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+    EXPECT_EQ(port.counters().unplugs, round);
+    const auto settings = instrument_.settings();
+    EXPECT_EQ(::cfgetospeed(&settings), speed_t{B4800});
+    EXPECT_TRUE((settings.c_cflag & CSTOPB) != 0);
+  }
+}
+
+TEST_F(PosixTerminalPortTest, MayStartBeforeItsDevice) {
+  instrument_.unplug();
+  PosixTerminalPort port({.device = folder_.file("tty"), .waitForDevice = true});
+  const BoundSerialPort line(port, collector_);
+  EXPECT_EQ(line->read(kWatchdog), SerialPortStatus::failure);
+
+  instrument_.plugIn();
+
+  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+}
+
+TEST_F(PosixTerminalPortTest, TapsSurviveAnUnplug) {
+  PosixTerminalPort port(options());
+  const BoundSerialPort line(port, collector_);
+  std::atomic<int> seen = 0;
+  const auto tap = port.attachTap([&](std::span<const PeekedByte> bytes) { seen += static_cast<int>(bytes.size()); });
+  instrument_.unplug();
+  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+  instrument_.plugIn();
+  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+
+  EXPECT_EQ(line->writeRead(bytesOf("ECHO a\n"), kWatchdog), SerialPortStatus::success);
+
+  EXPECT_EQ(seen, 10);
+}
+
+}  // namespace
+}  // namespace mpf::test

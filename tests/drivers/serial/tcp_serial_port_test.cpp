@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/serial/tcp_serial_port.h>
+
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <future>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <optional>
+#include <stdexcept>
+
+#include <mpf/tests/drivers/serial/line_collector.h>
+#include <mpf/tests/support/instrument.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::HasSubstr;
+
+// One port of a terminal server on this host, on a free TCP port.
+class TerminalServer {
+ public:
+  explicit TerminalServer(int family = AF_INET) : family_(family) { listen(0); }
+
+  [[nodiscard]] TcpAddress address() const { return {family_ == AF_INET ? "127.0.0.1" : "::1", std::to_string(port_)}; }
+  [[nodiscard]] FileDescriptor accept() const {
+    pollfd ready{listener_.get(), POLLIN, 0};
+    const auto watchdogMs = static_cast<int>(std::chrono::milliseconds(kWatchdog).count());
+    if (retryInterrupted([&] { return ::poll(&ready, 1, watchdogMs); }) != 1) throw std::runtime_error("nobody connects");
+    return FileDescriptor(checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
+  }
+  void switchOff() { listener_.reset(); }
+  void switchOn() { listen(port_); }
+
+ private:
+  void listen(std::uint16_t port) {
+    listener_.reset(checkCall(::socket(family_, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
+    const int yes = 1;
+    checkCall(::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes), "setsockopt");
+    sockaddr_in6 address{};  // the port is at the same place in sockaddr_in
+    address.sin6_family = static_cast<sa_family_t>(family_);
+    address.sin6_port = htons(port);
+    socklen_t length = family_ == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
+    auto* generic = reinterpret_cast<sockaddr*>(&address);
+    checkCall(::bind(listener_.get(), generic, length), "bind");
+    checkCall(::listen(listener_.get(), 1), "listen");
+    checkCall(::getsockname(listener_.get(), generic, &length), "getsockname");
+    port_ = ntohs(address.sin6_port);
+  }
+  const int family_;
+  std::uint16_t port_ = 0;
+  FileDescriptor listener_;
+};
+
+class TcpSerialPortTest : public testing::Test {
+ protected:
+  TerminalServer server_;
+  Instrument instrument_;
+  LineCollector collector_;
+};
+
+std::string whyNot(const TcpSerialOptions& options) {
+  try {
+    const TcpSerialPort port(options);
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+TEST_F(TcpSerialPortTest, WriteReadGetsTheAnswer) {
+  TcpSerialPort port({.address = server_.address()});
+  instrument_.connect(server_.accept());
+  const BoundSerialPort line(port, collector_);
+
+  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+
+  EXPECT_EQ(collector_.answer(), "MPF,INSTRUMENT,0,1.0\r\n");
+}
+
+TEST_F(TcpSerialPortTest, AllByteValuesPassUnchangedBothWays) {
+  std::string every;
+  for (int value = 0; value < 256; ++value) every += static_cast<char>(value);
+  LineCollector collector("never comes");
+  TcpSerialPort port({.address = server_.address()});
+  instrument_.connect(server_.accept());
+  const BoundSerialPort line(port, collector);
+
+  EXPECT_EQ(line->write(bytesOf(every), kWatchdog), SerialPortStatus::success);
+  instrument_.say(every);
+
+  EXPECT_TRUE(instrument_.waitForReceived(every));
+  EXPECT_TRUE(collector.waitForAll(every));
+}
+
+TEST_F(TcpSerialPortTest, TakesNames) {
+  TcpSerialPort port({.address = {"localhost", server_.address().port}});
+  instrument_.connect(server_.accept());
+  const BoundSerialPort line(port, collector_);
+
+  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+}
+
+TEST_F(TcpSerialPortTest, TakesIpv6) {
+  std::optional<TerminalServer> server;
+  try {
+    server.emplace(AF_INET6);
+  } catch (const std::system_error& error) {
+    GTEST_SKIP() << "this host has no IPv6: " << error.what();
+  }
+  TcpSerialPort port({.address = server->address()});
+  instrument_.connect(server->accept());
+  const BoundSerialPort line(port, collector_);
+
+  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+}
+
+TEST_F(TcpSerialPortTest, SettingsBelongToTheTerminalServer) {
+  TcpSerialPort port({.address = server_.address()});
+
+  EXPECT_EQ(port.config({}), "");
+  EXPECT_THAT(port.config({.baud = 9600}), HasSubstr("not supported over TCP: set it on the terminal server"));
+}
+
+TEST_F(TcpSerialPortTest, CannotSendABreak) {
+  TcpSerialPort port({.address = server_.address()});
+  const BoundSerialPort line(port, collector_);
+
+  EXPECT_EQ(line->sendBreak(1ms), SerialPortStatus::failure);
+}
+
+TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
+  server_.switchOff();
+
+  EXPECT_THAT(whyNot({.address = server_.address()}), HasSubstr("connect to " + server_.address().toString() + ": Connection refused"));
+  EXPECT_THAT(whyNot({.address = {"no-such-host.invalid", "1"}}), HasSubstr("resolve no-such-host.invalid:1"));
+}
+
+// The accept queue is full, so that the kernel does not answer.
+TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
+  const TcpSerialOptions options{.address = server_.address(), .connectTimeout = 50ms, .waitForServer = true};
+  std::vector<std::unique_ptr<TcpSerialPort>> fillers;
+  for (int i = 0; i < 4; ++i) fillers.push_back(std::make_unique<TcpSerialPort>(options));
+
+  const auto reason = [&] {
+    for (;;) {
+      if (auto why = whyNot({.address = server_.address(), .connectTimeout = 50ms}); !why.empty()) return why;
+    }
+  }();
+
+  EXPECT_THAT(reason, HasSubstr("no answer within 50 ms"));
+}
+
+TEST_F(TcpSerialPortTest, ALostConnectionFailsTheRequestThatIsOutstanding) {
+  TcpSerialPort port({.address = server_.address()});
+  instrument_.connect(server_.accept());
+  const BoundSerialPort line(port, collector_);
+  instrument_.behave({.isSilent = true});
+  auto status = std::async(std::launch::async, [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
+  ASSERT_TRUE(instrument_.waitForReceived("*IDN?\n"));
+
+  server_.switchOff();
+  instrument_.unplug();
+
+  EXPECT_EQ(status.get(), SerialPortStatus::failure);
+  EXPECT_EQ(port.counters().unplugs, 1U);
+}
+
+TEST_F(TcpSerialPortTest, ConnectsAgain) {
+  TcpSerialPort port({.address = server_.address()});
+  instrument_.connect(server_.accept());
+  const BoundSerialPort line(port, collector_);
+  server_.switchOff();
+  instrument_.unplug();
+  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+
+  server_.switchOn();
+  instrument_.connect(server_.accept());
+
+  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+}
+
+TEST_F(TcpSerialPortTest, MayStartBeforeItsServer) {
+  server_.switchOff();
+  TcpSerialPort port({.address = server_.address(), .waitForServer = true});
+  const BoundSerialPort line(port, collector_);
+
+  server_.switchOn();
+  instrument_.connect(server_.accept());
+
+  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
+}
+
+TEST_F(TcpSerialPortTest, AFloodDoesNotKeepARequestFromItsDeadline) {
+  LineCollector collector("never comes");
+  TcpSerialPort port({.address = server_.address()});
+  const auto far = server_.accept();
+  const BoundSerialPort line(port, collector);
+  std::jthread flood([&](const std::stop_token& stop) {
+    const std::string noise(1000, '#');
+    while (!stop.stop_requested() && ::send(far.get(), noise.data(), noise.size(), MSG_NOSIGNAL) > 0) {
+    }
+  });
+
+  EXPECT_EQ(line->read(50ms), SerialPortStatus::timeout);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// Instrument: answers SCPI-like commands at the far end of a line, and misbehaves on request.
+//
+//   *IDN?         MPF,INSTRUMENT,0,1.0
+//   MEAS:VOLT?    1.234
+//   ECHO <text>   <text>
+//   anything else: no answer                        commands end with \n or \r\n, answers with answerEnd
+//
+//   Instrument instrument("/tmp/test/ttyA");        // on a pseudo-terminal, or connect() a socket
+//   instrument.behave({.delay = 20ms, .noise = "\x07"});
+//
+// Threads  all members from any thread; the instrument has its own.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/tests/support/pty.h>
+
+namespace mpf::test {
+
+// From a command to its answer.
+struct Behaviour {
+  std::chrono::milliseconds delay{0};                           // before the answer
+  std::optional<std::chrono::milliseconds> gap = std::nullopt;  // set: the answer goes out byte by byte, with this between bytes
+  std::string noise = {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
+  bool isSilent = false;   // no answer at all
+  std::string answerEnd = "\r\n";
+};                // before the answer
+  std::optional<std::chrono::milliseconds> gap = std::nullopt;  // set: the answer goes out byte by byte, with this between bytes
+  std::string noise = {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
+  bool isSilent = false;                             // no answer at all
+  std::string answerEnd = "\r\n";
+};
+
+class Instrument {
+ public:
+  // Not connected to anything yet.
+  Instrument();
+  // On a pseudo-terminal that a port finds at `linkPath`.
+  explicit Instrument(std::string linkPath);
+  ~Instrument();
+  Instrument(const Instrument&) = delete;
+  Instrument& operator=(const Instrument&) = delete;
+
+  // How commands that come from now on are answered.
+  void behave(Behaviour behaviour);
+  // Sends `text` now, as it is.
+  void say(std::string_view text);
+
+  // Serves `line`, a socket for example, until unplug().
+  void connect(FileDescriptor line);
+  // Hangs up; what was still to be sent is lost.
+  void unplug();
+  // A new pseudo-terminal at the same path.
+  void plugIn();
+
+  // Waits until `text` has arrived, in whatever pieces, since the beginning. Returns false when the watchdog barks.
+  [[nodiscard]] bool waitForReceived(std::string_view text) const;
+  [[nodiscard]] std::string received() const;
+  // The settings of the pseudo-terminal.
+  [[nodiscard]] termios settings() const;
+  // Stops reading (a device that holds its flow control line), or reads on.
+  void setReading(bool isReading);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Output {
+    Clock::time_point at;
+    std::string text;
+  };
+  void run(const std::stop_token& stop);
+  [[nodiscard]] int descriptor() const;  // with mutex_, as the ones below
+  [[nodiscard]] int msToNextOutput() const;
+  void receive();
+  void execute(std::string_view command);
+  void answer(const std::string& text);
+  void sendDue();
+  void send(std::string_view text);
+  void hangUp();
+  void wake() const noexcept;
+
+  FileDescriptor bell_;
+  std::string linkPath_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::unique_ptr<Pty> pty_;  // all below under mutex_
+  FileDescriptor line_;
+  Behaviour behaviour_;
+  bool isReading_ = true;
+  std::string received_;
+  std::string command_;  // begun
+  std::vector<Output> outputs_;
+  std::jthread thread_;
+};
+
+}  // namespace mpf::test
