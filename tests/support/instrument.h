@@ -34,11 +34,6 @@ struct Behaviour {
   std::string noise = {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
   bool isSilent = false;   // no answer at all
   std::string answerEnd = "\r\n";
-};                // before the answer
-  std::optional<std::chrono::milliseconds> gap = std::nullopt;  // set: the answer goes out byte by byte, with this between bytes
-  std::string noise = {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
-  bool isSilent = false;                             // no answer at all
-  std::string answerEnd = "\r\n";
 };
 
 class Instrument {
