@@ -48,8 +48,8 @@ class LineKeeper {
 
   std::unique_ptr<SerialLine> line_;
   Phase phase_ = Phase::closed;
-  Deadline attemptAt_ = Deadline::atNs(0);       // when closed: the next attempt; when opening: the end of this one
-  Nanoseconds backoff_{};                        // before the next attempt
+  Deadline attemptAt_ = Deadline::atNs(0);  // when closed: the next attempt; when opening: the end of this one
+  Nanoseconds backoff_{};                    // before the next attempt
   std::int64_t openedAtNs_ = 0;
 
   mutable std::mutex mutex_;
