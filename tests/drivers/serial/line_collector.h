@@ -76,6 +76,7 @@ class LineCollector : public ByteHandler {
   [[nodiscard]] std::string answer() const { return copyOf(answer_); }
   [[nodiscard]] std::string all() const { return copyOf(all_); }
   [[nodiscard]] std::vector<SerialPortStatus> ends() const { return copyOf(ends_); }
+  [[nodiscard]] int readsBegun() const { return copyOf(readsBegun_); }
   [[nodiscard]] bool waitForAll(std::string_view text) const {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kWatchdog, [&] { return all_ == text; });

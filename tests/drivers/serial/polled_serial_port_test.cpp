@@ -117,6 +117,24 @@ TEST_F(PolledSerialPortTest, TapsSeeDamagedBytesWithTheirFault) {
   EXPECT_THAT(faults, ElementsAre(LineFault::none, LineFault::parity, LineFault::none));
 }
 
+TEST_F(PolledSerialPortTest, ReadingIsEnabledBeforeTheFirstByteIsSent) {
+  int readsBegun = 0;
+  const auto tap = port_.attachTap([&](std::span<const PeekedByte>) { readsBegun = collector_.readsBegun(); });
+
+  EXPECT_EQ(line_->writeRead(bytesOf("?"), 0ms), SerialPortStatus::timeout);
+
+  EXPECT_EQ(readsBegun, 1);
+}
+
+// Or a flush at the beginning of a request would leave what is still in the kernel.
+TEST_F(PolledSerialPortTest, WhatCameBeforeTheRequestBelongsToNoRead) {
+  for (int round = 0; round < 100; ++round) {
+    script_.arrive({{'a'}, {'\r'}, {'\n'}});
+
+    EXPECT_EQ(line_->writeRead(bytesOf("?"), 0ms), SerialPortStatus::timeout);
+  }
+}
+
 TEST_F(PolledSerialPortTest, LostBytesAreCounted) {
   script_.arrive({{'a'}}, 3);
 

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <array>
 #include <future>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -141,8 +142,8 @@ TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
 // The accept queue is full, so that the kernel does not answer.
 TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
   const TcpSerialOptions options{.address = server_.address(), .connectTimeout = 50ms, .waitForServer = true};
-  std::vector<std::unique_ptr<TcpSerialPort>> fillers;
-  for (int i = 0; i < 4; ++i) fillers.push_back(std::make_unique<TcpSerialPort>(options));
+  std::array<std::unique_ptr<TcpSerialPort>, 4> fillers;
+  for (auto& filler : fillers) filler = std::make_unique<TcpSerialPort>(options);
 
   const auto reason = [&] {
     for (;;) {
