@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <limits>
+#include <mpf/schema/conversion.h>
 
 #include <capnp/dynamic.h>
 #include <kj/exception.h>
+#include <limits>
 
-#include <mpf/schema/conversion.h>
 #include <mpf/schema/visit.h>
 
 namespace mpf {

@@ -8,11 +8,10 @@
 //          limit is allocated.
 #pragma once
 
+#include <capnp/message.h>
 #include <cstddef>
 #include <optional>
 #include <string>
-
-#include <capnp/message.h>
 
 #include <mpf/schema/message.capnp.h>
 #include <mpf/schema/message.h>

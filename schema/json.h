@@ -8,9 +8,8 @@
 #pragma once
 
 #include <cmath>
-#include <string>
-
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include <mpf/schema/text.h>
 #include <mpf/schema/visit.h>

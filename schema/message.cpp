@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/schema/message.h>
+
 #include <cstdlib>
 #include <new>
 #include <stdexcept>
 #include <string>
-
-#include <mpf/schema/message.h>
 
 namespace mpf {
 

@@ -195,9 +195,7 @@ struct RequestFate {
 
   static constexpr auto kType = MessageType::requestFate;
   static constexpr std::string_view kName = "requestFate";
-  static constexpr auto fields() {
-    return std::tuple{Field{"fate", &RequestFate::fate}, Field{"requestId", &RequestFate::requestId}};
-  }
+  static constexpr auto fields() { return std::tuple{Field{"fate", &RequestFate::fate}, Field{"requestId", &RequestFate::requestId}}; }
 };
 
 // A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place. MPF forwards it and never looks inside.
@@ -212,8 +210,7 @@ struct alignas(8) User {
 };
 
 // All types, in the order of their numbers.
-using MessageTypes =
-    std::tuple<Connect, Int32, Int32Array, Float64, Float64Array, Char8Array, SerialConfig, OutOfBand, RequestFate, User>;
+using MessageTypes = std::tuple<Connect, Int32, Int32Array, Float64, Float64Array, Char8Array, SerialConfig, OutOfBand, RequestFate, User>;
 
 static_assert(sizeof(Connect) == 16 && sizeof(Int32) == 24 && sizeof(Float64) == 32 && sizeof(SerialConfig) == 16);
 static_assert(sizeof(OutOfBand) == 24 && sizeof(RequestFate) == 8);
@@ -225,7 +222,9 @@ template <class T>
 concept ArrayBody = requires { typename T::Element; };
 
 template <class T>
-concept MessageBody = requires { { T::kType } -> std::convertible_to<MessageType>; } && std::is_trivially_copyable_v<T>;
+concept MessageBody = requires {
+  { T::kType } -> std::convertible_to<MessageType>;
+} && std::is_trivially_copyable_v<T>;
 
 template <class T>
 concept ScalarBody = MessageBody<T> && !ArrayBody<T>;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/schema/text.h>
+
 #include <charconv>
 #include <cmath>
 #include <vector>
 
-#include <mpf/schema/text.h>
 #include <mpf/schema/visit.h>
 
 namespace mpf {

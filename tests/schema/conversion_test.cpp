@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <bit>
-#include <limits>
-#include <random>
+#include <mpf/schema/conversion.h>
 
+#include <bit>
 #include <capnp/dynamic.h>
 #include <capnp/serialize.h>
 #include <gmock/gmock.h>
+#include <limits>
+#include <random>
 
-#include <mpf/schema/conversion.h>
 #include <mpf/schema/text.h>
 
 namespace {
@@ -195,9 +195,7 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   EXPECT_EQ(error.text, "requestFate.fate: -3 is no such value");
 }
 
-TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) {
-  expectSame(MessageOf(Connect{.status = ConnectStatus{4000}}));
-}
+TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) { expectSame(MessageOf(Connect{.status = ConnectStatus{4000}})); }
 
 TEST(Conversion, RefusesAnEndOfMessageStringThatDoesNotFit) {
   capnp::MallocMessageBuilder builder;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/schema/message.h>
+
 #include <algorithm>
+#include <gmock/gmock.h>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <gmock/gmock.h>
-
-#include <mpf/schema/message.h>
 #include <mpf/schema/visit.h>
 
 namespace {

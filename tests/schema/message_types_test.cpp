@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <string>
-
 #include <capnp/schema.h>
 #include <gmock/gmock.h>
+#include <string>
 
 #include <mpf/schema/message.capnp.h>
 #include <mpf/schema/visit.h>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/schema/text.h>
+
 #include <cmath>
+#include <gmock/gmock.h>
 #include <sstream>
 
-#include <gmock/gmock.h>
-
 #include <mpf/schema/json.h>
-#include <mpf/schema/text.h>
 
 namespace {
 
@@ -42,8 +42,9 @@ TEST(Text, PrintsOneLineAMessage) {
 TEST(Text, PrintsBytesAsCStrings) {
   const auto message = parsed<Char8Array>({R"(value=*IDN?\r\n\x00\xfe")", R"(eomString="\r\n")"});
 
-  EXPECT_EQ(print(message),
-            R"(char8Array timeout=0 cmd=0 status=0 address=0 extra=0 numberRetrys=0 eomLen=2 eomString="\r\n" value="*IDN?\r\n\x00\xfe\"")");
+  EXPECT_EQ(
+      print(message),
+      R"(char8Array timeout=0 cmd=0 status=0 address=0 extra=0 numberRetrys=0 eomLen=2 eomString="\r\n" value="*IDN?\r\n\x00\xfe\"")");
 }
 
 TEST(Text, ShortensLongArrays) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/schema/user.h>
+
 #include <capnp/any.h>
 #include <capnp/message.h>
 #include <gmock/gmock.h>
 #include <kj/exception.h>
 
 #include <mpf/schema/message.capnp.h>
-#include <mpf/schema/user.h>
 
 namespace {
 
