@@ -85,18 +85,21 @@ class MessageServer {
   // Ends a request without a reply: its client gets the fate `refused`.
   void refuse(Message&& request);
 
-  // Handles each request of type T in run(). A handler of T& changes the fields, and the message is the reply; one of
-  // MessageOf<T>&& owns the request.
+  // Handles each request of type T in run(). A handler of T& (its fields) or MessageOf<T>& (its elements, too) changes the request,
+  // which is the reply; one of MessageOf<T>&& owns the request.
   template <MessageBody T, class Handler>
   void on(Handler handler) {
     setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
       auto typed = MessageOf<T>::tryFrom(std::move(message));
       if (!typed) return refuse(std::move(message));  // NOLINT(bugprone-use-after-move): then it is as it was
-      if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&&>) {
-        handler(std::move(*typed));
-      } else {
+      if constexpr (std::is_invocable_v<Handler&, T&>) {
         handler(**typed);
         static_cast<void>(reply(std::move(*typed)));
+      } else if constexpr (std::is_invocable_v<Handler&, MessageOf<T>&>) {
+        handler(*typed);
+        static_cast<void>(reply(std::move(*typed)));
+      } else {
+        handler(std::move(*typed));
       }
     });
   }

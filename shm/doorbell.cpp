@@ -38,7 +38,8 @@ FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t gr
 }
 
 FileDescriptor tryOpenFifo(const std::string& name) noexcept {
-  return FileDescriptor(::open(segments::path(name).c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
+  // For reading, too: a write must not raise SIGPIPE when the owner has died.
+  return FileDescriptor(::open(segments::path(name).c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
 }
 
 void ringFifo(const FileDescriptor& fifo) noexcept {

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+// Processes are killed under load at random times. MPF_TEST_KILLS sets how many times per test; the seed is printed.
+#include <array>
+#include <cstdlib>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <iostream>
+#include <random>
+#include <set>
+
+#include <mpf/client/sync_client.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+int kills() {
+  const char* set = std::getenv("MPF_TEST_KILLS");
+  return set != nullptr ? std::atoi(set) : 500;
+}
+
+class KillTest : public testing::Test {
+ protected:
+  KillTest() : random_(std::random_device()()) {
+    const auto seed = random_();
+    random_.seed(seed);
+    std::cout << "seed " << seed << '\n';
+  }
+  std::string backplaneName() const { return backplane_.name(); }
+  // Whoever attaches next removes what the dead left; then nothing is there.
+  void TearDown() override {
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+
+  Watchdog watchdog_{"kill test"};
+  Backplane backplane_ = Backplane::isolated();
+  std::mt19937 random_;
+};
+
+// Counts the ends of requests by their ids.
+struct Ledger {
+  std::set<std::uint32_t> open;
+  std::uint64_t accepted = 0;
+  std::uint64_t replies = 0;
+  std::array<std::uint64_t, 5> fates{};
+  int connects = 0;
+  int disconnects = 0;
+
+  void note(const Message& message) {
+    if (const auto* news = message.tryAs<Connect>()) {
+      if (news->status == ConnectStatus::connectYes) ++connects;
+      if (news->status != ConnectStatus::connectNo) return;
+      ++disconnects;
+      EXPECT_TRUE(open.empty()) << "a disconnect comes after the fates of all requests";
+      return;
+    }
+    EXPECT_EQ(open.erase(message.route().requestId), 1u) << "an end of a request that is not open";
+    if (const auto* fate = message.tryAs<RequestFate>()) {
+      ++fates.at(static_cast<std::size_t>(fate->fate));
+    } else {
+      ++replies;
+    }
+  }
+};
+
+// One random request: small, large, or with a deadline that may pass.
+void sendOne(MessageClient& client, Ledger& ledger, std::mt19937& random) {
+  std::uint32_t id = 0;
+  SendResult result{};
+  if (random() % 4 == 0) {
+    result = client.send(client.alloc<Float64Array>(random() % 2000), Deadline::never(), &id);
+  } else {
+    const auto deadline = random() % 8 != 0 ? Deadline::never() : Deadline::after(std::chrono::microseconds(random() % 500));
+    result = client.send(Int32Message({.value = 1}), deadline, &id);
+  }
+  if (result != SendResult::sent) return;
+  ++ledger.accepted;
+  EXPECT_TRUE(ledger.open.insert(id).second) << "an id that is still open was given again";
+}
+
+TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
+  Victim server("serve", backplaneName());
+  Dispatcher dispatcher(backplane_);
+  Ledger ledger;
+  MessageClient client(dispatcher, [&](const Message& message) { ledger.note(message); });
+  client.bind("echo");
+
+  for (int round = 0; round < kills(); ++round) {
+    ASSERT_TRUE(client.connectWait(60s)) << client.notConnectedBecause();
+    const auto killAt = Deadline::after(std::chrono::microseconds(random_() % 3000));
+    bool killed = false;
+    while (client.isConnected()) {
+      if (!killed && killAt.hasPassed()) {
+        server.signal(SIGKILL);
+        killed = true;
+      }
+      sendOne(client, ledger, random_);
+      dispatcher.runOnce(Deadline::after(50us));
+    }
+    server = Victim(random_() % 3 == 0 ? "serve-block" : "serve", backplaneName());
+  }
+
+  EXPECT_TRUE(ledger.open.empty());
+  EXPECT_EQ(ledger.connects, kills());
+  EXPECT_EQ(ledger.disconnects, kills());
+  EXPECT_EQ(ledger.accepted, ledger.replies + ledger.fates[0] + ledger.fates[1] + ledger.fates[2] + ledger.fates[3]);
+  EXPECT_GT(ledger.replies, 0u);
+}
+
+TEST_F(KillTest, AServerGoesOnWhenClientsAreKilled) {
+  Victim server("serve", backplaneName());
+
+  for (int round = 0; round < kills(); ++round) {
+    Victim client("flood", backplaneName());
+    const auto until = Deadline::after(std::chrono::microseconds(random_() % 8000));
+    SyncClient witness(backplane_, "echo");
+    do {
+      auto answer = witness.call(Float64Message({.value = round + 0.5}), 60s);
+      ASSERT_TRUE(answer) << answer.why();
+      EXPECT_EQ(answer.message().tryAs<Float64>()->value, round + 1.5);
+    } while (!until.hasPassed());
+    client.end(SIGKILL);
+  }
+
+  const auto status = server.end(SIGTERM);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {
+  for (int round = 0; round < kills() / 4; ++round) {
+    Victim server("serve", backplaneName());
+    SyncClient client(backplane_, "echo");
+    ASSERT_TRUE(client.call(Float64Message({.value = 1}), 60s));
+
+    server.end(SIGKILL);
+    Victim successor("serve", backplaneName());
+
+    Answer answer = client.call(Float64Message({.value = 2}), 60s);
+    while (!answer) answer = client.call(Float64Message({.value = 2}), 60s);  // the fate of a call that met the death
+    EXPECT_EQ(answer.message().tryAs<Float64>()->value, 3);
+  }
+}
+
+TEST_F(KillTest, AStoppedServerIsNotDead) {
+  Victim server("serve", backplaneName());
+  SyncClient client(backplane_, "echo");
+  ASSERT_TRUE(client.call(Float64Message({.value = 1}), 60s));
+
+  server.signal(SIGSTOP);
+  auto late = client.call(Float64Message({.value = 2}), 100ms);
+  EXPECT_FALSE(late);
+  EXPECT_TRUE(client.client().isConnected());
+  server.signal(SIGCONT);
+
+  auto answer = client.call(Float64Message({.value = 3}), 60s);
+  ASSERT_TRUE(answer) << answer.why();
+  EXPECT_EQ(answer.message().tryAs<Float64>()->value, 4) << "a late reply must not be taken for this one's";
+}
+
+}  // namespace
+}  // namespace mpf::test
