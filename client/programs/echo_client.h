@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// Echo clients: send numbered messages to an echo server and check what comes back (manual: clientInt32, clientChar8Array).
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <fmt/format.h>
+#include <string>
+#include <vector>
+
+#include <mpf/client/sync_client.h>
+
+namespace mpf {
+
+struct EchoClient {
+  std::string program;
+  std::string server;
+  std::string what;
+};
+
+struct EchoOptions {
+  std::string server;
+  std::string backplane;
+  std::int32_t location = Backplane::defaultLocation();
+  int count = 1000;
+  int timeoutMs = 1000;
+  std::size_t bytes = 100;
+};
+
+// What became of the calls, as a person reads it.
+class EchoStatistics {
+ public:
+  void add(std::int64_t roundTripNs) { roundTripsNs_.push_back(roundTripNs); }
+  void fail(const std::string& why) {
+    ++failures_;
+    fmt::print(stderr, "{}\n", why);
+  }
+  // Returns the exit status: 0 when every message came back.
+  int report() {
+    std::sort(roundTripsNs_.begin(), roundTripsNs_.end());
+    fmt::print("{} came back, {} did not", roundTripsNs_.size(), failures_);
+    if (!roundTripsNs_.empty()) {
+      const auto at = [&](double part) {
+        return static_cast<double>(roundTripsNs_[static_cast<std::size_t>(part * (static_cast<double>(roundTripsNs_.size()) - 1))]) / 1e3;
+      };
+      fmt::print("; round trip [us]: p50 {:.2f}, p99 {:.2f}, max {:.2f}", at(0.5), at(0.99), at(1));
+    }
+    fmt::print("\n");
+    return failures_ == 0 ? 0 : 1;
+  }
+
+ private:
+  std::vector<std::int64_t> roundTripsNs_;
+  std::uint64_t failures_ = 0;
+};
+
+// `make(i)` gives message number i, `isEcho(i, reply)` says whether a reply is its echo.
+template <class Make, class IsEcho>
+int callEchoServer(const EchoOptions& options, Make&& make, IsEcho&& isEcho) {
+  SyncClient client(Backplane::attach(options.backplane), options.server, options.location);
+  EchoStatistics statistics;
+  for (int i = 0; i < options.count; ++i) {
+    const auto sentNs = Clock::nowNs();
+    auto answer = client.call(make(i), std::chrono::milliseconds(options.timeoutMs));
+    if (!answer) {
+      const auto why = client.client().notConnectedBecause();
+      statistics.fail(fmt::format("message {}: {}{}{}", i, answer.why(), why.empty() ? "" : ": ", why));
+    } else if (!isEcho(i, answer.message())) {
+      statistics.fail(fmt::format("message {}: the reply is not its echo", i));
+    } else {
+      statistics.add(Clock::nowNs() - sentNs);
+    }
+  }
+  return statistics.report();
+}
+
+// Parses the command line and runs `call(options)`. Returns the exit status.
+template <class Call>
+int runEchoClient(int argc, char** argv, const EchoClient& echo, Call&& call) try {
+  CLI::App app(fmt::format("{} - sends {}s to an echo server and checks what comes back", echo.program, echo.what), echo.program);
+  EchoOptions options;
+  options.server = echo.server;
+  app.add_option("server", options.server, "Name of the server")->capture_default_str();
+  app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
+  app.add_option("--location", options.location, "Location of the server; default: $MPF_LOCATION, or 0");
+  app.add_option("--count", options.count, "Messages to send")->capture_default_str()->check(CLI::PositiveNumber);
+  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")->capture_default_str()->check(CLI::PositiveNumber);
+  app.add_option("--bytes", options.bytes, "Length of an array message")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  return call(options);
+} catch (const std::exception& error) {
+  fmt::print(stderr, "{}: {}\n", echo.program, error.what());
+  return 1;
+}
+
+}  // namespace mpf

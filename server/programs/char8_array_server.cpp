@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/programs/echo_server.h>
+
+int main(int argc, char** argv) {
+  return mpf::runEchoServer<mpf::Char8Array>(argc, argv, {"mpf-char8-array-server", "Char8Array", "Char8Array message"});
+}
