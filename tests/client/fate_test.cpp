@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// Requests that end without a reply: refused, expired, cancelled, lost.
+#include <vector>
+
+#include <mpf/tests/client/client_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+TEST_F(ClientTest, ARequestThatTheServerDropsIsRefused) {
+  auto& server = startServer();
+  server.on<Int32>([](Int32Message&& request) { const Message dropped = std::move(request); });
+  bind();
+  Int32Message request;
+  request.setClientExtra(5);
+  ASSERT_EQ(client_.send(std::move(request)), SendResult::sent);
+
+  const auto end = next();
+
+  EXPECT_EQ(fateOf(end), Fate::refused);
+  EXPECT_EQ(end.getClientExtra(), 5);
+}
+
+TEST_F(ClientTest, ATypeWithoutHandlerIsRefused) {
+  startServer().on<Int32>([](Int32&) {});
+  bind();
+  ASSERT_EQ(client_.send(Float64Message()), SendResult::sent);
+
+  EXPECT_EQ(fateOf(next()), Fate::refused);
+}
+
+TEST_F(ClientTest, AFullQueueRefusesAtOnceAndSaysSoOnce) {
+  startServer({.queueSize = 5}).on<Int32>([](Int32&) {});
+  bind();
+  serverRuns_ = false;
+  for (int i = 0; i < 5; ++i) ASSERT_EQ(client_.send(Int32Message({.value = i})), SendResult::sent);
+
+  Int32Message sixth({.value = 6});
+  EXPECT_EQ(client_.send(std::move(sixth)), SendResult::queueFull);
+  EXPECT_EQ(sixth->value, 6) << "a message that was refused is still the caller's";
+  EXPECT_EQ(client_.send(std::move(sixth)), SendResult::queueFull);
+
+  runUntil([&] { return news_.size() == 2; });
+  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
+  serverRuns_ = true;
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(next().tryAs<Int32>()->value, i);
+  EXPECT_EQ(client_.send(std::move(sixth)), SendResult::sent);
+  EXPECT_EQ(next().tryAs<Int32>()->value, 6);
+}
+
+TEST_F(ClientTest, AMessageAboveTheLimitIsRefused) {
+  startServer({.maxMessageBytes = 1000});
+  bind();
+
+  EXPECT_EQ(client_.send(client_.alloc<Char8Array>(961)), SendResult::tooLarge);
+}
+
+TEST_F(ClientTest, ARequestThatIsNotTakenInTimeExpiresOnce) {
+  int handled = 0;
+  startServer().on<Int32>([&](Int32&) { ++handled; });
+  bind();
+  serverRuns_ = false;
+  std::uint32_t id = 0;
+  ASSERT_EQ(client_.send(Int32Message(), Deadline::after(2ms), &id), SendResult::sent);
+
+  const auto end = next();
+
+  EXPECT_EQ(fateOf(end), Fate::expired);
+  EXPECT_EQ(end.tryAs<RequestFate>()->requestId, id);
+  serverRuns_ = true;
+  server_->on<Float64>([](Float64&) {});
+  ASSERT_EQ(client_.send(Float64Message()), SendResult::sent);
+  EXPECT_NE(next().tryAs<Float64>(), nullptr) << "the server passed the expired one without a word";
+  EXPECT_EQ(handled, 0);
+}
+
+TEST_F(ClientTest, ALateReplyOfACancelledRequestIsNotDelivered) {
+  auto& server = startServer();
+  Message held;
+  server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
+  server.on<Float64>([](Float64&) {});
+  bind();
+  std::uint32_t id = 0;
+  ASSERT_EQ(client_.send(Int32Message(), Deadline::never(), &id), SendResult::sent);
+  runUntil([&] { return static_cast<bool>(held); });
+
+  client_.cancel(id);
+  EXPECT_EQ(fateOf(next()), Fate::cancelled);
+  EXPECT_EQ(server.reply(std::move(held)), ReplyResult::sent);
+
+  ASSERT_EQ(client_.send(Float64Message()), SendResult::sent);
+  EXPECT_NE(next().tryAs<Float64>(), nullptr);
+}
+
+TEST_F(ClientTest, AServerThatEndsGivesEachRequestItsFate) {
+  auto& server = startServer();
+  Message held;
+  server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  runUntil([&] { return static_cast<bool>(held); });
+  serverRuns_ = false;
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+
+  server_.reset();
+
+  std::vector<std::optional<Fate>> fates{fateOf(next()), fateOf(next())};
+  EXPECT_THAT(fates, testing::UnorderedElementsAre(Fate::outcomeUnknown, Fate::neverTaken));
+  runUntil([&] { return !client_.isConnected() && news_.size() == 2; });
+  held = Message();  // outlives its server
+}
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+// Event loops, threads, clients that end at odd moments, calls that wait.
+#include <poll.h>
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include <mpf/tests/client/client_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+TEST_F(ClientTest, ADescriptorWakesAnEventLoop) {
+  auto& server = startServer();
+  server.on<Int32>([](Int32&) {});
+  bind();
+  pollfd serverFd{server.descriptor(), POLLIN, 0};
+  pollfd clientFd{dispatcher_.descriptor(), POLLIN, 0};
+  while (server.handleOne()) {
+  }
+  dispatcher_.runPending();
+
+  ASSERT_EQ(client_.send(Int32Message({.value = 4})), SendResult::sent);
+  ASSERT_EQ(::poll(&serverFd, 1, -1), 1);
+  while (server.handleOne()) {
+  }
+  ASSERT_EQ(::poll(&clientFd, 1, -1), 1);
+  dispatcher_.runPending();
+
+  ASSERT_EQ(messages_.size(), 1u);
+  EXPECT_EQ(messages_[0].tryAs<Int32>()->value, 4);
+  messages_.clear();
+}
+
+TEST_F(ClientTest, AClientMayEndInItsOwnCallback) {
+  startServer().on<Int32>([](Int32&) {});
+  std::unique_ptr<MessageClient> brief;
+  brief = std::make_unique<MessageClient>(dispatcher_, [&](const Message& message) {
+    if (message.getType() == MessageType::int32) brief.reset();
+  });
+  brief->bind("device[0]/a");
+  runUntil([&] { return brief->isConnected(); });
+  ASSERT_EQ(brief->send(Int32Message()), SendResult::sent);
+
+  runUntil([&] { return !brief; });
+}
+
+// Callbacks of one client never run at the same time, whoever sends.
+TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
+  const Watchdog watchdog("shared dispatcher");
+  const auto backplane = Backplane::isolated();
+  MessageServer server(backplane, "echo", {.queueSize = 1000});
+  server.on<Int32>([](Int32&) {});
+  std::thread serving([&] { server.run(); });
+  int replies = 0;  // unprotected: ThreadSanitizer looks on
+  std::atomic<int> done{0};
+  constexpr int kThreads = 4;
+  constexpr int kEach = 500;
+  {
+    MessageClient client(backplane, [&](const Message& message) {
+      if (message.getType() != MessageType::int32) return;
+      if (++replies == kThreads * kEach) done.store(1);
+    });
+    client.bind("echo");
+    ASSERT_TRUE(client.connectWait(60s));
+    std::vector<std::thread> senders;
+    for (int thread = 0; thread < kThreads; ++thread) {
+      senders.emplace_back([&] {
+        for (int i = 0; i < kEach; ++i) {
+          Int32Message message;
+          while (client.send(std::move(message)) != SendResult::sent) std::this_thread::yield();
+        }
+      });
+    }
+    for (auto& sender : senders) sender.join();
+    while (done.load() == 0) std::this_thread::yield();
+  }
+  server.interrupt();
+  serving.join();
+  EXPECT_EQ(replies, kThreads * kEach);
+}
+
+TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
+  const Watchdog watchdog("sync client");
+  const auto backplane = Backplane::isolated();
+  SyncClient client(backplane, "echo");
+  auto none = client.call(Int32Message(), 1ms);
+  EXPECT_EQ(none.refusal(), SendResult::notConnected);
+
+  MessageServer server(backplane, "echo");
+  Message held;
+  server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
+  std::thread serving([&] { server.run(); });
+  ASSERT_TRUE(client.connectWait(60s));
+  auto unknown = client.call(Int32Message(), 50ms);
+  server.interrupt();
+  serving.join();
+  auto expired = client.call(Int32Message(), 5ms);
+
+  EXPECT_EQ(unknown.fate(), Fate::outcomeUnknown);
+  EXPECT_EQ(expired.fate(), Fate::expired);
+  EXPECT_EQ(expired.why(), "no reply: expired");
+}
+
+}  // namespace
+}  // namespace mpf::test
