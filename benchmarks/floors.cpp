@@ -192,7 +192,7 @@ Measurement floor(const std::string& question, const std::string& name, Mode mod
 
 }  // namespace
 
-std::vector<Measurement> floorMeasurements(bool) {
+std::vector<Measurement> floorMeasurements() {
   const std::string question = "Floors: what the machine itself needs";
   std::vector<Measurement> rows;
   rows.push_back(floor(question, kBounce, Mode::spin, 4, bounce<Spinning>(0, {})));

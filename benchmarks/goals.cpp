@@ -26,8 +26,10 @@ class Goals {
     const auto* row = find(question, kMpf, mode);
     return row != nullptr && row->ratioToFloor > 0 ? std::optional(row->ratioToFloor) : std::nullopt;
   }
+  // How much more one costs than the other; both were measured beside the same floor, each in its own minute.
   [[nodiscard]] std::optional<double> costRatio(const Result* row, const Result* to) const {
-    return row != nullptr && to != nullptr && to->costNs() > 0 ? std::optional(row->costNs() / to->costNs()) : std::nullopt;
+    const bool known = row != nullptr && to != nullptr && row->ratioToFloor > 0 && to->ratioToFloor > 0;
+    return known ? std::optional(row->ratioToFloor / to->ratioToFloor) : std::nullopt;
   }
 
   void atMost(std::string_view goal, std::optional<double> reached, double limit) {

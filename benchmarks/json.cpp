@@ -44,6 +44,7 @@ Json toObject(const Result& result, const Machine& machine, Placement placement)
     addFigures(object, result);
   }
   object["floor_name"] = what.floorName.empty() ? Json() : Json(what.floorName);
+  object["floor_ns"] = result.floorNs > 0 ? Json(result.floorNs) : Json();
   object["ratio_to_floor"] = result.ratioToFloor > 0 ? Json(result.ratioToFloor) : Json();
   object["cpus"] = {placement.server, placement.requester};
   object["machine"] = {{"cpu", machine.cpu},           {"kernel", machine.kernel},

@@ -12,13 +12,15 @@
 #include <optional>
 #include <set>
 
+#include <mpf/benchmarks/mpf_peer.h>
 #include <mpf/benchmarks/report.h>
+#include <mpf/benchmarks/runner.h>
 
 namespace mpf::bench {
 namespace {
 
-constexpr auto kQuickRun = std::chrono::seconds(21);  // of warm-up and measurement together; the rest is setting up
-constexpr auto kFullRow = std::chrono::milliseconds(1000);
+constexpr auto kQuickRun = std::chrono::seconds(12);  // of warm-up and measurement together; the rest is setting up
+constexpr auto kFullRow = std::chrono::milliseconds(400);
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
@@ -30,7 +32,7 @@ bool isWanted(const Measurement& row, const std::vector<std::string>& only) {
 
 // What was asked for, and the floors that it is divided by.
 std::vector<Measurement> choose(const LocalOptions& options) {
-  auto all = catalogue(options.quick, "mpf-bench-" + std::to_string(::getpid()));
+  auto all = catalogue("mpf-bench-" + std::to_string(::getpid()));
   std::set<std::pair<std::string, std::size_t>> floors;
   for (const auto& row : all) {
     if (isWanted(row, options.only)) floors.emplace(row.floorName, row.floorBytes);
@@ -65,41 +67,12 @@ std::optional<Placement> place(const LocalOptions& options) {
   return Placement{wanted[0], wanted[1]};
 }
 
-// Runs rows one after another and keeps the daemon that the last one needed.
-class Runner {
- public:
-  explicit Runner(Placement placement) : placement_(placement) {}
-
-  Result run(Measurement row, Budget budget) {
-    if (!row.skipped.empty()) return {std::move(row), {}, {}, 0};
-    if (const auto reason = enter(row); !reason.empty()) {
-      row.skipped = reason;
-      return {std::move(row), {}, {}, 0};
-    }
-    auto outcome = row.run(Stage(placement_, budget));
-    return {std::move(row), outcome.figures, std::move(outcome.error), 0};
-  }
-
- private:
-  // Empty, or why this row's environment is not to be had; then it is not tried again.
-  std::string enter(const Measurement& row) try {
-    if (row.environmentName == current_) return {};
-    environment_.reset();
-    current_.clear();
-    if (!row.environment) return {};
-    if (const auto known = missing_.find(row.environmentName); known != missing_.end()) return known->second;
-    environment_ = row.environment();
-    current_ = row.environmentName;
-    return {};
-  } catch (const std::exception& exception) {
-    return missing_[row.environmentName] = exception.what();
-  }
-
-  Placement placement_;
-  std::unique_ptr<Environment> environment_;
-  std::string current_;
-  std::map<std::string, std::string> missing_;
-};
+// Every row of a full run has a floor beside it; of a quick one ours have.
+int roundsOf(const Measurement& row, bool quick) {
+  if (row.floorName.empty()) return 0;
+  if (quick) return row.name.starts_with(kMpf) ? 1 : 0;
+  return row.isSlow ? 1 : 3;
+}
 
 int listRows(const std::vector<Measurement>& rows) {
   for (const auto& row : rows)
@@ -138,13 +111,12 @@ int runLocal(const LocalOptions& options) {
   }
   const auto machine = Machine::look(*placement);
 
-  Runner runner(*placement);
+  Runner runner(*placement, rows);
   std::vector<Result> results;
   for (const auto& row : rows) {
-    results.push_back(runner.run(row, budgetOf(row, rows, options.quick)));
+    results.push_back(runner.run(row, budgetOf(row, rows, options.quick), roundsOf(row, options.quick)));
     fmt::print(stderr, "{:3}% {}\n", results.size() * 100 / rows.size(), oneLine(results.back()));
   }
-  divideByFloors(results);
 
   const auto json = toJson(results, machine, *placement);
   if (options.jsonFile == "-") {

@@ -24,34 +24,34 @@ struct Measurement {
   std::string unit;        // of Figures::value; empty when the row is a latency or a rate
   std::string skipped;     // why it is not taken
   double share = 1.0;      // of the time that a row gets
+  bool isSlow = false;     // takes seconds to set up: once is enough
   std::function<std::unique_ptr<Environment>()> environment;  // rows one after another that name the same one share it
   std::string environmentName;
   std::function<Outcome(const Stage&)> run;
 };
 
+// Nanoseconds per message: typical, or p50 where groups make no sense, or from a rate; 0 for neither.
+[[nodiscard]] double costNs(const Figures& figures) noexcept;
+
 struct Result {
   Measurement measurement;
   Figures figures;
   std::string error;
+  double floorNs = 0;       // of the same minute
   double ratioToFloor = 0;  // above 1: slower than the floor. 0: there is none
 
   [[nodiscard]] bool isGood() const noexcept { return measurement.skipped.empty() && error.empty(); }
-  // Nanoseconds per message, whether latency (typical, or p50 where groups make no sense) or rate; 0 for neither.
-  [[nodiscard]] double costNs() const noexcept;
+  [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
 };
 
-// Fills in ratioToFloor.
-void divideByFloors(std::vector<Result>& results);
-
 // Everything that `mpf bench local` takes, in order, floors first.
-//   quick     fewer sizes
-//   run name  unique on this host: part of the names of sockets and segments
-[[nodiscard]] std::vector<Measurement> catalogue(bool quick, const std::string& runName);
+//   runName  unique on this host: part of the names of sockets and segments
+[[nodiscard]] std::vector<Measurement> catalogue(const std::string& runName);
 
 // The rows of one source file each.
-[[nodiscard]] std::vector<Measurement> floorMeasurements(bool quick);
-[[nodiscard]] std::vector<Measurement> peerMeasurements(bool quick, const std::string& runName);
-[[nodiscard]] std::vector<Measurement> scaleMeasurements(bool quick, const std::string& runName);
+[[nodiscard]] std::vector<Measurement> floorMeasurements();
+[[nodiscard]] std::vector<Measurement> peerMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> scaleMeasurements(const std::string& runName);
 
 inline constexpr const char* kBounce = "cache-line bounce";
 inline constexpr const char* kFutexBounce = "futex bounce";

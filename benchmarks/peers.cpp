@@ -99,7 +99,7 @@ std::vector<Mode> modesOf(const PeerFamily& family) { return family.skipped.empt
 
 }  // namespace
 
-std::vector<Measurement> peerMeasurements(bool, const std::string& runName) {
+std::vector<Measurement> peerMeasurements(const std::string& runName) {
   Asker asker(runName);
   std::vector<Measurement> rows;
   const auto all = families();

@@ -25,7 +25,12 @@ class LatencyRecorder {
     sum_ += ns;
     max_ = std::max(max_, ns);
   }
-  void clear() noexcept { *this = LatencyRecorder{}; }
+  void add(const LatencyRecorder& other) noexcept {
+    for (std::size_t index = 0; index < buckets_.size(); ++index) buckets_[index] += other.buckets_[index];
+    count_ += other.count_;
+    sum_ += other.sum_;
+    max_ = std::max(max_, other.max_);
+  }
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] std::uint64_t maxNs() const noexcept { return max_; }
@@ -33,7 +38,9 @@ class LatencyRecorder {
 
   // The smallest duration that at least `percent` of a hundred samples do not exceed; 0 without samples.
   [[nodiscard]] std::uint64_t percentileNs(double percent) const noexcept {
-    const auto rank = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(percent / 100.0 * static_cast<double>(count_))));
+    // In thousandths of a percent: 99.9 is no number that a double holds, and one sample too many would be the outlier itself.
+    const auto thousandths = static_cast<std::uint64_t>(std::llround(percent * 1000));
+    const auto rank = std::max<std::uint64_t>(1, (count_ * thousandths + 99'999) / 100'000);
     std::uint64_t seen = 0;
     for (std::size_t index = 0; index < buckets_.size(); ++index) {
       seen += buckets_[index];

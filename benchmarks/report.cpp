@@ -20,9 +20,10 @@ std::string ratioText(const Result& result) { return result.ratioToFloor > 0 ? f
 std::string row(const Result& result) {
   const auto& what = result.measurement;
   const auto& latency = result.figures.latency;
+  const auto floor = result.floorNs > 0 ? what.floorName + " of " + durationText(result.floorNs) : "";
   const auto line = [&](const std::array<std::string, 5>& percentiles, const std::string& rate) {
     return fmt::format(kRow, what.name, toString(what.mode), percentiles[0], percentiles[1], percentiles[2], percentiles[3], percentiles[4],
-                       rate, ratioText(result), what.floorName);
+                       rate, ratioText(result), floor);
   };
   if (!what.skipped.empty()) return fmt::format("  {:<24} {:<9} left out: {}\n", what.name, toString(what.mode), what.skipped);
   if (!result.error.empty()) return fmt::format("  {:<24} {:<9} failed: {}\n", what.name, toString(what.mode), result.error);

@@ -93,11 +93,6 @@ std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterC
   }
 }
 
-void sleepFor(Nanoseconds duration) {
-  const timespec pause{static_cast<time_t>(duration.count() / 1'000'000'000), static_cast<long>(duration.count() % 1'000'000'000)};
-  ::nanosleep(&pause, nullptr);
-}
-
 }  // namespace
 
 // PAIR(bench-ready): the requester starts after everything that the server did before.
@@ -173,6 +168,11 @@ void killProcess(int pid) noexcept {
 }
 
 bool hasEnded(int pid) noexcept { return ::waitpid(pid, nullptr, WNOHANG) != 0; }
+
+void sleepFor(Nanoseconds duration) {
+  const timespec pause{static_cast<time_t>(duration.count() / 1'000'000'000), static_cast<long>(duration.count() % 1'000'000'000)};
+  ::nanosleep(&pause, nullptr);
+}
 
 bool waitUntil(const std::function<bool()>& done, Nanoseconds limit) {
   const auto deadline = Deadline::after(limit);

@@ -119,6 +119,7 @@ void pinTo(int cpu);
 void killProcess(int pid) noexcept;
 // True once it has ended; it is reaped then.
 [[nodiscard]] bool hasEnded(int pid) noexcept;
+void sleepFor(Nanoseconds duration);
 // Waits until `done()`, looking every 200 us. False: not within `limit`.
 [[nodiscard]] bool waitUntil(const std::function<bool()>& done, Nanoseconds limit);
 
