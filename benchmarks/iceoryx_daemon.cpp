@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -70,6 +71,7 @@ IceoryxDaemon::IceoryxDaemon() : config_(writeConfig()) {
   const FileDescriptor read(ends[0]);
   FileDescriptor write(ends[1]);
   pid_ = forkProcess([&] {
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // removes its shared memory when the runner is killed
     ::dup2(write.get(), STDOUT_FILENO);
     ::dup2(write.get(), STDERR_FILENO);
     ::execlp("iox-roudi", "iox-roudi", "-c", config_.c_str(), "-m", "off", "-l", "error", static_cast<char*>(nullptr));

@@ -76,14 +76,13 @@ void timeOneWay(const Scene& scene, Flood&& flood) {
   std::uint64_t fromCount = 0;
   const auto startNs = Clock::nowNs();
   const auto warmNs = startNs + scene.budget().warmUp.count();
-  const auto endNs = warmNs + scene.budget().measure.count();
   flood([&] {
     const auto nowNs = Clock::nowNs();
     if (fromNs == 0 && nowNs >= warmNs) {
       fromNs = nowNs;
       fromCount = scene.consumedCount();
     }
-    if (nowNs < endNs || fromNs == 0) return true;
+    if (fromNs == 0 || nowNs <= fromNs + scene.budget().measure.count()) return true;
     if (scene.figures().perSecond == 0) {
       scene.figures().count = scene.consumedCount() - fromCount;
       scene.figures().perSecond = static_cast<double>(scene.figures().count) * 1e9 / static_cast<double>(nowNs - fromNs);
