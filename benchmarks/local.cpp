@@ -32,7 +32,7 @@ bool isWanted(const Measurement& row, const std::vector<std::string>& only) {
 
 // What was asked for, and the floors that it is divided by.
 std::vector<Measurement> choose(const LocalOptions& options) {
-  auto all = catalogue("mpf-bench-" + std::to_string(::getpid()));
+  auto all = catalogue(kRunPrefix + std::to_string(::getpid()));
   std::set<std::pair<std::string, std::size_t>> floors;
   for (const auto& row : all) {
     if (isWanted(row, options.only)) floors.emplace(row.floorName, row.floorBytes);
@@ -110,6 +110,7 @@ int runLocal(const LocalOptions& options) {
     return 2;
   }
   const auto machine = Machine::look(*placement);
+  removeBackplanes(kRunPrefix);  // of runs that were interrupted
 
   Runner runner(*placement, rows);
   std::vector<Result> results;

@@ -94,7 +94,7 @@ class MpfPeer final : public Peer {
     }
   }
 
-  void removeTraces() noexcept override { removeBackplane(options_.name); }
+  void removeTraces() noexcept override { removeBackplanes(options_.name); }
 
  private:
   void take(Message& message) {
@@ -130,11 +130,15 @@ ServerOptions serverOptions(Mode mode) {
 }
 
 // In a process of its own: attaching starts a thread, and the runner has to stay without.
-void removeBackplane(const std::string& name) noexcept try {
-  const auto pid = forkProcess([&] { Backplane::attach(name).removeDead(); });
+void removeBackplanes(const std::string& prefix) noexcept try {
+  const auto pid = forkProcess([&] {
+    for (const auto& name : Backplane::names()) {
+      if (name.starts_with(prefix)) Backplane::attach(name).removeDead();
+    }
+  });
   if (!waitUntil([pid] { return hasEnded(pid); }, std::chrono::seconds(10))) killProcess(pid);
 } catch (const std::exception&) {
-  return;  // segments of dead processes are removed by the next program on that backplane
+  return;  // the next run tries again
 }
 
 PeerFamily mpfPeer() {

@@ -13,7 +13,9 @@ inline constexpr const char* kMpf = "MPF";
 
 [[nodiscard]] WaitMode waitMode(Mode mode) noexcept;
 [[nodiscard]] ServerOptions serverOptions(Mode mode);
-// Removes what killed processes left on a backplane.
-void removeBackplane(const std::string& name) noexcept;
+// Begins the name of every backplane, queue and socket of a run; its pid follows.
+inline constexpr const char* kRunPrefix = "mpf-bench-";
+// Removes what killed processes left on backplanes whose names begin so. What belongs to a living process stays.
+void removeBackplanes(const std::string& prefix) noexcept;
 
 }  // namespace mpf::bench

@@ -86,7 +86,7 @@ class Crowd {
 
 Outcome runAndClean(const Stage& stage, const std::string& backplane, const Act& act) {
   auto outcome = stage.run(act);
-  removeBackplane(backplane);
+  removeBackplanes(backplane);
   return outcome;
 }
 
