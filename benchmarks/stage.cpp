@@ -30,8 +30,8 @@ enum Role : std::size_t { server = 0, requester = 1 };
 // Shared anonymous memory, populated.
 class Shared {
  public:
-  explicit Shared(std::size_t bytes) : bytes_(bytes) {
-    at_ = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+  explicit Shared(std::size_t bytes)
+      : bytes_(bytes), at_(::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0)) {
     if (at_ == MAP_FAILED) throwSystemError(errno, "mmap", "benchmark memory");
   }
   Shared(const Shared&) = delete;

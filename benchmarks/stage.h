@@ -47,7 +47,7 @@ struct Figures {
 };
 
 // Shared by the processes of one measurement.
-struct Control {
+struct Control {  // NOLINT(clang-analyzer-optin.performance.Padding): each word on a line of its own
   alignas(kLineBytes) std::atomic<std::uint32_t> ready{0};     // written by the server
   alignas(kLineBytes) std::atomic<std::uint32_t> stopping{0};  // written by the requester
   alignas(kLineBytes) std::atomic<std::uint64_t> consumed{0};  // written by the server: one-way messages taken

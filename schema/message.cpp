@@ -12,7 +12,9 @@ namespace {
 
 class HeapLender final : public BodyLender {
  public:
-  void takeBack(std::byte* data, std::size_t) noexcept override { std::free(data); }
+  void takeBack(std::byte* data, std::size_t) noexcept override {
+    std::free(data);  // NOLINT(cppcoreguidelines-no-malloc): the owner of what allocateHeapBody() gave
+  }
 };
 
 constinit HeapLender theHeap;

@@ -135,7 +135,7 @@ Expected parseElements(std::vector<char>& to, std::string_view text) {
 }
 
 Expected parseElements(std::vector<std::byte>& to, std::string_view text) {
-  const Expected expected = "an even number of hexadecimal digits";
+  Expected expected = "an even number of hexadecimal digits";
   if (text.size() % 2 != 0) return expected;
   for (std::size_t i = 0; i < text.size(); i += 2) {
     std::uint8_t byte = 0;

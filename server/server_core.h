@@ -59,7 +59,7 @@ class ServerCore {
   void abandoned(const Route& route) noexcept;
 
  private:
-  class Keeper;
+  class Keeper;  // NOLINT(cppcoreguidelines-virtual-class-destructor): never destroyed
   static Connection& connectionOf(const Route& route) noexcept {
     // NOLINTNEXTLINE(performance-no-int-to-ptr): a route is opaque to everybody else
     return *reinterpret_cast<Connection*>(route.link);
