@@ -9,8 +9,9 @@
 
 namespace mpf::bench {
 
-// Writes every byte.
+// Writes every byte. Nothing may have no address.
 inline void writeAll(void* to, std::size_t bytes) noexcept {
+  if (bytes == 0) return;
   static std::uint8_t value = 0;
   std::memset(to, ++value, bytes);
 }
