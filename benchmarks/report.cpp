@@ -4,6 +4,8 @@
 #include <array>
 #include <fmt/format.h>
 
+#include <mpf/base/duration_text.h>
+
 namespace mpf::bench {
 namespace {
 
@@ -36,13 +38,6 @@ std::string row(const Result& result) {
 }
 
 }  // namespace
-
-std::string durationText(double ns) {
-  if (ns < 100) return fmt::format("{:.1f} ns", ns);
-  if (ns < 10'000) return fmt::format("{:.0f} ns", ns);
-  if (ns < 10'000'000) return fmt::format("{:.1f} us", ns / 1e3);
-  return fmt::format("{:.1f} ms", ns / 1e6);
-}
 
 std::string oneLine(const Result& result) {
   const auto& what = result.measurement;

@@ -11,7 +11,6 @@
 namespace mpf::bench {
 
 // A line: "  2.31 us".
-[[nodiscard]] std::string durationText(double ns);
 [[nodiscard]] std::string oneLine(const Result& result);
 [[nodiscard]] std::string table(const std::vector<Result>& results);
 // The goals of the project beside what was reached; only those whose rows were taken.

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include <mpf/base/clock.h>
-#include <mpf/benchmarks/recorder.h>
+#include <mpf/base/latency_recorder.h>
 
 namespace mpf::bench {
 

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 #include <stdexcept>
 
+#include <mpf/base/stop_signals.h>
 #include <mpf/server/server_core.h>
-#include <mpf/server/stop_signals.h>
 
 namespace mpf {
 

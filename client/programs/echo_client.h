@@ -3,14 +3,15 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <fmt/format.h>
+#include <memory>
 #include <string>
-#include <vector>
 
+#include <mpf/base/duration_text.h>
+#include <mpf/base/latency_recorder.h>
 #include <mpf/client/sync_client.h>
 
 namespace mpf {
@@ -33,27 +34,22 @@ struct EchoOptions {
 // What became of the calls, as a person reads it.
 class EchoStatistics {
  public:
-  void add(std::int64_t roundTripNs) { roundTripsNs_.push_back(roundTripNs); }
+  void add(std::int64_t roundTripNs) { roundTrips_->add(static_cast<std::uint64_t>(roundTripNs)); }
   void fail(const std::string& why) {
     ++failures_;
     fmt::print(stderr, "{}\n", why);
   }
   // Returns the exit status: 0 when every message came back.
-  int report() {
-    std::sort(roundTripsNs_.begin(), roundTripsNs_.end());
-    fmt::print("{} came back, {} did not", roundTripsNs_.size(), failures_);
-    if (!roundTripsNs_.empty()) {
-      const auto at = [&](double part) {
-        return static_cast<double>(roundTripsNs_[static_cast<std::size_t>(part * (static_cast<double>(roundTripsNs_.size()) - 1))]) / 1e3;
-      };
-      fmt::print("; round trip [us]: p50 {:.2f}, p99 {:.2f}, max {:.2f}", at(0.5), at(0.99), at(1));
-    }
+  int report() const {
+    const auto at = [&](double percent) { return durationText(static_cast<double>(roundTrips_->percentileNs(percent))); };
+    fmt::print("{} came back, {} did not", roundTrips_->count(), failures_);
+    if (roundTrips_->count() != 0) fmt::print("; round trip: p50 {}, p99 {}, max {}", at(50), at(99), at(100));
     fmt::print("\n");
     return failures_ == 0 ? 0 : 1;
   }
 
  private:
-  std::vector<std::int64_t> roundTripsNs_;
+  std::unique_ptr<LatencyRecorder> roundTrips_ = std::make_unique<LatencyRecorder>();
   std::uint64_t failures_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/stop_signals.h>
+#include <mpf/base/stop_signals.h>
 
 #include <signal.h>
 
@@ -51,7 +51,7 @@ void uninstall() {
 StopSignals::StopSignals(Callback callback, void* argument) : slot_(0) {
   const std::lock_guard lock(installMutex);
   while (slot_ < slots.size() && slots[slot_].used.exchange(true, std::memory_order_relaxed)) ++slot_;
-  if (slot_ == slots.size()) throw std::runtime_error("more than 64 servers wait for signals in one process");
+  if (slot_ == slots.size()) throw std::runtime_error("more than 64 wait for signals in one process");
   slots[slot_].argument.store(argument, std::memory_order_relaxed);
   // PAIR(stop-slot): after its argument.
   slots[slot_].callback.store(callback, std::memory_order_release);

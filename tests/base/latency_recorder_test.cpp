@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/benchmarks/recorder.h>
+#include <mpf/base/latency_recorder.h>
 
 #include <gtest/gtest.h>
 
-namespace mpf::bench {
+namespace mpf {
 namespace {
 
 TEST(LatencyRecorder, TellsNothingOfNothing) {
@@ -78,4 +78,4 @@ TEST(LatencyRecorder, AddsAnother) {
 }
 
 }  // namespace
-}  // namespace mpf::bench
+}  // namespace mpf

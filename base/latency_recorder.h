@@ -15,7 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace mpf::bench {
+namespace mpf {
 
 class LatencyRecorder {
  public:
@@ -75,4 +75,4 @@ class LatencyRecorder {
   std::uint64_t max_ = 0;
 };
 
-}  // namespace mpf::bench
+}  // namespace mpf
