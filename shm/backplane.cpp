@@ -90,10 +90,14 @@ void surveyDependent(const std::string& name, const SegmentName::Parsed& parsed,
 
 Backplane::Backplane(std::string name) : state_(std::make_shared<State>(std::move(name))) {}
 
-Backplane Backplane::attach(const std::string& name) {
+Backplane Backplane::named(const std::string& name) {
   auto chosen = name.empty() ? environmentOr("MPF_BACKPLANE", "default") : name;
   SegmentName::checkBackplane(chosen);
-  Backplane backplane(std::move(chosen));
+  return Backplane(std::move(chosen));
+}
+
+Backplane Backplane::attach(const std::string& name) {
+  auto backplane = named(name);
   static_cast<void>(backplane.removeDead());
   return backplane;
 }

@@ -19,6 +19,8 @@ class Backplane {
   // no more than the processes that use its name.
   //   throws  std::invalid_argument for a name that cannot be one
   static Backplane attach(const std::string& name = {});
+  // The same, and removes nothing: for who wants to know what was left.
+  static Backplane named(const std::string& name);
   // One with a name of its own, for tests.
   static Backplane isolated();
 

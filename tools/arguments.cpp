@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/arguments.h>
+
+#include <mpf/shm/backplane.h>
+
+namespace mpf::tools {
+
+void addBackplane(CLI::App& app, std::string& backplane, const std::string& otherwise) {
+  app.add_option("--backplane", backplane, "Backplane; default: $MPF_BACKPLANE, or " + otherwise)->envname("MPF_BACKPLANE");
+}
+
+void addServer(CLI::App& app, ServerArguments& arguments) {
+  addBackplane(app, arguments.backplane, "\"default\"");
+  arguments.location = Backplane::defaultLocation();
+  app.add_option("--location", arguments.location, "Location of the server; default: $MPF_LOCATION, or 0");
+  app.add_option("server", arguments.server, "Name of the server")->required();
+}
+
+void addJson(CLI::App& app, bool& json) { app.add_flag("--json", json, "For programs: JSON"); }
+
+}  // namespace mpf::tools

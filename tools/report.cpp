@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/report.h>
+
+#include <fmt/format.h>
+
+#include <mpf/shm/backplane.h>
+#include <mpf/tools/arguments.h>
+
+namespace mpf::tools {
+
+void addReport(CLI::App& app, ReportArguments& arguments) {
+  addBackplane(app, arguments.backplane, "all that there are");
+  app.add_option("--interval", arguments.intervalMs, "Time between the two looks that give rates and show who is stalled [ms]")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 3'600'000));
+  addJson(app, arguments.json);
+}
+
+int reportEach(const ReportArguments& arguments, const std::function<void(const Look&)>& print,
+               const std::function<void(const Look&, nlohmann::json& list)>& collect) {
+  auto list = nlohmann::json::array();
+  const auto backplanes = arguments.backplane.empty() ? Backplane::names() : std::vector{arguments.backplane};
+  for (const auto& backplane : backplanes) {
+    const Look look(backplane, std::chrono::milliseconds(arguments.intervalMs));
+    if (arguments.json) collect(look, list);
+    else print(look);
+  }
+  if (arguments.json) fmt::print("{}\n", list.dump(2));
+  return static_cast<int>(backplanes.size());
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/report_json.h>
+
+#include <fmt/format.h>
+
+namespace mpf::tools {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<const char*, 3> kWaitModes = {"spin", "adaptive", "block"};
+
+const char* toString(layout::LinkState state) noexcept {
+  switch (state) {
+    case layout::LinkState::none:
+      return "none";
+    case layout::LinkState::open:
+      return "open";
+    case layout::LinkState::closed:
+      return "closed";
+    case layout::LinkState::refused:
+      return "refused";
+  }
+  return "unknown";
+}
+
+json toJson(const Latencies& latencies) {
+  return {{"count", latencies.count},
+          {"p50_ns", latencies.percentileNs(50)},
+          {"p99_ns", latencies.percentileNs(99)},
+          {"p999_ns", latencies.percentileNs(99.9)},
+          {"max_ns", latencies.maxNs}};
+}
+
+json toJson(const Traffic& traffic) { return {{"sent", traffic.sent}, {"taken", traffic.taken}, {"waiting", traffic.waiting()}}; }
+
+json toJson(const LinkView& link, const WindowView* peer) {
+  json entry{{"server", link.server},
+             {"location", link.location},
+             {"client_state", toString(link.clientState)},
+             {"server_state", toString(link.serverState)},
+             {"queue_size", link.queueSize},
+             {"requests", toJson(link.requests)},
+             {"replies", toJson(link.replies)},
+             {"refused_sends", link.refused},
+             {"unanswered", link.unanswered},
+             {"bytes", link.bytes}};
+  if (peer != nullptr) {
+    entry["peer_pid"] = peer->pid;
+    entry["peer_program"] = peer->program;
+  }
+  return entry;
+}
+
+}  // namespace
+
+json toJson(const Look& look, const WindowView& window) {
+  const auto rates = look.ratesOf(window);
+  json entry{{"name", window.name},
+             {"state", look.stateOf(window)},
+             {"pid", window.pid},
+             {"program", window.program},
+             {"age_s", static_cast<double>(window.ageNs) / 1e9},
+             {"wait_mode", window.waitMode < kWaitModes.size() ? kWaitModes[window.waitMode] : "unknown"},
+             {"received", window.received},
+             {"sent_per_s", rates.sentPerSecond},
+             {"received_per_s", rates.receivedPerSecond},
+             {"links_opened", window.linksOpened},
+             {"links_closed", window.linksClosed},
+             {"peers_died", window.peersDied},
+             {"protocol_errors", window.protocolErrors},
+             {"wakes", window.wakes},
+             {"queue_wait", toJson(window.queueWait)},
+             {"service", toJson(window.service)}};
+  if (window.isServer) {
+    entry.update({{"location", window.location},
+                  {"queue_size", window.queueSize},
+                  {"replies", window.sent},
+                  {"expired", window.expired},
+                  {"refused", window.refused},
+                  {"reply_queue_full", window.replyQueueFull},
+                  {"max_message_bytes", window.maxMessageBytes}});
+  }
+  entry["links"] = json::array();
+  for (const auto& link : window.links) {
+    entry["links"].push_back(toJson(link, look.now().find(window.isServer ? link.clientWindow : link.serverWindow)));
+  }
+  return entry;
+}
+
+json toJson(const Look& look) {
+  json servers = json::array();
+  json clients = json::array();
+  json waiting = json::array();
+  for (const auto& server : look.now().servers) servers.push_back(toJson(look, server));
+  for (const auto& client : look.now().clients) clients.push_back(toJson(look, client));
+  for (const auto& wish : look.now().wishes) {
+    const auto* client = look.now().find(wish.clientWindow);
+    waiting.push_back({{"server", wish.server}, {"location", wish.location}, {"pid", client == nullptr ? 0 : client->pid}});
+  }
+  return {{"backplane", look.now().backplane},
+          {"servers", servers},
+          {"clients", clients},
+          {"waiting", waiting},
+          {"problems", look.now().problems}};
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Reports as JSON, for `--json`. docs/tools.md says what each field means.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <mpf/tools/look.h>
+
+namespace mpf::tools {
+
+// {"backplane", "servers": [window...], "clients": [window...], "waiting": [{"pid", "server", "location"}...], "problems": [text...]}
+[[nodiscard]] nlohmann::json toJson(const Look& look);
+// One server or client window with its links.
+[[nodiscard]] nlohmann::json toJson(const Look& look, const WindowView& window);
+
+}  // namespace mpf::tools

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// SegmentImage: a private copy of the beginning of a segment. Read with pread(): nothing is mapped, locked or written, so that looking
+// disturbs nobody, and a segment that shrinks meanwhile is no signal.
+//
+// Threads  one.
+// Crash    the owner may die at any time; the copy stays.
+// Trust    header() has been checked; words() are what their writers say.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <mpf/shm/layout.h>
+
+namespace mpf::tools {
+
+class SegmentImage {
+ public:
+  // Up to `bytes` of the segment; what the file does not have is zero. nullopt when there is no segment of that name (any more).
+  //   throws  SegmentError when it is not what it should be, std::system_error when it may not be read
+  static std::optional<SegmentImage> tryRead(const std::string& name, layout::SegmentKind kind, std::size_t bytes);
+
+  [[nodiscard]] const layout::SegmentHeader& header() const noexcept { return at<layout::SegmentHeader>(0); }
+  [[nodiscard]] const layout::WindowControl& window() const noexcept { return at<layout::WindowControl>(layout::kWindowControlOffset); }
+  [[nodiscard]] const layout::LinkControl& link() const noexcept { return at<layout::LinkControl>(layout::kLinkControlOffset); }
+  [[nodiscard]] std::uint64_t fileBytes() const noexcept { return fileBytes_; }
+
+ private:
+  struct alignas(layout::kPairBytes) Block {
+    std::byte bytes[layout::kPairBytes];
+  };
+  template <class T>
+  [[nodiscard]] const T& at(std::size_t offset) const noexcept {
+    return *reinterpret_cast<const T*>(reinterpret_cast<const std::byte*>(blocks_.get()) + offset);
+  }
+  std::unique_ptr<Block[]> blocks_;
+  std::uint64_t fileBytes_ = 0;
+};
+
+}  // namespace mpf::tools

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/survey.h>
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <exception>
+#include <fstream>
+#include <map>
+
+#include <mpf/base/clock.h>
+#include <mpf/shm/histogram.h>
+#include <mpf/shm/process.h>
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tools/segment_image.h>
+
+namespace mpf::tools {
+namespace {
+
+constexpr std::size_t kLinkImageBytes = layout::kLinkControlOffset + sizeof(layout::LinkControl);
+
+template <class Word>
+auto value(const Word& word) noexcept {
+  return word.load(std::memory_order_relaxed);
+}
+
+template <std::size_t n>
+std::string text(const std::array<char, n>& chars) {
+  return {chars.data(), static_cast<std::size_t>(std::find(chars.begin(), chars.end(), '\0') - chars.begin())};
+}
+
+Latencies latenciesOf(const layout::Histogram& histogram) {
+  Latencies latencies;
+  for (std::size_t i = 0; i < latencies.buckets.size(); ++i) {
+    latencies.buckets[i] = value(histogram.buckets[i]);
+    latencies.count += latencies.buckets[i];
+  }
+  latencies.maxNs = value(histogram.maxNs);
+  return latencies;
+}
+
+// The letter of field 3 of /proc/<pid>/stat, which follows the program's name in brackets.
+char processState(const layout::SegmentHeader& header) {
+  if (header.pidNamespace != Process::self().pidNamespace) return '?';
+  std::ifstream file("/proc/" + std::to_string(header.ownerPid) + "/stat");
+  std::string line;
+  std::getline(file, line);
+  const auto bracket = line.rfind(") ");
+  return bracket == std::string::npos || bracket + 2 >= line.size() ? '?' : line[bracket + 2];
+}
+
+std::uint64_t fileBytes(const std::string& name) {
+  struct stat status{};
+  return ::stat(segments::path(name).c_str(), &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
+}
+
+Life lifeOf(const std::string& name, const SegmentImage& image) {
+  if (segments::probeOwner(name, image.header().incarnation) != segments::Owner::alive) return Life::dead;
+  return value(image.window().state) == layout::WindowState::closed ? Life::closed : Life::alive;
+}
+
+void copyCounters(const layout::WindowControl& from, WindowView& to) {
+  to.received = value(from.received);
+  to.sent = value(from.sent);
+  to.replyQueueFull = value(from.replyQueueFull);
+  to.queueFull = value(from.queueFull);
+  to.expired = value(from.expired);
+  to.refused = value(from.refused);
+  to.wakes = value(from.wakes);
+  to.linksOpened = value(from.linksOpened);
+  to.linksClosed = value(from.linksClosed);
+  to.peersDied = value(from.peersDied);
+  to.protocolErrors = value(from.protocolErrors);
+  to.queueWait = latenciesOf(from.queueWaitNs);
+  to.service = latenciesOf(from.serviceNs);
+}
+
+// Reads the segments of one backplane, one by one, into a Survey.
+class Surveyor {
+ public:
+  explicit Surveyor(Survey& survey) : survey_(survey) {}
+
+  void run() {
+    for (const auto& name : segments::list(SegmentName::prefix(survey_.backplane))) {
+      const auto parsed = SegmentName::tryParse(name);
+      if (!parsed) continue;
+      try {
+        look(name, *parsed);
+      } catch (const std::exception& error) {
+        survey_.problems.emplace_back(error.what());
+      }
+    }
+    joinLinks();
+    sort();
+  }
+
+ private:
+  void look(const std::string& name, const SegmentName::Parsed& parsed) {
+    switch (parsed.kind) {
+      case NameKind::serverWindow:
+        return window(name, layout::SegmentKind::serverWindow);
+      case NameKind::clientWindow:
+        return window(name, layout::SegmentKind::clientWindow);
+      case NameKind::link:
+        return link(name);
+      case NameKind::wish:
+        return wish(name);
+      case NameKind::bulk:
+        bulkBytes_[parsed.incarnation] += fileBytes(name);
+        return;
+      case NameKind::hints:
+      case NameKind::fifo:
+        return;
+    }
+  }
+
+  void window(const std::string& name, layout::SegmentKind kind) {
+    const auto image = SegmentImage::tryRead(name, kind, layout::kWindowBytes);
+    if (!image) return;
+    const auto& header = image->header();
+    WindowView view;
+    view.isServer = kind == layout::SegmentKind::serverWindow;
+    view.incarnation = header.incarnation;
+    view.program = text(header.program);
+    view.name = text(header.name);
+    if (view.name.empty()) view.name = view.program;
+    view.location = header.location;
+    view.pid = header.ownerPid;
+    view.waitMode = header.waitMode;
+    view.life = lifeOf(name, *image);
+    if (view.life != Life::dead) view.processState = processState(header);
+    view.ageNs = survey_.atNs - header.createdMonotonicNs;
+    view.queueSize = view.isServer ? value(image->window().queueSize) : header.queueSize;
+    view.maxMessageBytes = header.maxMessageBytes;
+    copyCounters(image->window(), view);
+    (view.isServer ? survey_.servers : survey_.clients).push_back(std::move(view));
+  }
+
+  void link(const std::string& name) {
+    const auto image = SegmentImage::tryRead(name, layout::SegmentKind::link, kLinkImageBytes);
+    if (!image) return;
+    const auto& header = image->header();
+    const auto& control = image->link();
+    LinkView view;
+    view.incarnation = header.incarnation;
+    view.serverWindow = header.serverWindow;
+    view.clientWindow = header.clientWindow;
+    view.server = text(header.name);
+    view.location = header.location;
+    view.clientState = value(control.clientState);
+    view.serverState = value(control.serverState);
+    view.queueSize = header.queueSize;
+    view.requests = {value(control.clientSent), value(control.requests.taken)};
+    view.replies = {value(control.serverSent), value(control.replies.taken)};
+    view.refused = value(control.clientRefused);
+    view.unanswered = value(control.clientUnanswered);
+    view.bytes = image->fileBytes();
+    links_.push_back(std::move(view));
+  }
+
+  void wish(const std::string& name) {
+    const auto image = SegmentImage::tryRead(name, layout::SegmentKind::wish, sizeof(layout::SegmentHeader));
+    if (!image) return;
+    const auto& header = image->header();
+    survey_.wishes.push_back({header.ownerWindow, text(header.name), header.location});
+  }
+
+  // A link belongs to both of its windows. One whose windows are gone is about to be removed: not shown.
+  void joinLinks() {
+    for (auto& link : links_) {
+      if (const auto bulk = bulkBytes_.find(link.incarnation); bulk != bulkBytes_.end()) link.bytes += bulk->second;
+      for (auto& server : survey_.servers) {
+        if (server.incarnation == link.serverWindow) server.links.push_back(link);
+      }
+      for (auto& client : survey_.clients) {
+        if (client.incarnation == link.clientWindow) client.links.push_back(link);
+      }
+    }
+  }
+
+  void sort() {
+    std::ranges::sort(survey_.servers, {}, [](const WindowView& view) { return std::pair(view.location, view.name); });
+    std::ranges::sort(survey_.clients, {}, [](const WindowView& view) { return std::pair(-view.ageNs, view.incarnation); });
+    std::ranges::sort(survey_.wishes, {}, [](const WishView& view) { return std::pair(view.location, view.server); });
+    const auto byServer = [](const LinkView& view) { return std::tuple(view.location, view.server, view.incarnation); };
+    for (auto* windows : {&survey_.servers, &survey_.clients}) {
+      for (auto& window : *windows) std::ranges::sort(window.links, {}, byServer);
+    }
+  }
+
+  Survey& survey_;
+  std::vector<LinkView> links_;
+  std::map<std::uint64_t, std::uint64_t> bulkBytes_;  // by link
+};
+
+}  // namespace
+
+std::uint64_t Latencies::percentileNs(double percent) const noexcept {
+  const auto wanted = static_cast<double>(count) * percent / 100;
+  std::uint64_t seen = 0;
+  for (std::uint32_t i = 0; i < layout::kHistogramBuckets; ++i) {
+    seen += buckets[i];
+    if (seen != 0 && static_cast<double>(seen) >= wanted) return std::min(HistogramBuckets::endNs(i), maxNs);
+  }
+  return maxNs;
+}
+
+Survey Survey::take(const std::string& backplane) {
+  SegmentName::checkBackplane(backplane);
+  Survey survey;
+  survey.backplane = backplane;
+  survey.atNs = Clock::nowNs();
+  Surveyor(survey).run();
+  return survey;
+}
+
+const WindowView* Survey::find(std::uint64_t incarnation) const noexcept {
+  for (const auto* windows : {&servers, &clients}) {
+    const auto found = std::ranges::find(*windows, incarnation, &WindowView::incarnation);
+    if (found != windows->end()) return &*found;
+  }
+  return nullptr;
+}
+
+}  // namespace mpf::tools

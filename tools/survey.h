@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// Survey: what the segments of a backplane say at one moment. What every report of `mpf` is made from.
+//
+//   /dev/shm/mpf.<backplane>.* ─ pread ─► Survey ─► ls, mrr, msr
+//
+// Threads  one.
+// Crash    works on a wedged system: it waits for nobody, and nobody notices it.
+// Trust    a segment that cannot be read is a problem by name; the rest is shown all the same.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <mpf/shm/layout.h>
+
+namespace mpf::tools {
+
+// A latency histogram of a window.
+struct Latencies {
+  std::array<std::uint64_t, layout::kHistogramBuckets> buckets{};
+  std::uint64_t count = 0;
+  std::uint64_t maxNs = 0;
+  // Upper end of the bucket that holds the percentile, at most maxNs; 0 without samples.
+  [[nodiscard]] std::uint64_t percentileNs(double percent) const noexcept;
+};
+
+// Messages of one direction of a link.
+struct Traffic {
+  std::uint64_t sent = 0;
+  std::uint64_t taken = 0;
+  [[nodiscard]] std::uint64_t waiting() const noexcept { return sent > taken ? sent - taken : 0; }
+};
+
+struct LinkView {
+  std::uint64_t incarnation = 0;
+  std::uint64_t serverWindow = 0;  // incarnations
+  std::uint64_t clientWindow = 0;
+  std::string server;
+  std::int32_t location = 0;
+  layout::LinkState clientState{};
+  layout::LinkState serverState{};
+  std::uint32_t queueSize = 0;
+  Traffic requests;
+  Traffic replies;
+  std::uint64_t refused = 0;     // sends that the client was refused: queue full, too large
+  std::uint64_t unanswered = 0;  // requests without a reply or fate
+  std::uint64_t bytes = 0;       // shared memory, pools included
+  [[nodiscard]] bool isOpen() const noexcept { return clientState == layout::LinkState::open && serverState == layout::LinkState::open; }
+};
+
+enum class Life { alive, closed, dead };
+
+// A server or a client process's window.
+struct WindowView {
+  bool isServer = false;
+  std::uint64_t incarnation = 0;
+  std::string name;  // the server's; a client's label or program
+  std::int32_t location = 0;
+  std::int32_t pid = 0;
+  std::string program;
+  std::uint32_t waitMode = 0;
+  Life life{};
+  char processState = '?';  // of /proc/<pid>/stat; '?' when it cannot be told
+  std::int64_t ageNs = 0;
+  std::uint32_t queueSize = 0;
+  std::uint64_t maxMessageBytes = 0;
+  std::uint64_t received = 0, sent = 0, replyQueueFull = 0, queueFull = 0, expired = 0, refused = 0, wakes = 0;
+  std::uint64_t linksOpened = 0, linksClosed = 0, peersDied = 0, protocolErrors = 0;
+  Latencies queueWait;
+  Latencies service;
+  std::vector<LinkView> links;  // by incarnation
+};
+
+// A client that waits for a server that is not there.
+struct WishView {
+  std::uint64_t clientWindow = 0;
+  std::string server;
+  std::int32_t location = 0;
+};
+
+struct Survey {
+  std::string backplane;
+  std::int64_t atNs = 0;            // CLOCK_MONOTONIC
+  std::vector<WindowView> servers;  // by location and name
+  std::vector<WindowView> clients;  // by age
+  std::vector<WishView> wishes;
+  std::vector<std::string> problems;  // segments that could not be read, and why
+
+  static Survey take(const std::string& backplane);
+  [[nodiscard]] const WindowView* find(std::uint64_t incarnation) const noexcept;
+};
+
+}  // namespace mpf::tools
