@@ -27,7 +27,7 @@ demo: release ## a client, shared memory, a serial server on a terminal line, an
 test: test-debug ## build with debug information and run every test
 
 bench: release ## how fast, beside the physical floors and other message systems
-	build/release/bin/mpf-bench-local
+	build/release/bin/mpf bench local
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"

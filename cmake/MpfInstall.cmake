@@ -101,7 +101,7 @@ function(mpf_find_programs out folder)
 endfunction()
 
 set(programs "")
-foreach(folder client server tools)
+foreach(folder client server tools benchmarks)
   if(EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
     mpf_find_programs(programs "${CMAKE_SOURCE_DIR}/${folder}")
   endif()
