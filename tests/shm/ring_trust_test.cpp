@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// A ring whose other end writes nonsense: it costs messages of this ring and nothing else.
+#include <mpf/tests/shm/ring_fixture.h>
+#include <mpf/tests/support/random.h>
+
+namespace mpf::test {
+namespace {
+
+class SlotCounts : public RingTest, public testing::WithParamInterface<int> {};
+
+TEST_P(SlotCounts, ThatCannotBeHoldNoBodyAndEndInOneStep) {
+  ASSERT_TRUE(push(1));
+  ASSERT_TRUE(push(2));
+  ring_[0].slots = static_cast<std::uint8_t>(GetParam());
+  ring_[0].bodyBytes = UINT32_MAX;
+
+  const auto envelope = consumer_.begin();
+  const auto capacity = consumer_.inlineCapacity();
+  consumer_.end();
+
+  EXPECT_EQ(envelope.bodyBytes, UINT32_MAX) << "the envelope says what was written; the reader compares";
+  EXPECT_EQ(capacity, 0u);
+  ASSERT_TRUE(consumer_.hasMessage());
+  EXPECT_EQ(take(), pattern(2, 8));
+}
+INSTANTIATE_TEST_SUITE_P(Nonsense, SlotCounts, testing::Values(0, 5, 127, 200, 255));
+
+TEST_F(RingTest, TheSlotCountIsReadOnce) {
+  ASSERT_TRUE(push(1));
+
+  static_cast<void>(consumer_.begin());
+  ring_[0].slots = 4;
+  const auto capacity = consumer_.inlineCapacity();
+  consumer_.end();
+
+  EXPECT_EQ(capacity, layout::kFirstSlotBodyBytes);
+  ASSERT_TRUE(push(2));
+  EXPECT_TRUE(consumer_.hasMessage());
+}
+
+TEST_F(RingTest, ASequenceFromThePastOrTheFutureIsNoMessage) {
+  for (const std::uint64_t sequence : {std::uint64_t{0}, std::uint64_t{2}, std::uint64_t{kCapacity + 1}, UINT64_MAX}) {
+    ring_[0].sequence.store(sequence, std::memory_order_relaxed);
+    EXPECT_FALSE(consumer_.hasMessage()) << sequence;
+  }
+}
+
+TEST_F(RingTest, FreedSlotsThatWereNeverUsedMakeNoMoreRoomThanTheRingHas) {
+  for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(push(i));
+
+  control_.freed.store(UINT64_MAX, std::memory_order_relaxed);
+
+  EXPECT_TRUE(producer_.hasFree(kCapacity));
+  EXPECT_FALSE(producer_.hasFree(kCapacity + 1));
+}
+
+TEST_F(RingTest, FreedSlotsThatGoBackTakeNothingAway) {
+  ASSERT_TRUE(push(1));
+  take();
+  ASSERT_TRUE(producer_.hasFree(kCapacity));
+
+  control_.freed.store(0, std::memory_order_relaxed);
+
+  for (std::uint32_t i = 0; i < kCapacity; ++i) EXPECT_TRUE(push(i));
+  EXPECT_FALSE(push(99));
+}
+
+TEST_F(RingTest, ACountOfTakenMessagesIsHeldToWhatWasSent) {
+  ASSERT_TRUE(push(1));
+  ASSERT_TRUE(push(2));
+
+  control_.taken.store(UINT64_MAX, std::memory_order_relaxed);
+  EXPECT_EQ(producer_.waiting(), 0u);
+  EXPECT_FALSE(producer_.isTaken(3));
+  control_.taken.store(0, std::memory_order_relaxed);
+  EXPECT_EQ(producer_.waiting(), 0u) << "what was taken stays taken";
+  EXPECT_TRUE(producer_.isTaken(2));
+}
+
+// Each step is bounded and stays inside the ring (the fixture looks at the guards), whatever the other side writes where.
+TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
+  Random random;
+  Bytes body(layout::kInlineBodyBytes);
+  constexpr auto kRingBytes = sizeof(layout::Slot) * kCapacity;
+  std::uint64_t taken = 0;
+
+  for (int step = 0; step < 300'000; ++step) {
+    switch (random.below(6)) {
+      case 0:
+        ringBytes()[random.below(kRingBytes)] = static_cast<std::byte>(random.bits());
+        break;
+      case 1:  // likely to be believed: the sequences of the next positions
+        ring_[random.below(kCapacity)].sequence.store(taken + random.below(2 * kCapacity), std::memory_order_relaxed);
+        break;
+      case 2:
+        control_.freed.store(random.nasty(), std::memory_order_relaxed);
+        break;
+      case 3:
+        control_.taken.store(random.nasty(), std::memory_order_relaxed);
+        break;
+      case 4: {
+        const auto before = producer_.messages();
+        const bool pushed = push(static_cast<std::uint64_t>(step), random.below(layout::kInlineBodyBytes + 1));
+        ASSERT_EQ(producer_.messages(), before + (pushed ? 1 : 0));
+        ASSERT_LE(producer_.waiting(), producer_.messages());
+        break;
+      }
+      default:
+        if (!consumer_.hasMessage()) break;
+        const auto envelope = consumer_.begin();
+        ASSERT_LE(consumer_.inlineCapacity(), layout::kInlineBodyBytes);
+        consumer_.copyBody(std::span(body).first(std::min<std::size_t>(envelope.bodyBytes, consumer_.inlineCapacity())));
+        consumer_.end();
+        ++taken;
+    }
+  }
+  EXPECT_EQ(consumer_.messages(), taken);
+}
+
+}  // namespace
+}  // namespace mpf::test
