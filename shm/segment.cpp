@@ -50,8 +50,9 @@ bool isLocked(int fd) {
   return ::fcntl(fd, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;  // a failure proves nothing
 }
 
+// Anybody may put anything under a name in /dev/shm: O_NONBLOCK, so that a pipe does not keep us waiting.
 FileDescriptor openByName(const std::string& name, int flags) {
-  return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW));
+  return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
 }
 
 }  // namespace
@@ -64,8 +65,8 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
     checkCall(::fchown(fd, static_cast<uid_t>(-1), rights.group), "give a segment to group", std::to_string(rights.group));
   }
   checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
-  const int shortage = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
-  if (shortage != 0) throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
+  if (const int shortage = reserve(fd, bytes); shortage != 0)
+    throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
   segment.map(Access::readWrite);
 
   auto& header = segment.sharedHeader();
@@ -120,6 +121,7 @@ std::optional<Segment> Segment::tryOpen(const std::string& name, layout::Segment
   segment.file_ = std::move(file);
   struct stat status{};
   checkCall(::fstat(segment.file_.get(), &status), "look at", segments::path(name));
+  if (!S_ISREG(status.st_mode)) throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", segments::path(name)));
   const auto fileBytes = static_cast<std::size_t>(status.st_size);
   const auto got = ::pread(segment.file_.get(), &segment.header_, sizeof segment.header_, 0);
   if (got != static_cast<ssize_t>(sizeof segment.header_)) {

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// ShmTest: a backplane of its own, on which nothing may be left.
+#pragma once
+
+#include <chrono>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <string>
+
+#include <mpf/shm/backplane.h>
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+
+using namespace std::chrono_literals;
+
+// What `act` throws, as a text; empty when it throws nothing.
+template <class Exception, class Act>
+std::string whatOf(Act act) {
+  try {
+    act();
+  } catch (const Exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
+class ShmTest : public testing::Test {
+ protected:
+  void TearDown() override { EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()) << "left behind"; }
+
+  [[nodiscard]] const std::string& name() const { return backplane_.name(); }
+  [[nodiscard]] std::string serverName(const std::string& server = "server") const { return SegmentName::serverWindow(name(), 0, server); }
+  // A segment of one page, not named yet.
+  [[nodiscard]] Segment createPage(layout::SegmentKind kind = layout::SegmentKind::wish, Rights rights = {}) const {
+    return Segment::create(layout::kPageBytes, kind, name(), rights);
+  }
+
+  Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+  Backplane backplane_ = Backplane::isolated();
+};
+
+}  // namespace mpf::test
