@@ -6,6 +6,7 @@
 #include <sys/random.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <boost/interprocess/shared_memory_object.hpp>
 #include <cstring>
 #include <fmt/format.h>
@@ -48,6 +49,19 @@ bool tryLock(int fd) {
 bool isLocked(int fd) {
   auto lock = wholeFile(F_WRLCK);
   return ::fcntl(fd, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;  // a failure proves nothing
+}
+
+// Older kernels end a long reservation at any signal and undo it; small pieces get done between two ticks of a timer.
+int reserve(int fd, std::size_t bytes) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;
+  int shortage = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
+  if (shortage != EINTR) return shortage;
+  for (std::size_t at = 0; at < bytes;) {
+    shortage = ::posix_fallocate(fd, static_cast<off_t>(at), static_cast<off_t>(std::min(kPiece, bytes - at)));
+    if (shortage != 0 && shortage != EINTR) return shortage;
+    if (shortage == 0) at += kPiece;
+  }
+  return 0;
 }
 
 // Anybody may put anything under a name in /dev/shm: O_NONBLOCK, so that a pipe does not keep us waiting.

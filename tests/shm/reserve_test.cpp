@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Memory is reserved when a segment is made. This file stands between the program and the kernel's answer.
+#include <fcntl.h>
+
+#include <cerrno>
+#include <functional>
+
+#include <mpf/tests/shm/shm_fixture.h>
+
+namespace {
+
+// What the kernel answers instead of reserving; nullopt-like 0: let it reserve.
+std::function<int(off_t bytes)> answer = [](off_t) { return 0; };
+
+}  // namespace
+
+extern "C" int posix_fallocate(int fd, off_t offset, off_t bytes) noexcept(false) {
+  if (const int error = answer(bytes); error != 0) return error;
+  return ::fallocate(fd, 0, offset, bytes) == 0 ? 0 : errno;
+}
+
+namespace mpf::test {
+namespace {
+
+class Reserve : public ShmTest {
+ protected:
+  ~Reserve() override {
+    answer = [](off_t) { return 0; };
+  }
+  [[nodiscard]] Segment create(std::size_t bytes) const { return Segment::create(bytes, layout::SegmentKind::bulk, name(), {}); }
+};
+
+TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
+  answer = [](off_t) { return ENOSPC; };
+
+  const auto why = whatOf<std::system_error>([&] { static_cast<void>(create(4096)); });
+
+  EXPECT_THAT(why, testing::AllOf(testing::HasSubstr("reserve 4096 bytes in /dev/shm"), testing::HasSubstr("No space left")));
+}
+
+// As kernels do that undo a long reservation at each tick of a timer.
+TEST_F(Reserve, SignalsAreNoShortage) {
+  int calls = 0;
+  answer = [&](off_t bytes) { return bytes > 1 << 20 || ++calls % 2 == 1 ? EINTR : 0; };
+  constexpr std::size_t kBytes = (std::size_t{5} << 20) + 4096;
+
+  const auto segment = create(kBytes);
+
+  EXPECT_EQ(segment.bytes(), kBytes);
+  EXPECT_EQ(calls, 12);
+}
+
+TEST_F(Reserve, AShortageBetweenSignalsIsAnError) {
+  int calls = 0;
+  answer = [&](off_t) { return ++calls < 5 ? EINTR : ENOSPC; };
+
+  EXPECT_THROW(static_cast<void>(create(std::size_t{5} << 20)), std::system_error);
+}
+
+}  // namespace
+}  // namespace mpf::test
