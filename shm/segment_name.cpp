@@ -37,17 +37,35 @@ std::vector<std::string_view> split(std::string_view name) {
   }
 }
 
-std::optional<std::uint64_t> tryHex(std::string_view text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+template <class Number>
+std::optional<Number> tryNumber(std::string_view text, int base) {
+  Number value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+std::optional<std::uint64_t> tryHex(std::string_view text) { return tryNumber<std::uint64_t>(text, 16); }
+
+bool isBackplane(std::string_view name) {
+  return !name.empty() && name.size() < layout::kBackplaneChars && std::all_of(name.begin(), name.end(), isPlain);
+}
+
+// Whether encode() could have made it.
+bool isEncoded(std::string_view name) {
+  const auto isUpperHex = [](char c) { return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'F'); };
+  for (std::size_t at = 0; at < name.size(); ++at) {
+    if (isPlain(name[at]) || name[at] == '[' || name[at] == ']') continue;
+    if (name[at] != '%' || name.size() - at < 3 || !isUpperHex(name[at + 1]) || !isUpperHex(name[at + 2])) return false;
+    at += 2;
+  }
+  return !name.empty();
 }
 
 }  // namespace
 
 void SegmentName::checkBackplane(std::string_view backplane) {
-  if (backplane.empty() || backplane.size() >= layout::kBackplaneChars || !std::all_of(backplane.begin(), backplane.end(), isPlain)) {
+  if (!isBackplane(backplane)) {
     throw std::invalid_argument(
         fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -", backplane, layout::kBackplaneChars - 1));
   }
@@ -87,13 +105,14 @@ std::string SegmentName::bulk(std::string_view backplane, std::uint64_t link, st
 
 std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) {
   const auto parts = split(name);
-  if (parts.size() < 4 || parts[0] != "mpf" || parts[2].size() != 1) return std::nullopt;
+  if (parts.size() < 4 || parts[0] != "mpf" || !isBackplane(parts[1]) || parts[2].size() != 1) return std::nullopt;
   Parsed parsed;
   parsed.backplane = parts[1];
   parsed.kind = static_cast<NameKind>(parts[2][0]);
   switch (parsed.kind) {
     case NameKind::serverWindow:
-      return parts.size() == 5 ? std::optional(parsed) : std::nullopt;
+      if (parts.size() != 5 || !tryNumber<std::int32_t>(parts[3], 10) || !isEncoded(parts[4])) return std::nullopt;
+      return parsed;
     case NameKind::link: {
       const auto server = tryHex(parts[3]);
       const auto link = parts.size() == 5 ? tryHex(parts[4]) : std::nullopt;
@@ -103,6 +122,8 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
       return parsed;
     }
     case NameKind::bulk:
+      if (parts.size() != 6 || (parts[4] != "0" && parts[4] != "1") || !tryNumber<std::uint32_t>(parts[5], 10)) return std::nullopt;
+      [[fallthrough]];
     case NameKind::clientWindow:
     case NameKind::hints:
     case NameKind::wish:
