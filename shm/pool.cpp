@@ -11,6 +11,7 @@ namespace mpf {
 namespace {
 
 constexpr std::uint32_t kMaxBulks = 256;  // bulk segments of one side of a link
+constexpr std::size_t kMaxChunkBytes = UINT32_MAX;  // as Slot::bodyBytes can say
 
 // A power of two of elements plus room for the header of a message, so that 1 MiB of data does not need 2 MiB.
 std::size_t chunkBytesFor(std::size_t bytes) {
@@ -37,7 +38,7 @@ PoolOwner::~PoolOwner() {
 
 std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
   collectReturned();
-  if (inUse_ >= layout::kReturnSlots) return std::nullopt;
+  if (inUse_ >= layout::kReturnSlots || bytes > kMaxChunkBytes) return std::nullopt;
   const auto chunkBytes = chunkBytesFor(bytes);
   for (int attempt = 0; attempt < 2; ++attempt) {
     for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
@@ -129,7 +130,8 @@ std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) noexce
     if (!segment) return std::nullopt;
     const auto header = segment->header();
     const auto room = segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
-    if (header.chunkBytes == 0 || header.chunkCount > room / header.chunkBytes) return std::nullopt;
+    if (header.chunkBytes == 0 || header.chunkBytes % layout::kCacheLineBytes != 0) return std::nullopt;
+    if (header.chunkCount > room / header.chunkBytes) return std::nullopt;
     segment->closeFile();
     bulk = {std::move(*segment), header.chunkBytes, header.chunkCount};
   }

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <functional>
 
+#include <mpf/shm/pool.h>
 #include <mpf/tests/shm/shm_fixture.h>
 
 namespace {
@@ -55,6 +56,19 @@ TEST_F(Reserve, AShortageBetweenSignalsIsAnError) {
   answer = [&](off_t) { return ++calls < 5 ? EINTR : ENOSPC; };
 
   EXPECT_THROW(static_cast<void>(create(std::size_t{5} << 20)), std::system_error);
+}
+
+TEST_F(Reserve, AShortageIsNoChunkAndPasses) {
+  layout::ReturnRing returns{};
+  PoolOwner pool({name(), 1, 0, 0}, Rights{}, 1 << 20, returns);
+  answer = [](off_t) { return ENOSPC; };
+
+  EXPECT_FALSE(pool.tryAlloc(1000));
+
+  EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  EXPECT_EQ(pool.bytes(), 0u);
+  answer = [](off_t) { return 0; };
+  EXPECT_TRUE(pool.tryAlloc(1000));
 }
 
 }  // namespace
