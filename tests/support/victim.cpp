@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: MIT
-// The program behind Victim: an echo server, or a client that sends as fast as it can.
+// The program behind Victim: an echo server, a client that sends as fast as it can, or a crowd of clients.
 #include <signal.h>
 #include <sys/prctl.h>
+#include <unistd.h>
 
 #include <cstdio>
+#include <grp.h>
+#include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
+#include <mpf/base/system_call.h>
 #include <mpf/client/message_client.h>
 #include <mpf/server/message_server.h>
 
@@ -13,9 +19,18 @@ namespace {
 
 using namespace std::chrono_literals;
 
+// The test waits for these.
+template <class... Values>
+void say(const char* format, Values... values) {
+  std::printf(format, values...);
+  std::putchar('\n');
+  std::fflush(stdout);
+}
+
 // Echoes; keeps each seventh Int32 (and so drops the one kept before), and answers some arrays with new ones.
-int serve(const mpf::Backplane& backplane, mpf::WaitMode mode) {
-  mpf::MessageServer server(backplane, "echo", {.queueSize = 32, .waitMode = mode});
+int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
+  options.queueSize = 32;
+  mpf::MessageServer server(backplane, "echo", options);
   mpf::Message kept;
   int requests = 0;
   server.on<mpf::Int32>([&](mpf::Int32Message&& request) {
@@ -31,6 +46,7 @@ int serve(const mpf::Backplane& backplane, mpf::WaitMode mode) {
     static_cast<void>(server.reply(std::move(reply)));
   });
   server.on<mpf::Float64>([](mpf::Float64& request) { request.value += 1; });
+  say("open");
   return server.runUntilSignal();
 }
 
@@ -47,15 +63,96 @@ int flood(const mpf::Backplane& backplane) {
   }
 }
 
+// One of a crowd: in each life of the server, it has some requests answered, a few at a time.
+class Visitor {
+ public:
+  static constexpr int kRequests = 50;
+  static constexpr int kAtATime = 4;
+
+  Visitor(mpf::Dispatcher& dispatcher, std::map<std::uint64_t, int>& done, int crowd)
+      : done_(done), crowd_(crowd), client_(dispatcher, [this](const mpf::Message& message) { take(message); }) {
+    client_.bind("echo");
+  }
+  [[nodiscard]] std::string reason() const { return client_.notConnectedBecause(); }
+
+ private:
+  void take(const mpf::Message& message) {
+    if (const auto* news = message.tryAs<mpf::Connect>()) {
+      if (open_ != 0) say("a change of the connection while %d requests have no end", open_);
+      if (news->status != mpf::ConnectStatus::connectYes) return;
+      life_ = news->incarnation;
+      sent_ = answered_ = 0;
+      for (int i = 0; i < kAtATime; ++i) send();
+    } else if (const auto* reply = message.tryAs<mpf::Float64>()) {
+      --open_;
+      if (reply->value != message.getClientExtra() + 1) say("a reply to something else");
+      if (++answered_ == kRequests && ++done_[life_] == crowd_) say("answered %lx", life_);
+      send();
+    } else {
+      --open_;
+      const auto fate = message.tryAs<mpf::RequestFate>()->fate;
+      if (fate != mpf::Fate::neverTaken && fate != mpf::Fate::outcomeUnknown) say("a request was %s", mpf::toString(fate).data());
+    }
+  }
+  void send() {
+    if (sent_ == kRequests) return;
+    mpf::Float64Message request({.value = sent_ + 0.0});
+    request.setClientExtra(sent_);
+    const auto result = client_.send(std::move(request));
+    if (result == mpf::SendResult::notConnected) return;  // the server ends: its fates come now
+    if (result != mpf::SendResult::sent) return say("a send was refused: %s", mpf::toString(result));
+    ++sent_;
+    ++open_;
+  }
+
+  std::map<std::uint64_t, int>& done_;  // clients by the incarnation of the server that answered them
+  int crowd_;
+  std::uint64_t life_ = 0;
+  int sent_ = 0;
+  int answered_ = 0;
+  int open_ = 0;
+  mpf::MessageClient client_;
+};
+
+// Says "waiting: <reason>", or nothing when the server is there; then "answered <incarnation>" for each life of the server that has
+// answered every client; whatever else it says went wrong.
+int crowd(const mpf::Backplane& backplane, int clients) {
+  mpf::Dispatcher dispatcher(backplane);
+  std::map<std::uint64_t, int> done;
+  std::vector<std::unique_ptr<Visitor>> visitors;
+  for (int i = 0; i < clients; ++i) visitors.push_back(std::make_unique<Visitor>(dispatcher, done, clients));
+  say("waiting: %s", visitors.back()->reason().c_str());
+  dispatcher.run();
+  return 0;
+}
+
+// The rest of the process's life belongs to that user.
+void become(const std::string& user, const std::string& group) {
+  mpf::checkCall(::setgroups(0, nullptr), "setgroups");
+  mpf::checkCall(::setgid(static_cast<gid_t>(std::stoul(group))), "setgid", group);
+  mpf::checkCall(::setuid(static_cast<uid_t>(std::stoul(user))), "setuid", user);
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // forgotten with the old user
+}
+
+int play(const std::vector<std::string>& arguments) {
+  const auto argument = [&](std::size_t index) { return index < arguments.size() ? arguments[index] : std::string(); };
+  const auto role = argument(1);
+  if (role == "crowd-as") become(argument(4), argument(5));
+  const auto backplane = mpf::Backplane::attach(argument(2));
+  if (role == "serve") return serve(backplane, {});
+  if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
+  if (role == "flood") return flood(backplane);
+  if (role == "crowd" || role == "crowd-as") return crowd(backplane, std::stoi(argument(3)));
+  std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, crowd or crowd-as\n", role.c_str());
+  return 2;
+}
+
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  const std::string role = argc > 1 ? argv[1] : "";
-  const auto backplane = mpf::Backplane::attach(argc > 2 ? argv[2] : "");
-  if (role == "serve") return serve(backplane, mpf::WaitMode::adaptive);
-  if (role == "serve-block") return serve(backplane, mpf::WaitMode::block);
-  if (role == "flood") return flood(backplane);
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block or flood\n", role.c_str());
-  return 2;
+  return play({argv, argv + argc});
+} catch (const std::exception& error) {
+  say("error: %s", error.what());
+  return 1;
 }

@@ -1,15 +1,24 @@
 // SPDX-License-Identifier: MIT
 // Victim: a process with a role, to be killed, stopped and started by a test. It dies with the test.
+//
+//   Victim server("serve", backplane.name());
+//   server.line();                            // "open": what the role writes to stdout, line by line
 #pragma once
 
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
 #include <spawn.h>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/base/system_call.h>
 
 namespace mpf::test {
 
@@ -17,34 +26,67 @@ class Victim {
  public:
   Victim() = default;
   // Runs tests/support/victim.cpp as `role` on `backplane`.
-  Victim(std::string role, std::string backplane) {
+  Victim(std::string role, std::string backplane, std::vector<std::string> more = {}) {
     std::string program = MPF_TEST_VICTIM;
-    std::array<char*, 4> arguments{program.data(), role.data(), backplane.data(), nullptr};
-    if (::posix_spawn(&pid_, program.c_str(), nullptr, nullptr, arguments.data(), environ) != 0) {
-      throw std::runtime_error("cannot start " + program);
-    }
+    std::vector<char*> arguments{program.data(), role.data(), backplane.data()};
+    for (auto& argument : more) arguments.push_back(argument.data());
+    arguments.push_back(nullptr);
+    std::array<int, 2> pipe{};
+    checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
+    output_.reset(pipe[0]);
+    const FileDescriptor input(pipe[1]);
+    posix_spawn_file_actions_t actions;
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawn_file_actions_adddup2(&actions, input.get(), STDOUT_FILENO);
+    const int error = ::posix_spawn(&pid_, program.c_str(), &actions, nullptr, arguments.data(), environ);
+    ::posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throwSystemError(error, "start", program);
   }
-  Victim(Victim&& other) noexcept : pid_(std::exchange(other.pid_, 0)) {}
+  Victim(Victim&& other) noexcept
+      : pid_(std::exchange(other.pid_, 0)), output_(std::move(other.output_)), read_(std::exchange(other.read_, {})) {}
   Victim& operator=(Victim&& other) noexcept {
     end(SIGKILL);
     pid_ = std::exchange(other.pid_, 0);
+    output_ = std::move(other.output_);
+    read_ = std::exchange(other.read_, {});
     return *this;
   }
   ~Victim() { end(SIGKILL); }
+
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
+  // Waits for the next line that it writes; empty when it has ended.
+  std::string line() {
+    for (;;) {
+      if (const auto end = read_.find('\n'); end != std::string::npos) {
+        auto line = read_.substr(0, end);
+        read_.erase(0, end + 1);
+        return line;
+      }
+      std::array<char, 512> bytes{};
+      const auto got = retryInterrupted([&] { return ::read(output_.get(), bytes.data(), bytes.size()); });
+      if (got <= 0) return {};
+      read_.append(bytes.data(), static_cast<std::size_t>(got));
+    }
+  }
 
   void signal(int number) const { ::kill(pid_, number); }
   // Sends the signal and waits for the end. Returns the status of waitpid().
   int end(int number) {
     if (pid_ == 0) return 0;
     signal(number);
+    return wait();
+  }
+  // Waits for the end. Returns the status of waitpid().
+  int wait() {
     int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = 0;
+    ::waitpid(std::exchange(pid_, 0), &status, 0);
     return status;
   }
 
  private:
   pid_t pid_ = 0;
+  FileDescriptor output_;
+  std::string read_;
 };
 
 }  // namespace mpf::test

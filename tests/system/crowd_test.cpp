@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// Three hundred clients at once, in many processes: all get in, all find the next server.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <vector>
+
+#include <mpf/shm/backplane.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/shm/window.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+class CrowdTest : public testing::Test {
+ protected:
+  static constexpr int kProcesses = 30;
+  static constexpr int kClientsOfEach = 10;
+
+  void startCrowd() {
+    for (int i = 0; i < kProcesses; ++i) crowd_.emplace_back("crowd", backplane_.name(), std::vector{std::to_string(kClientsOfEach)});
+  }
+  void waitUntilBound() {
+    for (auto& process : crowd_) EXPECT_THAT(process.line(), testing::StartsWith("waiting: "));
+  }
+  void startServer() {
+    server_ = Victim();
+    server_ = Victim("serve", backplane_.name());
+    EXPECT_EQ(server_.line(), "open");
+  }
+  // Waits until every client had all its requests answered by the server that runs now.
+  void waitUntilAnswered() {
+    const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"), layout::SegmentKind::serverWindow);
+    ASSERT_TRUE(window);
+    const auto all = fmt::format("answered {:x}", window->header().incarnation);
+    for (auto& process : crowd_) {
+      auto line = process.line();
+      while (line != all && (line.starts_with("answered ") || line.starts_with("waiting: "))) line = process.line();  // of a server before
+      ASSERT_EQ(line, all);
+    }
+    EXPECT_EQ(window->control().linksOpened.load(), kProcesses * kClientsOfEach);
+    EXPECT_EQ(window->control().protocolErrors.load(), 0u);
+  }
+  // Whoever attaches next removes what the dead left; then nothing is there.
+  void TearDown() override {
+    crowd_.clear();
+    server_ = Victim();
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+
+  Watchdog watchdog_{"crowd test", std::chrono::seconds(300)};
+  Backplane backplane_ = Backplane::isolated();
+  Victim server_;
+  std::vector<Victim> crowd_;
+};
+
+TEST_F(CrowdTest, ThreeHundredClientsThatWaitAllGetInAndAreAnswered) {
+  startCrowd();
+  waitUntilBound();
+
+  startServer();
+
+  waitUntilAnswered();
+}
+
+TEST_F(CrowdTest, ThreeHundredClientsThatStartAtOnceAllGetInAndAreAnswered) {
+  startServer();
+
+  startCrowd();
+
+  waitUntilAnswered();
+}
+
+TEST_F(CrowdTest, AllFindTheSuccessorOfAServerThatEndsInTheMiddle) {
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    startServer();
+    crowd_.clear();
+    startCrowd();
+    EXPECT_THAT(crowd_.front().line(), testing::StartsWith("waiting: "));
+    EXPECT_THAT(crowd_.front().line(), testing::StartsWith("answered "));
+
+    server_.end(signal);
+    startServer();
+
+    waitUntilAnswered();
+  }
+}
+
+TEST_F(CrowdTest, AllFindOneSuccessorAfterTheOther) {
+  startServer();
+  startCrowd();
+  waitUntilAnswered();
+
+  for (int life = 0; life < 5; ++life) {
+    server_.end(life % 2 == 0 ? SIGKILL : SIGTERM);
+    startServer();
+    waitUntilAnswered();
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
