@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// Who starts first does not matter; a name is served by one process at a time.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <vector>
+
+#include <mpf/shm/backplane.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+class StartOrderTest : public testing::Test {
+ protected:
+  Victim startServer() const { return {"serve", backplane_.name()}; }
+  Victim startClient() const { return {"crowd", backplane_.name(), {"1"}}; }
+  // The path of the server's window.
+  std::string windowPath() const { return segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")); }
+  // Whoever attaches next removes what the dead left; then nothing is there.
+  void TearDown() override {
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+
+  Watchdog watchdog_{"start order test"};
+  Backplane backplane_ = Backplane::isolated();
+};
+
+TEST_F(StartOrderTest, AClientMayStartBeforeItsServer) {
+  auto client = startClient();
+  EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not there");
+
+  auto server = startServer();
+
+  EXPECT_THAT(client.line(), testing::StartsWith("answered "));
+}
+
+TEST_F(StartOrderTest, AServerMayStartBeforeItsClient) {
+  auto server = startServer();
+  EXPECT_EQ(server.line(), "open");
+
+  auto client = startClient();
+
+  EXPECT_THAT(client.line(), testing::StartsWith("waiting: "));
+  EXPECT_THAT(client.line(), testing::StartsWith("answered "));
+}
+
+TEST_F(StartOrderTest, BothMayStartAtTheSameTime) {
+  for (int round = 0; round < 50; ++round) {
+    auto first = round % 2 == 0 ? startClient() : startServer();
+    auto second = round % 2 == 0 ? startServer() : startClient();
+    auto& client = round % 2 == 0 ? first : second;
+
+    EXPECT_THAT(client.line(), testing::StartsWith("waiting: "));
+    EXPECT_THAT(client.line(), testing::StartsWith("answered "));
+  }
+}
+
+TEST_F(StartOrderTest, AServerThatRestartsIsFoundUnderItsNewPid) {
+  auto server = startServer();
+  auto client = startClient();
+  EXPECT_THAT(client.line(), testing::StartsWith("waiting: "));
+  const auto before = client.line();
+  const auto pidBefore = server.pid();
+
+  server.end(SIGTERM);
+  server = startServer();
+
+  EXPECT_NE(server.pid(), pidBefore);
+  const auto after = client.line();
+  EXPECT_THAT(after, testing::StartsWith("answered "));
+  EXPECT_NE(after, before) << "the incarnation tells one life from the next";
+}
+
+TEST_F(StartOrderTest, ASecondServerOfANameIsToldWhoServesIt) {
+  auto first = startServer();
+  EXPECT_EQ(first.line(), "open");
+
+  auto second = startServer();
+
+  EXPECT_EQ(second.line(), fmt::format("error: {}: in use by mpf_test_victim (pid {})", windowPath(), first.pid()));
+  const auto status = second.wait();
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1);
+  auto client = startClient();
+  EXPECT_THAT(client.line(), testing::StartsWith("waiting: "));
+  EXPECT_THAT(client.line(), testing::StartsWith("answered ")) << "the first one goes on";
+}
+
+TEST_F(StartOrderTest, ASuccessorOfAKilledServerOpensAtOnce) {
+  auto client = startClient();
+  EXPECT_THAT(client.line(), testing::StartsWith("waiting: "));
+  for (int round = 0; round < 20; ++round) {
+    auto server = startServer();
+    EXPECT_EQ(server.line(), "open");
+    EXPECT_THAT(client.line(), testing::StartsWith("answered "));
+
+    server.end(SIGKILL);
+  }
+}
+
+TEST_F(StartOrderTest, OfManyThatStartAtOnceOneServes) {
+  std::vector<Victim> servers;
+  for (int i = 0; i < 10; ++i) servers.push_back(startServer());
+
+  int open = 0;
+  int refused = 0;
+  for (auto& server : servers) {
+    const auto line = server.line();
+    open += line == "open" ? 1 : 0;
+    refused += line.starts_with("error: " + windowPath() + ": in use by ") ? 1 : 0;
+  }
+
+  EXPECT_EQ(open, 1);
+  EXPECT_EQ(refused, 9);
+}
+
+}  // namespace
+}  // namespace mpf::test
