@@ -59,8 +59,9 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
   runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
   for (;;) {
-    if (step()) return true;
+    // First: in a loop that is never idle there would be no second.
     if (stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed)) return false;
+    if (step()) return true;
     while (endpoint_.takeKnock()) {  // nobody has reason to knock at a client
     }
     static_cast<void>(endpoint_.takeRescan());

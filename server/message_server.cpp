@@ -73,7 +73,7 @@ bool MessageServer::handleOne() {
 
 void MessageServer::run() {
   while (waitForMessage()) {
-    while (handleOne()) {
+    while (!impl_->core.isInterrupted() && handleOne()) {
     }
   }
 }

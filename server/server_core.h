@@ -45,6 +45,8 @@ class ServerCore {
   bool wait(Deadline deadline);
   Message receive();
   void interrupt() noexcept;
+  // Whether the next wait() ends at once.
+  [[nodiscard]] bool isInterrupted() const noexcept { return stop_.load(std::memory_order_relaxed); }
   ReplyResult reply(Message& message) noexcept;
   BodyBytes allocate(const Message& request, std::size_t bytes);
   int descriptor();

@@ -46,6 +46,49 @@ TEST_F(ClientTest, AClientMayEndInItsOwnCallback) {
   runUntil([&] { return !brief; });
 }
 
+// A loop that always has a next message still sees that it shall end.
+TEST_F(ClientTest, AnInterruptEndsAServerThatIsNeverIdle) {
+  auto& server = startServer();
+  int handled = 0;
+  server.on<Int32>([&](Int32&) {
+    if (++handled == 10) server.interrupt();
+    if (handled == 1000) return;  // it was not seen
+    while (dispatcher_.runOnce(Deadline::atNs(0))) {
+    }
+    ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+
+  server.run();
+
+  EXPECT_EQ(handled, 10);
+  messages_.clear();
+}
+
+TEST_F(ClientTest, AnInterruptEndsADispatcherThatIsNeverIdle) {
+  auto& server = startServer();
+  server.on<Int32>([](Int32&) {});
+  int replies = 0;
+  MessageClient busy(dispatcher_, [&](const Message& message) {
+    if (message.getType() != MessageType::int32) return;
+    if (++replies == 50) dispatcher_.interrupt();
+    if (replies == 1000) return dispatcher_.interrupt();  // it was not seen
+    ASSERT_EQ(busy.send(Int32Message()), SendResult::sent);
+    while (server.handleOne()) {
+    }
+  });
+  busy.bind("device[0]/a");
+  runUntil([&] { return busy.isConnected(); });
+  ASSERT_EQ(busy.send(Int32Message()), SendResult::sent);
+  while (server.handleOne()) {
+  }
+
+  dispatcher_.run();
+
+  EXPECT_LT(replies, 100);
+}
+
 // Callbacks of one client never run at the same time, whoever sends.
 TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
   const Watchdog watchdog("shared dispatcher");
