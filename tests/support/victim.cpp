@@ -54,6 +54,7 @@ int flood(const mpf::Backplane& backplane) {
   mpf::MessageClient client(backplane, [](const mpf::Message&) {});
   client.bind("echo");
   if (!client.connectWait(60s)) return 1;
+  say("connected");
   for (int sent = 0;; ++sent) {
     if (sent % 3 != 0) {
       static_cast<void>(client.send(mpf::Int32Message({.value = sent})));
