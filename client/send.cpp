@@ -18,6 +18,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     std::uint32_t id = 0;
     auto* request = requests_->tryReserve(id);
     if (request == nullptr) {
+      count(link.control().clientRefused);
       noteFull();
       return SendResult::tooManyOutstanding;
     }
@@ -63,8 +64,10 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
   return SendResult::sent;
 }
 
-// A run of refusals is told once, in its place among the other news.
+// Each refusal is counted; a run of them is told once, in its place among the other news.
 void Binding::noteFull() noexcept try {
+  // Clients of other threads count here, too.
+  dispatcher_.endpoint().control().queueFull.fetch_add(1, std::memory_order_relaxed);
   if (fullTold_) return;
   fullTold_ = true;
   dispatcher_.postLater([weak = weak_from_this()] {

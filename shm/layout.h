@@ -121,7 +121,7 @@ struct WindowControl {
   alignas(kPairBytes) Word64 received;  // messages taken
   Word64 sent;                          // messages pushed
   Word64 replyQueueFull;                // replies refused because the client did not take them
-  Word64 queueFull;                     // sends refused because the server's queue was full (client windows)
+  Word64 queueFull;                     // sends refused because the server's queue was full or owed too many replies (client windows)
   Word64 expired;                       // requests that were dropped because their deadline had passed
   Word64 refused;                       // requests answered with the fate `refused`
   Word64 wakes;                         // times that the owner slept and was woken
@@ -206,7 +206,7 @@ enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused =
 struct LinkControl {
   alignas(kPairBytes) std::atomic<LinkState> clientState;  // client
   Word64 clientSent;
-  Word64 clientRefused;     // sends refused: queue full, too large
+  Word64 clientRefused;     // sends refused: queue full, too many unanswered, too large, no memory
   Word64 clientUnanswered;  // requests without a reply or fate
   alignas(kPairBytes) std::atomic<LinkState> serverState;  // server
   Word32 serverIndex;       // bit of this link in the server window's ready bits
