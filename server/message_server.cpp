@@ -44,6 +44,7 @@ void MessageServer::setQueueSize(int size) { impl_->core.setQueueSize(size); }
 bool MessageServer::waitForMessage(Deadline deadline) { return impl_->core.wait(deadline); }
 Message MessageServer::receive() { return impl_->core.receive(); }
 void MessageServer::interrupt() noexcept { impl_->core.interrupt(); }
+std::uint64_t MessageServer::clientOf(const Message& request) const noexcept { return impl_->core.clientOf(request); }
 ReplyResult MessageServer::reply(Message&& message) { return impl_->core.reply(message); }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request, bytes); }

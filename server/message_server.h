@@ -62,8 +62,10 @@ class MessageServer {
   // The next request; empty when there is none. A request whose deadline has passed ends as `expired` and is not seen here.
   // A request that is neither replied to nor kept ends as `refused` when its handle dies.
   Message receive();
-  // Ends waitForMessage() or run(), now or the next time. Async-signal-safe.
+  // Ends waitForMessage() or run(), now or the next time; requests that wait stay where they are. Async-signal-safe.
   void interrupt() noexcept;
+  // Names the client that `request` came from, as long as it is connected; 0 when it is gone. No two connections have the same name.
+  [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
 
   // A reply to `request`, which must still exist: to be sent once, before or after the request itself is replied with.
   template <ScalarBody T>
@@ -103,7 +105,7 @@ class MessageServer {
       }
     });
   }
-  // Handles requests until interrupt(). Types without a handler are refused.
+  // Handles requests until interrupt(), which takes effect between two requests. Types without a handler are refused.
   void run();
   // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
   int runUntilSignal();

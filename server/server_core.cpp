@@ -95,6 +95,15 @@ void ServerCore::interrupt() noexcept {
   endpoint_.interrupt();
 }
 
+std::uint64_t ServerCore::clientOf(const Message& request) const noexcept {
+  const auto route = request.route();
+  if (route.link == 0) return 0;
+  auto& connection = connectionOf(route);
+  const std::lock_guard lock(*connection.lock);
+  if (connection.generation != route.flags || !connection.channel) return 0;
+  return std::uint64_t{connection.index + 1} << 32 | connection.generation;
+}
+
 int ServerCore::descriptor() {
   hasDescriptor_ = true;
   static_cast<void>(endpoint_.arm());

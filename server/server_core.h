@@ -47,6 +47,7 @@ class ServerCore {
   void interrupt() noexcept;
   // Whether the next wait() ends at once.
   [[nodiscard]] bool isInterrupted() const noexcept { return stop_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   ReplyResult reply(Message& message) noexcept;
   BodyBytes allocate(const Message& request, std::size_t bytes);
   int descriptor();

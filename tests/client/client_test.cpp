@@ -149,6 +149,33 @@ TEST_F(ClientTest, StreamedRepliesAreRefusedWhileTheClientDoesNotTakeThem) {
   EXPECT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
   EXPECT_NE(next().tryAs<Int32>(), nullptr);
 }
+TEST_F(ClientTest, AServerKnowsWhichClientARequestIsFromAndWhenThatIsGone) {
+  std::vector<Message> requests;
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) { requests.push_back(std::move(request)); });
+  bind();
+  auto other = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
+  other->bind("device[0]/a");
+  runUntil([&] { return other->isConnected(); });
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  runUntil([&] { return requests.size() == 2; });
+  ASSERT_EQ(other->send(Int32Message()), SendResult::sent);
+  runUntil([&] { return requests.size() == 3; });
+  EXPECT_EQ(server.clientOf(requests[0]), server.clientOf(requests[1]));
+  EXPECT_NE(server.clientOf(requests[0]), server.clientOf(requests[2]));
+  EXPECT_NE(server.clientOf(requests[2]), 0U);
+
+  other.reset();
+  runUntil([&] { return server.clientOf(requests[2]) == 0; });
+
+  EXPECT_NE(server.clientOf(requests[0]), 0U);
+  serverRuns_ = false;
+  requests.clear();
+  EXPECT_EQ(fateOf(next()), Fate::refused);
+  EXPECT_EQ(fateOf(next()), Fate::refused);
+}
+
 TEST_F(ClientTest, HandlesOutliveClientServerAndLink) {
   Message reply;
   {

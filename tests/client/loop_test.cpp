@@ -124,6 +124,26 @@ TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
   EXPECT_EQ(replies, kThreads * kEach);
 }
 
+// A server that always has work ends all the same, and what it has not taken it has not done.
+TEST_F(ClientTest, AnInterruptEndsTheServerBetweenTwoRequests) {
+  int handled = 0;
+  auto& server = startServer();
+  server.on<Int32>([&](Int32&) {
+    ++handled;
+    server.interrupt();
+  });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);
+  ASSERT_EQ(client_.send(Int32Message({.value = 2})), SendResult::sent);
+
+  server.run();
+
+  EXPECT_EQ(handled, 1);
+  server_.reset();
+  EXPECT_EQ(next().tryAs<Int32>()->value, 1);
+  EXPECT_EQ(fateOf(next()), Fate::neverTaken);
+}
+
 TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
   const Watchdog watchdog("sync client");
   const auto backplane = Backplane::isolated();
