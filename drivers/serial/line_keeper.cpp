@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <utility>
 
 namespace mpf {
 namespace {
@@ -59,10 +60,17 @@ void LineKeeper::retryLater(const std::string& reason) {
 
 void LineKeeper::publish(SerialPortState state, const std::string& reason) {
   const std::lock_guard lock(mutex_);
+  const bool changes = state_ != state;
   state_ = state;
   reason_ = reason;
   attempted_ = true;
   changed_.notify_all();
+  if (changes && stateHandler_) stateHandler_(state, reason);
+}
+
+void LineKeeper::onStateChange(StateHandler handler) {
+  const std::lock_guard lock(mutex_);
+  stateHandler_ = std::move(handler);
 }
 
 SerialPortState LineKeeper::state() const {

@@ -37,6 +37,7 @@ class LineKeeper {
   [[nodiscard]] SerialPortState state() const;
   [[nodiscard]] std::string unpluggedBecause() const;
   [[nodiscard]] bool waitForState(SerialPortState state, Deadline deadline) const;
+  void onStateChange(StateHandler handler);
   // Waits for the end of the first attempt to open; returns what went wrong, or empty.
   [[nodiscard]] std::string waitForFirstAttempt() const;
 
@@ -57,6 +58,7 @@ class LineKeeper {
   SerialPortState state_ = SerialPortState::unplugged;  // under mutex_
   std::string reason_ = "not opened yet";               // under mutex_
   bool attempted_ = false;                              // under mutex_
+  StateHandler stateHandler_;                           // under mutex_, also while it runs
 };
 
 }  // namespace mpf

@@ -17,6 +17,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <mpf/drivers/serial/line_keeper.h>
@@ -43,6 +44,7 @@ class PolledSerialPort : public SerialPort {
   [[nodiscard]] SerialPortState state() const override { return keeper_.state(); }
   [[nodiscard]] std::string unpluggedBecause() const override { return keeper_.unpluggedBecause(); }
   [[nodiscard]] bool waitForState(SerialPortState state, Deadline deadline) const override { return keeper_.waitForState(state, deadline); }
+  void onStateChange(StateHandler handler) override { keeper_.onStateChange(std::move(handler)); }
   [[nodiscard]] std::string description() const override { return keeper_.line().description(); }
 
  protected:

@@ -17,6 +17,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -48,6 +49,9 @@ class ByteHandler {
   // That read is over; bytes that come from here on belong to none.
   virtual void readEnds(SerialPortStatus /*status*/) {}
 };
+
+// Told what state the line has come into, and why when that is unplugged. Runs on the port's thread; must not block, throw or call the port.
+using StateHandler = std::function<void(SerialPortState state, const std::string& because)>;
 
 struct SerialPortCounters {
   std::uint64_t bytesIn = 0;
@@ -106,6 +110,8 @@ class SerialPort {
   [[nodiscard]] virtual std::string unpluggedBecause() const = 0;
   // Returns whether the port came into that state before the deadline.
   [[nodiscard]] virtual bool waitForState(SerialPortState state, Deadline deadline) const = 0;
+  // Tells `handler` each change of state from now on, instead of the one before, which after return does not run any more. Empty: nobody.
+  virtual void onStateChange(StateHandler handler) = 0;
   // The device or the address, for messages to people.
   [[nodiscard]] virtual std::string description() const = 0;
 

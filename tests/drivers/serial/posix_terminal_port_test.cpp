@@ -5,15 +5,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdexcept>
+#include <thread>
 
 #include <mpf/drivers/serial/terminal_settings.h>
 #include <mpf/tests/drivers/serial/line_collector.h>
 #include <mpf/tests/support/instrument.h>
+#include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
 namespace {
 
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 class PosixTerminalPortTest : public testing::Test {
@@ -193,6 +196,27 @@ TEST_F(PosixTerminalPortTest, TapsSurviveAnUnplug) {
   EXPECT_EQ(line->writeRead(bytesOf("ECHO a\n"), kWatchdog), SerialPortStatus::success);
 
   EXPECT_EQ(seen, 10);
+}
+
+TEST_F(PosixTerminalPortTest, TellsEachChangeOfStateOnce) {
+  const Watchdog dog("change of state");
+  PosixTerminalPort port(options());
+  std::vector<std::string> told;
+  port.onStateChange([&](SerialPortState state, const std::string& because) {
+    told.push_back(std::string(toString(state)) + (because.empty() ? "" : ", and says why"));
+  });
+  instrument_.unplug();
+  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+  const auto lost = port.unpluggedBecause();
+  while (port.unpluggedBecause() == lost) std::this_thread::yield();  // until an attempt to open has failed, which is no change
+  instrument_.plugIn();
+  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+
+  port.onStateChange({});
+  instrument_.unplug();
+  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+
+  EXPECT_THAT(told, ElementsAre("unplugged, and says why", "plugged"));
 }
 
 }  // namespace
