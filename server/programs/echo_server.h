@@ -9,6 +9,8 @@
 #include <string>
 
 #include <mpf/server/message_server.h>
+#include <mpf/server/programs/server_arguments.h>
+#include <mpf/server/programs/server_log.h>
 
 namespace mpf {
 
@@ -23,19 +25,19 @@ template <MessageBody T>
 int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
   CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what), echo.program);
   std::string name = echo.server;
-  std::string backplane;
-  ServerOptions options;
+  ServerArguments arguments;
   app.add_option("server", name, "Name under which clients find it")->capture_default_str();
-  app.add_option("--backplane", backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
-  app.add_option("--location", options.location, "Location; default: $MPF_LOCATION, or 0");
-  app.add_option("--queue-size", options.queueSize, "Requests of one client that may wait, 1 to 16384")->capture_default_str();
+  app.add_option("--queue-size", arguments.messages.queueSize, "Requests of one client that may wait, 1 to 16384")->capture_default_str();
+  arguments.addTo(app);
   CLI11_PARSE(app, argc, argv);
 
-  MessageServer server(Backplane::attach(backplane), name, options);
+  const ServerLog log(echo.program, arguments.logLevel);
+  MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);
   server.on<T>([](MessageOf<T>&) {});
-  fmt::print("{}: serving \"{}\" at location {}\n", echo.program, name, server.location());
-  std::fflush(stdout);
-  return server.runUntilSignal();
+  log->info("serving \"{}\" at location {}", name, server.location());
+  const auto status = server.runUntilSignal();
+  log->info("ends");
+  return status;
 } catch (const std::exception& error) {
   fmt::print(stderr, "{}: {}\n", echo.program, error.what());
   return 1;

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/programs/server_log.h>
+
+#include <spdlog/async.h>
+#include <spdlog/sinks/stdout_sinks.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::size_t kLinesThatMayWait = 1024;
+
+}  // namespace
+
+ServerLog::ServerLog(const std::string& program, const std::string& level)
+    : writer_(std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1)),
+      logger_(std::make_shared<spdlog::async_logger>(program, std::make_shared<spdlog::sinks::stderr_sink_mt>(), writer_,
+                                                     spdlog::async_overflow_policy::overrun_oldest)) {
+  logger_->set_level(spdlog::level::from_str(level));
+  logger_->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
+}
+
+const std::vector<std::string>& ServerLog::levels() {
+  static const std::vector<std::string> names{"trace", "debug", "info", "warning", "error", "critical", "off"};
+  return names;
+}
+
+}  // namespace mpf
