@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What clients of a serial server say and hear (manual, "serialServer"). The numbers are ours: no public source tells the original's.
+//
+// A server that ends answers the request that is on the line with serialServerStatusError; those that it has not taken yet end as
+// `neverTaken`, and nothing of them was sent. How to listen to the line: serial_sniff.h.
 #pragma once
 
 #include <cstdint>

@@ -24,7 +24,7 @@ using namespace std::chrono_literals;
 class SerialServerTest : public testing::Test {
  protected:
   void start(const SerialServerOptions& options = {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true}) {
-    serial_ = std::make_unique<SerialServer>(server_, port_, options);
+    serial_ = std::make_unique<SerialServer>(server_, port_, options, log_);
     thread_ = std::thread([this] { server_.run(); });
     ASSERT_TRUE(client_.connectWait(60s));
   }
@@ -58,6 +58,7 @@ class SerialServerTest : public testing::Test {
   }
 
   Watchdog watchdog_{"serial server test"};
+  ServerLog log_{"test", "off"};
   std::string path_ = linkPath();
   Instrument instrument_{path_};
   PosixTerminalPort port_{{.device = path_, .settings = {9600, 1, 8, 'N', 'N'}}};

@@ -1,25 +1,24 @@
 // SPDX-License-Identifier: MIT
 // mpf-serial-server: one serial line, one server, one process. The old command was
 // initSerialServer("serverName","portName",bufSize,queueSize,"eomstr",circularBufferMode).
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <fmt/format.h>
 #include <memory>
-#include <stdexcept>
 
 #include <mpf/drivers/serial/posix_terminal_port.h>
 #include <mpf/drivers/serial/tcp_serial_port.h>
 #include <mpf/server/programs/serial_server/serial_server.h>
+#include <mpf/server/programs/serial_server/sniff_server.h>
 #include <mpf/server/programs/serial_server/start_options.h>
+#include <mpf/server/programs/serial_server/stop_thread.h>
 
 namespace {
 
 std::unique_ptr<mpf::SerialPort> openPort(const mpf::SerialStartOptions& options) {
-  constexpr std::string_view kTcp = "tcp:";
-  if (options.port.starts_with(kTcp)) {
+  if (const auto address = options.tcpAddress()) {
     mpf::TcpSerialOptions tcp;
-    tcp.address = mpf::TcpAddress::parse(options.port.substr(kTcp.size()));
+    tcp.address = mpf::TcpAddress::parse(*address);
     tcp.waitForServer = options.wait;
     return std::make_unique<mpf::TcpSerialPort>(tcp);
   }
@@ -30,17 +29,33 @@ std::unique_ptr<mpf::SerialPort> openPort(const mpf::SerialStartOptions& options
   return std::make_unique<mpf::PosixTerminalPort>(terminal);
 }
 
+void logStateChanges(mpf::SerialPort& port, const mpf::ServerLog& log) {
+  port.onStateChange([&log](mpf::SerialPortState state, const std::string& because) {
+    if (state == mpf::SerialPortState::plugged) return log->info("the line is there");
+    log->warn("the line is lost: {}", because);
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
   mpf::SerialStartOptions options;
   if (const auto exit = options.parse(argc, argv)) return *exit;
+  const auto& arguments = options.arguments;
+  const mpf::ServerLog log("mpf-serial-server", arguments.logLevel);
   const auto port = openPort(options);
-  mpf::MessageServer server(mpf::Backplane::attach(options.backplane), options.server, options.messages);
-  const mpf::SerialServer serial(server, *port, options.serial);
-  fmt::print("mpf-serial-server: serving {} as \"{}\" at location {}\n", port->description(), options.server, server.location());
-  std::fflush(stdout);
-  return server.runUntilSignal();
+  logStateChanges(*port, log);
+  const auto backplane = mpf::Backplane::attach(arguments.backplane);
+  mpf::MessageServer server(backplane, options.server, arguments.messages);
+  mpf::SerialServer serial(server, *port, options.serial, log);
+  const mpf::SniffServer sniff(backplane, options.server, arguments.messages, *port, log);
+  const mpf::StopThread stop([&] { serial.stop(); });
+  log->info("serving {} ({}) as \"{}\" at location {}; listeners: \"{}\"", port->description(), options.describeLine(), server.getName(),
+            server.location(), sniff.getName());
+  if (port->state() == mpf::SerialPortState::unplugged) log->warn("the line is not there yet: {}", port->unpluggedBecause());
+  server.run();
+  log->info("ends");
+  return 0;
 } catch (const std::exception& error) {
   fmt::print(stderr, "mpf-serial-server: {}\n", error.what());
   return 1;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 #include <vector>
 
 #include <mpf/schema/serial_server.h>
@@ -34,10 +35,29 @@ std::int32_t statusOf(SerialPortStatus status) {
 
 }  // namespace
 
-SerialServer::SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options)
-    : server_(server), reader_(options.bufferBytes, options.eom, options.circularBuffer), port_(port, reader_) {
+SerialServer::SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log)
+    : server_(server), log_(log), reader_(options.bufferBytes, options.eom, options.circularBuffer), port_(port, reader_) {
   server.on<Char8Array>([this](Char8ArrayMessage&& request) { handle(std::move(request)); });
   server.on<SerialConfig>([this](SerialConfigMessage&& request) { configure(std::move(request)); });
+}
+
+void SerialServer::stop() {
+  isStopped_.store(true, std::memory_order_relaxed);
+  server_.interrupt();  // before the request that is on the line ends: the server shall take no other
+  port_->release();
+}
+
+void SerialServer::noteRequest() {
+  if (!std::exchange(isAsked_, true)) log_->info("the first client asks");
+}
+
+void SerialServer::noteStatus(const Char8Array& request, std::int32_t status) {
+  log_->debug("cmd {:#x}, timeout {}: status {}", request.cmd, request.timeout, status);
+  const bool fails = status == serialServerStatusError;
+  if (fails == std::exchange(isFailing_, fails)) return;
+  if (!fails) return log_->info("requests succeed again");
+  const auto because = port_->unpluggedBecause();
+  log_->warn("requests fail: {}", because.empty() ? "the line damaged bytes, or the request is no command" : because);
 }
 
 void SerialServer::applyOptions(const Char8Array& request) {
@@ -66,14 +86,17 @@ std::int32_t SerialServer::attempt(const Char8Array& request, SerialPort::Bytes 
 }
 
 void SerialServer::handle(Char8ArrayMessage&& request) {
+  noteRequest();
   const auto fields = *request;  // a copy: the client can write to the request while we work
   const std::vector<std::uint8_t> data(request.value().begin(), request.value().end());
   applyOptions(fields);
   std::string answer;
   auto status = attempt(fields, data, answer);
-  for (auto retries = fields.numberRetrys; status != serialServerStatusOK && retries > 0; --retries) {
+  for (auto retries = fields.numberRetrys; status != serialServerStatusOK && retries > 0 && !isStopped_.load(std::memory_order_relaxed);
+       --retries) {
     status = attempt(fields, data, answer);
   }
+  if (!isStopped_.load(std::memory_order_relaxed)) noteStatus(fields, status);
   auto reply = server_.allocReplyMessage<Char8Array>(request, answer.size());
   *reply = fields;
   reply.setSize(answer.size());
@@ -83,7 +106,9 @@ void SerialServer::handle(Char8ArrayMessage&& request) {
 }
 
 void SerialServer::configure(SerialConfigMessage&& request) {
+  noteRequest();
   const auto refusal = port_->config({request->baud, request->stopBits, request->bitsPerChar, request->parity, request->flowControl});
+  if (!refusal.empty()) log_->warn("settings refused: {}", refusal);
   auto reply = server_.allocReplyMessage<Int32>(request);
   reply->status = refusal.empty() ? serialServerStatusOK : serialServerStatusError;
   static_cast<void>(server_.reply(std::move(reply)));

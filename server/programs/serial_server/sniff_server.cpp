@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/programs/serial_server/sniff_server.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <span>
+#include <utility>
+
+namespace mpf {
+namespace {
+
+using serial::SniffKind;
+using serial::SniffRecord;
+
+// Listeners are in no hurry, and a thread that spun would take a processor from the line. For each of them some 250 messages may wait, with
+// bodies of at most 16 MB.
+ServerOptions optionsLike(ServerOptions options) {
+  options.queueSize = 128;
+  options.maxPoolBytes = 16ULL << 20;
+  options.waitMode = WaitMode::block;
+  return options;
+}
+
+SniffKind kindOf(const PeekedByte& byte) noexcept {
+  if (byte.fault == LineFault::breakSignal) return SniffKind::breakSignal;
+  if (byte.fault != LineFault::none) return SniffKind::damaged;
+  return byte.direction == ByteDirection::sent ? SniffKind::sent : SniffKind::received;
+}
+
+void writeRecords(std::span<const PeekedByte> bytes, std::vector<char>& records) {
+  records.resize(bytes.size() * SniffRecord::kBytes);
+  std::span<char> rest(records);
+  for (const auto& byte : bytes) {
+    SniffRecord{byte.atNs, kindOf(byte), byte.value}.write(rest.first<SniffRecord::kBytes>());
+    rest = rest.subspan(SniffRecord::kBytes);
+  }
+}
+
+// As much of a count as a field can tell.
+std::int32_t tellable(std::uint64_t count) noexcept { return static_cast<std::int32_t>(std::min<std::uint64_t>(count, INT32_MAX)); }
+
+}  // namespace
+
+SniffServer::SniffServer(const Backplane& backplane, const std::string& server, const ServerOptions& like, SerialPort& port,
+                         const ServerLog& log, const SniffBatching& batching)
+    : log_(log), port_(port), queue_(batching), server_(backplane, server + std::string(serial::sniffSuffix), optionsLike(like)) {
+  server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
+  thread_ = std::thread([this] { run(); });
+}
+
+SniffServer::~SniffServer() {
+  ends_.store(true, std::memory_order_relaxed);
+  server_.interrupt();
+  thread_.join();
+  tap_.reset();  // before what it pushes to
+}
+
+void SniffServer::run() try {
+  while (!ends_.load(std::memory_order_relaxed)) {
+    static_cast<void>(server_.waitForMessage(queue_.dueAt()));
+    while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) {
+    }
+    forgetGone();
+    if (queue_.dueAt().hasPassed()) deliver();
+  }
+} catch (const std::exception& error) {
+  log_->error("nobody can listen any more: {}", error.what());
+  tap_.reset();
+}
+
+void SniffServer::handle(Int32Message&& request) {
+  switch (request->cmd) {
+    case serial::cmdSniffStart:
+      return start(std::move(request));
+    case serial::cmdSniffStop:
+      return stop(request);
+    default:
+      return answer(request, serial::sniffStatusError);
+  }
+}
+
+void SniffServer::start(Int32Message&& request) {
+  deliver();  // what was before is not for this one
+  const auto client = server_.clientOf(request);
+  if (client == 0) return;  // gone already
+  if (const auto former = find(client); former != listeners_.end()) listeners_.erase(former);
+  if (!tap_) {
+    tap_ = port_.attachTap([this](std::span<const PeekedByte> bytes) {
+      if (queue_.push(bytes)) server_.interrupt();
+    });
+  }
+  listeners_.push_back({std::move(request), client, 0});
+  followCount();
+  answer(listeners_.back().request, serial::sniffStatusOK);
+}
+
+void SniffServer::stop(const Int32Message& request) {
+  deliver();
+  const auto listener = find(server_.clientOf(request));
+  if (listener == listeners_.end()) return answer(request, serial::sniffStatusNotListening);
+  const auto lost = listener->lost;
+  listeners_.erase(listener);
+  followCount();
+  answer(request, serial::sniffStatusOK, lost);
+}
+
+void SniffServer::answer(const Int32Message& request, std::int32_t status, std::uint64_t lost) {
+  auto reply = server_.allocReplyMessage<Int32>(request);
+  *reply = {.cmd = request->cmd, .status = status, .address = tellable(lost)};
+  static_cast<void>(server_.reply(std::move(reply)));
+}
+
+std::vector<SniffServer::Listener>::iterator SniffServer::find(std::uint64_t client) {
+  return std::find_if(listeners_.begin(), listeners_.end(), [&](const Listener& listener) { return listener.client == client; });
+}
+
+void SniffServer::forgetGone() {
+  std::erase_if(listeners_, [&](const Listener& listener) { return server_.clientOf(listener.request) != listener.client; });
+  followCount();
+}
+
+void SniffServer::followCount() {
+  const auto before = count_.load(std::memory_order_relaxed);
+  const auto now = listeners_.size();
+  if (now != before) log_->info("{} listening", now);
+  if (now == 0 && tap_) {
+    tap_.reset();
+    queue_.take(bytes_);
+  }
+  count_.store(now, std::memory_order_relaxed);
+}
+
+void SniffServer::deliver() {
+  const auto lost = queue_.take(bytes_);
+  if (bytes_.empty()) return;
+  writeRecords(bytes_, records_);
+  for (auto& listener : listeners_) {
+    send(listener);
+    listener.lost += lost;  // behind these bytes
+  }
+}
+
+void SniffServer::send(Listener& listener) {
+  auto message = server_.allocReplyMessage<Char8Array>(listener.request, records_.size());
+  message->extra = static_cast<std::int32_t>(bytes_.size());
+  message->address = tellable(listener.lost);
+  std::copy(records_.begin(), records_.end(), message.value().begin());
+  const auto told = static_cast<std::uint64_t>(message->address);
+  if (server_.reply(std::move(message)) == ReplyResult::sent) {
+    listener.lost -= told;
+  } else {
+    listener.lost += bytes_.size();
+  }
+}
+
+}  // namespace mpf
