@@ -2,72 +2,12 @@
 // A serial server on a real pseudo-terminal with an instrument at its far end, asked through shared memory.
 #include <mpf/schema/serial_server.h>
 
-#include <unistd.h>
-
-#include <filesystem>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <thread>
-
-#include <mpf/client/sync_client.h>
-#include <mpf/drivers/serial/posix_terminal_port.h>
-#include <mpf/server/programs/serial_server/serial_server.h>
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/tests/server/serial_fixture.h>
 
 namespace mpf::test {
 namespace {
 
 using namespace serial;
-using namespace std::chrono_literals;
-
-class SerialServerTest : public testing::Test {
- protected:
-  void start(const SerialServerOptions& options = {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true}) {
-    serial_ = std::make_unique<SerialServer>(server_, port_, options, log_);
-    thread_ = std::thread([this] { server_.run(); });
-    ASSERT_TRUE(client_.connectWait(60s));
-  }
-  void TearDown() override {
-    server_.interrupt();
-    if (thread_.joinable()) thread_.join();
-  }
-  static std::string linkPath() {
-    static int count = 0;
-    return std::filesystem::temp_directory_path() / ("mpf-serial-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
-  }
-
-  struct Reply {
-    std::int32_t status;
-    std::string text;
-  };
-  // Asks with a timeout in milliseconds, unless `fields` say otherwise.
-  Reply ask(std::string_view text, Char8Array fields) {
-    auto message = Char8ArrayMessage::allocValue(text.size());
-    *message = fields;
-    message.setSize(text.size());
-    std::copy(text.begin(), text.end(), message.value().begin());
-    auto answer = client_.call(std::move(message), 60s);
-    EXPECT_TRUE(answer) << answer.why();
-    auto reply = answer.as<Char8Array>();
-    if (!reply) return {-1, "not a Char8Array"};
-    return {(*reply)->status, std::string(reply->value().begin(), reply->value().end())};
-  }
-  static Char8Array fieldsOf(std::int32_t cmd, std::int32_t timeoutMs = 60'000) {
-    return {.timeout = timeoutMs, .cmd = cmd | cmdTimeoutMilliseconds};
-  }
-
-  Watchdog watchdog_{"serial server test"};
-  ServerLog log_{"test", "off"};
-  std::string path_ = linkPath();
-  Instrument instrument_{path_};
-  PosixTerminalPort port_{{.device = path_, .settings = {9600, 1, 8, 'N', 'N'}}};
-  Backplane backplane_ = Backplane::isolated();
-  MessageServer server_{backplane_, "serial[0]"};
-  std::unique_ptr<SerialServer> serial_;
-  std::thread thread_;
-  SyncClient client_{backplane_, "serial[0]"};
-};
 
 TEST_F(SerialServerTest, AQueryBringsTheAnswerWithItsTerminator) {
   start();

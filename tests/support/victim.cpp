@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The program behind Victim: an echo server, a client that sends as fast as it can, or a crowd of clients.
+// The program behind Victim: an echo server, a client that sends as fast as it can, a crowd of clients, or a client that listens to a serial line.
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -12,7 +12,8 @@
 #include <vector>
 
 #include <mpf/base/system_call.h>
-#include <mpf/client/message_client.h>
+#include <mpf/client/sync_client.h>
+#include <mpf/schema/serial_sniff.h>
 #include <mpf/server/message_server.h>
 
 namespace {
@@ -143,9 +144,16 @@ int play(const std::vector<std::string>& arguments) {
   if (role == "serve") return serve(backplane, {});
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
   if (role == "flood") return flood(backplane);
+  if (role == "listen") return listen(backplane);
   if (role == "crowd" || role == "crowd-as") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, crowd or crowd-as\n", role.c_str());
+  std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, listen, crowd or crowd-as\n", role.c_str());
   return 2;
+}
+
+int listen(const mpf::Backplane& backplane) {
+  mpf::SyncClient client(backplane, "serial[0].sniff");
+  if (!client.call(mpf::Int32Message({.cmd = mpf::serial::cmdSniffStart}), 60s)) return 1;
+  for (;;) static_cast<void>(client.receive(24h));
 }
 
 }  // namespace
