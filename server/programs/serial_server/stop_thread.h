@@ -7,7 +7,7 @@
 #include <semaphore.h>
 #include <thread>
 
-#include <mpf/server/stop_signals.h>
+#include <mpf/base/stop_signals.h>
 
 namespace mpf {
 
