@@ -13,6 +13,7 @@ int main(int argc, char** argv) try {
   mpf::tools::addMrr(app, run);
   mpf::tools::addMsr(app, run);
   mpf::tools::addCall(app, run);
+  mpf::tools::addSniff(app, run);
   mpf::tools::addClean(app, run);
   mpf::tools::addBench(app, run);
   app.require_subcommand(1);

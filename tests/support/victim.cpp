@@ -136,6 +136,12 @@ void become(const std::string& user, const std::string& group) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // forgotten with the old user
 }
 
+int listen(const mpf::Backplane& backplane) {
+  mpf::SyncClient client(backplane, "serial[0].sniff");
+  if (!client.call(mpf::Int32Message({.cmd = mpf::serial::cmdSniffStart}), 60s)) return 1;
+  for (;;) static_cast<void>(client.receive(24h));
+}
+
 int play(const std::vector<std::string>& arguments) {
   const auto argument = [&](std::size_t index) { return index < arguments.size() ? arguments[index] : std::string(); };
   const auto role = argument(1);
@@ -148,12 +154,6 @@ int play(const std::vector<std::string>& arguments) {
   if (role == "crowd" || role == "crowd-as") return crowd(backplane, std::stoi(argument(3)));
   std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, listen, crowd or crowd-as\n", role.c_str());
   return 2;
-}
-
-int listen(const mpf::Backplane& backplane) {
-  mpf::SyncClient client(backplane, "serial[0].sniff");
-  if (!client.call(mpf::Int32Message({.cmd = mpf::serial::cmdSniffStart}), 60s)) return 1;
-  for (;;) static_cast<void>(client.receive(24h));
 }
 
 }  // namespace
