@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cstdio>
 #include <fmt/format.h>
 #include <map>
 #include <memory>
@@ -55,6 +56,7 @@ class Caller {
 
  private:
   [[nodiscard]] bool isLoop() const noexcept { return arguments_.count > 1; }
+  [[nodiscard]] bool showsEach() const noexcept { return !isLoop() || arguments_.printAll; }
 
   void callOnce() {
     std::string error;  // parsed before: nothing is wrong with it
@@ -63,17 +65,20 @@ class Caller {
     auto answer = client_.call(std::move(*message), seconds(arguments_.timeout));
     if (answer) {
       recorder_->add(static_cast<std::uint64_t>(Clock::nowNs() - sentNs));
-      if (!isLoop() || arguments_.printAll) show(answer.message());
+      if (showsEach()) show(answer.message());
     } else {
       ++failed_;
       const auto because = client_.client().notConnectedBecause();
-      ++reasons_[answer.why() + (because.empty() ? "" : ": " + because)];
+      const auto why = answer.why() + (because.empty() ? "" : ": " + because);
+      ++reasons_[why];
+      if (showsEach() && !arguments_.json) fmt::print(stderr, "mpf call: {}\n", why);
     }
   }
 
   void show(const Message& message) {
     if (arguments_.json) replies_.push_back(toJson(message));
     else fmt::print("{}\n", print(message, arguments_.printAll ? std::numeric_limits<std::size_t>::max() : 64));
+    std::fflush(stdout);  // a reader in a pipe wants it now
   }
 
   // Messages of the server that come after the reply.
@@ -96,10 +101,10 @@ class Caller {
   void report() {
     if (shownNs_ != 0) fmt::print(stderr, "\r\x1b[K");
     if (arguments_.json) return reportJson();
-    for (const auto& [reason, times] : reasons_) {
-      fmt::print(stderr, "mpf call: {}{}\n", reason, times == 1 ? "" : fmt::format(" ({} times)", times));
-    }
     if (!isLoop()) return;
+    for (const auto& [reason, times] : reasons_) {
+      if (!showsEach()) fmt::print(stderr, "mpf call: {}{}\n", reason, times == 1 ? "" : fmt::format(" ({} times)", times));
+    }
     const auto at = [&](double percent) { return durationText(static_cast<double>(recorder_->percentileNs(percent))); };
     fmt::print("{} replied, {} did not; p50 {}, p99 {}, p99.9 {}, max {}\n", recorder_->count(), failed_, at(50), at(99), at(99.9),
                durationText(static_cast<double>(recorder_->maxNs())));
