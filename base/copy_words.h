@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// copyWords: copies a few 32-bit words through registers.
+// copyWords, copyField: copies of what has just been written, through registers.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +19,14 @@ inline void copyWords(std::byte* to, const std::byte* from) noexcept {
     asm("" : "+r"(word));
     std::memcpy(to + at, &word, sizeof word);
   }
+}
+
+// The same for one field, at its own width.
+template <class Field>
+inline void copyField(Field& to, const Field& from) noexcept {
+  Field field = from;
+  asm("" : "+r"(field));
+  to = field;
 }
 
 }  // namespace mpf

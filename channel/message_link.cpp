@@ -34,7 +34,7 @@ void MessageLink::discard(const Envelope& envelope) noexcept {
   link_->end();
 }
 
-LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message, Link::Limits limits) noexcept {
+LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message, const Link::Limits& limits) noexcept {
   const bool ours = message.lender() == this;
   const auto result = link_->trySend(envelope, message.body(), limits);
   if (result == LinkSend::sentInPlace) {

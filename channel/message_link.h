@@ -50,7 +50,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
 
   // Sends. Afterwards `message` has no body of this link any more; what is left of it the caller destroys without the lock, which
   // the return of a body would want. When it was not sent, `message` is as it was. The caller holds lock().
-  LinkSend trySendLocked(Envelope& envelope, Message& message, Link::Limits limits) noexcept;
+  LinkSend trySendLocked(Envelope& envelope, Message& message, const Link::Limits& limits) noexcept;
 
   // Memory of this link to build a body in; the heap's when the link has none for it.
   //   throws  std::bad_alloc

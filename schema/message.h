@@ -132,7 +132,7 @@ class Message {
   [[nodiscard]] static Message adopt(MessageType type, BodyBytes body) noexcept {
     Message message;
     message.state_.type = type;
-    message.state_.outside = true;
+    message.state_.inlineSize = kOutside;
     message.state_.at.body = body;
     message.check();
     return message;
@@ -164,13 +164,13 @@ class Message {
     forget();
   }
   // Who must get the body back; nullptr when it is inside the handle.
-  [[nodiscard]] BodyLender* lender() const noexcept { return state_.outside ? state_.at.body.lender : nullptr; }
-  [[nodiscard]] bool isInline() const noexcept { return !state_.outside; }
+  [[nodiscard]] BodyLender* lender() const noexcept { return state_.isOutside() ? state_.at.body.lender : nullptr; }
+  [[nodiscard]] bool isInline() const noexcept { return !state_.isOutside(); }
   // NOLINTNEXTLINE(clang-analyzer-core.uninitialized.UndefReturn): the analyzer does not follow the copy of the body word by word
-  [[nodiscard]] std::size_t capacity() const noexcept { return state_.outside ? state_.at.body.capacity : kInlineBytes; }
+  [[nodiscard]] std::size_t capacity() const noexcept { return state_.isOutside() ? state_.at.body.capacity : kInlineBytes; }
   // Hands an outside body over and leaves the handle empty. Of a body inside the handle nothing is left: data is nullptr.
   [[nodiscard]] BodyBytes releaseBody() noexcept {
-    const BodyBytes body = state_.outside ? state_.at.body : BodyBytes{};
+    const BodyBytes body = state_.isOutside() ? state_.at.body : BodyBytes{};
     forget();
     return body;
   }
@@ -181,9 +181,9 @@ class Message {
     return state_.type == T::kType && state_.sound;
   }
   // NOLINTBEGIN(clang-analyzer-core.uninitialized.UndefReturn): as above
-  [[nodiscard]] std::byte* data() noexcept { return state_.outside ? state_.at.body.data : state_.at.inside.data(); }
-  [[nodiscard]] const std::byte* data() const noexcept { return state_.outside ? state_.at.body.data : state_.at.inside.data(); }
-  [[nodiscard]] std::size_t size() const noexcept { return state_.outside ? state_.at.body.size : state_.inlineSize; }
+  [[nodiscard]] std::byte* data() noexcept { return state_.isOutside() ? state_.at.body.data : state_.at.inside.data(); }
+  [[nodiscard]] const std::byte* data() const noexcept { return state_.isOutside() ? state_.at.body.data : state_.at.inside.data(); }
+  [[nodiscard]] std::size_t size() const noexcept { return state_.isOutside() ? state_.at.body.size : state_.inlineSize; }
   // NOLINTEND(clang-analyzer-core.uninitialized.UndefReturn)
 
   template <ArrayBody T>
@@ -198,7 +198,7 @@ class Message {
     state_.length = static_cast<std::uint32_t>(length);
     reinterpret_cast<T*>(data())->length = state_.length;
     const std::size_t bytes = sizeof(T) + length * sizeof(typename T::Element);
-    if (state_.outside) state_.at.body.size = bytes;
+    if (state_.isOutside()) state_.at.body.size = bytes;
     else state_.inlineSize = static_cast<std::uint8_t>(bytes);
     return true;
   }
@@ -206,6 +206,7 @@ class Message {
   [[noreturn]] static void refuseLength(MessageType type, std::size_t length, std::size_t room);
 
  private:
+  static constexpr std::uint8_t kOutside = 0xff;
   union Where {
     alignas(8) std::array<std::byte, kInlineBytes> inside;
     BodyBytes body;
@@ -223,13 +224,31 @@ class Message {
     std::int32_t clientType = 0;
     std::int32_t clientExtra = 0;
     MessageType type = MessageType::none;
-    std::uint8_t inlineSize = 0;
-    bool outside : 1 = false;
-    bool sound : 1 = false;
+    std::uint8_t inlineSize = 0;  // kOutside: the body is elsewhere
+    bool sound = false;
+
+    [[nodiscard]] bool isOutside() const noexcept { return inlineSize == kOutside; }
+    State() noexcept = default;
+    State(const State& other) noexcept { *this = other; }  // NOLINT(cppcoreguidelines-pro-type-member-init)
+    // Field by field: see copy_words.h.
+    State& operator=(const State& other) noexcept {
+      at = other.at;
+      copyField(route.link, other.route.link);
+      copyField(route.requestId, other.route.requestId);
+      copyField(route.flags, other.route.flags);
+      copyField(route.keeper, other.route.keeper);
+      copyField(length, other.length);
+      copyField(clientType, other.clientType);
+      copyField(clientExtra, other.clientExtra);
+      copyField(type, other.type);
+      copyField(inlineSize, other.inlineSize);
+      copyField(sound, other.sound);
+      return *this;
+    }
   };
 
   void check() noexcept {
-    const BodyLayout layout = layoutOf(state_.type);
+    const auto& layout = layoutOf(state_.type);
     const std::byte* const bytes = data();
     state_.sound = layout.headerBytes != 0 && size() >= layout.headerBytes && reinterpret_cast<std::uintptr_t>(bytes) % 8 == 0;
     if (!state_.sound || layout.elementBytes == 0) return;
@@ -243,13 +262,13 @@ class Message {
     state_.route.keeper = nullptr;
     state_.inlineSize = 0;
     state_.length = 0;
-    state_.outside = false;
     state_.sound = false;
   }
   void giveBack() noexcept {
     if (state_.route.keeper != nullptr) state_.route.keeper->abandoned(state_.route);
     // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): as above
-    if (state_.outside && state_.at.body.lender != nullptr) state_.at.body.lender->takeBack(state_.at.body.data, state_.at.body.capacity);
+    if (state_.isOutside() && state_.at.body.lender != nullptr)
+      state_.at.body.lender->takeBack(state_.at.body.data, state_.at.body.capacity);
   }
 
   State state_;

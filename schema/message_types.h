@@ -262,12 +262,13 @@ inline constexpr auto kLayouts = []<class... T>(std::type_identity<std::tuple<T.
   ((layouts[static_cast<std::size_t>(T::kType)] = layoutOf<T>()), ...);
   return layouts;
 }(std::type_identity<MessageTypes>{});
+inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
 
 }  // namespace detail
 
-[[nodiscard]] constexpr BodyLayout layoutOf(MessageType type) noexcept {
+[[nodiscard]] constexpr const BodyLayout& layoutOf(MessageType type) noexcept {
   const auto at = static_cast<std::size_t>(type);
-  return at < detail::kLayouts.size() ? detail::kLayouts[at] : BodyLayout{.name = "unknown"};
+  return at < detail::kLayouts.size() ? detail::kLayouts[at] : detail::kUnknownLayout;
 }
 
 // The name of a type, a status, a fate; "unknown" when a newer peer said something that this program does not know.

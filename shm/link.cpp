@@ -148,7 +148,7 @@ bool Link::shallBeTimed() const noexcept {
   return outControl_.unwatched.load(std::memory_order_relaxed) != 0 || out_.messages() % kSampleEvery == 0;
 }
 
-LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, Limits limits) noexcept {
+LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, const Limits& limits) noexcept {
   if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
   if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting && out_.waiting() >= limits.waiting) return LinkSend::full;
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());

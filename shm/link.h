@@ -61,13 +61,13 @@ class Link {
   void notifyPeer() noexcept;
 
   // --- sending ---
-  struct Limits {
+  struct Limits {  // handed on by reference: packed into registers, they would be read before they are stored
     std::uint32_t waiting = 0;      // longest queue of messages that the peer has not taken; 0: what the ring holds
     std::uint32_t reserve = 0;      // slots to leave free
     std::uint32_t longReserve = 0;  // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
   };
   // Sends a body (its length and flags are added to `envelope`): in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
-  LinkSend trySend(Envelope& envelope, std::span<const std::byte> body, Limits limits) noexcept;
+  LinkSend trySend(Envelope& envelope, std::span<const std::byte> body, const Limits& limits) noexcept;
   // Whether the next message is one of those that carry their time (Envelope::sentTick).
   [[nodiscard]] bool shallBeTimed() const noexcept;
   // Number of the last message sent, from 1.
