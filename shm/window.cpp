@@ -11,12 +11,13 @@
 namespace mpf {
 namespace {
 
-// A reaper holds the lock of a dead window for some microseconds; only one that is held longer has an owner.
-bool isOwnedForLong(const std::string& name) {
+// Frees `name` if its owner is dead. A reaper holds the lock of a dead window for some microseconds; only one that is held longer
+// has an owner.
+bool tryFreeName(const std::string& name) {
   const auto until = Deadline::after(std::chrono::milliseconds(50));
   for (;;) {
-    if (segments::probeOwner(name) != segments::Owner::alive) return false;
-    if (until.hasPassed()) return true;
+    if (segments::removeIfOwnerless(name) || segments::probeOwner(name) == segments::Owner::absent) return true;
+    if (until.hasPassed()) return false;
     ::sched_yield();
   }
 }
@@ -52,19 +53,23 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
   hints_.lockForLife();
   hints_.sharedHeader().ownerWindow = incarnation;
   if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation))) throw NameInUse("an incarnation number came twice");
+  const auto fifo = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   try {
+    fifo_ = doorbell::createFifo(fifo, rights.mode, rights.group);
     publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : name);
   } catch (...) {
+    segments::remove(fifo);
     segments::remove(hints_.name());
     throw;
   }
-  fifo_ = doorbell::createFifo(SegmentName::keyed(backplane, NameKind::fifo, incarnation), rights.mode, rights.group);
 }
 
 void OwnWindow::publish(const std::string& name) {
   while (!window_.tryPublish(name)) {
-    if (segments::removeIfOwnerless(name)) continue;
-    if (isOwnedForLong(name)) throw NameInUse(fmt::format("{}: in use by {}", segments::path(name), describeOwner(name)));
+    if (tryFreeName(name)) continue;
+    const bool isAlive = segments::probeOwner(name) == segments::Owner::alive;
+    throw NameInUse(fmt::format("{}: {} {}", segments::path(name),
+                                isAlive ? "in use by" : "cannot be removed, though its owner is dead:", describeOwner(name)));
   }
 }
 

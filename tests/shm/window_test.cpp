@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+// What a process exposes on the backplane, and what its peers see of it.
+#include <mpf/shm/window.h>
+
+#include <sys/stat.h>
+
+#include <atomic>
+#include <fstream>
+#include <memory>
+#include <thread>
+
+#include <mpf/tests/shm/child.h>
+#include <mpf/tests/shm/shm_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+using layout::SegmentKind;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::UnorderedElementsAre;
+
+class WindowTest : public ShmTest {
+ protected:
+  std::unique_ptr<OwnWindow> makeServer(Rights rights = {}) const {
+    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), rights, [](layout::SegmentHeader&) {});
+  }
+  std::unique_ptr<OwnWindow> makeClient() const {
+    return std::make_unique<OwnWindow>(name(), SegmentKind::clientWindow, "", Rights{}, [](layout::SegmentHeader&) {});
+  }
+  std::shared_ptr<PeerWindow> openServer() const { return PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow); }
+  [[nodiscard]] static mode_t modeOf(const std::string& file) {
+    struct stat status{};
+    EXPECT_EQ(::stat(segments::path(file).c_str(), &status), 0) << file;
+    return status.st_mode & 07777;
+  }
+};
+
+TEST_F(WindowTest, StandsBesideItsHintsAndItsPipeAndGoesWithThem) {
+  auto server = makeServer();
+  auto client = makeClient();
+
+  const auto key = server->header().incarnation;
+  const auto clientKey = client->header().incarnation;
+  EXPECT_THAT(
+      backplane_.segmentNames(),
+      UnorderedElementsAre(serverName(), SegmentName::keyed(name(), NameKind::hints, key), SegmentName::keyed(name(), NameKind::fifo, key),
+                           SegmentName::keyed(name(), NameKind::clientWindow, clientKey),
+                           SegmentName::keyed(name(), NameKind::hints, clientKey), SegmentName::keyed(name(), NameKind::fifo, clientKey)));
+  server.reset();
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u);
+}
+
+TEST_F(WindowTest, IsDescribedBeforeAnybodySeesIt) {
+  std::vector<std::string> seen{"not called"};
+
+  OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {}, [&](layout::SegmentHeader& header) {
+    seen = backplane_.segmentNames();
+    header.location = 5;
+  });
+
+  EXPECT_THAT(seen, testing::IsEmpty());
+  EXPECT_EQ(openServer()->header().location, 5);
+  EXPECT_EQ(window.header().location, 5);
+}
+
+TEST_F(WindowTest, PeersMayWriteTheHintsAndReadTheRest) {
+  const auto server = makeServer({.mode = 0666});
+  const auto key = server->header().incarnation;
+
+  EXPECT_EQ(modeOf(serverName()), 0644u);
+  EXPECT_EQ(modeOf(SegmentName::keyed(name(), NameKind::hints, key)), 0666u);
+  EXPECT_EQ(modeOf(SegmentName::keyed(name(), NameKind::fifo, key)), 0666u);
+}
+
+TEST_F(WindowTest, IsItsOwnersAloneUnlessRightsSayOtherwise) {
+  const auto server = makeServer();
+
+  for (const auto& file : backplane_.segmentNames()) EXPECT_EQ(modeOf(file), 0600u) << file;
+}
+
+TEST_F(WindowTest, ANameInUseIsRefusedWithItsOwnersNameAndPid) {
+  const auto first = makeServer();
+
+  const auto why = whatOf<NameInUse>([&] { static_cast<void>(makeServer()); });
+
+  EXPECT_THAT(why, AllOf(HasSubstr(segments::path(serverName())), HasSubstr("shm_test"), HasSubstr(std::to_string(::getpid()))));
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "nothing is left of the second";
+  EXPECT_TRUE(openServer()->hasOwner());
+}
+
+TEST_F(WindowTest, TheNameOfAKilledOwnerCanBeUsedAtOnce) {
+  Child child([&](Child::Self& self) {
+    const auto server = makeServer();
+    self.stay();
+  });
+  const auto old = openServer();
+  child.end(SIGKILL);
+
+  const auto server = makeServer();
+
+  EXPECT_FALSE(old->hasOwner());
+  EXPECT_TRUE(openServer()->hasOwner());
+  EXPECT_NE(openServer()->header().incarnation, old->header().incarnation);
+  static_cast<void>(backplane_.removeDead());
+}
+
+TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerWins) {
+  for (int round = 0; round < 20; ++round) {
+    Child child([&](Child::Self& self) {
+      const auto server = makeServer();
+      self.stay();
+    });
+    child.end(SIGKILL);
+    std::atomic<int> wins{0};
+    std::atomic<int> tried{0};
+    std::vector<std::thread> successors;
+    for (int i = 0; i < 3; ++i) {
+      successors.emplace_back([&] {
+        std::unique_ptr<OwnWindow> server;
+        if (whatOf<NameInUse>([&] { server = makeServer(); }).empty()) ++wins;
+        for (++tried; tried < 3;) std::this_thread::yield();
+      });
+    }
+    for (auto& successor : successors) successor.join();
+
+    ASSERT_EQ(wins, 1);
+    static_cast<void>(backplane_.removeDead());
+  }
+}
+
+// A file that is nobody's and cannot be removed: another user's, say.
+TEST_F(WindowTest, ANameThatNobodyHasAndNobodyMayRemoveIsAnError) {
+  const auto path = segments::path(serverName());
+  ASSERT_EQ(::mkdir(path.c_str(), 0700), 0);
+
+  const auto why = whatOf<NameInUse>([&] { static_cast<void>(makeServer()); });
+
+  EXPECT_THAT(why, HasSubstr(path));
+  ASSERT_EQ(::rmdir(path.c_str()), 0);
+}
+
+TEST_F(WindowTest, OneThatCannotBeCompletedLeavesNothing) {
+  std::string pipe;
+
+  const auto why = whatOf<std::system_error>([&] {
+    OwnWindow(name(), SegmentKind::serverWindow, serverName(), {}, [&](layout::SegmentHeader& header) {
+      pipe = segments::path(SegmentName::keyed(name(), NameKind::fifo, header.incarnation));
+      std::ofstream{pipe};
+    });
+  });
+
+  EXPECT_THAT(why, HasSubstr(pipe));
+  ::unlink(pipe.c_str());
+  EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+}
+
+TEST_F(WindowTest, APeersViewOutlivesItAndSaysThatItIsClosed) {
+  auto server = makeServer();
+  const auto peer = openServer();
+  EXPECT_FALSE(peer->isClosed());
+  EXPECT_TRUE(peer->hasOwner());
+
+  server.reset();
+
+  EXPECT_TRUE(peer->isClosed());
+  EXPECT_FALSE(peer->hasOwner());
+  peer->notify(0);
+  peer->knock(1);
+}
+
+TEST_F(WindowTest, ThereIsNoneWithoutItsNameOrItsHints) {
+  EXPECT_EQ(openServer(), nullptr);
+  const auto server = makeServer();
+  segments::remove(SegmentName::keyed(name(), NameKind::hints, server->header().incarnation));
+
+  EXPECT_EQ(openServer(), nullptr);
+}
+
+TEST_F(WindowTest, OneThatIsTooShortIsRefusedByName) {
+  auto server = makeServer();
+  auto hints = SegmentName::keyed(name(), NameKind::hints, server->header().incarnation);
+  const auto shorten = [](const std::string& file, SegmentKind kind, std::size_t bytes) {
+    Segment::tryOpen(file, kind, Segment::Access::readWrite)->sharedHeader().totalBytes = bytes;
+    ASSERT_EQ(::truncate(segments::path(file).c_str(), static_cast<off_t>(bytes)), 0);
+  };
+
+  shorten(hints, SegmentKind::hints, sizeof(layout::WindowHints) - 1);
+  EXPECT_THAT(whatOf<SegmentError>([&] { openServer(); }), AllOf(HasSubstr(segments::path(hints)), HasSubstr("truncated")));
+  shorten(serverName(), SegmentKind::serverWindow, layout::kWindowBytes - 1);
+  EXPECT_THAT(whatOf<SegmentError>([&] { openServer(); }), AllOf(HasSubstr(segments::path(serverName())), HasSubstr("truncated")));
+}
+
+TEST_F(WindowTest, ANotedLinkHasItsReadyBitWhateverItsNumber) {
+  const auto server = makeServer();
+  const auto peer = openServer();
+  const auto& hints = server->hints();
+
+  peer->notify(64 * 65 + 3);
+
+  EXPECT_EQ(hints.readyBits[65].load(std::memory_order_relaxed), 8u);
+  EXPECT_EQ(hints.readyWords[1].load(std::memory_order_relaxed), 2u);
+  peer->notify(UINT32_MAX);
+  EXPECT_EQ(hints.readyBits[layout::kMaxLinks / 64 - 1].load(std::memory_order_relaxed), std::uint64_t{1} << 63);
+}
+
+TEST_F(WindowTest, AKnockThatOverwritesAnotherAsksForALookByName) {
+  const auto server = makeServer();
+  const auto peer = openServer();
+  const auto& hints = server->hints();
+
+  peer->knock(5);
+  peer->knock(5);
+  EXPECT_EQ(hints.rescan.load(std::memory_order_relaxed), 0u);
+  peer->knock(5 + layout::kKnocks);
+
+  EXPECT_EQ(hints.knocked.load(std::memory_order_relaxed), 3u);
+  EXPECT_EQ(hints.rescan.load(std::memory_order_relaxed), 1u);
+}
+
+TEST_F(WindowTest, OnlyASleeperIsRung) {
+  const auto server = makeServer();
+  const auto peer = openServer();
+  auto& bell = server->hints().bell;
+  const auto rung = [&] { return bell.load(std::memory_order_relaxed); };
+
+  peer->notify(0);
+  EXPECT_EQ(rung(), 0u) << "awake";
+  server->control().sleeping.store(layout::SleepState::onFutex, std::memory_order_relaxed);
+  peer->notify(0);
+  EXPECT_EQ(rung(), 1u);
+  server->control().sleeping.store(layout::SleepState::onDescriptor, std::memory_order_relaxed);
+  peer->notify(0);
+
+  EXPECT_EQ(rung(), 1u);
+  char byte = 0;
+  EXPECT_EQ(::read(server->fifo().get(), &byte, 1), 1) << "through the pipe instead";
+  server->control().sleeping.store(static_cast<layout::SleepState>(77), std::memory_order_relaxed);
+  peer->notify(0);
+}
+
+}  // namespace
+}  // namespace mpf::test
