@@ -111,10 +111,10 @@ void Segment::lockForLife() {
 }
 
 bool Segment::tryPublish(const std::string& name) {
+  header_ = sharedHeader();  // before a peer can write to it
   const auto self = fmt::format("/proc/self/fd/{}", file_.get());
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) == 0) {
     name_ = name;
-    header_ = sharedHeader();
     return true;
   }
   if (errno == EEXIST) return false;
