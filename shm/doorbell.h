@@ -33,7 +33,8 @@ inline void fence() noexcept {
 #endif
 }
 
-// Sleeps while `bell` still has the value `seen`, until rung or until `deadline`. Returns early when a signal handler ran.
+// Sleeps while `bell` still has the value `seen`, until rung or until `deadline`. May return early, when a signal handler ran that was
+// installed without SA_RESTART for example; a handler that must end the sleep rings.
 void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) noexcept;
 
 // Changes the bell and wakes who sleeps on it.

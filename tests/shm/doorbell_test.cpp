@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+// Sleep and wake.
+#include <mpf/shm/doorbell.h>
+
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <sys/stat.h>
+
+#include <thread>
+
+#include <mpf/tests/shm/child.h>
+#include <mpf/tests/shm/shm_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+class DoorbellTest : public ShmTest {
+ protected:
+  void TearDown() override {
+    segments::remove(fifoName_);
+    ShmTest::TearDown();
+  }
+  [[nodiscard]] static bool isReadable(const FileDescriptor& fifo) {
+    pollfd poll{fifo.get(), POLLIN, 0};
+    return ::poll(&poll, 1, 0) == 1;
+  }
+  layout::Word32 bell_{0};
+  std::string fifoName_ = SegmentName::keyed(name(), NameKind::fifo, 1);
+};
+
+TEST_F(DoorbellTest, ARingBeforeTheSleepIsNotLost) {
+  const auto seen = bell_.load(std::memory_order_relaxed);
+
+  doorbell::ring(bell_);
+
+  doorbell::sleep(bell_, seen, Deadline::never());
+}
+
+TEST_F(DoorbellTest, SleepersWakeEachOtherWithoutLosingATurn) {
+  constexpr int kTurns = 20'000;
+  layout::Word32 bells[2]{};
+  std::atomic<int> turn{0};
+  const auto play = [&](int self) {
+    for (int next = self; next < kTurns; next += 2) {
+      for (;;) {
+        const auto seen = bells[self].load(std::memory_order_relaxed);
+        doorbell::fence();
+        if (turn.load() == next) break;
+        doorbell::sleep(bells[self], seen, Deadline::never());
+      }
+      turn.store(next + 1);
+      doorbell::fence();
+      doorbell::ring(bells[1 - self]);
+    }
+  };
+
+  std::thread other(play, 1);
+  play(0);
+  other.join();
+
+  EXPECT_EQ(turn, kTurns);
+}
+
+TEST_F(DoorbellTest, ASleepEndsAtItsDeadline) {
+  const auto deadline = Deadline::after(5ms);
+
+  while (!deadline.hasPassed()) doorbell::sleep(bell_, 0, deadline);
+}
+
+TEST_F(DoorbellTest, ADeadlineThatHasPassedIsNoSleep) {
+  doorbell::sleep(bell_, 0, Deadline::after(-1h));
+  doorbell::sleep(bell_, 0, Deadline::atNs(0));
+  doorbell::sleep(bell_, 0, Deadline::atNs(-1));
+}
+
+class Signals : public DoorbellTest {
+ protected:
+  // Runs `handler` for SIGUSR1 in `sleep`'s thread again and again until that returns.
+  template <class Sleep>
+  static void interrupt(void (*handler)(int), int flags, Sleep sleep) {
+    struct sigaction action{};
+    action.sa_handler = handler;
+    action.sa_flags = flags;
+    struct sigaction before{};
+    ::sigaction(SIGUSR1, &action, &before);
+    std::atomic<bool> done{false};
+    std::thread sleeper([&] {
+      sleep();
+      done = true;
+    });
+    while (!done) {
+      ::pthread_kill(sleeper.native_handle(), SIGUSR1);
+      std::this_thread::yield();
+    }
+    sleeper.join();
+    ::sigaction(SIGUSR1, &before, nullptr);
+  }
+  static inline layout::Word32* rungBySignal = nullptr;
+};
+
+TEST_F(Signals, EndASleepWhenTheirHandlerRestartsNoCalls) {
+  interrupt([](int) {}, 0, [&] { doorbell::sleep(bell_, 0, Deadline::never()); });
+}
+
+TEST_F(Signals, EndASleepWithADeadline) {
+  interrupt([](int) {}, SA_RESTART, [&] { doorbell::sleep(bell_, 0, Deadline::after(1h)); });
+}
+
+TEST_F(Signals, EndAnySleepWhenTheirHandlerRings) {
+  rungBySignal = &bell_;
+
+  interrupt([](int) { doorbell::ring(*rungBySignal); }, SA_RESTART, [&] { doorbell::sleep(bell_, 0, Deadline::never()); });
+}
+
+TEST_F(DoorbellTest, AProcessWakesAnother) {
+  auto segment = createPage();
+  auto& bell = segment.at<layout::Word32>(1024);
+  Child ringer([&](Child::Self& self) {
+    self.ready();
+    doorbell::ring(bell);
+    self.stay();
+  });
+
+  ringer.go();
+  doorbell::sleep(bell, 0, Deadline::never());
+
+  EXPECT_EQ(bell.load(std::memory_order_relaxed), 1u);
+}
+
+TEST_F(DoorbellTest, APipeIsReadableOnceRungAndNotOnceDrained) {
+  const auto own = doorbell::createFifo(fifoName_, 0600, ~0u);
+  const auto peers = doorbell::tryOpenFifo(fifoName_);
+  ASSERT_TRUE(peers);
+  EXPECT_FALSE(isReadable(own));
+
+  for (int i = 0; i < 1000; ++i) doorbell::ringFifo(peers);
+
+  EXPECT_TRUE(isReadable(own));
+  doorbell::drainFifo(own);
+  EXPECT_FALSE(isReadable(own));
+  doorbell::drainFifo(own);
+}
+
+TEST_F(DoorbellTest, AFullPipeTakesRingsWithoutWaiting) {
+  const auto own = doorbell::createFifo(fifoName_, 0600, ~0u);
+
+  for (int i = 0; i < 100'000; ++i) doorbell::ringFifo(own);
+
+  EXPECT_TRUE(isReadable(own));
+  doorbell::drainFifo(own);
+  EXPECT_FALSE(isReadable(own));
+}
+
+TEST_F(DoorbellTest, APipeHasTheRightsAskedForWhateverTheUmask) {
+  const auto before = ::umask(0777);
+
+  const auto fifo = doorbell::createFifo(fifoName_, 0660, ::getgid());
+  ::umask(before);
+
+  struct stat status{};
+  ASSERT_EQ(::stat(segments::path(fifoName_).c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0660u);
+  EXPECT_TRUE(S_ISFIFO(status.st_mode));
+}
+
+TEST_F(DoorbellTest, RingingAtADeadOwnersPipeKillsNobody) {
+  Child owner([&](Child::Self& self) {
+    const auto fifo = doorbell::createFifo(fifoName_, 0600, ~0u);
+    self.stay();
+  });
+  const auto peers = doorbell::tryOpenFifo(fifoName_);
+  owner.end(SIGKILL);
+  Child ringer([&](Child::Self& self) {
+    ::signal(SIGPIPE, SIG_DFL);
+    doorbell::ringFifo(peers);
+    segments::remove(fifoName_);
+    doorbell::ringFifo(peers);
+    self.ready();
+  });
+
+  ringer.go();
+
+  EXPECT_EQ(ringer.end(0), 0);
+}
+
+TEST_F(DoorbellTest, APipeThatIsNotThereIsNotRung) {
+  const auto none = doorbell::tryOpenFifo(fifoName_);
+
+  EXPECT_FALSE(none);
+  doorbell::ringFifo(none);
+}
+
+}  // namespace
+}  // namespace mpf::test
