@@ -55,6 +55,8 @@ bool hasLivingOwner(const std::string& name, layout::SegmentKind kind, const Sur
   try {
     const auto segment = Segment::tryOpen(name, kind, Segment::Access::readOnly);
     return !segment || survey.windows.contains(segment->header().ownerWindow);
+  } catch (const VersionError&) {
+    return true;  // not ours to judge
   } catch (const SegmentError&) {
     return false;  // nobody can use it
   } catch (const std::exception&) {
@@ -68,13 +70,11 @@ void surveyDependent(const std::string& name, const SegmentName::Parsed& parsed,
     case NameKind::serverWindow:
     case NameKind::clientWindow:
     case NameKind::bulk:
+    case NameKind::fifo:
       return;
     case NameKind::hints:
       if (segments::removeIfOwnerless(name)) survey.removed.push_back(name);
       return;
-    case NameKind::fifo:
-      keep = survey.windows.contains(parsed.incarnation);
-      break;
     case NameKind::wish:
       keep = hasLivingOwner(name, layout::SegmentKind::wish, survey);
       break;
@@ -82,6 +82,17 @@ void surveyDependent(const std::string& name, const SegmentName::Parsed& parsed,
       keep = hasLivingOwner(name, layout::SegmentKind::link, survey);
       if (keep) survey.links.insert(parsed.incarnation);
       break;
+  }
+  if (!keep && segments::remove(name)) survey.removed.push_back(name);
+}
+
+// What hangs on dependents: bulk on links, pipes on hints, whose lock tells of owners of any version.
+void surveyLast(const std::string& name, const SegmentName::Parsed& parsed, Survey& survey) {
+  bool keep = true;
+  if (parsed.kind == NameKind::bulk) keep = survey.links.contains(parsed.incarnation);
+  if (parsed.kind == NameKind::fifo) {
+    const auto hints = SegmentName::keyed(parsed.backplane, NameKind::hints, parsed.incarnation);
+    keep = segments::probeOwner(hints) == segments::Owner::alive;
   }
   if (!keep && segments::remove(name)) survey.removed.push_back(name);
 }
@@ -131,11 +142,7 @@ std::vector<std::string> Backplane::removeDead() const {
     if (parsed.kind == NameKind::serverWindow || parsed.kind == NameKind::clientWindow) surveyWindow(segment, parsed, survey);
   });
   forEach([&](const std::string& segment, const SegmentName::Parsed& parsed) { surveyDependent(segment, parsed, survey); });
-  forEach([&](const std::string& segment, const SegmentName::Parsed& parsed) {
-    if (parsed.kind == NameKind::bulk && !survey.links.contains(parsed.incarnation) && segments::remove(segment)) {
-      survey.removed.push_back(segment);
-    }
-  });
+  forEach([&](const std::string& segment, const SegmentName::Parsed& parsed) { surveyLast(segment, parsed, survey); });
   return survey.removed;
 }
 

@@ -155,7 +155,7 @@ bool remove(const std::string& name) { return ipc::shared_memory_object::remove(
 void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& name) {
   if (header.magic != layout::kMagic) throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path(name)));
   if (header.layoutMajor < layout::kOldestMajor || header.layoutMajor > layout::kMajor) {
-    throw SegmentError(
+    throw VersionError(
         fmt::format("{}: layout {}, this program speaks {}-{}", path(name), header.layoutMajor, layout::kOldestMajor, layout::kMajor));
   }
   if (header.kind != kind) {

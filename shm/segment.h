@@ -31,6 +31,12 @@ class SegmentError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// A segment of a layout version that this program does not speak.
+class VersionError : public SegmentError {
+ public:
+  using SegmentError::SegmentError;
+};
+
 // Who may open what a process creates. Group ~0 is the creator's own.
 struct Rights {
   mode_t mode = 0600;
