@@ -45,7 +45,8 @@ enum class ReplyResult { sent, clientGone, queueFull, tooLarge, noMemory };
 class MessageServer {
  public:
   // Opens the server under `name` at once; requests wait until somebody receives them.
-  //   throws  NameInUse when another process serves that name at that location, std::invalid_argument, std::system_error
+  //   throws  NameInUse when another process serves that name at that location, SegmentError when something foreign is in its place,
+  //           std::invalid_argument, std::system_error
   MessageServer(const Backplane& backplane, const std::string& name, const ServerOptions& options = {});
   ~MessageServer();
   MessageServer(const MessageServer&) = delete;

@@ -69,6 +69,16 @@ FileDescriptor openByName(const std::string& name, int flags) {
   return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
 }
 
+// Whether a file is a segment of some kind that this program can use.
+bool isKnown(int fd, std::size_t fileBytes, const std::string& name) try {
+  layout::SegmentHeader header{};
+  if (::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) return false;
+  segments::check(header, fileBytes, header.kind, name);
+  return true;
+} catch (const SegmentError&) {
+  return false;
+}
+
 }  // namespace
 
 Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights) {
@@ -184,8 +194,9 @@ bool removeIfOwnerless(const std::string& name) {
   // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
   struct stat locked{};
   struct stat named{};
-  if (::fstat(file.get(), &locked) != 0 || ::stat(path(name).c_str(), &named) != 0) return false;
-  return locked.st_ino == named.st_ino && remove(name);
+  if (::fstat(file.get(), &locked) != 0 || ::stat(path(name).c_str(), &named) != 0 || locked.st_ino != named.st_ino) return false;
+  // Of anything but a segment that we know, a free lock proves nothing.
+  return isKnown(file.get(), static_cast<std::size_t>(locked.st_size), name) && remove(name);
 }
 
 std::vector<std::string> list(const std::string& prefix) {

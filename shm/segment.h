@@ -97,7 +97,8 @@ enum class Owner { alive, dead, absent };
 // Asks the kernel whether somebody holds the owner's lock of a window. With an incarnation: `absent` when the name has
 // another one's window now.
 [[nodiscard]] Owner probeOwner(const std::string& name, std::uint64_t incarnation = 0);
-// Removes a window whose owner is proven dead. Two processes may try at once; a window that was replaced meanwhile stays.
+// Removes a window whose owner is proven dead. Two processes may try at once; a window that was replaced meanwhile stays, and so does
+// what is no window of a version that we know: its lock may mean something else.
 bool removeIfOwnerless(const std::string& name);
 
 // Names in /dev/shm that start with `prefix`.

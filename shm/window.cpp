@@ -3,34 +3,43 @@
 
 #include <sched.h>
 
+#include <cerrno>
 #include <cstring>
 #include <fmt/format.h>
+#include <optional>
+#include <system_error>
 
 #include <mpf/shm/segment_name.h>
 
 namespace mpf {
 namespace {
 
-// Frees `name` if its owner is dead. A reaper holds the lock of a dead window for some microseconds; only one that is held longer
-// has an owner.
-bool tryFreeName(const std::string& name) {
-  const auto until = Deadline::after(std::chrono::milliseconds(50));
-  for (;;) {
-    if (segments::removeIfOwnerless(name) || segments::probeOwner(name) == segments::Owner::absent) return true;
-    if (until.hasPassed()) return false;
-    ::sched_yield();
-  }
+// What stands under a name that we want; nullopt when nothing does. Throws what to do about anything that is no window.
+std::optional<Segment> openInTheWay(const std::string& name, layout::SegmentKind kind) try {
+  return Segment::tryOpen(name, kind, Segment::Access::readOnly);
+} catch (const std::system_error& error) {
+  if (error.code().value() == EACCES) throw NameInUse(fmt::format("{}: in use by another user: {}", segments::path(name), error.what()));
+  throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
+} catch (const SegmentError& error) {
+  if (segments::probeOwner(name) == segments::Owner::alive) throw NameInUse(fmt::format("in use by another program: {}", error.what()));
+  throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 }
 
-std::string describeOwner(const std::string& name) {
-  try {
-    const auto window = Segment::tryOpen(name, layout::SegmentKind::serverWindow, Segment::Access::readOnly);
-    if (!window) return "another process";
-    const auto& header = window->header();
-    return fmt::format("{} (pid {})", std::string(header.program.data(), ::strnlen(header.program.data(), header.program.size())),
-                       header.ownerPid);
-  } catch (const std::exception& error) {
-    return error.what();
+// Throws what keeps us from a name; returns when it has gone meanwhile.
+void checkInTheWay(const std::string& name, layout::SegmentKind kind) {
+  const auto window = openInTheWay(name, kind);
+  if (!window) return;
+  const auto& header = window->header();
+  switch (segments::probeOwner(name, header.incarnation)) {
+    case segments::Owner::absent:
+      return;
+    case segments::Owner::alive:
+      throw NameInUse(fmt::format("{}: in use by {} (pid {})", segments::path(name),
+                                  std::string(header.program.data(), ::strnlen(header.program.data(), header.program.size())),
+                                  header.ownerPid));
+    case segments::Owner::dead:
+      if (segments::removeIfOwnerless(name)) return;
+      throw SegmentError(fmt::format("{}: left by a dead process of user {}, who must remove it", segments::path(name), header.ownerUid));
   }
 }
 
@@ -65,11 +74,15 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
 }
 
 void OwnWindow::publish(const std::string& name) {
+  // A reaper holds the lock of a dead window for some microseconds; only one that is held longer has an owner.
+  const auto patience = Deadline::after(std::chrono::milliseconds(50));
   while (!window_.tryPublish(name)) {
-    if (tryFreeName(name)) continue;
-    const bool isAlive = segments::probeOwner(name) == segments::Owner::alive;
-    throw NameInUse(fmt::format("{}: {} {}", segments::path(name),
-                                isAlive ? "in use by" : "cannot be removed, though its owner is dead:", describeOwner(name)));
+    if (segments::removeIfOwnerless(name)) continue;
+    if (patience.hasPassed()) {
+      checkInTheWay(name, header().kind);
+    } else {
+      ::sched_yield();
+    }
   }
 }
 

@@ -32,7 +32,7 @@ class OwnWindow {
  public:
   // `describe` fills in name, location and geometry before anybody can see the window.
   //   name    file name of a server window; empty: a client window, named by its incarnation
-  //   throws  NameInUse, std::system_error
+  //   throws  NameInUse, SegmentError when something that is no window has the name, std::system_error
   OwnWindow(const std::string& backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
             const std::function<void(layout::SegmentHeader&)>& describe);
   ~OwnWindow();
