@@ -11,8 +11,6 @@
 namespace mpf {
 namespace {
 
-constexpr std::int64_t kFirstNudgeNs = 50'000'000;
-constexpr std::int64_t kLastNudgeNs = 1'000'000'000;
 constexpr std::int64_t kRetryNs = 1'000'000'000;
 
 }  // namespace
@@ -64,6 +62,7 @@ void Binding::tryConnect() try {
     const std::lock_guard lock(*lock_);
     requests_ = std::make_unique<RequestTable>(created.header().maxOutstanding);
     channel_ = std::make_shared<MessageLink>(std::move(link), lock_);
+    nudging_ = true;
   }
   if (wish_) segments::remove(wish_.name());
   wish_ = {};
@@ -276,7 +275,10 @@ void Binding::expire(std::int64_t nowNs) {
 // Hints may be lost to somebody who scribbles over them: while something is owed to us, ring again now and then.
 void Binding::nudge(std::int64_t nowNs) {
   const bool connected = isConnected();
-  if (connected && requests_->outstanding() == 0) return;
+  if (connected && endNudging()) {
+    nudgeEveryNs_ = kFirstNudgeNs;
+    return;
+  }
   if (nowNs - knockedNs_ >= nudgeEveryNs_) {
     knockedNs_ = nowNs;
     nudgeEveryNs_ = std::min(2 * nudgeEveryNs_, kLastNudgeNs);
@@ -289,6 +291,14 @@ void Binding::nudge(std::int64_t nowNs) {
     if (link.hasMessage()) takeOne();
   }
   wakeAt(knockedNs_ + nudgeEveryNs_);
+}
+
+// True when nothing is owed to us: the next send() begins anew.
+bool Binding::endNudging() {
+  const std::lock_guard lock(*lock_);
+  if (requests_->outstanding() != 0) return false;
+  nudging_ = false;
+  return true;
 }
 
 void Binding::wakeAt(std::int64_t ns) noexcept {

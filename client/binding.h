@@ -66,8 +66,11 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void setReason(const std::string& reason);
   void wakeAt(std::int64_t ns) noexcept;
   void noteFull() noexcept;
+  static constexpr std::int64_t kFirstNudgeNs = 50'000'000;
+  static constexpr std::int64_t kLastNudgeNs = 1'000'000'000;
   void expire(std::int64_t nowNs);
   void nudge(std::int64_t nowNs);
+  bool endNudging();
 
   Dispatcher::Impl& dispatcher_;
   MessageClient::Callback callback_;
@@ -78,6 +81,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   std::unique_ptr<RequestTable> requests_;   // likewise
   std::atomic<bool> connected_{false};       // under lock_
   bool fullTold_ = false;                    // under lock_: this run of refusals has been reported
+  bool nudging_ = false;                     // under lock_: a time for the next nudge() is set
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::int64_t knockedNs_ = 0;
   std::int64_t nudgeEveryNs_ = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Binding, continued: the way out.
 #include <mutex>
+#include <utility>
 
 #include <mpf/client/binding.h>
 #include <mpf/client/dispatcher_impl.h>
@@ -11,6 +12,7 @@ namespace mpf {
 SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
   if (!message) return SendResult::empty;
   LinkSend sent{};
+  bool nudging = false;
   {
     const std::lock_guard lock(*lock_);
     if (!isConnected()) return SendResult::notConnected;
@@ -43,6 +45,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
       if (sent == LinkSend::full) noteFull();
     } else {
       fullTold_ = false;
+      nudging = std::exchange(nudging_, true);
       link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
       link.control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
       if (requestId != nullptr) *requestId = id;
@@ -60,6 +63,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     case LinkSend::noMemory:
       return SendResult::noMemory;
   }
+  if (!nudging) wakeAt(Clock::nowNs() + kFirstNudgeNs);
   if (!takeBefore.isNever()) wakeAt(takeBefore.ns());
   return SendResult::sent;
 }

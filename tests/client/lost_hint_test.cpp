@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Hints are written by every peer, and so can be lost to any: that costs time, never a message.
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/client/client_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+class LostHintTest : public ClientTest {
+ protected:
+  void SetUp() override {
+    startServer({.location = 0, .waitMode = WaitMode::block}).on<Int32>([](Int32&) {});
+    client_.bind("device[0]/a", 0);
+  }
+  // The hints of the only server or the only dispatcher, as a peer may write them.
+  Segment hintsOf(layout::SegmentKind kind) {
+    const auto* mark = kind == layout::SegmentKind::serverWindow ? ".s." : ".c.";
+    for (const auto& name : backplane_.segmentNames()) {
+      if (name.find(mark) == std::string::npos) continue;
+      const auto incarnation = PeerWindow::tryOpen(name, kind)->header().incarnation;
+      return *Segment::tryOpen(SegmentName::keyed(backplane_.name(), NameKind::hints, incarnation), layout::SegmentKind::hints,
+                               Segment::Access::readWrite);
+    }
+    return {};
+  }
+  // Whatever its owner was told and has not looked at yet is gone.
+  static void lose(const Segment& segment) {
+    auto& hints = segment.at<layout::WindowHints>(0);
+    for (auto& knock : hints.knocks) knock.store(0);
+    for (auto& word : hints.readyWords) word.store(0);
+    for (auto& bits : hints.readyBits) bits.store(0);
+  }
+  // Waits until the client expects nothing more, and neither side polls the link.
+  void settle() {
+    runUntil([&] { return dispatcher_.nextDeadline().isNever(); });
+    while (server_->waitForMessage(Deadline::after(1ms))) EXPECT_FALSE(server_->receive());
+    while (dispatcher_.runOnce(Deadline::after(10ms))) {
+    }
+  }
+};
+
+TEST_F(LostHintTest, AKnockThatIsLostDelaysTheConnection) {
+  lose(hintsOf(layout::SegmentKind::serverWindow));
+
+  runUntil([&] { return client_.isConnected(); });
+}
+
+TEST_F(LostHintTest, ARequestOfWhichTheServerIsNotToldIsAnswered) {
+  const auto hints = hintsOf(layout::SegmentKind::serverWindow);
+  runUntil([&] { return client_.isConnected(); });
+  for (int i = 0; i < 3; ++i) {
+    settle();
+    ASSERT_EQ(client_.send(Int32Message({.value = i})), SendResult::sent);
+
+    lose(hints);
+
+    EXPECT_EQ(next().tryAs<Int32>()->value, i);
+  }
+}
+
+TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
+  const auto hints = hintsOf(layout::SegmentKind::clientWindow);
+  runUntil([&] { return client_.isConnected(); });
+  for (int i = 0; i < 3; ++i) {
+    settle();
+    ASSERT_EQ(client_.send(Int32Message({.value = i})), SendResult::sent);
+    while (!server_->handleOne()) {
+    }
+
+    lose(hints);
+
+    EXPECT_EQ(next().tryAs<Int32>()->value, i);
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
