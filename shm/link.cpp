@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/link.h>
 
+#include <unistd.h>
+
 #include <bit>
 #include <fmt/format.h>
 
@@ -63,7 +65,9 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   const auto& offer = server->header();
   const auto queueSize = std::clamp(server->control().queueSize.load(std::memory_order_relaxed), 1u, LinkGeometry::kMaxQueueSize);
   const auto geometry = LinkGeometry::forQueue(queueSize);
-  const Rights rights{offer.linkMode & 0666, offer.linkGroup};
+  Rights rights{offer.linkMode & 0666, offer.linkGroup};
+  // Root opens anybody's window, but the server could not open root's link.
+  if (::geteuid() == 0 && (rights.mode & 0006u) != 0006u) rights.user = server->user();
   auto segment = Segment::create(layout::linkBytes(geometry.queueSlots, geometry.replySlots), layout::SegmentKind::link, backplane, rights);
   auto& header = segment.sharedHeader();
   header.ownerWindow = own.header().incarnation;
@@ -115,7 +119,7 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       outControl_(ringControl(segment_, side)),
       out_(slotsOf(segment_, side), slotCount(segment_, side), outControl_),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)), ringControl(segment_, other(side))),
-      pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group}, segment_.header().maxPoolBytes,
+      pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user}, segment_.header().maxPoolBytes,
             returnRing(segment_, side)),
       borrowed_(poolPlace(segment_, backplane, other(side)), returnRing(segment_, other(side))) {}
 

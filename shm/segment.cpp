@@ -69,6 +69,13 @@ FileDescriptor openByName(const std::string& name, int flags) {
   return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
 }
 
+// " (mode 0600, user 0, group 0)": what somebody lacks who may not open it.
+std::string rightsInWords(const std::string& name) {
+  struct stat status{};
+  if (::lstat(segments::path(name).c_str(), &status) != 0) return {};
+  return fmt::format(" (mode {:04o}, user {}, group {})", status.st_mode & 07777u, status.st_uid, status.st_gid);
+}
+
 // Whether a file is a segment of some kind that this program can use.
 bool isKnown(int fd, std::size_t fileBytes, const std::string& name) try {
   layout::SegmentHeader header{};
@@ -85,9 +92,9 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
   Segment segment;
   segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600), "create a segment in", kDirectory));
   const int fd = segment.file_.get();
-  if (rights.group != ~std::uint32_t{0}) {
-    checkCall(::fchown(fd, static_cast<uid_t>(-1), rights.group), "give a segment to group", std::to_string(rights.group));
-  }
+  constexpr auto kOwn = ~std::uint32_t{0};
+  if (rights.group != kOwn) checkCall(::fchown(fd, kOwn, rights.group), "give a segment to group", std::to_string(rights.group));
+  if (rights.user != kOwn) checkCall(::fchown(fd, rights.user, kOwn), "give a segment to user", std::to_string(rights.user));
   checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
   if (const int shortage = reserve(fd, bytes); shortage != 0)
     throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
@@ -131,6 +138,12 @@ bool Segment::tryPublish(const std::string& name) {
   throwSystemError(errno, "name a segment", segments::path(name));
 }
 
+std::uint32_t Segment::fileUser() const {
+  struct stat status{};
+  checkCall(::fstat(file_.get(), &status), "look at", segments::path(name_));
+  return status.st_uid;
+}
+
 bool Segment::hasOwner() const noexcept { return isLocked(file_.get()); }
 
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
@@ -140,7 +153,7 @@ std::optional<Segment> Segment::tryOpen(const std::string& name, layout::Segment
   if (!file) {
     const int reason = errno;
     if (reason == ENOENT) return std::nullopt;
-    throwSystemError(reason, "open", segments::path(name));
+    throwSystemError(reason, "open", segments::path(name) + (reason == EACCES ? rightsInWords(name) : ""));
   }
   segment.file_ = std::move(file);
   struct stat status{};

@@ -37,10 +37,11 @@ class VersionError : public SegmentError {
   using SegmentError::SegmentError;
 };
 
-// Who may open what a process creates. Group ~0 is the creator's own.
+// Who may open what a process creates. Group and user ~0 are the creator's own; only root may give to another user.
 struct Rights {
   mode_t mode = 0600;
   std::uint32_t group = ~std::uint32_t{0};
+  std::uint32_t user = ~std::uint32_t{0};
 };
 
 class Segment {
@@ -75,6 +76,8 @@ class Segment {
     return *reinterpret_cast<T*>(data() + offset);
   }
 
+  // Whose file it is. Needs the file.
+  [[nodiscard]] std::uint32_t fileUser() const;
   // Whether somebody holds the owner's lock, whatever became of the name. Needs the file.
   [[nodiscard]] bool hasOwner() const noexcept;
   // Lets go of the file, not of the mapping. A segment without lock needs it no longer.

@@ -79,6 +79,7 @@ class PeerWindow {
   void setDead() noexcept { dead_.store(true, std::memory_order_relaxed); }
   // Asks the kernel: whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept { return window_.hasOwner(); }
+  [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept { return control().state.load(std::memory_order_relaxed) == layout::WindowState::closed; }
 
  private:
