@@ -146,13 +146,14 @@ int play(const std::vector<std::string>& arguments) {
   const auto argument = [&](std::size_t index) { return index < arguments.size() ? arguments[index] : std::string(); };
   const auto role = argument(1);
   if (role == "crowd-as") become(argument(4), argument(5));
+  if (role == "serve-as") become(argument(3), argument(4));
   const auto backplane = mpf::Backplane::attach(argument(2));
-  if (role == "serve") return serve(backplane, {});
+  if (role == "serve" || role == "serve-as") return serve(backplane, {});
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
   if (role == "flood") return flood(backplane);
   if (role == "listen") return listen(backplane);
   if (role == "crowd" || role == "crowd-as") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, listen, crowd or crowd-as\n", role.c_str());
+  std::fprintf(stderr, "role \"%s\": use serve, serve-as, serve-block, flood, listen, crowd or crowd-as\n", role.c_str());
   return 2;
 }
 

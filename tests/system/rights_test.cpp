@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// Who may be a client: the owner alone, or a group, as the server says. Root plays several users; others see the files' rights only.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <string>
+#include <thread>
+
+#include <mpf/base/system_call.h>
+#include <mpf/client/sync_client.h>
+#include <mpf/server/message_server.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint32_t kNobody = 65534;
+constexpr std::uint32_t kOperators = 54321;
+
+class RightsTest : public testing::Test {
+ protected:
+  // An echo server, with a thread of its own.
+  class Server {
+   public:
+    Server(const Backplane& backplane, Rights rights) : server_(backplane, "echo", {.location = 0, .rights = rights}) {
+      server_.on<Float64>([](Float64& request) { request.value += 1; });
+      server_.on<Float64Array>([](Float64ArrayMessage&) {});
+      thread_ = std::thread([this] { server_.run(); });
+    }
+    ~Server() {
+      server_.interrupt();
+      thread_.join();
+    }
+    Server(const Server&) = delete;
+    Server& operator=(const Server&) = delete;
+
+   private:
+    MessageServer server_;
+    std::thread thread_;
+  };
+  // A client of another user in another process. What it says first is why it is not connected, if it is not.
+  Victim startClientAs(std::uint32_t user, std::uint32_t group) const {
+    return {"crowd-as", backplane_.name(), {"1", std::to_string(user), std::to_string(group)}};
+  }
+  // What a client is told that may not open the server's window.
+  std::string refusal(const std::string& mode, std::uint32_t group) const {
+    return fmt::format("open {} (mode {}, user {}, group {}): Permission denied",
+                       segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")), mode, ::geteuid(), group);
+  }
+  // Rights and group of each segment that has `mark` in its name, as "0600 0".
+  std::vector<std::string> rightsOf(const std::string& mark) const {
+    std::vector<std::string> found;
+    for (const auto& name : backplane_.segmentNames()) {
+      if (name.find(mark) == std::string::npos) continue;
+      struct stat status{};
+      checkCall(::stat(segments::path(name).c_str(), &status), "stat", name);
+      found.push_back(fmt::format("{:04o} {}", status.st_mode & 07777u, status.st_gid));
+    }
+    return found;
+  }
+  void TearDown() override {
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+
+  Watchdog watchdog_{"rights test"};
+  Backplane backplane_ = Backplane::isolated();
+};
+
+// Makes a link with memory for large messages both ways.
+void useLargeMessages(SyncClient& client) {
+  ASSERT_TRUE(client.connectWait(60s));
+  auto answer = client.call(client.client().alloc<Float64Array>(5000), 60s);
+  ASSERT_TRUE(answer) << answer.why();
+}
+
+TEST_F(RightsTest, AServerIsItsOwnersAloneUnlessItSaysOtherwise) {
+  const Server server(backplane_, {});
+  const auto own = fmt::format("{}", ::getegid());
+
+  EXPECT_THAT(rightsOf(".s."), testing::ElementsAre("0600 " + own));
+  EXPECT_THAT(rightsOf(".h."), testing::ElementsAre("0600 " + own));
+  EXPECT_THAT(rightsOf(".f."), testing::ElementsAre("0600 " + own));
+
+  SyncClient client(backplane_, "echo", 0);
+  useLargeMessages(client);
+  EXPECT_THAT(rightsOf(".l."), testing::ElementsAre("0600 " + own));
+  EXPECT_THAT(rightsOf(".b."), testing::Each("0600 " + own));
+}
+
+TEST_F(RightsTest, AServersGroupMayReadItsWindowAndWriteItsHintsAndLinks) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
+  const Server server(backplane_, {.mode = 0660, .group = kOperators});
+  const auto group = fmt::format("{}", kOperators);
+
+  EXPECT_THAT(rightsOf(".s."), testing::ElementsAre("0640 " + group));
+  EXPECT_THAT(rightsOf(".h."), testing::ElementsAre("0660 " + group));
+  EXPECT_THAT(rightsOf(".f."), testing::ElementsAre("0660 " + group));
+
+  SyncClient client(backplane_, "echo", 0);
+  useLargeMessages(client);
+  EXPECT_THAT(rightsOf(".l."), testing::ElementsAre("0660 " + group));
+  EXPECT_THAT(rightsOf(".b."), testing::Each("0660 " + group));
+}
+
+TEST_F(RightsTest, AStrangerIsToldWhichRightItLacks) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+  const Server server(backplane_, {});
+
+  auto stranger = startClientAs(kNobody, kNobody);
+
+  EXPECT_EQ(stranger.line(), "waiting: " + refusal("0600", ::getegid()));
+  SyncClient client(backplane_, "echo", 0);
+  EXPECT_TRUE(client.call(Float64Message(), 60s)) << "the owner is served all the same";
+}
+
+TEST_F(RightsTest, AStrangerOfTheGroupIsServed) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+  const Server server(backplane_, {.mode = 0660, .group = kOperators});
+
+  auto member = startClientAs(kNobody, kOperators);
+  auto stranger = startClientAs(kNobody, kNobody);
+
+  EXPECT_EQ(stranger.line(), "waiting: " + refusal("0640", kOperators));
+  EXPECT_THAT(member.line(), testing::StartsWith("waiting: "));
+  EXPECT_THAT(member.line(), testing::StartsWith("answered "));
+  EXPECT_THAT(rightsOf(".l."), testing::ElementsAre(fmt::format("0660 {}", kOperators)));
+}
+
+TEST_F(RightsTest, EverybodyIsServedWhenTheServerSaysSo) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+  const Server server(backplane_, {.mode = 0666});
+
+  auto stranger = startClientAs(kNobody, kNobody);
+
+  EXPECT_THAT(stranger.line(), testing::StartsWith("waiting: "));
+  EXPECT_THAT(stranger.line(), testing::StartsWith("answered "));
+}
+
+TEST_F(RightsTest, RootIsServedByAnybodysServer) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+  Victim server("serve-as", backplane_.name(), {std::to_string(kNobody), std::to_string(kNobody)});
+  EXPECT_EQ(server.line(), "open");
+
+  SyncClient client(backplane_, "echo", 0);
+
+  useLargeMessages(client);
+  EXPECT_EQ(server.end(SIGTERM), 0);
+}
+
+TEST_F(RightsTest, AStrangerIsServedOnceTheServerAdmitsIt) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+  auto server = std::make_unique<Server>(backplane_, Rights{});
+  auto stranger = startClientAs(kNobody, kOperators);
+  EXPECT_THAT(stranger.line(), testing::EndsWith("Permission denied"));
+
+  server.reset();
+  server = std::make_unique<Server>(backplane_, Rights{.mode = 0660, .group = kOperators});
+
+  EXPECT_THAT(stranger.line(), testing::StartsWith("answered "));
+}
+
+}  // namespace
+}  // namespace mpf::test
