@@ -102,7 +102,7 @@ endfunction()
 
 set(programs "")
 foreach(folder client server tools benchmarks)
-  if(EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
+  if(folder IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
     mpf_find_programs(programs "${CMAKE_SOURCE_DIR}/${folder}")
   endif()
 endforeach()
