@@ -53,7 +53,6 @@ SniffServer::~SniffServer() {
   ends_.store(true, std::memory_order_relaxed);
   server_.interrupt();
   thread_.join();
-  tap_.reset();  // before what it pushes to
 }
 
 void SniffServer::run() try {

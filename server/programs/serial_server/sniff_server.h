@@ -62,7 +62,7 @@ class SniffServer {
   SniffQueue queue_;
   MessageServer server_;
   std::vector<Listener> listeners_;  // this and below: the thread's
-  std::optional<PeekTap> tap_;       // there while somebody listens
+  std::optional<PeekTap> tap_;       // there while somebody listens; ends before what it pushes to
   std::vector<PeekedByte> bytes_;    // of the batch that is being delivered
   std::vector<char> records_;        // the same, as listeners get it
   std::atomic<std::size_t> count_{0};
