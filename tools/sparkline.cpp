@@ -21,7 +21,7 @@ std::string sparkline(const Latencies& latencies) {
   std::string blocks;
   for (auto i = first; i < last; ++i) {
     const auto count = buckets[static_cast<std::size_t>(i)];
-    blocks += kBlocks[count == 0 ? 0 : std::max<std::uint64_t>(1, count * 8 / most)];
+    blocks += kBlocks[count == 0 ? 0 : 1 + static_cast<std::size_t>(static_cast<double>(count) / static_cast<double>(most) * 7)];
   }
   const auto startNs = first == 0 ? 0 : HistogramBuckets::endNs(static_cast<std::uint32_t>(first) - 1);
   return fmt::format("{} {} {}", durationText(static_cast<double>(startNs)), blocks,

@@ -6,6 +6,13 @@
 
 namespace mpf::tools {
 
+namespace {
+
+// The columns that fmt takes a text for when it pads, never more than its bytes: "°" is one of two bytes, "電" two of three.
+std::size_t columnsOf(const std::string& text) { return 2 * text.size() - fmt::formatted_size("{:<{}}", text, text.size()); }
+
+}  // namespace
+
 Table::Table(std::vector<std::string> headings) {
   for (auto& heading : headings) {
     const bool right = heading.starts_with('>');
@@ -23,7 +30,7 @@ void Table::add(std::vector<std::string> cells) {
 std::string Table::text(const std::string& indent) const {
   std::vector<std::size_t> widths(toTheRight_.size());
   for (const auto& row : rows_) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], columnsOf(row[i]));
   }
   std::string text;
   for (const auto& row : rows_) {
