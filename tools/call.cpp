@@ -121,7 +121,7 @@ class Caller {
                         {"p99_ns", recorder_->percentileNs(99)},
                         {"p999_ns", recorder_->percentileNs(99.9)},
                         {"max_ns", recorder_->maxNs()}};
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   }
 
   const CallArguments& arguments_;

@@ -1,13 +1,28 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/tools/look.h>
 
+#include <algorithm>
 #include <thread>
 
 namespace mpf::tools {
 namespace {
 
-double perSecond(std::uint64_t before, std::uint64_t now, std::int64_t ns) noexcept {
-  return now > before && ns > 0 ? static_cast<double>(now - before) * 1e9 / static_cast<double>(ns) : 0;
+double perSecond(std::uint64_t messages, std::int64_t ns) noexcept {
+  return ns > 0 ? static_cast<double>(messages) * 1e9 / static_cast<double>(ns) : 0;
+}
+
+std::uint64_t grown(std::uint64_t was, std::uint64_t is) noexcept { return is > was ? is - was : 0; }
+
+// A client's window does not count what it sends, its links do. A link that came between the surveys started with nothing.
+std::uint64_t sentBetween(const WindowView& was, const WindowView& is) {
+  std::unordered_map<std::uint64_t, std::uint64_t> before;
+  for (const auto& link : was.links) before.emplace(link.incarnation, link.requests.sent);
+  std::uint64_t sent = 0;
+  for (const auto& link : is.links) {
+    const auto found = before.find(link.incarnation);
+    sent += link.requests.sent - (found == before.end() ? 0 : std::min(found->second, link.requests.sent));
+  }
+  return sent;
 }
 
 Survey surveyAfter(const std::string& backplane, std::chrono::milliseconds interval) {
@@ -34,23 +49,40 @@ Totals Totals::of(const WindowView& window) noexcept {
 }
 
 Look::Look(const std::string& backplane, std::chrono::milliseconds interval)
-    : before_(Survey::take(backplane)), now_(surveyAfter(backplane, interval)) {}
+    : Look{Survey::take(backplane), surveyAfter(backplane, interval)} {}  // braces: in this order
 
-Rates Look::ratesOf(const WindowView& window) const noexcept {
-  const auto* before = before_.find(window.incarnation);
-  if (before == nullptr) return {};
-  const auto ns = now_.atNs - before_.atNs;
-  const auto was = Totals::of(*before);
-  const auto is = Totals::of(window);
-  return {perSecond(was.outgoing.sent, is.outgoing.sent, ns), perSecond(was.incoming.taken, is.incoming.taken, ns)};
+Look::Look(Survey before, Survey now)
+    : before_(std::move(before)), now_(std::move(now)), windowsBefore_(windowsOf(before_)), windowsNow_(windowsOf(now_)) {}
+
+Look::Windows Look::windowsOf(const Survey& survey) {
+  Windows windows;
+  for (const auto& server : survey.servers) windows.emplace(server.incarnation, &server);
+  for (const auto& client : survey.clients) windows.emplace(client.incarnation, &client);
+  return windows;
 }
 
-bool Look::isStalled(const WindowView& window) const noexcept {
-  const auto* before = before_.find(window.incarnation);
-  if (before == nullptr) return false;
-  const auto was = Totals::of(*before);
-  const auto is = Totals::of(window);
-  return was.incoming.waiting() != 0 && is.incoming.waiting() != 0 && was.incoming.taken == is.incoming.taken;
+const WindowView* Look::find(std::uint64_t incarnation) const {
+  const auto found = windowsNow_.find(incarnation);
+  return found == windowsNow_.end() ? nullptr : found->second;
+}
+
+const WindowView* Look::before(const WindowView& window) const {
+  const auto found = windowsBefore_.find(window.incarnation);
+  return found == windowsBefore_.end() ? nullptr : found->second;
+}
+
+Rates Look::ratesOf(const WindowView& window) const {
+  const auto* was = before(window);
+  if (was == nullptr) return {};
+  const auto ns = now_.atNs - before_.atNs;
+  const auto sent = window.isServer ? grown(was->sent, window.sent) : sentBetween(*was, window);
+  return {perSecond(sent, ns), perSecond(grown(was->received, window.received), ns)};
+}
+
+bool Look::isStalled(const WindowView& window) const {
+  const auto* was = before(window);
+  return was != nullptr && was->received == window.received && Totals::of(*was).incoming.waiting() != 0 &&
+         Totals::of(window).incoming.waiting() != 0;
 }
 
 std::string Look::stateOf(const WindowView& window) const {

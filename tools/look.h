@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <string>
+#include <unordered_map>
 
 #include <mpf/tools/survey.h>
 
@@ -20,19 +21,28 @@ class Look {
  public:
   // Surveys now, and again after `interval`.
   Look(const std::string& backplane, std::chrono::milliseconds interval);
-  Look(Survey before, Survey now) : before_(std::move(before)), now_(std::move(now)) {}
+  Look(Survey before, Survey now);
+  Look(const Look&) = delete;
+  Look& operator=(const Look&) = delete;
 
   [[nodiscard]] const Survey& now() const noexcept { return now_; }
+  // A window as it is now; null when there is none.
+  [[nodiscard]] const WindowView* find(std::uint64_t incarnation) const;
   // Messages of a window in either direction. Client windows: requests sent, replies received.
-  [[nodiscard]] Rates ratesOf(const WindowView& window) const noexcept;
+  [[nodiscard]] Rates ratesOf(const WindowView& window) const;
   // "alive", "closed", "dead"; of the living "stalled" when messages wait for it and it took none between the surveys, and "stopped"
   // when its process is, by a signal or a debugger.
   [[nodiscard]] std::string stateOf(const WindowView& window) const;
 
  private:
-  [[nodiscard]] bool isStalled(const WindowView& window) const noexcept;
+  using Windows = std::unordered_map<std::uint64_t, const WindowView*>;  // by incarnation
+  static Windows windowsOf(const Survey& survey);
+  [[nodiscard]] const WindowView* before(const WindowView& window) const;
+  [[nodiscard]] bool isStalled(const WindowView& window) const;
   Survey before_;
   Survey now_;
+  Windows windowsBefore_;
+  Windows windowsNow_;
 };
 
 // What goes into a window and what comes out of it, over all of its links.

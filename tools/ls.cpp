@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // mpf ls: backplanes, servers, clients, and how they are.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <fmt/format.h>
+#include <map>
 #include <memory>
 
 #include <mpf/base/duration_text.h>
@@ -28,21 +28,16 @@ std::string servers(const Look& look) {
   return table.isEmpty() ? "  no server\n" : table.text("  ");
 }
 
-// "dac, serial (connecting), gpib@2 (waiting)", each once, however many clients of the window have it.
-std::string serversOf(const WindowView& client, const Survey& survey) {
-  std::vector<std::pair<std::string, int>> names;
-  const auto add = [&](const std::string& server, std::int32_t location, const char* state) {
-    const auto name = server + (location == 0 ? "" : fmt::format("@{}", location)) + state;
-    const auto found = std::ranges::find(names, name, [](const auto& entry) { return entry.first; });
-    if (found != names.end()) ++found->second;
-    else names.emplace_back(name, 1);
-  };
-  for (const auto& link : client.links) add(link.server, link.location, link.isOpen() ? "" : " (connecting)");
-  for (const auto& wish : survey.wishes) {
-    if (wish.clientWindow == client.incarnation) add(wish.server, wish.location, " (waiting)");
-  }
+// "dac x 3, gpib@2 (waiting), serial (connecting)": each once, however many clients the process has of it; `mpf mrr` has them all.
+std::string serversOf(const WindowView& client) {
+  constexpr std::size_t kMost = 6;
+  std::map<std::string, int> names;
+  for (const auto& link : client.links) ++names[serverText(link.server, link.location) + (link.isOpen() ? "" : " (connecting)")];
+  for (const auto& wish : client.wishes) ++names[serverText(wish.server, wish.location) + " (waiting)"];
   std::string text;
+  std::size_t shown = 0;
   for (const auto& [name, times] : names) {
+    if (++shown > kMost) return text + fmt::format(", {} more", names.size() - kMost);
     text += (text.empty() ? "" : ", ") + name + (times == 1 ? "" : fmt::format(" x {}", times));
   }
   return text;
@@ -52,7 +47,7 @@ std::string clients(const Look& look) {
   Table table({"CLIENT", "STATE", ">PID", "PROGRAM", ">UNANSWERED", ">AGE", "SERVERS"});
   for (const auto& client : look.now().clients) {
     table.add({client.name, look.stateOf(client), fmt::to_string(client.pid), client.program, fmt::to_string(Totals::of(client).unanswered),
-               age(client), serversOf(client, look.now())});
+               age(client), serversOf(client)});
   }
   return table.isEmpty() ? "  no client\n" : table.text("  ");
 }

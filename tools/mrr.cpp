@@ -35,10 +35,8 @@ void printClient(std::size_t number, const Look& look, const WindowView& client)
   fmt::print("{:2} {}[{}] {} queueSize {} inQueue {} sendQueueFull {} unanswered {}\n", number, client.name, client.pid,
              routerState(look.stateOf(client)), largestQueue(client), totals.outgoing.waiting(), totals.refused, totals.unanswered);
   std::map<std::pair<std::string, std::string>, int> servers;  // name and state to the number of clients
-  for (const auto& link : client.links) ++servers[{link.server, link.isOpen() ? "connected" : "connecting"}];
-  for (const auto& wish : look.now().wishes) {
-    if (wish.clientWindow == client.incarnation) ++servers[{wish.server, "waiting for the server"}];
-  }
+  for (const auto& link : client.links) ++servers[{serverText(link.server, link.location), link.isOpen() ? "connected" : "connecting"}];
+  for (const auto& wish : client.wishes) ++servers[{serverText(wish.server, wish.location), "waiting for the server"}];
   for (const auto& [server, clients] : servers) {
     fmt::print("   Server {} has {} client{}. bindState {}\n", server.first, clients, clients == 1 ? "" : "s", server.second);
   }
@@ -46,9 +44,9 @@ void printClient(std::size_t number, const Look& look, const WindowView& client)
 }
 
 void printServer(std::size_t number, const Look& look, const WindowView& server) {
-  fmt::print("{:2} {}[{}] {} queueSize {} inQueue {} replyQueueFull {} clients {}\n", number, server.name, server.pid,
-             routerState(look.stateOf(server)), largestQueue(server), Totals::of(server).incoming.waiting(), server.replyQueueFull,
-             server.links.size());
+  fmt::print("{:2} {}[{}] {} queueSize {} inQueue {} replyQueueFull {} clients {}\n", number, serverText(server.name, server.location),
+             server.pid, routerState(look.stateOf(server)), largestQueue(server), Totals::of(server).incoming.waiting(),
+             server.replyQueueFull, server.links.size());
   printRates(look.ratesOf(server));
 }
 

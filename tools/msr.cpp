@@ -34,7 +34,7 @@ void printLatencies(const char* name, const Latencies& latencies) {
 void printClients(const Look& look, const WindowView& server) {
   Table table({"client", ">pid", "state", ">inQueue", ">unanswered", ">requests", ">replies", ">notTaken", ">refused", ">bytes"});
   for (const auto& link : server.links) {
-    const auto* client = look.now().find(link.clientWindow);
+    const auto* client = look.find(link.clientWindow);
     const auto state = client == nullptr ? "gone" : look.stateOf(*client);
     table.add({client == nullptr ? "?" : client->name, client == nullptr ? "" : fmt::to_string(client->pid),
                link.isOpen() ? state : state + ", connecting", fmt::to_string(link.requests.waiting()), fmt::to_string(link.unanswered),

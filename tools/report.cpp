@@ -16,6 +16,10 @@ void addReport(CLI::App& app, ReportArguments& arguments) {
   addJson(app, arguments.json);
 }
 
+std::string serverText(const std::string& server, std::int32_t location) {
+  return location == 0 ? server : fmt::format("{}@{}", server, location);
+}
+
 int reportEach(const ReportArguments& arguments, const std::function<void(const Look&)>& print,
                const std::function<void(const Look&, nlohmann::json& list)>& collect) {
   auto list = nlohmann::json::array();
@@ -25,7 +29,7 @@ int reportEach(const ReportArguments& arguments, const std::function<void(const 
     if (arguments.json) collect(look, list);
     else print(look);
   }
-  if (arguments.json) fmt::print("{}\n", list.dump(2));
+  if (arguments.json) fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   return static_cast<int>(backplanes.size());
 }
 

@@ -19,6 +19,9 @@ struct ReportArguments {
 // Adds --backplane, --interval and --json.
 void addReport(CLI::App& app, ReportArguments& arguments);
 
+// The name of a server, and its location unless that is 0: "dac", "dac@2".
+std::string serverText(const std::string& server, std::int32_t location);
+
 // Looks at the backplane named, by argument or by MPF_BACKPLANE, or else at each that there is, and prints each look, or all as one
 // JSON list.
 //   collect   adds to the list

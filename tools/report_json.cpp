@@ -83,7 +83,7 @@ json toJson(const Look& look, const WindowView& window) {
   }
   entry["links"] = json::array();
   for (const auto& link : window.links) {
-    entry["links"].push_back(toJson(link, look.now().find(window.isServer ? link.clientWindow : link.serverWindow)));
+    entry["links"].push_back(toJson(link, look.find(window.isServer ? link.clientWindow : link.serverWindow)));
   }
   return entry;
 }
@@ -95,7 +95,7 @@ json toJson(const Look& look) {
   for (const auto& server : look.now().servers) servers.push_back(toJson(look, server));
   for (const auto& client : look.now().clients) clients.push_back(toJson(look, client));
   for (const auto& wish : look.now().wishes) {
-    const auto* client = look.now().find(wish.clientWindow);
+    const auto* client = look.find(wish.clientWindow);
     waiting.push_back({{"server", wish.server}, {"location", wish.location}, {"pid", client == nullptr ? 0 : client->pid}});
   }
   return {{"backplane", look.now().backplane},

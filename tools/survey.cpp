@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <exception>
 #include <fstream>
-#include <map>
+#include <unordered_map>
 
 #include <mpf/base/clock.h>
 #include <mpf/shm/histogram.h>
@@ -25,9 +25,12 @@ auto value(const Word& word) noexcept {
   return word.load(std::memory_order_relaxed);
 }
 
+// Whoever may write to /dev/shm chooses these bytes: none of them shall command a terminal.
 template <std::size_t n>
 std::string text(const std::array<char, n>& chars) {
-  return {chars.data(), static_cast<std::size_t>(std::find(chars.begin(), chars.end(), '\0') - chars.begin())};
+  std::string text(chars.begin(), std::find(chars.begin(), chars.end(), '\0'));
+  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');
+  return text;
 }
 
 Latencies latenciesOf(const layout::Histogram& histogram) {
@@ -50,9 +53,11 @@ char processState(const layout::SegmentHeader& header) {
   return bracket == std::string::npos || bracket + 2 >= line.size() ? '?' : line[bracket + 2];
 }
 
-std::uint64_t fileBytes(const std::string& name) {
+void checkIsFifo(const std::string& name) {
   struct stat status{};
-  return ::stat(segments::path(name).c_str(), &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
+  if (::lstat(segments::path(name).c_str(), &status) == 0 && !S_ISFIFO(status.st_mode)) {
+    throw SegmentError(segments::path(name) + ": not the FIFO of a window");
+  }
 }
 
 Life lifeOf(const std::string& name, const SegmentImage& image) {
@@ -83,15 +88,15 @@ class Surveyor {
 
   void run() {
     for (const auto& name : segments::list(SegmentName::prefix(survey_.backplane))) {
-      const auto parsed = SegmentName::tryParse(name);
-      if (!parsed) continue;
       try {
+        const auto parsed = SegmentName::tryParse(name);
+        if (!parsed) throw SegmentError(segments::path(name) + ": not a name that MPF gives");
         look(name, *parsed);
       } catch (const std::exception& error) {
         survey_.problems.emplace_back(error.what());
       }
     }
-    joinLinks();
+    join();
     sort();
   }
 
@@ -107,12 +112,19 @@ class Surveyor {
       case NameKind::wish:
         return wish(name);
       case NameKind::bulk:
-        bulkBytes_[parsed.incarnation] += fileBytes(name);
+        if (const auto image = header(name, layout::SegmentKind::bulk)) bulkBytes_[parsed.incarnation] += image->fileBytes();
         return;
       case NameKind::hints:
+        static_cast<void>(header(name, layout::SegmentKind::hints));
+        return;
       case NameKind::fifo:
+        checkIsFifo(name);
         return;
     }
+  }
+
+  static std::optional<SegmentImage> header(const std::string& name, layout::SegmentKind kind) {
+    return SegmentImage::tryRead(name, kind, sizeof(layout::SegmentHeader));
   }
 
   void window(const std::string& name, layout::SegmentKind kind) {
@@ -160,29 +172,31 @@ class Surveyor {
   }
 
   void wish(const std::string& name) {
-    const auto image = SegmentImage::tryRead(name, layout::SegmentKind::wish, sizeof(layout::SegmentHeader));
+    const auto image = header(name, layout::SegmentKind::wish);
     if (!image) return;
-    const auto& header = image->header();
-    survey_.wishes.push_back({header.ownerWindow, text(header.name), header.location});
+    survey_.wishes.push_back({image->header().ownerWindow, text(image->header().name), image->header().location});
   }
 
-  // A link belongs to both of its windows. One whose windows are gone is about to be removed: not shown.
-  void joinLinks() {
+  // A link belongs to both of its windows, a wish to its client's. One whose windows are gone is about to be removed: not shown.
+  void join() {
+    std::unordered_map<std::uint64_t, WindowView*> servers;
+    std::unordered_map<std::uint64_t, WindowView*> clients;
+    for (auto& server : survey_.servers) servers.emplace(server.incarnation, &server);
+    for (auto& client : survey_.clients) clients.emplace(client.incarnation, &client);
     for (auto& link : links_) {
       if (const auto bulk = bulkBytes_.find(link.incarnation); bulk != bulkBytes_.end()) link.bytes += bulk->second;
-      for (auto& server : survey_.servers) {
-        if (server.incarnation == link.serverWindow) server.links.push_back(link);
-      }
-      for (auto& client : survey_.clients) {
-        if (client.incarnation == link.clientWindow) client.links.push_back(link);
-      }
+      if (const auto server = servers.find(link.serverWindow); server != servers.end()) server->second->links.push_back(link);
+      if (const auto client = clients.find(link.clientWindow); client != clients.end()) client->second->links.push_back(link);
+    }
+    std::ranges::sort(survey_.wishes, {}, [](const WishView& view) { return std::pair(view.location, view.server); });
+    for (const auto& wish : survey_.wishes) {
+      if (const auto client = clients.find(wish.clientWindow); client != clients.end()) client->second->wishes.push_back(wish);
     }
   }
 
   void sort() {
     std::ranges::sort(survey_.servers, {}, [](const WindowView& view) { return std::pair(view.location, view.name); });
     std::ranges::sort(survey_.clients, {}, [](const WindowView& view) { return std::pair(-view.ageNs, view.incarnation); });
-    std::ranges::sort(survey_.wishes, {}, [](const WishView& view) { return std::pair(view.location, view.server); });
     const auto byServer = [](const LinkView& view) { return std::tuple(view.location, view.server, view.incarnation); };
     for (auto* windows : {&survey_.servers, &survey_.clients}) {
       for (auto& window : *windows) std::ranges::sort(window.links, {}, byServer);
@@ -191,7 +205,7 @@ class Surveyor {
 
   Survey& survey_;
   std::vector<LinkView> links_;
-  std::map<std::uint64_t, std::uint64_t> bulkBytes_;  // by link
+  std::unordered_map<std::uint64_t, std::uint64_t> bulkBytes_;  // by link
 };
 
 }  // namespace
@@ -201,6 +215,7 @@ std::uint64_t Latencies::percentileNs(double percent) const noexcept {
   std::uint64_t seen = 0;
   for (std::uint32_t i = 0; i < layout::kHistogramBuckets; ++i) {
     seen += buckets[i];
+    if (i + 1 == layout::kHistogramBuckets) break;  // it has no end
     if (seen != 0 && static_cast<double>(seen) >= wanted) return std::min(HistogramBuckets::endNs(i), maxNs);
   }
   return maxNs;
@@ -213,14 +228,6 @@ Survey Survey::take(const std::string& backplane) {
   survey.atNs = Clock::nowNs();
   Surveyor(survey).run();
   return survey;
-}
-
-const WindowView* Survey::find(std::uint64_t incarnation) const noexcept {
-  for (const auto* windows : {&servers, &clients}) {
-    const auto found = std::ranges::find(*windows, incarnation, &WindowView::incarnation);
-    if (found != windows->end()) return &*found;
-  }
-  return nullptr;
 }
 
 }  // namespace mpf::tools

@@ -53,6 +53,13 @@ struct LinkView {
 
 enum class Life { alive, closed, dead };
 
+// A client that waits for a server that is not there.
+struct WishView {
+  std::uint64_t clientWindow = 0;
+  std::string server;
+  std::int32_t location = 0;
+};
+
 // A server or a client process's window.
 struct WindowView {
   bool isServer = false;
@@ -71,14 +78,8 @@ struct WindowView {
   std::uint64_t linksOpened = 0, linksClosed = 0, peersDied = 0, protocolErrors = 0;
   Latencies queueWait;
   Latencies service;
-  std::vector<LinkView> links;  // by incarnation
-};
-
-// A client that waits for a server that is not there.
-struct WishView {
-  std::uint64_t clientWindow = 0;
-  std::string server;
-  std::int32_t location = 0;
+  std::vector<LinkView> links;   // by location, server and incarnation
+  std::vector<WishView> wishes;  // of a client; by location and server
 };
 
 struct Survey {
@@ -86,11 +87,11 @@ struct Survey {
   std::int64_t atNs = 0;            // CLOCK_MONOTONIC
   std::vector<WindowView> servers;  // by location and name
   std::vector<WindowView> clients;  // by age
-  std::vector<WishView> wishes;
+  std::vector<WishView> wishes;     // by location and server
   std::vector<std::string> problems;  // segments that could not be read, and why
 
+  // Throws std::invalid_argument for a name that no backplane can have.
   static Survey take(const std::string& backplane);
-  [[nodiscard]] const WindowView* find(std::uint64_t incarnation) const noexcept;
 };
 
 }  // namespace mpf::tools
