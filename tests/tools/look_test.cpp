@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+// Two surveys: rates, and who has stopped moving. The surveys are made by hand.
+#include <mpf/tools/look.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace mpf::tools {
+namespace {
+
+constexpr std::uint64_t kServer = 1;
+constexpr std::uint64_t kClient = 2;
+
+LinkView link(std::uint64_t incarnation, Traffic requests, Traffic replies = {}) {
+  LinkView view;
+  view.incarnation = incarnation;
+  view.serverWindow = kServer;
+  view.clientWindow = kClient;
+  view.requests = requests;
+  view.replies = replies;
+  return view;
+}
+
+WindowView server(std::uint64_t received, std::uint64_t sent, std::vector<LinkView> links = {}) {
+  WindowView view;
+  view.isServer = true;
+  view.incarnation = kServer;
+  view.received = received;
+  view.sent = sent;
+  view.processState = 'S';
+  view.links = std::move(links);
+  return view;
+}
+
+WindowView client(std::uint64_t received, std::vector<LinkView> links = {}) {
+  auto view = server(received, 0, std::move(links));
+  view.isServer = false;
+  view.incarnation = kClient;
+  return view;
+}
+
+Survey survey(std::int64_t atNs, std::vector<WindowView> servers, std::vector<WindowView> clients = {}) {
+  Survey made;
+  made.atNs = atNs;
+  made.servers = std::move(servers);
+  made.clients = std::move(clients);
+  return made;
+}
+
+constexpr std::int64_t kHalfASecond = 500'000'000;
+
+TEST(Look, AServersRatesAreWhatItTookAndSent) {
+  const Look look(survey(0, {server(100, 50)}), survey(kHalfASecond, {server(200, 80)}));
+
+  const auto rates = look.ratesOf(look.now().servers.front());
+
+  EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 200);
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 60);
+}
+
+// Clients that come, ask and go between two looks leave no link behind; their requests were handled all the same.
+TEST(Look, AServersRatesDoNotDependOnItsClientsStaying) {
+  const Look look(survey(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}), survey(kHalfASecond, {server(130, 130)}));
+
+  const auto rates = look.ratesOf(look.now().servers.front());
+
+  EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 60);
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 60);
+}
+
+TEST(Look, AClientsRatesAreWhatItsLinksSentAndWhatItTook) {
+  const Look look(survey(0, {}, {client(10, {link(7, {10, 10}), link(8, {1000, 1000})})}),
+                  survey(kHalfASecond, {}, {client(15, {link(7, {20, 20}), link(9, {5, 5})})}));
+
+  const auto rates = look.ratesOf(look.now().clients.front());
+
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 30);  // 10 on an old link, 5 on a new one; one is gone
+  EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 10);
+}
+
+TEST(Look, WhatWasNotThereBeforeHasNoRatesYet) {
+  const Look look(survey(0, {}), survey(kHalfASecond, {server(100, 100)}));
+
+  EXPECT_DOUBLE_EQ(look.ratesOf(look.now().servers.front()).receivedPerSecond, 0);
+}
+
+TEST(Look, CountersThatGoBackAndClocksThatStandGiveNoRates) {
+  const Look back(survey(0, {server(100, 100)}), survey(kHalfASecond, {server(10, 10)}));
+  const Look standing(survey(5, {server(1, 1)}), survey(5, {server(2, 2)}));
+
+  EXPECT_DOUBLE_EQ(back.ratesOf(back.now().servers.front()).sentPerSecond, 0);
+  EXPECT_DOUBLE_EQ(standing.ratesOf(standing.now().servers.front()).sentPerSecond, 0);
+}
+
+TEST(Look, WindowsAreFoundByTheirIncarnation) {
+  const Look look(survey(0, {}), survey(1, {server(0, 0)}, {client(0)}));
+
+  EXPECT_EQ(look.find(kServer), &look.now().servers.front());
+  EXPECT_EQ(look.find(kClient), &look.now().clients.front());
+  EXPECT_EQ(look.find(3), nullptr);
+}
+
+std::string serverState(const WindowView& before, const WindowView& now) {
+  const Look look(survey(0, {before}), survey(kHalfASecond, {now}));
+  return look.stateOf(look.now().servers.front());
+}
+
+TEST(Look, AServerWithNothingToDoIsAlive) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {5, 5})})), "alive");
+}
+
+TEST(Look, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {9, 5})})), "stalled");
+}
+
+TEST(Look, AServerThatTakesSomethingIsAliveHoweverMuchWaits) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {60, 5})}), server(6, 6, {link(7, {60, 6})})), "alive");
+}
+
+TEST(Look, ARequestThatCameJustNowStallsNobody) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {6, 5})})), "alive");
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {6, 6})})), "alive");
+}
+
+// Nor does it help that another client went away with what it had counted.
+TEST(Look, AStalledServerStaysStalledWhenAClientLeaves) {
+  EXPECT_EQ(serverState(server(9, 9, {link(7, {6, 5}), link(8, {4, 4})}), server(9, 9, {link(7, {6, 5})})), "stalled");
+}
+
+TEST(Look, AClientThatDoesNotTakeItsRepliesIsStalled) {
+  const auto stuck = client(2, {link(7, {5, 5}, {5, 2})});
+  const Look look(survey(0, {}, {stuck}), survey(kHalfASecond, {}, {stuck}));
+
+  EXPECT_EQ(look.stateOf(look.now().clients.front()), "stalled");
+}
+
+TEST(Look, WhatIsWorseIsSaidFirst) {
+  const auto stuck = server(5, 5, {link(7, {6, 5})});
+  auto stopped = stuck;
+  stopped.processState = 'T';
+  auto traced = stuck;
+  traced.processState = 't';
+  auto dead = stopped;
+  dead.life = Life::dead;
+  auto closed = stuck;
+  closed.life = Life::closed;
+
+  EXPECT_EQ(serverState(stuck, stopped), "stopped");
+  EXPECT_EQ(serverState(stuck, traced), "stopped");
+  EXPECT_EQ(serverState(stuck, dead), "dead");
+  EXPECT_EQ(serverState(stuck, closed), "closed");
+}
+
+TEST(Totals, AServersIncomingAreRequestsAClientsAreReplies) {
+  auto one = link(7, {10, 8}, {7, 6});
+  one.refused = 1;
+  one.unanswered = 2;
+  one.bytes = 4096;
+  const std::vector<LinkView> links{one, one};
+
+  const auto ofServer = Totals::of(server(0, 0, links));
+  const auto ofClient = Totals::of(client(0, links));
+
+  EXPECT_EQ(ofServer.incoming.waiting(), 4U);
+  EXPECT_EQ(ofServer.outgoing.waiting(), 2U);
+  EXPECT_EQ(ofClient.incoming.waiting(), 2U);
+  EXPECT_EQ(ofClient.outgoing.waiting(), 4U);
+  EXPECT_EQ(ofServer.refused, 2U);
+  EXPECT_EQ(ofServer.unanswered, 4U);
+  EXPECT_EQ(ofServer.bytes, 8192U);
+}
+
+}  // namespace
+}  // namespace mpf::tools
