@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include <mpf/base/clock.h>
+
 namespace mpf::tools {
 
 // Where the server of a subcommand is.
@@ -17,5 +19,8 @@ void addServer(CLI::App& app, ServerArguments& arguments);
 // --backplane; empty: none was named.
 void addBackplane(CLI::App& app, std::string& backplane, const std::string& otherwise);
 void addJson(CLI::App& app, bool& json);
+// A time in seconds that is shown with its default; 0 only if that means something.
+void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text, bool mayBeZero);
+[[nodiscard]] Nanoseconds ofSeconds(double seconds);
 
 }  // namespace mpf::tools

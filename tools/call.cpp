@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include <mpf/base/duration_text.h>
@@ -33,19 +34,49 @@ struct CallArguments : ServerArguments {
   bool printAll = false;
 };
 
-Nanoseconds seconds(double s) { return Nanoseconds(static_cast<std::int64_t>(s * 1e9)); }
+// What only MPF itself says is nothing to call with: no server waits for it, and its reply would pass for a fate.
+bool isForCalls(MessageType type) { return type != MessageType::connect && type != MessageType::requestFate; }
+
+std::string typesForCalls() {
+  std::string names;
+  for (std::uint16_t number = 1; toString(static_cast<MessageType>(number)) != "unknown"; ++number) {
+    const auto type = static_cast<MessageType>(number);
+    if (isForCalls(type)) names.append(names.empty() ? "" : ", ").append(toString(type));
+  }
+  return names;
+}
+
+// What the end of a request means for who sent it.
+std::string meaning(Fate fate, MessageType type) {
+  switch (fate) {
+    case Fate::refused:
+      return fmt::format("the server does not take {} messages, or let this one go without a reply", toString(type));
+    case Fate::neverTaken:
+      return "the server went away before it took the request: nothing was done";
+    case Fate::outcomeUnknown:
+      return "the server took the request and did not reply in time, or went away: it may have been done";
+    case Fate::expired:
+      return "the server did not take the request in time: nothing was done";
+    case Fate::cancelled:
+      return "the request was taken back";
+  }
+  return "this program does not know that fate";
+}
 
 class Caller {
  public:
   Caller(const CallArguments& arguments, MessageType type)
-      : arguments_(arguments),
-        type_(type),
-        client_(Backplane::attach(arguments.backplane), arguments.server, arguments.location),
-        stop_([](void* stopped) noexcept { static_cast<std::atomic<bool>*>(stopped)->store(true); }, &stopped_) {}
+      : arguments_(arguments), type_(type), client_(Backplane::attach(arguments.backplane), arguments.server, arguments.location) {
+    // What comes at the end is worth something: then a signal ends the loop, after the call that is under way. Else it ends the program.
+    if (isLoop() || arguments_.follow > 0) {
+      stop_.emplace([](void* stopped) noexcept { static_cast<std::atomic<bool>*>(stopped)->store(true); }, &stopped_);
+    }
+  }
 
   int run() {
     for (std::uint64_t i = 0; i < arguments_.count && !stopped_; ++i) {
-      if (i != 0 && arguments_.interval > 0) std::this_thread::sleep_for(seconds(arguments_.interval));
+      if (i != 0) pause();
+      if (stopped_) break;
       callOnce();
       showProgress(i + 1);
     }
@@ -55,24 +86,36 @@ class Caller {
   }
 
  private:
+  static constexpr Nanoseconds kGlance = std::chrono::milliseconds(100);  // how often waits look whether they shall end
+
   [[nodiscard]] bool isLoop() const noexcept { return arguments_.count > 1; }
   [[nodiscard]] bool showsEach() const noexcept { return !isLoop() || arguments_.printAll; }
+
+  void pause() const {
+    const auto until = Deadline::after(ofSeconds(arguments_.interval));
+    while (!stopped_ && !until.hasPassed()) std::this_thread::sleep_for(std::min(kGlance, until.left()));
+  }
 
   void callOnce() {
     std::string error;  // parsed before: nothing is wrong with it
     auto message = tryParse(type_, arguments_.fields, error);
     const auto sentNs = Clock::nowNs();
-    auto answer = client_.call(std::move(*message), seconds(arguments_.timeout));
+    auto answer = client_.call(std::move(*message), ofSeconds(arguments_.timeout));
     if (answer) {
       recorder_->add(static_cast<std::uint64_t>(Clock::nowNs() - sentNs));
       if (showsEach()) show(answer.message());
     } else {
       ++failed_;
-      const auto because = client_.client().notConnectedBecause();
-      const auto why = answer.why() + (because.empty() ? "" : ": " + because);
+      const auto why = whyNot(answer);
       ++reasons_[why];
       if (showsEach() && !arguments_.json) fmt::print(stderr, "mpf call: {}\n", why);
     }
+  }
+
+  std::string whyNot(const Answer& answer) {
+    if (const auto fate = answer.fate()) return fmt::format("{} ({})", answer.why(), meaning(*fate, type_));
+    const auto because = client_.client().notConnectedBecause();
+    return answer.why() + (because.empty() ? "" : fmt::format(": {}; `mpf ls` shows what there is", because));
   }
 
   void show(const Message& message) {
@@ -83,11 +126,9 @@ class Caller {
 
   // Messages of the server that come after the reply.
   void follow() {
-    const auto until = Deadline::after(seconds(arguments_.follow));
-    while (arguments_.follow > 0 && !stopped_) {
-      const auto message = client_.receive(until.left());
-      if (!message) return;
-      show(message);
+    const auto until = Deadline::after(ofSeconds(arguments_.follow));
+    while (arguments_.follow > 0 && !stopped_ && !until.hasPassed()) {
+      if (const auto message = client_.receive(std::min(kGlance, until.left()))) show(message);
     }
   }
 
@@ -128,7 +169,7 @@ class Caller {
   MessageType type_;
   SyncClient client_;
   std::atomic<bool> stopped_{false};
-  StopSignals stop_;
+  std::optional<StopSignals> stop_;
   std::unique_ptr<LatencyRecorder> recorder_ = std::make_unique<LatencyRecorder>();
   std::uint64_t failed_ = 0;
   std::map<std::string, std::uint64_t> reasons_;
@@ -138,8 +179,9 @@ class Caller {
 
 int call(const CallArguments& arguments) {
   const auto type = tryParseType(arguments.type);
-  if (!type) {
-    fmt::print(stderr, "mpf call: no message type \"{}\"; there are {}\n", arguments.type, typeNames());
+  if (!type || !isForCalls(*type)) {
+    const auto what = type ? "is what MPF itself says to clients" : "is no message type";
+    fmt::print(stderr, "mpf call: {} {}; use one of {}\n", arguments.type, what, typesForCalls());
     return 2;
   }
   std::string error;
@@ -156,18 +198,21 @@ void addCall(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("call", "Sends a message to a server and prints the reply; or many, and how long they took");
   auto arguments = std::make_shared<CallArguments>();
   addServer(command, *arguments);
-  command.add_option("type", arguments->type, "Type of the message: " + typeNames())->required();
+  command.add_option("type", arguments->type, "Type of the message: " + typesForCalls())->required();
   command.add_option("fields", arguments->fields, "Its fields, as field=value: value=3, value=1,2,3, value='*IDN?\\n', eomString='\\r\\n'");
-  command.add_option("--timeout", arguments->timeout, "Longest wait for a reply [s]")->capture_default_str()->check(CLI::PositiveNumber);
+  addSeconds(command, "--timeout", arguments->timeout, "Longest wait for a reply", false);
   command.add_option("--count", arguments->count, "Messages to send, one after the other's reply")
       ->capture_default_str()
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53));
-  command.add_option("--interval", arguments->interval, "Pause between them [s]")->capture_default_str()->check(CLI::NonNegativeNumber);
-  command.add_option("--follow", arguments->follow, "Go on printing what the server sends after the reply [s]")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+  addSeconds(command, "--interval", arguments->interval, "Pause between them", true);
+  addSeconds(command, "--follow", arguments->follow, "Go on for so long to print what the server sends after the reply", true);
   command.add_flag("--print", arguments->printAll, "Print each reply of a loop, and arrays in full");
   addJson(command, arguments->json);
+  command.footer(
+      "Fields that are not named are 0; a wrong one gets you the list of all.\n"
+      "Example: mpf call Int32 int32 value=3\n"
+      "Example: mpf call voltmeter char8Array cmd=3 timeout=1 value='*IDN?\\n'    (a serial server: write, then read; 1 s at most)\n"
+      "Exit status: 0 every message got a reply, whatever the reply says; 1 not so; 2 there is no such type or field.");
   command.callback([arguments, &run] { run = [arguments] { return call(*arguments); }; });
 }
 

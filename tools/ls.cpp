@@ -59,7 +59,7 @@ void print(const Look& look) {
 
 int list(const ReportArguments& arguments) {
   const int backplanes = reportEach(arguments, print, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
-  if (backplanes == 0 && !arguments.json) fmt::print("no backplane: no program uses MPF on this host\n");
+  if (backplanes == 0 && !arguments.json) fmt::print("{}", kNoBackplane);
   return 0;
 }
 

@@ -61,7 +61,8 @@ void print(const Look& look) {
 }
 
 int report(const ReportArguments& arguments) {
-  reportEach(arguments, print, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
+  const int backplanes = reportEach(arguments, print, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
+  if (backplanes == 0 && !arguments.json) fmt::print("{}", kNoBackplane);
   return 0;
 }
 

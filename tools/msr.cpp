@@ -53,8 +53,8 @@ void print(const Look& look, const WindowView& server) {
   printField("queueRequests", server.received);
   printField("queueFullResponses", totals.refused);
   printField("replyRequests", server.sent);
-  printField("state", fmt::format("{}, pid {}, {}, location {}, up {}", look.stateOf(server), server.pid, server.program, server.location,
-                                  durationText(static_cast<double>(server.ageNs))));
+  printField("state", fmt::format("{}, pid {}, {}, backplane {}, location {}, up {}", look.stateOf(server), server.pid, server.program,
+                                  look.now().backplane, server.location, durationText(static_cast<double>(server.ageNs))));
   printField("fates", fmt::format("expired {}, refused {}", server.expired, server.refused));
   printField("replyQueueFull", server.replyQueueFull);
   printField("clientsDied", server.peersDied);
@@ -76,9 +76,16 @@ int report(const MsrArguments& arguments) {
   reportEach(
       arguments, [&](const Look& look) { forEachServer(look, [&](const WindowView& server) { print(look, server); }); },
       [&](const Look& look, nlohmann::json& all) {
-        forEachServer(look, [&](const WindowView& server) { all.push_back(toJson(look, server)); });
+        forEachServer(look, [&](const WindowView& server) {
+          all.push_back(toJson(look, server));
+          all.back()["backplane"] = look.now().backplane;
+        });
       });
-  if (found || arguments.server.empty()) return 0;
+  if (found) return 0;
+  if (arguments.server.empty()) {
+    if (!arguments.json) fmt::print("no server\n");
+    return 0;
+  }
   fmt::print(stderr, "mpf msr: no server \"{}\"; `mpf ls` shows those that there are\n", arguments.server);
   return 1;
 }

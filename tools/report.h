@@ -19,6 +19,8 @@ struct ReportArguments {
 // Adds --backplane, --interval and --json.
 void addReport(CLI::App& app, ReportArguments& arguments);
 
+inline constexpr const char* kNoBackplane = "no backplane: no program uses MPF on this host\n";
+
 // The name of a server, and its location unless that is 0: "dac", "dac@2".
 std::string serverText(const std::string& server, std::int32_t location);
 

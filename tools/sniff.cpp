@@ -32,9 +32,10 @@ std::int64_t realtimeOffsetNs() {
 class Sniffer {
  public:
   explicit Sniffer(const SniffArguments& arguments)
-      : service_(arguments.server + std::string(serial::sniffSuffix)),
+      : server_(arguments.server),
+        service_(arguments.server + std::string(serial::sniffSuffix)),
         format_(SniffFormat::make(arguments.json ? "json" : arguments.format, realtimeOffsetNs())),
-        end_(arguments.seconds > 0 ? Deadline::after(Nanoseconds(static_cast<std::int64_t>(arguments.seconds * 1e9))) : Deadline::never()),
+        end_(arguments.seconds > 0 ? Deadline::after(ofSeconds(arguments.seconds)) : Deadline::never()),
         dispatcher_(Backplane::attach(arguments.backplane)),
         client_(dispatcher_, [this](Message&& message) { take(std::move(message)); }),
         stop_([](void* self) noexcept { static_cast<Sniffer*>(self)->stop(); }, this) {
@@ -42,22 +43,28 @@ class Sniffer {
   }
 
   int run() {
-    if (!client_.connectWait(std::min(kConnectLimit, end_.left()))) {
+    const auto limit = std::min(end_, Deadline::after(kConnectLimit));
+    while (!client_.isConnected() && !isOver(limit)) dispatcher_.runOnce(limit);
+    if (!client_.isConnected()) {
       fmt::print(stderr, "mpf sniff: {}; is it a serial server, and does it run? `mpf ls` shows\n", client_.notConnectedBecause());
       return 1;
     }
-    while (!stopped_ && !end_.hasPassed()) {
+    while (!isOver(end_)) {
       // What was begun is shown when the line has been quiet for a while.
       if (!dispatcher_.runOnce(std::min(end_, Deadline::after(kQuiet)))) show(format_->flush());
     }
+    takeTheRest();
     show(format_->flush());
     fmt::print(stderr, "mpf sniff: {} bytes seen, {} missing\n", seen_, missing_);
-    return 0;
+    return wasRefused_ ? 1 : 0;
   }
 
  private:
   static constexpr Nanoseconds kConnectLimit = std::chrono::seconds(2);
   static constexpr Nanoseconds kQuiet = std::chrono::milliseconds(200);
+  static constexpr Nanoseconds kStopLimit = std::chrono::seconds(1);
+
+  [[nodiscard]] bool isOver(Deadline deadline) const { return stopped_ || wasRefused_ || deadline.hasPassed(); }
 
   void stop() noexcept {
     stopped_.store(true);
@@ -66,6 +73,7 @@ class Sniffer {
 
   void take(Message&& message) {
     if (const auto* news = message.tryAs<Connect>()) return takeNews(*news);
+    if (const auto* reply = message.tryAs<Int32>()) return takeReply(*reply);
     if (const auto records = Char8ArrayMessage::tryFrom(std::move(message))) takeRecords(*records);
   }
 
@@ -74,15 +82,39 @@ class Sniffer {
     if (news.status == ConnectStatus::connectYes) {
       static_cast<void>(client_.send(Int32Message({.cmd = serial::cmdSniffStart})));
     } else if (news.status == ConnectStatus::connectNo) {
+      isListening_ = false;
       show(format_->flush());
       fmt::print(stderr, "mpf sniff: {}\n", client_.notConnectedBecause());
     }
   }
 
+  void takeReply(const Int32& reply) {
+    if (reply.cmd == serial::cmdSniffStart && reply.status == serial::sniffStatusOK) {
+      isListening_ = true;
+      fmt::print(stderr, "mpf sniff: listening to \"{}\"\n", server_);
+    } else if (reply.cmd == serial::cmdSniffStop) {
+      isListening_ = false;
+      takeMissing(static_cast<std::uint64_t>(reply.address));
+    } else {
+      wasRefused_ = true;
+      fmt::print(stderr, "mpf sniff: \"{}\" lets nobody listen: status {}\n", service_, reply.status);
+    }
+  }
+
+  // The server still has what the line said in the last few milliseconds.
+  void takeTheRest() {
+    if (!isListening_ || client_.send(Int32Message({.cmd = serial::cmdSniffStop})) != SendResult::sent) return;
+    const auto limit = Deadline::after(kStopLimit);
+    while (isListening_ && !limit.hasPassed()) dispatcher_.runOnce(limit);
+  }
+
+  void takeMissing(std::uint64_t bytes) {
+    if (bytes != 0) show(format_->missing(bytes));
+    missing_ += bytes;
+  }
+
   void takeRecords(const Char8ArrayMessage& message) {
-    const auto lost = static_cast<std::uint64_t>(message->address);
-    if (lost != 0) show(format_->missing(lost));
-    missing_ += lost;
+    takeMissing(static_cast<std::uint64_t>(message->address));
     const auto records = serial::tryReadRecords(message);
     if (!records) return fmt::print(stderr, "mpf sniff: \"{}\" sent what is no record\n", service_);
     std::string text;
@@ -97,11 +129,14 @@ class Sniffer {
     std::fflush(stdout);
   }
 
+  std::string server_;
   std::string service_;
   std::unique_ptr<SniffFormat> format_;
   Deadline end_;
   std::uint64_t seen_ = 0;
   std::uint64_t missing_ = 0;
+  bool isListening_ = false;
+  bool wasRefused_ = false;
   std::atomic<bool> stopped_{false};
   Dispatcher dispatcher_;
   MessageClient client_;
@@ -114,7 +149,7 @@ void addSniff(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("sniff", "Every byte that a serial server sends (T) and receives (R), live");
   auto arguments = std::make_shared<SniffArguments>();
   addServer(command, *arguments);
-  command.add_option("seconds", arguments->seconds, "For how long; 0: until Ctrl-C")->capture_default_str()->check(CLI::NonNegativeNumber);
+  addSeconds(command, "seconds", arguments->seconds, "For how long; 0: until Ctrl-C", true);
   command.add_option("--format", arguments->format, "lines: one direction a line, with times; manual: ten bytes a line, as of old")
       ->capture_default_str()
       ->check(CLI::IsMember({"lines", "manual"}));
