@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t kCoolAfter = 4096;      // looks in vain before a link is no longer polled
 constexpr std::uint32_t kReplaceAfter = 64;     // looks in vain before a busier link may take its place
-constexpr std::uint32_t kHintsEvery = 16;       // messages of busy links between looks at the hints
+constexpr std::uint32_t kHintsEvery = 16;       // messages of polled links between looks at the hints
 constexpr std::uint32_t kClockEvery = 64;       // spins between looks at the clock
 constexpr std::uint32_t kYieldEvery = 1u << 14;  // spins between offers of the CPU, for peers that share it
 constexpr std::int64_t kLookAtAllNs = 100'000'000;
@@ -92,31 +92,39 @@ void Endpoint::dropPeers() noexcept {
 
 std::optional<std::uint32_t> Endpoint::next() noexcept {
   if (armed_) disarm();
+  // Polled links have had their turn each: now the others, which have none while all that may be polled are busy.
+  if (sinceHints_ >= (hotCount_ == kHotLinks ? kHotLinks : kHintsEvery)) {
+    if (const auto index = nextCold()) return index;
+  }
   for (std::size_t looked = 0; looked < hotCount_; ++looked) {
     cursor_ = cursor_ + 1 < hotCount_ ? cursor_ + 1 : 0;
     auto& hot = hot_[cursor_];
-    if (!hot.link->hasMessage()) {
-      if (++hot.misses >= kCoolAfter) {
-        const auto index = hot.index;
-        cool(cursor_);
-        if (links_[index]->hasMessage()) return index;
-        break;
-      }
-      continue;
+    if (hot.link->hasMessage()) {
+      hot.misses = 0;
+      ++sinceHints_;
+      return hot.index;
     }
-    hot.misses = 0;
-    if (++sinceHints_ < kHintsEvery) return hot.index;
-    sinceHints_ = 0;
-    const auto index = hot.index;
-    const auto ready = nextReady();
-    return ready ? ready : index;
+    if (++hot.misses >= kCoolAfter) {
+      const auto index = hot.index;
+      cool(cursor_);
+      if (links_[index]->hasMessage()) return index;
+      break;
+    }
   }
   return nextReady();
 }
 
+// One message of each: the round ends when their numbers begin again.
+std::optional<std::uint32_t> Endpoint::nextCold() noexcept {
+  const auto from = readyCursor_;
+  const auto index = nextReady();
+  if (!index || *index < from) sinceHints_ = 0;
+  return index;
+}
+
 std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
   if (revisit_) {
-    if (links_[*revisit_] != nullptr && links_[*revisit_]->hasMessage()) setReadyBit(*revisit_);
+    if (isRevisitDue()) setReadyBit(*revisit_);
     revisit_.reset();
   }
   if (!hasReadyWords()) return std::nullopt;
@@ -230,8 +238,10 @@ bool Endpoint::hasNews() const noexcept {
   for (std::size_t position = 0; position < hotCount_; ++position) {
     if (hot_[position].link->hasMessage()) return true;
   }
-  return hasHints();
+  return isRevisitDue() || hasHints();
 }
+
+bool Endpoint::isRevisitDue() const noexcept { return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasMessage(); }
 
 bool Endpoint::wait(Deadline deadline) noexcept {
   slept_ = false;

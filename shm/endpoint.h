@@ -87,6 +87,7 @@ class Endpoint {
   static constexpr std::size_t kHotLinks = 8;
 
   std::optional<std::uint32_t> nextReady() noexcept;
+  std::optional<std::uint32_t> nextCold() noexcept;
   std::optional<std::uint32_t> takeReadyBit(std::size_t word) noexcept;
   void heat(std::uint32_t index) noexcept;
   void cool(std::size_t position) noexcept;
@@ -94,6 +95,7 @@ class Endpoint {
   void setReadyBit(std::uint32_t index) noexcept;
   [[nodiscard]] bool hasNews() const noexcept;
   [[nodiscard]] bool hasReadyWords() const noexcept;
+  [[nodiscard]] bool isRevisitDue() const noexcept;
   [[nodiscard]] bool hasHints() const noexcept;
   bool spin(Deadline deadline) noexcept;
   void announce(layout::SleepState how) noexcept;
@@ -109,7 +111,7 @@ class Endpoint {
   std::array<Hot, kHotLinks> hot_{};
   std::size_t hotCount_ = 0;
   std::size_t cursor_ = 0;
-  std::uint32_t sinceHints_ = 0;
+  std::uint32_t sinceHints_ = 0;  // messages of polled links
   std::uint32_t readyCursor_ = 0;
   std::optional<std::uint32_t> revisit_;  // a cold link that may have more than the one message taken
   std::uint32_t knockedSeen_ = 0;

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: MIT
+// A window with its links, and the wait for the next message of any of them.
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <thread>
+
+#include <mpf/tests/shm/child.h>
+#include <mpf/tests/shm/endpoint_pair.h>
+#include <mpf/tests/shm/shm_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+class EndpointTest : public ShmTest {
+ protected:
+  // Messages taken from each of `links` when `messages` are taken from `end`; all links are kept full.
+  static std::vector<int> shares(End& end, const std::vector<Connected>& links, int messages) {
+    std::vector<int> taken(links.size());
+    for (int i = 0; i < messages; ++i) {
+      for (const auto& link : links) static_cast<void>(send(link.client, 1));
+      const auto index = end.endpoint.next();
+      if (index && end.tryTake(*index)) ++taken[*index];
+    }
+    return taken;
+  }
+};
+
+class WaitModes : public EndpointTest, public testing::WithParamInterface<WaitMode> {};
+INSTANTIATE_TEST_SUITE_P(All, WaitModes, testing::Values(WaitMode::spin, WaitMode::adaptive, WaitMode::block));
+
+TEST_P(WaitModes, AWaitEndsWithAMessage) {
+  End server(backplane_, "server", GetParam());
+  End client(backplane_, "", GetParam());
+  const auto link = connect(client, server);
+  while (server.endpoint.next()) {
+  }
+  std::thread sender([&] { EXPECT_EQ(send(link.client, 7), LinkSend::sent); });
+
+  const bool news = server.endpoint.wait(Deadline::never());
+  sender.join();
+
+  EXPECT_TRUE(news);
+  const auto index = server.endpoint.next();
+  ASSERT_EQ(index, link.serverIndex);
+  EXPECT_EQ(server.tryTake(*index), 7u);
+}
+
+TEST_P(WaitModes, AWaitWithoutNewsEndsAtItsDeadline) {
+  End server(backplane_, "server", GetParam());
+
+  for (const auto patience : {-1ms, 0ms, 3ms}) {
+    const auto deadline = Deadline::after(patience);
+    EXPECT_FALSE(server.endpoint.wait(deadline));
+    EXPECT_TRUE(deadline.hasPassed());
+  }
+}
+
+TEST_P(WaitModes, AnInterruptFromAnotherThreadEndsAWait) {
+  End server(backplane_, "server", GetParam());
+  std::thread other([&] { server.endpoint.interrupt(); });
+
+  EXPECT_TRUE(server.endpoint.wait(Deadline::never()));
+  other.join();
+
+  EXPECT_TRUE(server.endpoint.takeLocalNews());
+  EXPECT_FALSE(server.endpoint.takeLocalNews());
+}
+
+TEST_P(WaitModes, AnInterruptBeforeAWaitEndsIt) {
+  End server(backplane_, "server", GetParam());
+
+  server.endpoint.interrupt();
+
+  EXPECT_TRUE(server.endpoint.wait(Deadline::never()));
+}
+
+TEST_P(WaitModes, AnInterruptFromASignalHandlerEndsAWait) {
+  End server(backplane_, "server", GetParam());
+  static Endpoint* interrupted = nullptr;
+  interrupted = &server.endpoint;
+  struct sigaction action{};
+  action.sa_handler = [](int) { interrupted->interrupt(); };
+  action.sa_flags = SA_RESTART;
+  struct sigaction before{};
+  ::sigaction(SIGUSR1, &action, &before);
+  std::atomic<bool> waiting{false};
+  std::thread waiter([&] {
+    waiting = true;
+    EXPECT_TRUE(server.endpoint.wait(Deadline::never()));
+  });
+  while (!waiting) std::this_thread::yield();
+
+  ::pthread_kill(waiter.native_handle(), SIGUSR1);
+
+  waiter.join();
+  ::sigaction(SIGUSR1, &before, nullptr);
+}
+
+TEST_P(WaitModes, ThousandsOfTurnsLoseNoWakeUp) {
+  constexpr std::uint32_t kTurns = 5000;
+  End server(backplane_, "server", GetParam());
+  End client(backplane_, "", GetParam());
+  const auto link = connect(client, server);
+  const auto takeNext = [](End& end) {
+    for (;;) {
+      if (const auto index = end.endpoint.next()) {
+        if (const auto id = end.tryTake(*index)) return *id;
+        continue;
+      }
+      EXPECT_TRUE(end.endpoint.wait(Deadline::never()));
+    }
+  };
+
+  std::thread echo([&] {
+    for (std::uint32_t turn = 0; turn < kTurns; ++turn) EXPECT_EQ(send(link.server, takeNext(server)), LinkSend::sent);
+  });
+  for (std::uint32_t turn = 0; turn < kTurns; ++turn) {
+    EXPECT_EQ(send(link.client, turn), LinkSend::sent);
+    ASSERT_EQ(takeNext(client), turn);
+  }
+  echo.join();
+}
+
+TEST_F(EndpointTest, LinksTakeTurns) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  std::vector<Connected> links;
+  for (int i = 0; i < 3; ++i) links.push_back(connect(client, server));
+
+  const auto taken = shares(server, links, 3000);
+
+  for (const auto share : taken) EXPECT_NEAR(share, 1000, 50);
+}
+
+// More busy links than are polled directly.
+TEST_F(EndpointTest, ManyBusyLinksTakeTurnsToo) {
+  constexpr int kLinks = 20;
+  constexpr int kEach = 2000;
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  std::vector<Connected> links;
+  for (int i = 0; i < kLinks; ++i) links.push_back(connect(client, server));
+
+  const auto taken = shares(server, links, kLinks * kEach);
+
+  const auto [least, most] = std::minmax_element(taken.begin(), taken.end());
+  EXPECT_GE(*least, kEach / 2);
+  EXPECT_LE(*most, kEach * 2);
+}
+
+// Whoever asks "is there news?" before each message gets all of them, also of a link that is not polled because others are.
+TEST_F(EndpointTest, AWaitBeforeEachMessageForgetsNone) {
+  constexpr std::uint32_t kLinks = 9;
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  std::vector<Connected> links;
+  for (std::uint32_t i = 0; i < kLinks; ++i) links.push_back(connect(client, server));
+  while (server.endpoint.next()) {
+  }
+  for (std::uint32_t i = 0; i < 5; ++i) ASSERT_EQ(send(links.back().client, i), LinkSend::sent);
+
+  for (std::uint32_t taken = 0; taken < 5;) {
+    ASSERT_TRUE(server.endpoint.wait(Deadline::never()));
+    if (const auto index = server.endpoint.next(); index && server.tryTake(*index)) ++taken;
+  }
+}
+
+TEST_F(EndpointTest, AFloodLeavesOthersTheirTurn) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto flood = connect(client, server);
+  const auto quiet = connect(client, server);
+  shares(server, {flood}, 10'000);
+
+  ASSERT_EQ(send(quiet.client, 7), LinkSend::sent);
+  int others = 0;
+  for (bool found = false; !found;) {
+    static_cast<void>(send(flood.client, 1));
+    const auto index = server.endpoint.next();
+    ASSERT_TRUE(index);
+    const auto id = server.tryTake(*index);
+    found = id && *index == quiet.serverIndex;
+    if (id && !found) ++others;
+  }
+
+  EXPECT_LE(others, 20);
+}
+
+TEST_F(EndpointTest, IdleLinksAreNotLookedAt) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  for (int i = 0; i < 100; ++i) connect(client, server);
+  for (int i = 0; i < 1'000'000 && server.endpoint.next(); ++i) {
+  }
+
+  EXPECT_FALSE(server.endpoint.next());
+  EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms)));
+  EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 100u);
+}
+
+TEST_F(EndpointTest, ABitIsUsedAgainAfterItsLinkIsGone) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto first = connect(client, server);
+  ASSERT_EQ(send(first.client, 1), LinkSend::sent);
+
+  server.drop(first.serverIndex);
+  EXPECT_FALSE(server.endpoint.next()) << "what it had left is gone with it";
+  const auto second = connect(client, server);
+
+  EXPECT_EQ(second.serverIndex, first.serverIndex);
+  ASSERT_EQ(send(second.client, 2), LinkSend::sent);
+  ASSERT_EQ(server.endpoint.next(), second.serverIndex);
+  EXPECT_EQ(server.tryTake(second.serverIndex), 2u);
+  EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 1u);
+}
+
+TEST_F(EndpointTest, ThereAreNoMoreBitsThanTheLayoutHas) {
+  End server(backplane_, "server");
+
+  for (std::uint32_t i = 0; i < layout::kMaxLinks; ++i) ASSERT_EQ(server.endpoint.tryReserve(), i);
+
+  EXPECT_FALSE(server.endpoint.tryReserve());
+  server.endpoint.detach(7);
+  EXPECT_EQ(server.endpoint.tryReserve(), 7u);
+}
+
+TEST_F(EndpointTest, KnocksAreTakenOnce) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
+  EXPECT_FALSE(server.endpoint.hasSideNews());
+
+  peer->knock(5);
+  peer->knock(6);
+
+  EXPECT_TRUE(server.endpoint.wait(Deadline::never()));
+  EXPECT_EQ(server.endpoint.takeKnock(), 5u);
+  EXPECT_TRUE(server.endpoint.hasSideNews()) << "until nothing was taken";
+  EXPECT_EQ(server.endpoint.takeKnock(), 6u);
+  EXPECT_FALSE(server.endpoint.takeKnock());
+  EXPECT_FALSE(server.endpoint.hasSideNews());
+  peer->knock(5 + layout::kKnocks);
+  peer->knock(5);
+  EXPECT_TRUE(server.endpoint.takeRescan());
+  EXPECT_FALSE(server.endpoint.takeRescan());
+}
+
+TEST_F(EndpointTest, APeersDeathIsLocalNews) {
+  Child child([&](Child::Self& self) {
+    const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader&) {});
+    self.stay();
+  });
+  End client(backplane_, "");
+  const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
+  EXPECT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), peer) << "mapped once";
+
+  child.end(SIGKILL);
+
+  while (!client.endpoint.takePeerDeath()) ASSERT_TRUE(client.endpoint.wait(Deadline::never()));
+  EXPECT_TRUE(client.endpoint.takeLocalNews());
+  EXPECT_TRUE(peer->isDead());
+  EXPECT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr);
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "what the dead one left is removed";
+}
+
+TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto link = connect(client, server);
+  const auto isReadable = [&] {
+    pollfd poll{server.endpoint.descriptor(), POLLIN, 0};
+    return ::poll(&poll, 1, 0) == 1;
+  };
+  while (server.endpoint.next()) {
+  }
+  ASSERT_TRUE(server.endpoint.arm());
+  EXPECT_FALSE(isReadable());
+
+  ASSERT_EQ(send(link.client, 7), LinkSend::sent);
+
+  EXPECT_TRUE(isReadable());
+  EXPECT_FALSE(server.endpoint.arm()) << "there is news already";
+  ASSERT_EQ(server.endpoint.next(), link.serverIndex);
+  EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
+  while (server.endpoint.next()) {
+  }
+  ASSERT_TRUE(server.endpoint.arm());
+  EXPECT_FALSE(isReadable());
+  server.endpoint.interrupt();
+  EXPECT_TRUE(isReadable());
+  server.endpoint.disarm();
+}
+
+TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUp) {
+  constexpr std::uint32_t kTurns = 5000;
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto link = connect(client, server);
+  const auto takeNext = [](End& end) {
+    for (;;) {
+      while (const auto index = end.endpoint.next()) {
+        if (const auto id = end.tryTake(*index)) return *id;
+      }
+      if (!end.endpoint.arm()) continue;
+      pollfd poll{end.endpoint.descriptor(), POLLIN, 0};
+      while (::poll(&poll, 1, -1) < 0) {
+      }
+    }
+  };
+
+  std::thread echo([&] {
+    for (std::uint32_t turn = 0; turn < kTurns; ++turn) EXPECT_EQ(send(link.server, takeNext(server)), LinkSend::sent);
+  });
+  for (std::uint32_t turn = 0; turn < kTurns; ++turn) {
+    EXPECT_EQ(send(link.client, turn), LinkSend::sent);
+    ASSERT_EQ(takeNext(client), turn);
+  }
+  echo.join();
+}
+
+}  // namespace
+}  // namespace mpf::test
