@@ -15,6 +15,8 @@ constexpr std::uint32_t kReplaceAfter = 64;     // looks in vain before a busier
 constexpr std::uint32_t kHintsEvery = 16;       // messages of polled links between looks at the hints
 constexpr std::uint32_t kClockEvery = 64;       // spins between looks at the clock
 constexpr std::uint32_t kYieldEvery = 1u << 14;  // spins between offers of the CPU, for peers that share it
+constexpr std::uint32_t kLookAtAllEvery = 1024;  // looks at the hints between looks at all links
+constexpr std::size_t kFewLinks = 64;           // cost nothing to look at; of more links a look takes its time
 constexpr std::int64_t kLookAtAllNs = 100'000'000;
 
 }  // namespace
@@ -126,6 +128,10 @@ std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
   if (revisit_) {
     if (isRevisitDue()) setReadyBit(*revisit_);
     revisit_.reset();
+  }
+  if (++sinceLook_ >= kLookAtAllEvery) {
+    sinceLook_ = 0;
+    tryLookAtAll();
   }
   if (!hasReadyWords()) return std::nullopt;
   constexpr auto kWords = layout::kMaxLinks / 64;
@@ -249,10 +255,8 @@ bool Endpoint::wait(Deadline deadline) noexcept {
   while (!deadline.hasPassed()) {
     sleep(deadline);
     if (hasNews()) return true;
-    lookAtAll();
-    if (hasNews()) return true;
   }
-  return hasNews();
+  return false;
 }
 
 bool Endpoint::spin(Deadline deadline) noexcept {
@@ -267,7 +271,9 @@ bool Endpoint::spin(Deadline deadline) noexcept {
     const auto nowNs = Clock::nowNs();
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
-    if (spins % kYieldEvery == 0) ::sched_yield();
+    if (spins % kYieldEvery != 0) continue;
+    tryLookAtAll();
+    ::sched_yield();
   }
 }
 
@@ -282,9 +288,10 @@ void Endpoint::sleep(Deadline deadline) noexcept {
   auto& bell = window_.hints().bell;
   const auto seen = bell.load(std::memory_order_relaxed);
   announce(layout::SleepState::onFutex);
+  const auto until = tryLookAtAll() ? deadline : std::min(deadline, Deadline::atNs(lookedAtAllNs_ + kLookAtAllNs));
   if (!hasNews()) {
     const auto sleptFrom = mode_ == WaitMode::adaptive ? Clock::nowNs() : 0;
-    doorbell::sleep(bell, seen, deadline);
+    doorbell::sleep(bell, seen, until);
     slept_ = true;
     control().wakes.store(control().wakes.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     if (mode_ == WaitMode::adaptive) {
@@ -294,19 +301,24 @@ void Endpoint::sleep(Deadline deadline) noexcept {
   control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
 }
 
-// A ready bit may have been lost to a peer that scribbles: once in a while, a wake-up without news looks at everything.
-void Endpoint::lookAtAll() noexcept {
-  const auto nowNs = Clock::nowNs();
-  if (nowNs - lookedAtAllNs_ < kLookAtAllNs) return;
-  lookedAtAllNs_ = nowNs;
+// A peer that scribbles may have lost another one's ready bit. Who is about to sleep looks at every link; with many links, not more
+// often than kLookAtAllNs allows. False when that is to be made up for.
+bool Endpoint::tryLookAtAll() noexcept {
+  if (links_.size() > kFewLinks) {
+    const auto nowNs = Clock::nowNs();
+    if (nowNs - lookedAtAllNs_ < kLookAtAllNs) return false;
+    lookedAtAllNs_ = nowNs;
+  }
   for (std::uint32_t index = 0; index < links_.size(); ++index) {
     if (links_[index] != nullptr && links_[index]->hasMessage()) setReadyBit(index);
   }
+  return true;
 }
 
 bool Endpoint::arm() noexcept {
   doorbell::drainFifo(window_.fifo());
   announce(layout::SleepState::onDescriptor);
+  tryLookAtAll();
   armed_ = true;
   if (!hasNews()) return true;
   disarm();

@@ -7,7 +7,7 @@
 //
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
 // Crash    a peer's death comes through the watcher as local news.
-// Trust    hints may be wrong in either way; a wake-up without news makes us look at every link.
+// Trust    hints may be wrong in either way: who is about to sleep looks at every link.
 #pragma once
 
 #include <array>
@@ -100,7 +100,7 @@ class Endpoint {
   bool spin(Deadline deadline) noexcept;
   void announce(layout::SleepState how) noexcept;
   void sleep(Deadline deadline) noexcept;
-  void lookAtAll() noexcept;
+  bool tryLookAtAll() noexcept;
   void dropPeers() noexcept;
 
   Backplane backplane_;
@@ -112,6 +112,7 @@ class Endpoint {
   std::size_t hotCount_ = 0;
   std::size_t cursor_ = 0;
   std::uint32_t sinceHints_ = 0;  // messages of polled links
+  std::uint32_t sinceLook_ = 0;   // looks at the hints
   std::uint32_t readyCursor_ = 0;
   std::optional<std::uint32_t> revisit_;  // a cold link that may have more than the one message taken
   std::uint32_t knockedSeen_ = 0;
