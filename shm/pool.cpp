@@ -56,9 +56,11 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
 }
 
 bool PoolOwner::addBulk(std::size_t chunkBytes) try {
-  const auto count = chunkCountFor(chunkBytes);
+  const auto room = maxBytes_ - bytes_;  // the last segment of a pool may be a small one
+  if (bulks_.size() >= kMaxBulks || room < layout::kBulkChunksOffset + chunkBytes) return false;
+  const auto fitting = (room - layout::kBulkChunksOffset) / chunkBytes;
+  const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(chunkCountFor(chunkBytes), fitting));
   const auto bytes = layout::kBulkChunksOffset + count * chunkBytes;
-  if (bulks_.size() >= kMaxBulks || bytes_ + bytes > maxBytes_) return false;
   auto segment = Segment::create(bytes, layout::SegmentKind::bulk, place_.backplane, rights_);
   auto& header = segment.sharedHeader();
   header.ownerWindow = place_.ownerWindow;

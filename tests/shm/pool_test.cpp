@@ -189,6 +189,18 @@ TEST_F(PoolTest, NothingIsLeftWhenTheLimitIsExhausted) {
   EXPECT_EQ(owner_->tryAlloc(50'000)->data, chunks.back().data);
 }
 
+TEST_F(PoolTest, ALimitIsUsedToItsEnd) {
+  for (const std::uint64_t limit : {20'000u, 70'000u, 300'000u, 1'000'000u}) {
+    makeOwner(limit);
+    std::uint64_t chunks = 0;
+
+    while (owner_->tryAlloc(10'000)) ++chunks;
+
+    EXPECT_GE(chunks * 17'000 + 3 * layout::kPageBytes + 17'000, limit);
+    EXPECT_LE(owner_->bytes(), limit);
+  }
+}
+
 TEST_F(PoolTest, SizesThatNobodyHasAreRefused) {
   for (const auto bytes : {(std::size_t{256} << 20) + 1, std::size_t{1} << 40, (std::size_t{1} << 63) + 1, SIZE_MAX - 127, SIZE_MAX}) {
     EXPECT_FALSE(owner_->tryAlloc(bytes)) << bytes;
