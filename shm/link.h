@@ -9,6 +9,7 @@
 // Trust    the peer may write every byte; geometry was copied and checked at the start, the rest is checked at use.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <span>
@@ -95,8 +96,10 @@ class Link {
   // While not watched, the peer sets our ready bit with each message.
   void setWatched(bool watched) noexcept;
 
-  // Largest body that may be sent.
-  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return segment_.header().maxMessageBytes; }
+  // Largest body that may be sent: what the peer offers and an envelope can say.
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
+    return std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX);
+  }
 
  private:
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);

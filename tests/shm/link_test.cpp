@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: MIT
+// Two rings and two pools between a client and a server.
+#include <cstring>
+#include <map>
+
+#include <mpf/tests/shm/endpoint_pair.h>
+#include <mpf/tests/shm/shm_fixture.h>
+#include <mpf/tests/support/random.h>
+
+namespace mpf::test {
+namespace {
+
+using layout::LinkState;
+using testing::HasSubstr;
+
+constexpr std::size_t kLarge = layout::kInlineBodyBytes + 1;  // does not fit a ring
+
+class LinkTest : public ShmTest {
+ protected:
+  void makeEnds(Offer offer = {}) {
+    server_.emplace(backplane_, "server", WaitMode::block, offer);
+    client_.emplace(backplane_, "", WaitMode::block);
+  }
+  Connected makeLink(Offer offer = {}) {
+    makeEnds(offer);
+    return connect(*client_, *server_);
+  }
+  void TearDown() override {
+    client_.reset();
+    server_.reset();
+    ShmTest::TearDown();
+  }
+  static std::vector<std::byte> filled(std::size_t bytes) {
+    std::vector<std::byte> body(bytes);
+    for (std::size_t i = 0; i < bytes; ++i) body[i] = static_cast<std::byte>(i * 7);
+    return body;
+  }
+  static LinkSend sendBody(Link& link, std::span<const std::byte> body, Link::Limits limits = {}) {
+    Envelope envelope{.requestId = 1};
+    return link.trySend(envelope, body, limits);
+  }
+  // The whole body of the next message; chunks are given back.
+  static std::vector<std::byte> take(Link& link) {
+    EXPECT_TRUE(link.hasMessage());
+    const auto envelope = link.begin();
+    std::vector<std::byte> body(envelope.bodyBytes);
+    if ((envelope.flags & layout::kSlotChunk) == 0) {
+      link.copyBody(body);
+    } else if (const auto chunk = link.tryChunk(envelope)) {
+      std::memcpy(body.data(), chunk->data, body.size());
+      link.release(chunk->data);
+    } else {
+      ADD_FAILURE() << "no chunk";
+    }
+    link.end();
+    return body;
+  }
+  // Why the server does not take a link of which `change` was made by its client.
+  std::string refusal(const std::function<void(layout::SegmentHeader&)>& change) {
+    const auto link = makeLink();
+    change(Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)->sharedHeader());
+    return whatOf<SegmentError>([&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); });
+  }
+
+  std::optional<End> server_;
+  std::optional<End> client_;
+};
+
+class BodySizes : public LinkTest, public testing::WithParamInterface<std::size_t> {};
+
+TEST_P(BodySizes, CrossInBothDirections) {
+  const auto link = makeLink({.maxMessageBytes = 8 << 20, .maxPoolBytes = 32 << 20});
+  const auto body = filled(GetParam());
+
+  ASSERT_EQ(sendBody(link.client, body), LinkSend::sent);
+  ASSERT_EQ(sendBody(link.server, body), LinkSend::sent);
+
+  EXPECT_EQ(take(link.server), body);
+  EXPECT_EQ(take(link.client), body);
+}
+INSTANTIATE_TEST_SUITE_P(InLineAndInChunks, BodySizes, testing::Values(0, 1, 24, 25, 80, 192, 193, 4096, 100'000, 8 << 20));
+
+TEST_F(LinkTest, AChunkIsReadWhereItWasBuiltAndSentBackAsItIs) {
+  const auto link = makeLink();
+  const auto built = *link.client.tryAlloc(5000);
+  built.data[4999] = std::byte{7};
+
+  ASSERT_EQ(sendBody(link.client, {built.data, 5000}), LinkSend::sentInPlace);
+  const auto borrowed = link.server.tryChunk(link.server.begin());
+  link.server.end();
+  ASSERT_TRUE(borrowed);
+  EXPECT_EQ(borrowed->data[4999], std::byte{7});
+  ASSERT_EQ(sendBody(link.server, {borrowed->data, 5000}), LinkSend::sentInPlace);
+  const auto back = link.client.tryChunk(link.client.begin());
+  link.client.end();
+
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->data, built.data);
+  link.client.release(back->data);
+}
+
+TEST_F(LinkTest, WhatIsTooLargeForTheServerIsNotSent) {
+  const auto link = makeLink({.maxMessageBytes = 1000});
+
+  EXPECT_EQ(sendBody(link.client, filled(1001)), LinkSend::tooLarge);
+  EXPECT_EQ(sendBody(link.client, filled(1000)), LinkSend::sent);
+
+  EXPECT_EQ(take(link.server), filled(1000));
+  EXPECT_FALSE(link.server.hasMessage());
+}
+
+TEST_F(LinkTest, NoMessageIsLongerThanAnEnvelopeCanSay) {
+  const auto link = makeLink({.maxMessageBytes = UINT64_MAX});
+
+  EXPECT_EQ(link.client.maxMessageBytes(), UINT32_MAX);
+  EXPECT_EQ(link.server.maxMessageBytes(), UINT32_MAX);
+}
+
+TEST_F(LinkTest, WithoutMemoryNothingIsSentAndNothingIsLost) {
+  const auto link = makeLink({.maxPoolBytes = 64 << 10});
+  std::vector<Chunk> held;
+  while (const auto chunk = link.client.tryAlloc(10'000)) held.push_back(*chunk);
+  ASSERT_FALSE(held.empty());
+
+  EXPECT_EQ(sendBody(link.client, filled(10'000)), LinkSend::noMemory);
+
+  EXPECT_FALSE(link.server.hasMessage());
+  link.client.release(held.back().data);
+  EXPECT_EQ(sendBody(link.client, filled(10'000)), LinkSend::sent);
+  EXPECT_EQ(take(link.server), filled(10'000));
+}
+
+TEST_F(LinkTest, AQueueTakesWhatItMayAndNoMore) {
+  const auto link = makeLink({.queueSize = 4});
+  for (int i = 0; i < 4; ++i) ASSERT_EQ(sendBody(link.client, filled(kLarge), {.waiting = 4}), LinkSend::sent);
+
+  EXPECT_EQ(sendBody(link.client, filled(8), {.waiting = 4}), LinkSend::full);
+
+  EXPECT_EQ(take(link.server), filled(kLarge));
+  EXPECT_EQ(sendBody(link.client, filled(8), {.waiting = 4}), LinkSend::sent);
+}
+
+// Long messages in line must not take the slots of short ones that the queue may still take.
+TEST_F(LinkTest, AQueueOfAnyBodiesHasItsFullLength) {
+  for (const std::uint32_t queue : {1u, 2u, 14u, 100u}) {
+    const auto link = makeLink({.queueSize = queue});
+    Random random;
+    for (int round = 0; round < 20; ++round) {
+      for (std::uint32_t i = 0; i < queue; ++i) {
+        ASSERT_EQ(sendBody(link.client, filled(random.below(300)), {.waiting = queue}), LinkSend::sent) << i << " of " << queue;
+      }
+      ASSERT_EQ(sendBody(link.client, filled(1), {.waiting = queue}), LinkSend::full);
+      for (std::uint32_t i = 0; i < queue; ++i) take(link.server);
+    }
+    client_.reset();
+    server_.reset();
+  }
+}
+
+TEST_F(LinkTest, EachSideSaysItsStateAndSeesTheOthers) {
+  const auto link = makeLink();
+  EXPECT_EQ(link.server.peerState(), LinkState::open) << "a client that knocks is open";
+  EXPECT_EQ(link.client.peerState(), LinkState::none);
+
+  link.server.setState(LinkState::open);
+  EXPECT_EQ(link.client.peerState(), LinkState::open);
+  link.client.setState(LinkState::closed);
+
+  EXPECT_EQ(link.server.peerState(), LinkState::closed);
+  EXPECT_EQ(link.client.peerState(), LinkState::open);
+}
+
+TEST_F(LinkTest, TheReadyBitIsSetWhileTheReceiverDoesNotWatch) {
+  const auto link = makeLink();
+  auto& hints = server_->endpoint.window().hints();
+  const auto takeBits = [&] { return hints.readyBits[0].exchange(0, std::memory_order_relaxed); };
+  takeBits();
+
+  link.server.setWatched(true);
+  ASSERT_EQ(sendBody(link.client, filled(1)), LinkSend::sent);
+  EXPECT_EQ(takeBits(), 0u);
+  link.server.setWatched(false);
+  ASSERT_EQ(sendBody(link.client, filled(1)), LinkSend::sent);
+  EXPECT_EQ(takeBits(), std::uint64_t{1} << link.serverIndex);
+
+  take(link.server);
+  take(link.server);
+}
+
+TEST_F(LinkTest, EveryMessageToASleeperIsTimedAndOneIn64ToWhoPolls) {
+  const auto link = makeLink();
+  link.server.setWatched(false);
+  EXPECT_TRUE(link.client.shallBeTimed());
+  link.server.setWatched(true);
+
+  int timed = 0;
+  for (int i = 0; i < 256; ++i) {
+    timed += link.client.shallBeTimed() ? 1 : 0;
+    ASSERT_EQ(sendBody(link.client, {}), LinkSend::sent);
+    take(link.server);
+  }
+
+  EXPECT_EQ(timed, 4);
+}
+
+TEST_F(LinkTest, GoesWithItsClientsSideAndItsPools) {
+  const auto link = makeLink();
+  const auto before = backplane_.segmentNames().size();
+  ASSERT_TRUE(link.client.tryAlloc(1000) && link.server.tryAlloc(1000));
+  ASSERT_EQ(backplane_.segmentNames().size(), before + 2);
+
+  client_->drop(link.clientIndex);
+  EXPECT_EQ(backplane_.segmentNames().size(), before) << "the server's pool is left";
+  server_->drop(link.serverIndex);
+
+  EXPECT_EQ(backplane_.segmentNames().size(), before - 1);
+}
+
+TEST_F(LinkTest, OneThatIsGoneIsNotOpened) {
+  makeEnds();
+
+  EXPECT_EQ(Link::tryOpen(name(), SegmentName::link(name(), 1, 2), server_->endpoint.window()), nullptr);
+}
+
+using Header = layout::SegmentHeader;
+class Geometries : public LinkTest, public testing::WithParamInterface<void (*)(Header&)> {};
+
+TEST_P(Geometries, ThatTheServerDidNotOfferAreRefused) { EXPECT_NE(refusal(GetParam()), ""); }
+INSTANTIATE_TEST_SUITE_P(
+    Nonsense, Geometries,
+    testing::Values([](Header& header) { header.queueSize = 0; }, [](Header& header) { header.queueSize = 16385; },
+                    [](Header& header) { header.queueSize = UINT32_MAX; }, [](Header& header) { header.queueSlots = 0; },
+                    [](Header& header) { header.queueSlots = 3; }, [](Header& header) { header.queueSlots *= 2; },
+                    [](Header& header) { header.replySlots = UINT32_MAX; }, [](Header& header) { header.replySlots /= 2; },
+                    [](Header& header) { header.maxOutstanding = UINT32_MAX; }, [](Header& header) { ++header.serverWindow; },
+                    [](Header& header) { ++header.maxPoolBytes; }, [](Header& header) { header.totalBytes = UINT64_MAX; }));
+
+TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
+  const auto link = makeLink();
+  const auto bytes = layout::linkBytes(link.client.header().queueSlots, link.client.header().replySlots) - 1;
+  Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)->sharedHeader().totalBytes = bytes;
+  ASSERT_EQ(::truncate(segments::path(link.client.name()).c_str(), static_cast<off_t>(bytes)), 0);
+
+  EXPECT_THAT(whatOf<SegmentError>([&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); }),
+              HasSubstr(segments::path(link.client.name())));
+}
+
+// The client may write every byte of the link and of its own pool, at any time. The server goes on: each of its calls ends, stays
+// inside the memory it mapped, and gives memory to one holder only.
+TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
+  Random random;
+  const auto link = makeLink({.maxPoolBytes = 4 << 20});
+  auto scribbled = *Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite);
+  ASSERT_EQ(sendBody(link.client, filled(1000)), LinkSend::sent);
+  auto bulk = *Segment::tryOpen(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0), layout::SegmentKind::bulk,
+                                Segment::Access::readWrite);
+  std::vector<std::byte> body(layout::kInlineBodyBytes);
+  std::map<std::byte*, std::size_t> held;
+  std::uint64_t sum = 0;
+  std::uint64_t taken = 0;
+  std::uint64_t position = 0;  // of the server in the ring
+  const auto nextSlot = [&]() -> layout::Slot& {
+    const auto index = position % link.client.header().queueSlots;
+    return scribbled.at<layout::Slot>(layout::kLinkRingsOffset + index * sizeof(layout::Slot));
+  };
+
+  for (int step = 0; step < 200'000; ++step) {
+    switch (random.below(8)) {
+      case 0:
+      case 1:
+        scribbled.data()[random.below(scribbled.bytes())] = static_cast<std::byte>(random.bits());
+        break;
+      case 2:
+        scribbled.at<std::uint64_t>(random.below(scribbled.bytes() / 8) * 8) = random.nasty();
+        break;
+      case 3: {  // the next message, of a chunk that might exist
+        auto& slot = nextSlot();
+        slot.flags = static_cast<std::uint8_t>(random.below(4));
+        slot.bodyBytes = static_cast<std::uint32_t>(random.oneIn(2) ? random.below(2000) : random.nasty());
+        slot.slots = static_cast<std::uint8_t>(random.below(6));
+        const layout::ChunkRef ref{static_cast<std::uint32_t>(random.below(3)), static_cast<std::uint32_t>(random.below(300)),
+                                   static_cast<std::uint32_t>(random.below(3)), 0};
+        std::memcpy(slot.body.data(), &ref, sizeof ref);
+        slot.sequence.store(position + 1, std::memory_order_relaxed);
+        break;
+      }
+      case 4:
+        bulk.data()[random.below(512)] = static_cast<std::byte>(random.bits());
+        break;
+      case 5:
+        static_cast<void>(sendBody(link.server, filled(random.below(3000)), {.waiting = static_cast<std::uint32_t>(random.below(100))}));
+        break;
+      case 6:
+        if (!held.empty()) {
+          link.server.release(held.begin()->first);
+          held.erase(held.begin());
+        } else if (const auto chunk = link.server.tryAlloc(random.below(10'000))) {
+          ASSERT_TRUE(held.emplace(chunk->data, chunk->capacity).second);
+          std::memset(chunk->data, 1, chunk->capacity);
+        }
+        break;
+      default:
+        if (!link.server.hasMessage()) break;
+        const auto slots = nextSlot().slots;
+        const auto envelope = link.server.begin();
+        ++taken;
+        if ((envelope.flags & layout::kSlotChunk) != 0) {
+          if (const auto chunk = link.server.tryChunk(envelope)) {
+            ASSERT_LE(envelope.bodyBytes, chunk->capacity);
+            for (std::uint32_t i = 0; i < envelope.bodyBytes; ++i) sum += static_cast<std::uint64_t>(chunk->data[i]);
+            link.server.release(chunk->data);
+            held.erase(chunk->data);
+          }
+        } else {
+          link.server.copyBody(std::span(body).first(std::min<std::size_t>(envelope.bodyBytes, link.server.inlineCapacity())));
+        }
+        link.server.end();
+        position += slots >= 1 && slots <= layout::kMaxMessageSlots ? slots : 1;
+    }
+  }
+
+  EXPECT_GT(taken, 1000u);
+  std::cout << "taken " << taken << ", sum " << sum << '\n';
+}
+
+}  // namespace
+}  // namespace mpf::test
