@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The program behind Victim: an echo server, a client that sends as fast as it can, a crowd of clients, or a client that listens to a serial line.
 #include <signal.h>
+#include <sys/inotify.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
 #include <mpf/client/sync_client.h>
 #include <mpf/schema/serial_sniff.h>
@@ -136,24 +138,36 @@ void become(const std::string& user, const std::string& group) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // forgotten with the old user
 }
 
+// The kernel has nothing left with which it could tell this user of new names.
+std::vector<mpf::FileDescriptor> takeAllInotify() {
+  std::vector<mpf::FileDescriptor> taken;
+  do taken.emplace_back(::inotify_init1(IN_CLOEXEC));
+  while (taken.back());
+  return taken;
+}
+
 int listen(const mpf::Backplane& backplane) {
   mpf::SyncClient client(backplane, "serial[0].sniff");
   if (!client.call(mpf::Int32Message({.cmd = mpf::serial::cmdSniffStart}), 60s)) return 1;
   for (;;) static_cast<void>(client.receive(24h));
 }
 
+// role, backplane, what the role wants; then "as USER GROUP", "without-inotify".
 int play(const std::vector<std::string>& arguments) {
   const auto argument = [&](std::size_t index) { return index < arguments.size() ? arguments[index] : std::string(); };
+  std::vector<mpf::FileDescriptor> taken;
+  for (std::size_t at = 3; at < arguments.size(); ++at) {
+    if (argument(at) == "as") become(argument(at + 1), argument(at + 2));
+    if (argument(at) == "without-inotify") taken = takeAllInotify();
+  }
   const auto role = argument(1);
-  if (role == "crowd-as") become(argument(4), argument(5));
-  if (role == "serve-as") become(argument(3), argument(4));
   const auto backplane = mpf::Backplane::attach(argument(2));
-  if (role == "serve" || role == "serve-as") return serve(backplane, {});
+  if (role == "serve") return serve(backplane, {});
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
   if (role == "flood") return flood(backplane);
   if (role == "listen") return listen(backplane);
-  if (role == "crowd" || role == "crowd-as") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-as, serve-block, flood, listen, crowd or crowd-as\n", role.c_str());
+  if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
+  std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, listen or crowd\n", role.c_str());
   return 2;
 }
 

@@ -47,7 +47,7 @@ class RightsTest : public testing::Test {
   };
   // A client of another user in another process. What it says first is why it is not connected, if it is not.
   Victim startClientAs(std::uint32_t user, std::uint32_t group) const {
-    return {"crowd-as", backplane_.name(), {"1", std::to_string(user), std::to_string(group)}};
+    return {"crowd", backplane_.name(), {"1", "as", std::to_string(user), std::to_string(group)}};
   }
   // What a client is told that may not open the server's window.
   std::string refusal(const std::string& mode, std::uint32_t group) const {
@@ -146,7 +146,7 @@ TEST_F(RightsTest, EverybodyIsServedWhenTheServerSaysSo) {
 
 TEST_F(RightsTest, RootIsServedByAnybodysServer) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
-  Victim server("serve-as", backplane_.name(), {std::to_string(kNobody), std::to_string(kNobody)});
+  Victim server("serve", backplane_.name(), {"as", std::to_string(kNobody), std::to_string(kNobody)});
   EXPECT_EQ(server.line(), "open");
 
   SyncClient client(backplane_, "echo", 0);
