@@ -68,11 +68,9 @@ bool tellsOfServer(const char* events, std::size_t bytes) {
 Watcher::Watcher()
     : epoll_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
       stop_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")),
-      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create")),
-      names_(checkCall(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK), "inotify_init1")) {
+      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create")) {
   add(epoll_.get(), stop_.get(), kStop);
   add(epoll_.get(), timer_.get(), kTimer);
-  add(epoll_.get(), names_.get(), kNames);
   const SignalsBlocked blocked;
   thread_ = std::thread([this] { run(); });
   ::pthread_setname_np(thread_.native_handle(), "mpf-watcher");
@@ -95,18 +93,27 @@ Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback cal
 
 Watcher::Token Watcher::watchNames(Callback callback) {
   const std::lock_guard lock(mutex_);
-  if (namesWatch_ < 0) namesWatch_ = checkCall(::inotify_add_watch(names_.get(), segments::path("").c_str(), IN_CREATE), "watch /dev/shm");
+  if (nameCallbacks_.empty()) openNames();
   const auto token = next_++;
   nameCallbacks_.emplace(token, std::move(callback));
+  updateTimer();
   return token;
+}
+
+// A user has few inotify instances (128 by default), so we hold one only while somebody waits, and do without when there is none left.
+void Watcher::openNames() {
+  names_.reset(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
+  if (!names_) return;
+  if (::inotify_add_watch(names_.get(), segments::path("").c_str(), IN_CREATE) < 0) return names_.reset();
+  add(epoll_.get(), names_.get(), kNames);
 }
 
 void Watcher::forget(Token token) {
   const std::lock_guard lock(mutex_);
   peers_.erase(token);
-  if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty()) {
-    ::inotify_rm_watch(names_.get(), namesWatch_);
-    namesWatch_ = -1;
+  if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty() && names_) {
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, names_.get(), nullptr);
+    unused_ = std::move(names_);
   }
   updateTimer();
 }
@@ -118,7 +125,9 @@ void Watcher::run() {
     for (int i = 0; i < count; ++i) {
       const auto token = events[static_cast<std::size_t>(i)].data.u64;
       if (token == kStop) return;
+      FileDescriptor closing;  // after the lock is free: the kernel takes some 15 ms to close an inotify instance
       const std::lock_guard lock(mutex_);
+      closing = std::move(unused_);
       handle(token);
     }
   }
@@ -154,7 +163,10 @@ void Watcher::readNames() {
   for (ssize_t got = 0; (got = ::read(names_.get(), events.data(), events.size())) > 0;) {
     news = tellsOfServer(events.data(), static_cast<std::size_t>(got)) || news;
   }
-  if (!news) return;
+  if (news) tellOfNames();
+}
+
+void Watcher::tellOfNames() {
   auto callbacks = nameCallbacks_;  // a callback may forget
   for (const auto& [token, callback] : callbacks) {
     if (nameCallbacks_.contains(token)) callback();
@@ -171,13 +183,15 @@ void Watcher::poll() {
   for (const auto token : gone) {
     if (peers_.contains(token)) report(token);
   }
+  if (!names_) tellOfNames();
 }
 
 void Watcher::updateTimer() {
-  bool needed = false;
+  bool needed = !names_ && !nameCallbacks_.empty();
   for (const auto& [token, peer] : peers_) needed = needed || !peer.process;
   itimerspec spec{};
   if (needed) spec.it_value.tv_nsec = spec.it_interval.tv_nsec = kPollNs;
+  if (unused_) spec.it_value.tv_nsec = 1;
   ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
 }
 

@@ -6,6 +6,7 @@
 //
 // Threads  any thread may call; callbacks run on the watcher's thread and must not wait.
 // Crash    what it cannot see by a pidfd (another pid namespace, a pid taken over) it sees by asking for the lock every 100 ms.
+//          So it does with names when the kernel has no inotify instance left for this user.
 // Trust    a peer's pid is only a hint where to look; the kernel's lock is the proof.
 #pragma once
 
@@ -46,15 +47,17 @@ class Watcher {
   void handle(Token token);
   bool isGone(const Peer& peer) const;
   void report(Token token);
+  void openNames();
   void readNames();
+  void tellOfNames();
   void poll();
   void updateTimer();
 
   FileDescriptor epoll_;
   FileDescriptor stop_;
   FileDescriptor timer_;
-  FileDescriptor names_;  // inotify; its watch exists while somebody waits for names
-  int namesWatch_ = -1;
+  FileDescriptor names_;   // inotify, while somebody waits for names; empty: polled
+  FileDescriptor unused_;  // what names_ was, for our thread to close
   std::recursive_mutex mutex_;  // callbacks run under it, so that forget() can promise what it does
   Token next_ = 16;             // below: our own descriptors
   std::map<Token, Peer> peers_;

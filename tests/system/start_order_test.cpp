@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Who starts first does not matter; a name is served by one process at a time.
+#include <unistd.h>
+
 #include <fmt/format.h>
+#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <thread>
 #include <vector>
 
+#include <mpf/server/message_server.h>
 #include <mpf/shm/backplane.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tests/support/victim.h>
@@ -99,6 +104,24 @@ TEST_F(StartOrderTest, ASuccessorOfAKilledServerOpensAtOnce) {
 
     server.end(SIGKILL);
   }
+}
+
+// By default a user has 128 inotify instances, and other programs want some, too.
+TEST_F(StartOrderTest, AClientFindsItsServerWhenTheKernelCannotTellItOfNewNames) {
+  constexpr int kMostToTake = 900;  // a process may have 1024 files
+  int limit = 0;
+  std::ifstream("/proc/sys/fs/inotify/max_user_instances") >> limit;
+  if (::geteuid() != 0 || limit > kMostToTake) GTEST_SKIP() << "only root can take all instances of a user who has nothing else running";
+  Victim client("crowd", backplane_.name(), {"1", "as", "65533", "65533", "without-inotify"});
+  EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not there");
+
+  MessageServer server(backplane_, "echo", {.location = 0, .rights = {.mode = 0666}});
+  server.on<Float64>([](Float64& request) { request.value += 1; });
+  std::thread serving([&] { server.run(); });
+
+  EXPECT_THAT(client.line(), testing::StartsWith("answered "));
+  server.interrupt();
+  serving.join();
 }
 
 TEST_F(StartOrderTest, OfManyThatStartAtOnceOneServes) {
