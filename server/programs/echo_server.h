@@ -34,7 +34,7 @@ int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
   const ServerLog log(echo.program, arguments.logLevel);
   MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);
   server.on<T>([](MessageOf<T>&) {});
-  log->info("serving \"{}\" at location {}", name, server.location());
+  log->info(R"(serving "{}" at location {})", name, server.location());
   const auto status = server.runUntilSignal();
   log->info("ends");
   return status;

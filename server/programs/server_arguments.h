@@ -8,7 +8,7 @@
 
 #include <mpf/server/message_server.h>
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
 class App;
 }
 

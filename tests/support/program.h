@@ -21,21 +21,7 @@ namespace mpf::test {
 class Program {
  public:
   // Starts `command`: a path and its arguments.
-  explicit Program(std::vector<std::string> command) {
-    std::vector<char*> arguments;
-    for (auto& word : command) arguments.push_back(word.data());
-    arguments.push_back(nullptr);
-    std::array<int, 2> pipe{};
-    checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
-    errors_.reset(pipe[0]);
-    const FileDescriptor writeEnd(pipe[1]);
-    pid_ = checkCall(::fork(), "fork");
-    if (pid_ != 0) return;
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    ::dup2(writeEnd.get(), STDERR_FILENO);
-    ::execv(arguments[0], arguments.data());
-    ::_exit(127);
-  }
+  explicit Program(std::vector<std::string> command) { start(command); }
   ~Program() {
     if (pid_ != 0) end(SIGKILL);
   }
@@ -65,6 +51,21 @@ class Program {
   }
 
  private:
+  void start(std::vector<std::string>& command) {
+    std::vector<char*> arguments;
+    for (auto& word : command) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    std::array<int, 2> pipe{};
+    checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
+    errors_.reset(pipe[0]);
+    const FileDescriptor writeEnd(pipe[1]);
+    pid_ = checkCall(::fork(), "fork");
+    if (pid_ != 0) return;
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ::dup2(writeEnd.get(), STDERR_FILENO);
+    ::execv(arguments[0], arguments.data());
+    ::_exit(127);
+  }
   FileDescriptor errors_;
   pid_t pid_ = 0;
 };

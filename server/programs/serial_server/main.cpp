@@ -50,7 +50,7 @@ int main(int argc, char** argv) try {
   mpf::SerialServer serial(server, *port, options.serial, log);
   const mpf::SniffServer sniff(backplane, options.server, arguments.messages, *port, log);
   const mpf::StopThread stop([&] { serial.stop(); });
-  log->info("serving {} ({}) as \"{}\" at location {}; listeners: \"{}\"", port->description(), options.describeLine(), server.getName(),
+  log->info(R"(serving {} ({}) as "{}" at location {}; listeners: "{}")", port->description(), options.describeLine(), server.getName(),
             server.location(), sniff.getName());
   if (port->state() == mpf::SerialPortState::unplugged) log->warn("the line is not there yet: {}", port->unpluggedBecause());
   server.run();
