@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+// Usage, errors and exit statuses of `mpf`.
+#include <mpf/tests/tools/tools_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+constexpr std::array<const char*, 7> kSubcommands{"ls", "mrr", "msr", "call", "sniff", "clean", "bench"};
+
+class CommandLineTest : public ToolsTest {};
+
+TEST_F(CommandLineTest, WithoutAnythingItShowsHowToUseIt) {
+  const auto ended = run({});
+
+  EXPECT_EQ(ended.status, 2);
+  EXPECT_THAT(ended.out, IsEmpty());
+  EXPECT_THAT(ended.err, StartsWith("mpf - looks at backplanes, servers and clients"));
+  for (const auto* name : kSubcommands) EXPECT_THAT(ended.err, HasSubstr(std::string("\n  ") + name + " "));
+}
+
+TEST_F(CommandLineTest, HelpGoesToStdout) {
+  const auto ended = run({"--help"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.err, IsEmpty());
+  for (const auto* name : kSubcommands) EXPECT_THAT(ended.out, HasSubstr(std::string("\n  ") + name + " "));
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF_BACKPLANE"), HasSubstr("MPF_LOCATION"), HasSubstr("Exit status: 0 done")));
+}
+
+TEST_F(CommandLineTest, EachSubcommandHasItsHelp) {
+  for (const std::string name : kSubcommands) {
+    if (name == "bench") continue;  // another program's
+
+    const auto ended = run({name, "--help"});
+
+    EXPECT_EQ(ended.status, 0) << name;
+    EXPECT_THAT(ended.out, AllOf(HasSubstr("Usage: mpf " + name), HasSubstr("--backplane"))) << name;
+    EXPECT_THAT(ended.err, IsEmpty()) << name;
+  }
+}
+
+TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
+  const auto ended = run({"nonsense", "--json"});
+
+  EXPECT_EQ(ended.status, 2);
+  EXPECT_THAT(ended.out, IsEmpty());
+  EXPECT_EQ(ended.err,
+            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, call, sniff, clean, bench; "
+            "`mpf --help` shows what they do\n");
+}
+
+struct Wrong {
+  std::vector<std::string> words;
+  std::string text;
+};
+
+// Each says what is wrong and where it is said how it is right.
+TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
+  const std::vector<Wrong> wrong{
+      {{"ls", "--jason"}, "mpf ls: The following argument was not expected: --jason; `mpf ls --help`"},
+      {{"ls", "--interval", "0"}, "mpf ls: --interval: Value 0 not in range 1 to 3600000; `mpf ls --help`"},
+      {{"msr", "a", "b"}, "mpf msr: The following argument was not expected: b; `mpf msr --help`"},
+      {{"call"}, "mpf call: server is required; `mpf call --help`"},
+      {{"call", "echo"}, "mpf call: type is required; `mpf call --help`"},
+      {{"call", "echo", "int32", "--count", "0"}, "mpf call: --count: Value 0 not in range"},
+      {{"call", "echo", "int32", "--timeout", "0"}, "mpf call: --timeout: 0 is no time: use a number of seconds above 0 to 1e9"},
+      {{"call", "echo", "int32", "--timeout", "nan"}, "mpf call: --timeout: nan is no time"},
+      {{"call", "echo", "int32", "--interval", "-1"}, "mpf call: --interval: -1 is no time: use a number of seconds from 0 to 1e9"},
+      {{"call", "echo", "int32", "--follow", "1e300"}, "mpf call: --follow: 1e300 is no time"},
+      {{"call", "echo", "int32", "--location", "here"}, "mpf call: Could not convert: --location = here"},
+      {{"sniff"}, "mpf sniff: server is required; `mpf sniff --help`"},
+      {{"sniff", "serial[0]", "soon"}, "mpf sniff: seconds: soon is no time"},
+      {{"sniff", "serial[0]", "--format", "hex"}, "mpf sniff: --format: hex not in {lines,manual}"},
+  };
+  for (const auto& [words, text] : wrong) {
+    const auto ended = run(words);
+
+    EXPECT_EQ(ended.status, 2) << text;
+    EXPECT_THAT(ended.err, StartsWith(text));
+    EXPECT_THAT(ended.out, IsEmpty());
+  }
+}
+
+TEST_F(CommandLineTest, NamesThatCannotBeAreNamed) {
+  for (const std::string name : {"ls", "mrr", "msr", "clean"}) {
+    const auto ended = run({name, "--backplane", "a.b"});
+    EXPECT_EQ(ended.status, 2);
+    EXPECT_EQ(ended.err, "mpf: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
+  }
+  EXPECT_EQ(runTool({"call", "echo", "int32"}, "a/b").err, "mpf: backplane name \"a/b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
+
+  const auto ended = run({"call", std::string(64, 'x'), "int32"});
+
+  EXPECT_EQ(ended.status, 2);
+  EXPECT_THAT(ended.err, HasSubstr("use 1 to 63 bytes without control characters"));
+}
+
+}  // namespace
+}  // namespace mpf::test

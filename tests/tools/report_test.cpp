@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: MIT
+// ls, mrr and msr: what they say of servers and clients in every state.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <set>
+
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/tools/tools_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::MatchesRegex;
+using testing::SizeIs;
+using testing::StartsWith;
+
+std::vector<std::string> linesOf(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+// A server and a client that take turns: what waits stays where it is.
+class ReportTest : public ToolsTest {
+ protected:
+  void openServer(const std::string& name, int queueSize = 100) {
+    server_ = std::make_unique<MessageServer>(backplane_, name, ServerOptions{.location = 0, .queueSize = queueSize});
+    server_->on<Int32>([](Int32&) {});
+  }
+  void connect() {
+    dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+    client_ = std::make_unique<MessageClient>(*dispatcher_, [this](const Message&) { ++taken_; });
+    client_->bind(server_->getName(), 0);
+    while (!client_->isConnected()) {
+      server_->handleOne();
+      dispatcher_->runOnce(Deadline::after(100us));
+    }
+  }
+  [[nodiscard]] SendResult send() const { return client_->send(Int32Message()); }
+  void handle(int requests) {
+    for (int done = 0; done < requests;) done += server_->handleOne() ? 1 : 0;
+  }
+  void TearDown() override {
+    client_.reset();
+    dispatcher_.reset();
+    server_.reset();
+    ToolsTest::TearDown();
+  }
+
+  int taken_ = 0;
+  std::unique_ptr<MessageServer> server_;
+  std::unique_ptr<Dispatcher> dispatcher_;
+  std::unique_ptr<MessageClient> client_;
+};
+
+TEST_F(ReportTest, AnEmptyBackplaneIsSaidToBeEmpty) {
+  EXPECT_EQ(run({"ls"}).out, "backplane " + backplane_.name() + "\n  no server\n  no client\n");
+  EXPECT_EQ(run({"mrr", "--interval", "1"}).out, "backplane " + backplane_.name() + "\nclientRouterList\nserverRouterList\n");
+  EXPECT_EQ(run({"msr"}).out, "no server\n");
+  EXPECT_EQ(report({"msr"}), nlohmann::json::array());
+}
+
+TEST_F(ReportTest, ServersAndClientsAreListed) {
+  openServer("dac/1");
+  connect();
+  const auto pid = std::to_string(::getpid());
+
+  const auto ended = run({"ls"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.err, IsEmpty());
+  EXPECT_THAT(linesOf(ended.out), ElementsAre("backplane " + backplane_.name(),
+                                              MatchesRegex("  SERVER +LOCATION +STATE +PID +PROGRAM +CLIENTS +WAITING +REQUESTS +AGE"),
+                                              MatchesRegex("  dac/1 +0 +alive +" + pid + " +tools_test +1 +0 +0 +[0-9.]+ [mun]?s"),
+                                              MatchesRegex("  CLIENT +STATE +PID +PROGRAM +UNANSWERED +AGE +SERVERS"),
+                                              MatchesRegex("  tools_test +alive +" + pid + " +tools_test +0 +[0-9.]+ [mun]?s +dac/1")));
+}
+
+TEST_F(ReportTest, ProgramsLearnTheSame) {
+  openServer("dac/1", 7);
+  connect();
+  ASSERT_EQ(send(), SendResult::sent);
+  ASSERT_EQ(send(), SendResult::sent);
+  handle(1);
+
+  const auto all = ls();
+
+  EXPECT_EQ(all.at("backplane"), backplane_.name());
+  EXPECT_THAT(all.at("problems"), SizeIs(0));
+  EXPECT_THAT(all.at("waiting"), SizeIs(0));
+  ASSERT_THAT(all.at("servers"), SizeIs(1));
+  const auto& server = all.at("servers").at(0);
+  EXPECT_EQ(server.at("name"), "dac/1");
+  EXPECT_EQ(server.at("pid"), ::getpid());
+  EXPECT_EQ(server.at("program"), "tools_test");
+  EXPECT_EQ(server.at("location"), 0);
+  EXPECT_EQ(server.at("queue_size"), 7);
+  EXPECT_EQ(server.at("received"), 1);
+  EXPECT_EQ(server.at("replies"), 1);
+  ASSERT_THAT(server.at("links"), SizeIs(1));
+  EXPECT_EQ(server.at("links").at(0).at("peer_pid"), ::getpid());
+  ASSERT_THAT(all.at("clients"), SizeIs(1));
+  ASSERT_THAT(all.at("clients").at(0).at("links"), SizeIs(1));
+  const auto& link = all.at("clients").at(0).at("links").at(0);
+  EXPECT_EQ(link.at("server"), "dac/1");
+  EXPECT_EQ(link.at("client_state"), "open");
+  EXPECT_EQ(link.at("server_state"), "open");
+  EXPECT_EQ(link.at("requests"), (nlohmann::json{{"sent", 2}, {"taken", 1}, {"waiting", 1}}));
+  EXPECT_EQ(link.at("replies"), (nlohmann::json{{"sent", 1}, {"taken", 0}, {"waiting", 1}}));
+  EXPECT_EQ(link.at("unanswered"), 2);
+}
+
+TEST_F(ReportTest, AClientThatWaitsForItsServerIsListed) {
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+  MessageClient client(*dispatcher_, [](const Message&) {});
+  client.bind("later", 3);
+  while (client.notConnectedBecause().find("not there") == std::string::npos) dispatcher_->runOnce(Deadline::after(100us));
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
+
+  const auto all = ls();
+  const auto text = run({"ls"}).out;
+  const auto routers = run({"mrr", "--interval", "1"}).out;
+
+  EXPECT_EQ(all.at("waiting"), (nlohmann::json{{{"server", "later"}, {"location", 3}, {"pid", ::getpid()}}}));
+  EXPECT_THAT(text, AllOf(HasSubstr("no server\n"), HasSubstr("later@3 (waiting)\n")));
+  EXPECT_THAT(routers, HasSubstr("   Server later@3 has 1 client. bindState waiting for the server\n"));
+}
+
+TEST_F(ReportTest, ADeadServerIsDead) {
+  Victim victim("serve", backplane_.name());
+  ASSERT_EQ(victim.line(), "open");
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "alive");
+
+  victim.end(SIGKILL);
+
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "dead");
+  EXPECT_THAT(run({"mrr", "--interval", "1"}).out, HasSubstr("] dead (removed by the next program that attaches) queueSize 32 "));
+  EXPECT_THAT(run({"msr", "echo"}).out, HasSubstr("              state dead, pid "));
+  static_cast<void>(backplane_.removeDead());
+}
+
+TEST_F(ReportTest, AStoppedProcessIsStopped) {
+  Victim victim("serve", backplane_.name());
+  ASSERT_EQ(victim.line(), "open");
+
+  victim.signal(SIGSTOP);
+  int status = 0;
+  ASSERT_EQ(::waitpid(victim.pid(), &status, WUNTRACED), victim.pid());
+
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "stopped");
+  victim.signal(SIGCONT);
+  ASSERT_EQ(::waitpid(victim.pid(), &status, WCONTINUED), victim.pid());
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "alive");
+  EXPECT_EQ(victim.end(SIGTERM), 0);
+}
+
+TEST_F(ReportTest, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
+  openServer("echo");
+  connect();
+  EXPECT_EQ(ls().at("servers").at(0).at("state"), "alive");
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(send(), SendResult::sent);
+
+  EXPECT_EQ(ls().at("servers").at(0).at("state"), "stalled");
+  EXPECT_THAT(run({"ls"}).out, testing::ContainsRegex("  echo +0 +stalled +[0-9]+ +tools_test +1 +3 +0 "));
+  handle(3);
+  const auto now = ls();
+  EXPECT_EQ(now.at("servers").at(0).at("state"), "alive");
+  EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it takes no replies";
+}
+
+// The example of the manual, "Diagnostic Aids": the same lines, with numbers that the test has made.
+TEST_F(ReportTest, MsrBeginsWithTheManualsLines) {
+  openServer("serial[7]", 2);
+  connect();
+  ASSERT_EQ(send(), SendResult::sent);
+  handle(1);
+  ASSERT_EQ(send(), SendResult::sent);
+  ASSERT_EQ(send(), SendResult::sent);
+  ASSERT_EQ(send(), SendResult::queueFull);
+
+  const auto ended = run({"msr", "serial[7]"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.out, StartsWith("serial[7]\n"
+                                    "          queueSize 2\n"
+                                    "            inQueue 2\n"
+                                    "      queueRequests 1\n"
+                                    " queueFullResponses 1\n"
+                                    "      replyRequests 1\n"
+                                    "              state stalled, pid "));
+  EXPECT_THAT(ended.out, testing::ContainsRegex("  client +pid +state +inQueue +unanswered +requests +replies +notTaken +refused +bytes\n"
+                                                "  tools_test +[0-9]+ +[a-z]+ +2 +3 +3 +1 +1 +1 +[0-9]+\n"));
+}
+
+TEST_F(ReportTest, MsrReportsAllServersOrTheOneThatIsNamed) {
+  openServer("one");
+  const MessageServer two(backplane_, "two");
+
+  EXPECT_THAT(report({"msr"}), SizeIs(2));
+  const auto named = report({"msr", "two"});
+  ASSERT_THAT(named, SizeIs(1));
+  EXPECT_EQ(named.at(0).at("name"), "two");
+  EXPECT_EQ(named.at(0).at("backplane"), backplane_.name());
+}
+
+TEST_F(ReportTest, MsrOfAServerThatIsNotThereNamesIt) {
+  const auto ended = run({"msr", "serial[7]"});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_EQ(ended.err, "mpf msr: no server \"serial[7]\"; `mpf ls` shows those that there are\n");
+}
+
+// What a server's histograms say: a distribution, its percentiles, and the same for programs.
+TEST_F(ReportTest, MsrShowsHowLongRequestsTake) {
+  const EchoThread echo(backplane_, "echo");
+  SyncClient client(backplane_, "echo", 0);
+  const auto isSampled = [&] { return report({"msr", "echo"}).at(0).at("service").at("count").get<int>() != 0; };
+  while (!isSampled()) {
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(client.call(Int32Message(), 60s));
+  }
+
+  const auto text = run({"msr", "echo"}).out;
+  const auto service = report({"msr", "echo"}).at(0).at("service");
+
+  EXPECT_THAT(text, testing::ContainsRegex("            service p50 [0-9.]+ [mun]?s, p99 [0-9.]+ [mun]?s, p99.9 [0-9.]+ [mun]?s, max "));
+  EXPECT_LE(service.at("p50_ns"), service.at("p99_ns"));
+  EXPECT_LE(service.at("p999_ns"), service.at("max_ns"));
+}
+
+TEST_F(ReportTest, MrrHasTheManualsLines) {
+  openServer("Int32");
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("Int32", 0);
+  while (!second.isConnected()) {
+    server_->handleOne();
+    dispatcher_->runOnce(Deadline::after(100us));
+  }
+  ASSERT_EQ(send(), SendResult::sent);
+  const auto us = "tools_test\\[" + std::to_string(::getpid()) + "\\]";
+
+  const auto ended = run({"mrr", "--interval", "100"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(linesOf(ended.out),
+              ElementsAre("backplane " + backplane_.name(), "clientRouterList",
+                          MatchesRegex(" 1 " + us + " stateConnected queueSize 100 inQueue 1 sendQueueFull 0 unanswered 1"),
+                          "   Server Int32 has 2 clients. bindState connected", "   sendPerSec 0 receivePerSec 0", "serverRouterList",
+                          MatchesRegex(" 1 Int32\\[[0-9]+\\] stalled queueSize 100 inQueue 1 replyQueueFull 0 clients 2"),
+                          "   sendPerSec 0 receivePerSec 0"));
+}
+
+TEST_F(ReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
+  const EchoThread echo(backplane_, "echo");
+  const Tool load({"call", "echo", "int32", "--count", "1000000000"}, backplane_.name());
+  while (entryOf(ls().at("servers"), "name", "echo").at("received") == 0) continue;
+
+  const auto all = ls();
+
+  const auto& server = all.at("servers").at(0);
+  const auto& client = all.at("clients").at(0);
+  EXPECT_GT(server.at("received_per_s"), 0);
+  EXPECT_GT(server.at("sent_per_s"), 0);
+  EXPECT_GT(client.at("received_per_s"), 0);
+  EXPECT_GT(client.at("sent_per_s"), 0);
+  load.signal(SIGINT);
+  while (!backplane_.removeDead().empty() || entryOf(ls().at("clients"), "pid", load.pid()) != nullptr) continue;
+}
+
+TEST_F(ReportTest, NamesInAnyLanguageAreAligned) {
+  const MessageServer oven(backplane_, "Ofen-Süd [°C]", {.location = 0});
+  const MessageServer plain(backplane_, "oven", {.location = 0});
+
+  const auto lines = linesOf(run({"ls"}).out);
+
+  ASSERT_THAT(lines, SizeIs(5));
+  EXPECT_THAT(lines[1], StartsWith("  SERVER         LOCATION  STATE"));
+  EXPECT_THAT(lines[2], StartsWith("  Ofen-Süd [°C]         0  alive"));
+  EXPECT_THAT(lines[3], StartsWith("  oven                  0  alive"));
+}
+
+TEST_F(ReportTest, ANameThatIsNoTextIsReportedAllTheSame) {
+  const MessageServer server(backplane_, "a\xff", {.location = 0});
+
+  EXPECT_EQ(ls().at("servers").at(0).at("name"), "a\uFFFD");
+  EXPECT_THAT(run({"ls"}).out, HasSubstr("  a\xff "));
+}
+
+TEST_F(ReportTest, ServersOfOneNameAtTwoLocationsAreToldApart) {
+  openServer("dac");
+  const EchoThread other(backplane_, "dac", {.location = 2});
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("dac", 2);
+  while (!second.isConnected()) dispatcher_->runOnce(Deadline::after(100us));
+
+  const auto text = run({"ls"}).out;
+  const auto routers = run({"mrr", "--interval", "1"}).out;
+
+  EXPECT_THAT(text, HasSubstr("dac, dac@2\n"));
+  EXPECT_THAT(routers,
+              AllOf(HasSubstr("   Server dac has 1 client. bindState connected\n   Server dac@2 has 1 client. bindState connected\n"),
+                    HasSubstr(" 2 dac@2[")));
+}
+
+TEST_F(ReportTest, AProcessWithThousandsOfClientsIsOneLine) {
+  const EchoThread echo(backplane_, "echo");
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+  std::vector<std::unique_ptr<MessageClient>> clients;
+  for (int i = 0; i < 3000; ++i) {
+    clients.push_back(std::make_unique<MessageClient>(*dispatcher_, [](const Message&) {}));
+    clients.back()->bind("echo", 0);
+  }
+  for (const auto& client : clients) ASSERT_TRUE(client->connectWait(60s));
+
+  const auto text = run({"ls"}).out;
+
+  EXPECT_THAT(text, HasSubstr("  echo x 3000\n"));
+  EXPECT_THAT(run({"mrr", "--interval", "1"}).out, HasSubstr("   Server echo has 3000 clients. bindState connected\n"));
+}
+
+TEST_F(ReportTest, AClientOfManyServersShowsSome) {
+  std::vector<std::unique_ptr<EchoThread>> servers;
+  std::vector<std::unique_ptr<MessageClient>> clients;
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+  for (char letter = 'a'; letter < 'j'; ++letter) {
+    servers.push_back(std::make_unique<EchoThread>(backplane_, std::string(1, letter)));
+    clients.push_back(std::make_unique<MessageClient>(*dispatcher_, [](const Message&) {}));
+    clients.back()->bind(std::string(1, letter));
+    ASSERT_TRUE(clients.back()->connectWait(60s));
+  }
+
+  const auto text = run({"ls"}).out;
+
+  EXPECT_THAT(text, HasSubstr("  a, b, c, d, e, f, 3 more\n"));
+  clients.clear();
+}
+
+TEST_F(ReportTest, WithoutABackplaneAllAreReported) {
+  const MessageServer here(backplane_, "here");
+  const auto elsewhere = Backplane::isolated();
+  const MessageServer there(elsewhere, "there");
+
+  const auto ended = runTool({"msr", "--json", "--interval", "1"}, "");
+
+  EXPECT_EQ(ended.status, 0);
+  const auto all = nlohmann::json::parse(ended.out);
+  EXPECT_EQ(entryOf(all, "backplane", backplane_.name()).at("name"), "here");
+  EXPECT_EQ(entryOf(all, "backplane", elsewhere.name()).at("name"), "there");
+}
+
+TEST_F(ReportTest, AnArgumentIsStrongerThanTheEnvironment) {
+  const MessageServer server(backplane_, "here");
+
+  const auto ended = runTool({"msr", "--backplane", backplane_.name()}, "another");
+
+  EXPECT_THAT(ended.out, StartsWith("here\n"));
+}
+
+}  // namespace
+}  // namespace mpf::test
