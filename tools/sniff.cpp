@@ -35,7 +35,7 @@ class Sniffer {
       : server_(arguments.server),
         service_(arguments.server + std::string(serial::sniffSuffix)),
         format_(SniffFormat::make(arguments.json ? "json" : arguments.format, realtimeOffsetNs())),
-        end_(arguments.seconds > 0 ? Deadline::after(ofSeconds(arguments.seconds)) : Deadline::never()),
+        seconds_(arguments.seconds),
         dispatcher_(Backplane::attach(arguments.backplane)),
         client_(dispatcher_, [this](Message&& message) { take(std::move(message)); }),
         stop_([](void* self) noexcept { static_cast<Sniffer*>(self)->stop(); }, this) {
@@ -43,15 +43,16 @@ class Sniffer {
   }
 
   int run() {
-    const auto limit = std::min(end_, Deadline::after(kConnectLimit));
+    const auto limit = Deadline::after(kConnectLimit);
     while (!client_.isConnected() && !isOver(limit)) dispatcher_.runOnce(limit);
+    const auto end = seconds_ > 0 ? Deadline::after(ofSeconds(seconds_)) : Deadline::never();
     if (!client_.isConnected()) {
       fmt::print(stderr, "mpf sniff: {}; is it a serial server, and does it run? `mpf ls` shows\n", client_.notConnectedBecause());
       return 1;
     }
-    while (!isOver(end_)) {
+    while (!isOver(end)) {
       // What was begun is shown when the line has been quiet for a while.
-      if (!dispatcher_.runOnce(std::min(end_, Deadline::after(kQuiet)))) show(format_->flush());
+      if (!dispatcher_.runOnce(std::min(end, Deadline::after(kQuiet)))) show(format_->flush());
     }
     takeTheRest();
     show(format_->flush());
@@ -132,7 +133,7 @@ class Sniffer {
   std::string server_;
   std::string service_;
   std::unique_ptr<SniffFormat> format_;
-  Deadline end_;
+  double seconds_;  // 0: until a signal
   std::uint64_t seen_ = 0;
   std::uint64_t missing_ = 0;
   bool isListening_ = false;

@@ -24,7 +24,7 @@ TEST_F(CleanTest, WithoutAnythingDeadItSaysSo) {
 
   EXPECT_EQ(ended.status, 0);
   EXPECT_EQ(ended.out, "nothing to remove: no dead process left anything\n");
-  EXPECT_EQ(run({"call", "echo", "int32"}).status, 0);
+  EXPECT_EQ(run({"call", "echo", "int32", "--timeout", "100"}).status, 0);
 }
 
 TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
