@@ -134,7 +134,7 @@ TEST_F(WindowTest, ANameThatNobodyHasAndNobodyMayRemoveIsAnError) {
   const auto path = segments::path(serverName());
   ASSERT_EQ(::mkdir(path.c_str(), 0700), 0);
 
-  const auto why = whatOf<NameInUse>([&] { static_cast<void>(makeServer()); });
+  const auto why = whatOf<SegmentError>([&] { static_cast<void>(makeServer()); });
 
   EXPECT_THAT(why, HasSubstr(path));
   ASSERT_EQ(::rmdir(path.c_str()), 0);
