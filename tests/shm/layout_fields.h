@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+// Every field of layout.h with its place, as JSON: what the tables of docs/shm-layout.md are compared with.
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+
+#include <mpf/shm/layout.h>
+
+namespace mpf::test {
+
+#define MPF_FIELD(name)                                     \
+  {                                                         \
+    #name, { offsetof(Struct, name), sizeof(Struct::name) } \
+  }
+
+inline nlohmann::json layoutFields() {
+  using namespace layout;
+  nlohmann::json all;
+  {
+    using Struct = SegmentHeader;
+    all["SegmentHeader"] = {{"bytes", sizeof(Struct)},
+                            {"fields",
+                             {MPF_FIELD(magic),
+                              MPF_FIELD(layoutMajor),
+                              MPF_FIELD(layoutMinor),
+                              MPF_FIELD(kind),
+                              MPF_FIELD(totalBytes),
+                              MPF_FIELD(incarnation),
+                              MPF_FIELD(ownerWindow),
+                              MPF_FIELD(ownerPid),
+                              MPF_FIELD(ownerUid),
+                              MPF_FIELD(ownerStartTicks),
+                              MPF_FIELD(pidNamespace),
+                              MPF_FIELD(createdMonotonicNs),
+                              MPF_FIELD(createdRealtimeNs),
+                              MPF_FIELD(location),
+                              MPF_FIELD(reserved0),
+                              MPF_FIELD(backplane),
+                              MPF_FIELD(name),
+                              MPF_FIELD(program),
+                              MPF_FIELD(queueSlots),
+                              MPF_FIELD(replySlots),
+                              MPF_FIELD(queueSize),
+                              MPF_FIELD(maxOutstanding),
+                              MPF_FIELD(maxMessageBytes),
+                              MPF_FIELD(maxPoolBytes),
+                              MPF_FIELD(linkMode),
+                              MPF_FIELD(linkGroup),
+                              MPF_FIELD(waitMode),
+                              MPF_FIELD(clientIndex),
+                              MPF_FIELD(serverWindow),
+                              MPF_FIELD(clientWindow),
+                              MPF_FIELD(ringBytesOffset),
+                              MPF_FIELD(chunkBytes),
+                              MPF_FIELD(chunkCount),
+                              MPF_FIELD(bulkSide),
+                              MPF_FIELD(reserved)}}};
+  }
+  {
+    using Struct = WindowControl;
+    all["WindowControl"] = {{"bytes", sizeof(Struct)},
+                            {"fields", {MPF_FIELD(sleeping),  MPF_FIELD(state),          MPF_FIELD(linkCount),    MPF_FIELD(queueSize),
+                                        MPF_FIELD(reserved0), MPF_FIELD(progress),       MPF_FIELD(progressAtNs), MPF_FIELD(received),
+                                        MPF_FIELD(sent),      MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),    MPF_FIELD(expired),
+                                        MPF_FIELD(refused),   MPF_FIELD(wakes),          MPF_FIELD(linksOpened),  MPF_FIELD(linksClosed),
+                                        MPF_FIELD(peersDied), MPF_FIELD(protocolErrors), MPF_FIELD(reserved),     MPF_FIELD(queueWaitNs),
+                                        MPF_FIELD(serviceNs)}}};
+  }
+  {
+    using Struct = Histogram;
+    all["Histogram"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(buckets), MPF_FIELD(maxNs), MPF_FIELD(reserved)}}};
+  }
+  {
+    using Struct = WindowHints;
+    all["WindowHints"] = {{"bytes", sizeof(Struct)},
+                          {"fields",
+                           {MPF_FIELD(header), MPF_FIELD(bell), MPF_FIELD(knocked), MPF_FIELD(rescan), MPF_FIELD(knocks),
+                            MPF_FIELD(readyWords), MPF_FIELD(readyBits)}}};
+  }
+  {
+    using Struct = LinkControl;
+    all["LinkControl"] = {{"bytes", sizeof(Struct)},
+                          {"fields",
+                           {MPF_FIELD(clientState), MPF_FIELD(clientSent), MPF_FIELD(clientRefused), MPF_FIELD(clientUnanswered),
+                            MPF_FIELD(serverState), MPF_FIELD(serverIndex), MPF_FIELD(reserved0), MPF_FIELD(serverSent),
+                            MPF_FIELD(requests), MPF_FIELD(replies), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
+  }
+  {
+    using Struct = RingControl;
+    all["RingControl"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(unwatched), MPF_FIELD(freed), MPF_FIELD(taken)}}};
+  }
+  {
+    using Struct = Slot;
+    all["Slot"] = {{"bytes", sizeof(Struct)},
+                   {"fields",
+                    {MPF_FIELD(sequence), MPF_FIELD(type), MPF_FIELD(slots), MPF_FIELD(flags), MPF_FIELD(bodyBytes), MPF_FIELD(requestId),
+                     MPF_FIELD(clientType), MPF_FIELD(clientExtra), MPF_FIELD(sentTick), MPF_FIELD(deadlineNs), MPF_FIELD(body)}}};
+  }
+  {
+    using Struct = MoreSlot;
+    all["MoreSlot"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(sequence), MPF_FIELD(body)}}};
+  }
+  {
+    using Struct = ReturnRing;
+    all["ReturnRing"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(returned), MPF_FIELD(chunks)}}};
+  }
+  {
+    using Struct = ChunkRef;
+    all["ChunkRef"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(reserved)}}};
+  }
+  return all;
+}
+
+#undef MPF_FIELD
+
+inline nlohmann::json layoutConstants() {
+  using namespace layout;
+  return {{"magic", kMagic},
+          {"layoutMajor", kMajor},
+          {"layoutMinor", kMinor},
+          {"windowControlOffset", kWindowControlOffset},
+          {"linkControlOffset", kLinkControlOffset},
+          {"linkRingsOffset", kLinkRingsOffset},
+          {"bulkChunksOffset", kBulkChunksOffset},
+          {"maxLinks", kMaxLinks},
+          {"maxRingSlots", kMaxRingSlots},
+          {"maxMessageSlots", kMaxMessageSlots},
+          {"inlineBodyBytes", kInlineBodyBytes},
+          {"knocks", kKnocks},
+          {"returnSlots", kReturnSlots},
+          {"histogramBuckets", kHistogramBuckets}};
+}
+
+inline nlohmann::json layoutKinds() {
+  using layout::SegmentKind;
+  return {{"serverWindow", SegmentKind::serverWindow},
+          {"clientWindow", SegmentKind::clientWindow},
+          {"hints", SegmentKind::hints},
+          {"link", SegmentKind::link},
+          {"bulk", SegmentKind::bulk},
+          {"wish", SegmentKind::wish}};
+}
+
+}  // namespace mpf::test
