@@ -55,5 +55,44 @@ TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
   EXPECT_EQ(run({"clean"}).out, "nothing to remove: no dead process left anything\n");
 }
 
+TEST_F(CleanTest, WhatAnotherUserLeftIsNamed) {
+  constexpr uid_t kNobody = 65534;
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be two users";
+  if (Tool({"--help"}, "", kNobody).end().status != 0) GTEST_SKIP() << "nobody else can run " << MPF_TEST_TOOL;
+  const auto name = SegmentName::serverWindow(backplane_.name(), 0, "left");
+  {
+    auto window = Segment::create(layout::kWindowBytes, layout::SegmentKind::serverWindow, backplane_.name(), {.mode = 0644});
+    ASSERT_TRUE(window.tryPublish(name));
+  }
+
+  const auto ended = Tool({"clean"}, backplane_.name(), kNobody).end();
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_EQ(ended.err,
+            "mpf clean: " + segments::path(name) + " belongs to user 0, whose process is dead; that user or root may remove it\n");
+  EXPECT_EQ(run({"clean"}).out, "removed " + segments::path(name) + "\n");
+}
+
+// Nothing that lies there keeps it waiting or ends it.
+TEST_F(CleanTest, JunkUnderOurNamesDoesNoHarm) {
+  const EchoThread echo(backplane_, "echo");
+  const auto pathOf = [&](const std::string& rest) { return segments::path(SegmentName::prefix(backplane_.name()) + rest); };
+  for (const char* kind : {"s.0.a", "c.1", "h.1", "l.1.1", "w.1", "b.1.0.0", "f.1"}) {
+    std::filesystem::create_directory(pathOf(kind));
+  }
+  for (const char* kind : {"s.0.b", "c.2", "h.2", "l.1.2", "w.2", "b.2.0.0", "f.2"}) {
+    ASSERT_EQ(::mkfifo(pathOf(kind).c_str(), 0600), 0);
+  }
+
+  const auto ended = run({"clean"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  EXPECT_EQ(run({"call", "echo", "int32", "--timeout", "100"}).status, 0);
+  for (const auto& name : backplane_.segmentNames()) {
+    if (std::filesystem::is_directory(segments::path(name))) std::filesystem::remove(segments::path(name));
+  }
+  for (const char* kind : {"s.0.b", "c.2", "h.2", "l.1.2", "w.2", "b.2.0.0", "f.2"}) std::filesystem::remove(pathOf(kind));
+}
+
 }  // namespace
 }  // namespace mpf::test

@@ -35,8 +35,9 @@ struct Ended {
 
 class Tool {
  public:
-  // Runs `mpf` with these arguments and $MPF_BACKPLANE = backplane; empty: without the variable.
-  Tool(std::vector<std::string> arguments, const std::string& backplane) : err_(::memfd_create("stderr", MFD_CLOEXEC)) {
+  // Runs `mpf` with these arguments and $MPF_BACKPLANE = backplane; empty: without the variable. `user`: as whom, for a test that is root.
+  Tool(std::vector<std::string> arguments, const std::string& backplane, uid_t user = ::geteuid())
+      : err_(::memfd_create("stderr", MFD_CLOEXEC)) {
     checkCall(err_.get(), "memfd_create");
     std::array<int, 2> pipe{};
     checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
@@ -53,6 +54,7 @@ class Tool {
     envp.push_back(nullptr);
     pid_ = checkCall(::fork(), "fork");
     if (pid_ != 0) return;
+    if (user != ::geteuid() && ::setuid(user) != 0) ::_exit(125);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::dup2(nothing.get(), STDIN_FILENO);
     ::dup2(input.get(), STDOUT_FILENO);
