@@ -267,6 +267,34 @@ TEST_F(ReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
   EXPECT_EQ(load.end().status, 0);
 }
 
+void addKeys(const nlohmann::json& json, std::set<std::string>& keys) {
+  if (!json.is_structured()) return;
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_object()) keys.insert(key);
+    addKeys(value, keys);
+  }
+}
+
+// Whoever reads the JSON can look each field up.
+TEST_F(ReportTest, EachFieldIsInTheDocument) {
+  openServer("echo");
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("later", 0);
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
+  std::set<std::string> keys;
+  addKeys(ls(), keys);
+  addKeys(report({"msr", "echo"}), keys);
+  auto call = nlohmann::json::parse(run({"call", "nobody", "int32", "--timeout", "0.01", "--json"}).out);
+  call.at("why").clear();  // its keys are reasons
+  addKeys(call, keys);
+  std::ostringstream document;
+  document << std::ifstream(MPF_TEST_TOOLS_MD).rdbuf();
+
+  for (const auto& key : keys) EXPECT_THAT(document.str(), HasSubstr("`" + key + "`"));
+  EXPECT_GT(keys.size(), 40U);
+}
+
 TEST_F(ReportTest, NamesInAnyLanguageAreAligned) {
   const MessageServer oven(backplane_, "Ofen-Süd [°C]", {.location = 0});
   const MessageServer plain(backplane_, "oven", {.location = 0});
