@@ -3,6 +3,7 @@
 
 #include <spdlog/async.h>
 #include <spdlog/sinks/stdout_sinks.h>
+#include <utility>
 
 namespace mpf {
 namespace {
@@ -12,9 +13,9 @@ constexpr std::size_t kLinesThatMayWait = 1024;
 }  // namespace
 
 ServerLog::ServerLog(const std::string& program, const std::string& level)
-    : writer_(std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1)),
-      logger_(std::make_shared<spdlog::async_logger>(program, std::make_shared<spdlog::sinks::stderr_sink_mt>(), writer_,
-                                                     spdlog::async_overflow_policy::overrun_oldest)) {
+    : writer_(std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1)) {
+  auto errors = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+  logger_ = std::make_shared<spdlog::async_logger>(program, std::move(errors), writer_, spdlog::async_overflow_policy::overrun_oldest);
   logger_->set_level(spdlog::level::from_str(level));
   logger_->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
 }

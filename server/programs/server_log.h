@@ -27,8 +27,8 @@ class ServerLog {
   static const std::vector<std::string>& levels();
 
  private:
-  std::shared_ptr<spdlog::details::thread_pool> writer_;  // ends after it has written what waits
   std::shared_ptr<spdlog::logger> logger_;
+  std::shared_ptr<spdlog::details::thread_pool> writer_;  // last: ends first, after it has written what waits
 };
 
 }  // namespace mpf
