@@ -237,7 +237,7 @@ TEST_F(SomebodyElsesWindow, ThatCannotBeRemovedIsNamedToTheServer) {
     const AsNobody nobody;
 
     try {
-      MessageServer(backplane_, "device[0]/a", {.location = 0});
+      const MessageServer server(backplane_, "device[0]/a", {.location = 0});
       FAIL() << "it took the place of another user's window";
     } catch (const std::exception& error) {
       // One that cannot even be read may be in use.
