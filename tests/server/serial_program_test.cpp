@@ -83,6 +83,12 @@ class SerialProgramTest : public testing::Test {
   }
   static std::string linkPath() { return std::filesystem::temp_directory_path() / ("mpf-serial-program-" + std::to_string(::getpid())); }
 
+  // A test that needs no orderly end kills its server, whose names are then anybody's to remove.
+  void TearDown() override {
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
+  }
+
   Watchdog watchdog_{"serial program test"};
   std::string path_ = linkPath();
   Instrument instrument_{path_};
