@@ -164,7 +164,7 @@ TEST_F(WatcherTest, ACallbackMayForgetAndWatchOthers) {
   News news;
   News never;
   News later;
-  Watcher::Token own = 0;
+  std::atomic<Watcher::Token> own{0};
   const auto other = watcher_.watchPeer(open("second"), never.callback());
   own = watcher_.watchPeer(open("first"), [&] {
     watcher_.forget(own);

@@ -37,6 +37,7 @@ class CallTest : public ToolsTest {
     ToolsTest::TearDown();
   }
 
+  std::vector<Message> kept_;  // requests that the server answers never
   std::unique_ptr<MessageServer> server_;
   std::thread thread_;
 };
@@ -210,8 +211,7 @@ TEST_F(CallTest, ATypeThatTheServerDoesNotTakeIsRefused) {
 
 // Whether the server has taken it by then is up to the machine.
 TEST_F(CallTest, ARequestThatIsNotAnsweredInTimeHasAFate) {
-  std::vector<Message> kept;
-  serve([&](MessageServer& server) { server.on<Int32>([&](Int32Message&& request) { kept.push_back(std::move(request)); }); });
+  serve([&](MessageServer& server) { server.on<Int32>([&](Int32Message&& request) { kept_.push_back(std::move(request)); }); });
 
   const auto ended = run({"call", "special", "int32", "--timeout", "0.5"});
 
