@@ -38,8 +38,10 @@ format: setup ## format all sources
 format-check: setup ## name the sources that `make format` would change
 	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
 
-tidy: debug ## clang-tidy over the sources that changed since the last clean run
-	scripts/tidy build/debug $(JOBS)
+tidy: setup ## clang-tidy over the targets that changed since they were last clean
+	@cmake --preset tidy --log-level=NOTICE
+	@cmake --build --preset tidy --parallel $(JOBS)
+	scripts/tidy build/tidy $(JOBS)
 
 clean: ## remove build/
 	$(RM) -r build

@@ -15,9 +15,6 @@
 namespace mpf::bench {
 namespace {
 
-constexpr const char* kServer = "bench";
-constexpr auto kConnectLimit = std::chrono::seconds(10);
-
 class MpfPeer final : public Peer {
  public:
   explicit MpfPeer(PeerOptions options) : options_(std::move(options)) {}

@@ -2,6 +2,7 @@
 // What the measurements of ours have in common.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include <mpf/benchmarks/mode.h>
@@ -10,6 +11,8 @@
 namespace mpf::bench {
 
 inline constexpr const char* kMpf = "MPF";
+inline constexpr const char* kServer = "bench";
+inline constexpr auto kConnectLimit = std::chrono::seconds(10);
 
 [[nodiscard]] WaitMode waitMode(Mode mode) noexcept;
 [[nodiscard]] ServerOptions serverOptions(Mode mode);

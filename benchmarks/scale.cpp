@@ -22,9 +22,6 @@
 namespace mpf::bench {
 namespace {
 
-constexpr const char* kServer = "bench";
-constexpr auto kConnectLimit = std::chrono::seconds(10);
-
 void ignore(Message&&) {}
 
 // Each link takes descriptors.

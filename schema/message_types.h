@@ -257,11 +257,13 @@ constexpr BodyLayout layoutOf() {
   }
 }
 
-inline constexpr auto kLayouts = []<class... T>(std::type_identity<std::tuple<T...>>) {
+template <class... T>
+constexpr auto layoutsOf(std::type_identity<std::tuple<T...>> /*types*/) {
   std::array<BodyLayout, sizeof...(T) + 1> layouts{};
   ((layouts[static_cast<std::size_t>(T::kType)] = layoutOf<T>()), ...);
   return layouts;
-}(std::type_identity<MessageTypes>{});
+}
+inline constexpr auto kLayouts = layoutsOf(std::type_identity<MessageTypes>{});
 inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
 
 }  // namespace detail

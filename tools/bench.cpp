@@ -19,6 +19,7 @@ int bench(std::vector<std::string> words) {
   const auto program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mpf-bench").string();
   words.insert(words.begin(), program);
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (auto& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   ::execv(program.c_str(), arguments.data());

@@ -97,8 +97,9 @@ class Caller {
   }
 
   void callOnce() {
-    std::string error;  // parsed before: nothing is wrong with it
+    std::string error;
     auto message = tryParse(type_, arguments_.fields, error);
+    if (!message) throw std::logic_error(error);  // parsed before: nothing is wrong with it
     const auto sentNs = Clock::nowNs();
     auto answer = client_.call(std::move(*message), ofSeconds(arguments_.timeout));
     if (answer) {
@@ -152,17 +153,17 @@ class Caller {
   }
 
   void reportJson() {
-    nlohmann::json json{{"server", arguments_.server},
-                        {"location", arguments_.location},
-                        {"replied", recorder_->count()},
-                        {"failed", failed_},
-                        {"why", reasons_},
-                        {"replies", replies_},
-                        {"p50_ns", recorder_->percentileNs(50)},
-                        {"p99_ns", recorder_->percentileNs(99)},
-                        {"p999_ns", recorder_->percentileNs(99.9)},
-                        {"max_ns", recorder_->maxNs()}};
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    nlohmann::json report{{"server", arguments_.server},
+                          {"location", arguments_.location},
+                          {"replied", recorder_->count()},
+                          {"failed", failed_},
+                          {"why", reasons_},
+                          {"replies", replies_},
+                          {"p50_ns", recorder_->percentileNs(50)},
+                          {"p99_ns", recorder_->percentileNs(99)},
+                          {"p999_ns", recorder_->percentileNs(99.9)},
+                          {"max_ns", recorder_->maxNs()}};
+    fmt::print("{}\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   }
 
   const CallArguments& arguments_;
@@ -199,7 +200,7 @@ void addCall(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<CallArguments>();
   addServer(command, *arguments);
   command.add_option("type", arguments->type, "Type of the message: " + typesForCalls())->required();
-  command.add_option("fields", arguments->fields, "Its fields, as field=value: value=3, value=1,2,3, value='*IDN?\\n', eomString='\\r\\n'");
+  command.add_option("fields", arguments->fields, R"(Its fields, as field=value: value=3, value=1,2,3, value='*IDN?\n', eomString='\r\n')");
   addSeconds(command, "--timeout", arguments->timeout, "Longest wait for a reply", false);
   command.add_option("--count", arguments->count, "Messages to send, one after the other's reply")
       ->capture_default_str()

@@ -52,13 +52,13 @@ std::string clients(const Look& look) {
   return table.isEmpty() ? "  no client\n" : table.text("  ");
 }
 
-void print(const Look& look) {
+void printBackplane(const Look& look) {
   fmt::print("backplane {}\n{}{}", look.now().backplane, servers(look), clients(look));
   for (const auto& problem : look.now().problems) fmt::print("  problem: {}\n", problem);
 }
 
 int list(const ReportArguments& arguments) {
-  const int backplanes = reportEach(arguments, print, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
+  const int backplanes = reportEach(arguments, printBackplane, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
   if (backplanes == 0 && !arguments.json) fmt::print("{}", kNoBackplane);
   return 0;
 }

@@ -50,7 +50,7 @@ void printServer(std::size_t number, const Look& look, const WindowView& server)
   printRates(look.ratesOf(server));
 }
 
-void print(const Look& look) {
+void printRouters(const Look& look) {
   std::size_t number = 0;
   fmt::print("backplane {}\nclientRouterList\n", look.now().backplane);
   for (const auto& client : look.now().clients) printClient(++number, look, client);
@@ -61,7 +61,7 @@ void print(const Look& look) {
 }
 
 int report(const ReportArguments& arguments) {
-  const int backplanes = reportEach(arguments, print, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
+  const int backplanes = reportEach(arguments, printRouters, [](const Look& look, nlohmann::json& all) { all.push_back(toJson(look)); });
   if (backplanes == 0 && !arguments.json) fmt::print("{}", kNoBackplane);
   return 0;
 }

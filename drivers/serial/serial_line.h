@@ -29,6 +29,9 @@ struct LineByte {
   friend bool operator==(const LineByte&, const LineByte&) = default;
 };
 
+// Bytes that a line takes from the kernel at once.
+inline constexpr std::size_t kReadBytes = 4096;
+
 class SerialLine {
  public:
   enum class OpenState : std::uint8_t { opening, open, failed };

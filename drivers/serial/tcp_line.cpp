@@ -14,7 +14,6 @@
 namespace mpf {
 namespace {
 
-constexpr std::size_t kReadBytes = 4096;
 constexpr int kKeepAliveIdleSeconds = 10;
 constexpr int kKeepAliveEverySeconds = 5;
 constexpr int kKeepAliveProbes = 3;

@@ -19,7 +19,6 @@
 namespace mpf {
 namespace {
 
-constexpr std::size_t kReadBytes = 4096;
 constexpr std::chrono::milliseconds kShortestDrainCheck{1};
 constexpr std::chrono::milliseconds kLongestDrainCheck{20};
 constexpr int kFlushOutputQueue = 1;  // TCOFLUSH, which is in <termios.h>
