@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <fmt/format.h>
 #include <grp.h>
 #include <map>
 #include <memory>
@@ -24,9 +25,8 @@ using namespace std::chrono_literals;
 
 // The test waits for these.
 template <class... Values>
-void say(const char* format, Values... values) {
-  std::printf(format, values...);
-  std::putchar('\n');
+void say(fmt::format_string<Values...> format, Values&&... values) {
+  fmt::print("{}\n", fmt::format(format, std::forward<Values>(values)...));
   std::fflush(stdout);
 }
 
@@ -82,7 +82,7 @@ class Visitor {
  private:
   void take(const mpf::Message& message) {
     if (const auto* news = message.tryAs<mpf::Connect>()) {
-      if (open_ != 0) say("a change of the connection while %d requests have no end", open_);
+      if (open_ != 0) say("a change of the connection while {} requests have no end", open_);
       if (news->status != mpf::ConnectStatus::connectYes) return;
       life_ = news->incarnation;
       sent_ = answered_ = 0;
@@ -90,12 +90,12 @@ class Visitor {
     } else if (const auto* reply = message.tryAs<mpf::Float64>()) {
       --open_;
       if (reply->value != message.getClientExtra() + 1) say("a reply to something else");
-      if (++answered_ == kRequests && ++done_[life_] == crowd_) say("answered %lx", life_);
+      if (++answered_ == kRequests && ++done_[life_] == crowd_) say("answered {:x}", life_);
       send();
     } else {
       --open_;
       const auto fate = message.tryAs<mpf::RequestFate>()->fate;
-      if (fate != mpf::Fate::neverTaken && fate != mpf::Fate::outcomeUnknown) say("a request was %s", mpf::toString(fate).data());
+      if (fate != mpf::Fate::neverTaken && fate != mpf::Fate::outcomeUnknown) say("a request was {}", mpf::toString(fate));
     }
   }
   void send() {
@@ -104,7 +104,7 @@ class Visitor {
     request.setClientExtra(sent_);
     const auto result = client_.send(std::move(request));
     if (result == mpf::SendResult::notConnected) return;  // the server ends: its fates come now
-    if (result != mpf::SendResult::sent) return say("a send was refused: %s", mpf::toString(result));
+    if (result != mpf::SendResult::sent) return say("a send was refused: {}", mpf::toString(result));
     ++sent_;
     ++open_;
   }
@@ -125,7 +125,7 @@ int crowd(const mpf::Backplane& backplane, int clients) {
   std::map<std::uint64_t, int> done;
   std::vector<std::unique_ptr<Visitor>> visitors;
   for (int i = 0; i < clients; ++i) visitors.push_back(std::make_unique<Visitor>(dispatcher, done, clients));
-  say("waiting: %s", visitors.back()->reason().c_str());
+  say("waiting: {}", visitors.back()->reason());
   dispatcher.run();
   return 0;
 }
@@ -177,6 +177,6 @@ int main(int argc, char** argv) try {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   return play({argv, argv + argc});
 } catch (const std::exception& error) {
-  say("error: %s", error.what());
+  say("error: {}", error.what());
   return 1;
 }
