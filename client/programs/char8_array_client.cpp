@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+
 #include <mpf/client/programs/echo_client.h>
 
 namespace {
@@ -8,18 +10,15 @@ char letter(int i) { return static_cast<char>('a' + i % 26); }
 }  // namespace
 
 int main(int argc, char** argv) {
-  return mpf::runEchoClient(
-      argc, argv, {"mpf-char8-array-client", "Char8Array", "Char8Array message"}, [](const mpf::EchoOptions& options) {
-        return mpf::callEchoServer(
-            options,
-            [&](int i) {
-              auto message = mpf::Char8ArrayMessage::allocValue(options.bytes);
-              std::fill(message.value().begin(), message.value().end(), letter(i));
-              return message;
-            },
-            [&](int i, const mpf::Message& reply) {
-              const auto value = reply.valueAs<mpf::Char8Array>();
-              return value.size() == options.bytes && std::all_of(value.begin(), value.end(), [&](char c) { return c == letter(i); });
-            });
-      });
+  mpf::EchoClient echo{"mpf-char8-array-client", "Char8Array", "Char8Array message", {}, {}};
+  echo.make = [](int i, std::size_t bytes) {
+    auto message = mpf::Char8ArrayMessage::allocValue(bytes);
+    std::ranges::fill(message.value(), letter(i));
+    return message;
+  };
+  echo.isEcho = [](int i, std::size_t bytes, const mpf::Message& reply) {
+    const auto value = reply.valueAs<mpf::Char8Array>();
+    return value.size() == bytes && std::ranges::all_of(value, [i](char c) { return c == letter(i); });
+  };
+  return mpf::runEchoClient(argc, argv, echo);
 }

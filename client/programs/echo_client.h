@@ -2,17 +2,11 @@
 // Echo clients: send numbered messages to an echo server and check what comes back (manual: clientInt32, clientChar8Array).
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <cstdint>
-#include <cstdio>
-#include <exception>
-#include <fmt/format.h>
-#include <memory>
+#include <cstddef>
+#include <functional>
 #include <string>
 
-#include <mpf/base/duration_text.h>
-#include <mpf/base/latency_recorder.h>
-#include <mpf/client/sync_client.h>
+#include <mpf/schema/message.h>
 
 namespace mpf {
 
@@ -20,76 +14,11 @@ struct EchoClient {
   std::string program;
   std::string server;
   std::string what;
+  std::function<Message(int i, std::size_t bytes)> make;                          // message number i
+  std::function<bool(int i, std::size_t bytes, const Message& reply)> isEcho;  // whether a reply is its echo
 };
 
-struct EchoOptions {
-  std::string server;
-  std::string backplane;
-  std::int32_t location = Backplane::defaultLocation();
-  int count = 1000;
-  int timeoutMs = 1000;
-  std::size_t bytes = 100;
-};
-
-// What became of the calls, as a person reads it.
-class EchoStatistics {
- public:
-  void add(std::int64_t roundTripNs) { roundTrips_->add(static_cast<std::uint64_t>(roundTripNs)); }
-  void fail(const std::string& why) {
-    ++failures_;
-    fmt::print(stderr, "{}\n", why);
-  }
-  // Returns the exit status: 0 when every message came back.
-  int report() const {
-    const auto at = [&](double percent) { return durationText(static_cast<double>(roundTrips_->percentileNs(percent))); };
-    fmt::print("{} came back, {} did not", roundTrips_->count(), failures_);
-    if (roundTrips_->count() != 0) fmt::print("; round trip: p50 {}, p99 {}, max {}", at(50), at(99), at(100));
-    fmt::print("\n");
-    return failures_ == 0 ? 0 : 1;
-  }
-
- private:
-  std::unique_ptr<LatencyRecorder> roundTrips_ = std::make_unique<LatencyRecorder>();
-  std::uint64_t failures_ = 0;
-};
-
-// `make(i)` gives message number i, `isEcho(i, reply)` says whether a reply is its echo.
-template <class Make, class IsEcho>
-int callEchoServer(const EchoOptions& options, Make&& make, IsEcho&& isEcho) {
-  SyncClient client(Backplane::attach(options.backplane), options.server, options.location);
-  EchoStatistics statistics;
-  for (int i = 0; i < options.count; ++i) {
-    const auto sentNs = Clock::nowNs();
-    auto answer = client.call(make(i), std::chrono::milliseconds(options.timeoutMs));
-    if (!answer) {
-      const auto why = client.client().notConnectedBecause();
-      statistics.fail(fmt::format("message {}: {}{}{}", i, answer.why(), why.empty() ? "" : ": ", why));
-    } else if (!isEcho(i, answer.message())) {
-      statistics.fail(fmt::format("message {}: the reply is not its echo", i));
-    } else {
-      statistics.add(Clock::nowNs() - sentNs);
-    }
-  }
-  return statistics.report();
-}
-
-// Parses the command line and runs `call(options)`. Returns the exit status.
-template <class Call>
-int runEchoClient(int argc, char** argv, const EchoClient& echo, Call&& call) try {
-  CLI::App app(fmt::format("{} - sends {}s to an echo server and checks what comes back", echo.program, echo.what), echo.program);
-  EchoOptions options;
-  options.server = echo.server;
-  app.add_option("server", options.server, "Name of the server")->capture_default_str();
-  app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
-  app.add_option("--location", options.location, "Location of the server; default: $MPF_LOCATION, or 0");
-  app.add_option("--count", options.count, "Messages to send")->capture_default_str()->check(CLI::PositiveNumber);
-  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")->capture_default_str()->check(CLI::PositiveNumber);
-  app.add_option("--bytes", options.bytes, "Length of an array message")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
-  return call(options);
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", echo.program, error.what());
-  return 1;
-}
+// Parses the command line, calls the server and reports. Returns the exit status: 0 when every message came back.
+int runEchoClient(int argc, char** argv, const EchoClient& echo);
 
 }  // namespace mpf

@@ -2,12 +2,11 @@
 #include <mpf/client/programs/echo_client.h>
 
 int main(int argc, char** argv) {
-  return mpf::runEchoClient(argc, argv, {"mpf-int32-client", "Int32", "Int32 message"}, [](const mpf::EchoOptions& options) {
-    return mpf::callEchoServer(
-        options, [](int i) { return mpf::Int32Message({.value = i}); },
-        [](int i, const mpf::Message& reply) {
-          const auto* echo = reply.tryAs<mpf::Int32>();
-          return echo != nullptr && echo->value == i;
-        });
-  });
+  mpf::EchoClient echo{"mpf-int32-client", "Int32", "Int32 message", {}, {}};
+  echo.make = [](int i, std::size_t) { return mpf::Int32Message({.value = i}); };
+  echo.isEcho = [](int i, std::size_t, const mpf::Message& reply) {
+    const auto* int32 = reply.tryAs<mpf::Int32>();
+    return int32 != nullptr && int32->value == i;
+  };
+  return mpf::runEchoClient(argc, argv, echo);
 }

@@ -2,15 +2,10 @@
 // Echo servers: send back what they get (manual, "Message Server": serverInt32, serverChar8Array).
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
-#include <fmt/format.h>
+#include <functional>
 #include <string>
 
 #include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_arguments.h>
-#include <mpf/server/programs/server_log.h>
 
 namespace mpf {
 
@@ -18,29 +13,10 @@ struct EchoServer {
   std::string program;
   std::string server;
   std::string what;
+  std::function<void(MessageServer&)> answer;  // adds the handler
 };
 
-// Echoes messages of type T until SIGINT or SIGTERM. Returns the exit status.
-template <MessageBody T>
-int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
-  CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what), echo.program);
-  std::string name = echo.server;
-  ServerArguments arguments;
-  app.add_option("server", name, "Name under which clients find it")->capture_default_str();
-  app.add_option("--queue-size", arguments.messages.queueSize, "Requests of one client that may wait, 1 to 16384")->capture_default_str();
-  arguments.addTo(app);
-  CLI11_PARSE(app, argc, argv);
-
-  const ServerLog log(echo.program, arguments.logLevel);
-  MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);
-  server.on<T>([](MessageOf<T>&) {});
-  log->info(R"(serving "{}" at location {})", name, server.location());
-  const auto status = server.runUntilSignal();
-  log->info("ends");
-  return status;
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", echo.program, error.what());
-  return 1;
-}
+// Echoes until SIGINT or SIGTERM. Returns the exit status.
+int runEchoServer(int argc, char** argv, const EchoServer& echo);
 
 }  // namespace mpf

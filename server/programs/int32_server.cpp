@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/server/programs/echo_server.h>
 
-int main(int argc, char** argv) { return mpf::runEchoServer<mpf::Int32>(argc, argv, {"mpf-int32-server", "Int32", "Int32 message"}); }
+int main(int argc, char** argv) {
+  return mpf::runEchoServer(argc, argv, {"mpf-int32-server", "Int32", "Int32 message", [](mpf::MessageServer& server) {
+                                           server.on<mpf::Int32>([](mpf::Int32&) {});
+                                         }});
+}

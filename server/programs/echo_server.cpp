@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/programs/echo_server.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <fmt/format.h>
+
+#include <mpf/server/programs/server_arguments.h>
+#include <mpf/server/programs/server_log.h>
+
+namespace mpf {
+
+int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
+  CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what), echo.program);
+  std::string name = echo.server;
+  ServerArguments arguments;
+  app.add_option("server", name, "Name under which clients find it")->capture_default_str();
+  app.add_option("--queue-size", arguments.messages.queueSize, "Requests of one client that may wait, 1 to 16384")->capture_default_str();
+  arguments.addTo(app);
+  CLI11_PARSE(app, argc, argv);
+
+  const ServerLog log(echo.program, arguments.logLevel);
+  MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);
+  echo.answer(server);
+  log->info(R"(serving "{}" at location {})", name, server.location());
+  const auto status = server.runUntilSignal();
+  log->info("ends");
+  return status;
+} catch (const std::exception& error) {
+  fmt::print(stderr, "{}: {}\n", echo.program, error.what());
+  return 1;
+}
+
+}  // namespace mpf
