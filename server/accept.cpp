@@ -21,10 +21,15 @@ void ServerCore::accept(std::uint64_t incarnation) {
     const auto& backplane = endpoint_.backplane().name();
     const auto name = SegmentName::link(backplane, endpoint_.window().header().incarnation, incarnation);
     auto link = Link::tryOpen(backplane, name, endpoint_.window());
-    if (!link || link->peerState() != layout::LinkState::open) return;
-    auto client = endpoint_.peer(SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow),
-                                 layout::SegmentKind::clientWindow);
-    if (client) open(std::move(link), std::move(client));
+    if (!link) return;
+    const auto window = SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
+    auto client = endpoint_.peer(window, layout::SegmentKind::clientWindow);
+    if (client && link->peerState() == layout::LinkState::open) return open(std::move(link), std::move(client));
+    if (!client && segments::probeOwner(window) == segments::Owner::absent) {
+      // A client's window stands before its links do and goes after them: this client died while it knocked.
+      segments::remove(name);
+      removeBulk(backplane, incarnation);
+    }
   } catch (const std::exception&) {
     // Not a link that we can use. Its client sees that nobody accepts it; we go on.
     count(endpoint_.control().protocolErrors);

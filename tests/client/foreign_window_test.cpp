@@ -178,6 +178,28 @@ TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
   EXPECT_TRUE(client_.isConnected());
 }
 
+// A client died while it knocked, and somebody removed its window: nobody else knows of the link.
+TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
+  startServer({.location = 0});
+  auto dead = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
+  dead->bind("device[0]/a", 0);
+  runUntil([&] { return dead->isConnected(); });
+  const auto window =
+      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"), layout::SegmentKind::serverWindow);
+  const auto name = segments::list(SegmentName::linkPrefix(backplane_.name(), window->header().incarnation)).at(0);
+  std::filesystem::copy_file(segments::path(name), junk(NameKind::link));
+  dead.reset();
+  runUntil([&] { return window->control().linksClosed.load() == 1; });
+  const FileDescriptor image(::open(junk(NameKind::link).c_str(), O_WRONLY | O_CLOEXEC));
+  const std::uint64_t nobody = 0x77;
+  checkCall(::pwrite(image.get(), &nobody, sizeof nobody, offsetof(layout::SegmentHeader, clientWindow)), "pwrite");
+  std::filesystem::rename(junk(NameKind::link), segments::path(name));
+
+  window->knock(SegmentName::tryParse(name)->incarnation);
+
+  runUntil([&] { return !std::filesystem::exists(segments::path(name)); });
+}
+
 TEST_F(JunkTest, WhoAttachesRemovesWhatNobodyCanUseAndLeavesOtherLayoutsAlone) {
   const auto link = [&](std::uint64_t number) { return SegmentName::link(backplane_.name(), 0x77, number); };
   writeFile(segments::path(link(0x771)), "", 0);
