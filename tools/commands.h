@@ -19,6 +19,8 @@ void addMrr(CLI::App& app, Run& run);
 void addMsr(CLI::App& app, Run& run);
 void addCall(CLI::App& app, Run& run);
 void addSniff(CLI::App& app, Run& run);
+void addTap(CLI::App& app, Run& run);
+void addReplay(CLI::App& app, Run& run);
 void addClean(CLI::App& app, Run& run);
 void addBench(CLI::App& app, Run& run);
 

@@ -48,6 +48,8 @@ int main(int argc, char** argv) try {
   mpf::tools::addMsr(app, run);
   mpf::tools::addCall(app, run);
   mpf::tools::addSniff(app, run);
+  mpf::tools::addTap(app, run);
+  mpf::tools::addReplay(app, run);
   mpf::tools::addClean(app, run);
   mpf::tools::addBench(app, run);
   app.require_subcommand(1);

@@ -25,14 +25,6 @@ auto value(const Word& word) noexcept {
   return word.load(std::memory_order_relaxed);
 }
 
-// Whoever may write to /dev/shm chooses these bytes: none of them shall command a terminal.
-template <std::size_t n>
-std::string text(const std::array<char, n>& chars) {
-  std::string text(chars.begin(), std::find(chars.begin(), chars.end(), '\0'));
-  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');
-  return text;
-}
-
 Latencies latenciesOf(const layout::Histogram& histogram) {
   Latencies latencies;
   for (std::size_t i = 0; i < latencies.buckets.size(); ++i) {
@@ -134,8 +126,8 @@ class Surveyor {
     WindowView view;
     view.isServer = kind == layout::SegmentKind::serverWindow;
     view.incarnation = header.incarnation;
-    view.program = text(header.program);
-    view.name = text(header.name);
+    view.program = printable(header.program);
+    view.name = printable(header.name);
     if (view.name.empty()) view.name = view.program;
     view.location = header.location;
     view.pid = header.ownerPid;
@@ -158,7 +150,7 @@ class Surveyor {
     view.incarnation = header.incarnation;
     view.serverWindow = header.serverWindow;
     view.clientWindow = header.clientWindow;
-    view.server = text(header.name);
+    view.server = printable(header.name);
     view.location = header.location;
     view.clientState = value(control.clientState);
     view.serverState = value(control.serverState);
@@ -174,7 +166,7 @@ class Surveyor {
   void wish(const std::string& name) {
     const auto image = header(name, layout::SegmentKind::wish);
     if (!image) return;
-    survey_.wishes.push_back({image->header().ownerWindow, text(image->header().name), image->header().location});
+    survey_.wishes.push_back({image->header().ownerWindow, printable(image->header().name), image->header().location});
   }
 
   // A link belongs to both of its windows, a wish to its client's. One whose windows are gone is about to be removed: not shown.

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+// `mpf tap` and `mpf replay`: every message beside its two ends, and again.
+#include <filesystem>
+#include <regex>
+
+#include <mpf/client/sync_client.h>
+#include <mpf/tests/tools/tools_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::MatchesRegex;
+
+class TapTest : public ToolsTest {
+ protected:
+  void TearDown() override {
+    std::filesystem::remove(file_);
+    ToolsTest::TearDown();
+  }
+  // Returns when the tap reads `links` links of the server.
+  std::unique_ptr<Tool> tap(std::vector<std::string> more, int links = 1) const {
+    std::vector<std::string> arguments{"tap", "echo"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    auto tool = std::make_unique<Tool>(arguments, backplane_.name());
+    while (tool->err().find("mpf tap: \"echo\" has " + std::to_string(links)) == std::string::npos) std::this_thread::yield();
+    return tool;
+  }
+  static void callMany(SyncClient& client, int from, int to) {
+    for (int i = from; i < to; ++i) {
+      const auto answer = client.call(Int32Message({.value = i}), 1h);
+      ASSERT_TRUE(answer);
+    }
+  }
+  static std::vector<nlohmann::json> objects(const std::string& lines) {
+    std::vector<nlohmann::json> all;
+    std::istringstream stream(lines);
+    for (std::string line; std::getline(stream, line);) all.push_back(nlohmann::json::parse(line));
+    return all;
+  }
+  // The messages that went in one direction.
+  static std::vector<nlohmann::json> messages(const std::vector<nlohmann::json>& all, const std::string& direction) {
+    std::vector<nlohmann::json> some;
+    for (const auto& object : all) {
+      if (object.value("direction", "") == direction) some.push_back(object.at("message"));
+    }
+    return some;
+  }
+
+  std::string file_ = std::filesystem::temp_directory_path() / (backplane_.name() + ".mpf");
+};
+
+TEST_F(TapTest, ShowsRequestsAndTheirReplies) {
+  const EchoThread echo(backplane_, "echo");
+  SyncClient client(backplane_, "echo");
+  callMany(client, 0, 1);
+  const auto tool = tap({"--count", "4"});
+
+  callMany(client, 5, 7);
+
+  const auto ended = tool->end();
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  EXPECT_THAT(ended.err, EndsWith("mpf tap: 4 messages seen, 0 missed\n"));
+  const std::string begin = "[0-9:]{8}\\.[0-9]{6}  [0-9a-f]{4}  ";
+  const std::string fields = "int32 timeout=0 cmd=0 status=0 address=0 extra=0 value=";
+  EXPECT_THAT(ended.out, MatchesRegex(begin + "--   tools_test\\[[0-9]+\\] and echo: link [0-9a-f]{16}\n" +  //
+                                      begin + "-> 2   " + fields + "5\n" + begin + "<- 2   " + fields + "5\n" +  //
+                                      begin + "-> 3   " + fields + "6\n" + begin + "<- 3   " + fields + "6\n" + begin + "--   closed\n"));
+}
+
+TEST_F(TapTest, AReplyNeverComesBeforeItsRequest) {
+  const EchoThread echo(backplane_, "echo");
+  SyncClient client(backplane_, "echo");
+  callMany(client, 0, 1);
+  const auto tool = tap({"--json", "--count", "100"});
+
+  callMany(client, 0, 500);
+
+  tool->signal(SIGINT);
+  std::uint64_t lastRequest = 0;
+  for (const auto& object : objects(tool->end().out)) {
+    if (!object.contains("direction")) continue;
+    const auto id = object.at("requestId").get<std::uint64_t>();
+    if (object.at("direction") == "request") lastRequest = id;
+    else EXPECT_LE(id, lastRequest);
+  }
+  EXPECT_GT(lastRequest, 0u);
+}
+
+// Seen and missed together are all that there was.
+TEST_F(TapTest, WhatItIsTooSlowForIsCounted) {
+  const EchoThread echo(backplane_, "echo");
+  SyncClient client(backplane_, "echo");
+  callMany(client, 0, 1);
+  const auto tool = tap({"--poll", "0.1", "--json"});
+
+  callMany(client, 0, 5'000);
+
+  tool->signal(SIGINT);
+  const auto ended = tool->end();
+  std::smatch numbers;
+  ASSERT_TRUE(std::regex_search(ended.err, numbers, std::regex("([0-9]+) messages seen, ([0-9]+) missed"))) << ended.err;
+  EXPECT_EQ(std::stoul(numbers[1]) + std::stoul(numbers[2]), 10'000u);
+  EXPECT_GT(std::stoul(numbers[2]), 0u);
+  EXPECT_EQ(std::stoul(numbers[1]), messages(objects(ended.out), "request").size() + messages(objects(ended.out), "reply").size());
+}
+
+TEST_F(TapTest, ReadsBodiesThatLieInThePool) {
+  const EchoThread echo(backplane_, "echo");
+  SyncClient client(backplane_, "echo");
+  callMany(client, 0, 1);
+  const auto tool = tap({"--json", "--count", "2"});
+  auto request = Float64ArrayMessage::allocValue(100'000);
+  for (std::size_t i = 0; i < request.value().size(); ++i) request.value()[i] = static_cast<double>(i);
+
+  ASSERT_TRUE(client.call(std::move(request), 1h));
+
+  const auto all = objects(tool->end().out);
+  for (const auto* direction : {"request", "reply"}) {
+    const auto seen = messages(all, direction);
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].at("value").size(), 100'000u);
+    EXPECT_EQ(seen[0].at("value").at(99'999), 99'999.0);
+  }
+}
+
+TEST_F(TapTest, FollowsClientsThatComeLaterFromTheirFirstMessage) {
+  const EchoThread echo(backplane_, "echo");
+  const auto tool = tap({"--json", "--count", "6"}, 0);
+
+  for (int i = 0; i < 3; ++i) {
+    SyncClient client(backplane_, "echo");
+    callMany(client, i, i + 1);
+    while (tool->lineWith("\"reply\"").empty()) continue;
+  }
+
+  const auto ended = tool->end();
+  EXPECT_THAT(ended.err, EndsWith("mpf tap: 6 messages seen, 0 missed\n"));
+}
+
+TEST_F(TapTest, FollowsItsServerThroughItsLives) {
+  auto echo = std::make_unique<EchoThread>(backplane_, "echo");
+  SyncClient client(backplane_, "echo");
+  callMany(client, 0, 1);
+  const auto tool = tap({"--json", "--count", "4"});
+  callMany(client, 1, 2);
+  while (tool->lineWith("\"reply\"").empty()) continue;
+
+  echo.reset();
+  echo = std::make_unique<EchoThread>(backplane_, "echo");
+  while (!client.call(Int32Message({.value = 2}), 1h)) continue;  // it may hear late that the server went
+
+  const auto all = objects(tool->end().out);
+  ASSERT_EQ(messages(all, "reply").size(), 1u);  // the other one was read above
+  EXPECT_EQ(messages(all, "reply")[0].at("value"), 2);
+}
+
+TEST_F(TapTest, OneLinkCanBeChosen) {
+  const EchoThread echo(backplane_, "echo");
+  SyncClient first(backplane_, "echo");
+  callMany(first, 0, 1);
+  const auto all = tap({"--json"});
+  const auto link = nlohmann::json::parse(all->line()).at("link").get<std::string>();
+  SyncClient second(backplane_, "echo");
+  callMany(second, 0, 1);
+  const auto tool = tap({"--json", "--count", "2", "--link", link});
+
+  callMany(second, 10, 12);
+  callMany(first, 20, 21);
+
+  EXPECT_EQ(messages(objects(tool->end().out), "request").at(0).at("value"), 20);
+  const auto wrong = run({"tap", "echo", "--link", "x1"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("\"x1\" is no link: use its 16 hexadecimal digits"));
+}
+
+// It maps what it reads, and changes nothing.
+TEST_F(TapTest, LeavesEveryByteAsItWas) {
+  const EchoThread echo(backplane_, "echo", {.waitMode = WaitMode::block});
+  SyncClient client(backplane_, "echo");
+  callMany(client, 0, 3);
+  const auto before = files();
+
+  EXPECT_EQ(run({"tap", "echo", "0.05"}).status, 0);
+
+  EXPECT_EQ(files(), before);
+}
+
+TEST_F(TapTest, ARecordingIsSentAgainWithItsMessagesInTheirOrder) {
+  {
+    const EchoThread echo(backplane_, "echo");
+    SyncClient one(backplane_, "echo");
+    SyncClient two(backplane_, "echo");
+    callMany(one, 0, 1);
+    callMany(two, 0, 1);
+    const auto tool = tap({"--write", file_, "--count", "44"}, 2);
+    for (int i = 0; i < 10; ++i) {
+      callMany(one, i, i + 1);
+      callMany(two, 100 + i, 101 + i);
+    }
+    auto array = Int32ArrayMessage::allocValue(1000);
+    std::ranges::fill(array.value(), 7);
+    ASSERT_TRUE(one.call(std::move(array), 1h));
+    ASSERT_TRUE(two.call(Char8ArrayMessage::allocValue(0), 1h));
+    EXPECT_EQ(tool->end().status, 0);
+  }
+  std::vector<std::int32_t> values;
+  std::size_t elements = 0;
+  MessageServer server(backplane_, "echo");
+  server.on<Int32>([&](Int32& request) { values.push_back(request.value); });
+  server.on<Int32Array>([&](Int32ArrayMessage& request) { elements += request.value().size(); });
+  server.on<Char8Array>([](Char8ArrayMessage&) {});
+  std::thread thread([&] { server.run(); });
+
+  const auto ended = run({"replay", file_, "--timeout", "1000", "--json"});
+
+  server.interrupt();
+  thread.join();
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto report = nlohmann::json::parse(ended.out);
+  EXPECT_EQ(report.at("clients"), 2);
+  EXPECT_EQ(report.at("requests"), 22);
+  EXPECT_EQ(report.at("replied"), 22);
+  EXPECT_THAT(report.at("ends"), IsEmpty());
+  std::vector<std::int32_t> ofOne;
+  std::ranges::copy_if(values, std::back_inserter(ofOne), [](auto value) { return value < 100; });
+  EXPECT_THAT(ofOne, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_EQ(values.size(), 20u);
+  EXPECT_EQ(elements, 1000u);
+}
+
+TEST_F(TapTest, WhatIsNoRecordingIsNamed) {
+  std::ofstream(file_) << "nothing of the kind, but long enough for a header or two of a frame";
+
+  const auto ended = run({"replay", file_});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err, HasSubstr(file_ + ": record 1: "));
+  EXPECT_EQ(run({"replay", file_ + ".none"}).status, 2);
+}
+
+TEST_F(TapTest, ARecordingThatWasCutIsSentUpToThere) {
+  {
+    const EchoThread echo(backplane_, "echo");
+    SyncClient client(backplane_, "echo");
+    callMany(client, 0, 1);
+    const auto tool = tap({"--write", file_, "--count", "4"});
+    callMany(client, 0, 2);
+    EXPECT_EQ(tool->end().status, 0);
+  }
+  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) - 5);
+  const EchoThread echo(backplane_, "echo");
+
+  const auto ended = run({"replay", file_, "--speed", "0", "--timeout", "1000"});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.out, HasSubstr("2 requests of 1 clients to \"echo\": 2 replied"));
+  EXPECT_THAT(ended.err, HasSubstr(file_ + ": record "));
+}
+
+TEST_F(TapTest, AServerThatIsNotThereIsNamed) {
+  const auto ended = run({"tap", "echo", "0.01"});
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.err, EndsWith("mpf tap: 0 messages seen, 0 missed\n"));
+}
+
+}  // namespace
+}  // namespace mpf::test
