@@ -30,7 +30,7 @@ class Backplane {
   // The location of servers that say nothing else: the environment variable MPF_LOCATION, or 0.
   static std::int32_t defaultLocation();
 
-  // Removes every segment of this backplane whose owner is proven dead. Returns their names.
+  // Removes every segment of this backplane whose owner is proven dead (shm/remains.h). Returns their names.
   std::vector<std::string> removeDead() const;
   // Names of all segments of this backplane.
   [[nodiscard]] std::vector<std::string> segmentNames() const;

@@ -76,11 +76,31 @@ std::string rightsInWords(const std::string& name) {
   return fmt::format(" (mode {:04o}, user {}, group {})", status.st_mode & 07777u, status.st_uid, status.st_gid);
 }
 
+// Opens a segment and copies its header; empty when there is none of that name. Throws as Segment::tryOpen.
+FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags, layout::SegmentHeader& header) {
+  const auto path = segments::path(name);
+  auto file = openByName(name, flags);
+  if (!file) {
+    const int reason = errno;
+    if (reason == ENOENT) return {};
+    throwSystemError(reason, "open", path + (reason == EACCES ? rightsInWords(name) : ""));
+  }
+  struct stat status{};
+  checkCall(::fstat(file.get(), &status), "look at", path);
+  if (!S_ISREG(status.st_mode)) throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", path));
+  const auto fileBytes = static_cast<std::size_t>(status.st_size);
+  if (::pread(file.get(), &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) {
+    throw SegmentError(fmt::format("{}: truncated, {} bytes are too few for a header", path, fileBytes));
+  }
+  segments::check(header, fileBytes, kind, path);
+  return file;
+}
+
 // Whether a file is a segment of some kind that this program can use.
 bool isKnown(int fd, std::size_t fileBytes, const std::string& name) try {
   layout::SegmentHeader header{};
   if (::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) return false;
-  segments::check(header, fileBytes, header.kind, name);
+  segments::check(header, fileBytes, header.kind, segments::path(name));
   return true;
 } catch (const SegmentError&) {
   return false;
@@ -149,22 +169,8 @@ bool Segment::hasOwner() const noexcept { return isLocked(file_.get()); }
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
   Segment segment;
   segment.name_ = name;
-  auto file = openByName(name, access == Access::readOnly ? O_RDONLY : O_RDWR);
-  if (!file) {
-    const int reason = errno;
-    if (reason == ENOENT) return std::nullopt;
-    throwSystemError(reason, "open", segments::path(name) + (reason == EACCES ? rightsInWords(name) : ""));
-  }
-  segment.file_ = std::move(file);
-  struct stat status{};
-  checkCall(::fstat(segment.file_.get(), &status), "look at", segments::path(name));
-  if (!S_ISREG(status.st_mode)) throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", segments::path(name)));
-  const auto fileBytes = static_cast<std::size_t>(status.st_size);
-  const auto got = ::pread(segment.file_.get(), &segment.header_, sizeof segment.header_, 0);
-  if (got != static_cast<ssize_t>(sizeof segment.header_)) {
-    throw SegmentError(fmt::format("{}: truncated, {} bytes are too few for a header", segments::path(name), fileBytes));
-  }
-  segments::check(segment.header_, fileBytes, kind, name);
+  segment.file_ = openChecked(name, kind, access == Access::readOnly ? O_RDONLY : O_RDWR, segment.header_);
+  if (!segment.file_) return std::nullopt;
   segment.map(access);
   return segment;
 }
@@ -175,19 +181,25 @@ std::string path(const std::string& name) { return fmt::format("{}/{}", kDirecto
 
 bool remove(const std::string& name) { return ipc::shared_memory_object::remove(name.c_str()); }
 
-void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& name) {
-  if (header.magic != layout::kMagic) throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path(name)));
+void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& path) {
+  if (header.magic != layout::kMagic) throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path));
   if (header.layoutMajor < layout::kOldestMajor || header.layoutMajor > layout::kMajor) {
     throw VersionError(
-        fmt::format("{}: layout {}, this program speaks {}-{}", path(name), header.layoutMajor, layout::kOldestMajor, layout::kMajor));
+        fmt::format("{}: layout {}, this program speaks {}-{}", path, header.layoutMajor, layout::kOldestMajor, layout::kMajor));
   }
   if (header.kind != kind) {
-    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path(name), static_cast<std::uint32_t>(header.kind),
+    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path, static_cast<std::uint32_t>(header.kind),
                                    static_cast<std::uint32_t>(kind)));
   }
   if (header.totalBytes < sizeof(layout::SegmentHeader) || fileBytes < header.totalBytes) {
-    throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", path(name), fileBytes, header.totalBytes));
+    throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", path, fileBytes, header.totalBytes));
   }
+}
+
+std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name, layout::SegmentKind kind) {
+  layout::SegmentHeader header{};
+  if (!openChecked(name, kind, O_RDONLY, header)) return std::nullopt;
+  return header;
 }
 
 Owner probeOwner(const std::string& name, std::uint64_t incarnation) {

@@ -12,6 +12,7 @@
 
 #include <sys/types.h>
 
+#include <algorithm>
 #include <boost/interprocess/mapped_region.hpp>
 #include <cstddef>
 #include <cstdint>
@@ -96,6 +97,10 @@ namespace segments {
 // Removes the name. False when there was none.
 bool remove(const std::string& name);
 
+// A copy of the header, checked as when the segment is opened; nothing is mapped. nullopt when there is none of that name.
+//   throws  as Segment::tryOpen
+std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name, layout::SegmentKind kind);
+
 enum class Owner { alive, dead, absent };
 // Asks the kernel whether somebody holds the owner's lock of a window. With an incarnation: `absent` when the name has
 // another one's window now.
@@ -110,11 +115,19 @@ std::vector<std::string> list(const std::string& prefix);
 // Path of a segment's file.
 std::string path(const std::string& name);
 
+// A text in a header. Whoever may write to /dev/shm chooses these bytes: none of them shall command a terminal.
+template <std::size_t n>
+std::string text(const std::array<char, n>& chars) {
+  std::string text(chars.begin(), std::find(chars.begin(), chars.end(), '\0'));
+  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');
+  return text;
+}
+
 // 64 random bits, never 0.
 std::uint64_t newIncarnation();
 
-// Throws SegmentError, naming `name`, when `header` (of a file of `fileBytes`) is not a usable one of `kind`.
-void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& name);
+// Throws SegmentError, naming `path`, when `header` (of a file of `fileBytes`) is not a usable one of `kind`.
+void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& path);
 
 }  // namespace segments
 }  // namespace mpf

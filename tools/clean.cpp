@@ -1,59 +1,122 @@
 // SPDX-License-Identifier: MIT
-// mpf clean: removes what dead processes left. Every program does so for its own backplane when it attaches; this is for backplanes
-// that no program uses any more.
+// mpf clean: removes what dead processes left, and says how it knows. Every program does so for its own backplane when it attaches; this
+// is for backplanes that no program uses any more.
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 
 #include <mpf/shm/backplane.h>
+#include <mpf/shm/remains.h>
 #include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
 
 namespace mpf::tools {
 namespace {
 
-// What a dead process left and this one may not remove: it is another user's. Returns how many.
-std::size_t nameTheRest(const std::string& backplane) {
-  std::size_t left = 0;
-  for (const auto& name : Backplane::named(backplane).segmentNames()) {
-    const auto parsed = SegmentName::tryParse(name);
-    if (!parsed || (parsed->kind != NameKind::serverWindow && parsed->kind != NameKind::clientWindow)) continue;
-    struct stat status{};
-    if (::lstat(segments::path(name).c_str(), &status) != 0 || !S_ISREG(status.st_mode) || status.st_uid == ::geteuid()) continue;
-    if (segments::probeOwner(name) != segments::Owner::dead) continue;
-    fmt::print(stderr, "mpf clean: {} belongs to user {}, whose process is dead; that user or root may remove it\n", segments::path(name),
-               status.st_uid);
-    ++left;
-  }
-  return left;
+using remains::Judged;
+using remains::Verdict;
+
+struct CleanArguments {
+  std::string backplane;
+  bool dryRun = false;
+  bool json = false;
+};
+
+// Whose file it is, if another user's who alone may remove it.
+std::optional<uid_t> otherUser(const Judged& file) {
+  struct stat status{};
+  const auto self = ::geteuid();
+  if (self == 0 || ::lstat(segments::path(file.name).c_str(), &status) != 0 || status.st_uid == self) return std::nullopt;
+  return status.st_uid;
 }
 
-int clean(const std::string& chosen) {
-  std::size_t removed = 0;
-  std::size_t left = 0;
-  for (const auto& backplane : chosen.empty() ? Backplane::names() : std::vector{chosen}) {
-    for (const auto& name : Backplane::named(backplane).removeDead()) {
-      fmt::print("removed {}\n", segments::path(name));
-      ++removed;
-    }
-    left += nameTheRest(backplane);
+const char* toString(Verdict verdict) noexcept {
+  switch (verdict) {
+    case Verdict::alive:
+      return "alive";
+    case Verdict::dead:
+      return "dead";
+    case Verdict::unknown:
+      return "unknown";
   }
-  if (removed + left == 0) fmt::print("nothing to remove: no dead process left anything\n");
-  return left == 0 ? 0 : 1;
+  return "unknown";
+}
+
+class Cleaner {
+ public:
+  explicit Cleaner(const CleanArguments& arguments) : arguments_(arguments) {}
+
+  void clean(const std::string& backplane) {
+    for (const auto& file : remains::judge(backplane)) {
+      const auto stranger = file.verdict == Verdict::dead ? otherUser(file) : std::nullopt;
+      const bool removed = !arguments_.dryRun && remains::tryRemove(file);
+      if (stranger && !removed) ++left_;
+      if (arguments_.json) collect(file, removed);
+      else if (file.verdict == Verdict::dead) tellDead(file, removed, stranger);
+      else tellStays(file);
+    }
+  }
+  // Returns the exit status.
+  int end() {
+    if (arguments_.json) fmt::print("{}\n", files_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    else if (!isAnythingDead_) fmt::print("nothing to remove: no dead process left anything\n");
+    if (arguments_.dryRun && !arguments_.json && alive_ != 0) fmt::print("{} files stay: their processes live\n", alive_);
+    return left_ == 0 ? 0 : 1;
+  }
+
+ private:
+  void collect(const Judged& file, bool removed) {
+    files_.push_back(
+        {{"file", segments::path(file.name)}, {"verdict", toString(file.verdict)}, {"reason", file.reason}, {"removed", removed}});
+  }
+  void tellDead(const Judged& file, bool removed, std::optional<uid_t> stranger) {
+    const auto path = segments::path(file.name);
+    isAnythingDead_ = isAnythingDead_ || removed || arguments_.dryRun || stranger;
+    if (removed) {
+      fmt::print("removed {}: {}\n", path, file.reason);
+    } else if (stranger) {
+      fmt::print(stderr, "mpf clean: {} belongs to user {}, whose process is dead; that user or root may remove it\n", path, *stranger);
+    } else if (arguments_.dryRun) {
+      fmt::print("would remove {}: {}\n", path, file.reason);
+    }
+  }
+  void tellStays(const Judged& file) {
+    if (file.verdict == Verdict::alive) ++alive_;
+    else if (arguments_.dryRun) fmt::print("{} stays: {}\n", segments::path(file.name), file.reason);
+  }
+
+  const CleanArguments& arguments_;
+  nlohmann::json files_ = nlohmann::json::array();
+  std::size_t left_ = 0;   // dead, and another user's
+  std::size_t alive_ = 0;
+  bool isAnythingDead_ = false;
+};
+
+int clean(const CleanArguments& arguments) {
+  Cleaner cleaner(arguments);
+  for (const auto& backplane :
+       arguments.backplane.empty() ? Backplane::names() : std::vector{Backplane::named(arguments.backplane).name()}) {
+    cleaner.clean(backplane);
+  }
+  return cleaner.end();
 }
 
 }  // namespace
 
 void addClean(CLI::App& app, Run& run) {
-  auto& command = *app.add_subcommand("clean", "Removes what dead processes left in shared memory, after proof by their locks");
-  auto backplane = std::make_shared<std::string>();
-  addBackplane(command, *backplane, "all that there are");
-  command.callback([backplane, &run] { run = [backplane] { return clean(*backplane); }; });
+  auto& command =
+      *app.add_subcommand("clean", "Removes what dead processes left in shared memory, and says how it knows that they are dead");
+  auto arguments = std::make_shared<CleanArguments>();
+  addBackplane(command, arguments->backplane, "all that there are");
+  command.add_flag("--dry-run", arguments->dryRun, "Remove nothing: say what would be removed, and why");
+  addJson(command, arguments->json);
+  command.callback([arguments, &run] { run = [arguments] { return clean(*arguments); }; });
 }
 
 }  // namespace mpf::tools

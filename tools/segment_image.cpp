@@ -31,7 +31,7 @@ std::optional<SegmentImage> SegmentImage::tryRead(const std::string& name, layou
   if (static_cast<std::size_t>(got) < sizeof(layout::SegmentHeader)) {
     throw SegmentError(fmt::format("{}: truncated, {} bytes are too few for a header", path, got));
   }
-  segments::check(image.header(), image.fileBytes_, kind, name);
+  segments::check(image.header(), image.fileBytes_, kind, path);
   return image;
 }
 

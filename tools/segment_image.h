@@ -7,8 +7,6 @@
 // Trust    header() has been checked; words() are what their writers say.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -17,14 +15,6 @@
 #include <mpf/shm/layout.h>
 
 namespace mpf::tools {
-
-// Characters of a header up to the zero. Whoever may write to /dev/shm chooses them: none of them shall command a terminal.
-template <std::size_t n>
-[[nodiscard]] std::string printable(const std::array<char, n>& chars) {
-  std::string text(chars.begin(), std::find(chars.begin(), chars.end(), '\0'));
-  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');
-  return text;
-}
 
 class SegmentImage {
  public:

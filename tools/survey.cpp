@@ -126,8 +126,8 @@ class Surveyor {
     WindowView view;
     view.isServer = kind == layout::SegmentKind::serverWindow;
     view.incarnation = header.incarnation;
-    view.program = printable(header.program);
-    view.name = printable(header.name);
+    view.program = segments::text(header.program);
+    view.name = segments::text(header.name);
     if (view.name.empty()) view.name = view.program;
     view.location = header.location;
     view.pid = header.ownerPid;
@@ -150,7 +150,7 @@ class Surveyor {
     view.incarnation = header.incarnation;
     view.serverWindow = header.serverWindow;
     view.clientWindow = header.clientWindow;
-    view.server = printable(header.name);
+    view.server = segments::text(header.name);
     view.location = header.location;
     view.clientState = value(control.clientState);
     view.serverState = value(control.serverState);
@@ -166,7 +166,7 @@ class Surveyor {
   void wish(const std::string& name) {
     const auto image = header(name, layout::SegmentKind::wish);
     if (!image) return;
-    survey_.wishes.push_back({image->header().ownerWindow, printable(image->header().name), image->header().location});
+    survey_.wishes.push_back({image->header().ownerWindow, segments::text(image->header().name), image->header().location});
   }
 
   // A link belongs to both of its windows, a wish to its client's. One whose windows are gone is about to be removed: not shown.

@@ -23,13 +23,13 @@ std::int64_t realtimeNs() {
 TappedLink describe(const std::string& backplane, const layout::SegmentHeader& header) {
   TappedLink link;
   link.incarnation = header.incarnation;
-  link.server = printable(header.name);
+  link.server = segments::text(header.name);
   link.location = header.location;
   const auto name = SegmentName::keyed(backplane, NameKind::clientWindow, header.clientWindow);
   const auto client = SegmentImage::tryRead(name, layout::SegmentKind::clientWindow, sizeof(layout::SegmentHeader));
   if (!client) return link;
-  link.client = printable(client->header().name);
-  if (link.client.empty()) link.client = printable(client->header().program);
+  link.client = segments::text(client->header().name);
+  if (link.client.empty()) link.client = segments::text(client->header().program);
   link.clientPid = client->header().ownerPid;
   return link;
 }

@@ -15,7 +15,19 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-class CleanTest : public ToolsTest {};
+class CleanTest : public ToolsTest {
+ protected:
+  // A server and its client, both killed while messages are on their way.
+  void leaveDeadPair() const {
+    Victim server("serve", backplane_.name());
+    ASSERT_EQ(server.line(), "open");
+    Victim flood("flood", backplane_.name());
+    ASSERT_EQ(flood.line(), "connected");
+    server.signal(SIGSTOP);
+    flood.end(SIGKILL);
+    server.end(SIGKILL);
+  }
+};
 
 TEST_F(CleanTest, WithoutAnythingDeadItSaysSo) {
   const EchoThread echo(backplane_, "echo");
@@ -32,13 +44,7 @@ TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
   SyncClient client(backplane_, "living", 0);
   ASSERT_TRUE(client.call(Int32Message(), 60s));
   const auto before = backplane_.segmentNames();
-  Victim server("serve", backplane_.name());
-  ASSERT_EQ(server.line(), "open");
-  Victim flood("flood", backplane_.name());
-  ASSERT_EQ(flood.line(), "connected");
-  server.signal(SIGSTOP);
-  flood.end(SIGKILL);
-  server.end(SIGKILL);
+  leaveDeadPair();
   std::set<std::string> dead;
   for (const auto& name : backplane_.segmentNames()) {
     if (std::ranges::find(before, name) == before.end()) dead.insert(name);
@@ -48,11 +54,48 @@ TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
   const auto ended = run({"clean"});
 
   EXPECT_EQ(ended.status, 0);
-  for (const auto& name : dead) EXPECT_THAT(ended.out, HasSubstr("removed " + segments::path(name) + "\n"));
+  for (const auto& name : dead) EXPECT_THAT(ended.out, HasSubstr("removed " + segments::path(name) + ": "));
   EXPECT_EQ(std::ranges::count(ended.out, '\n'), static_cast<std::ptrdiff_t>(dead.size()));
   EXPECT_THAT(backplane_.segmentNames(), testing::UnorderedElementsAreArray(before));
   EXPECT_TRUE(client.call(Int32Message(), 60s));
   EXPECT_EQ(run({"clean"}).out, "nothing to remove: no dead process left anything\n");
+}
+
+// A rehearsal finds what the removal then removes, and changes nothing.
+TEST_F(CleanTest, ADryRunSaysWhatWouldBeRemovedAndHowItKnows) {
+  const EchoThread living(backplane_, "living");
+  leaveDeadPair();
+  const auto before = files();
+
+  const auto rehearsal = run({"clean", "--dry-run"});
+
+  EXPECT_EQ(rehearsal.status, 0);
+  EXPECT_TRUE(files() == before);
+  EXPECT_THAT(rehearsal.out, HasSubstr("s.0.echo: nobody holds the lock of "));
+  EXPECT_THAT(rehearsal.out, testing::EndsWith("\n3 files stay: their processes live\n"));
+  auto expected = rehearsal.out.substr(0, rehearsal.out.rfind('\n', rehearsal.out.size() - 2) + 1);
+  for (std::size_t at = 0; (at = expected.find("would remove ", at)) != std::string::npos;) expected.replace(at, 13, "removed ");
+  EXPECT_EQ(run({"clean"}).out, expected);
+}
+
+TEST_F(CleanTest, AsJsonEveryFileHasItsVerdictAndItsReason) {
+  const EchoThread living(backplane_, "living");
+  const auto stray = segments::path(SegmentName::prefix(backplane_.name()) + "notes");
+  std::ofstream(stray) << "mine";
+  const auto dead = SegmentName::keyed(backplane_.name(), NameKind::fifo, 7);
+  ASSERT_EQ(::mkfifo(segments::path(dead).c_str(), 0600), 0);
+
+  const auto all = report({"clean"});
+
+  EXPECT_EQ(all.size(), 5U);
+  const auto window = entryOf(all, "file", segments::path(SegmentName::serverWindow(backplane_.name(), 0, "living")));
+  EXPECT_EQ(window.at("verdict"), "alive");
+  EXPECT_THAT(window.at("reason").get<std::string>(), StartsWith("pid " + std::to_string(::getpid())));
+  EXPECT_EQ(entryOf(all, "file", stray).at("verdict"), "unknown");
+  EXPECT_EQ(entryOf(all, "file", stray).at("removed"), false);
+  EXPECT_EQ(entryOf(all, "file", segments::path(dead)).at("verdict"), "dead");
+  EXPECT_EQ(entryOf(all, "file", segments::path(dead)).at("removed"), true);
+  std::filesystem::remove(stray);
 }
 
 TEST_F(CleanTest, WhatAnotherUserLeftIsNamed) {
@@ -70,7 +113,7 @@ TEST_F(CleanTest, WhatAnotherUserLeftIsNamed) {
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err,
             "mpf clean: " + segments::path(name) + " belongs to user 0, whose process is dead; that user or root may remove it\n");
-  EXPECT_EQ(run({"clean"}).out, "removed " + segments::path(name) + "\n");
+  EXPECT_THAT(run({"clean"}).out, StartsWith("removed " + segments::path(name) + ": nobody holds the lock of " + name));
 }
 
 // Nothing that lies there keeps it waiting or ends it.

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/remains.h>
+
+#include <fmt/format.h>
+#include <map>
+
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+
+namespace mpf::remains {
+namespace {
+
+// What is known of one file; of a window it is what is known of all that hang on it.
+struct Finding {
+  Verdict verdict{};
+  std::string reason;
+};
+
+std::string ownerText(const layout::SegmentHeader& header) {
+  return fmt::format("pid {} ({})", header.ownerPid, segments::text(header.program));
+}
+
+// A file with a lock of its own. Of anything but a segment that we know, a free lock proves nothing.
+Finding judgeLocked(const std::string& name, layout::SegmentKind kind) try {
+  const auto header = segments::tryReadHeader(name, kind);
+  if (!header) return {Verdict::dead, "its name is gone"};
+  switch (segments::probeOwner(name, header->incarnation)) {
+    case segments::Owner::alive:
+      return {Verdict::alive, fmt::format("{} holds the lock of {}", ownerText(*header), name)};
+    case segments::Owner::dead:
+      return {Verdict::dead, fmt::format("nobody holds the lock of {}; {} did", name, ownerText(*header))};
+    case segments::Owner::absent:
+      break;
+  }
+  return {Verdict::unknown, "it was replaced just now"};
+} catch (const std::exception& error) {
+  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+}
+
+class Judge {
+ public:
+  explicit Judge(std::string backplane) : backplane_(std::move(backplane)) {}
+
+  std::vector<Judged> run() {
+    const auto names = segments::list(SegmentName::prefix(backplane_));
+    for (const auto step : {&Judge::withLock, &Judge::ofWindow, &Judge::last}) {
+      for (const auto& name : names) {
+        if (const auto parsed = SegmentName::tryParse(name)) (this->*step)(name, *parsed);
+        else if (step == &Judge::last) add(name, {Verdict::unknown, "not a name that MPF gives"});
+      }
+    }
+    return std::move(judged_);
+  }
+
+ private:
+  using Parsed = SegmentName::Parsed;
+
+  void add(const std::string& name, Finding finding) { judged_.push_back({name, finding.verdict, std::move(finding.reason)}); }
+
+  void withLock(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::serverWindow) {
+      add(name, judgeLocked(name, layout::SegmentKind::serverWindow));
+    } else if (parsed.kind == NameKind::clientWindow) {
+      add(name, clients_[parsed.incarnation] = judgeLocked(name, layout::SegmentKind::clientWindow));
+    } else if (parsed.kind == NameKind::hints) {
+      add(name, hints_[parsed.incarnation] = judgeLocked(name, layout::SegmentKind::hints));
+    }
+  }
+
+  void ofWindow(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::wish) add(name, judgeOwned(name, layout::SegmentKind::wish));
+    if (parsed.kind == NameKind::link) add(name, links_[parsed.incarnation] = judgeOwned(name, layout::SegmentKind::link));
+  }
+
+  // A link, a wish: it lives as long as its client's window.
+  Finding judgeOwned(const std::string& name, layout::SegmentKind kind) try {
+    const auto header = segments::tryReadHeader(name, kind);
+    if (!header) return {Verdict::dead, "its name is gone"};
+    return ownerOf(clients_, NameKind::clientWindow, header->ownerWindow);
+  } catch (const VersionError& error) {
+    return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  } catch (const SegmentError& error) {
+    return {Verdict::dead, fmt::format("nobody can use it: {}", error.what())};
+  } catch (const std::exception& error) {
+    return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  }
+
+  // Pools hang on links, pipes on hints.
+  void last(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::bulk) {
+      const auto link = links_.find(parsed.incarnation);
+      add(name, link == links_.end() ? Finding{Verdict::dead, fmt::format("its link {:x} is gone", parsed.incarnation)} : link->second);
+    } else if (parsed.kind == NameKind::fifo) {
+      add(name, ownerOf(hints_, NameKind::hints, parsed.incarnation));
+    }
+  }
+
+  // What is known of an owner. One that was not listed may have come since: its lock tells, under either of its names.
+  const Finding& ownerOf(std::map<std::uint64_t, Finding>& known, NameKind kind, std::uint64_t incarnation) const {
+    const auto [found, isNew] = known.try_emplace(incarnation);
+    if (!isNew) return found->second;
+    const auto name = SegmentName::keyed(backplane_, kind, incarnation);
+    found->second = {Verdict::dead, fmt::format("its owner's {} is gone", name)};
+    for (const auto& lock : {name, SegmentName::keyed(backplane_, NameKind::hints, incarnation)}) {
+      if (segments::probeOwner(lock) == segments::Owner::alive)
+        found->second = {Verdict::alive, fmt::format("the lock of {} is held", lock)};
+    }
+    return found->second;
+  }
+
+  std::string backplane_;
+  std::map<std::uint64_t, Finding> clients_;  // by incarnation of the window, as the next
+  std::map<std::uint64_t, Finding> hints_;
+  std::map<std::uint64_t, Finding> links_;
+  std::vector<Judged> judged_;
+};
+
+}  // namespace
+
+std::vector<Judged> judge(const std::string& backplane) { return Judge(backplane).run(); }
+
+bool tryRemove(const Judged& file) {
+  const auto parsed = SegmentName::tryParse(file.name);
+  if (file.verdict != Verdict::dead || !parsed) return false;
+  // The name of a server window may be a successor's by now: the lock is asked again, and held until the name is gone.
+  const bool hasLock = parsed->kind == NameKind::serverWindow || parsed->kind == NameKind::clientWindow || parsed->kind == NameKind::hints;
+  return hasLock ? segments::removeIfOwnerless(file.name) : segments::remove(file.name);
+}
+
+}  // namespace mpf::remains

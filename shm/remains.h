@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// Remains: what dead processes left on a backplane, file by file, and how that is known. Who removes it and who only wants to know what
+// would be removed ask the same judge.
+//
+//   names ─► windows, hints: is their lock free? ─► links, wishes: does their window live? ─► pools: their link? pipes: their hints?
+//
+// Threads  any.
+// Crash    death is for good: what was found dead stays so until it is removed, by whomever, and however many try at once.
+// Trust    what may not be opened or is of another version is not judged, and stays.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mpf::remains {
+
+enum class Verdict { alive, dead, unknown };
+
+struct Judged {
+  std::string name;
+  Verdict verdict{};
+  std::string reason;  // how that is known
+};
+
+// Every file of a backplane: windows and hints first, then what hangs on them. One that goes away meanwhile may be missing.
+std::vector<Judged> judge(const std::string& backplane);
+
+// Removes a file that was found dead. False: somebody was quicker, or this user may not.
+bool tryRemove(const Judged& file);
+
+}  // namespace mpf::remains

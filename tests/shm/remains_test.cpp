@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+// What is dead, what is not, and what nobody can tell; and the reason for each.
+#include <mpf/shm/remains.h>
+
+#include <sys/stat.h>
+
+#include <fstream>
+#include <map>
+
+#include <mpf/shm/link.h>
+#include <mpf/tests/shm/child.h>
+#include <mpf/tests/shm/shm_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+using layout::SegmentKind;
+using remains::Verdict;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class RemainsTest : public ShmTest {
+ protected:
+  [[nodiscard]] std::map<std::string, remains::Judged> judge() const {
+    std::map<std::string, remains::Judged> all;
+    for (const auto& file : remains::judge(name())) all.emplace(file.name, file);
+    return all;
+  }
+  [[nodiscard]] remains::Judged judgementOf(const std::string& file) const { return judge()[file]; }
+  [[nodiscard]] std::string keyed(NameKind kind, std::uint64_t incarnation) const { return SegmentName::keyed(name(), kind, incarnation); }
+  OwnWindow makeClient() const {
+    return {name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {}};
+  }
+  // A segment of one page under that name, of a window that has this incarnation.
+  void leave(const std::string& file, SegmentKind kind, std::uint64_t ownerWindow, std::uint16_t layoutMajor = layout::kMajor) const {
+    auto page = createPage(kind);
+    page.sharedHeader().ownerWindow = ownerWindow;
+    page.sharedHeader().layoutMajor = layoutMajor;
+    EXPECT_TRUE(page.tryPublish(file));
+  }
+};
+
+TEST_F(RemainsTest, OfTheLivingTheLockIsTheReason) {
+  const auto client = makeClient();
+  const auto incarnation = client.header().incarnation;
+  const auto wish = keyed(NameKind::wish, 7);
+  leave(wish, SegmentKind::wish, incarnation);
+
+  const auto all = judge();
+
+  const auto lock = "pid " + std::to_string(::getpid()) + " (shm_test) holds the lock of ";
+  ASSERT_EQ(all.size(), 4U);
+  for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::alive) << file;
+  EXPECT_EQ(all.at(keyed(NameKind::clientWindow, incarnation)).reason, lock + keyed(NameKind::clientWindow, incarnation));
+  EXPECT_EQ(all.at(keyed(NameKind::hints, incarnation)).reason, lock + keyed(NameKind::hints, incarnation));
+  EXPECT_EQ(all.at(keyed(NameKind::fifo, incarnation)).reason, lock + keyed(NameKind::hints, incarnation));
+  EXPECT_EQ(all.at(wish).reason, lock + keyed(NameKind::clientWindow, incarnation));
+  EXPECT_FALSE(remains::tryRemove(all.at(wish))) << "it lives";
+  segments::remove(wish);
+}
+
+TEST_F(RemainsTest, OfTheDeadTheFreeLockIsTheReason) {
+  std::uint64_t incarnation = 0;
+  Child child([&](Child::Self& self) {
+    const auto client = makeClient();
+    self.stay();
+  });
+  for (const auto& [file, judged] : judge()) incarnation = SegmentName::tryParse(file)->incarnation;
+  const auto wish = keyed(NameKind::wish, 7);
+  leave(wish, SegmentKind::wish, incarnation);
+
+  child.end(SIGKILL);
+
+  const auto all = judge();
+  ASSERT_EQ(all.size(), 4U);
+  for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::dead) << file;
+  EXPECT_THAT(all.at(wish).reason,
+              AllOf(HasSubstr("nobody holds the lock of " + keyed(NameKind::clientWindow, incarnation)), HasSubstr("pid ")));
+  for (const auto& [file, judged] : all) EXPECT_TRUE(remains::tryRemove(judged)) << file;
+}
+
+TEST_F(RemainsTest, WhatNobodyOwnsIsDead) {
+  const auto wish = keyed(NameKind::wish, 7);
+  leave(wish, SegmentKind::wish, 0x99);
+  const auto bulk = SegmentName::bulk(name(), 0x55, 1, 0);
+  leave(bulk, SegmentKind::bulk, 0x99);
+  const auto link = SegmentName::link(name(), 1, 2);
+  std::ofstream(segments::path(link)) << "junk";
+
+  EXPECT_EQ(judgementOf(wish).reason, "its owner's " + keyed(NameKind::clientWindow, 0x99) + " is gone");
+  EXPECT_EQ(judgementOf(bulk).reason, "its link 55 is gone");
+  EXPECT_THAT(judgementOf(link).reason, HasSubstr("nobody can use it: "));
+  for (const auto& [file, judged] : judge()) EXPECT_TRUE(remains::tryRemove(judged)) << file;
+}
+
+// Somebody removed the name of a window whose owner lives on.
+TEST_F(RemainsTest, AWindowWithoutANameKeepsWhatIsItsOwn) {
+  const auto client = makeClient();
+  const auto wish = keyed(NameKind::wish, 7);
+  leave(wish, SegmentKind::wish, client.header().incarnation);
+
+  segments::remove(keyed(NameKind::clientWindow, client.header().incarnation));
+
+  EXPECT_EQ(judgementOf(wish).verdict, Verdict::alive);
+  EXPECT_EQ(judgementOf(wish).reason, "the lock of " + keyed(NameKind::hints, client.header().incarnation) + " is held");
+  segments::remove(wish);
+}
+
+TEST_F(RemainsTest, WhatCannotBeUnderstoodIsNotJudged) {
+  const auto notes = SegmentName::prefix(name()) + "notes";
+  std::ofstream(segments::path(notes)) << "mine";
+  leave(serverName("newer"), SegmentKind::serverWindow, 0, layout::kMajor + 1);
+  leave(serverName("wish"), SegmentKind::wish, 0);
+  leave(keyed(NameKind::wish, 7), SegmentKind::wish, 0, layout::kMajor + 1);
+  ASSERT_EQ(::mkfifo(segments::path(serverName("pipe")).c_str(), 0600), 0);
+
+  const auto all = judge();
+
+  ASSERT_EQ(all.size(), 5U);
+  for (const auto& [file, judged] : all) {
+    EXPECT_EQ(judged.verdict, Verdict::unknown) << file;
+    EXPECT_FALSE(remains::tryRemove(judged)) << file;
+    segments::remove(file);
+  }
+  EXPECT_EQ(all.at(notes).reason, "not a name that MPF gives");
+  EXPECT_THAT(all.at(serverName("newer")).reason, HasSubstr("layout 2, this program speaks 1-1"));
+}
+
+// Judged dead, and then the name is a successor's: the removal asks the lock once more.
+TEST_F(RemainsTest, ASuccessorThatTookTheNameStays) {
+  leave(serverName(), SegmentKind::serverWindow, 0);
+  const auto judged = judgementOf(serverName());
+  ASSERT_EQ(judged.verdict, Verdict::dead);
+  const OwnWindow successor(name(), SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader&) {});
+
+  EXPECT_FALSE(remains::tryRemove(judged));
+
+  EXPECT_EQ(segments::probeOwner(serverName(), successor.header().incarnation), segments::Owner::alive);
+}
+
+}  // namespace
+}  // namespace mpf::test
