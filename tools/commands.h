@@ -22,6 +22,7 @@ void addSniff(CLI::App& app, Run& run);
 void addTap(CLI::App& app, Run& run);
 void addReplay(CLI::App& app, Run& run);
 void addClean(CLI::App& app, Run& run);
+void addDoctor(CLI::App& app, Run& run);
 void addBench(CLI::App& app, Run& run);
 
 }  // namespace mpf::tools

@@ -51,6 +51,7 @@ int main(int argc, char** argv) try {
   mpf::tools::addTap(app, run);
   mpf::tools::addReplay(app, run);
   mpf::tools::addClean(app, run);
+  mpf::tools::addDoctor(app, run);
   mpf::tools::addBench(app, run);
   app.require_subcommand(1);
   app.footer(kFooter);

@@ -4,14 +4,9 @@
 #include <algorithm>
 #include <fmt/format.h>
 
+#include <mpf/tools/wrap.h>
+
 namespace mpf::tools {
-
-namespace {
-
-// The columns that fmt takes a text for when it pads, never more than its bytes: "°" is one of two bytes, "電" two of three.
-std::size_t columnsOf(const std::string& text) { return 2 * text.size() - fmt::formatted_size("{:<{}}", text, text.size()); }
-
-}  // namespace
 
 Table::Table(std::vector<std::string> headings) {
   for (auto& heading : headings) {

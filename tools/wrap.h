@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Wrapping: texts in the 80 columns of a terminal.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace mpf::tools {
+
+inline constexpr std::size_t kColumns = 80;
+
+// The columns that a text takes.
+[[nodiscard]] std::size_t columnsOf(const std::string& text);
+
+// `first` and then the words of `text`, broken between words, and inside a word that is longer than a line; each further line is indented
+// by `indent` blanks. Ends with a newline.
+[[nodiscard]] std::string wrap(const std::string& first, const std::string& text, std::size_t indent);
+
+// A text of at most so many columns; what is longer ends in "~".
+[[nodiscard]] std::string cut(const std::string& text, std::size_t columns);
+
+}  // namespace mpf::tools
