@@ -67,7 +67,7 @@ std::vector<std::string> Backplane::removeDead() const {
 
 void removeDeadWindow(const std::string& backplane, const std::string& name, std::uint64_t incarnation) {
   if (segments::probeOwner(name, incarnation) == segments::Owner::dead) segments::removeIfOwnerless(name);
-  if (segments::removeIfOwnerless(SegmentName::keyed(backplane, NameKind::hints, incarnation))) {
+  if (segments::removeHintsIfOwnerless(SegmentName::keyed(backplane, NameKind::hints, incarnation))) {
     segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
   }
 }

@@ -66,7 +66,7 @@ void Endpoint::detach(std::uint32_t index) noexcept {
 std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::SegmentKind kind) {
   dropPeers();
   if (const auto found = peers_.find(name); found != peers_.end()) {
-    if (auto window = found->second.window.lock(); window && !window->isDead() && !window->isClosed()) return window;
+    if (auto window = found->second.window.lock(); window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
     backplane_.watcher().forget(found->second.token);
     peers_.erase(found);
   }

@@ -72,6 +72,8 @@ class Endpoint {
   [[nodiscard]] int descriptor() const noexcept { return window_.fifo().get(); }
   bool arm() noexcept;
   void disarm() noexcept;
+  // Leaves the descriptor readable: not all that is new was looked at.
+  void callAgain() noexcept { window_.ring(); }
 
   // What a wake-up costs, as seen from a message that ended a sleep.
   void noteWake(std::int64_t ns) noexcept { wakeNs_ += (std::min<std::int64_t>(ns, 1'000'000) - wakeNs_) / 8; }

@@ -105,7 +105,7 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   const auto& offer = own.header();
   checkGeometry(header, name);
   if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes ||
-      segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+      segment->bytes() != layout::linkBytes(header.queueSlots, header.replySlots)) {
     throw SegmentError(fmt::format("{}: not a link that this server offers", segments::path(name)));
   }
   segment->closeFile();
@@ -121,7 +121,7 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)), ringControl(segment_, other(side))),
       pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user}, segment_.header().maxPoolBytes,
             returnRing(segment_, side)),
-      borrowed_(poolPlace(segment_, backplane, other(side)), returnRing(segment_, other(side))) {}
+      borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes, returnRing(segment_, other(side))) {}
 
 Link::~Link() {
   if (side_ == LinkSide::client) segments::remove(segment_.name());

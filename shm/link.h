@@ -55,6 +55,8 @@ class Link {
   void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
   void setPeerIndex(std::uint32_t peerIndex) noexcept { peerIndex_ = peerIndex; }
 
+  // Whether somebody cut its file: all that it holds is gone.
+  [[nodiscard]] bool isLost() const noexcept { return segment_.isLost(); }
   // Our half of the state, and the peer's as it says.
   void setState(layout::LinkState state) noexcept;
   [[nodiscard]] layout::LinkState peerState() const noexcept;

@@ -122,22 +122,26 @@ std::optional<layout::ChunkRef> PoolOwner::tryFind(const std::byte* data) const 
   return std::nullopt;
 }
 
+bool PoolBorrower::tryMap(std::uint32_t number) {
+  auto segment = Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, number), layout::SegmentKind::bulk,
+                                  Segment::Access::readWrite);
+  if (!segment || segment->bytes() > maxBytes_ - bytes_) return false;
+  const auto header = segment->header();
+  const auto room = segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
+  if (header.chunkBytes == 0 || header.chunkBytes % layout::kCacheLineBytes != 0) return false;
+  if (header.chunkCount > room / header.chunkBytes) return false;
+  segment->closeFile();
+  bytes_ += segment->bytes();
+  bulks_[number] = {std::move(*segment), header.chunkBytes, header.chunkCount};
+  return true;
+}
+
 std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) noexcept try {
   if (ref.segment >= kMaxBulks || ref.side != place_.side) return std::nullopt;
   if (ref.segment >= bulks_.size()) bulks_.resize(ref.segment + 1);
-  auto& bulk = bulks_[ref.segment];
-  if (!bulk.segment) {
-    auto segment = Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, ref.segment), layout::SegmentKind::bulk,
-                                    Segment::Access::readWrite);
-    if (!segment) return std::nullopt;
-    const auto header = segment->header();
-    const auto room = segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
-    if (header.chunkBytes == 0 || header.chunkBytes % layout::kCacheLineBytes != 0) return std::nullopt;
-    if (header.chunkCount > room / header.chunkBytes) return std::nullopt;
-    segment->closeFile();
-    bulk = {std::move(*segment), header.chunkBytes, header.chunkCount};
-  }
-  if (ref.chunk >= bulk.chunkCount) return std::nullopt;
+  const auto& bulk = bulks_[ref.segment];
+  if (!bulk.segment && !tryMap(ref.segment)) return std::nullopt;
+  if (ref.chunk >= bulk.chunkCount || bulk.segment.isLost()) return std::nullopt;
   return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + ref.chunk * bulk.chunkBytes, bulk.chunkBytes, ref};
 } catch (const std::exception&) {
   return std::nullopt;

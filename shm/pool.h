@@ -79,7 +79,8 @@ class PoolOwner {
 
 class PoolBorrower {
  public:
-  PoolBorrower(PoolPlace place, layout::ReturnRing& returns) : place_(std::move(place)), returns_(&returns) {}
+  PoolBorrower(PoolPlace place, std::uint64_t maxBytes, layout::ReturnRing& returns)
+      : place_(std::move(place)), maxBytes_(maxBytes), returns_(&returns) {}
 
   // The memory of a chunk that the peer sent; nullopt when there is no such chunk.
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref) noexcept;
@@ -92,7 +93,10 @@ class PoolBorrower {
     std::size_t chunkBytes{};
     std::uint32_t chunkCount{};
   };
+  bool tryMap(std::uint32_t number);
   PoolPlace place_;
+  std::uint64_t maxBytes_;  // that the peer may have us map
+  std::uint64_t bytes_ = 0;
   layout::ReturnRing* returns_;
   std::uint64_t returned_ = 0;
   std::vector<Bulk> bulks_;  // index = segment number; empty where not mapped

@@ -37,6 +37,19 @@ Finding judgeLocked(const std::string& name, layout::SegmentKind kind) try {
   return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
 }
 
+// Hints: every peer may write over their header, so only their lock counts.
+Finding judgeHints(const std::string& name) {
+  switch (segments::probeOwner(name)) {
+    case segments::Owner::alive:
+      return {Verdict::alive, fmt::format("the lock of {} is held", name)};
+    case segments::Owner::dead:
+      return {Verdict::dead, fmt::format("nobody holds the lock of {}", name)};
+    case segments::Owner::absent:
+      break;
+  }
+  return {Verdict::dead, "its name is gone"};
+}
+
 class Judge {
  public:
   explicit Judge(std::string backplane) : backplane_(std::move(backplane)) {}
@@ -63,7 +76,7 @@ class Judge {
     } else if (parsed.kind == NameKind::clientWindow) {
       add(name, clients_[parsed.incarnation] = judgeLocked(name, layout::SegmentKind::clientWindow));
     } else if (parsed.kind == NameKind::hints) {
-      add(name, hints_[parsed.incarnation] = judgeLocked(name, layout::SegmentKind::hints));
+      add(name, hints_[parsed.incarnation] = judgeHints(name));
     }
   }
 
@@ -123,7 +136,8 @@ bool tryRemove(const Judged& file) {
   const auto parsed = SegmentName::tryParse(file.name);
   if (file.verdict != Verdict::dead || !parsed) return false;
   // The name of a server window may be a successor's by now: the lock is asked again, and held until the name is gone.
-  const bool hasLock = parsed->kind == NameKind::serverWindow || parsed->kind == NameKind::clientWindow || parsed->kind == NameKind::hints;
+  if (parsed->kind == NameKind::hints) return segments::removeHintsIfOwnerless(file.name);
+  const bool hasLock = parsed->kind == NameKind::serverWindow || parsed->kind == NameKind::clientWindow;
   return hasLock ? segments::removeIfOwnerless(file.name) : segments::remove(file.name);
 }
 

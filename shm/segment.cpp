@@ -23,17 +23,6 @@ namespace ipc = boost::interprocess;
 
 constexpr const char* kDirectory = "/dev/shm";
 
-// Lets Boost.Interprocess map a file that we opened ourselves.
-class OpenFile {
- public:
-  explicit OpenFile(int fd) { handle_.handle = fd; }
-  [[nodiscard]] auto get_mapping_handle() const { return handle_; }
-  [[nodiscard]] ipc::mode_t get_mode() const { return ipc::read_write; }
-
- private:
-  decltype(std::declval<ipc::shared_memory_object>().get_mapping_handle()) handle_{};
-};
-
 struct flock64 wholeFile(short type) {
   struct flock64 lock{};
   lock.l_type = type;
@@ -76,8 +65,8 @@ std::string rightsInWords(const std::string& name) {
   return fmt::format(" (mode {:04o}, user {}, group {})", status.st_mode & 07777u, status.st_uid, status.st_gid);
 }
 
-// Opens a segment and copies its header; empty when there is none of that name. Throws as Segment::tryOpen.
-FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags, layout::SegmentHeader& header) {
+// Opens a regular file; empty when there is none of that name. Throws as Segment::tryOpen.
+FileDescriptor openRegular(const std::string& name, int flags, std::size_t& fileBytes) {
   const auto path = segments::path(name);
   auto file = openByName(name, flags);
   if (!file) {
@@ -88,7 +77,16 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
   struct stat status{};
   checkCall(::fstat(file.get(), &status), "look at", path);
   if (!S_ISREG(status.st_mode)) throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", path));
-  const auto fileBytes = static_cast<std::size_t>(status.st_size);
+  fileBytes = static_cast<std::size_t>(status.st_size);
+  return file;
+}
+
+// Opens a segment and copies its header; empty when there is none of that name. Throws as Segment::tryOpen.
+FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags, layout::SegmentHeader& header) {
+  std::size_t fileBytes = 0;
+  auto file = openRegular(name, flags, fileBytes);
+  if (!file) return {};
+  const auto path = segments::path(name);
   if (::pread(file.get(), &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) {
     throw SegmentError(fmt::format("{}: truncated, {} bytes are too few for a header", path, fileBytes));
   }
@@ -96,11 +94,24 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
   return file;
 }
 
+// The file of that name with its owner's lock; empty when somebody else has the lock or the name.
+FileDescriptor lockOwnerless(const std::string& name) {
+  auto file = openByName(name, O_RDWR);
+  if (!file || !tryLock(file.get())) return {};
+  // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
+  struct stat locked{};
+  struct stat named{};
+  if (::fstat(file.get(), &locked) != 0 || !S_ISREG(locked.st_mode)) return {};
+  if (::stat(segments::path(name).c_str(), &named) != 0 || locked.st_ino != named.st_ino) return {};
+  return file;
+}
+
 // Whether a file is a segment of some kind that this program can use.
-bool isKnown(int fd, std::size_t fileBytes, const std::string& name) try {
+bool isKnown(int fd, const std::string& name) try {
   layout::SegmentHeader header{};
-  if (::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) return false;
-  segments::check(header, fileBytes, header.kind, segments::path(name));
+  struct stat status{};
+  if (::fstat(fd, &status) != 0 || ::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) return false;
+  segments::check(header, static_cast<std::size_t>(status.st_size), header.kind, segments::path(name));
   return true;
 } catch (const SegmentError&) {
   return false;
@@ -118,7 +129,7 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
   checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
   if (const int shortage = reserve(fd, bytes); shortage != 0)
     throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
-  segment.map(Access::readWrite);
+  segment.mapping_ = Mapping(fd, bytes, Access::readWrite);
 
   auto& header = segment.sharedHeader();
   header.magic = layout::kMagic;
@@ -138,13 +149,9 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
   return segment;
 }
 
-void Segment::map(Access access) {
-  const auto mode = access == Access::readOnly ? ipc::read_only : ipc::read_write;
-  region_ = ipc::mapped_region(OpenFile(file_.get()), mode);
-}
-
 void Segment::lockForLife() {
   if (!tryLock(file_.get())) throwSystemError(errno, "lock the new segment", name_);
+  mapping_.growBy(file_.get());
 }
 
 bool Segment::tryPublish(const std::string& name) {
@@ -171,7 +178,21 @@ std::optional<Segment> Segment::tryOpen(const std::string& name, layout::Segment
   segment.name_ = name;
   segment.file_ = openChecked(name, kind, access == Access::readOnly ? O_RDONLY : O_RDWR, segment.header_);
   if (!segment.file_) return std::nullopt;
-  segment.map(access);
+  segment.mapping_ = Mapping(segment.file_.get(), segment.header_.totalBytes, access);
+  return segment;
+}
+
+std::optional<Segment> Segment::tryOpenShared(const std::string& name, std::size_t bytes) {
+  Segment segment;
+  segment.name_ = name;
+  std::size_t fileBytes = 0;
+  segment.file_ = openRegular(name, O_RDWR, fileBytes);
+  if (!segment.file_) return std::nullopt;
+  const int file = segment.file_.get();
+  if (fileBytes < bytes && (!isLocked(file) || reserve(file, bytes) != 0))
+    throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", segments::path(name), fileBytes, bytes));
+  segment.mapping_ = Mapping(file, bytes, Access::readWrite);
+  segment.mapping_.growAt(file, segments::path(name));
   return segment;
 }
 
@@ -214,14 +235,14 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
 }
 
 bool removeIfOwnerless(const std::string& name) {
-  const auto file = openByName(name, O_RDWR);
-  if (!file || !tryLock(file.get())) return false;
-  // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
-  struct stat locked{};
-  struct stat named{};
-  if (::fstat(file.get(), &locked) != 0 || ::stat(path(name).c_str(), &named) != 0 || locked.st_ino != named.st_ino) return false;
+  const auto file = lockOwnerless(name);
   // Of anything but a segment that we know, a free lock proves nothing.
-  return isKnown(file.get(), static_cast<std::size_t>(locked.st_size), name) && remove(name);
+  return file && isKnown(file.get(), name) && remove(name);
+}
+
+bool removeHintsIfOwnerless(const std::string& name) {
+  const auto file = lockOwnerless(name);
+  return file && remove(name);
 }
 
 std::vector<std::string> list(const std::string& prefix) {

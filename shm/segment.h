@@ -13,16 +13,17 @@
 #include <sys/types.h>
 
 #include <algorithm>
-#include <boost/interprocess/mapped_region.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <mpf/base/file_descriptor.h>
 #include <mpf/shm/layout.h>
+#include <mpf/shm/mapping.h>
 
 namespace mpf {
 
@@ -47,7 +48,7 @@ struct Rights {
 
 class Segment {
  public:
-  enum class Access { readOnly, readWrite };
+  using Access = Mapping::Access;
 
   Segment() = default;
 
@@ -55,7 +56,7 @@ class Segment {
   //   throws  std::system_error; ENOSPC when /dev/shm has not that much left
   static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights);
 
-  // Holds the owner's lock until this Segment dies or the process does.
+  // Holds the owner's lock until this Segment dies or the process does. A peer that cuts the file finds it grown again.
   void lockForLife();
   // False when another segment has the name.
   [[nodiscard]] bool tryPublish(const std::string& name);
@@ -64,13 +65,20 @@ class Segment {
   //   throws  SegmentError when it is not what it should be, std::system_error when it may not be opened
   static std::optional<Segment> tryOpen(const std::string& name, layout::SegmentKind kind, Access access);
 
+  // The first `bytes` of a segment that every peer may write: its header may be nonsense by now, and is not looked at. When a peer cuts the
+  // file, before or after, it is grown again. nullopt when there is none of that name.
+  //   throws  SegmentError when it is too short and nobody's, or no file, std::system_error when it may not be opened
+  static std::optional<Segment> tryOpenShared(const std::string& name, std::size_t bytes);
+
   // A private copy, taken and checked when the segment was opened.
   [[nodiscard]] const layout::SegmentHeader& header() const { return header_; }
   [[nodiscard]] layout::SegmentHeader& sharedHeader() const { return *reinterpret_cast<layout::SegmentHeader*>(data()); }
-  [[nodiscard]] std::byte* data() const { return static_cast<std::byte*>(region_.get_address()); }
-  [[nodiscard]] std::size_t bytes() const { return region_.get_size(); }
+  [[nodiscard]] std::byte* data() const { return mapping_.data(); }
+  [[nodiscard]] std::size_t bytes() const { return mapping_.bytes(); }
   [[nodiscard]] const std::string& name() const { return name_; }
-  explicit operator bool() const { return region_.get_address() != nullptr; }
+  explicit operator bool() const { return data() != nullptr; }
+  // Whether somebody cut the file: what is left is zeroes of our own.
+  [[nodiscard]] bool isLost() const noexcept { return mapping_.isLost(); }
 
   template <class T>
   [[nodiscard]] T& at(std::size_t offset) const {
@@ -85,9 +93,8 @@ class Segment {
   void closeFile() { file_.reset(); }
 
  private:
-  void map(Access access);
   FileDescriptor file_;
-  boost::interprocess::mapped_region region_;
+  Mapping mapping_;
   layout::SegmentHeader header_{};
   std::string name_;
 };
@@ -108,6 +115,8 @@ enum class Owner { alive, dead, absent };
 // Removes a window whose owner is proven dead. Two processes may try at once; a window that was replaced meanwhile stays, and so does
 // what is no window of a version that we know: its lock may mean something else.
 bool removeIfOwnerless(const std::string& name);
+// The same of hints, whatever a peer has written over them: their name and their lock mean the same in all versions.
+bool removeHintsIfOwnerless(const std::string& name);
 
 // Names in /dev/shm that start with `prefix`.
 std::vector<std::string> list(const std::string& prefix);

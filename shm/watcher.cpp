@@ -2,7 +2,6 @@
 #include <mpf/shm/watcher.h>
 
 #include <pthread.h>
-#include <signal.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/inotify.h>
@@ -12,6 +11,7 @@
 #include <cstring>
 #include <vector>
 
+#include <mpf/base/signals_blocked.h>
 #include <mpf/base/system_call.h>
 #include <mpf/shm/process.h>
 #include <mpf/shm/segment_name.h>
@@ -30,22 +30,6 @@ void add(int epoll, int fd, Watcher::Token token) {
   event.data.u64 = token;
   checkCall(::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
 }
-
-// Signals belong to the program's own threads.
-class SignalsBlocked {
- public:
-  SignalsBlocked() {
-    sigset_t all;
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsBlocked(const SignalsBlocked&) = delete;
-  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-
- private:
-  sigset_t before_{};
-};
 
 // Whether an inotify buffer tells of a new server window, or of so many names that some were lost.
 bool tellsOfServer(const char* events, std::size_t bytes) {

@@ -102,16 +102,18 @@ std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout:
   auto window = Segment::tryOpen(name, kind, Segment::Access::readOnly);
   if (!window) return nullptr;
   if (window->bytes() < layout::kWindowBytes) throw SegmentError(fmt::format("{}: truncated", segments::path(name)));
-  const std::string backplane(window->header().backplane.data(),
-                              ::strnlen(window->header().backplane.data(), window->header().backplane.size()));
-  auto hints = Segment::tryOpen(SegmentName::keyed(backplane, NameKind::hints, window->header().incarnation), layout::SegmentKind::hints,
-                                Segment::Access::readWrite);
+  if (window->bytes() > layout::kWindowBytes) throw SegmentError(fmt::format("{}: {} bytes are no window", segments::path(name), window->bytes()));
+  const auto parsed = SegmentName::tryParse(name);
+  if (!parsed) throw SegmentError(fmt::format("{}: no name of a window", segments::path(name)));
+  // Any peer may have written nonsense over their header; the window's, which it cannot write, is enough.
+  auto hints = Segment::tryOpenShared(SegmentName::keyed(parsed->backplane, NameKind::hints, window->header().incarnation),
+                                      sizeof(layout::WindowHints));
   if (!hints) return nullptr;
-  if (hints->bytes() < sizeof(layout::WindowHints)) throw SegmentError(fmt::format("{}: truncated", segments::path(hints->name())));
   hints->closeFile();
   auto peer = std::make_shared<PeerWindow>();
   peer->window_ = std::move(*window);
   peer->hints_ = std::move(*hints);
+  peer->fifoName_ = SegmentName::keyed(parsed->backplane, NameKind::fifo, peer->header().incarnation);
   return peer;
 }
 
@@ -146,11 +148,7 @@ void PeerWindow::wakeIfAsleep() noexcept {
     return;
   }
   const std::lock_guard lock(fifoMutex_);
-  if (!fifo_) {
-    const auto& header = window_.header();
-    const std::string backplane(header.backplane.data(), ::strnlen(header.backplane.data(), header.backplane.size()));
-    fifo_ = doorbell::tryOpenFifo(SegmentName::keyed(backplane, NameKind::fifo, header.incarnation));
-  }
+  if (!fifo_) fifo_ = doorbell::tryOpenFifo(fifoName_);
   doorbell::ringFifo(fifo_);
 }
 

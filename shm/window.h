@@ -77,6 +77,8 @@ class PeerWindow {
   // Set by the watcher once the owner is proven dead; stays.
   [[nodiscard]] bool isDead() const noexcept { return dead_.load(std::memory_order_relaxed); }
   void setDead() noexcept { dead_.store(true, std::memory_order_relaxed); }
+  // Whether somebody cut its files: what we see of it means nothing any more.
+  [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
   // Asks the kernel: whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept { return window_.hasOwner(); }
   [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
@@ -87,6 +89,7 @@ class PeerWindow {
   [[nodiscard]] layout::WindowHints& hints() const noexcept { return hints_.at<layout::WindowHints>(0); }
   Segment window_;
   Segment hints_;
+  std::string fifoName_;
   std::mutex fifoMutex_;
   FileDescriptor fifo_;  // opened when the owner first sleeps on its descriptor
   std::atomic<bool> dead_{false};

@@ -2,7 +2,6 @@
 #include <mpf/drivers/serial/polled_serial_port.h>
 
 #include <poll.h>
-#include <signal.h>
 
 #include <algorithm>
 #include <array>
@@ -10,26 +9,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include <mpf/base/signals_blocked.h>
 #include <mpf/base/system_call.h>
 
 namespace mpf {
 namespace {
-
-// Threads begun in this scope get no signals: those are for the program's own threads.
-class SignalsBlocked {
- public:
-  SignalsBlocked() noexcept {
-    sigset_t all{};
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsBlocked() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsBlocked(const SignalsBlocked&) = delete;
-  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-
- private:
-  sigset_t before_{};
-};
 
 void pollUntil(std::span<pollfd> entries, Deadline deadline) noexcept {
   constexpr std::int64_t kNsPerSecond = 1'000'000'000;

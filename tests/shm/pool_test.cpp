@@ -43,7 +43,7 @@ class PoolTest : public ShmTest {
   PoolPlace place_{name(), kLink, kSide, 0xdef};
   layout::ReturnRing returns_{};
   std::optional<PoolOwner> owner_{std::in_place, place_, Rights{}, std::uint64_t{256} << 20, returns_};
-  PoolBorrower borrower_{place_, returns_};
+  PoolBorrower borrower_{place_, std::uint64_t{256} << 20, returns_};
 };
 
 class ChunkSizes : public PoolTest, public testing::WithParamInterface<std::size_t> {};

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/fault_guard.h>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdint>
+#include <mutex>
+#include <utility>
+
+#include <mpf/base/system_call.h>
+
+namespace mpf::fault_guard {
+
+struct Range {
+  std::atomic<std::uintptr_t> begin{0};  // 0: free
+  std::atomic<std::size_t> bytes{0};
+  std::atomic<bool> writable{false};
+  std::atomic<bool> lost{false};
+  std::atomic<int> file{-1};       // to grow it by; -1: none
+  std::atomic<ino_t> inode{0};     // 0: no path
+  std::array<char, 128> path{};    // to grow it at
+  Range* nextFree = nullptr;       // under tableMutex
+};
+
+namespace {
+
+// Ranges lie in blocks that are never freed, so that a handler can walk them at any time.
+struct Block {
+  std::array<Range, 256> ranges;
+  Block* next = nullptr;
+};
+
+std::mutex tableMutex;  // held by who changes the table, never by a handler
+std::atomic<Block*> blocks{nullptr};
+Range* freeRanges = nullptr;  // under tableMutex
+struct sigaction previousAction {};
+
+Range* findFaulty(std::uintptr_t address) noexcept {
+  // PAIR(guard-block): its ranges, and the blocks before it.
+  for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr; block = block->next) {
+    for (auto& range : block->ranges) {
+      // PAIR(guarded-range): its length and kind.
+      const auto begin = range.begin.load(std::memory_order_acquire);
+      if (begin != 0 && address >= begin && address - begin < range.bytes.load(std::memory_order_relaxed)) return &range;
+    }
+  }
+  return nullptr;
+}
+
+bool tryGrow(const Range& range) noexcept {
+  const auto bytes = static_cast<off_t>(range.bytes.load(std::memory_order_relaxed));
+  if (const int file = range.file.load(std::memory_order_relaxed); file >= 0) return ::fallocate(file, 0, 0, bytes) == 0;
+  // PAIR(guard-path): the path.
+  const auto inode = range.inode.load(std::memory_order_acquire);
+  if (inode == 0) return false;
+  const int file = ::open(range.path.data(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  if (file < 0) return false;
+  struct stat status{};
+  const bool grown = ::fstat(file, &status) == 0 && status.st_ino == inode && ::fallocate(file, 0, 0, bytes) == 0;
+  ::close(file);
+  return grown;
+}
+
+// Zeroes in place of a file, at once for all threads.
+bool tryReplace(Range& range) noexcept {
+  const int protection = PROT_READ | (range.writable.load(std::memory_order_relaxed) ? PROT_WRITE : 0);
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): the address that was mapped
+  auto* const data = reinterpret_cast<void*>(range.begin.load(std::memory_order_relaxed));
+  const auto bytes = range.bytes.load(std::memory_order_relaxed);
+  if (::mmap(data, bytes, protection, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0) == MAP_FAILED) return false;
+  range.lost.store(true, std::memory_order_relaxed);
+  return true;
+}
+
+// As the kernel would have done without us.
+void passOn(int signal, siginfo_t* fault, void* context) {
+  if ((previousAction.sa_flags & SA_SIGINFO) != 0) return previousAction.sa_sigaction(signal, fault, context);
+  const bool isSent = fault->si_code <= 0;  // by a process, not by an access
+  if (previousAction.sa_handler == SIG_IGN && isSent) return;
+  if (previousAction.sa_handler != SIG_DFL && previousAction.sa_handler != SIG_IGN) return previousAction.sa_handler(signal);
+  ::signal(signal, SIG_DFL);
+  if (isSent) ::raise(signal);  // a faulty access comes again by itself
+}
+
+void onFault(int signal, siginfo_t* fault, void* context) {
+  if (!tryRepair(*fault)) passOn(signal, fault, context);
+}
+
+bool install() {
+  checkCall(::sigaction(SIGBUS, nullptr, &previousAction), "sigaction");
+  struct sigaction action{};
+  action.sa_sigaction = onFault;
+  action.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_RESTART;
+  action.sa_mask = previousAction.sa_mask;
+  checkCall(::sigaction(SIGBUS, &action, nullptr), "sigaction");
+  return true;
+}
+
+// Under tableMutex.
+Range& takeFree() {
+  if (freeRanges == nullptr) {
+    auto* const block = new Block;
+    block->next = blocks.load(std::memory_order_relaxed);
+    for (auto& range : block->ranges) range.nextFree = std::exchange(freeRanges, &range);
+    // PAIR(guard-block): complete.
+    blocks.store(block, std::memory_order_release);
+  }
+  return *std::exchange(freeRanges, freeRanges->nextFree);
+}
+
+}  // namespace
+
+Range* add(void* data, std::size_t bytes, bool writable) {
+  [[maybe_unused]] static const bool kInstalled = install();
+  const std::lock_guard lock(tableMutex);
+  auto& range = takeFree();
+  range.bytes.store(bytes, std::memory_order_relaxed);
+  range.writable.store(writable, std::memory_order_relaxed);
+  range.lost.store(false, std::memory_order_relaxed);
+  range.file.store(-1, std::memory_order_relaxed);
+  range.inode.store(0, std::memory_order_relaxed);
+  // PAIR(guarded-range): after what it says.
+  range.begin.store(reinterpret_cast<std::uintptr_t>(data), std::memory_order_release);
+  return &range;
+}
+
+void remove(Range* range) noexcept {
+  range->begin.store(0, std::memory_order_relaxed);
+  const std::lock_guard lock(tableMutex);
+  range->nextFree = std::exchange(freeRanges, range);
+}
+
+void growBy(Range& range, int file) noexcept { range.file.store(file, std::memory_order_relaxed); }
+
+void growAt(Range& range, int file, const std::string& path) noexcept {
+  struct stat status{};
+  if (path.size() >= range.path.size() || ::fstat(file, &status) != 0) return;
+  path.copy(range.path.data(), path.size());
+  range.path[path.size()] = '\0';
+  // PAIR(guard-path): after the path.
+  range.inode.store(status.st_ino, std::memory_order_release);
+}
+
+bool isLost(const Range& range) noexcept { return range.lost.load(std::memory_order_relaxed); }
+
+bool tryRepair(const siginfo_t& fault) noexcept {
+  if (fault.si_code != BUS_ADRERR) return false;
+  const int before = errno;
+  auto* const range = findFaulty(reinterpret_cast<std::uintptr_t>(fault.si_addr));
+  const bool repaired = range != nullptr && (tryGrow(*range) || tryReplace(*range));
+  errno = before;
+  return repaired;
+}
+
+}  // namespace mpf::fault_guard

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/mapping.h>
+
+#include <boost/interprocess/shared_memory_object.hpp>
+#include <fmt/format.h>
+#include <utility>
+
+#include <mpf/base/system_call.h>
+
+namespace mpf {
+namespace {
+
+namespace ipc = boost::interprocess;
+
+// Lets Boost.Interprocess map a file that we opened ourselves.
+class OpenFile {
+ public:
+  explicit OpenFile(int fd) { handle_.handle = fd; }
+  [[nodiscard]] auto get_mapping_handle() const { return handle_; }
+  [[nodiscard]] ipc::mode_t get_mode() const { return ipc::read_write; }
+
+ private:
+  decltype(std::declval<ipc::shared_memory_object>().get_mapping_handle()) handle_{};
+};
+
+ipc::mapped_region mapRegion(int file, std::size_t bytes, Mapping::Access access) try {
+  return {OpenFile(file), access == Mapping::Access::readOnly ? ipc::read_only : ipc::read_write, 0, bytes};
+} catch (const ipc::interprocess_exception& error) {
+  throwSystemError(error.get_native_error(), fmt::format("map {} bytes of a segment", bytes), {});
+}
+
+}  // namespace
+
+Mapping::Mapping(int file, std::size_t bytes, Access access)
+    : region_(mapRegion(file, bytes, access)),
+      range_(fault_guard::add(region_.get_address(), region_.get_size(), access == Access::readWrite)) {}
+
+Mapping::Mapping(Mapping&& other) noexcept : region_(std::move(other.region_)), range_(std::exchange(other.range_, nullptr)) {}
+
+Mapping& Mapping::operator=(Mapping&& other) noexcept {
+  unguard();
+  region_ = std::move(other.region_);
+  range_ = std::exchange(other.range_, nullptr);
+  return *this;
+}
+
+void Mapping::unguard() noexcept {
+  if (range_ != nullptr) fault_guard::remove(std::exchange(range_, nullptr));
+}
+
+}  // namespace mpf

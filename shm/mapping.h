@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Mapping: a shared file in our memory, guarded against a peer that cuts it.
+//
+// Threads  one thread makes and destroys it; any uses the memory.
+// Crash    the kernel unmaps.
+// Trust    whoever may write the file may cut it: then it is grown again, or isLost() and holds zeroes.
+#pragma once
+
+#include <boost/interprocess/mapped_region.hpp>
+#include <cstddef>
+#include <string>
+
+#include <mpf/shm/fault_guard.h>
+
+namespace mpf {
+
+class Mapping {
+ public:
+  enum class Access { readOnly, readWrite };
+
+  Mapping() noexcept = default;
+  // The first `bytes` of `file`, which may be closed afterwards.
+  //   throws  std::system_error
+  Mapping(int file, std::size_t bytes, Access access);
+  ~Mapping() { unguard(); }
+  Mapping(Mapping&& other) noexcept;
+  Mapping& operator=(Mapping&& other) noexcept;
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+
+  [[nodiscard]] std::byte* data() const noexcept { return static_cast<std::byte*>(region_.get_address()); }
+  [[nodiscard]] std::size_t bytes() const noexcept { return region_.get_size(); }
+  [[nodiscard]] bool isLost() const noexcept { return range_ != nullptr && fault_guard::isLost(*range_); }
+
+  // As fault_guard says.
+  void growBy(int file) noexcept { fault_guard::growBy(*range_, file); }
+  void growAt(int file, const std::string& path) noexcept { fault_guard::growAt(*range_, file, path); }
+
+ private:
+  void unguard() noexcept;
+  boost::interprocess::mapped_region region_;
+  fault_guard::Range* range_ = nullptr;
+};
+
+}  // namespace mpf
