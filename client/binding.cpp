@@ -13,6 +13,14 @@ namespace {
 
 constexpr std::int64_t kRetryNs = 1'000'000'000;
 
+// News of the connection is ours to tell, and a fate is the end of the request that it names.
+bool isForServersToSend(const Message& message, const Request* request) noexcept {
+  if (message.getType() == MessageType::connect) return false;
+  if (message.getType() != MessageType::requestFate) return true;
+  const auto* fate = message.tryAs<RequestFate>();
+  return fate != nullptr && request != nullptr && fate->requestId == request->id.load(std::memory_order_relaxed);
+}
+
 }  // namespace
 
 void Binding::setServer(const std::string& server, std::int32_t location) {
@@ -98,23 +106,28 @@ bool Binding::takeOne() {
   if (!channel_) return false;
   Envelope envelope;
   switch (channel_->tryBegin(envelope)) {
-    case MessageLink::Take::message:
-      deliverReply(envelope);
-      return true;
-    case MessageLink::Take::nonsense:
-      count(dispatcher_.endpoint().control().protocolErrors);
-      disconnect("the server sent nonsense", Ending::nonsense);
-      return true;
     case MessageLink::Take::nothing:
+      return onLinkState();
+    case MessageLink::Take::message:
+      if (tryDeliverReply(envelope)) return true;
+      break;
+    case MessageLink::Take::nonsense:
       break;
   }
-  return onLinkState();
+  count(dispatcher_.endpoint().control().protocolErrors);
+  disconnect("the server sent nonsense", Ending::nonsense);
+  return true;
 }
 
 // True when the state of the link was news.
 bool Binding::onLinkState() {
   auto& link = channel_->link();
   const auto state = link.peerState();
+  if (link.isLost() || link.peer()->isLost()) {
+    count(dispatcher_.endpoint().control().protocolErrors);
+    disconnect("somebody cut the connection's shared memory", Ending::nonsense);
+    return true;
+  }
   if (state == layout::LinkState::open && !isConnected()) {
     link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
     {
@@ -142,19 +155,17 @@ bool Binding::onLinkState() {
   return false;
 }
 
-void Binding::deliverReply(const Envelope& envelope) {
+// False: nonsense, of which nothing was delivered.
+bool Binding::tryDeliverReply(const Envelope& envelope) {
   auto& control = dispatcher_.endpoint().control();
   count(control.received);
   auto* request = (envelope.flags & layout::kSlotFirstReply) != 0 ? requests_->find(envelope.requestId) : nullptr;
   if ((envelope.flags & layout::kSlotFirstReply) != 0 && request == nullptr) {
     channel_->discard(envelope);  // its request was cancelled
-    return;
+    return true;
   }
   Message message;
-  if (!channel_->tryFinish(envelope, message)) {
-    count(control.protocolErrors);
-    return disconnect("the server sent nonsense", Ending::nonsense);
-  }
+  if (!channel_->tryFinish(envelope, message) || !isForServersToSend(message, request)) return false;
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0)) noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, 0, nullptr});
   if (request != nullptr) {
@@ -167,6 +178,7 @@ void Binding::deliverReply(const Envelope& envelope) {
     channel_->link().control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
   }
   deliver(std::move(message));
+  return true;
 }
 
 void Binding::noteTimes(const Envelope& envelope, const Request* request) noexcept {
@@ -196,6 +208,14 @@ void Binding::deliverFate(Request& request, Fate fate) {
 
 bool Binding::hasDeadPeer() const noexcept { return channel_ && channel_->link().peer()->isDead(); }
 
+// What a server sent before it went. One that is not gone may send for ever: what fits its ring is all that it had sent.
+void Binding::deliverTheRest(MessageLink& channel) {
+  Envelope envelope;
+  for (auto left = channel.link().header().replySlots; left != 0; --left) {
+    if (channel_.get() != &channel || channel.tryBegin(envelope) != MessageLink::Take::message || !tryDeliverReply(envelope)) return;
+  }
+}
+
 void Binding::disconnect(const std::string& reason, Ending ending) {
   const auto self = shared_from_this();
   const auto channel = channel_;
@@ -206,8 +226,7 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   }
   setReason(reason);
   auto& link = channel->link();
-  Envelope envelope;
-  while (channel_ == channel && channel->tryBegin(envelope) == MessageLink::Take::message) deliverReply(envelope);
+  if (ending == Ending::serverGone) deliverTheRest(*channel);
   requests_->forEach([&](Request& request) {
     deliverFate(request, ending != Ending::nonsense && !link.isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
   });
@@ -288,7 +307,7 @@ void Binding::nudge(std::int64_t nowNs) {
     } else {
       link.peer()->knock(link.header().incarnation);
     }
-    if (link.hasMessage()) takeOne();
+    takeOne();
   }
   wakeAt(knockedNs_ + nudgeEveryNs_);
 }

@@ -59,7 +59,8 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
-  void deliverReply(const Envelope& envelope);
+  bool tryDeliverReply(const Envelope& envelope);
+  void deliverTheRest(MessageLink& channel);
   void noteTimes(const Envelope& envelope, const Request* request) noexcept;
   bool onLinkState();
   void wish();

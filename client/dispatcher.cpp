@@ -2,17 +2,19 @@
 #include <mpf/client/dispatcher.h>
 
 #include <pthread.h>
-#include <signal.h>
 
 #include <condition_variable>
 #include <map>
 
+#include <mpf/base/signals_blocked.h>
 #include <mpf/client/dispatcher_impl.h>
 
 namespace mpf {
 namespace {
 
 constexpr int kBatch = 16;  // messages of one link before the others have their turn
+constexpr std::uint32_t kLooksInVain = 64;  // at news that is none, between looks at the clock
+constexpr int kPending = 1024;  // batches before a program's event loop has its turn
 
 }  // namespace
 
@@ -26,17 +28,12 @@ Dispatcher::Impl::~Impl() {
 }
 
 void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
-  sigset_t all;
-  sigset_t before;
-  ::sigfillset(&all);
-  // Signals belong to the program's own threads.
-  ::pthread_sigmask(SIG_SETMASK, &all, &before);
+  const SignalsBlocked blocked;
   hasThread_ = true;
   thread_ = std::thread([self] {
     ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
     while (!self->ended_.load(std::memory_order_relaxed)) self->runOnce(Deadline::never());
   });
-  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 void Dispatcher::Impl::endThread() {
@@ -58,15 +55,22 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
   runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
-  for (;;) {
+  for (std::uint32_t vain = 0;;) {
     // First: in a loop that is never idle there would be no second.
     if (stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed)) return false;
     if (step()) return true;
-    while (endpoint_.takeKnock()) {  // nobody has reason to knock at a client
-    }
-    static_cast<void>(endpoint_.takeRescan());
-    if (!endpoint_.wait(std::min(deadline, nextDue())) && !nextDue().hasPassed()) return false;
+    dropKnocks();
+    const bool hasNews = endpoint_.wait(std::min(deadline, nextDue()));
+    // Peers may invent news for ever.
+    if ((!hasNews || ++vain % kLooksInVain == 0) && deadline.hasPassed() && !nextDue().hasPassed()) return false;
   }
+}
+
+// Nobody has reason to knock at a client.
+void Dispatcher::Impl::dropKnocks() noexcept {
+  for (std::uint32_t knocks = 0; knocks < layout::kKnocks && endpoint_.takeKnock(); ++knocks) {
+  }
+  static_cast<void>(endpoint_.takeRescan());
 }
 
 bool Dispatcher::Impl::step() {
@@ -95,10 +99,13 @@ int Dispatcher::Impl::descriptor() {
 }
 
 void Dispatcher::Impl::runPending() {
-  do {
-    while (step()) {
-    }
-  } while (hasDescriptor_ && !endpoint_.arm());
+  // Peers may send, or invent news, for ever: the program's loop has its turn all the same.
+  for (int batches = 0; batches < kPending; ++batches) {
+    if (step()) continue;
+    dropKnocks();
+    if (!hasDescriptor_ || endpoint_.arm()) return;
+  }
+  if (hasDescriptor_) endpoint_.callAgain();
 }
 
 void Dispatcher::Impl::post(std::function<void()> command) {

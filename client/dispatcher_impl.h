@@ -53,6 +53,7 @@ class Dispatcher::Impl {
 
  private:
   bool step();
+  void dropKnocks() noexcept;
   void handleNews();
   void handleDue();
   void runCommands();

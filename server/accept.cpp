@@ -66,7 +66,9 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
 
 void ServerCore::closeIfClientDid(Connection& connection) noexcept {
   auto& link = connection.channel->link();
-  if (link.peerState() != layout::LinkState::open && !link.hasMessage()) close(connection);
+  if (link.peerState() == layout::LinkState::open || link.hasMessage()) return;
+  if (link.isLost()) count(endpoint_.control().protocolErrors);
+  close(connection);
 }
 
 void ServerCore::closeDead() {

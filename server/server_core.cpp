@@ -42,6 +42,9 @@ class ServerCore::Keeper final : public RouteKeeper {
 
 namespace {
 
+// More than there are links: each has been looked at.
+constexpr std::uint32_t kLooksInVain = 2 * layout::kMaxLinks;
+
 int checkedQueueSize(int size) {
   if (size < 1 || size > static_cast<int>(LinkGeometry::kMaxQueueSize)) {
     throw std::invalid_argument(fmt::format("queue size {}: use 1 to {}", size, LinkGeometry::kMaxQueueSize));
@@ -111,22 +114,27 @@ int ServerCore::descriptor() {
 }
 
 void ServerCore::lookAround() {
-  while (const auto incarnation = endpoint_.takeKnock()) accept(*incarnation);
+  // A client that never stops to knock has its turn, and no more.
+  for (std::uint32_t knocks = 0; knocks < layout::kKnocks; ++knocks) {
+    const auto incarnation = endpoint_.takeKnock();
+    if (!incarnation) break;
+    accept(*incarnation);
+  }
   if (endpoint_.takeRescan()) acceptAll();
   if (endpoint_.takeLocalNews() && endpoint_.takePeerDeath()) closeDead();
 }
 
 Message ServerCore::receive() {
   Message message;
-  for (;;) {
+  // Clients may invent news for ever: who receives gets its turn all the same.
+  for (std::uint32_t looks = 0; looks < kLooksInVain; ++looks) {
     if (endpoint_.hasSideNews()) lookAround();
     const auto index = endpoint_.next();
-    if (!index) {
-      if (hasDescriptor_ && !endpoint_.arm()) continue;
-      return message;
-    }
-    if (take(*connections_[*index], message)) return message;
+    if (index && take(*connections_[*index], message)) return message;
+    if (!index && (!hasDescriptor_ || endpoint_.arm())) return message;
   }
+  if (hasDescriptor_) endpoint_.callAgain();
+  return message;
 }
 
 bool ServerCore::take(Connection& connection, Message& message) noexcept {

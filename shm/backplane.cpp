@@ -66,8 +66,12 @@ std::vector<std::string> Backplane::removeDead() const {
 }
 
 void removeDeadWindow(const std::string& backplane, const std::string& name, std::uint64_t incarnation) {
-  if (segments::probeOwner(name, incarnation) == segments::Owner::dead) segments::removeIfOwnerless(name);
-  if (segments::removeHintsIfOwnerless(SegmentName::keyed(backplane, NameKind::hints, incarnation))) {
+  if (name == SegmentName::keyed(backplane, NameKind::clientWindow, incarnation)) {
+    segments::removeKeyedIfOwnerless(name);
+  } else if (segments::probeOwner(name, incarnation) == segments::Owner::dead) {
+    segments::removeIfOwnerless(name);
+  }
+  if (segments::removeKeyedIfOwnerless(SegmentName::keyed(backplane, NameKind::hints, incarnation))) {
     segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
   }
 }

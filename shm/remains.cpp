@@ -20,8 +20,21 @@ std::string ownerText(const layout::SegmentHeader& header) {
   return fmt::format("pid {} ({})", header.ownerPid, segments::text(header.program));
 }
 
-// A file with a lock of its own. Of anything but a segment that we know, a free lock proves nothing.
-Finding judgeLocked(const std::string& name, layout::SegmentKind kind) try {
+// A file with a lock of its own and a name that nobody else will ever have: the lock alone tells.
+Finding judgeKeyed(const std::string& name) {
+  switch (segments::probeOwner(name)) {
+    case segments::Owner::alive:
+      return {Verdict::alive, fmt::format("the lock of {} is held", name)};
+    case segments::Owner::dead:
+      return {Verdict::dead, fmt::format("nobody holds the lock of {}", name)};
+    case segments::Owner::absent:
+      break;
+  }
+  return {Verdict::dead, "its name is gone"};
+}
+
+// A window. Of anything but a segment that we know, a free lock proves nothing, unless its name does.
+Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
   const auto header = segments::tryReadHeader(name, kind);
   if (!header) return {Verdict::dead, "its name is gone"};
   switch (segments::probeOwner(name, header->incarnation)) {
@@ -33,21 +46,13 @@ Finding judgeLocked(const std::string& name, layout::SegmentKind kind) try {
       break;
   }
   return {Verdict::unknown, "it was replaced just now"};
+} catch (const VersionError& error) {
+  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+} catch (const SegmentError& error) {
+  if (kind == layout::SegmentKind::clientWindow) return judgeKeyed(name);
+  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
 } catch (const std::exception& error) {
   return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
-}
-
-// Hints: every peer may write over their header, so only their lock counts.
-Finding judgeHints(const std::string& name) {
-  switch (segments::probeOwner(name)) {
-    case segments::Owner::alive:
-      return {Verdict::alive, fmt::format("the lock of {} is held", name)};
-    case segments::Owner::dead:
-      return {Verdict::dead, fmt::format("nobody holds the lock of {}", name)};
-    case segments::Owner::absent:
-      break;
-  }
-  return {Verdict::dead, "its name is gone"};
 }
 
 class Judge {
@@ -72,11 +77,11 @@ class Judge {
 
   void withLock(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::serverWindow) {
-      add(name, judgeLocked(name, layout::SegmentKind::serverWindow));
+      add(name, judgeWindow(name, layout::SegmentKind::serverWindow));
     } else if (parsed.kind == NameKind::clientWindow) {
-      add(name, clients_[parsed.incarnation] = judgeLocked(name, layout::SegmentKind::clientWindow));
+      add(name, clients_[parsed.incarnation] = judgeWindow(name, layout::SegmentKind::clientWindow));
     } else if (parsed.kind == NameKind::hints) {
-      add(name, hints_[parsed.incarnation] = judgeHints(name));
+      add(name, hints_[parsed.incarnation] = judgeKeyed(name));  // every peer may write over their header
     }
   }
 
@@ -136,9 +141,8 @@ bool tryRemove(const Judged& file) {
   const auto parsed = SegmentName::tryParse(file.name);
   if (file.verdict != Verdict::dead || !parsed) return false;
   // The name of a server window may be a successor's by now: the lock is asked again, and held until the name is gone.
-  if (parsed->kind == NameKind::hints) return segments::removeHintsIfOwnerless(file.name);
-  const bool hasLock = parsed->kind == NameKind::serverWindow || parsed->kind == NameKind::clientWindow;
-  return hasLock ? segments::removeIfOwnerless(file.name) : segments::remove(file.name);
+  if (parsed->kind == NameKind::hints || parsed->kind == NameKind::clientWindow) return segments::removeKeyedIfOwnerless(file.name);
+  return parsed->kind == NameKind::serverWindow ? segments::removeIfOwnerless(file.name) : segments::remove(file.name);
 }
 
 }  // namespace mpf::remains

@@ -240,7 +240,7 @@ bool removeIfOwnerless(const std::string& name) {
   return file && isKnown(file.get(), name) && remove(name);
 }
 
-bool removeHintsIfOwnerless(const std::string& name) {
+bool removeKeyedIfOwnerless(const std::string& name) {
   const auto file = lockOwnerless(name);
   return file && remove(name);
 }

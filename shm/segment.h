@@ -115,8 +115,9 @@ enum class Owner { alive, dead, absent };
 // Removes a window whose owner is proven dead. Two processes may try at once; a window that was replaced meanwhile stays, and so does
 // what is no window of a version that we know: its lock may mean something else.
 bool removeIfOwnerless(const std::string& name);
-// The same of hints, whatever a peer has written over them: their name and their lock mean the same in all versions.
-bool removeHintsIfOwnerless(const std::string& name);
+// The same of client windows and hints, whatever is written there by now: a name with an incarnation and its lock mean the same in all
+// versions.
+bool removeKeyedIfOwnerless(const std::string& name);
 
 // Names in /dev/shm that start with `prefix`.
 std::vector<std::string> list(const std::string& prefix);

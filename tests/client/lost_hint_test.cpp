@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Hints are written by every peer, and so can be lost to any: that costs time, never a message.
+// Hints are written by every peer, and so can be lost or invented by any: that costs time, never a message.
+#include <poll.h>
+
+#include <thread>
+
 #include <mpf/shm/segment_name.h>
 #include <mpf/tests/client/client_fixture.h>
 
@@ -71,6 +75,62 @@ TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
 
     EXPECT_EQ(next().tryAs<Int32>()->value, i);
   }
+}
+
+// Writes news of everything into hints, for as long as it lives.
+class Inventor {
+ public:
+  explicit Inventor(Segment segment)
+      : segment_(std::move(segment)), thread_([this](const std::stop_token& stop) {
+          auto& hints = segment_.at<layout::WindowHints>(0);
+          while (!stop.stop_requested()) {
+            for (auto& word : hints.readyWords) word.store(UINT64_MAX);
+            for (auto& bits : hints.readyBits) bits.store(UINT64_MAX);
+            for (auto& knock : hints.knocks) knock.store(1);
+            ++hints.knocked;
+          }
+        }) {}
+
+ private:
+  Segment segment_;
+  std::jthread thread_;
+};
+
+TEST_F(LostHintTest, InventedNewsKeepsNoClientFromItsDeadline) {
+  runUntil([&] { return client_.isConnected(); });
+  settle();
+  const Inventor inventor(hintsOf(layout::SegmentKind::clientWindow));
+
+  EXPECT_FALSE(dispatcher_.runOnce(Deadline::after(20ms)));
+}
+
+TEST_F(LostHintTest, InventedNewsKeepsNoEventLoopFromItsTurn) {
+  runUntil([&] { return client_.isConnected(); });
+  settle();
+  pollfd readable{dispatcher_.descriptor(), POLLIN, 0};
+  const Inventor inventor(hintsOf(layout::SegmentKind::clientWindow));
+
+  for (int turn = 0; turn < 3; ++turn) dispatcher_.runPending();
+
+  ASSERT_EQ(client_.send(Int32Message({.value = 5})), SendResult::sent);
+  while (!server_->handleOne()) {
+  }
+  while (messages_.empty()) {
+    ASSERT_EQ(::poll(&readable, 1, -1), 1);
+    dispatcher_.runPending();
+  }
+  EXPECT_EQ(next().tryAs<Int32>()->value, 5);
+}
+
+TEST_F(LostHintTest, InventedNewsKeepsNoServerFromItsReceiverNorFromItsClients) {
+  runUntil([&] { return client_.isConnected(); });
+  settle();
+  const Inventor inventor(hintsOf(layout::SegmentKind::serverWindow));
+
+  EXPECT_FALSE(server_->receive());
+
+  ASSERT_EQ(client_.send(Int32Message({.value = 5})), SendResult::sent);
+  EXPECT_EQ(next().tryAs<Int32>()->value, 5);
 }
 
 }  // namespace

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// A server that says what is not its to say: it is treated as one that sends nonsense.
+#include <mpf/tests/client/client_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+class LiarTest : public ClientTest {
+ protected:
+  // Asks the server, whose answer must cost it the client.
+  void expectToBeLeft() {
+    bind();
+    ASSERT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);
+
+    runUntil([&] { return news_.size() == 2; });
+
+    EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo));
+    EXPECT_EQ(client_.notConnectedBecause(), "the server sent nonsense");
+    EXPECT_EQ(fateOf(next()), Fate::outcomeUnknown);
+  }
+};
+
+TEST_F(LiarTest, NewsOfTheConnectionIsNotTheServersToTell) {
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    auto lie = server.allocReplyMessage<Connect>(request);
+    lie->status = ConnectStatus::connectNo;
+    static_cast<void>(server.reply(std::move(lie)));
+  });
+
+  expectToBeLeft();
+}
+
+TEST_F(LiarTest, AFateThatNamesAnotherRequestEndsNone) {
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    auto lie = server.allocReplyMessage<RequestFate>(request);
+    lie->fate = Fate::cancelled;
+    lie->requestId = 77;
+    static_cast<void>(server.reply(std::move(lie)));
+  });
+
+  expectToBeLeft();
+}
+
+TEST_F(LiarTest, AFateAfterTheReplyEndsNothing) {
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    auto lie = server.allocReplyMessage<RequestFate>(request);
+    static_cast<void>(server.reply(std::move(request)));
+    static_cast<void>(server.reply(std::move(lie)));
+  });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);
+
+  runUntil([&] { return news_.size() == 2; });
+
+  EXPECT_TRUE(next().tryAs<Int32>());
+  EXPECT_EQ(client_.notConnectedBecause(), "the server sent nonsense");
+}
+
+}  // namespace
+}  // namespace mpf::test
