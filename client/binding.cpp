@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <mutex>
 
+#include <mpf/base/step.h>
 #include <mpf/client/dispatcher_impl.h>
 #include <mpf/shm/histogram.h>
 #include <mpf/shm/segment_name.h>
@@ -72,6 +73,7 @@ void Binding::tryConnect() try {
     channel_ = std::make_shared<MessageLink>(std::move(link), lock_);
     nudging_ = true;
   }
+  MPF_STEP(link_created);
   if (wish_) segments::remove(wish_.name());
   wish_ = {};
   dispatcher_.setLink(index_, this);
@@ -99,6 +101,7 @@ void Binding::wish() {
   header.location = location_;
   server_.copy(header.name.data(), header.name.size() - 1);
   static_cast<void>(wish_.tryPublish(SegmentName::keyed(endpoint.backplane().name(), NameKind::wish, header.incarnation)));
+  MPF_STEP(wish_named);
   wish_.closeFile();
 }
 
@@ -135,6 +138,7 @@ bool Binding::onLinkState() {
       fullTold_ = false;
       connected_.store(true, std::memory_order_relaxed);
     }
+    MPF_STEP(connected);
     {
       const std::lock_guard lock(reasonMutex_);
       connectedChanged_.notify_all();
@@ -175,6 +179,7 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
       message.setClientExtra(request->clientExtra);
     }
     requests_->end(*request);
+    MPF_STEP(request_ended);
     channel_->link().control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
   }
   deliver(std::move(message));
@@ -203,6 +208,7 @@ void Binding::deliverFate(Request& request, Fate fate) {
   message.setClientExtra(request.clientExtra);
   message.setRoute({0, message->requestId, 0, nullptr});
   requests_->end(request);
+  MPF_STEP(fate_given);
   deliver(std::move(message));
 }
 
@@ -224,6 +230,7 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
     const std::lock_guard lock(*lock_);
     wasConnected = connected_.exchange(false, std::memory_order_relaxed);
   }
+  MPF_STEP(disconnecting);
   setReason(reason);
   auto& link = channel->link();
   if (ending == Ending::serverGone) deliverTheRest(*channel);
@@ -232,11 +239,13 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   });
   if (channel_ != channel) return;  // a callback destroyed the client
   auto& endpoint = dispatcher_.endpoint();
+  MPF_STEP(requests_ended);
   const bool serverDied = link.peer()->isDead();
   if (serverDied) count(endpoint.control().peersDied);
   link.setState(layout::LinkState::closed);
   if (!serverDied) link.notifyPeer();
   removeBulk(endpoint.backplane().name(), link.header().incarnation);
+  MPF_STEP(bulk_removed);
   segments::remove(link.name());
   endpoint.detach(index_);
   dispatcher_.setLink(index_, nullptr);

@@ -3,6 +3,7 @@
 #include <mutex>
 #include <utility>
 
+#include <mpf/base/step.h>
 #include <mpf/client/binding.h>
 #include <mpf/client/dispatcher_impl.h>
 #include <mpf/shm/histogram.h>
@@ -38,6 +39,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
     // Before the message goes: its reply may be here before we are.
     requests_->add(*request, id);
+    MPF_STEP(request_added);
     sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0, 0});
     if (sent != LinkSend::sent && sent != LinkSend::sentInPlace) {
       requests_->takeBack(*request);
@@ -63,6 +65,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     case LinkSend::noMemory:
       return SendResult::noMemory;
   }
+  MPF_STEP(request_sent);
   if (!nudging) wakeAt(Clock::nowNs() + kFirstNudgeNs);
   if (!takeBefore.isNever()) wakeAt(takeBefore.ns());
   return SendResult::sent;

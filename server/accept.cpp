@@ -2,6 +2,7 @@
 // ServerCore, continued: clients come and go.
 #include <mutex>
 
+#include <mpf/base/step.h>
 #include <mpf/server/server_core.h>
 #include <mpf/shm/histogram.h>
 #include <mpf/shm/segment_name.h>
@@ -56,11 +57,13 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
     connection.unansweredMask = static_cast<std::uint32_t>(connection.unanswered.size() - 1);
     connection.channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
   }
+  MPF_STEP(link_opened);
   byLink_[opened.header().incarnation] = &connection;
   endpoint_.attach(*index, opened);
   count(endpoint_.control().linksOpened);
   opened.control().serverIndex.store(*index, std::memory_order_relaxed);
   opened.setState(layout::LinkState::open);
+  MPF_STEP(link_accepted);
   opened.notifyPeer();
 }
 
@@ -74,11 +77,13 @@ void ServerCore::closeIfClientDid(Connection& connection) noexcept {
 void ServerCore::closeDead() {
   for (const auto& connection : connections_) {
     if (!connection->channel || !connection->channel->link().peer()->isDead()) continue;
+    MPF_STEP(client_died);
     count(endpoint_.control().peersDied);
     // The client owned the link and is proven dead: its names are ours to remove.
     const auto& link = connection->channel->link();
     segments::remove(link.name());
     removeBulk(endpoint_.backplane().name(), link.header().incarnation);
+    MPF_STEP(client_removed);
     close(*connection);
   }
 }
@@ -91,6 +96,7 @@ void ServerCore::close(Connection& connection) noexcept {
     connection.channel.reset();
     ++connection.generation;
   }
+  MPF_STEP(link_closing);
   endpoint_.detach(connection.index);
   byLink_.erase(channel->link().header().incarnation);
   channel->link().setState(layout::LinkState::closed);

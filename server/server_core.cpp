@@ -6,6 +6,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include <mpf/base/step.h>
 #include <mpf/shm/histogram.h>
 #include <mpf/shm/segment_name.h>
 
@@ -78,6 +79,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name, cons
 
 ServerCore::~ServerCore() {
   keeper_->leave();
+  MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   for (const auto& connection : connections_) {
     if (connection->channel) close(*connection);
@@ -161,6 +163,7 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     return false;
   }
   unanswered.store(envelope.requestId, std::memory_order_relaxed);
+  MPF_STEP(request_taken);
   if (envelope.deadlineNs != 0 && hasExpired(envelope)) {
     count(control.expired);
     connection.channel->discard(envelope);
@@ -230,6 +233,7 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
   const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
   const auto result = connection.channel->trySendLocked(envelope, message, limits);
   if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
+    MPF_STEP(reply_sent);
     if (first) unanswered.store(0, std::memory_order_relaxed);
     count(endpoint_.control().sent);
     link.control().serverSent.store(link.sentMessages(), std::memory_order_relaxed);

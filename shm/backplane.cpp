@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <set>
 
+#include <mpf/base/step.h>
 #include <mpf/shm/remains.h>
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
@@ -58,8 +59,10 @@ std::vector<std::string> Backplane::names() {
 }
 
 std::vector<std::string> Backplane::removeDead() const {
+  auto judged = remains::judge(name());
+  MPF_STEP(survey_begun);
   std::vector<std::string> removed;
-  for (auto& file : remains::judge(name())) {
+  for (auto& file : judged) {
     if (remains::tryRemove(file)) removed.push_back(std::move(file.name));
   }
   return removed;
@@ -71,6 +74,7 @@ void removeDeadWindow(const std::string& backplane, const std::string& name, std
   } else if (segments::probeOwner(name, incarnation) == segments::Owner::dead) {
     segments::removeIfOwnerless(name);
   }
+  MPF_STEP(dead_window_removed);
   if (segments::removeKeyedIfOwnerless(SegmentName::keyed(backplane, NameKind::hints, incarnation))) {
     segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
   }

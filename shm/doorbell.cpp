@@ -9,6 +9,7 @@
 
 #include <array>
 
+#include <mpf/base/step.h>
 #include <mpf/base/system_call.h>
 #include <mpf/shm/segment.h>
 
@@ -24,6 +25,7 @@ void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) no
 
 void ring(layout::Word32& bell) noexcept {
   bell.fetch_add(1, std::memory_order_relaxed);
+  MPF_STEP(bell_changed);
   ::syscall(SYS_futex, &bell, FUTEX_WAKE, 1, nullptr, nullptr, 0);
 }
 

@@ -5,6 +5,7 @@
 
 #include <bit>
 
+#include <mpf/base/step.h>
 #include <mpf/shm/cpu_relax.h>
 
 namespace mpf {
@@ -149,6 +150,7 @@ std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
   if ((hints.readyWords[word / 64].load(std::memory_order_relaxed) & wordBit) == 0) return std::nullopt;
   // PAIR(ready-word): withdrawn before the bits are read; a peer that sets a bit later sets this one again.
   hints.readyWords[word / 64].fetch_and(~wordBit, std::memory_order_acq_rel);
+  MPF_STEP(ready_word_taken);
   const auto bits = hints.readyBits[word].load(std::memory_order_relaxed);
   if (bits == 0) return std::nullopt;
   const auto start = readyCursor_ / 64 == word ? readyCursor_ % 64 : 0;
@@ -156,6 +158,7 @@ std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
   const auto bit = (static_cast<std::uint32_t>(std::countr_zero(rotated)) + start) % 64;
   // PAIR(ready-bit): withdrawn before the link is looked at.
   const auto left = hints.readyBits[word].fetch_and(~(std::uint64_t{1} << bit), std::memory_order_acq_rel) & ~(std::uint64_t{1} << bit);
+  MPF_STEP(ready_bit_taken);
   // PAIR(ready-word): the others are still to come.
   if (left != 0) hints.readyWords[word / 64].fetch_or(wordBit, std::memory_order_release);
   const auto index = static_cast<std::uint32_t>(word * 64 + bit);
@@ -211,7 +214,10 @@ std::optional<std::uint64_t> Endpoint::takeKnock() noexcept {
     auto& knock = hints.knocks[knockCursor_];
     if (knock.load(std::memory_order_relaxed) == 0) continue;
     // PAIR(knock): the link has its name by now.
-    if (const auto incarnation = knock.exchange(0, std::memory_order_acq_rel); incarnation != 0) return incarnation;
+    if (const auto incarnation = knock.exchange(0, std::memory_order_acq_rel); incarnation != 0) {
+      MPF_STEP(knock_taken);
+      return incarnation;
+    }
   }
   return std::nullopt;
 }
@@ -280,6 +286,7 @@ bool Endpoint::spin(Deadline deadline) noexcept {
 void Endpoint::announce(layout::SleepState how) noexcept {
   coolAll();
   control().sleeping.store(how, std::memory_order_relaxed);
+  MPF_STEP(sleep_announced);
   // PAIR(sleep-fence): our announcement before, the last look after.
   doorbell::fence();
 }
@@ -291,7 +298,9 @@ void Endpoint::sleep(Deadline deadline) noexcept {
   const auto until = tryLookAtAll() ? deadline : std::min(deadline, Deadline::atNs(lookedAtAllNs_ + kLookAtAllNs));
   if (!hasNews()) {
     const auto sleptFrom = mode_ == WaitMode::adaptive ? Clock::nowNs() : 0;
+    MPF_STEP(falling_asleep);
     doorbell::sleep(bell, seen, until);
+    MPF_STEP(woken);
     slept_ = true;
     control().wakes.store(control().wakes.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     if (mode_ == WaitMode::adaptive) {

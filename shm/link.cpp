@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <mpf/base/clock.h>
+#include <mpf/base/step.h>
 #include <mpf/shm/segment_name.h>
 
 namespace mpf {
@@ -92,6 +93,7 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   if (!segment.tryPublish(SegmentName::link(backplane, offer.incarnation, header.incarnation))) {
     throw SegmentError("an incarnation number came twice");
   }
+  MPF_STEP(link_named);
   segment.closeFile();
   auto link = std::unique_ptr<Link>(new Link(std::move(segment), backplane, LinkSide::client, rights));
   link->attachPeer(std::move(server), 0);
@@ -108,6 +110,7 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
       segment->bytes() != layout::linkBytes(header.queueSlots, header.replySlots)) {
     throw SegmentError(fmt::format("{}: not a link that this server offers", segments::path(name)));
   }
+  MPF_STEP(link_mapped);
   segment->closeFile();
   return std::unique_ptr<Link>(new Link(std::move(*segment), backplane, LinkSide::server, own.rights()));
 }
@@ -136,6 +139,7 @@ void Link::setState(layout::LinkState state) noexcept {
   auto& own = side_ == LinkSide::client ? control().clientState : control().serverState;
   // PAIR(link-state): what was prepared before the state.
   own.store(state, std::memory_order_release);
+  MPF_STEP(link_state_set);
 }
 
 layout::LinkState Link::peerState() const noexcept {
@@ -175,9 +179,11 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, cons
     const auto chunk = pool_.tryAlloc(body.size());
     if (!chunk) return LinkSend::noMemory;
     std::memcpy(chunk->data, body.data(), body.size());
+    MPF_STEP(chunk_filled);
     own = chunk->ref;
   }
   if (own) pool_.lend(*own);
+  MPF_STEP(chunk_lent);
   envelope.flags |= layout::kSlotChunk;
   const auto ref = own ? *own : *foreign;
   if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve)) return LinkSend::full;  // hasFree() said that it fits
@@ -188,6 +194,7 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, cons
 void Link::afterPush() noexcept {
   // PAIR(watch-fence): our message before, the peer's word on whether it polls after.
   doorbell::fence();
+  MPF_STEP(peer_checked);
   if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
 }
 

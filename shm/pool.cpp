@@ -5,6 +5,7 @@
 #include <bit>
 #include <utility>
 
+#include <mpf/base/step.h>
 #include <mpf/shm/segment_name.h>
 
 namespace mpf {
@@ -48,6 +49,7 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
       bulk.free.pop_back();
       bulk.states[index] = ChunkState::held;
       ++inUse_;
+      MPF_STEP(chunk_claimed);
       return Chunk{bulk.chunk(index), chunkBytes, {segment, index, place_.side, 0}};
     }
     if (!addBulk(chunkBytes)) break;
@@ -71,6 +73,7 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
     return false;
   }
   segment.closeFile();
+  MPF_STEP(bulk_named);
   bytes_ += bytes;
   Bulk bulk{std::move(segment), chunkBytes, std::vector<ChunkState>(count, ChunkState::free), {}};
   for (auto index = count; index-- > 0;) bulk.free.push_back(index);
@@ -91,6 +94,7 @@ std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noex
   if (!isState(ref, ChunkState::lent)) return std::nullopt;
   auto& bulk = bulks_[ref.segment];
   bulk.states[ref.chunk] = ChunkState::held;
+  MPF_STEP(chunk_back);
   return Chunk{bulk.chunk(ref.chunk), bulk.chunkBytes, ref};
 }
 
@@ -149,8 +153,10 @@ std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) noexce
 
 void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
   returns_->chunks[returned_ % layout::kReturnSlots].store(std::uint64_t{ref.segment} << 32 | ref.chunk, std::memory_order_relaxed);
+  MPF_STEP(chunk_noted);
   // PAIR(chunk-returned): we have finished with the chunk.
   returns_->returned.store(++returned_, std::memory_order_release);
+  MPF_STEP(chunk_returned);
 }
 
 std::optional<layout::ChunkRef> PoolBorrower::tryFind(const std::byte* data) const noexcept {

@@ -15,6 +15,7 @@
 #include <span>
 
 #include <mpf/base/copy_words.h>
+#include <mpf/base/step.h>
 #include <mpf/shm/layout.h>
 
 namespace mpf {
@@ -74,11 +75,13 @@ class RingProducer {
     first.sentTick = envelope.sentTick;
     first.deadlineNs = envelope.deadlineNs;
     copyBody(first, body);
+    MPF_STEP(slot_written);
     const auto sequence = pushed_ + 1;
     pushed_ += count;
     ++messages_;
     // PAIR(slot-filled): who sees this sequence sees the message.
     first.sequence.store(sequence, std::memory_order_release);
+    MPF_STEP(slot_published);
     return true;
   }
 
@@ -142,6 +145,7 @@ class RingConsumer {
     ++messages_;
     // PAIR(message-taken): before we look at the message.
     own_.taken.store(messages_, std::memory_order_release);
+    MPF_STEP(message_counted);
     const auto& first = slot(taken_);
     slotsNow_ = first.slots;
     return {first.type,       first.flags,       first.bodyBytes, first.requestId,
@@ -178,6 +182,7 @@ class RingConsumer {
       freed_ = taken_;
       // PAIR(slot-freed): we have finished reading these slots.
       own_.freed.store(freed_, std::memory_order_release);
+      MPF_STEP(slots_freed);
     }
   }
 

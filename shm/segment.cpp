@@ -13,6 +13,7 @@
 #include <memory>
 
 #include <mpf/base/clock.h>
+#include <mpf/base/step.h>
 #include <mpf/base/system_call.h>
 #include <mpf/shm/process.h>
 
@@ -98,6 +99,7 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
 FileDescriptor lockOwnerless(const std::string& name) {
   auto file = openByName(name, O_RDWR);
   if (!file || !tryLock(file.get())) return {};
+  MPF_STEP(reclaim_locked);
   // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
   struct stat locked{};
   struct stat named{};
@@ -146,6 +148,7 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
   header.createdRealtimeNs = std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec;
   backplane.copy(header.backplane.data(), header.backplane.size() - 1);
   segment.header_ = header;
+  MPF_STEP(segment_created);
   return segment;
 }
 
@@ -156,8 +159,10 @@ void Segment::lockForLife() {
 
 bool Segment::tryPublish(const std::string& name) {
   header_ = sharedHeader();  // before a peer can write to it
+  MPF_STEP(segment_complete);
   const auto self = fmt::format("/proc/self/fd/{}", file_.get());
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) == 0) {
+    MPF_STEP(segment_named);
     name_ = name;
     return true;
   }
@@ -200,7 +205,11 @@ namespace segments {
 
 std::string path(const std::string& name) { return fmt::format("{}/{}", kDirectory, name); }
 
-bool remove(const std::string& name) { return ipc::shared_memory_object::remove(name.c_str()); }
+bool remove(const std::string& name) {
+  const bool removed = ipc::shared_memory_object::remove(name.c_str());
+  MPF_STEP(name_removed);
+  return removed;
+}
 
 void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& path) {
   if (header.magic != layout::kMagic) throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path));
@@ -237,12 +246,16 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
 bool removeIfOwnerless(const std::string& name) {
   const auto file = lockOwnerless(name);
   // Of anything but a segment that we know, a free lock proves nothing.
-  return file && isKnown(file.get(), name) && remove(name);
+  if (!file || !isKnown(file.get(), name)) return false;
+  MPF_STEP(reclaim_proved);
+  return remove(name);
 }
 
 bool removeKeyedIfOwnerless(const std::string& name) {
   const auto file = lockOwnerless(name);
-  return file && remove(name);
+  if (!file) return false;
+  MPF_STEP(reclaim_proved);
+  return remove(name);
 }
 
 std::vector<std::string> list(const std::string& prefix) {

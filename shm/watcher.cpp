@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <mpf/base/signals_blocked.h>
+#include <mpf/base/step.h>
 #include <mpf/base/system_call.h>
 #include <mpf/shm/process.h>
 #include <mpf/shm/segment_name.h>
@@ -138,6 +139,7 @@ void Watcher::report(Token token) {
   peers_.erase(found);
   updateTimer();
   peer.window->setDead();
+  MPF_STEP(death_noticed);
   peer.callback();
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <system_error>
 
+#include <mpf/base/step.h>
 #include <mpf/shm/segment_name.h>
 
 namespace mpf {
@@ -50,6 +51,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
     : backplane_(backplane), rights_(rights) {
   window_ = Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
   window_.lockForLife();
+  MPF_STEP(window_locked);
   auto& header = window_.sharedHeader();
   header.linkMode = rights.mode;
   header.linkGroup = rights.group;
@@ -65,6 +67,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
   const auto fifo = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   try {
     fifo_ = doorbell::createFifo(fifo, rights.mode, rights.group);
+    MPF_STEP(window_complete);
     publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : name);
   } catch (...) {
     segments::remove(fifo);
@@ -88,6 +91,7 @@ void OwnWindow::publish(const std::string& name) {
 
 OwnWindow::~OwnWindow() {
   control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  MPF_STEP(window_closed);
   segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
   segments::remove(hints_.name());
   segments::remove(window_.name());
@@ -110,6 +114,7 @@ std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout:
                                       sizeof(layout::WindowHints));
   if (!hints) return nullptr;
   hints->closeFile();
+  MPF_STEP(peer_mapped);
   auto peer = std::make_shared<PeerWindow>();
   peer->window_ = std::move(*window);
   peer->hints_ = std::move(*hints);
@@ -123,6 +128,7 @@ void PeerWindow::notify(std::uint32_t index) noexcept {
   const auto word = index / 64;
   // PAIR(ready-bit): who sees the bit sees the news.
   hint.readyBits[word].fetch_or(std::uint64_t{1} << (index % 64), std::memory_order_release);
+  MPF_STEP(ready_bit_set);
   // PAIR(ready-word): who sees the word's bit sees the bit.
   hint.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
   wakeIfAsleep();
@@ -133,12 +139,15 @@ void PeerWindow::knock(std::uint64_t incarnation) noexcept {
   // PAIR(knock): who sees the incarnation finds the link under its name.
   const auto overwritten = hint.knocks[incarnation % layout::kKnocks].exchange(incarnation, std::memory_order_acq_rel);
   if (overwritten != 0 && overwritten != incarnation) hint.rescan.store(1, std::memory_order_relaxed);
+  MPF_STEP(knock_placed);
   // PAIR(knocked): who sees the new count finds the knock.
   hint.knocked.fetch_add(1, std::memory_order_release);
+  MPF_STEP(knock_counted);
   wakeIfAsleep();
 }
 
 void PeerWindow::wakeIfAsleep() noexcept {
+  MPF_STEP(peer_told);
   // PAIR(sleep-fence): our news before, the owner's announcement after.
   doorbell::fence();
   const auto sleeping = control().sleeping.load(std::memory_order_relaxed);
