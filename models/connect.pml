@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: MIT
+// Connect: a client finds a server, makes a link and knocks; the server accepts; a request goes out; either may be killed before any step.
+//
+//   client  look up name ─ link: made, open, named ─ knock ─ (nudge) ─ connected ─ request ─ reply or fate ─ link closed, name removed
+//   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply        a second life follows the first
+//
+//   MODELS  client/binding.cpp: tryConnect wish onLinkState disconnect nudge leave
+//   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
+//   MODELS  shm/window.cpp: knock notify
+//   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer
+//   HOLDS   as long as the client lives, it gets connected to whichever server lives, whatever hints get lost
+//   HOLDS   its request has exactly one end; "never taken" is told of none that a server acted on; a reply that was sent is not lost
+//   HOLDS   a server accepts a link once, and lets go of it when the client has ended
+//   ASSUMES memory in order: link states have release and acquire, and names are system calls (weak memory: ring.pml, doorbell.pml)
+//   ASSUMES a timer runs out when nothing else can happen; one client, two lives of a server, one request a connection
+//   ASSUMES a stranger takes each hint away once
+//   BREAK   NO_NUDGE        the client knocks once
+//   BREAK   NUDGE_BLIND     the client knocks again without a look whether it has been accepted
+//   BREAK   ACCEPT_TWICE    a server does not know which links it has accepted
+//   BREAK   NO_WATCH        a server does not watch whose link it accepts
+//   BREAK   NO_DRAIN        a client ends its request without a look for the reply of the dead server
+//   BREAK   TAKEN_LATE      a server counts a request as taken after it acted
+//   BREAK   NO_DEATH_NEWS   a client is not told of its server's death
+#define SERVERS 2
+#define CLIENT 2
+#define PROCESSES 3
+#define LINKS SERVERS  // the client makes one for each life of the server
+#define NONE 255
+#define STRANGER 9     // a link of somebody else
+#define NUDGES 3
+#define EARLY_NUDGES 1
+
+typedef Link {
+  bool named;
+  bool clientOpen;
+  bool serverOpen;
+  bool accepted;  // in its server's memory
+  bool sent;      // a request
+  bool taken;     // counted
+  bool acted;     // what really happened
+  bool replied;
+}
+Link links[LINKS];  // by server
+
+typedef Hints {
+  byte knock;     // a link + 1
+  bool knocked;
+  bool rescan;
+  bool ready;     // the bit of the link
+}
+Hints hints[SERVERS];
+
+byte serverName = NONE;  // which life has it
+bool dead[PROCESSES];
+bool clientLeft;
+bool news;               // the client's ready bit
+
+#define clientHasEnded (dead[CLIENT] || clientLeft)
+
+inline knockAt(at, link) {
+  d_step {
+    if
+    :: hints[at].knock != 0 && hints[at].knock != link + 1 -> hints[at].rescan = true
+    :: else
+    fi;
+    hints[at].knock = link + 1
+  };
+  hints[at].knocked = true
+}
+
+// What the link says now: accepted, replied.
+inline look() {
+  if
+  :: links[server].serverOpen && !connected ->
+    connected = true;
+    links[server].sent = true;
+    hints[server].ready = true
+  :: links[server].replied -> goto replied
+  :: else
+  fi
+}
+
+inline nudge() {
+  nudges++;
+  if
+  :: connected -> hints[server].ready = true
+  :: !connected -> knockAt(server, server)
+  fi;
+#ifndef NUDGE_BLIND
+  look()
+#else
+  if
+  :: links[server].replied -> goto replied
+  :: else
+  fi
+#endif
+}
+
+inline closeLink() {
+  links[server].clientOpen = false;
+  hints[server].ready = true;
+  d_step { assert(links[server].named); links[server].named = false }
+}
+
+active proctype Client() {
+  byte server, nudges;
+  bool connected;
+  {
+    skip;
+search:
+    skip;
+    d_step { serverName != NONE && !dead[serverName] -> server = serverName };
+    d_step { links[server].clientOpen = true; links[server].named = true };
+    knockAt(server, server);
+    do
+    :: d_step { news -> news = false }; look()
+#ifndef NO_NUDGE
+    :: nudges < EARLY_NUDGES -> nudge()
+    :: timeout && nudges < NUDGES -> nudge()
+#endif
+#ifndef NO_DEATH_NEWS
+    :: dead[server] -> break
+#endif
+    od;
+#ifndef NO_DRAIN
+    if
+    :: links[server].replied -> goto replied
+    :: else
+    fi;
+#endif
+    // The fate of the request: "never taken", or "outcome unknown".
+    assert(!links[server].replied);
+    if
+    :: d_step { links[server].sent && !links[server].taken -> assert(!links[server].acted) }; closeLink(); goto ended
+    :: links[server].sent && links[server].taken -> closeLink(); goto ended
+    :: !links[server].sent -> closeLink(); d_step { connected = false; nudges = 0 }; goto search
+    fi;
+replied:
+    assert(links[server].sent && links[server].taken && links[server].acted);
+    closeLink();
+ended:
+    clientLeft = true
+  } unless { dead[CLIENT] }
+}
+
+inline accept(link) {
+  if
+#ifndef ACCEPT_TWICE
+  :: links[link].accepted
+  :: !links[link].accepted && links[link].named && links[link].clientOpen ->
+#else
+  :: links[link].named && links[link].clientOpen ->
+#endif
+    if
+    :: !clientHasEnded ->
+      d_step { assert(!links[link].accepted); links[link].accepted = true };
+      links[link].serverOpen = true;
+      news = true
+    :: clientHasEnded
+    fi
+  :: else
+  fi
+}
+
+inline take(link) {
+  if
+  :: links[link].accepted && links[link].sent && !links[link].taken ->
+#ifdef TAKEN_LATE
+    links[link].acted = true;
+    links[link].taken = true;
+#else
+    links[link].taken = true;
+    links[link].acted = true;
+#endif
+    links[link].replied = true;
+    news = true
+  :: else
+  fi
+}
+
+proctype Server(byte me) {
+  byte knocker;
+  {
+    if
+    :: me == 0
+    :: me == 1 && dead[0]
+    :: me == 1 && clientHasEnded -> goto over
+    fi;
+    serverName = me;
+    do
+    :: d_step { hints[me].knocked -> hints[me].knocked = false };
+      d_step { knocker = hints[me].knock; hints[me].knock = 0 };
+      if
+      :: knocker == me + 1 -> accept(me)
+      :: else
+      fi;
+      knocker = 0
+    :: d_step { hints[me].rescan -> hints[me].rescan = false }; accept(me)
+    :: d_step { hints[me].ready -> hints[me].ready = false }; take(me)
+#ifndef NO_WATCH
+    :: links[me].accepted && clientHasEnded -> links[me].named = false; links[me].accepted = false
+#endif
+    :: !links[me].accepted && clientHasEnded -> break
+    od;
+over:
+    skip
+  } unless { dead[me] }
+}
+
+// Takes hints away, and knocks itself in the place of another knock.
+active proctype Stranger() {
+  if
+  :: hints[0].knock = 0
+  :: knockAt(0, STRANGER)
+  :: skip
+  fi;
+  if
+  :: news = false
+  :: hints[0].ready = false
+  :: skip
+  fi
+}
+
+active proctype Killer() {
+  if
+  :: dead[0] = true
+  :: dead[CLIENT] = true
+  :: skip
+  fi
+}
+
+init {
+  atomic {
+    run Server(0);
+    run Server(1)
+  }
+}

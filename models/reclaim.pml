@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+// Reclaim: who wants a server's name, who removes what a dead one left under it; each may be killed before any step.
+//
+//   file made ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
+//   reaper: open by name ─ lock that file ─ does the name still lead to it? ─ remove the name ─ unlock
+//
+//   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless tryLock probeOwner
+//   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
+//   HOLDS   the name of a living window is removed by nobody but its owner
+//   HOLDS   never do two that live own the name
+//   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked
+//   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after its holder died
+//   ASSUMES a starter outwaits a reaper that holds the lock of a dead window (it waits 50 ms for some microseconds)
+//   ASSUMES three starters, each also a reaper, and one that only reaps; two of them are killed; nobody else removes names
+//   BREAK   NO_COMPARE    a reaper does not look whether the name still leads to the file that it locked
+//   BREAK   NO_LOCK       a reaper asks for the lock and does not take it
+//   BREAK   UNLOCK_EARLY  a reaper lets go of the lock before it removes the name
+//   BREAK   LOCK_LATE     a starter locks its window after it got its name
+//   BREAK   LEAVE_LATE    who leaves lets go of the lock before it removes its name
+//   BREAK   NO_REAPING    a starter waits for others to remove what is dead
+#define STARTERS 3
+#define REAPER 3
+#define PROCESSES 4
+#define NO_FILE 0
+#define FREE 255
+#define fileOf(starter) ((starter) + 1)
+
+byte name = NO_FILE;       // the file that the name leads to
+byte lock[STARTERS + 1];   // of each file: who holds it
+bool left[STARTERS];
+bool dead[PROCESSES];
+
+#define isLiving(file) (!dead[(file) - 1] && !left[(file) - 1])
+#define isOwned (name != NO_FILE && isLiving(name))
+#define isInUse (name != NO_FILE && lock[name] != FREE && isLiving(name))
+
+inline removeName(mayBe) {
+  atomic {
+    assert(name == mayBe || !isOwned);
+    name = NO_FILE
+  }
+}
+
+inline removeIfOwnerless(me) {
+  file = name;  // open
+  if
+  :: file == NO_FILE
+  :: file != NO_FILE ->
+    if
+#ifdef NO_LOCK
+    :: lock[file] == FREE ->
+#else
+    :: d_step { lock[file] == FREE -> lock[file] = me } ->
+#endif
+#ifndef NO_COMPARE
+      if
+      :: name == file ->
+#endif
+#ifdef UNLOCK_EARLY
+        lock[file] = FREE;
+#endif
+        removeName(NO_FILE)
+#ifndef NO_COMPARE
+      :: name != file
+      fi;
+#else
+      ;
+#endif
+#if !defined(UNLOCK_EARLY) && !defined(NO_LOCK)
+      lock[file] = FREE
+#else
+      skip
+#endif
+    :: else
+    fi
+  fi;
+  file = NO_FILE
+}
+
+proctype Starter(byte me) {
+  byte file;
+  {
+#ifndef LOCK_LATE
+    lock[fileOf(me)] = me;
+#endif
+    do
+    :: d_step { name == NO_FILE -> name = fileOf(me) } -> goto owner
+    :: isInUse -> goto refused
+#ifndef NO_REAPING
+    :: name != NO_FILE && lock[name] == FREE -> removeIfOwnerless(me)
+#endif
+    od;
+owner:
+#ifdef LOCK_LATE
+    lock[fileOf(me)] = me;
+#endif
+    // Two owners would be two that live and got the name.
+    assert(name == fileOf(me));
+    if
+    :: skip  // leaves, at any time
+    :: dead[me]
+    fi;
+#ifdef LEAVE_LATE
+    d_step { left[me] = true; lock[fileOf(me)] = FREE };
+    removeName(fileOf(me));
+#else
+    removeName(fileOf(me));
+    d_step { left[me] = true; lock[fileOf(me)] = FREE };
+#endif
+refused:
+    skip;
+    d_step { left[me] = true; lock[fileOf(me)] = FREE }
+  } unless { dead[me] }
+}
+
+active proctype Reaper() {
+  byte file;
+  {
+    removeIfOwnerless(REAPER)
+  } unless { dead[REAPER] }
+}
+
+inline kill(process) {
+  dead[process] = true;
+  d_step {
+    file = 1;
+    do
+    :: file <= STARTERS ->
+      if
+      :: lock[file] == process -> lock[file] = FREE
+      :: else
+      fi;
+      file++
+    :: else -> break
+    od;
+    file = 0
+  }
+}
+
+active proctype Killer() {
+  byte file, kills;
+  do
+  :: kills < 2 && !dead[0] -> kill(0); kills++
+  :: kills < 2 && !dead[1] -> kill(1); kills++
+  :: kills < 2 && !dead[REAPER] -> kill(REAPER); kills++
+  :: break
+  od
+}
+
+init {
+  atomic {
+    lock[1] = FREE;
+    lock[2] = FREE;
+    lock[3] = FREE;
+    run Starter(0);
+    run Starter(1);
+    run Starter(2)
+  }
+}

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+// Ring: messages of 1 or 2 slots from one producer to one consumer, over weak memory; either may be killed before any step.
+//
+//   MODELS  shm/ring.h: RingProducer tryPush hasFree waiting isTaken
+//   MODELS  shm/ring.h: RingConsumer hasMessage begin copyBody end
+//   HOLDS   each message arrives once, whole and in order, as long as both live; none hangs for want of slots
+//   HOLDS   of a producer that was killed, exactly the messages arrive whose release store was made
+//   HOLDS   of a consumer that was killed, a message that is not counted as taken was not looked at ("never taken" is true)
+//   ASSUMES a ring of 4 slots, handed back two at a time, and 4 messages: positions go round twice, messages lie across the end
+//   ASSUMES both ends play by the rules; what nonsense does is tested (tests/shm/ring_trust_test.cpp)
+//   BREAK   SEQUENCE_RELAXED   the sequence is stored without release
+//   BREAK   SEQUENCE_FIRST     the sequence is stored before the body
+//   BREAK   NO_ACQUIRE         the body is loaded before the sequence
+//   BREAK   FREED_EARLY        slots are handed back before they are read
+//   BREAK   ONE_SLOT_TOO_MANY  the producer takes one slot that is not free
+//   BREAK   TAKEN_LATE         a message is counted as taken after the look at it
+#define CAPACITY 4
+#define BATCH 2
+#define MESSAGES 4
+#ifdef ONE_SLOT_TOO_MANY
+#define USABLE (CAPACITY + 1)
+#else
+#define USABLE CAPACITY
+#endif
+
+#define PRODUCER 0
+#define CONSUMER 1
+#define PROCESSES 2
+#define SEQUENCE(position) ((position) % CAPACITY)
+#define BODY(position) (CAPACITY + (position) % CAPACITY)
+#define FREED (2 * CAPACITY)
+#define TAKEN (2 * CAPACITY + 1)
+#define WORDS (2 * CAPACITY + 2)
+#define FLUSH_ALL \
+  FLUSH(PRODUCER, 0) FLUSH(PRODUCER, 1) FLUSH(PRODUCER, 2) FLUSH(PRODUCER, 3) \
+  FLUSH(PRODUCER, 4) FLUSH(PRODUCER, 5) FLUSH(PRODUCER, 6) FLUSH(PRODUCER, 7) \
+  FLUSH(CONSUMER, FREED) FLUSH(CONSUMER, TAKEN)
+#include "memory.pml"
+
+byte sent;   // messages whose release store was made
+byte acted;  // messages that the consumer has looked at
+
+#define hasFree(slots) (pushed + slots - freedSeen <= USABLE)
+// A body says which message it is of and how many slots that has.
+#define bodyOf(message, slots) (2 * (message) + (slots) - 1)
+
+inline publish() {
+#ifdef SEQUENCE_RELAXED
+  atomic { store(PRODUCER, SEQUENCE(pushed), pushed + 1); sent++ }
+#else
+  atomic { storeRelease(PRODUCER, SEQUENCE(pushed), pushed + 1); sent++ }
+#endif
+}
+
+inline writeBody() {
+  store(PRODUCER, BODY(pushed), bodyOf(message, slots));
+  if
+  :: slots == 2 -> store(PRODUCER, BODY(pushed + 1), bodyOf(message, slots))
+  :: else
+  fi
+}
+
+active proctype Producer() {
+  byte pushed, freedSeen, slots, message = 1;
+  {
+    do
+    :: message > MESSAGES -> break
+    :: message <= MESSAGES ->
+      if
+      :: slots = 1
+      :: slots = 2
+      fi;
+      if
+      :: hasFree(slots)
+      :: else ->
+        do
+        :: d_step { !hasFree(slots) && memory[FREED] != freedSeen -> freedSeen = memory[FREED] }
+        :: hasFree(slots) -> break
+        :: isGone(CONSUMER) -> goto judge
+        od
+      fi;
+#ifdef SEQUENCE_FIRST
+      publish();
+      writeBody();
+#else
+      writeBody();
+      publish();
+#endif
+      d_step { pushed = pushed + slots; message++; slots = 0 }
+    od;
+judge:
+    // The fate of what a dead consumer left: what is not counted as taken was never acted on.
+    if
+    :: d_step { isGone(CONSUMER) -> assert(acted <= memory[TAKEN]) }
+    :: !dead[CONSUMER] && acted == MESSAGES
+    fi
+  } unless { dead[PRODUCER] }
+}
+
+#define hasMessage (memory[SEQUENCE(taken)] == taken + 1)
+
+inline look() {
+#ifdef NO_ACQUIRE
+  d_step { body = early; acted = messages }
+#else
+  d_step { body = memory[BODY(taken)]; acted = messages }
+#endif
+  assert(body / 2 == messages);
+  slots = 1 + body % 2;
+  if
+  :: slots == 2 -> assert(memory[BODY(taken + 1)] == body)
+  :: else
+  fi
+}
+
+inline handBack() {
+  storeRelease(CONSUMER, FREED, taken + slots);
+  freed = taken + slots
+}
+
+active proctype Consumer() {
+  byte taken, freed, messages, slots, body, early;
+  {
+    do
+    :: messages == MESSAGES -> break
+    :: messages < MESSAGES ->
+#ifdef NO_ACQUIRE
+      early = memory[BODY(taken)];
+#endif
+      if
+      :: hasMessage
+      :: isGone(PRODUCER) && !hasMessage -> assert(messages == sent); goto ended
+      fi;
+      messages++;
+#ifdef TAKEN_LATE
+      look();
+      storeRelease(CONSUMER, TAKEN, messages);
+#else
+      storeRelease(CONSUMER, TAKEN, messages);
+#ifdef FREED_EARLY
+      slots = 2;
+      handBack();
+#endif
+      look();
+#endif
+#ifndef FREED_EARLY
+      if
+      :: taken + slots - freed >= BATCH || memory[SEQUENCE(taken + slots)] != taken + slots + 1 -> handBack()
+      :: else
+      fi;
+#endif
+      d_step { taken = taken + slots; slots = 0; body = 0; early = 0 }
+    od;
+ended:
+    skip
+  } unless { dead[CONSUMER] }
+}
+
+active proctype Killer() {
+  if
+  :: dead[PRODUCER] = true
+  :: dead[CONSUMER] = true
+  :: skip
+  fi
+}
