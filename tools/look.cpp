@@ -52,7 +52,11 @@ Look::Look(const std::string& backplane, std::chrono::milliseconds interval)
     : Look{Survey::take(backplane), surveyAfter(backplane, interval)} {}  // braces: in this order
 
 Look::Look(Survey before, Survey now)
-    : before_(std::move(before)), now_(std::move(now)), windowsBefore_(windowsOf(before_)), windowsNow_(windowsOf(now_)) {}
+    : before_(std::move(before)), now_(std::move(now)), windowsBefore_(windowsOf(before_)), windowsNow_(windowsOf(now_)) {
+  for (const auto& server : before_.servers) {
+    for (const auto& link : server.links) linksBefore_.emplace(link.incarnation, &link);
+  }
+}
 
 Look::Windows Look::windowsOf(const Survey& survey) {
   Windows windows;
@@ -79,6 +83,14 @@ Rates Look::ratesOf(const WindowView& window) const {
   return {perSecond(sent, ns), perSecond(grown(was->received, window.received), ns)};
 }
 
+Rates Look::ratesOf(const LinkView& link) const {
+  const auto found = linksBefore_.find(link.incarnation);
+  if (found == linksBefore_.end()) return {};
+  const auto ns = now_.atNs - before_.atNs;
+  return {perSecond(grown(found->second->requests.sent, link.requests.sent), ns),
+          perSecond(grown(found->second->replies.sent, link.replies.sent), ns)};
+}
+
 bool Look::isStalled(const WindowView& window) const {
   const auto* was = before(window);
   return was != nullptr && was->received == window.received && Totals::of(*was).incoming.waiting() != 0 &&
@@ -90,6 +102,16 @@ std::string Look::stateOf(const WindowView& window) const {
   if (window.processState == 'T' || window.processState == 't') return "stopped";
   if (window.life == Life::closed) return "closed";
   return isStalled(window) ? "stalled" : "alive";
+}
+
+Latencies between(const Latencies& was, const Latencies& is) noexcept {
+  Latencies sampled;
+  for (std::size_t i = 0; i < is.buckets.size(); ++i) {
+    sampled.buckets[i] = grown(was.buckets[i], is.buckets[i]);
+    sampled.count += sampled.buckets[i];
+  }
+  sampled.maxNs = is.maxNs;
+  return sampled;
 }
 
 }  // namespace mpf::tools

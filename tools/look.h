@@ -30,6 +30,10 @@ class Look {
   [[nodiscard]] const WindowView* find(std::uint64_t incarnation) const;
   // Messages of a window in either direction. Client windows: requests sent, replies received.
   [[nodiscard]] Rates ratesOf(const WindowView& window) const;
+  // The same of a link, as its client sees it.
+  [[nodiscard]] Rates ratesOf(const LinkView& link) const;
+  // The window as it was at the first look; null when it was not there.
+  [[nodiscard]] const WindowView* before(const WindowView& window) const;
   // "alive", "closed", "dead"; of the living "stalled" when messages wait for it and it took none between the surveys, and "stopped"
   // when its process is, by a signal or a debugger.
   [[nodiscard]] std::string stateOf(const WindowView& window) const;
@@ -37,13 +41,16 @@ class Look {
  private:
   using Windows = std::unordered_map<std::uint64_t, const WindowView*>;  // by incarnation
   static Windows windowsOf(const Survey& survey);
-  [[nodiscard]] const WindowView* before(const WindowView& window) const;
   [[nodiscard]] bool isStalled(const WindowView& window) const;
   Survey before_;
   Survey now_;
   Windows windowsBefore_;
   Windows windowsNow_;
+  std::unordered_map<std::uint64_t, const LinkView*> linksBefore_;  // by incarnation
 };
+
+// What was sampled between two looks at a histogram. Its longest is that of all times.
+[[nodiscard]] Latencies between(const Latencies& was, const Latencies& is) noexcept;
 
 // What goes into a window and what comes out of it, over all of its links.
 struct Totals {
