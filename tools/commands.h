@@ -17,6 +17,7 @@ using Run = std::function<int()>;
 void addLs(CLI::App& app, Run& run);
 void addMrr(CLI::App& app, Run& run);
 void addMsr(CLI::App& app, Run& run);
+void addTop(CLI::App& app, Run& run);
 void addCall(CLI::App& app, Run& run);
 void addSniff(CLI::App& app, Run& run);
 void addTap(CLI::App& app, Run& run);

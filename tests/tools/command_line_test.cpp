@@ -10,7 +10,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-constexpr std::array<const char*, 8> kSubcommands{"ls", "mrr", "msr", "call", "sniff", "clean", "doctor", "bench"};
+constexpr std::array<const char*, 11> kSubcommands{"ls", "mrr", "msr", "top", "call", "sniff", "tap", "replay", "clean", "doctor", "bench"};
 
 class CommandLineTest : public ToolsTest {};
 
@@ -50,7 +50,7 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, call, sniff, clean, doctor, bench; "
+            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, call, sniff, tap, replay, clean, doctor, bench; "
             "`mpf --help` shows what they do\n");
 }
 
@@ -87,7 +87,7 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
 }
 
 TEST_F(CommandLineTest, NamesThatCannotBeAreNamed) {
-  for (const std::string name : {"ls", "mrr", "msr", "clean"}) {
+  for (const std::string name : {"ls", "mrr", "msr", "top", "clean"}) {
     const auto ended = run({name, "--backplane", "a.b"});
     EXPECT_EQ(ended.status, 2);
     EXPECT_EQ(ended.err, "mpf: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");

@@ -15,8 +15,8 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const std::vector<std::vector<std::string>> kReports{{"ls"},           {"mrr"},           {"msr"},          {"msr", "echo"},
-                                                     {"ls", "--json"}, {"mrr", "--json"}, {"msr", "--json"}};
+const std::vector<std::vector<std::string>> kReports{{"ls"},           {"mrr"},           {"msr"},           {"msr", "echo"},
+                                                     {"ls", "--json"}, {"mrr", "--json"}, {"msr", "--json"}, {"top", "--batch", "1"}};
 
 class ReadOnlyTest : public ToolsTest {
  protected:
