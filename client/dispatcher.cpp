@@ -23,6 +23,7 @@ Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
                 [&](layout::SegmentHeader& header) { options.label.copy(header.name.data(), header.name.size() - 1); }) {}
 
 Dispatcher::Impl::~Impl() {
+  if (endpoint_.origin().isInherited()) return;
   waitForNames(false);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
 }
@@ -38,6 +39,7 @@ void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
 
 void Dispatcher::Impl::endThread() {
   if (!hasThread_) return;
+  if (endpoint_.origin().isInherited()) return Origin::abandon(thread_);
   ended_.store(true, std::memory_order_relaxed);
   interrupt();
   // The last client may be destroyed by a callback: then the thread ends after it.
@@ -54,6 +56,7 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
 }
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
+  endpoint_.origin().check("Dispatcher");
   runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
   for (std::uint32_t vain = 0;;) {
     // First: in a loop that is never idle there would be no second.
@@ -99,6 +102,7 @@ int Dispatcher::Impl::descriptor() {
 }
 
 void Dispatcher::Impl::runPending() {
+  endpoint_.origin().check("Dispatcher");
   // Peers may send, or invent news, for ever: the program's loop has its turn all the same.
   for (int batches = 0; batches < kPending; ++batches) {
     if (step()) continue;
@@ -217,7 +221,7 @@ std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
   const std::lock_guard lock(mutex);
   auto& known = dispatchers[backplane.name()];
   auto dispatcher = known.lock();
-  if (!dispatcher) {
+  if (!dispatcher || dispatcher->impl_->endpoint().origin().isInherited()) {
     dispatcher = std::make_shared<Dispatcher>(backplane);
     dispatcher->impl_->startThread(dispatcher->impl_);
     known = dispatcher;

@@ -39,6 +39,7 @@ MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
 }
 
 MessageClient::~MessageClient() {
+  if (isInherited()) return;
   dispatcher_->postAndWait([&] {
     binding_->leave();
     dispatcher_->remove(binding_);
@@ -46,24 +47,31 @@ MessageClient::~MessageClient() {
 }
 
 void MessageClient::bind(const std::string& server, std::int32_t location) {
+  dispatcher_->endpoint().origin().check("MessageClient");
   binding_->setServer(server, location);
   dispatcher_->post([binding = binding_] { binding->tryConnect(); });
 }
 
 SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
+  if (isInherited()) return SendResult::notConnected;
   return binding_->send(message, takeBefore, requestId);
 }
 
 BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
 
 void MessageClient::cancel(std::uint32_t requestId) {
+  if (isInherited()) return;
   dispatcher_->post([binding = binding_, requestId] { binding->cancel(requestId); });
 }
 
-bool MessageClient::isConnected() const noexcept { return binding_->isConnected(); }
-std::string MessageClient::notConnectedBecause() const { return binding_->notConnectedBecause(); }
+bool MessageClient::isInherited() const noexcept { return dispatcher_->endpoint().origin().isInherited(); }
+bool MessageClient::isConnected() const noexcept { return !isInherited() && binding_->isConnected(); }
+std::string MessageClient::notConnectedBecause() const {
+  return isInherited() ? Origin::explain("MessageClient") : binding_->notConnectedBecause();
+}
 
 bool MessageClient::connectWait(Nanoseconds timeout) {
+  if (isInherited()) return false;
   const auto deadline = Deadline::after(timeout);
   if (dispatcher_->isHome()) {
     while (!isConnected() && !deadline.hasPassed()) dispatcher_->runOnce(deadline);

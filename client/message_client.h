@@ -11,6 +11,7 @@
 // Threads  any thread may bind, send and cancel. Callbacks run on the dispatcher's thread and may send.
 // Crash    a server that dies is reported, its requests get their fates, and the client binds again when it is back.
 // Trust    a server that writes nonsense loses this link and is treated as gone.
+// Fork     in a child without exec, clients, servers and dispatchers of its parent refuse; the child makes its own.
 #pragma once
 
 #include <cstdint>
@@ -69,6 +70,7 @@ class MessageClient {
  private:
   MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback);
   BodyBytes allocate(std::size_t bytes);
+  [[nodiscard]] bool isInherited() const noexcept;
   std::shared_ptr<Dispatcher> shared_;  // when the dispatcher is the backplane's
   std::shared_ptr<Dispatcher::Impl> dispatcher_;
   std::shared_ptr<class Binding> binding_;

@@ -79,6 +79,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name, cons
 
 ServerCore::~ServerCore() {
   keeper_->leave();
+  if (endpoint_.origin().isInherited()) return;
   MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   for (const auto& connection : connections_) {
@@ -91,6 +92,7 @@ void ServerCore::setQueueSize(int size) {
 }
 
 bool ServerCore::wait(Deadline deadline) {
+  endpoint_.origin().check("MessageServer");
   const auto stopped = [this] { return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed); };
   return !stopped() && endpoint_.wait(deadline) && !stopped();
 }
@@ -127,6 +129,7 @@ void ServerCore::lookAround() {
 }
 
 Message ServerCore::receive() {
+  endpoint_.origin().check("MessageServer");
   Message message;
   // Clients may invent news for ever: who receives gets its turn all the same.
   for (std::uint32_t looks = 0; looks < kLooksInVain; ++looks) {
@@ -198,7 +201,7 @@ void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noe
 }
 
 ReplyResult ServerCore::reply(Message& message) noexcept {
-  if (!message || message.route().link == 0) return ReplyResult::clientGone;
+  if (!message || message.route().link == 0 || endpoint_.origin().isInherited()) return ReplyResult::clientGone;
   auto& connection = connectionOf(message.route());
   ReplyResult result{};
   {

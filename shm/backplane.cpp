@@ -3,7 +3,9 @@
 
 #include <cstdlib>
 #include <fmt/format.h>
+#include <mutex>
 #include <set>
+#include <utility>
 
 #include <mpf/base/step.h>
 #include <mpf/shm/remains.h>
@@ -14,8 +16,15 @@ namespace mpf {
 
 struct Backplane::State {
   explicit State(std::string itsName) : name(std::move(itsName)) {}
+  // A handle crosses a fork; the parent's watcher does not, and stays where it is.
+  Watcher& itsWatcher() {
+    const std::lock_guard lock(mutex);
+    if (watcher->isInherited()) static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>()).release());
+    return *watcher;
+  }
   std::string name;
-  Watcher watcher;
+  std::mutex mutex;
+  std::unique_ptr<Watcher> watcher = std::make_unique<Watcher>();
 };
 
 namespace {
@@ -44,7 +53,7 @@ Backplane Backplane::attach(const std::string& name) {
 Backplane Backplane::isolated() { return Backplane(fmt::format("isolated-{:x}", segments::newIncarnation())); }
 
 const std::string& Backplane::name() const noexcept { return state_->name; }
-Watcher& Backplane::watcher() const noexcept { return state_->watcher; }
+Watcher& Backplane::watcher() const noexcept { return state_->itsWatcher(); }
 
 std::int32_t Backplane::defaultLocation() { return std::atoi(environmentOr("MPF_LOCATION", "0").c_str()); }
 

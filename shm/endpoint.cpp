@@ -33,6 +33,7 @@ Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::str
       mode_(mode) {}
 
 Endpoint::~Endpoint() {
+  if (origin().isInherited()) return;
   for (const auto& [name, peer] : peers_) backplane_.watcher().forget(peer.token);
 }
 

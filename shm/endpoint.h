@@ -34,6 +34,7 @@ class Endpoint {
 
   [[nodiscard]] const Backplane& backplane() const noexcept { return backplane_; }
   [[nodiscard]] OwnWindow& window() noexcept { return window_; }
+  [[nodiscard]] const Origin& origin() const noexcept { return window_.origin(); }
   [[nodiscard]] layout::WindowControl& control() const noexcept { return window_.control(); }
 
   // --- links ---

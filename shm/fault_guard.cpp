@@ -2,6 +2,7 @@
 #include <mpf/shm/fault_guard.h>
 
 #include <fcntl.h>
+#include <pthread.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -39,7 +40,7 @@ struct Block {
 std::mutex tableMutex;  // held by who changes the table, never by a handler
 std::atomic<Block*> blocks{nullptr};
 Range* freeRanges = nullptr;  // under tableMutex
-struct sigaction previousAction {};
+struct sigaction previousAction{};
 
 Range* findFaulty(std::uintptr_t address) noexcept {
   // PAIR(guard-block): its ranges, and the blocks before it.
@@ -92,7 +93,33 @@ void onFault(int signal, siginfo_t* fault, void* context) {
   if (!tryRepair(*fault)) passOn(signal, fault, context);
 }
 
+// The child of a fork: what it has of its parent's mappings becomes memory of its own, and its copies of the parent's locks go.
+void leaveToParent() noexcept {
+  const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  // PAIR(guard-block): its ranges, and the blocks before it.
+  for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr; block = block->next) {
+    for (auto& range : block->ranges) {
+      if (range.begin.load(std::memory_order_relaxed) == 0) continue;
+      if (const int file = range.file.exchange(-1, std::memory_order_relaxed); file >= 0) ::dup3(nothing, file, O_CLOEXEC);
+      range.inode.store(0, std::memory_order_relaxed);
+      tryReplace(range);
+    }
+  }
+  ::close(nothing);
+}
+
+void watchForks() {
+  const auto lock = [] { tableMutex.lock(); };
+  const auto unlock = [] { tableMutex.unlock(); };
+  const auto unlockInChild = [] {
+    leaveToParent();
+    tableMutex.unlock();
+  };
+  if (const int error = ::pthread_atfork(lock, unlock, unlockInChild); error != 0) throwSystemError(error, "pthread_atfork", {});
+}
+
 bool install() {
+  watchForks();
   checkCall(::sigaction(SIGBUS, nullptr, &previousAction), "sigaction");
   struct sigaction action{};
   action.sa_sigaction = onFault;

@@ -6,6 +6,8 @@
 //                                                 ours: zeroes in place of the whole mapping, which isLost() from now on
 //                                                 not ours: the handler that was there before
 //
+// The child of a fork gets zeroes in place of everything that its parent has mapped, and none of its parent's locks: see origin.h.
+//
 // Threads  any; a fault is repaired in the thread that met it. A thread that blocks SIGBUS is killed by the kernel before we are asked.
 // Crash    nothing of this is shared.
 // Trust    a peer may cut a file at any time, as often as it likes.

@@ -127,7 +127,7 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes, returnRing(segment_, other(side))) {}
 
 Link::~Link() {
-  if (side_ == LinkSide::client) segments::remove(segment_.name());
+  if (side_ == LinkSide::client && !origin_.isInherited()) segments::remove(segment_.name());
 }
 
 void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept {

@@ -107,6 +107,7 @@ class Link {
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
   void afterPush() noexcept;
 
+  Origin origin_;
   Segment segment_;
   std::string backplane_;
   LinkSide side_;

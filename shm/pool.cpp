@@ -34,6 +34,7 @@ PoolOwner::PoolOwner(PoolPlace place, Rights rights, std::uint64_t maxBytes, lay
     : place_(std::move(place)), rights_(rights), maxBytes_(maxBytes), returns_(&returns) {}
 
 PoolOwner::~PoolOwner() {
+  if (origin_.isInherited()) return;
   for (const auto& bulk : bulks_) segments::remove(bulk.segment.name());
 }
 

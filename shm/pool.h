@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <mpf/shm/layout.h>
+#include <mpf/shm/origin.h>
 #include <mpf/shm/segment.h>
 
 namespace mpf {
@@ -67,6 +68,7 @@ class PoolOwner {
   bool addBulk(std::size_t chunkBytes);
   bool isState(const layout::ChunkRef& ref, ChunkState state) const noexcept;
 
+  Origin origin_;
   PoolPlace place_;
   Rights rights_;
   std::uint64_t maxBytes_;

@@ -62,8 +62,12 @@ Watcher::Watcher()
 }
 
 Watcher::~Watcher() {
-  ::eventfd_write(stop_.get(), 1);
-  thread_.join();
+  if (isInherited()) {
+    Origin::abandon(thread_);
+  } else {
+    ::eventfd_write(stop_.get(), 1);
+    thread_.join();
+  }
 }
 
 Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
@@ -94,6 +98,7 @@ void Watcher::openNames() {
 }
 
 void Watcher::forget(Token token) {
+  if (isInherited()) return;  // its descriptors are the parent's, too
   const std::lock_guard lock(mutex_);
   peers_.erase(token);
   if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty() && names_) {

@@ -18,6 +18,7 @@
 #include <thread>
 
 #include <mpf/base/file_descriptor.h>
+#include <mpf/shm/origin.h>
 #include <mpf/shm/window.h>
 
 namespace mpf {
@@ -36,6 +37,7 @@ class Watcher {
   Token watchNames(Callback callback);
   // After return the callback does not run and will not run again.
   void forget(Token token);
+  [[nodiscard]] bool isInherited() const noexcept { return origin_.isInherited(); }
 
  private:
   struct Peer {
@@ -53,6 +55,7 @@ class Watcher {
   void poll();
   void updateTimer();
 
+  Origin origin_;
   FileDescriptor epoll_;
   FileDescriptor stop_;
   FileDescriptor timer_;

@@ -90,6 +90,7 @@ void OwnWindow::publish(const std::string& name) {
 }
 
 OwnWindow::~OwnWindow() {
+  if (origin_.isInherited()) return;
   control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   MPF_STEP(window_closed);
   segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
@@ -98,6 +99,7 @@ OwnWindow::~OwnWindow() {
 }
 
 void OwnWindow::ring() const noexcept {
+  if (origin_.isInherited()) return;
   doorbell::ring(hints().bell);
   doorbell::ringFifo(fifo_);
 }
@@ -106,7 +108,8 @@ std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout:
   auto window = Segment::tryOpen(name, kind, Segment::Access::readOnly);
   if (!window) return nullptr;
   if (window->bytes() < layout::kWindowBytes) throw SegmentError(fmt::format("{}: truncated", segments::path(name)));
-  if (window->bytes() > layout::kWindowBytes) throw SegmentError(fmt::format("{}: {} bytes are no window", segments::path(name), window->bytes()));
+  if (window->bytes() > layout::kWindowBytes)
+    throw SegmentError(fmt::format("{}: {} bytes are no window", segments::path(name), window->bytes()));
   const auto parsed = SegmentName::tryParse(name);
   if (!parsed) throw SegmentError(fmt::format("{}: no name of a window", segments::path(name)));
   // Any peer may have written nonsense over their header; the window's, which it cannot write, is enough.

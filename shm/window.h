@@ -16,6 +16,7 @@
 #include <string>
 
 #include <mpf/shm/doorbell.h>
+#include <mpf/shm/origin.h>
 #include <mpf/shm/segment.h>
 
 namespace mpf {
@@ -44,12 +45,14 @@ class OwnWindow {
   [[nodiscard]] layout::WindowHints& hints() const noexcept { return hints_.at<layout::WindowHints>(0); }
   [[nodiscard]] Rights rights() const noexcept { return rights_; }
   [[nodiscard]] const FileDescriptor& fifo() const noexcept { return fifo_; }
+  [[nodiscard]] const Origin& origin() const noexcept { return origin_; }
 
   // Wakes the owner. Async-signal-safe.
   void ring() const noexcept;
 
  private:
   void publish(const std::string& name);
+  Origin origin_;
   std::string backplane_;
   Rights rights_;
   Segment window_;

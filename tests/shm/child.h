@@ -6,7 +6,7 @@
 //     self.stay();          // tells the parent that it is ready; never returns
 //   });
 //
-// A fork shares its parent's locks: fork before the test opens windows of its own, unless that is what it is about.
+// A child has nothing of what the test opened before: see shm/origin.h.
 #pragma once
 
 #include <fcntl.h>

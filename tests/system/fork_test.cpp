@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+// A program forks without exec: its child keeps nobody alive, does nothing to what its parent has, and may have objects of its own.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <functional>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include <mpf/base/system_call.h>
+#include <mpf/client/sync_client.h>
+#include <mpf/server/message_server.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/shm/child.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class ForkTest : public testing::Test {
+ protected:
+  // An echo server with a thread, a client of it with the process's dispatcher thread, and one without a thread.
+  void SetUp() override {
+    server_->on<Float64>([](Float64& request) { request.value += 1; });
+    thread_ = std::thread([this] { server_->run(); });
+    client_ = std::make_unique<MessageClient>(backplane_, [](const Message&) {});
+    client_->bind("echo");
+    ASSERT_TRUE(client_->connectWait(60s));
+    sync_.emplace(backplane_, "echo");
+    expectAnswer(*sync_);
+  }
+  void TearDown() override {
+    sync_.reset();
+    client_.reset();
+    server_->interrupt();
+    thread_.join();
+    server_.reset();
+    static_cast<void>(backplane_.removeDead());  // of a process that a test killed
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+  static void expectAnswer(SyncClient& client) {
+    auto answer = client.call(Float64Message({.value = 1}), 60s);
+    ASSERT_TRUE(answer) << answer.why();
+    EXPECT_EQ(answer.message().tryAs<Float64>()->value, 2);
+  }
+  // Runs `act` in a child; returns its exit status, 0 when it has no failure.
+  static int inChild(const std::function<void()>& act) {
+    const auto pid = checkCall(::fork(), "fork");
+    if (pid == 0) {
+      ::alarm(100);
+      act();
+      ::_exit(testing::Test::HasFailure() ? 1 : 0);
+    }
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return status;
+  }
+
+  Watchdog watchdog_{"fork test"};
+  Backplane backplane_ = Backplane::isolated();
+  std::unique_ptr<MessageServer> server_ = std::make_unique<MessageServer>(backplane_, "echo");
+  std::thread thread_;
+  std::unique_ptr<MessageClient> client_;
+  std::optional<SyncClient> sync_;
+};
+
+TEST_F(ForkTest, WhatAChildInheritedRefusesAndSaysWhy) {
+  const auto status = inChild([&] {
+    EXPECT_FALSE(client_->isConnected());
+    EXPECT_EQ(client_->send(Float64Message({.value = 1})), SendResult::notConnected);
+    EXPECT_THAT(client_->notConnectedBecause(), testing::HasSubstr("made before a fork"));
+    EXPECT_FALSE(client_->connectWait(60s));
+    EXPECT_EQ(sync_->call(Float64Message({.value = 1}), 60s).refusal(), SendResult::notConnected);
+    EXPECT_THROW(server_->waitForMessage(), std::logic_error);
+    EXPECT_THROW(server_->receive(), std::logic_error);
+  });
+
+  EXPECT_EQ(status, 0);
+  expectAnswer(*sync_);
+}
+
+TEST_F(ForkTest, WhatAChildDestroysStaysItsParents) {
+  const auto names = backplane_.segmentNames();
+
+  const auto status = inChild([&] {
+    sync_.reset();
+    client_.reset();
+    server_.reset();
+  });
+
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(backplane_.segmentNames(), testing::UnorderedElementsAreArray(names));
+  EXPECT_TRUE(client_->isConnected());
+  expectAnswer(*sync_);
+}
+
+TEST_F(ForkTest, AChildMayHaveObjectsOfItsOwn) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some";
+#endif
+  const auto status = inChild([&] {
+    SyncClient own(backplane_, "echo");
+    expectAnswer(own);
+    MessageClient shared(backplane_, [](const Message&) {});
+    shared.bind("echo");
+    EXPECT_TRUE(shared.connectWait(60s));
+    const MessageServer server(backplane_, "child");
+  });
+
+  EXPECT_EQ(status, 0);
+  expectAnswer(*sync_);
+}
+
+TEST_F(ForkTest, AServerIsSeenToDieThoughItsChildLives) {
+  const auto mortal = std::make_unique<Child>([&](Child::Self& self) {
+    const MessageServer server(Backplane::named(backplane_.name()), "mortal");
+    if (::fork() == 0) {
+      ::prctl(PR_SET_PDEATHSIG, 0);
+      self.ready();  // lives until it is told to go on
+      ::_exit(0);
+    }
+    ::pause();
+  });
+  const auto window = SegmentName::serverWindow(backplane_.name(), 0, "mortal");
+  ASSERT_EQ(segments::probeOwner(window), segments::Owner::alive);
+
+  ::kill(mortal->pid(), SIGKILL);
+
+  while (segments::probeOwner(window) == segments::Owner::alive) std::this_thread::yield();
+  const MessageServer successor(backplane_, "mortal");
+  mortal->go();
+  EXPECT_EQ(successor.getName(), "mortal");
+}
+
+}  // namespace
+}  // namespace mpf::test
