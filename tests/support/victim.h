@@ -26,10 +26,16 @@ class Victim {
  public:
   Victim() = default;
   // Runs tests/support/victim.cpp as `role` on `backplane`.
-  Victim(std::string role, std::string backplane, std::vector<std::string> more = {}) {
-    std::string program = MPF_TEST_VICTIM;
-    std::vector<char*> arguments{program.data(), role.data(), backplane.data()};
-    for (auto& argument : more) arguments.push_back(argument.data());
+  Victim(const std::string& role, const std::string& backplane, const std::vector<std::string>& more = {})
+      : Victim(MPF_TEST_VICTIM, [&] {
+          std::vector<std::string> all{role, backplane};
+          all.insert(all.end(), more.begin(), more.end());
+          return all;
+        }()) {}
+  // Runs any program.
+  Victim(std::string program, std::vector<std::string> words) {
+    std::vector<char*> arguments{program.data()};
+    for (auto& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     std::array<int, 2> pipe{};
     checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+// A peer that is legal at first: mpf_test_hostile client|server BACKPLANE KIND. Says "hostile" when it has done many deeds,
+// and goes on for ever, with a new window and link now and then. Beside the kinds of Mischief: flood (sends as fast as it can, takes nothing), slow (one
+// message at a time, taken and never freed).
+#include <sys/prctl.h>
+
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <mpf/schema/message.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/hostile/mischief.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kDeedsOfALink = 500;
+constexpr int kLinks = 12;
+constexpr const char* kServer = "echo";
+
+class Peer {
+ public:
+  Peer(const Backplane& backplane, LinkSide side, std::string kind, Random& random)
+      : side_(side),
+        endpoint_(backplane, side == LinkSide::client ? layout::SegmentKind::clientWindow : layout::SegmentKind::serverWindow,
+                  side == LinkSide::client ? "" : SegmentName::serverWindow(backplane.name(), 0, "hostile"), Rights{0666, ~0u},
+                  WaitMode::block,
+                  [](layout::SegmentHeader& header) {
+                    header.queueSize = 32;
+                    header.maxMessageBytes = 1 << 20;
+                    header.maxPoolBytes = 4 << 20;
+                  }),
+        kind_(std::move(kind)),
+        mischief_(kind_, endpoint_.window(), random) {
+    endpoint_.control().queueSize.store(32, std::memory_order_relaxed);
+  }
+
+  void run() {
+    const auto index = endpoint_.tryReserve().value();
+    link_ = side_ == LinkSide::client ? connect(index) : accept(index);
+    beLegal();
+    mischief_.reach(*link_);
+    for (int deed = 0; deed < kDeedsOfALink; ++deed) act(deed);
+    endpoint_.detach(index);
+    link_->setState(layout::LinkState::closed);
+    link_->notifyPeer();
+  }
+
+ private:
+  std::unique_ptr<Link> connect(std::uint32_t index) {
+    std::shared_ptr<PeerWindow> server;
+    while (!server) server = endpoint_.peer(SegmentName::serverWindow(backplane(), 0, kServer), layout::SegmentKind::serverWindow);
+    auto link = Link::create(backplane(), endpoint_.window(), index, server);
+    endpoint_.attach(index, *link);
+    // The server may be busy with what we did to it before.
+    while (link->peerState() != layout::LinkState::open) {
+      server->knock(link->header().incarnation);
+      endpoint_.wait(Deadline::after(5ms));
+      static_cast<void>(endpoint_.next());
+    }
+    link->setPeerIndex(link->control().serverIndex.load(std::memory_order_relaxed));
+    return link;
+  }
+  std::unique_ptr<Link> accept(std::uint32_t index) {
+    for (;;) {
+      endpoint_.wait(Deadline::after(5ms));
+      static_cast<void>(endpoint_.next());
+      for (const auto& name : segments::list(SegmentName::linkPrefix(backplane(), endpoint_.window().header().incarnation))) {
+        if (auto link = tryAccept(name, index)) return link;
+      }
+    }
+  }
+  std::unique_ptr<Link> tryAccept(const std::string& name, std::uint32_t index) try {
+    auto link = Link::tryOpen(backplane(), name, endpoint_.window());
+    if (!link || link->control().serverState.load(std::memory_order_relaxed) != layout::LinkState::none) return nullptr;
+    auto client = endpoint_.peer(SegmentName::keyed(backplane(), NameKind::clientWindow, link->header().clientWindow),
+                                 layout::SegmentKind::clientWindow);
+    if (!client) return nullptr;
+    link->attachPeer(std::move(client), link->header().clientIndex);
+    endpoint_.attach(index, *link);
+    link->control().serverIndex.store(index, std::memory_order_relaxed);
+    link->setState(layout::LinkState::open);
+    link->notifyPeer();
+    return link;
+  } catch (const std::exception&) {
+    return nullptr;  // cut
+  }
+  // Some messages that are right, so that there are pools.
+  void beLegal() {
+    for (std::uint32_t id = 1; id < 5; ++id) send(id, id % 2 == 0 ? 3000 : sizeof(Int32));
+    for (int turn = 0; turn < 4; ++turn) takeOne(true);
+  }
+  void send(std::uint32_t id, std::size_t bytes) {
+    const auto type = bytes == sizeof(Int32) ? MessageType::int32 : MessageType::float64Array;
+    Envelope envelope{.type = static_cast<std::uint16_t>(type), .requestId = id};
+    if (side_ == LinkSide::server) envelope.flags = id % 2 == 0 ? layout::kSlotFirstReply : std::uint8_t{0};
+    static_cast<void>(link_->trySend(envelope, std::vector<std::byte>(bytes), {}));
+  }
+  void takeOne(bool frees) {
+    if (!link_->hasMessage()) return;
+    const auto envelope = link_->begin();
+    if (!frees) return;
+    if ((envelope.flags & layout::kSlotChunk) != 0) {
+      if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+    }
+    link_->end();
+  }
+  void act(int deed) {
+    if (kind_ == "flood") return send(static_cast<std::uint32_t>(deed + 5), deed % 8 == 0 ? 3000 : sizeof(Int32));
+    if (kind_ == "slow") {
+      if (deed % 100 == 0) send(static_cast<std::uint32_t>(deed + 5), sizeof(Int32));
+      return takeOne(false);
+    }
+    mischief_.act(*link_);
+    if (deed % 16 == 0) link_->notifyPeer();
+  }
+  [[nodiscard]] const std::string& backplane() const { return endpoint_.backplane().name(); }
+
+  LinkSide side_;
+  std::unique_ptr<Link> link_;
+  Endpoint endpoint_;
+  std::string kind_;
+  Mischief mischief_;
+};
+
+}  // namespace
+}  // namespace mpf::test
+
+int main(int argc, char** argv) try {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  const std::vector<std::string> arguments(argv, argv + argc);
+  const auto side = arguments.at(1) == "client" ? mpf::LinkSide::client : mpf::LinkSide::server;
+  const auto backplane = mpf::Backplane::attach(arguments.at(2));
+  mpf::test::Random random;
+  for (int links = 0;; ++links) {
+    if (links == mpf::test::kLinks) std::puts("hostile");
+    std::fflush(stdout);
+    mpf::test::Peer(backplane, side, arguments.at(3), random).run();
+  }
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "hostile: %s\n", error.what());
+  return 1;
+}

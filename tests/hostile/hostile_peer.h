@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// HostilePeer: a hostile process, from its start to its end. MischiefTest: one kind of it.
+#pragma once
+
+#include <atomic>
+#include <cstdlib>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <string>
+#include <thread>
+
+#include <mpf/shm/backplane.h>
+#include <mpf/tests/hostile/usage.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+
+class HostilePeer {
+ public:
+  HostilePeer(const std::string& side, const std::string& backplane, const std::string& kind)
+      : process_(MPF_TEST_HOSTILE, std::vector{side, backplane, kind}), listener_([this] { listen(); }) {}
+  ~HostilePeer() {
+    process_.signal(SIGKILL);
+    listener_.join();
+  }
+  HostilePeer(const HostilePeer&) = delete;
+  HostilePeer& operator=(const HostilePeer&) = delete;
+
+  // Whether it has done enough.
+  [[nodiscard]] bool hasActed() const noexcept { return hasActed_; }
+  // Whether it ended by itself, before it had.
+  [[nodiscard]] bool hasFailed() const noexcept { return hasFailed_; }
+
+ private:
+  void listen() {
+    auto line = process_.line();
+    while (!line.empty() && line != "hostile") line = process_.line();
+    (line.empty() ? hasFailed_ : hasActed_) = true;
+  }
+  Victim process_;
+  std::atomic<bool> hasActed_{false};
+  std::atomic<bool> hasFailed_{false};
+  std::thread listener_;
+};
+
+class MischiefTest : public testing::TestWithParam<const char*> {
+ protected:
+  static constexpr std::size_t kSlackKb = 4096;
+  static int seeds() {
+    const char* set = std::getenv("MPF_TEST_SEEDS");
+    return set != nullptr ? std::atoi(set) : 1;
+  }
+  // Whoever attaches next removes what the dead left; then nothing is there.
+  void TearDown() override {
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+
+  Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name(), std::chrono::seconds(270)};
+  Backplane backplane_ = Backplane::isolated();
+};
+
+inline constexpr const char* kMischief[] = {"bytes", "words", "slots", "hints", "headers", "cut", "backwards", "flood", "slow"};
+
+}  // namespace mpf::test

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// A server goes mad. A client of it and of an honest server loses that link and nothing else.
+#include <optional>
+
+#include <mpf/client/message_client.h>
+#include <mpf/tests/hostile/hostile_peer.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class MadServer : public MischiefTest {
+ protected:
+  // Sends to the honest server one by one, and checks each reply.
+  void take(const Message& message) {
+    if (message.getType() == MessageType::connect) return;
+    const auto* reply = message.tryAs<Float64>();
+    ASSERT_NE(reply, nullptr) << "no reply but " << toString(message.getType());
+    EXPECT_EQ(reply->value, asked_ + 1.0);
+    EXPECT_EQ(message.getClientExtra(), asked_);
+    ++answered_;
+  }
+  void ask() {
+    Float64Message request({.value = ++asked_ + 0.0});
+    request.setClientExtra(asked_);
+    ASSERT_EQ(honest_->send(std::move(request)), SendResult::sent);
+    while (answered_ < asked_) dispatcher_->runOnce(Deadline::after(1s));
+  }
+
+  void TearDown() override {
+    honest_.reset();
+    dispatcher_.reset();
+    MischiefTest::TearDown();
+  }
+
+  int asked_ = 0;
+  int answered_ = 0;
+  std::optional<Dispatcher> dispatcher_{std::in_place, backplane_};
+  std::optional<MessageClient> honest_{std::in_place, *dispatcher_, [this](const Message& message) { take(message); }};
+};
+
+// A client of the mad one. No request ends more often than once, whatever the server sends.
+class Unlucky {
+ public:
+  explicit Unlucky(Dispatcher& dispatcher) : client_(dispatcher, [this](const Message& message) { take(message); }) {
+    client_.bind("hostile");
+  }
+  void ask(int number) {
+    if (client_.send(Int32Message({.value = number})) == SendResult::sent) ++accepted_;
+    if (client_.send(client_.alloc<Float64Array>(500)) == SendResult::sent) ++accepted_;
+  }
+
+ private:
+  void take(const Message& message) {
+    if (message.getType() == MessageType::requestFate) ++fates_;
+    EXPECT_LE(fates_, accepted_);
+  }
+  int accepted_ = 0;
+  int fates_ = 0;
+  MessageClient client_;
+};
+
+TEST_P(MadServer, CostsItsClientThatLinkAlone) {
+  Victim server("serve", backplane_.name());
+  honest_->bind("echo");
+  ASSERT_TRUE(honest_->connectWait(60s));
+  ASSERT_NO_FATAL_FAILURE(ask());
+  const auto before = Usage::of(::getpid());
+
+  for (int seed = 0; seed < seeds(); ++seed) {
+    {
+      const HostilePeer mad("server", backplane_.name(), GetParam());
+      while (!mad.hasActed()) {
+        ASSERT_FALSE(mad.hasFailed());
+        Unlucky unlucky(*dispatcher_);  // a new one each time: it would wait a second after nonsense
+        for (int i = 0; i < 20; ++i) {
+          ASSERT_NO_FATAL_FAILURE(ask());
+          unlucky.ask(asked_);
+        }
+      }
+    }
+    static_cast<void>(backplane_.removeDead());
+    while (!Usage::of(::getpid()).isWithin(before, kSlackKb)) ASSERT_NO_FATAL_FAILURE(ask());
+  }
+
+  EXPECT_TRUE(honest_->isConnected());
+  std::cout << asked_ << " right answers; " << before << " before, " << Usage::of(::getpid()) << " after\n";
+  const auto status = server.end(SIGTERM);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+INSTANTIATE_TEST_SUITE_P(OfEachKind, MadServer, testing::ValuesIn(kMischief),
+                         [](const auto& parameter) { return std::string(parameter.param); });
+
+}  // namespace
+}  // namespace mpf::test
