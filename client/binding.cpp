@@ -322,6 +322,9 @@ void Binding::nudge(std::int64_t nowNs) {
       link.notifyPeer();
     } else {
       link.peer()->knock(link.header().incarnation);
+      if (dispatcher_.endpoint().window().isNameless())
+        setReason(
+            "somebody removed this process's files from /dev/shm (RemoveIPC of systemd-logind?): no server finds it until it starts again");
     }
     takeOne();  // a reply, or what the server says of the link: we may not have been told
   }

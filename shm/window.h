@@ -47,6 +47,9 @@ class OwnWindow {
   [[nodiscard]] const FileDescriptor& fifo() const noexcept { return fifo_; }
   [[nodiscard]] const Origin& origin() const noexcept { return origin_; }
 
+  // Whether somebody took its name away: who comes now does not find it.
+  [[nodiscard]] bool isNameless() const { return segments::probeOwner(window_.name(), header().incarnation) == segments::Owner::absent; }
+
   // Wakes the owner. Async-signal-safe.
   void ring() const noexcept;
 

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+// The rest of the world: little shared memory, other namespaces, clocks that differ, limits that are reached, names that somebody takes away.
+// Each test plays in a child of its own; what this host does not allow is skipped by name.
+#include <fcntl.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <thread>
+#include <vector>
+
+#include <mpf/base/system_call.h>
+#include <mpf/client/sync_client.h>
+#include <mpf/server/message_server.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kNotAllowed = 77;
+
+class WorldTest : public testing::Test {
+ protected:
+  void SetUp() override {
+#ifdef __SANITIZE_THREAD__
+    GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some";
+#endif
+  }
+  void TearDown() override {
+    static_cast<void>(backplane_.removeDead());
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+  }
+  // Runs `act` in a child that may change its world.
+  static void inChild(const std::function<void()>& act) {
+    std::fflush(stdout);
+    const auto pid = checkCall(::fork(), "fork");
+    if (pid == 0) {
+      ::alarm(110);  // also when the test is killed
+      try {
+        act();
+      } catch (const std::exception& error) {
+        std::fprintf(stderr, "child: %s\n", error.what());
+        ::_exit(1);
+      }
+      std::fflush(stdout);
+      ::_exit(testing::Test::HasFailure() ? 1 : 0);
+    }
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+    if (WEXITSTATUS(status) == kNotAllowed) GTEST_SKIP() << "this host does not allow it";
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+  }
+  // In the child: needs root, or a host that allows user namespaces.
+  static void enter(int namespaces) {
+    if (::geteuid() != 0) namespaces |= CLONE_NEWUSER;
+    if (::unshare(namespaces) != 0) ::_exit(kNotAllowed);
+  }
+  static void allow(bool success) {
+    if (!success) ::_exit(kNotAllowed);
+  }
+  static void expectAnswer(SyncClient& client, double value = 1) {
+    auto answer = client.call(Float64Message({.value = value}), 60s);
+    ASSERT_TRUE(answer) << answer.why();
+    EXPECT_EQ(answer.message().tryAs<Float64>()->value, value + 1);
+  }
+
+  Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+  Backplane backplane_ = Backplane::isolated();
+};
+
+TEST_F(WorldTest, SharedMemoryThatIsFullIsAClearErrorAndServesOn) {
+  inChild([] {
+    enter(CLONE_NEWNS);
+    ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr);
+    allow(::mount("tmpfs", "/dev/shm", "tmpfs", 0, "size=256k") == 0);
+    const auto backplane = Backplane::named("small");
+    Victim server("serve", backplane.name());
+    EXPECT_EQ(server.line(), "open");
+    SyncClient client(backplane, "echo");
+    expectAnswer(client);
+
+    // Large messages want more than there is: the sender is told, and the link stands.
+    auto array = client.client().alloc<Float64Array>(100'000);
+    EXPECT_EQ(client.call(std::move(array), 60s).refusal(), SendResult::noMemory);
+    expectAnswer(client);
+
+    // No byte is left: a new server says what it could not have, whoever is there goes on.
+    const FileDescriptor rest(::open("/dev/shm/rest", O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+    while (::posix_fallocate(rest.get(), ::lseek(rest.get(), 0, SEEK_END), 4096) == 0) {
+    }
+    try {
+      const MessageServer another(backplane, "another");
+      ADD_FAILURE() << "there was room";
+    } catch (const std::system_error& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("bytes in /dev/shm"), testing::HasSubstr("No space left")));
+    }
+    expectAnswer(client);
+    checkCall(::ftruncate(rest.get(), 0), "ftruncate");
+    const MessageServer another(backplane, "another");
+  });
+}
+
+TEST_F(WorldTest, TwoPidNamespacesShareABackplane) {
+  Victim server("serve", backplane_.name());
+  EXPECT_EQ(server.line(), "open");
+  inChild([&] {
+    enter(CLONE_NEWPID);
+    Victim stranger("crowd", backplane_.name(), {"3"});
+    EXPECT_THAT(stranger.line(), testing::StartsWith("waiting: "));
+    EXPECT_THAT(stranger.line(), testing::StartsWith("answered "));
+    stranger.end(SIGKILL);
+  });
+
+  // The stranger's death is seen, too: its links are closed.
+  const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"), layout::SegmentKind::serverWindow);
+  while (window->control().linkCount.load(std::memory_order_relaxed) != 0) std::this_thread::sleep_for(1ms);
+  SyncClient client(backplane_, "echo");
+  expectAnswer(client);
+}
+
+TEST_F(WorldTest, AServersDeathIsSeenFromAnotherPidNamespace) {
+  inChild([&] {
+    SyncClient client(backplane_, "echo");  // its thread first: there are no new ones afterwards
+    static_cast<void>(client.connectWait(1ms));
+    enter(CLONE_NEWPID);
+    Victim server("serve", backplane_.name());  // pid 1 there
+    EXPECT_EQ(server.line(), "open");
+    expectAnswer(client);
+
+    server.end(SIGKILL);
+
+    while (client.client().isConnected()) static_cast<void>(client.receive(1ms));
+    EXPECT_FALSE(client.client().isConnected());
+  });
+}
+
+// A monotonic clock that is an hour ahead, as in a container that was moved: nothing hangs, and what is alive stays alive.
+TEST_F(WorldTest, AClientWhoseClockIsAheadIsServed) {
+  Victim server("serve", backplane_.name());
+  EXPECT_EQ(server.line(), "open");
+  inChild([&] {
+    enter(CLONE_NEWTIME);
+    std::ofstream offsets("/proc/self/timens_offsets");
+    offsets << "monotonic 3600 0\nboottime 3600 0\n" << std::flush;
+    allow(offsets.good());
+    Victim stranger("crowd", backplane_.name(), {"2"});  // the first process of the new clock
+    EXPECT_THAT(stranger.line(), testing::StartsWith("waiting: "));
+    EXPECT_THAT(stranger.line(), testing::StartsWith("answered "));
+    stranger.end(SIGKILL);
+  });
+  SyncClient client(backplane_, "echo");
+  expectAnswer(client);
+}
+
+TEST_F(WorldTest, AProcessWithoutDescriptorsLeftIsToldSoAndRecovers) {
+  Victim server("serve", backplane_.name());
+  EXPECT_EQ(server.line(), "open");
+  inChild([&] {
+    SyncClient before(backplane_, "echo");
+    expectAnswer(before);
+    rlimit limit{};
+    ::getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = 64;
+    ::setrlimit(RLIMIT_NOFILE, &limit);
+    std::vector<FileDescriptor> all;
+    do all.emplace_back(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+    while (all.back());
+
+    try {
+      const MessageServer another(backplane_, "another");
+      ADD_FAILURE() << "there were descriptors";
+    } catch (const std::system_error& error) {
+      EXPECT_EQ(error.code().value(), EMFILE) << error.what();
+    }
+    expectAnswer(before);
+
+    all.clear();
+    const MessageServer another(backplane_, "another");
+    SyncClient after(backplane_, "echo");
+    expectAnswer(after);
+  });
+}
+
+TEST_F(WorldTest, AProcessWithoutMappingsLeftIsToldSoAndRecovers) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "AddressSanitizer needs mappings itself";
+#endif
+  Victim server("serve", backplane_.name());
+  EXPECT_EQ(server.line(), "open");
+  inChild([&] {
+    SyncClient before(backplane_, "echo");
+    expectAnswer(before);
+    std::vector<void*> all;
+    all.reserve(100'000);
+    for (;;) {  // kinds that alternate are not merged
+      auto* const page = ::mmap(nullptr, 4096, all.size() % 2 == 0 ? PROT_READ : PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+      if (page == MAP_FAILED) break;
+      all.push_back(page);
+      allow(all.size() < 99'000);  // a host whose limit is beyond a test
+    }
+
+    try {
+      const MessageServer another(backplane_, "another");
+      ADD_FAILURE() << "there were mappings";
+    } catch (const std::system_error& error) {
+      EXPECT_EQ(error.code().value(), ENOMEM) << error.what();
+    }
+    expectAnswer(before);
+
+    for (auto* const page : all) ::munmap(page, 4096);
+    const MessageServer another(backplane_, "another");
+  });
+}
+
+// As RemoveIPC does at a user's logout: names go, processes stay. Links that stand are not touched, a successor can take the name, and a process
+// that nobody finds any more says so.
+TEST_F(WorldTest, ASuccessorServesWhoComesAfterTheNamesWereTakenAway) {
+  Victim server("serve", backplane_.name());
+  EXPECT_EQ(server.line(), "open");
+  SyncClient client(backplane_, "echo");
+  expectAnswer(client);
+
+  for (const auto& name : backplane_.segmentNames()) segments::remove(name);
+
+  for (int i = 0; i < 10; ++i) expectAnswer(client, i);
+  Victim successor("serve", backplane_.name());
+  EXPECT_EQ(successor.line(), "open");
+  SyncClient later(backplane_, "echo");
+  expectAnswer(later);
+  server.end(SIGKILL);
+  while (client.client().notConnectedBecause().find("RemoveIPC") == std::string::npos) static_cast<void>(client.receive(1ms));
+  expectAnswer(later);
+}
+
+}  // namespace
+}  // namespace mpf::test
