@@ -10,7 +10,7 @@
 #include <thread>
 
 #include <mpf/shm/backplane.h>
-#include <mpf/tests/hostile/usage.h>
+#include <mpf/tests/support/usage.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
