@@ -24,6 +24,7 @@ void addTap(CLI::App& app, Run& run);
 void addReplay(CLI::App& app, Run& run);
 void addClean(CLI::App& app, Run& run);
 void addDoctor(CLI::App& app, Run& run);
+void addTorture(CLI::App& app, Run& run);
 void addBench(CLI::App& app, Run& run);
 
 }  // namespace mpf::tools

@@ -53,6 +53,7 @@ int main(int argc, char** argv) try {
   mpf::tools::addReplay(app, run);
   mpf::tools::addClean(app, run);
   mpf::tools::addDoctor(app, run);
+  mpf::tools::addTorture(app, run);
   mpf::tools::addBench(app, run);
   app.require_subcommand(1);
   app.footer(kFooter);

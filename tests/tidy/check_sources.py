@@ -25,6 +25,7 @@ MAY_INCLUDE = {
     "crate": ["base"],
     "benchmarks": ["client", "server"],
     "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
+    "tools/torture": ["tools", "server"],
 }
 MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "demo", "examples")
 

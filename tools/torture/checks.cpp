@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/torture/checks.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <set>
+
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tools/survey.h>
+
+namespace mpf::torture {
+namespace {
+
+struct Living {
+  std::set<std::uint64_t> windows;
+  std::set<std::uint64_t> links;
+};
+
+// Incarnation of the window that owns a segment; 0 when it is gone or cannot be read.
+std::uint64_t ownerOf(const std::string& name, layout::SegmentKind kind) try {
+  const auto segment = Segment::tryOpen(name, kind, Segment::Access::readOnly);
+  return segment ? segment->header().ownerWindow : 0;
+} catch (const SegmentError&) {
+  return 0;
+}
+
+bool isLivingWindow(const std::string& name, NameKind kind, Living& living) {
+  const bool isServer = kind == NameKind::serverWindow;
+  if (segments::probeOwner(name) != segments::Owner::alive) return false;
+  living.windows.insert(ownerOf(name, isServer ? layout::SegmentKind::serverWindow : layout::SegmentKind::clientWindow));
+  return true;
+}
+
+// Whether it belongs to the living; windows must have been looked at before links, and links before bulk segments.
+bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living& living) {
+  switch (parsed.kind) {
+    case NameKind::serverWindow:
+    case NameKind::clientWindow:
+      return isLivingWindow(name, parsed.kind, living);
+    case NameKind::hints:
+    case NameKind::fifo:
+      return living.windows.contains(parsed.incarnation);
+    case NameKind::wish:
+      return living.windows.contains(ownerOf(name, layout::SegmentKind::wish));
+    case NameKind::link:
+      if (!living.windows.contains(parsed.serverWindow)) return false;
+      if (!living.windows.contains(ownerOf(name, layout::SegmentKind::link))) return false;
+      living.links.insert(parsed.incarnation);
+      return true;
+    case NameKind::bulk:
+      return living.links.contains(parsed.incarnation);
+  }
+  return false;
+}
+
+int rank(NameKind kind) {
+  if (kind == NameKind::serverWindow || kind == NameKind::clientWindow) return 0;
+  return kind == NameKind::bulk ? 2 : 1;
+}
+
+// The number behind a word in a file of /proc; 0 when it is not there.
+std::size_t numberIn(const std::string& path, const std::string& word) {
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with(word)) return std::stoul(line.substr(word.size()));
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::vector<std::string> staleSegments(const std::string& backplane, std::size_t links) {
+  std::vector<std::pair<std::string, SegmentName::Parsed>> names;
+  for (auto& name : segments::list(SegmentName::prefix(backplane))) {
+    if (auto parsed = SegmentName::tryParse(name)) names.emplace_back(std::move(name), std::move(*parsed));
+  }
+  std::ranges::stable_sort(names, {}, [](const auto& name) { return rank(name.second.kind); });
+  Living living;
+  std::vector<std::string> stale;
+  for (const auto& [name, parsed] : names) {
+    if (!belongs(name, parsed, living)) stale.push_back(name);
+  }
+  if (living.links.size() > links) stale.push_back(fmt::format("{} links where {} are connected", living.links.size(), links));
+  return stale;
+}
+
+void checkNoNonsense(const std::string& backplane) {
+  const auto survey = tools::Survey::take(backplane);
+  for (const auto* windows : {&survey.servers, &survey.clients}) {
+    for (const auto& window : *windows) {
+      if (window.protocolErrors != 0) throw Broken(fmt::format("{} read nonsense from a peer", window.name));
+    }
+  }
+}
+
+std::uint64_t clientsDied(const std::string& backplane, const std::string& server) {
+  const auto survey = tools::Survey::take(backplane);
+  const auto found = std::ranges::find(survey.servers, server, &tools::WindowView::name);
+  return found == survey.servers.end() ? 0 : found->peersDied;
+}
+
+Holdings Holdings::of(pid_t pid) {
+  const auto directory = fmt::format("/proc/{}", pid);
+  Holdings holdings;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(directory + "/fd")) ++holdings.descriptors;
+  std::ifstream maps(directory + "/maps");
+  for (std::string line; std::getline(maps, line);) {
+    if (line.find(" /dev/shm/") != std::string::npos) ++holdings.mappings;
+  }
+  holdings.heapKiB = numberIn(directory + "/status", "RssAnon:");
+  return holdings;
+}
+
+}  // namespace mpf::torture

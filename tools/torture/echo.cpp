@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/torture/echo.h>
+
+#include <poll.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fmt/format.h>
+#include <utility>
+
+#include <mpf/tools/torture/talk.h>
+
+namespace mpf::torture {
+namespace {
+
+constexpr auto kLook = std::chrono::milliseconds(2);  // between looks at the board
+constexpr std::uint32_t kNewEvery = 3;                // arrays that get a new message as reply
+
+}  // namespace
+
+Echo::Echo(const Backplane& backplane, const std::string& name, World& world, WaitMode waitMode)
+    : world_(world), server_(backplane, name, {.location = 0, .queueSize = 16, .waitMode = waitMode}) {}
+
+void Echo::run(const Board& board, bool byDescriptor) {
+  pollfd descriptor{byDescriptor ? server_.descriptor() : -1, POLLIN, 0};
+  while (board.leave.load() == 0) {
+    const bool news =
+        byDescriptor ? ::poll(&descriptor, 1, static_cast<int>(kLook.count())) > 0 : server_.waitForMessage(Deadline::after(kLook));
+    if (!news) kept_.reset();  // refused: nobody came after it
+    handleAll();
+  }
+}
+
+void Echo::handleAll() {
+  while (auto request = server_.receive()) handle(std::move(request));
+}
+
+void Echo::handle(Message&& request) {
+  if (auto number = Int32Message::tryFrom(std::move(request))) return answer(std::move(*number));
+  if (auto array = Float64ArrayMessage::tryFrom(std::move(request))) return answer(std::move(*array));
+  world_.complain("a server got a message of a type that nobody sends");
+}
+
+// False when the request is not what was sent.
+bool Echo::note(std::int32_t value, bool isSound) {
+  if (!isSound) world_.complain(fmt::format("request {} arrived damaged", value));
+  world_.noteHandled(value);
+  return isSound;
+}
+
+void Echo::answer(Int32Message&& request) {
+  if (!note(request->value, request->address == answerTo(request->value))) return;
+  if (request->cmd == static_cast<std::int32_t>(Request::die)) ::raise(SIGKILL);
+  request->value = answerTo(request->value);
+  Message now = std::move(request);
+  if (now.tryAs<Int32>()->cmd == static_cast<std::int32_t>(Request::keep)) std::swap(now, kept_);
+  if (now) send(std::move(now));
+}
+
+void Echo::answer(Float64ArrayMessage&& request) {
+  const auto value = request->extra;
+  if (!note(value, holds(request.value(), value))) return;
+  if (++arrays_ % kNewEvery != 0) {
+    request->extra = answerTo(value);
+    return send(std::move(request));
+  }
+  auto reply = server_.allocReplyMessage<Float64Array>(request, request.getLength());
+  reply->extra = answerTo(value);
+  std::ranges::copy(request.value(), reply.value().begin());
+  send(std::move(reply));
+}
+
+void Echo::send(Message&& reply) {
+  const auto result = server_.reply(std::move(reply));
+  if (result != ReplyResult::sent && result != ReplyResult::clientGone) {
+    world_.complain(fmt::format("a first reply could not be sent: {}", toString(result)));
+  }
+}
+
+}  // namespace mpf::torture

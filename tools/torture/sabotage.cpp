@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/torture/sabotage.h>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include <mpf/base/system_call.h>
+#include <mpf/shm/layout.h>
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tools/torture/talk.h>
+
+namespace mpf::torture {
+namespace {
+
+// Links of this process's clients.
+template <class Visit>
+void forEachOwnLink(const std::string& backplane, Visit&& visit) {
+  for (const auto& name : segments::list(SegmentName::prefix(backplane))) {
+    const auto parsed = SegmentName::tryParse(name);
+    if (!parsed || parsed->kind != NameKind::link) continue;
+    const auto link = Segment::tryOpen(name, layout::SegmentKind::link, Segment::Access::readWrite);
+    if (link && link->header().ownerPid == ::getpid()) visit(*link);
+  }
+}
+
+// A link to a server that never was, of a client that lives.
+void leaveLink(const std::string& backplane) {
+  std::uint64_t owner = 0;
+  forEachOwnLink(backplane, [&](const Segment& link) { owner = link.header().ownerWindow; });
+  auto link = Segment::create(layout::linkBytes(16, 16), layout::SegmentKind::link, backplane, {});
+  link.sharedHeader().ownerWindow = owner;
+  static_cast<void>(link.tryPublish(SegmentName::link(backplane, segments::newIncarnation(), link.header().incarnation)));
+}
+
+}  // namespace
+
+void Saboteur::meddle(Talk& mortal, bool rests) {
+  const bool begins = rests && !std::exchange(rested_, rests);
+  rested_ = rests;
+  if (sabotage_ == Sabotage::loseFate && !rests) mortal.loseNextFate();
+  if (sabotage_ == Sabotage::leak && begins) leaked_.emplace_back(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  if (sabotage_ == Sabotage::stale && begins) leaveLink(backplane_);
+}
+
+void leaveChildBehind(const World& world) {
+  // Without fork(), so that no handler closes anything: the lock of the parent's window stays when the parent dies.
+  if (checkCall(::syscall(SYS_clone, SIGCHLD, nullptr, nullptr, nullptr, nullptr), "clone") != 0) return;
+  const auto referee = world.referee;
+  while (world.isOver.load() == 0 && ::kill(referee, 0) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ::_exit(0);
+}
+
+void publishHalfMessage(const std::string& backplane) {
+  forEachOwnLink(backplane, [](const Segment& link) {
+    const auto& control = link.at<layout::LinkControl>(layout::kLinkControlOffset);
+    const auto next = control.requests.freed.load(std::memory_order_relaxed);
+    auto* slots = &link.at<layout::Slot>(layout::kLinkRingsOffset);
+    slots[next % link.header().queueSlots].sequence.store(next + 1, std::memory_order_relaxed);
+  });
+}
+
+}  // namespace mpf::torture

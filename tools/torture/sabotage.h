@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Sabotage: mistakes made on purpose, each of which breaks one invariant. `mpf torture --break` with any of them must fail: a referee
+// that never whistles proves nothing.
+//
+// Threads  the actor's.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/tools/torture/actors.h>
+
+namespace mpf::torture {
+
+class Talk;
+
+// The survivor's.
+class Saboteur {
+ public:
+  Saboteur(Sabotage sabotage, std::string backplane) : sabotage_(sabotage), backplane_(std::move(backplane)) {}
+  // Once a look; `rests`: the referee is looking.
+  void meddle(Talk& mortal, bool rests);
+
+ private:
+  Sabotage sabotage_;
+  std::string backplane_;
+  bool rested_ = false;
+  std::vector<FileDescriptor> leaked_;
+};
+
+// A child that lives on until the torture is over, with all that is open.
+void leaveChildBehind(const World& world);
+// On each link of this process's clients: the next slot counts as complete, whatever it holds.
+void publishHalfMessage(const std::string& backplane);
+
+}  // namespace mpf::torture

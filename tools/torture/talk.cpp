@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/torture/talk.h>
+
+#include <fmt/format.h>
+#include <utility>
+
+namespace mpf::torture {
+namespace {
+
+constexpr std::size_t kOpen = 6;             // requests at a time
+constexpr std::size_t kSeveralSlots = 9;     // elements of an array that fits the ring
+constexpr std::size_t kLarge = 300;          // elements of one that needs a chunk
+constexpr unsigned kCancelEvery = 32;
+
+}  // namespace
+
+bool holds(std::span<const double> array, std::int32_t value) noexcept {
+  for (std::size_t i = 0; i < array.size(); ++i) {
+    if (array[i] != elementOf(value, i)) return false;
+  }
+  return true;
+}
+
+Talk::Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server, std::uint32_t seed)
+    : world_(world), talked_(talked), random_(seed), client_(dispatcher, [this](const Message& message) { take(message); }) {
+  client_.bind(server, 0);
+}
+
+void Talk::sendSome() {
+  while (open_.size() < kOpen && sendOne()) {
+  }
+}
+
+Message Talk::makeArray(std::int32_t value, std::size_t length, bool inPool) {
+  auto array = inPool ? client_.alloc<Float64Array>(length) : Float64ArrayMessage::allocValue(length);
+  array->extra = value;
+  for (std::size_t i = 0; i < length; ++i) array.value()[i] = elementOf(value, i);
+  return array;
+}
+
+Message Talk::makeMessage(std::int32_t value) {
+  switch (random_() % 16) {
+    case 0:
+    case 1:
+      return makeArray(value, kSeveralSlots, false);
+    case 2:
+    case 3:
+    case 4:
+      return makeArray(value, kLarge, true);
+    case 5:
+      return makeArray(value, kLarge, false);
+    case 6:
+      return Int32Message({.cmd = static_cast<std::int32_t>(Request::keep), .address = answerTo(value), .value = value});
+    default:
+      return Int32Message({.cmd = static_cast<std::int32_t>(Request::answer), .address = answerTo(value), .value = value});
+  }
+}
+
+bool Talk::sendOne() {
+  if (!client_.isConnected()) return false;
+  const auto value = world_.nextValue();
+  const auto deadline = random_() % 16 == 0 ? Deadline::after(std::chrono::microseconds(random_() % 300)) : Deadline::never();
+  std::uint32_t id = 0;
+  if (client_.send(makeMessage(value), deadline, &id) != SendResult::sent) return false;
+  if (!open_.emplace(id, value).second) world_.complain("a request got the id of one that is still open");
+  if (random_() % kCancelEvery == 0) client_.cancel(id);
+  return true;
+}
+
+void Talk::tellToDie() {
+  std::uint32_t id = 0;
+  const auto value = world_.nextValue();
+  Int32Message request({.cmd = static_cast<std::int32_t>(Request::die), .address = answerTo(value), .value = value});
+  if (client_.send(std::move(request), Deadline::never(), &id) == SendResult::sent) open_.emplace(id, value);
+}
+
+void Talk::take(const Message& message) {
+  if (const auto* news = message.tryAs<Connect>()) return takeConnect(news->status);
+  const auto found = open_.find(message.route().requestId);
+  if (found == open_.end()) return world_.complain("a request ended that had ended before, or was never sent");
+  const auto* fate = message.tryAs<RequestFate>();
+  if (fate != nullptr && std::exchange(losing_, false)) return;
+  const auto value = found->second;
+  open_.erase(found);
+  if (fate != nullptr) return takeFate(value, fate->fate);
+  takeReply(value, message);
+}
+
+void Talk::takeConnect(ConnectStatus status) {
+  if (status == ConnectStatus::connectYes) ++talked_.connects;
+  if (status != ConnectStatus::connectNo) return;
+  if (!open_.empty()) world_.complain(fmt::format("a disconnect came before the ends of {} requests", open_.size()));
+  ++talked_.disconnects;
+}
+
+void Talk::takeFate(std::int32_t value, Fate fate) {
+  if (fate == Fate::neverTaken || fate == Fate::expired) world_.noteNeverTaken(value);
+}
+
+void Talk::takeReply(std::int32_t value, const Message& reply) {
+  ++talked_.replies;
+  if (const auto* number = reply.tryAs<Int32>()) {
+    if (number->value != answerTo(value)) world_.complain(fmt::format("the reply to {} is {}", value, number->value));
+  } else if (const auto* array = reply.tryAs<Float64Array>(); array == nullptr || array->extra != answerTo(value)) {
+    world_.complain(fmt::format("the reply to {} is not what its server sends", value));
+  } else if (!holds(reply.valueAs<Float64Array>(), value)) {
+    world_.complain(fmt::format("the reply to {} is damaged", value));
+  }
+}
+
+}  // namespace mpf::torture

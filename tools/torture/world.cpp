@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tools/torture/world.h>
+
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <new>
+
+#include <mpf/base/system_call.h>
+
+namespace mpf::torture {
+
+void Board::clear() noexcept {
+  for (auto* word : {&rest, &leave, &isAtRest, &isLeaving}) word->store(0);
+  open.store(0);
+}
+
+void World::complain(std::string_view text) noexcept {
+  std::uint32_t nobody = 0;
+  if (!complained_.compare_exchange_strong(nobody, 1)) return;
+  text.copy(complaint_.data(), complaint_.size() - 1);
+  complained_.store(2);
+}
+
+std::string World::complaint() const { return complained_.load() == 2 ? std::string(complaint_.data()) : std::string(); }
+
+std::atomic<std::int32_t>& World::at(Values& values, std::int32_t value) noexcept {
+  return values[static_cast<std::uint32_t>(value) % values.size()];
+}
+
+// Each notes first and then looks: whoever comes second sees the other.
+void World::noteHandled(std::int32_t value) noexcept {
+  if (at(handled_, value).exchange(value) == value) complain("a server acted on a request for the second time");
+  if (at(neverTaken_, value).load() == value) complain("a server acted on a request whose client had been told that nobody ever would");
+}
+
+void World::noteNeverTaken(std::int32_t value) noexcept {
+  at(neverTaken_, value).store(value);
+  if (at(handled_, value).load() == value) complain("a client was told that nobody took its request, and a server had acted on it");
+}
+
+SharedWorld::SharedWorld() {
+  void* memory = ::mmap(nullptr, sizeof(World), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throwSystemError(errno, "mmap", "the world");
+  world_ = new (memory) World;
+}
+
+SharedWorld::~SharedWorld() { ::munmap(world_, sizeof(World)); }
+
+}  // namespace mpf::torture
