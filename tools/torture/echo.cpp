@@ -14,7 +14,7 @@
 namespace mpf::torture {
 namespace {
 
-constexpr auto kLook = std::chrono::milliseconds(2);  // between looks at the board
+constexpr auto kBoardLook = std::chrono::milliseconds(2);  // between looks at the board
 constexpr std::uint32_t kNewEvery = 3;                // arrays that get a new message as reply
 
 }  // namespace
@@ -25,8 +25,8 @@ Echo::Echo(const Backplane& backplane, const std::string& name, World& world, Wa
 void Echo::run(const Board& board, bool byDescriptor) {
   pollfd descriptor{byDescriptor ? server_.descriptor() : -1, POLLIN, 0};
   while (board.leave.load() == 0) {
-    const bool news =
-        byDescriptor ? ::poll(&descriptor, 1, static_cast<int>(kLook.count())) > 0 : server_.waitForMessage(Deadline::after(kLook));
+    const bool news = byDescriptor ? ::poll(&descriptor, 1, static_cast<int>(kBoardLook.count())) > 0
+                                   : server_.waitForMessage(Deadline::after(kBoardLook));
     if (!news) kept_.reset();  // refused: nobody came after it
     handleAll();
   }

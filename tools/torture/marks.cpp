@@ -83,6 +83,7 @@ Marks Marks::ofThisProgram() {
 
 std::vector<Marks::Address> Marks::addresses() const {
   std::vector<Address> all;
+  all.reserve(byAddress_.size());
   for (const auto& [address, name] : byAddress_) all.push_back(address);
   return all;
 }

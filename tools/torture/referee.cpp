@@ -111,7 +111,6 @@ void Referee::live(Role role, const std::optional<Plan>& plan) {
   processes_.setTracee(tracee_.get());
   if (plan) {
     tracee_->aim(plan->place);
-    tracee_->watchPlace();
   } else {
     tracee_->watchAll();
   }

@@ -60,8 +60,9 @@ void Tracee::watchAll() {
   for (const auto address : patched_ = marks_.addresses()) patch(address, kBreakpoint);
 }
 
-void Tracee::watchPlace() {
-  for (const auto address : patched_ = marks_.byName().at(place_.value().mark)) patch(address, kBreakpoint);
+void Tracee::aim(Place place) {
+  place_ = std::move(place);
+  for (const auto address : patched_ = marks_.byName().at(place_.mark)) patch(address, kBreakpoint);
 }
 
 void Tracee::resume(pid_t thread, int signal) const noexcept {
@@ -73,7 +74,9 @@ void Tracee::handle(pid_t thread, int status) {
   if (WIFEXITED(status) || WIFSIGNALED(status)) {
     if (thread == stepping_) stepping_ = 0;
     if (thread == stopped_) stopped_ = 0;
-    if (thread == pid_) status_ = status;  // the last one
+    if (thread != pid_) return;
+    isGone_ = true;  // the last one
+    status_ = status;
     return;
   }
   if (eventOf(status) != 0) return resume(thread);  // a new thread, as seen by its maker or by itself
@@ -91,16 +94,16 @@ void Tracee::onTrap(pid_t thread) {
 void Tracee::onMark(pid_t thread, const std::string& mark) {
   const auto hit = ++hits_[mark];
   if (thread == stepping_) return onInstruction(thread);
-  const bool aimed = place_ && !released_ && stepping_ == 0 && stopped_ == 0 && place_->mark == mark && place_->hit == hit;
+  const bool aimed = !released_ && stepping_ == 0 && stopped_ == 0 && place_.mark == mark && place_.hit == hit;
   if (!aimed) return resume(thread);
-  left_ = place_->instructions;
+  left_ = place_.instructions;
   stepping_ = thread;
   if (left_ == 0) return arrive(thread);
   resume(thread);
 }
 
 void Tracee::onInstruction(pid_t thread) {
-  atNextMark_ = place_->upToNextMark && marks_.find(programCounter(thread)) != nullptr;
+  atNextMark_ = place_.upToNextMark && marks_.find(programCounter(thread)) != nullptr;
   if (--left_ == 0 || atNextMark_) return arrive(thread);
   resume(thread);
 }

@@ -2,8 +2,7 @@
 // Tracee: a child under ptrace that is stopped at the k-th time that it comes to a step, or n instructions behind it.
 //
 //   Tracee victim(pid, marks);       stopped
-//   victim.aim({"slot_written", 3, 17});
-//   victim.go();
+//   victim.aim({"slot_written", 3, 17}); or victim.watchAll();
 //   ... victim.handle(event) ... until victim.isThere()
 //   victim.kill() or victim.release()
 //
@@ -18,7 +17,6 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,11 +39,10 @@ class Tracee {
   //   throws  std::system_error when this is not allowed, std::runtime_error on a processor that it does not know
   Tracee(pid_t pid, const Marks& marks);
 
-  // Where to stop. Without: it only counts.
-  void aim(Place place) { place_ = std::move(place); }
-  // Sets the breakpoints: all, as far as something is counted or walked through, or those of the place alone.
+  // Counts how often it comes to each step.
   void watchAll();
-  void watchPlace();
+  // Stops it there.
+  void aim(Place place);
   // What waitpid() told about a thread of it.
   void handle(pid_t thread, int status);
 
@@ -53,9 +50,9 @@ class Tracee {
   // Stopped at the place.
   [[nodiscard]] bool isThere() const noexcept { return stopped_ != 0; }
   // Ended, and so are all its threads.
-  [[nodiscard]] bool isGone() const noexcept { return status_.has_value(); }
+  [[nodiscard]] bool isGone() const noexcept { return isGone_; }
   // As waitpid() tells it, of a tracee that is gone.
-  [[nodiscard]] int status() const { return status_.value(); }
+  [[nodiscard]] int status() const noexcept { return status_; }
   // It came to the next step before so many instructions were over, and was stopped there.
   [[nodiscard]] bool cameToNextMark() const noexcept { return atNextMark_; }
   // How often it came to each step that was watched.
@@ -76,7 +73,7 @@ class Tracee {
   pid_t pid_;
   const Marks& marks_;
   FileDescriptor memory_;
-  std::optional<Place> place_;
+  Place place_;  // without mark: nowhere
   std::vector<Marks::Address> patched_;
   std::map<std::string, std::uint64_t> hits_;
   pid_t stepping_ = 0;  // thread that walks from the mark to the place
@@ -84,7 +81,8 @@ class Tracee {
   pid_t stopped_ = 0;  // thread that is there
   bool released_ = false;
   bool atNextMark_ = false;
-  std::optional<int> status_;
+  bool isGone_ = false;
+  int status_ = 0;
 };
 
 }  // namespace mpf::torture
