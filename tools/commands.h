@@ -18,6 +18,7 @@ void addLs(CLI::App& app, Run& run);
 void addMrr(CLI::App& app, Run& run);
 void addMsr(CLI::App& app, Run& run);
 void addTop(CLI::App& app, Run& run);
+void addInspect(CLI::App& app, Run& run);
 void addCall(CLI::App& app, Run& run);
 void addSniff(CLI::App& app, Run& run);
 void addTap(CLI::App& app, Run& run);

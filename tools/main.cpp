@@ -10,7 +10,7 @@
 namespace {
 
 constexpr const char* kFooter =
-    "Reports (ls, mrr, msr, top) only read: they disturb nobody, remove nothing, and work when a process is stopped or dead.\n"
+    "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work when a process is stopped or dead.\n"
     "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
     "Exit status: 0 done; 1 not done, the text on stderr says why; 2 asked for what cannot be.";
 
@@ -47,6 +47,7 @@ int main(int argc, char** argv) try {
   mpf::tools::addMrr(app, run);
   mpf::tools::addMsr(app, run);
   mpf::tools::addTop(app, run);
+  mpf::tools::addInspect(app, run);
   mpf::tools::addCall(app, run);
   mpf::tools::addSniff(app, run);
   mpf::tools::addTap(app, run);

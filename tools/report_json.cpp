@@ -8,22 +8,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<const char*, 3> kWaitModes = {"spin", "adaptive", "block"};
-
-const char* toString(layout::LinkState state) noexcept {
-  switch (state) {
-    case layout::LinkState::none:
-      return "none";
-    case layout::LinkState::open:
-      return "open";
-    case layout::LinkState::closed:
-      return "closed";
-    case layout::LinkState::refused:
-      return "refused";
-  }
-  return "unknown";
-}
-
 json toJson(const Latencies& latencies) {
   return {{"count", latencies.count},
           {"p50_ns", latencies.percentileNs(50)},
@@ -61,7 +45,7 @@ json toJson(const Look& look, const WindowView& window) {
              {"pid", window.pid},
              {"program", window.program},
              {"age_s", static_cast<double>(window.ageNs) / 1e9},
-             {"wait_mode", window.waitMode < kWaitModes.size() ? kWaitModes[window.waitMode] : "unknown"},
+             {"wait_mode", waitModeName(window.waitMode)},
              {"received", window.received},
              {"sent_per_s", rates.sentPerSecond},
              {"received_per_s", rates.receivedPerSecond},

@@ -52,6 +52,19 @@ void checkIsFifo(const std::string& name) {
   }
 }
 
+HintsView hintsOf(const layout::WindowHints& hints) {
+  HintsView view;
+  view.bell = value(hints.bell);
+  view.isRescanDue = value(hints.rescan) != 0;
+  for (const auto& knock : hints.knocks) {
+    if (const auto link = value(knock); link != 0) view.knocks.push_back(link);
+  }
+  for (std::uint32_t index = 0; index < layout::kMaxLinks; ++index) {
+    if ((value(hints.readyBits[index / 64]) >> index % 64 & 1u) != 0) view.ready.push_back(index);
+  }
+  return view;
+}
+
 Life lifeOf(const std::string& name, const SegmentImage& image) {
   if (segments::probeOwner(name, image.header().incarnation) != segments::Owner::alive) return Life::dead;
   return value(image.window().state) == layout::WindowState::closed ? Life::closed : Life::alive;
@@ -80,6 +93,7 @@ class Surveyor {
 
   void run() {
     for (const auto& name : segments::list(SegmentName::prefix(survey_.backplane))) {
+      ++survey_.files;
       try {
         const auto parsed = SegmentName::tryParse(name);
         if (!parsed) throw SegmentError(segments::path(name) + ": not a name that MPF gives");
@@ -104,10 +118,14 @@ class Surveyor {
       case NameKind::wish:
         return wish(name);
       case NameKind::bulk:
-        if (const auto image = header(name, layout::SegmentKind::bulk)) bulkBytes_[parsed.incarnation] += image->fileBytes();
+        if (const auto image = read(name, layout::SegmentKind::bulk, sizeof(layout::SegmentHeader))) {
+          bulkBytes_[parsed.incarnation] += image->fileBytes();
+        }
         return;
       case NameKind::hints:
-        static_cast<void>(header(name, layout::SegmentKind::hints));
+        if (const auto image = read(name, layout::SegmentKind::hints, sizeof(layout::WindowHints))) {
+          hints_.emplace(parsed.incarnation, hintsOf(image->hints()));
+        }
         return;
       case NameKind::fifo:
         checkIsFifo(name);
@@ -115,15 +133,18 @@ class Surveyor {
     }
   }
 
-  static std::optional<SegmentImage> header(const std::string& name, layout::SegmentKind kind) {
-    return SegmentImage::tryRead(name, kind, sizeof(layout::SegmentHeader));
+  std::optional<SegmentImage> read(const std::string& name, layout::SegmentKind kind, std::size_t bytes) {
+    auto image = SegmentImage::tryRead(name, kind, bytes);
+    if (image) survey_.bytes += image->fileBytes();
+    return image;
   }
 
   void window(const std::string& name, layout::SegmentKind kind) {
-    const auto image = SegmentImage::tryRead(name, kind, layout::kWindowBytes);
+    const auto image = read(name, kind, layout::kWindowBytes);
     if (!image) return;
     const auto& header = image->header();
     WindowView view;
+    view.file = name;
     view.isServer = kind == layout::SegmentKind::serverWindow;
     view.incarnation = header.incarnation;
     view.program = segments::text(header.program);
@@ -133,6 +154,7 @@ class Surveyor {
     view.pid = header.ownerPid;
     view.waitMode = header.waitMode;
     view.life = lifeOf(name, *image);
+    view.sleeping = value(image->window().sleeping);
     if (view.life != Life::dead) view.processState = processState(header);
     view.ageNs = survey_.atNs - header.createdMonotonicNs;
     view.queueSize = view.isServer ? value(image->window().queueSize) : header.queueSize;
@@ -142,11 +164,12 @@ class Surveyor {
   }
 
   void link(const std::string& name) {
-    const auto image = SegmentImage::tryRead(name, layout::SegmentKind::link, kLinkImageBytes);
+    const auto image = read(name, layout::SegmentKind::link, kLinkImageBytes);
     if (!image) return;
     const auto& header = image->header();
     const auto& control = image->link();
     LinkView view;
+    view.file = name;
     view.incarnation = header.incarnation;
     view.serverWindow = header.serverWindow;
     view.clientWindow = header.clientWindow;
@@ -154,6 +177,10 @@ class Surveyor {
     view.location = header.location;
     view.clientState = value(control.clientState);
     view.serverState = value(control.serverState);
+    view.clientIndex = header.clientIndex;
+    view.serverIndex = value(control.serverIndex);
+    view.isPolledByClient = value(control.replies.unwatched) == 0;
+    view.isPolledByServer = value(control.requests.unwatched) == 0;
     view.queueSize = header.queueSize;
     view.requests = {value(control.clientSent), value(control.requests.taken)};
     view.replies = {value(control.serverSent), value(control.replies.taken)};
@@ -164,7 +191,7 @@ class Surveyor {
   }
 
   void wish(const std::string& name) {
-    const auto image = header(name, layout::SegmentKind::wish);
+    const auto image = read(name, layout::SegmentKind::wish, sizeof(layout::SegmentHeader));
     if (!image) return;
     survey_.wishes.push_back({image->header().ownerWindow, segments::text(image->header().name), image->header().location});
   }
@@ -175,6 +202,11 @@ class Surveyor {
     std::unordered_map<std::uint64_t, WindowView*> clients;
     for (auto& server : survey_.servers) servers.emplace(server.incarnation, &server);
     for (auto& client : survey_.clients) clients.emplace(client.incarnation, &client);
+    for (auto* windows : {&servers, &clients}) {
+      for (auto& [incarnation, window] : *windows) {
+        if (const auto hints = hints_.find(incarnation); hints != hints_.end()) window->hints = hints->second;
+      }
+    }
     for (auto& link : links_) {
       if (const auto bulk = bulkBytes_.find(link.incarnation); bulk != bulkBytes_.end()) link.bytes += bulk->second;
       if (const auto server = servers.find(link.serverWindow); server != servers.end()) server->second->links.push_back(link);
@@ -198,9 +230,45 @@ class Surveyor {
   Survey& survey_;
   std::vector<LinkView> links_;
   std::unordered_map<std::uint64_t, std::uint64_t> bulkBytes_;  // by link
+  std::unordered_map<std::uint64_t, HintsView> hints_;          // by window
 };
 
 }  // namespace
+
+const char* toString(layout::LinkState state) noexcept {
+  switch (state) {
+    case layout::LinkState::none:
+      return "none";
+    case layout::LinkState::open:
+      return "open";
+    case layout::LinkState::closed:
+      return "closed";
+    case layout::LinkState::refused:
+      return "refused";
+  }
+  return "unknown";
+}
+
+const char* toString(layout::SleepState state) noexcept {
+  switch (state) {
+    case layout::SleepState::awake:
+      return "awake";
+    case layout::SleepState::onFutex:
+      return "asleep on its futex";
+    case layout::SleepState::onDescriptor:
+      return "asleep on its pipe";
+  }
+  return "unknown";
+}
+
+const char* waitModeName(std::uint32_t mode) noexcept {
+  constexpr std::array<const char*, 3> kNames{"spin", "adaptive", "block"};
+  return mode < kNames.size() ? kNames[mode] : "unknown";
+}
+
+bool HintsView::isReady(std::uint32_t index) const noexcept { return std::ranges::binary_search(ready, index); }
+
+bool HintsView::hasKnocked(std::uint64_t link) const noexcept { return std::ranges::find(knocks, link) != knocks.end(); }
 
 std::uint64_t Latencies::percentileNs(double percent) const noexcept {
   const auto wanted = static_cast<double>(count) * percent / 100;

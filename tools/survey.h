@@ -18,6 +18,13 @@
 
 namespace mpf::tools {
 
+// "none" (not yet), "open", "closed", "refused".
+[[nodiscard]] const char* toString(layout::LinkState state) noexcept;
+// What an owner does about news: "awake", "asleep on its futex", "asleep on its pipe".
+[[nodiscard]] const char* toString(layout::SleepState state) noexcept;
+// "spin", "adaptive", "block".
+[[nodiscard]] const char* waitModeName(std::uint32_t mode) noexcept;
+
 // A latency histogram of a window.
 struct Latencies {
   std::array<std::uint64_t, layout::kHistogramBuckets> buckets{};
@@ -35,6 +42,7 @@ struct Traffic {
 };
 
 struct LinkView {
+  std::string file;  // name of the segment
   std::uint64_t incarnation = 0;
   std::uint64_t serverWindow = 0;  // incarnations
   std::uint64_t clientWindow = 0;
@@ -42,6 +50,10 @@ struct LinkView {
   std::int32_t location = 0;
   layout::LinkState clientState{};
   layout::LinkState serverState{};
+  std::uint32_t clientIndex = 0;  // its bit in the client's ready bits, and in the server's
+  std::uint32_t serverIndex = 0;
+  bool isPolledByClient = false;  // the receiver looks by itself: it needs no ready bit
+  bool isPolledByServer = false;
   std::uint32_t queueSize = 0;
   Traffic requests;
   Traffic replies;
@@ -60,8 +72,19 @@ struct WishView {
   std::int32_t location = 0;
 };
 
+// What peers told a window: hints, which may be lost or invented.
+struct HintsView {
+  std::uint32_t bell = 0;             // grows with every ring
+  bool isRescanDue = false;           // a knock was overwritten
+  std::vector<std::uint64_t> knocks;  // incarnations of links that wait to be accepted
+  std::vector<std::uint32_t> ready;   // indices of links that have news
+  [[nodiscard]] bool isReady(std::uint32_t index) const noexcept;
+  [[nodiscard]] bool hasKnocked(std::uint64_t link) const noexcept;
+};
+
 // A server or a client process's window.
 struct WindowView {
+  std::string file;  // name of the segment
   bool isServer = false;
   std::uint64_t incarnation = 0;
   std::string name;  // the server's; a client's label or program
@@ -70,6 +93,8 @@ struct WindowView {
   std::string program;
   std::uint32_t waitMode = 0;
   Life life{};
+  layout::SleepState sleeping{};
+  HintsView hints;
   char processState = '?';  // of /proc/<pid>/stat; '?' when it cannot be told
   std::int64_t ageNs = 0;
   std::uint32_t queueSize = 0;
@@ -88,6 +113,8 @@ struct Survey {
   std::vector<WindowView> servers;  // by location and name
   std::vector<WindowView> clients;  // by age
   std::vector<WishView> wishes;     // by location and server
+  std::size_t files = 0;              // all that have a name of this backplane
+  std::uint64_t bytes = 0;            // shared memory of those that could be read
   std::vector<std::string> problems;  // segments that could not be read, and why
 
   // Throws std::invalid_argument for a name that no backplane can have.

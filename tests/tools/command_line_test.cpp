@@ -10,7 +10,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-constexpr std::array<const char*, 12> kSubcommands{"ls",  "mrr",    "msr",   "top",    "call",    "sniff",
+constexpr std::array<const char*, 13> kSubcommands{"ls",  "mrr",    "msr",   "top",    "inspect", "call", "sniff",
                                                    "tap", "replay", "clean", "doctor", "torture", "bench"};
 
 class CommandLineTest : public ToolsTest {};
@@ -53,7 +53,8 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, call, sniff, tap, replay, clean, doctor, torture, bench; "
+            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, call, sniff, tap, replay, clean, doctor, torture, "
+            "bench; "
             "`mpf --help` shows what they do\n");
 }
 
@@ -90,7 +91,7 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
 }
 
 TEST_F(CommandLineTest, NamesThatCannotBeAreNamed) {
-  for (const std::string name : {"ls", "mrr", "msr", "top", "clean"}) {
+  for (const std::string name : {"ls", "mrr", "msr", "top", "inspect", "clean"}) {
     const auto ended = run({name, "--backplane", "a.b"});
     EXPECT_EQ(ended.status, 2);
     EXPECT_EQ(ended.err, "mpf: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");

@@ -15,8 +15,16 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const std::vector<std::vector<std::string>> kReports{{"ls"},           {"mrr"},           {"msr"},           {"msr", "echo"},
-                                                     {"ls", "--json"}, {"mrr", "--json"}, {"msr", "--json"}, {"top", "--batch", "1"}};
+const std::vector<std::vector<std::string>> kReports{{"ls"},
+                                                     {"mrr"},
+                                                     {"msr"},
+                                                     {"msr", "echo"},
+                                                     {"ls", "--json"},
+                                                     {"mrr", "--json"},
+                                                     {"msr", "--json"},
+                                                     {"top", "--batch", "1"},
+                                                     {"inspect"},
+                                                     {"inspect", "echo", "--last", "100", "--raw"}};
 
 class ReadOnlyTest : public ToolsTest {
  protected:

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// Summary of a backplane for `mpf inspect`: its windows, and of its links those on which somebody waits. However many there are, it
+// stays a page.
+//
+// Threads  one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <mpf/tools/dissect.h>
+#include <mpf/tools/look.h>
+
+namespace mpf::tools {
+
+// All of it, for programs: {"backplane", "files", "bytes", "windows": [...], "links": [...], "problems"}.
+[[nodiscard]] Tree summaryTree(const Look& look);
+// What a person wants to see first.
+[[nodiscard]] std::string summaryText(const Look& look);
+
+// Every link of which a window is left, once.
+[[nodiscard]] std::vector<const LinkView*> linksOf(const Survey& survey);
+// One link in a list: {"link", "server", "client", ..., "waits"}.
+[[nodiscard]] Tree linkRow(const Look& look, const LinkView& link);
+// Links as a table of at most so many rows; says how many more there are.
+[[nodiscard]] std::string linkTable(const Look& look, const std::vector<const LinkView*>& links, std::size_t most);
+
+}  // namespace mpf::tools
