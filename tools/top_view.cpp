@@ -30,6 +30,7 @@ std::vector<std::string> textLines(const TopTable& table, std::size_t sortColumn
   Table columns(headings);
   for (const auto& row : table.rows) {
     std::vector<std::string> cells;
+    cells.reserve(row.cells.size());
     for (const auto& cell : row.cells) cells.push_back(cell.text);
     columns.add(std::move(cells));
   }
