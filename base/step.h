@@ -13,7 +13,7 @@
 #pragma once
 
 // The note as <sys/sdt.h> writes it (type 3 of owner "stapsdt"). `inline`: else g++ takes it for some sixty instructions, and stops
-// inlining the functions around it (docs/decisions/0006-steps.md).
+// inlining the functions around it (docs/decisions/0010-steps.md).
 #define MPF_STEP(name)                                                        \
   __asm__ __inline__ __volatile__(                                            \
       "990: nop\n"                                                            \
