@@ -52,10 +52,11 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
-  EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, call, sniff, tap, replay, clean, doctor, torture, "
-            "bench; "
-            "`mpf --help` shows what they do\n");
+  EXPECT_EQ(
+      ended.err,
+      "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, call, sniff, tap, replay, clean, doctor, torture, "
+      "bench; "
+      "`mpf --help` shows what they do\n");
 }
 
 struct Wrong {
