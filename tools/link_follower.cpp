@@ -68,16 +68,18 @@ bool LinkFollower::take(std::vector<TappedMessage>& messages) {
   newRequests_.clear();
   newReplies_.clear();
   // Replies first: whoever has a reply finds its request then.
-  drain(replies_, Direction::reply, newReplies_);
-  drain(requests_, Direction::request, newRequests_);
+  const bool some = drain(replies_, Direction::reply, newReplies_);
+  const bool more = drain(requests_, Direction::request, newRequests_);
   interleave(newRequests_, newReplies_, messages);
-  return !newRequests_.empty() || !newReplies_.empty();
+  return some || more;
 }
 
-void LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMessage>& messages) {
+bool LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMessage>& messages) {
   RingCopy copy;
+  bool some = false;
   while (messages.size() < kBatch) {
     const auto next = side.follower.tryNext(copy);
+    some = some || next != RingFollower::Next::nothing;
     if (next == RingFollower::Next::message) {
       ++side.seen;
       messages.push_back(read(copy, side, direction));
@@ -86,8 +88,9 @@ void LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMess
     // We stand behind the newest message: what was sent is what we saw and what we missed.
     const auto sent = side.sent.load(std::memory_order_relaxed) - side.sentBefore;
     side.missed = sent > side.seen ? sent - side.seen : 0;
-    if (next == RingFollower::Next::nothing) return;
+    if (next == RingFollower::Next::nothing) break;
   }
+  return some;
 }
 
 TappedMessage LinkFollower::read(const RingCopy& copy, const Side& side, Direction direction) {

@@ -39,7 +39,7 @@ class LinkFollower {
   //   throws  SegmentError, std::system_error when it may not be read
   static std::unique_ptr<LinkFollower> tryOpen(const std::string& backplane, const std::string& name, FollowFrom from);
 
-  // Appends what was said since the last call. True when that was something.
+  // Appends what was said since the last call. True when that was something, seen or missed.
   bool take(std::vector<TappedMessage>& messages);
   // Messages that were sent since then and not seen. Exact when both sides are at rest.
   [[nodiscard]] std::uint64_t missed() const noexcept { return requests_.missed + replies_.missed; }
@@ -59,7 +59,7 @@ class LinkFollower {
   };
   LinkFollower(const std::string& backplane, Segment segment, FollowFrom from);
   Side begin(Direction direction, FollowFrom from) const;
-  void drain(Side& side, Direction direction, std::vector<TappedMessage>& messages);
+  bool drain(Side& side, Direction direction, std::vector<TappedMessage>& messages);
   TappedMessage read(const RingCopy& copy, const Side& side, Direction direction);
   void readBody(const RingCopy& copy, const Side& side, TappedMessage& tapped);
 

@@ -35,7 +35,7 @@ class TapSession {
   //   throws  std::invalid_argument for names that cannot be
   TapSession(TapSelection selection, TapSink& sink);
 
-  // Hands over what has come, from new links too. False: nothing has come.
+  // Hands over what has come, from new links too. False: nothing has come, or gone by.
   bool runOnce();
   // Returns when there may be a new link, or after `limit`; a signal ends it, too.
   void pause(Nanoseconds limit) const noexcept { names_.wait(limit); }
