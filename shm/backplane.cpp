@@ -19,6 +19,7 @@ struct Backplane::State {
   // A handle crosses a fork; the parent's watcher does not, and stays where it is.
   Watcher& itsWatcher() {
     const std::lock_guard lock(mutex);
+    // NOLINTNEXTLINE(bugprone-unused-return-value)
     if (watcher->isInherited()) static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>()).release());
     return *watcher;
   }

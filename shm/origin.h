@@ -24,11 +24,7 @@ namespace mpf {
 
 class Origin {
  public:
-  Origin() noexcept {
-    [[maybe_unused]] static const int kWatched =
-        ::pthread_atfork(nullptr, nullptr, [] { forks().fetch_add(1, std::memory_order_relaxed); });
-    forks_ = forks().load(std::memory_order_relaxed);
-  }
+  Origin() noexcept : forks_(forksUntilNow()) {}
 
   [[nodiscard]] bool isInherited() const noexcept { return forks_ != forks().load(std::memory_order_relaxed); }
   // Throws std::logic_error when `object` is not this process's own.
@@ -42,6 +38,11 @@ class Origin {
   static void abandon(std::thread& thread) { new (&abandoned()) std::thread(std::move(thread)); }
 
  private:
+  static std::uint32_t forksUntilNow() noexcept {
+    [[maybe_unused]] static const int kWatched =
+        ::pthread_atfork(nullptr, nullptr, [] { forks().fetch_add(1, std::memory_order_relaxed); });
+    return forks().load(std::memory_order_relaxed);
+  }
   static std::atomic<std::uint32_t>& forks() noexcept {
     static std::atomic<std::uint32_t> count{0};
     return count;
@@ -51,7 +52,7 @@ class Origin {
     alignas(std::thread) static std::byte place[sizeof(std::thread)];
     return *reinterpret_cast<std::thread*>(place);
   }
-  std::uint32_t forks_ = 0;
+  std::uint32_t forks_;
 };
 
 }  // namespace mpf
