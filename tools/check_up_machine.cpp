@@ -99,7 +99,7 @@ Finding checkGovernor(const Host& host) {
   std::set<std::string> governors;
   const std::string folder = "sys/devices/system/cpu/cpufreq";
   for (const auto& policy : host.list(folder)) {
-    if (const auto governor = host.tryRead(folder + "/" + policy + "/scaling_governor")) governors.insert(*governor);
+    if (const auto governor = host.tryRead(fmt::format("{}/{}/scaling_governor", folder, policy))) governors.insert(*governor);
   }
   if (governors.empty()) return {kName, Health::unknown, "the kernel does not set the frequency, as in most virtual machines", {}};
   std::string seen;

@@ -17,7 +17,7 @@
 namespace mpf::tools {
 namespace {
 
-constexpr std::uint64_t kMiB = 1024 * 1024;
+constexpr std::uint64_t kMiB = 1024 * 1024UL;
 constexpr std::uint32_t kFirstLoginUser = 1000;  // what logind takes for a person: SYS_UID_MAX and above
 
 // Files of any backplane that this program can look at, with their status.
@@ -52,7 +52,7 @@ std::string logindSetting(const Host& host, const std::string& key, const std::s
   std::map<std::string, std::string> dropIns;  // by file name: one in /etc hides one of that name in /usr
   for (const std::string folder : {"usr/lib/systemd", "run/systemd", "etc/systemd"}) {
     for (const auto& name : host.list(folder + "/logind.conf.d")) {
-      if (name.ends_with(".conf")) dropIns[name] = folder + "/logind.conf.d/" + name;
+      if (name.ends_with(".conf")) dropIns[name] = fmt::format("{}/logind.conf.d/{}", folder, name);
     }
   }
   std::vector<std::string> files{"usr/lib/systemd/logind.conf", "etc/systemd/logind.conf"};
@@ -151,8 +151,9 @@ Finding checkNamespaces(const Host& host) {
   std::size_t windows = 0;
   std::size_t foreign = 0;
   for (const auto& [path, status] : segmentsOf(host)) {
-    const auto kind = SegmentName::tryParse(path.filename().string())->kind;
-    if ((kind != NameKind::serverWindow && kind != NameKind::clientWindow) || !S_ISREG(status.st_mode)) continue;
+    const auto parsed = SegmentName::tryParse(path.filename().string());
+    const bool isWindow = parsed && (parsed->kind == NameKind::serverWindow || parsed->kind == NameKind::clientWindow);
+    if (!isWindow || !S_ISREG(status.st_mode)) continue;
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     layout::SegmentHeader header{};
     if (!file || ::pread(file.get(), &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) continue;

@@ -105,7 +105,7 @@ class Replayer {
     ++requests_;
     const auto limit = Deadline::after(ofSeconds(arguments_.timeout));
     for (;;) {
-      const auto result = client.send(std::move(message), limit);
+      const auto result = client.send(std::move(message), limit);  // NOLINT(bugprone-use-after-move): what was not sent is as it was
       if (result == SendResult::sent) {
         ++open_;
         break;

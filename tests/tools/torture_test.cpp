@@ -91,7 +91,7 @@ TEST_F(TortureTest, AStepThatIsNeverReachedMakesTheVerdictIncomplete) {
 struct Mistake {
   std::string name, patience, complaint;
 };
-void PrintTo(const Mistake& mistake, std::ostream* out) { *out << mistake.name; }
+std::ostream& operator<<(std::ostream& out, const Mistake& mistake) { return out << mistake.name; }
 
 class MistakeTest : public TortureTest, public testing::WithParamInterface<Mistake> {};
 

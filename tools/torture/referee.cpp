@@ -22,7 +22,7 @@ constexpr std::size_t kMoreMappings = 16;
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr std::size_t kMoreHeapKiB = SIZE_MAX / 2;  // a sanitizer keeps what was freed
 #else
-constexpr std::size_t kMoreHeapKiB = 16 * 1024;
+constexpr std::size_t kMoreHeapKiB = 16 * 1024UL;
 #endif
 constexpr std::uint64_t kWarmUp = 20;  // rounds
 
