@@ -9,6 +9,7 @@
 
 #include <thread>
 
+#include <mpf/shm/segment_name.h>
 #include <mpf/tests/shm/child.h>
 #include <mpf/tests/shm/shm_fixture.h>
 
@@ -118,10 +119,14 @@ TEST_F(Signals, EndAnySleepWhenTheirHandlerRings) {
 
 TEST_F(DoorbellTest, AProcessWakesAnother) {
   auto segment = createPage();
+  ASSERT_TRUE(segment.tryPublish(SegmentName::keyed(name(), NameKind::wish, 1)));
   auto& bell = segment.at<layout::Word32>(1024);
   Child ringer([&](Child::Self& self) {
+    // A child's copies of its parent's segments are memory of its own.
+    const auto opened =
+        Segment::tryOpen(SegmentName::keyed(name(), NameKind::wish, 1), layout::SegmentKind::wish, Segment::Access::readWrite);
     self.ready();
-    doorbell::ring(bell);
+    doorbell::ring(opened->at<layout::Word32>(1024));
     self.stay();
   });
 
@@ -129,6 +134,7 @@ TEST_F(DoorbellTest, AProcessWakesAnother) {
   doorbell::sleep(bell, 0, Deadline::never());
 
   EXPECT_EQ(bell.load(std::memory_order_relaxed), 1u);
+  segments::remove(segment.name());
 }
 
 TEST_F(DoorbellTest, APipeIsReadableOnceRungAndNotOnceDrained) {
