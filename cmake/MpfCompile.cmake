@@ -18,8 +18,8 @@ endforeach()
 add_library(mpf_warnings INTERFACE)
 target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Werror)
 
-# g++ 12 takes "a" + std::string(...) for copies that may overlap (GCC bug 105651).
-target_compile_options(mpf_warnings INTERFACE -Wno-restrict)
+# Optimising, g++ 12 takes "a" + std::string(...) for copies that may overlap (GCC bug 105651).
+target_compile_options(mpf_warnings INTERFACE $<$<CONFIG:Release>:-Wno-restrict>)
 
 set(MPF_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
 if(MPF_SANITIZE)
