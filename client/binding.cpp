@@ -288,7 +288,7 @@ void Binding::nudge(std::int64_t nowNs) {
     } else {
       link.peer()->knock(link.header().incarnation);
     }
-    if (link.hasMessage()) takeOne();
+    takeOne();  // a reply, or what the server says of the link: we may not have been told
   }
   wakeAt(knockedNs_ + nudgeEveryNs_);
 }

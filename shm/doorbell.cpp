@@ -23,7 +23,8 @@ void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) no
 }
 
 void ring(layout::Word32& bell) noexcept {
-  bell.fetch_add(1, std::memory_order_relaxed);
+  // PAIR(bell): who has seen this ring before it slept has seen what it was rung for.
+  bell.fetch_add(1, std::memory_order_release);
   ::syscall(SYS_futex, &bell, FUTEX_WAKE, 1, nullptr, nullptr, 0);
 }
 

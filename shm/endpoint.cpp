@@ -286,6 +286,7 @@ void Endpoint::announce(layout::SleepState how) noexcept {
 
 void Endpoint::sleep(Deadline deadline) noexcept {
   auto& bell = window_.hints().bell;
+  // PAIR(bell): together with the fence of announce().
   const auto seen = bell.load(std::memory_order_relaxed);
   announce(layout::SleepState::onFutex);
   const auto until = tryLookAtAll() ? deadline : std::min(deadline, Deadline::atNs(lookedAtAllNs_ + kLookAtAllNs));

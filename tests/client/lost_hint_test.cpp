@@ -45,6 +45,15 @@ TEST_F(LostHintTest, AKnockThatIsLostDelaysTheConnection) {
   runUntil([&] { return client_.isConnected(); });
 }
 
+TEST_F(LostHintTest, AnAcceptanceOfWhichTheClientIsNotToldIsFound) {
+  const auto hints = hintsOf(layout::SegmentKind::clientWindow);
+  EXPECT_FALSE(server_->receive());
+
+  lose(hints);
+
+  runUntil([&] { return client_.isConnected(); });
+}
+
 TEST_F(LostHintTest, ARequestOfWhichTheServerIsNotToldIsAnswered) {
   const auto hints = hintsOf(layout::SegmentKind::serverWindow);
   runUntil([&] { return client_.isConnected(); });
