@@ -146,8 +146,9 @@ void Binding::deliverReply(const Envelope& envelope) {
   auto& control = dispatcher_.endpoint().control();
   count(control.received);
   auto* request = (envelope.flags & layout::kSlotFirstReply) != 0 ? requests_->find(envelope.requestId) : nullptr;
-  if ((envelope.flags & layout::kSlotFirstReply) != 0 && request == nullptr) {
-    channel_->discard(envelope);  // its request was cancelled
+  if ((envelope.flags & layout::kSlotFirstReply) != 0 && (request == nullptr || request->isGivenUp)) {
+    channel_->discard(envelope);
+    if (request != nullptr) requests_->end(*request);
     return;
   }
   Message message;
@@ -164,7 +165,7 @@ void Binding::deliverReply(const Envelope& envelope) {
       message.setClientExtra(request->clientExtra);
     }
     requests_->end(*request);
-    channel_->link().control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
+    channel_->link().control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
   }
   deliver(std::move(message));
 }
@@ -185,12 +186,18 @@ void Binding::deliver(Message&& message) {
 
 void Binding::deliverConnect(ConnectStatus status) { deliver(ConnectMessage({.status = status, .incarnation = incarnation_})); }
 
+// A request that the server may still reply to keeps its entry until it has.
 void Binding::deliverFate(Request& request, Fate fate) {
+  if (request.isGivenUp) return;
   RequestFateMessage message({.fate = fate, .requestId = request.id.load(std::memory_order_relaxed)});
   message.setClientType(request.clientType);
   message.setClientExtra(request.clientExtra);
   message.setRoute({0, message->requestId, 0, nullptr});
-  requests_->end(request);
+  if (fate == Fate::cancelled || fate == Fate::expired) {
+    requests_->giveUp(request);
+  } else {
+    requests_->end(request);
+  }
   deliver(std::move(message));
 }
 
@@ -259,7 +266,7 @@ void Binding::onTime(std::int64_t nowNs) {
 
 void Binding::expire(std::int64_t nowNs) {
   requests_->forEach([&](Request& request) {
-    if (request.deadlineNs == 0) return;
+    if (request.deadlineNs == 0 || request.isGivenUp) return;
     if (request.deadlineNs > nowNs) return wakeAt(request.deadlineNs);
     // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the deadline has passed.
     doorbell::fence();
@@ -296,7 +303,7 @@ void Binding::nudge(std::int64_t nowNs) {
 // True when nothing is owed to us: the next send() begins anew.
 bool Binding::endNudging() {
   const std::lock_guard lock(*lock_);
-  if (requests_->outstanding() != 0) return false;
+  if (requests_->awaited() != 0) return false;
   nudging_ = false;
   return true;
 }

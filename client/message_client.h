@@ -56,7 +56,8 @@ class MessageClient {
     return MessageOf<T>::inBuffer(allocate(MessageOf<T>::bytesFor(n)), n);
   }
 
-  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on it all the same.
+  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on it all the same, and until it has
+  // replied to it or refused it, the request counts as outstanding.
   void cancel(std::uint32_t requestId);
 
   // Waits until the server is connected. With a dispatcher without thread, runs it meanwhile.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RequestTable: the requests of one client that have no reply yet.
+// RequestTable: the requests of one client that its server owes a reply. A request that was given up (cancelled, expired) has had its end,
+// and stays until the server is through with it: the server knows it by its place in the table, which nobody else may get before.
 //
 // Threads  add(): one thread at a time, under the client's lock. The rest: the dispatcher's thread.
 #pragma once
@@ -8,7 +9,7 @@
 #include <bit>
 #include <cstdint>
 #include <memory>
-#include <optional>
+#include <utility>
 
 namespace mpf {
 
@@ -19,6 +20,7 @@ struct Request {
   std::uint64_t ordinal = 0;  // number of its message on the link
   std::int64_t deadlineNs = 0;
   std::int64_t sentNs = 0;  // of a timed request; else 0
+  bool isGivenUp = false;   // the dispatcher's
 };
 
 class RequestTable {
@@ -29,6 +31,9 @@ class RequestTable {
   [[nodiscard]] std::uint32_t outstanding() const noexcept {
     return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
   }
+
+  // Without those that were given up.
+  [[nodiscard]] std::uint32_t awaited() const noexcept { return outstanding() - givenUp_.load(std::memory_order_relaxed); }
 
   // A free entry with an id of its own, not yet added; nullptr when max are outstanding.
   Request* tryReserve(std::uint32_t& id) noexcept {
@@ -52,13 +57,18 @@ class RequestTable {
     request.id.store(0, std::memory_order_relaxed);
   }
 
-  // The request, if it has not ended.
+  // The request, if the server owes it a reply.
   Request* find(std::uint32_t id) noexcept {
     auto& request = requests_[id & (size_ - 1)];
     // PAIR(request-added): its fields.
     return id != 0 && request.id.load(std::memory_order_acquire) == id ? &request : nullptr;
   }
+  void giveUp(Request& request) noexcept {
+    request.isGivenUp = true;
+    givenUp_.store(givenUp_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  }
   void end(Request& request) noexcept {
+    if (std::exchange(request.isGivenUp, false)) givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
     ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     // PAIR(request-ended): we have finished with the entry.
     request.id.store(0, std::memory_order_release);
@@ -79,6 +89,7 @@ class RequestTable {
   std::uint32_t lastId_ = 0;
   std::atomic<std::uint32_t> added_{0};
   std::atomic<std::uint32_t> ended_{0};
+  std::atomic<std::uint32_t> givenUp_{0};
 };
 
 }  // namespace mpf

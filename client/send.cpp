@@ -47,7 +47,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
       fullTold_ = false;
       nudging = std::exchange(nudging_, true);
       link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
-      link.control().clientUnanswered.store(requests_->outstanding(), std::memory_order_relaxed);
+      link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
       if (requestId != nullptr) *requestId = id;
     }
   }

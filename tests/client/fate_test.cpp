@@ -92,6 +92,58 @@ TEST_F(ClientTest, ALateReplyOfACancelledRequestIsNotDelivered) {
   EXPECT_NE(next().tryAs<Float64>(), nullptr);
 }
 
+// The server knows a request by its place in a table; a cancelled one that it holds has its place until it answers.
+TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
+  auto& server = startServer({.queueSize = 4});
+  std::vector<Message> held;
+  server.on<Int32>([&](Int32Message&& request) { held.push_back(std::move(request)); });
+  server.on<Float64>([](Float64&) {});
+  bind();
+  for (int i = 0; i < 2; ++i) {
+    std::uint32_t id = 0;
+    ASSERT_EQ(client_.send(Int32Message(), Deadline::never(), &id), SendResult::sent);
+    runUntil([&] { return static_cast<int>(held.size()) == i + 1; });
+    client_.cancel(id);
+    EXPECT_EQ(fateOf(next()), Fate::cancelled);
+    client_.cancel(id);  // has ended: nothing comes
+  }
+
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(client_.send(Float64Message({.value = i + 0.0})), SendResult::sent);
+    const auto reply = next();
+    ASSERT_NE(reply.tryAs<Float64>(), nullptr) << "request " << i << " met a cancelled one";
+    ASSERT_EQ(reply.tryAs<Float64>()->value, i);
+  }
+
+  for (auto& request : held) EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent);
+  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
+  for (int i = 0; i < 8; ++i) ASSERT_EQ(client_.send(Float64Message()), i < 4 ? SendResult::sent : SendResult::queueFull);
+  for (int i = 0; i < 4; ++i) EXPECT_NE(next().tryAs<Float64>(), nullptr);
+}
+
+// What the server holds is bounded by what may be outstanding, cancelled or not: its replies have their room.
+TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
+  auto& server = startServer({.queueSize = 4});
+  std::vector<Message> held;
+  server.on<Int32>([&](Int32Message&& request) { held.push_back(std::move(request)); });
+  bind();
+  std::uint32_t id = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    ASSERT_EQ(client_.send(Int32Message(), Deadline::never(), &id), SendResult::sent);
+    runUntil([&] { return held.size() == i + 1; });
+    client_.cancel(id);
+    EXPECT_EQ(fateOf(next()), Fate::cancelled);
+  }
+
+  EXPECT_EQ(client_.send(Int32Message()), SendResult::tooManyOutstanding);
+  held.clear();  // refused
+
+  runUntil([&] { return client_.send(Int32Message(), Deadline::never(), &id) == SendResult::sent; });
+  runUntil([&] { return !held.empty(); });
+  held.clear();
+  EXPECT_EQ(fateOf(next()), Fate::refused);
+}
+
 TEST_F(ClientTest, AServerThatEndsGivesEachRequestItsFate) {
   auto& server = startServer();
   Message held;
