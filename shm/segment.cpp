@@ -34,20 +34,32 @@ class OpenFile {
   decltype(std::declval<ipc::shared_memory_object>().get_mapping_handle()) handle_{};
 };
 
-struct flock64 wholeFile(short type) {
+// An owner locks the whole file, a reaper its second byte: it cannot while there is an owner, and who asks for the first byte does not
+// take it for one.
+constexpr off_t kOwnersByte = 0;
+constexpr off_t kReapersByte = 1;
+
+struct flock64 writeLock(off_t from, off_t bytes) {
   struct flock64 lock{};
-  lock.l_type = type;
+  lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
+  lock.l_start = from;
+  lock.l_len = bytes;
   return lock;
 }
 
-bool tryLock(int fd) {
-  auto lock = wholeFile(F_WRLCK);
+bool tryLockAsOwner(int fd) {
+  auto lock = writeLock(0, 0);  // to the end, wherever it is
   return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
 }
 
-bool isLocked(int fd) {
-  auto lock = wholeFile(F_WRLCK);
+bool tryLockAsReaper(int fd) {
+  auto lock = writeLock(kReapersByte, 1);
+  return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
+}
+
+bool isOwned(int fd) {
+  auto lock = writeLock(kOwnersByte, 1);
   return ::fcntl(fd, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;  // a failure proves nothing
 }
 
@@ -124,7 +136,7 @@ void Segment::map(Access access) {
 }
 
 void Segment::lockForLife() {
-  if (!tryLock(file_.get())) throwSystemError(errno, "lock the new segment", name_);
+  if (!tryLockAsOwner(file_.get())) throwSystemError(errno, "lock the new segment", name_);
 }
 
 bool Segment::tryPublish(const std::string& name) {
@@ -144,7 +156,7 @@ std::uint32_t Segment::fileUser() const {
   return status.st_uid;
 }
 
-bool Segment::hasOwner() const noexcept { return isLocked(file_.get()); }
+bool Segment::hasOwner() const noexcept { return isOwned(file_.get()); }
 
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
   Segment segment;
@@ -198,13 +210,13 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
     const auto got = ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
     if (got != sizeof found || found != incarnation) return Owner::absent;
   }
-  return isLocked(file.get()) ? Owner::alive : Owner::dead;
+  return isOwned(file.get()) ? Owner::alive : Owner::dead;
 }
 
 bool removeIfOwnerless(const std::string& name) {
   const auto file = openByName(name, O_RDWR);
-  if (!file || !tryLock(file.get())) return false;
-  // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
+  if (!file || !tryLockAsReaper(file.get())) return false;
+  // With the reaper's lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
   struct stat locked{};
   struct stat named{};
   if (::fstat(file.get(), &locked) != 0 || ::stat(path(name).c_str(), &named) != 0 || locked.st_ino != named.st_ino) return false;
