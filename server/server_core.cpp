@@ -76,9 +76,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name, cons
 ServerCore::~ServerCore() {
   keeper_->leave();
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
-  for (const auto& connection : connections_) {
-    if (connection->channel) close(*connection);
-  }
+  closeAll();
 }
 
 void ServerCore::setQueueSize(int size) {
