@@ -41,7 +41,7 @@ count = 32
 )";
 
 std::string writeConfig() {
-  std::string path = "/tmp/mpf-bench-roudi-XXXXXX";
+  std::string path = "/tmp/mpf-bench-roudi-" + std::string(6, 'X');
   const FileDescriptor file(checkCall(::mkostemp(path.data(), O_CLOEXEC), "mkostemp", path));
   if (::write(file.get(), kPools.data(), kPools.size()) != static_cast<ssize_t>(kPools.size())) throwSystemError(EIO, "write", path);
   return path;

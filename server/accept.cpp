@@ -26,11 +26,8 @@ void ServerCore::accept(std::uint64_t incarnation) {
     const auto window = SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
     auto client = endpoint_.peer(window, layout::SegmentKind::clientWindow);
     if (client && link->peerState() == layout::LinkState::open) return open(std::move(link), std::move(client));
-    if (!client && segments::probeOwner(window) == segments::Owner::absent) {
-      // A client's window stands before its links do and goes after them: this client died while it knocked.
-      segments::remove(name);
-      removeBulk(backplane, incarnation);
-    }
+    // A client's window stands before its links do and goes after them: this client died while it knocked.
+    if (!client && segments::probeOwner(window) == segments::Owner::absent) removeLink(name, incarnation);
   } catch (const std::exception&) {
     // Not a link that we can use. Its client sees that nobody accepts it; we go on.
     count(endpoint_.control().protocolErrors);
@@ -79,11 +76,32 @@ void ServerCore::closeDead() {
     if (!connection->channel || !connection->channel->link().peer()->isDead()) continue;
     MPF_STEP(client_died);
     count(endpoint_.control().peersDied);
-    // The client owned the link and is proven dead: its names are ours to remove.
-    const auto& link = connection->channel->link();
-    segments::remove(link.name());
-    removeBulk(endpoint_.backplane().name(), link.header().incarnation);
+    removeLinkOfDead(*connection);
     MPF_STEP(client_removed);
+    close(*connection);
+  }
+}
+
+// The client owned the link and is proven dead: its names are ours to remove.
+void ServerCore::removeLinkOfDead(const Connection& connection) noexcept {
+  const auto& link = connection.channel->link();
+  removeLink(link.name(), link.header().incarnation);
+}
+
+void ServerCore::removeLink(const std::string& name, std::uint64_t incarnation) noexcept {
+  segments::remove(name);
+  removeBulk(endpoint_.backplane().name(), incarnation);
+}
+
+// Whoever died and was not noticed yet leaves nothing behind: nobody is here to notice it later.
+void ServerCore::closeAll() noexcept {
+  for (const auto& connection : connections_) {
+    if (!connection->channel) continue;
+    const auto peer = connection->channel->link().peer();
+    if (!peer->hasOwner()) {
+      removeLinkOfDead(*connection);
+      removeDeadWindow(endpoint_.backplane().name(), peer->name(), peer->header().incarnation);
+    }
     close(*connection);
   }
 }

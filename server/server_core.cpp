@@ -82,9 +82,7 @@ ServerCore::~ServerCore() {
   if (endpoint_.origin().isInherited()) return;
   MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
-  for (const auto& connection : connections_) {
-    if (connection->channel) close(*connection);
-  }
+  closeAll();
 }
 
 void ServerCore::setQueueSize(int size) {

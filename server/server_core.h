@@ -73,6 +73,9 @@ class ServerCore {
   void open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client);
   void close(Connection& connection) noexcept;
   void closeDead();
+  void closeAll() noexcept;
+  void removeLinkOfDead(const Connection& connection) noexcept;
+  void removeLink(const std::string& name, std::uint64_t incarnation) noexcept;
   void closeIfClientDid(Connection& connection) noexcept;
   bool take(Connection& connection, Message& message) noexcept;
   bool hasExpired(const Envelope& envelope) noexcept;

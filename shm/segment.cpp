@@ -24,20 +24,32 @@ namespace ipc = boost::interprocess;
 
 constexpr const char* kDirectory = "/dev/shm";
 
-struct flock64 wholeFile(short type) {
+// An owner locks the whole file, a reaper its second byte: it cannot while there is an owner, and who asks for the first byte does not
+// take it for one.
+constexpr off_t kOwnersByte = 0;
+constexpr off_t kReapersByte = 1;
+
+struct flock64 writeLock(off_t from, off_t bytes) {
   struct flock64 lock{};
-  lock.l_type = type;
+  lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
+  lock.l_start = from;
+  lock.l_len = bytes;
   return lock;
 }
 
-bool tryLock(int fd) {
-  auto lock = wholeFile(F_WRLCK);
+bool tryLockAsOwner(int fd) {
+  auto lock = writeLock(0, 0);  // to the end, wherever it is
   return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
 }
 
-bool isLocked(int fd) {
-  auto lock = wholeFile(F_WRLCK);
+bool tryLockAsReaper(int fd) {
+  auto lock = writeLock(kReapersByte, 1);
+  return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
+}
+
+bool isOwned(int fd) {
+  auto lock = writeLock(kOwnersByte, 1);
   return ::fcntl(fd, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;  // a failure proves nothing
 }
 
@@ -98,7 +110,7 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
 // The file of that name with its owner's lock; empty when somebody else has the lock or the name.
 FileDescriptor lockOwnerless(const std::string& name) {
   auto file = openByName(name, O_RDWR);
-  if (!file || !tryLock(file.get())) return {};
+  if (!file || !tryLockAsReaper(file.get())) return {};
   MPF_STEP(reclaim_locked);
   // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
   struct stat locked{};
@@ -153,7 +165,7 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
 }
 
 void Segment::lockForLife() {
-  if (!tryLock(file_.get())) throwSystemError(errno, "lock the new segment", name_);
+  if (!tryLockAsOwner(file_.get())) throwSystemError(errno, "lock the new segment", name_);
   mapping_.growBy(file_.get());
 }
 
@@ -176,7 +188,7 @@ std::uint32_t Segment::fileUser() const {
   return status.st_uid;
 }
 
-bool Segment::hasOwner() const noexcept { return isLocked(file_.get()); }
+bool Segment::hasOwner() const noexcept { return isOwned(file_.get()); }
 
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
   Segment segment;
@@ -194,7 +206,7 @@ std::optional<Segment> Segment::tryOpenShared(const std::string& name, std::size
   segment.file_ = openRegular(name, O_RDWR, fileBytes);
   if (!segment.file_) return std::nullopt;
   const int file = segment.file_.get();
-  if (fileBytes < bytes && (!isLocked(file) || reserve(file, bytes) != 0))
+  if (fileBytes < bytes && (!isOwned(file) || reserve(file, bytes) != 0))
     throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", segments::path(name), fileBytes, bytes));
   segment.mapping_ = Mapping(file, bytes, Access::readWrite);
   segment.mapping_.growAt(file, segments::path(name));
@@ -240,7 +252,7 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
     const auto got = ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
     if (got != sizeof found || found != incarnation) return Owner::absent;
   }
-  return isLocked(file.get()) ? Owner::alive : Owner::dead;
+  return isOwned(file.get()) ? Owner::alive : Owner::dead;
 }
 
 bool removeIfOwnerless(const std::string& name) {

@@ -56,22 +56,27 @@ Watcher::Watcher()
       timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create")) {
   add(epoll_.get(), stop_.get(), kStop);
   add(epoll_.get(), timer_.get(), kTimer);
-  const SignalsBlocked blocked;
-  thread_ = std::thread([this] { run(); });
-  ::pthread_setname_np(thread_.native_handle(), "mpf-watcher");
 }
 
 Watcher::~Watcher() {
   if (isInherited()) {
     Origin::abandon(thread_);
-  } else {
+  } else if (thread_.joinable()) {
     ::eventfd_write(stop_.get(), 1);
     thread_.join();
   }
 }
 
+void Watcher::start() {
+  if (thread_.joinable()) return;
+  const SignalsBlocked blocked;
+  thread_ = std::thread([this] { run(); });
+  ::pthread_setname_np(thread_.native_handle(), "mpf-watcher");
+}
+
 Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback) {
   const std::lock_guard lock(mutex_);
+  start();
   const auto token = next_++;
   auto process = Process::openOwner(peer->header());
   if (process) add(epoll_.get(), process.get(), token);
@@ -82,6 +87,7 @@ Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback cal
 
 Watcher::Token Watcher::watchNames(Callback callback) {
   const std::lock_guard lock(mutex_);
+  start();
   if (nameCallbacks_.empty()) openNames();
   const auto token = next_++;
   nameCallbacks_.emplace(token, std::move(callback));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Watcher: one thread of a process that tells when a peer has died and when a server has appeared. It sleeps all the time.
+// Watcher: one thread of a process that tells when a peer has died and when a server has appeared. It sleeps all the time,
+// and begins when there is somebody to watch.
 //
 //   pidfd readable ─► lock of the peer's window free? ─► dead: callback, once
 //   /dev/shm gets a new name of our backplane ─► callback for those who wait for a server
@@ -45,6 +46,7 @@ class Watcher {
     Callback callback;
     FileDescriptor process;  // empty: polled
   };
+  void start();
   void run();
   void handle(Token token);
   bool isGone(const Peer& peer) const;

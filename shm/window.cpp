@@ -40,7 +40,9 @@ void checkInTheWay(const std::string& name, layout::SegmentKind kind) {
                                   header.ownerPid));
     case segments::Owner::dead:
       if (segments::removeIfOwnerless(name)) return;
-      throw SegmentError(fmt::format("{}: left by a dead process of user {}, who must remove it", segments::path(name), header.ownerUid));
+      throw SegmentError(
+          fmt::format("{}: left by a dead process of user {}, who must remove it; if somebody is about to, that process does not go on",
+                      segments::path(name), header.ownerUid));
   }
 }
 
@@ -77,7 +79,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
 }
 
 void OwnWindow::publish(const std::string& name) {
-  // A reaper holds the lock of a dead window for some microseconds; only one that is held longer has an owner.
+  // Its owner may be dying, or somebody else be removing what it left: that takes some microseconds.
   const auto patience = Deadline::after(std::chrono::milliseconds(50));
   while (!window_.tryPublish(name)) {
     if (segments::removeIfOwnerless(name)) continue;

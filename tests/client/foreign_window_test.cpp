@@ -38,6 +38,8 @@ struct Foreign {
   const char* name;
   const char* saying;  // part of the reason
   std::function<void(const std::string& path)> put;
+
+  friend void PrintTo(const Foreign& foreign, std::ostream* out) { *out << foreign.name; }
 };
 
 class ForeignWindow : public ClientTest, public testing::WithParamInterface<Foreign> {

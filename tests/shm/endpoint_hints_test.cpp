@@ -8,6 +8,7 @@
 #include <mpf/tests/shm/endpoint_pair.h>
 #include <mpf/tests/shm/shm_fixture.h>
 #include <mpf/tests/support/random.h>
+#include <mpf/tests/support/wait_modes.h>
 
 namespace mpf::test {
 namespace {
@@ -50,8 +51,7 @@ class HintsTest : public ShmTest {
 };
 
 class LostHints : public HintsTest, public testing::WithParamInterface<std::tuple<WaitMode, int>> {};
-INSTANTIATE_TEST_SUITE_P(FewAndManyLinks, LostHints,
-                         testing::Combine(testing::Values(WaitMode::spin, WaitMode::adaptive, WaitMode::block), testing::Values(1, 100)));
+INSTANTIATE_TEST_SUITE_P(FewAndManyLinks, LostHints, testing::Combine(kWaitModes, testing::Values(1, 100)));
 
 TEST_P(LostHints, BeforeAWaitLoseNoMessage) {
   const auto [mode, links] = GetParam();

@@ -10,6 +10,7 @@
 #include <mpf/tests/shm/child.h>
 #include <mpf/tests/shm/endpoint_pair.h>
 #include <mpf/tests/shm/shm_fixture.h>
+#include <mpf/tests/support/wait_modes.h>
 
 namespace mpf::test {
 namespace {
@@ -29,7 +30,7 @@ class EndpointTest : public ShmTest {
 };
 
 class WaitModes : public EndpointTest, public testing::WithParamInterface<WaitMode> {};
-INSTANTIATE_TEST_SUITE_P(All, WaitModes, testing::Values(WaitMode::spin, WaitMode::adaptive, WaitMode::block));
+INSTANTIATE_TEST_SUITE_P(All, WaitModes, kWaitModes, nameOfWaitMode);
 
 TEST_P(WaitModes, AWaitEndsWithAMessage) {
   End server(backplane_, "server", GetParam());

@@ -105,6 +105,30 @@ TEST_F(WindowTest, TheNameOfAKilledOwnerCanBeUsedAtOnce) {
   static_cast<void>(backplane_.removeDead());
 }
 
+TEST_F(WindowTest, WhoeverRemovesADeadOneIsNotTakenForItsOwner) {
+  Child child([&](Child::Self& self) {
+    const auto server = makeServer();
+    self.stay();
+  });
+  child.end(SIGKILL);
+  FileDescriptor reaper(checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
+  struct flock64 lock{};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = 1;
+  lock.l_len = 1;
+  checkCall(::fcntl(reaper.get(), F_OFD_SETLK, &lock), "lock");
+
+  EXPECT_FALSE(openServer()->hasOwner());
+  EXPECT_EQ(segments::probeOwner(serverName()), segments::Owner::dead);
+  EXPECT_FALSE(segments::removeIfOwnerless(serverName()));
+  EXPECT_THAT(whatOf<SegmentError>([&] { makeServer(); }), testing::HasSubstr("left by a dead process of user"));
+
+  reaper.reset();
+  EXPECT_TRUE(makeServer());
+  static_cast<void>(backplane_.removeDead());
+}
+
 TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerWins) {
   for (int round = 0; round < 20; ++round) {
     Child child([&](Child::Self& self) {

@@ -9,6 +9,7 @@
 #include <set>
 
 #include <mpf/client/sync_client.h>
+#include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
@@ -129,6 +130,18 @@ TEST_F(KillTest, AServerGoesOnWhenClientsAreKilled) {
 
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+// The server ends before it hears of the death, or before it looks: nobody else is there who could remove what is left.
+TEST_F(KillTest, AServerThatEndsTakesItsDeadClientsAlong) {
+  auto server = std::make_unique<MessageServer>(backplane_, "echo");
+  Victim client("flood", backplaneName());
+  while (!server->receive()) server->waitForMessage(Deadline::after(60s));
+
+  client.end(SIGKILL);
+  server.reset();
+
+  EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
 TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {

@@ -31,7 +31,7 @@ inline std::span<const std::uint8_t> bytesOf(std::string_view text) {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = std::filesystem::temp_directory_path() / "mpf-serial-XXXXXX";
+    std::string name = std::filesystem::temp_directory_path() / ("mpf-serial-" + std::string(6, 'X'));
     if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
     path_ = name;
   }
