@@ -172,7 +172,9 @@ void Referee::checkOrderlyEnd(Role role) const {
 // The stopped one is slow, not dead.
 void Referee::hold(Role role) {
   auto& survivor = (*world_).survivor;
-  const bool leaving = boardOf(role).isLeaving.load() != 0;
+  // Who was told to leave may do so with another thread than the one that is held.
+  const auto& board = boardOf(role);
+  const bool leaving = board.leave.load() != 0 || board.isLeaving.load() != 0;
   const auto disconnects = survivor.talked[1].disconnects.load();
   const auto died = role == Role::client ? clientsDied(backplane_, "steady") : 0;
   const auto replies = repliesOf(0);
