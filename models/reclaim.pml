@@ -2,18 +2,20 @@
 // Reclaim: who wants a server's name, who removes what a dead one left under it; each may be killed before any step.
 //
 //   file made ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
-//   reaper: open by name ─ lock that file ─ does the name still lead to it? ─ remove the name ─ unlock
+//   reaper: open by name ─ lock a byte of that file that its owner would have locked, too ─ does the name still lead to it? ─ remove the
+//   name ─ unlock
 //
-//   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless tryLock probeOwner
+//   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless tryLockAsOwner tryLockAsReaper isOwned probeOwner
 //   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
 //   HOLDS   the name of a living window is removed by nobody but its owner
 //   HOLDS   never do two that live own the name
 //   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked
 //   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after its holder died
-//   ASSUMES a starter outwaits a reaper that holds the lock of a dead window (it waits 50 ms for some microseconds)
+//   ASSUMES a starter outwaits a reaper that removes a dead window, and the kernel (it waits 50 ms for some microseconds)
 //   ASSUMES three starters, each also a reaper, and one that only reaps; two of them are killed; nobody else removes names
 //   BREAK   NO_COMPARE    a reaper does not look whether the name still leads to the file that it locked
 //   BREAK   NO_LOCK       a reaper asks for the lock and does not take it
+//   BREAK   ONE_LOCK      a reaper locks the file as an owner does
 //   BREAK   UNLOCK_EARLY  a reaper lets go of the lock before it removes the name
 //   BREAK   LOCK_LATE     a starter locks its window after it got its name
 //   BREAK   LEAVE_LATE    who leaves lets go of the lock before it removes its name
@@ -26,13 +28,19 @@
 #define fileOf(starter) ((starter) + 1)
 
 byte name = NO_FILE;       // the file that the name leads to
-byte lock[STARTERS + 1];   // of each file: who holds it
+byte lock[STARTERS + 1];   // of each file: its owner
+byte reaper[STARTERS + 1]; // of each file: who is about to remove its name
 bool left[STARTERS];
 bool dead[PROCESSES];
 
 #define isLiving(file) (!dead[(file) - 1] && !left[(file) - 1])
 #define isOwned (name != NO_FILE && isLiving(name))
-#define isInUse (name != NO_FILE && lock[name] != FREE && isLiving(name))
+#define isLocked (name != NO_FILE && lock[name] != FREE && !dead[lock[name]])
+#ifdef ONE_LOCK
+#define reaperOf lock
+#else
+#define reaperOf reaper
+#endif
 
 inline removeName(mayBe) {
   atomic {
@@ -50,14 +58,14 @@ inline removeIfOwnerless(me) {
 #ifdef NO_LOCK
     :: lock[file] == FREE ->
 #else
-    :: d_step { lock[file] == FREE -> lock[file] = me } ->
+    :: d_step { lock[file] == FREE && reaperOf[file] == FREE -> reaperOf[file] = me } ->
 #endif
 #ifndef NO_COMPARE
       if
       :: name == file ->
 #endif
 #ifdef UNLOCK_EARLY
-        lock[file] = FREE;
+        reaperOf[file] = FREE;
 #endif
         removeName(NO_FILE)
 #ifndef NO_COMPARE
@@ -67,7 +75,7 @@ inline removeIfOwnerless(me) {
       ;
 #endif
 #if !defined(UNLOCK_EARLY) && !defined(NO_LOCK)
-      lock[file] = FREE
+      reaperOf[file] = FREE
 #else
       skip
 #endif
@@ -85,7 +93,7 @@ proctype Starter(byte me) {
 #endif
     do
     :: d_step { name == NO_FILE -> name = fileOf(me) } -> goto owner
-    :: isInUse -> goto refused
+    :: atomic { isLocked -> assert(isLiving(name)) } -> goto refused
 #ifndef NO_REAPING
     :: name != NO_FILE && lock[name] == FREE -> removeIfOwnerless(me)
 #endif
@@ -130,6 +138,10 @@ inline kill(process) {
       :: lock[file] == process -> lock[file] = FREE
       :: else
       fi;
+      if
+      :: reaper[file] == process -> reaper[file] = FREE
+      :: else
+      fi;
       file++
     :: else -> break
     od;
@@ -152,6 +164,9 @@ init {
     lock[1] = FREE;
     lock[2] = FREE;
     lock[3] = FREE;
+    reaper[1] = FREE;
+    reaper[2] = FREE;
+    reaper[3] = FREE;
     run Starter(0);
     run Starter(1);
     run Starter(2)
