@@ -39,7 +39,7 @@ struct Foreign {
   const char* saying;  // part of the reason
   std::function<void(const std::string& path)> put;
 
-  friend void PrintTo(const Foreign& foreign, std::ostream* out) { *out << foreign.name; }
+  friend std::ostream& operator<<(std::ostream& out, const Foreign& foreign) { return out << foreign.name; }
 };
 
 class ForeignWindow : public ClientTest, public testing::WithParamInterface<Foreign> {

@@ -10,20 +10,16 @@
 
 namespace mpf {
 
-// How googletest prints it, found by its name.
-inline void PrintTo(WaitMode mode, std::ostream* out) {
+inline std::ostream& operator<<(std::ostream& out, WaitMode mode) {
   switch (mode) {
     case WaitMode::spin:
-      *out << "Spin";
-      return;
+      return out << "Spin";
     case WaitMode::adaptive:
-      *out << "Adaptive";
-      return;
+      return out << "Adaptive";
     case WaitMode::block:
-      *out << "Block";
-      return;
+      return out << "Block";
   }
-  *out << "Unknown";
+  return out << "Unknown";
 }
 
 }  // namespace mpf
