@@ -14,6 +14,7 @@
 
 #include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
+#include <mpf/benchmarks/company.h>
 #include <mpf/benchmarks/measurement.h>
 #include <mpf/benchmarks/mpf_peer.h>
 #include <mpf/benchmarks/timing.h>
@@ -85,24 +86,6 @@ Outcome runAndClean(const Stage& stage, const std::string& backplane, const Act&
   auto outcome = stage.run(act);
   removeBackplanes(backplane);
   return outcome;
-}
-
-Outcome roundTripBeside(const Stage& stage, const std::string& backplane, Mode mode, int idle) {
-  Act act;
-  act.server = [=](const Scene& scene) { serveForEver(scene, backplane, mode); };
-  act.requester = [=](const Scene& scene) {
-    const Crowd crowd(backplane, idle);
-    Dispatcher dispatcher(Backplane::attach(backplane), {waitMode(mode), {}});
-    std::uint64_t received = 0;
-    MessageClient client(dispatcher, [&](Message&& message) { received += message.getType() == MessageType::int32 ? 1u : 0u; });
-    connectOrThrow(client);
-    timeEach(scene, [&] {
-      const auto wanted = received + 1;
-      if (client.send(Int32Message({.value = 1})) != SendResult::sent) throw std::runtime_error("send failed");
-      while (received < wanted) dispatcher.runOnce();
-    });
-  };
-  return runAndClean(stage, backplane, act);
 }
 
 // A client of a process that has a dispatcher already, until it is connected; its end is not timed.
@@ -255,6 +238,24 @@ Measurement scaleRow(const std::string& question, const std::string& name, Mode 
 
 }  // namespace
 
+Outcome roundTripBeside(const Stage& stage, const std::string& backplane, Mode mode, const Company& company) {
+  Act act;
+  act.server = [=](const Scene& scene) { serveForEver(scene, backplane, mode); };
+  act.requester = [=](const Scene& scene) {
+    const auto beside = company ? company() : nullptr;
+    Dispatcher dispatcher(Backplane::attach(backplane), {waitMode(mode), {}});
+    std::uint64_t received = 0;
+    MessageClient client(dispatcher, [&](Message&& message) { received += message.getType() == MessageType::int32 ? 1u : 0u; });
+    connectOrThrow(client);
+    timeEach(scene, [&] {
+      const auto wanted = received + 1;
+      if (client.send(Int32Message({.value = 1})) != SendResult::sent) throw std::runtime_error("send failed");
+      while (received < wanted) dispatcher.runOnce();
+    });
+  };
+  return runAndClean(stage, backplane, act);
+}
+
 std::vector<Measurement> scaleMeasurements(const std::string& runName) {
   std::vector<Measurement> rows;
   for (const auto mode : {Mode::spin, Mode::block}) {
@@ -264,7 +265,9 @@ std::vector<Measurement> scaleMeasurements(const std::string& runName) {
       row.floorName = mode == Mode::block ? kFutexBounce : kBounce;
       row.floorBytes = 4;
       const auto backplane = runName + "-idle" + std::to_string(idle) + toString(mode)[0];
-      row.run = [=](const Stage& stage) { return roundTripBeside(stage, backplane, mode, idle); };
+      row.run = [=](const Stage& stage) {
+        return roundTripBeside(stage, backplane, mode, [=] { return std::make_shared<Crowd>(backplane, idle); });
+      };
       row.isSlow = idle >= 1000;
       rows.push_back(std::move(row));
     }

@@ -4,7 +4,7 @@
 //   client    window: locked, named ─ link: named ─ bulk segment: named ─ ... ─ bulk, link, window: names removed ─ lock free
 //   attacher  list all names ─ which windows live? ─ links of the others away ─ bulk without a link away
 //
-//   MODELS  shm/backplane.cpp: removeDead surveyWindow surveyDependent surveyLast hasLivingOwner
+//   MODELS  shm/remains.cpp: judge tryRemove judgeWindow judgeOwned ownerOf
 //   MODELS  shm/segment.cpp: list removeIfOwnerless
 //   HOLDS   nothing of a living client is removed by anybody but that client
 //   HOLDS   nothing of a dead client keeps its name once somebody has attached after its death and after the others that attach

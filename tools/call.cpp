@@ -19,6 +19,7 @@
 #include <mpf/schema/json.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/show.h>
 
 namespace mpf::tools {
 namespace {
@@ -121,8 +122,7 @@ class Caller {
 
   void show(const Message& message) {
     if (arguments_.json) replies_.push_back(toJson(message));
-    else fmt::print("{}\n", print(message, arguments_.printAll ? std::numeric_limits<std::size_t>::max() : 64));
-    std::fflush(stdout);  // a reader in a pipe wants it now
+    else tools::show(print(message, arguments_.printAll ? std::numeric_limits<std::size_t>::max() : 64) + "\n");
   }
 
   // Messages of the server that come after the reply.

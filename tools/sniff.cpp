@@ -12,6 +12,7 @@
 #include <mpf/schema/serial_sniff.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/show.h>
 #include <mpf/tools/sniff_format.h>
 
 namespace mpf::tools {
@@ -122,12 +123,6 @@ class Sniffer {
     for (const auto& record : *records) text += format_->add(record);
     seen_ += records->size();
     show(text);
-  }
-
-  static void show(const std::string& text) {
-    if (text.empty()) return;
-    std::fwrite(text.data(), 1, text.size(), stdout);
-    std::fflush(stdout);
   }
 
   std::string server_;

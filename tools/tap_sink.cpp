@@ -2,7 +2,6 @@
 #include <mpf/tools/tap_sink.h>
 
 #include <capnp/message.h>
-#include <cstdio>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <limits>
@@ -11,6 +10,7 @@
 #include <mpf/schema/json.h>
 #include <mpf/schema/text.h>
 #include <mpf/tools/recording.h>
+#include <mpf/tools/show.h>
 
 namespace mpf::tools {
 namespace {
@@ -19,11 +19,6 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 std::string shortName(const TappedLink& link) { return fmt::format("{:04x}", link.incarnation >> 48); }
 const char* directionText(Direction direction) { return direction == Direction::request ? "request" : "reply"; }
-
-void show(const std::string& line) {
-  std::fwrite(line.data(), 1, line.size(), stdout);
-  std::fflush(stdout);  // a reader in a pipe wants it now
-}
 
 class LineSink final : public TapSink {
  public:

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fmt/format.h>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -46,7 +47,7 @@ class Soak {
       print(sample);
       if (sample == kSamples / 4) before_ = usage_;
     }
-    for (int i = 0; i < 1000; ++i) static_cast<void>(client_.call(Float64Message({.value = 0}), 60s));  // the last death is seen
+    for (int i = 0; i < 1000; ++i) static_cast<void>(client_->call(Float64Message({.value = 0}), 60s));  // the last death is seen
     print(kSamples);
     bool flat = true;
     for (const auto& [name, usage] : usage_) {
@@ -55,15 +56,23 @@ class Soak {
       flat = false;
     }
     fmt::print("{} right answers, {} clients killed: {}\n", answers_, killed_, flat ? "flat" : "NOT flat");
-    return flat ? 0 : 1;
+    const bool clean = leavesNothing();
+    return flat && clean ? 0 : 1;
   }
 
  private:
+  bool leavesNothing() {
+    crowd_.end(SIGKILL);
+    server_.end(SIGTERM);
+    client_.reset();
+    for (const auto& name : backplane_.segmentNames()) fmt::print("left behind: {}\n", name);
+    return backplane_.segmentNames().empty();
+  }
   // Some requests, answered rightly while a client floods the server and is killed.
   void visit() {
     Victim flood("flood", backplane_.name());
     for (int i = 0; i < 200; ++i) {
-      auto answer = client_.call(Float64Message({.value = i + 0.0}), 60s);
+      auto answer = client_->call(Float64Message({.value = i + 0.0}), 60s);
       if (!answer) throw std::runtime_error(answer.why());
       if (answer.message().tryAs<Float64>()->value != i + 1.0) throw std::runtime_error("a wrong answer");
       ++answers_;
@@ -85,7 +94,7 @@ class Soak {
   Backplane backplane_ = Backplane::isolated();
   Victim server_{"serve", backplane_.name()};
   Victim crowd_{"crowd", backplane_.name(), {"50"}};
-  SyncClient client_{backplane_, "echo"};
+  std::optional<SyncClient> client_{std::in_place, backplane_, "echo"};
   std::map<std::string, pid_t> pids_;
   std::map<std::string, Usage> usage_;
   std::map<std::string, Usage> before_;

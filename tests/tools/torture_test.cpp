@@ -104,11 +104,11 @@ TEST_P(MistakeTest, IsFound) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, MistakeTest,
-                         testing::Values(Mistake{"lose-fate", "5", "each request has an end"},
+                         testing::Values(Mistake{"lose-fate", "12", "each request has an end"},
                                          Mistake{"half-message", "30", ""},  // nonsense, or an old request once more
                                          Mistake{"keep-name", "30", "the successor could not take the place"},
-                                         Mistake{"stale", "5", "nothing stale is left; there are mpf."},
-                                         Mistake{"leak", "5", "the survivors hold no more than they did"}),
+                                         Mistake{"stale", "12", "nothing stale is left; there are mpf."},
+                                         Mistake{"leak", "12", "the survivors hold no more than they did"}),
                          [](const auto& mistake) {
                            auto name = mistake.param.name;
                            name.erase(name.find('-') == std::string::npos ? name.size() : name.find('-'), 1);

@@ -43,9 +43,14 @@ Processes::Processes() {
 }
 
 Processes::~Processes() {
+  killAll();
+  ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+}
+
+void Processes::killAll() {
   for (const auto pid : running_) ::kill(pid, SIGKILL);
   while (::waitpid(-1, nullptr, __WALL) > 0) continue;
-  ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  running_.clear();
 }
 
 pid_t Processes::start(const std::function<int()>& play) {

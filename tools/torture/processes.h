@@ -38,6 +38,7 @@ class Processes {
   [[nodiscard]] bool hasEnded(pid_t pid) const { return !running_.contains(pid); }
   // Kills it, if it still runs, waits for its end and forgets it.
   void kill(pid_t pid);
+  void killAll();
   // Of one that has ended, and is forgotten: as waitpid() tells it.
   int takeStatus(pid_t pid);
 

@@ -48,9 +48,7 @@ Referee::Referee(const Marks& marks, const Options& options)
 
 Referee::~Referee() {
   (*world_).isOver.store(1);
-  for (const auto pid : {companion_, mortal_, survivor_, steady_}) {
-    if (pid != 0) processes_.kill(pid);
-  }
+  processes_.killAll();  // and none of them is left to leave something behind
   static_cast<void>(Backplane::named(backplane_).removeDead());
 }
 
