@@ -102,7 +102,7 @@ class Inspector {
 };
 
 // "link 3f6c01ac6b1a424f: idle", and then the rest.
-void show(const Tree& tree) {
+void printTree(const Tree& tree) {
   auto rest = tree;
   std::string now;
   for (const char* key : {"state", "waits"}) {
@@ -152,7 +152,7 @@ int inspectFiles(const InspectArguments& arguments) {
       const auto tree = tryDissect(file, {arguments.last.value_or(DissectOptions().last), arguments.raw});
       if (!tree) throw SegmentError(file + ": not there");
       if (arguments.json) all.push_back(nlohmann::json(*tree));
-      else show(*tree);
+      else printTree(*tree);
     } catch (const std::exception& error) {
       fmt::print(stderr, "mpf inspect: {}\n", error.what());
       status = 1;
