@@ -128,7 +128,7 @@ int inspectNamed(const InspectArguments& arguments) {
     }
   };
   reportEach(
-      arguments, [&](const Look& look) { visit(look, show); },
+      arguments, [&](const Look& look) { visit(look, printTree); },
       [&](const Look& look, nlohmann::json& all) { visit(look, [&](const Tree& tree) { all.push_back(nlohmann::json(tree)); }); });
   for (const auto& name : selection.missing()) {
     fmt::print(stderr, "mpf inspect: no server, client or link \"{}\"; `mpf inspect` shows those that there are\n", name);
