@@ -8,7 +8,7 @@ import subprocess
 import sys
 import unittest
 
-import second_reader
+import reader
 
 DOCUMENT, TRAFFIC = sys.argv.pop(1), sys.argv.pop(1)
 
@@ -18,7 +18,7 @@ class Document(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.layout = second_reader.Layout(DOCUMENT)
+        cls.layout = reader.Layout(DOCUMENT)
         cls.code = json.loads(subprocess.run([TRAFFIC, "layout"], check=True, capture_output=True).stdout)
 
     def test_constants_are_those_of_the_code(self):
@@ -52,17 +52,17 @@ class Document(unittest.TestCase):
         self.assertEqual(self.layout.bytes, {name: struct["bytes"] for name, struct in self.code["structs"].items()})
 
     def test_buckets_end_where_the_formula_says(self):
-        self.assertEqual([second_reader.bucket_end(i) for i in range(len(self.code["bucketEnds"]))], self.code["bucketEnds"])
+        self.assertEqual([reader.bucket_end(i) for i in range(len(self.code["bucketEnds"]))], self.code["bucketEnds"])
 
 
 class Names(unittest.TestCase):
     def test_of_other_programs_are_refused(self):
         for name in ("mpf.default", "mpf.default.c.", "mpf.default.c.X", "mpf.default.s.0", "mpf.default.l.1", "mpf.a.b.c.1", "mpf..c.1", "notes"):
-            self.assertIsNone(second_reader.parse_name(name), name)
+            self.assertIsNone(reader.parse_name(name), name)
 
     def test_of_servers_are_decoded(self):
-        letter, parts = second_reader.parse_name("mpf.default.s.-1.AIM1%2F1%2Ea%20b%25[0]")
-        self.assertEqual((letter, parts[0], second_reader.decode_server(parts[1])), ("s", "-1", "AIM1/1.a b%[0]"))
+        letter, parts = reader.parse_name("mpf.default.s.-1.AIM1%2F1%2Ea%20b%25[0]")
+        self.assertEqual((letter, parts[0], reader.decode_server(parts[1])), ("s", "-1", "AIM1/1.a b%[0]"))
 
 
 class Reader(unittest.TestCase):
@@ -77,7 +77,7 @@ class Reader(unittest.TestCase):
         self.process.kill()
         self.process.communicate()
         subprocess.run([TRAFFIC, "clean", self.backplane], check=True, capture_output=True)
-        left = [file for file in os.listdir(second_reader.DIRECTORY) if file.startswith(f"mpf.{self.backplane}.")]
+        left = [file for file in os.listdir(reader.DIRECTORY) if file.startswith(f"mpf.{self.backplane}.")]
         self.assertEqual(left, [])
 
     def answer(self):
@@ -89,7 +89,7 @@ class Reader(unittest.TestCase):
         self.expected = self.answer()
 
     def look(self):
-        seen = second_reader.look(DOCUMENT, self.backplane)
+        seen = reader.look(DOCUMENT, self.backplane)
         self.assertEqual(seen["refused"], [])
         self.assertEqual([len(seen[kind]) for kind in ("servers", "clients", "links", "wishes")], [1, 1, 1, 1])
         return seen
@@ -172,13 +172,13 @@ class Reader(unittest.TestCase):
 
     def test_other_versions_are_refused_by_both_numbers(self):
         file = self.look()["links"][0]["file"]
-        with open(os.path.join(second_reader.DIRECTORY, file), "r+b") as link:
+        with open(os.path.join(reader.DIRECTORY, file), "r+b") as link:
             link.seek(8)
             link.write((3).to_bytes(2, sys.byteorder))
-        seen = second_reader.look(DOCUMENT, self.backplane)
+        seen = reader.look(DOCUMENT, self.backplane)
         self.assertEqual(seen["links"], [])
         self.assertIn(f"{file}: layout 3, this program speaks 1", seen["refused"][0])
-        with open(os.path.join(second_reader.DIRECTORY, file), "r+b") as link:
+        with open(os.path.join(reader.DIRECTORY, file), "r+b") as link:
             link.seek(8)
             link.write((1).to_bytes(2, sys.byteorder))
 

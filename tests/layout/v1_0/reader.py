@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""second_reader DOCUMENT BACKPLANE: prints as JSON what is on a backplane, as somebody reads it who has DOCUMENT (docs/shm-layout.md) alone.
+"""reader DOCUMENT BACKPLANE: prints as JSON what is on a backplane, as somebody reads it who has DOCUMENT (docs/shm-layout.md) alone.
 
 Offsets, sizes, types and constants are taken from the document's tables. Reads only; needs nothing but this host's /dev/shm.
 """
