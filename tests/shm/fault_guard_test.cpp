@@ -32,8 +32,8 @@ void onFaultOfTheProgram(int, siginfo_t* fault, void*) {
   ++faultsOfTheProgram;
   if (fault->si_code != BUS_ADRERR) return;
   const auto page = reinterpret_cast<std::uintptr_t>(fault->si_addr) & reinterpret_cast<std::uintptr_t>(kWholePage);
-  static_cast<void>(
-      ::mmap(reinterpret_cast<void*>(page), layout::kPageBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0));
+  constexpr int kReplacing = MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED;
+  if (::mmap(reinterpret_cast<void*>(page), layout::kPageBytes, PROT_READ | PROT_WRITE, kReplacing, -1, 0) == MAP_FAILED) ::_exit(1);
 }
 
 const bool kIsInstalled = [] {
