@@ -80,15 +80,14 @@ bool LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMess
   while (messages.size() < kBatch) {
     const auto next = side.follower.tryNext(copy);
     some = some || next != RingFollower::Next::nothing;
-    if (next == RingFollower::Next::message) {
-      ++side.seen;
-      messages.push_back(read(copy, side, direction));
-      continue;
+    if (next != RingFollower::Next::message) {
+      // We stand behind the newest message: what was sent is what we saw and what we missed.
+      const auto sent = side.sent.load(std::memory_order_relaxed) - side.sentBefore;
+      side.missed = sent > side.seen ? sent - side.seen : 0;
+      break;
     }
-    // We stand behind the newest message: what was sent is what we saw and what we missed.
-    const auto sent = side.sent.load(std::memory_order_relaxed) - side.sentBefore;
-    side.missed = sent > side.seen ? sent - side.seen : 0;
-    if (next == RingFollower::Next::nothing) break;
+    ++side.seen;
+    messages.push_back(read(copy, side, direction));
   }
   return some;
 }

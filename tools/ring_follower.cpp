@@ -4,20 +4,30 @@
 #include <algorithm>
 
 namespace mpf::tools {
+namespace {
+
+constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring has come that far
+
+}  // namespace
 
 RingFollower::RingFollower(const layout::Slot* slots, std::uint32_t capacity, FollowFrom from) noexcept
     : slots_(slots), capacity_(capacity) {
   if (from == FollowFrom::newest) goBehindNewest();
 }
 
-// What lies in a slot is the newest message if no slot has a higher sequence. A sequence that does not belong to its slot is nonsense.
+// A sequence that is none of its slot's is nonsense, and no reason to look for anything newer.
+bool RingFollower::isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept {
+  return sequence <= kMost && ((sequence - 1 - position) & (capacity_ - 1)) == 0;
+}
+
+// What lies in a slot is the newest message if no slot has a higher sequence.
 void RingFollower::goBehindNewest() noexcept {
   std::uint64_t newest = 0;
   std::uint8_t slots = 1;
   for (std::uint64_t index = 0; index < capacity_; ++index) {
     // PAIR(slot-filled): the message is complete.
     const auto sequence = slots_[index].sequence.load(std::memory_order_acquire);
-    if (sequence <= newest || ((sequence - 1) & (capacity_ - 1)) != index) continue;
+    if (sequence <= newest || !isPossible(sequence, index)) continue;
     newest = sequence;
     slots = slots_[index].slots;
   }
@@ -28,7 +38,8 @@ void RingFollower::goBehindNewest() noexcept {
 bool RingFollower::isOverrun() const noexcept {
   for (std::uint32_t i = 0; i < layout::kMaxMessageSlots; ++i) {
     const auto ahead = position_ + capacity_ / 2 + i;
-    if (slot(ahead).sequence.load(std::memory_order_relaxed) > ahead) return true;
+    const auto sequence = slot(ahead).sequence.load(std::memory_order_relaxed);
+    if (sequence > ahead && isPossible(sequence, ahead)) return true;
   }
   return false;
 }

@@ -45,6 +45,7 @@ class RingFollower {
 
  private:
   [[nodiscard]] const layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & (capacity_ - 1)]; }
+  [[nodiscard]] bool isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept;
   [[nodiscard]] bool isOverrun() const noexcept;
   void goBehindNewest() noexcept;
   bool tryCopy(std::uint32_t slots, RingCopy& copy) const noexcept;

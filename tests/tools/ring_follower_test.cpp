@@ -107,6 +107,17 @@ TEST_F(RingFollowerTest, NonsenseIsPassedOver) {
   EXPECT_NE(follower.tryNext(copy), Next::message);
 }
 
+// The producer may write any sequence into any slot. One that its slot cannot have must not look like an overrun for ever.
+TEST_F(RingFollowerTest, ASequenceThatItsSlotCannotHaveIsNoNewerMessage) {
+  auto follower = follow();
+  for (const std::uint64_t sequence : {std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
+    for (std::uint64_t slot = 0; slot < kCapacity; ++slot) ring_[slot].sequence.store(sequence + slot * 2, std::memory_order_relaxed);
+
+    RingCopy copy;
+    if (follower.tryNext(copy) == Next::overrun) expectNothing(follower);
+  }
+}
+
 TEST_F(RingFollowerTest, SurvivesARingOfNoise) {
   Random random;
   RingCopy copy;
