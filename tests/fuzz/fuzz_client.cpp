@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// A client attaches to a server that lies: its window, its hints, and then its half of the link.
+//   files: 0 server window, 1 its hints, 2 the link, once there is one
+#include <optional>
+
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/fuzz/hostile_files.h>
+#include <mpf/tests/fuzz/scene.h>
+#include <mpf/tests/fuzz/talk.h>
+
+namespace mpf::test {
+namespace {
+
+class Client {
+ public:
+  Client(Scene& scene, HostileFiles& files) : scene_(scene), files_(files) {}
+
+  void turn(std::uint64_t value) try {
+    if (!talk_) attach(value);
+    else talk_->turn(value);
+  } catch (const std::exception&) {  // as a client's dispatcher does: that server is not for us
+    talk_.reset();
+  }
+
+ private:
+  void attach(std::uint64_t value) {
+    const auto peer = PeerWindow::tryOpen(scene_.serverName(), layout::SegmentKind::serverWindow);
+    if (!peer || peer->isClosed() || !peer->hasOwner()) return;
+    static_cast<void>(peer->user());
+    auto link = Link::create(scene_.backplaneName(), scene_.client, static_cast<std::uint32_t>(value), peer);
+    files_.add(link->name());
+    peer->knock(link->header().incarnation);
+    talk_.emplace(std::move(link));
+  }
+  Scene& scene_;
+  HostileFiles& files_;
+  std::optional<Talk> talk_;
+};
+
+void play(std::span<const std::uint8_t> input) {
+  static Scene scene;
+  static HostileFiles files(scene.backplane, {scene.serverName(), scene.hintsOf(scene.server)});
+  {
+    Client client(scene, files);
+    files.play(input, [&](std::uint64_t value) { client.turn(value); });
+  }
+  files.restore();
+}
+
+}  // namespace
+}  // namespace mpf::test
+
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  mpf::test::play({data, size});
+  return 0;
+}

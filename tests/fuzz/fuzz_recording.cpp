@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// mpf replay reads a file of any content. The input is the file.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <stdexcept>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/base/system_call.h>
+#include <mpf/schema/conversion.h>
+#include <mpf/tests/fuzz/talk.h>
+#include <mpf/tools/recording.h>
+
+namespace mpf::test {
+namespace {
+
+// As Replayer::take() does.
+void take(wire::Record::Reader record) {
+  if (record.isOpened()) static_cast<void>(std::string(record.getOpened().getServer().cStr()));
+  if (!record.isMessage()) return;
+  ConversionError error;
+  const auto message = tryFromWire(record.getMessage().getEnvelope(), {.maxValueBytes = SIZE_MAX}, error);
+  if (message) lookAt(*message);
+}
+
+void play(std::span<const std::uint8_t> input) try {
+  static const FileDescriptor file(checkCall(::memfd_create("recording", MFD_CLOEXEC), "create a file"));
+  checkCall(::ftruncate(file.get(), static_cast<off_t>(input.size())), "cut a file");
+  checkCall(::pwrite(file.get(), input.data(), input.size(), 0), "write to a file");
+  tools::RecordingReader reader(fmt::format("/proc/self/fd/{}", file.get()));
+  while (reader.tryNext(take)) {
+  }
+} catch (const std::runtime_error&) {  // as mpf replay does
+}
+
+}  // namespace
+}  // namespace mpf::test
+
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  mpf::test::play({data, size});
+  return 0;
+}

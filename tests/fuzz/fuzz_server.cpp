@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// A server attaches to the link of a client that lies.
+//   files: 0 link, 1 client window, 2 its hints, 3 the client's pool, 4 the server's hints
+#include <optional>
+
+#include <mpf/shm/segment_name.h>
+#include <mpf/tests/fuzz/hostile_files.h>
+#include <mpf/tests/fuzz/scene.h>
+#include <mpf/tests/fuzz/talk.h>
+
+namespace mpf::test {
+namespace {
+
+class Server {
+ public:
+  explicit Server(Scene& scene) : scene_(scene) {}
+
+  void turn(std::uint64_t value) try {
+    if (!talk_) attach();
+    if (talk_) talk_->turn(value);
+  } catch (const std::exception&) {  // as ServerCore::accept() does: not a link that we can use
+    talk_.reset();
+  }
+
+ private:
+  void attach() {
+    auto link = Link::tryOpen(scene_.backplaneName(), scene_.clientLink->link().name(), scene_.server);
+    if (!link) return;
+    const auto window = SegmentName::keyed(scene_.backplaneName(), NameKind::clientWindow, link->header().clientWindow);
+    auto client = PeerWindow::tryOpen(window, layout::SegmentKind::clientWindow);
+    if (!client || client->isClosed() || !client->hasOwner()) return;
+    link->attachPeer(std::move(client), link->header().clientIndex);
+    link->setState(layout::LinkState::open);
+    link->notifyPeer();
+    talk_.emplace(std::move(link));
+  }
+  Scene& scene_;
+  std::optional<Talk> talk_;
+};
+
+void play(std::span<const std::uint8_t> input) {
+  static Scene scene;
+  static HostileFiles files = [] {
+    scene.serverLink.reset();  // ours comes in its place
+    return HostileFiles(scene.backplane, {scene.clientLink->link().name(), scene.clientName(), scene.hintsOf(scene.client),
+                                          scene.bulkName(LinkSide::client), scene.hintsOf(scene.server)});
+  }();
+  {
+    Server server(scene);
+    files.play(input, [&](std::uint64_t value) { server.turn(value); });
+  }
+  files.restore();
+}
+
+}  // namespace
+}  // namespace mpf::test
+
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  mpf::test::play({data, size});
+  return 0;
+}

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// The tools look at the files of a server and a client that lie both: mpf inspect, ls, top and tap.
+//   files: 0 link, 1 server window, 2 client window, 3 and 4 their hints, 5 and 6 the client's and the server's pool
+#include <memory>
+#include <vector>
+
+#include <mpf/shm/segment.h>
+#include <mpf/tests/fuzz/hostile_files.h>
+#include <mpf/tests/fuzz/scene.h>
+#include <mpf/tests/fuzz/talk.h>
+#include <mpf/tools/link_follower.h>
+#include <mpf/tools/outline.h>
+#include <mpf/tools/survey.h>
+
+namespace mpf::test {
+namespace {
+
+class Onlooker {
+ public:
+  Onlooker(const Scene& scene, const HostileFiles& files) : scene_(scene), files_(files) {}
+
+  void turn(std::uint64_t value) {
+    const auto what = value % 16;
+    if (what == 15) static_cast<void>(tools::Survey::take(scene_.backplaneName()));
+    else if (what >= 8) dissect(what - 8, value);
+    else follow(value);
+  }
+
+ private:
+  void dissect(std::size_t file, std::uint64_t value) try {
+    const auto tree = tools::tryDissect(segments::path(files_.name(file)), {.last = value / 16 % 16, .raw = value / 256 % 8 == 7});
+    if (tree) static_cast<void>(tools::outline(*tree));
+  } catch (const SegmentError&) {  // as mpf inspect does
+  }
+
+  void follow(std::uint64_t value) try {
+    const auto from = value % 2 == 0 ? tools::FollowFrom::first : tools::FollowFrom::newest;
+    if (!follower_) follower_ = tools::LinkFollower::tryOpen(scene_.backplaneName(), files_.name(0), from);
+    if (!follower_) return;
+    std::vector<tools::TappedMessage> messages;
+    follower_->take(messages);
+    for (const auto& tapped : messages) {
+      if (tapped.message) lookAt(tapped.message);
+    }
+    static_cast<void>(follower_->missed());
+    static_cast<void>(follower_->isOver());
+  } catch (const SegmentError&) {
+  }
+  const Scene& scene_;
+  const HostileFiles& files_;
+  std::unique_ptr<tools::LinkFollower> follower_;
+};
+
+void play(std::span<const std::uint8_t> input) {
+  static Scene scene;
+  static HostileFiles files(scene.backplane,
+                            {scene.clientLink->link().name(), scene.serverName(), scene.clientName(), scene.hintsOf(scene.server),
+                             scene.hintsOf(scene.client), scene.bulkName(LinkSide::client), scene.bulkName(LinkSide::server)});
+  {
+    Onlooker onlooker(scene, files);
+    files.play(input, [&](std::uint64_t value) { onlooker.turn(value); });
+  }
+  files.restore();
+}
+
+}  // namespace
+}  // namespace mpf::test
+
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  mpf::test::play({data, size});
+  return 0;
+}

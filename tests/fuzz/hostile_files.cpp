@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tests/fuzz/hostile_files.h>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <fmt/format.h>
+#include <iostream>
+
+#include <mpf/base/system_call.h>
+#include <mpf/shm/segment.h>
+#include <mpf/tests/support/usage.h>
+
+namespace mpf::test {
+namespace {
+
+constexpr std::uint64_t kCheckEvery = 1024;  // inputs; a check takes as long as some tens of them
+
+std::vector<std::string> sortedNames(const Backplane& backplane) {
+  auto names = backplane.segmentNames();
+  std::ranges::sort(names);
+  return names;
+}
+
+// Descriptors and mappings of segments that this process has. Others are none of ours: the sanitizer has its own.
+std::size_t segmentsInUse() {
+  std::size_t used = Usage::of(::getpid()).segments;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;  // the directory itself
+    used += std::filesystem::read_symlink(entry, gone).string().starts_with("/dev/shm") ? 1 : 0;
+  }
+  return used;
+}
+
+std::vector<std::byte> contentOf(int file) {
+  struct stat status{};
+  checkCall(::fstat(file, &status), "look at a file");
+  std::vector<std::byte> content(static_cast<std::size_t>(status.st_size));
+  checkCall(::pread(file, content.data(), content.size(), 0), "read a file");
+  return content;
+}
+
+}  // namespace
+
+Backplane fuzzBackplane() {
+  for (const auto& name : Backplane::names()) {
+    if (name.starts_with("fuzz-")) Backplane::attach(name);
+  }
+  return Backplane::attach(fmt::format("fuzz-{:x}", segments::newIncarnation()));
+}
+
+HostileFiles::HostileFiles(const Backplane& backplane, const std::vector<std::string>& names)
+    : backplane_(backplane), lasting_(names.size()) {
+  for (const auto& name : names) add(name);
+}
+
+void HostileFiles::add(const std::string& name) {
+  FileDescriptor file(checkCall(::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC), "open", name));
+  auto content = contentOf(file.get());
+  files_.push_back({name, std::move(file), std::move(content)});
+}
+
+void HostileFiles::play(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn) {
+  for (; input.size() >= Deed::kBytes; input = input.subspan(Deed::kBytes)) {
+    const Deed deed(input.first<Deed::kBytes>());
+    if (deed.what == Deed::What::turn) turn(deed.value);
+    else act(deed);
+  }
+  turn(0);
+}
+
+void HostileFiles::act(const Deed& deed) {
+  const int file = files_[deed.file % files_.size()].file.get();
+  if (deed.what == Deed::What::cut) {
+    checkCall(::ftruncate(file, deed.at), "cut a file");
+    return;
+  }
+  constexpr std::array<std::size_t, 3> kWidths{8, 4, 1};
+  checkCall(::pwrite(file, &deed.value, kWidths[static_cast<std::size_t>(deed.what)], deed.at), "write to a file");
+}
+
+void HostileFiles::restore() {
+  files_.erase(files_.begin() + static_cast<std::ptrdiff_t>(lasting_), files_.end());
+  for (const auto& file : files_) {
+    checkCall(::ftruncate(file.file.get(), static_cast<off_t>(file.before.size())), "restore a file");
+    checkCall(::pwrite(file.file.get(), file.before.data(), file.before.size(), 0), "restore a file");
+  }
+  if (++runs_ % kCheckEvery == 0) checkNothingLeft();
+}
+
+void HostileFiles::checkNothingLeft() {
+  const auto used = segmentsInUse();
+  auto names = sortedNames(backplane_);
+  if (runs_ == kCheckEvery) {
+    used_ = used;
+    names_ = names;
+  }
+  if (used == used_ && names == names_) return;
+  std::cerr << "after " << runs_ << " inputs: " << used << " segments in use, were " << used_ << "; " << names.size() << " names, were "
+            << names_.size() << '\n';
+  std::abort();
+}
+
+}  // namespace mpf::test

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/tests/fuzz/talk.h>
+
+#include <capnp/message.h>
+#include <mutex>
+#include <sanitizer/asan_interface.h>
+
+#include <mpf/schema/conversion.h>
+#include <mpf/schema/json.h>
+#include <mpf/schema/text.h>
+
+namespace mpf::test {
+namespace {
+
+// What the last page of a link has behind its rings: nobody has business there.
+std::span<const std::byte> behind(Link& link) {
+  const auto* begin = reinterpret_cast<const std::byte*>(&link.control()) - layout::kLinkControlOffset;
+  const auto bytes = layout::linkBytes(link.header().queueSlots, link.header().replySlots);
+  const auto pages = (bytes + layout::kPageBytes - 1) / layout::kPageBytes * layout::kPageBytes;
+  return {begin + bytes, pages - bytes};
+}
+
+}  // namespace
+
+LinkSend sendArray(MessageLink& link, std::uint32_t requestId, std::size_t bytes) {
+  Message message = Char8ArrayMessage::inBuffer(link.allocate(Char8ArrayMessage::bytesFor(bytes)), bytes);
+  Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()), .requestId = requestId};
+  const std::lock_guard lock(link.lock());
+  return link.trySendLocked(envelope, message, {});
+}
+
+void lookAt(const Message& message) {
+  static_cast<void>(print(message));
+  static_cast<void>(toJson(message).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  capnp::MallocMessageBuilder builder;
+  ConversionError error;
+  static_cast<void>(tryToWire(message, builder.initRoot<wire::Envelope>(), {}, error));
+}
+
+Talk::Talk(std::unique_ptr<Link> link) : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<SpinLock>())) {
+  [[maybe_unused]] const auto nobodys = behind(channel_->link());
+  ASAN_POISON_MEMORY_REGION(nobodys.data(), nobodys.size());
+}
+
+Talk::~Talk() {
+  [[maybe_unused]] const auto nobodys = behind(channel_->link());
+  ASAN_UNPOISON_MEMORY_REGION(nobodys.data(), nobodys.size());
+}
+
+void Talk::turn(std::uint64_t value) {
+  constexpr int kMost = 8;  // messages of a turn
+  auto& link = channel_->link();
+  if (isOver_) return;
+  for (int i = 0; i < kMost && tryTakeOne(value >> i); ++i) {
+  }
+  if (link.peerState() != layout::LinkState::open || link.isLost()) link.setState(layout::LinkState::closed);
+  sendArray(*channel_, static_cast<std::uint32_t>(value), value % 2048);
+  static_cast<void>(link.isTaken(value % 8));
+  link.setWatched(value % 2 != 0);
+  link.notifyPeer();
+}
+
+// False: there is none, or nonsense, which ends the talk.
+bool Talk::tryTakeOne(std::uint64_t choice) {
+  Envelope envelope;
+  const auto take = channel_->tryBegin(envelope);
+  if (take == MessageLink::Take::nothing) return false;
+  if (take == MessageLink::Take::message && choice % 4 == 3) {
+    channel_->discard(envelope);
+    return true;
+  }
+  Message message;
+  isOver_ = take == MessageLink::Take::nonsense || !channel_->tryFinish(envelope, message);
+  if (isOver_) return false;
+  lookAt(message);
+  if (choice % 4 == 0) sendBack(envelope, message);
+  else if (choice % 4 == 1) kept_ = std::move(message);
+  return true;
+}
+
+void Talk::sendBack(Envelope envelope, Message& message) {
+  envelope.flags = layout::kSlotFirstReply;
+  const std::lock_guard lock(channel_->lock());
+  static_cast<void>(channel_->trySendLocked(envelope, message, {}));
+}
+
+}  // namespace mpf::test
