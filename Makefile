@@ -3,19 +3,19 @@
 #
 #   JOBS=n      parallel jobs (default: all processors)
 #   PREFIX=dir  where `make install` puts the tree (default /usr/local)
-#   DURATION=t  of `make soak`: 30s, 10m, 2h
+#   DURATION=t  of `make soak`: 30s, 10m, 2h; of `make fuzz`: seconds
+#   FUZZERS=... only these: client, server, tools, recording
 #   TESTS=regex only the tests whose name matches
 
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
-DURATION ?= 2h
 CTEST_FLAGS ?= --parallel $(JOBS)
 PRESETS := release debug asan tsan
 TESTED := debug asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test soak bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
+.PHONY: help setup demo test soak fuzz bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## this list
 	@sed -nE 's/^([a-z][a-z-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
@@ -29,7 +29,13 @@ demo: release ## a client, shared memory, a serial server on a terminal line, an
 test: test-debug ## build with debug information and run every test
 
 soak: debug ## hours of traffic with clients that are killed; memory and descriptors must stay flat (DURATION=2h)
-	build/debug/bin/mpf_test_soak $(DURATION)
+	build/debug/bin/mpf_test_soak $(or $(DURATION),2h)
+
+fuzz: ## contents of shared memory that harm who reads them, looked for with coverage (DURATION=60 FUZZERS=tools)
+	@scripts/setup fuzz
+	@cmake --preset fuzz --log-level=NOTICE
+	cmake --build --preset fuzz --parallel $(JOBS)
+	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
 bench: release ## how fast, beside the physical floors and other message systems
 	build/release/bin/mpf bench local

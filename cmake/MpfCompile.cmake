@@ -21,10 +21,15 @@ target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow 
 # Optimising, g++ 12 takes "a" + std::string(...) for copies that may overlap (GCC bug 105651).
 target_compile_options(mpf_warnings INTERFACE $<$<CONFIG:Release>:-Wno-restrict>)
 
+if(CMAKE_CXX_COMPILER_ID STREQUAL Clang) # for fuzzing
+  add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/scripts/kj_for_clang.h")
+  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations) # of what libstdc++ 12 itself uses
+endif()
+
 set(MPF_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
 if(MPF_SANITIZE)
   # -Og -g1: half the time to compile of -O1 -g, and the reports still name lines. g++ 12 takes what a sanitizer adds for uses of what may be uninitialised.
-  add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -Og -g1 -Wno-maybe-uninitialized)
+  add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -Og -g1 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   add_link_options(-fsanitize=${MPF_SANITIZE})
 endif()
 if(MPF_SANITIZE STREQUAL thread) # g++ warns that ThreadSanitizer does not model std::atomic_thread_fence; the tests tell whether it matters
