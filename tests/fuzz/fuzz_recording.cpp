@@ -31,7 +31,7 @@ void play(std::span<const std::uint8_t> input) try {
   tools::RecordingReader reader(fmt::format("/proc/self/fd/{}", file.get()));
   while (reader.tryNext(take)) {
   }
-} catch (const std::runtime_error&) {  // as mpf replay does
+} catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): mpf replay says so
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ class Onlooker {
   void dissect(std::size_t file, std::uint64_t value) try {
     const auto tree = tools::tryDissect(segments::path(files_.name(file)), {.last = value / 16 % 16, .raw = value / 256 % 8 == 7});
     if (tree) static_cast<void>(tools::outline(*tree));
-  } catch (const SegmentError&) {  // as mpf inspect does
+  } catch (const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool says so, and goes on
   }
 
   void follow(std::uint64_t value) try {
@@ -44,7 +44,7 @@ class Onlooker {
     }
     static_cast<void>(follower_->missed());
     static_cast<void>(follower_->isOver());
-  } catch (const SegmentError&) {
+  } catch (const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool says so, and goes on
   }
   const Scene& scene_;
   const HostileFiles& files_;

@@ -75,13 +75,12 @@ void HostileFiles::play(std::span<const std::uint8_t> input, const std::function
 }
 
 void HostileFiles::act(const Deed& deed) {
-  const int file = files_[deed.file % files_.size()].file.get();
-  if (deed.what == Deed::What::cut) {
-    checkCall(::ftruncate(file, deed.at), "cut a file");
-    return;
-  }
-  constexpr std::array<std::size_t, 3> kWidths{8, 4, 1};
-  checkCall(::pwrite(file, &deed.value, kWidths[static_cast<std::size_t>(deed.what)], deed.at), "write to a file");
+  constexpr std::array<std::size_t, 4> kWidths{8, 4, 1, 1};
+  const auto& [name, file, before] = files_[deed.file % files_.size()];
+  const auto width = kWidths[static_cast<std::size_t>(deed.what)];
+  const auto offset = static_cast<off_t>(deed.at * width % before.size());
+  if (deed.what == Deed::What::cut) checkCall(::ftruncate(file.get(), offset), "cut a file");
+  else checkCall(::pwrite(file.get(), &deed.value, width, offset), "write to a file");
 }
 
 void HostileFiles::restore() {

@@ -2,7 +2,8 @@
 // Hostile files: a fuzzer's input, done to the files of a system that was legal, while somebody looks at them.
 //
 //   input = | what | file | at | value | what | file | at | value | ...     a deed is 12 bytes: u8, u8, u16, u64
-//   what    0 write `value` at `at`, 1 its lower half, 2 its lowest byte; 3 cut the file there; 4 the victim's turn     all modulo 5
+//   what    0 write `value` over the word number `at`, 1 its lower half over a half, 2 its lowest byte over a byte; 3 cut the file before
+//           byte `at`; 4 the victim's turn                      modulo 5, places modulo what there is
 //
 // So the fuzzer starts behind magic numbers and lengths that fit, and needs few bytes to lie about one of them.
 //
