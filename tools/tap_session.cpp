@@ -129,8 +129,9 @@ void TapSession::tellMissed(Followed& followed) {
 }
 
 void TapSession::close(Followed& followed) {
-  while (take(followed)) {
-  }
+  // Whoever goes on sending is not waited for: what fits the rings is all that had been sent.
+  std::size_t left = followed.follower->header().queueSlots + std::size_t{followed.follower->header().replySlots};
+  while (left != 0 && take(followed)) left -= std::min(left, std::max<std::size_t>(batch_.size(), 1));
   tellMissed(followed);
   tellMissed(followed);
   missedBefore_ += followed.follower->missed();
