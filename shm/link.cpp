@@ -47,7 +47,8 @@ PoolPlace poolPlace(const Segment& segment, const std::string& backplane, LinkSi
 void checkGeometry(const layout::SegmentHeader& header, const std::string& name) {
   const auto queueSize = std::clamp(header.queueSize, 1u, LinkGeometry::kMaxQueueSize);
   const auto expected = LinkGeometry::forQueue(queueSize);
-  if (header.queueSize != queueSize || header.queueSlots != expected.queueSlots || header.replySlots != expected.replySlots || header.maxOutstanding != expected.maxOutstanding) {
+  if (header.queueSize != queueSize || header.queueSlots != expected.queueSlots || header.replySlots != expected.replySlots ||
+      header.maxOutstanding != expected.maxOutstanding) {
     throw SegmentError(fmt::format("{}: rings of {} and {} slots for a queue of {} make no sense", segments::path(name), header.queueSlots,
                                    header.replySlots, header.queueSize));
   }

@@ -231,9 +231,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values([](Header& header) { header.queueSize = 0; }, [](Header& header) { header.queueSize = 16385; },
                     [](Header& header) { header.queueSize = 1u << 30; }, [](Header& header) { header.queueSize = UINT32_MAX; },
                     [](Header& header) { header.queueSlots = 0; }, [](Header& header) { header.queueSlots = 3; },
-                    [](Header& header) { header.queueSlots *= 2; }, [](Header& header) { header.replySlots = UINT32_MAX; }, [](Header& header) { header.replySlots /= 2; },
-                    [](Header& header) { header.maxOutstanding = UINT32_MAX; }, [](Header& header) { ++header.serverWindow; },
-                    [](Header& header) { ++header.maxPoolBytes; }, [](Header& header) { header.totalBytes = UINT64_MAX; }));
+                    [](Header& header) { header.queueSlots *= 2; }, [](Header& header) { header.replySlots = UINT32_MAX; },
+                    [](Header& header) { header.replySlots /= 2; }, [](Header& header) { header.maxOutstanding = UINT32_MAX; },
+                    [](Header& header) { ++header.serverWindow; }, [](Header& header) { ++header.maxPoolBytes; },
+                    [](Header& header) { header.totalBytes = UINT64_MAX; }));
 
 TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
   const auto link = makeLink();

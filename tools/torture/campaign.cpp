@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include <mpf/base/stop_signals.h>
@@ -57,9 +58,9 @@ void Campaign::play(Referee& referee) {
 }
 
 void Campaign::reconnoitre(Referee& referee, Role role) {
-  for (const auto& [mark, hits] : referee.reconnoitre(role)) {
-    if (tally_.marks.contains(mark)) hits_[role][mark] = std::max(hits_[role][mark], hits);
-  }
+  std::set<std::string> wanted;
+  for (const auto& [mark, tally] : tally_.marks) wanted.insert(mark);
+  for (const auto& [mark, hits] : referee.reconnoitre(role, wanted)) hits_[role][mark] = std::max(hits_[role][mark], hits);
 }
 
 // Whether somebody comes to each step that was asked for.

@@ -81,13 +81,6 @@ Marks Marks::ofThisProgram() {
   return marks;
 }
 
-std::vector<Marks::Address> Marks::addresses() const {
-  std::vector<Address> all;
-  all.reserve(byAddress_.size());
-  for (const auto& [address, name] : byAddress_) all.push_back(address);
-  return all;
-}
-
 const std::string* Marks::find(Address address) const {
   const auto found = byAddress_.find(address);
   return found == byAddress_.end() ? nullptr : &found->second;

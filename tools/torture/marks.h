@@ -22,7 +22,6 @@ class Marks {
   // All, in alphabetical order. A step in an inline function is at several addresses.
   [[nodiscard]] const std::map<std::string, std::vector<Address>>& byName() const noexcept { return byName_; }
   [[nodiscard]] bool contains(const std::string& name) const { return byName_.contains(name); }
-  [[nodiscard]] std::vector<Address> addresses() const;
   // Name of the step at `address`; nullptr when there is none.
   [[nodiscard]] const std::string* find(Address address) const;
 

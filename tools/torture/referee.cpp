@@ -92,7 +92,7 @@ void Referee::endMortal() {
 }
 
 // Starts the one to be tormented and its companion, and lets them go.
-void Referee::live(Role role, const std::optional<Plan>& plan) {
+void Referee::live(Role role, const std::function<void(Tracee&)>& prepare) {
   boardOf(role).clear();
   pid_t pid = 0;
   if (role == Role::server) {
@@ -107,11 +107,7 @@ void Referee::live(Role role, const std::optional<Plan>& plan) {
   }
   tracee_ = std::make_unique<Tracee>(pid, marks_);
   processes_.setTracee(tracee_.get());
-  if (plan) {
-    tracee_->aim(plan->place);
-  } else {
-    tracee_->watchAll();
-  }
+  prepare(*tracee_);
   processes_.letGo();
 }
 
@@ -119,9 +115,9 @@ bool Referee::isLifeDone(Role role) const {
   return role == Role::server && repliesOf(1) - mortalReplies_ >= kLife && processes_.hasEnded(companion_);
 }
 
-std::map<std::string, std::uint64_t> Referee::reconnoitre(Role role) {
+std::map<std::string, std::uint64_t> Referee::reconnoitre(Role role, const std::set<std::string>& marks) {
   layOutCorpse();
-  live(role, std::nullopt);
+  live(role, [&](Tracee& tracee) { tracee.watch(marks); });
   torment({role, Mode::stop, {}});
   settle();
   return tracee_->hits();
@@ -130,7 +126,7 @@ std::map<std::string, std::uint64_t> Referee::reconnoitre(Role role) {
 Outcome Referee::play(const Plan& plan) {
   ++rounds_;
   layOutCorpse();
-  live(plan.role, plan);
+  live(plan.role, [&](Tracee& tracee) { tracee.aim(plan.place); });
   torment(plan);
   settle();
   return {wasThere_, tracee_->cameToNextMark()};

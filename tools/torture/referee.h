@@ -13,8 +13,8 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <random>
+#include <set>
 #include <string>
 
 #include <mpf/tools/torture/actors.h>
@@ -56,8 +56,8 @@ class Referee {
   // One round.
   //   throws  Broken when something does not hold
   Outcome play(const Plan& plan);
-  // A round in which nobody is tormented: how often each step is reached.
-  std::map<std::string, std::uint64_t> reconnoitre(Role role);
+  // A round in which nobody is tormented: how often each of these steps is reached.
+  std::map<std::string, std::uint64_t> reconnoitre(Role role, const std::set<std::string>& marks);
   [[nodiscard]] std::uint64_t rounds() const noexcept { return rounds_; }
   // What the survivors hold, in words.
   [[nodiscard]] std::string holdings() const;
@@ -69,7 +69,7 @@ class Referee {
   void layOutCorpse();
   void startMortal();
   void endMortal();
-  void live(Role role, const std::optional<Plan>& plan);
+  void live(Role role, const std::function<void(Tracee&)>& prepare);
   void torment(const Plan& plan);
   void hold(Role role);
   void checkOrderlyEnd(Role role) const;

@@ -56,13 +56,18 @@ void Tracee::patch(Marks::Address address, char instruction) const {
   checkCall(::pwrite(memory_.get(), &instruction, 1, static_cast<off_t>(address)), "write to", fmt::format("process {}", pid_));
 }
 
-void Tracee::watchAll() {
-  for (const auto address : patched_ = marks_.addresses()) patch(address, kBreakpoint);
+void Tracee::watch(const std::set<std::string>& marks) {
+  for (const auto& mark : marks) {
+    for (const auto address : marks_.byName().at(mark)) {
+      patch(address, kBreakpoint);
+      patched_.push_back(address);
+    }
+  }
 }
 
 void Tracee::aim(Place place) {
   place_ = std::move(place);
-  for (const auto address : patched_ = marks_.byName().at(place_.mark)) patch(address, kBreakpoint);
+  watch({place_.mark});
 }
 
 void Tracee::resume(pid_t thread, int signal) const noexcept {

@@ -2,7 +2,7 @@
 // Tracee: a child under ptrace that is stopped at the k-th time that it comes to a step, or n instructions behind it.
 //
 //   Tracee victim(pid, marks);       stopped
-//   victim.aim({"slot_written", 3, 17}); or victim.watchAll();
+//   victim.aim({"slot_written", 3, 17}); or victim.watch({"slot_written", "slot_published"});
 //   ... victim.handle(event) ... until victim.isThere()
 //   victim.kill() or victim.release()
 //
@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,8 +40,8 @@ class Tracee {
   //   throws  std::system_error when this is not allowed, std::runtime_error on a processor that it does not know
   Tracee(pid_t pid, const Marks& marks);
 
-  // Counts how often it comes to each step.
-  void watchAll();
+  // Counts how often it comes to each of these steps.
+  void watch(const std::set<std::string>& marks);
   // Stops it there.
   void aim(Place place);
   // What waitpid() told about a thread of it.
