@@ -31,6 +31,34 @@ using namespace std::chrono_literals;
 
 constexpr int kNotAllowed = 77;
 
+// While it lives, programs that are started have the wall clock of libfaketime; all other clocks are the host's.
+class FakeWallClock {
+ public:
+  explicit FakeWallClock(std::string file) : file_(std::move(file)) {
+    ::setenv("LD_PRELOAD", MPF_TEST_FAKETIME, 1);
+    ::setenv("FAKETIME_TIMESTAMP_FILE", file_.c_str(), 1);
+    ::setenv("FAKETIME_NO_CACHE", "1", 1);
+    ::setenv("FAKETIME_DONT_FAKE_MONOTONIC", "1", 1);
+  }
+  ~FakeWallClock() {
+    for (const auto* variable : {"LD_PRELOAD", "FAKETIME_TIMESTAMP_FILE", "FAKETIME_NO_CACHE", "FAKETIME_DONT_FAKE_MONOTONIC"})
+      ::unsetenv(variable);
+    ::unlink(file_.c_str());
+  }
+  FakeWallClock(const FakeWallClock&) = delete;
+  FakeWallClock& operator=(const FakeWallClock&) = delete;
+
+  // Ahead of the host's, or behind it: "+1h", "-1d". At once, for all programs.
+  void set(const std::string& offset) const {
+    std::ofstream(file_ + ".new") << offset << '\n';
+    checkCall(::rename((file_ + ".new").c_str(), file_.c_str()), "rename", file_);
+  }
+  static long asProgramsSeeIt() { return std::stol(Victim("/bin/date", std::vector<std::string>{"+%s"}).line()); }
+
+ private:
+  std::string file_;
+};
+
 class WorldTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -168,6 +196,35 @@ TEST_F(WorldTest, AClientWhoseClockIsAheadIsServed) {
     EXPECT_THAT(stranger.line(), testing::StartsWith("answered "));
     stranger.end(SIGKILL);
   });
+  SyncClient client(backplane_, "echo");
+  expectAnswer(client);
+}
+
+// Of all that the programs read, only the wall clock goes back a day, in the middle of their talk.
+TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "AddressSanitizer must be the first library of a program";
+#endif
+  const FakeWallClock clock(testing::TempDir() + backplane_.name());
+  clock.set("+0d");
+  Victim server("serve", backplane_.name());
+  EXPECT_EQ(server.line(), "open");
+  Victim crowd("crowd", backplane_.name(), {"5"});
+  const auto answered = [&] {
+    auto line = crowd.line();
+    while (line.starts_with("waiting: ")) line = crowd.line();
+    return line;
+  };
+  const auto first = answered();
+  EXPECT_THAT(first, testing::StartsWith("answered "));
+  const auto before = FakeWallClock::asProgramsSeeIt();
+
+  clock.set("-1d");
+  EXPECT_LT(FakeWallClock::asProgramsSeeIt(), before);
+  server.end(SIGKILL);
+  server = Victim("serve", backplane_.name());
+
+  EXPECT_THAT(answered(), testing::AllOf(testing::StartsWith("answered "), testing::Ne(first)));
   SyncClient client(backplane_, "echo");
   expectAnswer(client);
 }
