@@ -10,8 +10,8 @@
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
 CTEST_FLAGS ?= --parallel $(JOBS)
-PRESETS := release debug asan tsan
-TESTED := debug asan tsan
+PRESETS := release debug edit asan tsan
+TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
@@ -57,7 +57,7 @@ tidy: setup ## clang-tidy over the targets that changed since they were last cle
 clean: ## remove build/
 	$(RM) -r build
 
-# make release, debug, asan, tsan: build with that preset. make test-asan: and run its tests.
+# make release, debug, edit, asan, tsan: build with that preset. make test-asan: and run its tests.
 $(PRESETS): setup
 	@cmake --preset $@ --log-level=NOTICE
 	cmake --build --preset $@ --parallel $(JOBS)

@@ -12,6 +12,8 @@
 #include <ostream>
 #include <string>
 
+#include <mpf/tests/support/sanitized.h>
+
 namespace mpf::test {
 
 struct Usage {
@@ -32,9 +34,7 @@ struct Usage {
   }
   // No more than `before`, give or take what an allocator keeps.
   [[nodiscard]] bool isWithin(const Usage& before, std::size_t slackKb) const {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    slackKb = std::size_t{1} << 20;  // sanitizers keep what was freed
-#endif
+    if (kIsSanitized) slackKb = std::size_t{1} << 20;  // sanitizers keep what was freed
     return files <= before.files && segments <= before.segments && residentKb <= before.residentKb + slackKb;
   }
 };

@@ -11,6 +11,7 @@
 #include <mpf/client/sync_client.h>
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/sanitized.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -21,7 +22,7 @@ using namespace std::chrono_literals;
 
 int kills() {
   const char* set = std::getenv("MPF_TEST_KILLS");
-  return set != nullptr ? std::atoi(set) : 500;
+  return set != nullptr ? std::atoi(set) : kIsSanitized ? 100 : 500;
 }
 
 class KillTest : public testing::Test {

@@ -31,26 +31,24 @@ using namespace std::chrono_literals;
 
 constexpr int kNotAllowed = 77;
 
-// While it lives, programs that are started have the wall clock of libfaketime; all other clocks are the host's.
-class FakeWallClock {
+// While it lives, programs that are started have a wall clock that can be set back (tests/support/wall_clock.cpp).
+class WallClock {
  public:
-  explicit FakeWallClock(std::string file) : file_(std::move(file)) {
-    ::setenv("LD_PRELOAD", MPF_TEST_FAKETIME, 1);
-    ::setenv("FAKETIME_TIMESTAMP_FILE", file_.c_str(), 1);
-    ::setenv("FAKETIME_NO_CACHE", "1", 1);
-    ::setenv("FAKETIME_DONT_FAKE_MONOTONIC", "1", 1);
+  explicit WallClock(std::string file) : file_(std::move(file)) {
+    setBack(0);
+    ::setenv("LD_PRELOAD", MPF_TEST_WALL_CLOCK, 1);
+    ::setenv("MPF_TEST_WALL_CLOCK", file_.c_str(), 1);
   }
-  ~FakeWallClock() {
-    for (const auto* variable : {"LD_PRELOAD", "FAKETIME_TIMESTAMP_FILE", "FAKETIME_NO_CACHE", "FAKETIME_DONT_FAKE_MONOTONIC"})
-      ::unsetenv(variable);
+  ~WallClock() {
+    ::unsetenv("LD_PRELOAD");
     ::unlink(file_.c_str());
   }
-  FakeWallClock(const FakeWallClock&) = delete;
-  FakeWallClock& operator=(const FakeWallClock&) = delete;
+  WallClock(const WallClock&) = delete;
+  WallClock& operator=(const WallClock&) = delete;
 
-  // Ahead of the host's, or behind it: "+1h", "-1d". At once, for all programs.
-  void set(const std::string& offset) const {
-    std::ofstream(file_ + ".new") << offset << '\n';
+  // At once, for all programs.
+  void setBack(long seconds) const {
+    std::ofstream(file_ + ".new") << seconds << '\n';
     checkCall(::rename((file_ + ".new").c_str(), file_.c_str()), "rename", file_);
   }
   static long asProgramsSeeIt() { return std::stol(Victim("/bin/date", std::vector<std::string>{"+%s"}).line()); }
@@ -205,8 +203,7 @@ TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer must be the first library of a program";
 #endif
-  const FakeWallClock clock(testing::TempDir() + backplane_.name());
-  clock.set("+0d");
+  const WallClock clock(testing::TempDir() + backplane_.name());
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
   Victim crowd("crowd", backplane_.name(), {"5"});
@@ -217,10 +214,10 @@ TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
   };
   const auto first = answered();
   EXPECT_THAT(first, testing::StartsWith("answered "));
-  const auto before = FakeWallClock::asProgramsSeeIt();
+  const auto before = WallClock::asProgramsSeeIt();
 
-  clock.set("-1d");
-  EXPECT_LT(FakeWallClock::asProgramsSeeIt(), before);
+  clock.setBack(86'400);
+  EXPECT_LT(WallClock::asProgramsSeeIt(), before);
   server.end(SIGKILL);
   server = Victim("serve", backplane_.name());
 

@@ -61,6 +61,23 @@ TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
   EXPECT_EQ(run({"clean"}).out, "nothing to remove: no dead process left anything\n");
 }
 
+// Their server is stopped, and so cannot do it.
+TEST_F(CleanTest, AThousandLinksOfADeadClientAreRemoved) {
+  Victim server("serve", backplane_.name());
+  Victim crowd("crowd", backplane_.name(), {"1000"});
+  while (!crowd.line().starts_with("answered ")) continue;
+  server.signal(SIGSTOP);
+  crowd.end(SIGKILL);
+
+  const auto ended = run({"clean"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_GE(std::ranges::count(ended.out, '\n'), 1000);
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "the server's window, hints and pipe";
+  server.signal(SIGCONT);
+  server.end(SIGTERM);
+}
+
 // A rehearsal finds what the removal then removes, and changes nothing.
 TEST_F(CleanTest, ADryRunSaysWhatWouldBeRemovedAndHowItKnows) {
   const EchoThread living(backplane_, "living");

@@ -4,6 +4,7 @@
 #include <regex>
 
 #include <mpf/client/sync_client.h>
+#include <mpf/tests/support/victim.h>
 #include <mpf/tests/tools/tools_fixture.h>
 
 namespace mpf::test {
@@ -157,6 +158,21 @@ TEST_F(TapTest, FollowsItsServerThroughItsLives) {
   while (!client.call(Int32Message({.value = 2}), 1h)) continue;  // it may hear late that the server went
 
   EXPECT_EQ(nextReply(), 2);
+}
+
+TEST_F(TapTest, AThousandLinksAreFollowed) {
+  Victim server("serve", backplane_.name());
+  Victim crowd("crowd", backplane_.name(), {"1000"});
+  while (!crowd.line().starts_with("answered ")) continue;
+  const auto tool = tap({"--write", file_, "--count", "2"}, 1000);
+  SyncClient client(backplane_, "echo");
+
+  ASSERT_TRUE(client.call(Float64Message({.value = 5}), 1h));
+
+  EXPECT_THAT(tool->end().err, EndsWith("mpf tap: 2 messages seen, 0 missed\n"));
+  EXPECT_THAT(run({"replay", file_, "--speed", "0"}).out, HasSubstr("1 requests of 1 clients to \"echo\": 1 replied"));
+  crowd.end(SIGKILL);
+  server.end(SIGTERM);
 }
 
 TEST_F(TapTest, OneLinkCanBeChosen) {

@@ -118,11 +118,11 @@ TEST_P(MistakeTest, IsFound) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, MistakeTest,
-                         testing::Values(Mistake{"lose-fate", "8", "each request has an end"},
+                         testing::Values(Mistake{"lose-fate", "4", "each request has an end"},
                                          Mistake{"half-message", "30", ""},  // nonsense, or an old request once more
                                          Mistake{"keep-name", "30", "the successor could not take the place"},
-                                         Mistake{"stale", "8", "nothing stale is left; there are mpf."},
-                                         Mistake{"leak", "8", "the survivors hold no more than they did"}),
+                                         Mistake{"stale", "4", "nothing stale is left; there are mpf."},
+                                         Mistake{"leak", "4", "the survivors hold no more than they did"}),
                          [](const auto& mistake) {
                            auto name = mistake.param.name;
                            name.erase(name.find('-') == std::string::npos ? name.size() : name.find('-'), 1);
