@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/backplane.h>
 
+#include <charconv>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <mutex>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include <mpf/base/step.h>
@@ -56,7 +58,13 @@ Backplane Backplane::isolated() { return Backplane(fmt::format("isolated-{:x}", 
 const std::string& Backplane::name() const noexcept { return state_->name; }
 Watcher& Backplane::watcher() const noexcept { return state_->itsWatcher(); }
 
-std::int32_t Backplane::defaultLocation() { return std::atoi(environmentOr("MPF_LOCATION", "0").c_str()); }
+std::int32_t Backplane::defaultLocation() {
+  const auto text = environmentOr("MPF_LOCATION", "0");
+  std::int32_t location = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), location);
+  if (error == std::errc{} && end == text.data() + text.size()) return location;
+  throw std::invalid_argument(fmt::format("MPF_LOCATION \"{}\": use an integer", text));
+}
 
 std::vector<std::string> Backplane::segmentNames() const { return segments::list(SegmentName::prefix(name())); }
 

@@ -28,6 +28,7 @@ class Backplane {
   [[nodiscard]] Watcher& watcher() const noexcept;
 
   // The location of servers that say nothing else: the environment variable MPF_LOCATION, or 0.
+  //   throws  std::invalid_argument when that is no integer
   static std::int32_t defaultLocation();
 
   // Removes every segment of this backplane whose owner is proven dead (shm/remains.h). Returns their names.

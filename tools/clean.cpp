@@ -66,6 +66,8 @@ class Cleaner {
   int end() {
     if (arguments_.json) fmt::print("{}\n", files_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     else if (!isAnythingDead_) fmt::print("nothing to remove: no dead process left anything\n");
+    if (!arguments_.dryRun && unknown_ != 0)
+      fmt::print(stderr, "mpf clean: {} files could not be judged; `mpf clean --dry-run` says why\n", unknown_);
     if (arguments_.dryRun && !arguments_.json && alive_ != 0) fmt::print("{} files stay: their processes live\n", alive_);
     return left_ == 0 ? 0 : 1;
   }
@@ -88,13 +90,15 @@ class Cleaner {
   }
   void tellStays(const Judged& file) {
     if (file.verdict == Verdict::alive) ++alive_;
-    else if (arguments_.dryRun) fmt::print("{} stays: {}\n", segments::path(file.name), file.reason);
+    else ++unknown_;
+    if (file.verdict == Verdict::unknown && arguments_.dryRun) fmt::print("{} stays: {}\n", segments::path(file.name), file.reason);
   }
 
   const CleanArguments& arguments_;
   nlohmann::json files_ = nlohmann::json::array();
   std::size_t left_ = 0;   // dead, and another user's
   std::size_t alive_ = 0;
+  std::size_t unknown_ = 0;
   bool isAnythingDead_ = false;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // mpf: looks at backplanes, servers and clients, and talks to them from the shell.
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <exception>
 #include <fmt/format.h>
 #include <stdexcept>
@@ -63,7 +64,10 @@ int main(int argc, char** argv) try {
   } catch (const CLI::ParseError& error) {
     return explain(app, error);
   }
-  return run();
+  const int status = run();
+  // A full disk is found when what was printed is written.
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) throw std::runtime_error("not all of the output could be written");
+  return status;
 } catch (const std::invalid_argument& error) {
   fmt::print(stderr, "mpf: {}\n", error.what());
   return 2;

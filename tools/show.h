@@ -10,12 +10,12 @@
 
 namespace mpf::tools {
 
-// Waits for a reader that is slow; drops the rest when there is none any more.
+// Waits for a reader that is slow.
+//   throws  std::system_error when it cannot be written
 inline void show(std::string_view text) {
   while (!text.empty()) {
     const auto written = retryInterrupted([&] { return ::write(STDOUT_FILENO, text.data(), text.size()); });
-    if (written < 0) return;
-    text.remove_prefix(static_cast<std::size_t>(written));
+    text.remove_prefix(static_cast<std::size_t>(checkCall(written, "write", "stdout")));
   }
 }
 

@@ -32,7 +32,8 @@ std::uint64_t linkNumber(const std::string& digits) {
   std::uint64_t number = 0;
   const auto* const end = digits.data() + digits.size();
   if (digits.empty()) return 0;
-  if (const auto [at, failure] = std::from_chars(digits.data(), end, number, 16); failure == std::errc{} && at == end && number != 0)
+  if (const auto [at, failure] = std::from_chars(digits.data(), end, number, 16);
+      failure == std::errc{} && at == end && digits.size() == 16)
     return number;
   throw std::invalid_argument(fmt::format("tap: \"{}\" is no link: use its 16 hexadecimal digits, as tap and inspect show them", digits));
 }
@@ -49,7 +50,11 @@ int tap(const TapArguments& arguments) {
   const auto sink = sinkFor(arguments);
   TapSession session({Backplane::named(arguments.backplane).name(), arguments.server, arguments.location, linkNumber(arguments.link)},
                      *sink);
-  fmt::print(stderr, "mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(), session.links() == 1 ? "" : "s");
+  if (session.isServerThere()) {
+    fmt::print(stderr, "mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(), session.links() == 1 ? "" : "s");
+  } else {
+    fmt::print(stderr, "mpf tap: server \"{}\" at location {} is not there; waiting for it\n", arguments.server, arguments.location);
+  }
 
   const auto end = arguments.seconds > 0 ? Deadline::after(ofSeconds(arguments.seconds)) : Deadline::never();
   const auto isOver = [&] { return stopped || end.hasPassed() || (arguments.count != 0 && session.seen() >= arguments.count); };

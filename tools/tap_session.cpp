@@ -128,18 +128,22 @@ void TapSession::tellMissed(Followed& followed) {
   sink_.missed(realtimeNs(), followed.link, missed);
 }
 
-void TapSession::close(Followed& followed) {
+void TapSession::takeTheRest(Followed& followed) {
   // Whoever goes on sending is not waited for: what fits the rings is all that had been sent.
   std::size_t left = followed.follower->header().queueSlots + std::size_t{followed.follower->header().replySlots};
   while (left != 0 && take(followed)) left -= std::min(left, std::max<std::size_t>(batch_.size(), 1));
   tellMissed(followed);
   tellMissed(followed);
   missedBefore_ += followed.follower->missed();
+}
+
+void TapSession::close(Followed& followed) {
+  takeTheRest(followed);
   sink_.closed(realtimeNs(), followed.link);
 }
 
 void TapSession::finish() {
-  for (auto& [name, followed] : followed_) close(followed);
+  for (auto& [name, followed] : followed_) takeTheRest(followed);
   followed_.clear();
 }
 

@@ -42,6 +42,7 @@ class TapSession {
   // Looks a last time, and tells what is missing.
   void finish();
 
+  [[nodiscard]] bool isServerThere() const noexcept { return incarnation_ != 0; }
   [[nodiscard]] std::size_t links() const noexcept { return followed_.size(); }
   [[nodiscard]] std::uint64_t seen() const noexcept { return seen_; }
   [[nodiscard]] std::uint64_t missed() const noexcept;
@@ -62,6 +63,7 @@ class TapSession {
   void follow(const std::string& name, FollowFrom from);
   bool take(Followed& followed);
   void tellMissed(Followed& followed);
+  void takeTheRest(Followed& followed);
   void close(Followed& followed);
   [[nodiscard]] bool isWanted(const std::string& name) const;
 

@@ -71,6 +71,8 @@ TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
   EXPECT_EQ(Backplane::defaultLocation(), 0);
   ::setenv("MPF_LOCATION", "7", 1);
   EXPECT_EQ(Backplane::defaultLocation(), 7);
+  ::setenv("MPF_LOCATION", "7a", 1);
+  EXPECT_THAT(whatOf<std::invalid_argument>([] { static_cast<void>(Backplane::defaultLocation()); }), HasSubstr("MPF_LOCATION \"7a\""));
   ::unsetenv("MPF_LOCATION");
 }
 

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include <mpf/shm/segment_name.h>
 #include <mpf/tests/support/victim.h>
@@ -37,6 +38,21 @@ TEST_F(CleanTest, WithoutAnythingDeadItSaysSo) {
   EXPECT_EQ(ended.status, 0);
   EXPECT_EQ(ended.out, "nothing to remove: no dead process left anything\n");
   EXPECT_EQ(run({"call", "echo", "int32", "--timeout", "100"}).status, 0);
+}
+
+TEST_F(CleanTest, OutputThatCannotBeWrittenIsAnError) {
+  Victim shell("/bin/sh",
+               std::vector<std::string>{"-c", std::string(MPF_TEST_TOOL) + " clean --backplane " + backplane_.name() + " >/dev/full 2>/dev/null"});
+
+  EXPECT_EQ(WEXITSTATUS(shell.wait()), 1);
+}
+
+TEST_F(CleanTest, WhatCannotBeJudgedIsCounted) {
+  const auto stray = segments::path("mpf." + backplane_.name() + ".notes");
+  std::ofstream(stray) << "x";
+
+  EXPECT_THAT(run({"clean"}).err, HasSubstr("mpf clean: 1 files could not be judged; `mpf clean --dry-run` says why\n"));
+  EXPECT_TRUE(std::filesystem::remove(stray));
 }
 
 TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
