@@ -41,8 +41,8 @@ TEST_F(CleanTest, WithoutAnythingDeadItSaysSo) {
 }
 
 TEST_F(CleanTest, OutputThatCannotBeWrittenIsAnError) {
-  Victim shell("/bin/sh",
-               std::vector<std::string>{"-c", std::string(MPF_TEST_TOOL) + " clean --backplane " + backplane_.name() + " >/dev/full 2>/dev/null"});
+  Victim shell("/bin/sh", std::vector<std::string>{
+                              "-c", std::string(MPF_TEST_TOOL) + " clean --backplane " + backplane_.name() + " >/dev/full 2>/dev/null"});
 
   EXPECT_EQ(WEXITSTATUS(shell.wait()), 1);
 }
