@@ -226,6 +226,24 @@ TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
   expectAnswer(client);
 }
 
+// As when the host sleeps, but that the clocks went on: all stand still in the middle of what they do, and nobody takes anybody for dead.
+TEST_F(WorldTest, ProcessesThatAllStoodStillGoOn) {
+  Victim crowd("crowd", backplane_.name(), {"20"});
+  EXPECT_THAT(crowd.line(), testing::StartsWith("waiting: "));
+  Victim server("serve", backplane_.name());
+  for (const auto* const process : {&server, &crowd}) {
+    process->signal(SIGSTOP);
+    EXPECT_EQ(::waitpid(process->pid(), nullptr, WUNTRACED), process->pid());
+  }
+
+  for (const auto* const process : {&crowd, &server}) process->signal(SIGCONT);
+
+  EXPECT_EQ(server.line(), "open");
+  EXPECT_THAT(crowd.line(), testing::StartsWith("answered "));
+  SyncClient client(backplane_, "echo");
+  expectAnswer(client);
+}
+
 TEST_F(WorldTest, AProcessWithoutDescriptorsLeftIsToldSoAndRecovers) {
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
