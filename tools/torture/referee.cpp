@@ -49,7 +49,11 @@ Referee::Referee(const Marks& marks, const Options& options)
 Referee::~Referee() {
   (*world_).isOver.store(1);
   processes_.killAll();  // and none of them is left to leave something behind
-  static_cast<void>(Backplane::named(backplane_).removeDead());
+  // A child that somebody left behind, which is not ours to wait for, ends soon after.
+  const auto backplane = Backplane::named(backplane_);
+  const auto patience = Deadline::after(std::chrono::seconds(5));
+  do static_cast<void>(backplane.removeDead());
+  while (!backplane.segmentNames().empty() && !patience.hasPassed());
 }
 
 Cast Referee::cast() { return {*world_, backplane_, static_cast<std::uint32_t>(random_()), options_.sabotage}; }
