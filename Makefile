@@ -4,29 +4,44 @@
 #   JOBS=n      parallel jobs (default: all processors)
 #   PREFIX=dir  where `make install` puts the tree (default /usr/local)
 #   DURATION=t  of `make soak`: 30s, 10m, 2h; of `make fuzz`: seconds
-#   FUZZERS=... only these: client, server, tools, recording
+#   FUZZERS=... only these: client, server, tools, recording, frames, server_router, client_router
 #   TESTS=regex only the tests whose name matches
+#   BENCH=...   of `make bench`: local (default), remote or hardware
 
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
-CTEST_FLAGS ?= --parallel $(JOBS)
+CTEST_FLAGS ?= --parallel $(shell expr 2 \* $(JOBS))
 PRESETS := release debug edit asan tsan
 TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test soak fuzz bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
+.PHONY: help setup demo test test-big-endian test-tpci200 soak fuzz bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## this list
-	@sed -nE 's/^([a-z][a-z-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
+	@sed -nE 's/^([a-z][a-z0-9-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 24
 
 setup: ## install what is missing from Debian packages (every other target calls it)
 	@scripts/setup
 
-demo: release ## a client, shared memory, a serial server on a terminal line, and what a crash does
+demo: release ## a voltmeter, its server, clients, and what a crash does; then modules that are wired to each other
 	./demo/run build/release
+	./demo/hardware build/release
 
 test: test-debug ## build with debug information and run every test
+
+test-big-endian: debug ## messages between this host and one of the other byte order, which is emulated
+	@scripts/setup big-endian
+	@scripts/big-endian-sysroot
+	@cmake --preset big-endian --log-level=NOTICE
+	cmake --build --preset big-endian --parallel $(JOBS)
+	ctest --preset big-endian $(CTEST_FLAGS)
+	MPF_TEST_BIG_ENDIAN="$(CURDIR)/build/big-endian" ctest --preset debug $(CTEST_FLAGS) --label-regex '^byte_order_test$$'
+
+test-tpci200: debug ## the PCI carrier and serial servers on octal UARTs behind it, in a machine that is emulated
+	@scripts/setup tpci200
+	@scripts/tpci200-machine make build/debug
+	MPF_TEST_TPCI200="$(CURDIR)/build/debug" ctest --preset debug $(CTEST_FLAGS) --label-regex '^tpci200_test$$'
 
 soak: debug ## hours of traffic with clients that are killed; memory and descriptors must stay flat (DURATION=2h)
 	build/debug/bin/mpf_test_soak $(or $(DURATION),2h)
@@ -37,8 +52,8 @@ fuzz: ## contents of shared memory that harm who reads them, looked for with cov
 	cmake --build --preset fuzz --parallel $(JOBS)
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
-bench: release ## how fast, beside the physical floors and other message systems
-	build/release/bin/mpf bench local
+bench: release ## how fast, beside the physical floors and other message systems; BENCH=remote: between hosts; BENCH=hardware: servers over models
+	build/release/bin/mpf bench $(or $(BENCH),local)
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"
@@ -49,10 +64,10 @@ format: setup ## format all sources
 format-check: setup ## name the sources that `make format` would change
 	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
 
-tidy: setup ## clang-tidy over the targets that changed since they were last clean
+tidy: setup ## clang-tidy over the targets that changed since they were last clean (FOLDERS="shm router": only there)
 	@cmake --preset tidy --log-level=NOTICE
 	@cmake --build --preset tidy --parallel $(JOBS)
-	scripts/tidy build/tidy $(JOBS)
+	scripts/tidy build/tidy $(JOBS) $(FOLDERS)
 
 clean: ## remove build/
 	$(RM) -r build

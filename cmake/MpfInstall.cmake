@@ -1,8 +1,27 @@
 # The installed tree: one library, its headers, mpf::mpf, pkg-config mpf, the programs and their man pages.
 include(CMakePackageConfigHelpers)
 
-# The libraries that other repositories link, as one archive libmpf.a: no link order to know, one name to write.
-set(publicLibraries mpf_base mpf_schema mpf_shm mpf_channel mpf_client mpf_server mpf_drivers_serial)
+# Appends to `out` the targets of `type` that the CMakeLists of `folder` and below define.
+function(mpf_find_targets out folder type)
+  get_property(targets DIRECTORY "${folder}" PROPERTY BUILDSYSTEM_TARGETS)
+  get_property(subfolders DIRECTORY "${folder}" PROPERTY SUBDIRECTORIES)
+  foreach(target IN LISTS targets)
+    get_target_property(targetType ${target} TYPE)
+    if(targetType STREQUAL type)
+      list(APPEND ${out} ${target})
+    endif()
+  endforeach()
+  foreach(subfolder IN LISTS subfolders)
+    mpf_find_targets(${out} "${subfolder}" ${type})
+  endforeach()
+  set(${out} "${${out}}" PARENT_SCOPE)
+endfunction()
+
+# The libraries that other repositories link, as one archive libmpf.a: no link order to know, one name to write. Those of drivers/ are all public.
+set(publicLibraries mpf_base mpf_schema mpf_shm mpf_channel mpf_client mpf_server)
+if(drivers IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/drivers/CMakeLists.txt")
+  mpf_find_targets(publicLibraries "${CMAKE_SOURCE_DIR}/drivers" STATIC_LIBRARY)
+endif()
 set(publicFolders base schema shm channel client server drivers)
 
 # What those may link from outside, and how a consumer finds it: target, find_package() arguments, pkg-config name ("-": none needed).
@@ -65,7 +84,8 @@ target_include_directories(mpf_all INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL
 foreach(folder IN LISTS publicFolders)
   foreach(origin "${CMAKE_SOURCE_DIR}/${folder}/" "${CMAKE_BINARY_DIR}/generated/mpf/${folder}/")
     install(DIRECTORY "${origin}" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mpf/${folder} OPTIONAL
-      FILES_MATCHING PATTERN "*.h" PATTERN "*.capnp" PATTERN programs EXCLUDE)
+      FILES_MATCHING PATTERN "*.h" PATTERN "*.capnp" PATTERN programs EXCLUDE
+      PATTERN command_line.h EXCLUDE) # of programs; not in the archive
   endforeach()
 endforeach()
 
@@ -84,26 +104,10 @@ install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR}
 
 # ---- programs and man pages: every executable of these folders
 
-# Appends to `out` the executables that the CMakeLists of `folder` and below define.
-function(mpf_find_programs out folder)
-  get_property(targets DIRECTORY "${folder}" PROPERTY BUILDSYSTEM_TARGETS)
-  get_property(subfolders DIRECTORY "${folder}" PROPERTY SUBDIRECTORIES)
-  foreach(target IN LISTS targets)
-    get_target_property(type ${target} TYPE)
-    if(type STREQUAL EXECUTABLE)
-      list(APPEND ${out} ${target})
-    endif()
-  endforeach()
-  foreach(subfolder IN LISTS subfolders)
-    mpf_find_programs(${out} "${subfolder}")
-  endforeach()
-  set(${out} "${${out}}" PARENT_SCOPE)
-endfunction()
-
 set(programs "")
-foreach(folder client server tools benchmarks)
+foreach(folder client server router tools benchmarks)
   if(folder IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
-    mpf_find_programs(programs "${CMAKE_SOURCE_DIR}/${folder}")
+    mpf_find_targets(programs "${CMAKE_SOURCE_DIR}/${folder}" EXECUTABLE)
   endif()
 endforeach()
 if(programs)

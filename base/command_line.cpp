@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/base/command_line.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <fmt/format.h>
+#include <limits>
+#include <system_error>
+
+#include <mpf/base/version.h>
+
+namespace mpf {
+namespace {
+
+std::string subcommandsOf(const CLI::App& app) {
+  std::string names;
+  for (const auto* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names += (names.empty() ? "" : ", ") + command->get_name();
+  }
+  return names;
+}
+
+// "mpf call" of `mpf call echo`: the program and the subcommands that were chosen.
+std::string chosenCommand(const CLI::App& app) {
+  std::string name = app.get_name();
+  for (const auto* command = &app; !command->get_subcommands().empty();) {
+    command = command->get_subcommands().front();
+    name += " " + command->get_name();
+  }
+  return name;
+}
+
+int explain(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+  const auto command = chosenCommand(app);
+  const auto subcommands = subcommandsOf(app);
+  if (command != app.get_name() || subcommands.empty()) return refuseArguments(command, error.what());
+  if (const auto words = app.remaining(); !words.empty()) {
+    fmt::print(stderr, "{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(),
+               subcommands, command);
+  } else {
+    fmt::print(stderr, "{}", app.help());
+  }
+  return 2;
+}
+
+// Whether all of `text` is a number, which is then in `value`.
+template <class Number>
+bool isNumber(const std::string& text, Number& value) {
+  const auto* const end = text.data() + text.size();
+  const auto [stopped, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && stopped == end;
+}
+
+template <class Number>
+CLI::Validator inRange(Number least, Number most) {
+  return CLI::Validator(
+      [least, most](const std::string& text) {
+        Number value{};
+        const bool good = isNumber(text, value) && value >= least && value <= most;  // NaN is not
+        if (good) return std::string();
+        if (most == std::numeric_limits<Number>::max()) return fmt::format("{} is out of range: use {} or more", text, least);
+        return fmt::format("{} is out of range: use {} to {}", text, least, most);
+      },
+      {});
+}
+
+}  // namespace
+
+std::optional<int> parseCommandLine(CLI::App& app, int argc, const char* const* argv) try {
+  app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), kVersion), "Print the version");
+  app.parse(argc, argv);
+  return std::nullopt;
+} catch (const CLI::ParseError& error) {
+  return explain(app, error);
+}
+
+int refuseArguments(const std::string& program, const std::string& why) {
+  fmt::print(stderr, "{}: {}; `{} --help` shows how to use it\n", program, why, program);
+  return 2;
+}
+
+CLI::Validator wholeNumber(std::uint64_t least, std::uint64_t most) { return inRange(least, most); }
+CLI::Validator number(double least, double most) { return inRange(least, most); }
+
+}  // namespace mpf
