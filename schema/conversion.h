@@ -10,6 +10,7 @@
 
 #include <capnp/message.h>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -43,6 +44,8 @@ struct ConversionError {
                              ConversionError& error);
 
 // Makes the message that `envelope` holds; arrays on the heap. nullopt: see `error`. Throws std::bad_alloc.
-[[nodiscard]] std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error);
+//   allocate  gives the memory for an array, as allocateHeapBody() does
+[[nodiscard]] std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
+                                                 const std::function<BodyBytes(std::size_t)>& allocate = allocateHeapBody);
 
 }  // namespace mpf

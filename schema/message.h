@@ -55,6 +55,7 @@ class RouteKeeper {
   ~RouteKeeper() = default;
 };
 
+inline constexpr std::uint32_t kEndsRequest = 1;  // in the flags of what a client got: it ended its request
 // Where a reply to this message goes. For transports; copied into replies, carried through servers, never interpreted by them.
 struct Route {
   std::uint64_t link{};

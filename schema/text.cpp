@@ -89,7 +89,8 @@ Expected parseInto(Integer& to, std::string_view text)
   std::uint64_t magnitude = 0;
   const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), magnitude, hexadecimal ? 16 : 10);
   const auto most = static_cast<std::uint64_t>(std::numeric_limits<Integer>::max());
-  const auto limit = !negative ? most : std::is_signed_v<Integer> ? most + 1 : 0;
+  const auto allBits = static_cast<std::uint64_t>(std::numeric_limits<std::make_unsigned_t<Integer>>::max());
+  const auto limit = negative ? (std::is_signed_v<Integer> ? most + 1 : 0) : hexadecimal ? allBits : most;
   if (failure != std::errc{} || end != digits.data() + digits.size() || magnitude > limit) {
     return "an integer from " + std::to_string(std::numeric_limits<Integer>::min()) + " to " +
            std::to_string(std::numeric_limits<Integer>::max());

@@ -31,8 +31,8 @@ namespace mpf {
 
 // Makes a message from words `field=value`; fields not named are 0, arrays empty.
 //
-//   words     integers decimal or 0x hexadecimal; numbers as strtod; statuses by name; characters as themselves or escaped; `value=1,2,3`;
-//             strings C-escaped, quotes around them optional; eomString sets eomLen too
+//   words     integers decimal, or hexadecimal as bits: 0xffffffff is -1 of 32 bits; numbers as strtod; statuses by name; characters as
+//             themselves or escaped; `value=1,2,3`; strings C-escaped, quotes around them optional; eomString sets eomLen too
 //   error     "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, clientType, clientExtra"
 //   returns   nullopt with `error` set
 [[nodiscard]] std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error);

@@ -69,6 +69,15 @@ TEST(Text, ParsesTheWordsOfAShell) {
   EXPECT_EQ(message.getClientExtra(), 4);
 }
 
+// A mask is all bits of a field, whatever its sign.
+TEST(Text, TakesHexadecimalAsBits) {
+  EXPECT_EQ(parsed<Int32>({"address=0xffffffff"})->address, -1);
+  EXPECT_EQ(parsed<Int32>({"address=0x80000000"})->address, INT32_MIN);
+  EXPECT_EQ(parsed<Int32>({"address=-0x1"})->address, -1);
+  EXPECT_THAT(parsed<Int32Array>({"value=0xfffffffe,2"}).value(), testing::ElementsAre(-2, 2));
+  EXPECT_EQ(parsed<Connect>({"incarnation=0xffffffffffffffff"})->incarnation, UINT64_MAX);
+}
+
 TEST(Text, ParsesArrays) {
   EXPECT_THAT(parsed<Int32Array>({"value=1,-2,3", "cmd=2"}).value(), testing::ElementsAre(1, -2, 3));
   EXPECT_EQ(parsed<Int32Array>({"value=1,2", "cmd=2"})->cmd, 2);
@@ -105,7 +114,8 @@ TEST(Text, NamesTheBadFieldAndTheAllowedOnes) {
 }
 
 TEST(Text, RefusesWordsThatAreNotQuiteNumbers) {
-  for (const auto* const bad : {"value=", "value=1x", "value= 1", "value=-", "value=0x", "value=--1", "value=1.5", "value=-2147483649"}) {
+  for (const auto* const bad : {"value=", "value=1x", "value= 1", "value=-", "value=0x", "value=--1", "value=1.5", "value=-2147483649",
+                                "value=0x100000000", "value=-0x80000001", "value=4294967295"}) {
     EXPECT_NE(refusal(MessageType::int32, {bad}), "") << bad;
   }
   for (const auto* const bad : {"value=1,,2", "value=1,", "value=,1", "value=1;2"}) {
