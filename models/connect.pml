@@ -4,7 +4,8 @@
 //   client  look up name ─ link: made, open, named ─ knock ─ (nudge) ─ connected ─ request ─ reply or fate ─ link closed, name removed
 //   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply        a second life follows the first
 //
-//   MODELS  client/binding.cpp: tryConnect wish onLinkState disconnect nudge leave
+//   MODELS  client/connect.cpp: tryConnect wish
+//   MODELS  client/binding.cpp: onLinkState disconnect nudge leave
 //   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer

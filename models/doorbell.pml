@@ -5,7 +5,7 @@
 //
 //   MODELS  shm/endpoint.cpp: sleep announce hasNews interrupt takeLocalNews arm disarm
 //   MODELS  shm/window.cpp: wakeIfAsleep ring
-//   MODELS  shm/doorbell.cpp: sleep ring ringFifo drainFifo
+//   MODELS  shm/doorbell.cpp: sleep ring tryRingFifo drainFifo
 //   HOLDS   no wake-up is lost: the owner never sleeps for ever while a message or the news of a death waits for it
 //   HOLDS   so on the futex and on the descriptor, also when a peer is killed between its message and its ring
 //   ASSUMES the kernel compares the bell and puts to sleep in one step; FUTEX_WAKE is a fence for who calls it
@@ -18,6 +18,9 @@
 //   BREAK   BELL_RELAXED     the bell may change before the news for which it rings is visible
 //   BREAK   DRAIN_LATE       the descriptor is drained after the look
 //   BREAK   NO_DEATH_NEWS    nobody tells of a death
+//   BREAK   NUMBER_KEPT      a sleep has the number of the one before, for which a peer has rung
+//   BREAK   NUMBER_LATE      the number of a sleep is stored after the look
+//   BREAK   STATE_EARLY      a peer looks how the owner sleeps before it reads the number: it may ring another bell
 #define PEERS 2
 #define OWNER 2
 #define WATCHER 3
@@ -25,8 +28,9 @@
 #define SENT(peer) (peer)
 #define SLEEPING 2
 #define LOCAL_NEWS 3
-#define WORDS 4
-#define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, SLEEPING) FLUSH(WATCHER, LOCAL_NEWS)
+#define NUMBER 4
+#define WORDS 5
+#define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, SLEEPING) FLUSH(OWNER, NUMBER) FLUSH(WATCHER, LOCAL_NEWS)
 #include "memory.pml"
 
 #define MESSAGES(peer) (2 - (peer))
@@ -42,6 +46,9 @@ bool senderEnded[PEERS];
 
 byte taken[PEERS];
 bool deathSeen;
+byte sleeps;          // the number of the owner's sleep
+byte number;          // that peer 0 has read
+byte rungFor;         // the number for which it has rung
 
 #define hasMessage (memory[SENT(0)] != taken[0] || memory[SENT(1)] != taken[1])
 #define hasLocalNews (memory[LOCAL_NEWS] == 1 && !deathSeen)
@@ -68,6 +75,18 @@ inline ringBell(process) {
   asleep = false
 }
 
+// Peer 0 alone sends twice, and so may have rung before; what is known after its last message means nothing.
+inline forget(process) {
+  d_step {
+    state = AWAKE;
+    if
+    :: process == 0 -> number = 0; if :: sent[0] == MESSAGES(0) -> rungFor = 0 :: else fi
+    :: else
+    fi
+  }
+}
+#define hasRung (me == 0 && number != 0 && number == rungFor)
+
 proctype Peer(byte me) {
   byte state;
   {
@@ -77,16 +96,36 @@ proctype Peer(byte me) {
 #ifndef NO_PEER_FENCE
       fence(me);
 #endif
+#ifndef STATE_EARLY
+      if :: me == 0 -> number = memory[NUMBER] :: else fi;
+#endif
       state = memory[SLEEPING];
+#ifdef STATE_EARLY
+      if :: me == 0 -> number = memory[NUMBER] :: else fi;
+#endif
       if
       :: state == AWAKE
-      :: state == ON_FUTEX -> ringBell(me)
-      :: state == ON_DESCRIPTOR -> readable = true
-      fi
+      :: state != AWAKE && hasRung
+      :: state == ON_FUTEX && !hasRung -> ringBell(me); if :: me == 0 -> rungFor = number :: else fi
+      :: state == ON_DESCRIPTOR && !hasRung -> readable = true; if :: me == 0 -> rungFor = number :: else fi
+      fi;
+      forget(me)
     :: sent[me] == MESSAGES(me) -> break
     od
   } unless { dead[me] };
   senderEnded[me] = true
+}
+
+inline newNumber() {
+#ifdef NUMBER_KEPT
+  sleeps = 1
+#else
+  // Numbers matter only where a peer compares them: one that nobody has may stay.
+  if
+  :: sleeps == 0 || sleeps == number || sleeps == rungFor -> sleeps++
+  :: else
+  fi
+#endif
 }
 
 active proctype Owner() {
@@ -99,6 +138,11 @@ active proctype Owner() {
     changed = false;
 #endif
     store(OWNER, SLEEPING, ON_FUTEX);
+#ifndef NUMBER_LATE
+    atomic { newNumber(); storeRelease(OWNER, NUMBER, sleeps) }
+#else
+    newNumber();
+#endif
 #ifndef NO_OWNER_FENCE
     fence(OWNER);
 #endif
@@ -112,6 +156,9 @@ active proctype Owner() {
 #ifdef BELL_READ_LATE
       changed = false;
 #endif
+#ifdef NUMBER_LATE
+      store(OWNER, NUMBER, sleeps);
+#endif
       futexWait()
     fi;
     store(OWNER, SLEEPING, AWAKE)
@@ -120,6 +167,11 @@ active proctype Owner() {
     readable = false;
 #endif
     store(OWNER, SLEEPING, ON_DESCRIPTOR);
+#ifndef NUMBER_LATE
+    atomic { newNumber(); storeRelease(OWNER, NUMBER, sleeps) }
+#else
+    newNumber();
+#endif
 #ifndef NO_OWNER_FENCE
     fence(OWNER);
 #endif
@@ -132,6 +184,9 @@ active proctype Owner() {
 #endif
 #ifdef DRAIN_LATE
       readable = false;
+#endif
+#ifdef NUMBER_LATE
+      store(OWNER, NUMBER, sleeps);
 #endif
       readable || allSeen
     fi;

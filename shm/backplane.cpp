@@ -22,12 +22,12 @@ struct Backplane::State {
   Watcher& itsWatcher() {
     const std::lock_guard lock(mutex);
     // NOLINTNEXTLINE(bugprone-unused-return-value)
-    if (watcher->isInherited()) static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>()).release());
+    if (watcher->isInherited()) static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>(name)).release());
     return *watcher;
   }
   std::string name;
   std::mutex mutex;
-  std::unique_ptr<Watcher> watcher = std::make_unique<Watcher>();
+  std::unique_ptr<Watcher> watcher = std::make_unique<Watcher>(name);
 };
 
 namespace {

@@ -48,15 +48,15 @@ FileDescriptor tryOpenFifo(const std::string& name) noexcept {
   return fifo;
 }
 
-void ringFifo(const FileDescriptor& fifo) noexcept {
+bool tryRingFifo(const FileDescriptor& fifo) noexcept {
   const char one = 1;
-  // A full FIFO is readable already.
-  [[maybe_unused]] const auto written = ::write(fifo.get(), &one, 1);
+  return ::write(fifo.get(), &one, 1) == 1 || errno == EAGAIN;  // a full FIFO is readable already
 }
 
 void drainFifo(const FileDescriptor& fifo) noexcept {
   std::array<char, 256> discarded;
-  while (::read(fifo.get(), discarded.data(), discarded.size()) > 0) {
+  // Less than there was room for: it is empty now, and what comes from now on is news again.
+  while (::read(fifo.get(), discarded.data(), discarded.size()) == static_cast<ssize_t>(discarded.size())) {
   }
 }
 

@@ -43,7 +43,8 @@ void ring(layout::Word32& bell) noexcept;
 // The descriptor form: a FIFO in /dev/shm, readable when it was rung.
 FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t group);
 FileDescriptor tryOpenFifo(const std::string& name) noexcept;
-void ringFifo(const FileDescriptor& fifo) noexcept;
+// False: nobody was rung, for there is no FIFO.
+bool tryRingFifo(const FileDescriptor& fifo) noexcept;
 void drainFifo(const FileDescriptor& fifo) noexcept;
 
 }  // namespace mpf::doorbell

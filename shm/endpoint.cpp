@@ -55,14 +55,23 @@ void Endpoint::attach(std::uint32_t index, Link& link) {
 }
 
 void Endpoint::detach(std::uint32_t index) noexcept {
-  for (std::size_t position = 0; position < hotCount_; ++position) {
-    if (hot_[position].index == index) cool(position);
-  }
+  coolLink(index);
   if (links_[index] != nullptr) {
     control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
   }
   links_[index] = nullptr;
   freeIndices_.push_back(index);
+}
+
+void Endpoint::hold(std::uint32_t index) noexcept {
+  coolLink(index);
+  links_[index] = nullptr;
+}
+
+void Endpoint::release(std::uint32_t index, Link& link) noexcept {
+  links_[index] = &link;
+  setReadyBit(index);
+  window_.ring();
 }
 
 std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::SegmentKind kind) {
@@ -85,7 +94,7 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
 
 void Endpoint::dropPeers() noexcept {
   for (auto peer = peers_.begin(); peer != peers_.end();) {
-    if (!peer->second.window.expired()) {
+    if (peer->second.window.use_count() > 1) {  // the watcher's is one
       ++peer;
       continue;
     }
@@ -188,7 +197,13 @@ void Endpoint::cool(std::size_t position) noexcept {
   const auto hot = hot_[position];
   hot_[position] = hot_[--hotCount_];
   hot.link->setWatched(false);
-  if (hot.link->hasMessage()) setReadyBit(hot.index);
+  if (hot.link->hasNews()) setReadyBit(hot.index);
+}
+
+void Endpoint::coolLink(std::uint32_t index) noexcept {
+  for (std::size_t position = 0; position < hotCount_; ++position) {
+    if (hot_[position].index == index) return cool(position);
+  }
 }
 
 void Endpoint::coolAll() noexcept {
@@ -254,7 +269,7 @@ bool Endpoint::hasNews() const noexcept {
   return isRevisitDue() || hasHints();
 }
 
-bool Endpoint::isRevisitDue() const noexcept { return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasMessage(); }
+bool Endpoint::isRevisitDue() const noexcept { return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasNews(); }
 
 bool Endpoint::wait(Deadline deadline) noexcept {
   slept_ = false;
@@ -287,6 +302,8 @@ bool Endpoint::spin(Deadline deadline) noexcept {
 void Endpoint::announce(layout::SleepState how) noexcept {
   coolAll();
   control().sleeping.store(how, std::memory_order_relaxed);
+  // PAIR(sleep-number): who sees the number rings as this sleep, or a later one, wants it.
+  control().sleepNumber.store(++sleepNumber_, std::memory_order_release);
   MPF_STEP(sleep_announced);
   // PAIR(sleep-fence): our announcement before, the last look after.
   doorbell::fence();
@@ -321,7 +338,7 @@ bool Endpoint::tryLookAtAll() noexcept {
     lookedAtAllNs_ = nowNs;
   }
   for (std::uint32_t index = 0; index < links_.size(); ++index) {
-    if (links_[index] != nullptr && links_[index]->hasMessage()) setReadyBit(index);
+    if (links_[index] != nullptr && links_[index]->hasNews()) setReadyBit(index);
   }
   return true;
 }

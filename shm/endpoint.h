@@ -42,6 +42,9 @@ class Endpoint {
   std::optional<std::uint32_t> tryReserve() noexcept;
   void attach(std::uint32_t index, Link& link);
   void detach(std::uint32_t index) noexcept;
+  // What comes of a held link is no news until it is released.
+  void hold(std::uint32_t index) noexcept;
+  void release(std::uint32_t index, Link& link) noexcept;
   // A peer's window, mapped once and watched: its death comes as local news, with peer()->isDead() on the links.
   std::shared_ptr<PeerWindow> peer(const std::string& name, layout::SegmentKind kind);
 
@@ -94,6 +97,7 @@ class Endpoint {
   std::optional<std::uint32_t> takeReadyBit(std::size_t word) noexcept;
   void heat(std::uint32_t index) noexcept;
   void cool(std::size_t position) noexcept;
+  void coolLink(std::uint32_t index) noexcept;
   void coolAll() noexcept;
   void setReadyBit(std::uint32_t index) noexcept;
   [[nodiscard]] bool hasNews() const noexcept;
@@ -123,6 +127,7 @@ class Endpoint {
   std::atomic<std::uint32_t> localNews_{0};
   std::atomic<bool> peerDied_{false};
   bool armed_ = false;
+  std::uint64_t sleepNumber_ = 0;  // of the last sleep that was announced
   bool slept_ = false;
   std::int64_t wakeNs_ = 10'000;
   std::uint32_t spinShift_ = 0;  // spinning that did not pay is tried shorter

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Layout: every byte that processes share. docs/shm-layout.md tells the same to writers of a second reader.
 //
-// Four kinds of segment, each a file in /dev/shm that starts with a SegmentHeader:
+// Each kind of segment is a file in /dev/shm that starts with a SegmentHeader:
 //
 //   mpf.<backplane>.s.<location>.<server>   server window   ┐ WindowControl: sleeping, state, counters, histograms.
 //   mpf.<backplane>.c.<incarnation>         client window   ┘ Written by the owner alone, mapped read-only by its peers.
@@ -9,6 +9,7 @@
 //   mpf.<backplane>.l.<server>.<link>       link            two rings of one client-server pair, mapped by these two alone.
 //   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks for messages that do not fit a ring; `side` writes.
 //   mpf.<backplane>.w.<incarnation>         wish            a client that waits for a server: the header alone.
+//   mpf.<backplane>.r.<incarnation>         router          a router's connections to others, for reports. Locked and written by the router.
 //
 // Threads  each word has one writing process, named next to it; WindowHints are the exception and only hints.
 // Crash    segments appear under their name complete and locked (or not at all); messages appear with one release store.
@@ -34,7 +35,7 @@ inline constexpr std::size_t kCacheLineBytes = 64;
 inline constexpr std::size_t kPairBytes = 128;  // two lines: the adjacent-line prefetcher pulls both
 inline constexpr std::size_t kPageBytes = 4096;
 
-inline constexpr std::uint32_t kMaxLinks = 16384;        // links of one window
+inline constexpr std::uint32_t kMaxLinks = 16384;  // links of one window
 inline constexpr std::uint32_t kMaxRingSlots = 1u << 16;  // slots of one ring
 inline constexpr std::uint32_t kKnocks = 64;
 inline constexpr std::size_t kBackplaneChars = 40;  // including the terminating zero, as below
@@ -46,7 +47,7 @@ using Word64 = std::atomic<std::uint64_t>;
 static_assert(Word32::is_always_lock_free && sizeof(Word32) == 4);
 static_assert(Word64::is_always_lock_free && sizeof(Word64) == 8);
 
-enum class SegmentKind : std::uint32_t { serverWindow = 1, clientWindow = 2, hints = 3, link = 4, bulk = 5, wish = 6 };
+enum class SegmentKind : std::uint32_t { serverWindow = 1, clientWindow = 2, hints = 3, link = 4, bulk = 5, wish = 6, router = 7 };
 
 // First 512 bytes of every segment. Written before the segment gets its name, constant afterwards.
 struct SegmentHeader {
@@ -54,13 +55,13 @@ struct SegmentHeader {
   std::uint16_t layoutMajor;
   std::uint16_t layoutMinor;
   SegmentKind kind;
-  std::uint64_t totalBytes;      // the file is at least this long
-  std::uint64_t incarnation;     // unique on this host
-  std::uint64_t ownerWindow;     // incarnation of the window whose lock tells whether the owner lives; a window names itself
-  std::int32_t ownerPid;         // as seen in pidNamespace
+  std::uint64_t totalBytes;  // the file is at least this long
+  std::uint64_t incarnation;  // unique on this host
+  std::uint64_t ownerWindow;  // incarnation of the window whose lock tells whether the owner lives; a window names itself
+  std::int32_t ownerPid;  // as seen in pidNamespace
   std::uint32_t ownerUid;
   std::uint64_t ownerStartTicks;  // field 22 of /proc/<pid>/stat
-  std::uint64_t pidNamespace;     // inode of /proc/self/ns/pid
+  std::uint64_t pidNamespace;  // inode of /proc/self/ns/pid
   std::int64_t createdMonotonicNs;
   std::int64_t createdRealtimeNs;
   std::int32_t location;
@@ -70,20 +71,20 @@ struct SegmentHeader {
   std::array<char, kProgramChars> program;
 
   // Geometry of rings and pools. A link has all of it; of a server window, the limits and rights are what it offers.
-  std::uint32_t queueSlots;      // slots of the request ring, a power of two
-  std::uint32_t replySlots;      // slots of the reply ring, a power of two
-  std::uint32_t queueSize;       // requests of one client that may wait
+  std::uint32_t queueSlots;  // slots of the request ring, a power of two
+  std::uint32_t replySlots;  // slots of the reply ring, a power of two
+  std::uint32_t queueSize;  // requests of one client that may wait
   std::uint32_t maxOutstanding;  // requests of one client that may be unanswered
   std::uint64_t maxMessageBytes;
   std::uint64_t maxPoolBytes;  // bulk memory that one side of a link may create
-  std::uint32_t linkMode;      // rights of links and hints, as in chmod
-  std::uint32_t linkGroup;     // their group, or ~0 for the creator's own
-  std::uint32_t waitMode;      // of the owner: 0 spin, 1 adaptive, 2 block
+  std::uint32_t linkMode;  // rights of links and hints, as in chmod
+  std::uint32_t linkGroup;  // their group, or ~0 for the creator's own
+  std::uint32_t waitMode;  // of the owner: 0 spin, 1 adaptive, 2 block
 
   // Link only.
-  std::uint32_t clientIndex;      // bit of this link in the client window's ready bits
-  std::uint64_t serverWindow;     // incarnation
-  std::uint64_t clientWindow;     // incarnation
+  std::uint32_t clientIndex;  // bit of this link in the client window's ready bits
+  std::uint64_t serverWindow;  // incarnation
+  std::uint64_t clientWindow;  // incarnation
   std::uint64_t ringBytesOffset;  // offset of LinkControl; rings follow it
 
   // Bulk only.
@@ -112,26 +113,28 @@ enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2
 // What a window's owner says of itself. At offset 512 of a server or client window. Every word is written by the owner.
 struct WindowControl {
   alignas(kPairBytes) std::atomic<SleepState> sleeping;  // announced before a sleep, withdrawn after it
+  Word64 sleepNumber;  // of the sleep that is announced: who has rung for it need not ring again; 0: nobody says
   alignas(kPairBytes) std::atomic<WindowState> state;
   Word32 linkCount;
-  Word32 queueSize;       // requests of one client that may wait, for links made from now on (server windows)
+  Word32 queueSize;  // requests of one client that may wait, for links made from now on (server windows)
   Word32 reserved0;
-  Word64 progress;        // grows with every message handled
-  Word64 progressAtNs;    // CLOCK_MONOTONIC when `progress` was last sampled
+  Word64 progress;  // grows with every message handled
+  Word64 progressAtNs;  // CLOCK_MONOTONIC when `progress` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken
-  Word64 sent;                          // messages pushed
-  Word64 replyQueueFull;                // replies refused because the client did not take them
-  Word64 queueFull;                     // sends refused because the server's queue was full or owed too many replies (client windows)
-  Word64 expired;                       // requests that were dropped because their deadline had passed
-  Word64 refused;                       // requests answered with the fate `refused`
-  Word64 wakes;                         // times that the owner slept and was woken
+  Word64 sent;  // messages pushed
+  Word64 replyQueueFull;  // replies refused because the client did not take them
+  Word64 queueFull;  // sends refused because the server's queue was full or owed too many replies (client windows)
+  Word64 expired;  // requests that were dropped because their deadline had passed
+  Word64 refused;  // requests answered with the fate `refused`
+  Word64 wakes;  // times that the owner slept and was woken
   Word64 linksOpened;
   Word64 linksClosed;
   Word64 peersDied;
   Word64 protocolErrors;  // nonsense read from a peer; each costs that link
-  std::array<Word64, kHistogramBuckets / 4> reserved;
+  Word64 alarms;  // faults of the hardware that a server drives
+  std::array<Word64, (kHistogramBuckets / 4) - 1> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
-  Histogram serviceNs;    // server: from take to reply; client: from send to reply, sampled
+  Histogram serviceNs;  // server: from take to reply; client: from send to reply, sampled
 };
 inline constexpr std::size_t kWindowControlOffset = 512;
 inline constexpr std::size_t kWindowBytes = kWindowControlOffset + sizeof(WindowControl);
@@ -139,12 +142,12 @@ inline constexpr std::size_t kWindowBytes = kWindowControlOffset + sizeof(Window
 // Hints of a window, written by every peer and by the owner. Losing or inventing one costs a wake-up, never a message.
 struct WindowHints {
   SegmentHeader header;
-  alignas(kPairBytes) Word32 bell;               // changes with every ring; the futex that the owner sleeps on
-  alignas(kPairBytes) Word32 knocked;            // changes with every knock
-  Word32 rescan;                                 // not 0: a knock was overwritten, look for new links by name
+  alignas(kPairBytes) Word32 bell;  // changes with every ring; the futex that the owner sleeps on
+  alignas(kPairBytes) Word32 knocked;  // changes with every knock
+  Word32 rescan;  // not 0: a knock was overwritten, look for new links by name
   alignas(kPairBytes) std::array<Word64, kKnocks> knocks;  // incarnations of links that wait to be accepted
   alignas(kPairBytes) std::array<Word64, kMaxLinks / 64 / 64> readyWords;  // bit w: readyBits[w] is not zero
-  alignas(kPairBytes) std::array<Word64, kMaxLinks / 64> readyBits;        // bit i: link i has news
+  alignas(kPairBytes) std::array<Word64, kMaxLinks / 64> readyBits;  // bit i: link i has news
 };
 static_assert(offsetof(WindowHints, bell) == 512);
 
@@ -190,8 +193,8 @@ static_assert(sizeof(ChunkRef) == 16);
 // What the consumer of a ring says. Written by the consumer alone.
 struct RingControl {
   alignas(kPairBytes) Word32 unwatched;  // 1: not polled directly, set the ready bit; 0: polled
-  alignas(kPairBytes) Word64 freed;      // slots before this position may be overwritten
-  Word64 taken;                          // messages taken so far; one that is not counted here has not been looked at
+  alignas(kPairBytes) Word64 freed;  // slots before this position may be overwritten
+  Word64 taken;  // messages taken so far; one that is not counted here has not been looked at
 };
 
 // Chunks on their way home. Written by the borrower, read by the pool's owner.
@@ -206,16 +209,16 @@ enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused =
 struct LinkControl {
   alignas(kPairBytes) std::atomic<LinkState> clientState;  // client
   Word64 clientSent;
-  Word64 clientRefused;     // sends refused: queue full, too many unanswered, too large, no memory
+  Word64 clientRefused;  // sends refused: queue full, too many unanswered, too large, no memory
   Word64 clientUnanswered;  // requests without a reply or fate
   alignas(kPairBytes) std::atomic<LinkState> serverState;  // server
-  Word32 serverIndex;       // bit of this link in the server window's ready bits
+  Word32 serverIndex;  // bit of this link in the server window's ready bits
   Word32 reserved0;
   Word64 serverSent;
   RingControl requests;  // consumer: server
-  RingControl replies;   // consumer: client
+  RingControl replies;  // consumer: client
   ReturnRing requestChunks;  // client's pool: borrower server
-  ReturnRing replyChunks;    // server's pool: borrower client
+  ReturnRing replyChunks;  // server's pool: borrower client
 };
 inline constexpr std::size_t kLinkControlOffset = 512;
 inline constexpr std::size_t kLinkRingsOffset = kLinkControlOffset + sizeof(LinkControl);
@@ -227,6 +230,40 @@ static_assert(kLinkRingsOffset % kPairBytes == 0);
 
 // Chunks of a bulk segment start here, each chunkBytes long.
 inline constexpr std::size_t kBulkChunksOffset = kPageBytes;
+
+// One connection of a router, or one remote that it is to be connected to. Written by the router.
+enum class RouterLineState : std::uint32_t { none = 0, waiting = 1, connecting = 2, connected = 3 };
+enum class RouterRole : std::uint32_t { none = 0, client = 1, server = 2 };
+struct RouterLine {
+  std::atomic<RouterLineState> state;
+  std::atomic<RouterRole> role;
+  Word32 isTls;
+  Word32 texts;  // changes of the texts; odd while they change
+  Word64 sinceNs;  // CLOCK_MONOTONIC since when it is connected, or is not
+  Word64 connects;  // times that it was connected
+  Word64 queueSize;  // messages that may wait for the line
+  Word64 inQueue;  // and that do
+  Word64 queueFull;  // requests that found a far server's queue full (client), or a server's here (server)
+  Word64 messagesSent;
+  Word64 messagesReceived;
+  Word64 framesSent;  // each one write
+  Word64 framesReceived;
+  Word64 bytesSent;
+  Word64 bytesReceived;
+  Word64 roundTripNs;  // of the last ping
+  Word64 clients;
+  Word64 bindings;  // servers that somebody wanted
+  std::array<char, 80> address;
+  std::array<char, kNameChars> peer;  // what it calls itself
+  std::array<char, kProgramChars> program;  // its program and version
+  std::array<char, kNameChars> locations;  // "1, 2"
+  std::array<char, 144> problem;  // why it is not connected
+};
+static_assert(sizeof(RouterLine) == 512);
+
+inline constexpr std::uint32_t kRouterLines = 256;
+inline constexpr std::size_t kRouterLinesOffset = 512;
+inline constexpr std::size_t kRouterBytes = kRouterLinesOffset + kRouterLines * sizeof(RouterLine);
 
 // Nothing above has a constructor that does work, a pointer, a bool or a size_t.
 static_assert(std::is_standard_layout_v<SegmentHeader> && std::is_trivially_copyable_v<SegmentHeader>);

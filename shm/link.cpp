@@ -129,6 +129,8 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
 
 Link::~Link() {
   if (side_ == LinkSide::client && !origin_.isInherited()) segments::remove(segment_.name());
+  // A client that has ended the link may have removed what there was before our last: then it is for us to remove.
+  if (leavesPool_ && peerState() == layout::LinkState::open && peer_->hasOwner()) pool_.leaveNames();
 }
 
 void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept {
@@ -148,6 +150,15 @@ layout::LinkState Link::peerState() const noexcept {
   // PAIR(link-state): what the peer prepared.
   return peers.load(std::memory_order_acquire);
 }
+
+bool Link::tryLeavePoolToClient() noexcept {
+  if (pool_.bytes() == 0) return true;
+  const auto client = peer_->user();
+  leavesPool_ = client == ::geteuid() || client == 0;
+  return leavesPool_;
+}
+
+bool Link::hasPeerEnded() const noexcept { return peerState() >= layout::LinkState::closed || peer_->isDead() || !peer_->hasOwner(); }
 
 void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
@@ -211,13 +222,23 @@ void Link::release(const std::byte* data) noexcept {
   }
 }
 
-std::optional<Chunk> Link::tryChunk(const Envelope& envelope) noexcept {
+std::optional<Chunk> Link::tryChunk(const Envelope& envelope) {
   layout::ChunkRef ref{};
   if (inlineCapacity() == 0) return std::nullopt;
   copyBody(std::as_writable_bytes(std::span(&ref, 1)));
-  auto chunk = ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : borrowed_.tryBorrow(ref);
+  auto chunk = ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
   if (!chunk || envelope.bodyBytes > chunk->capacity) return std::nullopt;
   return chunk;
+}
+
+std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
+  try {
+    auto chunk = borrowed_.tryBorrow(ref);
+    if (chunk || !hasPeerEnded()) return chunk;
+  } catch (const std::exception&) {  // no descriptor, no memory
+  }
+  borrowed_.giveBack(ref);
+  throw ChunkUnavailable();
 }
 
 void Link::setWatched(bool watched) noexcept {

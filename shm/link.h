@@ -10,6 +10,7 @@
 #pragma once
 
 #include <algorithm>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <span>
@@ -25,6 +26,9 @@ enum class LinkSide : std::uint32_t { client = 0, server = 1 };
 
 // Whether a message was sent. `sentInPlace`: the chunk that held the body is the peer's now; after all others the caller keeps it.
 enum class LinkSend { sent, sentInPlace, full, tooLarge, noMemory };
+
+// Memory that a peer lent us went with the peer, or we lack the descriptors or the memory to look at it.
+class ChunkUnavailable final : public std::exception {};
 
 // Sizes of a link that follow from the length of its queue.
 struct LinkGeometry {
@@ -60,6 +64,10 @@ class Link {
   // Our half of the state, and the peer's as it says.
   void setState(layout::LinkState state) noexcept;
   [[nodiscard]] layout::LinkState peerState() const noexcept;
+  // The peer has ended the link, or itself: what it left in the rings may speak of memory that is gone.
+  [[nodiscard]] bool hasPeerEnded() const noexcept;
+  // For a server that ends: its client finds the memory of what it has yet to take, and removes it. False: that of this user may not.
+  [[nodiscard]] bool tryLeavePoolToClient() noexcept;
   // Tells the peer to look at this link, whether it polls it or not.
   void notifyPeer() noexcept;
 
@@ -85,13 +93,16 @@ class Link {
 
   // --- receiving ---
   [[nodiscard]] bool hasMessage() const noexcept { return in_.hasMessage(); }
+  // The same, or the peer has ended the link: one hint may have told of both, and only the first was looked at.
+  [[nodiscard]] bool hasNews() const noexcept { return hasMessage() || peerState() >= layout::LinkState::closed; }
   [[nodiscard]] Envelope begin() noexcept { return in_.begin(); }
   [[nodiscard]] std::size_t inlineCapacity() const noexcept { return in_.inlineCapacity(); }
   void copyBody(std::span<std::byte> body) const noexcept { in_.copyBody(body); }
   // All that the first slot of the message begun may hold.
   void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept { in_.copyFirst(body); }
   // The chunk of a kSlotChunk message begun: borrowed, or our own come back. nullopt: nonsense.
-  std::optional<Chunk> tryChunk(const Envelope& envelope) noexcept;
+  //   throws  ChunkUnavailable: its memory cannot be had, and the chunk has been given back
+  std::optional<Chunk> tryChunk(const Envelope& envelope);
   void end() noexcept { in_.end(); }
   [[nodiscard]] std::uint64_t receivedMessages() const noexcept { return in_.messages(); }
 
@@ -106,6 +117,7 @@ class Link {
  private:
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
   void afterPush() noexcept;
+  std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
   Origin origin_;
   Segment segment_;
@@ -117,6 +129,7 @@ class Link {
   RingProducer out_;
   RingConsumer in_;
   PoolOwner pool_;
+  bool leavesPool_ = false;
   PoolBorrower borrowed_;
 };
 

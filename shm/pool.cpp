@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <ranges>
 #include <utility>
 
 #include <mpf/base/step.h>
@@ -34,8 +35,8 @@ PoolOwner::PoolOwner(PoolPlace place, Rights rights, std::uint64_t maxBytes, lay
     : place_(std::move(place)), rights_(rights), maxBytes_(maxBytes), returns_(&returns) {}
 
 PoolOwner::~PoolOwner() {
-  if (origin_.isInherited()) return;
-  for (const auto& bulk : bulks_) segments::remove(bulk.segment.name());
+  if (origin_.isInherited() || leavesNames_) return;
+  for (const auto& bulk : std::views::reverse(bulks_)) segments::remove(bulk.segment.name());
 }
 
 std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
@@ -141,14 +142,14 @@ bool PoolBorrower::tryMap(std::uint32_t number) {
   return true;
 }
 
-std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) noexcept try {
+std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) try {
   if (ref.segment >= kMaxBulks || ref.side != place_.side) return std::nullopt;
   if (ref.segment >= bulks_.size()) bulks_.resize(ref.segment + 1);
   const auto& bulk = bulks_[ref.segment];
   if (!bulk.segment && !tryMap(ref.segment)) return std::nullopt;
   if (ref.chunk >= bulk.chunkCount || bulk.segment.isLost()) return std::nullopt;
   return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + ref.chunk * bulk.chunkBytes, bulk.chunkBytes, ref};
-} catch (const std::exception&) {
+} catch (const SegmentError&) {
   return std::nullopt;
 }
 
@@ -172,8 +173,9 @@ std::optional<layout::ChunkRef> PoolBorrower::tryFind(const std::byte* data) con
 
 void removeBulk(const std::string& backplane, std::uint64_t link) {
   for (std::uint32_t side = 0; side < 2; ++side) {
-    for (std::uint32_t segment = 0; segments::remove(SegmentName::bulk(backplane, link, side, segment)); ++segment) {
-    }
+    std::uint32_t count = 0;
+    while (segments::exists(SegmentName::bulk(backplane, link, side, count))) ++count;
+    while (count != 0) segments::remove(SegmentName::bulk(backplane, link, side, --count));
   }
 }
 

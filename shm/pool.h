@@ -54,6 +54,8 @@ class PoolOwner {
   // Where a pointer into this pool belongs to; nullopt when it is not ours.
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
+  // Its segments keep their names, which somebody else will remove.
+  void leaveNames() noexcept { leavesNames_ = true; }
 
  private:
   enum class ChunkState : std::uint8_t { free, held, lent };
@@ -75,6 +77,7 @@ class PoolOwner {
   std::uint64_t bytes_ = 0;
   layout::ReturnRing* returns_;
   std::uint64_t collected_ = 0;
+  bool leavesNames_ = false;
   std::uint32_t inUse_ = 0;  // chunks held or lent, at most kReturnSlots
   std::vector<Bulk> bulks_;
 };
@@ -85,7 +88,8 @@ class PoolBorrower {
       : place_(std::move(place)), maxBytes_(maxBytes), returns_(&returns) {}
 
   // The memory of a chunk that the peer sent; nullopt when there is no such chunk.
-  std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref) noexcept;
+  //   throws  std::system_error, std::bad_alloc: it cannot be looked at, for lack of descriptors or memory
+  std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
   void giveBack(const layout::ChunkRef& ref) noexcept;
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
 
@@ -104,7 +108,8 @@ class PoolBorrower {
   std::vector<Bulk> bulks_;  // index = segment number; empty where not mapped
 };
 
-// Removes the bulk segments of a link, of both sides.
+// Removes the bulk segments of a link, of both sides; the last ones first, as their owner does: whoever is killed meanwhile leaves no gap in
+// their numbers, behind which nobody would look.
 void removeBulk(const std::string& backplane, std::uint64_t link);
 
 }  // namespace mpf

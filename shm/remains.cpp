@@ -82,6 +82,8 @@ class Judge {
       add(name, clients_[parsed.incarnation] = judgeWindow(name, layout::SegmentKind::clientWindow));
     } else if (parsed.kind == NameKind::hints) {
       add(name, hints_[parsed.incarnation] = judgeKeyed(name));  // every peer may write over their header
+    } else if (parsed.kind == NameKind::router) {
+      add(name, judgeKeyed(name));
     }
   }
 
@@ -141,7 +143,9 @@ bool tryRemove(const Judged& file) {
   const auto parsed = SegmentName::tryParse(file.name);
   if (file.verdict != Verdict::dead || !parsed) return false;
   // The name of a server window may be a successor's by now: the lock is asked again, and held until the name is gone.
-  if (parsed->kind == NameKind::hints || parsed->kind == NameKind::clientWindow) return segments::removeKeyedIfOwnerless(file.name);
+  if (parsed->kind == NameKind::hints || parsed->kind == NameKind::clientWindow || parsed->kind == NameKind::router) {
+    return segments::removeKeyedIfOwnerless(file.name);
+  }
   return parsed->kind == NameKind::serverWindow ? segments::removeIfOwnerless(file.name) : segments::remove(file.name);
 }
 

@@ -44,6 +44,7 @@ struct Rights {
   mode_t mode = 0600;
   std::uint32_t group = ~std::uint32_t{0};
   std::uint32_t user = ~std::uint32_t{0};
+  bool operator==(const Rights&) const = default;
 };
 
 class Segment {
@@ -103,6 +104,7 @@ namespace segments {
 
 // Removes the name. False when there was none.
 bool remove(const std::string& name);
+[[nodiscard]] bool exists(const std::string& name);
 
 // A copy of the header, checked as when the segment is opened; nothing is mapped. nullopt when there is none of that name.
 //   throws  as Segment::tryOpen
@@ -125,12 +127,13 @@ std::vector<std::string> list(const std::string& prefix);
 // Path of a segment's file.
 std::string path(const std::string& name);
 
-// A text in a header. Whoever may write to /dev/shm chooses these bytes: none of them shall command a terminal.
+// Whoever may write to /dev/shm chooses what stands there: none of these characters shall command a terminal.
+std::string printable(std::string text);
+
+// A text in a header, printable.
 template <std::size_t n>
 std::string text(const std::array<char, n>& chars) {
-  std::string text(chars.begin(), std::find(chars.begin(), chars.end(), '\0'));
-  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');
-  return text;
+  return printable({chars.begin(), std::find(chars.begin(), chars.end(), '\0')});
 }
 
 // 64 random bits, never 0.

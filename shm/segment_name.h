@@ -10,7 +10,16 @@
 namespace mpf {
 
 // Name of a segment whose key is an incarnation number.
-enum class NameKind : char { serverWindow = 's', clientWindow = 'c', hints = 'h', link = 'l', bulk = 'b', wish = 'w', fifo = 'f' };
+enum class NameKind : char {
+  serverWindow = 's',
+  clientWindow = 'c',
+  hints = 'h',
+  link = 'l',
+  bulk = 'b',
+  wish = 'w',
+  fifo = 'f',
+  router = 'r'
+};
 
 struct SegmentName {
   // Throws std::invalid_argument, naming it, when a backplane name is empty, too long or has other characters than [A-Za-z0-9_-].

@@ -32,26 +32,28 @@ void add(int epoll, int fd, Watcher::Token token) {
   checkCall(::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
 }
 
-// Whether an inotify buffer tells of a new server window, or of so many names that some were lost.
-bool tellsOfServer(const char* events, std::size_t bytes) {
+// The kinds of the backplane's new names that an inotify buffer tells of; of so many that some were lost, `*`.
+std::string kindsIn(const char* events, std::size_t bytes, const std::string& backplane) {
+  std::string kinds;
   for (std::size_t at = 0; at < bytes;) {
     inotify_event event{};
     std::memcpy(&event, events + at, sizeof event);
     const auto* name = events + at + sizeof event;
-    if ((event.mask & IN_Q_OVERFLOW) != 0) return true;
+    if ((event.mask & IN_Q_OVERFLOW) != 0) return "*";
     if (event.len != 0) {
       const auto parsed = SegmentName::tryParse(name);
-      if (parsed && parsed->kind == NameKind::serverWindow) return true;
+      if (parsed && parsed->backplane == backplane) kinds += static_cast<char>(parsed->kind);
     }
     at += sizeof event + event.len;
   }
-  return false;
+  return kinds;
 }
 
 }  // namespace
 
-Watcher::Watcher()
-    : epoll_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
+Watcher::Watcher(std::string backplane)
+    : backplane_(std::move(backplane)),
+      epoll_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
       stop_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")),
       timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create")) {
   add(epoll_.get(), stop_.get(), kStop);
@@ -85,12 +87,12 @@ Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback cal
   return token;
 }
 
-Watcher::Token Watcher::watchNames(Callback callback) {
+Watcher::Token Watcher::watchNames(NameKind kind, Callback callback) {
   const std::lock_guard lock(mutex_);
   start();
   if (nameCallbacks_.empty()) openNames();
   const auto token = next_++;
-  nameCallbacks_.emplace(token, std::move(callback));
+  nameCallbacks_.emplace(token, Names{kind, std::move(callback)});
   updateTimer();
   return token;
 }
@@ -154,19 +156,20 @@ void Watcher::report(Token token) {
   peer.callback();
 }
 
+// A buffer of them a turn: who fills /dev/shm with names, as every user may, keeps nobody from the lock.
 void Watcher::readNames() {
   alignas(inotify_event) std::array<char, 4096> events;
-  bool news = false;
-  for (ssize_t got = 0; (got = ::read(names_.get(), events.data(), events.size())) > 0;) {
-    news = tellsOfServer(events.data(), static_cast<std::size_t>(got)) || news;
-  }
-  if (news) tellOfNames();
+  const auto got = ::read(names_.get(), events.data(), events.size());
+  if (got <= 0) return;
+  const auto kinds = kindsIn(events.data(), static_cast<std::size_t>(got), backplane_);
+  const bool someLost = kinds.find('*') != std::string::npos;
+  tellOfNames([&](NameKind kind) { return someLost || kinds.find(static_cast<char>(kind)) != std::string::npos; });
 }
 
-void Watcher::tellOfNames() {
+void Watcher::tellOfNames(const std::function<bool(NameKind)>& isNew) {
   auto callbacks = nameCallbacks_;  // a callback may forget
-  for (const auto& [token, callback] : callbacks) {
-    if (nameCallbacks_.contains(token)) callback();
+  for (const auto& [token, names] : callbacks) {
+    if (isNew(names.kind) && nameCallbacks_.contains(token)) names.callback();
   }
 }
 
@@ -180,7 +183,7 @@ void Watcher::poll() {
   for (const auto token : gone) {
     if (peers_.contains(token)) report(token);
   }
-  if (!names_) tellOfNames();
+  if (!names_) tellOfNames([](NameKind) { return true; });
 }
 
 void Watcher::updateTimer() {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Watcher: one thread of a process that tells when a peer has died and when a server has appeared. It sleeps all the time,
+// Watcher: one thread of a process that tells when a peer has died and when a server or a wish has appeared. It sleeps all the time,
 // and begins when there is somebody to watch.
 //
 //   pidfd readable ─► lock of the peer's window free? ─► dead: callback, once
-//   /dev/shm gets a new name of our backplane ─► callback for those who wait for a server
+//   /dev/shm gets a new name ─► callback for those who wait for its kind: clients for a server, routers for a wish
 //
 // Threads  any thread may call; callbacks run on the watcher's thread and must not wait.
 // Crash    what it cannot see by a pidfd (another pid namespace, a pid taken over) it sees by asking for the lock every 100 ms.
@@ -20,6 +20,7 @@
 
 #include <mpf/base/file_descriptor.h>
 #include <mpf/shm/origin.h>
+#include <mpf/shm/segment_name.h>
 #include <mpf/shm/window.h>
 
 namespace mpf {
@@ -29,13 +30,14 @@ class Watcher {
   using Callback = std::function<void()>;
   using Token = std::uint64_t;
 
-  Watcher();
+  // Of the names in /dev/shm, those of this backplane are news.
+  explicit Watcher(std::string backplane);
   ~Watcher();
 
   // Calls back once when the owner of `peer` is proven dead (then peer->isDead()) or its window is gone.
   Token watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
-  // Calls back whenever a server window may have appeared, or links may want to be cleaned up.
-  Token watchNames(Callback callback);
+  // Calls back whenever a segment of this kind may have appeared.
+  Token watchNames(NameKind kind, Callback callback);
   // After return the callback does not run and will not run again.
   void forget(Token token);
   [[nodiscard]] bool isInherited() const noexcept { return origin_.isInherited(); }
@@ -53,11 +55,16 @@ class Watcher {
   void report(Token token);
   void openNames();
   void readNames();
-  void tellOfNames();
+  struct Names {
+    NameKind kind;
+    Callback callback;
+  };
+  void tellOfNames(const std::function<bool(NameKind)>& isNew);
   void poll();
   void updateTimer();
 
   Origin origin_;
+  std::string backplane_;
   FileDescriptor epoll_;
   FileDescriptor stop_;
   FileDescriptor timer_;
@@ -66,7 +73,7 @@ class Watcher {
   std::recursive_mutex mutex_;  // callbacks run under it, so that forget() can promise what it does
   Token next_ = 16;             // below: our own descriptors
   std::map<Token, Peer> peers_;
-  std::map<Token, Callback> nameCallbacks_;
+  std::map<Token, Names> nameCallbacks_;
   std::thread thread_;
 };
 

@@ -103,7 +103,7 @@ OwnWindow::~OwnWindow() {
 void OwnWindow::ring() const noexcept {
   if (origin_.isInherited()) return;
   doorbell::ring(hints().bell);
-  doorbell::ringFifo(fifo_);
+  static_cast<void>(doorbell::tryRingFifo(fifo_));
 }
 
 std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout::SegmentKind kind) {
@@ -155,15 +155,26 @@ void PeerWindow::wakeIfAsleep() noexcept {
   MPF_STEP(peer_told);
   // PAIR(sleep-fence): our news before, the owner's announcement after.
   doorbell::fence();
+  // PAIR(sleep-number): before how it sleeps.
+  const auto number = control().sleepNumber.load(std::memory_order_acquire);
   const auto sleeping = control().sleeping.load(std::memory_order_relaxed);
   if (sleeping == layout::SleepState::awake) return;
+  // Who has been woken and has not run yet still looks asleep: one ring for each sleep is enough. It must be one of our own, which is
+  // complete; another process may be stopped in the middle of its. An owner that has gone to sleep anew meanwhile, and whose number we do
+  // not see yet, will see our news: its fence comes after ours.
+  if (number != 0 && rungFor_.load(std::memory_order_relaxed) == number) return;
+  if (tryRing(sleeping)) rungFor_.store(number, std::memory_order_relaxed);
+}
+
+// False: it was not rung, for lack of descriptors, say.
+bool PeerWindow::tryRing(layout::SleepState sleeping) noexcept {
   if (sleeping == layout::SleepState::onFutex) {
     doorbell::ring(hints().bell);
-    return;
+    return true;
   }
   const std::lock_guard lock(fifoMutex_);
   if (!fifo_) fifo_ = doorbell::tryOpenFifo(fifoName_);
-  doorbell::ringFifo(fifo_);
+  return doorbell::tryRingFifo(fifo_);
 }
 
 }  // namespace mpf

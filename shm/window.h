@@ -79,6 +79,8 @@ class PeerWindow {
   void notify(std::uint32_t index) noexcept;
   // Asks the owner to accept link `incarnation`.
   void knock(std::uint64_t incarnation) noexcept;
+  // The next news rings, whatever was rung before: for who waits for long, and whose ring may have been taken by somebody else.
+  void doubtRing() noexcept { rungFor_.store(0, std::memory_order_relaxed); }
 
   // Set by the watcher once the owner is proven dead; stays.
   [[nodiscard]] bool isDead() const noexcept { return dead_.load(std::memory_order_relaxed); }
@@ -92,12 +94,14 @@ class PeerWindow {
 
  private:
   void wakeIfAsleep() noexcept;
+  bool tryRing(layout::SleepState sleeping) noexcept;
   [[nodiscard]] layout::WindowHints& hints() const noexcept { return hints_.at<layout::WindowHints>(0); }
   Segment window_;
   Segment hints_;
   std::string fifoName_;
   std::mutex fifoMutex_;
   FileDescriptor fifo_;  // opened when the owner first sleeps on its descriptor
+  std::atomic<std::uint64_t> rungFor_{0};  // the number of the owner's sleep for which this process has rung last
   std::atomic<bool> dead_{false};
 };
 

@@ -79,7 +79,7 @@ TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
 TEST_F(BackplaneTest, IsolatedOnesDiffer) { EXPECT_NE(Backplane::isolated().name(), Backplane::isolated().name()); }
 
 TEST_F(BackplaneTest, CopiesShareTheirWatcher) {
-  const auto copy = backplane_;
+  const Backplane copy = backplane_;
 
   EXPECT_EQ(&copy.watcher(), &backplane_.watcher());
 }

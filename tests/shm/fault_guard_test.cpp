@@ -200,9 +200,6 @@ TEST_F(FaultGuard, AThreadOfOursCanMeetACutFile) {
 }
 
 TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
-#ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "ThreadSanitizer takes the mapping that replaces another for a write to it";
-#endif
   for (int round = 0; round < 50; ++round) {
     const auto segment = publish();
     cut(file_);

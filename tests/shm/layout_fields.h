@@ -60,12 +60,12 @@ inline nlohmann::json layoutFields() {
   {
     using Struct = WindowControl;
     all["WindowControl"] = {{"bytes", sizeof(Struct)},
-                            {"fields", {MPF_FIELD(sleeping),  MPF_FIELD(state),          MPF_FIELD(linkCount),    MPF_FIELD(queueSize),
-                                        MPF_FIELD(reserved0), MPF_FIELD(progress),       MPF_FIELD(progressAtNs), MPF_FIELD(received),
-                                        MPF_FIELD(sent),      MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),    MPF_FIELD(expired),
-                                        MPF_FIELD(refused),   MPF_FIELD(wakes),          MPF_FIELD(linksOpened),  MPF_FIELD(linksClosed),
-                                        MPF_FIELD(peersDied), MPF_FIELD(protocolErrors), MPF_FIELD(reserved),     MPF_FIELD(queueWaitNs),
-                                        MPF_FIELD(serviceNs)}}};
+                            {"fields", {MPF_FIELD(sleeping),    MPF_FIELD(sleepNumber), MPF_FIELD(state),          MPF_FIELD(linkCount),
+                                        MPF_FIELD(queueSize),   MPF_FIELD(reserved0),   MPF_FIELD(progress),       MPF_FIELD(progressAtNs),
+                                        MPF_FIELD(received),    MPF_FIELD(sent),        MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),
+                                        MPF_FIELD(expired),     MPF_FIELD(refused),     MPF_FIELD(wakes),          MPF_FIELD(linksOpened),
+                                        MPF_FIELD(linksClosed), MPF_FIELD(peersDied),   MPF_FIELD(protocolErrors), MPF_FIELD(alarms),
+                                        MPF_FIELD(reserved),    MPF_FIELD(queueWaitNs), MPF_FIELD(serviceNs)}}};
   }
   {
     using Struct = Histogram;
@@ -109,6 +109,34 @@ inline nlohmann::json layoutFields() {
     using Struct = ChunkRef;
     all["ChunkRef"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(reserved)}}};
   }
+  {
+    using Struct = RouterLine;
+    all["RouterLine"] = {{"bytes", sizeof(Struct)},
+                         {"fields",
+                          {MPF_FIELD(state),
+                           MPF_FIELD(role),
+                           MPF_FIELD(isTls),
+                           MPF_FIELD(texts),
+                           MPF_FIELD(sinceNs),
+                           MPF_FIELD(connects),
+                           MPF_FIELD(queueSize),
+                           MPF_FIELD(inQueue),
+                           MPF_FIELD(queueFull),
+                           MPF_FIELD(messagesSent),
+                           MPF_FIELD(messagesReceived),
+                           MPF_FIELD(framesSent),
+                           MPF_FIELD(framesReceived),
+                           MPF_FIELD(bytesSent),
+                           MPF_FIELD(bytesReceived),
+                           MPF_FIELD(roundTripNs),
+                           MPF_FIELD(clients),
+                           MPF_FIELD(bindings),
+                           MPF_FIELD(address),
+                           MPF_FIELD(peer),
+                           MPF_FIELD(program),
+                           MPF_FIELD(locations),
+                           MPF_FIELD(problem)}}};
+  }
   return all;
 }
 
@@ -129,7 +157,9 @@ inline nlohmann::json layoutConstants() {
           {"inlineBodyBytes", kInlineBodyBytes},
           {"knocks", kKnocks},
           {"returnSlots", kReturnSlots},
-          {"histogramBuckets", kHistogramBuckets}};
+          {"histogramBuckets", kHistogramBuckets},
+          {"routerLinesOffset", kRouterLinesOffset},
+          {"routerLines", kRouterLines}};
 }
 
 inline nlohmann::json layoutKinds() {
@@ -139,7 +169,8 @@ inline nlohmann::json layoutKinds() {
           {"hints", SegmentKind::hints},
           {"link", SegmentKind::link},
           {"bulk", SegmentKind::bulk},
-          {"wish", SegmentKind::wish}};
+          {"wish", SegmentKind::wish},
+          {"router", SegmentKind::router}};
 }
 
 }  // namespace mpf::test

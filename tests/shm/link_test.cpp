@@ -246,6 +246,11 @@ TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
               HasSubstr(segments::path(link.client.name())));
 }
 
+// None of a peer that has scribbled an end over its state, either.
+std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try { return link.tryChunk(envelope); } catch (const ChunkUnavailable&) {
+  return std::nullopt;
+}
+
 // The client may write every byte of the link and of its own pool, at any time. The server goes on: each of its calls ends, stays
 // inside the memory it mapped, and gives memory to one holder only.
 TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
@@ -306,7 +311,7 @@ TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
         const auto envelope = link.server.begin();
         ++taken;
         if ((envelope.flags & layout::kSlotChunk) != 0) {
-          if (const auto chunk = link.server.tryChunk(envelope)) {
+          if (const auto chunk = chunkOf(link.server, envelope)) {
             ASSERT_LE(envelope.bodyBytes, chunk->capacity);
             for (std::uint32_t i = 0; i < envelope.bodyBytes; ++i) sum += static_cast<std::uint64_t>(chunk->data[i]);
             link.server.release(chunk->data);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <bit>
 #include <cstring>
 #include <set>
 #include <thread>
@@ -38,7 +39,7 @@ TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
   const auto segment = createPage(SegmentKind::bulk);
 
   const auto& header = segment.header();
-  EXPECT_EQ(std::memcmp(&header.magic, "MPF-WIN1", 8), 0);
+  EXPECT_EQ(std::memcmp(&header.magic, std::endian::native == std::endian::little ? "MPF-WIN1" : "1NIW-FPM", 8), 0);
   EXPECT_EQ(header.layoutMajor, layout::kMajor);
   EXPECT_EQ(header.layoutMinor, layout::kMinor);
   EXPECT_EQ(header.kind, SegmentKind::bulk);

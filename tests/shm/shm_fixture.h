@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 #include <string>
 
-#include <mpf/shm/backplane.h>
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
@@ -39,7 +39,7 @@ class ShmTest : public testing::Test {
   }
 
   Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 }  // namespace mpf::test

@@ -247,7 +247,7 @@ TEST_F(WatcherTest, AnOwnersForkDoesNotKeepItAlive) {
 
 TEST_F(WatcherTest, AServersBirthIsNews) {
   News news;
-  const auto token = watcher_.watchNames(news.callback());
+  const auto token = watcher_.watchNames(NameKind::serverWindow, news.callback());
 
   const auto server = startServer("server");
   news.wait();
@@ -260,8 +260,8 @@ TEST_F(WatcherTest, EveryoneWhoWaitsForABirthHearsOfIt) {
   News first;
   News second;
   News third;
-  const auto firstToken = watcher_.watchNames(first.callback());
-  const auto secondToken = watcher_.watchNames([&] {
+  const auto firstToken = watcher_.watchNames(NameKind::serverWindow, first.callback());
+  const auto secondToken = watcher_.watchNames(NameKind::serverWindow, [&] {
     watcher_.forget(firstToken);
     second.callback()();
   });
@@ -270,7 +270,7 @@ TEST_F(WatcherTest, EveryoneWhoWaitsForABirthHearsOfIt) {
   second.wait();
   watcher_.forget(secondToken);
   const auto heard = second.count();
-  const auto thirdToken = watcher_.watchNames(third.callback());
+  const auto thirdToken = watcher_.watchNames(NameKind::serverWindow, third.callback());
   const auto other = startServer("other");
   third.wait();
 
