@@ -5,7 +5,7 @@
 
 namespace mpf {
 
-void MessageLink::readBody(const Envelope& envelope, Message& message) noexcept try {
+MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& message) noexcept try {
   const auto type = static_cast<MessageType>(envelope.type);
   message.reset();
   if ((envelope.flags & layout::kSlotChunk) != 0) {
@@ -22,14 +22,20 @@ void MessageLink::readBody(const Envelope& envelope, Message& message) noexcept 
     link_->copyBody({body.data, body.size});
     message = Message::adopt(type, body);
   }
+  return Finish::message;
+} catch (const ChunkUnavailable&) {
+  return Finish::unavailable;
 } catch (const std::bad_alloc&) {
-  message.reset();
+  return Finish::unavailable;
 }
 
 void MessageLink::discard(const Envelope& envelope) noexcept {
-  if ((envelope.flags & layout::kSlotChunk) != 0) {
-    const std::lock_guard guard(*lock_);
-    if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+  try {
+    if ((envelope.flags & layout::kSlotChunk) != 0) {
+      const std::lock_guard guard(*lock_);
+      if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+    }
+  } catch (const ChunkUnavailable&) {  // and so it has been given back
   }
   link_->end();
 }

@@ -31,19 +31,22 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
     const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
     return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room) ? Take::message : Take::nonsense;
   }
-  // The body of the message begun into `message`, then done with its slots. False: nonsense, and `message` is empty.
-  [[nodiscard]] bool tryFinish(const Envelope& envelope, Message& message) noexcept {
+  // `unavailable`: the memory of the body went with its owner, or cannot be had now. The message is lost, and the link is sound.
+  enum class Finish { message, nonsense, unavailable };
+  // The body of the message begun into `message`, then done with its slots. `message` is empty when there is none.
+  [[nodiscard]] Finish tryFinish(const Envelope& envelope, Message& message) noexcept {
+    auto finish = Finish::message;
     if ((envelope.flags & layout::kSlotChunk) == 0 && envelope.bodyBytes <= layout::kFirstSlotBodyBytes) {
       message.assignInline(static_cast<MessageType>(envelope.type), envelope.bodyBytes,
                            [&](auto body) { link_->copyFirst(body.template first<layout::kFirstSlotBodyBytes>()); });
     } else {
-      readBody(envelope, message);
+      finish = readBody(envelope, message);
     }
     link_->end();
-    if (!message) return false;
+    if (!message) return finish == Finish::message ? Finish::nonsense : finish;
     message.setClientType(envelope.clientType);
     message.setClientExtra(envelope.clientExtra);
-    return true;
+    return finish;
   }
   // Done with the message begun without looking at its body; a chunk goes back.
   void discard(const Envelope& envelope) noexcept;
@@ -59,7 +62,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
 
  private:
   // Of a message that is more than one slot can hold.
-  void readBody(const Envelope& envelope, Message& message) noexcept;
+  Finish readBody(const Envelope& envelope, Message& message) noexcept;
   void lendOne() noexcept;
   void endLending() noexcept;
 

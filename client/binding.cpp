@@ -12,11 +12,10 @@
 namespace mpf {
 namespace {
 
-constexpr std::int64_t kRetryNs = 1'000'000'000;
-
-// News of the connection is ours to tell, and a fate is the end of the request that it names.
+// News of the connection is ours to tell, but for a queue that is full somewhere behind the server, and a fate is the end of the request
+// that it names.
 bool isForServersToSend(const Message& message, const Request* request) noexcept {
-  if (message.getType() == MessageType::connect) return false;
+  if (const auto* news = message.tryAs<Connect>()) return request == nullptr && news->status == ConnectStatus::connectQueueFull;
   if (message.getType() != MessageType::requestFate) return true;
   const auto* fate = message.tryAs<RequestFate>();
   return fate != nullptr && request != nullptr && fate->requestId == request->id.load(std::memory_order_relaxed);
@@ -24,12 +23,9 @@ bool isForServersToSend(const Message& message, const Request* request) noexcept
 
 }  // namespace
 
-void Binding::setServer(const std::string& server, std::int32_t location) {
-  SegmentName::checkServer(server);
-  if (isBound()) throw std::logic_error(fmt::format("bind: the client is bound to server \"{}\" already", server_));
-  server_ = server;
-  location_ = location;
-  setReason(fmt::format("server \"{}\" at location {} is not there yet", server, location));
+std::uint64_t Binding::maxMessageBytes() const noexcept {
+  const std::lock_guard lock(*lock_);
+  return isConnected() ? channel_->link().maxMessageBytes() : 0;
 }
 
 std::string Binding::notConnectedBecause() const {
@@ -53,60 +49,8 @@ bool Binding::waitConnected(Deadline deadline) {
   return connectedChanged_.wait_for(lock, deadline.left(), connected);
 }
 
-void Binding::tryConnect() try {
-  auto& endpoint = dispatcher_.endpoint();
-  const auto& backplane = endpoint.backplane().name();
-  auto server = endpoint.peer(SegmentName::serverWindow(backplane, location_, server_), layout::SegmentKind::serverWindow);
-  if (!server) return wish();
-  const auto index = endpoint.tryReserve();
-  if (!index) {
-    setReason(fmt::format("this process has {} clients on the backplane, no more are possible", layout::kMaxLinks));
-    return wakeAt(Clock::nowNs() + kRetryNs);
-  }
-  index_ = *index;
-  auto link = Link::create(backplane, endpoint.window(), index_, server);
-  auto& created = *link;
-  incarnation_ = server->header().incarnation;
-  {
-    const std::lock_guard lock(*lock_);
-    requests_ = std::make_unique<RequestTable>(created.header().maxOutstanding);
-    channel_ = std::make_shared<MessageLink>(std::move(link), lock_);
-    nudging_ = true;
-  }
-  MPF_STEP(link_created);
-  if (wish_) segments::remove(wish_.name());
-  wish_ = {};
-  dispatcher_.setLink(index_, this);
-  endpoint.attach(index_, created);
-  setReason(fmt::format("server \"{}\" has not accepted the client yet", server_));
-  server->knock(created.header().incarnation);
-  knockedNs_ = Clock::nowNs();
-  nudgeEveryNs_ = kFirstNudgeNs;
-  wakeAt(knockedNs_ + nudgeEveryNs_);
-} catch (const std::exception& error) {
-  // No memory, no right, a window of another version: the reason is told, and it is tried again.
-  setReason(error.what());
-  wakeAt(Clock::nowNs() + kRetryNs);
-}
-
-// Shows whom we wait for, and has us told when a server appears.
-void Binding::wish() {
-  setReason(fmt::format("server \"{}\" at location {} is not there", server_, location_));
-  dispatcher_.waitForNames(true);
-  if (wish_) return;
-  auto& endpoint = dispatcher_.endpoint();
-  wish_ = Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::wish, endpoint.backplane().name(), {0644, ~std::uint32_t{0}});
-  auto& header = wish_.sharedHeader();
-  header.ownerWindow = endpoint.window().header().incarnation;
-  header.location = location_;
-  server_.copy(header.name.data(), header.name.size() - 1);
-  static_cast<void>(wish_.tryPublish(SegmentName::keyed(endpoint.backplane().name(), NameKind::wish, header.incarnation)));
-  MPF_STEP(wish_named);
-  wish_.closeFile();
-}
-
 bool Binding::takeOne() {
-  if (!channel_) return false;
+  if (!channel_ || paused_ || ending_) return false;
   Envelope envelope;
   switch (channel_->tryBegin(envelope)) {
     case MessageLink::Take::nothing:
@@ -170,9 +114,19 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
     return true;
   }
   Message message;
-  if (!channel_->tryFinish(envelope, message) || !isForServersToSend(message, request)) return false;
+  switch (channel_->tryFinish(envelope, message)) {
+    case MessageLink::Finish::nonsense:
+      return false;
+    case MessageLink::Finish::unavailable:
+      if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
+      return true;
+    case MessageLink::Finish::message:
+      break;
+  }
+  if (!isForServersToSend(message, request)) return false;
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0)) noteTimes(envelope, request);
-  message.setRoute({0, envelope.requestId, 0, nullptr});
+  message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
+  if (auto* news = message.tryAs<Connect>()) news->incarnation = incarnation_;
   if (request != nullptr) {
     // A fate that the server sent without knowing them.
     if (message.getType() == MessageType::requestFate) {
@@ -209,7 +163,7 @@ void Binding::deliverFate(Request& request, Fate fate) {
   RequestFateMessage message({.fate = fate, .requestId = request.id.load(std::memory_order_relaxed)});
   message.setClientType(request.clientType);
   message.setClientExtra(request.clientExtra);
-  message.setRoute({0, message->requestId, 0, nullptr});
+  message.setRoute({0, message->requestId, kEndsRequest, nullptr});
   if (fate == Fate::cancelled || fate == Fate::expired) {
     requests_->giveUp(request);
   } else {
@@ -219,7 +173,7 @@ void Binding::deliverFate(Request& request, Fate fate) {
   deliver(std::move(message));
 }
 
-bool Binding::hasDeadPeer() const noexcept { return channel_ && channel_->link().peer()->isDead(); }
+bool Binding::hasDeadPeer() const noexcept { return channel_ && !ending_ && channel_->link().peer()->isDead(); }
 
 // What a server sent before it went. One that is not gone may send for ever: what fits its ring is all that it had sent.
 void Binding::deliverTheRest(MessageLink& channel) {
@@ -232,6 +186,8 @@ void Binding::deliverTheRest(MessageLink& channel) {
 void Binding::disconnect(const std::string& reason, Ending ending) {
   const auto self = shared_from_this();
   const auto channel = channel_;
+  const auto requests = requests_;
+  ending_ = true;
   bool wasConnected = false;
   {
     const std::lock_guard lock(*lock_);
@@ -240,8 +196,9 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   MPF_STEP(disconnecting);
   setReason(reason);
   auto& link = channel->link();
+  goOn();
   if (ending == Ending::serverGone) deliverTheRest(*channel);
-  requests_->forEach([&](Request& request) {
+  requests->forEach([&](Request& request) {
     deliverFate(request, ending != Ending::nonsense && !link.isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
@@ -250,10 +207,14 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   const bool serverDied = link.peer()->isDead();
   if (serverDied) count(endpoint.control().peersDied);
   link.setState(layout::LinkState::closed);
+  // It may have accepted us without our having looked since.
+  if (link.peerState() == layout::LinkState::open)
+    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
   if (!serverDied) link.notifyPeer();
   removeBulk(endpoint.backplane().name(), link.header().incarnation);
   MPF_STEP(bulk_removed);
   segments::remove(link.name());
+  goOn();  // a callback may have paused us anew
   endpoint.detach(index_);
   dispatcher_.setLink(index_, nullptr);
   count(endpoint.control().linksClosed);
@@ -261,6 +222,7 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
     const std::lock_guard lock(*lock_);
     channel_.reset();
   }
+  ending_ = false;
   if (wasConnected) deliverConnect(ConnectStatus::connectNo);
   if (left_) return;
   if (ending == Ending::serverGone) return tryConnect();
@@ -272,6 +234,15 @@ void Binding::cancel(std::uint32_t requestId) {
   if (auto* request = requests_->find(requestId)) deliverFate(*request, Fate::cancelled);
 }
 
+void Binding::pause() {
+  if (!channel_ || std::exchange(paused_, true)) return;
+  dispatcher_.endpoint().hold(index_);
+}
+
+void Binding::goOn() {
+  if (std::exchange(paused_, false)) dispatcher_.endpoint().release(index_, channel_->link());
+}
+
 void Binding::leave() {
   left_ = true;
   if (channel_) disconnect("the client ended", Ending::serverGone);
@@ -281,6 +252,7 @@ void Binding::leave() {
 
 void Binding::onTime(std::int64_t nowNs) {
   dueNs_.store(INT64_MAX, std::memory_order_relaxed);
+  if (ending_) return;
   if (!channel_) {
     if (isBound() && !left_) tryConnect();
     return;
@@ -293,7 +265,10 @@ void Binding::onTime(std::int64_t nowNs) {
 }
 
 void Binding::expire(std::int64_t nowNs) {
-  requests_->forEach([&](Request& request) {
+  const auto requests = requests_;
+  const auto channel = channel_;
+  requests->forEach([&](Request& request) {
+    if (channel_ != channel || ending_) return;  // a callback ran the dispatcher
     if (request.deadlineNs == 0 || request.isGivenUp) return;
     if (request.deadlineNs > nowNs) return wakeAt(request.deadlineNs);
     // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the deadline has passed.
@@ -318,8 +293,11 @@ void Binding::nudge(std::int64_t nowNs) {
     knockedNs_ = nowNs;
     nudgeEveryNs_ = std::min(2 * nudgeEveryNs_, kLastNudgeNs);
     auto& link = channel_->link();
+    link.peer()->doubtRing();
     if (connected) {
       link.notifyPeer();
+    } else if (link.peer()->isClosed()) {
+      return disconnect("the server ended before it had accepted the client", Ending::serverGone);
     } else {
       link.peer()->knock(link.header().incarnation);
       if (dispatcher_.endpoint().window().isNameless())

@@ -27,11 +27,14 @@ class Binding : public std::enable_shared_from_this<Binding> {
   Binding(Dispatcher::Impl& dispatcher, MessageClient::Callback callback) : dispatcher_(dispatcher), callback_(std::move(callback)) {}
 
   // --- any thread ---
-  SendResult send(Message& message, Deadline takeBefore, std::uint32_t* requestId) noexcept;
+  // `requestId`: in, 0 or the id that the request shall have; out, its id when it was sent.
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isConnected() const noexcept { return connected_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   [[nodiscard]] std::string notConnectedBecause() const;
-  [[nodiscard]] bool isBound() const { return !server_.empty(); }
+  // PAIR(bound): whom to.
+  [[nodiscard]] bool isBound() const noexcept { return bound_.load(std::memory_order_acquire); }
   void setServer(const std::string& server, std::int32_t location);
   bool waitConnected(Deadline deadline);
 
@@ -46,6 +49,9 @@ class Binding : public std::enable_shared_from_this<Binding> {
   };
   void disconnect(const std::string& reason, Ending ending);
   void cancel(std::uint32_t requestId);
+  // What the server sends stays where it is until go on.
+  void pause();
+  void goOn();
   // No callback after this.
   void leave();
   // What is due at a time: expired requests, hints that may have been lost.
@@ -63,10 +69,12 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void deliverTheRest(MessageLink& channel);
   void noteTimes(const Envelope& envelope, const Request* request) noexcept;
   bool onLinkState();
+  void makeChannel(const std::shared_ptr<PeerWindow>& server);
   void wish();
   void setReason(const std::string& reason);
   void wakeAt(std::int64_t ns) noexcept;
   void noteFull() noexcept;
+  static constexpr std::int64_t kRetryNs = 1'000'000'000;
   static constexpr std::int64_t kFirstNudgeNs = 50'000'000;
   static constexpr std::int64_t kLastNudgeNs = 1'000'000'000;
   void expire(std::int64_t nowNs);
@@ -77,9 +85,10 @@ class Binding : public std::enable_shared_from_this<Binding> {
   MessageClient::Callback callback_;
   std::string server_;
   std::int32_t location_ = 0;
+  std::atomic<bool> bound_{false};
   std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
   std::shared_ptr<MessageLink> channel_;     // written by the dispatcher's thread under lock_
-  std::unique_ptr<RequestTable> requests_;   // likewise
+  std::shared_ptr<RequestTable> requests_;   // likewise
   std::atomic<bool> connected_{false};       // under lock_
   bool fullTold_ = false;                    // under lock_: this run of refusals has been reported
   bool nudging_ = false;                     // under lock_: a time for the next nudge() is set
@@ -89,6 +98,8 @@ class Binding : public std::enable_shared_from_this<Binding> {
   std::uint32_t index_ = 0;
   std::uint64_t incarnation_ = 0;  // of the server
   bool left_ = false;
+  bool paused_ = false;
+  bool ending_ = false;  // disconnect() is calling back
   Segment wish_;
   mutable std::mutex reasonMutex_;
   std::condition_variable connectedChanged_;

@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <condition_variable>
 #include <map>
 
@@ -14,7 +15,17 @@ namespace {
 
 constexpr int kBatch = 16;  // messages of one link before the others have their turn
 constexpr std::uint32_t kLooksInVain = 64;  // at news that is none, between looks at the clock
-constexpr int kPending = 1024;  // batches before a program's event loop has its turn
+
+class Inside {
+ public:
+  explicit Inside(int& depth) noexcept : depth_(depth) { ++depth_; }
+  ~Inside() { --depth_; }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+
+ private:
+  int& depth_;
+};
 
 }  // namespace
 
@@ -53,6 +64,10 @@ void Dispatcher::Impl::endThread() {
 void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
   bindings_.erase(binding);
   removed_.push_back(binding);
+  if (namesToken_ == 0) return;
+  // It may have been the last that waited for a server: then names are of no interest any more.
+  namesChanged_.store(true, std::memory_order_relaxed);
+  endpoint_.interrupt();
 }
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
@@ -77,15 +92,18 @@ void Dispatcher::Impl::dropKnocks() noexcept {
 }
 
 bool Dispatcher::Impl::step() {
-  if (!removed_.empty()) removed_.clear();
-  if (endpoint_.takeLocalNews()) handleNews();
+  // A callback may run us, too: whoever is being called back lives on.
+  const Inside inside(depth_);
+  if (depth_ == 1) removed_.clear();
+  bool hasActed = endpoint_.takeLocalNews() && handleNews();
+  hasActed = goOnWithRounds() || hasActed;
   if (const auto index = endpoint_.next()) {
     auto* binding = *index < byIndex_.size() ? byIndex_[*index] : nullptr;
     int taken = 0;
     while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;  // a binding that leaves lives until the next step
     if (taken != 0) return true;
   }
-  if (dueNs_.load(std::memory_order_relaxed) == INT64_MAX || !nextDue().hasPassed()) return false;
+  if (dueNs_.load(std::memory_order_relaxed) == INT64_MAX || !nextDue().hasPassed()) return hasActed;
   handleDue();
   return true;
 }
@@ -101,15 +119,16 @@ int Dispatcher::Impl::descriptor() {
   return endpoint_.descriptor();
 }
 
-void Dispatcher::Impl::runPending() {
+bool Dispatcher::Impl::runPending(int most) {
   endpoint_.origin().check("Dispatcher");
   // Peers may send, or invent news, for ever: the program's loop has its turn all the same.
-  for (int batches = 0; batches < kPending; ++batches) {
+  for (int batches = 0; batches < most; ++batches) {
     if (step()) continue;
     dropKnocks();
-    if (!hasDescriptor_ || endpoint_.arm()) return;
+    if (!hasDescriptor_ || endpoint_.arm()) return true;
   }
   if (hasDescriptor_) endpoint_.callAgain();
+  return false;
 }
 
 void Dispatcher::Impl::post(std::function<void()> command) {
@@ -156,7 +175,7 @@ void Dispatcher::Impl::setLink(std::uint32_t index, Binding* binding) {
 void Dispatcher::Impl::waitForNames(bool wait) {
   auto& watcher = endpoint_.backplane().watcher();
   if (wait && namesToken_ == 0) {
-    namesToken_ = watcher.watchNames([this] {
+    namesToken_ = watcher.watchNames(NameKind::serverWindow, [this] {
       namesChanged_.store(true, std::memory_order_relaxed);
       endpoint_.interrupt();
     });
@@ -169,25 +188,31 @@ void Dispatcher::Impl::waitForNames(bool wait) {
   }
 }
 
-void Dispatcher::Impl::handleNews() {
-  if (hasCommands_.load(std::memory_order_relaxed)) runCommands();
-  if (endpoint_.takePeerDeath()) {
-    const auto bindings = bindings_;  // a callback may destroy a client
-    for (const auto& binding : bindings) {
-      if (binding->hasDeadPeer()) binding->disconnect("the server's process ended", Binding::Ending::serverGone);
-    }
-  }
-  if (namesChanged_.exchange(false, std::memory_order_relaxed)) connectWaiting();
+// True when it may have called back.
+bool Dispatcher::Impl::handleNews() {
+  const bool hasCalled = hasCommands_.load(std::memory_order_relaxed);
+  if (hasCalled) runCommands();
+  if (endpoint_.takePeerDeath()) dead_.begin(bindings_);
+  if (namesChanged_.exchange(false, std::memory_order_relaxed)) waiting_.begin(bindings_);
+  return hasCalled;
 }
 
-void Dispatcher::Impl::connectWaiting() {
-  bool waiting = false;
-  const auto bindings = bindings_;
-  for (const auto& binding : bindings) {
-    if (binding->isWaiting()) binding->tryConnect();
-    waiting = waiting || binding->isWaiting();
-  }
-  waitForNames(waiting);
+// True while there is more to do.
+bool Dispatcher::Impl::goOnWithRounds() {
+  if (dead_.isOver() && waiting_.isOver()) return false;
+  dead_.goOn([](Binding& binding) {
+    if (!binding.hasDeadPeer()) return false;
+    binding.disconnect("the server's process ended", Binding::Ending::serverGone);
+    return true;
+  });
+  if (waiting_.isOver()) return true;
+  waiting_.goOn([](Binding& binding) {
+    if (!binding.isWaiting()) return false;
+    binding.tryConnect();
+    return true;
+  });
+  if (waiting_.isOver()) waitForNames(std::ranges::any_of(bindings_, [](const auto& binding) { return binding->isWaiting(); }));
+  return true;
 }
 
 void Dispatcher::Impl::runCommands() {
@@ -201,14 +226,19 @@ void Dispatcher::Impl::runCommands() {
 }
 
 void Dispatcher::Impl::handleDue() {
-  dueNs_.store(INT64_MAX, std::memory_order_relaxed);
-  // PAIR(due): a sender that stored its deadline before we withdrew ours is seen below; a later one lowers ours again.
-  doorbell::fence();
-  const auto nowNs = Clock::nowNs();
-  const auto bindings = bindings_;
-  for (const auto& binding : bindings) {
-    if (binding->dueNs() <= nowNs) binding->onTime(nowNs);
+  if (due_.isOver()) {
+    dueNs_.store(INT64_MAX, std::memory_order_relaxed);
+    // PAIR(due): a sender that stored its deadline before we withdrew ours is seen below; a later one lowers ours again.
+    doorbell::fence();
+    due_.begin(bindings_);
   }
+  const auto nowNs = Clock::nowNs();
+  due_.goOn([nowNs](Binding& binding) {
+    if (binding.dueNs() > nowNs) return false;
+    binding.onTime(nowNs);
+    return true;
+  });
+  if (!due_.isOver()) return noteDue(nowNs);  // the others at once
   for (const auto& binding : bindings_) noteDue(binding->dueNs());
 }
 
@@ -236,7 +266,7 @@ void Dispatcher::run() {
 }
 void Dispatcher::interrupt() noexcept { impl_->interrupt(); }
 int Dispatcher::descriptor() { return impl_->descriptor(); }
-void Dispatcher::runPending() { impl_->runPending(); }
+bool Dispatcher::runPending(int batches) { return impl_->runPending(batches); }
 Deadline Dispatcher::nextDeadline() const noexcept { return impl_->nextDue(); }
 const Backplane& Dispatcher::backplane() const noexcept { return impl_->endpoint().backplane(); }
 

@@ -42,7 +42,9 @@ class Dispatcher {
 
   // For event loops: poll() the descriptor for reading, at most until nextDeadline(), then runPending(), which arms it again.
   [[nodiscard]] int descriptor();
-  void runPending();
+  // At most `batches` of messages. False: there may be more, and the descriptor stays readable.
+  bool runPending(int batches = kPendingBatches);
+  static constexpr int kPendingBatches = 1024;
   [[nodiscard]] Deadline nextDeadline() const noexcept;
 
   [[nodiscard]] const Backplane& backplane() const noexcept;

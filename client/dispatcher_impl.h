@@ -14,6 +14,7 @@
 
 #include <mpf/client/binding.h>
 #include <mpf/client/dispatcher.h>
+#include <mpf/client/round.h>
 
 namespace mpf {
 
@@ -28,7 +29,7 @@ class Dispatcher::Impl {
   bool runOnce(Deadline deadline);
   void interrupt() noexcept;
   int descriptor();
-  void runPending();
+  bool runPending(int most);
   [[nodiscard]] Deadline nextDue() const noexcept { return Deadline::atNs(dueNs_.load(std::memory_order_relaxed)); }
 
   // Runs `command` on the dispatcher's thread: now when this is it (or nobody's), else later.
@@ -54,10 +55,10 @@ class Dispatcher::Impl {
  private:
   bool step();
   void dropKnocks() noexcept;
-  void handleNews();
+  bool handleNews();
+  bool goOnWithRounds();
   void handleDue();
   void runCommands();
-  void connectWaiting();
 
   Endpoint endpoint_;
   std::set<std::shared_ptr<Binding>> bindings_;
@@ -67,11 +68,15 @@ class Dispatcher::Impl {
   std::vector<std::function<void()>> commands_;
   std::atomic<bool> hasCommands_{false};
   std::atomic<bool> namesChanged_{false};
+  Round dead_;     // of those whose server may have died
+  Round waiting_;  // of those whose server may be there
+  Round due_;
   Watcher::Token namesToken_ = 0;
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
   std::atomic<std::thread::id> runner_;
+  int depth_ = 0;  // of steps, in callbacks of steps
   bool hasDescriptor_ = false;
   bool hasThread_ = false;
   std::thread thread_;

@@ -54,8 +54,19 @@ void MessageClient::bind(const std::string& server, std::int32_t location) {
 
 SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
   if (isInherited()) return SendResult::notConnected;
+  std::uint32_t id = 0;
+  const auto result = binding_->send(message, takeBefore, id);
+  if (requestId != nullptr && result == SendResult::sent) *requestId = id;
+  return result;
+}
+
+SendResult MessageClient::sendAs(std::uint32_t requestId, Message&& message, Deadline takeBefore) noexcept {
+  if (isInherited()) return SendResult::notConnected;
   return binding_->send(message, takeBefore, requestId);
 }
+
+void MessageClient::pause() { binding_->pause(); }
+void MessageClient::goOn() { binding_->goOn(); }
 
 BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
 
@@ -66,6 +77,7 @@ void MessageClient::cancel(std::uint32_t requestId) {
 
 bool MessageClient::isInherited() const noexcept { return dispatcher_->endpoint().origin().isInherited(); }
 bool MessageClient::isConnected() const noexcept { return !isInherited() && binding_->isConnected(); }
+std::uint64_t MessageClient::maxMessageBytes() const noexcept { return isInherited() ? 0 : binding_->maxMessageBytes(); }
 std::string MessageClient::notConnectedBecause() const {
   return isInherited() ? Origin::explain("MessageClient") : binding_->notConnectedBecause();
 }

@@ -61,9 +61,22 @@ class MessageClient {
   // replied to it or refused it, the request counts as outstanding.
   void cancel(std::uint32_t requestId);
 
+  // --- for routers, who are clients in the name of others; on the thread that runs the dispatcher
+  // As send(), with an id of the caller's choice, not 0; tooManyOutstanding when another request is in its way.
+  [[nodiscard]] SendResult sendAs(std::uint32_t requestId, Message&& message, Deadline takeBefore) noexcept;
+  // Whether a message that the callback got ended its request.
+  [[nodiscard]] static bool endsRequest(const Message& message) noexcept { return message.route().flags == kEndsRequest; }
+  // Until goOn(), what the server sends waits in the link; when that is full, the server is told so. Ends with the connection.
+  void pause();
+  void goOn();
+  // Memory to build the body of a request in, as alloc() uses it. Throws std::bad_alloc.
+  [[nodiscard]] BodyBytes allocateBody(std::size_t bytes) { return allocate(bytes); }
+
   // Waits until the server is connected. With a dispatcher without thread, runs it meanwhile.
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] bool isConnected() const noexcept;
+  // Largest body that the server takes; 0 without a connection.
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   // Why there is no connection, in words; empty when there is one.
   [[nodiscard]] std::string notConnectedBecause() const;
 

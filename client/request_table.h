@@ -35,9 +35,15 @@ class RequestTable {
   // Without those that were given up.
   [[nodiscard]] std::uint32_t awaited() const noexcept { return outstanding() - givenUp_.load(std::memory_order_relaxed); }
 
-  // A free entry with an id of its own, not yet added; nullptr when max are outstanding.
+  // A free entry, not yet added, with the id asked for or, for 0, one of its own; nullptr when max are outstanding, or another one has
+  // that place.
   Request* tryReserve(std::uint32_t& id) noexcept {
     if (outstanding() >= max_) return nullptr;
+    if (id != 0) {
+      auto& request = requests_[id & (size_ - 1)];
+      // PAIR(request-ended): the dispatcher has finished with the entry.
+      return request.id.load(std::memory_order_acquire) == 0 ? &request : nullptr;
+    }
     for (;;) {
       id = ++lastId_;
       auto& request = requests_[id & (size_ - 1)];

@@ -10,7 +10,7 @@
 
 namespace mpf {
 
-SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
+SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept {
   if (!message) return SendResult::empty;
   LinkSend sent{};
   bool nudging = false;
@@ -18,7 +18,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
     const std::lock_guard lock(*lock_);
     if (!isConnected()) return SendResult::notConnected;
     auto& link = channel_->link();
-    std::uint32_t id = 0;
+    std::uint32_t id = requestId;
     auto* request = requests_->tryReserve(id);
     if (request == nullptr) {
       count(link.control().clientRefused);
@@ -50,7 +50,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t* r
       nudging = std::exchange(nudging_, true);
       link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
       link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
-      if (requestId != nullptr) *requestId = id;
+      requestId = id;
     }
   }
   switch (sent) {

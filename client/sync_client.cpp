@@ -2,10 +2,17 @@
 #include <mpf/client/sync_client.h>
 
 namespace mpf {
+namespace {
+
+std::string limitExceeded(const Message& message, std::uint64_t maxBytes) {
+  return ": " + std::to_string(message.body().size()) + " bytes, the limit is " + std::to_string(maxBytes);
+}
+
+}  // namespace
 
 std::string Answer::why() const {
   if (fate_) return std::string("no reply: ") + std::string(toString(*fate_));
-  if (refusal_) return std::string("not sent: ") + toString(*refusal_);
+  if (refusal_) return std::string("not sent: ") + toString(*refusal_) + details_;
   return {};
 }
 
@@ -34,6 +41,8 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
   // While the message is on its way, no reply to it can be taken: that is this thread's work.
   if (const auto result = client_.send(std::move(message), deadline, &awaited_); result != SendResult::sent) {
     awaited_ = 0;
+    // NOLINTNEXTLINE(bugprone-use-after-move): not sent, it is as it was
+    if (result == SendResult::tooLarge) return Answer(result, limitExceeded(message, client_.maxMessageBytes()));
     return Answer(result);
   }
   while (!answer_ && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
@@ -53,7 +62,8 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
 
 Message SyncClient::receive(Nanoseconds timeout) {
   const auto deadline = Deadline::after(timeout);
-  while (others_.empty() && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
+  // Looks at least once: with a timeout of 0, what is there is taken.
+  for (bool isFirst = true; others_.empty() && (isFirst || !deadline.hasPassed()); isFirst = false) dispatcher_.runOnce(deadline);
   if (others_.empty()) return {};
   auto message = std::move(others_.front());
   others_.pop_front();

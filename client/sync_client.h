@@ -20,7 +20,8 @@ namespace mpf {
 class Answer {
  public:
   explicit Answer(Message reply) noexcept : reply_(std::move(reply)) {}
-  explicit Answer(SendResult refusal) noexcept : refusal_(refusal) {}
+  // `details` follow the refusal when it is put in words.
+  explicit Answer(SendResult refusal, std::string details = {}) noexcept : refusal_(refusal), details_(std::move(details)) {}
   explicit Answer(Fate fate) noexcept : fate_(fate) {}
 
   explicit operator bool() const noexcept { return static_cast<bool>(reply_); }
@@ -41,6 +42,7 @@ class Answer {
   Message reply_;
   std::optional<Fate> fate_;
   std::optional<SendResult> refusal_;
+  std::string details_;
 };
 
 class SyncClient {

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: MIT
 // ServerCore, continued: clients come and go.
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
 #include <mutex>
+#include <new>
+#include <system_error>
+#include <thread>
 
 #include <mpf/base/step.h>
 #include <mpf/server/server_core.h>
@@ -8,6 +14,19 @@
 #include <mpf/shm/segment_name.h>
 
 namespace mpf {
+namespace {
+
+constexpr std::chrono::milliseconds kToTakeTheRest{100};
+constexpr std::chrono::microseconds kLookAtThem{500};
+
+// Of ours: of memory or descriptors.
+bool isLack(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return true;
+  const auto* failed = dynamic_cast<const std::system_error*>(&error);
+  return failed != nullptr && (failed->code().value() == EMFILE || failed->code().value() == ENFILE || failed->code().value() == ENOMEM);
+}
+
+}  // namespace
 
 void ServerCore::acceptAll() {
   const auto prefix = SegmentName::linkPrefix(endpoint_.backplane().name(), endpoint_.window().header().incarnation);
@@ -28,9 +47,9 @@ void ServerCore::accept(std::uint64_t incarnation) {
     if (client && link->peerState() == layout::LinkState::open) return open(std::move(link), std::move(client));
     // A client's window stands before its links do and goes after them: this client died while it knocked.
     if (!client && segments::probeOwner(window) == segments::Owner::absent) removeLink(name, incarnation);
-  } catch (const std::exception&) {
-    // Not a link that we can use. Its client sees that nobody accepts it; we go on.
-    count(endpoint_.control().protocolErrors);
+  } catch (const std::exception& error) {
+    // Its client sees that nobody accepts it, and knocks again; we go on.
+    if (!isLack(error)) count(endpoint_.control().protocolErrors);
   }
 }
 
@@ -43,7 +62,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
     return;
   }
   if (*index >= connections_.size()) connections_.resize(*index + 1);
-  if (!connections_[*index]) connections_[*index] = std::make_unique<Connection>();
+  if (!connections_[*index]) connections_[*index] = Connection::take();
   auto& connection = *connections_[*index];
   auto& opened = *link;
   {
@@ -62,6 +81,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
   opened.setState(layout::LinkState::open);
   MPF_STEP(link_accepted);
   opened.notifyPeer();
+  if (clientNews_) clientNews_(nameOf(connection), true);
 }
 
 void ServerCore::closeIfClientDid(Connection& connection) noexcept {
@@ -75,9 +95,12 @@ void ServerCore::closeDead() {
   for (const auto& connection : connections_) {
     if (!connection->channel || !connection->channel->link().peer()->isDead()) continue;
     MPF_STEP(client_died);
-    count(endpoint_.control().peersDied);
     removeLinkOfDead(*connection);
     MPF_STEP(client_removed);
+    // It ended in order before its process did: take() closes behind what is left.
+    const auto& link = connection->channel->link();
+    if (link.peerState() == layout::LinkState::closed && link.hasMessage()) continue;
+    count(endpoint_.control().peersDied);
     close(*connection);
   }
 }
@@ -95,18 +118,25 @@ void ServerCore::removeLink(const std::string& name, std::uint64_t incarnation) 
 
 // Whoever died and was not noticed yet leaves nothing behind: nobody is here to notice it later.
 void ServerCore::closeAll() noexcept {
+  std::vector<std::shared_ptr<MessageLink>> others;
   for (const auto& connection : connections_) {
     if (!connection->channel) continue;
-    const auto peer = connection->channel->link().peer();
-    if (!peer->hasOwner()) {
+    auto& link = connection->channel->link();
+    if (!link.peer()->hasOwner()) {
       removeLinkOfDead(*connection);
-      removeDeadWindow(endpoint_.backplane().name(), peer->name(), peer->header().incarnation);
+      removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(), link.peer()->header().incarnation);
+    } else if (!link.tryLeavePoolToClient()) {
+      others.push_back(connection->channel);
     }
     close(*connection);
-  }
+  }  // Clients of other users may not remove what is ours, and find it no more once we have: they have a moment to take what they were sent.
+  const auto patience = Deadline::after(kToTakeTheRest);
+  const auto isTaking = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
+  while (std::ranges::any_of(others, isTaking) && !patience.hasPassed()) std::this_thread::sleep_for(kLookAtThem);
 }
 
 void ServerCore::close(Connection& connection) noexcept {
+  const auto name = nameOf(connection);
   std::shared_ptr<MessageLink> channel;
   {
     const std::lock_guard lock(*connection.lock);
@@ -120,6 +150,7 @@ void ServerCore::close(Connection& connection) noexcept {
   channel->link().setState(layout::LinkState::closed);
   channel->link().notifyPeer();
   count(endpoint_.control().linksClosed);
+  if (clientNews_) clientNews_(name, false);
 }
 
 }  // namespace mpf

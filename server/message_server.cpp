@@ -47,8 +47,20 @@ void MessageServer::interrupt() noexcept { impl_->core.interrupt(); }
 std::uint64_t MessageServer::clientOf(const Message& request) const noexcept { return impl_->core.clientOf(request); }
 ReplyResult MessageServer::reply(Message&& message) { return impl_->core.reply(message); }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
-BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request, bytes); }
+BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request.route(), bytes); }
 int MessageServer::descriptor() { return impl_->core.descriptor(); }
+
+void MessageServer::onClient(std::function<void(std::uint64_t, bool)> news) { impl_->core.onClient(std::move(news)); }
+Deadline MessageServer::takeBefore() const noexcept { return impl_->core.takeBefore(); }
+ReplyResult MessageServer::replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message) {
+  message.setRoute(impl_->core.routeTo(client, requestId));
+  return impl_->core.reply(message);
+}
+bool MessageServer::owes(std::uint64_t client, std::uint32_t requestId) const noexcept { return impl_->core.owes(client, requestId); }
+std::vector<std::uint32_t> MessageServer::owed(std::uint64_t client) const { return impl_->core.owed(client); }
+BodyBytes MessageServer::allocateBody(std::uint64_t client, std::size_t bytes) {
+  return impl_->core.allocate(impl_->core.routeTo(client, 0), bytes);
+}
 
 void MessageServer::address(Message& reply, const Message& request) noexcept {
   auto route = request.route();
@@ -84,6 +96,8 @@ int MessageServer::runUntilSignal() {
   run();
   return 0;
 }
+
+void MessageServer::countAlarm() noexcept { impl_->core.countAlarm(); }
 
 void MessageServer::report() const {
   const auto counts = impl_->core.counts();

@@ -22,6 +22,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <mpf/base/clock.h>
 #include <mpf/schema/message.h>
@@ -112,6 +113,24 @@ class MessageServer {
   int runUntilSignal();
   // Handles one request if there is one.
   bool handleOne();
+
+  // --- for routers, who serve in the name of others
+  // `news(client, true)` when a client has connected, `news(client, false)` when it is gone; from within receive() and waitForMessage().
+  // Once, before the first of them.
+  void onClient(std::function<void(std::uint64_t client, bool isThere)> news);
+  // By when the request received last shall be taken.
+  [[nodiscard]] Deadline takeBefore() const noexcept;
+  // As reply(), to a request whose handle is gone: that of clientOf(request) and request.route().requestId.
+  ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
+  // Whether that request has had no reply yet.
+  [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
+  // The requests of a client that were received and have had no reply yet.
+  [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
+  // Memory to build the body of a reply to one in. Throws std::bad_alloc.
+  [[nodiscard]] BodyBytes allocateBody(std::uint64_t client, std::size_t bytes);
+
+  // For servers that drive hardware: one more of its faults, for `mpf msr`. Any thread.
+  void countAlarm() noexcept;
 
   // For event loops: poll() the descriptor for reading, then receive() until empty, which arms it again.
   [[nodiscard]] int descriptor();

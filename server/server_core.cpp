@@ -82,6 +82,7 @@ ServerCore::~ServerCore() {
   if (endpoint_.origin().isInherited()) return;
   MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  clientNews_ = nullptr;
   closeAll();
 }
 
@@ -106,7 +107,35 @@ std::uint64_t ServerCore::clientOf(const Message& request) const noexcept {
   auto& connection = connectionOf(route);
   const std::lock_guard lock(*connection.lock);
   if (connection.generation != route.flags || !connection.channel) return 0;
-  return std::uint64_t{connection.index + 1} << 32 | connection.generation;
+  return nameOf(connection);
+}
+
+Route ServerCore::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  const auto number = client >> 32;
+  if (number == 0 || number > connections_.size()) return {};
+  return {reinterpret_cast<std::uint64_t>(connections_[number - 1].get()), requestId, static_cast<std::uint32_t>(client), nullptr};
+}
+
+bool ServerCore::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  const auto route = routeTo(client, requestId);
+  if (route.link == 0 || requestId == 0) return false;
+  auto& connection = connectionOf(route);
+  const std::lock_guard lock(*connection.lock);
+  return connection.generation == route.flags && connection.channel &&
+         connection.owed(requestId).load(std::memory_order_relaxed) == requestId;
+}
+
+std::vector<std::uint32_t> ServerCore::owed(std::uint64_t client) const {
+  const auto route = routeTo(client, 0);
+  std::vector<std::uint32_t> ids;
+  if (route.link == 0) return ids;
+  auto& connection = connectionOf(route);
+  const std::lock_guard lock(*connection.lock);
+  if (connection.generation != route.flags || !connection.channel) return ids;
+  for (const auto& place : connection.unanswered) {
+    if (const auto id = place.load(std::memory_order_relaxed); id != 0) ids.push_back(id);
+  }
+  return ids;
 }
 
 int ServerCore::descriptor() {
@@ -171,13 +200,21 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra, Fate::expired);
     return false;
   }
-  if (!connection.channel->tryFinish(envelope, message)) {
-    count(control.protocolErrors);
-    close(connection);
-    return false;
+  switch (connection.channel->tryFinish(envelope, message)) {
+    case MessageLink::Finish::nonsense:
+      count(control.protocolErrors);
+      close(connection);
+      return false;
+    case MessageLink::Finish::unavailable:
+      count(control.refused);
+      sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra, Fate::refused);
+      return false;
+    case MessageLink::Finish::message:
+      break;
   }
   if (envelope.sentTick != 0) noteTimes(connection, envelope);
   message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId, connection.generation, keeper_});
+  takeBefore_ = envelope.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(envelope.deadlineNs);
   return true;
 }
 
@@ -216,7 +253,7 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
     return ReplyResult::clientGone;
   }
   auto& unanswered = connection.owed(route.requestId);
-  const bool first = unanswered.load(std::memory_order_relaxed) == route.requestId;
+  const bool first = route.requestId != 0 && unanswered.load(std::memory_order_relaxed) == route.requestId;
   const auto maxOutstanding = connection.channel->link().header().maxOutstanding;
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
@@ -269,12 +306,12 @@ void ServerCore::abandoned(const Route& route) noexcept {
   if (sendReply(connection, message) == ReplyResult::sent) count(endpoint_.control().refused);
 }
 
-BodyBytes ServerCore::allocate(const Message& request, std::size_t bytes) {
+BodyBytes ServerCore::allocate(const Route& route, std::size_t bytes) {
   std::shared_ptr<MessageLink> channel;
-  if (request.route().link != 0) {
-    auto& connection = connectionOf(request.route());
+  if (route.link != 0) {
+    auto& connection = connectionOf(route);
     const std::lock_guard lock(*connection.lock);
-    if (connection.generation == request.route().flags) channel = connection.channel;
+    if (connection.generation == route.flags) channel = connection.channel;
   }
   return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
 }

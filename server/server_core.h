@@ -7,31 +7,18 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <mpf/channel/message_link.h>
 #include <mpf/schema/message.h>
+#include <mpf/server/connection.h>
 #include <mpf/server/message_server.h>
 #include <mpf/shm/endpoint.h>
 
 namespace mpf {
-
-// One client's end at the server. Lives as long as the server and is used again; `generation` tells its lives apart.
-struct Connection {
-  std::shared_ptr<SpinLock> lock = std::make_shared<SpinLock>();
-  std::shared_ptr<MessageLink> channel;  // under lock; empty: free
-  std::uint32_t index = 0;
-  std::uint32_t generation = 0;                          // under lock
-  std::vector<std::atomic<std::uint32_t>> unanswered;    // a power of two: ids of requests that owe their first reply
-  std::uint32_t unansweredMask = 0;
-
-  [[nodiscard]] std::atomic<std::uint32_t>& owed(std::uint32_t requestId) noexcept { return unanswered[requestId & unansweredMask]; }
-  std::uint32_t timedId = 0;                             // the request whose service time is measured, under lock
-  std::int64_t timedFromNs = 0;
-};
 
 class ServerCore {
  public:
@@ -49,8 +36,15 @@ class ServerCore {
   [[nodiscard]] bool isInterrupted() const noexcept { return stop_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   ReplyResult reply(Message& message) noexcept;
-  BodyBytes allocate(const Message& request, std::size_t bytes);
+  BodyBytes allocate(const Route& route, std::size_t bytes);
+  void onClient(std::function<void(std::uint64_t, bool)> news) { clientNews_ = std::move(news); }
+  [[nodiscard]] Deadline takeBefore() const noexcept { return takeBefore_; }
+  // A route with link 0 when the client is gone.
+  [[nodiscard]] Route routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept;
+  [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
+  [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
   int descriptor();
+  void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }
 
   struct Counts {
     std::uint32_t queueSize;
@@ -66,6 +60,9 @@ class ServerCore {
   static Connection& connectionOf(const Route& route) noexcept {
     // NOLINTNEXTLINE(performance-no-int-to-ptr): a route is opaque to everybody else
     return *reinterpret_cast<Connection*>(route.link);
+  }
+  static std::uint64_t nameOf(const Connection& connection) noexcept {
+    return std::uint64_t{connection.index + 1} << 32 | connection.generation;
   }
   void lookAround();
   void accept(std::uint64_t incarnation);
@@ -87,8 +84,10 @@ class ServerCore {
   std::int32_t location_;
   Endpoint endpoint_;
   Keeper* keeper_;
-  std::vector<std::unique_ptr<Connection>> connections_;  // by index in the window
+  std::vector<Connection::Pointer> connections_;  // by index in the window
   std::map<std::uint64_t, Connection*> byLink_;
+  std::function<void(std::uint64_t, bool)> clientNews_;
+  Deadline takeBefore_ = Deadline::never();  // of the request taken last
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;
 };

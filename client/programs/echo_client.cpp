@@ -6,14 +6,19 @@
 #include <cstdio>
 #include <exception>
 #include <fmt/format.h>
+#include <limits>
 #include <memory>
 
+#include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
 #include <mpf/client/sync_client.h>
 
 namespace mpf {
 namespace {
+
+constexpr std::uint64_t kMost = std::numeric_limits<int>::max();
+constexpr std::uint64_t kMostBytes = 1u << 30;
 
 struct EchoOptions {
   std::string server;
@@ -73,10 +78,10 @@ int runEchoClient(int argc, char** argv, const EchoClient& echo) try {
   app.add_option("server", options.server, "Name of the server")->capture_default_str();
   app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
   app.add_option("--location", options.location, "Location of the server; default: $MPF_LOCATION, or 0");
-  app.add_option("--count", options.count, "Messages to send")->capture_default_str()->check(CLI::PositiveNumber);
-  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")->capture_default_str()->check(CLI::PositiveNumber);
-  app.add_option("--bytes", options.bytes, "Length of an array message")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  app.add_option("--count", options.count, "Messages to send")->capture_default_str()->check(wholeNumber(1, kMost));
+  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")->capture_default_str()->check(wholeNumber(1, kMost));
+  app.add_option("--bytes", options.bytes, "Length of an array message")->capture_default_str()->check(wholeNumber(0, kMostBytes));
+  if (const auto status = parseCommandLine(app, argc, argv)) return *status;
   return callEchoServer(options, echo);
 } catch (const std::exception& error) {
   fmt::print(stderr, "{}: {}\n", echo.program, error.what());

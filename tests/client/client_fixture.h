@@ -2,20 +2,57 @@
 // ClientTest: a server and a client that take turns in one thread.
 #pragma once
 
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <chrono>
+#include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include <mpf/base/system_call.h>
 #include <mpf/client/sync_client.h>
 #include <mpf/server/message_server.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/shm/window.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
 
 using namespace std::chrono_literals;
+
+#ifdef __SANITIZE_THREAD__
+#define MPF_NEEDS_A_CHILD GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some"
+#else
+#define MPF_NEEDS_A_CHILD
+#endif
+
+// Runs in a process of its own, which ends without the destructors of this one, and with it.
+inline pid_t inAChild(const std::function<void()>& work) {
+  const auto child = checkCall(::fork(), "fork");
+  if (child == 0) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    work();
+    ::_exit(0);
+  }
+  return child;
+}
+
+inline constexpr std::size_t kBeyondRings = 10'000;  // elements of an array that no ring holds
+
+inline std::ptrdiff_t countNames(const Backplane& backplane, NameKind kind) {
+  return std::ranges::count_if(backplane.segmentNames(), [kind](const auto& name) {
+    const auto parsed = SegmentName::tryParse(name);
+    return parsed && parsed->kind == kind;
+  });
+}
 
 class ClientTest : public testing::Test {
  protected:
@@ -34,6 +71,15 @@ class ClientTest : public testing::Test {
       dispatcher_.runOnce(Deadline::after(100us));
     }
   }
+  // A request of the client, which its server holds; both are connected then.
+  Message heldRequest() {
+    const auto held = std::make_shared<Message>();
+    server_->on<Int32>([held](Int32Message&& request) { *held = std::move(request); });
+    bind();
+    EXPECT_EQ(client_.send(Int32Message()), SendResult::sent);
+    runUntil([&] { return static_cast<bool>(*held); });
+    return std::move(*held);
+  }
   // The next message that is no ConnectMessage.
   Message next() {
     runUntil([&] { return !messages_.empty(); });
@@ -41,13 +87,28 @@ class ClientTest : public testing::Test {
     messages_.erase(messages_.begin());
     return message;
   }
+  // By all that are on the backplane.
+  [[nodiscard]] std::uint64_t nonsenseRead() const { return sumOf(&layout::WindowControl::protocolErrors); }
+  // A counter of all windows.
+  template <class Counter>
+  [[nodiscard]] std::uint64_t sumOf(Counter layout::WindowControl::* counter) const {
+    std::uint64_t sum = 0;
+    for (const auto& name : backplane_.segmentNames()) {
+      const auto parsed = SegmentName::tryParse(name);
+      if (!parsed || (parsed->kind != NameKind::serverWindow && parsed->kind != NameKind::clientWindow)) continue;
+      const bool isServer = parsed->kind == NameKind::serverWindow;
+      const auto window = PeerWindow::tryOpen(name, isServer ? layout::SegmentKind::serverWindow : layout::SegmentKind::clientWindow);
+      sum += (window->control().*counter).load(std::memory_order_relaxed);
+    }
+    return sum;
+  }
   void TearDown() override {
     EXPECT_THAT(messages_, testing::IsEmpty());
     server_.reset();
   }
 
   Watchdog watchdog_{"client test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   std::unique_ptr<MessageServer> server_;
   bool serverRuns_ = true;
   std::vector<Message> messages_;

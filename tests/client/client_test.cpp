@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Connections, replies, ownership.
+#include <algorithm>
 #include <cmath>
 #include <thread>
 
@@ -30,6 +31,59 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
   runUntil([&] { return client_.isConnected(); });
 
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo, ConnectStatus::connectYes));
+}
+
+// In a process that lives on: nothing dies, and there is no link that it could close.
+TEST_F(ClientTest, AServerThatEndsBeforeItAcceptsItsClientIsGoneAllTheSame) {
+  startServer();
+  serverRuns_ = false;
+  client_.bind("device[0]/a");
+  runUntil([&] { return client_.notConnectedBecause().find("not accepted") != std::string::npos; });
+
+  server_.reset();
+  runUntil([&] { return client_.notConnectedBecause().find("not there") != std::string::npos; });
+  serverRuns_ = true;
+  startServer();
+  runUntil([&] { return client_.isConnected(); });
+
+  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
+}
+
+// One hint tells of messages and of the end behind them: for any number of them.
+TEST_F(ClientTest, AServerHearsOfAClientThatLeftRightBehindItsRequests) {
+  constexpr int kMost = 40;
+  int gone = 0;
+  startServer().onClient([&](std::uint64_t, bool isThere) { gone += isThere ? 0 : 1; });
+  for (int requests = 1; requests <= kMost; ++requests) {
+    MessageClient leaving(dispatcher_, [](const Message&) {});
+    leaving.bind("device[0]/a");
+    runUntil([&] { return leaving.isConnected(); });
+    for (int i = 0; i < requests; ++i) static_cast<void>(leaving.send(Int32Message()));
+    // and goes
+  }
+  runUntil([&] { return gone == kMost; });
+}
+
+TEST_F(ClientTest, AClientHearsOfAServerThatWentRightBehindItsReplies) {
+  constexpr int kMost = 40;
+  serverRuns_ = false;
+  for (std::size_t replies = 1; replies <= kMost; ++replies) {
+    auto& server = startServer();
+    if (replies == 1) client_.bind("device[0]/a");
+    Message request;
+    while (!client_.isConnected() || client_.send(Int32Message()) != SendResult::sent) {
+      EXPECT_FALSE(server.receive());
+      dispatcher_.runOnce(Deadline::after(100us));
+    }
+    while (!request) request = server.receive();
+    for (std::size_t extra = 1; extra < replies; ++extra) static_cast<void>(server.reply(request.duplicate()));
+    static_cast<void>(server.reply(std::move(request)));
+
+    server_.reset();
+
+    runUntil([&] { return news_.back() == ConnectStatus::connectNo; });
+    EXPECT_EQ(std::exchange(messages_, {}).size(), replies);
+  }
 }
 
 TEST_F(ClientTest, EchoesEveryScalarTypeWithItsMarks) {
@@ -200,5 +254,22 @@ TEST_F(ClientTest, ANameIsServedOnceAtALocation) {
   MessageServer elsewhere(backplane_, "device[0]/a", {.location = 7});
   EXPECT_EQ(elsewhere.location(), 7);
 }
+
+// A server that many wait for: some connect in a step, so that whatever else the dispatcher has to do gets its turn.
+TEST_F(ClientTest, ManyThatConnectAtOnceDoSoInSteps) {
+  constexpr int kCrowd = 100;
+  std::vector<std::unique_ptr<MessageClient>> crowd;
+  for (int i = 0; i < kCrowd; ++i) {
+    crowd.push_back(std::make_unique<MessageClient>(dispatcher_, [](const Message&) {}));
+    crowd.back()->bind("device[0]/a");
+  }
+  startServer();
+
+  while (countNames(backplane_, NameKind::link) == 0) dispatcher_.runOnce(Deadline::after(100us));
+
+  EXPECT_LT(countNames(backplane_, NameKind::link), kCrowd);
+  runUntil([&] { return std::ranges::all_of(crowd, [](const auto& client) { return client->isConnected(); }); });
+}
+
 }  // namespace
 }  // namespace mpf::test

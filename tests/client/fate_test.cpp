@@ -145,12 +145,8 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
 }
 
 TEST_F(ClientTest, AServerThatEndsGivesEachRequestItsFate) {
-  auto& server = startServer();
-  Message held;
-  server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
-  bind();
-  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
-  runUntil([&] { return static_cast<bool>(held); });
+  startServer();
+  auto held = heldRequest();
   serverRuns_ = false;
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
 

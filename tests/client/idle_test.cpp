@@ -17,6 +17,7 @@
 #include <mpf/client/message_client.h>
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/wait_modes.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -114,7 +115,7 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
   }
 
   Watchdog watchdog_{"idle test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   MessageServer server_{backplane_, "device", {.location = 0, .waitMode = GetParam()}};
   std::thread serving_;
   std::vector<std::unique_ptr<IdleClient>> clients_;

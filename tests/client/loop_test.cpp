@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <mpf/tests/client/client_fixture.h>
+#include <mpf/tests/support/test_backplane.h>
 
 namespace mpf::test {
 namespace {
@@ -92,7 +93,7 @@ TEST_F(ClientTest, AnInterruptEndsADispatcherThatIsNeverIdle) {
 // Callbacks of one client never run at the same time, whoever sends.
 TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
   const Watchdog watchdog("shared dispatcher");
-  const auto backplane = Backplane::isolated();
+  const TestBackplane backplane;
   MessageServer server(backplane, "echo", {.queueSize = 1000});
   server.on<Int32>([](Int32&) {});
   std::thread serving([&] { server.run(); });
@@ -144,9 +145,30 @@ TEST_F(ClientTest, AnInterruptEndsTheServerBetweenTwoRequests) {
   EXPECT_EQ(fateOf(next()), Fate::neverTaken);
 }
 
+TEST(SyncClientTest, TakesWhatIsThereWithoutWaiting) {
+  const TestBackplane backplane;
+  MessageServer server(backplane, "device");
+  Message held;
+  server.on<Int32>([&](Int32Message&& request) {
+    static_cast<void>(server.reply(server.allocReplyMessage<Int32>(request)));
+    held = std::move(request);
+  });
+  std::thread thread([&] { server.run(); });
+  SyncClient client(backplane, "device");
+  ASSERT_TRUE(client.call(Int32Message(), 60s));
+  server.interrupt();
+  thread.join();
+  EXPECT_FALSE(client.receive(0s));
+
+  ASSERT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
+
+  EXPECT_TRUE(client.receive(0s));
+  EXPECT_FALSE(client.receive(0s));
+}
+
 TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
   const Watchdog watchdog("sync client");
-  const auto backplane = Backplane::isolated();
+  const TestBackplane backplane;
   SyncClient client(backplane, "echo");
   auto none = client.call(Int32Message(), 1ms);
   EXPECT_EQ(none.refusal(), SendResult::notConnected);

@@ -86,6 +86,27 @@ TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
   }
 }
 
+// Whoever may ring may also take rings.
+TEST_F(LostHintTest, ARingThatSomebodyElseTookIsRepeated) {
+  runUntil([&] { return client_.isConnected(); });
+  settle();
+  const auto incarnation = hintsOf(layout::SegmentKind::serverWindow).header().ownerWindow;
+  const auto fifo = doorbell::tryOpenFifo(SegmentName::keyed(backplane_.name(), NameKind::fifo, incarnation));
+  ASSERT_TRUE(fifo);
+  pollfd readable{server_->descriptor(), POLLIN, 0};
+  EXPECT_FALSE(server_->receive());
+  ASSERT_EQ(client_.send(Int32Message({.value = 5})), SendResult::sent);
+
+  doorbell::drainFifo(fifo);
+
+  while (messages_.empty()) {
+    while (::poll(&readable, 1, 0) == 1 && server_->handleOne()) {
+    }
+    dispatcher_.runOnce(Deadline::after(1ms));
+  }
+  EXPECT_EQ(next().tryAs<Int32>()->value, 5);
+}
+
 // Writes news of everything into hints, for as long as it lives.
 class Inventor {
  public:

@@ -13,6 +13,7 @@
 
 #include <mpf/client/sync_client.h>
 #include <mpf/server/message_server.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/wait_modes.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -77,7 +78,7 @@ class SignalTest : public testing::TestWithParam<WaitMode> {
   };
 
   Watchdog watchdog_{"signal test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   struct sigaction before_{};
 };
 
@@ -293,7 +294,7 @@ TEST(SharedDispatcherSignals, AClientWaitsForItsServerAndItsPatienceHolds) {
   action.sa_handler = handle;
   ::sigemptyset(&action.sa_mask);
   ::sigaction(SIGUSR1, &action, &before);
-  const auto backplane = Backplane::isolated();
+  const TestBackplane backplane;
   MessageClient client(backplane, [](const Message&) {});
   client.bind("device", 0);
   const auto deadline = Deadline::after(100ms);

@@ -106,7 +106,10 @@ class Peer {
     const auto envelope = link_->begin();
     if (!frees) return;
     if ((envelope.flags & layout::kSlotChunk) != 0) {
-      if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+      try {
+        if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+      } catch (const ChunkUnavailable&) {  // its server has ended
+      }
     }
     link_->end();
   }

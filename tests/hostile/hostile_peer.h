@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include <mpf/shm/backplane.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/usage.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
@@ -51,14 +51,9 @@ class MischiefTest : public testing::TestWithParam<const char*> {
     const char* set = std::getenv("MPF_TEST_SEEDS");
     return set != nullptr ? std::atoi(set) : 1;
   }
-  // Whoever attaches next removes what the dead left; then nothing is there.
-  void TearDown() override {
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
-  }
 
   Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name(), std::chrono::seconds(270)};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 inline constexpr const char* kMischief[] = {"bytes", "words", "slots", "hints", "headers", "cut", "backwards", "flood", "slow"};

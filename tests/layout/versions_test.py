@@ -74,7 +74,7 @@ class Versions(Interop):
             party = self.old_server(self.other(layoutMajor=major))
             refusal = f"s.0.echo: layout {major}, this program speaks \\d+-{self.NEWEST}"
             self.assertRegex(self.call("int32", "value=1", "--timeout", "1"), refusal)
-            self.assertRegex(self.program(MPF, "ls", "--backplane", self.backplane).rest(), f"problem: .*{refusal}")
+            self.assertRegex(" ".join(self.program(MPF, "ls", "--backplane", self.backplane).rest().split()), f"problem: .*{refusal}")
             self.assertRegex(self.program(VICTIM, "serve", self.backplane).rest(), f"in use by another program: .*{refusal}")
             names = self.names()
             self.program(MPF, "clean", "--backplane", self.backplane).rest()

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The program behind Victim: an echo server, a client that sends as fast as it can, a crowd of clients, or a client that listens to a serial line.
+// The program behind Victim: an echo server, one that counts what it sees, a client that sends as fast as it can, a crowd of clients, or
+// a client that listens to a serial line or to another server.
 #include <signal.h>
 #include <sys/inotify.h>
 #include <sys/prctl.h>
@@ -18,6 +19,7 @@
 #include <mpf/client/sync_client.h>
 #include <mpf/schema/serial_sniff.h>
 #include <mpf/server/message_server.h>
+#include <mpf/tests/support/request_log.h>
 
 namespace {
 
@@ -48,6 +50,22 @@ int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
     auto reply = server.allocReplyMessage<mpf::Float64Array>(request, 3000);
     static_cast<void>(server.reply(std::move(reply)));
   });
+  server.on<mpf::Float64>([](mpf::Float64& request) { request.value += 1; });
+  say("open");
+  return server.runUntilSignal();
+}
+
+// Echoes, and counts each request in the log before it does.
+int count(const mpf::Backplane& backplane, const std::string& file, mpf::ServerOptions options) {
+  mpf::test::RequestLog log(file);
+  mpf::MessageServer server(backplane, "echo", options);
+  server.on<mpf::Int32>([&](mpf::Int32& request) {
+    if (request.cmd == mpf::test::RequestLog::kCounted) log.note(request.value);
+  });
+  server.on<mpf::Int32Array>([&](mpf::Int32ArrayMessage& request) {
+    if (request->cmd == mpf::test::RequestLog::kCounted && !request.value().empty()) log.note(request.value()[0]);
+  });
+  server.on<mpf::Float64Array>([](mpf::Float64ArrayMessage&) {});
   server.on<mpf::Float64>([](mpf::Float64& request) { request.value += 1; });
   say("open");
   return server.runUntilSignal();
@@ -146,9 +164,9 @@ std::vector<mpf::FileDescriptor> takeAllInotify() {
   return taken;
 }
 
-int listen(const mpf::Backplane& backplane) {
-  mpf::SyncClient client(backplane, "serial[0].sniff");
-  if (!client.call(mpf::Int32Message({.cmd = mpf::serial::cmdSniffStart}), 60s)) return 1;
+int listen(const mpf::Backplane& backplane, const std::string& server, std::int32_t cmd) {
+  mpf::SyncClient client(backplane, server);
+  if (!client.call(mpf::Int32Message({.cmd = cmd}), 60s)) return 1;
   for (;;) static_cast<void>(client.receive(24h));
 }
 
@@ -164,10 +182,12 @@ int play(const std::vector<std::string>& arguments) {
   const auto backplane = mpf::Backplane::attach(argument(2));
   if (role == "serve") return serve(backplane, {});
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
+  if (role == "count") return count(backplane, argument(3), {});
   if (role == "flood") return flood(backplane);
-  if (role == "listen") return listen(backplane);
+  if (role == "listen" && argument(3).empty()) return listen(backplane, "serial[0].sniff", mpf::serial::cmdSniffStart);
+  if (role == "listen") return listen(backplane, argument(3), std::stoi(argument(4)));
   if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block, flood, listen or crowd\n", role.c_str());
+  std::fprintf(stderr, "role \"%s\": use serve, serve-block, count, flood, listen or crowd\n", role.c_str());
   return 2;
 }
 

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// Binding, continued: to whom, and how it gets there.
+#include <fmt/format.h>
+#include <mutex>
+#include <utility>
+
+#include <mpf/base/step.h>
+#include <mpf/client/binding.h>
+#include <mpf/client/dispatcher_impl.h>
+#include <mpf/shm/segment_name.h>
+
+namespace mpf {
+
+void Binding::setServer(const std::string& server, std::int32_t location) {
+  SegmentName::checkServer(server);
+  if (isBound()) throw std::logic_error(fmt::format("bind: the client is bound to server \"{}\" already", server_));
+  server_ = server;
+  location_ = location;
+  // PAIR(bound): whom to, which the dispatcher's thread looks at.
+  bound_.store(true, std::memory_order_release);
+  setReason(fmt::format("server \"{}\" at location {} is not there yet", server, location));
+}
+
+void Binding::tryConnect() try {
+  if (channel_ || left_) return;  // somebody was quicker: another thread's bind(), a callback that ran the dispatcher
+  auto& endpoint = dispatcher_.endpoint();
+  const auto& backplane = endpoint.backplane().name();
+  auto server = endpoint.peer(SegmentName::serverWindow(backplane, location_, server_), layout::SegmentKind::serverWindow);
+  if (!server) return wish();
+  const auto index = endpoint.tryReserve();
+  if (!index) {
+    setReason(fmt::format("this process has {} clients on the backplane, no more are possible", layout::kMaxLinks));
+    return wakeAt(Clock::nowNs() + kRetryNs);
+  }
+  index_ = *index;
+  try {
+    makeChannel(server);
+  } catch (...) {
+    endpoint.detach(index_);  // or each attempt would cost one
+    throw;
+  }
+  auto& created = channel_->link();
+  incarnation_ = server->header().incarnation;
+  MPF_STEP(link_created);
+  if (wish_) segments::remove(wish_.name());
+  wish_ = {};
+  endpoint.attach(index_, created);
+  setReason(fmt::format("server \"{}\" has not accepted the client yet", server_));
+  server->knock(created.header().incarnation);
+  knockedNs_ = Clock::nowNs();
+  nudgeEveryNs_ = kFirstNudgeNs;
+  wakeAt(knockedNs_ + nudgeEveryNs_);
+} catch (const std::exception& error) {
+  // No memory, no right, a window of another version: the reason is told, and it is tried again.
+  setReason(error.what());
+  wakeAt(Clock::nowNs() + kRetryNs);
+}
+
+void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
+  auto& endpoint = dispatcher_.endpoint();
+  auto link = Link::create(endpoint.backplane().name(), endpoint.window(), index_, server);
+  auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding);
+  auto channel = std::make_shared<MessageLink>(std::move(link), lock_);
+  dispatcher_.setLink(index_, this);
+  const std::lock_guard lock(*lock_);
+  requests_ = std::move(requests);
+  channel_ = std::move(channel);
+  nudging_ = true;
+}
+
+// Shows whom we wait for, and has us told when a server appears.
+void Binding::wish() {
+  setReason(fmt::format("server \"{}\" at location {} is not there", server_, location_));
+  dispatcher_.waitForNames(true);
+  if (wish_) return;
+  auto& endpoint = dispatcher_.endpoint();
+  auto wish =
+      Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::wish, endpoint.backplane().name(), {0644, ~std::uint32_t{0}});
+  auto& header = wish.sharedHeader();
+  header.ownerWindow = endpoint.window().header().incarnation;
+  header.location = location_;
+  server_.copy(header.name.data(), header.name.size() - 1);
+  static_cast<void>(wish.tryPublish(SegmentName::keyed(endpoint.backplane().name(), NameKind::wish, header.incarnation)));
+  MPF_STEP(wish_named);
+  wish.closeFile();
+  wish_ = std::move(wish);
+}
+
+}  // namespace mpf

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+// The ends of links, continued: no descriptors left, paused clients, callbacks that run the dispatcher.
+#include <fcntl.h>
+#include <sys/inotify.h>
+#include <sys/resource.h>
+
+#include <array>
+#include <atomic>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/tests/client/client_fixture.h>
+#include <mpf/tests/support/sanitized.h>
+
+namespace mpf::test {
+namespace {
+
+// While it lives, this process opens nothing.
+class NoDescriptors {
+ public:
+  NoDescriptors() {
+    ::getrlimit(RLIMIT_NOFILE, &old_);
+    const rlimit none{3, old_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &none);
+  }
+  ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &old_); }
+
+ private:
+  rlimit old_{};
+};
+
+using EndMoreTest = ClientTest;
+
+// A request whose memory cannot be mapped for want of descriptors is no nonsense of its client.
+TEST_F(EndMoreTest, AServerWithoutDescriptorsKeepsTheClientOfALargeRequest) {
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  auto& server = startServer();
+  server.on<Float64Array>([](Float64Array&) {});
+  bind();
+  ASSERT_EQ(client_.send(client_.alloc<Float64Array>(kBeyondRings)), SendResult::sent);
+  {
+    const NoDescriptors now;
+    for (int i = 0; i < 5; ++i) server.handleOne();
+  }
+
+  EXPECT_EQ(fateOf(next()), Fate::refused);
+  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
+}
+
+// Nor is a link that cannot be mapped.
+TEST_F(EndMoreTest, AServerWithoutDescriptorsAcceptsItsClientLater) {
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  auto& server = startServer();
+  client_.bind("device[0]/a");
+  {
+    const NoDescriptors now;
+    server.handleOne();
+  }
+
+  EXPECT_EQ(nonsenseRead(), 0u);
+  runUntil([&] { return client_.isConnected(); });
+}
+
+// Nor is a reply nonsense of its server.
+TEST_F(EndMoreTest, AClientWithoutDescriptorsKeepsTheServerOfALargeReply) {
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    auto reply = server.allocReplyMessage<Float64Array>(request, kBeyondRings);
+    static_cast<void>(server.reply(std::move(reply)));
+  });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  while (!server.handleOne()) {
+  }
+  {
+    const NoDescriptors now;
+    for (int i = 0; i < 5; ++i) dispatcher_.runOnce(Deadline::after(1ms));
+  }
+
+  EXPECT_EQ(fateOf(next()), Fate::outcomeUnknown);
+  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
+}
+
+// A client that ends within its callback lives until that returns, although the dispatcher runs on meanwhile.
+TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItReturns) {
+  startServer().on<Int32>([](Int32&) {});
+  MessageClient other(dispatcher_, [](const Message&) {});
+  other.bind("absent");
+  std::unique_ptr<MessageClient> client;
+  bool done = false;
+  const std::string canary(1000, 'x');
+  client = std::make_unique<MessageClient>(dispatcher_, [&, canary](const Message& message) {
+    if (message.tryAs<Connect>() != nullptr) return;
+    client.reset();
+    static_cast<void>(other.connectWait(5ms));
+    EXPECT_EQ(canary, std::string(1000, 'x'));
+    done = true;
+  });
+  client->bind("device[0]/a");
+  runUntil([&] { return client->isConnected(); });
+  ASSERT_EQ(client->send(Int32Message()), SendResult::sent);
+
+  runUntil([&] { return done; });
+}
+
+// Who is paused finds what was sent before the end, and then hears of it; the successor comes after.
+TEST_F(EndMoreTest, APausedClientGetsWhatAServerThatEndedSent) {
+  auto& server = startServer();
+  server.on<Int32>([&](Int32Message&& request) {
+    for (int i = 0; i < 3; ++i) {
+      auto reply = server.allocReplyMessage<Float64Array>(request, kBeyondRings << i);
+      static_cast<void>(server.reply(std::move(reply)));
+    }
+    static_cast<void>(server.reply(std::move(request)));
+  });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
+  client_.pause();
+  while (!server.handleOne()) {
+  }
+  server_.reset();
+  startServer();
+  for (int i = 0; i < 5; ++i) dispatcher_.runOnce(Deadline::after(1ms));
+  EXPECT_THAT(messages_, testing::IsEmpty());
+
+  client_.goOn();
+
+  for (int i = 0; i < 3; ++i) EXPECT_THAT(next().valueAs<Float64Array>(), testing::SizeIs(kBeyondRings << i));
+  EXPECT_NE(next().tryAs<Int32>(), nullptr);
+  runUntil([&] { return news_.size() == 3; });
+  EXPECT_EQ(nonsenseRead(), 0u);
+}
+
+// A handle keeps a link beyond its server's end; its client dies before it has seen that end. The last one goes.
+TEST_F(EndMoreTest, AHandleThatOutlivesItsServerAndItsClientLeavesNoPool) {
+  MPF_NEEDS_A_CHILD;
+  auto& server = startServer();
+  Message held;
+  server.on<Int32>([&](Int32Message&& request) {
+    held = server.allocReplyMessage<Float64Array>(request, kBeyondRings);
+    static_cast<void>(server.reply(std::move(request)));
+  });
+  std::array<int, 2> told{};
+  checkCall(::pipe2(told.data(), O_CLOEXEC), "pipe2");
+  const FileDescriptor heard(told[0]);
+  const FileDescriptor says(told[1]);
+  const auto child = inAChild([&] {
+    SyncClient own(Backplane::named(backplane_.name()), "device[0]/a");
+    static_cast<void>(own.call(Int32Message(), 100s));
+    static_cast<void>(::write(says.get(), "!", 1));
+    for (;;) ::pause();  // never looks again
+  });
+  while (!held) server.handleOne();
+  char byte = 0;
+  ASSERT_EQ(::read(heard.get(), &byte, 1), 1);  // it has its reply
+  server_.reset();
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+
+  held.reset();
+
+  EXPECT_EQ(countNames(backplane_, NameKind::bulk), 0);
+}
+
+// Whoever is killed meanwhile leaves no gap in their numbers, behind which nobody would look.
+TEST_F(EndMoreTest, NamesOfAPoolGoLastOneFirst) {
+  startServer().on<Float64Array>([](Float64Array&) {});
+  const FileDescriptor watch(checkCall(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC), "inotify"));
+  checkCall(::inotify_add_watch(watch.get(), "/dev/shm", IN_DELETE), "watch");
+  std::optional<MessageClient> leaver(std::in_place, dispatcher_, [this](Message&& message) { messages_.push_back(std::move(message)); });
+  leaver->bind("device[0]/a");
+  runUntil([&] { return leaver->isConnected(); });
+  messages_.clear();
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(leaver->send(leaver->alloc<Float64Array>(kBeyondRings << (4 * i))), SendResult::sent);
+  for (int i = 0; i < 2; ++i) EXPECT_NE(next().tryAs<Float64Array>(), nullptr);
+
+  leaver.reset();
+
+  std::vector<std::string> removed;
+  alignas(inotify_event) std::array<char, 65536> events{};
+  for (ssize_t bytes = 0; (bytes = ::read(watch.get(), events.data(), events.size())) > 0;) {
+    for (ssize_t at = 0; at < bytes;) {
+      const auto* event = reinterpret_cast<const inotify_event*>(events.data() + at);
+      const std::string name(event->name);
+      if (name.starts_with(SegmentName::prefix(backplane_.name())) && SegmentName::tryParse(name)->kind == NameKind::bulk)
+        removed.push_back(name);
+      at += static_cast<ssize_t>(sizeof *event + event->len);
+    }
+  }
+  EXPECT_THAT(removed, testing::ElementsAre(testing::EndsWith(".0.1"), testing::EndsWith(".0.0")));
+}
+
+// Who hears of the end may wait for the next connection there and then.
+TEST_F(EndMoreTest, ACallbackMayWaitForTheNextConnection) {
+  startServer().on<Int32>([](Int32&) {});
+  int connects = 0;
+  int replies = 0;
+  std::unique_ptr<MessageClient> client;
+  client = std::make_unique<MessageClient>(dispatcher_, [&](const Message& message) {
+    if (message.tryAs<Int32>() != nullptr) ++replies;
+    const auto* connect = message.tryAs<Connect>();
+    if (connect == nullptr) return;
+    if (connect->status == ConnectStatus::connectYes) ++connects;
+    if (connect->status == ConnectStatus::connectNo) static_cast<void>(client->connectWait(300ms));
+  });
+  client->bind("device[0]/a");
+  runUntil([&] { return connects == 1; });
+  serverRuns_ = false;
+  ASSERT_EQ(client->send(Int32Message()), SendResult::sent);
+  server_.reset();
+  startServer().on<Int32>([](Int32&) {});
+  serverRuns_ = true;
+
+  runUntil([&] { return client->isConnected() && connects == 2; });
+  ASSERT_EQ(client->send(Int32Message()), SendResult::sent);
+  runUntil([&] { return replies == 1; });
+  for (int i = 0; i < 20; ++i) {
+    server_->handleOne();
+    dispatcher_.runOnce(Deadline::after(1ms));
+  }
+
+  EXPECT_TRUE(client->isConnected());
+  EXPECT_EQ(countNames(backplane_, NameKind::link), 1);
+  EXPECT_EQ(sumOf(&layout::WindowControl::linkCount), 2u) << "its end and the server's";
+}
+
+// Another thread binds a client while the dispatcher tells of an end, after which it looks for servers of its own accord.
+TEST(EndOfOthers, AClientThatIsBoundMeanwhileConnectsOnce) {
+  MPF_NEEDS_A_CHILD;
+  const Watchdog watchdog("bound meanwhile");
+  TestBackplane backplane;
+  const auto child = inAChild([&] {
+    MessageServer mortal(Backplane::named(backplane.name()), "mortal");
+    mortal.run();
+  });
+  {
+    MessageServer server(backplane, "device[0]/a");
+    server.on<Int32>([](Int32&) {});
+    std::atomic<int> replies{0};
+    std::atomic<bool> blocked{false};
+    std::atomic<bool> goesOn{false};
+    MessageClient first(backplane, [&](const Message& message) {
+      const auto* connect = message.tryAs<Connect>();
+      if (connect == nullptr || connect->status != ConnectStatus::connectNo) return;
+      blocked = true;
+      blocked.notify_one();
+      goesOn.wait(false);
+    });
+    MessageClient second(backplane, [&](const Message& message) { replies += message.tryAs<Int32>() != nullptr ? 1 : 0; });
+    first.bind("mortal");
+    EXPECT_TRUE(first.connectWait(100s));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    blocked.wait(false);
+
+    second.bind("device[0]/a");
+    goesOn = true;
+    goesOn.notify_one();
+
+    while (!second.isConnected()) server.handleOne();
+    const auto window =
+        PeerWindow::tryOpen(SegmentName::serverWindow(backplane.name(), 0, "device[0]/a"), layout::SegmentKind::serverWindow);
+    EXPECT_EQ(second.send(Int32Message()), SendResult::sent);
+    while (replies == 0) server.handleOne();
+    EXPECT_EQ(countNames(backplane, NameKind::link), 1);
+    EXPECT_EQ(window->control().linkCount.load(), 1u);
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test

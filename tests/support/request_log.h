@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// RequestLog: how often servers have seen each request of a test, in a file that they share and that outlives them when they are killed.
+//
+// Threads  any number of processes count; the test reads.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/base/system_call.h>
+
+namespace mpf::test {
+
+class RequestLog {
+ public:
+  static constexpr std::uint32_t kRequests = 1u << 20;
+  static constexpr std::int32_t kCounted = 4711;  // in `cmd` of a request whose number, its `value`, shall be counted
+
+  // The file is made when it is not there.
+  explicit RequestLog(const std::string& file) {
+    const FileDescriptor log(checkCall(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", file));
+    checkCall(::ftruncate(log.get(), kBytes), "ftruncate", file);
+    auto* const memory = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_SHARED, log.get(), 0);
+    if (memory == MAP_FAILED) throwSystemError(errno, "mmap", file);
+    counts_ = static_cast<std::atomic<std::uint8_t>*>(memory);
+  }
+  ~RequestLog() { ::munmap(counts_, kBytes); }
+  RequestLog(const RequestLog&) = delete;
+  RequestLog& operator=(const RequestLog&) = delete;
+
+  // Counts wrap at kRequests.
+  void note(std::int32_t number) noexcept { ++at(number); }
+  [[nodiscard]] int timesSeen(std::int32_t number) const noexcept { return at(number); }
+
+ private:
+  static constexpr std::size_t kBytes = kRequests;
+  [[nodiscard]] std::atomic<std::uint8_t>& at(std::int32_t number) const noexcept {
+    return counts_[static_cast<std::uint32_t>(number) % kRequests];
+  }
+  std::atomic<std::uint8_t>* counts_ = nullptr;
+};
+
+}  // namespace mpf::test
