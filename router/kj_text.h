@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+// Texts and times between kj and the standard library.
+#pragma once
+
+#include <chrono>
+#include <kj/string.h>
+#include <kj/time.h>
+#include <string>
+
+namespace mpf::router {
+
+[[nodiscard]] inline std::string toStd(kj::StringPtr text) { return {text.begin(), text.size()}; }
+// What a peer said for people: cut when it is long, and nothing in it that moves a terminal's cursor or breaks a log's lines.
+[[nodiscard]] std::string forPeople(const std::string& text);
+[[nodiscard]] inline std::string forPeople(kj::StringPtr text) { return forPeople(toStd(text)); }
+
+[[nodiscard]] inline kj::Duration toKj(std::chrono::nanoseconds time) { return time.count() * kj::NANOSECONDS; }
+
+}  // namespace mpf::router

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+// mpf-router: joins this host's backplane to those of others.
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <fmt/format.h>
+
+#include <mpf/router/arguments.h>
+#include <mpf/router/kj_text.h>
+#include <mpf/router/router.h>
+#include <mpf/router/service_manager.h>
+#include <mpf/server/programs/server_log.h>
+
+namespace {
+
+using mpf::router::Router;
+using mpf::router::RouterArguments;
+using mpf::router::ServiceManager;
+
+constexpr auto kToStop = 2 * kj::SECONDS;  // for farewells
+constexpr unsigned kTurnsBetweenLooks = 32;  // at descriptors, timers and signals
+
+// Each listening address on a line of its own: for who starts us with port 0 and waits until we listen.
+void tellAddresses(int fd, Router& router) {
+  if (fd < 0) return;
+  std::string text;
+  for (const auto& address : router.listening()) text += address.text() + '\n';
+  for (std::size_t at = 0; at < text.size();) {
+    const auto written = ::write(fd, text.data() + at, text.size() - at);
+    if (written <= 0) break;
+    at += static_cast<std::size_t>(written);
+  }
+  ::close(fd);
+}
+
+// A configuration that is wrong is told, and changes nothing.
+void reload(Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
+  ServiceManager::tellReloading();
+  try {
+    router.reload(arguments.load());
+    log->info("the configuration has been read again");
+  } catch (const std::exception& error) {
+    log->error("the configuration stays as it was: {}", error.what());
+  }
+  ServiceManager::tellReady();
+}
+
+kj::Promise<void> reloadAtHangup(kj::UnixEventPort& port, Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
+  return port.onSignal(SIGHUP).then([&](siginfo_t&&) {
+    reload(router, arguments, log);
+    return reloadAtHangup(port, router, arguments, log);
+  });
+}
+
+// Never resolves.
+kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
+  return router.start().then([&] {
+    for (const auto& address : router.listening()) log->info("listening on {}", address.text());
+    tellAddresses(arguments.readyDescriptor(), router);
+    ServiceManager::tellReady();
+    return reloadAtHangup(port, router, arguments, log);
+  });
+}
+
+int run(const RouterArguments& arguments) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kj::UnixEventPort::captureSignal(signal);  // before there are threads
+  const mpf::ServerLog log("mpf-router", arguments.config().logLevel);
+  auto io = kj::setupAsyncIo();
+  io.waitScope.setBusyPollInterval(kTurnsBetweenLooks);  // or a peer whose bytes come faster than they are read would be all that there is
+  auto& port = io.unixEventPort;
+  Router router(io, arguments.config(), *log.operator->());
+  auto toEnd = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
+  serve(port, router, arguments, log).exclusiveJoin(kj::mv(toEnd)).wait(io.waitScope);  // also while it starts; who ends reloads no more
+  ServiceManager::tellStopping();
+  log->info("ends");
+  router.stop().exclusiveJoin(io.provider->getTimer().afterDelay(kToStop)).wait(io.waitScope);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  RouterArguments arguments;
+  if (const auto status = arguments.start(argc, argv)) return *status;
+  return run(arguments);
+} catch (const kj::Exception& error) {
+  fmt::print(stderr, "mpf-router: {}\n", mpf::router::toStd(error.getDescription()));
+  return 1;
+} catch (const std::exception& error) {
+  fmt::print(stderr, "mpf-router: {}\n", error.what());
+  return 1;
+}

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// ProtocolError: what a peer sent, or did not send, that ends its connection.
+#pragma once
+
+#include <stdexcept>
+
+#include <mpf/schema/router.capnp.h>
+
+namespace mpf::router {
+
+using FarewellCode = wire::Farewell::Code;
+
+class ProtocolError : public std::runtime_error {
+ public:
+  ProtocolError(FarewellCode code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  [[nodiscard]] FarewellCode code() const noexcept { return code_; }
+
+ private:
+  FarewellCode code_;
+};
+
+}  // namespace mpf::router

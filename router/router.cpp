@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/router/router.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fmt/format.h>
+#include <system_error>
+
+#include <mpf/router/kj_text.h>
+
+namespace mpf::router {
+namespace {
+
+constexpr auto kWishesAfter = std::chrono::milliseconds(5);  // a thousand clients that come at once are looked at together
+constexpr auto kWishesAgain = std::chrono::seconds(1);       // when not all could be seen
+
+}  // namespace
+
+Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logger& log)
+    : statistics_(Backplane::attach(config.backplane), config.name),
+      here_{.port = io.unixEventPort,
+            .network = io.provider->getNetwork(),
+            .timer = io.provider->getTimer(),
+            .backplane = Backplane::attach(config.backplane),
+            .log = log,
+            .statistics = statistics_,
+            .presences = presences_,
+            .config = config,
+            .tls = nullptr,
+            .incarnation = segments::newIncarnation()},
+      presences_(here_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
+      wishes_(here_.backplane),
+      bell_(io.unixEventPort, [this] { lookAtWishes(); }),
+      callerLog_(log),
+      wishesDue_(here_.timer, [this] { readWishes(); }),
+      tasks_(*this) {
+  openTls(config);
+  names_ = here_.backplane.watcher().watchNames(NameKind::wish, [this] { bell_.ring(); });
+}
+
+Router::~Router() { here_.backplane.watcher().forget(names_); }
+
+void Router::openTls(const RouterConfig& config) {
+  if (!config.tls.certificate.empty()) here_.tls = std::make_shared<Tls>(config.tls, here_.timer);
+}
+
+kj::Promise<void> Router::start() {
+  auto starts = kj::Vector<kj::Promise<void>>();
+  for (const auto& each : here_.config.listen) starts.add(listen(each).start());
+  for (const auto& remote : here_.config.remotes) remotes_.push_back(std::make_unique<ClientRouter>(here_, remote));
+  lookAtWishes();
+  return kj::joinPromises(starts.releaseAsArray());
+}
+
+Listener& Router::listen(const Listen& listen) {
+  auto hear = [this, listen](Listener::Caller caller) { onCaller(listen, std::move(caller)); };
+  return *listeners_.emplace_back(std::make_shared<Listener>(here_, listen, std::move(hear)));
+}
+
+// One that cannot listen goes, and the next reload tries it again. It may have gone before it knew.
+void Router::listenLate(const Listen& listen) {
+  auto started = this->listen(listen).start();
+  tasks_.add(started.catch_([this, late = std::weak_ptr(listeners_.back())](kj::Exception&& error) {
+    const auto listener = late.lock();
+    if (!listener) return;
+    here_.log.error("{}: {}", listener->listen().address.text(), toStd(error.getDescription()));
+    listeners_.remove(listener);
+  }));
+}
+
+std::vector<Address> Router::listening() {
+  std::vector<Address> addresses;
+  for (const auto& listener : listeners_) addresses.push_back(listener->address());
+  return addresses;
+}
+
+void Router::onCaller(const Listen& listen, Listener::Caller caller) {
+  if (sessions_.size() >= here_.config.limits.maxConnections) {
+    callerLog_.warn("{}: turned away: there are {} connections", caller.address, sessions_.size());
+    return;
+  }
+  sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls)});
+  const auto session = std::prev(sessions_.end());
+  tasks_.add(session->router->run().then([this, session] { sessions_.erase(session); }));
+}
+
+void Router::lookAtServers() {
+  for (const auto& session : sessions_) session.router->lookAtAll();
+}
+
+void Router::lookAtWishes() { wishesDue_.setAt(Deadline::after(kWishesAfter)); }
+
+void Router::readWishes() {
+  std::string problem;
+  try {
+    const auto wishes = wishes_.look();
+    for (const auto& remote : remotes_) remote->setWishes(wishes);
+    problem = wishes_.problem();
+  } catch (const std::system_error& error) {
+    problem = error.what();
+  }
+  if (!problem.empty()) {
+    if (wishProblem_.empty()) here_.log.warn("some clients are not seen, for a while: {}", problem);
+    wishesDue_.setAt(Deadline::after(kWishesAgain));
+  }
+  wishProblem_ = std::move(problem);
+}
+
+void Router::reload(const RouterConfig& config) {
+  openTls(config);
+  if (config.backplane != here_.config.backplane || config.name != here_.config.name)
+    here_.log.warn("another name or backplane needs a restart: this is still {}", here_.config.name);
+  here_.log.set_level(spdlog::level::from_str(config.logLevel));
+  here_.config = config;
+  std::erase_if(listeners_,
+                [&](const auto& listener) { return std::ranges::find(config.listen, listener->listen()) == config.listen.end(); });
+  for (const auto& session : sessions_) {
+    if (std::ranges::find(config.listen, session.listen) == config.listen.end()) session.router->stop();
+    else session.router->onConfig();
+  }
+  for (const auto& each : config.listen) {
+    if (std::ranges::any_of(listeners_, [&](const auto& listener) { return listener->listen() == each; })) continue;
+    listenLate(each);
+  }
+  for (auto remote = remotes_.begin(); remote != remotes_.end();) {
+    if (std::ranges::find(config.remotes, (*remote)->remote()) != config.remotes.end()) {
+      ++remote;
+      continue;
+    }
+    auto gone = kj::heap(std::move(*remote));
+    auto stopped = (*gone)->stop();
+    tasks_.add(stopped.attach(kj::mv(gone)));
+    remote = remotes_.erase(remote);
+  }
+  for (const auto& each : config.remotes) {
+    if (std::ranges::any_of(remotes_, [&](const auto& remote) { return remote->remote() == each; })) continue;
+    remotes_.push_back(std::make_unique<ClientRouter>(here_, each));
+  }
+  lookAtWishes();
+}
+
+kj::Promise<void> Router::stop() {
+  listeners_.clear();
+  auto ends = kj::Vector<kj::Promise<void>>();
+  for (const auto& remote : remotes_) ends.add(remote->stop());
+  for (const auto& session : sessions_) session.router->stop();
+  ends.add(tasks_.onEmpty());
+  return kj::joinPromises(ends.releaseAsArray());
+}
+
+void Router::taskFailed(kj::Exception&& error) { here_.log.error("{}", toStd(error.getDescription())); }
+
+}  // namespace mpf::router

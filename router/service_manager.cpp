@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/router/service_manager.h>
+
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+
+#include <mpf/base/clock.h>
+#include <mpf/base/file_descriptor.h>
+
+namespace mpf::router {
+
+void ServiceManager::tellReloading() noexcept { tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000)); }
+
+void ServiceManager::tell(const std::string& state) noexcept {
+  const char* const path = std::getenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe): nobody sets it
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path == nullptr || *path == '\0' || std::strlen(path) >= sizeof address.sun_path) return;
+  const auto length = std::strlen(path);
+  std::memcpy(address.sun_path, path, length);
+  if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // an abstract name
+  const FileDescriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  // Whoever does not listen is no reason to stop.
+  static_cast<void>(::sendto(socket.get(), state.data(), state.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&address),
+                             static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length)));
+}
+
+}  // namespace mpf::router

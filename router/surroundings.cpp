@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/router/surroundings.h>
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <sstream>
+
+#include <mpf/base/version.h>
+#include <mpf/router/line.h>
+
+namespace mpf::router {
+
+std::string hostForKj(const Address& address) {
+  return address.host.find(':') == std::string::npos ? address.host : fmt::format("[{}]", address.host);
+}
+
+void prepare(kj::AsyncIoStream& stream, const Limits& limits) {
+  // What a peer does not acknowledge or does not read for so long is lost: our own signs of life do not get through, either.
+  const auto timeoutMs = static_cast<unsigned>(2 * limits.deadTime.count());
+  stream.setsockopt(IPPROTO_TCP, TCP_USER_TIMEOUT, &timeoutMs, sizeof timeoutMs);
+  const int on = 1;
+  stream.setsockopt(IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+void checkPlain(kj::NetworkAddress& address, const RouterConfig& config) {
+  if (config.allowPublicPlain) return;
+  const auto text = address.toString();
+  std::istringstream each(std::string(text.begin(), text.size()));
+  for (std::string one; std::getline(each, one, ',');) {
+    const auto parsed = parseAddress(one);
+    if (isPublic(parsed.host)) {
+      throw std::runtime_error(fmt::format("{} is a public address: plain TCP there only with allow-public-plain = true", one));
+    }
+  }
+}
+
+void introduce(wire::Greeting::Builder greeting, const Surroundings& here) {
+  Line::describe(greeting, here.config.limits);
+  greeting.setRouter(here.config.name);
+  greeting.setProgram(fmt::format("mpf-router {}", kVersion));
+  greeting.setIncarnation(here.incarnation);
+}
+
+}  // namespace mpf::router

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Surroundings: what every part of a router works with.
+//
+// Threads  that of the event loop.
+#pragma once
+
+#include <kj/async-io.h>
+#include <kj/async-unix.h>
+#include <memory>
+#include <spdlog/logger.h>
+
+#include <mpf/router/config.h>
+#include <mpf/router/presences.h>
+#include <mpf/router/seldom_log.h>
+#include <mpf/router/statistics.h>
+#include <mpf/router/tls.h>
+#include <mpf/schema/router.capnp.h>
+#include <mpf/shm/backplane.h>
+
+namespace mpf::router {
+
+struct Surroundings {
+  kj::UnixEventPort& port;
+  kj::Network& network;
+  kj::Timer& timer;
+  Backplane backplane;
+  spdlog::logger& log;
+  Statistics& statistics;
+  Presences& presences;
+  RouterConfig config;                 // as it is now; a reload changes it
+  std::shared_ptr<Tls> tls;            // nullptr: nothing uses TLS
+  std::uint64_t incarnation = 0;       // which life of this router
+  // What callers cause, of all together: who calls again and again has no log of his own to fill.
+  SeldomLog sessionLog{log};           // they come and go
+  SeldomLog refusalLog{log};           // they do not get something
+  SeldomLog lostLog{log};              // they do not get what they asked for
+};
+
+// Options of every TCP connection, before TLS.
+void prepare(kj::AsyncIoStream& stream, const Limits& limits);
+
+// An address's host as kj parses it.
+[[nodiscard]] std::string hostForKj(const Address& address);
+
+// Throws std::runtime_error when plain TCP to or on one of these is not allowed.
+void checkPlain(kj::NetworkAddress& address, const RouterConfig& config);
+
+// What this router says of itself; the rest of its greeting is the caller's.
+void introduce(wire::Greeting::Builder greeting, const Surroundings& here);
+
+}  // namespace mpf::router

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+# The real programs, on backplanes of this process's own. Nothing outlives stopAll(), nor the watchdog.
+import faulthandler
+import json
+import os
+import signal
+import subprocess
+import threading
+
+
+class Programs:
+  def __init__(self, folder):
+    self.folder_ = folder
+    self.running = []
+    self.backplanes_ = []
+
+  def backplane(self, name):
+    """A name of its own; `name` tells apart those of one test."""
+    full = f"mpf-peer-{os.getpid()}-{len(self.backplanes_)}-{name}"
+    self.backplanes_.append(full)
+    return full
+
+  def start(self, backplane, program, *arguments, **options):
+    command = [os.path.join(self.folder_, program), *map(str, arguments)]
+    started = subprocess.Popen(command, env={**os.environ, "MPF_BACKPLANE": backplane}, text=True, **options)
+    self.running.append(started)
+    return started
+
+  def router(self, backplane, *arguments):
+    """One that listens; returns the program, and its address."""
+    ready, write = os.pipe()
+    try:
+      router = self.start(backplane, "mpf-router", "--backplane", backplane, *arguments, "--listen", "127.0.0.1:0", "--plain",
+                          "--ready-fd", write, pass_fds=(write,))
+    finally:
+      os.close(write)
+    with os.fdopen(ready) as lines:
+      host, port = lines.readline().strip().rsplit(":", 1)
+    return router, (host, int(port))
+
+  def remoteRouter(self, backplane, location, address, *options):
+    """One that connects to `address` for the servers of `location`."""
+    remote = f"{location}={address[0]}:{address[1]}"
+    return self.start(backplane, "mpf-router", "--backplane", backplane, "--remote", remote, "--plain", *options)
+
+  def call(self, backplane, *arguments):
+    """`mpf call`, for a long time; its output is to be read from the process."""
+    return self.start(backplane, "mpf", "call", *arguments, "--timeout", 600, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+  def called(self, backplane, *arguments):
+    """What `mpf call --json` printed, and its exit status."""
+    call = self.call(backplane, *arguments, "--json")
+    out, error = call.communicate()
+    return (json.loads(out) if out.startswith("{") else out), error, call.returncode
+
+  def stop(self, program):
+    program.send_signal(signal.SIGCONT)
+    program.terminate()
+    program.wait()
+
+  def kill(self, program):
+    program.kill()
+    program.wait()
+
+  def stopAll(self):
+    for program in reversed(self.running):
+      if program.poll() is None:
+        self.stop(program)
+      for end in (program.stdout, program.stderr):
+        if end:
+          end.close()
+    for backplane in self.backplanes_:
+      subprocess.run([os.path.join(self.folder_, "mpf"), "clean", "--backplane", backplane], stdout=subprocess.DEVNULL, check=False)
+    self.running, self.backplanes_ = [], []
+
+  def watchdog(self, seconds):
+    """Ends this process, and what it started, when it hangs."""
+    def bark():
+      faulthandler.dump_traceback()
+      for program in self.running:
+        program.kill()
+      os._exit(1)
+    timer = threading.Timer(seconds, bark)
+    timer.daemon = True
+    timer.start()
+    return timer

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// A router whose look-ups of names take their time: what it does not want any more ends, whatever comes of them later.
+#include <mpf/router/router.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <kj/debug.h>
+#include <memory>
+#include <optional>
+#include <spdlog/details/null_mutex.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <sstream>
+#include <stdexcept>
+
+#include <mpf/tests/router/held_network.h>
+#include <mpf/tests/support/test_backplane.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::router::test {
+namespace {
+
+class HeldRouterTest : public testing::Test {
+ public:
+  ~HeldRouterTest() noexcept override = default;
+
+ protected:
+  [[nodiscard]] RouterConfig config() const {
+    RouterConfig config;
+    config.backplane = backplane_.name();
+    config.name = "test";
+    return config;
+  }
+  [[nodiscard]] RouterConfig withRemote() const {
+    auto with = config();
+    with.remotes.push_back({.locations = {1}, .address = parseAddress("slow.lab:9900"), .security = Security::plain, .tlsName = {}});
+    return with;
+  }
+  [[nodiscard]] RouterConfig withListener() const {
+    auto with = config();
+    with.listen.push_back({.address = parseAddress("slow.lab:9900"), .security = Security::plain});
+    return with;
+  }
+  [[nodiscard]] auto& lookups() { return io_.network().lookups; }
+  void fail(std::size_t lookup) {
+    lookups()[lookup]->reject(KJ_EXCEPTION(FAILED, "no such name"));
+    io_.run();
+  }
+
+  const mpf::test::Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+  const mpf::test::TestBackplane backplane_;
+  std::ostringstream said_;
+  spdlog::logger log_{"router", std::make_shared<spdlog::sinks::ostream_sink_st>(said_)};
+  HeldIo io_;
+  std::optional<Router> router_{std::in_place, io_.context(), config(), log_};
+};
+
+using SlowLookupTest = HeldRouterTest;
+
+TEST_F(SlowLookupTest, EndsWithAListenerThatAReloadNamesNoMore) {
+  router_->reload(withListener());
+  ASSERT_EQ(lookups().size(), 1u);
+
+  router_->reload(config());
+  EXPECT_FALSE(lookups()[0]->isWaiting());
+  fail(0);
+
+  EXPECT_EQ(said_.str(), "");
+}
+
+TEST_F(SlowLookupTest, EndsWithTheRouter) {
+  router_->reload(withListener());
+
+  auto stopped = router_->stop();
+  ASSERT_FALSE(lookups()[0]->isWaiting());
+
+  stopped.wait(io_.context().waitScope);
+  EXPECT_EQ(said_.str(), "");
+}
+
+// At start-up, when somebody waits for it.
+TEST_F(SlowLookupTest, EndsWithARouterThatHasYetToStart) {
+  router_.emplace(io_.context(), withListener(), log_);
+  auto started = router_->start();
+
+  router_->stop().wait(io_.context().waitScope);
+
+  EXPECT_FALSE(lookups()[0]->isWaiting());
+  EXPECT_ANY_THROW(started.wait(io_.context().waitScope));
+}
+
+TEST_F(SlowLookupTest, ThatFailsIsToldAndTheNextReloadTriesItAgain) {
+  router_->reload(withListener());
+  fail(0);
+  EXPECT_THAT(said_.str(), testing::HasSubstr("slow.lab:9900: no such name"));
+  EXPECT_TRUE(router_->listening().empty());
+
+  router_->reload(withListener());
+  ASSERT_EQ(lookups().size(), 2u);
+  lookups()[1]->fulfill(io_.addressOf("127.0.0.1:0"));
+  io_.run();
+
+  ASSERT_EQ(router_->listening().size(), 1u);
+  EXPECT_NE(router_->listening()[0].port, 9900) << "it listens";
+}
+
+TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
+  router_->reload(withListener());
+  router_->reload(config());
+  router_->reload(withListener());
+  io_.run();
+
+  ASSERT_EQ(lookups().size(), 2u);
+  EXPECT_TRUE(lookups()[1]->isWaiting());
+  EXPECT_EQ(router_->listening().size(), 1u);
+}
+
+// A line end that cannot be told, say: the remote would be called no more, and nobody would know.
+using RemoteTest = HeldRouterTest;
+
+class FullSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+  void sink_it_(const spdlog::details::log_msg& /*message*/) override { throw std::runtime_error("no room"); }
+  void flush_() override {}
+};
+
+TEST_F(RemoteTest, ThatCannotGoOnEndsTheProgram) {
+  log_.sinks() = {std::make_shared<FullSink>()};
+  log_.set_error_handler([](const std::string& why) { throw std::runtime_error(why); });
+  router_->reload(withRemote());
+  ASSERT_EQ(lookups().size(), 1u);
+
+  EXPECT_ANY_THROW(fail(0));
+}
+
+}  // namespace
+}  // namespace mpf::router::test

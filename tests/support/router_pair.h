@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// RouterPair: two backplanes, as two hosts have them, and a router on each. Clients on the near one reach servers on the far one.
+//
+//   near: client ─► mpf-router ══ TCP ══ mpf-router ─► server :far
+//
+//   RouterPair routers;
+//   routers.start();                            // or startFar() and startNear(), in any order, again
+//   MessageServer server(routers.far(), "echo", {.location = RouterPair::kLocation});
+//   MessageClient client(routers.near(), ...);
+//   client.bind("echo", RouterPair::kLocation);
+//   ...
+//   routers.expectGoodEnd();                    // once servers and clients are gone
+//
+// Link mpf_test_routers. The routers die with the test.
+//
+// Threads  one.
+#pragma once
+
+#include <netinet/in.h>
+#include <signal.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/base/system_call.h>
+#include <mpf/shm/backplane.h>
+#include <mpf/tests/support/router_process.h>
+#include <mpf/tests/support/test_backplane.h>
+
+namespace mpf::test {
+
+// A port of this host that is nobody's, and stays free for routers that listen on it, one after the other.
+class FreePort {
+ public:
+  FreePort() : socket_(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket")) {
+    const int on = 1;  // as listeners have it: bound by two, listening one
+    checkCall(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on), "SO_REUSEADDR");
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof address;
+    checkCall(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), length), "bind");
+    checkCall(::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &length), "getsockname");
+    address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  }
+  // "127.0.0.1:54321"
+  [[nodiscard]] const std::string& address() const noexcept { return address_; }
+
+ private:
+  FileDescriptor socket_;
+  std::string address_;
+};
+
+// Where routers are, when that is not simply here.
+struct RouterPlace {
+  std::string address;  // of the far one, HOST:PORT; empty: a free port of this host
+  RouterProcess::Enter enterNear{};
+  RouterProcess::Enter enterFar{};
+};
+
+class RouterPair {
+ public:
+  // Where the servers of the far backplane are: there itself, and as the near one calls it.
+  static constexpr std::int32_t kLocation = 1;
+  using Options = std::vector<std::string>;
+
+  explicit RouterPair(RouterPlace place = {}) : place_(std::move(place)) {}
+
+  [[nodiscard]] const Backplane& near() const noexcept { return near_; }
+  [[nodiscard]] const Backplane& far() const noexcept { return far_; }
+  // Where the far one listens, and the near one calls.
+  [[nodiscard]] const std::string& address() const noexcept { return place_.address.empty() ? port_.address() : place_.address; }
+
+  void start(const Options& more = {}) {
+    startFar(more);
+    startNear(more);
+  }
+  // One that runs is killed first. `more`: further options.
+  void startFar(const Options& more = {}) {
+    farRouter_.reset();
+    farRouter_ = started({"--backplane", far_.name(), "--serve", std::to_string(kLocation), "--listen", address(), "--plain"}, more,
+                         place_.enterFar);
+  }
+  void startNear(const Options& more = {}) {
+    nearRouter_.reset();
+    nearRouter_ =
+        started({"--backplane", near_.name(), "--remote", std::to_string(kLocation) + "=" + address(), "--plain"}, more, place_.enterNear);
+  }
+  // Once started.
+  [[nodiscard]] RouterProcess& nearRouter() { return *nearRouter_; }
+  [[nodiscard]] RouterProcess& farRouter() { return *farRouter_; }
+
+  // Ends both as a service manager does.
+  void expectGoodEnd() {
+    for (auto* router : {&nearRouter_, &farRouter_}) {
+      if (!*router) continue;
+      EXPECT_EQ((*router)->end(SIGTERM), 0) << (*router)->said();
+      router->reset();
+    }
+  }
+
+ private:
+  static std::unique_ptr<RouterProcess> started(Options options, const Options& more, const RouterProcess::Enter& enter) {
+    options.insert(options.end(), more.begin(), more.end());
+    // Where many want the processors, a router may not run for seconds: that is for those tests to count that mean it.
+    if (std::ranges::find(more, "--dead-time") == more.end()) options.insert(options.end(), {"--dead-time", "60s"});
+    return std::make_unique<RouterProcess>(options, enter);
+  }
+  TestBackplane near_;
+  TestBackplane far_;
+  FreePort port_;
+  RouterPlace place_;
+  std::unique_ptr<RouterProcess> nearRouter_;
+  std::unique_ptr<RouterProcess> farRouter_;
+};
+
+}  // namespace mpf::test

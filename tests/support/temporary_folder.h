@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// TemporaryFolder: a folder of the test's own, removed with all that is in it.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <string>
+
+#include <mpf/base/system_call.h>
+
+namespace mpf::test {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = testing::TempDir() + "mpf-test-" + std::string(6, 'X');  // as mkdtemp() wants it
+    if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  // The path of the file `name` in it.
+  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
+  // Makes that file, with this text in it.
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(file(name)) << text;
+    return file(name);
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace mpf::test
