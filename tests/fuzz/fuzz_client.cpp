@@ -4,6 +4,7 @@
 #include <optional>
 
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/fuzz/fuzzer.h>
 #include <mpf/tests/fuzz/hostile_files.h>
 #include <mpf/tests/fuzz/scene.h>
 #include <mpf/tests/fuzz/talk.h>
@@ -37,21 +38,12 @@ class Client {
   std::optional<Talk> talk_;
 };
 
+}  // namespace
+
 void play(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files(scene.backplane, {scene.serverName(), scene.hintsOf(scene.server)});
-  {
-    Client client(scene, files);
-    files.play(input, [&](std::uint64_t value) { client.turn(value); });
-  }
-  files.restore();
+  files.play(input, [] { return Client(scene, files); });
 }
 
-}  // namespace
 }  // namespace mpf::test
-
-// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  mpf::test::play({data, size});
-  return 0;
-}

@@ -9,6 +9,7 @@
 #include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
 #include <mpf/schema/conversion.h>
+#include <mpf/tests/fuzz/fuzzer.h>
 #include <mpf/tests/fuzz/talk.h>
 #include <mpf/tools/recording.h>
 
@@ -24,6 +25,8 @@ void take(wire::Record::Reader record) {
   if (message) lookAt(*message);
 }
 
+}  // namespace
+
 void play(std::span<const std::uint8_t> input) try {
   static const FileDescriptor file(checkCall(::memfd_create("recording", MFD_CLOEXEC), "create a file"));
   checkCall(::ftruncate(file.get(), static_cast<off_t>(input.size())), "cut a file");
@@ -34,11 +37,4 @@ void play(std::span<const std::uint8_t> input) try {
 } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): mpf replay says so
 }
 
-}  // namespace
 }  // namespace mpf::test
-
-// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  mpf::test::play({data, size});
-  return 0;
-}

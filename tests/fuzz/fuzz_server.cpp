@@ -4,6 +4,7 @@
 #include <optional>
 
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/fuzz/fuzzer.h>
 #include <mpf/tests/fuzz/hostile_files.h>
 #include <mpf/tests/fuzz/scene.h>
 #include <mpf/tests/fuzz/talk.h>
@@ -38,6 +39,8 @@ class Server {
   std::optional<Talk> talk_;
 };
 
+}  // namespace
+
 void play(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files = [] {
@@ -45,18 +48,7 @@ void play(std::span<const std::uint8_t> input) {
     return HostileFiles(scene.backplane, {scene.clientLink->link().name(), scene.clientName(), scene.hintsOf(scene.client),
                                           scene.bulkName(LinkSide::client), scene.hintsOf(scene.server)});
   }();
-  {
-    Server server(scene);
-    files.play(input, [&](std::uint64_t value) { server.turn(value); });
-  }
-  files.restore();
+  files.play(input, [] { return Server(scene); });
 }
 
-}  // namespace
 }  // namespace mpf::test
-
-// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  mpf::test::play({data, size});
-  return 0;
-}

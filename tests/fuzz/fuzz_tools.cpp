@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <mpf/shm/segment.h>
+#include <mpf/tests/fuzz/fuzzer.h>
 #include <mpf/tests/fuzz/hostile_files.h>
 #include <mpf/tests/fuzz/scene.h>
 #include <mpf/tests/fuzz/talk.h>
@@ -51,23 +52,14 @@ class Onlooker {
   std::unique_ptr<tools::LinkFollower> follower_;
 };
 
+}  // namespace
+
 void play(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files(scene.backplane,
                             {scene.clientLink->link().name(), scene.serverName(), scene.clientName(), scene.hintsOf(scene.server),
                              scene.hintsOf(scene.client), scene.bulkName(LinkSide::client), scene.bulkName(LinkSide::server)});
-  {
-    Onlooker onlooker(scene, files);
-    files.play(input, [&](std::uint64_t value) { onlooker.turn(value); });
-  }
-  files.restore();
+  files.play(input, [] { return Onlooker(scene, files); });
 }
 
-}  // namespace
 }  // namespace mpf::test
-
-// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  mpf::test::play({data, size});
-  return 0;
-}

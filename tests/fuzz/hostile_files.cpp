@@ -65,7 +65,7 @@ void HostileFiles::add(const std::string& name) {
   files_.push_back({name, std::move(file), std::move(content)});
 }
 
-void HostileFiles::play(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn) {
+void HostileFiles::deceive(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn) {
   for (; input.size() >= Deed::kBytes; input = input.subspan(Deed::kBytes)) {
     const Deed deed(input.first<Deed::kBytes>());
     if (deed.what == Deed::What::turn) turn(deed.value);

@@ -46,13 +46,18 @@ class HostileFiles {
   // Inputs name files by their place in `names`.
   HostileFiles(const Backplane& backplane, const std::vector<std::string>& names);
 
-  // Plays an input. The victim has a turn wherever the input says so, and one more at the end.
-  void play(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn);
+  // Plays an input with a victim of its own, which makeVictim() returns. It has a turn(value) wherever the input says so, and one more at
+  // the end. Afterwards all files are as they were.
+  template <class MakeVictim>
+  void play(std::span<const std::uint8_t> input, MakeVictim makeVictim) {
+    {
+      auto victim = makeVictim();
+      deceive(input, [&](std::uint64_t value) { victim.turn(value); });
+    }
+    restore();
+  }
   // A file that came while the input was played; deeds reach it like the others.
   void add(const std::string& name);
-  // All files as they were. The victim has let go of everything: when it has not, that is the end.
-  void restore();
-
   [[nodiscard]] const std::string& name(std::size_t file) const { return files_[file % files_.size()].name; }
   [[nodiscard]] std::size_t count() const noexcept { return files_.size(); }
 
@@ -62,6 +67,9 @@ class HostileFiles {
     FileDescriptor file;
     std::vector<std::byte> before;
   };
+  void deceive(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn);
+  // The victim has let go of everything: when it has not, that is the end.
+  void restore();
   void act(const Deed& deed);
   void checkNothingLeft();
 
@@ -70,7 +78,7 @@ class HostileFiles {
   std::size_t lasting_;  // those of the start
   std::uint64_t runs_ = 0;
   std::vector<std::string> names_;  // between two inputs: on the backplane, sorted
-  std::size_t used_ = 0;            // segments open or mapped in this process
+  std::size_t used_ = 0;  // segments open or mapped in this process
 };
 
 }  // namespace mpf::test
