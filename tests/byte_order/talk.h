@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// What mpf_test_ask and mpf_test_echo agree on: Int32 messages that are not echoed but obeyed, and a way to tell the test.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <fmt/format.h>
+#include <optional>
+
+#include <mpf/schema/message.h>
+
+namespace mpf::test {
+
+enum class Command : std::int32_t {
+  sendOutOfBand = 0x01020301,  // an OutOfBand message before the reply
+  refuse,
+  stall,  // replies, and then takes nothing until SIGUSR1
+  die,
+};
+inline constexpr std::int32_t kQueueSize = 4;
+
+inline Int32Message toMessage(Command command) { return Int32Message({.cmd = static_cast<std::int32_t>(command)}); }
+inline std::optional<Command> toCommand(const Message& message) {
+  const auto* body = message.tryAs<Int32>();
+  if (body == nullptr || body->cmd < static_cast<std::int32_t>(Command::sendOutOfBand)) return std::nullopt;
+  return static_cast<Command>(body->cmd);
+}
+
+// A line for the test.
+template <class... Arguments>
+void say(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
+  fmt::print(stderr, "{}\n", fmt::format(text, std::forward<Arguments>(arguments)...));
+}
+
+}  // namespace mpf::test
