@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/industry_pack/create_carrier.h>
+
+#include <array>
+#include <fmt/format.h>
+#include <stdexcept>
+
+#include <mpf/drivers/industry_pack/carrier_parameters.h>
+#include <mpf/drivers/industry_pack/industry_pack_error.h>
+#include <mpf/drivers/industry_pack/model_carrier.h>
+#include <mpf/drivers/industry_pack/tpci200.h>
+
+namespace mpf {
+namespace {
+
+struct Kind {
+  const char* name;
+  const char* parameters;
+  const char* what;
+  std::unique_ptr<IndustryPackCarrier> (*create)(const std::string& parameters);
+};
+
+std::unique_ptr<IndustryPackCarrier> createModel(const std::string& parameters) {
+  if (!parameters.empty()) throw std::invalid_argument("carrier kind \"model\" has no parameters");
+  return std::make_unique<ModelCarrier>();
+}
+
+std::unique_ptr<IndustryPackCarrier> createTpci200(const std::string& parameters) {
+  return std::make_unique<Tpci200>(Tpci200Options::parse(parameters));
+}
+
+constexpr std::array kKinds{
+    Kind{"model", "", "four sites with models of the modules that a program drives", createModel},
+    Kind{"tpci200", "[ADDRESS|NUMBER][,poll=US]", "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", createTpci200}};
+
+// A wrong line is found here all the same, before it is moved to a host that has the board.
+[[noreturn]] void refuseOutOfReach(const std::string& kind, const std::string& parameters) {
+  const auto carrier = parseCarrierParameters(kind, parameters);
+  throw IndustryPackError(
+      IndustryPackStatus::notImplemented,
+      fmt::format("{}: \"{}\" is right, but this host has no access to {}. Put the modules on a PCI carrier and use kind "
+                  "tpci200, or use kind model, which has models of them",
+                  carrier.board, parameters, carrier.registers == BusSpace::isa ? "an ISA bus" : "a VME crate"));
+}
+
+}  // namespace
+
+std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind, const std::string& parameters) {
+  for (const auto& known : kKinds) {
+    if (known.name == kind) return known.create(parameters);
+  }
+  if (isParameterKind(kind)) refuseOutOfReach(kind, parameters);
+  throw std::invalid_argument(fmt::format("no kind of carrier \"{}\"; there are:\n{}", kind, carrierKinds()));
+}
+
+std::string carrierKinds() {
+  std::string text;
+  for (const auto& kind : kKinds)
+    text += fmt::format("  {}{}{}  {}\n", kind.name, *kind.parameters == '\0' ? "" : ":", kind.parameters, kind.what);
+  return text + "  vipc616_01, ipmv162, tvme200 and others of VME and ISA  are checked; no program here reaches such a bus\n";
+}
+
+}  // namespace mpf

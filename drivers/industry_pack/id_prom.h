@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// IdProm: what a module says of itself (ANSI/VITA 4-1995, chapter "ID PROM").
+//
+//   format I   8-bit words 'I' 'P' 'A' 'C' (or 'H': runs at 32 MHz), manufacturer, model, revision, reserved, driver low, driver high, bytes used, CRC-8
+//   format II  16-bit words "VI" "TA" "4 ", manufacturer (24 bits), model, revision, reserved, driver low, driver high, flags, bytes used, CRC-16 (0: not checked)
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <mpf/drivers/industry_pack/registers.h>
+
+namespace mpf {
+
+struct IdProm {
+  enum class Format : std::uint8_t { one = 1, two = 2 };
+
+  Format format = Format::one;
+  bool runsAt32MHz = false;
+  std::uint32_t manufacturer = 0;
+  std::uint16_t model = 0;
+  std::uint16_t revision = 0;
+  std::uint32_t driverId = 0;
+  std::uint16_t flags = 0;  // format II
+  std::uint16_t bytesUsed = 12;
+  bool isCrcRight = true;
+
+  friend bool operator==(const IdProm&, const IdProm&) = default;
+};
+
+// Reads the ID space, by 16-bit cycles.
+//   throws  IndustryPackError noModule when nothing answers, noIpacId when what answers is no ID PROM; `where` names the site in it
+[[nodiscard]] IdProm readIdProm(Registers& idSpace, const std::string& where);
+
+// The 16-bit words of the ID space of a module that says `prom`, with a right CRC. For models.
+[[nodiscard]] std::vector<std::uint16_t> wordsOf(const IdProm& prom);
+
+// The CRC of a format I PROM over its first `bytes.size()` bytes, that at index 11 counting as 0.
+[[nodiscard]] std::uint8_t crcOfFormatOne(std::span<const std::uint8_t> bytes) noexcept;
+
+}  // namespace mpf

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/industry_pack/interrupt_thread.h>
+
+#include <poll.h>
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <mpf/base/signals_blocked.h>
+#include <mpf/base/system_call.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::chrono::milliseconds kPollWhilePaused{100};
+constexpr int kOneMakesUpFor = 2;
+constexpr int kPausesToCalm = 10;
+
+}  // namespace
+
+InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions options, Handler handler, TroubleHandler trouble)
+    : interrupt_(interrupt),
+      options_(options),
+      handler_(std::move(handler)),
+      trouble_(std::move(trouble)),
+      wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt thread")) {
+  isPolled_ = interrupt_.isPolled();  // a carrier that begins so says it itself
+  const SignalsBlocked blocked;
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+}
+
+InterruptThread::~InterruptThread() {
+  thread_.request_stop();
+  wake();
+  thread_.join();
+  interrupt_.disable();
+}
+
+void InterruptThread::wake() noexcept { ::eventfd_write(wakeUp_.get(), 1); }
+
+InterruptThread::Counters InterruptThread::counters() const noexcept {
+  const auto count = [](const std::atomic<std::uint64_t>& counter) { return counter.load(std::memory_order_relaxed); };
+  return {.interrupts = count(interrupts_), .spurious = count(spurious_), .late = count(late_), .storms = count(storms_)};
+}
+
+void InterruptThread::run(const std::stop_token& stop) {
+  goOn();
+  while (!stop.stop_requested()) {
+    wait();
+    if (stop.stop_requested()) return;
+    if (interrupt_.take() > 0) serveInterrupt();
+    eventfd_t wakes = 0;
+    const bool isWoken = ::eventfd_read(wakeUp_.get(), &wakes) == 0;
+    if (isWoken || pollAt_.hasPassed()) servePoll();
+    if (isPaused() && pausedUntil_.hasPassed()) goOn();
+    followPolling();
+  }
+}
+
+void InterruptThread::serveInterrupt() {
+  interrupts_.fetch_add(1, std::memory_order_relaxed);
+  lateInRow_ = 0;
+  if (handler_(Cause::interrupt)) {
+    inVain_ = std::max(0, inVain_ - kOneMakesUpFor);
+  } else {
+    spurious_.fetch_add(1, std::memory_order_relaxed);
+    if (++inVain_ >= options_.stormLimit) return pause();
+  }
+  interrupt_.enable();
+}
+
+void InterruptThread::servePoll() {
+  if (handler_(Cause::poll)) {
+    late_.fetch_add(1, std::memory_order_relaxed);
+    if (!isPaused() && ++lateInRow_ == options_.lateLimit) tell(InterruptTrouble::never);
+  }
+  const auto period = isPaused() && options_.pollEvery.count() == 0 ? kPollWhilePaused : options_.pollEvery;
+  pollAt_ = period.count() == 0 ? Deadline::never() : Deadline::after(period);
+}
+
+// The line stays masked, as it was when it came.
+void InterruptThread::pause() {
+  storms_.fetch_add(1, std::memory_order_relaxed);
+  pausedUntil_ = Deadline::after(options_.stormPause);
+  if (stormEnds_.hasPassed()) tell(InterruptTrouble::storm);
+  stormEnds_ = Deadline::after((1 + kPausesToCalm) * options_.stormPause);
+  servePoll();
+}
+
+void InterruptThread::goOn() {
+  inVain_ = lateInRow_ = 0;
+  pausedUntil_ = Deadline::never();
+  pollAt_ = options_.pollEvery.count() == 0 ? Deadline::never() : Deadline::after(options_.pollEvery);
+  interrupt_.enable();
+}
+
+void InterruptThread::followPolling() {
+  if (isPolled_ || !interrupt_.isPolled()) return;
+  isPolled_ = true;
+  tell(InterruptTrouble::polled);
+}
+
+void InterruptThread::tell(InterruptTrouble trouble) const {
+  if (trouble_) trouble_(trouble);
+}
+
+void InterruptThread::wait() const {
+  std::array<pollfd, 2> events{
+      {{.fd = interrupt_.descriptor(), .events = POLLIN, .revents = 0}, {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0}}};
+  const auto next = std::min(pollAt_, pausedUntil_);
+  const auto left = next.left().count();
+  const timespec timeout{.tv_sec = left / 1'000'000'000, .tv_nsec = left % 1'000'000'000};
+  ::ppoll(events.data(), events.size(), next.isNever() ? nullptr : &timeout, nullptr);
+}
+
+}  // namespace mpf

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/industry_pack/interrupt_thread.h>
+
+#include <atomic>
+#include <gtest/gtest.h>
+#include <semaphore>
+
+#include <mpf/tests/support/watchdog.h>
+
+#include "plain_model.h"
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class InterruptThreadTest : public testing::Test {
+ protected:
+  InterruptThreadTest() { carrier_.plug("IP_a", std::make_unique<PlainModel>()); }
+  Registers& io() { return carrier_.site(0).io(); }
+  // The handler of a chip that asks by bit 0 of word 0.
+  InterruptThread::Handler serve() {
+    return [this](InterruptThread::Cause) {
+      const bool asks = io().read16(0) != 0;
+      if (asks) io().write16(0, 0);
+      if (asks) served_.release();
+      return asks;
+    };
+  }
+  Watchdog watchdog_{"interrupt thread test"};
+  ModelCarrier carrier_;
+  std::counting_semaphore<> served_{0};
+};
+
+TEST_F(InterruptThreadTest, ServesEachInterrupt) {
+  InterruptThread thread(carrier_.site(0).interrupt(0), {}, serve());
+  for (int i = 0; i < 100; ++i) {
+    io().write16(0, 1);
+    served_.acquire();
+  }
+  EXPECT_EQ(thread.counters().storms, 0u);
+}
+
+TEST_F(InterruptThreadTest, ServesOneThatWasThereBefore) {
+  io().write16(0, 1);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {}, serve());
+  served_.acquire();
+}
+
+TEST_F(InterruptThreadTest, PollsForOneThatNeverComes) {
+  carrier_.setFault("IP_a", ModelFault::interruptsLost);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms}, serve());
+  io().write16(0, 1);
+  served_.acquire();
+  while (thread.counters().late == 0) std::this_thread::yield();
+  EXPECT_EQ(thread.counters().interrupts, 0u);
+}
+
+TEST_F(InterruptThreadTest, MasksAStormAndStillPolls) {
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h}, serve());
+  while (thread.counters().storms == 0) std::this_thread::yield();
+  const auto interrupts = thread.counters().interrupts;
+  io().write16(0, 1);
+  served_.acquire();
+  EXPECT_EQ(interrupts, 10u);
+  EXPECT_EQ(thread.counters().interrupts, 10u);
+}
+
+// One interrupt of four is for something, as on a line that is stuck while the chip is busy.
+TEST_F(InterruptThreadTest, MasksAStormThatTrafficInterrupts) {
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  std::counting_semaphore<> storms{0};
+  InterruptThread thread(
+      carrier_.site(0).interrupt(0), {.stormLimit = 100, .stormPause = 1h},
+      [i = 0](InterruptThread::Cause) mutable { return ++i % 4 == 0; },
+      [&](InterruptTrouble trouble) {
+        EXPECT_EQ(trouble, InterruptTrouble::storm);
+        storms.release();
+      });
+
+  storms.acquire();
+
+  EXPECT_EQ(thread.counters().storms, 1u);
+}
+
+TEST_F(InterruptThreadTest, ToleratesInterruptsInVainAmongUsefulOnes) {
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 100, .stormPause = 1h},
+                         [i = 0](InterruptThread::Cause) mutable { return ++i % 3 == 0; });
+  while (thread.counters().spurious < 5000) std::this_thread::yield();
+  EXPECT_EQ(thread.counters().storms, 0u);
+}
+
+TEST_F(InterruptThreadTest, TellsOfAStormWhenItBeginsAndNotAfterEachPause) {
+  std::atomic<int> told = 0;
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 10ms}, serve(), [&](InterruptTrouble) { ++told; });
+
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  while (thread.counters().storms < 10) std::this_thread::yield();
+
+  EXPECT_GE(told, 1);
+  EXPECT_LT(told, 10);  // 1, unless the host forgot this process for a while
+}
+
+TEST_F(InterruptThreadTest, TellsOnceOfALineThatIsDead) {
+  std::atomic<int> told = 0;
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .lateLimit = 3}, serve(), [&](InterruptTrouble trouble) {
+    EXPECT_EQ(trouble, InterruptTrouble::never);
+    ++told;
+  });
+  carrier_.setFault("IP_a", ModelFault::interruptsLost);
+  for (int i = 0; i < 10; ++i) {
+    io().write16(0, 1);
+    served_.acquire();
+  }
+  while (thread.counters().late < 10) std::this_thread::yield();
+  EXPECT_EQ(told, 1);
+}
+
+TEST_F(InterruptThreadTest, CallsNoLineDeadThatItMasksItself) {
+  std::atomic<int> dead = 0;
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h, .lateLimit = 3}, serve(),
+                         [&](InterruptTrouble trouble) { dead += trouble == InterruptTrouble::never ? 1 : 0; });
+  while (thread.counters().storms == 0) std::this_thread::yield();
+  for (int i = 0; i < 10; ++i) {
+    io().write16(0, 1);
+    served_.acquire();
+  }
+  EXPECT_EQ(dead, 0);
+}
+
+TEST_F(InterruptThreadTest, GoesOnAfterAStorm) {
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 1ms}, serve());
+  while (thread.counters().storms < 3) std::this_thread::yield();
+  carrier_.setFault("IP_a", ModelFault::none);
+  io().write16(0, 1);
+  served_.acquire();
+}
+
+TEST_F(InterruptThreadTest, RunsItsHandlerWhenWoken) {
+  std::counting_semaphore<> ran{0};
+  InterruptThread thread(carrier_.site(0).interrupt(0), {}, [&](InterruptThread::Cause cause) {
+    if (cause == InterruptThread::Cause::poll) ran.release();
+    return false;
+  });
+  thread.wake();
+  ran.acquire();
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// How many alarms a server has counted, read from its window as `mpf msr` does.
+#pragma once
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/base/system_call.h>
+#include <mpf/shm/backplane.h>
+#include <mpf/shm/layout.h>
+
+namespace mpf::test {
+
+// Of `server` at location 0; its name must be one that file names can have.
+inline std::uint64_t alarmsOf(const Backplane& backplane, const std::string& server) {
+  const auto path = "/dev/shm/mpf." + backplane.name() + ".s.0." + server;
+  const FileDescriptor window(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
+  std::uint64_t alarms = 0;
+  constexpr auto kAt = static_cast<off_t>(layout::kWindowControlOffset + offsetof(layout::WindowControl, alarms));
+  checkCall(::pread(window.get(), &alarms, sizeof alarms, kAt), "pread", path);
+  return alarms;
+}
+
+}  // namespace mpf::test
