@@ -171,9 +171,11 @@ void PolledSerialPort::receive() {
   received_.clear();
   const bool alive = keeper_.line().tryRead(received_);
   if (!received_.empty()) {
+    const auto overruns = keeper_.line().takeOverruns();
     add(counters_.bytesIn, received_.size());
-    add(counters_.overruns, keeper_.line().takeOverruns());
+    add(counters_.overruns, overruns);
     show(ByteDirection::received, received_);
+    if (overruns > 0) act(ByteHandlerResult::error);  // an answer with a gap is none
     for (const auto& byte : received_) deliver(byte);
   }
   if (!alive) loseLine();

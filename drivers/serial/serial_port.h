@@ -42,7 +42,8 @@ enum class ByteHandlerResult : std::uint8_t { ok, endRead, error };
 class ByteHandler {
  public:
   virtual ~ByteHandler() = default;
-  // For each byte received, also when no read is outstanding. Bytes that the line damaged are not passed: they end the read with failure.
+  // For each byte received, also when no read is outstanding. Bytes that the line damaged are not passed: they end the read with
+  // failure, and so do bytes that got lost.
   [[nodiscard]] virtual ByteHandlerResult byteReceived(std::uint8_t byte) = 0;
   // A read begins; what had come before has been passed, and nothing of the request is sent yet. endRead: what is kept already satisfies it.
   [[nodiscard]] virtual ByteHandlerResult readBegins() { return ByteHandlerResult::ok; }

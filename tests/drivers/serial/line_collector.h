@@ -4,14 +4,12 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <filesystem>
 #include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <mpf/base/system_call.h>
 #include <mpf/drivers/serial/serial_port.h>
 
 namespace mpf::test {
@@ -26,26 +24,6 @@ inline Deadline watchdog() { return Deadline::after(kWatchdog); }
 inline std::span<const std::uint8_t> bytesOf(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
-
-// A folder of its own for each test, removed at its end.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = std::filesystem::temp_directory_path() / ("mpf-serial-" + std::string(6, 'X'));
-    if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] std::string file(std::string_view name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
 
 class LineCollector : public ByteHandler {
  public:
@@ -71,6 +49,11 @@ class LineCollector : public ByteHandler {
     ends_.push_back(status);
   }
 
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    all_.clear();
+    start_ = 0;
+  }
   // Circular buffer mode: a line that came before the read satisfies it.
   void acceptEarlier() { acceptsEarlier_ = true; }
   [[nodiscard]] std::string answer() const { return copyOf(answer_); }

@@ -7,6 +7,7 @@
 #include <mpf/drivers/serial/posix_terminal_port.h>
 #include <mpf/tests/drivers/serial/line_collector.h>
 #include <mpf/tests/support/instrument.h>
+#include <mpf/tests/support/temporary_folder.h>
 
 namespace mpf::test {
 namespace {

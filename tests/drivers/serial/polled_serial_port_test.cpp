@@ -142,6 +142,14 @@ TEST_F(PolledSerialPortTest, LostBytesAreCounted) {
   EXPECT_EQ(line_->counters().overruns, 3U);
 }
 
+TEST_F(PolledSerialPortTest, AnAnswerWithAGapFailsTheRead) {
+  const auto tap = port_.attachTap([&](std::span<const PeekedByte> bytes) {
+    if (bytes.front().direction == ByteDirection::sent) script_.arrive({{'a'}, {'\r'}, {'\n'}}, 1);
+  });
+
+  EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::failure);
+}
+
 TEST_F(PolledSerialPortTest, AWriteThatTheLineHoldsUpIsLateAndDiscarded) {
   script_.isHeldUp = true;
 

@@ -10,6 +10,7 @@
 #include <mpf/drivers/serial/terminal_settings.h>
 #include <mpf/tests/drivers/serial/line_collector.h>
 #include <mpf/tests/support/instrument.h>
+#include <mpf/tests/support/temporary_folder.h>
 #include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {

@@ -10,6 +10,7 @@
 #include <mpf/drivers/serial/serial_port_registry.h>
 #include <mpf/tests/drivers/serial/line_collector.h>
 #include <mpf/tests/support/instrument.h>
+#include <mpf/tests/support/temporary_folder.h>
 
 namespace mpf::test {
 namespace {

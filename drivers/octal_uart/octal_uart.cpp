@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/octal_uart/octal_uart.h>
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <stdexcept>
+#include <utility>
+
+#include <mpf/drivers/industry_pack/industry_pack_error.h>
+
+namespace mpf {
+namespace {
+
+using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+
+constexpr std::uint16_t kOctal485 = 0x48;
+constexpr int kBlocksPerLine = 2;
+constexpr int kMostPasses = 64;  // per interrupt; one that still waits comes again
+constexpr int kPortsPerLine = 4;
+constexpr std::size_t kMostAlarmsToBeTold = 100;  // to a handler that may come
+
+OctalUartOptions checked(const OctalUartOptions& options, IndustryPackModule& module) {
+  if (options.ports != 4 && options.ports != 8)
+    throw std::invalid_argument(fmt::format("module \"{}\": {} ports: there are modules of 4 and of 8", module.name(), options.ports));
+  static_cast<void>(module.checkedVector(options.vector));
+  if (module.memory().size() == 0) {
+    throw IndustryPackError(IndustryPackStatus::badAddress,
+                            fmt::format("module \"{}\": the carrier gives {} no memory, where its interrupt vector is; "
+                                        "its parameters say how much memory a site has",
+                                        module.name(), module.where()));
+  }
+  return options;
+}
+
+}  // namespace
+
+OctalUart::OctalUart(IndustryPackModule& module, const OctalUartOptions& options)
+    : module_(module),
+      io_(module.io()),
+      options_(checked(options, module)),
+      isRs485_(module.idProm().model == kOctal485),
+      isTaken_(static_cast<std::size_t>(options.ports)) {
+  channels_.reserve(kChannels);
+  for (int i = 0; i < kChannels; ++i) channels_.emplace_back(io_, i, isRs485_, imr_.at(static_cast<std::size_t>(i / 2)));
+  setUp();
+  for (const int line : {1, 0}) startThread(line);
+}
+
+OctalUart::~OctalUart() {
+  for (auto& thread : threads_) thread.reset();
+  const std::lock_guard lock(mutex_);
+  lookAt(true);
+  if (!isReady_) return;  // what is there now, if anything, is not ours
+  for (auto& channel : channels_) channel.close();
+}
+
+void OctalUart::startThread(int line) {
+  InterruptThreadOptions options{.pollEvery = options_.pollEvery, .stormLimit = options_.stormLimit, .stormPause = options_.stormPause};
+  if (line * kPortsPerLine >= options_.ports) options.pollEvery = {};  // nothing is there to be found
+  threads_.at(static_cast<std::size_t>(line))
+      .emplace(
+          module_.interrupt(line), options, [this, line](InterruptThread::Cause cause) { return serve(line, cause); },
+          [this, line](InterruptTrouble trouble) { note(line, trouble); });
+}
+
+void OctalUart::onAlarm(AlarmHandler handler) {
+  const std::lock_guard lock(alarmMutex_);
+  alarmHandler_ = std::move(handler);
+}
+
+OctalUart::Counters OctalUart::counters() const {
+  Counters counters;
+  for (const auto& thread : threads_) {
+    counters.interrupts += thread->counters().interrupts;
+    counters.spurious += thread->counters().spurious;
+  }
+  const std::lock_guard lock(mutex_);
+  counters.alarms = alarmCount_;
+  return counters;
+}
+
+// ---- ports
+
+void OctalUart::takePort(int number) {
+  const std::lock_guard lock(mutex_);
+  if (number < 0 || number >= options_.ports) {
+    throw std::invalid_argument(fmt::format("module \"{}\": port {}: its ports are 0 to {}", module_.name(), number, options_.ports - 1));
+  }
+  if (isTaken_[static_cast<std::size_t>(number)])
+    throw std::invalid_argument(fmt::format("module \"{}\": port {} is in use already", module_.name(), number));
+  isTaken_[static_cast<std::size_t>(number)] = true;
+}
+
+void OctalUart::leavePort(int number) noexcept {
+  const std::lock_guard lock(mutex_);
+  isTaken_[static_cast<std::size_t>(number)] = false;
+}
+
+std::string OctalUart::tryOpen(int number, const SerialSettings& settings) {
+  const std::lock_guard lock(mutex_);
+  lookAt(true);
+  if (!isReady_) {
+    if (auto problem = module_.problem(); !problem.empty()) return problem;
+  }
+  // Nobody would have noticed a reset while no port was open.
+  if (!isReady_ || std::ranges::none_of(channels_, &OctalUartChannel::isOpen)) setUp();
+  channels_[static_cast<std::size_t>(number)].open(settings);
+  return {};
+}
+
+// All channels, used or not, also those behind the ports of a Quad module: one that floats must not interrupt.
+void OctalUart::setUp() {
+  for (int block = 0; block < kBlocks; ++block) {
+    imr_.at(static_cast<std::size_t>(block)) = 0;
+    io_.write8(atBlock(block, kImr), 0);
+    io_.write8(atBlock(block, kAcr), kAcrSet2);
+    io_.write8(atBlock(block, kOpcr), kOpcrMppOutput);
+  }
+  for (auto& channel : channels_) channel.close();
+  module_.memory().write8(kVector, static_cast<std::uint8_t>(options_.vector));
+  isReady_ = true;
+}
+
+// ---- interrupts
+
+bool OctalUart::serve(int line, InterruptThread::Cause cause) {
+  bool hadSomething = false;
+  {
+    const std::lock_guard lock(mutex_);
+    hadSomething = cause == InterruptThread::Cause::interrupt ? serveInterrupt(line) : servePoll(line);
+  }
+  tellAlarms();
+  return hadSomething;
+}
+
+// Its own half of the chip; the other one for boards that have one line only.
+bool OctalUart::serveInterrupt(int line) {
+  const int first = line * kBlocksPerLine;
+  return serveBlocks(first, kBlocksPerLine) || serveBlocks(kBlocksPerLine - first, kBlocksPerLine);
+}
+
+bool OctalUart::servePoll(int line) {
+  const bool isLate = serveBlocks(line * kBlocksPerLine, kBlocksPerLine);
+  if (line == 0) checkPresence();
+  return isLate;
+}
+
+void OctalUart::note(int line, InterruptTrouble trouble) {
+  {
+    const std::lock_guard lock(mutex_);
+    raise(trouble == InterruptTrouble::storm ? OctalUartAlarm::storm : OctalUartAlarm::noInterrupts, textOf(line, trouble));
+  }
+  tellAlarms();
+}
+
+std::string OctalUart::textOf(int line, InterruptTrouble trouble) const {
+  const auto which = fmt::format("module \"{}\" ({}), ports {} to {}: interrupt line {}", module_.name(), module_.where(),
+                                 line * kPortsPerLine, line * kPortsPerLine + kPortsPerLine - 1, line);
+  switch (trouble) {
+    case InterruptTrouble::storm:
+      return fmt::format("{} asks without end and wants nothing: masked for {} ms, again and again until that ends", which,
+                         options_.stormPause.count());
+    case InterruptTrouble::polled:
+      return fmt::format("{} is polled by its carrier from now on, which is too slow for fast lines", which);
+    case InterruptTrouble::never:
+      return fmt::format("{} does not come when they have something: polled every {} ms, which is too slow for fast lines", which,
+                         options_.pollEvery.count());
+  }
+  return which;
+}
+
+// Until it asks for nothing. A block at a time would let the others wait for as long as one has something.
+bool OctalUart::serveBlocks(int first, int count) {
+  bool hadSomething = false;
+  for (int pass = 0; pass < kMostPasses && isReady_; ++pass) {
+    bool asks = false;
+    for (int block = first; block < std::min(first + count, options_.ports / 2) && isReady_; ++block) {
+      const auto pending = pendingOf(block);
+      if (pending == 0) continue;
+      asks = true;
+      serveBlock(block, pending);
+    }
+    if (!asks) break;
+    hadSomething = true;
+  }
+  return hadSomething;
+}
+
+std::uint8_t OctalUart::pendingOf(int block) {
+  const auto isr = io_.read8(atBlock(block, kIsr));
+  lookAt(isr == kOnes);
+  return isReady_ ? isr & imr_.at(static_cast<std::size_t>(block)) : 0;
+}
+
+void OctalUart::serveBlock(int block, std::uint8_t pending) {
+  for (const int number : {2 * block, 2 * block + 1}) {
+    const auto ours = static_cast<std::uint8_t>((number % 2 == 0 ? pending : pending >> 4) & 0xf);
+    auto& channel = channels_[static_cast<std::size_t>(number)];
+    if (ours == 0 || channel.serve(ours, false)) continue;
+    lookAt(true);
+    if (isReady_) static_cast<void>(channel.serve(ours, true));
+  }
+}
+
+// ---- is it there?
+
+void OctalUart::checkPresence() {
+  for (auto& channel : channels_) {
+    if (!isReady_ || !channel.isOpen() || channel.isAsConfigured()) continue;
+    lookAt(true);
+    if (isReady_) lose("the module has been reset");
+  }
+}
+
+// A register may say ones and mean it; an ID PROM never does.
+void OctalUart::lookAt(bool mayBeGone) {
+  if (!mayBeGone || !isReady_) return;
+  if (const auto problem = module_.problem(); !problem.empty()) lose(problem);
+}
+
+void OctalUart::lose(const std::string& because) {
+  isReady_ = false;
+  for (auto& channel : channels_) channel.lose(because);
+  raise(OctalUartAlarm::lost, fmt::format("module \"{}\": {}", module_.name(), because));
+}
+
+void OctalUart::raise(OctalUartAlarm alarm, std::string what) {
+  ++alarmCount_;
+  if (alarms_.size() < kMostAlarmsToBeTold) alarms_.emplace_back(alarm, std::move(what));
+}
+
+void OctalUart::tellAlarms() {
+  const std::lock_guard telling(alarmMutex_);
+  if (!alarmHandler_) return;
+  std::vector<std::pair<OctalUartAlarm, std::string>> alarms;
+  {
+    const std::lock_guard lock(mutex_);
+    alarms.swap(alarms_);
+  }
+  for (const auto& [alarm, what] : alarms) alarmHandler_(alarm, what);
+}
+
+}  // namespace mpf

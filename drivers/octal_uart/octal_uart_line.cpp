@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/octal_uart/octal_uart_line.h>
+
+#include <sys/epoll.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <stdexcept>
+
+#include <mpf/base/system_call.h>
+
+namespace mpf {
+namespace {
+
+constexpr SerialSettings kUsual{9600, 1, 8, 'N', 'N'};
+constexpr std::chrono::milliseconds kShortestDrainCheck{1};
+constexpr std::chrono::milliseconds kLongestDrainCheck{20};
+
+void watch(const FileDescriptor& events, int descriptor) {
+  epoll_event event{.events = EPOLLIN, .data = {.fd = descriptor}};
+  checkCall(::epoll_ctl(events.get(), EPOLL_CTL_ADD, descriptor, &event), "epoll_ctl", "for a serial port");
+}
+
+}  // namespace
+
+OctalUartLine::OctalUartLine(OctalUart& uart, int number, const SerialSettings& settings)
+    : uart_(uart),
+      number_(number),
+      description_(fmt::format("port {} of {} ({})", number, uart.module().name(), uart.module().where())),
+      settings_(merged(kUsual, settings)),
+      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create", "for a serial port")),
+      events_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1", "for a serial port")) {
+  if (const auto refused = octalUartProblemOf(settings, uart.isRs485()); !refused.empty())
+    throw std::invalid_argument(fmt::format("{}: {}", description_, refused));
+  uart.takePort(number);
+  watch(events_, uart.with(number, [](OctalUartChannel& channel) { return channel.bell(); }));
+  watch(events_, timer_.get());
+}
+
+OctalUartLine::~OctalUartLine() {
+  close();
+  uart_.leavePort(number_);
+}
+
+SerialLine::OpenState OctalUartLine::tryOpen() {
+  problem_ = uart_.tryOpen(number_, settings_);
+  return problem_.empty() ? OpenState::open : OpenState::failed;
+}
+
+void OctalUartLine::close() noexcept {
+  uart_.with(number_, [](OctalUartChannel& channel) {
+    if (channel.isOpen()) channel.close();
+  });
+}
+
+bool OctalUartLine::isThere(OctalUartChannel& channel) {
+  if (!channel.isOpen()) problem_ = channel.lostBecause();
+  return channel.isOpen();
+}
+
+bool OctalUartLine::tryRead(std::vector<LineByte>& bytes) {
+  return uart_.with(number_, [&](OctalUartChannel& channel) {
+    channel.take(bytes);
+    turnOrWait(channel);
+    return isThere(channel);
+  });
+}
+
+std::optional<std::size_t> OctalUartLine::tryWrite(std::span<const std::uint8_t> bytes) {
+  return uart_.with(number_, [&](OctalUartChannel& channel) -> std::optional<std::size_t> {
+    if (!isThere(channel)) return std::nullopt;
+    return channel.put(bytes);
+  });
+}
+
+// While bytes wait in memory their interrupts tell how it goes; then only asking the chip does.
+void OctalUartLine::turnOrWait(OctalUartChannel& channel) const {
+  std::uint64_t expirations = 0;
+  static_cast<void>(::read(timer_.get(), &expirations, sizeof expirations));
+  channel.tryTurn();
+  if (!channel.waitsForTurn()) return;
+  const auto wait = channel.timeToSend() / 4;
+  itimerspec when{};
+  when.it_value.tv_sec = wait.count() / 1'000'000'000;
+  when.it_value.tv_nsec = wait.count() % 1'000'000'000;
+  ::timerfd_settime(timer_.get(), 0, &when, nullptr);
+}
+
+std::chrono::milliseconds OctalUartLine::timeToSend() const {
+  const auto needed = uart_.with(number_, [](OctalUartChannel& channel) { return channel.timeToSend(); });
+  if (needed.count() == 0) return {};
+  return std::clamp(std::chrono::duration_cast<std::chrono::milliseconds>(needed), kShortestDrainCheck, kLongestDrainCheck);
+}
+
+void OctalUartLine::discardUnsent() noexcept {
+  uart_.with(number_, [](OctalUartChannel& channel) { channel.discardUnsent(); });
+}
+
+std::uint64_t OctalUartLine::takeOverruns() noexcept {
+  return uart_.with(number_, [](OctalUartChannel& channel) { return channel.takeOverruns(); });
+}
+
+std::string OctalUartLine::tryConfigure(const SerialSettings& settings) {
+  if (auto refused = octalUartProblemOf(settings, uart_.isRs485()); !refused.empty()) return refused;
+  settings_ = merged(settings_, settings);
+  uart_.with(number_, [&](OctalUartChannel& channel) {
+    if (channel.isOpen()) channel.configure(settings_);
+  });
+  return {};
+}
+
+bool OctalUartLine::trySetBreak(bool on) noexcept {
+  return uart_.with(number_, [&](OctalUartChannel& channel) {
+    if (!isThere(channel)) return false;
+    channel.setBreak(on);
+    turnOrWait(channel);
+    return true;
+  });
+}
+
+}  // namespace mpf

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// OctalUartLine: the line of an OctalUartPort: a channel of a chip, with a bell and, for RS-485, a timer in one descriptor.
+//
+// Threads  the port's thread.
+// Crash    see OctalUart.
+// Trust    see SerialPort.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <mpf/base/file_descriptor.h>
+#include <mpf/drivers/octal_uart/octal_uart.h>
+#include <mpf/drivers/serial/serial_line.h>
+
+namespace mpf {
+
+class OctalUartLine final : public SerialLine {
+ public:
+  //   uart      outlives this
+  //   settings  0 in a field: 9600 baud, 8 bits, no parity, 1 stop bit, no flow control
+  //   throws    std::invalid_argument for settings that the chip does not have, for a port that is not there or is taken
+  OctalUartLine(OctalUart& uart, int number, const SerialSettings& settings);
+  ~OctalUartLine() override;
+
+  [[nodiscard]] std::string description() const override { return description_; }
+  [[nodiscard]] std::string problem() const override { return problem_; }
+  [[nodiscard]] OpenState tryOpen() override;
+  [[nodiscard]] std::chrono::milliseconds openTimeout() const override { return {}; }
+  void close() noexcept override;
+  [[nodiscard]] pollfd waitsFor() const noexcept override { return {events_.get(), POLLIN, 0}; }
+  [[nodiscard]] bool tryRead(std::vector<LineByte>& bytes) override;
+  [[nodiscard]] std::optional<std::size_t> tryWrite(std::span<const std::uint8_t> bytes) override;
+  [[nodiscard]] std::chrono::milliseconds timeToSend() const override;
+  void discardUnsent() noexcept override;
+  [[nodiscard]] std::uint64_t takeOverruns() noexcept override;
+  [[nodiscard]] std::string tryConfigure(const SerialSettings& settings) override;
+  [[nodiscard]] bool trySetBreak(bool on) noexcept override;
+
+ private:
+  bool isThere(OctalUartChannel& channel);
+  void turnOrWait(OctalUartChannel& channel) const;
+
+  OctalUart& uart_;
+  const int number_;
+  const std::string description_;
+  SerialSettings settings_;
+  std::string problem_;
+  FileDescriptor timer_;   // when an RS-485 line may have to be turned
+  FileDescriptor events_;  // epoll over the channel's bell and the timer: never writable, unlike a bell
+};
+
+}  // namespace mpf

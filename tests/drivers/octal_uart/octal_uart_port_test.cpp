@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/octal_uart/octal_uart_port.h>
+
+#include <poll.h>
+
+#include <thread>
+
+#include "octal_uart_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class OctalUartPortTest : public OctalUartTest {
+ protected:
+  // Lets time pass until `done`.
+  template <class Done>
+  void stepUntil(Done done) {
+    while (!done()) {
+      model_->advance(10us);
+      std::this_thread::yield();
+    }
+  }
+  [[nodiscard]] bool isBreaking(int number) const {
+    return model_->with(number, [](const OctalUartModelChannel& channel) { return channel.isBreaking(); });
+  }
+};
+
+TEST_F(OctalUartPortTest, EveryPortTalksAndListens) {
+  auto& uart = start();
+  for (int i = 0; i < 8; ++i) {
+    BoundOctalPort bound(uart, i, kFast);
+
+    EXPECT_TRUE(echoes(bound, i)) << i;
+
+    EXPECT_EQ(model_->heard(i), "ok?\r");
+  }
+}
+
+TEST_F(OctalUartPortTest, LongTextsPassInOrder) {
+  BoundOctalPort bound(start(), 7, kFast);
+  std::string text;
+  for (int i = 0; i < 20'000; ++i) text += static_cast<char>('a' + i % 23);
+
+  EXPECT_EQ(bound.line->write(bytesOf(text), kWatchdog), SerialPortStatus::success);
+  model_->say(7, text);
+
+  EXPECT_EQ(model_->heard(7), text);
+  EXPECT_TRUE(bound.collector.waitForAll(text));
+}
+
+TEST_F(OctalUartPortTest, AWriteEndsWhenTheLastBitIsOut) {
+  BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 1, kFast);
+  std::atomic<bool> isDone = false;
+  std::thread writer([&] {
+    EXPECT_EQ(bound.line->write(bytesOf("abcd"), kWatchdog), SerialPortStatus::success);
+    EXPECT_EQ(model_->heard(1), "abcd");
+    isDone = true;
+  });
+
+  stepUntil([&] { return isDone.load(); });
+
+  writer.join();
+}
+
+// The estimate of the time that bytes need is of use only until the last one is in the chip.
+TEST_F(OctalUartPortTest, WhoWritesIsToldThatTheChipHasAll) {
+  auto& uart = start({.time = OctalUartModelTime::stepped});
+  OctalUartLine line(uart, 1, kFast);
+  ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
+
+  ASSERT_EQ(line.tryWrite(bytesOf("abc")), 3U);
+  model_->advance(byteTime(kFast));
+
+  auto bell = line.waitsFor();
+  EXPECT_EQ(::poll(&bell, 1, -1), 1);
+}
+
+TEST_F(OctalUartPortTest, ALineThatTakesNoTimeTakesNone) {
+  auto& uart = start();
+  OctalUartLine line(uart, 1, {75, 1, 8, 'N', 'N'});
+  ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
+
+  ASSERT_EQ(line.tryWrite(bytesOf("at once")), 7U);
+
+  EXPECT_EQ(model_->heard(1), "at once");
+  EXPECT_EQ(line.timeToSend(), 0ms);
+}
+
+TEST_F(OctalUartPortTest, DamagedBytesFailTheReadAndAreTold) {
+  BoundOctalPort bound(start(), 2, kFast);
+  std::vector<LineFault> faults;
+  {
+    const auto tap = bound.port.attachTap([&](std::span<const PeekedByte> bytes) {
+      for (const auto& byte : bytes) faults.push_back(byte.fault);
+    });
+    model_->say(2, "a");
+    model_->say(2, "b", LineFault::parity);
+    model_->say(2, "c", LineFault::framing);
+    model_->say(2, std::string(1, '\0'), LineFault::breakSignal);
+    model_->say(2, "d\r");
+    EXPECT_TRUE(bound.collector.waitForAll("ad\r"));
+  }
+
+  EXPECT_THAT(faults, ElementsAre(LineFault::none, LineFault::parity, LineFault::framing, LineFault::breakSignal, LineFault::none,
+                                  LineFault::none));
+  const auto counters = bound.port.counters();
+  EXPECT_EQ(counters.parityErrors, 1U);
+  EXPECT_EQ(counters.framingErrors, 1U);
+  EXPECT_EQ(counters.breaks, 1U);
+  EXPECT_EQ(counters.overruns, 0U);
+}
+
+TEST_F(OctalUartPortTest, AnOverrunIsCountedAndCostsNoOtherByte) {
+  BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
+  model_->say(0, "abcdef");
+
+  model_->advance(10 * byteTime(kFast));  // all at once: nobody can read in between
+
+  EXPECT_TRUE(bound.collector.waitForAll("abcf"));
+  EXPECT_EQ(bound.port.counters().overruns, 1U);
+}
+
+TEST_F(OctalUartPortTest, NobodyLosesWhatFitsIntoTheChip) {
+  BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
+  model_->say(0, "abcd");
+
+  model_->advance(10 * byteTime(kFast));
+
+  EXPECT_TRUE(bound.collector.waitForAll("abcd"));
+  EXPECT_EQ(bound.port.counters().overruns, 0U);
+}
+
+TEST_F(OctalUartPortTest, SendsABreak) {
+  BoundOctalPort bound(start(), 4, kFast);
+
+  EXPECT_EQ(bound.line->sendBreak(20ms), SerialPortStatus::success);
+
+  EXPECT_EQ(model_->with(4, [](const OctalUartModelChannel& channel) { return channel.breaks(); }), 1);
+  EXPECT_FALSE(isBreaking(4));
+  EXPECT_TRUE(echoes(bound, 4));
+}
+
+TEST_F(OctalUartPortTest, AFarEndThatHoldsItsLineMakesAWriteLate) {
+  BoundOctalPort bound(start(), 3, {38400, 1, 8, 'N', 'H'});
+  model_->setClearToSend(3, false);
+
+  EXPECT_EQ(bound.line->write(bytesOf("never"), 30ms), SerialPortStatus::timeout);
+  model_->setClearToSend(3, true);
+
+  EXPECT_TRUE(echoes(bound, 3));
+  EXPECT_EQ(model_->heard(3), "ok?\r") << "what was late is discarded";
+}
+
+TEST_F(OctalUartPortTest, WithoutFlowControlNobodyHoldsItUp) {
+  BoundOctalPort bound(start(), 3, kFast);
+  model_->setClearToSend(3, false);
+
+  EXPECT_TRUE(echoes(bound, 3));
+}
+
+TEST_F(OctalUartPortTest, RequestsToSendAsLongAsItIsOpen) {
+  auto& uart = start();
+  {
+    const OctalUartPort port(uart, 6, {});
+    EXPECT_TRUE(requestsToSend(6));
+  }
+  EXPECT_FALSE(requestsToSend(6));
+}
+
+// RTS switches the transmitter on, and the receiver is off meanwhile.
+TEST_F(OctalUartPortTest, Rs485TalksOrListens) {
+  BoundOctalPort bound(start({.model = 0x48, .time = OctalUartModelTime::stepped}), 5, kFast);
+  EXPECT_FALSE(requestsToSend(5));
+  std::atomic<bool> isDone = false;
+  std::thread writer([&] {
+    EXPECT_EQ(bound.line->write(bytesOf("talk"), kWatchdog), SerialPortStatus::success);
+    isDone = true;
+  });
+  model_->waitUntilServed();
+  while (!requestsToSend(5)) std::this_thread::yield();
+  model_->say(5, "unheard");
+  while (model_->heard(5) != "talk") {
+    EXPECT_TRUE(requestsToSend(5));
+    model_->advance(10us);
+  }
+
+  stepUntil([&] { return isDone.load(); });
+  writer.join();
+
+  EXPECT_FALSE(requestsToSend(5));
+  EXPECT_GE(model_->with(5, [](const OctalUartModelChannel& channel) { return channel.unheard(); }), 3U);
+}
+
+TEST_F(OctalUartPortTest, Rs485HearsAnAnswerAtOnce) {
+  BoundOctalPort bound(start({.model = 0x48}), 5, kFast);
+  std::thread instrument([&] {
+    for (int i = 0; i < 100; ++i) {
+      model_->waitUntilHeard(5, "?" + std::to_string(i) + "\r");
+      while (requestsToSend(5)) std::this_thread::yield();
+      model_->say(5, "yes\r");
+    }
+  });
+
+  for (int i = 0; i < 100; ++i)
+    EXPECT_EQ(bound.line->writeRead(bytesOf("?" + std::to_string(i) + "\r"), kWatchdog), SerialPortStatus::success);
+
+  instrument.join();
+}
+
+TEST_F(OctalUartPortTest, Rs485SendsABreakAndTurns) {
+  BoundOctalPort bound(start({.model = 0x48}), 5, kFast);
+
+  EXPECT_EQ(bound.line->sendBreak(20ms), SerialPortStatus::success);
+
+  while (requestsToSend(5)) std::this_thread::yield();
+}
+
+TEST_F(OctalUartPortTest, HasASpeedOfItsOwn) {
+  auto& uart = start();
+  const OctalUartPort slow(uart, 0, {.settings = {.baud = 1200}});
+  const OctalUartPort fast(uart, 1, {.settings = {.baud = 38400}});
+
+  EXPECT_EQ(settingsInChip(0).baud, 1200);
+  EXPECT_EQ(settingsInChip(1).baud, 38400);
+}
+
+TEST_F(OctalUartPortTest, OnePortIsOnesOwn) {
+  auto& uart = start();
+  const OctalUartPort port(uart, 2, {});
+  try {
+    const OctalUartPort other(uart, 2, {});
+    FAIL() << "two have it";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("port 2 is in use already"));
+  }
+}
+
+TEST_F(OctalUartPortTest, AModuleOfFourHasFour) {
+  auto& uart = start({}, {.ports = 4});
+  BoundOctalPort bound(uart, 3, kFast);
+
+  EXPECT_TRUE(echoes(bound, 3));
+  EXPECT_THROW(OctalUartPort(uart, 4, {}), std::invalid_argument);
+  EXPECT_THROW(OctalUartPort(uart, -1, {}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace mpf::test
