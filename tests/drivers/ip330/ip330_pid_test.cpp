@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/ip330/ip330_pid.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "ip330_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+PidLoop loopOf(double kp, double ki, double kd) {
+  PidLoop loop;
+  loop.kp = kp;
+  loop.ki = ki;
+  loop.kd = kd;
+  loop.lowLimit = 0;
+  loop.highLimit = 100;
+  loop.setPoint = 10;
+  return loop;
+}
+
+TEST(PidLoop, HasNoChangeOfErrorInItsFirstStep) {
+  auto loop = loopOf(2, 0, 3);
+  loop.step(4, 0.5);
+  EXPECT_DOUBLE_EQ(loop.terms().error, 6);
+  EXPECT_DOUBLE_EQ(loop.terms().p, 12);
+  EXPECT_DOUBLE_EQ(loop.terms().d, 0);
+  loop.step(5, 0.5);
+  EXPECT_DOUBLE_EQ(loop.terms().d, 2 * 3 * (-1 / 0.5));
+}
+
+TEST(PidLoop, BeginsWithWhatTheOutputIs) {
+  auto loop = loopOf(1, 2, 0);
+  loop.turnOn(42);
+  EXPECT_DOUBLE_EQ(loop.step(10, 1), 42);
+  EXPECT_DOUBLE_EQ(loop.step(9, 1), 42 + 1 + 2);
+  EXPECT_DOUBLE_EQ(loop.terms().i, 44);
+}
+
+TEST(PidLoop, DoesNotIntegrateWhileFeedbackIsOff) {
+  auto loop = loopOf(1, 2, 0);
+  loop.setI(5);
+  loop.step(0, 1);
+  EXPECT_DOUBLE_EQ(loop.terms().i, 5);
+}
+
+TEST(PidLoop, DoesNotWindUpAtALimit) {
+  auto loop = loopOf(1, 1, 0);
+  loop.turnOn(50);
+  for (int i = 0; i < 1000; ++i) EXPECT_LE(loop.step(-90, 1), 100);
+  EXPECT_LE(loop.terms().i, 100);
+  for (int i = 0; i < 1000; ++i) loop.step(110, 1);
+  EXPECT_GE(loop.terms().i, 0);
+  EXPECT_DOUBLE_EQ(loop.terms().output, 0);
+}
+
+TEST(PidLoop, HasItsIntegralAtALimitWhenItHasNone) {
+  auto loop = loopOf(1, 0, 0);
+  loop.turnOn(50);
+  loop.step(9, 1);
+  EXPECT_DOUBLE_EQ(loop.terms().i, 0);
+  loop.kp = -1;
+  loop.step(9, 1);
+  EXPECT_DOUBLE_EQ(loop.terms().i, 100);
+}
+
+// A 12-bit output of -10 to 10 V; any thread.
+class FakeOutput final : public AnalogOutput {
+ public:
+  std::optional<double> tryRead() override { return answers ? std::optional(code.load()) : std::nullopt; }
+  bool tryWrite(double wanted) override {
+    if (answers) code = std::round(wanted);
+    if (answers) ++writes;
+    return answers;
+  }
+  std::atomic<double> code{2048};
+  std::atomic<int> writes{0};
+  std::atomic<bool> answers{true};
+};
+
+class Ip330PidTest : public testing::Test {
+ protected:
+  // Channel 1 is what the output drives, a quarter of it and 0.2 V.
+  Ip330PidTest() {
+    with_.model.setSignal(1, [this](double) { return 0.2 + (output_.code - 2048) * 20 / 4096 / 4; });
+    pid_.set([](PidLoop& loop) {
+      loop.kp = 0.05;
+      loop.ki = 100;
+      loop.setPoint = 40000;
+    });
+  }
+  FakeOutput output_;
+  Ip330Board with_{{.lastChannel = 3, .secondsBetweenCalibrate = 0}};
+  Notes outputNotes_;
+  Ip330Pid pid_{with_.board, 1, output_, 0, 4095, outputNotes_.hook()};
+};
+
+TEST_F(Ip330PidTest, LeavesTheOutputAloneUntilItIsStarted) {
+  with_.scan(5);
+  EXPECT_EQ(output_.writes, 0);
+  EXPECT_NEAR(pid_.status().terms.actual, 32768 + 1311, 1);
+  EXPECT_NEAR(pid_.status().terms.error, 40000 - 34079, 1);
+}
+
+TEST_F(Ip330PidTest, BringsTheInputToTheSetPoint) {
+  pid_.start();
+  with_.scan(300);
+  EXPECT_NEAR(pid_.status().terms.actual, 40000, 10);  // a step of the output is 8 codes
+  pid_.stop();
+  const int writes = output_.writes;
+  with_.scan(3);
+  EXPECT_EQ(output_.writes, writes);
+}
+
+TEST_F(Ip330PidTest, StepsAsSlowlyAsItIsTold) {
+  ASSERT_TRUE(pid_.trySetSecondsPerScan(0.004));
+  EXPECT_DOUBLE_EQ(pid_.status().secondsPerScan, 4 * with_.board.microsecondsPerScan() / 1e6);
+  pid_.start();
+  with_.scan(12);
+  EXPECT_EQ(output_.writes, 3);
+  EXPECT_FALSE(pid_.trySetSecondsPerScan(NAN));
+  EXPECT_FALSE(pid_.trySetSecondsPerScan(-1));
+}
+
+// The converter's gain 1 is far off: it cannot be calibrated.
+TEST(Ip330Pid, SaysThatItsChannelIsNotCalibrated) {
+  FakeOutput output;
+  Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.gainError = {-0.5}, .isRealTime = false});
+  Ip330Pid pid(with.board, 1, output, 0, 4095);
+  with.scan(1);
+  EXPECT_FALSE(pid.status().isGood);
+  ASSERT_TRUE(with.board.trySetGain(1, 1));
+  with.scan(1);
+  EXPECT_TRUE(pid.status().isGood);
+}
+
+TEST_F(Ip330PidTest, SaysThatTheOutputFailsAndGoesOnFromWhereItIsThen) {
+  output_.answers = false;
+  pid_.start();
+  with_.scan(2);
+  EXPECT_TRUE(outputNotes_.has("+the output"));
+  EXPECT_FALSE(pid_.status().isGood);
+  output_.answers = true;
+  output_.code = 3000;
+  with_.scan(1);
+  EXPECT_TRUE(outputNotes_.has("-the output"));
+  EXPECT_DOUBLE_EQ(pid_.status().terms.i, 3000);
+  EXPECT_TRUE(pid_.status().isGood);
+}
+
+}  // namespace
+}  // namespace mpf::test

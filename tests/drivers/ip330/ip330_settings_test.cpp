@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/drivers/ip330/ip330_settings.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <limits>
+#include <stdexcept>
+
+#include <mpf/drivers/ip330/ip330_timing.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::HasSubstr;
+using Mode = Ip330ScanMode;
+
+struct TimerRow {
+  Mode mode;
+  int channels;
+  double asked;
+  int prescaler;
+  int conversion;
+  double made;
+};
+
+class Ip330TimerTest : public testing::TestWithParam<TimerRow> {};
+
+TEST_P(Ip330TimerTest, MakesTheTimeAskedFor) {
+  const auto& row = GetParam();
+
+  const auto timer = ip330TimerOf(row.mode, row.channels, row.asked);
+
+  EXPECT_EQ(timer.problem, "");
+  EXPECT_EQ(timer.prescaler, row.prescaler);
+  EXPECT_EQ(timer.conversion, row.conversion);
+  EXPECT_DOUBLE_EQ(timer.microsecondsPerScan, row.made);
+}
+
+// The first two are the manual's board: release 1-4 took 1240 and 1480 us for what it called 1 ms.
+INSTANTIATE_TEST_SUITE_P(Table, Ip330TimerTest,
+                         testing::Values(TimerRow{Mode::burstContinuous, 16, 1000, 64, 95, 1000},
+                                         TimerRow{Mode::burstContinuous, 32, 1000, 64, 65, 1000},
+                                         TimerRow{Mode::burstContinuous, 1, 23, 64, 1, 23},
+                                         TimerRow{Mode::burstContinuous, 1, 15 + 64 * 65535 / 8.0, 64, 65535, 15 + 64 * 65535 / 8.0},
+                                         TimerRow{Mode::burstContinuous, 1, 1e6 + 15, 123, 65041, 15 + 123 * 65041 / 8.0},
+                                         TimerRow{Mode::burstContinuous, 1, 15 + 255 * 65535 / 8.0, 255, 65535, 15 + 255 * 65535 / 8.0},
+                                         TimerRow{Mode::uniformContinuous, 16, 16 * 64, 64, 8, 1024},
+                                         TimerRow{Mode::uniformContinuous, 10, 10000, 64, 125, 10000},
+                                         TimerRow{Mode::uniformSingle, 1, 16, 64, 2, 16}));
+
+TEST(Ip330Timer, IsNotUsedWhereTriggersSayWhen) {
+  for (const auto mode : {Mode::disable, Mode::burstSingle, Mode::convertOnExternalTriggerOnly}) {
+    const auto timer = ip330TimerOf(mode, 4, 0);
+    EXPECT_EQ(timer.problem, "");
+    EXPECT_FALSE(timer.isUsed);
+  }
+}
+
+TEST(Ip330Timer, RefusesWhatCannotBeInsteadOfTakingAnotherTime) {
+  EXPECT_THAT(ip330TimerOf(Mode::burstContinuous, 16, 247).problem, HasSubstr("use 248 to "));
+  EXPECT_EQ(ip330TimerOf(Mode::burstContinuous, 16, 248).problem, "");
+  EXPECT_THAT(ip330TimerOf(Mode::uniformContinuous, 16, 239).problem, HasSubstr("use 240 to "));
+  EXPECT_THAT(ip330TimerOf(Mode::burstContinuous, 1, 2.1e6).problem, HasSubstr("to 2088943 us"));
+  EXPECT_THAT(ip330TimerOf(Mode::uniformContinuous, 1, std::numeric_limits<double>::quiet_NaN()).problem, HasSubstr("use 15"));
+}
+
+TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
+  EXPECT_EQ(parseIp330Type("D"), Ip330Type::differential);
+  EXPECT_EQ(parseIp330Type("S"), Ip330Type::singleEnded);
+  EXPECT_EQ(parseIp330Range("-10to10"), Ip330Range::minus10to10);
+  EXPECT_STREQ(toString(parseIp330Range("0to5")), "0to5");
+  EXPECT_STREQ(dipSwitchesOf(Ip330Range::from0to10), "1011001000");
+  EXPECT_EQ(parseIp330Trigger("Output"), Ip330Trigger::output);
+  EXPECT_EQ(parseIp330ScanMode(3), Mode::burstContinuous);
+  EXPECT_THROW(static_cast<void>(parseIp330Type("d")), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(parseIp330Range("5")), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(parseIp330Trigger("")), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(parseIp330ScanMode(6)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(parseIp330ScanMode(-1)), std::invalid_argument);
+}
+
+TEST(Ip330Settings, SayWhatCannotBe) {
+  EXPECT_EQ(Ip330Settings().problem(), "");
+  EXPECT_THAT((Ip330Settings{.type = Ip330Type::differential, .lastChannel = 16}.problem()), HasSubstr("use 0 to 15"));
+  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()), HasSubstr("the first one first"));
+  EXPECT_THAT((Ip330Settings{.vector = 256}.problem()), HasSubstr("use 0 to 255"));
+  EXPECT_THAT((Ip330Settings{.maxClients = 0}.problem()), HasSubstr("use 1 or more"));
+  EXPECT_THAT((Ip330Settings{.microsecondsPerScan = 1}.problem()), HasSubstr("us per scan"));
+}
+
+}  // namespace
+}  // namespace mpf::test
