@@ -6,8 +6,10 @@
 #include <exception>
 #include <fmt/format.h>
 
+#include <mpf/base/command_line.h>
 #include <mpf/server/programs/server_arguments.h>
 #include <mpf/server/programs/server_log.h>
+#include <mpf/shm/link.h>
 
 namespace mpf {
 
@@ -16,9 +18,12 @@ int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
   std::string name = echo.server;
   ServerArguments arguments;
   app.add_option("server", name, "Name under which clients find it")->capture_default_str();
-  app.add_option("--queue-size", arguments.messages.queueSize, "Requests of one client that may wait, 1 to 16384")->capture_default_str();
+  app.add_option("--queue-size", arguments.messages.queueSize,
+                 fmt::format("Requests of one client that may wait, 1 to {}", LinkGeometry::kMaxQueueSize))
+      ->capture_default_str()
+      ->check(wholeNumber(1, LinkGeometry::kMaxQueueSize));
   arguments.addTo(app);
-  CLI11_PARSE(app, argc, argv);
+  if (const auto status = parseCommandLine(app, argc, argv)) return *status;
 
   const ServerLog log(echo.program, arguments.logLevel);
   MessageServer server(Backplane::attach(arguments.backplane), name, arguments.messages);

@@ -2,44 +2,36 @@
 #include <mpf/server/programs/server_arguments.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
-#include <charconv>
-#include <fmt/format.h>
-#include <grp.h>
 #include <map>
-#include <vector>
+#include <stdexcept>
 
+#include <mpf/base/command_line.h>
 #include <mpf/server/programs/server_log.h>
+#include <mpf/shm/link.h>
+#include <mpf/shm/rights_text.h>
 
 namespace mpf {
 namespace {
 
-constexpr mode_t kAnybodyReadsAndWrites = 0666;
-constexpr mode_t kOwnerReadsAndWrites = 0600;
-
+constexpr int kQueueSizeAsBefore = 20;
 const std::map<std::string, WaitMode> kWaitModes{{"spin", WaitMode::spin}, {"adaptive", WaitMode::adaptive}, {"block", WaitMode::block}};
 
-mode_t modeOf(const std::string& text) {
-  mode_t mode = 0;
-  const auto* const end = text.data() + text.size();
-  const auto [stopped, error] = std::from_chars(text.data(), end, mode, 8);
-  if (error == std::errc() && stopped == end && (mode & ~kAnybodyReadsAndWrites) == 0 &&
-      (mode & kOwnerReadsAndWrites) == kOwnerReadsAndWrites) {
-    return mode;
-  }
-  throw CLI::ValidationError("--mode", fmt::format("{}: use an octal number between 0600 and 0666, such as 0660", text));
-}
-
-std::uint32_t groupOf(const std::string& name) {
-  group entry{};
-  group* found = nullptr;
-  std::vector<char> room(1024);
-  while (::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found) == ERANGE) room.resize(2 * room.size());
-  if (found == nullptr) throw CLI::ValidationError("--group", fmt::format("{}: there is no group of this name", name));
-  return found->gr_gid;
+// What `parse` makes of the value of `option`.
+template <class Value>
+void take(const char* option, const std::string& text, Value (*parse)(const std::string&), Value& into) try {
+  into = parse(text);
+} catch (const std::invalid_argument& error) {
+  throw CLI::ValidationError(option, error.what());
 }
 
 }  // namespace
+
+void ServerArguments::addQueueSizeTo(CLI::App& app) {
+  messages.queueSize = kQueueSizeAsBefore;
+  app.add_option("queuesize", messages.queueSize, "Requests of one client that may wait")
+      ->capture_default_str()
+      ->check(wholeNumber(1, LinkGeometry::kMaxQueueSize));
+}
 
 void ServerArguments::addTo(CLI::App& app) {
   app.add_option("--backplane", backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
@@ -50,11 +42,11 @@ void ServerArguments::addTo(CLI::App& app) {
       ->check(CLI::IsMember(kWaitModes))
       ->default_str("adaptive");
   auto* const mode = app.add_option_function<std::string>(
-                            "--mode", [this](const std::string& text) { messages.rights.mode = modeOf(text); },
+                            "--mode", [this](const std::string& text) { take("--mode", text, parseMode, messages.rights.mode); },
                             "Who may be a client, octal as for chmod: 0600 its own user, 0660 also the group, 0666 everybody")
                          ->default_str("0600");
   app.add_option_function<std::string>(
-         "--group", [this](const std::string& name) { messages.rights.group = groupOf(name); },
+         "--group", [this](const std::string& name) { take("--group", name, parseGroup, messages.rights.group); },
          "The group that --mode speaks of; default: the user's own")
       ->needs(mode);
   app.add_option("--log-level", logLevel, "Least weight of what it says on stderr")

@@ -22,6 +22,8 @@ struct ServerArguments {
   // Adds the options to `app`, which fills this object when it parses and must not outlive it. A value that is none is a
   // CLI::ValidationError that says which values there are.
   void addTo(CLI::App& app);
+  // Adds what old commands call queuesize, an argument that may be left out.
+  void addQueueSizeTo(CLI::App& app);
 };
 
 }  // namespace mpf

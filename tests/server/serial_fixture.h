@@ -13,7 +13,9 @@
 #include <mpf/drivers/serial/posix_terminal_port.h>
 #include <mpf/schema/serial_server.h>
 #include <mpf/server/programs/serial_server/serial_server.h>
+#include <mpf/tests/server/ask_serial.h>
 #include <mpf/tests/support/instrument.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
@@ -42,22 +44,9 @@ class SerialServerTest : public testing::Test {
     return std::filesystem::temp_directory_path() / ("mpf-serial-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
   }
 
-  struct Reply {
-    std::int32_t status;
-    std::string text;
-  };
+  using Reply = SerialReply;
   // Asks with a timeout in milliseconds, unless `fields` say otherwise.
-  Reply ask(std::string_view text, Char8Array fields) {
-    auto message = Char8ArrayMessage::allocValue(text.size());
-    *message = fields;
-    message.setSize(text.size());
-    std::copy(text.begin(), text.end(), message.value().begin());
-    auto answer = client_.call(std::move(message), 60s);
-    EXPECT_TRUE(answer) << answer.why();
-    auto reply = answer.as<Char8Array>();
-    if (!reply) return {-1, "not a Char8Array"};
-    return {(*reply)->status, std::string(reply->value().begin(), reply->value().end())};
-  }
+  Reply ask(std::string_view text, const Char8Array& fields) { return askSerial(client_, text, fields); }
   static Char8Array fieldsOf(std::int32_t cmd, std::int32_t timeoutMs = 60'000) {
     return {.timeout = timeoutMs, .cmd = cmd | serial::cmdTimeoutMilliseconds};
   }
@@ -67,7 +56,7 @@ class SerialServerTest : public testing::Test {
   std::string path_ = linkPath();
   Instrument instrument_{path_};
   OpenPort port_{{.device = path_, .settings = {9600, 1, 8, 'N', 'N'}}};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   MessageServer server_{backplane_, "serial[0]"};
   std::unique_ptr<SerialServer> serial_;
   std::thread thread_;

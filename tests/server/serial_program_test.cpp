@@ -16,6 +16,7 @@
 #include <mpf/schema/serial_sniff.h>
 #include <mpf/tests/support/instrument.h>
 #include <mpf/tests/support/program.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
@@ -83,16 +84,10 @@ class SerialProgramTest : public testing::Test {
   }
   static std::string linkPath() { return std::filesystem::temp_directory_path() / ("mpf-serial-program-" + std::to_string(::getpid())); }
 
-  // A test that needs no orderly end kills its server, whose names are then anybody's to remove.
-  void TearDown() override {
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
-  }
-
   Watchdog watchdog_{"serial program test"};
   std::string path_ = linkPath();
   Instrument instrument_{path_};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 class SerialProgramSignalTest : public SerialProgramTest, public testing::WithParamInterface<int> {};

@@ -39,6 +39,12 @@ class Program {
     signal(number);
     return wait();
   }
+  // Waits for the next line on stderr, without its end; empty when there is none any more.
+  [[nodiscard]] std::string line() const {
+    std::string text;
+    for (char next = 0; retryInterrupted([&] { return ::read(errors_.get(), &next, 1); }) == 1 && next != '\n';) text += next;
+    return text;
+  }
   // Reads what it wrote to stderr; waits for its end.
   [[nodiscard]] std::string errors() const {
     std::string text;
@@ -53,6 +59,7 @@ class Program {
  private:
   void start(std::vector<std::string>& command) {
     std::vector<char*> arguments;
+    arguments.reserve(command.size() + 1);
     for (auto& word : command) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     std::array<int, 2> pipe{};

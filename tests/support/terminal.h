@@ -92,6 +92,17 @@ class Terminal {
     text.resize(vterm_screen_get_text(screen_, text.data(), text.size(), {number, number + 1, 0, columns_}));
     return text;
   }
+  // How the first character of a row looks.
+  struct Look {
+    bool isRed = false;
+    bool isReversed = false;
+  };
+  [[nodiscard]] Look look(int number) const {
+    constexpr std::uint8_t kRed = 1;
+    VTermScreenCell cell{};
+    vterm_screen_get_cell(screen_, {number, 0}, &cell);
+    return {VTERM_COLOR_IS_INDEXED(&cell.fg) && cell.fg.indexed.idx % 8 == kRed, cell.attrs.reverse != 0};  // bold may make it bright
+  }
   [[nodiscard]] std::string screen() const {
     std::string text;
     for (int number = 0; number < rows_; ++number) text += row(number) + '\n';

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <mpf/schema/serial_server.h>
+#include <mpf/server/programs/hardware/other_types.h>
 
 namespace mpf {
 namespace {
@@ -39,6 +40,8 @@ SerialServer::SerialServer(MessageServer& server, SerialPort& port, const Serial
     : server_(server), log_(log), reader_(options.bufferBytes, options.eom, options.circularBuffer), port_(port, reader_) {
   server.on<Char8Array>([this](Char8ArrayMessage&& request) { handle(std::move(request)); });
   server.on<SerialConfig>([this](SerialConfigMessage&& request) { configure(std::move(request)); });
+  answerOtherTypes<Char8Array, SerialConfig>(server,
+                                             [this](MessageType type) { log_->debug("a request of type {}: status -1", toString(type)); });
 }
 
 void SerialServer::stop() {

@@ -22,7 +22,7 @@ struct SerialServerOptions {
 
 class SerialServer {
  public:
-  // Answers Char8Array and SerialConfig requests of `server`; other types are refused by it.
+  // Answers Char8Array and SerialConfig requests of `server`, and those of other types with status -1.
   // All that is passed must outlive this, but for the options.
   SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log);
 

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <exception>
 #include <span>
 #include <utility>
+
+#include <mpf/server/programs/hardware/other_types.h>
 
 namespace mpf {
 namespace {
@@ -46,7 +47,11 @@ SniffServer::SniffServer(const Backplane& backplane, const std::string& server, 
                          const ServerLog& log, const SniffBatching& batching)
     : log_(log), port_(port), queue_(batching), server_(backplane, server + std::string(serial::sniffSuffix), optionsLike(like)) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
-  thread_ = std::thread([this] { run(); });
+  answerOtherTypes<Int32>(server_, [this](MessageType type) { log_->debug("listeners: a request of type {}: status -1", toString(type)); });
+}
+
+void SniffServer::start(std::function<void()> failed) {
+  thread_.start(log_, [this] { run(); }, std::move(failed));
 }
 
 SniffServer::~SniffServer() {
@@ -55,7 +60,7 @@ SniffServer::~SniffServer() {
   thread_.join();
 }
 
-void SniffServer::run() try {
+void SniffServer::run() {
   while (!ends_.load(std::memory_order_relaxed)) {
     static_cast<void>(server_.waitForMessage(queue_.dueAt()));
     while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) {
@@ -63,23 +68,20 @@ void SniffServer::run() try {
     forgetGone();
     if (queue_.dueAt().hasPassed()) deliver();
   }
-} catch (const std::exception& error) {
-  log_->error("nobody can listen any more: {}", error.what());
-  tap_.reset();
 }
 
 void SniffServer::handle(Int32Message&& request) {
   switch (request->cmd) {
     case serial::cmdSniffStart:
-      return start(std::move(request));
+      return listen(std::move(request));
     case serial::cmdSniffStop:
-      return stop(request);
+      return leave(request);
     default:
       return answer(request, serial::sniffStatusError);
   }
 }
 
-void SniffServer::start(Int32Message&& request) {
+void SniffServer::listen(Int32Message&& request) {
   deliver();  // what was before is not for this one
   const auto client = server_.clientOf(request);
   if (client == 0) return;  // gone already
@@ -94,7 +96,7 @@ void SniffServer::start(Int32Message&& request) {
   answer(listeners_.back().request, serial::sniffStatusOK);
 }
 
-void SniffServer::stop(const Int32Message& request) {
+void SniffServer::leave(const Int32Message& request) {
   deliver();
   const auto listener = find(server_.clientOf(request));
   if (listener == listeners_.end()) return answer(request, serial::sniffStatusNotListening);

@@ -11,9 +11,9 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <mpf/drivers/serial/serial_port.h>
@@ -21,6 +21,7 @@
 #include <mpf/server/message_server.h>
 #include <mpf/server/programs/serial_server/sniff_queue.h>
 #include <mpf/server/programs/server_log.h>
+#include <mpf/server/programs/serving_thread.h>
 
 namespace mpf {
 
@@ -35,6 +36,8 @@ class SniffServer {
   SniffServer(const SniffServer&) = delete;
   SniffServer& operator=(const SniffServer&) = delete;
 
+  // Serves, until this object ends. `failed` is called when it cannot any more, which the log says.
+  void start(std::function<void()> failed);
   [[nodiscard]] const std::string& getName() const noexcept { return server_.getName(); }
   // How many clients listen now.
   [[nodiscard]] std::size_t listeners() const noexcept { return count_.load(std::memory_order_relaxed); }
@@ -48,8 +51,8 @@ class SniffServer {
 
   void run();
   void handle(Int32Message&& request);
-  void start(Int32Message&& request);
-  void stop(const Int32Message& request);
+  void listen(Int32Message&& request);
+  void leave(const Int32Message& request);
   void answer(const Int32Message& request, std::int32_t status, std::uint64_t lost = 0);
   [[nodiscard]] std::vector<Listener>::iterator find(std::uint64_t client);
   void forgetGone();
@@ -67,7 +70,7 @@ class SniffServer {
   std::vector<char> records_;        // the same, as listeners get it
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
-  std::thread thread_;
+  ServingThread thread_;
 };
 
 }  // namespace mpf

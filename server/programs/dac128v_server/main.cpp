@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// mpf-dac128v-server: one DAC128V, one server, one process. The old command was initDAC128V("module","carrier","site",queueSize).
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <fmt/format.h>
+#include <memory>
+#include <optional>
+
+#include <mpf/base/command_line.h>
+#include <mpf/drivers/dac128v/dac128v_model.h>
+#include <mpf/server/programs/dac128v_server/dac128v_server.h>
+#include <mpf/server/programs/hardware/hardware.h>
+#include <mpf/server/programs/hardware/wire_options.h>
+#include <mpf/server/programs/server_arguments.h>
+
+namespace {
+
+constexpr const char* kProgram = "mpf-dac128v-server";
+
+struct Options {
+  mpf::ModulePlace place;
+  mpf::Dac128vRanges ranges;
+  mpf::ServerArguments arguments;
+
+  std::optional<int> parse(int argc, char** argv, mpf::Hardware& hardware) {
+    CLI::App app("mpf-dac128v-server - serves the eight outputs of a Systran DAC128V to the clients of a backplane", kProgram);
+    place.addTo(app, "Name of the module, under which clients find the server, too");
+    arguments.addQueueSizeTo(app);
+    app.add_option_function<std::string>(
+           "--ranges", [this](const std::string& text) { takeRanges(text); },
+           "What the jumpers say, as LOWtoHIGH: for all, or for channels 0 to 3 and 4 to 7; for models")
+        ->default_str("-10to10,-10to10");
+    hardware.addTo(app);
+    arguments.addTo(app);
+    app.footer(
+        "The old command: initDAC128V(\"module\", \"carrier\", \"site\", queuesize)\n"
+        "A model's outputs are the wires MODULE.0 to MODULE.7, in volts.\n"
+        "Example: mpf-dac128v-server dac ipac IP_a 20 --carrier ipac=model");
+    return mpf::parseCommandLine(app, argc, argv);
+  }
+
+ private:
+  void takeRanges(const std::string& text) try { ranges = mpf::parseDac128vRanges(text); } catch (const std::invalid_argument& error) {
+    throw CLI::ValidationError("--ranges", error.what());
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  Options options;
+  mpf::Hardware hardware;
+  if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
+  const auto& arguments = options.arguments;
+  const mpf::ServerLog log(kProgram, arguments.logLevel);
+  auto* const module = hardware.open(
+      options.place, mpf::Dac128v::kind(),
+      [&] {
+        return std::make_unique<mpf::Dac128vModel>(options.ranges,
+                                                   mpf::wireOutputs(hardware.wires(), options.place.name, mpf::Dac128v::kChannels));
+      },
+      log);
+  if (module == nullptr) return 0;
+  mpf::Dac128v dac(*module);
+  mpf::MessageServer server(mpf::Backplane::attach(arguments.backplane), options.place.name, arguments.messages);
+  const mpf::Dac128vServer outputs(server, dac, log);
+  return mpf::runServer(server, *module, log);
+} catch (const std::exception& error) {
+  fmt::print(stderr, "{}: {}\n", kProgram, error.what());
+  return 1;
+}

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/programs/digital_io_server/input_server.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include <mpf/server/programs/hardware/bits_request.h>
+#include <mpf/server/programs/hardware/other_types.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::size_t kMaxNews = 1000;
+
+}  // namespace
+
+DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::string& name, const ServerOptions& options, DigitalIo& io,
+                                       const ServerLog& log, std::function<void()> onFailure)
+    : io_(io), log_(log), onFailure_(std::move(onFailure)), server_(backplane, name, options), faults_(server_, log) {
+  server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
+  answerOtherTypes<Int32>(server_, [this](MessageType type) { log_->debug("inputs: a request of type {}: status -1", toString(type)); });
+  subscription_ = io.subscribe([this](const DigitalIoNews& news) { hear(news); });
+  thread_ = std::thread([this] { run(); });
+}
+
+DigitalInputServer::~DigitalInputServer() {
+  ends_.store(true, std::memory_order_relaxed);
+  server_.interrupt();
+  thread_.join();
+  subscription_ = {};
+}
+
+void DigitalInputServer::run() try {
+  while (!ends_.load(std::memory_order_relaxed)) {
+    static_cast<void>(server_.waitForMessage());
+    deliver();
+    while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) deliver();  // who asks all the time must not keep news back
+    forgetGone();
+  }
+} catch (const std::exception& error) {
+  log_->critical("the inputs are not served any more: {}", error.what());
+  hasFailed_.store(true, std::memory_order_relaxed);
+  if (onFailure_) onFailure_();
+}
+
+void DigitalInputServer::handle(Int32Message&& request) {
+  const auto asked = *request;  // a copy: the client can write to the request while we work
+  if (asked.cmd == digital::cmdStartMonitor) return start(std::move(request));
+  auto fields = asked;
+  fields.status = 0;
+  if (asked.cmd == digital::cmdStopMonitor) {
+    fields.status = stop(request);
+  } else if (isReadRequest(asked.cmd)) {
+    read(fields);
+  } else if (asked.cmd == digital::cmdSetEdges) {
+    const auto status = io_.trySetEdges(static_cast<std::uint32_t>(asked.address), static_cast<std::uint32_t>(asked.value));
+    if (isFault(status)) faults_.fault(toString(status));
+    fields.status = status == DigitalIoStatus::success ? 0 : -1;
+  } else {
+    log_->debug("inputs: there is no cmd {}", asked.cmd);
+    fields.status = -1;
+  }
+  answer(request, fields);
+}
+
+void DigitalInputServer::answer(const Int32Message& request, const Int32& fields) {
+  auto reply = server_.allocReplyMessage<Int32>(request);
+  *reply = fields;
+  static_cast<void>(server_.reply(std::move(reply)));
+}
+
+void DigitalInputServer::read(Int32& fields) {
+  const auto inputs = io_.tryReadInputs();
+  if (!inputs || !tryAnswerBits(fields, fields.cmd, *inputs)) fields.status = -1;
+  if (inputs) return faults_.success();
+  faults_.fault(toString(DigitalIoStatus::gone));
+}
+
+// What was before is not for the new one, and what it hears first is what the others know.
+void DigitalInputServer::start(Int32Message&& request) {
+  const auto client = server_.clientOf(request);
+  if (client == 0) return;  // gone already
+  const auto state = io_.look();
+  deliver();
+  if (const auto former = find(client); former != monitors_.end()) monitors_.erase(former);
+  const auto mask = static_cast<std::uint32_t>(request->address);
+  Monitor monitor{std::move(request), client, mask == 0 ? ~0U : mask};
+  if (send(monitor, state.inputs, monitor.mask & io_.kind().inputs, state.isThere)) monitors_.push_back(std::move(monitor));
+  followCount();
+}
+
+std::int32_t DigitalInputServer::stop(const Int32Message& request) {
+  deliver();
+  const auto monitor = find(server_.clientOf(request));
+  if (monitor == monitors_.end()) return -1;
+  monitors_.erase(monitor);
+  followCount();
+  return 0;
+}
+
+// On whatever thread has news.
+void DigitalInputServer::hear(const DigitalIoNews& news) {
+  {
+    const std::lock_guard lock(mutex_);
+    using Kind = DigitalIoNews::Kind;
+    if (news_.size() >= kMaxNews && news.kind == Kind::inputs && news_.back().kind == Kind::inputs) {
+      news_.back().inputs = news.inputs;
+      news_.back().changed |= news.changed;
+    } else {
+      news_.push_back(news);
+    }
+  }
+  server_.interrupt();
+}
+
+void DigitalInputServer::deliver() {
+  std::deque<DigitalIoNews> all;
+  {
+    const std::lock_guard lock(mutex_);
+    if (news_.empty()) return;
+    all = std::exchange(news_, {});
+  }
+  for (const auto& news : all) {
+    note(news);
+    const bool isThere = news.kind != DigitalIoNews::Kind::gone;
+    const bool isForAll = !isThere || news.kind == DigitalIoNews::Kind::back;
+    std::erase_if(monitors_, [&](Monitor& monitor) {
+      return (isForAll || (news.changed & monitor.mask) != 0) && !send(monitor, news.inputs, news.changed & monitor.mask, isThere);
+    });
+  }
+  followCount();
+}
+
+void DigitalInputServer::note(const DigitalIoNews& news) {
+  switch (news.kind) {
+    case DigitalIoNews::Kind::inputs:
+      return;
+    case DigitalIoNews::Kind::back:
+      log_->warn("the module is back, or was reset: it is set up anew, with what was written to its outputs");
+      break;
+    case DigitalIoNews::Kind::gone:
+      log_->warn("the module is gone: nothing answers");
+      break;
+    case DigitalIoNews::Kind::lostInterrupt:
+      log_->warn("interrupts do not come: changes are seen when the inputs are polled");
+      break;
+    case DigitalIoNews::Kind::storm:
+      log_->warn("an interrupt storm: interrupts are off for a while, the inputs are polled");
+      break;
+  }
+  server_.countAlarm();
+}
+
+// False: it could not be delivered.
+bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed, bool isThere) {
+  auto message = server_.allocReplyMessage<Int32>(monitor.request);
+  *message = {.cmd = digital::cmdStartMonitor,
+              .status = isThere ? 0 : -1,
+              .address = static_cast<std::int32_t>(changed),
+              .value = static_cast<std::int32_t>(inputs)};
+  const auto result = server_.reply(std::move(message));
+  if (result == ReplyResult::sent) return true;
+  if (result != ReplyResult::clientGone) log_->warn("a client does not take its messages and loses its monitor: {}", toString(result));
+  return false;
+}
+
+std::vector<DigitalInputServer::Monitor>::iterator DigitalInputServer::find(std::uint64_t client) {
+  return std::find_if(monitors_.begin(), monitors_.end(), [&](const Monitor& monitor) { return monitor.client == client; });
+}
+
+void DigitalInputServer::forgetGone() {
+  std::erase_if(monitors_, [&](const Monitor& monitor) { return server_.clientOf(monitor.request) != monitor.client; });
+  followCount();
+}
+
+void DigitalInputServer::followCount() {
+  const auto now = monitors_.size();
+  if (count_.exchange(now, std::memory_order_relaxed) != now) log_->info("{} monitoring", now);
+}
+
+}  // namespace mpf

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// DigitalInputServer: tells clients what the inputs of a digital module are, and each change, as schema/digital_io_server.h promises.
+//
+//   driver's thread ── news ──► queue ── own thread ──► monitor 1, monitor 2, ...
+//
+// Threads  its own, which waits for requests and news, and for nobody who listens. News go out before the next request is taken.
+// Crash    a client that dies is forgotten as soon as its death is known.
+// Trust    a client that does not take its messages loses its monitor. News that wait in the queue are joined when there are too many.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <mpf/drivers/digital_io/digital_io.h>
+#include <mpf/schema/digital_io_server.h>
+#include <mpf/server/message_server.h>
+#include <mpf/server/programs/hardware/fault_note.h>
+#include <mpf/server/programs/server_log.h>
+
+namespace mpf {
+
+class DigitalInputServer {
+ public:
+  //   io         must outlive this, as `log`
+  //   onFailure  runs on the server's thread when that cannot go on: no request is answered any more, and the program shall end
+  //   throws     as MessageServer
+  DigitalInputServer(const Backplane& backplane, const std::string& name, const ServerOptions& options, DigitalIo& io, const ServerLog& log,
+                     std::function<void()> onFailure = {});
+  ~DigitalInputServer();
+  DigitalInputServer(const DigitalInputServer&) = delete;
+  DigitalInputServer& operator=(const DigitalInputServer&) = delete;
+
+  [[nodiscard]] const std::string& getName() const noexcept { return server_.getName(); }
+  // Whether onFailure ran, or is about to.
+  [[nodiscard]] bool hasFailed() const noexcept { return hasFailed_.load(std::memory_order_relaxed); }
+  // How many clients have a monitor now.
+  [[nodiscard]] std::size_t monitors() const noexcept { return count_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Monitor {
+    Int32Message request;  // its start, which the news are replies to
+    std::uint64_t client = 0;
+    std::uint32_t mask = 0;
+  };
+
+  void run();
+  void handle(Int32Message&& request);
+  void start(Int32Message&& request);
+  [[nodiscard]] std::int32_t stop(const Int32Message& request);
+  void read(Int32& fields);
+  void answer(const Int32Message& request, const Int32& fields);
+  void hear(const DigitalIoNews& news);
+  void deliver();
+  void note(const DigitalIoNews& news);
+  [[nodiscard]] bool send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed, bool isThere);
+  [[nodiscard]] std::vector<Monitor>::iterator find(std::uint64_t client);
+  void forgetGone();
+  void followCount();
+
+  DigitalIo& io_;
+  const ServerLog& log_;
+  std::function<void()> onFailure_;
+  MessageServer server_;
+  FaultNote faults_;               // of reads; this and below, but for what is guarded: the thread's
+  std::vector<Monitor> monitors_;
+  std::mutex mutex_;               // guards
+  std::deque<DigitalIoNews> news_;  // this
+  std::atomic<std::size_t> count_{0};
+  std::atomic<bool> ends_{false};
+  std::atomic<bool> hasFailed_{false};
+  DigitalIo::Subscription subscription_;
+  std::thread thread_;
+};
+
+}  // namespace mpf

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// mpf-digital-io-server: one module of digital lines, two servers, one process. The old command was
+// initIpUnidig("module","carrier","site",queueSize,msecPoll,intVec,risingMask,fallingMask,biMask,maxClients).
+#include <cstdio>
+#include <exception>
+#include <fmt/format.h>
+#include <memory>
+
+#include <mpf/base/stop_signals.h>
+#include <mpf/drivers/digital_io/digital_io_model.h>
+#include <mpf/server/programs/digital_io_server/input_server.h>
+#include <mpf/server/programs/digital_io_server/output_server.h>
+#include <mpf/server/programs/digital_io_server/start_options.h>
+
+namespace {
+
+constexpr const char* kProgram = "mpf-digital-io-server";
+constexpr int kLines = 32;
+
+// A model, its outputs and inputs at their wires.
+std::unique_ptr<mpf::DigitalIoModel> makeModel(const mpf::DigitalIoStartOptions& options, mpf::ModelWires* wires) {
+  auto model = std::make_unique<mpf::DigitalIoModel>(*options.kind, mpf::wireOutputs(wires, options.place.name, kLines));
+  options.inputs.connect(*model, wires);
+  return model;
+}
+
+void describe(const mpf::DigitalIo& io, const mpf::IndustryPackModule& module, const mpf::DigitalIoStartOptions& options,
+              const mpf::ServerLog& log) {
+  log->info("{} at {}: polled every {} ms, {}", io.kind().name, module.where(), options.io.pollEvery.count(),
+            io.usesInterrupts() ? fmt::format("interrupts with vector {}", options.io.vector) : "no interrupts");
+  if (options.io.vector != 0 && !io.usesInterrupts()) log->warn("{} cannot interrupt: changes are seen by polling", io.kind().name);
+  if (options.maxClients != 0) log->info("maxclients {} is ignored: any number of clients may monitor the inputs", options.maxClients);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  mpf::DigitalIoStartOptions options;
+  mpf::Hardware hardware;
+  if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
+  const auto& arguments = options.arguments;
+  const auto& name = options.place.name;
+  const mpf::ServerLog log(kProgram, arguments.logLevel);
+  mpf::DigitalIoModel* model = nullptr;
+  auto* const module = hardware.open(
+      options.place, mpf::digitalIoModules(),
+      [&] {
+        auto made = makeModel(options, hardware.wires());
+        model = made.get();
+        return made;
+      },
+      log);
+  if (module == nullptr) return 0;
+  std::unique_ptr<mpf::ModelWireWatcher> watcher;
+  if (model != nullptr && hardware.wires() != nullptr)
+    watcher = std::make_unique<mpf::ModelWireWatcher>(*hardware.wires(), [model] { model->look(); });
+  if (options.io.vector != 0) hardware.modules().takeVector(options.io.vector, *module);
+  mpf::DigitalIo io(*module, options.io);
+  const auto backplane = mpf::Backplane::attach(arguments.backplane);
+  mpf::MessageServer server(backplane, name + "Out", arguments.messages);
+  const auto stop = [](void* outputs) noexcept { static_cast<mpf::MessageServer*>(outputs)->interrupt(); };
+  const mpf::StopSignals signals(stop, &server);  // before anybody has an answer, and may stop us
+  const mpf::DigitalOutputServer outputs(server, io, log);
+  const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log, [&] { stop(&server); });
+  describe(io, *module, options, log);
+  log->info(R"(serving "{}" and "{}" at location {})", inputs.getName(), server.getName(), server.location());
+  server.run();
+  log->info("ends");
+  return inputs.hasFailed() ? 1 : 0;
+} catch (const std::exception& error) {
+  fmt::print(stderr, "{}: {}\n", kProgram, error.what());
+  return 1;
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// DigitalIoStartOptions: the command line of mpf-digital-io-server.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <mpf/drivers/digital_io/digital_io.h>
+#include <mpf/server/programs/hardware/hardware.h>
+#include <mpf/server/programs/hardware/wire_options.h>
+#include <mpf/server/programs/server_arguments.h>
+
+namespace mpf {
+
+struct DigitalIoStartOptions {
+  ModulePlace place;
+  DigitalIoOptions io;
+  const DigitalIoKind* kind = nullptr;  // of a model; never null after parse()
+  InputWires inputs;                    // of a model
+  int maxClients = 0;                   // of old command lines; nothing follows from it
+  ServerArguments arguments;
+
+  // The exit status when the program shall end: --help, or a line that is wrong.
+  std::optional<int> parse(int argc, char** argv, Hardware& hardware);
+};
+
+}  // namespace mpf

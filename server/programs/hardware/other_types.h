@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// answerOtherTypes(): a reply is owed for every request, one of a type that the server does not speak included.
+#pragma once
+
+#include <concepts>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include <mpf/server/message_server.h>
+
+namespace mpf {
+
+template <class T>
+concept HasStatus = std::same_as<decltype(T::status), std::int32_t>;
+
+// Requests of all types but `Known` come back with status -1. A SerialConfig, which has none, is answered with an Int32, as serial servers
+// do; other types without a status are refused, as any server does.
+//   note  runs for each of them, on the server's thread
+template <class... Known, class Note>
+void answerOtherTypes(MessageServer& server, Note note) {
+  const auto answer = [&]<class T>(std::type_identity<T>) {
+    constexpr bool kIsKnown = (std::same_as<T, Known> || ...);
+    if constexpr (std::same_as<T, SerialConfig> && !kIsKnown) {
+      server.on<T>([&server, note](MessageOf<T>&& request) mutable {
+        auto reply = server.allocReplyMessage<Int32>(request);
+        reply->status = -1;
+        static_cast<void>(server.reply(std::move(reply)));
+        note(T::kType);
+      });
+    } else if constexpr (HasStatus<T> && !kIsKnown) {
+      server.on<T>([note](MessageOf<T>& request) mutable {
+        request->status = -1;
+        note(T::kType);
+      });
+    }
+  };
+  [&]<class... T>(std::type_identity<std::tuple<T...>>) { (answer(std::type_identity<T>{}), ...); }(std::type_identity<MessageTypes>{});
+}
+
+}  // namespace mpf

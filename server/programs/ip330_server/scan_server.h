@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// Ip330ScanServer: means of channels for clients (manual, "ip330Scan"); Ip330ConfigServer: how the board scans and calibrates.
+//
+// Threads  one each: the server's.
+#pragma once
+
+#include <chrono>
+
+#include <mpf/drivers/ip330/ip330_scan.h>
+#include <mpf/server/message_server.h>
+#include <mpf/server/programs/server_log.h>
+
+namespace mpf {
+
+class Ip330ScanServer {
+ public:
+  // Answers every request of `server`. All that is passed must outlive this.
+  //   average  for requests that do not say; 0: since the last such reading
+  Ip330ScanServer(MessageServer& server, Ip330Scan& scan, std::chrono::milliseconds average, const ServerLog& log);
+
+ private:
+  void handle(Int32& request);
+
+  Ip330Scan& scan_;
+  const std::chrono::milliseconds average_;
+  const ServerLog& log_;
+};
+
+class Ip330ConfigServer {
+ public:
+  Ip330ConfigServer(MessageServer& server, Ip330& board, const ServerLog& log);
+
+ private:
+  [[nodiscard]] bool tryDo(std::int32_t command, Int32& request);
+  [[nodiscard]] bool tryConfigure(Ip330ScanMode mode, double microsecondsPerScan);
+
+  Ip330& board_;
+  const ServerLog& log_;
+};
+
+}  // namespace mpf

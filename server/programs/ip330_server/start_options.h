@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Ip330StartOptions: the command line of mpf-ip330-server.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <mpf/drivers/ip330/ip330_settings.h>
+#include <mpf/server/programs/hardware/hardware.h>
+#include <mpf/server/programs/server_arguments.h>
+
+namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
+class App;
+}
+
+namespace mpf {
+
+struct Ip330StartOptions {
+  struct Scan {
+    std::string name;
+    int first, last, averageMs, queueSize;
+  };
+  struct Config {
+    std::string name;
+    int queueSize;
+  };
+  struct Sweep {
+    std::string name;
+    int first, last, maxPoints, queueSize;
+  };
+  struct Pid {
+    std::string name;
+    int channel;
+    std::string dac;
+    int dacChannel, queueSize;
+  };
+
+  ModulePlace place;
+  Ip330Settings settings;
+  std::vector<Scan> scans;
+  std::vector<Config> configs;
+  std::vector<Sweep> sweeps;
+  std::vector<Pid> pids;
+  std::vector<ModulePlace> dacs;
+  std::string signals;  // as parseIp330Signals()
+  ServerArguments arguments;
+
+  // The exit status when the program shall end: --help, or a line that is wrong.
+  std::optional<int> parse(int argc, char** argv, Hardware& hardware);
+
+ private:
+  void addBoard(CLI::App& app);
+  void addServers(CLI::App& app);
+  // What the texts below say. Throws std::invalid_argument.
+  void takeAll();
+
+  std::string type_ = "S";
+  std::string range_ = "-5to5";
+  int scanMode_ = 3;
+  std::string trigger_ = "Input";
+};
+
+}  // namespace mpf

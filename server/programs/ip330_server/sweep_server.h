@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Ip330SweepServer: a digitiser for clients that speak to an MCA; Ip330PidServer: fast feedback for those of an EPID record.
+// Their commands: schema/ip330_server.h.
+//
+// Threads  one each: the server's.
+#pragma once
+
+#include <mpf/drivers/ip330/ip330_pid.h>
+#include <mpf/drivers/ip330/ip330_sweep.h>
+#include <mpf/server/message_server.h>
+#include <mpf/server/programs/server_log.h>
+
+namespace mpf {
+
+class Ip330SweepServer {
+ public:
+  // Answers every request of `server`. All that is passed must outlive this.
+  Ip330SweepServer(MessageServer& server, Ip330& board, Ip330Sweep& sweep, const ServerLog& log);
+
+ private:
+  void handle(Float64Message&& request);
+  [[nodiscard]] bool sendPoints(const Float64Message& request);
+  [[nodiscard]] bool sendStatus(const Float64Message& request);
+  [[nodiscard]] bool tryDo(std::int32_t command, double value);
+
+  MessageServer& server_;
+  Ip330& board_;
+  Ip330Sweep& sweep_;
+};
+
+class Ip330PidServer {
+ public:
+  Ip330PidServer(MessageServer& server, Ip330Pid& pid, const ServerLog& log);
+
+ private:
+  void handle(Float64Message&& request);
+  [[nodiscard]] bool sendParams(const Float64Message& request);
+  [[nodiscard]] bool tryDo(std::int32_t command, double value);
+
+  MessageServer& server_;
+  Ip330Pid& pid_;
+};
+
+}  // namespace mpf

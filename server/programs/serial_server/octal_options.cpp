@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/server/programs/serial_server/octal_options.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include <mpf/server/programs/hardware/words.h>
+
+namespace mpf {
+namespace {
+
+constexpr const char* kUartForm = "MODULE,CARRIER,SITE,NPORTS[,VECTOR]";
+constexpr const char* kPortForm = "PORT,MODULE,N[,BAUD[,PARITY[,STOPBITS[,BITS[,FLOW]]]]]";
+
+OctalUartStart readUart(Words& words) {
+  OctalUartStart uart;
+  uart.place.name = words.word("module");
+  uart.place.carrier = words.word("carrier");
+  uart.place.site = words.word("site");
+  uart.ports = words.number("number of ports");
+  const int vector = words.number("vector", -1);
+  if (vector != -1) uart.vector = vector;
+  return uart;
+}
+
+OctalPortStart readPort(Words& words) {
+  OctalPortStart port;
+  port.name = words.word("port");
+  port.module = words.word("module");
+  port.number = words.number("number of the port");
+  auto& settings = port.settings;
+  settings.baud = words.number("baud rate", settings.baud);
+  settings.parity = words.letter("parity", settings.parity);
+  settings.stopBits = words.number("stop bits", settings.stopBits);
+  settings.bitsPerChar = words.number("bits per character", settings.bitsPerChar);
+  settings.flowControl = words.letter("flow control", settings.flowControl);
+  return port;
+}
+
+}  // namespace
+
+void OctalOptions::addTo(CLI::App& app) {
+  addWords(app, "--octal-uart", kUartForm, "A module of serial ports. All its ports are one process's",
+           [this](Words& words) { uarts.push_back(readUart(words)); });
+  addWords(app, "--octal-port", kPortForm, "A port of such a module: a PORT to serve. Unless said: 9600,N,1,8,N",
+           [this](Words& words) { ports.push_back(readPort(words)); });
+  app.add_option_function<std::string>(
+         "--octal-model", [this](const std::string& kind) { model.model = kind == "232"   ? 0x22
+                                                                          : kind == "422" ? 0x2a
+                                                                                          : 0x48; },
+         "On a carrier of models: which module it is")
+      ->check(CLI::IsMember({"232", "422", "485"}))
+      ->default_str("232");
+  app.add_flag_callback(
+      "--octal-timing", [this] { model.time = OctalUartModelTime::clock; },
+      "On a carrier of models: bytes take as long as on a line, and may get lost");
+}
+
+const OctalPortStart* OctalOptions::find(const std::string& port) const {
+  const auto found = std::ranges::find(ports, port, &OctalPortStart::name);
+  return found == ports.end() ? nullptr : &*found;
+}
+
+const OctalUartStart* OctalOptions::findUart(const std::string& module) const {
+  const auto found = std::ranges::find(uarts, module, [](const OctalUartStart& uart) { return uart.place.name; });
+  return found == uarts.end() ? nullptr : &*found;
+}
+
+}  // namespace mpf
