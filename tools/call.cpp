@@ -12,6 +12,7 @@
 #include <optional>
 #include <thread>
 
+#include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
 #include <mpf/base/stop_signals.h>
@@ -55,7 +56,8 @@ std::string meaning(Fate fate, MessageType type) {
     case Fate::neverTaken:
       return "the server went away before it took the request: nothing was done";
     case Fate::outcomeUnknown:
-      return "the server took the request and did not reply in time, or went away: it may have been done";
+      return "the server took the request and did not reply in time, went away, or its reply was larger than a router lets through: it may "
+             "have been done";
     case Fate::expired:
       return "the server did not take the request in time: nothing was done";
     case Fate::cancelled:
@@ -204,7 +206,7 @@ void addCall(CLI::App& app, Run& run) {
   addSeconds(command, "--timeout", arguments->timeout, "Longest wait for a reply", false);
   command.add_option("--count", arguments->count, "Messages to send, one after the other's reply")
       ->capture_default_str()
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53));
+      ->check(wholeNumber(1, std::uint64_t{1} << 53));
   addSeconds(command, "--interval", arguments->interval, "Pause between them", true);
   addSeconds(command, "--follow", arguments->follow, "Go on for so long to print what the server sends after the reply", true);
   command.add_flag("--print", arguments->printAll, "Print each reply of a loop, and arrays in full");

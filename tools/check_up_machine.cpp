@@ -111,8 +111,9 @@ Finding checkGovernor(const Host& host) {
 
 std::vector<Finding> checkUp(const Host& host) {
   std::vector<Finding> findings;
-  for (const auto check : {checkMount, checkSpace, checkRights, checkSegments, checkNamespaces, checkRemoveIpc, checkHidepid, checkPidfd,
-                           checkOpenFiles, checkMaps, checkAddressSpace, checkInotify, checkCpus, checkClock, checkGovernor}) {
+  for (const auto check :
+       {checkMount, checkSpace, checkRights, checkSegments, checkNamespaces, checkRemoveIpc, checkHidepid, checkPidfd, checkOpenFiles,
+        checkMaps, checkAddressSpace, checkInotify, checkCpus, checkClock, checkGovernor, checkRouters}) {
     findings.push_back(check(host));
   }
   return findings;

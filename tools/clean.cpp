@@ -15,6 +15,7 @@
 #include <mpf/shm/segment.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -67,8 +68,9 @@ class Cleaner {
     if (arguments_.json) fmt::print("{}\n", files_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     else if (!isAnythingDead_) fmt::print("nothing to remove: no dead process left anything\n");
     if (!arguments_.dryRun && unknown_ != 0)
-      fmt::print(stderr, "mpf clean: {} files could not be judged; `mpf clean --dry-run` says why\n", unknown_);
-    if (arguments_.dryRun && !arguments_.json && alive_ != 0) fmt::print("{} files stay: their processes live\n", alive_);
+      fmt::print(stderr, "mpf clean: {} could not be judged; `mpf clean --dry-run` says why\n", counted(unknown_, "file"));
+    if (arguments_.dryRun && !arguments_.json && alive_ != 0)
+      fmt::print("{}: {}\n", counted(alive_, "file stays", "files stay"), alive_ == 1 ? "its process lives" : "their processes live");
     return left_ == 0 ? 0 : 1;
   }
 
@@ -81,17 +83,21 @@ class Cleaner {
     const auto path = segments::path(file.name);
     isAnythingDead_ = isAnythingDead_ || removed || arguments_.dryRun || stranger;
     if (removed) {
-      fmt::print("removed {}: {}\n", path, file.reason);
+      tell("removed " + path, file.reason);
     } else if (stranger) {
       fmt::print(stderr, "mpf clean: {} belongs to user {}, whose process is dead; that user or root may remove it\n", path, *stranger);
     } else if (arguments_.dryRun) {
-      fmt::print("would remove {}: {}\n", path, file.reason);
+      tell("would remove " + path, file.reason);
     }
   }
   void tellStays(const Judged& file) {
     if (file.verdict == Verdict::alive) ++alive_;
     else ++unknown_;
-    if (file.verdict == Verdict::unknown && arguments_.dryRun) fmt::print("{} stays: {}\n", segments::path(file.name), file.reason);
+    if (file.verdict == Verdict::unknown && arguments_.dryRun) tell(segments::path(file.name) + " stays", file.reason);
+  }
+  // A path stays in one piece, to be copied.
+  static void tell(const std::string& what, const std::string& reason) {
+    fmt::print("{}:\n{}", segments::printable(what), wrap("  ", segments::printable(reason), 2));
   }
 
   const CleanArguments& arguments_;

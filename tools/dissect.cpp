@@ -9,6 +9,7 @@
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tools/dissect_link.h>
+#include <mpf/tools/router_view.h>
 #include <mpf/tools/segment_image.h>
 #include <mpf/tools/survey.h>
 
@@ -24,7 +25,7 @@ auto now(const Word& word) noexcept {
 }
 
 const char* kindName(SegmentKind kind) noexcept {
-  constexpr std::array<const char*, 7> kNames{"unknown", "server window", "client window", "hints", "link", "bulk", "wish"};
+  constexpr std::array<const char*, 8> kNames{"unknown", "server window", "client window", "hints", "link", "bulk", "wish", "router"};
   const auto number = static_cast<std::size_t>(kind);
   return number < kNames.size() ? kNames[number] : kNames[0];
 }
@@ -83,7 +84,8 @@ Tree controlOf(const layout::WindowControl& control) {
           {"links_opened", now(control.linksOpened)},
           {"links_closed", now(control.linksClosed)},
           {"peers_died", now(control.peersDied)},
-          {"protocol_errors", now(control.protocolErrors)}};
+          {"protocol_errors", now(control.protocolErrors)},
+          {"alarms", now(control.alarms)}};
 }
 
 void dissectHints(Tree& tree, const layout::WindowHints& hints) {
@@ -124,6 +126,36 @@ void dissectWindow(Tree& tree, const SegmentImage& image, const std::string& pat
   tree["hints"] = hintsBeside(path, header);
 }
 
+void dissectRouter(Tree& tree, const SegmentImage& image, const std::string& path) {
+  tree["name"] = segments::text(image.header().name);
+  tree["lines"] = Tree::array();
+  for (const auto& line : routerLines(image, path)) {
+    tree["lines"].push_back({{"row", line.row},
+                             {"role", line.isClient() ? "client" : "server"},
+                             {"state", toString(line.state)},
+                             {"tls", line.isTls},
+                             {"since_ns", line.sinceNs},
+                             {"connects", line.connects},
+                             {"queue_size", line.queueSize},
+                             {"in_queue", line.inQueue},
+                             {"queue_full", line.queueFull},
+                             {"messages_sent", line.messagesSent},
+                             {"messages_received", line.messagesReceived},
+                             {"frames_sent", line.framesSent},
+                             {"frames_received", line.framesReceived},
+                             {"bytes_sent", line.bytesSent},
+                             {"bytes_received", line.bytesReceived},
+                             {"round_trip_ns", line.roundTripNs},
+                             {"clients", line.clients},
+                             {"bindings", line.bindings},
+                             {"address", line.address},
+                             {"peer", line.peer},
+                             {"peer_program", line.program},
+                             {"locations", line.locations},
+                             {"problem", line.problem}});
+  }
+}
+
 }  // namespace
 
 std::string hex(std::uint64_t incarnation) { return fmt::format("{:x}", incarnation); }
@@ -152,6 +184,9 @@ std::optional<Tree> tryDissect(const std::string& path, const DissectOptions& op
     case SegmentKind::wish:
       tree["server"] = segments::text(header.name);
       tree["location"] = header.location;
+      break;
+    case SegmentKind::router:
+      dissectRouter(tree, *image, path);
       break;
     default:
       tree["problem"] = fmt::format("kind {} is none that this program knows", static_cast<std::uint32_t>(header.kind));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <set>
 
+#include <mpf/base/command_line.h>
 #include <mpf/shm/segment.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/inspect_summary.h>
@@ -37,6 +38,10 @@ class Selection {
   }
   bool takes(const LinkView& link) {
     return takes([&](const std::string& name) { return isFile(name, link.file) || isNumber(name, link.incarnation); });
+  }
+  bool takes(const RouterView& router) {
+    return takes(
+        [&](const std::string& name) { return name == router.name || isFile(name, router.file) || isNumber(name, router.incarnation); });
   }
   [[nodiscard]] const std::set<std::string>& missing() const noexcept { return missing_; }
 
@@ -88,6 +93,12 @@ class Inspector {
     (*tree)["waits"] = waitsOf(look, link);
     give(*tree);
   }
+  void router(const Look& look, const RouterView& router, const std::function<void(const Tree&)>& give) {
+    auto tree = dissect(router.file);
+    if (!tree) return;
+    (*tree)["state"] = look.stateOf(router);
+    give(*tree);
+  }
 
  private:
   static constexpr std::size_t kMostLinks = 100;
@@ -126,12 +137,15 @@ int inspectNamed(const InspectArguments& arguments) {
     for (const auto* link : linksOf(look.now())) {
       if (selection.takes(*link)) inspector.link(look, *link, give);
     }
+    for (const auto& router : look.now().routers) {
+      if (selection.takes(router)) inspector.router(look, router, give);
+    }
   };
   reportEach(
       arguments, [&](const Look& look) { visit(look, printTree); },
       [&](const Look& look, nlohmann::json& all) { visit(look, [&](const Tree& tree) { all.push_back(nlohmann::json(tree)); }); });
   for (const auto& name : selection.missing()) {
-    fmt::print(stderr, "mpf inspect: no server, client or link \"{}\"; `mpf inspect` shows those that there are\n", name);
+    fmt::print(stderr, "mpf inspect: no server, client, link or router \"{}\"; `mpf inspect` shows those that there are\n", name);
   }
   return selection.missing().empty() ? 0 : 1;
 }
@@ -175,12 +189,13 @@ void addInspect(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<InspectArguments>();
   auto* names =
       command.add_option("name", arguments->names,
-                         "Servers, clients, links (incarnation or its first 6 digits) or files of windows and links; default: a summary");
+                         "Servers, clients, routers, links (incarnation or its first 6 digits) or files of these; default: a summary");
   command
       .add_option("--file", arguments->files,
                   "Files anywhere, copied after an accident for example; what belongs to them is looked for beside them")
       ->excludes(names);
-  command.add_option("--last", arguments->last, "Messages of each ring; default: 8. With a server or client: of all of its links, too");
+  command.add_option("--last", arguments->last, "Messages of each ring; default: 8. With a server or client: of all of its links, too")
+      ->check(wholeNumber(0, layout::kMaxRingSlots));
   command.add_flag("--raw", arguments->raw, "The bytes, too");
   addReport(command, *arguments);
   command.callback([arguments, &run] { run = [arguments] { return inspect(*arguments); }; });

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <map>
 #include <set>
 
 #include <mpf/tools/host.h>
@@ -27,6 +28,8 @@ std::string processText(const WindowView* window) { return window == nullptr ? "
 Tree windowRow(const Look& look, const WindowView& window) {
   Tree knocks = Tree::array();
   for (const auto knock : window.hints.knocks) knocks.push_back(hex(knock));
+  Tree wishes = Tree::array();
+  for (const auto& wish : window.wishes) wishes.push_back({{"server", wish.server}, {"location", wish.location}});
   return {{"window", hex(window.incarnation)},
           {"kind", window.isServer ? "server" : "client"},
           {"name", window.name},
@@ -41,7 +44,8 @@ Tree windowRow(const Look& look, const WindowView& window) {
           {"bell", window.hints.bell},
           {"ready", window.hints.ready},
           {"knocks", knocks},
-          {"rescan", window.hints.isRescanDue}};
+          {"rescan", window.hints.isRescanDue},
+          {"waits_for", wishes}};
 }
 
 std::string windowTable(const Look& look) {
@@ -63,7 +67,53 @@ std::string windowTable(const Look& look) {
     }
   }
   auto text = table.isEmpty() ? "  no window\n" : table.text("  ");
-  if (left != 0) text += fmt::format("  and {} windows more; --json has all\n", left);
+  if (left != 0) text += fmt::format("  and {} more; --json has all\n", counted(left, "window"));
+  return text;
+}
+
+// Who waits for a server that is not there, each server once a client.
+std::string wishText(const Look& look) {
+  std::map<std::pair<std::string, std::string>, std::size_t> waiting;
+  for (const auto& client : look.now().clients) {
+    for (const auto& wish : client.wishes) ++waiting[{processText(&client), serverText(wish.server, wish.location)}];
+  }
+  std::string text;
+  std::size_t shown = 0;
+  for (const auto& [who, times] : waiting) {
+    if (++shown > kMostRows) break;
+    text += wrap("  ",
+                 fmt::format("{} waits for the server {}, which is not there{}", who.first, who.second,
+                             times == 1 ? "" : fmt::format(", {} times", times)),
+                 4);
+  }
+  if (waiting.size() > kMostRows) text += fmt::format("  and {} more that wait; --json has all\n", waiting.size() - kMostRows);
+  return text;
+}
+
+std::size_t cutLinesOf(const Look& look, const RouterView& router) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(router.lines, [&](const RouterLineView& line) { return look.stateOf(router, line) != "connected"; }));
+}
+
+Tree routerRow(const Look& look, const RouterView& router) {
+  return {{"router", hex(router.incarnation)},
+          {"name", router.name},
+          {"file", router.file},
+          {"pid", router.owner.pid},
+          {"program", router.program},
+          {"state", look.stateOf(router)},
+          {"lines", router.lines.size()},
+          {"cut", cutLinesOf(look, router)}};
+}
+
+std::string routerText(const Look& look) {
+  std::string text;
+  for (const auto& router : look.now().routers) {
+    text += wrap("  ",
+                 fmt::format("router {}[{}], {}: {}, {} of them cut", router.name, router.owner.pid, look.stateOf(router),
+                             counted(router.lines.size(), "connection"), cutLinesOf(look, router)),
+                 4);
+  }
   return text;
 }
 
@@ -104,7 +154,7 @@ std::string linkTable(const Look& look, const std::vector<const LinkView*>& link
                         cut(processText(look.find(link->clientWindow)), 26));
     text += wrap("    ", waitsOf(look, *link), 6);
   }
-  if (links.size() > most) text += fmt::format("  and {} links more; --json has all\n", links.size() - most);
+  if (links.size() > most) text += fmt::format("  and {} more; --json has all\n", counted(links.size() - most, "link"));
   return text;
 }
 
@@ -115,19 +165,26 @@ Tree summaryTree(const Look& look) {
   }
   Tree links = Tree::array();
   for (const auto* link : linksOf(look.now())) links.push_back(linkRow(look, *link));
-  return {
-      {"backplane", look.now().backplane}, {"files", look.now().files}, {"bytes", look.now().bytes}, {"windows", windows}, {"links", links},
-      {"problems", look.now().problems}};
+  Tree routers = Tree::array();
+  for (const auto& router : look.now().routers) routers.push_back(routerRow(look, router));
+  return {{"backplane", look.now().backplane},
+          {"files", look.now().files},
+          {"bytes", look.now().bytes},
+          {"windows", windows},
+          {"routers", routers},
+          {"links", links},
+          {"problems", look.now().problems}};
 }
 
 std::string summaryText(const Look& look) {
-  auto text =
-      fmt::format("backplane {}: {} files, {}\n{}", look.now().backplane, look.now().files, bytesText(look.now().bytes), windowTable(look));
+  auto text = fmt::format("backplane {}: {}, {}\n{}", look.now().backplane, counted(look.now().files, "file"), bytesText(look.now().bytes),
+                          windowTable(look));
+  text += routerText(look) + wishText(look);
   auto links = linksOf(look.now());
   const auto all = links.size();
   std::erase_if(links, [&](const LinkView* link) { return waitsOf(look, *link) == kIdle; });
   text += linkTable(look, links, kMostRows);
-  if (all != 0) text += fmt::format("  {} of {} links idle\n", all - links.size(), all);
+  if (all != 0) text += fmt::format("  {} of {} idle\n", all - links.size(), counted(all, "link"));
   for (const auto& problem : look.now().problems) text += wrap("  problem: ", problem, 4);
   return text;
 }

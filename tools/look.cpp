@@ -11,6 +11,8 @@ double perSecond(std::uint64_t messages, std::int64_t ns) noexcept {
   return ns > 0 ? static_cast<double>(messages) * 1e9 / static_cast<double>(ns) : 0;
 }
 
+bool isStopped(char processState) noexcept { return processState == 'T' || processState == 't'; }
+
 std::uint64_t grown(std::uint64_t was, std::uint64_t is) noexcept { return is > was ? is - was : 0; }
 
 // A client's window does not count what it sends, its links do. A link that came between the surveys started with nothing.
@@ -23,6 +25,18 @@ std::uint64_t sentBetween(const WindowView& was, const WindowView& is) {
     sent += link.requests.sent - (found == before.end() ? 0 : std::min(found->second, link.requests.sent));
   }
   return sent;
+}
+
+Rates ratesBetween(std::uint64_t sentBefore, std::uint64_t sent, std::uint64_t receivedBefore, std::uint64_t received, std::int64_t ns) {
+  return {perSecond(grown(sentBefore, sent), ns), perSecond(grown(receivedBefore, received), ns)};
+}
+
+// A row is given to the next connection when one has ended.
+const RouterLineView* findLine(const Survey& survey, std::uint64_t router, const RouterLineView& line) {
+  const auto found = std::ranges::find(survey.routers, router, &RouterView::incarnation);
+  if (found == survey.routers.end()) return nullptr;
+  const auto was = std::ranges::find(found->lines, line.row, &RouterLineView::row);
+  return was != found->lines.end() && was->role == line.role && was->address == line.address ? &*was : nullptr;
 }
 
 Survey surveyAfter(const std::string& backplane, std::chrono::milliseconds interval) {
@@ -91,6 +105,15 @@ Rates Look::ratesOf(const LinkView& link) const {
           perSecond(grown(found->second->replies.sent, link.replies.sent), ns)};
 }
 
+LineRates Look::ratesOf(const RouterView& router, const RouterLineView& line) const {
+  const auto* was = findLine(before_, router.incarnation, line);
+  if (was == nullptr) return {};
+  const auto ns = now_.atNs - before_.atNs;
+  return {ratesBetween(was->messagesSent, line.messagesSent, was->messagesReceived, line.messagesReceived, ns),
+          ratesBetween(was->framesSent, line.framesSent, was->framesReceived, line.framesReceived, ns),
+          ratesBetween(was->bytesSent, line.bytesSent, was->bytesReceived, line.bytesReceived, ns)};
+}
+
 bool Look::isStalled(const WindowView& window) const {
   const auto* was = before(window);
   return was != nullptr && was->received == window.received && Totals::of(*was).incoming.waiting() != 0 &&
@@ -99,9 +122,27 @@ bool Look::isStalled(const WindowView& window) const {
 
 std::string Look::stateOf(const WindowView& window) const {
   if (window.life == Life::dead) return "dead";
-  if (window.processState == 'T' || window.processState == 't') return "stopped";
+  if (isStopped(window.processState)) return "stopped";
   if (window.life == Life::closed) return "closed";
   return isStalled(window) ? "stalled" : "alive";
+}
+
+std::string Look::stateOf(const RouterView& router) const {
+  if (router.life == Life::dead) return "dead";
+  return isStopped(router.processState) ? "stopped" : "alive";
+}
+
+std::string Look::stateOf(const RouterView& router, const RouterLineView& line) const {
+  auto state = stateOf(router);
+  return state == "alive" ? toString(line.state) : state;
+}
+
+Look::RouterLineOf Look::routerOf(const WindowView& window) const {
+  if (window.router == 0) return {};
+  const auto router = std::ranges::find(now_.routers, window.router, &RouterView::incarnation);
+  if (router == now_.routers.end()) return {};
+  const auto line = std::ranges::find(router->lines, window.routerRow, &RouterLineView::row);
+  return line == router->lines.end() ? RouterLineOf() : RouterLineOf{&*router, &*line};
 }
 
 Latencies between(const Latencies& was, const Latencies& is) noexcept {

@@ -17,6 +17,13 @@ struct Rates {
   double receivedPerSecond = 0;
 };
 
+// Of a router's connection.
+struct LineRates {
+  Rates messages;
+  Rates frames;  // each one sent is one write
+  Rates bytes;
+};
+
 class Look {
  public:
   // Surveys now, and again after `interval`.
@@ -32,11 +39,24 @@ class Look {
   [[nodiscard]] Rates ratesOf(const WindowView& window) const;
   // The same of a link, as its client sees it.
   [[nodiscard]] Rates ratesOf(const LinkView& link) const;
+  [[nodiscard]] LineRates ratesOf(const RouterView& router, const RouterLineView& line) const;
   // The window as it was at the first look; null when it was not there.
   [[nodiscard]] const WindowView* before(const WindowView& window) const;
   // "alive", "closed", "dead"; of the living "stalled" when messages wait for it and it took none between the surveys, and "stopped"
   // when its process is, by a signal or a debugger.
   [[nodiscard]] std::string stateOf(const WindowView& window) const;
+  // "alive", "stopped", "dead".
+  [[nodiscard]] std::string stateOf(const RouterView& router) const;
+  // The same of a router that does not live; else "connected", "connecting", "waiting" (to try again).
+  [[nodiscard]] std::string stateOf(const RouterView& router, const RouterLineView& line) const;
+
+  // The connection that a window of a router is for (WindowView::router); null when there is none.
+  struct RouterLineOf {
+    const RouterView* router = nullptr;
+    const RouterLineView* line = nullptr;
+    explicit operator bool() const noexcept { return line != nullptr; }
+  };
+  [[nodiscard]] RouterLineOf routerOf(const WindowView& window) const;
 
  private:
   using Windows = std::unordered_map<std::uint64_t, const WindowView*>;  // by incarnation

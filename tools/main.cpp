@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <stdexcept>
 
+#include <mpf/base/command_line.h>
 #include <mpf/tools/commands.h>
 
 namespace {
@@ -14,30 +15,6 @@ constexpr const char* kFooter =
     "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work when a process is stopped or dead.\n"
     "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
     "Exit status: 0 done; 1 not done, the text on stderr says why; 2 asked for what cannot be.";
-
-std::string subcommandNames(const CLI::App& app) {
-  std::string names;
-  for (const auto* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    names += (names.empty() ? "" : ", ") + command->get_name();
-  }
-  return names;
-}
-
-// What is wrong with the command line, and where one can read how it is right. Returns the exit status.
-int explain(const CLI::App& app, const CLI::ParseError& error) {
-  if (error.get_exit_code() == 0) return app.exit(error);  // --help
-  const auto chosen = app.get_subcommands();
-  if (!chosen.empty()) {
-    const auto name = chosen.front()->get_name();
-    fmt::print(stderr, "mpf {}: {}; `mpf {} --help` shows how to use it\n", name, error.what(), name);
-  } else if (const auto words = app.remaining(); !words.empty()) {
-    fmt::print(stderr, "mpf: no subcommand or option \"{}\"; there are {}; `mpf --help` shows what they do\n", words.front(),
-               subcommandNames(app));
-  } else {
-    fmt::print(stderr, "{}", app.help());
-  }
-  return 2;
-}
 
 }  // namespace
 
@@ -59,11 +36,7 @@ int main(int argc, char** argv) try {
   mpf::tools::addBench(app, run);
   app.require_subcommand(1);
   app.footer(kFooter);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return explain(app, error);
-  }
+  if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
   const int status = run();
   // A full disk is found when what was printed is written.
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) throw std::runtime_error("not all of the output could be written");

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 // mrr: message router report (manual, "Diagnostic Aids"). On one host each process that has clients is a client router, each server
-// a server router; what they have in their queues, whom they reach, how much goes through.
+// a server router; what they have in their queues, whom they reach, how much goes through. Behind them the connections of routers to
+// other hosts: RMRClient, RMRServer.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fmt/format.h>
 #include <map>
 #include <memory>
 
+#include <mpf/base/duration_text.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/report.h>
 #include <mpf/tools/report_json.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -30,16 +33,30 @@ void printRates(const Rates& rates) {
   fmt::print("   sendPerSec {:.0f} receivePerSec {:.0f}\n", rates.sentPerSecond, rates.receivedPerSecond);
 }
 
+// Servers by name and state, with the number of their clients.
+class Bindings {
+ public:
+  void add(const std::string& server, const char* state, std::size_t clients = 1) { servers_[{server, state}] += clients; }
+  void add(const LinkView& link) { add(serverText(link.server, link.location), link.isOpen() ? "connected" : "connecting"); }
+  void add(const WishView& wish) { add(serverText(wish.server, wish.location), "waiting for the server"); }
+  void print() const {
+    for (const auto& [server, clients] : servers_) {
+      fmt::print("   Server {} has {}. bindState {}\n", server.first, counted(clients, "client"), server.second);
+    }
+  }
+
+ private:
+  std::map<std::pair<std::string, std::string>, std::size_t> servers_;
+};
+
 void printClient(std::size_t number, const Look& look, const WindowView& client) {
   const auto totals = Totals::of(client);
   fmt::print("{:2} {}[{}] {} queueSize {} inQueue {} sendQueueFull {} unanswered {}\n", number, client.name, client.pid,
              routerState(look.stateOf(client)), largestQueue(client), totals.outgoing.waiting(), totals.refused, totals.unanswered);
-  std::map<std::pair<std::string, std::string>, int> servers;  // name and state to the number of clients
-  for (const auto& link : client.links) ++servers[{serverText(link.server, link.location), link.isOpen() ? "connected" : "connecting"}];
-  for (const auto& wish : client.wishes) ++servers[{serverText(wish.server, wish.location), "waiting for the server"}];
-  for (const auto& [server, clients] : servers) {
-    fmt::print("   Server {} has {} client{}. bindState {}\n", server.first, clients, clients == 1 ? "" : "s", server.second);
-  }
+  Bindings servers;
+  for (const auto& link : client.links) servers.add(link);
+  for (const auto& wish : client.wishes) servers.add(wish);
+  servers.print();
   printRates(look.ratesOf(client));
 }
 
@@ -50,14 +67,114 @@ void printServer(std::size_t number, const Look& look, const WindowView& server)
   printRates(look.ratesOf(server));
 }
 
+// ---- routers between hosts
+
+using Router = Look::RouterLineOf;
+
+// "stateConnected", "stateConnecting", "stateWaiting"; of a router that does not live, how it is.
+std::string lineState(const Look& look, const Router& at) {
+  if (look.stateOf(*at.router) != "alive") return look.stateOf(*at.router);
+  auto state = look.stateOf(*at.router, *at.line);
+  state.front() = static_cast<char>(state.front() - 'a' + 'A');
+  return "state" + state;
+}
+
+// Of each connection: the servers elsewhere that clients here have or wait for; the servers here that the clients of a caller have.
+class LineBindings {
+ public:
+  explicit LineBindings(const Look& look) : look_(look) {
+    for (const auto& server : look.now().servers) addServer(server);
+    for (const auto& client : look.now().clients) {
+      if (const auto at = look.routerOf(client)) {
+        for (const auto& link : client.links) of_[at.line].add(link);
+      }
+    }
+    if (look.now().routers.empty()) return;
+    for (const auto& wish : look.now().wishes) {
+      for (const auto* line : linesTo(wish.location)) of_[line].add(wish);
+    }
+  }
+  void print(const RouterLineView& line) const {
+    if (const auto found = of_.find(&line); found != of_.end()) found->second.print();
+  }
+
+ private:
+  void addServer(const WindowView& server) {
+    const auto at = look_.routerOf(server);
+    if (!at) return;
+    const auto name = serverText(server.name, server.location);
+    const auto open = static_cast<std::size_t>(std::ranges::count_if(server.links, &LinkView::isOpen));
+    if (open != 0 || server.links.empty()) of_[at.line].add(name, "connected", open);
+    if (open != server.links.size()) of_[at.line].add(name, "connecting", server.links.size() - open);
+  }
+  const std::vector<const RouterLineView*>& linesTo(std::int32_t location) {
+    const auto [found, isNew] = linesTo_.try_emplace(location);
+    if (!isNew) return found->second;
+    for (const auto& router : look_.now().routers) {
+      if (const auto* line = router.lineTo(location)) found->second.push_back(line);
+    }
+    return found->second;
+  }
+
+  const Look& look_;
+  std::map<const RouterLineView*, Bindings> of_;
+  std::map<std::int32_t, std::vector<const RouterLineView*>> linesTo_;
+};
+
+// The manual's line; in two when the numbers are too long for one.
+void printLineRates(const LineRates& rates) {
+  const auto messages =
+      fmt::format("   sendPerSec {:.0f} receivePerSec {:.0f}", rates.messages.sentPerSecond, rates.messages.receivedPerSecond);
+  const auto frames =
+      fmt::format("tcpSendPerSec {:.0f} tcpReceivePerSec {:.0f}", rates.frames.sentPerSecond, rates.frames.receivedPerSecond);
+  const bool isLong = messages.size() + 2 + frames.size() > kColumns;
+  fmt::print("{}{}{}\n", messages, isLong ? "\n   " : "  ", frames);
+  fmt::print("   sendBytesPerSec {:.0f} receiveBytesPerSec {:.0f}\n", rates.bytes.sentPerSecond, rates.bytes.receivedPerSecond);
+}
+
+void printLine(std::size_t number, const Look& look, const Router& at, const LineBindings& bindings) {
+  const auto& line = *at.line;
+  fmt::print("{:2} {} {} queueSize {} inQueue {} {} {}\n", number, line.isClient() ? "RMRClient" : "RMRServer", lineState(look, at),
+             line.queueSize, line.inQueue, line.isClient() ? "sendQueueFull" : "replyQueueFull", line.queueFull);
+  bindings.print(line);
+  printLineRates(look.ratesOf(*at.router, line));
+  const auto roundTrip = line.roundTripNs == 0 ? std::string("unknown") : durationText(static_cast<double>(line.roundTripNs));
+  fmt::print("{}", wrap("   ",
+                        fmt::format("roundTrip {} {} {}{} clients {}", roundTrip, line.isConnected() ? "connectedFor" : "notConnectedFor",
+                                    durationText(static_cast<double>(std::max<std::int64_t>(look.now().atNs - line.sinceNs, 0))),
+                                    line.isClient() ? fmt::format(" reconnects {}", line.reconnects()) : "", line.clients),
+                        5));
+  const auto peer = line.peer.empty() ? std::string("peer unknown") : fmt::format("peer {} ({})", line.peer, line.program);
+  const auto locations = line.locations.empty() ? std::string() : " locations " + line.locations;
+  fmt::print("{}", wrap("   ", fmt::format("{} address {} {}{}", peer, line.address, line.isTls ? "tls" : "plain", locations), 5));
+  fmt::print("{}", wrap("   ", fmt::format("router {}[{}]", at.router->name, at.router->owner.pid), 5));
+  if (!line.problem.empty()) fmt::print("{}", wrap("   ", "problem " + line.problem, 5));
+}
+
+void printLines(std::size_t number, const Look& look, bool areClients, const LineBindings& bindings) {
+  for (const auto& router : look.now().routers) {
+    for (const auto& line : router.lines) {
+      if (line.isClient() == areClients) printLine(++number, look, {&router, &line}, bindings);
+    }
+  }
+}
+
+// What a router has here for those elsewhere stands with its connection.
 void printRouters(const Look& look) {
+  const LineBindings bindings(look);
   std::size_t number = 0;
   fmt::print("backplane {}\nclientRouterList\n", look.now().backplane);
-  for (const auto& client : look.now().clients) printClient(++number, look, client);
+  for (const auto& client : look.now().clients) {
+    if (!look.routerOf(client)) printClient(++number, look, client);
+  }
+  printLines(number, look, true, bindings);
   fmt::print("serverRouterList\n");
   number = 0;
-  for (const auto& server : look.now().servers) printServer(++number, look, server);
-  for (const auto& problem : look.now().problems) fmt::print("problem: {}\n", problem);
+  for (const auto& server : look.now().servers) {
+    if (!look.routerOf(server)) printServer(++number, look, server);
+  }
+  printLines(number, look, false, bindings);
+  for (const auto& problem : look.now().problems) fmt::print("{}", wrap("problem: ", problem, 2));
 }
 
 int report(const ReportArguments& arguments) {

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <memory>
+#include <optional>
 
 #include <mpf/base/duration_text.h>
 #include <mpf/tools/commands.h>
@@ -10,17 +11,20 @@
 #include <mpf/tools/report_json.h>
 #include <mpf/tools/sparkline.h>
 #include <mpf/tools/table.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
 
 struct MsrArguments : ReportArguments {
-  std::string server;  // empty: all
+  std::string server;                    // empty: all
+  std::optional<std::int32_t> location;  // nullopt: any
 };
 
 template <class Value>
 void printField(const char* name, const Value& value) {
-  fmt::print("{:>19} {}\n", name, value);
+  constexpr std::size_t kIndent = 20;
+  fmt::print("{}", wrap(fmt::format("{:>{}} ", name, kIndent - 1), fmt::to_string(value), kIndent));
 }
 
 void printLatencies(const char* name, const Latencies& latencies) {
@@ -28,20 +32,34 @@ void printLatencies(const char* name, const Latencies& latencies) {
   const auto at = [&](double percent) { return durationText(static_cast<double>(latencies.percentileNs(percent))); };
   printField(name, fmt::format("p50 {}, p99 {}, p99.9 {}, max {}  ({} sampled)", at(50), at(99), at(99.9),
                                durationText(static_cast<double>(latencies.maxNs)), latencies.count));
-  printField("", sparkline(latencies));
+  fmt::print("{:20}{}\n", "", sparkline(latencies, kColumns - 20));
+}
+
+std::string stateOf(const Look& look, const LinkView& link, const WindowView* client) {
+  auto state = client == nullptr ? "gone" : look.stateOf(*client);
+  if (link.isOpen()) return state;
+  return state == "alive" ? "connecting" : state + ", connecting";
 }
 
 void printClients(const Look& look, const WindowView& server) {
-  Table table({"client", ">pid", "state", ">inQueue", ">unanswered", ">requests", ">replies", ">notTaken", ">refused", ">bytes"});
+  Table table({"client", "state", ">inQueue", ">open", ">requests", ">replies", ">notTaken", ">refused", ">bytes"});
   for (const auto& link : server.links) {
     const auto* client = look.find(link.clientWindow);
-    const auto state = client == nullptr ? "gone" : look.stateOf(*client);
-    table.add({client == nullptr ? "?" : client->name, client == nullptr ? "" : fmt::to_string(client->pid),
-               link.isOpen() ? state : state + ", connecting", fmt::to_string(link.requests.waiting()), fmt::to_string(link.unanswered),
-               fmt::to_string(link.requests.sent), fmt::to_string(link.replies.sent), fmt::to_string(link.replies.waiting()),
-               fmt::to_string(link.refused), fmt::to_string(link.bytes)});
+    table.add({client == nullptr ? "?" : fmt::format("{}[{}]", client->name, client->pid), stateOf(look, link, client),
+               fmt::to_string(link.requests.waiting()), fmt::to_string(link.unanswered), fmt::to_string(link.requests.sent),
+               fmt::to_string(link.replies.sent), fmt::to_string(link.replies.waiting()), fmt::to_string(link.refused),
+               fmt::to_string(link.bytes)});
   }
-  if (!table.isEmpty()) fmt::print("{}", table.text("  "));
+  if (!table.isEmpty()) fmt::print("{}", table.fitted("  "));
+}
+
+// Of a server elsewhere: whom it is reached by.
+void printVia(const Look& look, const Look::RouterLineOf& at) {
+  const auto& line = *at.line;
+  const auto peer = line.peer.empty() ? std::string() : line.peer + " at ";
+  const auto roundTrip = line.roundTripNs == 0 ? std::string() : ", round trip " + durationText(static_cast<double>(line.roundTripNs));
+  printField("via", fmt::format("{}{}, {}{}, router {}[{}]", peer, line.address, look.stateOf(*at.router, line), roundTrip, at.router->name,
+                                at.router->owner.pid));
 }
 
 // The manual's five lines first, as they were.
@@ -55,20 +73,39 @@ void print(const Look& look, const WindowView& server) {
   printField("replyRequests", server.sent);
   printField("state", fmt::format("{}, pid {}, {}, backplane {}, location {}, up {}", look.stateOf(server), server.pid, server.program,
                                   look.now().backplane, server.location, durationText(static_cast<double>(server.ageNs))));
+  if (const auto at = look.routerOf(server)) printVia(look, at);
   printField("fates", fmt::format("expired {}, refused {}", server.expired, server.refused));
   printField("replyQueueFull", server.replyQueueFull);
   printField("clientsDied", server.peersDied);
   printField("protocolErrors", server.protocolErrors);
+  printField("alarms", server.alarms);
   printLatencies("queueWait", server.queueWait);
   printLatencies("service", server.service);
   printClients(look, server);
 }
 
+// What could not be read may be what was asked for.
+int explainNothing(const MsrArguments& arguments, const std::vector<std::string>& problems) {
+  for (const auto& problem : problems) fmt::print(stderr, "mpf msr: {}\n", problem);
+  const auto unless = problems.empty() ? "" : ", unless it is among what could not be read";
+  if (!arguments.server.empty() || arguments.location) {
+    const auto where = arguments.location ? fmt::format(" at location {}", *arguments.location) : "";
+    const auto what = arguments.server.empty() ? "no server" : fmt::format("no server \"{}\"", arguments.server);
+    fmt::print(stderr, "mpf msr: {}{}{}; `mpf ls` shows those that there are\n", what, where, unless);
+    return 1;
+  }
+  if (!arguments.json) fmt::print("no server{}\n", unless);
+  return problems.empty() ? 0 : 1;
+}
+
 int report(const MsrArguments& arguments) {
   bool found = false;
+  std::vector<std::string> problems;
   const auto forEachServer = [&](const Look& look, auto&& act) {
+    problems.insert(problems.end(), look.now().problems.begin(), look.now().problems.end());
     for (const auto& server : look.now().servers) {
       if (!arguments.server.empty() && server.name != arguments.server) continue;
+      if (arguments.location && server.location != *arguments.location) continue;
       found = true;
       act(server);
     }
@@ -81,13 +118,11 @@ int report(const MsrArguments& arguments) {
           all.back()["backplane"] = look.now().backplane;
         });
       });
-  if (found) return 0;
-  if (arguments.server.empty()) {
-    if (!arguments.json) fmt::print("no server\n");
-    return 0;
+  if (!found) return explainNothing(arguments, problems);
+  if (arguments.server.empty() && !arguments.json) {
+    for (const auto& problem : problems) fmt::print("{}", wrap("problem: ", problem, 2));
   }
-  fmt::print(stderr, "mpf msr: no server \"{}\"; `mpf ls` shows those that there are\n", arguments.server);
-  return 1;
+  return 0;
 }
 
 }  // namespace
@@ -96,6 +131,7 @@ void addMsr(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("msr", "Message server report: queue, requests, fates, latencies and clients of a server");
   auto arguments = std::make_shared<MsrArguments>();
   command.add_option("server", arguments->server, "Name of the server; default: all");
+  command.add_option("--location", arguments->location, "Location of the server; default: any");
   addReport(command, *arguments);
   command.callback([arguments, &run] { run = [arguments] { return report(*arguments); }; });
 }

@@ -27,6 +27,7 @@ bool isFlat(const Tree& tree) {
 std::string flatText(const Tree& tree) {
   std::string text;
   for (const auto& [key, value] : tree.items()) {
+    if (value.is_string() && value.get_ref<const std::string&>().empty()) continue;
     text += tree.is_array() ? (text.empty() ? "" : " ") : (text.empty() ? "" : ", ") + words(key) + " ";
     text += valueText(value);
   }

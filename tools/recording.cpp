@@ -42,8 +42,10 @@ bool RecordingReader::tryNext(const std::function<void(wire::Record::Reader)>& t
   capnp::InputStreamMessageReader message(buffered_, limits_);
   take(message.getRoot<wire::Record>());
   return true;
-} catch (const kj::Exception& exception) {
-  throw std::runtime_error(fmt::format("{}: record {}: {}", path_, number_, exception.getDescription().cStr()));
+} catch (const kj::Exception&) {
+  const auto what = number_ == 1 ? "this is no recording of `mpf tap`, or one that was cut off within its first record"
+                                 : "the file is damaged, or was cut off here";
+  throw std::runtime_error(fmt::format("{}: record {}: {}", path_, number_, what));
 }
 
 }  // namespace mpf::tools

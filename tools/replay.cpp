@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
 #include <mpf/base/stop_signals.h>
@@ -17,6 +18,7 @@
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/recording.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -156,7 +158,8 @@ class Replayer {
                                   {"late_max_ns", late_->maxNs()}};
       return fmt::print("{}\n", report.dump(2));
     }
-    fmt::print("{} requests of {} clients to \"{}\": {} replied", requests_, clients_.size(), server_, replied_);
+    if (requests_ == 0) return;  // why is said
+    fmt::print("{} of {} to \"{}\": {} replied", counted(requests_, "request"), counted(clients_.size(), "client"), server_, replied_);
     for (const auto& [end, times] : ends_) fmt::print(", {} {}", times, end);
     if (arguments_.speed > 0 && requests_ != 0) {
       fmt::print("; sent late by p50 {}, max {}", durationText(static_cast<double>(late_->percentileNs(50))),
@@ -196,7 +199,7 @@ void addReplay(CLI::App& app, Run& run) {
   command.add_option("--server", arguments->server, "Name of the server; default: the recording's");
   command.add_option("--speed", arguments->speed, "2: twice as fast as recorded; 0: as fast as the server takes them")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(number(0, 1e6));
   addSeconds(command, "--timeout", arguments->timeout, "Longest wait for the server, for room in its queue, for the last reply", false);
   addJson(command, arguments->json);
   command.footer("Exit status: 0 every request got a reply; 1 not so; 2 asked for what cannot be.");

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <mpf/base/command_line.h>
 #include <mpf/shm/backplane.h>
 #include <mpf/tools/arguments.h>
 
@@ -12,7 +13,7 @@ void addReport(CLI::App& app, ReportArguments& arguments) {
   addBackplane(app, arguments.backplane, "all that there are");
   app.add_option("--interval", arguments.intervalMs, "Time between the two looks that give rates and show who is stalled [ms]")
       ->capture_default_str()
-      ->check(CLI::Range(1, 3'600'000));
+      ->check(wholeNumber(1, 3'600'000));
   addJson(app, arguments.json);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/tools/report_json.h>
 
-#include <fmt/format.h>
+#include <algorithm>
 
 namespace mpf::tools {
 namespace {
@@ -36,6 +36,49 @@ json toJson(const LinkView& link, const WindowView* peer) {
   return entry;
 }
 
+json toJson(const Look& look, const RouterView& router, const RouterLineView& line) {
+  const auto rates = look.ratesOf(router, line);
+  return {{"role", line.isClient() ? "client" : "server"},
+          {"state", look.stateOf(router, line)},
+          {"since_s", static_cast<double>(std::max<std::int64_t>(look.now().atNs - line.sinceNs, 0)) / 1e9},
+          {"address", line.address},
+          {"tls", line.isTls},
+          {"peer", line.peer},
+          {"peer_program", line.program},
+          {"locations", line.locationList()},
+          {"problem", line.problem},
+          {"connects", line.connects},
+          {"clients", line.clients},
+          {"bindings", line.bindings},
+          {"queue_size", line.queueSize},
+          {"in_queue", line.inQueue},
+          {"queue_full", line.queueFull},
+          {"round_trip_ns", line.roundTripNs},
+          {"messages_sent", line.messagesSent},
+          {"messages_received", line.messagesReceived},
+          {"frames_sent", line.framesSent},
+          {"frames_received", line.framesReceived},
+          {"bytes_sent", line.bytesSent},
+          {"bytes_received", line.bytesReceived},
+          {"sent_per_s", rates.messages.sentPerSecond},
+          {"received_per_s", rates.messages.receivedPerSecond},
+          {"frames_sent_per_s", rates.frames.sentPerSecond},
+          {"frames_received_per_s", rates.frames.receivedPerSecond},
+          {"bytes_sent_per_s", rates.bytes.sentPerSecond},
+          {"bytes_received_per_s", rates.bytes.receivedPerSecond}};
+}
+
+json toJson(const Look& look, const RouterView& router) {
+  json lines = json::array();
+  for (const auto& line : router.lines) lines.push_back(toJson(look, router, line));
+  return {{"name", router.name},
+          {"state", look.stateOf(router)},
+          {"pid", router.owner.pid},
+          {"program", router.program},
+          {"age_s", static_cast<double>(router.ageNs) / 1e9},
+          {"lines", lines}};
+}
+
 }  // namespace
 
 json toJson(const Look& look, const WindowView& window) {
@@ -53,6 +96,7 @@ json toJson(const Look& look, const WindowView& window) {
              {"links_closed", window.linksClosed},
              {"peers_died", window.peersDied},
              {"protocol_errors", window.protocolErrors},
+             {"alarms", window.alarms},
              {"wakes", window.wakes},
              {"queue_wait", toJson(window.queueWait)},
              {"service", toJson(window.service)}};
@@ -65,6 +109,7 @@ json toJson(const Look& look, const WindowView& window) {
                   {"reply_queue_full", window.replyQueueFull},
                   {"max_message_bytes", window.maxMessageBytes}});
   }
+  if (const auto at = look.routerOf(window)) entry["via"] = {{"peer", at.line->peer}, {"address", at.line->address}};
   entry["links"] = json::array();
   for (const auto& link : window.links) {
     entry["links"].push_back(toJson(link, look.find(window.isServer ? link.clientWindow : link.serverWindow)));
@@ -75,17 +120,16 @@ json toJson(const Look& look, const WindowView& window) {
 json toJson(const Look& look) {
   json servers = json::array();
   json clients = json::array();
+  json routers = json::array();
   json waiting = json::array();
+  for (const auto& router : look.now().routers) routers.push_back(toJson(look, router));
   for (const auto& server : look.now().servers) servers.push_back(toJson(look, server));
   for (const auto& client : look.now().clients) clients.push_back(toJson(look, client));
   for (const auto& wish : look.now().wishes) {
     const auto* client = look.find(wish.clientWindow);
     waiting.push_back({{"server", wish.server}, {"location", wish.location}, {"pid", client == nullptr ? 0 : client->pid}});
   }
-  return {{"backplane", look.now().backplane},
-          {"servers", servers},
-          {"clients", clients},
-          {"waiting", waiting},
+  return {{"backplane", look.now().backplane}, {"servers", servers}, {"clients", clients}, {"routers", routers}, {"waiting", waiting},
           {"problems", look.now().problems}};
 }
 

@@ -8,7 +8,8 @@
 
 namespace mpf::tools {
 
-// {"backplane", "servers": [window...], "clients": [window...], "waiting": [{"pid", "server", "location"}...], "problems": [text...]}
+// {"backplane", "servers": [window...], "clients": [window...], "routers": [{..., "lines": [line...]}...],
+//  "waiting": [{"pid", "server", "location"}...], "problems": [text...]}
 [[nodiscard]] nlohmann::json toJson(const Look& look);
 // One server or client window with its links.
 [[nodiscard]] nlohmann::json toJson(const Look& look, const WindowView& window);

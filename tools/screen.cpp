@@ -26,6 +26,8 @@ int attributesOf(TopLine::Style style) {
       return A_REVERSE;
     case TopLine::Style::alarm:
       return static_cast<int>(A_BOLD | static_cast<unsigned>(has_colors() ? COLOR_PAIR(kAlarmColours) : 0));
+    case TopLine::Style::selectedAlarm:
+      return static_cast<int>(A_REVERSE | static_cast<unsigned>(attributesOf(TopLine::Style::alarm)));
     case TopLine::Style::keys:
       return A_DIM;
   }
@@ -79,7 +81,8 @@ void Screen::draw(const std::vector<TopLine>& lines) {
   int row = 0;
   for (const auto& line : lines) {
     // What is too long would go on in the next row: cut here, and what is left of wide characters is overwritten.
-    const auto text = fmt::format("{:<{}.{}}", line.text, line.style == TopLine::Style::selected ? COLS : 0, COLS);
+    const bool isSelected = line.style == TopLine::Style::selected || line.style == TopLine::Style::selectedAlarm;
+    const auto text = fmt::format("{:<{}.{}}", line.text, isSelected ? COLS : 0, COLS);
     move(row, 0);
     clrtoeol();
     attrset(attributesOf(line.style));

@@ -59,6 +59,12 @@ std::optional<SegmentImage> SegmentImage::tryLoad(const std::string& path, std::
   return image;
 }
 
+std::span<const layout::RouterLine> SegmentImage::routerLines() const noexcept {
+  if (bytesRead_ < layout::kRouterLinesOffset) return {};
+  const auto rows = (bytesRead_ - layout::kRouterLinesOffset) / sizeof(layout::RouterLine);
+  return {&at<layout::RouterLine>(layout::kRouterLinesOffset), std::min<std::size_t>(rows, layout::kRouterLines)};
+}
+
 std::span<const layout::Slot> SegmentImage::slots(std::size_t offset, std::size_t count) const noexcept {
   if (offset % sizeof(layout::Slot) != 0 || offset >= bytesRead_) return {};
   return {&at<layout::Slot>(offset), std::min(count, (bytesRead_ - offset) / sizeof(layout::Slot))};

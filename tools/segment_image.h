@@ -29,6 +29,8 @@ class SegmentImage {
   [[nodiscard]] const layout::WindowControl& window() const noexcept { return at<layout::WindowControl>(layout::kWindowControlOffset); }
   [[nodiscard]] const layout::LinkControl& link() const noexcept { return at<layout::LinkControl>(layout::kLinkControlOffset); }
   [[nodiscard]] const layout::WindowHints& hints() const noexcept { return at<layout::WindowHints>(0); }
+  // Of a router; those that the copy has not are left out.
+  [[nodiscard]] std::span<const layout::RouterLine> routerLines() const noexcept;
   // The slots of a link that begin at `offset`; those that the copy has not are left out.
   [[nodiscard]] std::span<const layout::Slot> slots(std::size_t offset, std::size_t count) const noexcept;
   // What was read.
@@ -51,5 +53,11 @@ class SegmentImage {
   std::size_t bytesRead_ = 0;
   std::uint64_t fileBytes_ = 0;
 };
+
+// A word of an image, which nobody writes any more.
+template <class Word>
+[[nodiscard]] auto value(const Word& word) noexcept {
+  return word.load(std::memory_order_relaxed);
+}
 
 }  // namespace mpf::tools

@@ -14,6 +14,7 @@
 #include <mpf/tools/commands.h>
 #include <mpf/tools/show.h>
 #include <mpf/tools/sniff_format.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -57,7 +58,7 @@ class Sniffer {
     }
     takeTheRest();
     show(format_->flush());
-    fmt::print(stderr, "mpf sniff: {} bytes seen, {} missing\n", seen_, missing_);
+    fmt::print(stderr, "mpf sniff: {} seen, {} missing\n", counted(seen_, "byte"), missing_);
     return wasRefused_ ? 1 : 0;
   }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include <mpf/schema/text.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -25,7 +26,7 @@ class Manual final : public SniffFormat {
     text_ += printable ? static_cast<char>(record.value) : '.';
     return text_.size() == kBytesPerLine ? flush() : std::string();
   }
-  std::string missing(std::uint64_t bytes) override { return flush() + fmt::format("({} bytes missing)\n", bytes); }
+  std::string missing(std::uint64_t bytes) override { return flush() + fmt::format("({} missing)\n", counted(bytes, "byte")); }
   std::string flush() override {
     if (text_.empty()) return {};
     auto line = fmt::format("{}{}\n", hex_, text_);
@@ -54,7 +55,7 @@ class Lines final : public SniffFormat {
     bytes_ += static_cast<char>(record.value);
     return record.value == '\n' ? text + flush() : text;
   }
-  std::string missing(std::uint64_t bytes) override { return flush() + fmt::format("({} bytes missing)\n", bytes); }
+  std::string missing(std::uint64_t bytes) override { return flush() + fmt::format("({} missing)\n", counted(bytes, "byte")); }
   std::string flush() override {
     if (bytes_.empty()) return {};
     constexpr std::int64_t kSecond = 1'000'000'000;

@@ -5,12 +5,11 @@
 
 #include <algorithm>
 #include <exception>
-#include <fstream>
+#include <map>
 #include <unordered_map>
 
 #include <mpf/base/clock.h>
 #include <mpf/shm/histogram.h>
-#include <mpf/shm/process.h>
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tools/segment_image.h>
@@ -20,11 +19,6 @@ namespace {
 
 constexpr std::size_t kLinkImageBytes = layout::kLinkControlOffset + sizeof(layout::LinkControl);
 
-template <class Word>
-auto value(const Word& word) noexcept {
-  return word.load(std::memory_order_relaxed);
-}
-
 Latencies latenciesOf(const layout::Histogram& histogram) {
   Latencies latencies;
   for (std::size_t i = 0; i < latencies.buckets.size(); ++i) {
@@ -33,16 +27,6 @@ Latencies latenciesOf(const layout::Histogram& histogram) {
   }
   latencies.maxNs = value(histogram.maxNs);
   return latencies;
-}
-
-// The letter of field 3 of /proc/<pid>/stat, which follows the program's name in brackets.
-char processState(const layout::SegmentHeader& header) {
-  if (header.pidNamespace != Process::self().pidNamespace) return '?';
-  std::ifstream file("/proc/" + std::to_string(header.ownerPid) + "/stat");
-  std::string line;
-  std::getline(file, line);
-  const auto bracket = line.rfind(") ");
-  return bracket == std::string::npos || bracket + 2 >= line.size() ? '?' : line[bracket + 2];
 }
 
 void checkIsFifo(const std::string& name) {
@@ -82,6 +66,7 @@ void copyCounters(const layout::WindowControl& from, WindowView& to) {
   to.linksClosed = value(from.linksClosed);
   to.peersDied = value(from.peersDied);
   to.protocolErrors = value(from.protocolErrors);
+  to.alarms = value(from.alarms);
   to.queueWait = latenciesOf(from.queueWaitNs);
   to.service = latenciesOf(from.serviceNs);
 }
@@ -99,10 +84,11 @@ class Surveyor {
         if (!parsed) throw SegmentError(segments::path(name) + ": not a name that MPF gives");
         look(name, *parsed);
       } catch (const std::exception& error) {
-        survey_.problems.emplace_back(error.what());
+        survey_.problems.push_back(segments::printable(error.what()));
       }
     }
     join();
+    joinRouters();
     sort();
   }
 
@@ -130,6 +116,8 @@ class Surveyor {
       case NameKind::fifo:
         checkIsFifo(name);
         return;
+      case NameKind::router:
+        return router(name);
     }
   }
 
@@ -152,10 +140,11 @@ class Surveyor {
     if (view.name.empty()) view.name = view.program;
     view.location = header.location;
     view.pid = header.ownerPid;
+    view.owner = Owner::of(header);
     view.waitMode = header.waitMode;
     view.life = lifeOf(name, *image);
     view.sleeping = value(image->window().sleeping);
-    if (view.life != Life::dead) view.processState = processState(header);
+    if (view.life != Life::dead) view.processState = processState(view.owner);
     view.ageNs = survey_.atNs - header.createdMonotonicNs;
     view.queueSize = view.isServer ? value(image->window().queueSize) : header.queueSize;
     view.maxMessageBytes = header.maxMessageBytes;
@@ -196,6 +185,30 @@ class Surveyor {
     survey_.wishes.push_back({image->header().ownerWindow, segments::text(image->header().name), image->header().location});
   }
 
+  void router(const std::string& name) {
+    auto view = tryReadRouter(name);
+    if (!view) return;
+    survey_.bytes += view->bytes;
+    survey_.routers.push_back(std::move(*view));
+  }
+
+  // Servers and clients that a router has here for those elsewhere.
+  void joinRouters() {
+    std::map<Owner, const RouterView*> routers;
+    for (const auto& router : survey_.routers) routers.emplace(router.owner, &router);
+    if (routers.empty()) return;
+    for (auto* windows : {&survey_.servers, &survey_.clients}) {
+      for (auto& window : *windows) {
+        const auto router = routers.find(window.owner);
+        if (router == routers.end()) continue;
+        const auto* line = window.isServer ? router->second->lineTo(window.location) : router->second->lineFrom(window.name);
+        if (line == nullptr) continue;
+        window.router = router->second->incarnation;
+        window.routerRow = line->row;
+      }
+    }
+  }
+
   // A link belongs to both of its windows, a wish to its client's. One whose windows are gone is about to be removed: not shown.
   void join() {
     std::unordered_map<std::uint64_t, WindowView*> servers;
@@ -221,6 +234,7 @@ class Surveyor {
   void sort() {
     std::ranges::sort(survey_.servers, {}, [](const WindowView& view) { return std::pair(view.location, view.name); });
     std::ranges::sort(survey_.clients, {}, [](const WindowView& view) { return std::pair(-view.ageNs, view.incarnation); });
+    std::ranges::sort(survey_.routers, {}, [](const RouterView& view) { return std::pair(view.name, view.incarnation); });
     const auto byServer = [](const LinkView& view) { return std::tuple(view.location, view.server, view.incarnation); };
     for (auto* windows : {&survey_.servers, &survey_.clients}) {
       for (auto& window : *windows) std::ranges::sort(window.links, {}, byServer);

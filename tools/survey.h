@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Survey: what the segments of a backplane say at one moment. What every report of `mpf` is made from.
 //
-//   /dev/shm/mpf.<backplane>.* ─ pread ─► Survey ─► ls, mrr, msr
+//   /dev/shm/mpf.<backplane>.* ─ pread ─► Survey ─► ls, mrr, msr, top, inspect
 //
 // Threads  one.
 // Crash    works on a wedged system: it waits for nobody, and nobody notices it.
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/shm/layout.h>
+#include <mpf/tools/router_view.h>
 
 namespace mpf::tools {
 
@@ -63,8 +63,6 @@ struct LinkView {
   [[nodiscard]] bool isOpen() const noexcept { return clientState == layout::LinkState::open && serverState == layout::LinkState::open; }
 };
 
-enum class Life { alive, closed, dead };
-
 // A client that waits for a server that is not there.
 struct WishView {
   std::uint64_t clientWindow = 0;
@@ -90,6 +88,7 @@ struct WindowView {
   std::string name;  // the server's; a client's label or program
   std::int32_t location = 0;
   std::int32_t pid = 0;
+  Owner owner;
   std::string program;
   std::uint32_t waitMode = 0;
   Life life{};
@@ -100,21 +99,26 @@ struct WindowView {
   std::uint32_t queueSize = 0;
   std::uint64_t maxMessageBytes = 0;
   std::uint64_t received = 0, sent = 0, replyQueueFull = 0, queueFull = 0, expired = 0, refused = 0, wakes = 0;
-  std::uint64_t linksOpened = 0, linksClosed = 0, peersDied = 0, protocolErrors = 0;
+  std::uint64_t linksOpened = 0, linksClosed = 0, peersDied = 0, protocolErrors = 0, alarms = 0;
   Latencies queueWait;
   Latencies service;
   std::vector<LinkView> links;   // by location, server and incarnation
   std::vector<WishView> wishes;  // of a client; by location and server
+  // Of a router's process: incarnation of the router's segment and row of the connection that it is for. A server here that is elsewhere;
+  // a client elsewhere.
+  std::uint64_t router = 0;  // 0: of no router's process, or of no connection that is certain
+  std::size_t routerRow = 0;
 };
 
 struct Survey {
   std::string backplane;
-  std::int64_t atNs = 0;            // CLOCK_MONOTONIC
+  std::int64_t atNs = 0;  // CLOCK_MONOTONIC
   std::vector<WindowView> servers;  // by location and name
   std::vector<WindowView> clients;  // by age
-  std::vector<WishView> wishes;     // by location and server
-  std::size_t files = 0;              // all that have a name of this backplane
-  std::uint64_t bytes = 0;            // shared memory of those that could be read
+  std::vector<WishView> wishes;  // by location and server
+  std::vector<RouterView> routers;  // by name and incarnation
+  std::size_t files = 0;  // all that have a name of this backplane
+  std::uint64_t bytes = 0;  // shared memory of those that could be read
   std::vector<std::string> problems;  // segments that could not be read, and why
 
   // Throws std::invalid_argument for a name that no backplane can have.

@@ -7,11 +7,13 @@
 #include <fmt/format.h>
 #include <memory>
 
+#include <mpf/base/command_line.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/shm/backplane.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/tap_session.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -66,7 +68,7 @@ int tap(const TapArguments& arguments) {
   }
   session.finish();
   for (const auto& problem : session.problems()) fmt::print(stderr, "mpf tap: {}\n", problem);
-  fmt::print(stderr, "mpf tap: {} messages seen, {} missed\n", session.seen(), session.missed());
+  fmt::print(stderr, "mpf tap: {} seen, {} missed\n", counted(session.seen(), "message"), session.missed());
   if (session.goneLinks() != 0) fmt::print(stderr, "mpf tap: {} links came and went unread\n", session.goneLinks());
   return session.problems().empty() ? 0 : 1;
 }
@@ -78,7 +80,7 @@ void addTap(CLI::App& app, Run& run) {
   auto arguments = std::make_shared<TapArguments>();
   addServer(command, *arguments);
   addSeconds(command, "seconds", arguments->seconds, "For how long; 0: until Ctrl-C", true);
-  command.add_option("--count", arguments->count, "End after so many messages; 0: do not")->capture_default_str();
+  command.add_option("--count", arguments->count, "End after so many messages; 0: do not")->capture_default_str()->check(wholeNumber(0));
   command.add_option("--link", arguments->link, "Only this link: its 16 hexadecimal digits");
   command.add_option("--write", arguments->file, "Write to this file, for `mpf replay`, instead of to the screen")->type_name("FILE");
   addSeconds(command, "--poll", arguments->poll, "Pause between two looks at links that are at rest", false);

@@ -11,6 +11,7 @@
 #include <mpf/schema/text.h>
 #include <mpf/tools/recording.h>
 #include <mpf/tools/show.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -36,7 +37,7 @@ class LineSink final : public TapSink {
                      message.mayHaveChanged ? "  (read late: may have changed)" : ""));
   }
   void missed(std::int64_t atNs, const TappedLink& link, std::uint64_t messages) override {
-    show(fmt::format("{}  --   {} messages missed so far: they came too fast\n", begin(atNs, link), messages));
+    show(fmt::format("{}  --   {} missed so far: they came too fast\n", begin(atNs, link), counted(messages, "message")));
   }
   void closed(std::int64_t atNs, const TappedLink& link) override { show(fmt::format("{}  --   closed\n", begin(atNs, link))); }
 

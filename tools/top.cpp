@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf top: servers, clients and links of a backplane, live on a terminal, or printed some times.
+// mpf top: servers, clients, links and connections to other hosts of a backplane, live on a terminal, or printed some times.
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -10,6 +10,7 @@
 #include <memory>
 #include <thread>
 
+#include <mpf/base/command_line.h>
 #include <mpf/base/file_descriptor.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/base/system_call.h>
@@ -28,6 +29,7 @@ struct TopArguments {
   double seconds = 1;
   int batch = 0;
   bool clients = false;
+  bool routers = false;
   std::string sort;
   std::string filter;
 };
@@ -51,6 +53,7 @@ class Looks {
 // Applies the options that need a table to look at. False when there is no such column.
 bool prepare(TopView& view, const TopArguments& arguments) {
   if (arguments.clients) view.showClients();
+  if (arguments.routers) view.showRouters();
   view.setFilter(arguments.filter);
   if (arguments.sort.empty() || view.trySortBy(arguments.sort)) return true;
   fmt::print(stderr, "mpf top: no column \"{}\"; they are in the heading of `mpf top --batch 1`\n", arguments.sort);
@@ -110,12 +113,14 @@ int showLive(const TopArguments& arguments) {
 }  // namespace
 
 void addTop(CLI::App& app, Run& run) {
-  auto& command = *app.add_subcommand("top", "Servers, clients and links, live: rates, queues, latencies, who is stalled");
+  auto& command =
+      *app.add_subcommand("top", "Servers, clients, links and connections to other hosts, live: rates, queues, latencies, who is stalled");
   auto arguments = std::make_shared<TopArguments>();
   addBackplane(command, arguments->backplane, "\"default\"");
   addSeconds(command, "--interval", arguments->seconds, "Time between two looks", false);
-  command.add_option("--batch", arguments->batch, "No terminal: print the table so many times")->check(CLI::Range(1, 1'000'000'000));
-  command.add_flag("--clients", arguments->clients, "Begin with the clients");
+  command.add_option("--batch", arguments->batch, "No terminal: print the table so many times")->check(wholeNumber(1, 1'000'000'000));
+  auto* clients = command.add_flag("--clients", arguments->clients, "Begin with the clients");
+  command.add_flag("--routers", arguments->routers, "Begin with the connections to other hosts")->excludes(clients);
   command.add_option("--sort", arguments->sort, "Column to sort by, as its heading says");
   command.add_option("--filter", arguments->filter, "Only rows that hold this text");
   command.footer(std::string("Keys: ") + TopView::kKeys + "; arrows, j, k, PgUp, PgDn select.");

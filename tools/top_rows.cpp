@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/tools/top_rows.h>
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <sstream>
+#include <utility>
 
 #include <mpf/base/duration_text.h>
 #include <mpf/tools/report.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
 
 constexpr std::size_t kNameColumns = 16;
 
-// fmt cuts by characters; "~" says that something is missing.
-TopCell nameCell(const std::string& name) {
-  auto cut = fmt::format("{:.{}}", name, kNameColumns);
-  if (cut.size() < name.size()) cut = fmt::format("{:.{}}~", name, kNameColumns - 1);
-  return {cut, 0};
-}
+TopCell nameCell(const std::string& name) { return {cut(name, kNameColumns), 0}; }
 
 TopCell countCell(std::uint64_t count) { return {fmt::to_string(count), static_cast<double>(count)}; }
 
@@ -43,11 +42,23 @@ std::string stateOf(const Look& look, std::uint64_t incarnation) {
   return window == nullptr ? "gone" : look.stateOf(*window);
 }
 
-bool isAlarming(const std::string& state) { return state != "alive" && state != "closed"; }
+bool isAlarming(const std::string& state) { return state != "alive" && state != "closed" && state != "connected"; }
 
 std::string linkState(const LinkView& link) {
   if (link.serverState == layout::LinkState::refused) return "refused";
   return link.isOpen() ? "open" : "connecting";
+}
+
+// Whom a router's connection is with, and who called: "→ ioc1", "← ioc2".
+std::string lineName(const RouterLineView& line) { return (line.isClient() ? "→ " : "← ") + line.peerText(); }
+
+// A text in rows that fit beside what they are called.
+std::vector<std::string> partsOf(const std::string& text) {
+  constexpr std::size_t kBeside = 20;
+  std::vector<std::string> parts;
+  std::istringstream lines(text.empty() ? text : wrap(std::string(kBeside, ' '), text, kBeside));
+  for (std::string line; std::getline(lines, line);) parts.push_back(line.substr(kBeside));
+  return parts;
 }
 
 std::string nameOf(const Look& look, std::uint64_t incarnation) {
@@ -134,6 +145,93 @@ TopTable topLink(const Look& look, const LinkView& link) {
   add("refused sends", fmt::to_string(link.refused));
   add("shared memory", fmt::format("{} bytes", link.bytes));
   add("incarnation", fmt::format("{:x}", link.incarnation));
+  return table;
+}
+
+std::uint64_t topId(const RouterView& router, const RouterLineView& line) noexcept { return router.incarnation + line.row + 1; }
+
+TopTable topRouters(const Look& look) {
+  TopTable table{{"ROUTER", "STATE", ">CONN", ">QUEUED", ">SENT/s", ">RECV/s", ">WRITES/s", ">RTT"}, {}};
+  for (const auto& router : look.now().routers) {
+    for (const auto& line : router.lines) {
+      const auto state = look.stateOf(router, line);
+      const auto rates = look.ratesOf(router, line);
+      const auto roundTripNs = static_cast<double>(line.roundTripNs);
+      table.rows.push_back({topId(router, line),
+                            isAlarming(state),
+                            {nameCell(lineName(line)),
+                             {state, 0},
+                             countCell(line.clients),
+                             countCell(line.inQueue),
+                             rateCell(rates.messages.sentPerSecond),
+                             rateCell(rates.messages.receivedPerSecond),
+                             rateCell(rates.frames.sentPerSecond),
+                             {line.roundTripNs == 0 ? "-" : durationText(roundTripNs), roundTripNs}}});
+    }
+  }
+  return table;
+}
+
+TopTable topLine(const Look& look, const RouterView& router, const RouterLineView& line) {
+  TopTable table{{"OF THE CONNECTION", "NOW"}, {}};
+  const auto add = [&](const char* name, std::string text) {
+    table.rows.push_back({table.rows.size() + 1, false, {{name, 0}, {std::move(text), 0}}});
+  };
+  const auto both = [](std::uint64_t sent, std::uint64_t received, const Rates& rates) {
+    return fmt::format("{} sent, {:.0f}/s; {} received, {:.0f}/s", sent, rates.sentPerSecond, received, rates.receivedPerSecond);
+  };
+  const auto rates = look.ratesOf(router, line);
+  const auto sinceNs = std::max<std::int64_t>(look.now().atNs - line.sinceNs, 0);
+  add("state", fmt::format("{} for {}", look.stateOf(router, line), durationText(static_cast<double>(sinceNs))));
+  for (const auto* name = "problem"; const auto& part : partsOf(line.problem)) add(std::exchange(name, ""), part);
+  add("peer", line.peer.empty() ? "unknown" : fmt::format("{}, {}", line.peer, line.program));
+  add("address", fmt::format("{}, {}", line.address, line.isTls ? "TLS" : "plain TCP"));
+  if (!line.locations.empty()) add("locations", line.locations);
+  add("connected", fmt::format("{} times", line.connects));
+  add("round trip", line.roundTripNs == 0 ? "unknown" : durationText(static_cast<double>(line.roundTripNs)));
+  add("clients", fmt::format("{}, of {}", line.clients, counted(line.bindings, "server")));
+  add("queue", fmt::format("{} of {} wait; full {} times", line.inQueue, line.queueSize, line.queueFull));
+  add("messages", both(line.messagesSent, line.messagesReceived, rates.messages));
+  add("frames", both(line.framesSent, line.framesReceived, rates.frames));
+  add("bytes", both(line.bytesSent, line.bytesReceived, rates.bytes));
+  add("router", fmt::format("{}[{}], {}", router.name, router.owner.pid, look.stateOf(router)));
+  return table;
+}
+
+std::string topTitle(const Look& look, const WindowView& window) {
+  const auto name = window.isServer ? serverText(window.name, window.location) : fmt::format("{}[{}]", window.name, window.pid);
+  return fmt::format("{} {}, {}", window.isServer ? "server" : "client", name, look.stateOf(window));
+}
+
+std::string topTitle(const Look& look, const LinkView& link) {
+  return fmt::format("{} <- {}", serverText(link.server, link.location), nameOf(look, link.clientWindow));
+}
+
+std::string topTitle(const Look& look, const RouterView& router, const RouterLineView& line) {
+  return fmt::format("router {}, {}", lineName(line), look.stateOf(router, line));
+}
+
+TopTable topHelp() {
+  TopTable table{{"KEY", "DOES"}, {}};
+  const auto add = [&](const char* key, const char* does) { table.rows.push_back({table.rows.size() + 1, false, {{key, 0}, {does, 0}}}); };
+  add("Tab", "servers, clients, connections to other hosts, in turn");
+  add("arrows j k", "select a row; PgUp and PgDn by ten");
+  add("Enter", "opens it: links of a server or client; all about a link");
+  add("Esc", "back");
+  add("s", "sorts by the next column, which has a *");
+  add("r", "reverses; numbers begin with the largest");
+  add("/", "filter: only rows that hold a text; Enter keeps it, Esc drops it");
+  add("q", "quits");
+  add("red", "to be looked at: stalled, stopped, dead, refused, not connected");
+  add("CONN", "connections; of a router, clients");
+  add("QUEUED", "requests that wait; of a router, messages");
+  add("OPEN REQ", "requests without reply or fate");
+  add("REFUSED", "sends that were refused");
+  add("QUEUE99", "99 % of the requests waited no longer for the server");
+  add("SERVE50 99", "from take to first reply: median, and 99 %");
+  add("REPLY50 99", "from send to reply, as the client sees it");
+  add("WRITES/s", "frames sent; many messages may share one");
+  add("RTT", "round trip to the other router");
   return table;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// TopRows: the tables of `mpf top`, made from a look: servers, clients, the links of one of them, all about one link.
+// TopRows: the tables of `mpf top`, made from a look: servers, clients, the links of one of them, all about one link; connections of
+// routers, all about one.
 //
 // Threads  one.
 #pragma once
@@ -18,8 +19,8 @@ struct TopCell {
 };
 
 struct TopRow {
-  std::uint64_t id = 0;  // incarnation of the window or link
-  bool isAlarm = false;  // somebody should look at it: stalled, stopped, dead, refused
+  std::uint64_t id = 0;  // incarnation of the window or link; topId() of a router's connection
+  bool isAlarm = false;  // somebody should look at it: stalled, stopped, dead, refused, not connected
   std::vector<TopCell> cells;
 };
 
@@ -35,5 +36,18 @@ struct TopTable {
 [[nodiscard]] TopTable topLinks(const Look& look, const WindowView& window);
 // One row for each fact.
 [[nodiscard]] TopTable topLink(const Look& look, const LinkView& link);
+
+// Connections to other hosts.
+[[nodiscard]] TopTable topRouters(const Look& look);
+[[nodiscard]] TopTable topLine(const Look& look, const RouterView& router, const RouterLineView& line);
+[[nodiscard]] std::uint64_t topId(const RouterView& router, const RouterLineView& line) noexcept;
+
+// Keys and columns.
+[[nodiscard]] TopTable topHelp();
+
+// What was opened, in a few words: "server dac@2, alive", "client mpf[123], stopped", "dac <- mpf[123]", "router → ioc1, connected".
+[[nodiscard]] std::string topTitle(const Look& look, const WindowView& window);
+[[nodiscard]] std::string topTitle(const Look& look, const LinkView& link);
+[[nodiscard]] std::string topTitle(const Look& look, const RouterView& router, const RouterLineView& line);
 
 }  // namespace mpf::tools

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include <mpf/tools/table.h>
+#include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
 namespace {
@@ -22,6 +23,14 @@ const LinkView* findLink(const Look& look, std::uint64_t incarnation) {
     }
   }
   return nullptr;
+}
+
+Look::RouterLineOf findLine(const Look& look, std::uint64_t id) {
+  for (const auto& router : look.now().routers) {
+    const auto found = std::ranges::find_if(router.lines, [&](const RouterLineView& line) { return topId(router, line) == id; });
+    if (found != router.lines.end()) return {&router, &*found};
+  }
+  return {};
 }
 
 std::vector<std::string> textLines(const TopTable& table, std::size_t sortColumn) {
@@ -47,27 +56,51 @@ void TopView::show(std::shared_ptr<const Look> look) {
   refresh();
 }
 
-TopTable TopView::table() const {
-  const auto& place = places_.back();
+TopTable TopView::table() {
+  isGone_ = false;
+  auto& place = places_.back();
   switch (place.page) {
     case Page::servers:
       return topServers(*look_);
     case Page::clients:
       return topClients(*look_);
+    case Page::routers:
+      return topRouters(*look_);
     case Page::links:
-      if (const auto* window = look_->find(place.of)) return topLinks(*look_, *window);
+      if (const auto* window = look_->find(place.of)) {
+        place.title = topTitle(*look_, *window);
+        return topLinks(*look_, *window);
+      }
       break;
     case Page::link:
-      if (const auto* link = findLink(*look_, place.of)) return topLink(*look_, *link);
+      if (const auto* link = findLink(*look_, place.of)) {
+        place.title = topTitle(*look_, *link);
+        return topLink(*look_, *link);
+      }
       break;
+    case Page::line:
+      if (const auto [router, line] = findLine(*look_, place.of); line != nullptr) {
+        place.title = topTitle(*look_, *router, *line);
+        return topLine(*look_, *router, *line);
+      }
+      break;
+    case Page::help:
+      return topHelp();
   }
-  return {{"GONE"}, {}};
+  isGone_ = true;
+  return {{"GONE: " + place.title + "; Esc goes back"}, {}};
+}
+
+// Facts and keys stay in the order that they have.
+bool TopView::isSorted() const noexcept {
+  const auto page = places_.back().page;
+  return page != Page::link && page != Page::line && page != Page::help;
 }
 
 void TopView::refresh() {
   if (!look_) return;
   table_ = table();
-  if (places_.back().page != Page::link) {
+  if (isSorted()) {
     std::erase_if(table_.rows, [this](const TopRow& row) {
       return std::ranges::none_of(row.cells, [this](const TopCell& cell) { return cell.text.find(filter_) != std::string::npos; });
     });
@@ -95,6 +128,10 @@ void TopView::sort(TopTable& table) const {
     const auto& right = place.isReversed ? a.cells[column] : b.cells[column];
     return numeric ? left.number > right.number : left.text < right.text;
   });
+}
+
+TopView::Page TopView::afterTab(Page page) noexcept {
+  return page == Page::servers ? Page::clients : page == Page::clients ? Page::routers : Page::servers;
 }
 
 bool TopView::handle(int key) {
@@ -127,7 +164,12 @@ bool TopView::handle(int key) {
       if (places_.size() > 1) places_.pop_back();
       break;
     case kTopTab:
-      places_ = {Place{.page = places_.front().page == Page::servers ? Page::clients : Page::servers}};
+      places_ = {Place{.page = afterTab(places_.front().page)}};
+      break;
+    case '?':
+    case 'h':
+      if (place.page != Page::help) places_.push_back(Place{.page = Page::help});
+      index_ = 0;
       break;
     case 's':
       place.sortColumn = (place.sortColumn + 1) % std::max<std::size_t>(table_.headings.size(), 1);
@@ -175,6 +217,11 @@ void TopView::showClients() {
   refresh();
 }
 
+void TopView::showRouters() {
+  places_ = {Place{.page = Page::routers}};
+  refresh();
+}
+
 void TopView::move(std::ptrdiff_t by) {
   if (table_.rows.empty()) return;
   const auto last = static_cast<std::ptrdiff_t>(table_.rows.size()) - 1;
@@ -184,13 +231,20 @@ void TopView::move(std::ptrdiff_t by) {
 
 void TopView::open() {
   const auto page = places_.back().page;
-  if (table_.rows.empty() || page == Page::link) return;
-  const auto next = page == Page::links ? Page::link : Page::links;
+  if (table_.rows.empty() || !isSorted()) return;
+  const auto next = page == Page::routers ? Page::line : page == Page::links ? Page::link : Page::links;
   places_.push_back(Place{.page = next, .of = table_.rows[index_].id});
   index_ = 0;
 }
 
+// Where one is, and how it is there.
 std::string TopView::title() const {
+  const auto& place = places_.back();
+  const auto what = place.page == Page::help ? "keys and columns" : place.title.empty() ? counts() : place.title;
+  return fmt::format("mpf top  {}: {}", look_->now().backplane, what);
+}
+
+std::string TopView::counts() const {
   const auto& survey = look_->now();
   std::size_t links = 0;
   double requests = 0;
@@ -198,23 +252,34 @@ std::string TopView::title() const {
     links += server.links.size();
     requests += look_->ratesOf(server).receivedPerSecond;
   }
-  return fmt::format("mpf top  {}: {} servers, {} clients, {} links, {:.0f} requests/s", survey.backplane, survey.servers.size(),
-                     survey.clients.size(), links, requests) +
-         (survey.problems.empty() ? "" : fmt::format(", {} problems (mpf ls)", survey.problems.size()));
+  std::size_t lines = 0;
+  std::size_t cut = 0;
+  for (const auto& router : survey.routers) {
+    lines += router.lines.size();
+    cut += static_cast<std::size_t>(
+        std::ranges::count_if(router.lines, [&](const auto& line) { return look_->stateOf(router, line) != "connected"; }));
+  }
+  auto text = cut == 0 ? std::string() : fmt::format("{} of {} cut, ", cut, counted(lines, "router line"));
+  text += fmt::format("{}, {}, {}, {:.0f} requests/s", counted(survey.servers.size(), "server"), counted(survey.clients.size(), "client"),
+                      counted(links, "link"), requests);
+  if (lines != 0 && cut == 0) text += ", " + counted(lines, "router line");
+  if (!survey.problems.empty()) text += fmt::format(", {} (mpf ls)", counted(survey.problems.size(), "problem"));
+  return text;
 }
 
 std::vector<TopLine> TopView::lines(int rows) const {
   if (!look_) return {};
   std::vector<TopLine> lines{{title(), TopLine::Style::title}};
-  const auto text = textLines(table_, places_.back().page == Page::link ? SIZE_MAX : places_.back().sortColumn);
+  const auto text = textLines(table_, isSorted() && !isGone_ ? places_.back().sortColumn : SIZE_MAX);
   lines.push_back({text.front(), TopLine::Style::heading});
   const bool isWhole = rows == 0;
   const auto room = isWhole ? table_.rows.size() : static_cast<std::size_t>(std::max(rows - 3, 1));
   const auto first = isWhole || index_ < room ? 0 : index_ - room + 1;
   for (auto i = first; i < std::min(first + room, table_.rows.size()); ++i) {
-    auto style = table_.rows[i].isAlarm ? TopLine::Style::alarm : TopLine::Style::plain;
-    if (!isWhole && i == index_) style = TopLine::Style::selected;
-    lines.push_back({text[i + 1], style});
+    const bool isSelected = !isWhole && i == index_;
+    const auto plain = isSelected ? TopLine::Style::selected : TopLine::Style::plain;
+    const auto alarm = isSelected ? TopLine::Style::selectedAlarm : TopLine::Style::alarm;
+    lines.push_back({text[i + 1], table_.rows[i].isAlarm ? alarm : plain});
   }
   if (isWhole) return lines;
   lines.resize(static_cast<std::size_t>(std::max(rows - 1, 2)));

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <mpf/tools/wrap.h>
+
 namespace mpf::tools {
 namespace {
-
-std::string counted(std::uint64_t count, const char* one, const char* many) { return fmt::format("{} {}", count, count == 1 ? one : many); }
 
 // What the one that messages wait for does, and whether it has been told of them.
 std::string posture(const Look& look, const WindowView& window, std::uint32_t index, bool isPolled) {

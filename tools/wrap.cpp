@@ -41,6 +41,10 @@ std::string wrap(const std::string& first, const std::string& text, std::size_t 
   return lines + line + '\n';
 }
 
+std::string counted(std::uint64_t count, const std::string& one, const std::string& many) {
+  return fmt::format("{} {}", count, count == 1 ? one : many.empty() ? one + "s" : many);
+}
+
 std::string cut(const std::string& text, std::size_t columns) {
   if (columnsOf(text) <= columns) return text;
   auto shorter = text;

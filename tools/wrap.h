@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 namespace mpf::tools {
@@ -15,6 +16,9 @@ inline constexpr std::size_t kColumns = 80;
 // `first` and then the words of `text`, broken between words, and inside a word that is longer than a line; each further line is indented
 // by `indent` blanks. Ends with a newline.
 [[nodiscard]] std::string wrap(const std::string& first, const std::string& text, std::size_t indent);
+
+// "1 client", "2 clients"; `many` for what does not end in "s".
+[[nodiscard]] std::string counted(std::uint64_t count, const std::string& one, const std::string& many = {});
 
 // A text of at most so many columns; what is longer ends in "~".
 [[nodiscard]] std::string cut(const std::string& text, std::size_t columns);

@@ -193,6 +193,16 @@ TEST_F(CallTest, TheServerMayStartWithinTheTimeout) {
   EXPECT_THAT(tool.end().out, EndsWith("value=3\n"));
 }
 
+TEST_F(CallTest, AMessageThatIsTooLargeIsRefusedWithTheLimit) {
+  const EchoThread echo(backplane_, "echo", {.maxMessageBytes = 1000});
+
+  const auto ended = call({"echo", "char8Array", "value=" + std::string(1000, 'x')});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_EQ(ended.err, "mpf call: not sent: larger than the server allows: " + std::to_string(1000 + sizeof(Char8Array)) +
+                           " bytes, the limit is 1000\n");
+}
+
 TEST_F(CallTest, AServerAtAnotherLocationIsFoundThere) {
   const EchoThread echo(backplane_, "echo", {.location = 5});
 

@@ -2,6 +2,7 @@
 // Every verdict of every check, on a host made of files in a temporary folder.
 #include <mpf/tools/check_up.h>
 
+#include <fcntl.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -11,8 +12,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
 #include <mpf/shm/layout.h>
+#include <mpf/shm/segment.h>
+#include <mpf/tests/support/temporary_folder.h>
+#include <mpf/tests/support/test_backplane.h>
+#include <mpf/tests/tools/router_rows.h>
 
 namespace mpf::tools {
 namespace {
@@ -29,9 +35,7 @@ constexpr std::uint64_t kGiB = std::uint64_t{1} << 30;
 class CheckUp : public testing::Test {
  protected:
   CheckUp() {
-    std::string folder = std::filesystem::temp_directory_path() / "mpf-host-XXXXXX";
-    if (::mkdtemp(folder.data()) == nullptr) throwSystemError(errno, "mkdtemp", folder);
-    host_.root = folder;
+    host_.root = folder_.path();
     host_.sharedMemory = [] { return Host::Space{8 * kGiB, 7 * kGiB, 1'000'000}; };
     host_.hasPidfd = [] { return true; };
     write("proc/self/mounts", "proc /proc proc rw,relatime 0 0\ntmpfs /dev/shm tmpfs rw,nosuid,size=8388608k 0 0\n");
@@ -53,7 +57,6 @@ class CheckUp : public testing::Test {
     std::filesystem::create_directories(host_.root / "dev/shm");
     chmod("dev/shm", 01777);
   }
-  ~CheckUp() override { std::filesystem::remove_all(host_.root); }
 
   void write(const std::string& path, const std::string& text) const {
     std::filesystem::create_directories((host_.root / path).parent_path());
@@ -88,13 +91,14 @@ class CheckUp : public testing::Test {
     else EXPECT_THAT(finding.remedy, HasSubstr(remedy)) << finding.check;
   }
 
+  test::TemporaryFolder folder_;
   Host host_;
 };
 
 TEST_F(CheckUp, OnAGoodHostAllIsWell) {
   const auto findings = checkUp(host_);
 
-  EXPECT_EQ(findings.size(), 15U);
+  EXPECT_EQ(findings.size(), 16U);
   for (const auto& finding : findings) {
     EXPECT_STREQ(toString(finding.health), "ok") << finding.check << ": " << finding.seen;
     EXPECT_THAT(finding.check, Not(IsEmpty()));
@@ -110,7 +114,8 @@ TEST_F(CheckUp, OnAHostThatTellsNothingNothingIsGuessed) {
   host_.sharedMemory = [] { return std::nullopt; };
 
   for (const auto& finding : checkUp(host_)) {
-    const bool isKnown = finding.check == "rights of /dev/shm" || finding.check == "RemoveIPC of logind" || finding.check == "pidfd";
+    const bool isKnown = finding.check == "rights of /dev/shm" || finding.check == "RemoveIPC of logind" || finding.check == "pidfd" ||
+                         finding.check == "connections of routers";
     EXPECT_STREQ(toString(finding.health), isKnown ? "ok" : "unknown") << finding.check << ": " << finding.seen;
   }
 }
@@ -274,6 +279,40 @@ TEST_F(CheckUp, AGovernorThatSavesPowerIsAWarning) {
   expect(checkGovernor(host_), Health::warning, "performance, schedutil", "cpupower");
   remove("sys/devices/system/cpu/cpufreq");
   expect(checkGovernor(host_), Health::unknown, "virtual machines");
+}
+
+// A copy of what a router says, on that host; its lock is held while the result lives.
+FileDescriptor leaveRouter(const std::filesystem::path& folder, const Backplane& backplane) {
+  const auto name = backplane.segmentNames().at(0);
+  std::filesystem::copy_file(segments::path(name), folder / name, std::filesystem::copy_options::overwrite_existing);
+  FileDescriptor file(checkCall(::open((folder / name).c_str(), O_RDWR | O_CLOEXEC), "open", name));
+  struct flock lock{};
+  lock.l_type = F_WRLCK;
+  checkCall(::fcntl(file.get(), F_OFD_SETLK, &lock), "lock", name);
+  return file;
+}
+
+TEST_F(CheckUp, ARemoteThatCannotBeReachedForLongIsAWarning) {
+  const test::TestBackplane backplane;
+  router::Statistics statistics(backplane, "lab1");
+  const auto folder = host_.root / "dev/shm";
+  expect(checkRouters(host_), Health::ok, "none");
+
+  const auto remote = test::connectedRemote(statistics, {1});
+  const auto caller = test::connectedCaller(statistics);
+  const auto lost = test::lostRemote(statistics);
+  auto router = leaveRouter(folder, backplane);
+  expect(checkRouters(host_), Health::ok, "2 remotes, 1 caller");
+
+  constexpr std::uint64_t kFiveMinutesNs = 300'000'000'000;
+  test::set((*lost)->sinceNs, static_cast<std::uint64_t>(Clock::nowNs()) - kFiveMinutesNs);
+  router.reset();
+  router = leaveRouter(folder, backplane);
+  expect(checkRouters(host_), Health::warning, "1 of 2 remotes cannot be reached: 10.0.0.8:9900, for 5 min: connect(): Connection refused",
+         "mpf-router runs there");
+
+  router.reset();
+  expect(checkRouters(host_), Health::ok, "none");
 }
 
 // The real host: whatever it is, each check has an answer.

@@ -8,6 +8,7 @@
 #include <mpf/shm/segment_name.h>
 #include <mpf/shm/window.h>
 #include <mpf/tests/support/random.h>
+#include <mpf/tests/support/temporary_folder.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/tools/tools_fixture.h>
 
@@ -21,13 +22,6 @@ using testing::SizeIs;
 
 class InspectTest : public ToolsTest {
  protected:
-  InspectTest() {
-    std::string folder = std::filesystem::temp_directory_path() / "mpf-copies-XXXXXX";
-    if (::mkdtemp(folder.data()) == nullptr) throwSystemError(errno, "mkdtemp", folder);
-    folder_ = folder;
-  }
-  ~InspectTest() override { std::filesystem::remove_all(folder_); }
-
   // Clients of this process, connected to a server that does nothing by itself.
   void connect(int clients, int queueSize = 20) {
     server_.emplace(backplane_, "dac", ServerOptions{.location = 0, .queueSize = queueSize});
@@ -66,7 +60,8 @@ class InspectTest : public ToolsTest {
     for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   }
 
-  std::filesystem::path folder_;
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
   std::optional<MessageServer> server_;
   std::optional<Dispatcher> dispatcher_;
   std::vector<std::unique_ptr<MessageClient>> clients_;
@@ -151,7 +146,7 @@ TEST_F(InspectTest, WhatIsNotThereIsNamed) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out, HasSubstr("server window"));
-  EXPECT_EQ(ended.err, "mpf inspect: no server, client or link \"adc\"; `mpf inspect` shows those that there are\n");
+  EXPECT_EQ(ended.err, "mpf inspect: no server, client, link or router \"adc\"; `mpf inspect` shows those that there are\n");
 }
 
 TEST_F(InspectTest, ALargeBodyIsReadFromItsChunkAndMissedWhenThatIsGone) {

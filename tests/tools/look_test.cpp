@@ -170,5 +170,86 @@ TEST(Totals, AServersIncomingAreRequestsAClientsAreReplies) {
   EXPECT_EQ(ofServer.bytes, 8192U);
 }
 
+RouterView router(std::vector<RouterLineView> lines) {
+  RouterView view;
+  view.incarnation = 5;
+  view.processState = 'S';
+  view.lines = std::move(lines);
+  return view;
+}
+
+RouterLineView line(const std::string& address, std::uint64_t count) {
+  RouterLineView view;
+  view.row = 3;
+  view.role = layout::RouterRole::client;
+  view.state = layout::RouterLineState::connected;
+  view.address = address;
+  view.messagesSent = count;
+  view.messagesReceived = 2 * count;
+  view.framesSent = 3 * count;
+  view.framesReceived = 4 * count;
+  view.bytesSent = 5 * count;
+  view.bytesReceived = 6 * count;
+  return view;
+}
+
+Look routersAt(const RouterView& before, const RouterView& now) {
+  auto was = survey(0, {});
+  auto is = survey(kHalfASecond, {});
+  was.routers = {before};
+  is.routers = {now};
+  return {std::move(was), std::move(is)};
+}
+
+TEST(Look, AConnectionsRatesAreOfMessagesFramesAndBytes) {
+  const auto look = routersAt(router({line("a", 100)}), router({line("a", 110)}));
+  const auto& now = look.now().routers.front();
+
+  const auto rates = look.ratesOf(now, now.lines.front());
+
+  EXPECT_DOUBLE_EQ(rates.messages.sentPerSecond, 20);
+  EXPECT_DOUBLE_EQ(rates.messages.receivedPerSecond, 40);
+  EXPECT_DOUBLE_EQ(rates.frames.sentPerSecond, 60);
+  EXPECT_DOUBLE_EQ(rates.frames.receivedPerSecond, 80);
+  EXPECT_DOUBLE_EQ(rates.bytes.sentPerSecond, 100);
+  EXPECT_DOUBLE_EQ(rates.bytes.receivedPerSecond, 120);
+}
+
+// A row is given on when its connection has ended.
+TEST(Look, AnotherConnectionInTheSameRowHasNoRatesYet) {
+  const auto look = routersAt(router({line("a", 100)}), router({line("b", 110)}));
+  const auto& now = look.now().routers.front();
+
+  EXPECT_DOUBLE_EQ(look.ratesOf(now, now.lines.front()).messages.sentPerSecond, 0);
+}
+
+TEST(Look, AConnectionIsAsItsRouterIs) {
+  auto view = router({line("a", 0)});
+  const auto stateOf = [](const RouterView& now) {
+    const auto look = routersAt(now, now);
+    return look.stateOf(look.now().routers.front(), look.now().routers.front().lines.front());
+  };
+
+  EXPECT_EQ(stateOf(view), "connected");
+  view.lines.front().state = layout::RouterLineState::connecting;
+  EXPECT_EQ(stateOf(view), "connecting");
+  view.processState = 'T';
+  EXPECT_EQ(stateOf(view), "stopped");
+  view.life = Life::dead;
+  EXPECT_EQ(stateOf(view), "dead");
+}
+
+TEST(Look, AWindowOfARouterLeadsToItsConnection) {
+  auto proxy = server(0, 0);
+  proxy.router = 5;
+  proxy.routerRow = 3;
+  auto is = survey(1, {proxy, server(0, 0)});
+  is.routers = {router({line("a", 0)})};
+  const Look look(survey(0, {}), std::move(is));
+
+  EXPECT_EQ(look.routerOf(look.now().servers.front()).line, &look.now().routers.front().lines.front());
+  EXPECT_FALSE(look.routerOf(look.now().servers.back()));
+}
+
 }  // namespace
 }  // namespace mpf::tools

@@ -51,7 +51,7 @@ class ReadOnlyTest : public ToolsTest {
     server_.end(SIGKILL);
     client_.end(SIGKILL);
     static_cast<void>(backplane_.removeDead());
-    ToolsTest::TearDown();
+    ToolsTest::TearDown();  // nothing else is left
   }
 
   Victim server_;
@@ -71,6 +71,15 @@ TEST_F(ReadOnlyTest, NoByteChangesAndNothingDeadIsRemoved) {
     EXPECT_THAT(ended.err, IsEmpty());
     EXPECT_TRUE(files() == before) << arguments.front();
   }
+}
+
+TEST_F(ReadOnlyTest, ATapChangesNoByte) {
+  wedge();
+  const auto before = files();
+
+  EXPECT_EQ(run({"tap", "echo", "0.05"}).status, 0);
+
+  EXPECT_TRUE(files() == before);
 }
 
 TEST_F(ReadOnlyTest, AWedgedSystemCanBeLookedAt) {
@@ -119,16 +128,32 @@ TEST_F(ReadOnlyTest, JunkUnderOurNamesIsNamedAndHidesNothing) {
     const auto ended = run(arguments);
 
     EXPECT_EQ(ended.status, 0);
-    EXPECT_THAT(ended.out, HasSubstr("echo"));
-    EXPECT_THAT(ended.out, HasSubstr("problem: " + file + ": truncated, 4 bytes are too few for a header\n"));
-    EXPECT_THAT(ended.out, HasSubstr("problem: " + fifo + ": not a segment of MPF (no plain file)\n"));
-    EXPECT_THAT(ended.out, HasSubstr("problem: " + folder + ": not a segment of MPF (no plain file)\n"));
-    EXPECT_THAT(ended.out, HasSubstr("problem: open " + loop + ": "));
-    EXPECT_THAT(ended.out, HasSubstr("problem: " + stray + ": not a name that MPF gives\n"));
+    const auto said = inOneLine(ended.out);
+    EXPECT_THAT(said, HasSubstr("echo"));
+    EXPECT_THAT(said, HasSubstr("problem: " + file + ": truncated, 4 bytes are too few for a header"));
+    EXPECT_THAT(said, HasSubstr("problem: " + fifo + ": not a segment of MPF (no plain file)"));
+    EXPECT_THAT(said, HasSubstr("problem: " + folder + ": not a segment of MPF (no plain file)"));
+    EXPECT_THAT(said, HasSubstr("problem: open " + loop + ": "));
+    EXPECT_THAT(said, HasSubstr("problem: " + stray + ": not a name that MPF gives"));
   }
   EXPECT_EQ(ls().at("problems").size(), 5U);
   EXPECT_EQ(run({"msr", "echo"}).status, 0);
   for (const auto& path : {file, fifo, folder, loop, stray}) std::filesystem::remove(path);
+}
+
+// Anybody chooses the names of files, too.
+TEST_F(ReadOnlyTest, NoNameOfAFileCommandsATerminal) {
+  const auto path = segments::path(SegmentName::prefix(backplane_.name()) + "\x1b[2J\xc2\x9b");
+  std::ofstream(path) << "junk";
+
+  for (const auto& arguments :
+       std::vector<std::vector<std::string>>{{"ls"}, {"mrr", "--interval", "1"}, {"msr"}, {"inspect"}, {"clean", "--dry-run"}, {"clean"}}) {
+    const auto ended = run(arguments);
+
+    EXPECT_THAT(ended.out + ended.err, testing::Not(testing::AnyOf(HasSubstr("\x1b"), HasSubstr("\xc2\x9b")))) << arguments.front();
+  }
+  EXPECT_THAT(inOneLine(run({"clean", "--dry-run"}).out), HasSubstr(".?[2J?? stays: not a name that MPF gives"));
+  std::filesystem::remove(path);
 }
 
 }  // namespace

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// ls, mrr and msr: what they say of servers and clients in every state.
+// ls and mrr: what they say of servers and clients in every state.
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <fstream>
 #include <set>
 
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
-#include <mpf/tests/tools/tools_fixture.h>
+#include <mpf/tests/tools/report_fixture.h>
 
 namespace mpf::test {
 namespace {
@@ -18,46 +20,6 @@ using testing::IsEmpty;
 using testing::MatchesRegex;
 using testing::SizeIs;
 using testing::StartsWith;
-
-std::vector<std::string> linesOf(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
-}
-
-// A server and a client that take turns: what waits stays where it is.
-class ReportTest : public ToolsTest {
- protected:
-  void openServer(const std::string& name, int queueSize = 100) {
-    server_ = std::make_unique<MessageServer>(backplane_, name, ServerOptions{.location = 0, .queueSize = queueSize});
-    server_->on<Int32>([](Int32&) {});
-  }
-  void connect() {
-    dispatcher_ = std::make_unique<Dispatcher>(backplane_);
-    client_ = std::make_unique<MessageClient>(*dispatcher_, [this](const Message&) { ++taken_; });
-    client_->bind(server_->getName(), 0);
-    while (!client_->isConnected()) {
-      server_->handleOne();
-      dispatcher_->runOnce(Deadline::after(100us));
-    }
-  }
-  [[nodiscard]] SendResult send() const { return client_->send(Int32Message()); }
-  void handle(int requests) {
-    for (int done = 0; done < requests;) done += server_->handleOne() ? 1 : 0;
-  }
-  void TearDown() override {
-    client_.reset();
-    dispatcher_.reset();
-    server_.reset();
-    ToolsTest::TearDown();
-  }
-
-  int taken_ = 0;
-  std::unique_ptr<MessageServer> server_;
-  std::unique_ptr<Dispatcher> dispatcher_;
-  std::unique_ptr<MessageClient> client_;
-};
 
 TEST_F(ReportTest, AnEmptyBackplaneIsSaidToBeEmpty) {
   EXPECT_EQ(run({"ls"}).out, "backplane " + backplane_.name() + "\n  no server\n  no client\n");
@@ -75,11 +37,11 @@ TEST_F(ReportTest, ServersAndClientsAreListed) {
 
   EXPECT_EQ(ended.status, 0);
   EXPECT_THAT(ended.err, IsEmpty());
-  EXPECT_THAT(linesOf(ended.out), ElementsAre("backplane " + backplane_.name(),
-                                              MatchesRegex("  SERVER +LOCATION +STATE +PID +PROGRAM +CLIENTS +WAITING +REQUESTS +AGE"),
-                                              MatchesRegex("  dac/1 +0 +alive +" + pid + " +tools_test +1 +0 +0 +[0-9.]+ [mun]?s"),
-                                              MatchesRegex("  CLIENT +STATE +PID +PROGRAM +UNANSWERED +AGE +SERVERS"),
-                                              MatchesRegex("  tools_test +alive +" + pid + " +tools_test +0 +[0-9.]+ [mun]?s +dac/1")));
+  EXPECT_THAT(linesOf(ended.out),
+              ElementsAre("backplane " + backplane_.name(), MatchesRegex("  SERVER +STATE +PID +PROGRAM +CONN +QUEUED +TAKEN +AGE"),
+                          MatchesRegex("  dac/1 +alive +" + pid + " +tools_test +1 +0 +0 +[0-9.]+ [mun]?s"),
+                          MatchesRegex("  CLIENT +STATE +PID +UNANSWERED +AGE +SERVERS"),
+                          MatchesRegex("  tools_test +alive +" + pid + " +0 +[0-9.]+ [mun]?s +dac/1")));
 }
 
 TEST_F(ReportTest, ProgramsLearnTheSame) {
@@ -128,7 +90,7 @@ TEST_F(ReportTest, AClientThatWaitsForItsServerIsListed) {
   const auto routers = run({"mrr", "--interval", "1"}).out;
 
   EXPECT_EQ(all.at("waiting"), (nlohmann::json{{{"server", "later"}, {"location", 3}, {"pid", ::getpid()}}}));
-  EXPECT_THAT(text, AllOf(HasSubstr("no server\n"), HasSubstr("later@3 (waiting)\n")));
+  EXPECT_THAT(text, AllOf(HasSubstr("no server\n"), HasSubstr("  later@3 (waiting)\n")));
   EXPECT_THAT(routers, HasSubstr("   Server later@3 has 1 client. bindState waiting for the server\n"));
 }
 
@@ -167,70 +129,11 @@ TEST_F(ReportTest, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
   for (int i = 0; i < 3; ++i) ASSERT_EQ(send(), SendResult::sent);
 
   EXPECT_EQ(ls().at("servers").at(0).at("state"), "stalled");
-  EXPECT_THAT(run({"ls"}).out, testing::ContainsRegex("  echo +0 +stalled +[0-9]+ +tools_test +1 +3 +0 "));
+  EXPECT_THAT(run({"ls"}).out, testing::ContainsRegex("  echo +stalled +[0-9]+ +tools_test +1 +3 +0 "));
   handle(3);
   const auto now = ls();
   EXPECT_EQ(now.at("servers").at(0).at("state"), "alive");
   EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it takes no replies";
-}
-
-// The example of the manual, "Diagnostic Aids": the same lines, with numbers that the test has made.
-TEST_F(ReportTest, MsrBeginsWithTheManualsLines) {
-  openServer("serial[7]", 2);
-  connect();
-  ASSERT_EQ(send(), SendResult::sent);
-  handle(1);
-  ASSERT_EQ(send(), SendResult::sent);
-  ASSERT_EQ(send(), SendResult::sent);
-  ASSERT_EQ(send(), SendResult::queueFull);
-
-  const auto ended = run({"msr", "serial[7]"});
-
-  EXPECT_EQ(ended.status, 0);
-  EXPECT_THAT(ended.out, StartsWith("serial[7]\n"
-                                    "          queueSize 2\n"
-                                    "            inQueue 2\n"
-                                    "      queueRequests 1\n"
-                                    " queueFullResponses 1\n"
-                                    "      replyRequests 1\n"
-                                    "              state stalled, pid "));
-  EXPECT_THAT(ended.out, testing::ContainsRegex("  client +pid +state +inQueue +unanswered +requests +replies +notTaken +refused +bytes\n"
-                                                "  tools_test +[0-9]+ +[a-z]+ +2 +3 +3 +1 +1 +1 +[0-9]+\n"));
-}
-
-TEST_F(ReportTest, MsrReportsAllServersOrTheOneThatIsNamed) {
-  openServer("one");
-  const MessageServer two(backplane_, "two");
-
-  EXPECT_THAT(report({"msr"}), SizeIs(2));
-  const auto named = report({"msr", "two"});
-  ASSERT_THAT(named, SizeIs(1));
-  EXPECT_EQ(named.at(0).at("name"), "two");
-  EXPECT_EQ(named.at(0).at("backplane"), backplane_.name());
-}
-
-TEST_F(ReportTest, MsrOfAServerThatIsNotThereNamesIt) {
-  const auto ended = run({"msr", "serial[7]"});
-
-  EXPECT_EQ(ended.status, 1);
-  EXPECT_EQ(ended.err, "mpf msr: no server \"serial[7]\"; `mpf ls` shows those that there are\n");
-}
-
-// What a server's histograms say: a distribution, its percentiles, and the same for programs.
-TEST_F(ReportTest, MsrShowsHowLongRequestsTake) {
-  const EchoThread echo(backplane_, "echo");
-  SyncClient client(backplane_, "echo", 0);
-  const auto isSampled = [&] { return report({"msr", "echo"}).at(0).at("service").at("count").get<int>() != 0; };
-  while (!isSampled()) {
-    for (int i = 0; i < 100; ++i) ASSERT_TRUE(client.call(Int32Message(), 60s));
-  }
-
-  const auto text = run({"msr", "echo"}).out;
-  const auto service = report({"msr", "echo"}).at(0).at("service");
-
-  EXPECT_THAT(text, testing::ContainsRegex("            service p50 [0-9.]+ [mun]?s, p99 [0-9.]+ [mun]?s, p99.9 [0-9.]+ [mun]?s, max "));
-  EXPECT_LE(service.at("p50_ns"), service.at("p99_ns"));
-  EXPECT_LE(service.at("p999_ns"), service.at("max_ns"));
 }
 
 TEST_F(ReportTest, MrrHasTheManualsLines) {
@@ -291,7 +194,7 @@ TEST_F(ReportTest, EachFieldIsInTheDocument) {
   std::ostringstream document;
   document << std::ifstream(MPF_TEST_TOOLS_MD).rdbuf();
 
-  for (const auto& key : keys) EXPECT_THAT(document.str(), HasSubstr("`" + key + "`"));
+  for (const auto& key : keys) EXPECT_NE(document.str().find("`" + key + "`"), std::string::npos) << key;
   EXPECT_GT(keys.size(), 40U);
 }
 
@@ -302,9 +205,9 @@ TEST_F(ReportTest, NamesInAnyLanguageAreAligned) {
   const auto lines = linesOf(run({"ls"}).out);
 
   ASSERT_THAT(lines, SizeIs(5));
-  EXPECT_THAT(lines[1], StartsWith("  SERVER         LOCATION  STATE"));
-  EXPECT_THAT(lines[2], StartsWith("  Ofen-Süd [°C]         0  alive"));
-  EXPECT_THAT(lines[3], StartsWith("  oven                  0  alive"));
+  EXPECT_THAT(lines[1], StartsWith("  SERVER         STATE"));
+  EXPECT_THAT(lines[2], StartsWith("  Ofen-Süd [°C]  alive"));
+  EXPECT_THAT(lines[3], StartsWith("  oven           alive"));
 }
 
 TEST_F(ReportTest, ANameThatIsNoTextIsReportedAllTheSame) {
@@ -360,13 +263,39 @@ TEST_F(ReportTest, AClientOfManyServersShowsSome) {
 
   const auto text = run({"ls"}).out;
 
-  EXPECT_THAT(text, HasSubstr("  a, b, c, d, e, f, 3 more\n"));
+  EXPECT_THAT(inOneLine(text), HasSubstr(" a, b, c, d, e, f, 3 more"));
   clients.clear();
+}
+
+std::size_t widestOf(const std::string& text) {
+  std::size_t widest = 0;
+  for (const auto& line : linesOf(text)) widest = std::max(widest, line.size());
+  return widest;
+}
+
+// Of names as long as they may be, nothing is lost.
+TEST_F(ReportTest, LongNamesFitIntoEightyColumns) {
+  const std::string name = "a-server-" + std::string(54, 'x');
+  openServer(name);
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_, DispatcherOptions{WaitMode::adaptive, "a-client-" + std::string(54, 'y')});
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("another-" + std::string(54, 'z'), -2'000'000'000);
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
+
+  const auto list = run({"ls"}).out;
+  const auto server = run({"msr", name}).out;
+
+  EXPECT_LE(widestOf(list), 80U) << list;
+  EXPECT_LE(widestOf(server), 80U) << server;
+  EXPECT_THAT(list, AllOf(HasSubstr("  " + name + "\n"), HasSubstr("  a-client-" + std::string(54, 'y'))));
+  EXPECT_THAT(server, HasSubstr("\n  a-client-" + std::string(54, 'y') + "["));
+  dispatcher_->runOnce(Deadline::after(1us));
 }
 
 TEST_F(ReportTest, WithoutABackplaneAllAreReported) {
   const MessageServer here(backplane_, "here");
-  const auto elsewhere = Backplane::isolated();
+  const TestBackplane elsewhere;
   const MessageServer there(elsewhere, "there");
 
   const auto ended = runTool({"msr", "--json", "--interval", "1"}, "");

@@ -22,6 +22,7 @@ class SniffToolTest : public SerialServerTest {
   void SetUp() override { start(); }
   void listen(const SniffBatching& batching = {}) {
     sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_, batching);
+    sniff_->start([] { ADD_FAILURE() << "it cannot be served any more"; });
   }
   // Returns when the server knows that it listens.
   std::unique_ptr<Tool> sniff(std::vector<std::string> more = {}) {

@@ -67,14 +67,14 @@ Latencies latencies(std::initializer_list<std::pair<std::uint64_t, std::uint64_t
   return made;
 }
 
-TEST(Sparkline, IsEmptyWithoutSamples) { EXPECT_EQ(sparkline({}), ""); }
+TEST(Sparkline, IsEmptyWithoutSamples) { EXPECT_EQ(sparkline({}, 80), ""); }
 
 TEST(Sparkline, GoesFromTheFirstBucketThatHoldsAnythingToTheLast) {
-  EXPECT_EQ(sparkline(latencies({{512, 1}, {1000, 8}})), "512 ns ▁  █ 1024 ns");
+  EXPECT_EQ(sparkline(latencies({{512, 1}, {1000, 8}}), 80), "512 ns ▁  █ 1024 ns");
 }
 
 TEST(Sparkline, BlocksAreAsHighAsTheirShareOfTheFullestBucket) {
-  EXPECT_EQ(sparkline(latencies({{1024, 800}, {1280, 400}, {1536, 100}, {1792, 1}})), "1024 ns █▄▁▁ 2048 ns");
+  EXPECT_EQ(sparkline(latencies({{1024, 800}, {1280, 400}, {1536, 100}, {1792, 1}}), 80), "1024 ns █▄▁▁ 2048 ns");
 }
 
 // 2^64 - 1 of a hostile segment is not to overflow what is multiplied.
@@ -84,7 +84,7 @@ TEST(Sparkline, TheLargestCountIsTheHighestBlock) {
   all.buckets[0] = ~std::uint64_t{0};
   all.buckets[1] = 1;
 
-  EXPECT_EQ(sparkline(all), "0.0 ns █▁ 24.0 ns");
+  EXPECT_EQ(sparkline(all, 80), "0.0 ns █▁ 24.0 ns");
 }
 
 TEST(Latencies, AreZeroWithoutSamples) { EXPECT_EQ(Latencies().percentileNs(50), 0U); }

@@ -16,6 +16,7 @@
 #include <mpf/client/sync_client.h>
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
 #include <mpf/tests/tools/tool.h>
 
@@ -76,8 +77,23 @@ class ToolsTest : public testing::Test {
   }
 
   Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
+
+inline std::vector<std::string> linesOf(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+// A text without its line ends and indents, for words that may stand in two lines.
+inline std::string inOneLine(const std::string& text) {
+  std::string line;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+  return line;
+}
 
 // The entry of `list` whose `key` is `value`; null when there is none.
 inline nlohmann::json entryOf(const nlohmann::json& list, const std::string& key, const nlohmann::json& value) {

@@ -2,6 +2,7 @@
 // mpf top on a real terminal.
 #include <mpf/client/message_client.h>
 #include <mpf/tests/support/terminal.h>
+#include <mpf/tests/tools/router_rows.h>
 #include <mpf/tests/tools/tools_fixture.h>
 
 namespace mpf::test {
@@ -24,7 +25,7 @@ TEST_F(TopTest, ShowsServersAndTheirClientsAndALinkOfOne) {
   const auto top = this->top();
 
   ASSERT_TRUE(top->waitFor("alpha")) << top->screen();
-  EXPECT_THAT(top->row(0), testing::HasSubstr("2 servers, 1 clients, 1 links"));
+  EXPECT_THAT(top->row(0), testing::HasSubstr("2 servers, 1 client, 1 link, "));
   top->type("j\r");
   ASSERT_TRUE(top->waitFor("CLIENT*")) << top->screen();
   top->type("\r");
@@ -69,6 +70,27 @@ TEST_F(TopTest, ShowsAServerThatHasStalled) {
   const auto top = this->top();
 
   EXPECT_TRUE(top->waitFor("stalled")) << top->screen();
+  EXPECT_TRUE(top->look(2).isRed && top->look(2).isReversed) << "selected, and to be looked at";
+}
+
+TEST_F(TopTest, ShowsConnectionsToOtherHosts) {
+  router::Statistics statistics(backplane_, "lab1");
+  const auto remote = connectedRemote(statistics, {1});
+  const auto lost = lostRemote(statistics);
+  const auto top = this->top({"--routers"});
+
+  ASSERT_TRUE(top->waitFor("→ 10.0.0.8:9900")) << top->screen();
+  EXPECT_THAT(top->row(0), testing::HasSubstr("1 of 2 router lines cut"));
+  EXPECT_TRUE(top->look(2).isRed);
+  EXPECT_FALSE(top->look(3).isRed);
+  top->type("j\r");
+  ASSERT_TRUE(top->waitFor("mpf-router 0.1.0")) << top->screen();
+  EXPECT_THAT(top->row(0), testing::HasSubstr("router → ioc1, connected"));
+  top->type("?");
+  ASSERT_TRUE(top->waitFor("not connected")) << top->screen();
+  top->type("q");
+
+  EXPECT_EQ(top->wait(), 0);
 }
 
 TEST_F(TopTest, FitsTheTerminalThatItHas) {

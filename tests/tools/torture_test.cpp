@@ -118,11 +118,11 @@ TEST_P(MistakeTest, IsFound) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, MistakeTest,
-                         testing::Values(Mistake{"lose-fate", "4", "each request has an end"},
+                         testing::Values(Mistake{"lose-fate", "8", "each request has an end"},
                                          Mistake{"half-message", "30", ""},  // nonsense, or an old request once more
                                          Mistake{"keep-name", "30", "the successor could not take the place"},
-                                         Mistake{"stale", "4", "nothing stale is left; there are mpf."},
-                                         Mistake{"leak", "4", "the survivors hold no more than they did"}),
+                                         Mistake{"stale", "8", "nothing stale is left; there are mpf."},
+                                         Mistake{"leak", "8", "the survivors hold no more than they did"}),
                          [](const auto& mistake) {
                            auto name = mistake.param.name;
                            name.erase(name.find('-') == std::string::npos ? name.size() : name.find('-'), 1);
@@ -148,6 +148,15 @@ TEST(TortureStepsTest, AnUnknownOneIsNamed) {
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.err, HasSubstr("no step \"nonsense\"; `mpf torture --list` names all"));
+}
+
+// Before hours of work, not after them.
+TEST_F(TortureTest, AVerdictThatCannotBeWrittenEndsItAtOnce) {
+  const auto ended = runTool({"torture", "--json", "/nowhere/verdict.json", "--duration", "1000000"}, "");
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err, HasSubstr("create /nowhere/verdict.json: No such file or directory"));
+  EXPECT_EQ(ended.out, "");
 }
 
 }  // namespace

@@ -43,6 +43,8 @@ bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living&
     case NameKind::hints:
     case NameKind::fifo:
       return living.windows.contains(parsed.incarnation);
+    case NameKind::router:
+      return segments::probeOwner(name) == segments::Owner::alive;
     case NameKind::wish:
       return living.windows.contains(ownerOf(name, layout::SegmentKind::wish));
     case NameKind::link:

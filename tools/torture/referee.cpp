@@ -3,9 +3,11 @@
 
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <mpf/base/clock.h>
 #include <mpf/shm/backplane.h>
 
 namespace mpf::torture {
@@ -59,11 +61,14 @@ Referee::~Referee() {
 Cast Referee::cast() { return {*world_, backplane_, static_cast<std::uint32_t>(random_()), options_.sabotage}; }
 
 void Referee::waitFor(const std::string& what, const Condition& condition) {
-  const auto patience = Deadline::after(std::chrono::duration_cast<Nanoseconds>(options_.patience));
+  Nanoseconds waited{0};
   while (!condition()) {
+    const auto sinceNs = Clock::nowNs();
     processes_.handleEvents(kLook);
     checkAlive();
-    if (patience.hasPassed()) throw Broken(fmt::format("this did not come true in {} s: {}", options_.patience.count(), what));
+    // Where so many wait for a processor that we do, too, the others are not what is slow.
+    waited += std::min<Nanoseconds>(Nanoseconds(Clock::nowNs() - sinceNs), kLook);
+    if (waited >= options_.patience) throw Broken(fmt::format("this did not come true in {} s: {}", options_.patience.count(), what));
   }
 }
 

@@ -3,13 +3,17 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <fmt/format.h>
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <stdexcept>
 
+#include <mpf/base/command_line.h>
+#include <mpf/base/system_call.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/torture/campaign.h>
@@ -34,6 +38,16 @@ const std::map<std::string, torture::Sabotage> kSabotages{{"lose-fate", torture:
                                                           {"stale", torture::Sabotage::stale},
                                                           {"leak", torture::Sabotage::leak}};
 
+// An option whose value is one of the names.
+template <class Value, class Choice>
+CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& value, const std::map<std::string, Choice>& choices,
+                       const std::string& text) {
+  return command
+      .add_option_function<std::string>(
+          name, [&value, &choices](const std::string& chosen) { value = choices.at(chosen); }, text)
+      ->check(CLI::IsMember(choices));
+}
+
 int list(const torture::Marks& marks) {
   for (const auto& [mark, addresses] : marks.byName()) fmt::print("{}\n", mark);
   return 0;
@@ -55,6 +69,14 @@ torture::Campaign::Progress progress() {
   };
 }
 
+// Before the work, which may take hours: empty without a name.
+std::optional<std::ofstream> openVerdict(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  std::optional<std::ofstream> file(path);
+  if (!*file) throwSystemError(errno, "create", path);
+  return file;
+}
+
 int run(const Arguments& arguments) {
   const auto marks = torture::Marks::ofThisProgram();
   if (arguments.list) return list(marks);
@@ -64,13 +86,13 @@ int run(const Arguments& arguments) {
   options.duration = std::chrono::duration<double>(arguments.seconds);
   options.referee.patience = std::chrono::duration<double>(arguments.patience);
   checkSteps(marks, options.steps);
+  auto verdict = openVerdict(arguments.json);
   const auto tally = torture::Campaign(marks, options, progress()).run();
   if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\x1b[K");
   fmt::print("{}", tally.text());
-  if (!arguments.json.empty()) {
-    std::ofstream file(arguments.json);
-    file << tally.json().dump(2) << '\n';
-    if (!file.flush()) throw std::runtime_error(fmt::format("cannot write {}", arguments.json));
+  if (verdict) {
+    *verdict << tally.json().dump(2) << '\n';
+    if (!verdict->flush()) throw std::runtime_error(fmt::format("cannot write {}", arguments.json));
   }
   return tally.verdict() == "held" ? 0 : 1;
 }
@@ -84,17 +106,17 @@ void addTorture(CLI::App& app, Run& run) {
   auto& options = arguments->campaign;
   options.referee.seed = std::random_device()();
   addSeconds(command, "--duration", arguments->seconds, "Time for random places, after each step had its turn", true);
-  command.add_option("--seed", options.referee.seed, "Of what is random; it is printed at the end");
+  command.add_option("--seed", options.referee.seed, "Of what is random; it is printed at the end")->check(wholeNumber(0));
   command.add_flag("--list", arguments->list, "Names the steps, and does nothing");
   command.add_option("--step", options.steps, "Only this step; may be given several times");
-  command.add_option("--role", options.role, "Only clients, or only servers")->transform(CLI::CheckedTransformer(kRoles));
-  command.add_option("--mode", options.mode, "Only kill, or only stop for a while")->transform(CLI::CheckedTransformer(kModes));
-  command.add_option("--hit", options.hit, "The how-many-th time that the process comes to the step")->check(CLI::PositiveNumber);
-  command.add_option("--instructions", options.instructions, "So many instructions behind the step")->check(CLI::NonNegativeNumber);
+  addChoice(command, "--role", options.role, kRoles, "Only clients, or only servers");
+  addChoice(command, "--mode", options.mode, kModes, "Only kill, or only stop for a while");
+  command.add_option("--hit", options.hit, "The how-many-th time that the process comes to the step")->check(wholeNumber(1));
+  command.add_option("--instructions", options.instructions, "So many instructions behind the step")->check(wholeNumber(0));
   command.add_option("--every-instruction", arguments->everyInstruction, "At each instruction from this step to the next one");
   addSeconds(command, "--patience", arguments->patience, "Longest wait for what must come true", false);
   command.add_option("--json", arguments->json, "Writes the verdict into this file, too: JSON")->type_name("FILE");
-  command.add_option("--break", options.referee.sabotage)->transform(CLI::CheckedTransformer(kSabotages))->group("");
+  addChoice(command, "--break", options.referee.sabotage, kSabotages, "")->group("");
   command.callback([arguments, &run] { run = [arguments] { return tools::run(*arguments); }; });
 }
 

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Caller: a client, and all that it was told, in order. That each request has one end, before the disconnect, is seen to here.
+//
+// Threads  one, its dispatcher's.
+#pragma once
+
+#include <deque>
+#include <gtest/gtest.h>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <mpf/client/message_client.h>
+#include <mpf/tests/support/router_pair.h>
+
+namespace mpf::test {
+
+class Caller {
+ public:
+  explicit Caller(Dispatcher& dispatcher, const std::string& server = "echo", std::int32_t location = RouterPair::kLocation)
+      : client(dispatcher, [this](Message&& message) { note(std::move(message)); }) {
+    client.bind(server, location);
+  }
+  // Returns the id of the request; 0 when it was not sent.
+  std::uint32_t send(Message&& message, Deadline takeBefore = Deadline::never()) {
+    std::uint32_t id = 0;
+    EXPECT_EQ(client.send(std::move(message), takeBefore, &id), SendResult::sent);
+    const bool isNew = id == 0 || open.insert(id).second;
+    EXPECT_TRUE(isNew) << "an id that is still open was given again";
+    return id;
+  }
+  [[nodiscard]] bool isConnected() const { return client.isConnected(); }
+  // The next message that is no news; empty when there is none.
+  Message take() {
+    if (messages.empty()) return {};
+    auto message = std::move(messages.front());
+    messages.pop_front();
+    return message;
+  }
+
+  std::vector<ConnectStatus> news;
+  std::deque<Message> messages;
+  std::set<std::uint32_t> open;  // requests without an end
+  MessageClient client;
+
+ private:
+  void note(Message&& message) {
+    if (const auto* connect = message.tryAs<Connect>()) {
+      news.push_back(connect->status);
+      EXPECT_TRUE(connect->status != ConnectStatus::connectNo || open.empty()) << "a disconnect before the ends of requests";
+      return;
+    }
+    const bool isSound = !MessageClient::endsRequest(message) || open.erase(message.route().requestId) == 1;
+    EXPECT_TRUE(isSound) << "an end of a request that is not open";
+    messages.push_back(std::move(message));
+  }
+};
+
+inline std::optional<Fate> fateOf(const Message& message) {
+  const auto* fate = message.tryAs<RequestFate>();
+  return fate != nullptr ? std::optional(fate->fate) : std::nullopt;
+}
+
+}  // namespace mpf::test

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// Check-up of connections to other hosts.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include <mpf/base/clock.h>
+#include <mpf/base/duration_text.h>
+#include <mpf/base/file_descriptor.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/tools/check_up.h>
+#include <mpf/tools/router_view.h>
+#include <mpf/tools/wrap.h>
+
+namespace mpf::tools {
+namespace {
+
+constexpr std::int64_t kLongNs = 60'000'000'000;  // a restart, a cable that was pulled and plugged in again take less
+
+// Whether the router's process lives: it holds the lock of its segment.
+bool isLocked(const std::filesystem::path& path) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct flock lock{};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_len = 1;
+  return file && ::fcntl(file.get(), F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+}
+
+std::vector<RouterLineView> linesOf(const std::filesystem::path& path) try {
+  const auto image = SegmentImage::tryReadFile(path.string());
+  return image && isLocked(path) ? routerLines(*image, path.string()) : std::vector<RouterLineView>();
+} catch (const std::exception&) {
+  return {};  // not ours to read; `rights of segments` says so
+}
+
+}  // namespace
+
+Finding checkRouters(const Host& host) {
+  constexpr const char* kName = "connections of routers";
+  std::size_t remotes = 0;
+  std::size_t callers = 0;
+  std::size_t cut = 0;
+  std::string longest;
+  std::int64_t longestNs = 0;
+  for (const auto& name : host.list("dev/shm")) {
+    const auto parsed = SegmentName::tryParse(name);
+    if (!parsed || parsed->kind != NameKind::router) continue;
+    for (const auto& line : linesOf(host.root / "dev/shm" / name)) {
+      ++(line.isClient() ? remotes : callers);
+      const auto sinceNs = Clock::nowNs() - line.sinceNs;
+      if (!line.isClient() || line.isConnected() || sinceNs < kLongNs) continue;
+      ++cut;
+      if (sinceNs <= longestNs) continue;
+      longestNs = sinceNs;
+      longest = fmt::format("{}, for {}: {}", line.address, durationText(static_cast<double>(sinceNs)),
+                            line.problem.empty() ? "no reason is known" : line.problem);
+    }
+  }
+  if (remotes + callers == 0) return {kName, Health::ok, "none", {}};
+  if (cut == 0) return {kName, Health::ok, fmt::format("{}, {}", counted(remotes, "remote"), counted(callers, "caller")), {}};
+  return {kName, Health::warning, fmt::format("{} of {} cannot be reached: {}", cut, counted(remotes, "remote"), longest),
+          "look whether mpf-router runs there and listens on that address, and what is between; `mpf mrr` shows each connection"};
+}
+
+}  // namespace mpf::tools
