@@ -29,7 +29,7 @@ class BoostPeer final : public Peer {
       put(*replies_);
     }
   }
-  void connect() override {
+  void connect(const Scene&) override {
     requests_.emplace(ipc::open_only, requestName().c_str());
     replies_.emplace(ipc::open_only, replyName().c_str());
     buffer_.assign(options_.bytes, std::byte{1});
@@ -50,8 +50,8 @@ class BoostPeer final : public Peer {
       if (++taken % 64 == 0) scene.consumed(taken);
     }
   }
-  void flood(const std::function<bool()>& goOn) override {
-    connect();
+  void flood(const Scene& scene, const std::function<bool()>& goOn) override {
+    connect(scene);
     while (goOn()) {
       for (int i = 0; i < 64; ++i) put(*requests_);
     }

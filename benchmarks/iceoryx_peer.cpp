@@ -41,7 +41,7 @@ class IceoryxPeer final : public Peer {
       answer(server, request);
     }
   }
-  void connect() override {
+  void connect(const Scene&) override {
     start("client");
     popo::ClientOptions options;
     options.responseQueueFullPolicy = popo::QueueFullPolicy::BLOCK_PRODUCER;
@@ -77,7 +77,7 @@ class IceoryxPeer final : public Peer {
       if (++taken % 64 == 0) scene.consumed(taken);
     }
   }
-  void flood(const std::function<bool()>& goOn) override {
+  void flood(const Scene&, const std::function<bool()>& goOn) override {
     start("publisher");
     popo::PublisherOptions options;
     options.subscriberTooSlowPolicy = popo::ConsumerTooSlowPolicy::WAIT_FOR_CONSUMER;

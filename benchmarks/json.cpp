@@ -13,7 +13,9 @@ void addFigures(Json& object, const Result& result) {
   if (!result.measurement.unit.empty()) {
     object["value"] = result.figures.value;
     object["unit"] = result.measurement.unit;
-  } else if (latency.count() != 0) {
+    return;
+  }
+  if (latency.count() != 0) {
     object["p50_ns"] = latency.percentileNs(50);
     object["p99_ns"] = latency.percentileNs(99);
     object["p999_ns"] = latency.percentileNs(99.9);
@@ -21,16 +23,19 @@ void addFigures(Json& object, const Result& result) {
     if (result.figures.typicalNs > 0) object["typical_ns"] = result.figures.typicalNs;
     object["mean_ns"] = latency.meanNs();
     object["samples"] = latency.count();
-  } else {
-    object["per_s"] = result.figures.perSecond;
-    object["samples"] = result.figures.count;
   }
+  if (result.figures.perSecond > 0) object["per_s"] = result.figures.perSecond;
+  if (latency.count() == 0) object["samples"] = result.figures.count;
+  if (result.figures.writesPerSecond >= 0) object["writes_per_s"] = result.figures.writesPerSecond;
+  if (result.figures.idleServer >= 0) object["idle_server_percent"] = 100 * result.figures.idleServer;
+  if (result.figures.idleRequester >= 0) object["idle_client_percent"] = 100 * result.figures.idleRequester;
 }
 
-Json toObject(const Result& result, const Machine& machine, Placement placement) {
+Json toObject(const Result& result, const Machine& machine, const Placement& placement) {
   const auto& what = result.measurement;
   Json object;
   object["name"] = what.name;
+  if (!what.setting.empty()) object["setting"] = what.setting;
   object["question"] = what.question;
   object["mode"] = toString(what.mode);
   object["bytes"] = what.bytes;
@@ -46,7 +51,9 @@ Json toObject(const Result& result, const Machine& machine, Placement placement)
   object["floor_name"] = what.floorName.empty() ? Json() : Json(what.floorName);
   object["floor_ns"] = result.floorNs > 0 ? Json(result.floorNs) : Json();
   object["ratio_to_floor"] = result.ratioToFloor > 0 ? Json(result.ratioToFloor) : Json();
-  object["cpus"] = {placement.server, placement.requester};
+  auto cpus = placement.server;
+  cpus.insert(cpus.end(), placement.requester.begin(), placement.requester.end());
+  object["cpus"] = cpus;
   object["machine"] = {{"cpu", machine.cpu},           {"kernel", machine.kernel},
                        {"governor", machine.governor}, {"placement", machine.placement},
                        {"virtual", machine.isVirtual}, {"load", machine.load}};
@@ -55,7 +62,7 @@ Json toObject(const Result& result, const Machine& machine, Placement placement)
 
 }  // namespace
 
-std::string toJson(const std::vector<Result>& results, const Machine& machine, Placement placement) {
+std::string toJson(const std::vector<Result>& results, const Machine& machine, const Placement& placement) {
   auto list = Json::array();
   for (const auto& result : results) list.push_back(toObject(result, machine, placement));
   return list.dump(1) + "\n";

@@ -30,28 +30,29 @@ std::string cpuInfo(std::string_view key) {
 
 std::string cpuFile(int cpu, const char* file) { return readLine(fmt::format("/sys/devices/system/cpu/cpu{}/{}", cpu, file)); }
 
-std::string placementText(Placement at) {
+std::string placementText(const Placement& at) {
   const auto same = [&](const char* file) {
-    const auto mine = cpuFile(at.server, file);
-    return !mine.empty() && mine == cpuFile(at.requester, file);
+    const auto mine = cpuFile(at.server.front(), file);
+    return !mine.empty() && mine == cpuFile(at.requester.front(), file);
   };
   const char* cores = same("topology/thread_siblings_list") ? "two threads of one core" : "separate cores";
   const char* cache = same("cache/index3/shared_cpu_list")   ? ", one last-level cache"
                       : same("topology/physical_package_id") ? ", one socket"
                                                              : ", different sockets";
-  return fmt::format("CPUs {} (server) and {} (requester): {}{}", at.server, at.requester, cores, cache);
+  if (at.server == at.requester) return fmt::format("CPU {}: server and requester", toString(at.server));
+  return fmt::format("CPUs {} (server) and {} (requester): {}{}", toString(at.server), toString(at.requester), cores, cache);
 }
 
 }  // namespace
 
-Machine Machine::look(Placement placement) {
+Machine Machine::look(const Placement& placement) {
   Machine machine;
   machine.cpu = cpuInfo("model name");
   if (machine.cpu.empty()) machine.cpu = "unknown CPU";
   utsname system{};
   ::uname(&system);
   machine.kernel = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
-  machine.governor = cpuFile(placement.requester, "cpufreq/scaling_governor");
+  machine.governor = cpuFile(placement.requester.front(), "cpufreq/scaling_governor");
   if (machine.governor.empty()) machine.governor = "unknown";
   machine.placement = placementText(placement);
   machine.isVirtual = fmt::format(" {} ", cpuInfo("flags")).find(" hypervisor ") != std::string::npos;

@@ -16,7 +16,7 @@ struct Machine {
   bool isVirtual = false;
   double load = 0;  // average of the last minute when the run began
 
-  [[nodiscard]] static Machine look(Placement placement);
+  [[nodiscard]] static Machine look(const Placement& placement);
   [[nodiscard]] std::string text() const;
 };
 

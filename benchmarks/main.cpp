@@ -4,18 +4,29 @@
 #include <exception>
 #include <fmt/format.h>
 
+#include <mpf/base/command_line.h>
+#include <mpf/benchmarks/hardware.h>
 #include <mpf/benchmarks/local.h>
+#include <mpf/benchmarks/remote.h>
 
 int main(int argc, char** argv) try {
   CLI::App app("mpf bench - how fast messages are, beside the physical floors and other message systems", "mpf bench");
   auto& local = *app.add_subcommand("local", mpf::bench::kLocalHelp);
-  mpf::bench::LocalOptions options;
-  mpf::bench::addOptions(local, options);
+  auto& remote = *app.add_subcommand("remote", mpf::bench::kRemoteHelp);
+  auto& hardware = *app.add_subcommand("hardware", mpf::bench::kHardwareHelp);
+  mpf::bench::Options localOptions;
+  mpf::bench::RemoteOptions remoteOptions;
+  mpf::bench::HardwareOptions hardwareOptions;
+  mpf::bench::addOptions(local, localOptions);
+  mpf::bench::addOptions(remote, remoteOptions);
+  mpf::bench::addOptions(hardware, hardwareOptions);
   app.require_subcommand(1);
-  CLI11_PARSE(app, argc, argv);
-  options.commandLine = "mpf bench";
-  for (int i = 1; i < argc; ++i) options.commandLine += std::string(" ") + argv[i];
-  return mpf::bench::runLocal(options);
+  if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
+  std::string commandLine = "mpf bench";
+  for (int i = 1; i < argc; ++i) commandLine += std::string(" ") + argv[i];
+  localOptions.commandLine = remoteOptions.commandLine = hardwareOptions.commandLine = commandLine;
+  if (hardware.parsed()) return mpf::bench::runHardware(hardwareOptions);
+  return local.parsed() ? mpf::bench::runLocal(localOptions) : mpf::bench::runRemote(remoteOptions);
 } catch (const std::exception& error) {
   fmt::print(stderr, "mpf bench: {}\n", error.what());
   return 1;

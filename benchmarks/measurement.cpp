@@ -7,9 +7,9 @@
 namespace mpf::bench {
 
 double costNs(const Figures& figures) noexcept {
+  if (figures.perSecond > 0) return 1e9 / figures.perSecond;
   if (figures.typicalNs > 0) return figures.typicalNs;
-  if (figures.latency.count() != 0) return static_cast<double>(figures.latency.percentileNs(50));
-  return figures.perSecond > 0 ? 1e9 / figures.perSecond : 0;
+  return static_cast<double>(figures.latency.percentileNs(50));
 }
 
 std::vector<Measurement> catalogue(const std::string& runName) {

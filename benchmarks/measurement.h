@@ -13,6 +13,7 @@
 namespace mpf::bench {
 
 struct Measurement {
+  std::string setting;   // the surroundings that it is taken in; its floor is of the same
   std::string question;  // the heading in the table
   std::string name;
   Mode mode = Mode::spin;
@@ -30,14 +31,14 @@ struct Measurement {
   std::function<Outcome(const Stage&)> run;
 };
 
-// Nanoseconds per message: typical, or p50 where groups make no sense, or from a rate; 0 for neither.
+// Nanoseconds per message: from a rate, or typical, or p50 where groups make no sense; 0 for neither.
 [[nodiscard]] double costNs(const Figures& figures) noexcept;
 
 struct Result {
   Measurement measurement;
   Figures figures;
   std::string error;
-  double floorNs = 0;       // of the same minute
+  double floorNs = 0;       // a message of the floor, in the same minute
   double ratioToFloor = 0;  // above 1: slower than the floor. 0: there is none
 
   [[nodiscard]] bool isGood() const noexcept { return measurement.skipped.empty() && error.empty(); }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Ours, through the public API: MessageServer, and MessageClient with its callback, on a dispatcher that the requester runs itself.
-// 4 bytes are an Int32 message; larger ones a Char8Array that the client builds in shared memory and the server replies with.
 #include <mpf/benchmarks/mpf_peer.h>
+
+#include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <optional>
 #include <stdexcept>
@@ -15,30 +17,31 @@
 namespace mpf::bench {
 namespace {
 
+template <ArrayBody Array>
 class MpfPeer final : public Peer {
  public:
-  explicit MpfPeer(PeerOptions options) : options_(std::move(options)) {}
+  MpfPeer(PeerOptions options, MpfPlaces places) : options_(std::move(options)), places_(std::move(places)) {}
 
   void serve(const Scene& scene) override {
-    MessageServer server(Backplane::attach(options_.name), kServer, serverOptions(options_.mode));
+    MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
     scene.ready();
     for (bool last = false; !last && server.waitForMessage();) {
       while (auto request = server.receive()) {
         last = scene.stopping();
         if (options_.touch) {
-          const auto value = request.valueAs<Char8Array>();
-          readAll(value.data(), value.size());
-          writeAll(value.data(), value.size());
+          const auto value = request.template valueAs<Array>();
+          readAll(value.data(), value.size_bytes());
+          writeAll(value.data(), value.size_bytes());
         }
         if (server.reply(std::move(request)) != ReplyResult::sent) throw std::runtime_error("a reply was not sent");
       }
     }
   }
 
-  void connect() override {
-    dispatcher_.emplace(Backplane::attach(options_.name), DispatcherOptions{waitMode(options_.mode), {}});
+  void connect(const Scene&) override {
+    dispatcher_.emplace(Backplane::attach(places_.clientBackplane), DispatcherOptions{waitMode(options_.mode), {}});
     client_.emplace(*dispatcher_, [this](Message&& message) { take(message); });
-    client_->bind(kServer);
+    client_->bind(kServer, places_.location);
     if (!client_->connectWait(kConnectLimit)) throw std::runtime_error("not connected: " + client_->notConnectedBecause());
   }
   void send() override {
@@ -46,7 +49,7 @@ class MpfPeer final : public Peer {
     if (options_.bytes == 4) {
       result = client_->send(Int32Message({.address = 3, .value = 100}));
     } else {
-      auto request = client_->alloc<Char8Array>(options_.bytes);
+      auto request = client_->template alloc<Array>(options_.bytes / sizeof(typename Array::Element));
       if (options_.touch) writeAll(request.value().data(), options_.bytes);
       result = client_->send(std::move(request));
     }
@@ -64,15 +67,15 @@ class MpfPeer final : public Peer {
   // One way, the server sends: to one request any number of replies may be sent, and the client takes them in its callback.
   void sink(const Scene& scene) override {
     scene.ready();
-    connect();
+    connect(scene);
     send();
     for (;;) {
       dispatcher_->runOnce();
       if (received_ % 64 == 0) scene.consumed(received_);
     }
   }
-  void flood(const std::function<bool()>& goOn) override {
-    MessageServer server(Backplane::attach(options_.name), kServer, serverOptions(options_.mode));
+  void flood(const Scene&, const std::function<bool()>& goOn) override {
+    MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
     Message request;
     while (!request) {
       if (!server.waitForMessage(Deadline::after(kConnectLimit))) throw std::runtime_error("no request from the client");
@@ -91,22 +94,32 @@ class MpfPeer final : public Peer {
     }
   }
 
-  void removeTraces() noexcept override { removeBackplanes(options_.name); }
+  void removeTraces() noexcept override {
+    removeBackplanes(places_.serverBackplane);
+    if (places_.clientBackplane != places_.serverBackplane) removeBackplanes(places_.clientBackplane);
+  }
 
  private:
+  [[nodiscard]] ServerOptions optionsOfServer() const {
+    auto options = serverOptions(options_.mode);
+    options.location = places_.location;
+    options.queueSize = places_.queueSize;
+    return options;
+  }
   void take(Message& message) {
     if (message.getType() == MessageType::connect) return;
     if (options_.bytes == 4) {
       if (message.tryAs<Int32>() == nullptr) throw std::runtime_error("a reply that is none");
     } else {
-      const auto value = message.valueAs<Char8Array>();
-      if (value.size() != options_.bytes) throw std::runtime_error("a reply of another size");
-      if (options_.touch) readAll(value.data(), value.size());
+      const auto value = message.template valueAs<Array>();
+      if (value.size_bytes() != options_.bytes) throw std::runtime_error("a reply of another size");
+      if (options_.touch) readAll(value.data(), value.size_bytes());
     }
     ++received_;
   }
 
   PeerOptions options_;
+  MpfPlaces places_;
   std::optional<Dispatcher> dispatcher_;
   std::optional<MessageClient> client_;
   std::uint64_t received_ = 0;
@@ -114,6 +127,14 @@ class MpfPeer final : public Peer {
 };
 
 }  // namespace
+
+template <ArrayBody Array>
+std::unique_ptr<Peer> makeMpfPeer(const PeerOptions& options, const MpfPlaces& places) {
+  return std::make_unique<MpfPeer<Array>>(options, places);
+}
+template std::unique_ptr<Peer> makeMpfPeer<Char8Array>(const PeerOptions&, const MpfPlaces&);
+template std::unique_ptr<Peer> makeMpfPeer<Int32Array>(const PeerOptions&, const MpfPlaces&);
+template std::unique_ptr<Peer> makeMpfPeer<Float64Array>(const PeerOptions&, const MpfPlaces&);
 
 WaitMode waitMode(Mode mode) noexcept {
   return mode == Mode::spin ? WaitMode::spin : mode == Mode::block ? WaitMode::block : WaitMode::adaptive;
@@ -124,6 +145,22 @@ ServerOptions serverOptions(Mode mode) {
   options.queueSize = 256;
   options.waitMode = waitMode(mode);
   return options;
+}
+
+void raiseDescriptorLimit() noexcept {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_NOFILE, &limit);
+  limit.rlim_cur = limit.rlim_max;
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+double occupiedBytes(const Backplane& backplane) {
+  double bytes = 0;
+  for (const auto& name : backplane.segmentNames()) {
+    struct stat file{};
+    if (::stat(("/dev/shm/" + name).c_str(), &file) == 0) bytes += static_cast<double>(file.st_blocks) * 512;
+  }
+  return bytes;
 }
 
 // In a process of its own: attaching starts a thread, and the runner has to stay without.
@@ -142,7 +179,9 @@ PeerFamily mpfPeer() {
   PeerFamily family;
   family.name = kMpf;
   family.modes = {Mode::spin, Mode::adaptive, Mode::block};
-  family.make = [](const PeerOptions& options) { return std::make_unique<MpfPeer>(options); };
+  family.make = [](const PeerOptions& options) {
+    return makeMpfPeer<Char8Array>(options, {.serverBackplane = options.name, .clientBackplane = options.name});
+  };
   family.oneWay = true;
   return family;
 }

@@ -32,7 +32,7 @@ class Peer {
   // Server: answers requests until scene.stopping().
   virtual void serve(const Scene& scene) = 0;
 
-  virtual void connect() = 0;
+  virtual void connect(const Scene& scene) = 0;
   // Sends one request; waits while there is no room.
   virtual void send() = 0;
   // Waits for the next reply.
@@ -45,7 +45,7 @@ class Peer {
   // One way: the server's process takes messages and counts them with scene.consumed(), now and then at least; flood() sends until
   // the deadline. Ours may swap the roles: what counts is that one process sends and another takes.
   virtual void sink(const Scene&) {}
-  virtual void flood(const std::function<bool()>& goOn) { static_cast<void>(goOn); }
+  virtual void flood(const Scene&, const std::function<bool()>&) {}
 
   // Runner: removes what killed processes left.
   virtual void removeTraces() noexcept {}
@@ -55,6 +55,19 @@ class Peer {
 class Environment {
  public:
   virtual ~Environment() = default;
+};
+
+// What has start() and stop(): it runs while this lives.
+template <class Started>
+class Running final : public Environment {
+ public:
+  explicit Running(std::shared_ptr<Started> started) : started_(std::move(started)) { started_->start(); }
+  ~Running() override { started_->stop(); }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+ private:
+  std::shared_ptr<Started> started_;
 };
 
 // A kind of peer. `skipped` says why it cannot be measured here; then `make` may be empty.

@@ -21,7 +21,7 @@ Outcome roundTrips(const Stage& stage, const std::shared_ptr<Peer>& peer) {
   act.stopsByItself = true;
   act.server = [peer](const Scene& scene) { peer->serve(scene); };
   act.requester = [peer](const Scene& scene) {
-    peer->connect();
+    peer->connect(scene);
     timeEach(scene, [&] { peer->roundTrip(); });
     scene.stop();
     peer->roundTrip();
@@ -34,7 +34,7 @@ Outcome outstanding(const Stage& stage, const std::shared_ptr<Peer>& peer, int w
   act.stopsByItself = true;
   act.server = [peer](const Scene& scene) { peer->serve(scene); };
   act.requester = [peer, window](const Scene& scene) {
-    peer->connect();
+    peer->connect(scene);
     for (int i = 0; i < window; ++i) peer->send();
     timeRate(scene, 1, [&] {
       peer->receive();
@@ -50,7 +50,7 @@ Outcome outstanding(const Stage& stage, const std::shared_ptr<Peer>& peer, int w
 Outcome oneWay(const Stage& stage, const std::shared_ptr<Peer>& peer) {
   Act act;
   act.server = [peer](const Scene& scene) { peer->sink(scene); };
-  act.requester = [peer](const Scene& scene) { timeOneWay(scene, [&](const std::function<bool()>& goOn) { peer->flood(goOn); }); };
+  act.requester = [peer](const Scene& scene) { timeOneWay(scene, [&](const std::function<bool()>& goOn) { peer->flood(scene, goOn); }); };
   return runAndClean(stage, peer, act);
 }
 

@@ -11,12 +11,6 @@ namespace {
 
 constexpr const char* kRow = "  {:<24} {:<9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>12} {:>9}  {}\n";
 
-std::string rateText(double perSecond) {
-  if (perSecond >= 1e6) return fmt::format("{:.2f} M/s", perSecond / 1e6);
-  if (perSecond >= 1e3) return fmt::format("{:.1f} k/s", perSecond / 1e3);
-  return fmt::format("{:.0f} /s", perSecond);
-}
-
 std::string ratioText(const Result& result) { return result.ratioToFloor > 0 ? fmt::format("{:.2f}", result.ratioToFloor) : ""; }
 
 std::string row(const Result& result) {
@@ -39,13 +33,19 @@ std::string row(const Result& result) {
 
 }  // namespace
 
+std::string rateText(double perSecond) {
+  if (perSecond >= 1e6) return fmt::format("{:.2f} M/s", perSecond / 1e6);
+  if (perSecond >= 1e3) return fmt::format("{:.1f} k/s", perSecond / 1e3);
+  return fmt::format("{:.0f} /s", perSecond);
+}
+
 std::string oneLine(const Result& result) {
   const auto& what = result.measurement;
   auto text = what.question + ": " + what.name + ", " + toString(what.mode);
   if (!what.skipped.empty()) return text + ": left out, " + what.skipped;
   if (!result.error.empty()) return text + ": FAILED, " + result.error;
   if (!what.unit.empty()) return text + fmt::format(": {:.6g} {}", result.figures.value, what.unit);
-  if (result.figures.latency.count() == 0) return text + ": " + rateText(result.figures.perSecond);
+  if (result.figures.perSecond > 0) return text + ": " + rateText(result.figures.perSecond);
   return text + ": " + durationText(result.costNs());
 }
 

@@ -24,12 +24,22 @@ class Rounds {
     typical_.push_back(figures.typicalNs);
     perSecond_.push_back(figures.perSecond);
     values_.push_back(figures.value);
+    writes_.push_back(figures.writesPerSecond);
+    idleServer_.push_back(figures.idleServer);
+    idleRequester_.push_back(figures.idleRequester);
     if (floorNs <= 0) return;
     floors_.push_back(floorNs);
     ratios_.push_back(costNs(figures) / floorNs);
   }
   void writeTo(Result& result) const {
-    result.figures = {latency_, median(typical_), count_, median(perSecond_), median(values_)};
+    result.figures = {latency_,
+                      median(typical_),
+                      count_,
+                      median(perSecond_),
+                      median(values_),
+                      median(writes_),
+                      median(idleServer_),
+                      median(idleRequester_)};
     result.floorNs = median(floors_);
     result.ratioToFloor = median(ratios_);
   }
@@ -37,7 +47,7 @@ class Rounds {
  private:
   LatencyRecorder latency_;
   std::uint64_t count_ = 0;
-  std::vector<double> typical_, perSecond_, values_, floors_, ratios_;
+  std::vector<double> typical_, perSecond_, values_, writes_, idleServer_, idleRequester_, floors_, ratios_;
 };
 
 }  // namespace
@@ -77,10 +87,11 @@ std::string Runner::enter(const Measurement& row) try {
 // 0: there is none.
 double Runner::measureFloor(const Measurement& row, Budget budget, int rounds) {
   if (row.floorName.empty()) return 0;
-  auto& known = lastFloor_[{row.floorName, row.floorBytes}];
+  auto& known = lastFloor_[{row.setting, row.floorName, row.floorBytes}];
   if (rounds == 0 && known > 0) return known;
-  const auto floor = std::find_if(all_.begin(), all_.end(),
-                                  [&](const Measurement& other) { return other.name == row.floorName && other.bytes == row.floorBytes; });
+  const auto floor = std::find_if(all_.begin(), all_.end(), [&](const Measurement& other) {
+    return other.setting == row.setting && other.name == row.floorName && other.bytes == row.floorBytes;
+  });
   if (floor == all_.end()) return 0;
   return known = costNs(floor->run(Stage(placement_, {budget.warmUp / 2, budget.measure / 2})).figures);
 }

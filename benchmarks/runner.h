@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -22,7 +23,7 @@ namespace mpf::bench {
 class Runner {
  public:
   // `all` outlives the runner; floors are found there.
-  Runner(Placement placement, const std::vector<Measurement>& all) noexcept : placement_(placement), all_(all) {}
+  Runner(Placement placement, const std::vector<Measurement>& all) noexcept : placement_(std::move(placement)), all_(all) {}
 
   //   rounds  0: measure the row once, and divide it by its floor as that was last measured
   [[nodiscard]] Result run(Measurement row, Budget budget, int rounds);
@@ -36,7 +37,7 @@ class Runner {
   std::unique_ptr<Environment> environment_;  // of the last row, for the next
   std::string current_;
   std::map<std::string, std::string> missing_;
-  std::map<std::pair<std::string, std::size_t>, double> lastFloor_;  // by name and bytes [ns]
+  std::map<std::tuple<std::string, std::string, std::size_t>, double> lastFloor_;  // by setting, name and bytes [ns]
 };
 
 }  // namespace mpf::bench

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What many clients, and clients that come and go, cost; ours only: no peer has anything to set beside it but the socket's connect.
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -16,6 +14,7 @@
 #include <mpf/base/system_call.h>
 #include <mpf/benchmarks/company.h>
 #include <mpf/benchmarks/measurement.h>
+#include <mpf/benchmarks/meter.h>
 #include <mpf/benchmarks/mpf_peer.h>
 #include <mpf/benchmarks/timing.h>
 #include <mpf/client/message_client.h>
@@ -24,14 +23,6 @@ namespace mpf::bench {
 namespace {
 
 void ignore(Message&&) {}
-
-// Each link takes descriptors.
-void raiseDescriptorLimit() {
-  rlimit limit{};
-  ::getrlimit(RLIMIT_NOFILE, &limit);
-  limit.rlim_cur = limit.rlim_max;
-  ::setrlimit(RLIMIT_NOFILE, &limit);
-}
 
 void connectOrThrow(MessageClient& client) {
   client.bind(kServer);
@@ -134,16 +125,6 @@ Outcome socketConnectTime(const Stage& stage, const std::string& name) {
   return stage.run(act);
 }
 
-// Pages of shared memory that this backplane's segments occupy.
-double occupiedBytes(const Backplane& backplane) {
-  double bytes = 0;
-  for (const auto& name : backplane.segmentNames()) {
-    struct stat file{};
-    if (::stat(("/dev/shm/" + name).c_str(), &file) == 0) bytes += static_cast<double>(file.st_blocks) * 512;
-  }
-  return bytes;
-}
-
 Outcome memoryPerLink(const Stage& stage, const std::string& backplane) {
   Act act;
   act.server = [=](const Scene& scene) {
@@ -194,12 +175,7 @@ class IdlePairs {
   // Time on a CPU so far, of all threads of all processes [ns].
   [[nodiscard]] double cpuNs() const {
     double sum = 0;
-    for (const auto pid : pids_) {
-      timespec used{};
-      clockid_t clock{};
-      if (::clock_getcpuclockid(pid, &clock) != 0 || ::clock_gettime(clock, &used) != 0) throw std::runtime_error("a process is gone");
-      sum += static_cast<double>(used.tv_sec) * 1e9 + static_cast<double>(used.tv_nsec);
-    }
+    for (const auto pid : pids_) sum += cpuNsOf(pid);
     return sum;
   }
 

@@ -32,7 +32,7 @@ class SocketPeer final : public Peer {
       put();
     }
   }
-  void connect() override {
+  void connect(const Scene&) override {
     const auto address = addressOf();
     fd_ = FileDescriptor(checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
     checkCall(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), "connect", options_.name);
@@ -54,8 +54,8 @@ class SocketPeer final : public Peer {
       if (++taken % 64 == 0) scene.consumed(taken);
     }
   }
-  void flood(const std::function<bool()>& goOn) override {
-    connect();
+  void flood(const Scene& scene, const std::function<bool()>& goOn) override {
+    connect(scene);
     while (goOn()) {
       for (int i = 0; i < 64; ++i) put();
     }

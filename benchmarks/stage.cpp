@@ -2,13 +2,9 @@
 #include <mpf/benchmarks/stage.h>
 
 #include <poll.h>
-#include <sched.h>
-#include <signal.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -23,7 +19,6 @@
 namespace mpf::bench {
 namespace {
 
-constexpr auto kGrace = std::chrono::seconds(15);           // beyond the budget: connecting, tearing down
 constexpr auto kStopGrace = std::chrono::milliseconds(500);  // for a server that leaves by itself
 enum Role : std::size_t { server = 0, requester = 1 };
 
@@ -49,11 +44,11 @@ int pidFd(int pid) { return static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));
 // One of the two processes.
 class Child {
  public:
-  Child(Role role, int cpu, Control& control, const std::function<void()>& body)
+  Child(Role role, const Cpus& cpus, Control& control, const std::function<void()>& body)
       : pid_(forkProcess([&] {
           auto& error = control.errors[role];
           try {
-            pinTo(cpu);
+            pinTo(cpus);
             body();
           } catch (const std::exception& exception) {
             std::snprintf(error.data(), error.size(), "%s", exception.what());
@@ -95,22 +90,25 @@ std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterC
 
 }  // namespace
 
-// PAIR(bench-ready): the requester starts after everything that the server did before.
-void Scene::ready() const noexcept { control_.ready.store(1, std::memory_order_release); }
+void Scene::ready(std::uint16_t port) const noexcept {
+  control_.port.store(port, std::memory_order_relaxed);
+  // PAIR(bench-ready): the requester starts after everything that the server did before.
+  control_.ready.store(1, std::memory_order_release);
+}
 
 Outcome Stage::run(const Act& act) const {
   const Shared memory(sizeof(Control) + act.scratchBytes + 4096);
   auto& control = *new (memory.bytes().data()) Control;
   constexpr std::size_t kScratchOffset = (sizeof(Control) + 4095) / 4096 * 4096;
   const Scene scene(control, budget_, memory.bytes().subspan(std::min(kScratchOffset, memory.bytes().size()), act.scratchBytes));
-  const auto limit = budget_.warmUp + budget_.measure + kGrace;
+  const auto limit = budget_.warmUp + budget_.measure + act.grace;
 
   std::unique_ptr<Child> serverChild;
   if (act.server) serverChild = std::make_unique<Child>(server, placement_.server, control, [&] { act.server(scene); });
   Child requesterChild(requester, placement_.requester, control, [&] {
     // PAIR(bench-ready): what the server did before is done.
     const auto isReady = [&] { return control.ready.load(std::memory_order_acquire) != 0; };
-    if (act.server && !waitUntil(isReady, kGrace)) throw std::runtime_error("the server is not ready in time");
+    if (act.server && !waitUntil(isReady, act.grace)) throw std::runtime_error("the server is not ready in time");
     act.requester(scene);
   });
 
@@ -126,61 +124,11 @@ Outcome Stage::run(const Act& act) const {
     }
   } else if (outcome.error = serverChild->ending("server", control.errors[server]); outcome.error.empty()) {
     // It answered the last request and left first.
-    const auto second = waitForEnd(nullptr, requesterChild, Deadline::after(kGrace));
+    const auto second = waitForEnd(nullptr, requesterChild, Deadline::after(act.grace));
     outcome.error = second ? requesterChild.ending("requester", control.errors[requester]) : "the requester does not end";
   }
   outcome.figures = control.figures;
   return outcome;
-}
-
-void pinTo(int cpu) {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  CPU_SET(static_cast<std::size_t>(cpu), &set);
-  checkCall(::sched_setaffinity(0, sizeof set, &set), "sched_setaffinity", "CPU " + std::to_string(cpu));
-}
-
-std::vector<int> allowedCpus() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  checkCall(::sched_getaffinity(0, sizeof set, &set), "sched_getaffinity");
-  std::vector<int> cpus;
-  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
-    if (CPU_ISSET(static_cast<std::size_t>(cpu), &set)) cpus.push_back(cpu);
-  }
-  return cpus;
-}
-
-int forkProcess(const std::function<void()>& body) {
-  const auto parent = ::getpid();
-  const auto pid = checkCall(::fork(), "fork", "a benchmark process");
-  if (pid != 0) return pid;
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) std::_Exit(1);
-  body();
-  std::_Exit(0);
-}
-
-void killProcess(int pid) noexcept {
-  if (pid <= 0) return;
-  ::kill(pid, SIGKILL);
-  retryInterrupted([&] { return ::waitpid(pid, nullptr, 0); });
-}
-
-bool hasEnded(int pid) noexcept { return ::waitpid(pid, nullptr, WNOHANG) != 0; }
-
-void sleepFor(Nanoseconds duration) {
-  const timespec pause{static_cast<time_t>(duration.count() / 1'000'000'000), static_cast<long>(duration.count() % 1'000'000'000)};
-  ::nanosleep(&pause, nullptr);
-}
-
-bool waitUntil(const std::function<bool()>& done, Nanoseconds limit) {
-  const auto deadline = Deadline::after(limit);
-  while (!done()) {
-    if (deadline.hasPassed()) return false;
-    sleepFor(std::chrono::microseconds(200));
-  }
-  return true;
 }
 
 }  // namespace mpf::bench

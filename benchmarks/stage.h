@@ -17,18 +17,20 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <mpf/base/clock.h>
 #include <mpf/base/latency_recorder.h>
+#include <mpf/benchmarks/processes.h>
 
 namespace mpf::bench {
 
 inline constexpr std::size_t kLineBytes = 64;
 
 struct Placement {
-  int server = 0;
-  int requester = 1;
+  Cpus server{0};
+  Cpus requester{1};
 };
 
 // How long a measurement takes.
@@ -37,6 +39,8 @@ struct Budget {
   Nanoseconds measure{};
 };
 
+inline constexpr double kNotLookedAt = -1;
+
 // What the requester found out. Plain data in shared memory.
 struct Figures {
   LatencyRecorder latency;   // each message timed by itself
@@ -44,11 +48,16 @@ struct Figures {
   std::uint64_t count = 0;   // of what `perSecond` counts
   double perSecond = 0;      // 0: not a rate
   double value = 0;          // in the measurement's own unit
+  double writesPerSecond = kNotLookedAt;  // system calls that write; see Meter
+  double idleServer = kNotLookedAt;       // share of time that the server's CPUs had nothing to do, 0 to 1
+  double idleRequester = kNotLookedAt;    // the same of the requester's
+  std::array<double, 4> more{};           // what else a row finds out that several rows tell of; from its last round
 };
 
 // Shared by the processes of one measurement.
 struct Control {  // NOLINT(clang-analyzer-optin.performance.Padding): each word on a line of its own
   alignas(kLineBytes) std::atomic<std::uint32_t> ready{0};     // written by the server
+  std::atomic<std::uint32_t> port{0};                          // written by the server, before `ready`
   alignas(kLineBytes) std::atomic<std::uint32_t> stopping{0};  // written by the requester
   alignas(kLineBytes) std::atomic<std::uint64_t> consumed{0};  // written by the server: one-way messages taken
   alignas(kLineBytes) Figures figures;                         // written by the requester
@@ -65,8 +74,10 @@ class Scene {
   // Shared zeroed memory, page-aligned, as large as was asked for.
   [[nodiscard]] std::span<std::byte> scratch() const noexcept { return scratch_; }
 
-  // Server: requests may come.
-  void ready() const noexcept;
+  // Server: requests may come; at this port, if it has one.
+  void ready(std::uint16_t port = 0) const noexcept;
+  // Requester: the server's port.
+  [[nodiscard]] std::uint16_t port() const noexcept { return static_cast<std::uint16_t>(control_.port.load(std::memory_order_relaxed)); }
   // Server: look after a request is there and before the reply leaves. True: this reply is the last.
   [[nodiscard]] bool stopping() const noexcept { return control_.stopping.load(std::memory_order_relaxed) != 0; }
   // Requester: the next request is the last.
@@ -87,6 +98,7 @@ struct Act {
   std::function<void(const Scene&)> requester;  // starts when the server is ready
   std::size_t scratchBytes = 0;
   bool stopsByItself = false;  // the server leaves after stop(), and gets a moment to do so
+  Nanoseconds grace = std::chrono::seconds(15);  // beyond the budget: connecting, tearing down
 };
 
 struct Outcome {
@@ -96,31 +108,17 @@ struct Outcome {
 
 class Stage {
  public:
-  Stage(Placement placement, Budget budget) noexcept : placement_(placement), budget_(budget) {}
+  Stage(Placement placement, Budget budget) noexcept : placement_(std::move(placement)), budget_(budget) {}
 
-  // Returns in less than budget + 20 s whatever the processes do.
+  // Returns in less than the budget, twice the act's grace and a second, whatever the processes do.
   [[nodiscard]] Outcome run(const Act& act) const;
 
   [[nodiscard]] Budget budget() const noexcept { return budget_; }
-  [[nodiscard]] Placement placement() const noexcept { return placement_; }
+  [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
 
  private:
   Placement placement_;
   Budget budget_;
 };
-
-// Pins the calling thread, and threads that it starts, to one CPU. Throws std::system_error.
-void pinTo(int cpu);
-// CPUs that this process may run on.
-[[nodiscard]] std::vector<int> allowedCpus();
-// Runs `body` in a process of its own that dies with this one. Returns its pid. Nothing of the caller's is torn down at its end.
-[[nodiscard]] int forkProcess(const std::function<void()>& body);
-// Ends a process that forkProcess() or fork() made and waits for it.
-void killProcess(int pid) noexcept;
-// True once it has ended; it is reaped then.
-[[nodiscard]] bool hasEnded(int pid) noexcept;
-void sleepFor(Nanoseconds duration);
-// Waits until `done()`, looking every 200 us. False: not within `limit`.
-[[nodiscard]] bool waitUntil(const std::function<bool()>& done, Nanoseconds limit);
 
 }  // namespace mpf::bench

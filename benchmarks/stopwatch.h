@@ -8,6 +8,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include <mpf/base/clock.h>
@@ -55,7 +56,7 @@ class Stopwatch {
   // Between a start() and a stop(), less what reading costs [ns].
   [[nodiscard]] double elapsed(std::uint64_t from, std::uint64_t to) const noexcept { return std::max(0.0, toNs(to - from) - costNs_); }
   [[nodiscard]] std::uint64_t elapsedNs(std::uint64_t from, std::uint64_t to) const noexcept {
-    return static_cast<std::uint64_t>(elapsed(from, to) + 0.5);
+    return static_cast<std::uint64_t>(std::llround(elapsed(from, to)));
   }
   [[nodiscard]] std::uint64_t ticksOf(Nanoseconds duration) const noexcept {
     return static_cast<std::uint64_t>(static_cast<double>(duration.count()) / nsPerTick_);

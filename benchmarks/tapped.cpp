@@ -26,7 +26,12 @@ class Tap {
     checkCall(::pipe2(ends, O_CLOEXEC), "pipe2");
     const FileDescriptor said(ends[0]);
     FileDescriptor says(ends[1]);
-    pid_ = forkProcess([&] { run(backplane, says); });
+    pid_ = startProgram({tool(), "tap", kServer, "--backplane", backplane, "--write", "/dev/null"}, [&] {
+      cpu_set_t all;
+      std::memset(&all, 0xff, sizeof all);
+      ::sched_setaffinity(0, sizeof all, &all);
+      ::dup2(says.get(), STDERR_FILENO);
+    });
     says.reset();
     char first{};
     if (retryInterrupted([&] { return ::read(said.get(), &first, 1); }) != 1) throw std::runtime_error("mpf tap does not start");
@@ -36,13 +41,6 @@ class Tap {
   Tap& operator=(const Tap&) = delete;
 
  private:
-  static void run(const std::string& backplane, const FileDescriptor& says) {
-    cpu_set_t all;
-    std::memset(&all, 0xff, sizeof all);
-    ::sched_setaffinity(0, sizeof all, &all);
-    ::dup2(says.get(), STDERR_FILENO);
-    ::execl(tool().c_str(), "mpf", "tap", kServer, "--backplane", backplane.c_str(), "--write", "/dev/null", nullptr);
-  }
   int pid_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include <mpf/benchmarks/meter.h>
 #include <mpf/benchmarks/stage.h>
 #include <mpf/benchmarks/stopwatch.h>
 
@@ -67,6 +68,67 @@ void timeRate(const Scene& scene, std::uint64_t perStep, Step&& step) {
   const auto elapsedNs = Clock::nowNs() - fromNs;
   scene.figures().count = steps * perStep;
   scene.figures().perSecond = static_cast<double>(steps * perStep) * 1e9 / static_cast<double>(elapsedNs);
+}
+
+// Calls `exchange`, which sends `perExchange` messages and takes their replies, over and over. Each exchange is timed by itself; the rate
+// is that of the messages.
+template <class Exchange>
+void timeExchanges(const Scene& scene, Meter& meter, std::uint64_t perExchange, Exchange&& exchange) {
+  const Stopwatch watch;
+  const auto warm = Stopwatch::start() + watch.ticksOf(scene.budget().warmUp);
+  do exchange();
+  while (Stopwatch::start() < warm);
+
+  LatencyRecorder recorder;  // private: a shared one would be a line that bounces
+  meter.start();
+  const auto begin = Stopwatch::start();
+  const auto end = begin + watch.ticksOf(scene.budget().measure);
+  std::uint64_t now = begin;
+  while (now < end) {
+    const auto from = Stopwatch::start();
+    exchange();
+    now = Stopwatch::stop();
+    recorder.add(watch.elapsedNs(from, now));
+  }
+  meter.stop(scene.figures());
+  scene.figures().latency = recorder;
+  scene.figures().count = recorder.count() * perExchange;
+  scene.figures().perSecond = static_cast<double>(scene.figures().count) * 1e9 / watch.elapsed(begin, now);
+}
+
+// Keeps `window` messages on their way: `receive` takes the oldest reply, then `send` sends one more. Each is timed from its send to its reply.
+template <class Send, class Receive>
+void timeWindow(const Scene& scene, Meter& meter, std::size_t window, Send&& send, Receive&& receive) {
+  const Stopwatch watch;
+  std::vector<std::uint64_t> sentAt(window);
+  const auto sendAt = [&](std::size_t place) {
+    sentAt[place] = Stopwatch::start();
+    send();
+  };
+  LatencyRecorder recorder;
+  std::size_t oldest = 0;
+  const auto goOn = [&](Nanoseconds duration) {
+    const auto end = Stopwatch::start() + watch.ticksOf(duration);
+    for (std::uint64_t now = 0; now < end; oldest = (oldest + 1) % window) {
+      receive();
+      now = Stopwatch::stop();
+      recorder.add(watch.elapsedNs(sentAt[oldest], now));
+      sendAt(oldest);
+    }
+  };
+  for (std::size_t place = 0; place < window; ++place) sendAt(place);
+  goOn(scene.budget().warmUp);
+
+  recorder = {};
+  meter.start();
+  const auto begin = Stopwatch::start();
+  goOn(scene.budget().measure);
+  const auto elapsed = watch.elapsed(begin, Stopwatch::stop());
+  meter.stop(scene.figures());
+  for (std::size_t i = 0; i < window; ++i) receive();
+  scene.figures().latency = recorder;
+  scene.figures().count = recorder.count();
+  scene.figures().perSecond = static_cast<double>(recorder.count()) * 1e9 / elapsed;
 }
 
 // For one-way traffic: `flood(goOn)` sends while goOn(); what counts is what the other process has taken.

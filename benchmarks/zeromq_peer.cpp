@@ -36,7 +36,7 @@ class ZeromqPeer final : public Peer {
     // The last reply must leave before the process does.
     close();
   }
-  void connect() override {
+  void connect(const Scene&) override {
     open();
     check(zmq_connect(socket_, address().c_str()), "zmq_connect");
   }
@@ -50,8 +50,8 @@ class ZeromqPeer final : public Peer {
       if (++taken % 64 == 0) scene.consumed(taken);
     }
   }
-  void flood(const std::function<bool()>& goOn) override {
-    connect();
+  void flood(const Scene& scene, const std::function<bool()>& goOn) override {
+    connect(scene);
     while (goOn()) {
       for (int i = 0; i < 64; ++i) put();
     }

@@ -18,7 +18,7 @@ void expectToAnswer(const PeerFamily& family, Mode mode, std::size_t bytes) {
   act.stopsByItself = true;
   act.server = [peer](const Scene& scene) { peer->serve(scene); };
   act.requester = [peer](const Scene& scene) {
-    peer->connect();
+    peer->connect(scene);
     for (int i = 0; i < 3; ++i) peer->roundTrip();
     for (int i = 0; i < 2; ++i) peer->send();
     for (int i = 0; i < 2; ++i) peer->receive();
@@ -26,7 +26,7 @@ void expectToAnswer(const PeerFamily& family, Mode mode, std::size_t bytes) {
     peer->roundTrip();
   };
 
-  const auto outcome = Stage({cpus.front(), cpus.back()}, {}).run(act);
+  const auto outcome = Stage({{cpus.front()}, {cpus.back()}}, {}).run(act);
   peer->removeTraces();
 
   EXPECT_EQ(outcome.error, "") << family.name << ", " << toString(mode) << ", " << bytes << " bytes";

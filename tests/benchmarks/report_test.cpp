@@ -12,12 +12,12 @@ namespace {
 
 using testing::HasSubstr;
 
-nlohmann::json parsed(const Result& result) { return nlohmann::json::parse(toJson({result}, Machine{}, {0, 1})).at(0); }
+nlohmann::json parsed(const Result& result) { return nlohmann::json::parse(toJson({result}, Machine{}, {})).at(0); }
 
 // One row in earnest, however short: processes, loop, figures, JSON.
 TEST(Json, HasWhatReadersCountOnForALatency) {
   const auto cpus = allowedCpus();
-  const Placement placement{cpus.front(), cpus.back()};
+  const Placement placement{{cpus.front()}, {cpus.back()}};
   const auto rows = floorMeasurements();
   const Budget moment{std::chrono::milliseconds(1), std::chrono::milliseconds(4)};
   const auto asleep = std::find_if(rows.begin(), rows.end(), [](const auto& row) { return row.name == kFutexBounce; });

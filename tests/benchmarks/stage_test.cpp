@@ -13,7 +13,7 @@ namespace {
 // Both on one CPU, so that a machine with a single one will do.
 Stage smallStage() {
   const auto cpu = allowedCpus().front();
-  return Stage({cpu, cpu}, {std::chrono::milliseconds(1), std::chrono::milliseconds(2)});
+  return Stage({{cpu}, {cpu}}, {std::chrono::milliseconds(1), std::chrono::milliseconds(2)});
 }
 
 TEST(Stage, BringsTheRequestersFiguresBack) {

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// The table of `mpf bench hardware`.
+#include <fmt/format.h>
+
+#include <mpf/base/duration_text.h>
+#include <mpf/benchmarks/hardware.h>
+#include <mpf/benchmarks/report.h>
+
+namespace mpf::bench {
+namespace {
+
+constexpr const char* kHardwareLine = "  {:<54} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}  {}\n";
+constexpr const char* kOne = "  {:<54} {}\n";
+
+std::string hardwareLineOf(const Result& result) {
+  const auto& what = result.measurement;
+  const auto& figures = result.figures;
+  if (!what.skipped.empty()) return fmt::format(kOne, what.name, "left out: " + what.skipped);
+  if (!result.error.empty()) return fmt::format(kOne, what.name, "failed: " + result.error);
+  if (!what.unit.empty())
+    return fmt::format("  {:<54} {:>8.4g} {}{}{}\n", what.name, figures.value, what.unit, what.detail.empty() ? "" : ", ", what.detail);
+  const bool isMeasured = figures.latency.count() != 0;
+  const auto at = [&](double percent) {
+    return isMeasured ? durationText(static_cast<double>(figures.latency.percentileNs(percent))) : "";
+  };
+  const bool isCompared = result.ratioToFloor > 0;
+  return fmt::format(kHardwareLine, what.name, rateText(figures.perSecond), at(50), at(99), at(99.9),
+                     isMeasured ? durationText(static_cast<double>(figures.latency.maxNs())) : "",
+                     isCompared ? fmt::format("{:.3f}", 1 / result.ratioToFloor) : "",
+                     isCompared ? rateText(1e9 / result.floorNs) + ": " + what.floorName : what.detail);
+}
+
+std::string hardwareHeader(const Measurement& first) {
+  if (!first.unit.empty()) return {};  // the line says what its figure is
+  const bool isServers = first.question == kServers;
+  return fmt::format(kHardwareLine, "", "messages", "p50", "p99", "p99.9", "max", isServers ? "x echo" : "x manual",
+                     isServers ? "the echo was" : "");
+}
+
+}  // namespace
+
+std::string hardwareTable(const std::vector<Result>& results) {
+  std::string text;
+  std::string question;
+  for (const auto& result : results) {
+    if (result.measurement.question != question) {
+      question = result.measurement.question;
+      text += "\n" + question + "\n" + hardwareHeader(result.measurement);
+    }
+    text += hardwareLineOf(result);
+  }
+  return text;
+}
+
+}  // namespace mpf::bench

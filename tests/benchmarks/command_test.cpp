@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+// `mpf bench`, as one calls it. How fast anything is, is no test's business.
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <mpf/tests/tools/tool.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+Ended bench(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "bench");
+  return runTool(std::move(arguments), {});
+}
+
+TEST(BenchCommand, HelpNamesAllBenches) {
+  const auto ended = bench({"--help"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("local"), HasSubstr("remote"), HasSubstr("hardware")));
+}
+
+TEST(BenchCommand, ListsTheManualsTableAtBothPlaces) {
+  const auto ended = bench({"remote", "--list"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  for (const auto* place : {"One host, loopback", "Two network namespaces, veth"}) {
+    for (const auto* row : {"raw TCP, no buffer", "raw TCP, 100 in one write", "MPF remote, no buffer", "MPF remote, 100 buffered",
+                            "MPF remote, 1000 buffered"})
+      EXPECT_THAT(ended.out, HasSubstr(std::string(place) + ": round trips of an Int32: " + row + ","));
+  }
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF local, no buffer"), HasSubstr("MPF local, 1000 buffered")));
+}
+
+TEST(BenchCommand, MeasuresOnLoopback) {
+  const auto ended = bench({"remote", "--quick", "--json", "-", "--only", "loopback: round trips of an Int32: raw TCP, no buffer", "--only",
+                            "MPF local, 100 buffered"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto rows = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(rows.size(), 3u);  // and the floor of the second
+  EXPECT_EQ(rows[0].at("name"), "raw TCP, no buffer");
+  EXPECT_GT(rows[0].at("per_s").get<double>(), 0);
+  EXPECT_GT(rows[0].at("writes_per_s").get<double>(), 0);
+  EXPECT_EQ(rows[1].at("name"), "raw TCP, 100 in one write");
+  EXPECT_EQ(rows[1].at("bytes"), 4);
+  EXPECT_EQ(rows[2].at("floor_name"), "raw TCP, 100 in one write");
+  EXPECT_GT(rows[2].at("ratio_to_floor").get<double>(), 0);
+}
+
+TEST(BenchCommand, LeavesOutNamespacesByNameForWhoMayNotMakeThem) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  constexpr uid_t kNobody = 65534;
+
+  const auto ended = Tool({"bench", "remote", "--list", "--only", "veth: round trips of an Int32: raw TCP"}, {}, kNobody).end();
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  EXPECT_THAT(ended.out, HasSubstr("(left out: unshare"));
+}
+
+TEST(BenchCommand, ListsEachServerOverHardware) {
+  const auto ended = bench({"hardware", "--list"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  for (const auto* program : {"mpf-int32-server", "mpf-dac128v-server", "mpf-ip330-server", "mpf-digital-io-server", "mpf-serial-server"})
+    EXPECT_THAT(ended.out, HasSubstr(std::string("Round trips with a server over a model: ") + program));
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("the driver's thread"), HasSubstr("the manual's, local")));
+}
+
+TEST(BenchCommand, ListsWhateverTheProcessorsAre) {
+  for (const auto* const which : {"local", "remote", "hardware"})
+    EXPECT_EQ(bench({which, "--list", "--cpus", "0,9999"}).status, 0) << which;
+}
+
+TEST(BenchCommand, HasTheManualsFiguresAsNotMeasured) {
+  const auto ended = bench({"hardware", "--json", "-", "--only", "the manual's, remote"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto rows = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].at("per_s"), 156);
+  EXPECT_EQ(rows[1].at("value"), 91);
+  EXPECT_EQ(rows[1].at("unit"), "% of one CPU");
+  for (const auto& row : rows) EXPECT_EQ(row.at("detail"), "not measured here");
+}
+
+TEST(BenchCommand, MeasuresAServerOverAModelBesideTheEcho) {
+  const auto ended = bench({"hardware", "--quick", "--json", "-", "--only", "mpf-dac128v-server"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto rows = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(rows.size(), 2u);  // and its floor
+  EXPECT_EQ(rows[0].at("name"), "mpf-int32-server, the echo");
+  EXPECT_GT(rows[0].at("per_s").get<double>(), 0);
+  EXPECT_EQ(rows[1].at("floor_name"), rows[0].at("name"));
+  EXPECT_GT(rows[1].at("ratio_to_floor").get<double>(), 0);
+  EXPECT_GT(rows[1].at("p99_ns").get<double>(), 0);
+}
+
+TEST(BenchCommand, MeasuresEightSerialPortsBesideTheManual) {
+  const auto ended = bench({"hardware", "--quick", "--json", "-", "--only", "echo read, no line time"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto rows = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0].at("per_s"), 159);
+  EXPECT_GT(rows[1].at("per_s").get<double>(), 0);
+  EXPECT_GT(rows[1].at("ratio_to_floor").get<double>(), 0);
+  EXPECT_EQ(rows[2].at("unit"), "% of one CPU");
+}
+
+TEST(BenchCommand, LooksAtAModelThatScans) {
+  const auto ended = bench({"hardware", "--quick", "--json", "-", "--only", "scans read", "--only", "driver's thread"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto rows = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(rows.size(), 2u);
+  for (const auto& row : rows) EXPECT_GT(row.at("value").get<double>(), 0) << row.at("name");
+}
+
+TEST(BenchCommand, SaysWhatIsWrongWithTheCommandLine) {
+  EXPECT_EQ(bench({"remote", "--only", "no such row"}).status, 2);
+  EXPECT_EQ(bench({"remote", "--cpus", "0,none"}).status, 2);
+  EXPECT_THAT(bench({"remote", "--wait", "long"}).err, HasSubstr("--wait"));
+  const auto spinning = bench({"hardware", "--list", "--wait", "spin"});
+  EXPECT_EQ(spinning.status, 2);
+  EXPECT_THAT(spinning.err, HasSubstr("share the server's CPU"));
+}
+
+}  // namespace
+}  // namespace mpf::test
