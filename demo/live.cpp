@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+// mpf-demo: writes to a DAC and to digital lines, reads what comes back and an instrument, and draws it until q is pressed. Without a
+// terminal it prints lines for some seconds. demo/hardware starts the servers.
+//
+// Time that passes is no failure: a run ends well once each of the three was seen to work, and always when somebody ends it.
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <fmt/format.h>
+#include <numbers>
+#include <thread>
+
+#include <mpf/base/clock.h>
+#include <mpf/base/command_line.h>
+#include <mpf/base/stop_signals.h>
+#include <mpf/tools/screen.h>
+
+#include "devices.h"
+#include "picture.h"
+
+namespace {
+
+using namespace std::chrono_literals;
+using mpf::demo::Sample;
+
+constexpr auto kPause = 40ms;  // from what is written to what is read; longer than the ADC's mean
+constexpr double kPeriodSeconds = 4, kAmplitudeVolts = 4;
+constexpr int kRoundsPerLine = 10;
+constexpr double kCloseVolts = 0.05;
+constexpr double kAwayVolts = 1;  // from 0 V, which an ADC without a wire measures, too
+constexpr int kMoreRounds = 100;  // when the time is over and something was not seen yet
+
+struct Options {
+  std::string backplane;
+  double seconds = 0;
+  double patience = 0.25;
+};
+
+std::atomic<bool> isStopped{false};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables): of a signal handler
+
+// What was seen to work.
+struct Verdict {
+  int followed = 0, measured = 0, measuredAway = 0, instrument = 0, rounds = 0;
+
+  void add(const Sample& sample) {
+    ++rounds;
+    if (sample.inputs && sample.inputs == sample.outputs) ++followed;
+    if (sample.written && sample.measured && std::abs(*sample.written - *sample.measured) < kCloseVolts) {
+      ++measured;
+      if (std::abs(*sample.written) > kAwayVolts) ++measuredAway;
+    }
+    if (sample.instrument) ++instrument;
+  }
+  [[nodiscard]] bool isGood() const { return std::min({followed, measuredAway, instrument}) > 0; }
+};
+
+// A sine, and a bit that wanders.
+class Rounds {
+ public:
+  Rounds(const std::string& backplane, std::chrono::milliseconds patience, mpf::Deadline end)
+      : devices_(mpf::Backplane::attach(backplane), patience), end_(end) {}
+  void next() {
+    const auto seconds = static_cast<double>(mpf::Clock::nowNs() - begin_) * 1e-9;
+    const auto volts = kAmplitudeVolts * std::sin(2 * std::numbers::pi * seconds / kPeriodSeconds);
+    const auto place = static_cast<int>(4 * seconds) % 14;
+    devices_.give(volts, static_cast<std::uint8_t>(1 << std::min(place, 14 - place)));
+    std::this_thread::sleep_for(kPause);
+    const auto sample = devices_.look();
+    picture_.add(sample);
+    verdict_.add(sample);
+    if (end_.hasPassed()) ++late_;
+  }
+  [[nodiscard]] std::vector<mpf::tools::TopLine> lines(int rows, int columns) const {
+    return picture_.lines(rows, columns, devices_.told());
+  }
+  [[nodiscard]] std::string line() const { return picture_.line(devices_.told()); }
+  [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
+  // Somebody ended it, or the time is over, and all was seen or will not be.
+  [[nodiscard]] bool areOver() const {
+    if (isStopped.load(std::memory_order_relaxed)) return true;
+    return end_.hasPassed() && (verdict_.isGood() || late_ >= kMoreRounds);
+  }
+
+ private:
+  std::int64_t begin_ = mpf::Clock::nowNs();
+  mpf::demo::DemoDevices devices_;
+  mpf::Deadline end_;
+  mpf::demo::Picture picture_;
+  Verdict verdict_;
+  int late_ = 0;
+};
+
+int columns() {
+  winsize size{};
+  return ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+void draw(Rounds& rounds) {
+  mpf::tools::Screen screen;
+  while (!rounds.areOver()) {
+    rounds.next();
+    screen.draw(rounds.lines(screen.rows(), columns()));
+    while (const auto key = screen.tryKey()) {
+      if (*key == 'q') isStopped.store(true, std::memory_order_relaxed);
+    }
+  }
+}
+
+void print(Rounds& rounds) {
+  for (int round = 0; !rounds.areOver(); ++round) {
+    rounds.next();
+    if (round % kRoundsPerLine == 0) fmt::print("{}\n", rounds.line());
+    std::fflush(stdout);
+  }
+}
+
+template <class Duration>
+Duration durationOf(double seconds) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+}
+
+int run(const Options& options) {
+  const bool hasTerminal = ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0;
+  const auto seconds = options.seconds > 0 || hasTerminal ? options.seconds : 5;
+  const auto end = seconds > 0 ? mpf::Deadline::after(durationOf<mpf::Nanoseconds>(seconds)) : mpf::Deadline::never();
+  const mpf::StopSignals stop([](void*) noexcept { isStopped.store(true, std::memory_order_relaxed); }, nullptr);
+  Rounds rounds(options.backplane, durationOf<std::chrono::milliseconds>(options.patience), end);
+  (hasTerminal ? draw : print)(rounds);
+  const auto& verdict = rounds.verdict();
+  fmt::print("of {} rounds: the ADC measured what the DAC gave in {}, inputs followed outputs in {}, the voltmeter answered in {}\n",
+             verdict.rounds, verdict.measured, verdict.followed, verdict.instrument);
+  return verdict.isGood() || isStopped.load(std::memory_order_relaxed) ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  Options options;
+  CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws what they say", "mpf-demo");
+  app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
+  app.add_option("--seconds", options.seconds, "End after so long; without a terminal 5, else with q")->check(mpf::number(0.1, 1e9));
+  app.add_option("--patience", options.patience, "Wait so long for an answer [s]; default 0.25")->check(mpf::number(0.001, 1e6));
+  if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
+  return run(options);
+} catch (const std::exception& error) {
+  fmt::print(stderr, "mpf-demo: {}\n", error.what());
+  return 1;
+}

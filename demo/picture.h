@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Picture: the last rounds of the demo as lines of text: a chart of the DAC and the ADC, lamps for digital lines, a chart of the instrument.
+//
+// Threads  one.
+#pragma once
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include <mpf/tools/top_view.h>
+
+#include "devices.h"
+
+namespace mpf::demo {
+
+class Picture {
+ public:
+  void add(const Sample& sample);
+  // For a screen of so many rows and columns.
+  [[nodiscard]] std::vector<tools::TopLine> lines(int rows, int columns, std::uint64_t told) const;
+  // The last round in one line.
+  [[nodiscard]] std::string line(std::uint64_t told) const;
+
+ private:
+  [[nodiscard]] std::vector<std::string> chart(std::size_t rows, std::size_t columns) const;
+  [[nodiscard]] std::string bars(std::size_t columns) const;
+
+  std::deque<Sample> samples_;  // the newest last
+};
+
+}  // namespace mpf::demo
