@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 #include <vector>
 
-#include <mpf/shm/backplane.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/shm/window.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -43,16 +43,9 @@ class CrowdTest : public testing::Test {
     EXPECT_EQ(window->control().linksOpened.load(), kProcesses * kClientsOfEach);
     EXPECT_EQ(window->control().protocolErrors.load(), 0u);
   }
-  // Whoever attaches next removes what the dead left; then nothing is there.
-  void TearDown() override {
-    crowd_.clear();
-    server_ = Victim();
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
-  }
 
   Watchdog watchdog_{"crowd test", std::chrono::seconds(300)};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   Victim server_;
   std::vector<Victim> crowd_;
 };

@@ -15,6 +15,7 @@
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tests/shm/child.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
@@ -40,8 +41,6 @@ class ForkTest : public testing::Test {
     server_->interrupt();
     thread_.join();
     server_.reset();
-    static_cast<void>(backplane_.removeDead());  // of a process that a test killed
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
   }
   static void expectAnswer(SyncClient& client) {
     auto answer = client.call(Float64Message({.value = 1}), 60s);
@@ -62,7 +61,7 @@ class ForkTest : public testing::Test {
   }
 
   Watchdog watchdog_{"fork test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   std::unique_ptr<MessageServer> server_ = std::make_unique<MessageServer>(backplane_, "echo");
   std::thread thread_;
   std::unique_ptr<MessageClient> client_;

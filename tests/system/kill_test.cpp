@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <iostream>
+#include <memory>
+#include <optional>
 #include <random>
 #include <set>
 
@@ -12,6 +14,7 @@
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tests/support/sanitized.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -33,14 +36,9 @@ class KillTest : public testing::Test {
     std::cout << "seed " << seed << '\n';
   }
   std::string backplaneName() const { return backplane_.name(); }
-  // Whoever attaches next removes what the dead left; then nothing is there.
-  void TearDown() override {
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
-  }
 
   Watchdog watchdog_{"kill test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
   std::mt19937 random_;
 };
 
@@ -114,6 +112,25 @@ TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
   EXPECT_GT(ledger.replies, 0u);
 }
 
+// Who runs one thing at a time has the death as one of them, and not with whatever comes next.
+TEST_F(KillTest, ADeathIsAThingThatRuns) {
+  Victim server("serve", backplaneName());
+  Dispatcher dispatcher(backplane_);
+  bool isGone = false;
+  MessageClient client(dispatcher, [&](const Message& message) {
+    const auto* news = message.tryAs<Connect>();
+    isGone = news != nullptr && news->status == ConnectStatus::connectNo;
+  });
+  client.bind("echo");
+  ASSERT_TRUE(client.connectWait(60s));
+  while (!dispatcher.nextDeadline().isNever()) dispatcher.runOnce();  // then the death is all that comes
+
+  server.end(SIGKILL);
+  static_cast<void>(backplane_.removeDead());  // there is no window any more, either
+
+  while (!isGone) EXPECT_TRUE(dispatcher.runOnce());
+}
+
 TEST_F(KillTest, AServerGoesOnWhenClientsAreKilled) {
   Victim server("serve", backplaneName());
 
@@ -158,6 +175,37 @@ TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {
     while (!answer) answer = client.call(Float64Message({.value = 2}), 60s);  // the fate of a call that met the death
     EXPECT_EQ(answer.message().tryAs<Float64>()->value, 3);
   }
+}
+
+// It pauses once more while it is given what its server had sent: that holds for nothing any more.
+TEST_F(KillTest, AClientThatPausesAtItsServersEndMayGoOn) {
+  Victim server("serve", backplaneName());
+  ASSERT_EQ(server.line(), "open");
+  int replies = 0;
+  std::optional<ConnectStatus> news;
+  Dispatcher dispatcher(backplane_);
+  std::unique_ptr<MessageClient> client;
+  client = std::make_unique<MessageClient>(dispatcher, [&](const Message& message) {
+    if (const auto* connect = message.tryAs<Connect>()) {
+      news = connect->status;
+    } else {
+      ++replies;
+      client->pause();
+    }
+  });
+  client->bind("echo");
+  while (!client->isConnected()) dispatcher.runOnce(Deadline::after(1ms));
+  client->pause();
+  ASSERT_EQ(client->send(Float64Message()), SendResult::sent);
+  ASSERT_EQ(client->send(Float64Message()), SendResult::sent);
+  SyncClient other(backplane_, "echo");
+  ASSERT_TRUE(other.call(Float64Message(), 60s)) << "and so did the two before it";
+
+  server.end(SIGKILL);
+  while (news != ConnectStatus::connectNo) dispatcher.runOnce(Deadline::after(1ms));
+  client->goOn();
+
+  EXPECT_EQ(replies, 2);
 }
 
 TEST_F(KillTest, AStoppedServerIsNotDead) {

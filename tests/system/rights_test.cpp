@@ -13,6 +13,7 @@
 #include <mpf/client/sync_client.h>
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -65,13 +66,9 @@ class RightsTest : public testing::Test {
     }
     return found;
   }
-  void TearDown() override {
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
-  }
 
   Watchdog watchdog_{"rights test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 // Makes a link with memory for large messages both ways.

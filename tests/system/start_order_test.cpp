@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <mpf/server/message_server.h>
-#include <mpf/shm/backplane.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -24,14 +24,9 @@ class StartOrderTest : public testing::Test {
   Victim startClient() const { return {"crowd", backplane_.name(), {"1"}}; }
   // The path of the server's window.
   std::string windowPath() const { return segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")); }
-  // Whoever attaches next removes what the dead left; then nothing is there.
-  void TearDown() override {
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
-  }
 
   Watchdog watchdog_{"start order test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 TEST_F(StartOrderTest, AClientMayStartBeforeItsServer) {

@@ -7,6 +7,7 @@
 
 #include <mpf/client/sync_client.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -32,7 +33,7 @@ class StopTest : public testing::TestWithParam<int> {
   void TearDown() override { EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()); }
 
   Watchdog watchdog_{"stop test"};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 void expectEndedInOrder(int status) {
@@ -95,7 +96,7 @@ TEST_P(StopTest, AServerEndsWhileClientsSendAsFastAsTheyCan) {
 
   EXPECT_FALSE(hasWindow());
   clients.clear();
-  static_cast<void>(backplane_.removeDead());  // the clients were killed
+  static_cast<void>(backplane_.removeDead());  // those are dead
 }
 
 TEST_P(StopTest, ASecondSignalDoesNoHarm) {

@@ -21,6 +21,7 @@
 #include <mpf/client/sync_client.h>
 #include <mpf/server/message_server.h>
 #include <mpf/shm/segment_name.h>
+#include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/victim.h>
 #include <mpf/tests/support/watchdog.h>
 
@@ -63,10 +64,6 @@ class WorldTest : public testing::Test {
 #ifdef __SANITIZE_THREAD__
     GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some";
 #endif
-  }
-  void TearDown() override {
-    static_cast<void>(backplane_.removeDead());
-    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
   }
   // Runs `act` in a child that may change its world.
   static void inChild(const std::function<void()>& act) {
@@ -111,7 +108,7 @@ class WorldTest : public testing::Test {
   }
 
   Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
-  Backplane backplane_ = Backplane::isolated();
+  TestBackplane backplane_;
 };
 
 TEST_F(WorldTest, SharedMemoryThatIsFullIsAClearErrorAndServesOn) {

@@ -14,13 +14,13 @@ MAY_INCLUDE = {
     "base": [],
     "schema": ["base"],
     "shm": ["base"],
-    "router": ["schema", "shm"],
     "server": ["schema", "shm", "channel"],
     "server/programs": ["server", "drivers"],
     "channel": ["schema", "shm"],
     "client": ["schema", "shm", "channel"],
     "client/programs": ["client"],
     "drivers": ["base"],
+    "router": ["schema", "shm", "channel", "client", "server", "server/programs"],  # it looks like a server to local clients, and like a client to local servers
     "epics": ["client"],
     "crate": ["base"],
     "benchmarks": ["client", "server"],
@@ -130,6 +130,17 @@ def unfinished(files):
                 yield path, number, f"{match[0]}: do it, or put it into an issue"
 
 
+def shown_code(files):
+    """Where a document shows code under the name of its file (`drivers/x.h`: and a block), each line of it is one of that file."""
+    block = re.compile(r"^`([\w./-]+)`:\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+    for path, text in files.items():
+        for match in block.finditer(text) if path.endswith(".md") else ():
+            real = files.get(match[1], "").splitlines()
+            for number, line in enumerate(match[2].splitlines(), start=line_of(text, match.start(2))):
+                if line not in real:
+                    yield path, number, f"shows a line that is not in {match[1]}"
+
+
 def machine_paths(files):
     """Nothing depends on where somebody keeps the tree or gets packages from."""
     place = re.compile(r"(?<![\w.$}-])/(work|root|home/\w+)/[\w.]|\b(pypi|debian|npmjs|docker|ghcr)\.(org|com|io)\b/(?!doc)|\bdeb\.debian\.org\b")
@@ -139,7 +150,7 @@ def machine_paths(files):
                 yield path, number, f"names a place of somebody's machine or a package host: {match[0]}"
 
 
-RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, machine_paths)
+RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, shown_code, machine_paths)
 
 
 def read_tree(top):

@@ -54,6 +54,12 @@ class Rules(unittest.TestCase):
         self.refuses(check.licences, {"demo/run": "#!/bin/sh\ntrue\n"}, ("demo/run", 1))
         self.passes(check.licences, {"shm/a.h": SPDX, "demo/run": "#!/bin/sh\n# SPDX-License-Identifier: MIT\n", "README.md": "# MPF\n"})
 
+    def test_shown_code(self):
+        shown = "Look:\n\n`shm/a.h`:\n```cpp\nint a;\nint b;\n```\n"
+        self.refuses(check.shown_code, {"docs/a.md": shown, "shm/a.h": SPDX + "int a;\n"}, ("docs/a.md", 6))
+        self.refuses(check.shown_code, {"docs/a.md": shown}, ("docs/a.md", 5), ("docs/a.md", 6))
+        self.passes(check.shown_code, {"docs/a.md": shown + "```cpp\nint c;\n```\n", "shm/a.h": SPDX + "int b;\n\nint a;\n"})
+
     def test_sizes(self):
         self.refuses(check.sizes, {"shm/a.cpp": "\n" * 401}, ("shm/a.cpp", 401))
         self.passes(check.sizes, {"shm/a.cpp": "\n" * 400, "docs/long.md": "\n" * 900})

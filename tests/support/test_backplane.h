@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// TestBackplane: an isolated backplane that ends with its test. What users of it that were killed left behind is removed; anything
+// else that is left fails the test. Declare it before whatever uses it.
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <mpf/shm/backplane.h>
+
+namespace mpf::test {
+
+class TestBackplane : public Backplane {
+ public:
+  TestBackplane() : Backplane(Backplane::isolated()) {}
+  TestBackplane(const TestBackplane&) = delete;
+  TestBackplane& operator=(const TestBackplane&) = delete;
+  ~TestBackplane() {
+    static_cast<void>(removeDead());
+    EXPECT_THAT(segmentNames(), testing::IsEmpty()) << "left behind";
+  }
+};
+
+}  // namespace mpf::test

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the client that draws what they say.
+#include <filesystem>
+#include <gmock/gmock.h>
+#include <string>
+
+#include <mpf/tests/support/command.h>
+#include <mpf/tests/support/temporary_folder.h>
+#include <mpf/tests/support/terminal.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+// Without a terminal. What waits for an answer waits for as long as the test does.
+EndedCommand runDemo(const std::string& build) {
+  return runCommand(MPF_TEST_DEMO " " + build + " --seconds 0.1 --patience 1000 </dev/null 2>&1");
+}
+
+class Demo : public testing::Test {
+ protected:
+  // The programs of the build, but for an ADC's server that is this script.
+  [[nodiscard]] std::string buildWithAdc(const std::string& script) const {
+    const auto programs = folder_.file("bin");
+    std::filesystem::create_directory(programs);
+    for (const auto& program : std::filesystem::directory_iterator(MPF_TEST_BUILD "/bin"))
+      std::filesystem::create_symlink(program, programs + "/" + program.path().filename().string());
+    const auto server = programs + "/mpf-ip330-server";
+    std::filesystem::remove(server);
+    folder_.write("bin/mpf-ip330-server", "#!/bin/bash\n" + script);
+    std::filesystem::permissions(server, std::filesystem::perms::owner_all);
+    return folder_.path();
+  }
+
+  Watchdog watchdog_{"demo test"};
+  TemporaryFolder folder_;
+};
+
+TEST_F(Demo, PrintsWhatComesBackWithoutATerminal) {
+  const auto demo = runDemo(MPF_TEST_BUILD);
+
+  EXPECT_EQ(demo.status, 0) << demo.output;
+  EXPECT_THAT(demo.output, AllOf(HasSubstr("$ mpf-ip330-server adc ipac IP_b"), HasSubstr("VOLTMETER"), HasSubstr("  voltmeter "),
+                                 HasSubstr("the ADC measured what the DAC gave in"), HasSubstr("dioOut")));
+}
+
+TEST_F(Demo, ShowsWhatAServerSaidThatDoesNotStart) {
+  const auto demo = runDemo(buildWithAdc("echo this host has no analog inputs >&2; exit 3\n"));
+
+  EXPECT_NE(demo.status, 0);
+  EXPECT_THAT(demo.output, HasSubstr("this host has no analog inputs"));
+}
+
+TEST_F(Demo, FailsWhenNothingComesOverAWire) {
+  const auto demo = runDemo(buildWithAdc("exec " MPF_TEST_BUILD "/bin/mpf-ip330-server \"${@/0=wire:dac.0/0=dc:0}\"\n"));
+
+  EXPECT_NE(demo.status, 0) << demo.output;
+  EXPECT_THAT(demo.output, HasSubstr("the ADC measured what the DAC gave in"));
+}
+
+TEST_F(Demo, DrawsOnATerminalUntilQ) {
+  Terminal demo({MPF_TEST_DEMO, MPF_TEST_BUILD}, 30, 100);
+  ASSERT_TRUE(demo.waitFor("changes told"));
+  ASSERT_TRUE(demo.waitUntilGone("wired to them: 0 changes told"));
+  EXPECT_TRUE(demo.waitFor("●"));
+
+  demo.type("q");
+
+  EXPECT_EQ(demo.wait(), 0);
+  EXPECT_TRUE(demo.isRestored());
+}
+
+// Also when not all was seen to work: the voltmeter needs more than a millisecond.
+TEST_F(Demo, EndsWellWhenItIsEnded) {
+  constexpr auto* kQuit = "q";
+  constexpr auto* kInterrupt = "\x03";
+  for (const auto* const key : {kQuit, kInterrupt}) {
+    Terminal demo({MPF_TEST_DEMO, MPF_TEST_BUILD, "--patience", "0.001"}, 30, 100);
+    ASSERT_TRUE(demo.waitFor("q quit"));
+
+    demo.type(key);
+
+    EXPECT_EQ(demo.wait(), 0);
+    EXPECT_TRUE(demo.isRestored());
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// What holds for every program that is installed: how it says what it is, and what is wrong with its arguments.
+#include <sys/wait.h>
+
+#include <filesystem>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <sstream>
+#include <vector>
+
+#include <mpf/tests/support/command.h>
+#include <mpf/tests/support/program.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+using testing::AnyOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::vector<std::string> programs() {
+  std::istringstream list(MPF_TEST_PROGRAMS);
+  return {std::istream_iterator<std::string>(list), {}};
+}
+
+// What people call it: mpf-bench is what `mpf bench` starts.
+std::string nameOf(const std::string& program) {
+  const auto name = std::filesystem::path(program).filename().string();
+  return name == "mpf-bench" ? "mpf bench" : name;
+}
+
+// What a command writes to stdout; empty unless it ends well.
+std::string outputOf(const std::string& command) {
+  const auto ended = runCommand(command);
+  return ended.status == 0 ? ended.output : std::string();
+}
+
+class EveryProgram : public testing::TestWithParam<std::string> {
+ protected:
+  Watchdog watchdog_{"a program"};
+};
+
+TEST_P(EveryProgram, SaysItsVersion) { EXPECT_EQ(outputOf(GetParam() + " --version"), nameOf(GetParam()) + " " + MPF_TEST_VERSION + "\n"); }
+
+// The man pages are made of it.
+TEST_P(EveryProgram, SaysInItsFirstLineWhatItIsFor) {
+  EXPECT_THAT(outputOf(GetParam() + " --help"), StartsWith(nameOf(GetParam()) + " - "));
+}
+
+TEST_P(EveryProgram, NamesItselfAndWhatIsWrongAndEndsWith2) {
+  Program program({GetParam(), "--no-such-option"});
+
+  const auto said = program.errors();
+
+  const auto status = program.wait();
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_THAT(said, StartsWith(nameOf(GetParam()) + ": "));
+  EXPECT_THAT(said, AnyOf(HasSubstr("--no-such-option"), HasSubstr("is required")));
+  EXPECT_THAT(said, AnyOf(EndsWith("`" + nameOf(GetParam()) + " --help` shows how to use it\n"),
+                          EndsWith("`" + nameOf(GetParam()) + " --help` shows what they do\n")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Programs, EveryProgram, testing::ValuesIn(programs()), [](const auto& test) {
+  auto name = std::filesystem::path(test.param).filename().string();
+  std::ranges::replace(name, '-', '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace mpf::test

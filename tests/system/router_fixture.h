@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+// RouterTest: two routers, a client near and a server far, which take turns in the test's own thread; only the routers are processes.
+#pragma once
+
+#include <chrono>
+#include <fmt/format.h>
+#include <functional>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <mpf/client/message_client.h>
+#include <mpf/server/message_server.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/shm/window.h>
+#include <mpf/tests/support/caller.h>
+#include <mpf/tests/support/router_pair.h>
+#include <mpf/tests/support/victim.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+
+using namespace std::chrono_literals;
+
+class RouterTest : public testing::Test {
+ protected:
+  explicit RouterTest(RouterPlace place = {}) : routers_(std::move(place)) {}
+
+  // The server; `serve` is called for each request that it has received. Default: it sends the request back.
+  void openServer(ServerOptions options = {}) {
+    options.location = RouterPair::kLocation;
+    server_ = std::make_unique<MessageServer>(routers_.far(), "echo", options);
+  }
+  // Both routers, the server and a client that is connected to it.
+  void startAll(const RouterPair::Options& more = {}) {
+    routers_.start(more);
+    openServer();
+    caller_.emplace(*dispatcher_);
+    runUntil([&] { return caller_->isConnected(); });
+  }
+  // Another life of the server, and the client is connected to that; its news begin there.
+  void restartServer(const ServerOptions& options = {}) {
+    server_.reset();
+    runUntil([&] { return caller_->news.back() == ConnectStatus::connectNo; });
+    openServer(options);
+    runUntil([&] { return caller_->isConnected(); });
+    caller_->news.clear();
+  }
+  template <class Condition>
+  void runUntil(Condition condition) {
+    while (!condition()) {
+      runServer();
+      dispatcher_->runOnce(Deadline::after(200us));
+    }
+  }
+  // One round trip.
+  void expectAnswer() {
+    runUntil([&] { return caller_->isConnected(); });
+    caller_->send(Int32Message({.value = ++value_}));
+    EXPECT_EQ(next().tryAs<Int32>()->value, value_);
+  }
+  // The server sends each request back, and remembers its number (numberOf): nothing is to be delivered twice.
+  void serveOnceEach() {
+    serve_ = [this](Message&& request) {
+      EXPECT_TRUE(delivered_.insert(numberOf(request)).second) << numberOf(request) << " was delivered twice";
+      static_cast<void>(server_->reply(std::move(request)));
+    };
+  }
+  // Of an Int32, its value; of an Int32Array, its first.
+  static std::int32_t numberOf(const Message& message) {
+    const auto* int32 = message.tryAs<Int32>();
+    return int32 != nullptr ? int32->value : message.valueAs<Int32Array>()[0];
+  }
+  void waitForNews(ConnectStatus status) {
+    runUntil([&] { return !caller_->news.empty() && caller_->news.back() == status; });
+  }
+  void runFor(Nanoseconds time) {
+    runUntil([until = Deadline::after(time)] { return until.hasPassed(); });
+  }
+  // The next message of the client that is no news.
+  Message next() {
+    runUntil([&] { return !caller_->messages.empty(); });
+    return caller_->take();
+  }
+  // The next request that reaches the server.
+  Message nextRequest() {
+    for (;;) {
+      if (auto request = server_->receive()) return request;
+      dispatcher_->runOnce(Deadline::after(200us));
+    }
+  }
+  // Until the near router has taken so many requests for the server that is there now: none waits for it then.
+  void waitUntilTaken(const std::string& server, std::uint64_t requests) {
+    const auto window = SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, server);
+    const auto proxy = PeerWindow::tryOpen(window, layout::SegmentKind::serverWindow);
+    runUntil([&] { return proxy->control().received.load(std::memory_order_relaxed) >= requests; });
+  }
+  // Until each client of a crowd (victim.cpp) had all its requests answered, with its own answers, in the life of the server that is there now.
+  void waitUntilAnswered(Victim& crowd) const {
+    const auto window = SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, "echo");
+    for (auto line = crowd.line();; line = crowd.line()) {
+      ASSERT_THAT(line, testing::AnyOf(testing::StartsWith("answered "), testing::StartsWith("waiting: ")));
+      const auto proxy = PeerWindow::tryOpen(window, layout::SegmentKind::serverWindow);
+      if (proxy && line == fmt::format("answered {:x}", proxy->header().incarnation)) return;
+    }
+  }
+  void runServer() {
+    if (!server_ || !serverRuns_) return;
+    // Not for longer than there are some: the client has its turn.
+    for (int left = 100; left > 0; --left) {
+      auto request = server_->receive();
+      if (!request) return;
+      if (serve_) {
+        serve_(std::move(request));
+      } else {
+        static_cast<void>(server_->reply(std::move(request)));
+      }
+      if (!serverRuns_) return;
+    }
+  }
+  void TearDown() override {
+    caller_.reset();
+    dispatcher_.reset();
+    server_.reset();
+    routers_.expectGoodEnd();
+  }
+
+  Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+  RouterPair routers_;
+  std::unique_ptr<MessageServer> server_;
+  bool serverRuns_ = true;
+  std::function<void(Message&&)> serve_;
+  std::optional<Dispatcher> dispatcher_{routers_.near()};
+  std::optional<Caller> caller_;
+  std::int32_t value_ = 0;  // of expectAnswer(), the last
+  std::set<std::int32_t> delivered_;  // numbers, by serveOnceEach()
+};
+
+}  // namespace mpf::test

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// Routers that stand still for a while (SIGSTOP): the others miss them after the dead time, all meet again, and nothing is delivered twice.
+#include <mpf/tests/system/router_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+const RouterPair::Options kSoonDead{"--dead-time", "1s"};
+const RouterPair::Options kPatient{"--dead-time", "60s"};
+
+class RouterPauseTest : public RouterTest {
+ protected:
+  // So many, with numbers that no other request has.
+  void send(int requests) {
+    for (int i = 0; i < requests; ++i) caller_->send(Int32Message({.value = --numbered_}));
+  }
+
+ private:
+  std::int32_t numbered_ = 0;
+};
+
+TEST_F(RouterPauseTest, AFarRouterThatStandsStillIsMissedAndFoundAgain) {
+  startAll(kSoonDead);
+  serveOnceEach();
+  for (int round = 0; round < 2; ++round) {
+    expectAnswer();
+    const auto news = caller_->news.size();
+
+    routers_.farRouter().stop();
+    send(10);
+    runUntil([&] { return caller_->news.size() == news + 1; });
+    EXPECT_EQ(caller_->messages.size(), 10u);
+    for (auto message = caller_->take(); message; message = caller_->take()) {
+      EXPECT_THAT(fateOf(message), testing::AnyOf(Fate::outcomeUnknown, Fate::neverTaken));
+    }
+    routers_.farRouter().goOn();
+
+    expectAnswer();
+  }
+}
+
+// Its clients see that it lives; when it goes on it finds its line cut.
+TEST_F(RouterPauseTest, ANearRouterThatStoodStillConnectsAgain) {
+  startAll(kSoonDead);
+  send(1);
+  const auto kept = nextRequest();
+  serveOnceEach();
+
+  routers_.nearRouter().stop();
+  runUntil([&] { return server_->clientOf(kept) == 0; });
+  EXPECT_TRUE(caller_->isConnected());
+  send(1);
+  routers_.nearRouter().goOn();
+
+  runUntil([&] { return caller_->news.size() == 3; });
+  EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo, ConnectStatus::connectYes));
+  EXPECT_EQ(caller_->messages.size(), 2u);
+  for (auto message = caller_->take(); message; message = caller_->take()) {
+    EXPECT_THAT(fateOf(message), testing::AnyOf(Fate::outcomeUnknown, Fate::neverTaken));
+  }
+  expectAnswer();
+}
+
+TEST_F(RouterPauseTest, RoutersThatStandStillForLessThanTheDeadTimeLoseNothing) {
+  startAll(kPatient);
+  serveOnceEach();
+  int answered = 0;
+  for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()}) {
+    router->stop();
+    send(10);
+    router->goOn();
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(next().tryAs<Int32>()->value, --answered);
+  }
+  EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
+}
+
+// As when a laptop sleeps: they may have missed each other or not, and go on in any case.
+TEST_F(RouterPauseTest, RoutersThatBothStoodStillForLongGoOn) {
+  startAll({"--dead-time", "300ms"});
+  serveOnceEach();
+  for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()}) router->stop();
+
+  runFor(1s);
+  for (auto* const router : {&routers_.farRouter(), &routers_.nearRouter()}) router->goOn();
+
+  const auto isAnswered = [&] {
+    runUntil([&] { return caller_->isConnected(); });
+    send(1);
+    return !fateOf(next());
+  };
+  while (!isAnswered()) {
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
