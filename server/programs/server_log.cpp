@@ -5,6 +5,8 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <utility>
 
+#include <mpf/base/signals_blocked.h>
+
 namespace mpf {
 namespace {
 
@@ -12,8 +14,9 @@ constexpr std::size_t kLinesThatMayWait = 1024;
 
 }  // namespace
 
-ServerLog::ServerLog(const std::string& program, const std::string& level)
-    : writer_(std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1)) {
+ServerLog::ServerLog(const std::string& program, const std::string& level) {
+  const SignalsBlocked blocked;  // for the thread that writes
+  writer_ = std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1);
   auto errors = std::make_shared<spdlog::sinks::stderr_sink_mt>();
   logger_ = std::make_shared<spdlog::async_logger>(program, std::move(errors), writer_, spdlog::async_overflow_policy::overrun_oldest);
   logger_->set_level(spdlog::level::from_str(level));

@@ -140,7 +140,8 @@ TEST_P(SerialProgramSignalTest, EndsItWhileItWaitsForItsLine) {
   const auto server = start({"--wait"});
   const auto connected = std::make_unique<Asker>(backplane_);
 
-  EXPECT_TRUE(hasExitedWith(server->end(GetParam()), 0));
+  const auto status = server->end(GetParam());
+  EXPECT_TRUE(hasExitedWith(status, 0)) << status << ": " << server->errors();
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, SerialProgramSignalTest, testing::Values(SIGTERM, SIGINT));

@@ -2,7 +2,6 @@
 #include <mpf/server/programs/digital_io_server/input_server.h>
 
 #include <algorithm>
-#include <exception>
 #include <utility>
 
 #include <mpf/server/programs/hardware/bits_request.h>
@@ -16,12 +15,12 @@ constexpr std::size_t kMaxNews = 1000;
 }  // namespace
 
 DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::string& name, const ServerOptions& options, DigitalIo& io,
-                                       const ServerLog& log, std::function<void()> onFailure)
-    : io_(io), log_(log), onFailure_(std::move(onFailure)), server_(backplane, name, options), faults_(server_, log) {
+                                       const ServerLog& log, std::function<void()> failed)
+    : io_(io), log_(log), server_(backplane, name, options), faults_(server_, log) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
   answerOtherTypes<Int32>(server_, [this](MessageType type) { log_->debug("inputs: a request of type {}: status -1", toString(type)); });
   subscription_ = io.subscribe([this](const DigitalIoNews& news) { hear(news); });
-  thread_ = std::thread([this] { run(); });
+  thread_.start(log, [this] { run(); }, std::move(failed));
 }
 
 DigitalInputServer::~DigitalInputServer() {
@@ -31,17 +30,13 @@ DigitalInputServer::~DigitalInputServer() {
   subscription_ = {};
 }
 
-void DigitalInputServer::run() try {
+void DigitalInputServer::run() {
   while (!ends_.load(std::memory_order_relaxed)) {
     static_cast<void>(server_.waitForMessage());
     deliver();
     while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) deliver();  // who asks all the time must not keep news back
     forgetGone();
   }
-} catch (const std::exception& error) {
-  log_->critical("the inputs are not served any more: {}", error.what());
-  hasFailed_.store(true, std::memory_order_relaxed);
-  if (onFailure_) onFailure_();
 }
 
 void DigitalInputServer::handle(Int32Message&& request) {

@@ -13,7 +13,6 @@
 #include <functional>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <mpf/drivers/digital_io/digital_io.h>
@@ -21,23 +20,22 @@
 #include <mpf/server/message_server.h>
 #include <mpf/server/programs/hardware/fault_note.h>
 #include <mpf/server/programs/server_log.h>
+#include <mpf/server/programs/serving_thread.h>
 
 namespace mpf {
 
 class DigitalInputServer {
  public:
-  //   io         must outlive this, as `log`
-  //   onFailure  runs on the server's thread when that cannot go on: no request is answered any more, and the program shall end
-  //   throws     as MessageServer
+  //   io      must outlive this, as `log`
+  //   failed  is called when this cannot serve any more, which the log says: the program shall end
+  //   throws  as MessageServer
   DigitalInputServer(const Backplane& backplane, const std::string& name, const ServerOptions& options, DigitalIo& io, const ServerLog& log,
-                     std::function<void()> onFailure = {});
+                     std::function<void()> failed);
   ~DigitalInputServer();
   DigitalInputServer(const DigitalInputServer&) = delete;
   DigitalInputServer& operator=(const DigitalInputServer&) = delete;
 
   [[nodiscard]] const std::string& getName() const noexcept { return server_.getName(); }
-  // Whether onFailure ran, or is about to.
-  [[nodiscard]] bool hasFailed() const noexcept { return hasFailed_.load(std::memory_order_relaxed); }
   // How many clients have a monitor now.
   [[nodiscard]] std::size_t monitors() const noexcept { return count_.load(std::memory_order_relaxed); }
 
@@ -64,7 +62,6 @@ class DigitalInputServer {
 
   DigitalIo& io_;
   const ServerLog& log_;
-  std::function<void()> onFailure_;
   MessageServer server_;
   FaultNote faults_;               // of reads; this and below, but for what is guarded: the thread's
   std::vector<Monitor> monitors_;
@@ -72,9 +69,8 @@ class DigitalInputServer {
   std::deque<DigitalIoNews> news_;  // this
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
-  std::atomic<bool> hasFailed_{false};
   DigitalIo::Subscription subscription_;
-  std::thread thread_;
+  ServingThread thread_;
 };
 
 }  // namespace mpf

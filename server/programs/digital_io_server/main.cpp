@@ -61,12 +61,13 @@ int main(int argc, char** argv) try {
   const auto stop = [](void* outputs) noexcept { static_cast<mpf::MessageServer*>(outputs)->interrupt(); };
   const mpf::StopSignals signals(stop, &server);  // before anybody has an answer, and may stop us
   const mpf::DigitalOutputServer outputs(server, io, log);
-  const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log, [&] { stop(&server); });
+  mpf::ProgramFailure failure;
+  const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log, [&] { failure.report(); });
   describe(io, *module, options, log);
   log->info(R"(serving "{}" and "{}" at location {})", inputs.getName(), server.getName(), server.location());
   server.run();
   log->info("ends");
-  return inputs.hasFailed() ? 1 : 0;
+  return failure.exitStatus();
 } catch (const std::exception& error) {
   fmt::print(stderr, "{}: {}\n", kProgram, error.what());
   return 1;
