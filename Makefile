@@ -64,7 +64,8 @@ format: setup ## format all sources
 format-check: setup ## name the sources that `make format` would change
 	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
 
-tidy: setup ## clang-tidy over the targets that changed since they were last clean (FOLDERS="shm router": only there)
+tidy: ## clang-tidy over the targets that changed since they were last clean (FOLDERS="shm router": only there)
+	@scripts/setup fuzz
 	@cmake --preset tidy --log-level=NOTICE
 	@cmake --build --preset tidy --parallel $(JOBS)
 	scripts/tidy build/tidy $(JOBS) $(FOLDERS)

@@ -24,7 +24,7 @@ FarClient::FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, c
       window_(std::max<std::int64_t>(terms.window, 1)),
       fullWindow_(window_),
       expiry_(here.timer, [this] { expire(); }),
-      client_(std::in_place, dispatcher, [this](Message&& message) { onMessage(std::move(message)); }) {}
+      client_(std::make_unique<MessageClient>(dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
 
 FarClient::~FarClient() { owner_.heldBytes() -= waitingBytes_; }
 

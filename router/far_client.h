@@ -91,7 +91,7 @@ class FarClient {
   std::size_t waitingBytes_ = 0;
   bool fullTold_ = false;  // this run of refusals of waiting requests
   Alarm expiry_;
-  std::optional<MessageClient> client_;  // until it gives up
+  std::unique_ptr<MessageClient> client_;  // until it gives up
 };
 
 }  // namespace mpf::router

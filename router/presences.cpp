@@ -8,7 +8,7 @@ Presences::Presences(const Backplane& backplane, kj::UnixEventPort& port, std::f
   names_ = backplane_.watcher().watchNames(NameKind::serverWindow, [this] { bell_.ring(); });
 }
 
-Presences::~Presences() { backplane_.watcher().forget(names_); }
+Presences::~Presences() noexcept { backplane_.watcher().forget(names_); }
 
 std::shared_ptr<Presence> Presences::of(const ServerName& name) {
   const auto each = all_.try_emplace(name, backplane_, name, [this] { bell_.ring(); }).first;

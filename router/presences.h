@@ -18,7 +18,7 @@ class Presences {
  public:
   // `news` when a server may have come or gone: all who have bound look again, as another's look may have been the one that found it.
   Presences(const Backplane& backplane, kj::UnixEventPort& port, std::function<void()> news);
-  ~Presences();
+  ~Presences() noexcept;
   Presences(const Presences&) = delete;
   Presences& operator=(const Presences&) = delete;
 

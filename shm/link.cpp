@@ -235,7 +235,7 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
   try {
     auto chunk = borrowed_.tryBorrow(ref);
     if (chunk || !hasPeerEnded()) return chunk;
-  } catch (const std::exception&) {  // no descriptor, no memory
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): no descriptor, no memory: so it is unavailable
   }
   borrowed_.giveBack(ref);
   throw ChunkUnavailable();

@@ -93,7 +93,11 @@ std::string Table::fitted(const std::string& indent) const {
     }
     auto line = indent;
     line += cells(row, widths, row.size() - (goesOn ? 1 : 0));
-    if (goesOn) line = columnsOf(line) + kLeastCut <= kColumns ? wrap(line, row.back(), columnsOf(line)) : line + row.back();
+    if (goesOn) {
+      const auto width = columnsOf(line);
+      if (width + kLeastCut <= kColumns) line = wrap(line, row.back(), width);
+      else line += row.back();
+    }
     line.erase(line.find_last_not_of(" \n") + 1);
     text += line + '\n';
   }

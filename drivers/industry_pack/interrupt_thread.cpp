@@ -25,8 +25,8 @@ InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions op
       options_(options),
       handler_(std::move(handler)),
       trouble_(std::move(trouble)),
-      wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt thread")) {
-  isPolled_ = interrupt_.isPolled();  // a carrier that begins so says it itself
+      wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt thread")),
+      isPolled_(interrupt_.isPolled()) {  // a carrier that begins so says it itself
   const SignalsBlocked blocked;
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }

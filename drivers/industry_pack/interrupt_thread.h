@@ -84,7 +84,7 @@ class InterruptThread {
   FileDescriptor wakeUp_;
   int inVain_ = 0;  // interrupts, less what made up for them; this and below: the thread's
   int lateInRow_ = 0;  // polls that found something
-  bool isPolled_ = false;
+  bool isPolled_;
   Deadline pausedUntil_ = Deadline::never();
   Deadline stormEnds_ = Deadline::atNs(0);  // afterwards the next one is another
   Deadline pollAt_ = Deadline::never();

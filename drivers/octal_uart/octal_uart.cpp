@@ -57,10 +57,9 @@ OctalUart::~OctalUart() {
 void OctalUart::startThread(int line) {
   InterruptThreadOptions options{.pollEvery = options_.pollEvery, .stormLimit = options_.stormLimit, .stormPause = options_.stormPause};
   if (line * kPortsPerLine >= options_.ports) options.pollEvery = {};  // nothing is there to be found
-  threads_.at(static_cast<std::size_t>(line))
-      .emplace(
-          module_.interrupt(line), options, [this, line](InterruptThread::Cause cause) { return serve(line, cause); },
-          [this, line](InterruptTrouble trouble) { note(line, trouble); });
+  threads_.at(static_cast<std::size_t>(line)) = std::make_unique<InterruptThread>(
+      module_.interrupt(line), options, [this, line](InterruptThread::Cause cause) { return serve(line, cause); },
+      [this, line](InterruptTrouble trouble) { note(line, trouble); });
 }
 
 void OctalUart::onAlarm(AlarmHandler handler) {
@@ -154,8 +153,8 @@ void OctalUart::note(int line, InterruptTrouble trouble) {
 }
 
 std::string OctalUart::textOf(int line, InterruptTrouble trouble) const {
-  const auto which = fmt::format("module \"{}\" ({}), ports {} to {}: interrupt line {}", module_.name(), module_.where(),
-                                 line * kPortsPerLine, line * kPortsPerLine + kPortsPerLine - 1, line);
+  auto which = fmt::format("module \"{}\" ({}), ports {} to {}: interrupt line {}", module_.name(), module_.where(), line * kPortsPerLine,
+                           line * kPortsPerLine + kPortsPerLine - 1, line);
   switch (trouble) {
     case InterruptTrouble::storm:
       return fmt::format("{} asks without end and wants nothing: masked for {} ms, again and again until that ends", which,

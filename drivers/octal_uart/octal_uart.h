@@ -22,7 +22,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -118,7 +117,7 @@ class OctalUart {
 
   std::mutex alarmMutex_;  // held while the handler runs
   AlarmHandler alarmHandler_;
-  std::array<std::optional<InterruptThread>, 2> threads_;  // of the request lines; last: they end before what they use
+  std::array<std::unique_ptr<InterruptThread>, 2> threads_;  // of the request lines; last: they end before what they use
 };
 
 }  // namespace mpf

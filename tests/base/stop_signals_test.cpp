@@ -22,23 +22,23 @@ namespace {
 class StopSignalsTest : public testing::Test {
  public:  // for callbacks
   void TearDown() override {
-    if (other_.joinable()) other_.join();
+    if (other.joinable()) other.join();
   }
   // Returns once the other thread is in `callback`.
   void interruptOther(StopSignals::Callback callback) {
-    signals_.emplace(callback, this);
-    ::pthread_kill(other_.native_handle(), SIGTERM);
-    while (!entered_) std::this_thread::yield();
+    signals.emplace(callback, this);
+    ::pthread_kill(other.native_handle(), SIGTERM);  // NOLINT(bugprone-bad-signal-to-kill-thread): it is handled
+    while (!entered) std::this_thread::yield();
   }
 
-  Watchdog watchdog_{"stop signals test"};
-  std::atomic<bool> entered_{false};
-  std::atomic<bool> isGone_{false};
-  std::atomic<bool> mayLeave_{false};
-  bool wasGone_ = false;
-  std::optional<StopSignals> signals_;
-  std::thread other_{[this] {
-    while (!entered_) std::this_thread::yield();
+  Watchdog watchdog{"stop signals test"};
+  std::atomic<bool> entered{false};
+  std::atomic<bool> isGone{false};
+  std::atomic<bool> mayLeave{false};
+  bool wasGone = false;
+  std::optional<StopSignals> signals;
+  std::thread other{[this] {
+    while (!entered) std::this_thread::yield();
   }};
 };
 
@@ -46,32 +46,32 @@ class StopSignalsTest : public testing::Test {
 TEST_F(StopSignalsTest, EndOnceNoThreadIsInTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
-    self.entered_ = true;
+    self.entered = true;
     const timespec aWhile{.tv_sec = 0, .tv_nsec = 20'000'000};  // for an end that does not wait to come first
     ::nanosleep(&aWhile, nullptr);
-    self.wasGone_ = self.isGone_;
+    self.wasGone = self.isGone;
   });
-  signals_.reset();
-  isGone_ = true;
-  other_.join();
-  EXPECT_FALSE(wasGone_);
+  signals.reset();
+  isGone = true;
+  other.join();
+  EXPECT_FALSE(wasGone);
 }
 
 TEST_F(StopSignalsTest, EndInAChildThatWasForkedBesideTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
-    self.entered_ = true;
-    while (!self.mayLeave_) ::usleep(1000);
+    self.entered = true;
+    while (!self.mayLeave) ::usleep(1000);
   });
   const auto child = checkCall(::fork(), "fork");
   if (child == 0) {
     ::alarm(60);  // the other thread is not here: to wait for it is to wait for ever
-    signals_.reset();
+    signals.reset();
     ::_exit(0);
   }
   int status = 0;
   ::waitpid(child, &status, 0);
-  mayLeave_ = true;
+  mayLeave = true;
   EXPECT_EQ(status, 0);
 }
 

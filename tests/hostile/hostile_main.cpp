@@ -108,7 +108,7 @@ class Peer {
     if ((envelope.flags & layout::kSlotChunk) != 0) {
       try {
         if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
-      } catch (const ChunkUnavailable&) {  // its server has ended
+      } catch (const ChunkUnavailable&) {  // NOLINT(bugprone-empty-catch): its server has ended
       }
     }
     link_->end();

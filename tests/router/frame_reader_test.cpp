@@ -167,8 +167,8 @@ TEST(FrameReader, GivesBackWhatALongFrameTook) {
   message.initRoot<wire::Frame>().initItems(1)[0].initFarewell().initReason(16u << 20);
   Reading reading;
 
-  const auto long_ = bytesOf(message);
-  const std::span all(long_);
+  const auto frame = bytesOf(message);
+  const std::span all(frame);
   reading.feed(all.first(all.size() - 1));
   static_cast<void>(reading.reader().tryNext());
   auto room = reading.reader().room();

@@ -26,7 +26,7 @@ std::size_t columnsOf(const std::string& line) {
   return static_cast<std::size_t>(std::ranges::count_if(line, [](char c) { return (static_cast<unsigned char>(c) & 0xc0u) != 0x80u; }));
 }
 
-MATCHER(FitsInto80Columns, "") { return columnsOf(arg) <= 80; }
+auto fitsInto80Columns() { return testing::ResultOf("columns", columnsOf, testing::Le(80u)); }
 
 class RouterReportTest : public ToolsTest {
  protected:
@@ -73,7 +73,7 @@ TEST_F(RouterReportTest, MrrShowsAClientRouterAsTheManualDoes) {
           "   sendPerSec 0 receivePerSec 0  tcpSendPerSec 0 tcpReceivePerSec 0", "   sendBytesPerSec 0 receiveBytesPerSec 0",
           MatchesRegex("   roundTrip 81.2 us connectedFor [0-9.]+ [mun]?s reconnects 2 clients 4"),
           "   peer ioc1 (mpf-router 0.1.0) address 10.0.0.7:9900 plain locations 1, 2", "   router lab1" + us(), "serverRouterList"));
-  EXPECT_THAT(lines, Each(FitsInto80Columns()));
+  EXPECT_THAT(lines, Each(fitsInto80Columns()));
 }
 
 TEST_F(RouterReportTest, MrrShowsAServerRouterAsTheManualDoes) {
@@ -145,7 +145,7 @@ TEST_F(RouterReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
   }
 
   // Numbers of any length stay within a line.
-  EXPECT_THAT(mrr(), Each(FitsInto80Columns()));
+  EXPECT_THAT(mrr(), Each(fitsInto80Columns()));
 }
 
 TEST_F(RouterReportTest, LsShowsWhichServersAreElsewhere) {
@@ -166,7 +166,7 @@ TEST_F(RouterReportTest, LsShowsWhichServersAreElsewhere) {
                           MatchesRegex("  → 10.0.0.7:9900 +connected +4 +81.2 us +[0-9.]+ [mun]?s +ioc1, locations 1"),
                           MatchesRegex("  → 10.0.0.8:9900 +waiting +0 +- +[0-9.]+ [mun]?s +locations 8:"), MatchesRegex(" +connect.*"),
                           MatchesRegex(" +refused"), MatchesRegex("  ← 10.0.0.9:51234 +connected +2 +- +[0-9.]+ [mun]?s +ioc2")));
-  EXPECT_THAT(lines, Each(FitsInto80Columns()));
+  EXPECT_THAT(lines, Each(fitsInto80Columns()));
 }
 
 TEST_F(RouterReportTest, MsrSaysByWhomAServerElsewhereIsReached) {
