@@ -41,9 +41,9 @@ struct Carried {
 };
 
 // What a reply takes of its client's window (router.capnp, Credit): the bytes of its elements, and some for the rest.
+inline constexpr std::uint32_t kWindowBytesBeside = 64;
 [[nodiscard]] inline std::uint32_t windowBytesOf(const Message& reply) noexcept {
-  constexpr std::uint32_t kRest = 64;
-  return kRest + reply.arrayLength() * layoutOf(reply.getType()).elementBytes;
+  return kWindowBytesBeside + reply.arrayLength() * layoutOf(reply.getType()).elementBytes;
 }
 
 // The largest body but for its elements. Limits on the wire are of elements, those of shared memory of whole bodies.

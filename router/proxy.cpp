@@ -169,7 +169,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
     return loseReply(number, reply, error.text);
   }
   client.unpaid += windowBytesOf(*message);
-  deliver(number, reply.getRequestId(), std::move(*message));
+  deliver(number, client, reply.getRequestId(), std::move(*message));
 }
 
 // It was done, and what came of it cannot be said.
@@ -177,7 +177,7 @@ void Proxy::loseReply(std::uint32_t number, wire::Reply::Reader reply, const std
   log_.warn("{} at location {}: a reply is lost: {}", name_.server, name_.location, why);
   if (reply.getIsFirst()) endRequest(number, reply.getRequestId(), Fate::outcomeUnknown, why);
   // At least what it took.
-  giveCredit(number, clients_.at(number), 64 + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
+  giveCredit(number, clients_.at(number), kWindowBytesBeside + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
 }
 
 void Proxy::endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why) {
@@ -188,7 +188,7 @@ void Proxy::endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate,
 void Proxy::end(std::uint32_t number, std::uint32_t requestId, Fate fate) {
   const auto found = clients_.find(number);
   if (found == clients_.end() || !awaits(found->second, requestId)) return;
-  deliver(number, requestId, RequestFateMessage({.fate = fate, .requestId = requestId}));
+  deliver(number, found->second, requestId, RequestFateMessage({.fate = fate, .requestId = requestId}));
 }
 
 void Proxy::queueFull(std::uint32_t number) {
@@ -196,7 +196,7 @@ void Proxy::queueFull(std::uint32_t number) {
   const auto found = clients_.find(number);
   if (found == clients_.end() || found->second.heldQueueFull) return;
   found->second.heldQueueFull = true;
-  deliver(number, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull}));
+  deliver(number, found->second, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull}));
 }
 
 void Proxy::refuse(std::uint32_t number, const std::string& why) {
@@ -208,10 +208,7 @@ void Proxy::refuse(std::uint32_t number, const std::string& why) {
 }
 
 // In order: behind what is held.
-void Proxy::deliver(std::uint32_t number, std::uint32_t requestId, Message&& message) {
-  const auto found = clients_.find(number);
-  if (found == clients_.end()) return;
-  auto& client = found->second;
+void Proxy::deliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message&& message) {
   if (client.held.empty() && tryDeliver(number, client, requestId, message)) return;
   client.held.push_back({requestId, std::move(message)});
   retryAfter_ = kFirstRetry;

@@ -92,7 +92,7 @@ class Proxy {
   void close(std::uint32_t number);
   void loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why);
   void forward(Message request);
-  void deliver(std::uint32_t number, std::uint32_t requestId, Message&& message);
+  void deliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message&& message);
   bool tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message& message);
   void giveCredit(std::uint32_t number, Client& client, std::size_t bytes);
   [[nodiscard]] bool awaits(const Client& client, std::uint32_t requestId) const noexcept;

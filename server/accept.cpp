@@ -129,7 +129,8 @@ void ServerCore::closeAll() noexcept {
       others.push_back(connection->channel);
     }
     close(*connection);
-  }  // Clients of other users may not remove what is ours, and find it no more once we have: they have a moment to take what they were sent.
+  }
+  // Clients of other users may not remove what is ours, and find it no more once we have: they have a moment to take what they were sent.
   const auto patience = Deadline::after(kToTakeTheRest);
   const auto isTaking = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
   while (std::ranges::any_of(others, isTaking) && !patience.hasPassed()) std::this_thread::sleep_for(kLookAtThem);

@@ -5,11 +5,12 @@
 #include <filesystem>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <utility>
 
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tools/dissect_link.h>
-#include <mpf/tools/router_view.h>
+#include <mpf/tools/router_json.h>
 #include <mpf/tools/segment_image.h>
 #include <mpf/tools/survey.h>
 
@@ -130,29 +131,11 @@ void dissectRouter(Tree& tree, const SegmentImage& image, const std::string& pat
   tree["name"] = segments::text(image.header().name);
   tree["lines"] = Tree::array();
   for (const auto& line : routerLines(image, path)) {
-    tree["lines"].push_back({{"row", line.row},
-                             {"role", line.isClient() ? "client" : "server"},
-                             {"state", toString(line.state)},
-                             {"tls", line.isTls},
-                             {"since_ns", line.sinceNs},
-                             {"connects", line.connects},
-                             {"queue_size", line.queueSize},
-                             {"in_queue", line.inQueue},
-                             {"queue_full", line.queueFull},
-                             {"messages_sent", line.messagesSent},
-                             {"messages_received", line.messagesReceived},
-                             {"frames_sent", line.framesSent},
-                             {"frames_received", line.framesReceived},
-                             {"bytes_sent", line.bytesSent},
-                             {"bytes_received", line.bytesReceived},
-                             {"round_trip_ns", line.roundTripNs},
-                             {"clients", line.clients},
-                             {"bindings", line.bindings},
-                             {"address", line.address},
-                             {"peer", line.peer},
-                             {"peer_program", line.program},
-                             {"locations", line.locations},
-                             {"problem", line.problem}});
+    Tree entry{{"row", line.row}};
+    addFacts(entry, line, toString(line.state));
+    entry["since_ns"] = line.sinceNs;
+    entry["locations"] = line.locations;
+    tree["lines"].push_back(std::move(entry));
   }
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <mpf/tools/router_json.h>
+
 namespace mpf::tools {
 namespace {
 
@@ -38,34 +40,16 @@ json toJson(const LinkView& link, const WindowView* peer) {
 
 json toJson(const Look& look, const RouterView& router, const RouterLineView& line) {
   const auto rates = look.ratesOf(router, line);
-  return {{"role", line.isClient() ? "client" : "server"},
-          {"state", look.stateOf(router, line)},
-          {"since_s", static_cast<double>(std::max<std::int64_t>(look.now().atNs - line.sinceNs, 0)) / 1e9},
-          {"address", line.address},
-          {"tls", line.isTls},
-          {"peer", line.peer},
-          {"peer_program", line.program},
-          {"locations", line.locationList()},
-          {"problem", line.problem},
-          {"connects", line.connects},
-          {"clients", line.clients},
-          {"bindings", line.bindings},
-          {"queue_size", line.queueSize},
-          {"in_queue", line.inQueue},
-          {"queue_full", line.queueFull},
-          {"round_trip_ns", line.roundTripNs},
-          {"messages_sent", line.messagesSent},
-          {"messages_received", line.messagesReceived},
-          {"frames_sent", line.framesSent},
-          {"frames_received", line.framesReceived},
-          {"bytes_sent", line.bytesSent},
-          {"bytes_received", line.bytesReceived},
-          {"sent_per_s", rates.messages.sentPerSecond},
-          {"received_per_s", rates.messages.receivedPerSecond},
-          {"frames_sent_per_s", rates.frames.sentPerSecond},
-          {"frames_received_per_s", rates.frames.receivedPerSecond},
-          {"bytes_sent_per_s", rates.bytes.sentPerSecond},
-          {"bytes_received_per_s", rates.bytes.receivedPerSecond}};
+  json entry{{"since_s", static_cast<double>(std::max<std::int64_t>(look.now().atNs - line.sinceNs, 0)) / 1e9},
+             {"locations", line.locationList()},
+             {"sent_per_s", rates.messages.sentPerSecond},
+             {"received_per_s", rates.messages.receivedPerSecond},
+             {"frames_sent_per_s", rates.frames.sentPerSecond},
+             {"frames_received_per_s", rates.frames.receivedPerSecond},
+             {"bytes_sent_per_s", rates.bytes.sentPerSecond},
+             {"bytes_received_per_s", rates.bytes.receivedPerSecond}};
+  addFacts(entry, line, look.stateOf(router, line));
+  return entry;
 }
 
 json toJson(const Look& look, const RouterView& router) {
