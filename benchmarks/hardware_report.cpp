@@ -39,17 +39,6 @@ std::string hardwareHeader(const Measurement& first) {
 
 }  // namespace
 
-std::string hardwareTable(const std::vector<Result>& results) {
-  std::string text;
-  std::string question;
-  for (const auto& result : results) {
-    if (result.measurement.question != question) {
-      question = result.measurement.question;
-      text += "\n" + question + "\n" + hardwareHeader(result.measurement);
-    }
-    text += hardwareLineOf(result);
-  }
-  return text;
-}
+std::string hardwareTable(const std::vector<Result>& results) { return sections(results, hardwareHeader, hardwareLineOf); }
 
 }  // namespace mpf::bench

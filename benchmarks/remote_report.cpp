@@ -44,17 +44,6 @@ std::string header(const Measurement& first) {
 
 }  // namespace
 
-std::string remoteTable(const std::vector<Result>& results) {
-  std::string text;
-  std::string question;
-  for (const auto& result : results) {
-    if (result.measurement.question != question) {
-      question = result.measurement.question;
-      text += "\n" + question + "\n" + header(result.measurement);
-    }
-    text += lineOf(result);
-  }
-  return text;
-}
+std::string remoteTable(const std::vector<Result>& results) { return sections(results, header, lineOf); }
 
 }  // namespace mpf::bench

@@ -13,17 +13,27 @@ constexpr const char* kRow = "  {:<24} {:<9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>12
 
 std::string ratioText(const Result& result) { return result.ratioToFloor > 0 ? fmt::format("{:.2f}", result.ratioToFloor) : ""; }
 
+std::string heading(const Measurement&) {
+  return fmt::format(kRow, "", "mode", "typical", "p50", "p99", "p99.9", "max", "rate", "x floor", "floor");
+}
+
+// Floors stand for several sizes under one heading.
+std::string nameOf(const Measurement& what) {
+  return what.question.starts_with("Floors") && what.bytes > 4 ? fmt::format("{} {} KiB", what.name, what.bytes / 1024) : what.name;
+}
+
 std::string row(const Result& result) {
   const auto& what = result.measurement;
+  const auto name = nameOf(what);
   const auto& latency = result.figures.latency;
   const auto floor = result.floorNs > 0 ? what.floorName + " of " + durationText(result.floorNs) : "";
   const auto line = [&](const std::array<std::string, 5>& percentiles, const std::string& rate) {
-    return fmt::format(kRow, what.name, toString(what.mode), percentiles[0], percentiles[1], percentiles[2], percentiles[3], percentiles[4],
+    return fmt::format(kRow, name, toString(what.mode), percentiles[0], percentiles[1], percentiles[2], percentiles[3], percentiles[4],
                        rate, ratioText(result), floor);
   };
-  if (!what.skipped.empty()) return fmt::format("  {:<24} {:<9} left out: {}\n", what.name, toString(what.mode), what.skipped);
-  if (!result.error.empty()) return fmt::format("  {:<24} {:<9} failed: {}\n", what.name, toString(what.mode), result.error);
-  if (!what.unit.empty()) return fmt::format("  {:<24} {:<9} {:.6g} {}\n", what.name, toString(what.mode), result.figures.value, what.unit);
+  if (!what.skipped.empty()) return fmt::format("  {:<24} {:<9} left out: {}\n", name, toString(what.mode), what.skipped);
+  if (!result.error.empty()) return fmt::format("  {:<24} {:<9} failed: {}\n", name, toString(what.mode), result.error);
+  if (!what.unit.empty()) return fmt::format("  {:<24} {:<9} {:.6g} {}\n", name, toString(what.mode), result.figures.value, what.unit);
   if (latency.count() == 0) return line({}, rateText(result.figures.perSecond));
   const auto at = [&](double percent) { return durationText(static_cast<double>(latency.percentileNs(percent))); };
   return line({result.figures.typicalNs > 0 ? durationText(result.figures.typicalNs) : "", at(50), at(99), at(99.9),
@@ -49,22 +59,20 @@ std::string oneLine(const Result& result) {
   return text + ": " + durationText(result.costNs());
 }
 
-std::string table(const std::vector<Result>& results) {
+std::string sections(const std::vector<Result>& results, const std::function<std::string(const Measurement&)>& heading,
+                     const std::function<std::string(const Result&)>& row) {
   std::string text;
   std::string question;
   for (const auto& result : results) {
     if (result.measurement.question != question) {
       question = result.measurement.question;
-      text += "\n" + question + "\n";
-      text += fmt::format(kRow, "", "mode", "typical", "p50", "p99", "p99.9", "max", "rate", "x floor", "floor");
+      text += "\n" + question + "\n" + heading(result.measurement);
     }
-    // Floors stand for several sizes under one heading.
-    auto shown = result;
-    if (question.starts_with("Floors") && shown.measurement.bytes > 4)
-      shown.measurement.name += fmt::format(" {} KiB", shown.measurement.bytes / 1024);
-    text += row(shown);
+    text += row(result);
   }
   return text;
 }
+
+std::string table(const std::vector<Result>& results) { return sections(results, heading, row); }
 
 }  // namespace mpf::bench
