@@ -25,8 +25,8 @@ setup: ## install what is missing from Debian packages (every other target calls
 	@scripts/setup
 
 demo: release ## a voltmeter, its server, clients, and what a crash does; then modules that are wired to each other
-	./demo/run build/release
-	./demo/hardware build/release
+	./examples/demo/run build/release
+	./examples/demo/hardware build/release
 
 test: test-debug ## build with debug information and run every test
 

@@ -27,7 +27,7 @@ MAY_INCLUDE = {
     "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
     "tools/torture": ["tools", "server"],
 }
-MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "demo", "examples")
+MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "examples")
 
 MAX_LINES = 400
 PAIR_REACH = 3  # lines above an ordered access in which its PAIR line stands

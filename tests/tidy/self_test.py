@@ -51,8 +51,8 @@ class Rules(unittest.TestCase):
 
     def test_licences(self):
         self.refuses(check.licences, {"shm/a.h": "#pragma once\n" + SPDX}, ("shm/a.h", 1))
-        self.refuses(check.licences, {"demo/run": "#!/bin/sh\ntrue\n"}, ("demo/run", 1))
-        self.passes(check.licences, {"shm/a.h": SPDX, "demo/run": "#!/bin/sh\n# SPDX-License-Identifier: MIT\n", "README.md": "# MPF\n"})
+        self.refuses(check.licences, {"examples/demo/run": "#!/bin/sh\ntrue\n"}, ("examples/demo/run", 1))
+        self.passes(check.licences, {"shm/a.h": SPDX, "examples/demo/run": "#!/bin/sh\n# SPDX-License-Identifier: MIT\n", "README.md": "# MPF\n"})
 
     def test_shown_code(self):
         shown = "Look:\n\n`shm/a.h`:\n```cpp\nint a;\nint b;\n```\n"
