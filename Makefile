@@ -52,8 +52,9 @@ fuzz: ## contents of shared memory that harm who reads them, looked for with cov
 	cmake --build --preset fuzz --parallel $(JOBS)
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
-bench: release ## how fast, beside the physical floors and other message systems; BENCH=remote: between hosts; BENCH=hardware: servers over models
-	build/release/bin/mpf bench $(or $(BENCH),local)
+bench: release ## measure this host (BENCH=local, remote or hardware); the table also goes to build/release/bench/
+	@mkdir -p build/release/bench
+	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | tee build/release/bench/$(or $(BENCH),local).txt'
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"

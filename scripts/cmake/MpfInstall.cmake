@@ -101,6 +101,7 @@ string(REGEX REPLACE "/$" "" upToPrefix "${upToPrefix}")
 configure_file(scripts/cmake/mpf.pc.in mpf.pc @ONLY)
 install(FILES "${CMAKE_BINARY_DIR}/mpf.pc" DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL) # the tables of `make bench`
 
 # ---- programs and man pages: every executable of these folders
 

@@ -141,6 +141,15 @@ def shown_code(files):
                     yield path, number, f"shows a line that is not in {match[1]}"
 
 
+def named_functions(files):
+    """A table row that ends in | `Class::function` | `path` | names a function that this file declares or defines."""
+    row = re.compile(r"\| `(?:\w+::)*(\w+)` \| `([\w./]+)` \|$", re.MULTILINE)
+    for path, text in files.items():
+        for match in row.finditer(text) if path.endswith(".md") else ():
+            if not re.search(rf"\b{match[1]}\(", files.get(match[2], "")):
+                yield path, line_of(text, match.start()), f"names {match[1]}(), which {match[2]} does not have"
+
+
 def machine_paths(files):
     """Nothing depends on where somebody keeps the tree or gets packages from."""
     place = re.compile(r"(?<![\w.$}-])/(work|root|home/\w+)/[\w.]|\b(pypi|debian|npmjs|docker|ghcr)\.(org|com|io)\b/(?!doc)|\bdeb\.debian\.org\b")
@@ -150,7 +159,7 @@ def machine_paths(files):
                 yield path, number, f"names a place of somebody's machine or a package host: {match[0]}"
 
 
-RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, shown_code, machine_paths)
+RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, shown_code, named_functions, machine_paths)
 
 
 def read_tree(top):
