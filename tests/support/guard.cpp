@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/tests/support/guard.h>
 
-#include <dirent.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -11,19 +11,24 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <gmock/gmock.h>
 #include <new>
+#include <set>
+#include <string>
 #include <string_view>
-#include <vector>
 
+#include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
+#include <mpf/shm/backplane.h>
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
 
 namespace mpf::test {
 namespace {
@@ -67,36 +72,50 @@ void forwardSignals() {
   for (const int signal : {SIGINT, SIGQUIT}) ::signal(signal, SIG_IGN);
 }
 
-// Returns the status of the tests. Reaps their orphans meanwhile: they are children of the guard.
-int waitForTests(pid_t tests) {
+using Pids = std::set<pid_t>;
+
+// Returns the status of the tests. Reaps their orphans meanwhile: they are children of the guard. Adds all of them to `dead`.
+int waitForTests(pid_t tests, Pids& dead) {
   for (int status = 0;;) {
     const auto ended = checkCall(retryInterrupted([&] { return ::waitpid(-1, &status, 0); }), "waitpid");
+    dead.insert(ended);
     if (ended == tests) return status;
   }
 }
 
-// Kills all children of the guard; their children become the guard's, and are killed next.
-void killOrphans() {
+// Kills all children of the guard, and adds them to `dead`; their children become the guard's, and are killed next.
+void killOrphans(Pids& dead) {
   for (;;) {
     std::ifstream children("/proc/self/task/" + std::to_string(::getpid()) + "/children");
     if (!children) return;  // a kernel without this list: children die with their parents, by PR_SET_PDEATHSIG
     for (pid_t child = 0; children >> child;) ::kill(child, SIGKILL);
-    if (::waitpid(-1, nullptr, 0) < 0 && errno == ECHILD) return;
+    const auto ended = ::waitpid(-1, nullptr, 0);
+    if (ended > 0) dead.insert(ended);
+    if (ended < 0 && errno == ECHILD) return;
   }
 }
 
 // Removes all files of the registered backplanes: none of the processes that used them lives.
 void removeSegments() {
-  constexpr std::string_view kFolder = "/dev/shm/";
   std::error_code ignored;
   for (std::size_t i = 0; i < std::min(registry->count.load(std::memory_order_relaxed), Registry::kNames); ++i) {
-    const auto prefix = "mpf." + std::string(registry->names.at(i).data()) + ".";
-    std::vector<std::filesystem::path> left;
-    for (const auto& file : std::filesystem::directory_iterator(kFolder, ignored)) {
-      if (file.path().filename().string().starts_with(prefix)) left.push_back(file.path());
-    }
-    for (const auto& file : left) std::filesystem::remove(file, ignored);
+    const auto left = segments::list(SegmentName::prefix(registry->names.at(i).data()));
+    for (const auto& name : left) std::filesystem::remove(segments::path(name), ignored);
     if (!left.empty()) std::fprintf(stderr, "guard: removed %zu segments of backplane %s\n", left.size(), registry->names.at(i).data());
+  }
+}
+
+// Programs such as `mpf torture` and the demo choose backplanes of their own. Removes what the dead left on the backplanes of `dead`.
+void removeSegmentsOf(const Pids& dead) {
+  for (const auto& backplane : Backplane::names()) {
+    const auto names = segments::list(SegmentName::prefix(backplane));
+    const bool isTheirs = std::ranges::any_of(names, [&](const auto& name) {
+      layout::SegmentHeader header{};
+      const FileDescriptor file(::open(segments::path(name).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+      return ::pread(file.get(), &header, sizeof header, 0) == sizeof header && dead.contains(header.ownerPid);
+    });
+    const auto removed = isTheirs ? Backplane::named(backplane).removeDead().size() : 0;
+    if (removed != 0) std::fprintf(stderr, "guard: removed %zu segments of backplane %s\n", removed, backplane.c_str());
   }
 }
 
@@ -138,9 +157,13 @@ int runGuarded(int argc, char** argv) {
   }
   testProcess = tests;
   forwardSignals();
-  const auto status = waitForTests(tests);
-  killOrphans();
-  if (status != 0) removeSegments();
+  Pids dead;
+  const auto status = waitForTests(tests, dead);
+  killOrphans(dead);
+  if (status != 0) {
+    removeSegments();
+    removeSegmentsOf(dead);
+  }
   std::error_code ignored;
   std::filesystem::remove_all(folder, ignored);
   return endAs(status);
