@@ -5,9 +5,12 @@
 
 #include <gtest/gtest.h>
 #include <iostream>
+#include <string>
 
 #include <mpf/base/system_call.h>
 #include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/shm/window.h>
 #include <mpf/tests/support/temporary_folder.h>
 #include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
@@ -15,7 +18,7 @@
 namespace mpf::test {
 namespace {
 
-// A segment, a temporary file, and a child that does not die with its parent.
+// A segment, a window on another backplane of which the guard does not know, a folder, and a child that does not die with its parent.
 class DyingTest : public testing::Test {
  protected:
   DyingTest() {
@@ -25,12 +28,20 @@ class DyingTest : public testing::Test {
     if (child_ == 0) {
       for (;;) ::pause();
     }
-    std::cout << "backplane " << backplane_.name() << "\nfolder " << folder_.path().string() << "\nchild " << child_ << std::endl;
+    std::cout << "other " << otherBackplane() << "\nbackplane " << backplane_.name() << "\nfolder " << folder_.path().string() << "\nchild "
+              << child_ << std::endl;
   }
+
+  static std::string otherBackplane() { return "dying-" + std::to_string(::getpid()); }
 
   TestBackplane backplane_;
   TemporaryFolder folder_;
   Segment segment_ = Segment::create(1 << 16, layout::SegmentKind::bulk, backplane_.name(), {});
+  OwnWindow window_{otherBackplane(),
+                    layout::SegmentKind::serverWindow,
+                    SegmentName::serverWindow(otherBackplane(), 0, "left"),
+                    {},
+                    [](layout::SegmentHeader&) {}};
   pid_t child_ = 0;
 };
 

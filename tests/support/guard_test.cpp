@@ -55,6 +55,7 @@ TEST_P(GuardTest, RemovesWhatADyingTestLeaves) {
   const auto backplane = Backplane::named(valueOf("backplane", ended.output));
   EXPECT_THAT(backplane.segmentNames(), IsEmpty());
   EXPECT_THAT(ended.output, HasSubstr("guard: removed 1 segments of backplane " + backplane.name()));
+  EXPECT_THAT(Backplane::named(valueOf("other", ended.output)).segmentNames(), IsEmpty());
   EXPECT_FALSE(std::filesystem::exists(valueOf("folder", ended.output)));
   EXPECT_EQ(::kill(std::stoi(valueOf("child", ended.output)), 0), -1);
 }
