@@ -6,6 +6,8 @@
 #   DURATION=t  of `make soak`: 30s, 10m, 2h; of `make fuzz`: seconds
 #   FUZZERS=... only these: client, server, tools, recording, frames, server_router, client_router
 #   TESTS=regex only the tests whose name matches
+#   COPIES=n    of `make test-repeated`: runs of all tests beside each other (default 6)
+#   ROUNDS=n    of `make test-repeated`: how many times (default 20)
 #   BENCH=...   of `make bench`: local (default), remote or hardware
 
 JOBS ?= $(shell nproc)
@@ -16,7 +18,7 @@ TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-big-endian test-tpci200 soak fuzz bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
+.PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## this list
 	@sed -nE 's/^([a-z][a-z0-9-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 24
@@ -29,6 +31,9 @@ demo: release ## a voltmeter, its server, clients, and what a crash does; then m
 	./examples/demo/hardware build/release
 
 test: test-debug ## build with debug information and run every test
+
+test-repeated: debug ## every test, COPIES beside each other, ROUNDS times: none may fail, nothing may be left (COPIES=6 ROUNDS=20)
+	scripts/repeat-tests build/debug --copies $(or $(COPIES),6) --rounds $(or $(ROUNDS),20) $(if $(TESTS),--tests '$(TESTS)')
 
 test-big-endian: debug ## messages between this host and one of the other byte order, which is emulated
 	@scripts/setup big-endian

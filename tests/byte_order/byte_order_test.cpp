@@ -54,9 +54,8 @@ class Host {
 
 // What a line of `program` that holds `text` says behind it.
 std::string after(const Program& program, const std::string& text) {
-  for (auto line = program.line(); !line.empty(); line = program.line()) {
-    if (const auto at = line.find(text); at != std::string::npos) return line.substr(at + text.size());
-  }
+  const auto line = program.waitForLine(text);
+  if (const auto at = line.find(text); at != std::string::npos) return line.substr(at + text.size());
   ADD_FAILURE() << "it ended without saying: " << text;
   return {};
 }

@@ -52,7 +52,7 @@ class MischiefTest : public testing::TestWithParam<const char*> {
     return set != nullptr ? std::atoi(set) : 1;
   }
 
-  Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name(), std::chrono::seconds(270)};
+  Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
   TestBackplane backplane_;
 };
 

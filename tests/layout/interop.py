@@ -17,11 +17,27 @@ import memory
 import messages
 import reader
 import server
+import wish
 from party import run_until
 
 LAYOUT, TRAFFIC, VICTIM, MPF = (sys.argv.pop(1) for _ in range(4))
-WATCHDOG_SECONDS = 120
+WATCHDOG_SECONDS = 900
 CODE = json.loads(subprocess.run([TRAFFIC, "layout"], check=True, capture_output=True).stdout)
+
+
+class PatientLibc:
+    """libc, but inotify_init1() waits while the user has no inotify instance left: tests beside this one have some."""
+
+    def __getattr__(self, name):
+        return getattr(memory.libc, name)
+
+    def inotify_init1(self, flags):
+        while (instance := memory.libc.inotify_init1(flags)) < 0:
+            os.sched_yield()
+        return instance
+
+
+wish.libc = PatientLibc()
 
 
 class Program:

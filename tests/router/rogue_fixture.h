@@ -114,7 +114,7 @@ class RogueTest : public testing::Test {
     routers_.expectGoodEnd();
   }
 
-  const Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name(), std::chrono::seconds(270)};
+  const Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
   RouterPair routers_;
   std::unique_ptr<EchoServer> server_;
   std::unique_ptr<HonestClient> honest_;

@@ -27,15 +27,8 @@ class OctalProgramTest : public testing::Test {
     command.insert(command.end(), options.begin(), options.end());
     return std::make_unique<Program>(command);
   }
-  // The next line in which that stands.
-  static std::string lineWith(const Program& program, std::string_view text) {
-    for (auto line = program.line(); !line.empty(); line = program.line()) {
-      if (line.find(text) != std::string::npos) return line;
-    }
-    return {};
-  }
   static std::string terminalOf(const Program& program, const std::string& port) {
-    const auto line = lineWith(program, port + " is a model");
+    const auto line = program.waitForLine(port + " is a model");
     return line.substr(std::min(line.find("/dev/"), line.size()));
   }
   static void connect(Instrument& instrument, const std::string& terminal) {
@@ -86,7 +79,7 @@ TEST_F(OctalProgramTest, ServesOnePortAsItServesATerminal) {
                              "--octal-port", "UART0[3],UART0,3"});
   Instrument instrument;
   connect(instrument, terminalOf(*server, "UART0[3]"));
-  EXPECT_THAT(lineWith(*server, "serving"),
+  EXPECT_THAT(server->waitForLine("serving"),
               HasSubstr("port 3 of UART0 (carrier ipac, site IP_a) (9600 baud, 8N1, no flow control) as \"dmm\""));
 
   EXPECT_EQ(ask("dmm", "*IDN?\n"), "MPF,INSTRUMENT,0,1.0\r\n");
@@ -161,8 +154,8 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
     EXPECT_THAT(server->errors(), HasSubstr(complaint));
   }
   const auto server = startWith("tpci200:9");
-  EXPECT_THAT(lineWith(*server, "the board is not there yet"), HasSubstr("there is no TPCI200"));
-  EXPECT_NE(lineWith(*server, "the line is not there yet"), "");
+  EXPECT_THAT(server->waitForLine("the board is not there yet"), HasSubstr("there is no TPCI200"));
+  EXPECT_NE(server->waitForLine("the line is not there yet"), "");
   EXPECT_EQ(ask("dmm", "*IDN?\n"), "refused");
   EXPECT_EQ(server->end(SIGTERM), 0);
 }

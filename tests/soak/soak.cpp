@@ -37,6 +37,7 @@ class Soak {
  public:
   explicit Soak(std::chrono::seconds duration) : duration_(duration) {
     static_cast<void>(server_.line());
+    while (!crowd_.line().starts_with("answered ")) continue;  // all are connected: what comes later is growth
     pids_ = {{"server", server_.pid()}, {"crowd", crowd_.pid()}, {"this", ::getpid()}};
   }
 

@@ -9,12 +9,9 @@
 #include <array>
 #include <cstdint>
 
+#include <mpf/tests/support/watchdog.h>
+
 namespace mpf::test {
-namespace {
-
-constexpr std::chrono::seconds kWatchdog{30};
-
-}  // namespace
 
 Instrument::Instrument() : Instrument(std::string()) {}
 
@@ -61,7 +58,7 @@ void Instrument::setReading(bool isReading) {
 
 bool Instrument::waitForReceived(std::string_view text) const {
   std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, kWatchdog, [&] { return received_.find(text) != std::string::npos; });
+  return changed_.wait_for(lock, Watchdog::kPatience, [&] { return received_.find(text) != std::string::npos; });
 }
 
 std::string Instrument::received() const {

@@ -9,12 +9,15 @@
 #include <unistd.h>
 
 #include <array>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
+#include <mpf/tests/support/output.h>
 
 namespace mpf::test {
 
@@ -39,22 +42,13 @@ class Program {
     signal(number);
     return wait();
   }
-  // Waits for the next line on stderr, without its end; empty when there is none any more.
-  [[nodiscard]] std::string line() const {
-    std::string text;
-    for (char next = 0; retryInterrupted([&] { return ::read(errors_.get(), &next, 1); }) == 1 && next != '\n';) text += next;
-    return text;
-  }
-  // Reads what it wrote to stderr; waits for its end.
-  [[nodiscard]] std::string errors() const {
-    std::string text;
-    std::array<char, 4096> bytes{};
-    for (;;) {
-      const auto length = retryInterrupted([&] { return ::read(errors_.get(), bytes.data(), bytes.size()); });
-      if (length <= 0) return text;
-      text.append(bytes.data(), static_cast<std::size_t>(length));
-    }
-  }
+  // Waits for a line on stderr that holds `text`, and returns it without its end. A line that came before the call counts: which of
+  // the lines of two threads comes first is not certain. Empty when the program ends without such a line.
+  [[nodiscard]] std::string waitForLine(std::string_view text) const { return errors_->waitForLine(text); }
+  // Waits for the next line on stderr; empty when the program has ended. Only for programs that write all lines with one thread.
+  [[nodiscard]] std::string line() const { return errors_->nextLine(); }
+  // Waits for the end of stderr. Returns what line() has not returned.
+  [[nodiscard]] std::string errors() const { return errors_->rest(); }
 
  private:
   void start(std::vector<std::string>& command) {
@@ -64,16 +58,19 @@ class Program {
     arguments.push_back(nullptr);
     std::array<int, 2> pipe{};
     checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
-    errors_.reset(pipe[0]);
+    FileDescriptor readEnd(pipe[0]);
     const FileDescriptor writeEnd(pipe[1]);
     pid_ = checkCall(::fork(), "fork");
-    if (pid_ != 0) return;
+    if (pid_ != 0) {
+      errors_ = std::make_unique<Output>(std::move(readEnd));
+      return;
+    }
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::dup2(writeEnd.get(), STDERR_FILENO);
     ::execv(arguments[0], arguments.data());
     ::_exit(127);
   }
-  FileDescriptor errors_;
+  std::unique_ptr<Output> errors_;
   pid_t pid_ = 0;
 };
 

@@ -44,7 +44,7 @@ class CrowdTest : public testing::Test {
     EXPECT_EQ(window->control().protocolErrors.load(), 0u);
   }
 
-  Watchdog watchdog_{"crowd test", std::chrono::seconds(300)};
+  Watchdog watchdog_{"crowd test"};
   TestBackplane backplane_;
   Victim server_;
   std::vector<Victim> crowd_;

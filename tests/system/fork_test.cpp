@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A program forks without exec: its child keeps nobody alive, does nothing to what its parent has, and may have objects of its own.
+#include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -51,7 +53,7 @@ class ForkTest : public testing::Test {
   static int inChild(const std::function<void()>& act) {
     const auto pid = checkCall(::fork(), "fork");
     if (pid == 0) {
-      ::alarm(100);
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
       act();
       ::_exit(testing::Test::HasFailure() ? 1 : 0);
     }

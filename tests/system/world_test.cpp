@@ -3,8 +3,10 @@
 // Each test plays in a child of its own; what this host does not allow is skipped by name.
 #include <fcntl.h>
 #include <sched.h>
+#include <signal.h>
 #include <sys/mman.h>
 #include <sys/mount.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -70,7 +72,7 @@ class WorldTest : public testing::Test {
     std::fflush(stdout);
     const auto pid = checkCall(::fork(), "fork");
     if (pid == 0) {
-      ::alarm(110);  // also when the test is killed
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
       try {
         act();
       } catch (const std::exception& error) {

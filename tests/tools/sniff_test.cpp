@@ -24,12 +24,13 @@ class SniffToolTest : public SerialServerTest {
     sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_, batching);
     sniff_->start([] { ADD_FAILURE() << "it cannot be served any more"; });
   }
-  // Returns when the server knows that it listens.
+  // Returns when both the server and the tool know that it listens.
   std::unique_ptr<Tool> sniff(std::vector<std::string> more = {}) {
     std::vector<std::string> arguments{"sniff", "serial[0]"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     auto tool = std::make_unique<Tool>(arguments, backplane_.name());
     waitForListener();
+    while (tool->err().find("listening to") == std::string::npos) std::this_thread::yield();
     return tool;
   }
   void waitForListener() const {

@@ -43,7 +43,7 @@ class TortureTest : public testing::Test {
     arguments.insert(arguments.begin(), "torture");
     return runTool(std::move(arguments), "");
   }
-  const Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name(), std::chrono::seconds(280)};
+  const Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
 TEST_F(TortureTest, EverythingHoldsWhenProcessesAreKilledAtEachStep) {

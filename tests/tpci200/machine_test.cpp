@@ -66,7 +66,7 @@ std::vector<std::string> linesOf(const Program& program) {
 TEST(Tpci200Machine, ServesInstrumentsOnOctalUarts) {
   const char* const build = std::getenv("MPF_TEST_TPCI200");
   if (build == nullptr) GTEST_SKIP() << "no emulated machine with a TPCI200: make test-tpci200 makes one";
-  const Watchdog watchdog("the machine", std::chrono::seconds(280));
+  const Watchdog watchdog("the machine");
   const TemporaryFolder folder;
   const Line voltmeter(folder.file("voltmeter"));
   const Line counter(folder.file("counter"));

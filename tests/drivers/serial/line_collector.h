@@ -11,13 +11,14 @@
 #include <vector>
 
 #include <mpf/drivers/serial/serial_port.h>
+#include <mpf/tests/support/watchdog.h>
 
 namespace mpf::test {
 
 using std::chrono_literals::operator""ms;
 using std::chrono_literals::operator""s;
 
-constexpr auto kWatchdog = 30s;  // longer than anything takes; what it guards against is a hang
+constexpr auto kWatchdog = Watchdog::kPatience;  // no upper time limit: what it guards against is a hang
 
 inline Deadline watchdog() { return Deadline::after(kWatchdog); }
 

@@ -8,7 +8,7 @@ import unittest
 from codec import encodeFrame, item
 from programs import Programs
 
-kWatchdogSeconds = 600
+kWatchdogSeconds = 900
 kNaN = struct.unpack("<d", bytes.fromhex("efbeadde0000f87f"))[0]
 # As 1.0, as the minor versions after and before it, in many segments.
 kSpeech = ({}, {"version": "newer", "protocolMinor": 1}, {"version": "older"}, {"spread": True})

@@ -69,16 +69,21 @@ class Programs:
       for end in (program.stdout, program.stderr):
         if end:
           end.close()
+    self.clean()
+    self.running, self.backplanes_ = [], []
+
+  def clean(self):
+    """Removes what programs that were killed left."""
     for backplane in self.backplanes_:
       subprocess.run([os.path.join(self.folder_, "mpf"), "clean", "--backplane", backplane], stdout=subprocess.DEVNULL, check=False)
-    self.running, self.backplanes_ = [], []
 
   def watchdog(self, seconds):
     """Ends this process, and what it started, when it hangs."""
     def bark():
       faulthandler.dump_traceback()
       for program in self.running:
-        program.kill()
+        self.kill(program)
+      self.clean()
       os._exit(1)
     timer = threading.Timer(seconds, bark)
     timer.daemon = True

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// Tests that die, one way each: guard_test.cpp runs them. Each writes what it had, a word and a value to a line.
+#include <signal.h>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <iostream>
+#include <string>
+
+#include <mpf/base/system_call.h>
+#include <mpf/shm/segment.h>
+#include <mpf/shm/segment_name.h>
+#include <mpf/shm/window.h>
+#include <mpf/tests/support/temporary_folder.h>
+#include <mpf/tests/support/test_backplane.h>
+#include <mpf/tests/support/watchdog.h>
+
+namespace mpf::test {
+namespace {
+
+// A segment, a window on another backplane of which the guard does not know, a folder, and a child that does not die with its parent.
+class DyingTest : public testing::Test {
+ protected:
+  DyingTest() {
+    segment_.lockForLife();
+    EXPECT_TRUE(segment_.tryPublish("mpf." + backplane_.name() + ".s.0.left"));
+    child_ = checkCall(::fork(), "fork");
+    if (child_ == 0) {
+      for (;;) ::pause();
+    }
+    std::cout << "other " << otherBackplane() << "\nbackplane " << backplane_.name() << "\nfolder " << folder_.path().string() << "\nchild "
+              << child_ << std::endl;
+  }
+
+  static std::string otherBackplane() { return "dying-" + std::to_string(::getpid()); }
+
+  TestBackplane backplane_;
+  TemporaryFolder folder_;
+  Segment segment_ = Segment::create(1 << 16, layout::SegmentKind::bulk, backplane_.name(), {});
+  OwnWindow window_{otherBackplane(),
+                    layout::SegmentKind::serverWindow,
+                    SegmentName::serverWindow(otherBackplane(), 0, "left"),
+                    {},
+                    [](layout::SegmentHeader&) {}};
+  pid_t child_ = 0;
+};
+
+TEST_F(DyingTest, Hangs) {
+  const Watchdog watchdog("a test that", std::chrono::seconds(1));
+  for (;;) ::pause();
+}
+TEST_F(DyingTest, IsKilled) { ::raise(SIGKILL); }
+TEST_F(DyingTest, Ends) { ::_exit(3); }
+
+}  // namespace
+}  // namespace mpf::test
