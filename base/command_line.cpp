@@ -7,6 +7,7 @@
 #include <limits>
 #include <system_error>
 
+#include <mpf/base/print_error.h>
 #include <mpf/base/version.h>
 
 namespace mpf {
@@ -36,10 +37,10 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   const auto subcommands = subcommandsOf(app);
   if (command != app.get_name() || subcommands.empty()) return refuseArguments(command, error.what());
   if (const auto words = app.remaining(); !words.empty()) {
-    fmt::print(stderr, "{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(),
+    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(),
                subcommands, command);
   } else {
-    fmt::print(stderr, "{}", app.help());
+    printError("{}", app.help());
   }
   return 2;
 }
@@ -76,7 +77,7 @@ std::optional<int> parseCommandLine(CLI::App& app, int argc, const char* const* 
 }
 
 int refuseArguments(const std::string& program, const std::string& why) {
-  fmt::print(stderr, "{}: {}; `{} --help` shows how to use it\n", program, why, program);
+  printError("{}: {}; `{} --help` shows how to use it\n", program, why, program);
   return 2;
 }
 

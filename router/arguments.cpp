@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/print_error.h>
 #include <mpf/router/limits.h>
 #include <mpf/shm/rights_text.h>
 
@@ -105,7 +106,7 @@ std::optional<int> RouterArguments::start(int argc, const char* const* argv) {
     config_ = load();
   } catch (const ConfigError& error) {
     if (file_.empty()) return refuseArguments(kProgram, error.what());
-    fmt::print(stderr, "{}: {}\n", kProgram, error.what());
+    printError("{}: {}\n", kProgram, error.what());
     return 2;
   }
   if (!checkOnly_) return std::nullopt;

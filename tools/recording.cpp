@@ -14,16 +14,12 @@
 
 namespace mpf::tools {
 
-RecordingWriter::RecordingWriter(std::string path)
-    : path_(std::move(path)), file_(checkCall(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600), "create", path_)) {}
+RecordingWriter::RecordingWriter(std::string path) : file_(std::move(path), 0600) {}
 
 void RecordingWriter::write(capnp::MessageBuilder& record) {
   const auto words = capnp::messageToFlatArray(record);
-  auto left = words.asBytes();
-  while (left.size() != 0) {
-    const auto written = checkCall(retryInterrupted([&] { return ::write(file_.get(), left.begin(), left.size()); }), "write", path_);
-    left = left.slice(static_cast<std::size_t>(written), left.size());
-  }
+  const auto bytes = words.asChars();
+  file_.write({bytes.begin(), bytes.size()});
 }
 
 RecordingReader::RecordingReader(std::string path)

@@ -13,21 +13,23 @@
 #include <string>
 
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/output_file.h>
 #include <mpf/schema/recording.capnp.h>
 
 namespace mpf::tools {
 
 class RecordingWriter {
  public:
-  // Creates the file, or empties it. Throws std::system_error.
+  // Creates the file, or opens it, and checks that it can be written. Throws std::system_error.
   explicit RecordingWriter(std::string path);
 
   // Throws std::system_error when the disk is full, say.
   void write(capnp::MessageBuilder& record);
+  // Throws std::system_error when what was written is not kept.
+  void close() { file_.close(); }
 
  private:
-  std::string path_;
-  FileDescriptor file_;
+  OutputFile file_;
 };
 
 class RecordingReader {

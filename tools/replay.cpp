@@ -12,11 +12,13 @@
 #include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/client/message_client.h>
 #include <mpf/schema/conversion.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/recording.h>
 #include <mpf/tools/wrap.h>
 
@@ -142,12 +144,12 @@ class Replayer {
     const auto nowNs = Clock::nowNs();
     if (nowNs - shownNs_ < 1'000'000'000 || ::isatty(STDERR_FILENO) == 0) return;
     shownNs_ = nowNs;
-    fmt::print(stderr, "\r{} requests, {} replied ", requests_, replied_);
+    writeError(fmt::format("\r{} requests, {} replied ", requests_, replied_));
   }
 
   void report() {
-    if (shownNs_ != 0) fmt::print(stderr, "\r\x1b[K");
-    if (!problem_.empty()) fmt::print(stderr, "mpf replay: {}\n", problem_);
+    if (shownNs_ != 0) writeError("\r\x1b[K");
+    if (!problem_.empty()) printError("mpf replay: {}\n", problem_);
     if (arguments_.json) {
       const nlohmann::json report{{"server", server_},
                                   {"clients", clients_.size()},
@@ -156,7 +158,7 @@ class Replayer {
                                   {"ends", ends_},
                                   {"late_p50_ns", late_->percentileNs(50)},
                                   {"late_max_ns", late_->maxNs()}};
-      return fmt::print("{}\n", report.dump(2));
+      return fmt::print("{}\n", jsonText(report));
     }
     if (requests_ == 0) return;  // why is said
     fmt::print("{} of {} to \"{}\": {} replied", counted(requests_, "request"), counted(clients_.size(), "client"), server_, replied_);
