@@ -85,6 +85,7 @@ class Inspector {
       links.push_back(&link);
     }
     if (arguments_.json) (*tree)["links"] = std::move(rows);
+    if (!window.wishes.empty()) (*tree)["waits_for"] = waitsFor(window);
     give(*tree);
     if (!arguments_.json) fmt::print("{}", linkTable(look, links, kMostLinks));
     if (!arguments_.last) return;
@@ -105,6 +106,12 @@ class Inspector {
 
  private:
   static constexpr std::size_t kMostLinks = 100;
+  // Servers that are not there.
+  static Tree waitsFor(const WindowView& window) {
+    Tree wishes = Tree::array();
+    for (const auto& wish : window.wishes) wishes.push_back({{"server", wish.server}, {"location", wish.location}});
+    return wishes;
+  }
   // nullopt: it has gone since it was listed, or cannot be read, which is said.
   [[nodiscard]] std::optional<Tree> dissect(const std::string& file) const try {
     return tryDissect(segments::path(file), {arguments_.last.value_or(DissectOptions().last), arguments_.raw});

@@ -12,7 +12,7 @@ namespace {
 constexpr const char* kFooter =
     "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work when a process is stopped or dead.\n"
     "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
-    "Exit status: 0 done; 1 not done, the text on stderr says why; 2 asked for what cannot be.";
+    "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.";
 
 int runSubcommand(int argc, char** argv) {
   CLI::App app("mpf - looks at backplanes, servers and clients, and talks to them from the shell", "mpf");

@@ -100,6 +100,19 @@ int explainNothing(const MsrArguments& arguments, const std::vector<std::string>
   return problems.empty() ? 0 : 1;
 }
 
+// Servers among what could not be read are missing in the report.
+void tellProblems(const MsrArguments& arguments, const std::vector<std::string>& problems) {
+  if (problems.empty()) return;
+  const auto count = counted(problems.size(), "file") + " could not be read: servers may be missing here";
+  if (arguments.json) {
+    printError("mpf msr: {}\n", count);
+    for (const auto& problem : problems) printError("mpf msr: {}\n", problem);
+    return;
+  }
+  fmt::print("{}", wrap("", count, 2));
+  for (const auto& problem : problems) fmt::print("{}", wrap("problem: ", problem, 2));
+}
+
 int report(const MsrArguments& arguments) {
   bool found = false;
   std::vector<std::string> problems;
@@ -121,9 +134,7 @@ int report(const MsrArguments& arguments) {
         });
       });
   if (!found) return explainNothing(arguments, problems);
-  if (arguments.server.empty() && !arguments.json) {
-    for (const auto& problem : problems) fmt::print("{}", wrap("problem: ", problem, 2));
-  }
+  if (arguments.server.empty()) tellProblems(arguments, problems);
   return 0;
 }
 

@@ -57,7 +57,7 @@ class Replayer {
   // What is sent before the file turns out to be none has been sent: it is awaited and reported.
   void send() try {
     RecordingReader reader(arguments_.file);
-    while (!stopped_ && problem_.empty() && reader.tryNext([this](wire::Record::Reader record) { take(record); })) {
+    while (!stopped_ && problem_.empty() && reader.tryNext([&](wire::Record::Reader record) { take(record, reader); })) {
     }
   } catch (const std::runtime_error& error) {
     problem_ = error.what();
@@ -68,13 +68,13 @@ class Replayer {
     dispatcher_.interrupt();
   }
 
-  void take(wire::Record::Reader record) {
+  void take(wire::Record::Reader record, const RecordingReader& reader) {
     if (record.isOpened() && server_.empty())
       server_ = arguments_.server.empty() ? record.getOpened().getServer().cStr() : arguments_.server;
     if (!record.isMessage() || record.getMessage().getDirection() != wire::Direction::REQUEST) return;
     ConversionError error;
     auto message = tryFromWire(record.getMessage().getEnvelope(), kNoLimit, error);
-    if (!message) throw std::runtime_error(arguments_.file + ": " + error.text);
+    if (!message) throw std::runtime_error(fmt::format("{}: the message is damaged: {}", reader.place(), error.text));
     auto* const client = clientFor(record.getLink());
     if (client == nullptr) return;
     waitFor(record.getAtNs());
@@ -204,7 +204,7 @@ void addReplay(CLI::App& app, Run& run) {
       ->check(number(0, 1e6));
   addSeconds(command, "--timeout", arguments->timeout, "Longest wait for the server, for room in its queue, for the last reply", false);
   addJson(command, arguments->json);
-  command.footer("Exit status: 0 every request got a reply; 1 not so; 2 asked for what cannot be.");
+  command.footer("Exit status: 0 every request got a reply; 1 not so; 2 usage error.");
   command.callback([arguments, &run] { run = [arguments] { return Replayer(*arguments).run(); }; });
 }
 
