@@ -47,8 +47,8 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   const auto subcommands = subcommandsOf(app);
   if (command != app.get_name() || subcommands.empty()) return refuseArguments(command, error.what());
   if (const auto words = app.remaining(); !words.empty()) {
-    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(),
-               subcommands, command);
+    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(), subcommands,
+               command);
   } else {
     printError("{}", app.help());
   }

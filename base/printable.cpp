@@ -15,11 +15,11 @@ struct Range {
 };
 
 // Control characters beyond ASCII, category Cf of Unicode 15.1, the two separators, and the tags.
-constexpr std::array<Range, 20> kUnprintable{
-    {{0x80, 0x9f},       {0xad, 0xad},       {0x600, 0x605},     {0x61c, 0x61c},     {0x6dd, 0x6dd},
-     {0x70f, 0x70f},     {0x890, 0x891},     {0x8e2, 0x8e2},     {0x180e, 0x180e},   {0x200b, 0x200f},
-     {0x2028, 0x202e},   {0x2060, 0x206f},   {0xfeff, 0xfeff},   {0xfff9, 0xfffb},   {0x110bd, 0x110bd},
-     {0x110cd, 0x110cd}, {0x13430, 0x1343f}, {0x1bca0, 0x1bca3}, {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}}};
+constexpr std::array<Range, 20> kUnprintable{{{0x80, 0x9f},       {0xad, 0xad},       {0x600, 0x605},     {0x61c, 0x61c},
+                                              {0x6dd, 0x6dd},     {0x70f, 0x70f},     {0x890, 0x891},     {0x8e2, 0x8e2},
+                                              {0x180e, 0x180e},   {0x200b, 0x200f},   {0x2028, 0x202e},   {0x2060, 0x206f},
+                                              {0xfeff, 0xfeff},   {0xfff9, 0xfffb},   {0x110bd, 0x110bd}, {0x110cd, 0x110cd},
+                                              {0x13430, 0x1343f}, {0x1bca0, 0x1bca3}, {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}}};
 
 // One character of a text, or one byte that is no part of any.
 struct Character {
@@ -49,7 +49,8 @@ Character firstOf(std::string_view text) noexcept {
 bool isShown(const Character& character) noexcept {
   const auto code = character.code;
   if (!character.isValid || code < ' ' || code == 0x7f) return false;
-  return code < 0x80 || std::ranges::none_of(kUnprintable, [code](const Range& range) { return code >= range.first && code <= range.last; });
+  return code < 0x80 ||
+         std::ranges::none_of(kUnprintable, [code](const Range& range) { return code >= range.first && code <= range.last; });
 }
 
 std::string escaped(const Character& character) {

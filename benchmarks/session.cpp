@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <map>
 #include <numeric>
-#include <set>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <tuple>
 

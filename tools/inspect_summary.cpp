@@ -60,9 +60,9 @@ std::string windowTable(const Look& look) {
       const auto* sleeps = window.sleeping == layout::SleepState::onFutex ? "futex"
                            : window.sleeping == layout::SleepState::awake ? "no"
                                                                           : "pipe";
-      table.add({titleOf(window), look.stateOf(window), fmt::to_string(window.pid), sleeps,
-                 fmt::to_string(window.links.size()), fmt::to_string(Totals::of(window).incoming.waiting()),
-                 fmt::to_string(window.hints.ready.size()), fmt::to_string(window.hints.knocks.size())});
+      table.add({titleOf(window), look.stateOf(window), fmt::to_string(window.pid), sleeps, fmt::to_string(window.links.size()),
+                 fmt::to_string(Totals::of(window).incoming.waiting()), fmt::to_string(window.hints.ready.size()),
+                 fmt::to_string(window.hints.knocks.size())});
     }
   }
   auto text = table.isEmpty() ? "  no window\n" : table.fitted("  ");

@@ -44,7 +44,8 @@ class Bindings {
   void add(const WishView& wish) { add(serverText(wish.server, wish.location), "waiting for the server"); }
   void print() const {
     for (const auto& [server, clients] : servers_) {
-      fmt::print("{}", wrap("   ", fmt::format("Server {} has {}. bindState {}", server.first, counted(clients, "client"), server.second), 5));
+      fmt::print("{}",
+                 wrap("   ", fmt::format("Server {} has {}. bindState {}", server.first, counted(clients, "client"), server.second), 5));
     }
   }
 
@@ -66,8 +67,8 @@ void printClient(std::size_t number, const Look& look, const WindowView& client)
 
 void printServer(std::size_t number, const Look& look, const WindowView& server) {
   printHead(number, fmt::format("{}[{}] {} queueSize {} inQueue {} replyQueueFull {} clients {}", serverText(server.name, server.location),
-                                server.pid, routerState(look.stateOf(server)), largestQueue(server),
-                                Totals::of(server).incoming.waiting(), server.replyQueueFull, server.links.size()));
+                                server.pid, routerState(look.stateOf(server)), largestQueue(server), Totals::of(server).incoming.waiting(),
+                                server.replyQueueFull, server.links.size()));
   printRates(look.ratesOf(server));
 }
 

@@ -46,10 +46,10 @@ bool RecordingReader::tryNext(const std::function<void(wire::Record::Reader)>& t
     throw std::runtime_error(
         fmt::format("{}: this is no recording of `mpf tap --write`, or one that was cut off within its first record", place()));
   }
-  throw std::runtime_error(fmt::format(
-      "{}: the file is damaged, or was cut off here; the {} before it can be read: `head -c {} FILE >NEW` keeps them, "
-      "`mpf tap --write` records again",
-      place(), number_ == 2 ? "record" : "records", begin_));
+  throw std::runtime_error(
+      fmt::format("{}: the file is damaged, or was cut off here; the {} before it can be read: `head -c {} FILE >NEW` keeps them, "
+                  "`mpf tap --write` records again",
+                  place(), number_ == 2 ? "record" : "records", begin_));
 }
 
 std::string RecordingReader::place() const { return fmt::format("{}: record {}, at byte {} of {}", path_, number_, begin_, bytes_); }

@@ -26,7 +26,9 @@ TEST(Printable, EscapesBidirectionalAndInvisibleCharacters) {
 }
 
 TEST(Printable, EscapesEachByteThatIsNotUtf8) {
-  EXPECT_EQ(printable("S\xfc" "d"), "S\\xfcd");                     // Latin-1
+  EXPECT_EQ(printable("S\xfc"
+                      "d"),
+            "S\\xfcd");                     // Latin-1
   EXPECT_EQ(printable("\xc2"), "\\xc2");                            // cut
   EXPECT_EQ(printable("\xe2\x80"), "\\xe2\\x80");                   // cut
   EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b");                   // overlong ESC [

@@ -3,6 +3,7 @@
 // place, and never writes its log to an instrument.
 #include <fcntl.h>
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
@@ -16,7 +17,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <map>
-#include <sched.h>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -24,6 +24,7 @@
 #include <mpf/base/system_call.h>
 #include <mpf/client/sync_client.h>
 #include <mpf/schema/serial_server.h>
+#include <mpf/tests/support/program.h>
 #include <mpf/tests/support/pty.h>
 #include <mpf/tests/support/temporary_folder.h>
 #include <mpf/tests/support/test_backplane.h>
@@ -191,6 +192,14 @@ TEST_P(SerialServerWithout, TheInstrumentGetsNoLineOfTheLog) {
   pollfd poll{line_.master().get(), POLLIN, 0};
   const auto received = ::poll(&poll, 1, 0) == 1 ? ::read(line_.master().get(), bytes.data(), bytes.size()) : 0;
   EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(received)), "*IDN?");
+}
+
+TEST(LogOfAProgram, HasTheTextOfOthersEscaped) {
+  const Watchdog watchdog("a program");
+  const TestBackplane backplane;
+  const Program server({MPF_TEST_INT32_SERVER, "a\u202eb", "--backplane", backplane.name()});
+
+  EXPECT_THAT(server.line(), testing::EndsWith(R"(info mpf-int32-server: serving "a\u202eb" at location 0)"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Descriptors, SerialServerWithout, testing::Range(0U, kSubsets));

@@ -84,7 +84,8 @@ TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
   EXPECT_THAT(named.err, HasSubstr("no server \"dac\", unless it is among what could not be read; `mpf ls` shows those that there are\n"));
   EXPECT_EQ(some.status, 0);
   EXPECT_THAT(inOneLine(some.out), HasSubstr("1 file could not be read: servers may be missing here problem: " + file + ": truncated"));
-  EXPECT_THAT(forPrograms.err, testing::StartsWith("mpf msr: 1 file could not be read: servers may be missing here\nmpf msr: " + file + ":"));
+  EXPECT_THAT(forPrograms.err,
+              testing::StartsWith("mpf msr: 1 file could not be read: servers may be missing here\nmpf msr: " + file + ":"));
   EXPECT_EQ(nlohmann::json::parse(forPrograms.out).size(), 1U);
 }
 

@@ -65,7 +65,7 @@ torture::Campaign::Progress progress() {
   return [](const torture::Plan& plan, std::uint64_t round, std::uint64_t planned) {
     const auto of = planned == 0 ? std::string() : fmt::format(" of {}", planned);
     writeError(fmt::format("\r\x1b[Kround {}{}: {} {} at {} + {}", round, of, toString(plan.mode), toString(plan.role), plan.place.mark,
-               plan.place.instructions));
+                           plan.place.instructions));
   };
 }
 
