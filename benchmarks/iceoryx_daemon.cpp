@@ -98,6 +98,7 @@ void IceoryxDaemon::stop() noexcept {
   ::kill(pid_, SIGTERM);
   const bool ended = waitUntil([this] { return hasEnded(pid_); }, std::chrono::seconds(3));
   if (!ended) killProcess(pid_);
+  removeRouDiFiles(kTemporary, "/dev/shm");
   removeIceoryxFiles(kTemporary);
   pid_ = 0;
 }

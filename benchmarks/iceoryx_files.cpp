@@ -3,7 +3,9 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <unistd.h>
 
+#include <grp.h>
 #include <string>
 #include <vector>
 
@@ -25,17 +27,42 @@ std::vector<fs::path> locksIn(const fs::path& folder) {
   return locks;
 }
 
+// The lock of a process that is gone; none when somebody holds it, or there is no such file.
+FileDescriptor tryLock(const fs::path& path) {
+  FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
+  if (file && ::flock(file.get(), LOCK_EX | LOCK_NB) != 0) file.reset();
+  return file;
+}
+
+void remove(const fs::path& path) {
+  std::error_code ignored;
+  fs::remove(path, ignored);
+}
+
+void removeSocket(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_socket(path, ignored)) remove(path);
+}
+
 }  // namespace
 
 void removeIceoryxFiles(const fs::path& folder) {
   for (auto lock : locksIn(folder)) {
-    const FileDescriptor file(::open(lock.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-    if (!file || ::flock(file.get(), LOCK_EX | LOCK_NB) != 0) continue;
-    std::error_code ignored;
-    fs::remove(lock, ignored);
-    const auto socket = lock.replace_extension();
-    if (fs::is_socket(socket, ignored)) fs::remove(socket, ignored);
+    const auto held = tryLock(lock);
+    if (!held) continue;
+    remove(lock);
+    removeSocket(lock.replace_extension());
   }
+}
+
+void removeRouDiFiles(const fs::path& folder, const fs::path& sharedMemory) {
+  const auto held = tryLock(folder / "iox-unique-roudi.lock");  // another RouDi cannot start meanwhile
+  if (!held) return;
+  remove(sharedMemory / "iceoryx_mgmt");
+  if (const auto* group = ::getgrgid(::getegid()); group != nullptr) remove(sharedMemory / group->gr_name);
+  removeSocket(folder / "roudi");
+  remove(folder / "roudi.lock");
+  remove(folder / "iox-unique-roudi.lock");
 }
 
 }  // namespace mpf::bench

@@ -6,9 +6,11 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 
 #include <mpf/base/file_descriptor.h>
@@ -46,6 +48,26 @@ TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
 
   EXPECT_THAT(namesIn(folder.path()),
               testing::UnorderedElementsAre("another.lock", "mpf-bench-roudi-XXXXXX", "mpf-bench-2-client.lock", "mpf-bench-2-client"));
+}
+
+TEST(IceoryxFiles, ThoseOfADaemonThatIsGoneAreRemoved) {
+  const test::TemporaryFolder folder;
+  const test::TemporaryFolder sharedMemory;
+  for (const char* name : {"iox-unique-roudi.lock", "roudi.lock", "another.lock"}) folder.write(name, "");
+  leaveSocket(folder.file("roudi"));
+  const std::string segment = ::getgrgid(::getegid())->gr_name;
+  for (const auto& name : {std::string("iceoryx_mgmt"), segment, std::string("another")}) sharedMemory.write(name, "");
+  {
+    const FileDescriptor held(::open(folder.file("iox-unique-roudi.lock").c_str(), O_RDWR | O_CLOEXEC));
+    checkCall(::flock(held.get(), LOCK_EX), "flock");
+    removeRouDiFiles(folder.path(), sharedMemory.path());
+    EXPECT_EQ(namesIn(folder.path()).size(), 4U) << "of a daemon that runs";
+  }
+
+  removeRouDiFiles(folder.path(), sharedMemory.path());
+
+  EXPECT_THAT(namesIn(folder.path()), testing::ElementsAre("another.lock"));
+  EXPECT_THAT(namesIn(sharedMemory.path()), testing::ElementsAre("another"));
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
 #include <mpf/client/sync_client.h>
 #include <mpf/schema/serial_server.h>
@@ -44,8 +45,17 @@ class Bare {
     std::vector<char*> arguments;
     for (auto& word : command) arguments.push_back(word.data());
     arguments.push_back(nullptr);
+    std::array<int, 2> pipe{};
+    checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
+    const FileDescriptor started(pipe[0]);
+    FileDescriptor writeEnd(pipe[1]);
     pid_ = checkCall(::fork(), "fork");
-    if (pid_ != 0) return;
+    if (pid_ != 0) {
+      writeEnd.reset();
+      char none = 0;
+      [[maybe_unused]] const auto nothing = ::read(started.get(), &none, 1);  // ends when the program has been started
+      return;
+    }
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
       const auto found = files.find(descriptor);
@@ -77,14 +87,22 @@ class Bare {
     std::error_code none;
     return std::filesystem::read_symlink(fmt::format("/proc/{}/fd/{}", pid_, descriptor), none).string();
   }
-  // Waits until each of these descriptors leads to /dev/null.
-  void waitForNull(unsigned descriptors) const {
+  // Waits until each of these descriptors leads to /dev/null. False when the program ends first.
+  [[nodiscard]] bool waitForNull(unsigned descriptors) const {
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
-      while ((descriptors >> descriptor & 1u) != 0 && placeOf(descriptor) != "/dev/null") ::sched_yield();
+      while ((descriptors >> descriptor & 1u) != 0 && placeOf(descriptor) != "/dev/null") {
+        if (hasEnded()) return false;
+        ::sched_yield();
+      }
     }
+    return true;
   }
 
  private:
+  [[nodiscard]] bool hasEnded() const {
+    siginfo_t info{};
+    return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
+  }
   pid_t pid_ = 0;
 };
 
@@ -150,7 +168,7 @@ TEST_P(EveryProgramStarted, HasNullInPlaceOfWhatIsClosed) {
   for (unsigned closed = 1; closed < kSubsets; ++closed) {
     Bare program(longRun(), closed);
 
-    program.waitForNull(closed);  // a file of the program's own would stay there
+    ASSERT_TRUE(program.waitForNull(closed)) << closed;  // a file of the program's own would stay there
 
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
       EXPECT_EQ(program.placeOf(descriptor), (closed >> descriptor & 1u) != 0 ? "/dev/null" : "/dev/zero") << closed;
