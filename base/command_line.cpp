@@ -7,6 +7,8 @@
 #include <limits>
 #include <system_error>
 
+#include <mpf/base/print_error.h>
+#include <mpf/base/run_main.h>
 #include <mpf/base/version.h>
 
 namespace mpf {
@@ -30,18 +32,27 @@ std::string chosenCommand(const CLI::App& app) {
   return name;
 }
 
+// Says in --help, from which the man pages are made, how the program or subcommand ends.
+void addExitStatus(CLI::App& app) {
+  auto footer = app.get_footer();
+  if (footer.find("Exit status") == std::string::npos) {
+    app.footer(footer + (footer.empty() ? "" : "\n") + "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.");
+  }
+  for (auto* command : app.get_subcommands([](CLI::App*) { return true; })) addExitStatus(*command);
+}
+
 int explain(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
   const auto command = chosenCommand(app);
   const auto subcommands = subcommandsOf(app);
   if (command != app.get_name() || subcommands.empty()) return refuseArguments(command, error.what());
   if (const auto words = app.remaining(); !words.empty()) {
-    fmt::print(stderr, "{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(),
-               subcommands, command);
+    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(), subcommands,
+               command);
   } else {
-    fmt::print(stderr, "{}", app.help());
+    printError("{}", app.help());
   }
-  return 2;
+  return kExitUsage;
 }
 
 // Whether all of `text` is a number, which is then in `value`.
@@ -68,6 +79,7 @@ CLI::Validator inRange(Number least, Number most) {
 }  // namespace
 
 std::optional<int> parseCommandLine(CLI::App& app, int argc, const char* const* argv) try {
+  addExitStatus(app);
   app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), kVersion), "Print the version");
   app.parse(argc, argv);
   return std::nullopt;
@@ -76,8 +88,8 @@ std::optional<int> parseCommandLine(CLI::App& app, int argc, const char* const* 
 }
 
 int refuseArguments(const std::string& program, const std::string& why) {
-  fmt::print(stderr, "{}: {}; `{} --help` shows how to use it\n", program, why, program);
-  return 2;
+  printError("{}: {}; `{} --help` shows how to use it\n", program, why, program);
+  return kExitUsage;
 }
 
 CLI::Validator wholeNumber(std::uint64_t least, std::uint64_t most) { return inRange(least, most); }

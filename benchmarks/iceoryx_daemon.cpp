@@ -13,9 +13,12 @@
 
 #include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
+#include <mpf/benchmarks/iceoryx_files.h>
 
 namespace mpf::bench {
 namespace {
+
+constexpr const char* kTemporary = "/tmp";  // where iceoryx has its files, whatever $TMPDIR says
 
 // As little shared memory as the measurements need.
 constexpr std::string_view kPools = R"([general]
@@ -66,6 +69,7 @@ bool isReady(int pipe) {
 }  // namespace
 
 IceoryxDaemon::IceoryxDaemon() : config_(writeConfig()) {
+  removeIceoryxFiles(kTemporary);  // of runs that were interrupted
   int ends[2];
   checkCall(::pipe2(ends, 0), "pipe2");
   const FileDescriptor read(ends[0]);
@@ -94,6 +98,8 @@ void IceoryxDaemon::stop() noexcept {
   ::kill(pid_, SIGTERM);
   const bool ended = waitUntil([this] { return hasEnded(pid_); }, std::chrono::seconds(3));
   if (!ended) killProcess(pid_);
+  removeRouDiFiles(kTemporary, "/dev/shm");
+  removeIceoryxFiles(kTemporary);
   pid_ = 0;
 }
 

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 // mpf-bench: what `mpf bench` starts.
 #include <CLI/CLI.hpp>
-#include <exception>
 #include <fmt/format.h>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/run_main.h>
 #include <mpf/benchmarks/hardware.h>
 #include <mpf/benchmarks/local.h>
 #include <mpf/benchmarks/remote.h>
 
-int main(int argc, char** argv) try {
+namespace {
+
+int bench(int argc, char** argv) {
   CLI::App app("mpf bench - how fast messages are, beside the physical floors and other message systems", "mpf bench");
   auto& local = *app.add_subcommand("local", mpf::bench::kLocalHelp);
   auto& remote = *app.add_subcommand("remote", mpf::bench::kRemoteHelp);
@@ -27,7 +29,10 @@ int main(int argc, char** argv) try {
   localOptions.commandLine = remoteOptions.commandLine = hardwareOptions.commandLine = commandLine;
   if (hardware.parsed()) return mpf::bench::runHardware(hardwareOptions);
   return local.parsed() ? mpf::bench::runLocal(localOptions) : mpf::bench::runRemote(remoteOptions);
-} catch (const std::exception& error) {
-  fmt::print(stderr, "mpf bench: {}\n", error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain("mpf bench", [&] { return bench(argc, argv); });
 }

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <exception>
 
+#include <mpf/base/print_error.h>
 #include <mpf/base/system_call.h>
 
 namespace mpf::bench {
@@ -57,7 +58,7 @@ int startProgram(std::vector<std::string> words, const std::function<void()>& pr
     try {
       prepare();
     } catch (const std::exception& exception) {
-      std::fprintf(stderr, "%s\n", exception.what());
+      printError("{}\n", exception.what());
       std::_Exit(1);
     }
     std::vector<char*> arguments;
@@ -65,7 +66,7 @@ int startProgram(std::vector<std::string> words, const std::function<void()>& pr
     for (auto& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     ::execvp(arguments[0], arguments.data());
-    std::fprintf(stderr, "%s: %s\n", arguments[0], std::strerror(errno));
+    printError("{}: {}\n", arguments[0], std::strerror(errno));
     std::_Exit(kNoSuchProgram);
   });
 }

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/system_call.h>
 #include <mpf/benchmarks/company.h>
 #include <mpf/benchmarks/measurement.h>
@@ -67,7 +68,7 @@ class Crowd {
     static_cast<void>(::write(write.get(), "+", 1) == 1);
     dispatcher.run();
   } catch (const std::exception& exception) {
-    std::fprintf(stderr, "idle clients: %s\n", exception.what());
+    printError("idle clients: {}\n", exception.what());
     std::_Exit(1);
   }
   int pid_ = 0;

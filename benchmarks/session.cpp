@@ -6,13 +6,15 @@
 #include <charconv>
 #include <cstdio>
 #include <fmt/format.h>
-#include <fstream>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <tuple>
 
+#include <mpf/base/output_file.h>
+#include <mpf/base/print_error.h>
 #include <mpf/benchmarks/mpf_peer.h>
 #include <mpf/benchmarks/report.h>
 #include <mpf/benchmarks/runner.h>
@@ -50,12 +52,10 @@ Cpus parseCpus(const std::string& text) {
   return cpus;
 }
 
-bool writeFile(const std::string& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text;
-  file.close();
-  if (!file) fmt::print(stderr, "bench: cannot write {}\n", path);
-  return static_cast<bool>(file);
+// Before the work, which takes minutes: empty without a name.
+std::optional<OutputFile> openJson(const Options& options) {
+  if (options.jsonFile.empty() || options.jsonFile == "-") return std::nullopt;
+  return OutputFile(options.jsonFile);
 }
 
 void listRows(const std::vector<Measurement>& rows) {
@@ -64,13 +64,16 @@ void listRows(const std::vector<Measurement>& rows) {
 }
 
 int show(const std::vector<Result>& results, const Machine& machine, const Placement& placement, const Options& options,
-         const std::string& table) {
+         const std::string& table, std::optional<OutputFile> jsonFile) {
   const auto json = toJson(results, machine, placement);
   if (options.jsonFile == "-") {
     fmt::print("{}", json);
   } else {
     fmt::print("{}\n{}\n{}", machine.text(), options.commandLine, table);
-    if (!options.jsonFile.empty() && !writeFile(options.jsonFile, json)) return 1;
+  }
+  if (jsonFile) {
+    jsonFile->write(json);
+    jsonFile->close();
   }
   return std::any_of(results.begin(), results.end(), [](const Result& result) { return !result.error.empty(); }) ? 1 : 0;
 }
@@ -112,17 +115,17 @@ std::optional<Placement> place(const Options& options, bool mayShare) {
   if (!options.cpus.empty()) placement = {parseCpus(options.cpus.front()), parseCpus(options.cpus.back())};
   for (const auto& side : {placement.server, placement.requester}) {
     if (side.empty()) {
-      fmt::print(stderr, "bench: --cpus: a side is a number, or several as 0+2\n");
+      printError("bench: --cpus: a side is a number, or several as 0+2\n");
       return std::nullopt;
     }
     for (const auto cpu : side) {
       if (std::find(allowed.begin(), allowed.end(), cpu) != allowed.end()) continue;
-      fmt::print(stderr, "bench: this process may not use CPU {}\n", cpu);
+      printError("bench: this process may not use CPU {}\n", cpu);
       return std::nullopt;
     }
   }
   if (placement.server == placement.requester && !mayShare) {
-    fmt::print(stderr, "bench: two CPUs are needed, this process may use {}\n", allowed.size());
+    printError("bench: two CPUs are needed, this process may use {}\n", allowed.size());
     return std::nullopt;
   }
   return placement;
@@ -133,7 +136,7 @@ std::vector<Result> takeAll(const std::vector<Measurement>& rows, const Placemen
   std::vector<Result> results;
   for (const auto& row : rows) {
     results.push_back(runner.run(row, budgetOf(row, rows, pace, options.quick), pace.rounds(row)));
-    fmt::print(stderr, "{:3}% {}\n", results.size() * 100 / rows.size(), oneLine(results.back()));
+    printError("{:3}% {}\n", results.size() * 100 / rows.size(), oneLine(results.back()));
   }
   return results;
 }
@@ -147,13 +150,14 @@ int run(std::vector<Measurement> all, const std::optional<Placement>& placement,
   }
   if (!placement) return 2;
   if (rows.empty()) {
-    fmt::print(stderr, "bench: nothing has such a name; --list shows the names\n");
+    printError("bench: nothing has such a name; --list shows the names\n");
     return 2;
   }
   const auto machine = Machine::look(*placement);
+  auto jsonFile = openJson(options);
   removeBackplanes(kRunPrefix);  // of runs that were interrupted
   const auto results = takeAll(rows, *placement, options, pace);
-  return show(results, machine, *placement, options, tableOf(results));
+  return show(results, machine, *placement, options, tableOf(results), std::move(jsonFile));
 }
 
 }  // namespace mpf::bench

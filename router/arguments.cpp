@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/print_error.h>
 #include <mpf/router/limits.h>
 #include <mpf/shm/rights_text.h>
 
@@ -19,7 +20,7 @@ constexpr const char* kFooter =
     "          mpf-router --serve 1 --listen 10.0.0.7:9900 --plain     on the host of the servers\n"
     "          mpf-router --remote 1=10.0.0.7:9900 --plain             on the host of the clients\n"
     "SIGHUP loads the file anew; what stays the same stays connected.\n"
-    "Exit status: 0 told to end; 1 could not go on; 2 asked for what cannot be.";
+    "Exit status: 0 stopped; 1 failed; 2 usage error, or an error in the configuration.";
 
 std::int32_t parseLocation(std::string_view text) {
   std::int32_t location = 0;
@@ -105,7 +106,7 @@ std::optional<int> RouterArguments::start(int argc, const char* const* argv) {
     config_ = load();
   } catch (const ConfigError& error) {
     if (file_.empty()) return refuseArguments(kProgram, error.what());
-    fmt::print(stderr, "{}: {}\n", kProgram, error.what());
+    printError("{}: {}\n", kProgram, error.what());
     return 2;
   }
   if (!checkOnly_) return std::nullopt;

@@ -1,22 +1,25 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/router/kj_text.h>
 
-#include <algorithm>
+#include <mpf/base/printable.h>
 
 namespace mpf::router {
 namespace {
 
 constexpr std::size_t kMaxText = 200;  // bytes
 
+// Cuts a text to kMaxText, between two characters of UTF-8.
+std::string shortened(std::string text) {
+  const auto isWithin = [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) == 0x80; };
+  auto size = kMaxText;
+  while (size < text.size() && size != 0 && isWithin(text[size])) --size;
+  if (size < text.size()) text.resize(size);
+  return text;
+}
+
 }  // namespace
 
-std::string forPeople(const std::string& text) {
-  const auto isWithin = [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) == 0x80; };  // a character of UTF-8
-  auto size = std::min(text.size(), kMaxText);
-  while (size != 0 && size < text.size() && isWithin(text[size])) --size;
-  auto clean = text.substr(0, size);
-  std::ranges::replace_if(clean, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');
-  return clean;
-}
+// A peer may send megabytes: the text is cut first, and again when its escapes made it longer.
+std::string forPeople(const std::string& text) { return shortened(printable(shortened(text))); }
 
 }  // namespace mpf::router

@@ -10,7 +10,7 @@
 namespace mpf::router {
 
 [[nodiscard]] inline std::string toStd(kj::StringPtr text) { return {text.begin(), text.size()}; }
-// What a peer said for people: cut when it is long, and nothing in it that moves a terminal's cursor or breaks a log's lines.
+// What a peer said, printable() and at most 200 bytes.
 [[nodiscard]] std::string forPeople(const std::string& text);
 [[nodiscard]] inline std::string forPeople(kj::StringPtr text) { return forPeople(toStd(text)); }
 

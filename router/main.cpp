@@ -5,8 +5,10 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
-#include <fmt/format.h>
+#include <stdexcept>
 
+#include <mpf/base/run_main.h>
+#include <mpf/base/standard_descriptors.h>
 #include <mpf/router/arguments.h>
 #include <mpf/router/kj_text.h>
 #include <mpf/router/router.h>
@@ -32,7 +34,7 @@ void tellAddresses(int fd, Router& router) {
     if (written <= 0) break;
     at += static_cast<std::size_t>(written);
   }
-  ::close(fd);
+  mpf::closeDescriptor(fd);
 }
 
 // A configuration that is wrong is told, and changes nothing.
@@ -79,16 +81,16 @@ int run(const RouterArguments& arguments) {
   return 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int route(int argc, char** argv) try {
   RouterArguments arguments;
   if (const auto status = arguments.start(argc, argv)) return *status;
   return run(arguments);
-} catch (const kj::Exception& error) {
-  fmt::print(stderr, "mpf-router: {}\n", mpf::router::toStd(error.getDescription()));
-  return 1;
-} catch (const std::exception& error) {
-  fmt::print(stderr, "mpf-router: {}\n", error.what());
-  return 1;
+} catch (const kj::Exception& error) {  // its what() has places of source files and a stack trace
+  throw std::runtime_error(mpf::router::toStd(error.getDescription()));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain("mpf-router", [&] { return route(argc, argv); });
 }

@@ -31,7 +31,7 @@ std::set<ServerName> Wishes::look() {
     }
     try {
       if (const auto header = segments::tryReadHeader(name, layout::SegmentKind::wish)) {
-        known[name] = {{header->location, segments::text(header->name)}, header->ownerWindow};
+        known[name] = {{header->location, segments::rawText(header->name)}, header->ownerWindow};
       }
     } catch (const std::exception& error) {
       if (isShortage(error)) problem_ = error.what();

@@ -217,17 +217,6 @@ namespace segments {
 
 std::string path(const std::string& name) { return fmt::format("{}/{}", kDirectory, name); }
 
-// C0, DEL, and in UTF-8 the C1 characters, of which some terminals take U+009B for the escape sequence that it is short for.
-std::string printable(std::string text) {
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const auto byte = static_cast<unsigned char>(text[at]);
-    const bool isC1 = byte >= 0x80 && byte < 0xa0 && at != 0 && text[at - 1] == '\xc2';
-    if (isC1) text[at - 1] = '?';
-    if (isC1 || byte < ' ' || byte == 127) text[at] = '?';
-  }
-  return text;
-}
-
 bool remove(const std::string& name) {
   const bool removed = ipc::shared_memory_object::remove(name.c_str());
   MPF_STEP(name_removed);

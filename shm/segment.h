@@ -22,6 +22,7 @@
 #include <vector>
 
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/printable.h>
 #include <mpf/shm/layout.h>
 #include <mpf/shm/mapping.h>
 
@@ -127,13 +128,16 @@ std::vector<std::string> list(const std::string& prefix);
 // Path of a segment's file.
 std::string path(const std::string& name);
 
-// Whoever may write to /dev/shm chooses what stands there: none of these characters shall command a terminal.
-std::string printable(std::string text);
+// A text in a header as it is, for comparisons and for other programs.
+template <std::size_t n>
+std::string rawText(const std::array<char, n>& chars) {
+  return {chars.begin(), std::find(chars.begin(), chars.end(), '\0')};
+}
 
-// A text in a header, printable.
+// The same for people: any process that may write to /dev/shm chooses these characters.
 template <std::size_t n>
 std::string text(const std::array<char, n>& chars) {
-  return printable({chars.begin(), std::find(chars.begin(), chars.end(), '\0')});
+  return printable(rawText(chars));
 }
 
 // 64 random bits, never 0.

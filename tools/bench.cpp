@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include <mpf/base/print_error.h>
 #include <mpf/tools/commands.h>
 
 namespace mpf::tools {
@@ -23,7 +24,7 @@ int bench(std::vector<std::string> words) {
   for (auto& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   ::execv(program.c_str(), arguments.data());
-  fmt::print(stderr, "mpf bench: cannot start {}: {}; it is there when MPF was built with MPF_BUILD_BENCHMARKS=ON\n", program,
+  printError("mpf bench: cannot start {}: {}; it is there when MPF was built with MPF_BUILD_BENCHMARKS=ON\n", program,
              std::strerror(errno));
   return 1;
 }

@@ -15,11 +15,13 @@
 #include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/client/sync_client.h>
 #include <mpf/schema/json.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/show.h>
 
 namespace mpf::tools {
@@ -112,7 +114,7 @@ class Caller {
       ++failed_;
       const auto why = whyNot(answer);
       ++reasons_[why];
-      if (showsEach() && !arguments_.json) fmt::print(stderr, "mpf call: {}\n", why);
+      if (showsEach() && !arguments_.json) printError("mpf call: {}\n", why);
     }
   }
 
@@ -139,15 +141,15 @@ class Caller {
     const auto nowNs = Clock::nowNs();
     if (!isLoop() || nowNs - shownNs_ < 1'000'000'000 || ::isatty(STDERR_FILENO) == 0) return;
     shownNs_ = nowNs;
-    fmt::print(stderr, "\r{} of {}, {} failed ", done, arguments_.count, failed_);
+    writeError(fmt::format("\r{} of {}, {} failed ", done, arguments_.count, failed_));
   }
 
   void report() {
-    if (shownNs_ != 0) fmt::print(stderr, "\r\x1b[K");
+    if (shownNs_ != 0) writeError("\r\x1b[K");
     if (arguments_.json) return reportJson();
     if (!isLoop()) return;
     for (const auto& [reason, times] : reasons_) {
-      if (!showsEach()) fmt::print(stderr, "mpf call: {}{}\n", reason, times == 1 ? "" : fmt::format(" ({} times)", times));
+      if (!showsEach()) printError("mpf call: {}{}\n", reason, times == 1 ? "" : fmt::format(" ({} times)", times));
     }
     const auto at = [&](double percent) { return durationText(static_cast<double>(recorder_->percentileNs(percent))); };
     fmt::print("{} replied, {} did not; p50 {}, p99 {}, p99.9 {}, max {}\n", recorder_->count(), failed_, at(50), at(99), at(99.9),
@@ -165,7 +167,7 @@ class Caller {
                           {"p99_ns", recorder_->percentileNs(99)},
                           {"p999_ns", recorder_->percentileNs(99.9)},
                           {"max_ns", recorder_->maxNs()}};
-    fmt::print("{}\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    fmt::print("{}\n", jsonText(report));
   }
 
   const CallArguments& arguments_;
@@ -184,12 +186,12 @@ int call(const CallArguments& arguments) {
   const auto type = tryParseType(arguments.type);
   if (!type || !isForCalls(*type)) {
     const auto what = type ? "is what MPF itself says to clients" : "is no message type";
-    fmt::print(stderr, "mpf call: {} {}; use one of {}\n", arguments.type, what, typesForCalls());
+    printError("mpf call: {} {}; use one of {}\n", arguments.type, what, typesForCalls());
     return 2;
   }
   std::string error;
   if (!tryParse(*type, arguments.fields, error)) {
-    fmt::print(stderr, "mpf call: {}\n", error);
+    printError("mpf call: {}\n", error);
     return 2;
   }
   return Caller(arguments, *type).run();

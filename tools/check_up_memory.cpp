@@ -92,16 +92,21 @@ Finding checkSpace(const Host& host) {
   constexpr const char* kName = "space in /dev/shm";
   constexpr std::uint64_t kLittle = 16 * kMiB;
   constexpr std::uint64_t kFewFiles = 1000;
+  constexpr std::uint64_t kFilesOfALink = 10;
   const auto space = host.sharedMemory();
   if (!space) return {kName, Health::unknown, "its size cannot be told", {}};
   const auto seen = fmt::format("{} of {} free", bytesText(space->freeBytes), bytesText(space->totalBytes));
+  const auto files = fmt::format("{} of {} inodes free, and each window, link and pool is a file", space->freeFiles, space->totalFiles);
+  const std::string moreFiles = "mount -o remount,nr_inodes=1M /dev/shm";
   const std::string more = "mount -o remount,size=1G /dev/shm; containers: --shm-size=1g";
-  if (space->freeBytes < kMiB || space->freeFiles < 10) {
+  if (space->freeFiles < kFilesOfALink) {
+    return {kName, Health::problem, files + ": links and servers are refused", "mpf clean; remove what others left; " + moreFiles};
+  }
+  if (space->freeBytes < kMiB) {
     return {kName, Health::problem, seen + ": links and servers are refused", "mpf clean; remove what others left; " + more};
   }
   if (space->freeFiles < kFewFiles) {
-    return {kName, Health::warning, fmt::format("{}, room for {} files: each link is one", seen, space->freeFiles),
-            "mpf clean; mount -o remount,nr_inodes=1M /dev/shm"};
+    return {kName, Health::warning, files, "mpf clean; " + moreFiles};
   }
   if (space->freeBytes < kLittle) return {kName, Health::warning, seen + ": large messages will be refused", "mpf clean; " + more};
   if (space->totalBytes <= 64 * kMiB) {

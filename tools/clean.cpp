@@ -10,11 +10,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include <mpf/base/print_error.h>
+#include <mpf/base/printable.h>
 #include <mpf/shm/backplane.h>
 #include <mpf/shm/remains.h>
 #include <mpf/shm/segment.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
@@ -65,10 +68,10 @@ class Cleaner {
   }
   // Returns the exit status.
   int end() {
-    if (arguments_.json) fmt::print("{}\n", files_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    if (arguments_.json) fmt::print("{}\n", jsonText(files_));
     else if (!isAnythingDead_) fmt::print("nothing to remove: no dead process left anything\n");
     if (!arguments_.dryRun && unknown_ != 0)
-      fmt::print(stderr, "mpf clean: {} could not be judged; `mpf clean --dry-run` says why\n", counted(unknown_, "file"));
+      printError("mpf clean: {} could not be judged; `mpf clean --dry-run` says why\n", counted(unknown_, "file"));
     if (arguments_.dryRun && !arguments_.json && alive_ != 0)
       fmt::print("{}: {}\n", counted(alive_, "file stays", "files stay"), alive_ == 1 ? "its process lives" : "their processes live");
     return left_ == 0 ? 0 : 1;
@@ -85,7 +88,7 @@ class Cleaner {
     if (removed) {
       tell("removed " + path, file.reason);
     } else if (stranger) {
-      fmt::print(stderr, "mpf clean: {} belongs to user {}, whose process is dead; that user or root may remove it\n", path, *stranger);
+      printError("mpf clean: {} belongs to user {}, whose process is dead; that user or root may remove it\n", path, *stranger);
     } else if (arguments_.dryRun) {
       tell("would remove " + path, file.reason);
     }
@@ -95,9 +98,8 @@ class Cleaner {
     else ++unknown_;
     if (file.verdict == Verdict::unknown && arguments_.dryRun) tell(segments::path(file.name) + " stays", file.reason);
   }
-  // A path stays in one piece, to be copied.
   static void tell(const std::string& what, const std::string& reason) {
-    fmt::print("{}:\n{}", segments::printable(what), wrap("  ", segments::printable(reason), 2));
+    fmt::print("{}{}", wrap("", printable(what) + ":", 4), wrap("  ", printable(reason), 2));
   }
 
   const CleanArguments& arguments_;

@@ -9,6 +9,7 @@
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/check_up.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/wrap.h>
 
 namespace mpf::tools {
@@ -30,7 +31,7 @@ nlohmann::json toJson(const std::vector<Finding>& findings) {
 
 int examine(bool json) {
   const auto findings = checkUp(Host());
-  if (json) fmt::print("{}\n", toJson(findings).dump(2));
+  if (json) fmt::print("{}\n", jsonText(toJson(findings)));
   else
     for (const auto& finding : findings) print(finding);
   return std::ranges::any_of(findings, [](const Finding& finding) { return finding.health == Health::problem; }) ? 1 : 0;

@@ -101,7 +101,11 @@ std::optional<Host::Space> Host::spaceOfSharedMemory() {
   struct statvfs status{};
   if (::statvfs("/dev/shm", &status) != 0) return std::nullopt;
   // A file system without a limit on files says that it has none at all.
-  return Space{status.f_blocks * status.f_frsize, status.f_bavail * status.f_frsize, status.f_files == 0 ? UINT64_MAX : status.f_favail};
+  const bool isLimited = status.f_files != 0;
+  return Space{.totalBytes = status.f_blocks * status.f_frsize,
+               .freeBytes = status.f_bavail * status.f_frsize,
+               .freeFiles = isLimited ? status.f_favail : UINT64_MAX,
+               .totalFiles = isLimited ? status.f_files : UINT64_MAX};
 }
 
 bool Host::kernelHasPidfd() { return static_cast<bool>(FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, ::getpid(), 0)))); }

@@ -20,7 +20,7 @@ struct Host {
 
   // What no file says.
   struct Space {
-    std::uint64_t totalBytes = 0, freeBytes = 0, freeFiles = 0;
+    std::uint64_t totalBytes = 0, freeBytes = 0, freeFiles = 0, totalFiles = 0;
   };
   std::function<std::optional<Space>()> sharedMemory = spaceOfSharedMemory;
   std::function<bool()> hasPidfd = kernelHasPidfd;

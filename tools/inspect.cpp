@@ -7,9 +7,12 @@
 #include <set>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/print_error.h>
+#include <mpf/base/printable.h>
 #include <mpf/shm/segment.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/inspect_summary.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/outline.h>
 #include <mpf/tools/report.h>
 #include <mpf/tools/waits.h>
@@ -82,6 +85,7 @@ class Inspector {
       links.push_back(&link);
     }
     if (arguments_.json) (*tree)["links"] = std::move(rows);
+    if (!window.wishes.empty()) (*tree)["waits_for"] = waitsFor(window);
     give(*tree);
     if (!arguments_.json) fmt::print("{}", linkTable(look, links, kMostLinks));
     if (!arguments_.last) return;
@@ -102,11 +106,17 @@ class Inspector {
 
  private:
   static constexpr std::size_t kMostLinks = 100;
+  // Servers that are not there.
+  static Tree waitsFor(const WindowView& window) {
+    Tree wishes = Tree::array();
+    for (const auto& wish : window.wishes) wishes.push_back({{"server", wish.server}, {"location", wish.location}});
+    return wishes;
+  }
   // nullopt: it has gone since it was listed, or cannot be read, which is said.
   [[nodiscard]] std::optional<Tree> dissect(const std::string& file) const try {
     return tryDissect(segments::path(file), {arguments_.last.value_or(DissectOptions().last), arguments_.raw});
   } catch (const std::exception& error) {
-    fmt::print(stderr, "mpf inspect: {}\n", error.what());
+    printError("mpf inspect: {}\n", error.what());
     return std::nullopt;
   }
   const InspectArguments& arguments_;
@@ -126,7 +136,9 @@ void printTree(const Tree& tree) {
 }
 
 int inspectNamed(const InspectArguments& arguments) {
-  Selection selection(arguments.names);
+  std::vector<std::string> names;  // as reports show them
+  for (const auto& name : arguments.names) names.push_back(printable(name));
+  Selection selection(names);
   Inspector inspector(arguments);
   const auto visit = [&](const Look& look, const std::function<void(const Tree&)>& give) {
     for (const auto* windows : {&look.now().servers, &look.now().clients}) {
@@ -145,7 +157,7 @@ int inspectNamed(const InspectArguments& arguments) {
       arguments, [&](const Look& look) { visit(look, printTree); },
       [&](const Look& look, nlohmann::json& all) { visit(look, [&](const Tree& tree) { all.push_back(nlohmann::json(tree)); }); });
   for (const auto& name : selection.missing()) {
-    fmt::print(stderr, "mpf inspect: no server, client, link or router \"{}\"; `mpf inspect` shows those that there are\n", name);
+    printError("mpf inspect: no server, client, link or router \"{}\"; `mpf inspect` shows those that there are\n", name);
   }
   return selection.missing().empty() ? 0 : 1;
 }
@@ -168,11 +180,11 @@ int inspectFiles(const InspectArguments& arguments) {
       if (arguments.json) all.push_back(nlohmann::json(*tree));
       else printTree(*tree);
     } catch (const std::exception& error) {
-      fmt::print(stderr, "mpf inspect: {}\n", error.what());
+      printError("mpf inspect: {}\n", error.what());
       status = 1;
     }
   }
-  if (arguments.json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  if (arguments.json) fmt::print("{}\n", jsonText(all));
   return status;
 }
 

@@ -16,7 +16,6 @@ namespace mpf::tools {
 namespace {
 
 constexpr std::size_t kMostRows = 30;
-constexpr std::size_t kNameColumns = 18;
 
 // "server dac@2", "client mpf".
 std::string titleOf(const WindowView& window) {
@@ -61,12 +60,12 @@ std::string windowTable(const Look& look) {
       const auto* sleeps = window.sleeping == layout::SleepState::onFutex ? "futex"
                            : window.sleeping == layout::SleepState::awake ? "no"
                                                                           : "pipe";
-      table.add({cut(titleOf(window), kNameColumns + 7), look.stateOf(window), fmt::to_string(window.pid), sleeps,
-                 fmt::to_string(window.links.size()), fmt::to_string(Totals::of(window).incoming.waiting()),
-                 fmt::to_string(window.hints.ready.size()), fmt::to_string(window.hints.knocks.size())});
+      table.add({titleOf(window), look.stateOf(window), fmt::to_string(window.pid), sleeps, fmt::to_string(window.links.size()),
+                 fmt::to_string(Totals::of(window).incoming.waiting()), fmt::to_string(window.hints.ready.size()),
+                 fmt::to_string(window.hints.knocks.size())});
     }
   }
-  auto text = table.isEmpty() ? "  no window\n" : table.text("  ");
+  auto text = table.isEmpty() ? "  no window\n" : table.fitted("  ");
   if (left != 0) text += fmt::format("  and {} more; --json has all\n", counted(left, "window"));
   return text;
 }
@@ -150,8 +149,8 @@ std::string linkTable(const Look& look, const std::vector<const LinkView*>& link
   std::size_t shown = 0;
   for (const auto* link : links) {
     if (++shown > most) break;
-    text += fmt::format("  {:<16}  {} <- {}\n", hex(link->incarnation), cut(serverText(link->server, link->location), 24),
-                        cut(processText(look.find(link->clientWindow)), 26));
+    text += wrap(fmt::format("  {:<16}  ", hex(link->incarnation)),
+                 fmt::format("{} <- {}", serverText(link->server, link->location), processText(look.find(link->clientWindow))), 20);
     text += wrap("    ", waitsOf(look, *link), 6);
   }
   if (links.size() > most) text += fmt::format("  and {} more; --json has all\n", counted(links.size() - most, "link"));

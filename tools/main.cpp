@@ -1,24 +1,20 @@
 // SPDX-License-Identifier: MIT
 // mpf: looks at backplanes, servers and clients, and talks to them from the shell.
 #include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
-#include <fmt/format.h>
-#include <stdexcept>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/run_main.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/wrap.h>
 
 namespace {
 
 constexpr const char* kFooter =
     "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work when a process is stopped or dead.\n"
     "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
-    "Exit status: 0 done; 1 not done, the text on stderr says why; 2 asked for what cannot be.";
+    "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.";
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int runSubcommand(int argc, char** argv) {
   CLI::App app("mpf - looks at backplanes, servers and clients, and talks to them from the shell", "mpf");
   mpf::tools::Run run;
   mpf::tools::addLs(app, run);
@@ -37,14 +33,12 @@ int main(int argc, char** argv) try {
   app.require_subcommand(1);
   app.footer(kFooter);
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
-  const int status = run();
-  // A full disk is found when what was printed is written.
-  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) throw std::runtime_error("not all of the output could be written");
-  return status;
-} catch (const std::invalid_argument& error) {
-  fmt::print(stderr, "mpf: {}\n", error.what());
-  return 2;
-} catch (const std::exception& error) {
-  fmt::print(stderr, "mpf: {}\n", error.what());
-  return 1;
+  mpf::tools::fitToTerminal();
+  return run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain("mpf", [&] { return runSubcommand(argc, argv); });
 }

@@ -33,6 +33,9 @@ void printRates(const Rates& rates) {
   fmt::print("   sendPerSec {:.0f} receivePerSec {:.0f}\n", rates.sentPerSecond, rates.receivedPerSecond);
 }
 
+// The first line of an entry, with its number.
+void printHead(std::size_t number, const std::string& text) { fmt::print("{}", wrap(fmt::format("{:2} ", number), text, 5)); }
+
 // Servers by name and state, with the number of their clients.
 class Bindings {
  public:
@@ -41,7 +44,8 @@ class Bindings {
   void add(const WishView& wish) { add(serverText(wish.server, wish.location), "waiting for the server"); }
   void print() const {
     for (const auto& [server, clients] : servers_) {
-      fmt::print("   Server {} has {}. bindState {}\n", server.first, counted(clients, "client"), server.second);
+      fmt::print("{}",
+                 wrap("   ", fmt::format("Server {} has {}. bindState {}", server.first, counted(clients, "client"), server.second), 5));
     }
   }
 
@@ -51,8 +55,9 @@ class Bindings {
 
 void printClient(std::size_t number, const Look& look, const WindowView& client) {
   const auto totals = Totals::of(client);
-  fmt::print("{:2} {}[{}] {} queueSize {} inQueue {} sendQueueFull {} unanswered {}\n", number, client.name, client.pid,
-             routerState(look.stateOf(client)), largestQueue(client), totals.outgoing.waiting(), totals.refused, totals.unanswered);
+  printHead(number, fmt::format("{}[{}] {} queueSize {} inQueue {} sendQueueFull {} unanswered {}", client.name, client.pid,
+                                routerState(look.stateOf(client)), largestQueue(client), totals.outgoing.waiting(), totals.refused,
+                                totals.unanswered));
   Bindings servers;
   for (const auto& link : client.links) servers.add(link);
   for (const auto& wish : client.wishes) servers.add(wish);
@@ -61,9 +66,9 @@ void printClient(std::size_t number, const Look& look, const WindowView& client)
 }
 
 void printServer(std::size_t number, const Look& look, const WindowView& server) {
-  fmt::print("{:2} {}[{}] {} queueSize {} inQueue {} replyQueueFull {} clients {}\n", number, serverText(server.name, server.location),
-             server.pid, routerState(look.stateOf(server)), largestQueue(server), Totals::of(server).incoming.waiting(),
-             server.replyQueueFull, server.links.size());
+  printHead(number, fmt::format("{}[{}] {} queueSize {} inQueue {} replyQueueFull {} clients {}", serverText(server.name, server.location),
+                                server.pid, routerState(look.stateOf(server)), largestQueue(server), Totals::of(server).incoming.waiting(),
+                                server.replyQueueFull, server.links.size()));
   printRates(look.ratesOf(server));
 }
 
@@ -127,15 +132,15 @@ void printLineRates(const LineRates& rates) {
       fmt::format("   sendPerSec {:.0f} receivePerSec {:.0f}", rates.messages.sentPerSecond, rates.messages.receivedPerSecond);
   const auto frames =
       fmt::format("tcpSendPerSec {:.0f} tcpReceivePerSec {:.0f}", rates.frames.sentPerSecond, rates.frames.receivedPerSecond);
-  const bool isLong = messages.size() + 2 + frames.size() > kColumns;
+  const bool isLong = messages.size() + 2 + frames.size() > lineColumns();
   fmt::print("{}{}{}\n", messages, isLong ? "\n   " : "  ", frames);
   fmt::print("   sendBytesPerSec {:.0f} receiveBytesPerSec {:.0f}\n", rates.bytes.sentPerSecond, rates.bytes.receivedPerSecond);
 }
 
 void printLine(std::size_t number, const Look& look, const Router& at, const LineBindings& bindings) {
   const auto& line = *at.line;
-  fmt::print("{:2} {} {} queueSize {} inQueue {} {} {}\n", number, line.isClient() ? "RMRClient" : "RMRServer", lineState(look, at),
-             line.queueSize, line.inQueue, line.isClient() ? "sendQueueFull" : "replyQueueFull", line.queueFull);
+  printHead(number, fmt::format("{} {} queueSize {} inQueue {} {} {}", line.isClient() ? "RMRClient" : "RMRServer", lineState(look, at),
+                                line.queueSize, line.inQueue, line.isClient() ? "sendQueueFull" : "replyQueueFull", line.queueFull));
   bindings.print(line);
   printLineRates(look.ratesOf(*at.router, line));
   const auto roundTrip = line.roundTripNs == 0 ? std::string("unknown") : durationText(static_cast<double>(line.roundTripNs));

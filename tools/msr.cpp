@@ -6,6 +6,8 @@
 #include <optional>
 
 #include <mpf/base/duration_text.h>
+#include <mpf/base/print_error.h>
+#include <mpf/base/printable.h>
 #include <mpf/tools/commands.h>
 #include <mpf/tools/report.h>
 #include <mpf/tools/report_json.h>
@@ -32,7 +34,7 @@ void printLatencies(const char* name, const Latencies& latencies) {
   const auto at = [&](double percent) { return durationText(static_cast<double>(latencies.percentileNs(percent))); };
   printField(name, fmt::format("p50 {}, p99 {}, p99.9 {}, max {}  ({} sampled)", at(50), at(99), at(99.9),
                                durationText(static_cast<double>(latencies.maxNs)), latencies.count));
-  fmt::print("{:20}{}\n", "", sparkline(latencies, kColumns - 20));
+  fmt::print("{:20}{}\n", "", sparkline(latencies, lineColumns() - 20));
 }
 
 std::string stateOf(const Look& look, const LinkView& link, const WindowView* client) {
@@ -65,7 +67,7 @@ void printVia(const Look& look, const Look::RouterLineOf& at) {
 // The manual's five lines first, as they were.
 void print(const Look& look, const WindowView& server) {
   const auto totals = Totals::of(server);
-  fmt::print("{}\n", server.name);
+  fmt::print("{}", wrap("", server.name, 2));
   printField("queueSize", server.queueSize);
   printField("inQueue", totals.incoming.waiting());
   printField("queueRequests", server.received);
@@ -86,16 +88,29 @@ void print(const Look& look, const WindowView& server) {
 
 // What could not be read may be what was asked for.
 int explainNothing(const MsrArguments& arguments, const std::vector<std::string>& problems) {
-  for (const auto& problem : problems) fmt::print(stderr, "mpf msr: {}\n", problem);
+  for (const auto& problem : problems) printError("mpf msr: {}\n", problem);
   const auto unless = problems.empty() ? "" : ", unless it is among what could not be read";
   if (!arguments.server.empty() || arguments.location) {
     const auto where = arguments.location ? fmt::format(" at location {}", *arguments.location) : "";
     const auto what = arguments.server.empty() ? "no server" : fmt::format("no server \"{}\"", arguments.server);
-    fmt::print(stderr, "mpf msr: {}{}{}; `mpf ls` shows those that there are\n", what, where, unless);
+    printError("mpf msr: {}{}{}; `mpf ls` shows those that there are\n", what, where, unless);
     return 1;
   }
   if (!arguments.json) fmt::print("no server{}\n", unless);
   return problems.empty() ? 0 : 1;
+}
+
+// Servers among what could not be read are missing in the report.
+void tellProblems(const MsrArguments& arguments, const std::vector<std::string>& problems) {
+  if (problems.empty()) return;
+  const auto count = counted(problems.size(), "file") + " could not be read: servers may be missing here";
+  if (arguments.json) {
+    printError("mpf msr: {}\n", count);
+    for (const auto& problem : problems) printError("mpf msr: {}\n", problem);
+    return;
+  }
+  fmt::print("{}", wrap("", count, 2));
+  for (const auto& problem : problems) fmt::print("{}", wrap("problem: ", problem, 2));
 }
 
 int report(const MsrArguments& arguments) {
@@ -104,7 +119,7 @@ int report(const MsrArguments& arguments) {
   const auto forEachServer = [&](const Look& look, auto&& act) {
     problems.insert(problems.end(), look.now().problems.begin(), look.now().problems.end());
     for (const auto& server : look.now().servers) {
-      if (!arguments.server.empty() && server.name != arguments.server) continue;
+      if (!arguments.server.empty() && server.name != printable(arguments.server)) continue;
       if (arguments.location && server.location != *arguments.location) continue;
       found = true;
       act(server);
@@ -119,9 +134,7 @@ int report(const MsrArguments& arguments) {
         });
       });
   if (!found) return explainNothing(arguments, problems);
-  if (arguments.server.empty() && !arguments.json) {
-    for (const auto& problem : problems) fmt::print("{}", wrap("problem: ", problem, 2));
-  }
+  if (arguments.server.empty()) tellProblems(arguments, problems);
   return 0;
 }
 

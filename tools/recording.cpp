@@ -14,16 +14,12 @@
 
 namespace mpf::tools {
 
-RecordingWriter::RecordingWriter(std::string path)
-    : path_(std::move(path)), file_(checkCall(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600), "create", path_)) {}
+RecordingWriter::RecordingWriter(std::string path) : file_(std::move(path), 0600) {}
 
 void RecordingWriter::write(capnp::MessageBuilder& record) {
   const auto words = capnp::messageToFlatArray(record);
-  auto left = words.asBytes();
-  while (left.size() != 0) {
-    const auto written = checkCall(retryInterrupted([&] { return ::write(file_.get(), left.begin(), left.size()); }), "write", path_);
-    left = left.slice(static_cast<std::size_t>(written), left.size());
-  }
+  const auto bytes = words.asChars();
+  file_.write({bytes.begin(), bytes.size()});
 }
 
 RecordingReader::RecordingReader(std::string path)
@@ -33,19 +29,29 @@ RecordingReader::RecordingReader(std::string path)
       buffered_(stream_) {
   struct stat status{};
   checkCall(::fstat(file_.get(), &status), "look at", path_);
-  limits_ = ConversionLimits{.maxValueBytes = static_cast<std::size_t>(status.st_size)}.readerOptions();
+  bytes_ = static_cast<std::uint64_t>(status.st_size);
+  limits_ = ConversionLimits{.maxValueBytes = bytes_}.readerOptions();
 }
 
 bool RecordingReader::tryNext(const std::function<void(wire::Record::Reader)>& take) try {
-  if (buffered_.tryGetReadBuffer().size() == 0) return false;
+  const auto buffered = buffered_.tryGetReadBuffer().size();
+  if (buffered == 0) return false;
   ++number_;
+  begin_ = static_cast<std::uint64_t>(checkCall(::lseek(file_.get(), 0, SEEK_CUR), "lseek", path_)) - buffered;
   capnp::InputStreamMessageReader message(buffered_, limits_);
   take(message.getRoot<wire::Record>());
   return true;
-} catch (const kj::Exception&) {
-  const auto what = number_ == 1 ? "this is no recording of `mpf tap`, or one that was cut off within its first record"
-                                 : "the file is damaged, or was cut off here";
-  throw std::runtime_error(fmt::format("{}: record {}: {}", path_, number_, what));
+} catch (const kj::Exception&) {  // its words are of frames and pointers
+  if (number_ == 1) {
+    throw std::runtime_error(
+        fmt::format("{}: this is no recording of `mpf tap --write`, or one that was cut off within its first record", place()));
+  }
+  throw std::runtime_error(
+      fmt::format("{}: the file is damaged, or was cut off here; the {} before it can be read: `head -c {} FILE >NEW` keeps them, "
+                  "`mpf tap --write` records again",
+                  place(), number_ == 2 ? "record" : "records", begin_));
 }
+
+std::string RecordingReader::place() const { return fmt::format("{}: record {}, at byte {} of {}", path_, number_, begin_, bytes_); }
 
 }  // namespace mpf::tools

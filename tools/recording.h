@@ -13,21 +13,23 @@
 #include <string>
 
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/output_file.h>
 #include <mpf/schema/recording.capnp.h>
 
 namespace mpf::tools {
 
 class RecordingWriter {
  public:
-  // Creates the file, or empties it. Throws std::system_error.
+  // Creates the file, or opens it, and checks that it can be written. Throws std::system_error.
   explicit RecordingWriter(std::string path);
 
   // Throws std::system_error when the disk is full, say.
   void write(capnp::MessageBuilder& record);
+  // Throws std::system_error when what was written is not kept.
+  void close() { file_.close(); }
 
  private:
-  std::string path_;
-  FileDescriptor file_;
+  OutputFile file_;
 };
 
 class RecordingReader {
@@ -36,8 +38,11 @@ class RecordingReader {
   explicit RecordingReader(std::string path);
 
   // Hands over the next record. False at the end.
-  //   throws  std::runtime_error for what is no record: "x.mpf: record 12: ..."
+  //   throws  std::runtime_error for what is no record: "x.mpf: record 12, at byte 3456 of 5000: ..."
   bool tryNext(const std::function<void(wire::Record::Reader)>& take);
+
+  // The record that was handed over last: "x.mpf: record 12, at byte 3456 of 5000".
+  [[nodiscard]] std::string place() const;
 
  private:
   std::string path_;
@@ -46,6 +51,8 @@ class RecordingReader {
   kj::BufferedInputStreamWrapper buffered_;
   capnp::ReaderOptions limits_;  // no message is longer than the file
   std::uint64_t number_ = 0;
+  std::uint64_t bytes_ = 0;  // of the file
+  std::uint64_t begin_ = 0;  // of the record, in the file
 };
 
 }  // namespace mpf::tools

@@ -12,11 +12,13 @@
 #include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/client/message_client.h>
 #include <mpf/schema/conversion.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/recording.h>
 #include <mpf/tools/wrap.h>
 
@@ -55,7 +57,7 @@ class Replayer {
   // What is sent before the file turns out to be none has been sent: it is awaited and reported.
   void send() try {
     RecordingReader reader(arguments_.file);
-    while (!stopped_ && problem_.empty() && reader.tryNext([this](wire::Record::Reader record) { take(record); })) {
+    while (!stopped_ && problem_.empty() && reader.tryNext([&](wire::Record::Reader record) { take(record, reader); })) {
     }
   } catch (const std::runtime_error& error) {
     problem_ = error.what();
@@ -66,13 +68,13 @@ class Replayer {
     dispatcher_.interrupt();
   }
 
-  void take(wire::Record::Reader record) {
+  void take(wire::Record::Reader record, const RecordingReader& reader) {
     if (record.isOpened() && server_.empty())
       server_ = arguments_.server.empty() ? record.getOpened().getServer().cStr() : arguments_.server;
     if (!record.isMessage() || record.getMessage().getDirection() != wire::Direction::REQUEST) return;
     ConversionError error;
     auto message = tryFromWire(record.getMessage().getEnvelope(), kNoLimit, error);
-    if (!message) throw std::runtime_error(arguments_.file + ": " + error.text);
+    if (!message) throw std::runtime_error(fmt::format("{}: the message is damaged: {}", reader.place(), error.text));
     auto* const client = clientFor(record.getLink());
     if (client == nullptr) return;
     waitFor(record.getAtNs());
@@ -142,12 +144,12 @@ class Replayer {
     const auto nowNs = Clock::nowNs();
     if (nowNs - shownNs_ < 1'000'000'000 || ::isatty(STDERR_FILENO) == 0) return;
     shownNs_ = nowNs;
-    fmt::print(stderr, "\r{} requests, {} replied ", requests_, replied_);
+    writeError(fmt::format("\r{} requests, {} replied ", requests_, replied_));
   }
 
   void report() {
-    if (shownNs_ != 0) fmt::print(stderr, "\r\x1b[K");
-    if (!problem_.empty()) fmt::print(stderr, "mpf replay: {}\n", problem_);
+    if (shownNs_ != 0) writeError("\r\x1b[K");
+    if (!problem_.empty()) printError("mpf replay: {}\n", problem_);
     if (arguments_.json) {
       const nlohmann::json report{{"server", server_},
                                   {"clients", clients_.size()},
@@ -156,7 +158,7 @@ class Replayer {
                                   {"ends", ends_},
                                   {"late_p50_ns", late_->percentileNs(50)},
                                   {"late_max_ns", late_->maxNs()}};
-      return fmt::print("{}\n", report.dump(2));
+      return fmt::print("{}\n", jsonText(report));
     }
     if (requests_ == 0) return;  // why is said
     fmt::print("{} of {} to \"{}\": {} replied", counted(requests_, "request"), counted(clients_.size(), "client"), server_, replied_);
@@ -202,7 +204,7 @@ void addReplay(CLI::App& app, Run& run) {
       ->check(number(0, 1e6));
   addSeconds(command, "--timeout", arguments->timeout, "Longest wait for the server, for room in its queue, for the last reply", false);
   addJson(command, arguments->json);
-  command.footer("Exit status: 0 every request got a reply; 1 not so; 2 asked for what cannot be.");
+  command.footer("Exit status: 0 every request got a reply; 1 not so; 2 usage error.");
   command.callback([arguments, &run] { run = [arguments] { return Replayer(*arguments).run(); }; });
 }
 

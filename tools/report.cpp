@@ -6,6 +6,7 @@
 #include <mpf/base/command_line.h>
 #include <mpf/shm/backplane.h>
 #include <mpf/tools/arguments.h>
+#include <mpf/tools/json_text.h>
 
 namespace mpf::tools {
 
@@ -30,7 +31,7 @@ int reportEach(const ReportArguments& arguments, const std::function<void(const 
     if (arguments.json) collect(look, list);
     else print(look);
   }
-  if (arguments.json) fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  if (arguments.json) fmt::print("{}\n", jsonText(list));
   return static_cast<int>(backplanes.size());
 }
 

@@ -12,6 +12,7 @@
 
 #include <mpf/base/clock.h>
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/printable.h>
 #include <mpf/shm/process.h>
 #include <mpf/shm/segment.h>
 
@@ -136,7 +137,7 @@ const RouterLineView* RouterView::lineFrom(const std::string& label) const {
   const RouterLineView* found = nullptr;
   for (const auto& line : lines) {
     if (line.isClient() || line.peer.empty()) continue;
-    if (("router " + line.peer).substr(0, layout::kNameChars - 1) != label) continue;
+    if (printable(("router " + line.peer).substr(0, layout::kNameChars - 1)) != label) continue;  // may be cut within a character
     if (found != nullptr) return nullptr;
     found = &line;
   }

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include <mpf/base/clock.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/client/message_client.h>
 #include <mpf/schema/serial_sniff.h>
@@ -49,7 +50,7 @@ class Sniffer {
     while (!client_.isConnected() && !isOver(limit)) dispatcher_.runOnce(limit);
     const auto end = seconds_ > 0 ? Deadline::after(ofSeconds(seconds_)) : Deadline::never();
     if (!client_.isConnected()) {
-      fmt::print(stderr, "mpf sniff: {}; is it a serial server, and does it run? `mpf ls` shows\n", client_.notConnectedBecause());
+      printError("mpf sniff: {}; is it a serial server, and does it run? `mpf ls` shows\n", client_.notConnectedBecause());
       return 1;
     }
     while (!isOver(end)) {
@@ -58,7 +59,7 @@ class Sniffer {
     }
     takeTheRest();
     show(format_->flush());
-    fmt::print(stderr, "mpf sniff: {} seen, {} missing\n", counted(seen_, "byte"), missing_);
+    printError("mpf sniff: {} seen, {} missing\n", counted(seen_, "byte"), missing_);
     return wasRefused_ ? 1 : 0;
   }
 
@@ -87,20 +88,20 @@ class Sniffer {
     } else if (news.status == ConnectStatus::connectNo) {
       isListening_ = false;
       show(format_->flush());
-      fmt::print(stderr, "mpf sniff: {}\n", client_.notConnectedBecause());
+      printError("mpf sniff: {}\n", client_.notConnectedBecause());
     }
   }
 
   void takeReply(const Int32& reply) {
     if (reply.cmd == serial::cmdSniffStart && reply.status == serial::sniffStatusOK) {
       isListening_ = true;
-      fmt::print(stderr, "mpf sniff: listening to \"{}\"\n", server_);
+      printError("mpf sniff: listening to \"{}\"\n", server_);
     } else if (reply.cmd == serial::cmdSniffStop) {
       isListening_ = false;
       takeMissing(static_cast<std::uint64_t>(reply.address));
     } else {
       wasRefused_ = true;
-      fmt::print(stderr, "mpf sniff: \"{}\" lets nobody listen: status {}\n", service_, reply.status);
+      printError("mpf sniff: \"{}\" lets nobody listen: status {}\n", service_, reply.status);
     }
   }
 
@@ -119,7 +120,7 @@ class Sniffer {
   void takeRecords(const Char8ArrayMessage& message) {
     takeMissing(static_cast<std::uint64_t>(message->address));
     const auto records = serial::tryReadRecords(message);
-    if (!records) return fmt::print(stderr, "mpf sniff: \"{}\" sent what is no record\n", service_);
+    if (!records) return printError("mpf sniff: \"{}\" sent what is no record\n", service_);
     std::string text;
     for (const auto& record : *records) text += format_->add(record);
     seen_ += records->size();

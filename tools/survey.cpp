@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include <mpf/base/clock.h>
+#include <mpf/base/printable.h>
 #include <mpf/shm/histogram.h>
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
@@ -84,7 +85,7 @@ class Surveyor {
         if (!parsed) throw SegmentError(segments::path(name) + ": not a name that MPF gives");
         look(name, *parsed);
       } catch (const std::exception& error) {
-        survey_.problems.push_back(segments::printable(error.what()));
+        survey_.problems.push_back(printable(error.what()));
       }
     }
     join();

@@ -83,7 +83,7 @@ std::string Table::text(const std::string& indent) const {
 }
 
 std::string Table::fitted(const std::string& indent) const {
-  const auto widths = fit(kColumns - indent.size());
+  const auto widths = fit(lineColumns() - indent.size());
   const bool goesOn = columns_.size() > 1 && !columns_.back().isRight;
   std::string text;
   for (auto row : rows_) {
@@ -95,7 +95,7 @@ std::string Table::fitted(const std::string& indent) const {
     line += cells(row, widths, row.size() - (goesOn ? 1 : 0));
     if (goesOn) {
       const auto width = columnsOf(line);
-      if (width + kLeastCut <= kColumns) line = wrap(line, row.back(), width);
+      if (width + kLeastCut <= lineColumns()) line = wrap(line, row.back(), width);
       else line += row.back();
     }
     line.erase(line.find_last_not_of(" \n") + 1);

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/shm/backplane.h>
 #include <mpf/tools/arguments.h>
@@ -53,9 +54,9 @@ int tap(const TapArguments& arguments) {
   TapSession session({Backplane::named(arguments.backplane).name(), arguments.server, arguments.location, linkNumber(arguments.link)},
                      *sink);
   if (session.isServerThere()) {
-    fmt::print(stderr, "mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(), session.links() == 1 ? "" : "s");
+    printError("mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(), session.links() == 1 ? "" : "s");
   } else {
-    fmt::print(stderr, "mpf tap: server \"{}\" at location {} is not there; waiting for it\n", arguments.server, arguments.location);
+    printError("mpf tap: server \"{}\" at location {} is not there; waiting for it\n", arguments.server, arguments.location);
   }
 
   const auto end = arguments.seconds > 0 ? Deadline::after(ofSeconds(arguments.seconds)) : Deadline::never();
@@ -67,9 +68,10 @@ int tap(const TapArguments& arguments) {
     else session.pause(pause = std::min(2 * pause, ofSeconds(arguments.poll)));
   }
   session.finish();
-  for (const auto& problem : session.problems()) fmt::print(stderr, "mpf tap: {}\n", problem);
-  fmt::print(stderr, "mpf tap: {} seen, {} missed\n", counted(session.seen(), "message"), session.missed());
-  if (session.goneLinks() != 0) fmt::print(stderr, "mpf tap: {} links came and went unread\n", session.goneLinks());
+  sink->finish();
+  for (const auto& problem : session.problems()) printError("mpf tap: {}\n", problem);
+  printError("mpf tap: {} seen, {} missed\n", counted(session.seen(), "message"), session.missed());
+  if (session.goneLinks() != 0) printError("mpf tap: {} links came and went unread\n", session.goneLinks());
   return session.problems().empty() ? 0 : 1;
 }
 

@@ -23,13 +23,13 @@ std::int64_t realtimeNs() {
 TappedLink describe(const std::string& backplane, const layout::SegmentHeader& header) {
   TappedLink link;
   link.incarnation = header.incarnation;
-  link.server = segments::text(header.name);
+  link.server = segments::rawText(header.name);
   link.location = header.location;
   const auto name = SegmentName::keyed(backplane, NameKind::clientWindow, header.clientWindow);
   const auto client = SegmentImage::tryRead(name, layout::SegmentKind::clientWindow, sizeof(layout::SegmentHeader));
   if (!client) return link;
-  link.client = segments::text(client->header().name);
-  if (link.client.empty()) link.client = segments::text(client->header().program);
+  link.client = segments::rawText(client->header().name);
+  if (link.client.empty()) link.client = segments::rawText(client->header().program);
   link.clientPid = client->header().ownerPid;
   return link;
 }
@@ -84,19 +84,26 @@ void TapSession::dropEnded(const std::set<std::string>& there) {
   std::erase_if(notFollowed_, [&](const std::string& name) { return !there.contains(name); });
 }
 
-void TapSession::follow(const std::string& name, FollowFrom from) try {
+void TapSession::follow(const std::string& name, FollowFrom from) {
   if (followed_.contains(name) || notFollowed_.contains(name)) return;
+  auto followed = tryOpen(name, from);
+  if (!followed) return;
+  sink_.opened(realtimeNs(), followed->link);  // a sink that cannot write ends the session
+  followed_.emplace(name, std::move(*followed));
+}
+
+std::optional<TapSession::Followed> TapSession::tryOpen(const std::string& name, FollowFrom from) try {
   auto follower = LinkFollower::tryOpen(selection_.backplane, name, from);
   if (!follower) {
     ++goneLinks_;
-    return;
+    return std::nullopt;
   }
   auto link = describe(selection_.backplane, follower->header());
-  sink_.opened(realtimeNs(), link);
-  followed_.emplace(name, Followed{std::move(link), std::move(follower)});
+  return Followed{std::move(link), std::move(follower)};
 } catch (const std::exception& error) {
   notFollowed_.insert(name);
   problems_.emplace_back(error.what());
+  return std::nullopt;
 }
 
 bool TapSession::runOnce() {

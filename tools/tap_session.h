@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -61,6 +62,7 @@ class TapSession {
   void lookAtNew(const std::vector<std::string>& names);
   void dropEnded(const std::set<std::string>& there);
   void follow(const std::string& name, FollowFrom from);
+  std::optional<Followed> tryOpen(const std::string& name, FollowFrom from);
   bool take(Followed& followed);
   void tellMissed(Followed& followed);
   void takeTheRest(Followed& followed);

@@ -6,9 +6,11 @@
 #include <fmt/format.h>
 #include <limits>
 
+#include <mpf/base/printable.h>
 #include <mpf/schema/conversion.h>
 #include <mpf/schema/json.h>
 #include <mpf/schema/text.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/recording.h>
 #include <mpf/tools/show.h>
 #include <mpf/tools/wrap.h>
@@ -27,12 +29,12 @@ class LineSink final : public TapSink {
 
   void opened(std::int64_t atNs, const TappedLink& link) override {
     const auto client = link.client.empty() ? "a client that is gone" : fmt::format("{}[{}]", link.client, link.clientPid);
-    show(fmt::format("{}  --   {} and {}: link {:016x}\n", begin(atNs, link), client, link.server, link.incarnation));
+    show(fmt::format("{}  --   {} and {}: link {:016x}\n", begin(atNs, link), printable(client), printable(link.server), link.incarnation));
   }
   // A reply that ends no request is one more of a subscription, say: it has a smaller arrow.
   void message(std::int64_t atNs, const TappedLink& link, const TappedMessage& message) override {
     const char* arrow = message.direction == Direction::request ? "->" : message.isFirstReply ? "<-" : "< ";
-    const auto what = message.message ? print(message.message, maxElements_) : "unreadable: " + message.problem;
+    const auto what = message.message ? print(message.message, maxElements_) : "unreadable: " + printable(message.problem);
     show(fmt::format("{}  {} {:<3} {}{}\n", begin(atNs, link), arrow, message.requestId, what,
                      message.mayHaveChanged ? "  (read late: may have changed)" : ""));
   }
@@ -70,7 +72,7 @@ class JsonSink final : public TapSink {
   static void add(std::int64_t atNs, const TappedLink& link, nlohmann::json json) {
     json["at_ns"] = atNs;
     json["link"] = fmt::format("{:016x}", link.incarnation);
-    show(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    show(jsonText(json, -1) + "\n");
   }
 };
 
@@ -111,6 +113,7 @@ class FileSink final : public TapSink {
   void closed(std::int64_t atNs, const TappedLink& link) override {
     add(atNs, link, [](wire::Record::Builder record) { record.setClosed(); });
   }
+  void finish() override { writer_.close(); }
 
  private:
   static constexpr ConversionLimits kNoLimit{.maxValueBytes = std::numeric_limits<std::size_t>::max()};

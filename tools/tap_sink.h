@@ -16,7 +16,7 @@
 
 namespace mpf::tools {
 
-// A link as its watchers name it.
+// A link as its watchers name it. The names are as the processes gave them: printable() before they are shown.
 struct TappedLink {
   std::uint64_t incarnation = 0;
   std::string server;
@@ -33,6 +33,8 @@ class TapSink {
   virtual void message(std::int64_t atNs, const TappedLink& link, const TappedMessage& message) = 0;
   virtual void missed(std::int64_t atNs, const TappedLink& link, std::uint64_t messages) = 0;  // in all, so far
   virtual void closed(std::int64_t atNs, const TappedLink& link) = 0;
+  // Nothing else comes. As the others, throws std::system_error when something cannot be written.
+  virtual void finish() {}
 
   static std::unique_ptr<TapSink> lines(std::size_t maxElements);
   static std::unique_ptr<TapSink> json();

@@ -12,6 +12,7 @@
 
 #include <mpf/base/command_line.h>
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/print_error.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/base/system_call.h>
 #include <mpf/shm/backplane.h>
@@ -56,7 +57,7 @@ bool prepare(TopView& view, const TopArguments& arguments) {
   if (arguments.routers) view.showRouters();
   view.setFilter(arguments.filter);
   if (arguments.sort.empty() || view.trySortBy(arguments.sort)) return true;
-  fmt::print(stderr, "mpf top: no column \"{}\"; they are in the heading of `mpf top --batch 1`\n", arguments.sort);
+  printError("mpf top: no column \"{}\"; they are in the heading of `mpf top --batch 1`\n", arguments.sort);
   return false;
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/tools/wrap.h>
 
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <fmt/format.h>
-#include <sstream>
 
 namespace mpf::tools {
 namespace {
@@ -10,7 +13,18 @@ namespace {
 // Of a character in UTF-8, a byte after the first.
 bool isContinuation(char c) noexcept { return (static_cast<unsigned char>(c) & 0xc0u) == 0x80u; }
 
+std::size_t columnsInUse = kColumns;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables): of this process's one stdout
+
 }  // namespace
+
+std::size_t lineColumns() noexcept { return columnsInUse; }
+
+void fitToTerminal() noexcept {
+  constexpr std::size_t kLeast = 40;
+  winsize size{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return;
+  columnsInUse = std::max<std::size_t>(size.ws_col, kLeast);
+}
 
 // fmt pads by columns, never more than a text's bytes: "°" is one of two bytes, "電" two of three.
 std::size_t columnsOf(const std::string& text) { return 2 * text.size() - fmt::formatted_size("{:<{}}", text, text.size()); }
@@ -24,12 +38,17 @@ std::string wrap(const std::string& first, const std::string& text, std::size_t 
     line.assign(indent, ' ');
     isFresh = true;
   };
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    if (!isFresh && columnsOf(line) + 1 + columnsOf(word) > kColumns) next();
-    if (!isFresh) line += ' ';
-    while (columnsOf(line) + columnsOf(word) > kColumns) {
-      auto room = kColumns - columnsOf(line);
+  constexpr const char* kBlanks = " \t\n\r\v\f";
+  for (std::size_t at = 0; at < text.size();) {
+    const auto begin = std::min(text.find_first_not_of(kBlanks, at), text.size());
+    if (begin == text.size()) break;
+    const auto blanks = begin - at;  // a name may have several
+    at = std::min(text.find_first_of(kBlanks, begin), text.size());
+    auto word = text.substr(begin, at - begin);
+    if (!isFresh && columnsOf(line) + blanks + columnsOf(word) > lineColumns()) next();
+    if (!isFresh) line.append(blanks, ' ');
+    while (columnsOf(line) + columnsOf(word) > lineColumns()) {
+      auto room = lineColumns() - columnsOf(line);
       while (room > 1 && isContinuation(word[room])) --room;
       line += word.substr(0, room);
       word.erase(0, room);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Wrapping: texts in the 80 columns of a terminal.
+// Wrapping: texts in the columns of the terminal, or in 80.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +9,12 @@
 namespace mpf::tools {
 
 inline constexpr std::size_t kColumns = 80;
+
+// The columns that a line may take: kColumns, unless fitToTerminal() was called on a terminal.
+[[nodiscard]] std::size_t lineColumns() noexcept;
+// Takes the width of the terminal on stdout, at least 40 columns, for all lines of this process.
+// Changes nothing when stdout is no terminal. For main(), before anything is printed.
+void fitToTerminal() noexcept;
 
 // The columns that a text takes.
 [[nodiscard]] std::size_t columnsOf(const std::string& text);

@@ -12,6 +12,8 @@
 #include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
+#include <mpf/base/print_error.h>
+#include <mpf/base/run_main.h>
 #include <mpf/client/sync_client.h>
 
 namespace mpf {
@@ -35,7 +37,7 @@ class EchoStatistics {
   void add(std::int64_t roundTripNs) { roundTrips_->add(static_cast<std::uint64_t>(roundTripNs)); }
   void fail(const std::string& why) {
     ++failures_;
-    fmt::print(stderr, "{}\n", why);
+    printError("{}\n", why);
   }
   // Returns the exit status: 0 when every message came back.
   int report() const {
@@ -69,9 +71,7 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
   return statistics.report();
 }
 
-}  // namespace
-
-int runEchoClient(int argc, char** argv, const EchoClient& echo) try {
+int callServer(int argc, char** argv, const EchoClient& echo) {
   CLI::App app(fmt::format("{} - sends {}s to an echo server and checks what comes back", echo.program, echo.what), echo.program);
   EchoOptions options;
   options.server = echo.server;
@@ -83,9 +83,12 @@ int runEchoClient(int argc, char** argv, const EchoClient& echo) try {
   app.add_option("--bytes", options.bytes, "Length of an array message")->capture_default_str()->check(wholeNumber(0, kMostBytes));
   if (const auto status = parseCommandLine(app, argc, argv)) return *status;
   return callEchoServer(options, echo);
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", echo.program, error.what());
-  return 1;
+}
+
+}  // namespace
+
+int runEchoClient(int argc, char** argv, const EchoClient& echo) {
+  return runMain(echo.program, [&] { return callServer(argc, argv, echo); });
 }
 
 }  // namespace mpf

@@ -11,13 +11,13 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <fmt/format.h>
 #include <numbers>
 #include <thread>
 
 #include <mpf/base/clock.h>
 #include <mpf/base/command_line.h>
+#include <mpf/base/run_main.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/tools/screen.h>
 
@@ -138,9 +138,7 @@ int run(const Options& options) {
   return verdict.isGood() || isStopped.load(std::memory_order_relaxed) ? 0 : 1;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int demo(int argc, char** argv) {
   Options options;
   CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws what they say", "mpf-demo");
   app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
@@ -148,7 +146,10 @@ int main(int argc, char** argv) try {
   app.add_option("--patience", options.patience, "Wait so long for an answer [s]; default 0.25")->check(mpf::number(0.001, 1e6));
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
   return run(options);
-} catch (const std::exception& error) {
-  fmt::print(stderr, "mpf-demo: {}\n", error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain("mpf-demo", [&] { return demo(argc, argv); });
 }

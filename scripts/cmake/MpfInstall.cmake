@@ -128,6 +128,7 @@ if(MPF_BUILD_MAN_PAGES AND MPF_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
       COMMAND "${CMAKE_SOURCE_DIR}/scripts/cmake/make-man-page" $<TARGET_FILE:${program}> "${page}" "MPF ${PROJECT_VERSION}"
       COMMENT "Man page of ${program}" VERBATIM)
     list(APPEND pages "${page}")
+    install(DIRECTORY "${CMAKE_BINARY_DIR}/man/${name}.d/" DESTINATION ${CMAKE_INSTALL_MANDIR}/man1) # of its subcommands
   endforeach()
   add_custom_target(mpf_man_pages ALL DEPENDS ${pages})
   if(pages)

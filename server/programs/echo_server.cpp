@@ -7,13 +7,16 @@
 #include <fmt/format.h>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/run_main.h>
 #include <mpf/server/programs/server_arguments.h>
 #include <mpf/server/programs/server_log.h>
 #include <mpf/shm/link.h>
 
 namespace mpf {
 
-int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
+namespace {
+
+int serve(int argc, char** argv, const EchoServer& echo) {
   CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what), echo.program);
   std::string name = echo.server;
   ServerArguments arguments;
@@ -32,9 +35,12 @@ int runEchoServer(int argc, char** argv, const EchoServer& echo) try {
   const auto status = server.runUntilSignal();
   log->info("ends");
   return status;
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", echo.program, error.what());
-  return 1;
+}
+
+}  // namespace
+
+int runEchoServer(int argc, char** argv, const EchoServer& echo) {
+  return runMain(echo.program, [&] { return serve(argc, argv, echo); });
 }
 
 }  // namespace mpf

@@ -2,10 +2,10 @@
 #include <mpf/server/programs/server_log.h>
 
 #include <spdlog/async.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <utility>
 
 #include <mpf/base/signals_blocked.h>
+#include <mpf/server/programs/printable_sink.h>
 
 namespace mpf {
 namespace {
@@ -17,7 +17,7 @@ constexpr std::size_t kLinesThatMayWait = 1024;
 ServerLog::ServerLog(const std::string& program, const std::string& level) {
   const SignalsBlocked blocked;  // for the thread that writes
   writer_ = std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1);
-  auto errors = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+  auto errors = std::make_shared<PrintableSink>();
   logger_ = std::make_shared<spdlog::async_logger>(program, std::move(errors), writer_, spdlog::async_overflow_policy::overrun_oldest);
   logger_->set_level(spdlog::level::from_str(level));
   logger_->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");

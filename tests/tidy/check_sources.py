@@ -159,7 +159,20 @@ def machine_paths(files):
                 yield path, number, f"names a place of somebody's machine or a package host: {match[0]}"
 
 
-RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, shown_code, named_functions, machine_paths)
+def errors_never_throw(files):
+    """A program reports errors with printError(), and its main() is runMain(): both work when stderr is closed or full."""
+    for path, text in files.items():
+        if not path.endswith((".h", ".cpp")) or path.startswith(("tests/", "examples/", "base/")):
+            continue
+        for number, line in lines(text):
+            code = line.split("//")[0]
+            if re.search(r"\bprint\(stderr\b|\bstd::(cerr|clog)\b|\bfprintf\(stderr\b", code):
+                yield path, number, "may throw or be lost when stderr is closed or full: use printError()"
+            if re.match(r"int main\(", code) and not re.search(r"\brun(Main|Echo\w+)\(", text):
+                yield path, number, "main() without runMain()"
+
+
+RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, shown_code, named_functions, machine_paths, errors_never_throw)
 
 
 def read_tree(top):

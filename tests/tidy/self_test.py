@@ -74,6 +74,14 @@ class Rules(unittest.TestCase):
         self.refuses(check.unfinished, {"shm/a.cpp": f"\n// {UNFINISHED}: later\n"}, ("shm/a.cpp", 2))
         self.passes(check.unfinished, {"shm/a.cpp": 'mkstemp("file' + "X" * 6 + '");\n'})
 
+    def test_errors_never_throw(self):
+        rule = check.errors_never_throw
+        self.refuses(rule, {"tools/a.cpp": '\nfmt::print(stderr, "x");\n'}, ("tools/a.cpp", 2))
+        self.refuses(rule, {"demo/a.cpp": "std::cerr << 1;\n"}, ("demo/a.cpp", 1))
+        self.refuses(rule, {"router/main.cpp": "int main(int argc, char** argv) try {\n"}, ("router/main.cpp", 1))
+        self.passes(rule, {"router/main.cpp": "int main(int argc, char** argv) {\n  return mpf::runMain(kProgram, [&] { return 0; });\n"})
+        self.passes(rule, {"tests/a.cpp": "std::cerr << 1;\n", "client/c.h": "//   std::cerr << why;\n"})
+
     def test_machine_paths(self):
         rule = check.machine_paths
         self.refuses(rule, {"Makefile": "\ncd /wo" + "rk/mpf\n"}, ("Makefile", 2))

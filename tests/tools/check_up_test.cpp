@@ -36,7 +36,7 @@ class CheckUp : public testing::Test {
  protected:
   CheckUp() {
     host_.root = folder_.path();
-    host_.sharedMemory = [] { return Host::Space{8 * kGiB, 7 * kGiB, 1'000'000}; };
+    host_.sharedMemory = [] { return Host::Space{8 * kGiB, 7 * kGiB, 1'000'000, 2'000'000}; };
     host_.hasPidfd = [] { return true; };
     write("proc/self/mounts", "proc /proc proc rw,relatime 0 0\ntmpfs /dev/shm tmpfs rw,nosuid,size=8388608k 0 0\n");
     write("proc/self/status",
@@ -133,16 +133,16 @@ TEST_F(CheckUp, AMountOfAnotherKindOrNoneIsAWarning) {
 }
 
 TEST_F(CheckUp, LittleSpaceIsAWarningNoneIsAProblem) {
-  host_.sharedMemory = [] { return Host::Space{64 << 20, 60 << 20, 1'000'000}; };
+  host_.sharedMemory = [] { return Host::Space{64 << 20, 60 << 20, 1'000'000, 2'000'000}; };
   expect(checkSpace(host_), Health::warning, "60.0 MiB of 64.0 MiB free: little", "--shm-size");
-  host_.sharedMemory = [] { return Host::Space{8 * kGiB, 5 << 20, 1'000'000}; };
+  host_.sharedMemory = [] { return Host::Space{8 * kGiB, 5 << 20, 1'000'000, 2'000'000}; };
   expect(checkSpace(host_), Health::warning, "5.0 MiB of 8.0 GiB free: large messages", "mpf clean");
-  host_.sharedMemory = [] { return Host::Space{8 * kGiB, 7 * kGiB, 500}; };
-  expect(checkSpace(host_), Health::warning, "room for 500 files", "nr_inodes");
-  host_.sharedMemory = [] { return Host::Space{8 * kGiB, 4096, 1'000'000}; };
+  host_.sharedMemory = [] { return Host::Space{8 * kGiB, 7 * kGiB, 500, 2'000'000}; };
+  expect(checkSpace(host_), Health::warning, "500 of 2000000 inodes free", "nr_inodes");
+  host_.sharedMemory = [] { return Host::Space{8 * kGiB, 4096, 1'000'000, 2'000'000}; };
   expect(checkSpace(host_), Health::problem, "4.0 KiB of 8.0 GiB free: links and servers are refused", "mpf clean");
-  host_.sharedMemory = [] { return Host::Space{8 * kGiB, kGiB, 3}; };
-  expect(checkSpace(host_), Health::problem, "refused", "mpf clean");
+  host_.sharedMemory = [] { return Host::Space{8 * kGiB, kGiB, 3, 800}; };
+  expect(checkSpace(host_), Health::problem, "3 of 800 inodes free", "nr_inodes=");
 }
 
 TEST_F(CheckUp, RightsOfSharedMemoryAreOpenAndSticky) {

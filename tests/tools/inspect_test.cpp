@@ -84,6 +84,22 @@ TEST_F(InspectTest, TheSummarySaysWhoWaitsForWhom) {
   EXPECT_THAT(run({"inspect"}).out, HasSubstr("over: the server is gone"));
 }
 
+TEST_F(InspectTest, AClientShowsTheServersThatItWaitsFor) {
+  connect(1);
+  MessageClient waiting(*dispatcher_, [](const Message&) {});
+  waiting.bind("later", 3);
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(std::chrono::microseconds(100)));
+  const auto client = ls().at("clients").at(0).at("name").get<std::string>();
+
+  const auto text = run({"inspect", client}).out;
+
+  EXPECT_THAT(text, HasSubstr("  waits for: server later, location 3\n"));
+  const auto wishes = report({"inspect", client}).at(0).at("waits_for");
+  ASSERT_EQ(wishes.size(), 1U);
+  EXPECT_EQ(wishes.at(0).at("server"), "later");
+  EXPECT_EQ(wishes.at(0).at("location"), 3);
+}
+
 TEST_F(InspectTest, ALinkShowsItsLastMessagesAndWhatBecameOfThem) {
   connect(1);
   for (int i = 1; i <= 3; ++i) ASSERT_EQ(clients_.front()->send(Int32Message({.address = 7, .value = i})), SendResult::sent);

@@ -74,6 +74,7 @@ TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
   const auto named = run({"msr", "dac"});
   const MessageServer other(backplane_, "other");
   const auto some = run({"msr"});
+  const auto forPrograms = run({"msr", "--json"});
   std::filesystem::remove(file);
 
   EXPECT_EQ(all.status, 1);
@@ -82,7 +83,10 @@ TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
   EXPECT_EQ(named.status, 1);
   EXPECT_THAT(named.err, HasSubstr("no server \"dac\", unless it is among what could not be read; `mpf ls` shows those that there are\n"));
   EXPECT_EQ(some.status, 0);
-  EXPECT_THAT(inOneLine(some.out), HasSubstr(" problem: " + file + ": truncated"));
+  EXPECT_THAT(inOneLine(some.out), HasSubstr("1 file could not be read: servers may be missing here problem: " + file + ": truncated"));
+  EXPECT_THAT(forPrograms.err,
+              testing::StartsWith("mpf msr: 1 file could not be read: servers may be missing here\nmpf msr: " + file + ":"));
+  EXPECT_EQ(nlohmann::json::parse(forPrograms.out).size(), 1U);
 }
 
 // What a server's histograms say: a distribution, its percentiles, and the same for programs.

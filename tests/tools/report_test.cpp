@@ -213,8 +213,29 @@ TEST_F(ReportTest, NamesInAnyLanguageAreAligned) {
 TEST_F(ReportTest, ANameThatIsNoTextIsReportedAllTheSame) {
   const MessageServer server(backplane_, "a\xff", {.location = 0});
 
-  EXPECT_EQ(ls().at("servers").at(0).at("name"), "a\uFFFD");
-  EXPECT_THAT(run({"ls"}).out, HasSubstr("  a\xff "));
+  EXPECT_EQ(ls().at("servers").at(0).at("name"), R"(a\xff)");
+  EXPECT_THAT(run({"ls"}).out, HasSubstr(R"(  a\xff )"));
+}
+
+// Control characters are refused when a server starts; those that turn the direction of a text are not.
+TEST_F(ReportTest, NoNameReachesTheTerminalAsItIsAndEachIsFoundAsItIsShown) {
+  const std::string name = "a\u202eb\u200b";
+  const std::string shown = R"(a\u202eb\u200b)";
+  openServer(name);
+  connect();
+
+  for (const std::vector<std::string>& report : std::vector<std::vector<std::string>>{
+           {"ls"}, {"mrr", "--interval", "1"}, {"msr"}, {"inspect"}, {"top", "--batch", "1"}, {"ls", "--json"}, {"inspect", "--json"}}) {
+    const auto ended = run(report);
+
+    EXPECT_THAT(ended.out, AllOf(HasSubstr("a\\"), Not(HasSubstr("\u202e")), Not(HasSubstr("\u200b")))) << report.front();
+    if (report.back() == "--json") EXPECT_TRUE(nlohmann::json::accept(ended.out)) << ended.out;
+  }
+  for (const auto& given : {name, shown}) {
+    EXPECT_THAT(run({"msr", given}).out, StartsWith(shown + "\n"));
+    EXPECT_EQ(run({"inspect", given}).status, 0);
+  }
+  EXPECT_EQ(run({"msr", "x\u202ey"}).err, "mpf msr: no server \"x\\u202ey\"; `mpf ls` shows those that there are\n");
 }
 
 TEST_F(ReportTest, ServersOfOneNameAtTwoLocationsAreToldApart) {
@@ -285,7 +306,14 @@ TEST_F(ReportTest, LongNamesFitIntoEightyColumns) {
 
   const auto list = run({"ls"}).out;
   const auto server = run({"msr", name}).out;
+  const auto routers = run({"mrr", "--interval", "1"}).out;
+  const auto summary = run({"inspect"}).out;
 
+  EXPECT_LE(widestOf(routers), 80U) << routers;
+  EXPECT_LE(widestOf(summary), 80U) << summary;
+  EXPECT_THAT(routers, AllOf(HasSubstr(name + "["), HasSubstr("Server " + name), HasSubstr("a-client-" + std::string(54, 'y') + "["),
+                             HasSubstr("another-" + std::string(54, 'z'))));
+  EXPECT_THAT(summary, AllOf(HasSubstr("server " + name + "\n"), HasSubstr("client a-client-" + std::string(54, 'y') + "\n")));
   EXPECT_LE(widestOf(list), 80U) << list;
   EXPECT_LE(widestOf(server), 80U) << server;
   EXPECT_THAT(list, AllOf(HasSubstr("  " + name + "\n"), HasSubstr("  a-client-" + std::string(54, 'y'))));

@@ -128,11 +128,11 @@ TEST_F(RouterViewTest, NoTextCommandsATerminal) {
 
   const auto seen = router();
 
-  EXPECT_EQ(seen.name, "l?[2Jab");
-  EXPECT_EQ(seen.lines.front().problem, "a?b???2Jc\xc2\xb0");
-  EXPECT_EQ(seen.lines.front().peer, "?]0;x?");
-  EXPECT_EQ(seen.lines.front().program, "?p");
-  EXPECT_EQ(seen.lines.front().address, "?");
+  EXPECT_EQ(seen.name, R"(l\x1b[2Jab)");
+  EXPECT_EQ(seen.lines.front().problem, "a\\nb\\x7f\\u009b2Jc\xc2\xb0");
+  EXPECT_EQ(seen.lines.front().peer, R"(\x1b]0;x\x07)");
+  EXPECT_EQ(seen.lines.front().program, R"(\tp)");
+  EXPECT_EQ(seen.lines.front().address, R"(\r)");
 }
 
 TEST_F(RouterViewTest, ATextIsNeverSeenHalfWritten) {

@@ -172,8 +172,8 @@ TEST_F(SurveyTest, ANameCannotCommandTheTerminal) {
   const auto survey = take();
 
   ASSERT_THAT(survey.servers, SizeIs(1));
-  EXPECT_EQ(survey.servers.front().name, "a?[2Jb??");
-  EXPECT_EQ(survey.servers.front().program, "?H?");
+  EXPECT_EQ(survey.servers.front().name, R"(a\x1b[2Jb\n\x7f)");
+  EXPECT_EQ(survey.servers.front().program, R"(\tH\r)");
   segments::remove(serverName());
 }
 

@@ -245,8 +245,9 @@ TEST_F(TapTest, WhatIsNoRecordingIsNamed) {
   const auto ended = run({"replay", file_});
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_EQ(ended.err,
-            "mpf replay: " + file_ + ": record 1: this is no recording of `mpf tap`, or one that was cut off within its first record\n");
+  EXPECT_EQ(ended.err, "mpf replay: " + file_ +
+                           ": record 1, at byte 0 of 67: this is no recording of `mpf tap --write`, or one that was cut off within its "
+                           "first record\n");
   EXPECT_EQ(ended.out, "") << "nothing was sent, to nobody";
   EXPECT_EQ(run({"replay", file_ + ".none"}).status, 2);
 }
@@ -267,7 +268,20 @@ TEST_F(TapTest, ARecordingThatWasCutIsSentUpToThere) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out, HasSubstr("2 requests of 1 client to \"echo\": 2 replied"));
-  EXPECT_THAT(ended.err, testing::MatchesRegex("mpf replay: .*: record [0-9]+: the file is damaged, or was cut off here\n"));
+  EXPECT_THAT(ended.err,
+              testing::MatchesRegex("mpf replay: .*: record 5, at byte [0-9]+ of [0-9]+: the file is damaged, or was cut off here; the "
+                                    "records before it can be read: `head -c [0-9]+ FILE >NEW` keeps them, `mpf tap --write` records "
+                                    "again\n"));
+}
+
+TEST_F(TapTest, AFileThatCannotBeWrittenIsAFailureAtOnce) {
+  const auto full = run({"tap", "nobody", "--write", "/dev/full"});
+  const auto nowhere = run({"tap", "nobody", "--write", file_ + ".none/x"});
+
+  EXPECT_EQ(full.status, 1);
+  EXPECT_EQ(full.err, "mpf: write /dev/full: No space left on device\n");
+  EXPECT_EQ(nowhere.status, 1);
+  EXPECT_EQ(nowhere.err, "mpf: open " + file_ + ".none/x: No such file or directory\n");
 }
 
 TEST_F(TapTest, AServerThatIsNotThereIsNamed) {

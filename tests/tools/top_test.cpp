@@ -162,5 +162,24 @@ TEST_F(TopTest, ShowsAThousandLinks) {
   EXPECT_EQ(top->wait(), 0);
 }
 
+// A line that the terminal itself breaks does not begin with the indent of mrr.
+TEST_F(TopTest, ReportsTakeTheWidthOfTheTerminal) {
+  const std::string name(40, 'x');
+  const EchoThread echo(backplane_, name);
+  const std::vector<std::string> mrr{MPF_TEST_TOOL, "mrr", "--backplane", backplane_.name(), "--interval", "1"};
+  Terminal narrow(mrr, 24, 60);
+  Terminal wide(mrr, 24, 200);
+
+  EXPECT_EQ(narrow.wait(), 0);
+  EXPECT_EQ(wide.wait(), 0);
+
+  const auto lines = linesOf(narrow.screen());
+  const auto last = std::ranges::find_if(lines, [](const std::string& line) { return line.find("clients 0") != std::string::npos; });
+  ASSERT_NE(last, lines.end()) << narrow.screen();
+  EXPECT_THAT(*last, testing::StartsWith("     "));
+  EXPECT_THAT(wide.screen(), testing::HasSubstr(" queueSize 100 inQueue 0 replyQueueFull 0 clients 0"));
+  EXPECT_THAT(wide.screen(), testing::HasSubstr(" 1 " + name + "["));
+}
+
 }  // namespace
 }  // namespace mpf::test

@@ -33,6 +33,8 @@ TEST(Wrap, BreaksAWordThatIsLongerThanALine) {
   EXPECT_THAT(lines, testing::ElementsAre("- a", "    " + std::string(76, 'x'), "    " + std::string(24, 'x') + " b"));
 }
 
+TEST(Wrap, KeepsTheBlanksOfAName) { EXPECT_EQ(wrap("", "a  b   c", 4), "a  b   c\n"); }
+
 TEST(Wrap, NeverBreaksACharacter) {
   std::string text;
   for (int i = 0; i < 100; ++i) text += "°";

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <exception>
 
+#include <mpf/base/print_error.h>
 #include <mpf/base/system_call.h>
 
 namespace mpf::torture {
@@ -30,7 +31,7 @@ sigset_t childSignal() {
   try {
     ::_exit(play());
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "mpf torture: an actor ended: %s\n", error.what());
+    printError("mpf torture: an actor ended: {}\n", error.what());
     ::_exit(1);
   }
 }

@@ -3,9 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
 #include <fmt/format.h>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,9 +11,11 @@
 #include <stdexcept>
 
 #include <mpf/base/command_line.h>
-#include <mpf/base/system_call.h>
+#include <mpf/base/output_file.h>
+#include <mpf/base/print_error.h>
 #include <mpf/tools/arguments.h>
 #include <mpf/tools/commands.h>
+#include <mpf/tools/json_text.h>
 #include <mpf/tools/torture/campaign.h>
 
 namespace mpf::tools {
@@ -64,17 +64,15 @@ torture::Campaign::Progress progress() {
   if (::isatty(STDERR_FILENO) == 0) return [](const auto&...) {};
   return [](const torture::Plan& plan, std::uint64_t round, std::uint64_t planned) {
     const auto of = planned == 0 ? std::string() : fmt::format(" of {}", planned);
-    fmt::print(stderr, "\r\x1b[Kround {}{}: {} {} at {} + {}", round, of, toString(plan.mode), toString(plan.role), plan.place.mark,
-               plan.place.instructions);
+    writeError(fmt::format("\r\x1b[Kround {}{}: {} {} at {} + {}", round, of, toString(plan.mode), toString(plan.role), plan.place.mark,
+                           plan.place.instructions));
   };
 }
 
 // Before the work, which may take hours: empty without a name.
-std::optional<std::ofstream> openVerdict(const std::string& path) {
+std::optional<OutputFile> openVerdict(const std::string& path) {
   if (path.empty()) return std::nullopt;
-  std::optional<std::ofstream> file(path);
-  if (!*file) throwSystemError(errno, "create", path);
-  return file;
+  return OutputFile(path);
 }
 
 int run(const Arguments& arguments) {
@@ -88,11 +86,11 @@ int run(const Arguments& arguments) {
   checkSteps(marks, options.steps);
   auto verdict = openVerdict(arguments.json);
   const auto tally = torture::Campaign(marks, options, progress()).run();
-  if (::isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\x1b[K");
+  if (::isatty(STDERR_FILENO) != 0) writeError("\r\x1b[K");
   fmt::print("{}", tally.text());
   if (verdict) {
-    *verdict << tally.json().dump(2) << '\n';
-    if (!verdict->flush()) throw std::runtime_error(fmt::format("cannot write {}", arguments.json));
+    verdict->write(jsonText(tally.json()) + '\n');
+    verdict->close();
   }
   return tally.verdict() == "held" ? 0 : 1;
 }

@@ -2,12 +2,12 @@
 // mpf-dac128v-server: one DAC128V, one server, one process. The old command was initDAC128V("module","carrier","site",queueSize).
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <fmt/format.h>
 #include <memory>
 #include <optional>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/run_main.h>
 #include <mpf/drivers/dac128v/dac128v_model.h>
 #include <mpf/server/programs/dac128v_server/dac128v_server.h>
 #include <mpf/server/programs/hardware/hardware.h>
@@ -46,9 +46,7 @@ struct Options {
   }
 };
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int serve(int argc, char** argv) {
   Options options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
@@ -66,7 +64,10 @@ int main(int argc, char** argv) try {
   mpf::MessageServer server(mpf::Backplane::attach(arguments.backplane), options.place.name, arguments.messages);
   const mpf::Dac128vServer outputs(server, dac, log);
   return mpf::runServer(server, *module, log);
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", kProgram, error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain(kProgram, [&] { return serve(argc, argv); });
 }

@@ -2,10 +2,10 @@
 // mpf-digital-io-server: one module of digital lines, two servers, one process. The old command was
 // initIpUnidig("module","carrier","site",queueSize,msecPoll,intVec,risingMask,fallingMask,biMask,maxClients).
 #include <cstdio>
-#include <exception>
 #include <fmt/format.h>
 #include <memory>
 
+#include <mpf/base/run_main.h>
 #include <mpf/base/stop_signals.h>
 #include <mpf/drivers/digital_io/digital_io_model.h>
 #include <mpf/server/programs/digital_io_server/input_server.h>
@@ -32,9 +32,7 @@ void describe(const mpf::DigitalIo& io, const mpf::IndustryPackModule& module, c
   if (options.maxClients != 0) log->info("maxclients {} is ignored: any number of clients may monitor the inputs", options.maxClients);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int serve(int argc, char** argv) {
   mpf::DigitalIoStartOptions options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
@@ -68,7 +66,10 @@ int main(int argc, char** argv) try {
   server.run();
   log->info("ends");
   return failure.exitStatus();
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", kProgram, error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain(kProgram, [&] { return serve(argc, argv); });
 }

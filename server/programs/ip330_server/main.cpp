@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // mpf-ip330-server: one Acromag IP330, all servers over it, one process. The old commands: --help.
 #include <cstdio>
-#include <exception>
 #include <fmt/format.h>
 #include <map>
 #include <memory>
 
+#include <mpf/base/run_main.h>
 #include <mpf/base/stop_bell.h>
 #include <mpf/drivers/dac128v/dac128v_model.h>
 #include <mpf/drivers/ip330/ip330_model.h>
@@ -61,9 +61,7 @@ void describe(const mpf::Ip330Servers& servers, mpf::Ip330& board, const mpf::In
             servers.names());
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int serve(int argc, char** argv) {
   mpf::Ip330StartOptions options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
@@ -85,7 +83,10 @@ int main(int argc, char** argv) try {
   }
   log->info("ends");
   return failure.exitStatus();
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", kProgram, error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain(kProgram, [&] { return serve(argc, argv); });
 }

@@ -2,12 +2,12 @@
 // mpf-ip440-server: one IP440, one server, one process.
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <fmt/format.h>
 #include <memory>
 #include <optional>
 
 #include <mpf/base/command_line.h>
+#include <mpf/base/run_main.h>
 #include <mpf/drivers/ip440/ip440_model.h>
 #include <mpf/server/programs/hardware/hardware.h>
 #include <mpf/server/programs/hardware/wire_options.h>
@@ -45,9 +45,7 @@ std::unique_ptr<mpf::Ip440Model> makeModel(const Options& options, mpf::ModelWir
   return model;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+int serve(int argc, char** argv) {
   Options options;
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
@@ -58,7 +56,10 @@ int main(int argc, char** argv) try {
   mpf::MessageServer server(mpf::Backplane::attach(options.arguments.backplane), options.place.name, options.arguments.messages);
   const mpf::Ip440Server served(server, inputs, log);
   return mpf::runServer(server, *module, log);
-} catch (const std::exception& error) {
-  fmt::print(stderr, "{}: {}\n", kProgram, error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain(kProgram, [&] { return serve(argc, argv); });
 }

@@ -4,17 +4,19 @@
 // initOctalUART("moduleName","carrierName","carrierSite",nports,intVec) and
 // initOctalUARTPort("portName","moduleName",port,baud,"parity",stop_bits,bits_char,"flowType").
 #include <cstdio>
-#include <exception>
 #include <fmt/format.h>
 #include <memory>
 #include <vector>
 
+#include <mpf/base/run_main.h>
 #include <mpf/base/stop_bell.h>
 #include <mpf/server/programs/serial_server/serial_ports.h>
 #include <mpf/server/programs/serial_server/served_port.h>
 #include <mpf/server/programs/serial_server/start_options.h>
 
-int main(int argc, char** argv) try {
+namespace {
+
+int serve(int argc, char** argv) {
   mpf::SerialStartOptions options;
   if (const auto exit = options.parse(argc, argv)) return *exit;
   const mpf::ServerLog log("mpf-serial-server", options.arguments.logLevel);
@@ -38,7 +40,10 @@ int main(int argc, char** argv) try {
   for (const auto& server : served) server->join();
   ports.onAlarm({});
   return failure.exitStatus();
-} catch (const std::exception& error) {
-  fmt::print(stderr, "mpf-serial-server: {}\n", error.what());
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mpf::runMain("mpf-serial-server", [&] { return serve(argc, argv); });
 }

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Files in which no failed write goes unnoticed.
+#include <mpf/base/output_file.h>
+
+#include <filesystem>
+#include <fstream>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sstream>
+#include <system_error>
+
+#include <mpf/tests/support/temporary_folder.h>
+
+namespace mpf {
+namespace {
+
+std::string textOf(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+// What a call says that throws std::system_error; empty when it does not.
+template <class Call>
+std::string errorOf(Call call) try {
+  call();
+  return {};
+} catch (const std::system_error& error) {
+  return error.what();
+}
+
+TEST(OutputFile, ReplacesWhatTheFileHeldWithTheFirstWrite) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.write("x", "old and longer");
+
+  OutputFile file(path);
+  EXPECT_EQ(textOf(path), "old and longer");
+  file.write("new ");
+  file.write("text");
+  file.close();
+
+  EXPECT_EQ(textOf(path), "new text");
+}
+
+TEST(OutputFile, WithoutAWriteIsEmptyOnceItIsClosed) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.write("x", "old");
+
+  OutputFile(path).close();
+
+  EXPECT_EQ(textOf(path), "");
+}
+
+TEST(OutputFile, SaysBeforeTheWorkThatItCannotBeWritten) {
+  const test::TemporaryFolder folder;
+
+  EXPECT_EQ(errorOf([] { OutputFile("/dev/full"); }), "write /dev/full: No space left on device");
+  const auto missing = folder.file("none/x");
+  EXPECT_EQ(errorOf([&] { OutputFile{missing}; }), "open " + missing + ": No such file or directory");
+}
+
+}  // namespace
+}  // namespace mpf
