@@ -32,6 +32,7 @@ void CallbackErrors::note(const std::string& server, std::int32_t location) noex
 }
 
 void CallbackErrors::report() noexcept try {
+  const auto client = std::exchange(client_, {});
   const auto nowNs = Clock::nowNs();
   if (reportedNs_ != 0 && nowNs - reportedNs_ < kReportEveryNs) {
     ++leftOut_;
@@ -43,7 +44,7 @@ void CallbackErrors::report() noexcept try {
   const auto text = fmt::format(
       "mpf: the callback{} threw an exception: {}. The dispatcher continues; catch the exception in the "
       "callback.{}\n",
-      client_, textOfException(), more);
+      client, textOfException(), more);
   std::fwrite(text.data(), 1, text.size(), stderr);
 } catch (const std::exception&) {
   ++leftOut_;  // no memory for the text
