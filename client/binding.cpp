@@ -50,7 +50,7 @@ bool Binding::waitConnected(Deadline deadline) {
 }
 
 bool Binding::takeOne() {
-  if (!channel_ || paused_ || ending_) return false;
+  if (!channel_ || paused_ || end_) return false;
   Envelope envelope;
   switch (channel_->tryBegin(envelope)) {
     case MessageLink::Take::nothing:
@@ -151,8 +151,12 @@ void Binding::noteTimes(const Envelope& envelope, const Request* request) noexce
   if (endpoint.slept()) endpoint.noteWake(waitedNs);
 }
 
-void Binding::deliver(Message&& message) {
+// Before it is called all of the message's state is as it is to be after it: it may throw.
+void Binding::deliver(Message&& message) try {
   if (!left_) callback_(std::move(message));
+} catch (...) {
+  dispatcher_.noteThrower(server_, location_);
+  throw;
 }
 
 void Binding::deliverConnect(ConnectStatus status) { deliver(ConnectMessage({.status = status, .incarnation = incarnation_})); }
@@ -173,21 +177,19 @@ void Binding::deliverFate(Request& request, Fate fate) {
   deliver(std::move(message));
 }
 
-bool Binding::hasDeadPeer() const noexcept { return channel_ && !ending_ && channel_->link().peer()->isDead(); }
+bool Binding::hasDeadPeer() const noexcept { return channel_ && !end_ && channel_->link().peer()->isDead(); }
 
 // What a server sent before it went. One that is not gone may send for ever: what fits its ring is all that it had sent.
-void Binding::deliverTheRest(MessageLink& channel) {
+void Binding::deliverTheRest(const MessageLink* channel) {
   Envelope envelope;
-  for (auto left = channel.link().header().replySlots; left != 0; --left) {
-    if (channel_.get() != &channel || channel.tryBegin(envelope) != MessageLink::Take::message || !tryDeliverReply(envelope)) return;
+  while (channel_.get() == channel && end_->restSlots != 0) {
+    --end_->restSlots;
+    if (channel_->tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope)) continue;
+    end_->restSlots = 0;
   }
 }
 
 void Binding::disconnect(const std::string& reason, Ending ending) {
-  const auto self = shared_from_this();
-  const auto channel = channel_;
-  const auto requests = requests_;
-  ending_ = true;
   bool wasConnected = false;
   {
     const std::lock_guard lock(*lock_);
@@ -195,13 +197,49 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   }
   MPF_STEP(disconnecting);
   setReason(reason);
-  auto& link = channel->link();
   goOn();
-  if (ending == Ending::serverGone) deliverTheRest(*channel);
+  end_ = {ending, wasConnected, ending == Ending::serverGone ? channel_->link().header().replySlots : 0};
+  resumeEnd();
+}
+
+// A callback that throws has had its message; onTime() comes back for what is left.
+void Binding::resumeEnd() {
+  const auto self = shared_from_this();
+  try {
+    endAll();
+  } catch (...) {
+    if (end_) {
+      end_->isInterrupted = true;
+      wakeAt(Clock::nowNs());
+    }
+    throw;
+  }
+}
+
+void Binding::endAll() {
+  const auto channel = channel_;
+  const auto requests = requests_;
+  const auto ending = end_->ending;
+  end_->isInterrupted = false;
+  deliverTheRest(channel.get());
   requests->forEach([&](Request& request) {
-    deliverFate(request, ending != Ending::nonsense && !link.isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
+    deliverFate(request, ending != Ending::nonsense && !channel->link().isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
+  const bool wasConnected = end_->wasConnected;
+  closeChannel();
+  end_.reset();
+  try {
+    if (wasConnected) deliverConnect(ConnectStatus::connectNo);
+  } catch (...) {
+    lookForServer(ending);
+    throw;
+  }
+  lookForServer(ending);
+}
+
+void Binding::closeChannel() {
+  auto& link = channel_->link();
   auto& endpoint = dispatcher_.endpoint();
   MPF_STEP(requests_ended);
   const bool serverDied = link.peer()->isDead();
@@ -218,12 +256,11 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   endpoint.detach(index_);
   dispatcher_.setLink(index_, nullptr);
   count(endpoint.control().linksClosed);
-  {
-    const std::lock_guard lock(*lock_);
-    channel_.reset();
-  }
-  ending_ = false;
-  if (wasConnected) deliverConnect(ConnectStatus::connectNo);
+  const std::lock_guard lock(*lock_);
+  channel_.reset();
+}
+
+void Binding::lookForServer(Ending ending) {
   if (left_) return;
   if (ending == Ending::serverGone) return tryConnect();
   wakeAt(Clock::nowNs() + kRetryNs);
@@ -252,7 +289,10 @@ void Binding::leave() {
 
 void Binding::onTime(std::int64_t nowNs) {
   dueNs_.store(INT64_MAX, std::memory_order_relaxed);
-  if (ending_) return;
+  if (end_) {
+    if (end_->isInterrupted) resumeEnd();
+    return;
+  }
   if (!channel_) {
     if (isBound() && !left_) tryConnect();
     return;
@@ -260,15 +300,20 @@ void Binding::onTime(std::int64_t nowNs) {
   // PAIR(due): a sender that lowers it from now on wakes us again.
   doorbell::fence();
   const auto self = shared_from_this();
-  expire(nowNs);
-  if (channel_) nudge(nowNs);
+  try {
+    expire(nowNs);
+    if (channel_) nudge(nowNs);
+  } catch (...) {
+    wakeAt(nowNs);  // for the other requests
+    throw;
+  }
 }
 
 void Binding::expire(std::int64_t nowNs) {
   const auto requests = requests_;
   const auto channel = channel_;
   requests->forEach([&](Request& request) {
-    if (channel_ != channel || ending_) return;  // a callback ran the dispatcher
+    if (channel_ != channel || end_) return;  // a callback ran the dispatcher
     if (request.deadlineNs == 0 || request.isGivenUp) return;
     if (request.deadlineNs > nowNs) return wakeAt(request.deadlineNs);
     // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the deadline has passed.

@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include <mpf/channel/message_link.h>
@@ -57,6 +58,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   // What is due at a time: expired requests, hints that may have been lost.
   void onTime(std::int64_t nowNs);
   [[nodiscard]] std::int64_t dueNs() const noexcept { return dueNs_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool hasLeft() const noexcept { return left_; }
   [[nodiscard]] bool isWaiting() const noexcept { return !channel_ && isBound() && !left_; }
   [[nodiscard]] bool hasDeadPeer() const noexcept;
   void tellQueueFull();
@@ -66,7 +68,11 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   bool tryDeliverReply(const Envelope& envelope);
-  void deliverTheRest(MessageLink& channel);
+  void deliverTheRest(const MessageLink* channel);
+  void resumeEnd();
+  void endAll();
+  void closeChannel();
+  void lookForServer(Ending ending);
   void noteTimes(const Envelope& envelope, const Request* request) noexcept;
   bool onLinkState();
   void makeChannel(const std::shared_ptr<PeerWindow>& server);
@@ -99,7 +105,14 @@ class Binding : public std::enable_shared_from_this<Binding> {
   std::uint64_t incarnation_ = 0;  // of the server
   bool left_ = false;
   bool paused_ = false;
-  bool ending_ = false;  // disconnect() is calling back
+  // What is left of a disconnect() that is calling back, or whose callback has thrown.
+  struct End {
+    Ending ending;
+    bool wasConnected;
+    std::uint32_t restSlots;  // of the server's ring: what it sent before it went
+    bool isInterrupted = false;  // by an exception: resumeEnd() is due
+  };
+  std::optional<End> end_;
   Segment wish_;
   mutable std::mutex reasonMutex_;
   std::condition_variable connectedChanged_;

@@ -13,11 +13,14 @@ namespace mpf {
 
 void Binding::setServer(const std::string& server, std::int32_t location) {
   SegmentName::checkServer(server);
-  if (isBound()) throw std::logic_error(fmt::format("bind: the client is bound to server \"{}\" already", server_));
-  server_ = server;
-  location_ = location;
-  // PAIR(bound): whom to, which the dispatcher's thread looks at.
-  bound_.store(true, std::memory_order_release);
+  {
+    const std::lock_guard lock(reasonMutex_);
+    if (isBound()) throw std::logic_error(fmt::format("bind: the client is bound to server \"{}\" already", server_));
+    server_ = server;
+    location_ = location;
+    // PAIR(bound): whom to, which the dispatcher's thread looks at.
+    bound_.store(true, std::memory_order_release);
+  }
   setReason(fmt::format("server \"{}\" at location {} is not there yet", server, location));
 }
 
@@ -59,7 +62,7 @@ void Binding::tryConnect() try {
 void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
   auto& endpoint = dispatcher_.endpoint();
   auto link = Link::create(endpoint.backplane().name(), endpoint.window(), index_, server);
-  auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding);
+  auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding, requests_ ? requests_->lastId() : 0);
   auto channel = std::make_shared<MessageLink>(std::move(link), lock_);
   dispatcher_.setLink(index_, this);
   const std::lock_guard lock(*lock_);

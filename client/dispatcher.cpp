@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <map>
+#include <utility>
 
 #include <mpf/base/signals_blocked.h>
 #include <mpf/client/dispatcher_impl.h>
@@ -44,21 +45,34 @@ void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
   hasThread_ = true;
   thread_ = std::thread([self] {
     ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
-    while (!self->ended_.load(std::memory_order_relaxed)) self->runOnce(Deadline::never());
+    const auto turn = self->enterAnyway();
+    while (!self->ended_.load(std::memory_order_relaxed)) {
+      try {
+        self->runOnce(Deadline::never());
+      } catch (...) {  // of a callback, and no caller of ours could handle it
+        self->endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed);
+        self->errors_.report();
+      }
+    }
   });
 }
 
 void Dispatcher::Impl::endThread() {
-  if (!hasThread_) return;
+  if (!thread_.joinable()) return;
   if (endpoint_.origin().isInherited()) return Origin::abandon(thread_);
   ended_.store(true, std::memory_order_relaxed);
   interrupt();
   // The last client may be destroyed by a callback: then the thread ends after it.
-  if (isHome()) {
+  if (lock_.isMine()) {
     thread_.detach();
   } else {
     thread_.join();
   }
+}
+
+// A client may end before the command that adds it runs.
+void Dispatcher::Impl::add(const std::shared_ptr<Binding>& binding) {
+  if (!binding->hasLeft()) bindings_.insert(binding);
 }
 
 void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
@@ -70,13 +84,49 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
   endpoint_.interrupt();
 }
 
-bool Dispatcher::Impl::runOnce(Deadline deadline) {
+RunnerTurn Dispatcher::Impl::enter() {
   endpoint_.origin().check("Dispatcher");
-  runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
+  if (lock_.isMine()) return RunnerTurn(nullptr);
+  if (hasThread_) RunnerLock::refuse();
+  return enterAnyway();
+}
+
+RunnerTurn Dispatcher::Impl::enterAnyway() {
+  lock_.enter([this] { endpoint_.interrupt(); });
+  return RunnerTurn(&lock_);
+}
+
+bool Dispatcher::Impl::takeStop() noexcept {
+  return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed);
+}
+
+bool Dispatcher::Impl::runOnce(Deadline deadline) {
+  const auto turn = enter();
+  return run(deadline, [this] { return takeStop(); });
+}
+
+bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()>& isDone) {
+  const bool isNested = lock_.isMine();
+  if (!isNested && (hasThread_ || !lock_.mayRunAsGuest() || !lock_.tryEnterAsGuest())) return false;
+  const RunnerTurn turn(isNested ? nullptr : &lock_);
+  const auto isWanted = [&] { return !isNested && lock_.isWanted(); };
+  while (!isDone() && !deadline.hasPassed() && !isWanted()) run(deadline, isWanted);
+  if (hasDescriptor_) endpoint_.callAgain();  // running has disarmed it
+  return true;
+}
+
+// True when something was done; false at the deadline and when `isOver`.
+template <class IsOver>
+bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
+  const auto me = std::this_thread::get_id();
+  // PAIR(ran-last): before we look how long we may wait.
+  if (ranLast_.load(std::memory_order_relaxed) != me) ranLast_.store(me, std::memory_order_seq_cst);
   for (std::uint32_t vain = 0;;) {
-    // First: in a loop that is never idle there would be no second.
-    if (stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed)) return false;
+    // In a loop that is never idle there would be no other look.
+    if (isOver()) return false;
     if (step()) return true;
+    // The step takes the local news, and with it the news of an interrupt since the look above.
+    if (isOver()) return false;
     dropKnocks();
     const bool hasNews = endpoint_.wait(std::min(deadline, nextDue()));
     // Peers may invent news for ever.
@@ -91,7 +141,13 @@ void Dispatcher::Impl::dropKnocks() noexcept {
   static_cast<void>(endpoint_.takeRescan());
 }
 
-bool Dispatcher::Impl::step() {
+// What a callback that throws leaves undone is local news: the next step does it at once.
+bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
+  endpoint_.interrupt();
+  throw;
+}
+
+bool Dispatcher::Impl::tryStep() {
   // A callback may run us, too: whoever is being called back lives on.
   const Inside inside(depth_);
   if (depth_ == 1) removed_.clear();
@@ -120,7 +176,7 @@ int Dispatcher::Impl::descriptor() {
 }
 
 bool Dispatcher::Impl::runPending(int most) {
-  endpoint_.origin().check("Dispatcher");
+  const auto turn = enter();
   // Peers may send, or invent news, for ever: the program's loop has its turn all the same.
   for (int batches = 0; batches < most; ++batches) {
     if (step()) continue;
@@ -132,7 +188,7 @@ bool Dispatcher::Impl::runPending(int most) {
 }
 
 void Dispatcher::Impl::post(std::function<void()> command) {
-  if (isHome()) return command();
+  if (lock_.isMine()) return command();
   postLater(std::move(command));
 }
 
@@ -145,26 +201,55 @@ void Dispatcher::Impl::postLater(std::function<void()> command) {
   endpoint_.interrupt();
 }
 
-void Dispatcher::Impl::postAndWait(std::function<void()> command) {
-  if (isHome()) return command();
-  std::mutex mutex;
-  std::condition_variable changed;
-  bool done = false;
-  post([&] {
+void Dispatcher::Impl::runQuietly(const std::function<void()>& command) {
+  if (lock_.isMine()) return command();
+  if (!lock_.tryEnterAsGuest()) return postLater(command);
+  const RunnerTurn turn(&lock_);
+  command();
+}
+
+// The thread that runs the dispatcher may stop to do so before it has seen the command: then the caller
+// runs it.
+void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
+  if (lock_.isMine()) return command();
+  struct State {
+    bool isStarted = false;  // under lock_
+    bool isDone = false;     // under mutex
+    std::mutex mutex;
+    std::condition_variable changed;
+  };
+  const auto state = std::make_shared<State>();
+  const auto runFirst = [state, &command] {
+    if (std::exchange(state->isStarted, true)) return;
     command();
-    const std::lock_guard lock(mutex);
-    done = true;
-    changed.notify_one();
-  });
-  std::unique_lock lock(mutex);
-  changed.wait(lock, [&] { return done; });
+    const std::lock_guard lock(state->mutex);
+    state->isDone = true;
+    state->changed.notify_one();
+  };
+  const auto isDone = [&] { return state->isDone; };
+  for (bool isPosted = false;; isPosted = true) {
+    if (lock_.tryEnterAsGuest()) {
+      const RunnerTurn turn(&lock_);
+      return runFirst();
+    }
+    if (!isPosted) postLater(runFirst);
+    std::unique_lock lock(state->mutex);
+    if (hasThread_) return state->changed.wait(lock, isDone);
+    if (state->changed.wait_for(lock, kLookForRunner, isDone)) return;
+  }
 }
 
 void Dispatcher::Impl::noteDue(std::int64_t ns) noexcept {
   auto due = dueNs_.load(std::memory_order_relaxed);
-  while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
+  // PAIR(ran-last): before we look which thread waits.
+  while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst, std::memory_order_relaxed)) {
   }
-  if (ns < due && std::this_thread::get_id() != runner_.load(std::memory_order_relaxed)) endpoint_.interrupt();
+  // PAIR(ran-last): after our time, which that thread looks at, or we see it here.
+  if (ns < due && ranLast_.load(std::memory_order_seq_cst) != std::this_thread::get_id()) endpoint_.interrupt();
+}
+
+void Dispatcher::Impl::noteThrower(const std::string& server, std::int32_t location) noexcept {
+  if (hasThread_) errors_.note(server, location);
 }
 
 void Dispatcher::Impl::setLink(std::uint32_t index, Binding* binding) {
@@ -215,14 +300,27 @@ bool Dispatcher::Impl::goOnWithRounds() {
   return true;
 }
 
+// Those that there are now. Each is taken before it runs: when it throws, the others are still there.
 void Dispatcher::Impl::runCommands() {
-  std::vector<std::function<void()>> commands;
+  std::size_t left = 0;
   {
     const std::lock_guard lock(commandMutex_);
-    commands.swap(commands_);
-    hasCommands_.store(false, std::memory_order_relaxed);
+    left = commands_.size();
   }
-  for (const auto& command : commands) command();
+  for (; left != 0; --left) {
+    const auto command = takeCommand();
+    if (!command) return;  // a callback ran the dispatcher
+    command();
+  }
+}
+
+std::function<void()> Dispatcher::Impl::takeCommand() {
+  const std::lock_guard lock(commandMutex_);
+  if (commands_.empty()) return {};
+  auto command = std::move(commands_.front());
+  commands_.pop_front();
+  hasCommands_.store(!commands_.empty(), std::memory_order_relaxed);
+  return command;
 }
 
 void Dispatcher::Impl::handleDue() {
@@ -233,11 +331,16 @@ void Dispatcher::Impl::handleDue() {
     due_.begin(bindings_);
   }
   const auto nowNs = Clock::nowNs();
-  due_.goOn([nowNs](Binding& binding) {
-    if (binding.dueNs() > nowNs) return false;
-    binding.onTime(nowNs);
-    return true;
-  });
+  try {
+    due_.goOn([nowNs](Binding& binding) {
+      if (binding.dueNs() > nowNs) return false;
+      binding.onTime(nowNs);
+      return true;
+    });
+  } catch (...) {
+    noteDue(nowNs);  // for the others, and for what it has not done yet
+    throw;
+  }
   if (!due_.isOver()) return noteDue(nowNs);  // the others at once
   for (const auto& binding : bindings_) noteDue(binding->dueNs());
 }
@@ -261,6 +364,7 @@ std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
 
 bool Dispatcher::runOnce(Deadline deadline) { return impl_->runOnce(deadline); }
 void Dispatcher::run() {
+  const auto turn = impl_->enter();
   while (impl_->runOnce(Deadline::never())) {
   }
 }

@@ -1,71 +1,103 @@
 // SPDX-License-Identifier: MIT
 // Dispatcher::Impl: the endpoint of a process's clients, and what is due for them.
 //
-// Threads  one thread runs it; post() and noteDue() may be called by any.
+// Threads  the thread that has the RunnerLock, unless a function says that any thread may call it.
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <set>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include <mpf/client/binding.h>
+#include <mpf/client/callback_errors.h>
 #include <mpf/client/dispatcher.h>
 #include <mpf/client/round.h>
+#include <mpf/client/runner_lock.h>
 
 namespace mpf {
 
 class Dispatcher::Impl {
  public:
+  // Between looks whether another thread still runs a dispatcher without a thread of its own.
+  static constexpr Nanoseconds kLookForRunner = std::chrono::milliseconds(5);
+
   Impl(Backplane backplane, const DispatcherOptions& options);
   ~Impl();
 
   // The thread keeps `self` alive.
   void startThread(const std::shared_ptr<Impl>& self);
   void endThread();
-  bool runOnce(Deadline deadline);
-  void interrupt() noexcept;
-  int descriptor();
-  bool runPending(int most);
-  [[nodiscard]] Deadline nextDue() const noexcept { return Deadline::atNs(dueNs_.load(std::memory_order_relaxed)); }
 
-  // Runs `command` on the dispatcher's thread: now when this is it (or nobody's), else later.
+  // --- any thread, as long as no other thread runs the dispatcher ---
+  // Makes the calling thread the runner, if it is not yet.
+  //   throws  std::logic_error when another thread runs the dispatcher
+  [[nodiscard]] RunnerTurn enter();
+  bool runOnce(Deadline deadline);
+  bool runPending(int most);
+  int descriptor();
+  // Runs until `isDone` or the deadline, or until another thread wants to run the dispatcher. Returns
+  // false, and runs nothing, when callbacks belong on another thread.
+  [[nodiscard]] bool tryRunUntil(Deadline deadline, const std::function<bool()>& isDone);
+
+  // --- any thread ---
+  void interrupt() noexcept;
+  [[nodiscard]] Deadline nextDue() const noexcept {
+    // PAIR(ran-last): after the name of the thread that waits until then.
+    return Deadline::atNs(dueNs_.load(std::memory_order_seq_cst));
+  }
+  // Runs `command`, which may call back, on the thread that runs the dispatcher: now when that is the
+  // calling thread, else in the next step.
   void post(std::function<void()> command);
-  // On the dispatcher's thread, and not before the callback that is running has returned.
+  // In the next step, and not before the callback that is running has returned.
   void postLater(std::function<void()> command);
-  // As post(), and waits until it has run.
-  void postAndWait(std::function<void()> command);
+  // Runs `command`, which calls nobody back: now when no other thread runs the dispatcher, else in the
+  // next step.
+  void runQuietly(const std::function<void()>& command);
+  // The same, and waits until it has run.
+  void runQuietlyAndWait(const std::function<void()>& command);
   // Something is due at `ns`.
   void noteDue(std::int64_t ns) noexcept;
 
   Endpoint& endpoint() noexcept { return endpoint_; }
-  void add(const std::shared_ptr<Binding>& binding) { bindings_.insert(binding); }
+  void add(const std::shared_ptr<Binding>& binding);
   // The binding lives until no callback of it can be running.
   void remove(const std::shared_ptr<Binding>& binding);
   void setLink(std::uint32_t index, Binding* binding);
   // Looks for servers whenever a new one may have appeared, while `waiting` bindings do not have theirs.
   void waitForNames(bool wait);
 
-  // Whether callbacks may be run by the calling thread.
-  [[nodiscard]] bool isHome() const noexcept { return !hasThread_ || std::this_thread::get_id() == thread_.get_id(); }
+  // The dispatcher's own thread runs it, and no other.
+  [[nodiscard]] bool hasThread() const noexcept { return hasThread_; }
+  // The callback of a client of that server has thrown what is being handled.
+  void noteThrower(const std::string& server, std::int32_t location) noexcept;
 
  private:
+  RunnerTurn enterAnyway();
+  template <class IsOver>
+  bool run(Deadline deadline, const IsOver& isOver);
+  bool takeStop() noexcept;
   bool step();
+  bool tryStep();
   void dropKnocks() noexcept;
   bool handleNews();
   bool goOnWithRounds();
   void handleDue();
   void runCommands();
+  std::function<void()> takeCommand();
 
   Endpoint endpoint_;
   std::set<std::shared_ptr<Binding>> bindings_;
   std::vector<std::shared_ptr<Binding>> removed_;
   std::vector<Binding*> byIndex_;
   std::mutex commandMutex_;
-  std::vector<std::function<void()>> commands_;
+  std::deque<std::function<void()>> commands_;  // under commandMutex_
   std::atomic<bool> hasCommands_{false};
   std::atomic<bool> namesChanged_{false};
   Round dead_;     // of those whose server may have died
@@ -75,7 +107,9 @@ class Dispatcher::Impl {
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
-  std::atomic<std::thread::id> runner_;
+  RunnerLock lock_;
+  std::atomic<std::thread::id> ranLast_;  // the thread that waits, or the last one that did
+  CallbackErrors errors_;
   int depth_ = 0;  // of steps, in callbacks of steps
   bool hasDescriptor_ = false;
   bool hasThread_ = false;

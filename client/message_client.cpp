@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/client/message_client.h>
 
+#include <algorithm>
+
 #include <mpf/client/binding.h>
 #include <mpf/client/dispatcher_impl.h>
 
@@ -35,12 +37,12 @@ MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callba
 
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
     : dispatcher_(dispatcher.impl_), binding_(std::make_shared<Binding>(*dispatcher_, std::move(callback))) {
-  dispatcher_->post([dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
+  dispatcher_->runQuietly([dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
 }
 
 MessageClient::~MessageClient() {
   if (isInherited()) return;
-  dispatcher_->postAndWait([&] {
+  dispatcher_->runQuietlyAndWait([&] {
     binding_->leave();
     dispatcher_->remove(binding_);
   });
@@ -49,7 +51,7 @@ MessageClient::~MessageClient() {
 void MessageClient::bind(const std::string& server, std::int32_t location) {
   dispatcher_->endpoint().origin().check("MessageClient");
   binding_->setServer(server, location);
-  dispatcher_->post([binding = binding_] { binding->tryConnect(); });
+  dispatcher_->runQuietly([binding = binding_] { binding->tryConnect(); });
 }
 
 SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
@@ -85,11 +87,14 @@ std::string MessageClient::notConnectedBecause() const {
 bool MessageClient::connectWait(Nanoseconds timeout) {
   if (isInherited()) return false;
   const auto deadline = Deadline::after(timeout);
-  if (dispatcher_->isHome()) {
-    while (!isConnected() && !deadline.hasPassed()) dispatcher_->runOnce(deadline);
-    return isConnected();
+  const auto isDone = [this] { return isConnected(); };
+  while (!isDone() && !deadline.hasPassed()) {
+    if (dispatcher_->tryRunUntil(deadline, isDone)) continue;
+    // The thread that runs a dispatcher without a thread of its own may stop to do so.
+    static_cast<void>(binding_->waitConnected(
+        dispatcher_->hasThread() ? deadline : std::min(deadline, Deadline::after(Dispatcher::Impl::kLookForRunner))));
   }
-  return binding_->waitConnected(deadline);
+  return isConnected();
 }
 
 }  // namespace mpf

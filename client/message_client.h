@@ -8,7 +8,10 @@
 // The callback gets replies, ConnectMessages (connected, disconnected, queue full) and RequestFateMessages, one at a time, in the
 // order in which things happened. Each request that send() accepted ends in a reply or in exactly one fate.
 //
-// Threads  any thread may bind, send and cancel. Callbacks run on the dispatcher's thread and may send.
+// Threads  any thread may construct a client, bind, send, cancel and wait for the connection. Callbacks run
+//          on the thread that runs the dispatcher, and may do all of that, too, and end the client.
+// Throws   a callback may throw: see Dispatcher. Each other request still gets its end, and the client
+//          stays bound.
 // Crash    a server that dies is reported, its requests get their fates, and the client binds again when it is back.
 // Trust    a server that writes nonsense loses this link and is treated as gone.
 // Fork     in a child without exec, clients, servers and dispatchers of its parent refuse; the child makes its own.
@@ -34,15 +37,19 @@ class MessageClient {
   using Callback = std::function<void(Message&&)>;
 
   // Callbacks run on the backplane's shared dispatcher thread.
+  //   throws  as Dispatcher::shared()
   MessageClient(const Backplane& backplane, Callback callback);
   // Callbacks run where `dispatcher` runs, which must outlive the client.
+  //   throws  std::bad_alloc; the memory of a connection is not needed before bind()
   MessageClient(Dispatcher& dispatcher, Callback callback);
-  // After return no callback runs. With a dispatcher that has no thread of its own: from the thread that runs it.
+  // After return no callback runs. On another thread than the one that runs the dispatcher it waits until
+  // the callback that is running there has returned.
   ~MessageClient();
   MessageClient(const MessageClient&) = delete;
   MessageClient& operator=(const MessageClient&) = delete;
 
-  // Binds to `server` at `location`, once in the client's life.
+  // Binds to `server` at `location`, once in the client's life. What keeps it from a connection, full
+  // shared memory for example, is in notConnectedBecause(), and it tries again.
   //   throws  std::invalid_argument for a name that cannot be one, std::logic_error when bound already
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
@@ -58,7 +65,8 @@ class MessageClient {
   }
 
   // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on it all the same, and until it has
-  // replied to it or refused it, the request counts as outstanding.
+  // replied to it or refused it, the request counts as outstanding. In a callback the fate is delivered
+  // before cancel() returns, otherwise when the dispatcher runs next, before any reply.
   void cancel(std::uint32_t requestId);
 
   // --- for routers, who are clients in the name of others; on the thread that runs the dispatcher
@@ -72,7 +80,10 @@ class MessageClient {
   // Memory to build the body of a request in, as alloc() uses it. Throws std::bad_alloc.
   [[nodiscard]] BodyBytes allocateBody(std::size_t bytes) { return allocate(bytes); }
 
-  // Waits until the server is connected. With a dispatcher without thread, runs it meanwhile.
+  // Waits until the server is connected. Runs a dispatcher without a thread of its own meanwhile, unless
+  // another thread runs it or ran it last: then it waits until that thread has connected the client.
+  // SyncClient::connectWait() always runs its dispatcher.
+  //   throws  what a callback throws that it runs
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] bool isConnected() const noexcept;
   // Largest body that the server takes; 0 without a connection.

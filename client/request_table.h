@@ -25,8 +25,11 @@ struct Request {
 
 class RequestTable {
  public:
-  explicit RequestTable(std::uint32_t maxOutstanding)
-      : size_(std::bit_ceil(maxOutstanding)), max_(maxOutstanding), requests_(std::make_unique<Request[]>(size_)) {}
+  // `lastId`: of the table before, so that a late cancel() does not meet a request of the next connection.
+  explicit RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId = 0)
+      : size_(std::bit_ceil(maxOutstanding)), max_(maxOutstanding), requests_(std::make_unique<Request[]>(size_)), lastId_(lastId) {}
+
+  [[nodiscard]] std::uint32_t lastId() const noexcept { return lastId_; }
 
   [[nodiscard]] std::uint32_t outstanding() const noexcept {
     return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
@@ -92,7 +95,7 @@ class RequestTable {
   std::uint32_t size_;
   std::uint32_t max_;
   std::unique_ptr<Request[]> requests_;
-  std::uint32_t lastId_ = 0;
+  std::uint32_t lastId_;
   std::atomic<std::uint32_t> added_{0};
   std::atomic<std::uint32_t> ended_{0};
   std::atomic<std::uint32_t> givenUp_{0};

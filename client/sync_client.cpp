@@ -34,9 +34,16 @@ void SyncClient::take(Message&& message) {
   }
 }
 
+// The calling thread becomes the one that runs the dispatcher, whichever thread did so before.
+bool SyncClient::connectWait(Nanoseconds timeout) {
+  const auto deadline = Deadline::after(timeout);
+  while (!client_.isConnected() && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
+  return client_.isConnected();
+}
+
 Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
   const auto deadline = Deadline::after(timeout);
-  if (!client_.isConnected() && !client_.connectWait(timeout)) return Answer(SendResult::notConnected);
+  if (!client_.isConnected() && !connectWait(timeout)) return Answer(SendResult::notConnected);
   answer_.reset();
   // While the message is on its way, no reply to it can be taken: that is this thread's work.
   if (const auto result = client_.send(std::move(message), deadline, &awaited_); result != SendResult::sent) {

@@ -5,7 +5,7 @@
 //   auto answer = client.call(mpf::Int32Message({.address = 3}), 1s);
 //   if (!answer) std::cerr << answer.why();
 //
-// Threads  one at a time.
+// Threads  one at a time; another thread may take over between two calls.
 #pragma once
 
 #include <deque>
@@ -47,6 +47,9 @@ class Answer {
 
 class SyncClient {
  public:
+  // Creates a client window in shared memory; the connection comes later, see client().notConnectedBecause().
+  //   throws  std::system_error: ENOSPC when /dev/shm is full, EMFILE when no descriptor is left, ...;
+  //           std::invalid_argument when `server` cannot be a name
   SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location = Backplane::defaultLocation(),
              WaitMode waitMode = WaitMode::adaptive);
 
@@ -56,7 +59,8 @@ class SyncClient {
   // Further messages of the server: later replies of a subscription, OutOfBand. Empty after `timeout`.
   Message receive(Nanoseconds timeout);
 
-  [[nodiscard]] bool connectWait(Nanoseconds timeout) { return client_.connectWait(timeout); }
+  // Waits until the server is connected.
+  [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] MessageClient& client() noexcept { return client_; }
 
  private:

@@ -81,7 +81,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
   opened.setState(layout::LinkState::open);
   MPF_STEP(link_accepted);
   opened.notifyPeer();
-  if (clientNews_) clientNews_(nameOf(connection), true);
+  tell(nameOf(connection), true);
 }
 
 void ServerCore::closeIfClientDid(Connection& connection) noexcept {
@@ -151,7 +151,7 @@ void ServerCore::close(Connection& connection) noexcept {
   channel->link().setState(layout::LinkState::closed);
   channel->link().notifyPeer();
   count(endpoint_.control().linksClosed);
-  if (clientNews_) clientNews_(name, false);
+  tell(name, false);
 }
 
 }  // namespace mpf

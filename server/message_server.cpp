@@ -78,8 +78,13 @@ bool MessageServer::handleOne() {
   const auto handler = impl_->handlers.find(request.getType());
   if (handler == impl_->handlers.end()) {
     refuse(std::move(request));
-  } else {
+    return true;
+  }
+  try {
     handler->second(std::move(request));
+  } catch (...) {  // what it held of the request has been refused by now
+    impl_->core.callAgain();
+    throw;
   }
   return true;
 }

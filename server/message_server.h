@@ -14,6 +14,10 @@
 // Threads  one thread waits and receives; reply(), allocReplyMessage() and interrupt() may be called by any.
 // Crash    a client that dies takes nothing along; what this server held of it goes when the handles go.
 // Trust    a client that writes nonsense loses its link; nobody else notices.
+// Throws   an exception that leaves a handler leaves run(), runUntilSignal() or handleOne(); the request, if
+//          it has had no reply, ends as `refused`. One that leaves the callback of onClient() leaves
+//          receive(). Everything else is intact, and the next call continues with what is left. Clients
+//          follow the same rule: see Dispatcher.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +51,8 @@ class MessageServer {
  public:
   // Opens the server under `name` at once; requests wait until somebody receives them.
   //   throws  NameInUse when another process serves that name at that location, SegmentError when something foreign is in its place,
-  //           std::invalid_argument, std::system_error
+  //           std::invalid_argument for a name or an option that cannot be, std::system_error: ENOSPC when
+  //           /dev/shm is full, EMFILE when no descriptor is left, ...
   MessageServer(const Backplane& backplane, const std::string& name, const ServerOptions& options = {});
   ~MessageServer();
   MessageServer(const MessageServer&) = delete;
@@ -108,15 +113,16 @@ class MessageServer {
     });
   }
   // Handles requests until interrupt(), which takes effect between two requests. Types without a handler are refused.
+  //   throws  what a handler throws; requests wait until run() is called again
   void run();
   // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
   int runUntilSignal();
-  // Handles one request if there is one.
+  // Handles one request if there is one. Throws what its handler throws.
   bool handleOne();
 
   // --- for routers, who serve in the name of others
   // `news(client, true)` when a client has connected, `news(client, false)` when it is gone; from within receive() and waitForMessage().
-  // Once, before the first of them.
+  // Once, before the first of them. What it throws, receive() throws after it has brought its links in order.
   void onClient(std::function<void(std::uint64_t client, bool isThere)> news);
   // By when the request received last shall be taken.
   [[nodiscard]] Deadline takeBefore() const noexcept;

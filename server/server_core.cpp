@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 #include <list>
 #include <mutex>
+#include <new>
 #include <stdexcept>
+#include <utility>
 
 #include <mpf/base/step.h>
 #include <mpf/shm/histogram.h>
@@ -161,12 +163,34 @@ Message ServerCore::receive() {
   // Clients may invent news for ever: who receives gets its turn all the same.
   for (std::uint32_t looks = 0; looks < kLooksInVain; ++looks) {
     if (endpoint_.hasSideNews()) lookAround();
+    if (!thrown_.empty()) throwNext();
     const auto index = endpoint_.next();
     if (index && take(*connections_[*index], message)) return message;
     if (!index && (!hasDescriptor_ || endpoint_.arm())) return message;
   }
-  if (hasDescriptor_) endpoint_.callAgain();
+  callAgain();
   return message;
+}
+
+void ServerCore::callAgain() noexcept {
+  if (hasDescriptor_) endpoint_.callAgain();
+}
+
+// An exception must not interrupt what changes the links: receive() throws it afterwards.
+void ServerCore::tell(std::uint64_t client, bool isThere) noexcept try {
+  if (clientNews_) clientNews_(client, isThere);
+} catch (...) {
+  try {
+    thrown_.push_back(std::current_exception());
+  } catch (const std::bad_alloc&) {  // as many as there is memory for
+  }
+}
+
+void ServerCore::throwNext() {
+  const auto first = std::move(thrown_.front());
+  thrown_.pop_front();
+  endpoint_.interrupt();  // there may be more, and messages: the next wait() ends at once
+  std::rethrow_exception(first);
 }
 
 bool ServerCore::take(Connection& connection, Message& message) noexcept {

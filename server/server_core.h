@@ -7,6 +7,8 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -44,6 +46,8 @@ class ServerCore {
   [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
   [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
   int descriptor();
+  // Leaves the descriptor readable: not all that there is was received.
+  void callAgain() noexcept;
   void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }
 
   struct Counts {
@@ -74,6 +78,8 @@ class ServerCore {
   void removeLinkOfDead(const Connection& connection) noexcept;
   void removeLink(const std::string& name, std::uint64_t incarnation) noexcept;
   void closeIfClientDid(Connection& connection) noexcept;
+  void tell(std::uint64_t client, bool isThere) noexcept;
+  void throwNext();
   bool take(Connection& connection, Message& message) noexcept;
   bool hasExpired(const Envelope& envelope) noexcept;
   void noteTimes(Connection& connection, const Envelope& envelope) noexcept;
@@ -87,6 +93,7 @@ class ServerCore {
   std::vector<Connection::Pointer> connections_;  // by index in the window
   std::map<std::uint64_t, Connection*> byLink_;
   std::function<void(std::uint64_t, bool)> clientNews_;
+  std::deque<std::exception_ptr> thrown_;  // by clientNews_; receive() throws them, one each time
   Deadline takeBefore_ = Deadline::never();  // of the request taken last
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;

@@ -131,7 +131,7 @@ struct WindowControl {
   Word64 linksClosed;
   Word64 peersDied;
   Word64 protocolErrors;  // nonsense read from a peer; each costs that link
-  Word64 alarms;  // faults of the hardware that a server drives
+  Word64 alarms;  // server windows: faults of the hardware; client windows: exceptions that nobody could catch
   std::array<Word64, (kHistogramBuckets / 4) - 1> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
   Histogram serviceNs;  // server: from take to reply; client: from send to reply, sampled

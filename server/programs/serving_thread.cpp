@@ -18,6 +18,8 @@ void ServingThread::start(const ServerLog& log, std::function<void()> serve, std
       return serve();
     } catch (const std::exception& error) {
       log->critical("{}", error.what());
+    } catch (...) {
+      log->critical("the server stops: an exception that is not a std::exception left it");
     }
     failed();
   });

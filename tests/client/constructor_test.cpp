@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// What constructors throw when memory or threads are short. This file stands between the program and the
+// answers of the kernel.
+#include <fcntl.h>
+#include <pthread.h>
+
+#include <cerrno>
+#include <dlfcn.h>
+#include <functional>
+#include <system_error>
+
+#include <mpf/tests/client/client_fixture.h>
+#include <mpf/tests/support/sanitized.h>
+
+namespace {
+
+int reserving = 0;       // what the kernel answers; 0: it reserves memory
+int startingThread = 0;  // likewise
+
+}  // namespace
+
+extern "C" int posix_fallocate(int fd, off_t offset, off_t bytes) noexcept(false) {
+  if (reserving != 0) return reserving;
+  return ::fallocate(fd, 0, offset, bytes) == 0 ? 0 : errno;
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*start)(void*), void* argument) noexcept {
+  if (startingThread != 0) return startingThread;
+  static const auto real = reinterpret_cast<decltype(&pthread_create)>(::dlsym(RTLD_NEXT, "pthread_create"));
+  return real(thread, attributes, start, argument);
+}
+#endif
+
+namespace mpf::test {
+namespace {
+
+// The code of the std::system_error that `construct` throws; 0 when it throws none.
+int codeOf(const std::function<void()>& construct) {
+  try {
+    construct();
+  } catch (const std::system_error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("reserve"));
+    return error.code().value();
+  }
+  return 0;
+}
+
+TEST(Constructors, SayThatSharedMemoryIsFull) {
+  const TestBackplane backplane;
+  reserving = ENOSPC;
+
+  EXPECT_EQ(codeOf([&] { const SyncClient client(backplane, "device"); }), ENOSPC);
+  EXPECT_EQ(codeOf([&] { const Dispatcher dispatcher(backplane); }), ENOSPC);
+  EXPECT_EQ(codeOf([&] { const MessageClient client(backplane, [](const Message&) {}); }), ENOSPC);
+  EXPECT_EQ(codeOf([&] { const MessageServer server(backplane, "device"); }), ENOSPC);
+
+  EXPECT_THAT(backplane.segmentNames(), testing::IsEmpty());
+  reserving = 0;
+  SyncClient client(backplane, "device");
+  EXPECT_FALSE(client.connectWait(1ms));
+}
+
+// The memory for a connection is not the constructor's: bind() returns, and says why it waits.
+TEST(Constructors, DoNotThrowForMemoryOfAConnection) {
+  const TestBackplane backplane;
+  MessageServer server(backplane, "device");
+  Dispatcher dispatcher(backplane);
+  reserving = ENOSPC;
+
+  MessageClient client(dispatcher, [](const Message&) {});
+  client.bind("device");
+
+  reserving = 0;
+  EXPECT_THAT(client.notConnectedBecause(), testing::HasSubstr("No space left"));
+}
+
+TEST(Constructors, SayThatNoThreadStarts) {
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer starts threads itself";
+  const TestBackplane backplane;
+  startingThread = EAGAIN;
+
+  EXPECT_THROW(MessageClient(backplane, [](const Message&) {}), std::system_error);
+
+  startingThread = 0;
+  MessageServer server(backplane, "device");
+  MessageClient client(backplane, [](const Message&) {});
+  client.bind("device");
+  while (!client.isConnected()) server.handleOne();
+}
+
+}  // namespace
+}  // namespace mpf::test
