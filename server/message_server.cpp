@@ -45,6 +45,7 @@ bool MessageServer::waitForMessage(Deadline deadline) { return impl_->core.wait(
 Message MessageServer::receive() { return impl_->core.receive(); }
 void MessageServer::interrupt() noexcept { impl_->core.interrupt(); }
 std::uint64_t MessageServer::clientOf(const Message& request) const noexcept { return impl_->core.clientOf(request); }
+bool MessageServer::isAwaited(const Message& request) const noexcept { return impl_->core.isAwaited(request); }
 ReplyResult MessageServer::reply(Message&& message) { return impl_->core.reply(message); }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request.route(), bytes); }
@@ -81,6 +82,7 @@ bool MessageServer::handleOne() {
   } else {
     handler->second(std::move(request));
   }
+  impl_->core.endHandling();
   return true;
 }
 
