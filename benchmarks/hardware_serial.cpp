@@ -139,6 +139,7 @@ std::vector<std::string> eightPorts(bool takesTime) {
     words.insert(words.end(), {"--octal-port", fmt::format("UART{},UART,{},{},N,1,8,N", port, port, kBaud), "--server",
                                fmt::format("port{},UART{},1000,20,\\r,1", port, port)});
   }
+  words.insert(words.end(), {"--settle-time", "0"});  // what the server and the lines can do: the model repeats no answer
   if (takesTime) words.emplace_back("--octal-timing");
   return words;
 }

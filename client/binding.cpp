@@ -345,6 +345,7 @@ void Binding::nudge(std::int64_t nowNs) {
       return disconnect("the server ended before it had accepted the client", Ending::serverGone);
     } else {
       link.peer()->knock(link.header().incarnation);
+      setReason(notAcceptedBecause(*link.peer()));
       if (dispatcher_.endpoint().window().isNameless())
         setReason(
             "somebody removed this process's files from /dev/shm (RemoveIPC of systemd-logind?): no server finds it until it starts again");

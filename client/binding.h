@@ -77,6 +77,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   bool onLinkState();
   void makeChannel(const std::shared_ptr<PeerWindow>& server);
   void wish();
+  [[nodiscard]] std::string notAcceptedBecause(const PeerWindow& server) const;
   void setReason(const std::string& reason);
   void wakeAt(std::int64_t ns) noexcept;
   void noteFull() noexcept;

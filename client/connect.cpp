@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Binding, continued: to whom, and how it gets there.
+#include <time.h>
+
+#include <array>
+#include <chrono>
+#include <ctime>
 #include <fmt/format.h>
 #include <mutex>
 #include <utility>
@@ -7,9 +12,26 @@
 #include <mpf/base/step.h>
 #include <mpf/client/binding.h>
 #include <mpf/client/dispatcher_impl.h>
+#include <mpf/shm/handling.h>
 #include <mpf/shm/segment_name.h>
 
 namespace mpf {
+
+namespace {
+
+constexpr std::int64_t kBusyNs = 20'000'000;
+
+// The local time so long ago.
+std::string timeText(std::int64_t agoNs) {
+  const auto when = std::chrono::system_clock::now() - std::chrono::nanoseconds(agoNs);
+  const auto seconds = std::chrono::system_clock::to_time_t(when);
+  std::tm local{};
+  ::localtime_r(&seconds, &local);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S", &local)};
+}
+
+}  // namespace
 
 void Binding::setServer(const std::string& server, std::int32_t location) {
   SegmentName::checkServer(server);
@@ -48,7 +70,7 @@ void Binding::tryConnect() try {
   if (wish_) segments::remove(wish_.name());
   wish_ = {};
   endpoint.attach(index_, created);
-  setReason(fmt::format("server \"{}\" has not accepted the client yet", server_));
+  setReason(notAcceptedBecause(*server));
   server->knock(created.header().incarnation);
   knockedNs_ = Clock::nowNs();
   nudgeEveryNs_ = kFirstNudgeNs;
@@ -57,6 +79,19 @@ void Binding::tryConnect() try {
   // No memory, no right, a window of another version: the reason is told, and it is tried again.
   setReason(error.what());
   wakeAt(Clock::nowNs() + kRetryNs);
+}
+
+// A server that works on a request accepts nobody meanwhile.
+std::string Binding::notAcceptedBecause(const PeerWindow& server) const {
+  const auto& control = server.control();
+  const auto handling = Handling::of(control.handling.load(std::memory_order_relaxed));
+  const auto sinceNs = static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));
+  const auto busyNs = Clock::nowNs() - sinceNs;
+  if (!handling || server.header().layoutMinor < Handling::kSinceMinor || busyNs < kBusyNs) {
+    return fmt::format("server \"{}\" has not accepted the client yet", server_);
+  }
+  return fmt::format("server \"{}\" is busy with a request, {} cmd={}, since {}, and has not accepted the client yet", server_,
+                     toString(static_cast<MessageType>(handling->type)), handling->cmd, timeText(busyNs));
 }
 
 void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {

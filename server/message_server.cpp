@@ -45,6 +45,7 @@ bool MessageServer::waitForMessage(Deadline deadline) { return impl_->core.wait(
 Message MessageServer::receive() { return impl_->core.receive(); }
 void MessageServer::interrupt() noexcept { impl_->core.interrupt(); }
 std::uint64_t MessageServer::clientOf(const Message& request) const noexcept { return impl_->core.clientOf(request); }
+bool MessageServer::isAwaited(const Message& request) const noexcept { return impl_->core.isAwaited(request); }
 ReplyResult MessageServer::reply(Message&& message) { return impl_->core.reply(message); }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request.route(), bytes); }
@@ -72,20 +73,24 @@ void MessageServer::address(Message& reply, const Message& request) noexcept {
 
 void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) { impl_->handlers[type] = std::move(handler); }
 
+void MessageServer::callHandler(const std::function<void(Message&&)>& handler, Message&& request) try {
+  handler(std::move(request));
+} catch (...) {  // the request has been refused by now
+  impl_->core.endHandling();
+  impl_->core.callAgain();
+  throw;
+}
+
 bool MessageServer::handleOne() {
   auto request = receive();
   if (!request) return false;
   const auto handler = impl_->handlers.find(request.getType());
   if (handler == impl_->handlers.end()) {
     refuse(std::move(request));
-    return true;
+  } else {
+    callHandler(handler->second, std::move(request));
   }
-  try {
-    handler->second(std::move(request));
-  } catch (...) {  // what it held of the request has been refused by now
-    impl_->core.callAgain();
-    throw;
-  }
+  impl_->core.endHandling();
   return true;
 }
 

@@ -73,6 +73,9 @@ class MessageServer {
   void interrupt() noexcept;
   // Names the client that `request` came from, as long as it is connected; 0 when it is gone. No two connections have the same name.
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
+  // Whether that client is still there: false once it has died or disconnected. For any thread, and during a handler: clientOf() names a
+  // client until this server's thread looks around again.
+  [[nodiscard]] bool isAwaited(const Message& request) const noexcept;
 
   // A reply to `request`, which must still exist: to be sent once, before or after the request itself is replied with.
   template <ScalarBody T>
@@ -147,6 +150,7 @@ class MessageServer {
  private:
   class Impl;
   void setHandler(MessageType type, std::function<void(Message&&)> handler);
+  void callHandler(const std::function<void(Message&&)>& handler, Message&& request);
   BodyBytes allocate(const Message& request, std::size_t bytes);
   static void address(Message& reply, const Message& request) noexcept;
   std::unique_ptr<Impl> impl_;

@@ -94,6 +94,7 @@ void ServerCore::setQueueSize(int size) {
 
 bool ServerCore::wait(Deadline deadline) {
   endpoint_.origin().check("MessageServer");
+  endHandling();
   const auto stopped = [this] { return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed); };
   return !stopped() && endpoint_.wait(deadline) && !stopped();
 }
@@ -110,6 +111,16 @@ std::uint64_t ServerCore::clientOf(const Message& request) const noexcept {
   const std::lock_guard lock(*connection.lock);
   if (connection.generation != route.flags || !connection.channel) return 0;
   return nameOf(connection);
+}
+
+bool ServerCore::isAwaited(const Message& request) const noexcept {
+  const auto route = request.route();
+  if (route.link == 0) return false;
+  auto& connection = connectionOf(route);
+  const std::lock_guard lock(*connection.lock);
+  if (connection.generation != route.flags || !connection.channel) return false;
+  const auto& link = connection.channel->link();
+  return link.peerState() == layout::LinkState::open && !link.peer()->isDead();
 }
 
 Route ServerCore::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
@@ -166,8 +177,12 @@ Message ServerCore::receive() {
     if (!thrown_.empty()) throwNext();
     const auto index = endpoint_.next();
     if (index && take(*connections_[*index], message)) return message;
-    if (!index && (!hasDescriptor_ || endpoint_.arm())) return message;
+    if (!index && (!hasDescriptor_ || endpoint_.arm())) {
+      endHandling();
+      return message;
+    }
   }
+  endHandling();
   callAgain();
   return message;
 }
@@ -236,7 +251,12 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     case MessageLink::Finish::message:
       break;
   }
-  if (envelope.sentTick != 0) noteTimes(connection, envelope);
+  if (envelope.sentTick != 0) {
+    noteTimes(connection, envelope);
+  } else if (isSlow_) {
+    noteProgress(Clock::nowNs());
+  }
+  beginHandling(message);
   message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId, connection.generation, keeper_});
   takeBefore_ = envelope.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(envelope.deadlineNs);
   return true;
@@ -253,7 +273,7 @@ void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noe
   const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
   record(endpoint_.control().queueWaitNs, waitedNs);
   if (endpoint_.slept()) endpoint_.noteWake(waitedNs);
-  endpoint_.control().progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);
+  noteProgress(nowNs);
   const std::lock_guard lock(*connection.lock);
   connection.timedId = envelope.requestId;
   connection.timedFromNs = nowNs;

@@ -37,6 +37,9 @@ class ServerCore {
   // Whether the next wait() ends at once.
   [[nodiscard]] bool isInterrupted() const noexcept { return stop_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
+  [[nodiscard]] bool isAwaited(const Message& request) const noexcept;
+  // The request received last is done with, or kept for later: the window does not show it any more.
+  void endHandling() noexcept;
   ReplyResult reply(Message& message) noexcept;
   BodyBytes allocate(const Route& route, std::size_t bytes);
   void onClient(std::function<void(std::uint64_t, bool)> news) { clientNews_ = std::move(news); }
@@ -83,6 +86,8 @@ class ServerCore {
   bool take(Connection& connection, Message& message) noexcept;
   bool hasExpired(const Envelope& envelope) noexcept;
   void noteTimes(Connection& connection, const Envelope& envelope) noexcept;
+  void noteProgress(std::int64_t nowNs) noexcept;
+  void beginHandling(const Message& request) noexcept;
   ReplyResult sendReply(Connection& connection, Message& message) noexcept;
   void sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType, std::int32_t clientExtra, Fate fate) noexcept;
 
@@ -95,6 +100,10 @@ class ServerCore {
   std::function<void(std::uint64_t, bool)> clientNews_;
   std::deque<std::exception_ptr> thrown_;  // by clientNews_; receive() throws them, one each time
   Deadline takeBefore_ = Deadline::never();  // of the request taken last
+  bool isHandling_ = false;          // the window shows a request
+  bool isSlow_ = false;              // requests take so long that a look at the clock for each costs nothing
+  std::int64_t progressAtNs_ = 0;    // the last look at the clock,
+  std::uint64_t progressAt_ = 0;     // and the number of requests taken until then
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;
 };

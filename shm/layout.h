@@ -28,7 +28,7 @@ namespace mpf::layout {
 inline constexpr std::uint64_t kMagic =
     0x314e'4957'2d46'504d;  // "MPF-WIN1" as bytes on a little-endian host; another byte order mismatches
 inline constexpr std::uint16_t kMajor = 1;
-inline constexpr std::uint16_t kMinor = 0;
+inline constexpr std::uint16_t kMinor = 1;
 inline constexpr std::uint16_t kOldestMajor = 1;  // oldest major version that this code reads
 
 inline constexpr std::size_t kCacheLineBytes = 64;
@@ -132,7 +132,8 @@ struct WindowControl {
   Word64 peersDied;
   Word64 protocolErrors;  // nonsense read from a peer; each costs that link
   Word64 alarms;  // server windows: faults of the hardware; client windows: exceptions that nobody could catch
-  std::array<Word64, (kHistogramBuckets / 4) - 1> reserved;
+  Word64 handling;  // the request that a server works on, see Handling; 0: none. Since layout 1.1
+  std::array<Word64, (kHistogramBuckets / 4) - 2> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
   Histogram serviceNs;  // server: from take to reply; client: from send to reply, sampled
 };

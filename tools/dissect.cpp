@@ -76,6 +76,7 @@ Tree controlOf(const layout::WindowControl& control) {
           {"queue_size", now(control.queueSize)},
           {"progress", now(control.progress)},
           {"progress_at_ns", now(control.progressAtNs)},
+          {"handling", fmt::format("{:x}", now(control.handling))},
           {"received", now(control.received)},
           {"sent", now(control.sent)},
           {"reply_queue_full", now(control.replyQueueFull)},

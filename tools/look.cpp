@@ -2,7 +2,11 @@
 #include <mpf/tools/look.h>
 
 #include <algorithm>
+#include <fmt/format.h>
 #include <thread>
+
+#include <mpf/base/duration_text.h>
+#include <mpf/schema/message_types.h>
 
 namespace mpf::tools {
 namespace {
@@ -120,10 +124,24 @@ bool Look::isStalled(const WindowView& window) const {
          Totals::of(window).incoming.waiting() != 0;
 }
 
+bool Look::isBusy(const WindowView& window) const {
+  const auto* was = before(window);
+  return window.life == Life::alive && !isStopped(window.processState) && was != nullptr && was->received == window.received &&
+         was->handling && window.handling;
+}
+
+std::string Look::workOf(const WindowView& window) const {
+  if (!isBusy(window)) return {};
+  const auto& handling = *window.handling;
+  return fmt::format("{} cmd={} for {}", toString(static_cast<MessageType>(handling.type)), handling.cmd,
+                     durationText(static_cast<double>(std::max<std::int64_t>(now_.atNs - window.progressAtNs, 0))));
+}
+
 std::string Look::stateOf(const WindowView& window) const {
   if (window.life == Life::dead) return "dead";
   if (isStopped(window.processState)) return "stopped";
   if (window.life == Life::closed) return "closed";
+  if (isBusy(window)) return "busy";
   return isStalled(window) ? "stalled" : "alive";
 }
 

@@ -42,9 +42,12 @@ class Look {
   [[nodiscard]] LineRates ratesOf(const RouterView& router, const RouterLineView& line) const;
   // The window as it was at the first look; null when it was not there.
   [[nodiscard]] const WindowView* before(const WindowView& window) const;
-  // "alive", "closed", "dead"; of the living "stalled" when messages wait for it and it took none between the surveys, and "stopped"
-  // when its process is, by a signal or a debugger.
+  // "alive", "closed", "dead"; of the living "busy" when it worked on one request all the time between the surveys, "stalled" when
+  // messages wait for it and it took none, and "stopped" when its process is, by a signal or a debugger.
   [[nodiscard]] std::string stateOf(const WindowView& window) const;
+  // What a busy server works on, and for how long: "char8Array cmd=3 for 35.2 s". Empty when it is not busy.
+  [[nodiscard]] std::string workOf(const WindowView& window) const;
+  [[nodiscard]] bool isBusy(const WindowView& window) const;
   // "alive", "stopped", "dead".
   [[nodiscard]] std::string stateOf(const RouterView& router) const;
   // The same of a router that does not live; else "connected", "connecting", "waiting" (to try again).

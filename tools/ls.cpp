@@ -33,7 +33,13 @@ std::string servers(const Look& look) {
                fmt::to_string(server.links.size()), fmt::to_string(totals.incoming.waiting()), fmt::to_string(server.received),
                age(server)});
   }
-  return table.isEmpty() ? "  no server\n" : table.fitted("  ");
+  if (table.isEmpty()) return "  no server\n";
+  auto text = table.fitted("  ");
+  for (const auto& server : look.now().servers) {
+    const auto work = look.workOf(server);
+    if (!work.empty()) text += wrap("  busy: ", fmt::format("{}, with {}", serverText(server.name, server.location), work), 4);
+  }
+  return text;
 }
 
 // "dac x 3, gpib@2 (waiting), serial (connecting)": each once, however many clients the process has of it; `mpf mrr` has them all.

@@ -73,7 +73,9 @@ void print(const Look& look, const WindowView& server) {
   printField("queueRequests", server.received);
   printField("queueFullResponses", totals.refused);
   printField("replyRequests", server.sent);
-  printField("state", fmt::format("{}, pid {}, {}, backplane {}, location {}, up {}", look.stateOf(server), server.pid, server.program,
+  const auto work = look.workOf(server);
+  const auto state = work.empty() ? look.stateOf(server) : "busy with " + work;
+  printField("state", fmt::format("{}, pid {}, {}, backplane {}, location {}, up {}", state, server.pid, server.program,
                                   look.now().backplane, server.location, durationText(static_cast<double>(server.ageNs))));
   if (const auto at = look.routerOf(server)) printVia(look, at);
   printField("fates", fmt::format("expired {}, refused {}", server.expired, server.refused));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include <mpf/schema/message_types.h>
 #include <mpf/tools/router_json.h>
 
 namespace mpf::tools {
@@ -92,6 +93,11 @@ json toJson(const Look& look, const WindowView& window) {
                   {"refused", window.refused},
                   {"reply_queue_full", window.replyQueueFull},
                   {"max_message_bytes", window.maxMessageBytes}});
+  }
+  if (look.isBusy(window)) {
+    entry["handling"] = {{"type", toString(static_cast<MessageType>(window.handling->type))},
+                         {"cmd", window.handling->cmd},
+                         {"since_s", static_cast<double>(std::max<std::int64_t>(look.now().atNs - window.progressAtNs, 0)) / 1e9}};
   }
   if (const auto at = look.routerOf(window)) entry["via"] = {{"peer", at.line->peer}, {"address", at.line->address}};
   entry["links"] = json::array();

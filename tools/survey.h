@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include <mpf/shm/handling.h>
 #include <mpf/tools/router_view.h>
 
 namespace mpf::tools {
@@ -100,6 +101,8 @@ struct WindowView {
   std::uint64_t maxMessageBytes = 0;
   std::uint64_t received = 0, sent = 0, replyQueueFull = 0, queueFull = 0, expired = 0, refused = 0, wakes = 0;
   std::uint64_t linksOpened = 0, linksClosed = 0, peersDied = 0, protocolErrors = 0, alarms = 0;
+  std::optional<Handling> handling;  // the request that a server works on
+  std::int64_t progressAtNs = 0;     // CLOCK_MONOTONIC: since when, at the earliest
   Latencies queueWait;
   Latencies service;
   std::vector<LinkView> links;   // by location, server and incarnation

@@ -42,7 +42,7 @@ std::string stateOf(const Look& look, std::uint64_t incarnation) {
   return window == nullptr ? "gone" : look.stateOf(*window);
 }
 
-bool isAlarming(const std::string& state) { return state != "alive" && state != "closed" && state != "connected"; }
+bool isAlarming(const std::string& state) { return state != "alive" && state != "busy" && state != "closed" && state != "connected"; }
 
 std::string linkState(const LinkView& link) {
   if (link.serverState == layout::LinkState::refused) return "refused";
@@ -73,8 +73,9 @@ TopTable topServers(const Look& look) {
   for (const auto& server : look.now().servers) {
     const auto state = look.stateOf(server);
     const auto sampled = sampledOf(look, server);
+    const bool holdsUp = state == "busy" && Totals::of(server).incoming.waiting() != 0;
     table.rows.push_back({server.incarnation,
-                          isAlarming(state),
+                          holdsUp || isAlarming(state),
                           {nameCell(serverText(server.name, server.location)),
                            {state, 0},
                            countCell(server.links.size()),
@@ -222,7 +223,7 @@ TopTable topHelp() {
   add("r", "reverses; numbers begin with the largest");
   add("/", "filter: only rows that hold a text; Enter keeps it, Esc drops it");
   add("q", "quits");
-  add("red", "to be looked at: stalled, stopped, dead, refused, not connected");
+  add("red", "to be looked at: stalled, busy while requests wait, stopped, dead, refused, not connected");
   add("CONN", "connections; of a router, clients");
   add("QUEUED", "requests that wait; of a router, messages");
   add("OPEN REQ", "requests without reply or fate");

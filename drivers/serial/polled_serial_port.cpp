@@ -59,7 +59,7 @@ void PolledSerialPort::release() {
 }
 
 SerialPortStatus PolledSerialPort::transfer(Bytes data, bool wantsRead, Deadline deadline) {
-  Request request{.unsent = data, .sends = !data.empty(), .awaitsAnswer = wantsRead, .deadline = deadline};
+  Request request{.unsent = data, .awaitsAnswer = wantsRead, .deadline = deadline};
   request.awaitsIdleLine = !wantsRead && !deadline.hasPassed();
   return execute(request);
 }
@@ -70,9 +70,21 @@ SerialPortStatus PolledSerialPort::sendBreak(Milliseconds duration) {
 }
 
 SerialPortStatus PolledSerialPort::execute(Request& request) {
-  tasks_.callUntil(request.done, [&] { begin(request); });
+  std::function<void()> ask;
+  if (isHopeless_) {
+    ask = [&] {
+      if (isHopeless_()) giveUp(request);
+    };
+  }
+  tasks_.callUntil(request.done, [&] { begin(request); }, ask);
   status_.store(request.status, std::memory_order_relaxed);
   return request.status;
+}
+
+void PolledSerialPort::giveUp(const Request& request) {
+  tasks_.call([&] {
+    if (request_ == &request) end(SerialPortStatus::failure);
+  });
 }
 
 SerialPortStatus PolledSerialPort::getStatus() const noexcept { return status_.load(std::memory_order_relaxed); }
@@ -127,7 +139,7 @@ Deadline PolledSerialPort::wakeAt() const {
 }
 
 void PolledSerialPort::begin(Request& request) {
-  receive();  // what has come until now is older than the request
+  receiveAll();  // older than the request
   if (handler_ == nullptr || request_ != nullptr || !keeper_.isOpen()) {
     add(counters_.failures);
     return tasks_.finish(request.done);
@@ -156,6 +168,7 @@ void PolledSerialPort::send() {
     const auto taken = keeper_.line().tryWrite(request_->unsent);
     if (!taken) return loseLine();
     if (*taken == 0) return;
+    if (!std::exchange(request_->hasSent, true) && request_->awaitsAnswer) handler_->sendBegins();
     add(counters_.bytesOut, *taken);
     if (!taps().isEmpty()) {
       std::vector<LineByte> sent;
@@ -181,6 +194,15 @@ void PolledSerialPort::receive() {
   if (!alive) loseLine();
 }
 
+// All that the kernel has, unless it gets more as fast as we read.
+void PolledSerialPort::receiveAll() {
+  constexpr int kMostReads = 64;
+  for (int reads = 0; reads < kMostReads && keeper_.isOpen(); ++reads) {
+    receive();
+    if (received_.empty()) return;
+  }
+}
+
 void PolledSerialPort::deliver(const LineByte& byte) {
   if (byte.fault != LineFault::none) {
     countFault(byte.fault);
@@ -204,7 +226,7 @@ void PolledSerialPort::end(SerialPortStatus status) {
   if (request_ == nullptr) return;
   auto& line = keeper_.line();
   if (request_->isBreak) static_cast<void>(line.trySetBreak(false));
-  if (status != SerialPortStatus::success && request_->sends) line.discardUnsent();
+  if (status != SerialPortStatus::success && request_->hasSent) line.discardUnsent();
   if (status == SerialPortStatus::timeout) add(counters_.timeouts);
   if (status == SerialPortStatus::failure) add(counters_.failures);
   endRead(status);

@@ -14,6 +14,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -37,6 +38,7 @@ class PolledSerialPort : public SerialPort {
 
   void bind(ByteHandler& handler) override;
   void release() override;
+  void giveUpWhen(std::function<bool()> isHopeless) override { isHopeless_ = std::move(isHopeless); }
   SerialPortStatus sendBreak(Milliseconds duration) override;
   [[nodiscard]] SerialPortStatus getStatus() const noexcept override;
   [[nodiscard]] std::string config(const SerialSettings& settings) override;
@@ -54,7 +56,7 @@ class PolledSerialPort : public SerialPort {
   // The request that is outstanding; lives in its caller's frame.
   struct Request {
     Bytes unsent;
-    bool sends = false;
+    bool hasSent = false;  // the kernel took some of it
     bool awaitsAnswer = false;
     bool awaitsIdleLine = false;  // all bytes out of the kernel's queue
     bool isBreak = false;
@@ -75,6 +77,8 @@ class PolledSerialPort : public SerialPort {
   void advance();
   void send();
   void receive();
+  void receiveAll();
+  void giveUp(const Request& request);
   void deliver(const LineByte& byte);
   void act(ByteHandlerResult result);
   void endRead(SerialPortStatus status);
@@ -83,6 +87,7 @@ class PolledSerialPort : public SerialPort {
   void countFault(LineFault fault);
   void show(ByteDirection direction, std::span<const LineByte> bytes) const;
 
+  std::function<bool()> isHopeless_;  // the binder's threads
   PortTasks tasks_;
   LineKeeper keeper_;
   ByteHandler* handler_ = nullptr;  // this and below: the port's thread

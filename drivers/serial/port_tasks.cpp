@@ -17,11 +17,17 @@ void PortTasks::wake() const noexcept {
   static_cast<void>(retryInterrupted([&] { return ::write(bell_.get(), &one, sizeof one); }));  // full: it is awake already
 }
 
-void PortTasks::callUntil(const bool& done, std::function<void()> begin) {
+void PortTasks::callUntil(const bool& done, std::function<void()> begin, const std::function<void()>& whileWaiting) {
   std::unique_lock lock(mutex_);
   waiting_.push_back(std::move(begin));
   wake();
-  finished_.wait(lock, [&] { return done; });
+  const auto isDone = [&] { return done; };
+  if (!whileWaiting) return finished_.wait(lock, isDone);
+  while (!finished_.wait_for(lock, kAskEvery, isDone)) {
+    lock.unlock();
+    whileWaiting();
+    lock.lock();
+  }
 }
 
 void PortTasks::call(const std::function<void()>& task) {

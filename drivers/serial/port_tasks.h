@@ -2,11 +2,13 @@
 // PortTasks: hands work to a port's thread and waits for it.
 //
 //   caller         call(task) ── queue ── wake ── wait ──────────────────── done ──► goes on
+//                                                   └─ callUntil: asks now and then
 //   port's thread        poll(descriptor()) ──► runAll(): task ... finish(done) ┘
 //
 // Threads  any may call; one runs the tasks and never blocks in one, so a caller waits as long as its task says.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <mutex>
@@ -25,7 +27,9 @@ class PortTasks {
   void wake() const noexcept;
 
   // Runs `begin` on the port's thread and returns once `done`, which the port's thread sets by finish().
-  void callUntil(const bool& done, std::function<void()> begin);
+  //   whileWaiting  runs on the caller's thread every kAskEvery as long as the wait lasts; it may call()
+  void callUntil(const bool& done, std::function<void()> begin, const std::function<void()>& whileWaiting = {});
+  static constexpr std::chrono::milliseconds kAskEvery{20};
   void call(const std::function<void()>& task);
 
   // For the port's thread.

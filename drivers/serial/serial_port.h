@@ -46,7 +46,10 @@ class ByteHandler {
   // failure, and so do bytes that got lost.
   [[nodiscard]] virtual ByteHandlerResult byteReceived(std::uint8_t byte) = 0;
   // A read begins; what had come before has been passed, and nothing of the request is sent yet. endRead: what is kept already satisfies it.
+  // error: the read fails, and nothing is sent.
   [[nodiscard]] virtual ByteHandlerResult readBegins() { return ByteHandlerResult::ok; }
+  // The kernel has taken the first byte of a writeRead(); bytes passed from here on arrived after that.
+  virtual void sendBegins() {}
   // That read is over; bytes that come from here on belong to none.
   virtual void readEnds(SerialPortStatus /*status*/) {}
 };
@@ -93,6 +96,9 @@ class SerialPort {
   SerialPortStatus write(Bytes data, Deadline deadline) { return transfer(data, false, deadline); }
   SerialPortStatus read(Deadline deadline) { return transfer({}, true, deadline); }
   SerialPortStatus writeRead(Bytes data, Deadline deadline) { return transfer(data, true, deadline); }
+  // The thread that waits for a request asks `isHopeless` every 20 ms; true ends the request with failure. Empty: wait on.
+  // For the binder, between requests.
+  virtual void giveUpWhen(std::function<bool()> isHopeless) = 0;
   // Holds the line in the break state. Fails where the line cannot.
   virtual SerialPortStatus sendBreak(Milliseconds duration) = 0;
   // How the last request ended.

@@ -47,7 +47,7 @@ class Versions(Interop):
         return {"reserved": b"\xff" * 200, "reserved0": 0xFFFFFFFF}
 
     def fill_reserved(self, party):
-        for i in range(37):
+        for i in range(self.layout.sizes["WindowControl"]["reserved"] // 8):
             party.window.control["reserved", i] = ~0
         party.window.control["reserved0"] = ~0
 

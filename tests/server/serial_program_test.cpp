@@ -176,6 +176,41 @@ TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
   EXPECT_THAT(lines[0], MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}[.][0-9]{3} info mpf-serial-server: .*"));
 }
 
+TEST_F(SerialProgramTest, ReportsSurplusInputOnce) {
+  const auto server = start({"--quiet-time", "1", "--resync-limit", "60000"});
+  Asker asker(backplane_);
+  for (int i = 0; i < 3; ++i) {
+    instrument_.behave({.delay = 300ms});
+    asker.send("ECHO late\n", {.timeout = 20, .cmd = cmdWriteRead | cmdTimeoutMilliseconds});
+    const auto late = asker.next();
+    ASSERT_NE(late.tryAs<Char8Array>(), nullptr);
+    ASSERT_EQ(late.tryAs<Char8Array>()->status, serialServerStatusTimeout);
+    instrument_.behave({});
+    ASSERT_EQ(asker.ask("ECHO next\n"), serialServerStatusOK);
+  }
+
+  ASSERT_TRUE(hasExitedWith(server->end(SIGTERM), 0));
+
+  const auto log = server->errors();
+  const auto first = log.find("surplus input");
+  EXPECT_NE(first, std::string::npos) << log;
+  EXPECT_EQ(log.find("surplus input", first + 1), std::string::npos) << log;
+  EXPECT_EQ(log.find("late"), std::string::npos) << "the log shows no input";
+}
+
+TEST_F(SerialProgramTest, RefusesLimitsThatCannotBe) {
+  for (const auto& [option, value] : std::vector<std::array<std::string, 2>>{{"--settle-time", "-1"},
+                                                                             {"--quiet-time", "9999999999"},
+                                                                             {"--resync-limit", "soon"},
+                                                                             {"--max-timeout", "0"},
+                                                                             {"--max-retries", "-1"}}) {
+    const auto server = start({option, value});
+
+    EXPECT_TRUE(hasExitedWith(server->wait(), 2)) << option;
+    EXPECT_THAT(server->errors(), HasSubstr(option));
+  }
+}
+
 TEST_F(SerialProgramTest, SaysNothingWhenToldSo) {
   const auto server = start({"--log-level", "off"});
   Asker asker(backplane_);

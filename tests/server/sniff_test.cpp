@@ -80,7 +80,7 @@ class SniffTest : public SerialServerTest {
   static constexpr SniffBatching kNever{.maxAge = 24h, .largeBytes = 1'000'000};
 
   void startWithListening(const SniffBatching& batching = {}) {
-    start();
+    start({.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = {.settleTime = 0ms}});
     sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_, batching);
     sniff_->start([] { FAIL() << "it cannot serve"; });
   }

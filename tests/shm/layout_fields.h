@@ -65,7 +65,7 @@ inline nlohmann::json layoutFields() {
                                         MPF_FIELD(received),    MPF_FIELD(sent),        MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),
                                         MPF_FIELD(expired),     MPF_FIELD(refused),     MPF_FIELD(wakes),          MPF_FIELD(linksOpened),
                                         MPF_FIELD(linksClosed), MPF_FIELD(peersDied),   MPF_FIELD(protocolErrors), MPF_FIELD(alarms),
-                                        MPF_FIELD(reserved),    MPF_FIELD(queueWaitNs), MPF_FIELD(serviceNs)}}};
+                                        MPF_FIELD(handling),    MPF_FIELD(reserved),    MPF_FIELD(queueWaitNs),    MPF_FIELD(serviceNs)}}};
   }
   {
     using Struct = Histogram;

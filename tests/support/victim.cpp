@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The program behind Victim: an echo server, one that counts what it sees, a client that sends as fast as it can, a crowd of clients, or
-// a client that listens to a serial line or to another server.
+// a client that listens to a serial line or to another server, or one that asks an instrument.
 #include <signal.h>
 #include <sys/inotify.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <fmt/format.h>
 #include <grp.h>
@@ -17,6 +19,7 @@
 #include <mpf/base/file_descriptor.h>
 #include <mpf/base/system_call.h>
 #include <mpf/client/sync_client.h>
+#include <mpf/schema/serial_server.h>
 #include <mpf/schema/serial_sniff.h>
 #include <mpf/server/message_server.h>
 #include <mpf/tests/support/request_log.h>
@@ -170,6 +173,16 @@ int listen(const mpf::Backplane& backplane, const std::string& server, std::int3
   for (;;) static_cast<void>(client.receive(24h));
 }
 
+// Asks an instrument that need not answer, and waits for as long as a client can say.
+int ask(const mpf::Backplane& backplane, const std::string& server, const std::string& text) {
+  mpf::SyncClient client(backplane, server);
+  auto message = mpf::Char8ArrayMessage::allocValue(text.size());
+  *message = {.timeout = INT32_MAX, .cmd = mpf::serial::cmdWriteRead, .numberRetrys = INT32_MAX};
+  message.setSize(text.size());
+  std::copy(text.begin(), text.end(), message.value().begin());
+  return client.call(std::move(message), 24h) ? 0 : 1;
+}
+
 // role, backplane, what the role wants; then "as USER GROUP", "without-inotify".
 int play(const std::vector<std::string>& arguments) {
   const auto argument = [&](std::size_t index) { return index < arguments.size() ? arguments[index] : std::string(); };
@@ -186,8 +199,9 @@ int play(const std::vector<std::string>& arguments) {
   if (role == "flood") return flood(backplane);
   if (role == "listen" && argument(3).empty()) return listen(backplane, "serial[0].sniff", mpf::serial::cmdSniffStart);
   if (role == "listen") return listen(backplane, argument(3), std::stoi(argument(4)));
+  if (role == "ask") return ask(backplane, argument(3), argument(4));
   if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block, count, flood, listen or crowd\n", role.c_str());
+  std::fprintf(stderr, "role \"%s\": use serve, serve-block, count, flood, listen, ask or crowd\n", role.c_str());
   return 2;
 }
 

@@ -136,6 +136,40 @@ TEST_F(ReportTest, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
   EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it takes no replies";
 }
 
+// A server whose one thread works on a request accepts nobody and takes nothing: all say why.
+TEST_F(ReportTest, ABusyServerIsShownWithItsRequestAndTheTime) {
+  openServer("dmm");
+  connect();
+  auto question = client_->alloc<Char8Array>(1);
+  *question = {.cmd = 3, .length = 1};
+  ASSERT_EQ(client_->send(std::move(question)), SendResult::sent);
+  Message inWork;
+  while (!inWork) inWork = server_->receive();
+
+  const auto now = ls().at("servers").at(0);
+  EXPECT_EQ(now.at("state"), "busy");
+  EXPECT_EQ(now.at("handling").at("type"), "char8Array");
+  EXPECT_EQ(now.at("handling").at("cmd"), 3);
+  EXPECT_GT(now.at("handling").at("since_s"), 0);
+  EXPECT_THAT(run({"ls"}).out, testing::ContainsRegex("  dmm +busy +(.*\n)+  busy: dmm, with char8Array cmd=3 for [0-9.]+ [mun]?s\n"));
+  EXPECT_THAT(run({"msr"}).out, testing::ContainsRegex("  state busy with char8Array cmd=3 for [0-9.]+ [mun]?s, pid "));
+
+  Dispatcher another(backplane_);
+  MessageClient newcomer(another, [](const Message&) {});
+  newcomer.bind("dmm", 0);
+  while (newcomer.notConnectedBecause().find("busy") == std::string::npos) another.runOnce(Deadline::after(100us));
+  EXPECT_THAT(newcomer.notConnectedBecause(),
+              MatchesRegex("server \"dmm\" is busy with a request, char8Array cmd=3, since [0-9]{4}-[0-9]{2}-[0-9]{2} "
+                           "[0-9]{2}:[0-9]{2}:[0-9]{2}, and has not accepted the client yet"));
+
+  EXPECT_EQ(server_->reply(std::move(inWork)), ReplyResult::sent);
+  while (!newcomer.isConnected()) {
+    EXPECT_FALSE(server_->handleOne());
+    another.runOnce(Deadline::after(100us));
+  }
+  EXPECT_EQ(ls().at("servers").at(0).at("state"), "alive");
+}
+
 TEST_F(ReportTest, MrrHasTheManualsLines) {
   openServer("Int32");
   connect();

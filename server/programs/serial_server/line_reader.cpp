@@ -5,9 +5,14 @@
 #include <utility>
 
 namespace mpf {
+namespace {
 
-LineReader::LineReader(std::size_t bufferBytes, std::string eom, bool circular)
-    : bufferBytes_(bufferBytes), eom_(std::move(eom)), circular_(circular) {}
+constexpr std::chrono::milliseconds kAskEvery{20};
+
+}  // namespace
+
+LineReader::LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits, SurplusHandler onSurplus)
+    : bufferBytes_(bufferBytes), eom_(std::move(eom)), circular_(circular), onSurplus_(std::move(onSurplus)), sync_(limits) {}
 
 void LineReader::setEom(std::string eom) {
   const std::lock_guard lock(mutex_);
@@ -19,17 +24,74 @@ void LineReader::setCircular(bool circular) {
   circular_ = circular;
 }
 
-void LineReader::prepare(bool flush, std::size_t maxBytes) {
+// ---- the server's thread
+
+void LineReader::prepareRead(bool flush, std::size_t maxBytes) {
   const std::lock_guard lock(mutex_);
+  stopLingering();
+  isQuestion_ = false;
   flush_ = flush;
   maxBytes_ = maxBytes;
   answer_ = {};
 }
 
+void LineReader::prepareQuestion(std::size_t maxBytes, bool mayBeLate) {
+  const std::lock_guard lock(mutex_);
+  stopLingering();
+  isQuestion_ = true;
+  mayBeLate_ = mayBeLate;
+  maxBytes_ = maxBytes;
+  answer_ = {};
+}
+
+bool LineReader::tryContinue() {
+  const std::lock_guard lock(mutex_);
+  continues_ = phase_ == Phase::lingering;
+  mayBeLate_ = false;
+  if (continues_) answer_ = {};
+  return continues_;
+}
+
+LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isHopeless) {
+  std::unique_lock lock(mutex_);
+  stopLingering();
+  phase_ = isQuestion ? Phase::syncing : Phase::idle;
+  if (isQuestion && !std::exchange(input_, {}).empty()) noteSurplus();
+  for (;;) {
+    const auto readyAt = Deadline::atNs(sync_.readyAtNs(isQuestion));
+    if (readyAt.hasPassed()) return Sync::inStep;
+    const bool isLate = until.hasPassed();
+    lock.unlock();
+    const bool isOver = isLate || isHopeless();
+    lock.lock();
+    if (isOver) {
+      phase_ = Phase::idle;
+      return isLate ? Sync::noSilence : Sync::hopeless;
+    }
+    answerSeen_.wait_for(lock, std::min({readyAt, until, Deadline::after(kAskEvery)}).left());
+  }
+}
+
+void LineReader::noteWritten() {
+  const std::lock_guard lock(mutex_);
+  sync_.written(Clock::nowNs());
+}
+
+// What lingers was in the reply that said "timeout".
+void LineReader::stopLingering() {
+  continues_ = false;
+  if (phase_ != Phase::lingering) return;
+  phase_ = Phase::idle;
+  input_.clear();
+}
+
 LineReader::Answer LineReader::takeAnswer() {
   const std::lock_guard lock(mutex_);
+  if (phase_ == Phase::syncing) phase_ = Phase::idle;  // the port did not even begin
   return std::exchange(answer_, {});
 }
+
+// ---- the port's thread
 
 std::size_t LineReader::completeBytes() const {
   if (maxBytes_ != 0 && input_.size() >= maxBytes_) {
@@ -42,32 +104,96 @@ std::size_t LineReader::completeBytes() const {
 
 ByteHandlerResult LineReader::byteReceived(std::uint8_t byte) {
   const std::lock_guard lock(mutex_);
-  if (!reading_ && !circular_) return ByteHandlerResult::ok;
+  const bool wasWhole = sync_.isWhole();
+  sync_.received(byte, Clock::nowNs());
+  if (!wasWhole && sync_.isWhole()) answerSeen_.notify_one();
+  switch (phase_) {
+    case Phase::idle:
+      if (circular_) return collect(byte);
+      noteSurplus();
+      return ByteHandlerResult::ok;
+    case Phase::syncing:
+      noteSurplus();
+      return ByteHandlerResult::ok;
+    case Phase::armed:
+      noteSurplus();
+      answer_.wasDisturbed = true;
+      return ByteHandlerResult::error;
+    case Phase::reading:
+    case Phase::lingering:
+      return collect(byte);
+  }
+  return ByteHandlerResult::ok;
+}
+
+ByteHandlerResult LineReader::collect(std::uint8_t byte) {
+  const bool isRead = phase_ == Phase::reading;
   if (input_.size() >= bufferBytes_) {
-    if (reading_) {
+    if (isRead) {
       answer_.overflow = true;
       return ByteHandlerResult::endRead;
+    }
+    if (phase_ == Phase::lingering) {
+      stopLingering();
+      return ByteHandlerResult::ok;
     }
     input_.erase(0, 1);  // circular: the oldest goes
   }
   input_.push_back(static_cast<char>(byte));
-  return reading_ && completeBytes() != 0 ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+  return isRead && completeBytes() != 0 ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+}
+
+void LineReader::noteSurplus() {
+  if (sync_.isSurplusExpected()) return;
+  sync_.noteSurplus();
+  if (!std::exchange(isSurplusTold_, true) && onSurplus_) onSurplus_();
 }
 
 ByteHandlerResult LineReader::readBegins() {
   const std::lock_guard lock(mutex_);
-  reading_ = true;
-  if (flush_ || !circular_) input_.clear();
+  if (isQuestion_ && !continues_) {
+    if (!std::exchange(input_, {}).empty()) noteSurplus();
+    // The port has passed all that had arrived; some of it may have come after the silence was seen.
+    answer_.wasDisturbed = !Deadline::atNs(sync_.readyAtNs(true)).hasPassed();
+    phase_ = answer_.wasDisturbed ? Phase::idle : Phase::armed;
+    return answer_.wasDisturbed ? ByteHandlerResult::error : ByteHandlerResult::ok;
+  }
+  phase_ = Phase::reading;
+  if (!continues_ && (flush_ || !circular_)) input_.clear();
   return completeBytes() != 0 ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
 }
 
-void LineReader::readEnds(SerialPortStatus /*status*/) {
+void LineReader::sendBegins() {
   const std::lock_guard lock(mutex_);
-  reading_ = false;
+  phase_ = Phase::reading;
+  isSurplusTold_ = false;
+  sync_.asked(eom_, maxBytes_);
+}
+
+void LineReader::readEnds(SerialPortStatus status) {
+  const std::lock_guard lock(mutex_);
+  const bool wasSent = phase_ == Phase::reading && isQuestion_;
+  if (phase_ == Phase::armed && status == SerialPortStatus::failure) answer_.wasDisturbed = true;
+  phase_ = Phase::idle;
+  continues_ = false;
   const auto complete = completeBytes();
   const auto bytes = complete != 0 ? complete : input_.size();
   answer_.bytes = input_.substr(0, bytes);
-  input_.erase(0, bytes);
+  if (!wasSent) {
+    input_.erase(0, bytes);
+    return;
+  }
+  if (complete != 0 && status == SerialPortStatus::success) {
+    sync_.answered();
+  } else {
+    sync_.unanswered(Clock::nowNs());
+  }
+  // One whose end nobody can tell is not waited for.
+  if (mayBeLate_ && status == SerialPortStatus::timeout && (!eom_.empty() || maxBytes_ != 0)) {
+    phase_ = Phase::lingering;
+  } else {
+    input_.erase(0, bytes);
+  }
 }
 
 }  // namespace mpf

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fmt/format.h>
 #include <utility>
-#include <vector>
 
 #include <mpf/schema/serial_server.h>
 #include <mpf/server/programs/hardware/other_types.h>
@@ -14,6 +14,13 @@ namespace {
 
 // NOLINTNEXTLINE(google-build-using-namespace): the manual's words, all of them
 using namespace serial;
+
+// A client that leaves right after its last command means it: as long as this may go on.
+constexpr std::chrono::seconds kGraceOfWrites{2};
+
+std::int32_t commandOf(const Char8Array& request) { return request.cmd & cmdCommandMask; }
+
+std::size_t maxBytesOf(const Char8Array& request) { return static_cast<std::size_t>(std::max(request.extra, 0)); }
 
 // A timeout of 0 gives at once what is there.
 std::chrono::milliseconds timeoutOf(const Char8Array& request) {
@@ -37,7 +44,11 @@ std::int32_t statusOf(SerialPortStatus status) {
 }  // namespace
 
 SerialServer::SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log)
-    : server_(server), log_(log), reader_(options.bufferBytes, options.eom, options.circularBuffer), port_(port, reader_) {
+    : server_(server),
+      log_(log),
+      limits_(options.limits),
+      reader_(options.bufferBytes, options.eom, options.circularBuffer, options.limits, [this] { noteSurplus(); }),
+      port_(port, reader_) {
   server.on<Char8Array>([this](Char8ArrayMessage&& request) { handle(std::move(request)); });
   server.on<SerialConfig>([this](SerialConfigMessage&& request) { configure(std::move(request)); });
   answerOtherTypes<Char8Array, SerialConfig>(server,
@@ -50,18 +61,40 @@ void SerialServer::stop() {
   port_->release();
 }
 
+// ---- what the log says
+
 void SerialServer::noteRequest() {
   if (!std::exchange(isAsked_, true)) log_->info("the first client asks");
 }
 
-void SerialServer::noteStatus(const Char8Array& request, std::int32_t status) {
-  log_->debug("cmd {:#x}, timeout {}: status {}", request.cmd, request.timeout, status);
-  const bool fails = status == serialServerStatusError;
+void SerialServer::noteStatus(const Work& work) {
+  log_->debug("cmd {:#x}, timeout {}: status {}", work.fields.cmd, work.fields.timeout, work.status);
+  const bool fails = work.status == serialServerStatusError;
   if (fails == std::exchange(isFailing_, fails)) return;
   if (!fails) return log_->info("requests succeed again");
+  if (!work.problem.empty()) return log_->warn("requests fail: {}", work.problem);
   const auto because = port_->unpluggedBecause();
-  log_->warn("requests fail: {}", because.empty() ? "the line damaged bytes, or the request is no command" : because);
+  log_->warn("requests fail: {}", because.empty() ? "the line damaged or lost bytes" : because);
 }
+
+void SerialServer::noteSurplus() {
+  server_.countAlarm();
+  const auto times = surplusLog_.note();
+  if (!times) return;
+  log_->warn("surplus input, {} {} since the last report: bytes arrived that no request was waiting for; requests wait for a silent line",
+             *times, *times == 1 ? "time" : "times");
+}
+
+void SerialServer::noteLimits(const Char8Array& request) {
+  if (timeoutOf(request) <= limits_.maxTimeout && request.numberRetrys <= limits_.maxRetries) return;
+  if (const auto times = limitLog_.note()) {
+    log_->warn("{} of clients limited to {} s (--max-timeout) and {} retries (--max-retries): cmd {:#x}, timeout {}, numberRetrys {}",
+               *times == 1 ? "a request" : fmt::format("{} requests", *times), limits_.maxTimeout.count(), limits_.maxRetries, request.cmd,
+               request.timeout, request.numberRetrys);
+  }
+}
+
+// ---- requests
 
 void SerialServer::applyOptions(const Char8Array& request) {
   if ((request.cmd & cmdStartCircularBuffer) != 0) reader_.setCircular(true);
@@ -70,42 +103,127 @@ void SerialServer::applyOptions(const Char8Array& request) {
   if ((request.cmd & cmdSetEom) != 0) reader_.setEom(std::string(request.eom().substr(0, 2)));
 }
 
-std::int32_t SerialServer::attempt(const Char8Array& request, SerialPort::Bytes data, std::string& answer) {
-  const auto timeout = timeoutOf(request);
-  const auto command = request.cmd & cmdCommandMask;
-  if (command == cmdWrite) return statusOf(port_->write(data, timeout));
-  reader_.prepare((request.cmd & cmdFlush) != 0, static_cast<std::size_t>(std::max(request.extra, 0)));
-  SerialPortStatus status{};
-  if (command == cmdRead) {
-    status = port_->read(timeout);
-  } else if (command == cmdWriteRead) {
-    status = port_->writeRead(data, timeout);
-  } else {
-    return serialServerStatusError;  // options alone do no I/O, and are no command
-  }
-  auto read = reader_.takeAnswer();
-  answer = std::move(read.bytes);
-  return read.overflow ? serialServerStatusOverflow : statusOf(status);
+// A copy: the client can write to the request while we work.
+SerialServer::Work SerialServer::workOf(const Char8ArrayMessage& request) {
+  Work work{.fields = *request, .data = {request.value().begin(), request.value().end()}};
+  work.until = Deadline::after(limits_.maxTimeout);
+  work.retries = std::clamp(work.fields.numberRetrys, 0, limits_.maxRetries);
+  return work;
 }
 
 void SerialServer::handle(Char8ArrayMessage&& request) {
   noteRequest();
-  const auto fields = *request;  // a copy: the client can write to the request while we work
-  const std::vector<std::uint8_t> data(request.value().begin(), request.value().end());
-  applyOptions(fields);
-  std::string answer;
-  auto status = attempt(fields, data, answer);
-  for (auto retries = fields.numberRetrys; status != serialServerStatusOK && retries > 0 && !isStopped_.load(std::memory_order_relaxed);
-       --retries) {
-    status = attempt(fields, data, answer);
+  auto work = workOf(request);
+  noteLimits(work.fields);
+  applyOptions(work.fields);
+  writeEnds_ = Deadline::never();
+  const bool isWrite = commandOf(work.fields) == cmdWrite;
+  work.isHopeless = [this, &request, isWrite] { return isHopeless(request, isWrite); };
+  port_->giveUpWhen(work.isHopeless);
+  serve(work);
+  port_->giveUpWhen({});
+  if (work.status == serialServerStatusError && !server_.isAwaited(request)) {
+    log_->info("a client left while its request (cmd {:#x}) had the line", work.fields.cmd);
+  } else if (!isStopped_.load(std::memory_order_relaxed)) {
+    noteStatus(work);
   }
-  if (!isStopped_.load(std::memory_order_relaxed)) noteStatus(fields, status);
-  auto reply = server_.allocReplyMessage<Char8Array>(request, answer.size());
-  *reply = fields;
-  reply.setSize(answer.size());
-  std::copy(answer.begin(), answer.end(), reply.value().begin());
-  reply->status = status;
+  reply(request, work);
+}
+
+void SerialServer::reply(const Char8ArrayMessage& request, const Work& work) {
+  auto reply = server_.allocReplyMessage<Char8Array>(request, work.answer.size());
+  *reply = work.fields;
+  reply.setSize(work.answer.size());
+  std::copy(work.answer.begin(), work.answer.end(), reply.value().begin());
+  reply->status = work.status;
   static_cast<void>(server_.reply(std::move(reply)));
+}
+
+// Whether to end the wait of a request: nobody is there for its answer.
+bool SerialServer::isHopeless(const Char8ArrayMessage& request, bool isWrite) {
+  if (isStopped_.load(std::memory_order_relaxed) || port_->state() == SerialPortState::unplugged) return true;
+  if (server_.isAwaited(request)) return false;
+  if (!isWrite) return true;
+  if (writeEnds_.isNever()) writeEnds_ = Deadline::after(kGraceOfWrites);
+  return writeEnds_.hasPassed();
+}
+
+void SerialServer::serve(Work& work) {
+  for (;;) {
+    attempt(work);
+    if (work.status == serialServerStatusOK || work.retries == 0 || work.isHopeless()) return;
+    if (work.status == serialServerStatusTimeout && commandOf(work.fields) == cmdWriteRead) takeLateAnswer(work);
+    if (work.status == serialServerStatusOK || work.until.hasPassed()) return;
+    --work.retries;
+  }
+}
+
+void SerialServer::attempt(Work& work) {
+  switch (commandOf(work.fields)) {
+    case cmdRead:
+      return read(work);
+    case cmdWrite:
+      return write(work);
+    case cmdWriteRead:
+      return ask(work);
+    default:  // options alone do no I/O, and are no command
+      work.status = serialServerStatusError;
+      work.problem = fmt::format("cmd {:#x} is no command: use 1 (read), 2 (write) or 3 (write-read), plus options", work.fields.cmd);
+      work.retries = 0;
+  }
+}
+
+Deadline SerialServer::deadlineOf(const Work& work) const {
+  return std::min(work.until, Deadline::after(std::min<std::chrono::milliseconds>(timeoutOf(work.fields), limits_.maxTimeout)));
+}
+
+void SerialServer::read(Work& work) {
+  reader_.prepareRead((work.fields.cmd & cmdFlush) != 0, maxBytesOf(work.fields));
+  takeAnswer(work, port_->read(deadlineOf(work)));
+}
+
+void SerialServer::write(Work& work) {
+  if (!isInStep(work, false, Deadline::after(limits_.longestSync()))) return;
+  work.status = statusOf(port_->write(work.data, deadlineOf(work)));
+  reader_.noteWritten();
+}
+
+void SerialServer::ask(Work& work) {
+  if (work.data.empty()) {  // nothing to send: what arrives from now on
+    reader_.prepareRead(true, maxBytesOf(work.fields));
+    takeAnswer(work, port_->read(deadlineOf(work)));
+    return;
+  }
+  const auto until = Deadline::after(limits_.longestSync());
+  while (isInStep(work, true, until)) {
+    reader_.prepareQuestion(maxBytesOf(work.fields), work.retries > 0);
+    if (takeAnswer(work, port_->writeRead(work.data, deadlineOf(work)))) return;
+  }
+}
+
+// An answer that is late for its request is in time for the retry, which need not ask again.
+void SerialServer::takeLateAnswer(Work& work) {
+  if (!reader_.tryContinue()) return;
+  takeAnswer(work, port_->read(std::min(work.until, Deadline::after(limits_.resyncLimit))));
+}
+
+bool SerialServer::takeAnswer(Work& work, SerialPortStatus status) {
+  auto read = reader_.takeAnswer();
+  work.answer = std::move(read.bytes);
+  work.status = read.overflow ? serialServerStatusOverflow : statusOf(status);
+  work.problem.clear();
+  return !read.wasDisturbed;
+}
+
+bool SerialServer::isInStep(Work& work, bool isQuestion, Deadline until) {
+  const auto sync = reader_.getInStep(isQuestion, std::min(until, work.until), work.isHopeless);
+  if (sync == LineReader::Sync::inStep) return true;
+  work.status = serialServerStatusError;
+  work.answer.clear();
+  if (sync == LineReader::Sync::noSilence)
+    work.problem = fmt::format("input does not stop, so a question cannot be told from its answers: not silent for {} ms (--quiet-time)",
+                               limits_.quietTime.count());
+  return false;
 }
 
 void SerialServer::configure(SerialConfigMessage&& request) {

@@ -1,14 +1,27 @@
 // SPDX-License-Identifier: MIT
 // SerialServer: requests of clients become requests to a serial port (manual, "serialServer").
 //
-// Threads  one: the server's; stop() from another. A request occupies the line until its answer, its time or its retries are over.
+//   request ─► in step? ─► port ─► answer, timeout, failure ─► retry? ─► reply
+//                 └ see LineSync
+//
+// A request has the line until its answer, its time or its retries are over, all of them limited by
+// LineLimits, or until its client is gone.
+//
+// Threads  one: the server's; stop() from another.
+// Trust    a client asks for any timeout and any number of retries, or dies: it costs the others no more
+//          than LineLimits::maxTimeout.
 #pragma once
 
 #include <atomic>
+#include <cstdint>
+#include <functional>
 #include <string>
+#include <vector>
 
+#include <mpf/base/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/server/message_server.h>
+#include <mpf/server/programs/rare_log.h>
 #include <mpf/server/programs/serial_server/line_reader.h>
 #include <mpf/server/programs/server_log.h>
 
@@ -18,11 +31,12 @@ struct SerialServerOptions {
   std::size_t bufferBytes = 1000;
   std::string eom = "\r";  // 0 to 2 bytes
   bool circularBuffer = true;
+  LineLimits limits = {};
 };
 
 class SerialServer {
  public:
-  // Answers Char8Array and SerialConfig requests of `server`, and those of other types with status -1.
+  // Surplus input is an alarm of `server`. Answers Char8Array and SerialConfig requests of `server`, and those of other types with status -1.
   // All that is passed must outlive this, but for the options.
   SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log);
 
@@ -31,21 +45,52 @@ class SerialServer {
   void stop();
 
  private:
+  // The request in work.
+  struct Work {
+    Char8Array fields;
+    std::vector<std::uint8_t> data;
+    Deadline until = Deadline::never();  // of all attempts together
+    int retries = 0;  // left
+    std::function<bool()> isHopeless = {};  // nobody is there for the answer
+    std::int32_t status = 0;  // a serialServerStatus
+    std::string answer = {};  // what was read last
+    std::string problem = {};  // why the status is serialServerStatusError, if that is known
+  };
+
   void handle(Char8ArrayMessage&& request);
   void configure(SerialConfigMessage&& request);
-  void noteRequest();
-  void noteStatus(const Char8Array& request, std::int32_t status);
+  void reply(const Char8ArrayMessage& request, const Work& work);
   void applyOptions(const Char8Array& request);
-  // One attempt. Returns a serialServerStatus; `answer` is what was read.
-  std::int32_t attempt(const Char8Array& request, SerialPort::Bytes data, std::string& answer);
+  [[nodiscard]] Work workOf(const Char8ArrayMessage& request);
+  [[nodiscard]] bool isHopeless(const Char8ArrayMessage& request, bool isWrite);
+
+  void serve(Work& work);
+  void attempt(Work& work);
+  void read(Work& work);
+  void write(Work& work);
+  void ask(Work& work);
+  void takeLateAnswer(Work& work);
+  // False: nothing was sent, because input arrived at the last moment.
+  bool takeAnswer(Work& work, SerialPortStatus status);
+  [[nodiscard]] bool isInStep(Work& work, bool isQuestion, Deadline until);
+  [[nodiscard]] Deadline deadlineOf(const Work& work) const;
+
+  void noteRequest();
+  void noteStatus(const Work& work);
+  void noteSurplus();
+  void noteLimits(const Char8Array& request);
 
   MessageServer& server_;
   const ServerLog& log_;
-  LineReader reader_;
-  BoundSerialPort port_;
+  const LineLimits limits_;
+  RareLog surplusLog_;  // under the reader's mutex
+  RareLog limitLog_;
   bool isAsked_ = false;  // there was a request
   bool isFailing_ = false;  // the last one was an error
+  Deadline writeEnds_ = Deadline::never();  // of a plain write whose client is gone
   std::atomic<bool> isStopped_{false};
+  LineReader reader_;
+  BoundSerialPort port_;  // last: it calls the reader
 };
 
 }  // namespace mpf

@@ -106,6 +106,7 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
       app.add_option("--bits", settings.bitsPerChar, "Bits per character of terminal devices, 5 to 8")->capture_default_str(),
       app.add_option("--flow", settings.flowControl, "Flow control of terminal devices: H (hardware) or N")->capture_default_str()};
   octal.addTo(app);
+  limits.addTo(app);
   hardware.addTo(app);
   app.get_option("--wait")->description("Start even if the line or its board is not there, and wait for it");
   arguments.addTo(app);
@@ -125,6 +126,7 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
   first.serial.eom = *bytes;
   if (!first.server.empty()) servers.push_back(first);
   servers.insert(servers.end(), others.begin(), others.end());
+  for (auto& start : servers) start.serial.limits = limits;
   if (const auto why = problem(); !why.empty()) return refuseArguments(app.get_name(), why);
   const auto useless = std::ranges::find_if(ofTerminals, [](const CLI::Option* option) { return option->count() > 0; });
   if (useless != ofTerminals.end() && !hasTerminal()) {

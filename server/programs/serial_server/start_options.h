@@ -26,6 +26,7 @@ struct SerialStartOptions {
   std::vector<SerialServerStart> servers;  // one at least
   SerialSettings settings{9600, 1, 8, 'N', 'N'};  // of terminal devices
   OctalOptions octal;
+  LineLimits limits;  // of all lines
   Hardware hardware;  // --carrier, --wait
   ServerArguments arguments;
 

@@ -182,6 +182,41 @@ TEST_F(PolledSerialPortTest, AnAnswerEndsAWriteReadThoughTheLineIsBusy) {
   EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::success);
 }
 
+TEST_F(PolledSerialPortTest, ARequestThatItsBinderGivesUpFails) {
+  int asked = 0;
+  line_->giveUpWhen([&] { return ++asked == 2; });
+
+  EXPECT_EQ(line_->read(Deadline::never()), SerialPortStatus::failure);
+
+  EXPECT_EQ(asked, 2);
+  line_->giveUpWhen({});
+  const auto tap = port_.attachTap(answering(script_, {{'a'}, {'\r'}, {'\n'}}));
+  EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::success);
+}
+
+// A handler that refuses the read, and counts what begins to be sent.
+struct Refuser : ByteHandler {
+  ByteHandlerResult byteReceived(std::uint8_t /*byte*/) override { return ByteHandlerResult::ok; }
+  ByteHandlerResult readBegins() override { return refuses ? ByteHandlerResult::error : ByteHandlerResult::ok; }
+  void sendBegins() override { ++sends; }
+  std::atomic<bool> refuses = true;
+  std::atomic<int> sends = 0;
+};
+
+TEST_F(PolledSerialPortTest, AHandlerThatRefusesAReadKeepsItsRequestFromTheLine) {
+  line_->release();
+  Refuser refuser;
+  const BoundSerialPort line(port_, refuser);
+
+  EXPECT_EQ(line->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::failure);
+  EXPECT_EQ(line->counters().bytesOut, 0U);
+  EXPECT_EQ(script_.discards, 0) << "what an earlier request left in the kernel stays there";
+
+  refuser.refuses = false;
+  EXPECT_EQ(line->writeRead(bytesOf("?"), 1ms), SerialPortStatus::timeout);
+  EXPECT_EQ(refuser.sends, 1);
+}
+
 TEST_F(PolledSerialPortTest, ReleaseEndsABreak) {
   std::jthread other([&] { EXPECT_EQ(port_.sendBreak(std::chrono::hours(1)), SerialPortStatus::failure); });
   for (const auto deadline = watchdog(); !script_.isInBreak && !deadline.hasPassed();) std::this_thread::yield();

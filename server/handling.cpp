@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// ServerCore: what its window says of the request that it works on.
+#include <mpf/shm/handling.h>
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include <mpf/server/server_core.h>
+
+namespace mpf {
+namespace {
+
+constexpr std::int64_t kSlowNs = 10'000;
+
+template <class T>
+constexpr bool kHasCmd = requires { T::cmd; };
+
+// Which types have a `cmd`, by their numbers. It is at the same place in all of them.
+constexpr std::size_t kCmdOffset = offsetof(Int32, cmd);
+template <class... T>
+constexpr auto typesWithCmd(std::type_identity<std::tuple<T...>> /*types*/) {
+  std::array<bool, sizeof...(T) + 1> has{};
+  const auto look = [&]<class Body>(std::type_identity<Body>) {
+    if constexpr (kHasCmd<Body>) {
+      static_assert(offsetof(Body, cmd) == kCmdOffset);
+      has[static_cast<std::size_t>(Body::kType)] = true;
+    }
+  };
+  (look(std::type_identity<T>{}), ...);
+  return has;
+}
+
+std::int32_t cmdOf(const Message& request) noexcept {
+  static constexpr auto kTypes = typesWithCmd(std::type_identity<MessageTypes>{});
+  const auto type = static_cast<std::size_t>(request.getType());
+  std::int32_t cmd = 0;
+  if (type < kTypes.size() && kTypes[type]) std::memcpy(&cmd, request.body().data() + kCmdOffset, sizeof cmd);
+  return cmd;
+}
+
+}  // namespace
+
+// A fast server looks at the clock for one request in 64, a slow one for each: so the time is at most 64 * kSlowNs too early.
+void ServerCore::noteProgress(std::int64_t nowNs) noexcept {
+  auto& control = endpoint_.control();
+  const auto taken = control.received.load(std::memory_order_relaxed);
+  isSlow_ = nowNs - progressAtNs_ > kSlowNs * static_cast<std::int64_t>(taken - progressAt_);
+  progressAtNs_ = nowNs;
+  progressAt_ = taken;
+  control.progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);
+}
+
+void ServerCore::beginHandling(const Message& request) noexcept {
+  const Handling handling{static_cast<std::uint16_t>(request.getType()), cmdOf(request)};
+  endpoint_.control().handling.store(handling.word(), std::memory_order_relaxed);
+  isHandling_ = true;
+}
+
+void ServerCore::endHandling() noexcept {
+  if (std::exchange(isHandling_, false)) endpoint_.control().handling.store(0, std::memory_order_relaxed);
+}
+
+}  // namespace mpf
