@@ -32,8 +32,7 @@ ClientRouter::ClientRouter(Surroundings& here, const Remote& remote)
     : here_(here),
       remote_(remote),
       record_(here.statistics.add(layout::RouterRole::client)),
-      serverLog_(here.log),
-      lostLog_(here.log),
+      log_(here.log.forObject()),
       retry_(here.config.limits.firstRetry),
       pumpAgain_(here.timer,
                  [this] {
@@ -131,14 +130,14 @@ void ClientRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
   record_->setState(layout::RouterLineState::connected);
   record_->setProblem({});
-  here_.log.info("connected to {} at {} ({})", greeting.router, remote_.address.text(), greeting.program);
+  log_.info("connected to {} at {} ({})", greeting.router, remote_.address.text(), greeting.program);
   bindWanted();
 }
 
 // Requests that did not reach the line were not done, and that is said; of the others the local clients know as much as we do.
 void ClientRouter::onLineEnd(const std::string& why) {
   if (!stopping_ && (connected_ || problem_ != why)) {
-    here_.log.warn("{} {}: {}", connected_ ? "lost" : "cannot reach", remote_.address.text(), why);
+    log_.warn("{} {}: {}", connected_ ? "lost" : "cannot reach", remote_.address.text(), why);
   }
   problem_ = why;
   // One that greets and goes is called less and less often, too.
@@ -228,7 +227,7 @@ void ClientRouter::onServer(wire::Server::Reader server) {
 
 // Its configuration may change.
 void ClientRouter::onRefusal(const ServerName& name, Wanted& wanted, const std::string& why) {
-  if (wanted.problem != why) here_.log.warn("{} at location {}: {} refuses: {}", name.server, name.location, remote_.address.text(), why);
+  if (wanted.problem != why) log_.warn("{} at location {}: {} refuses: {}", name.server, name.location, remote_.address.text(), why);
   wanted.problem = why;
   wanted.binding = 0;
   wanted.bindAgainNs = Clock::nowNs() + kBindAgainNs;
@@ -239,10 +238,10 @@ void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
   wanted.proxy = std::make_unique<Proxy>(here_, *this, name, *wanted.offer);
   wanted.offer.reset();
   wanted.problem.clear();
-  serverLog_.info("{} at location {} is there", name.server, name.location);
+  log_.info("{} at location {} is there", name.server, name.location);
 } catch (const std::exception& error) {
   if (wanted.problem != error.what())
-    here_.log.warn("{} at location {} cannot be offered here: {}", name.server, name.location, error.what());
+    log_.warn("{} at location {} cannot be offered here: {}", name.server, name.location, error.what());
   wanted.problem = error.what();
 }
 
@@ -252,7 +251,7 @@ void ClientRouter::sweep() {
   for (auto each = wanted_.begin(); each != wanted_.end();) {
     auto& [name, wanted] = *each;
     if (wanted.proxy && wanted.proxy->isDone()) {
-      serverLog_.info("{} at location {} is gone", name.server, name.location);
+      log_.info("{} at location {} is gone", name.server, name.location);
       wanted.proxy.reset();
     }
     if (!wanted.proxy && wanted.offer && connected_) makeProxy(name, wanted);
@@ -294,7 +293,7 @@ Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
 std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
   const auto most = line_->peer().maxClients;
   if (most != 0 && clients_.size() >= most) {
-    if (!std::exchange(saidFull_, true)) here_.log.warn("{} takes {} clients and no more", remote_.address.text(), most);
+    if (!std::exchange(saidFull_, true)) log_.warn("{} takes {} clients and no more", remote_.address.text(), most);
     return std::nullopt;
   }
   if (lastClient_ == UINT32_MAX) {
@@ -369,7 +368,7 @@ void ClientRouter::onRoom() {
 }
 
 void ClientRouter::onUnsendable(const Carried& carried, const std::string& why, wire::Item::Builder /*instead*/) {
-  lostLog_.warn("a request is refused: {}", why);
+  log_.warn("a request is refused: {}", why);
   if (auto* proxy = proxyOf(carried.client)) proxy->endRequest(carried.client, carried.requestId, Fate::refused, why);
 }
 

@@ -19,7 +19,6 @@
 
 #include <mpf/router/fatal_tasks.h>
 #include <mpf/router/proxy.h>
-#include <mpf/router/seldom_log.h>
 
 namespace mpf::router {
 
@@ -74,6 +73,7 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   std::optional<std::uint32_t> tryNewClient(Proxy& proxy) override;
   void dropClient(std::uint32_t number) override;
   PeerRecord& record() override { return *record_; }
+  const Log& log() override { return log_; }
   Proxy* proxyOf(std::uint32_t client);
   Proxy* openedProxyOf(std::uint32_t client);
 
@@ -90,8 +90,7 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   std::uint32_t lastBinding_ = 0;
   std::uint32_t lastClient_ = 0;
   bool saidFull_ = false;
-  SeldomLog serverLog_;
-  SeldomLog lostLog_;
+  Log log_;
   std::chrono::milliseconds retry_{};
   std::int64_t connectedNs_ = 0;
   ServerName pumped_;  // the last one whose requests had their turn

@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::size_t kProgressBytes = std::size_t{64} << 10;  // so much of a long frame is a sign of life
 constexpr std::int64_t kMeasureEveryNs = 10'000'000'000;  // the round trip, where the peer's pings make ours needless
-constexpr auto kLastMoment = 500 * kj::MILLISECONDS;  // for a farewell to go
 constexpr std::int64_t kTurnNs = 2'000'000;            // with one peer's items, while others wait
 constexpr std::uint64_t kLeastFrame = std::uint64_t{64} << 10;  // what each side must read, and the longest greeting
 

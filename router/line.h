@@ -130,6 +130,7 @@ class Line {
   [[nodiscard]] bool isDeaf() const noexcept { return phase_ == Phase::leaving || phase_ == Phase::finished; }
   using Outgoing = std::variant<Note, Answer, Carried>;
   static constexpr std::size_t kManyNotes = 4096;
+  static constexpr auto kLastMoment = 500 * kj::MILLISECONDS;  // for a farewell to go
   kj::Promise<void> readLoop();
   kj::Promise<void> aliveLoop();
   void onPing(std::uint64_t stamp);

@@ -21,7 +21,7 @@ std::string addressOf(kj::PeerIdentity& identity) {
 }  // namespace
 
 Listener::Listener(Surroundings& here, const Listen& listen, OnCaller onCaller)
-    : here_(here), listen_(listen), onCaller_(std::move(onCaller)), callerLog_(here.log), tasks_(*this) {}
+    : here_(here), listen_(listen), onCaller_(std::move(onCaller)), tasks_(*this) {}
 
 kj::Promise<void> Listener::start() {
   auto started = kj::newPromiseAndFulfiller<void>();
@@ -73,7 +73,7 @@ void Listener::admit(kj::AuthenticatedStream caller) {
 
 void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& address) {
   if (handshakes_.size() >= kMaxHandshakes) {
-    callerLog_.warn("{}: {} TLS handshakes are under way: the oldest one makes room", listen_.address.text(), handshakes_.size());
+    here_.log.warn("{}: {} TLS handshakes are under way: the oldest one makes room", listen_.address.text(), handshakes_.size());
     handshakes_.begin()->second->fulfill();
     handshakes_.erase(handshakes_.begin());
   }
@@ -89,7 +89,7 @@ void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& add
                      },
                      [this, address, number](kj::Exception&& error) {
                        handshakes_.erase(number);
-                       callerLog_.warn("{}: no TLS with it: {}", address, tlsTrouble(error));
+                       here_.log.warn("{}: no TLS with it: {}", address, tlsTrouble(error));
                      })
                  .exclusiveJoin(kj::mv(cancel.promise)));
 }

@@ -10,7 +10,6 @@
 #include <map>
 #include <string>
 
-#include <mpf/router/seldom_log.h>
 #include <mpf/router/surroundings.h>
 
 namespace mpf::router {
@@ -47,7 +46,6 @@ class Listener final : private kj::TaskSet::ErrorHandler {
   std::vector<kj::Own<kj::ConnectionReceiver>> receivers_;
   std::map<std::uint64_t, kj::Own<kj::PromiseFulfiller<void>>> handshakes_;  // under way, in order; fulfilling one ends it
   std::uint64_t lastHandshake_ = 0;
-  SeldomLog callerLog_;
   std::string problem_;  // of accepting, that was logged last
   kj::TaskSet tasks_;
 };

@@ -70,7 +70,7 @@ int run(const RouterArguments& arguments) {
   auto io = kj::setupAsyncIo();
   io.waitScope.setBusyPollInterval(kTurnsBetweenLooks);  // or a peer whose bytes come faster than they are read would be all that there is
   auto& port = io.unixEventPort;
-  Router router(io, arguments.config(), *log.operator->());
+  Router router(io, arguments.config(), *log);
   auto toEnd = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
   serve(port, router, arguments, log).exclusiveJoin(kj::mv(toEnd)).wait(io.waitScope);  // also while it starts; who ends reloads no more
   ServiceManager::tellStopping();

@@ -16,7 +16,7 @@ constexpr auto kWishesAgain = std::chrono::seconds(1);       // when not all cou
 
 }  // namespace
 
-Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logger& log)
+Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log)
     : statistics_(Backplane::attach(config.backplane), config.name),
       here_{.port = io.unixEventPort,
             .network = io.provider->getNetwork(),
@@ -31,7 +31,6 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logge
       presences_(here_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
       wishes_(here_.backplane),
       bell_(io.unixEventPort, [this] { lookAtWishes(); }),
-      callerLog_(log),
       wishesDue_(here_.timer, [this] { readWishes(); }),
       tasks_(*this) {
   openTls(config);
@@ -76,7 +75,7 @@ std::vector<Address> Router::listening() {
 
 void Router::onCaller(const Listen& listen, Listener::Caller caller) {
   if (sessions_.size() >= here_.config.limits.maxConnections) {
-    callerLog_.warn("{}: turned away: there are {} connections", caller.address, sessions_.size());
+    here_.log.warn("{}: turned away: there are {} connections", caller.address, sessions_.size());
     return;
   }
   sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls)});
@@ -110,7 +109,7 @@ void Router::reload(const RouterConfig& config) {
   openTls(config);
   if (config.backplane != here_.config.backplane || config.name != here_.config.name)
     here_.log.warn("another name or backplane needs a restart: this is still {}", here_.config.name);
-  here_.log.set_level(spdlog::level::from_str(config.logLevel));
+  here_.log.setLevel(config.logLevel);
   here_.config = config;
   std::erase_if(listeners_,
                 [&](const auto& listener) { return std::ranges::find(config.listen, listener->listen()) == config.listen.end(); });

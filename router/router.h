@@ -21,7 +21,7 @@ namespace mpf::router {
 class Router final : private kj::TaskSet::ErrorHandler {
  public:
   //   throws  ConfigError (TLS files), std::system_error
-  Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logger& log);
+  Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log);
   ~Router();
 
   // Resolves once it listens everywhere that it shall.
@@ -57,7 +57,6 @@ class Router final : private kj::TaskSet::ErrorHandler {
   std::list<std::shared_ptr<Listener>> listeners_;
   std::list<std::unique_ptr<ClientRouter>> remotes_;
   std::list<Session> sessions_;
-  SeldomLog callerLog_;
   Alarm wishesDue_;
   std::string wishProblem_;  // that was logged last
   kj::TaskSet tasks_;

@@ -50,7 +50,7 @@ kj::Promise<void> ServerRouter::run() {
         greeting.setMaxClients(line_->limits().maxClients);
       })
       .then([this](const LineEnd& end) {
-        here_.sessionLog.info("{} at {} is gone: {}", line_->peer().router.empty() ? "a peer" : line_->peer().router, address_, end.text);
+        here_.log.info("{} at {} is gone: {}", line_->peer().router.empty() ? "a peer" : line_->peer().router, address_, end.text);
       });
 }
 
@@ -66,7 +66,7 @@ void ServerRouter::stop() { line_->end(FarewellCode::STOPPING, "the router ends"
 void ServerRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
   record_->setState(layout::RouterLineState::connected);
-  here_.sessionLog.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program,
+  here_.log.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program,
                         peer_.empty() ? "" : ", certificate of ", peer_);
 }
 
@@ -111,7 +111,7 @@ void ServerRouter::countAll() {
 }
 
 void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
-  here_.refusalLog.warn("{}: {}", address_, why);
+  here_.log.warn("{}: {}", address_, why);
   line_->send([number, why](wire::Item::Builder item) {
     auto server = item.initServer();
     server.setBinding(number);
@@ -121,7 +121,7 @@ void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
 }
 
 void ServerRouter::refuseClient(std::uint32_t number, const std::string& why) {
-  here_.refusalLog.warn("{}: a client is refused: {}", address_, why);
+  here_.log.warn("{}: a client is refused: {}", address_, why);
   line_->send([number, why](wire::Item::Builder item) {
     auto refusal = item.initRefuse();
     refusal.setClient(number);
@@ -138,7 +138,7 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
   const bool isThere = binding.presence->look();
   const bool hasFailed = !isThere && binding.presence->isDoubtful();
   if (hasFailed && !binding.failureSaid) {
-    here_.refusalLog.warn("{} at location {} cannot be offered to {}: {}", binding.name.server, binding.name.location, address_,
+    here_.log.warn("{} at location {} cannot be offered to {}: {}", binding.name.server, binding.name.location, address_,
                           binding.presence->problem());
   }
   binding.failureSaid = hasFailed;
@@ -347,7 +347,7 @@ void ServerRouter::onRoom() {
 
 // What was asked for has been done, but what came of it cannot be said.
 void ServerRouter::onUnsendable(const Carried& carried, const std::string& why, wire::Item::Builder instead) {
-  here_.lostLog.warn("a reply to {} is lost: {}", address_, why);
+  here_.log.warn("a reply to {} is lost: {}", address_, why);
   // The window that it took comes back from nobody else.
   if (const auto client = clients_.find(carried.client); client != clients_.end()) client->second->credit(windowBytesOf(carried.message));
   if (!carried.isFirst) return;
