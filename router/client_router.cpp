@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include <mpf/router/kj_text.h>
+#include <mpf/router/limits.h>
 #include <mpf/shm/link.h>
 
 namespace mpf::router {
@@ -89,7 +90,8 @@ kj::Promise<LineEnd> ClientRouter::runOnce() {
 // A name may stand for several addresses, the first of which may answer nothing.
 kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
   const auto& address = remote_.address;
-  return within(here_.network.parseAddress(hostForKj(address), address.port)).then([this](kj::Own<kj::NetworkAddress> parsed) {
+  auto lookUp = kj::evalNow([&] { return here_.network.parseAddress(hostForKj(address), address.port); });
+  return within(fmt::format("the look-up of {}", address.host), kj::mv(lookUp)).then([this](kj::Own<kj::NetworkAddress> parsed) {
     if (remote_.security == Security::plain) checkPlain(*parsed, here_.config);
     std::vector<std::string> addresses;
     std::istringstream all(toStd(parsed->toString()));
@@ -98,10 +100,17 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
   });
 }
 
+kj::Exception ClientRouter::failed(const std::string& step, const kj::Exception& error) const {
+  const auto deadTime = limitText(here_.config.limits, "dead-time");
+  const auto why = reasonOf(error);
+  const auto text = why == kTimeout ? fmt::format("{} took longer than {} (dead-time)", step, deadTime) : fmt::format("{} failed: {}", step, why);
+  return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
+}
+
 kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connectToOne(std::vector<std::string> addresses) {
   const auto next = addresses.front();
   addresses.erase(addresses.begin());
-  return within(connectTo(next))
+  return within(fmt::format("the connection to {}", next), connectTo(next))
       .catch_([this, addresses = std::move(addresses)](kj::Exception&& error) mutable -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
         if (addresses.empty()) return kj::mv(error);
         return connectToOne(std::move(addresses));

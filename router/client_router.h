@@ -47,11 +47,13 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   kj::Promise<kj::Own<kj::AsyncIoStream>> connect();
   kj::Promise<kj::Own<kj::AsyncIoStream>> connectToOne(std::vector<std::string> addresses);
   kj::Promise<kj::Own<kj::AsyncIoStream>> connectTo(const std::string& address);
-  // The dead time is enough for each thing that somebody else has to do.
+  // Each step of connecting may take the dead time. An error names the step.
   template <class T>
-  kj::Promise<T> within(kj::Promise<T> promise) {
-    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise));
+  kj::Promise<T> within(const std::string& step, kj::Promise<T> promise) {
+    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise))
+        .catch_([this, step](kj::Exception&& error) -> kj::Promise<T> { return failed(step, error); });
   }
+  [[nodiscard]] kj::Exception failed(const std::string& step, const kj::Exception& error) const;
   [[nodiscard]] kj::Duration nextDelay();
   void onLineEnd(const std::string& why);
   void bindWanted();

@@ -19,4 +19,14 @@ std::string forPeople(const std::string& text) {
   return clean;
 }
 
+std::string reasonOf(const kj::Exception& error) {
+  const auto said = toStd(error.getDescription());
+  if (said.starts_with("operation timed out")) return std::string(kTimeout);
+  for (const std::string_view mark : {"gai_strerror(status) = ", "(): "}) {
+    const auto at = said.find(mark);
+    if (at != std::string::npos) return said.substr(at + mark.size());
+  }
+  return said;
+}
+
 }  // namespace mpf::router

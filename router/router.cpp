@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
+#include <map>
 #include <system_error>
+#include <utility>
 
 #include <mpf/router/kj_text.h>
 
@@ -32,6 +34,7 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& lo
       wishes_(here_.backplane),
       bell_(io.unixEventPort, [this] { lookAtWishes(); }),
       wishesDue_(here_.timer, [this] { readWishes(); }),
+      turnedAway_(here_.timer),
       tasks_(*this) {
   openTls(config);
   names_ = here_.backplane.watcher().watchNames(NameKind::wish, [this] { bell_.ring(); });
@@ -40,7 +43,7 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& lo
 Router::~Router() { here_.backplane.watcher().forget(names_); }
 
 void Router::openTls(const RouterConfig& config) {
-  if (!config.tls.certificate.empty()) here_.tls = std::make_shared<Tls>(config.tls, here_.timer);
+  if (!config.tls.certificate.empty()) here_.tls = std::make_shared<Tls>(config.tls, here_.timer, config.limits.handshakeTime);
 }
 
 kj::Promise<void> Router::start() {
@@ -74,13 +77,34 @@ std::vector<Address> Router::listening() {
 }
 
 void Router::onCaller(const Listen& listen, Listener::Caller caller) {
-  if (sessions_.size() >= here_.config.limits.maxConnections) {
-    here_.log.warn("{}: turned away: there are {} connections", caller.address, sessions_.size());
-    return;
+  if (sessions_.size() >= here_.config.limits.maxConnections && !tryMakeRoom()) {
+    here_.log.warn("{}: turned away: there are {} connections (max-connections)", caller.address, sessions_.size());
+    return turnedAway_.add(kj::mv(caller.stream), FarewellCode::LIMIT,
+                           fmt::format("this router has {} connections, its limit (max-connections)", sessions_.size()));
   }
-  sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls)});
+  auto end = kj::newPromiseAndFulfiller<void>();
+  sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls),
+                       hostOf(caller.address), kj::mv(end.fulfiller)});
   const auto session = std::prev(sessions_.end());
-  tasks_.add(session->router->run().then([this, session] { sessions_.erase(session); }));
+  tasks_.add(session->router->run().exclusiveJoin(kj::mv(end.promise)).then([this, session] { sessions_.erase(session); }));
+}
+
+// Of the callers that have not greeted yet, the oldest one of the host with the most of them goes. Each
+// makes room once: it stays in the list until the event loop has closed it.
+bool Router::tryMakeRoom() {
+  const auto isIdle = [](const Session& session) { return session.end && !session.router->hasGreeted(); };
+  std::map<std::string, std::size_t> counts;
+  for (const auto& session : sessions_) {
+    if (isIdle(session)) ++counts[session.host];
+  }
+  if (counts.empty()) return false;
+  const auto most = std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; })->second;
+  const auto victim =
+      std::ranges::find_if(sessions_, [&](const Session& session) { return isIdle(session) && counts[session.host] == most; });
+  here_.log.warn("{} connections (max-connections), {} of them with {}, which has not greeted: the oldest one of these is closed",
+                 sessions_.size(), most, victim->host);
+  std::exchange(victim->end, nullptr)->fulfill();
+  return true;
 }
 
 void Router::lookAtServers() {

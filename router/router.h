@@ -38,6 +38,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   Listener& listen(const Listen& listen);
   void listenLate(const Listen& listen);
   void onCaller(const Listen& listen, Listener::Caller caller);
+  bool tryMakeRoom();
   void lookAtServers();
   void lookAtWishes();
   void readWishes();
@@ -46,6 +47,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   struct Session {
     Listen listen;  // where it called
     std::unique_ptr<ServerRouter> router;
+    std::string host;  // that called
+    kj::Own<kj::PromiseFulfiller<void>> end;  // fulfilling it closes the connection; nullptr: done
   };
 
   Statistics statistics_;
@@ -59,6 +62,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   std::list<Session> sessions_;
   Alarm wishesDue_;
   std::string wishProblem_;  // that was logged last
+  TurnedAway turnedAway_;
   kj::TaskSet tasks_;
 };
 

@@ -35,7 +35,7 @@ TEST(Listener, WhoIdlesInItsHandshakeMakesRoomForOthers) {
   const mpf::test::TestBackplane backplane;
   const Certificates ours(folder, "ours");
   auto io = kj::setupAsyncIo();
-  spdlog::logger log("nobody reads it");
+  const Log log([](Log::Level, const std::string&) {});
   Statistics statistics(backplane, "test");
   Presences presences(backplane, io.unixEventPort, [] {});
   Surroundings here{.port = io.unixEventPort,

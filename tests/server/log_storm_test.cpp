@@ -23,6 +23,11 @@ constexpr std::uint64_t kMostLines = 100;
 
 class LogStormTest : public testing::Test {
  protected:
+  void TearDown() override {
+    if (!said_.valid()) return;  // the test has read it
+    program_->signal(SIGKILL);
+    said_.wait();
+  }
   void start(std::vector<std::string> command) {
     command.insert(command.end(), {"--backplane", backplane_.name(), "--log-level", "debug"});
     program_ = std::make_unique<Program>(std::move(command));
@@ -127,6 +132,20 @@ TEST_F(LogStormTest, OfTheEchoServers) {
   start({MPF_TEST_CHAR8_ARRAY_SERVER});
   storm("Char8Array", Float64Message({.value = 1}));
   expectShortLog("Float64", 0);
+}
+
+// A server of another type refuses each message of the client at once.
+TEST_F(LogStormTest, OfAClientProgramWhoseMessagesAreRefused) {
+  start({MPF_TEST_CHAR8_ARRAY_SERVER});
+  Program client({MPF_TEST_INT32_CLIENT, "Char8Array", "--backplane", backplane_.name(), "--count", std::to_string(kRequests),
+                  "--timeout", "60000"});
+
+  const auto said = client.errors();
+
+  EXPECT_EQ(WEXITSTATUS(client.wait()), 1);
+  const auto count = countLines(said, "message ");
+  EXPECT_EQ(count.meant, kRequests) << said;
+  EXPECT_LT(count.all, kMostLines) << said.substr(0, 10'000);
 }
 
 }  // namespace
