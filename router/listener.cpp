@@ -82,7 +82,6 @@ void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& add
   auto end = kj::newPromiseAndFulfiller<void>();
   const auto number = ++lastHandshake_;
   handshakes_[number] = {hostOf(address), kj::mv(end.fulfiller)};
-  const auto forget = [this, number] { handshakes_.erase(number); };
   tasks_.add(here_.timer
                  .timeoutAfter(toKj(here_.config.limits.handshakeTime), kj::evalNow([&] { return handshake(kj::mv(caller), address); }))
                  .then([]() {},
@@ -90,7 +89,7 @@ void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& add
                          here_.log.warn("{}: no TLS connection: {}", address, tlsTrouble(error));
                        })
                  .exclusiveJoin(kj::mv(end.promise))
-                 .attach(kj::defer(forget)));
+                 .attach(kj::defer([this, number] { handshakes_.erase(number); })));
 }
 
 // A host that opens many connections loses the oldest one of its own.

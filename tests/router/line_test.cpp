@@ -71,6 +71,29 @@ TEST_F(LineTest, EndsWhenThePeerReadsShortFramesOnly) {
   EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("65535")));
 }
 
+// The beginning of a handshake, and the alert by which TLS answers a plain greeting.
+TEST_F(LineTest, SaysThatThePeerUsesTls) {
+  for (const Bytes& bytes : {Bytes{0x16, 3, 1, 2, 0, 1}, Bytes{0x15, 3, 1, 0, 2, 2, 70}}) {
+    start();
+    receive();
+
+    send(bytes);
+
+    EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("the peer uses TLS")));
+    restart();
+  }
+}
+
+TEST_F(LineTest, SaysWhatMayBeWrongWithAPeerThatClosesBeforeItsGreeting) {
+  start();
+  receive();
+
+  peer_ = nullptr;
+  settle();
+
+  EXPECT_THAT(end_, StartsWith("the peer closed the connection before its greeting: is it a router"));
+}
+
 // Before it has said who it is, nobody gets memory.
 TEST_F(LineTest, TakesNoLongGreeting) {
   start();
