@@ -293,7 +293,7 @@ Proxy* ClientRouter::proxyOf(std::uint32_t client) {
   return found == clients_.end() ? nullptr : found->second;
 }
 
-// Whoever speaks of a client that was never opened is not in his right mind.
+// Naming a client that was never opened is a protocol error.
 Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
   if (client == 0 || client > lastClient_) throw ProtocolError(FarewellCode::PROTOCOL, fmt::format("client {} was never opened", client));
   return proxyOf(client);
@@ -302,7 +302,7 @@ Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
 std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
   const auto most = line_->peer().maxClients;
   if (most != 0 && clients_.size() >= most) {
-    if (!std::exchange(saidFull_, true)) log_.warn("{} takes {} clients and no more", remote_.address.text(), most);
+    if (!std::exchange(saidFull_, true)) log_.warn("{} accepts at most {} clients of this connection (its max-clients): others are refused", remote_.address.text(), most);
     return std::nullopt;
   }
   if (lastClient_ == UINT32_MAX) {

@@ -132,7 +132,7 @@ kj::Promise<void> Line::readOn() {
   } catch (const ProtocolError& error) {
     end(error.code(), error.what());
   } catch (const kj::Exception& error) {  // a pointer that leads nowhere
-    end(FarewellCode::PROTOCOL, fmt::format("a frame that is none: {}", toStd(error.getDescription())));
+    end(FarewellCode::PROTOCOL, fmt::format("the peer sent a frame that cannot be read: {}", toStd(error.getDescription())));
   } catch (const std::exception& error) {  // ours, for lack of memory or descriptors
     end(FarewellCode::STOPPING, error.what());
   }
@@ -184,7 +184,7 @@ void Line::handle(wire::Item::Reader item) {
   if (phase_ == Phase::broken && !item.isFarewell()) return;
   if (!greeted_) {
     if (item.isGreeting()) return takeGreeting(item.getGreeting());
-    if (!item.isFarewell()) throw ProtocolError(FarewellCode::PROTOCOL, "the first item is no greeting");
+    if (!item.isFarewell()) throw ProtocolError(FarewellCode::PROTOCOL, "the first item is not a greeting");
   }
   switch (item.which()) {
     case wire::Item::NONE:
@@ -209,7 +209,7 @@ void Line::handle(wire::Item::Reader item) {
 
 void Line::takeGreeting(wire::Greeting::Reader greeting) {
   if (greeting.getProtocolMajor() != wire::PROTOCOL_MAJOR) {
-    throw ProtocolError(FarewellCode::VERSION, fmt::format("protocol {}.{}: this router speaks {}.x", greeting.getProtocolMajor(),
+    throw ProtocolError(FarewellCode::VERSION, fmt::format("the peer has protocol {}.{}, this router {}.x: install the same release of mpf-router on both hosts", greeting.getProtocolMajor(),
                                                            greeting.getProtocolMinor(), wire::PROTOCOL_MAJOR));
   }
   peer_.router = forPeople(greeting.getRouter());

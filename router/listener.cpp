@@ -33,7 +33,10 @@ kj::Promise<void> Listener::start() {
   auto started = kj::newPromiseAndFulfiller<void>();
   auto& result = *started.fulfiller;
   tasks_.add(open()
-                 .then([&result] { result.fulfill(); }, [&result](kj::Exception&& error) { result.reject(kj::mv(error)); })
+                 .then([&result] { result.fulfill(); }, [this, &result](kj::Exception&& error) {
+                   const auto text = fmt::format("cannot listen at {}: {}", listen_.address.text(), reasonOf(error));
+                   result.reject({kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)});
+                 })
                  .attach(kj::mv(started.fulfiller)));
   return kj::mv(started.promise);
 }
@@ -63,7 +66,7 @@ kj::Promise<void> Listener::acceptLoop() {
       .then([]() -> kj::Promise<void> { return kj::READY_NOW; },
             [this](kj::Exception&& error) -> kj::Promise<void> {
               const auto why = toStd(error.getDescription());
-              if (problem_ != why) here_.log.warn("{}: accept: {}", listen_.address.text(), why);
+              if (problem_ != why) here_.log.warn("{}: cannot accept a connection, trying again: {}", listen_.address.text(), why);
               problem_ = why;
               return here_.timer.afterDelay(kAfterFailure);
             })

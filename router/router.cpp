@@ -65,7 +65,7 @@ void Router::listenLate(const Listen& listen) {
   tasks_.add(started.catch_([this, late = std::weak_ptr(listeners_.back())](kj::Exception&& error) {
     const auto listener = late.lock();
     if (!listener) return;
-    here_.log.error("{}: {}", listener->listen().address.text(), toStd(error.getDescription()));
+    here_.log.error("{}", toStd(error.getDescription()));
     listeners_.remove(listener);
   }));
 }
@@ -123,7 +123,7 @@ void Router::readWishes() {
     problem = error.what();
   }
   if (!problem.empty()) {
-    if (wishProblem_.empty()) here_.log.warn("some clients are not seen, for a while: {}", problem);
+    if (wishProblem_.empty()) here_.log.warn("cannot read which servers some clients wait for, trying again: {}", problem);
     wishesDue_.setAt(Deadline::after(kWishesAgain));
   }
   wishProblem_ = std::move(problem);
@@ -132,7 +132,7 @@ void Router::readWishes() {
 void Router::reload(const RouterConfig& config) {
   openTls(config);
   if (config.backplane != here_.config.backplane || config.name != here_.config.name)
-    here_.log.warn("another name or backplane needs a restart: this is still {}", here_.config.name);
+    here_.log.warn("a new name or backplane takes effect when the router starts again: this is still {}", here_.config.name);
   here_.log.setLevel(config.logLevel);
   here_.config = config;
   std::erase_if(listeners_,

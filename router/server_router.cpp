@@ -89,7 +89,7 @@ void ServerRouter::onBind(wire::Bind::Reader bind) {
   const auto number = bind.getBinding();
   if (bindings_.contains(number)) throw ProtocolError(FarewellCode::PROTOCOL, fmt::format("binding {} is open already", number));
   if (bindings_.size() >= kMaxBindings) return refuse(number, fmt::format("more than {} bindings", kMaxBindings));
-  if (!isServerName(bind.getServer())) return refuse(number, fmt::format("\"{}\" is no server's name", forPeople(bind.getServer())));
+  if (!isServerName(bind.getServer())) return refuse(number, fmt::format("\"{}\" is not a valid name of a server", forPeople(bind.getServer())));
   const ServerName name{bind.getLocation(), toStd(bind.getServer())};
   const auto* serve = served(name);
   if (serve == nullptr) return refuse(number, fmt::format("server {} at location {} is not for this peer", name.server, name.location));

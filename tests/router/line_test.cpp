@@ -172,7 +172,7 @@ TEST_F(LineTest, EndsWithAFarewellWhenAFrameIsNone) {
   send(bytes);
 
   EXPECT_THAT(farewell(), HasSubstr("code = protocol"));
-  EXPECT_THAT(end_, HasSubstr("a frame that is none"));
+  EXPECT_THAT(end_, HasSubstr("a frame that cannot be read"));
 }
 
 TEST_F(LineTest, EndsWithTheCodeThatItsOwnerThrows) {
