@@ -35,8 +35,7 @@ LogLimiter::Line LogLimiter::summary(State& state, std::int64_t nowNs) {
   auto text = std::exchange(state.last, {});
   if (held != 1) {
     text += fmt::format(" ({} {} {} in {:.1f} s)", state.areAlike ? "repeated" : "the last of", held,
-                        state.areAlike ? "times" : "such lines",
-                        static_cast<double>(nowNs - state.heldSinceNs) / 1e9);
+                        state.areAlike ? "times" : "such lines", static_cast<double>(nowNs - state.heldSinceNs) / 1e9);
   }
   return {state.level, std::move(text)};
 }

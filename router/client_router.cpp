@@ -103,7 +103,8 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
 kj::Exception ClientRouter::failed(const std::string& step, const kj::Exception& error) const {
   const auto deadTime = limitText(here_.config.limits, "dead-time");
   const auto why = reasonOf(error);
-  const auto text = why == kTimeout ? fmt::format("{} took longer than {} (dead-time)", step, deadTime) : fmt::format("{} failed: {}", step, why);
+  const auto text =
+      why == kTimeout ? fmt::format("{} took longer than {} (dead-time)", step, deadTime) : fmt::format("{} failed: {}", step, why);
   return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
 }
 
@@ -249,8 +250,7 @@ void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
   wanted.problem.clear();
   log_.info("{} at location {} is there", name.server, name.location);
 } catch (const std::exception& error) {
-  if (wanted.problem != error.what())
-    log_.warn("{} at location {} cannot be offered here: {}", name.server, name.location, error.what());
+  if (wanted.problem != error.what()) log_.warn("{} at location {} cannot be offered here: {}", name.server, name.location, error.what());
   wanted.problem = error.what();
 }
 
@@ -302,7 +302,8 @@ Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
 std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
   const auto most = line_->peer().maxClients;
   if (most != 0 && clients_.size() >= most) {
-    if (!std::exchange(saidFull_, true)) log_.warn("{} accepts at most {} clients of this connection (its max-clients): others are refused", remote_.address.text(), most);
+    if (!std::exchange(saidFull_, true))
+      log_.warn("{} accepts at most {} clients of this connection (its max-clients): others are refused", remote_.address.text(), most);
     return std::nullopt;
   }
   if (lastClient_ == UINT32_MAX) {

@@ -26,12 +26,8 @@ class WithFirstByte final : public kj::AsyncIoStream {
   kj::Promise<void> whenWriteDisconnected() override { return stream_->whenWriteDisconnected(); }
   void shutdownWrite() override { stream_->shutdownWrite(); }
   void abortRead() override { stream_->abortRead(); }
-  void getsockopt(int level, int option, void* value, kj::uint* length) override {
-    stream_->getsockopt(level, option, value, length);
-  }
-  void setsockopt(int level, int option, const void* value, kj::uint length) override {
-    stream_->setsockopt(level, option, value, length);
-  }
+  void getsockopt(int level, int option, void* value, kj::uint* length) override { stream_->getsockopt(level, option, value, length); }
+  void setsockopt(int level, int option, const void* value, kj::uint length) override { stream_->setsockopt(level, option, value, length); }
   void getsockname(sockaddr* address, kj::uint* length) override { stream_->getsockname(address, length); }
   void getpeername(sockaddr* address, kj::uint* length) override { stream_->getpeername(address, length); }
 

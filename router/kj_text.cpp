@@ -22,9 +22,11 @@ std::string forPeople(const std::string& text) {
 std::string reasonOf(const kj::Exception& error) {
   const auto said = toStd(error.getDescription());
   if (said.starts_with("operation timed out")) return std::string(kTimeout);
-  for (const std::string_view mark : {"gai_strerror(status) = ", "(): "}) {
+  for (const std::string_view mark : {"gai_strerror(status) = ", "): "}) {
     const auto at = said.find(mark);
-    if (at != std::string::npos) return said.substr(at + mark.size());
+    if (at == std::string::npos) continue;
+    const auto begin = at + mark.size();
+    return said.substr(begin, said.find("; ", begin) - begin);
   }
   return said;
 }

@@ -209,8 +209,9 @@ void Line::handle(wire::Item::Reader item) {
 
 void Line::takeGreeting(wire::Greeting::Reader greeting) {
   if (greeting.getProtocolMajor() != wire::PROTOCOL_MAJOR) {
-    throw ProtocolError(FarewellCode::VERSION, fmt::format("the peer has protocol {}.{}, this router {}.x: install the same release of mpf-router on both hosts", greeting.getProtocolMajor(),
-                                                           greeting.getProtocolMinor(), wire::PROTOCOL_MAJOR));
+    throw ProtocolError(FarewellCode::VERSION,
+                        fmt::format("the peer has protocol {}.{}, this router {}.x: install the same release of mpf-router on both hosts",
+                                    greeting.getProtocolMajor(), greeting.getProtocolMinor(), wire::PROTOCOL_MAJOR));
   }
   peer_.router = forPeople(greeting.getRouter());
   peer_.program = forPeople(greeting.getProgram());

@@ -33,10 +33,11 @@ kj::Promise<void> Listener::start() {
   auto started = kj::newPromiseAndFulfiller<void>();
   auto& result = *started.fulfiller;
   tasks_.add(open()
-                 .then([&result] { result.fulfill(); }, [this, &result](kj::Exception&& error) {
-                   const auto text = fmt::format("cannot listen at {}: {}", listen_.address.text(), reasonOf(error));
-                   result.reject({kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)});
-                 })
+                 .then([&result] { result.fulfill(); },
+                       [this, &result](kj::Exception&& error) {
+                         const auto text = fmt::format("cannot listen at {}: {}", listen_.address.text(), reasonOf(error));
+                         result.reject({kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)});
+                       })
                  .attach(kj::mv(started.fulfiller)));
   return kj::mv(started.promise);
 }
@@ -85,14 +86,12 @@ void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& add
   auto end = kj::newPromiseAndFulfiller<void>();
   const auto number = ++lastHandshake_;
   handshakes_[number] = {hostOf(address), kj::mv(end.fulfiller)};
-  tasks_.add(here_.timer
-                 .timeoutAfter(toKj(here_.config.limits.handshakeTime), kj::evalNow([&] { return handshake(kj::mv(caller), address); }))
-                 .then([]() {},
-                       [this, address](kj::Exception&& error) {
-                         here_.log.warn("{}: no TLS connection: {}", address, tlsTrouble(error));
-                       })
-                 .exclusiveJoin(kj::mv(end.promise))
-                 .attach(kj::defer([this, number] { handshakes_.erase(number); })));
+  tasks_.add(
+      here_.timer.timeoutAfter(toKj(here_.config.limits.handshakeTime), kj::evalNow([&] { return handshake(kj::mv(caller), address); }))
+          .then([]() {},
+                [this, address](kj::Exception&& error) { here_.log.warn("{}: no TLS connection: {}", address, tlsTrouble(error)); })
+          .exclusiveJoin(kj::mv(end.promise))
+          .attach(kj::defer([this, number] { handshakes_.erase(number); })));
 }
 
 // A host that opens many connections loses the oldest one of its own.

@@ -66,8 +66,8 @@ void ServerRouter::stop() { line_->end(FarewellCode::STOPPING, "the router ends"
 void ServerRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
   record_->setState(layout::RouterLineState::connected);
-  here_.log.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program,
-                        peer_.empty() ? "" : ", certificate of ", peer_);
+  here_.log.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program, peer_.empty() ? "" : ", certificate of ",
+                 peer_);
 }
 
 // ---- servers
@@ -89,7 +89,8 @@ void ServerRouter::onBind(wire::Bind::Reader bind) {
   const auto number = bind.getBinding();
   if (bindings_.contains(number)) throw ProtocolError(FarewellCode::PROTOCOL, fmt::format("binding {} is open already", number));
   if (bindings_.size() >= kMaxBindings) return refuse(number, fmt::format("more than {} bindings", kMaxBindings));
-  if (!isServerName(bind.getServer())) return refuse(number, fmt::format("\"{}\" is not a valid name of a server", forPeople(bind.getServer())));
+  if (!isServerName(bind.getServer()))
+    return refuse(number, fmt::format("\"{}\" is not a valid name of a server", forPeople(bind.getServer())));
   const ServerName name{bind.getLocation(), toStd(bind.getServer())};
   const auto* serve = served(name);
   if (serve == nullptr) return refuse(number, fmt::format("server {} at location {} is not for this peer", name.server, name.location));
@@ -139,7 +140,7 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
   const bool hasFailed = !isThere && binding.presence->isDoubtful();
   if (hasFailed && !binding.failureSaid) {
     here_.log.warn("{} at location {} cannot be offered to {}: {}", binding.name.server, binding.name.location, address_,
-                          binding.presence->problem());
+                   binding.presence->problem());
   }
   binding.failureSaid = hasFailed;
   if (isThere && binding.told == binding.presence->incarnation()) return;

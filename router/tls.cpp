@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include <mpf/router/kj_text.h>
 #include <mpf/router/tls_files.h>
 
 namespace mpf::router {
@@ -34,8 +35,7 @@ kj::TlsContext contextOf(const TlsTexts& texts, Side side) {
   return kj::TlsContext(options);
 }
 
-constexpr const char* kNoTls =
-    "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers";
+constexpr const char* kNoTls = "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers";
 constexpr const char* kNotVersion13 = "the peer does not support TLS 1.3, the only version that routers use";
 constexpr const char* kLeft = "the peer closed the connection during the TLS handshake";
 
@@ -108,7 +108,7 @@ std::string peerName(kj::PeerIdentity& peer) {
 std::string tlsTrouble(const kj::Exception& error) {
   const std::string said = error.getDescription().cStr();
   const auto* const trouble = std::ranges::find_if(kTroubles, [&](const Trouble& one) { return said.find(one.said) != std::string::npos; });
-  return trouble != kTroubles.end() ? std::string(trouble->means) : said;
+  return trouble != kTroubles.end() ? std::string(trouble->means) : reasonOf(error);
 }
 
 }  // namespace mpf::router

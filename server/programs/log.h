@@ -92,8 +92,7 @@ class Log {
   };
 
   template <class... Arguments>
-  void say(Level level, const LogFormat<std::type_identity_t<Arguments>...>& format,
-           Arguments&&... arguments) const {
+  void say(Level level, const LogFormat<std::type_identity_t<Arguments>...>& format, Arguments&&... arguments) const {
     if (level < core_->least.load(std::memory_order_relaxed)) return;
     sayText(level, format.at, fmt::format(format.format, std::forward<Arguments>(arguments)...));
   }

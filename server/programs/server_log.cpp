@@ -22,8 +22,7 @@ constexpr std::size_t kLinesThatMayWait = 1024;
 // The queue, and the thread that empties it.
 class ServerLog::Writer {
  public:
-  explicit Writer(const std::string& program)
-      : logger_(program, std::make_shared<spdlog::sinks::stderr_sink_st>()) {
+  explicit Writer(const std::string& program) : logger_(program, std::make_shared<spdlog::sinks::stderr_sink_st>()) {
     logger_.set_level(Log::Level::trace);
     logger_.set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
   }
@@ -113,8 +112,7 @@ class ServerLog::Writer {
 // A Log that outlives this object keeps the queue, whose lines nobody writes any more.
 ServerLog::ServerLog(const std::string& program, const std::string& level)
     : writer_(std::make_shared<Writer>(program)),
-      log_([writer = writer_](Log::Level of, std::string text) { writer->add(of, std::move(text)); },
-           spdlog::level::from_str(level)) {
+      log_([writer = writer_](Log::Level of, std::string text) { writer->add(of, std::move(text)); }, spdlog::level::from_str(level)) {
   log_.onHeld([writer = writer_](std::int64_t dueNs) { writer->wakeAt(dueNs); });
   writer_->start(log_);
 }

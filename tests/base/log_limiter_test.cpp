@@ -59,8 +59,7 @@ TEST_F(LogLimiterTest, KeepsTheLastOfLinesThatDiffer) {
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("request " + std::to_string(i)));
   nowNs_ += kEveryNs;
 
-  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)),
-              ElementsAre("request 999 (the last of 1000 such lines in 10.0 s)"));
+  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)), ElementsAre("request 999 (the last of 1000 such lines in 10.0 s)"));
 }
 
 TEST_F(LogLimiterTest, WritesASingleHeldLineAsItIs) {

@@ -67,9 +67,7 @@ class ListenerTest : public testing::Test {
     return called.promise.wait(io_.waitScope);
   }
   std::string call() { return finish(begin()); }
-  bool tryCall() try {
-    return call() == "honest";
-  } catch (const kj::Exception&) {
+  bool tryCall() try { return call() == "honest"; } catch (const kj::Exception&) {
     return false;
   }
   // Lets the listener work until that is so.

@@ -22,7 +22,7 @@ TEST_F(RogueClientTest, IsServedWhileItIsLegal) {
 TEST_F(RogueClientTest, ThatDoesNotGreetIsCut) {
   RoguePeer peer(routers_.address());
   peer.sendItems({bind(1)});
-  EXPECT_THAT(peer.farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("no greeting")));
+  EXPECT_THAT(peer.farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("is not a greeting")));
 }
 
 // ---- items that cannot be

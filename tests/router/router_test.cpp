@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include <mpf/router/kj_text.h>
 #include <mpf/tests/router/held_network.h>
 #include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
@@ -113,6 +114,22 @@ TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
   ASSERT_EQ(lookups().size(), 2u);
   EXPECT_TRUE(lookups()[1]->isWaiting());
   EXPECT_EQ(router_->listening().size(), 1u);
+}
+
+TEST_F(SlowLookupTest, ThatFailsNamesItsStepAndTheReason) {
+  router_->reload(withRemote());
+  lookups()[0]->reject(KJ_EXCEPTION(FAILED, "DNS lookup failed.; params.host = slow.lab; gai_strerror(status) = Name or service not known"));
+  io_.run();
+
+  EXPECT_EQ(said_, "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
+}
+
+TEST(ReasonOf, LeavesOutTheNamesOfCallsAndVariables) {
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "connect(): Connection refused")), "Connection refused");
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "::bind(sockfd, &addr, length): Address already in use; toString() = 127.0.0.1:1")),
+            "Address already in use");
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(OVERLOADED, "operation timed out")), kTimeout);
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "something else; whatever")), "something else; whatever");
 }
 
 // A line end that cannot be told, say: the remote would be called no more, and nobody would know.

@@ -26,8 +26,7 @@ class LogTest : public testing::Test {
 
   std::int64_t nowNs_ = 1'000'000'000'000;
   std::vector<std::string> lines_;
-  const Log log_{[this](Log::Level, std::string text) { lines_.push_back(std::move(text)); },
-                 Log::Level::info, [this] { return nowNs_; }};
+  const Log log_{[this](Log::Level, std::string text) { lines_.push_back(std::move(text)); }, Log::Level::info, [this] { return nowNs_; }};
 };
 
 TEST_F(LogTest, WritesLinesOfItsLevelAndAbove) {
