@@ -118,7 +118,8 @@ TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
 
 TEST_F(SlowLookupTest, ThatFailsNamesItsStepAndTheReason) {
   router_->reload(withRemote());
-  lookups()[0]->reject(KJ_EXCEPTION(FAILED, "DNS lookup failed.; params.host = slow.lab; gai_strerror(status) = Name or service not known"));
+  lookups()[0]->reject(
+      KJ_EXCEPTION(FAILED, "DNS lookup failed.; params.host = slow.lab; gai_strerror(status) = Name or service not known"));
   io_.run();
 
   EXPECT_EQ(said_, "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
