@@ -235,6 +235,7 @@ TEST_F(RogueClientTest, ConnectionsBeyondTheLimitAreClosed) {
       ++kept;
     } catch (const std::runtime_error& farewell) {
       EXPECT_THAT(farewell.what(), HasSubstr("its limit (max-connections)"));
+      peer.close();
     }
   }
 
