@@ -37,7 +37,7 @@ std::string canonicalIpv6(const std::string& host) {
   return ::inet_ntop(AF_INET6, &address, text.data(), text.size());
 }
 
-std::string hostOf(const std::string& text, const std::string& host) {
+std::string checkedHost(const std::string& text, const std::string& host) {
   if (host.starts_with('[')) {
     auto canonical = canonicalIpv6(host.substr(1, host.size() - 2));
     if (!host.ends_with(']') || canonical.empty()) refuseAddress(text, "has no IPv6 address in its brackets");
@@ -92,7 +92,7 @@ std::string Address::text() const {
 Address parseAddress(const std::string& text) {
   const auto colon = text.rfind(':');
   if (colon == std::string::npos || text.ends_with(']')) refuseAddress(text, "has no port");
-  return {hostOf(text, text.substr(0, colon)), portOf(text, std::string_view(text).substr(colon + 1))};
+  return {checkedHost(text, text.substr(0, colon)), portOf(text, std::string_view(text).substr(colon + 1))};
 }
 
 bool isIpAddress(const std::string& host) {

@@ -19,14 +19,14 @@ constexpr const char* kFooter =
     "Examples: mpf-router /etc/mpf/router.toml\n"
     "          mpf-router --serve 1 --listen 10.0.0.7:9900 --plain     on the host of the servers\n"
     "          mpf-router --remote 1=10.0.0.7:9900 --plain             on the host of the clients\n"
-    "SIGHUP loads the file anew; what stays the same stays connected.\n"
-    "Exit status: 0 stopped; 1 failed; 2 usage error, or an error in the configuration.";
+    "SIGHUP reads the file again; connections that it does not change stay.\n"
+    "Exit status: 0 stopped by SIGINT or SIGTERM; 1 failed; 2 usage error, or an error in the configuration.";
 
 std::int32_t parseLocation(std::string_view text) {
   std::int32_t location = 0;
   const auto [stopped, error] = std::from_chars(text.data(), text.data() + text.size(), location);
   if (error == std::errc() && stopped == text.data() + text.size()) return location;
-  throw std::invalid_argument(fmt::format("\"{}\" is no location: write an integer", text));
+  throw std::invalid_argument(fmt::format("\"{}\" is not a location: write an integer", text));
 }
 
 // "1", or "1=0" of a location that is called otherwise here.

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include <mpf/router/kj_text.h>
+#include <mpf/router/limits.h>
 #include <mpf/shm/link.h>
 
 namespace mpf::router {
@@ -32,8 +33,7 @@ ClientRouter::ClientRouter(Surroundings& here, const Remote& remote)
     : here_(here),
       remote_(remote),
       record_(here.statistics.add(layout::RouterRole::client)),
-      serverLog_(here.log),
-      lostLog_(here.log),
+      log_(here.log.forObject()),
       retry_(here.config.limits.firstRetry),
       pumpAgain_(here.timer,
                  [this] {
@@ -90,7 +90,8 @@ kj::Promise<LineEnd> ClientRouter::runOnce() {
 // A name may stand for several addresses, the first of which may answer nothing.
 kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
   const auto& address = remote_.address;
-  return within(here_.network.parseAddress(hostForKj(address), address.port)).then([this](kj::Own<kj::NetworkAddress> parsed) {
+  auto lookUp = kj::evalNow([&] { return here_.network.parseAddress(hostForKj(address), address.port); });
+  return within(fmt::format("the look-up of {}", address.host), kj::mv(lookUp)).then([this](kj::Own<kj::NetworkAddress> parsed) {
     if (remote_.security == Security::plain) checkPlain(*parsed, here_.config);
     std::vector<std::string> addresses;
     std::istringstream all(toStd(parsed->toString()));
@@ -99,10 +100,18 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
   });
 }
 
+kj::Exception ClientRouter::failed(const std::string& step, const kj::Exception& error) const {
+  const auto deadTime = limitText(here_.config.limits, "dead-time");
+  const auto why = reasonOf(error);
+  const auto text =
+      why == kTimeout ? fmt::format("{} took longer than {} (dead-time)", step, deadTime) : fmt::format("{} failed: {}", step, why);
+  return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
+}
+
 kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connectToOne(std::vector<std::string> addresses) {
   const auto next = addresses.front();
   addresses.erase(addresses.begin());
-  return within(connectTo(next))
+  return within(fmt::format("the connection to {}", next), connectTo(next))
       .catch_([this, addresses = std::move(addresses)](kj::Exception&& error) mutable -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
         if (addresses.empty()) return kj::mv(error);
         return connectToOne(std::move(addresses));
@@ -131,14 +140,14 @@ void ClientRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
   record_->setState(layout::RouterLineState::connected);
   record_->setProblem({});
-  here_.log.info("connected to {} at {} ({})", greeting.router, remote_.address.text(), greeting.program);
+  log_.info("connected to {} at {} ({})", greeting.router, remote_.address.text(), greeting.program);
   bindWanted();
 }
 
 // Requests that did not reach the line were not done, and that is said; of the others the local clients know as much as we do.
 void ClientRouter::onLineEnd(const std::string& why) {
   if (!stopping_ && (connected_ || problem_ != why)) {
-    here_.log.warn("{} {}: {}", connected_ ? "lost" : "cannot reach", remote_.address.text(), why);
+    log_.warn("{} {}: {}", connected_ ? "lost" : "cannot reach", remote_.address.text(), why);
   }
   problem_ = why;
   // One that greets and goes is called less and less often, too.
@@ -228,7 +237,7 @@ void ClientRouter::onServer(wire::Server::Reader server) {
 
 // Its configuration may change.
 void ClientRouter::onRefusal(const ServerName& name, Wanted& wanted, const std::string& why) {
-  if (wanted.problem != why) here_.log.warn("{} at location {}: {} refuses: {}", name.server, name.location, remote_.address.text(), why);
+  if (wanted.problem != why) log_.warn("{} at location {}: {} refuses: {}", name.server, name.location, remote_.address.text(), why);
   wanted.problem = why;
   wanted.binding = 0;
   wanted.bindAgainNs = Clock::nowNs() + kBindAgainNs;
@@ -239,10 +248,9 @@ void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
   wanted.proxy = std::make_unique<Proxy>(here_, *this, name, *wanted.offer);
   wanted.offer.reset();
   wanted.problem.clear();
-  serverLog_.info("{} at location {} is there", name.server, name.location);
+  log_.info("{} at location {} is there", name.server, name.location);
 } catch (const std::exception& error) {
-  if (wanted.problem != error.what())
-    here_.log.warn("{} at location {} cannot be offered here: {}", name.server, name.location, error.what());
+  if (wanted.problem != error.what()) log_.warn("{} at location {} cannot be offered here: {}", name.server, name.location, error.what());
   wanted.problem = error.what();
 }
 
@@ -252,7 +260,7 @@ void ClientRouter::sweep() {
   for (auto each = wanted_.begin(); each != wanted_.end();) {
     auto& [name, wanted] = *each;
     if (wanted.proxy && wanted.proxy->isDone()) {
-      serverLog_.info("{} at location {} is gone", name.server, name.location);
+      log_.info("{} at location {} is gone", name.server, name.location);
       wanted.proxy.reset();
     }
     if (!wanted.proxy && wanted.offer && connected_) makeProxy(name, wanted);
@@ -285,7 +293,7 @@ Proxy* ClientRouter::proxyOf(std::uint32_t client) {
   return found == clients_.end() ? nullptr : found->second;
 }
 
-// Whoever speaks of a client that was never opened is not in his right mind.
+// Naming a client that was never opened is a protocol error.
 Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
   if (client == 0 || client > lastClient_) throw ProtocolError(FarewellCode::PROTOCOL, fmt::format("client {} was never opened", client));
   return proxyOf(client);
@@ -294,7 +302,8 @@ Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
 std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
   const auto most = line_->peer().maxClients;
   if (most != 0 && clients_.size() >= most) {
-    if (!std::exchange(saidFull_, true)) here_.log.warn("{} takes {} clients and no more", remote_.address.text(), most);
+    if (!std::exchange(saidFull_, true))
+      log_.warn("{} accepts at most {} clients of this connection (its max-clients): others are refused", remote_.address.text(), most);
     return std::nullopt;
   }
   if (lastClient_ == UINT32_MAX) {
@@ -369,7 +378,7 @@ void ClientRouter::onRoom() {
 }
 
 void ClientRouter::onUnsendable(const Carried& carried, const std::string& why, wire::Item::Builder /*instead*/) {
-  lostLog_.warn("a request is refused: {}", why);
+  log_.warn("a request is refused: {}", why);
   if (auto* proxy = proxyOf(carried.client)) proxy->endRequest(carried.client, carried.requestId, Fate::refused, why);
 }
 

@@ -19,7 +19,6 @@
 
 #include <mpf/router/fatal_tasks.h>
 #include <mpf/router/proxy.h>
-#include <mpf/router/seldom_log.h>
 
 namespace mpf::router {
 
@@ -48,11 +47,13 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   kj::Promise<kj::Own<kj::AsyncIoStream>> connect();
   kj::Promise<kj::Own<kj::AsyncIoStream>> connectToOne(std::vector<std::string> addresses);
   kj::Promise<kj::Own<kj::AsyncIoStream>> connectTo(const std::string& address);
-  // The dead time is enough for each thing that somebody else has to do.
+  // Each step of connecting may take the dead time. An error names the step.
   template <class T>
-  kj::Promise<T> within(kj::Promise<T> promise) {
-    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise));
+  kj::Promise<T> within(const std::string& step, kj::Promise<T> promise) {
+    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise))
+        .catch_([this, step](kj::Exception&& error) -> kj::Promise<T> { return failed(step, error); });
   }
+  [[nodiscard]] kj::Exception failed(const std::string& step, const kj::Exception& error) const;
   [[nodiscard]] kj::Duration nextDelay();
   void onLineEnd(const std::string& why);
   void bindWanted();
@@ -74,6 +75,7 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   std::optional<std::uint32_t> tryNewClient(Proxy& proxy) override;
   void dropClient(std::uint32_t number) override;
   PeerRecord& record() override { return *record_; }
+  const Log& log() override { return log_; }
   Proxy* proxyOf(std::uint32_t client);
   Proxy* openedProxyOf(std::uint32_t client);
 
@@ -90,8 +92,7 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   std::uint32_t lastBinding_ = 0;
   std::uint32_t lastClient_ = 0;
   bool saidFull_ = false;
-  SeldomLog serverLog_;
-  SeldomLog lostLog_;
+  Log log_;
   std::chrono::milliseconds retry_{};
   std::int64_t connectedNs_ = 0;
   ServerName pumped_;  // the last one whose requests had their turn

@@ -69,6 +69,7 @@ struct Limits {
   std::uint32_t maxClients = 16000;                     // of one connection
   std::uint32_t maxConnections = 1000;                  // accepted
   std::chrono::milliseconds deadTime{2000};             // a line without a sign of life for so long is cut
+  std::chrono::milliseconds handshakeTime{5000};        // of a peer: for TLS, and then for its greeting
   std::chrono::milliseconds firstRetry{100};            // back-off of reconnecting; jittered, doubled up to lastRetry
   std::chrono::milliseconds lastRetry{5000};
   bool operator==(const Limits&) const = default;
@@ -111,6 +112,9 @@ class ConfigError : public std::runtime_error {
 
 // "host:port" taken apart; throws std::invalid_argument that names it and shows how it is written.
 [[nodiscard]] Address parseAddress(const std::string& text);
+
+// The host of "10.0.0.7:40000" or "[fd00::7]:40000", as the kernel tells the address of a caller.
+[[nodiscard]] inline std::string hostOf(const std::string& address) { return address.substr(0, address.rfind(':')); }
 
 // Whether `ip`, "10.0.0.7" or "fd00::7" without a port, is neither loopback, private (RFC 1918, fc00::/7) nor link-local. Whoever
 // resolves a name asks this before plain TCP. "*", and what is no IPv4 or IPv6 address, is public.

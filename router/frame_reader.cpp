@@ -74,6 +74,15 @@ std::optional<std::uint64_t> FrameReader::frameBytes() const {
   return bytes;
 }
 
+// As a segment table, these bytes would announce more than kMaxSegments segments.
+bool FrameReader::beginsAsTls() const noexcept {
+  constexpr kj::byte kAlert = 0x15;
+  constexpr kj::byte kHandshake = 0x16;
+  constexpr kj::byte kMajorVersion = 3;
+  if (pending() < 2) return false;
+  return (*at(begin_) == kAlert || *at(begin_) == kHandshake) && *at(begin_ + 1) == kMajorVersion;
+}
+
 capnp::MessageReader* FrameReader::tryNext() {
   frame_.reset();
   const auto bytes = frameBytes();

@@ -33,6 +33,9 @@ class FrameReader {
   //   throws  ProtocolError: too long, too many segments
   [[nodiscard]] capnp::MessageReader* tryNext();
 
+  // Whether what has come is a record of TLS (handshake, alert), which is never the beginning of a frame.
+  [[nodiscard]] bool beginsAsTls() const noexcept;
+
   // Bytes of the frame that has begun to come.
   [[nodiscard]] std::size_t pending() const noexcept { return end_ - begin_; }
 

@@ -22,4 +22,16 @@ std::string shortened(std::string text) {
 // A peer may send megabytes: the text is cut first, and again when its escapes made it longer.
 std::string forPeople(const std::string& text) { return shortened(printable(shortened(text))); }
 
+std::string reasonOf(const kj::Exception& error) {
+  const auto said = toStd(error.getDescription());
+  if (said.starts_with("operation timed out")) return std::string(kTimeout);
+  for (const std::string_view mark : {"gai_strerror(status) = ", "): "}) {
+    const auto at = said.find(mark);
+    if (at == std::string::npos) continue;
+    const auto begin = at + mark.size();
+    return said.substr(begin, said.find("; ", begin) - begin);
+  }
+  return said;
+}
+
 }  // namespace mpf::router

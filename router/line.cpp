@@ -15,6 +15,9 @@ constexpr std::int64_t kMeasureEveryNs = 10'000'000'000;  // the round trip, whe
 constexpr std::int64_t kTurnNs = 2'000'000;            // with one peer's items, while others wait
 constexpr std::uint64_t kLeastFrame = std::uint64_t{64} << 10;  // what each side must read, and the longest greeting
 
+constexpr const char* kTlsOnPlain =
+    "the peer uses TLS, this side of the connection plain TCP: set the same security, \"tls\" or \"plain\", at both routers";
+
 std::uint64_t maxFrameBytes(const Limits& limits) {
   constexpr std::uint64_t kFields = std::uint64_t{1} << 20;  // around bodies
   return std::max<std::uint64_t>(limits.maxMessageBytes, limits.bufferBytes) + kFields;
@@ -47,6 +50,7 @@ kj::Promise<LineEnd> Line::run(Note greeting) {
   auto paf = kj::newPromiseAndFulfiller<LineEnd>();
   ended_ = kj::mv(paf.fulfiller);
   heardNs_ = Clock::nowNs();
+  greetBeforeNs_ = heardNs_ + std::chrono::nanoseconds(limits_.handshakeTime).count();
   send([greeting = std::move(greeting)](wire::Item::Builder item) { greeting(item); });
   reads_ = watched(&Line::readLoop);
   life_ = watched(&Line::aliveLoop);
@@ -90,7 +94,7 @@ kj::Promise<void> Line::readLoop() {
   auto room = reader_.room();
   return stream_->tryRead(room.begin(), 1, room.size()).then([this, most = room.size()](std::size_t bytes) -> kj::Promise<void> {
     if (bytes == 0) {
-      finish({farewell_.empty() ? "the peer closed the connection" : farewell_});
+      finish({farewell_.empty() ? closed() : farewell_});
       return kj::READY_NOW;
     }
     if (isDeaf()) return readAndDiscard();
@@ -100,6 +104,11 @@ kj::Promise<void> Line::readLoop() {
     reader_.filled(bytes);
     return readOn();
   });
+}
+
+std::string Line::closed() const {
+  if (greeted_) return "the peer closed the connection";
+  return "the peer closed the connection before its greeting: is it a router, and does it have the same security, \"tls\" or \"plain\"?";
 }
 
 // What comes behind our own farewell matters no more, but for its end.
@@ -123,7 +132,7 @@ kj::Promise<void> Line::readOn() {
   } catch (const ProtocolError& error) {
     end(error.code(), error.what());
   } catch (const kj::Exception& error) {  // a pointer that leads nowhere
-    end(FarewellCode::PROTOCOL, fmt::format("a frame that is none: {}", toStd(error.getDescription())));
+    end(FarewellCode::PROTOCOL, fmt::format("the peer sent a frame that cannot be read: {}", toStd(error.getDescription())));
   } catch (const std::exception& error) {  // ours, for lack of memory or descriptors
     end(FarewellCode::STOPPING, error.what());
   }
@@ -160,6 +169,7 @@ bool Line::handleSome() {
 }
 
 bool Line::tryNextFrame() {
+  if (!greeted_ && reader_.beginsAsTls()) throw ProtocolError(FarewellCode::PROTOCOL, kTlsOnPlain);
   auto* frame = reader_.tryNext();
   if (frame == nullptr) return false;
   heardNs_ = Clock::nowNs();
@@ -174,7 +184,7 @@ void Line::handle(wire::Item::Reader item) {
   if (phase_ == Phase::broken && !item.isFarewell()) return;
   if (!greeted_) {
     if (item.isGreeting()) return takeGreeting(item.getGreeting());
-    if (!item.isFarewell()) throw ProtocolError(FarewellCode::PROTOCOL, "the first item is no greeting");
+    if (!item.isFarewell()) throw ProtocolError(FarewellCode::PROTOCOL, "the first item is not a greeting");
   }
   switch (item.which()) {
     case wire::Item::NONE:
@@ -199,8 +209,9 @@ void Line::handle(wire::Item::Reader item) {
 
 void Line::takeGreeting(wire::Greeting::Reader greeting) {
   if (greeting.getProtocolMajor() != wire::PROTOCOL_MAJOR) {
-    throw ProtocolError(FarewellCode::VERSION, fmt::format("protocol {}.{}: this router speaks {}.x", greeting.getProtocolMajor(),
-                                                           greeting.getProtocolMinor(), wire::PROTOCOL_MAJOR));
+    throw ProtocolError(FarewellCode::VERSION,
+                        fmt::format("the peer has protocol {}.{}, this router {}.x: install the same release of mpf-router on both hosts",
+                                    greeting.getProtocolMajor(), greeting.getProtocolMinor(), wire::PROTOCOL_MAJOR));
   }
   peer_.router = forPeople(greeting.getRouter());
   peer_.program = forPeople(greeting.getProgram());
@@ -221,22 +232,37 @@ void Line::takeGreeting(wire::Greeting::Reader greeting) {
 
 // ---- signs of life
 
-// Looks now and then, and at the moment when it would be too long.
+// Time until the next look: now and then, and when the peer is overdue.
+std::int64_t Line::nextLookNs(std::int64_t nowNs) {
+  auto dueNs = heardNs_ + std::chrono::nanoseconds(limits_.deadTime).count();
+  if (!greeted_) dueNs = std::min(dueNs, greetBeforeNs_);
+  return std::clamp<std::int64_t>(dueNs - nowNs, 1'000'000, std::exchange(lookAfterNs_, halfDeadNs()));
+}
+
+// What the peer did not do in time; empty: it is in time.
+std::string Line::silence(std::int64_t nowNs) const {
+  if (nowNs - heardNs_ >= std::chrono::nanoseconds(limits_.deadTime).count()) {
+    return fmt::format("nothing was heard of the peer for {} ms (dead-time)", (nowNs - heardNs_) / 1'000'000);
+  }
+  if (greeted_ || nowNs < greetBeforeNs_) return {};
+  return fmt::format("the peer sent no greeting within {} ms (handshake-time)", limits_.handshakeTime.count());
+}
+
 kj::Promise<void> Line::aliveLoop() {
-  const auto deadNs = std::chrono::nanoseconds(limits_.deadTime).count();
-  const auto nextNs = std::clamp<std::int64_t>(heardNs_ + deadNs - Clock::nowNs(), 1'000'000, std::exchange(lookAfterNs_, halfDeadNs()));
-  return timer_.afterDelay(nextNs * kj::NANOSECONDS).then([this, deadNs, dueNs = Clock::nowNs() + nextNs]() -> kj::Promise<void> {
+  const auto lookNs = nextLookNs(Clock::nowNs());
+  return timer_.afterDelay(lookNs * kj::NANOSECONDS).then([this, dueNs = Clock::nowNs() + lookNs]() -> kj::Promise<void> {
     const auto nowNs = Clock::nowNs();
-    heardNs_ = std::min(heardNs_ + std::max<std::int64_t>(nowNs - dueNs, 0), nowNs);  // while we do not run, the peer need not, either
+    const auto lateNs = std::max<std::int64_t>(nowNs - dueNs, 0);  // while we do not run, the peer need not, either
+    heardNs_ = std::min(heardNs_ + lateNs, nowNs);
+    greetBeforeNs_ += lateNs;
     if (heardBytes_ >= kProgressBytes) {
       heardNs_ = nowNs;
       heardBytes_ = 0;
     }
     // Twice: if we did not run for long, what it said meanwhile has yet to be read.
-    if (nowNs - heardNs_ < deadNs) {
+    if (const auto text = silence(nowNs); text.empty()) {
       overdue_ = false;
     } else if (std::exchange(overdue_, true)) {
-      const auto text = fmt::format("nothing was heard of the peer for {} ms", (nowNs - heardNs_) / 1'000'000);
       if (writing_) finish({text});  // it does not take a farewell, either
       else end(FarewellCode::SILENCE, text);
       return kj::NEVER_DONE;

@@ -104,6 +104,7 @@ class Line {
   void send(Carried carried);
   [[nodiscard]] bool hasRoom() const noexcept { return greeted_ && !isEnding() && waiting_ < limits_.queueSize && notes() < kManyNotes; }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
+  [[nodiscard]] bool hasGreeted() const noexcept { return greeted_; }
   // Those that it began with: what we greeted with.
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
   // Largest body that may be sent.
@@ -133,10 +134,13 @@ class Line {
   static constexpr auto kLastMoment = 500 * kj::MILLISECONDS;  // for the farewell to be written
   kj::Promise<void> readLoop();
   kj::Promise<void> aliveLoop();
+  [[nodiscard]] std::int64_t nextLookNs(std::int64_t nowNs);
+  [[nodiscard]] std::string silence(std::int64_t nowNs) const;
   void onPing(std::uint64_t stamp);
   void ping();
   kj::Promise<void> watched(kj::Promise<void> (Line::*loop)());
   kj::Promise<void> readOn();
+  [[nodiscard]] std::string closed() const;
   kj::Promise<void> readAndDiscard();
   kj::Promise<void> whenAnswersHaveGone();
   bool handleSome();
@@ -182,6 +186,7 @@ class Line {
   std::int64_t heardNs_ = 0;      // when there was a sign of life
   std::size_t heardBytes_ = 0;    // since then, of a frame that is still coming
   bool overdue_ = false;          // at the last look
+  std::int64_t greetBeforeNs_ = 0;  // the peer
   std::int64_t lookAfterNs_;      // at most, from the last look on
   std::int64_t pingedNs_ = 0;     // when we asked last
   std::int64_t putOffNs_ = 0;     // when we put off asking last

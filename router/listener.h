@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Listener: one listening address. Who calls there is let in, over TLS unless the configuration says plain, and handed on.
+// Listener: one listening address. It accepts callers, over TLS unless the configuration says plain, and
+// hands them on.
+//
+//   accept ─► first byte ─ TLS ──► handshake ─► OnCaller
+//                        ├ frame ► a farewell in plain TCP: this port expects TLS
+//                        └ other ► closed
 //
 // Threads  that of the event loop.
-// Trust    a handshake has a time limit; of too many the oldest makes room, so that who idles locks nobody out.
+// Trust    a caller has Limits::handshakeTime for its handshake, first byte included. Of too many handshakes,
+//          the oldest one of the host with the most makes room: callers that idle keep no other host out.
 #pragma once
 
 #include <functional>
@@ -10,8 +16,8 @@
 #include <map>
 #include <string>
 
-#include <mpf/router/seldom_log.h>
 #include <mpf/router/surroundings.h>
+#include <mpf/router/turned_away.h>
 
 namespace mpf::router {
 
@@ -39,16 +45,23 @@ class Listener final : private kj::TaskSet::ErrorHandler {
   kj::Promise<void> acceptLoop();
   void admit(kj::AuthenticatedStream caller);
   void shakeHands(kj::AuthenticatedStream caller, const std::string& address);
+  kj::Promise<void> handshake(kj::AuthenticatedStream caller, const std::string& address);
+  kj::Promise<void> openTls(kj::AuthenticatedStream caller, kj::byte first, const std::string& address);
+  void makeRoom();
   void taskFailed(kj::Exception&& error) override;
 
   Surroundings& here_;
   Listen listen_;
   OnCaller onCaller_;
   std::vector<kj::Own<kj::ConnectionReceiver>> receivers_;
-  std::map<std::uint64_t, kj::Own<kj::PromiseFulfiller<void>>> handshakes_;  // under way, in order; fulfilling one ends it
+  struct Handshake {
+    std::string host;
+    kj::Own<kj::PromiseFulfiller<void>> end;  // fulfilling it closes the connection
+  };
+  std::map<std::uint64_t, Handshake> handshakes_;  // under way, the oldest one first
   std::uint64_t lastHandshake_ = 0;
-  SeldomLog callerLog_;
   std::string problem_;  // of accepting, that was logged last
+  TurnedAway turnedAway_;
   kj::TaskSet tasks_;
 };
 

@@ -10,6 +10,7 @@
 #include <mpf/base/run_main.h>
 #include <mpf/base/standard_descriptors.h>
 #include <mpf/router/arguments.h>
+#include <mpf/router/kj_log.h>
 #include <mpf/router/kj_text.h>
 #include <mpf/router/router.h>
 #include <mpf/router/service_manager.h>
@@ -69,10 +70,11 @@ kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArg
 int run(const RouterArguments& arguments) {
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kj::UnixEventPort::captureSignal(signal);  // before there are threads
   const mpf::ServerLog log("mpf-router", arguments.config().logLevel);
+  const mpf::router::KjLog kjLog(*log);
   auto io = kj::setupAsyncIo();
   io.waitScope.setBusyPollInterval(kTurnsBetweenLooks);  // or a peer whose bytes come faster than they are read would be all that there is
   auto& port = io.unixEventPort;
-  Router router(io, arguments.config(), *log.operator->());
+  Router router(io, arguments.config(), *log);
   auto toEnd = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
   serve(port, router, arguments, log).exclusiveJoin(kj::mv(toEnd)).wait(io.waitScope);  // also while it starts; who ends reloads no more
   ServiceManager::tellStopping();

@@ -33,7 +33,7 @@ Proxy::Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Off
       owner_(owner),
       name_(name),
       offer_(offer),
-      log_(here.log),
+      log_(owner.log()),
       retry_(here.timer, [this] { retryHeld(); }),
       server_(here.backplane, name.server, optionsFor(here, name, offer, owner.line().maxMessageBytes())),
       again_(here.timer, [this] { onReadable(); }) {
@@ -181,7 +181,7 @@ void Proxy::loseReply(std::uint32_t number, wire::Reply::Reader reply, const std
 }
 
 void Proxy::endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why) {
-  if (!why.empty()) here_.log.debug("{} at location {}: request {}: {}", name_.server, name_.location, requestId, why);
+  if (!why.empty()) log_.debug("{} at location {}: request {}: {}", name_.server, name_.location, requestId, why);
   end(number, requestId, fate);
 }
 

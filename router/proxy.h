@@ -20,7 +20,6 @@
 #include <mpf/router/alarm.h>
 #include <mpf/router/line.h>
 #include <mpf/router/readable.h>
-#include <mpf/router/seldom_log.h>
 #include <mpf/router/surroundings.h>
 #include <mpf/router/wishes.h>
 #include <mpf/server/message_server.h>
@@ -37,6 +36,7 @@ class Proxy {
     virtual std::optional<std::uint32_t> tryNewClient(Proxy& proxy) = 0;
     virtual void dropClient(std::uint32_t number) = 0;
     virtual PeerRecord& record() = 0;
+    virtual const Log& log() = 0;  // of the connection
 
    protected:
     ~Owner() = default;
@@ -106,7 +106,7 @@ class Proxy {
   Offer offer_;
   std::unordered_map<std::uint32_t, Client> clients_;  // by number
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // of local clients; 0: the far side has no place for it
-  SeldomLog log_;
+  Log log_;
   std::uint64_t owed_ = 0;
   bool hasMore_ = true;  // requests may wait that were not taken: else we are told of the next
   Deadline drainUntil_ = Deadline::never();  // not never: it is draining

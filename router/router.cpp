@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
+#include <map>
 #include <system_error>
+#include <utility>
 
 #include <mpf/router/kj_text.h>
 
@@ -16,7 +18,7 @@ constexpr auto kWishesAgain = std::chrono::seconds(1);       // when not all cou
 
 }  // namespace
 
-Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logger& log)
+Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log)
     : statistics_(Backplane::attach(config.backplane), config.name),
       here_{.port = io.unixEventPort,
             .network = io.provider->getNetwork(),
@@ -31,8 +33,8 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logge
       presences_(here_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
       wishes_(here_.backplane),
       bell_(io.unixEventPort, [this] { lookAtWishes(); }),
-      callerLog_(log),
       wishesDue_(here_.timer, [this] { readWishes(); }),
+      turnedAway_(here_.timer),
       tasks_(*this) {
   openTls(config);
   names_ = here_.backplane.watcher().watchNames(NameKind::wish, [this] { bell_.ring(); });
@@ -41,7 +43,7 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logge
 Router::~Router() { here_.backplane.watcher().forget(names_); }
 
 void Router::openTls(const RouterConfig& config) {
-  if (!config.tls.certificate.empty()) here_.tls = std::make_shared<Tls>(config.tls, here_.timer);
+  if (!config.tls.certificate.empty()) here_.tls = std::make_shared<Tls>(config.tls, here_.timer, config.limits.handshakeTime);
 }
 
 kj::Promise<void> Router::start() {
@@ -63,7 +65,7 @@ void Router::listenLate(const Listen& listen) {
   tasks_.add(started.catch_([this, late = std::weak_ptr(listeners_.back())](kj::Exception&& error) {
     const auto listener = late.lock();
     if (!listener) return;
-    here_.log.error("{}: {}", listener->listen().address.text(), toStd(error.getDescription()));
+    here_.log.error("{}", toStd(error.getDescription()));
     listeners_.remove(listener);
   }));
 }
@@ -75,13 +77,34 @@ std::vector<Address> Router::listening() {
 }
 
 void Router::onCaller(const Listen& listen, Listener::Caller caller) {
-  if (sessions_.size() >= here_.config.limits.maxConnections) {
-    callerLog_.warn("{}: turned away: there are {} connections", caller.address, sessions_.size());
-    return;
+  if (sessions_.size() >= here_.config.limits.maxConnections && !tryMakeRoom()) {
+    here_.log.warn("{}: turned away: there are {} connections (max-connections)", caller.address, sessions_.size());
+    return turnedAway_.add(kj::mv(caller.stream), FarewellCode::LIMIT,
+                           fmt::format("this router has {} connections, its limit (max-connections)", sessions_.size()));
   }
-  sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls)});
+  auto end = kj::newPromiseAndFulfiller<void>();
+  sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls),
+                       hostOf(caller.address), kj::mv(end.fulfiller)});
   const auto session = std::prev(sessions_.end());
-  tasks_.add(session->router->run().then([this, session] { sessions_.erase(session); }));
+  tasks_.add(session->router->run().exclusiveJoin(kj::mv(end.promise)).then([this, session] { sessions_.erase(session); }));
+}
+
+// Of the callers that have not greeted yet, the oldest one of the host with the most of them goes. Each
+// makes room once: it stays in the list until the event loop has closed it.
+bool Router::tryMakeRoom() {
+  const auto isIdle = [](const Session& session) { return session.end && !session.router->hasGreeted(); };
+  std::map<std::string, std::size_t> counts;
+  for (const auto& session : sessions_) {
+    if (isIdle(session)) ++counts[session.host];
+  }
+  if (counts.empty()) return false;
+  const auto most = std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; })->second;
+  const auto victim =
+      std::ranges::find_if(sessions_, [&](const Session& session) { return isIdle(session) && counts[session.host] == most; });
+  here_.log.warn("{} connections (max-connections), {} of them with {}, which has not greeted: the oldest one of these is closed",
+                 sessions_.size(), most, victim->host);
+  std::exchange(victim->end, nullptr)->fulfill();
+  return true;
 }
 
 void Router::lookAtServers() {
@@ -100,7 +123,7 @@ void Router::readWishes() {
     problem = error.what();
   }
   if (!problem.empty()) {
-    if (wishProblem_.empty()) here_.log.warn("some clients are not seen, for a while: {}", problem);
+    if (wishProblem_.empty()) here_.log.warn("cannot read which servers some clients wait for, trying again: {}", problem);
     wishesDue_.setAt(Deadline::after(kWishesAgain));
   }
   wishProblem_ = std::move(problem);
@@ -109,8 +132,8 @@ void Router::readWishes() {
 void Router::reload(const RouterConfig& config) {
   openTls(config);
   if (config.backplane != here_.config.backplane || config.name != here_.config.name)
-    here_.log.warn("another name or backplane needs a restart: this is still {}", here_.config.name);
-  here_.log.set_level(spdlog::level::from_str(config.logLevel));
+    here_.log.warn("a new name or backplane takes effect when the router starts again: this is still {}", here_.config.name);
+  here_.log.setLevel(config.logLevel);
   here_.config = config;
   std::erase_if(listeners_,
                 [&](const auto& listener) { return std::ranges::find(config.listen, listener->listen()) == config.listen.end(); });

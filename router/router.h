@@ -21,7 +21,7 @@ namespace mpf::router {
 class Router final : private kj::TaskSet::ErrorHandler {
  public:
   //   throws  ConfigError (TLS files), std::system_error
-  Router(kj::AsyncIoContext& io, const RouterConfig& config, spdlog::logger& log);
+  Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log);
   ~Router();
 
   // Resolves once it listens everywhere that it shall.
@@ -38,6 +38,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   Listener& listen(const Listen& listen);
   void listenLate(const Listen& listen);
   void onCaller(const Listen& listen, Listener::Caller caller);
+  bool tryMakeRoom();
   void lookAtServers();
   void lookAtWishes();
   void readWishes();
@@ -46,6 +47,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   struct Session {
     Listen listen;  // where it called
     std::unique_ptr<ServerRouter> router;
+    std::string host;  // that called
+    kj::Own<kj::PromiseFulfiller<void>> end;  // fulfilling it closes the connection; nullptr: done
   };
 
   Statistics statistics_;
@@ -57,9 +60,9 @@ class Router final : private kj::TaskSet::ErrorHandler {
   std::list<std::shared_ptr<Listener>> listeners_;
   std::list<std::unique_ptr<ClientRouter>> remotes_;
   std::list<Session> sessions_;
-  SeldomLog callerLog_;
   Alarm wishesDue_;
   std::string wishProblem_;  // that was logged last
+  TurnedAway turnedAway_;
   kj::TaskSet tasks_;
 };
 

@@ -50,7 +50,7 @@ kj::Promise<void> ServerRouter::run() {
         greeting.setMaxClients(line_->limits().maxClients);
       })
       .then([this](const LineEnd& end) {
-        here_.sessionLog.info("{} at {} is gone: {}", line_->peer().router.empty() ? "a peer" : line_->peer().router, address_, end.text);
+        here_.log.info("{} at {} is gone: {}", line_->peer().router.empty() ? "a peer" : line_->peer().router, address_, end.text);
       });
 }
 
@@ -66,8 +66,8 @@ void ServerRouter::stop() { line_->end(FarewellCode::STOPPING, "the router ends"
 void ServerRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
   record_->setState(layout::RouterLineState::connected);
-  here_.sessionLog.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program,
-                        peer_.empty() ? "" : ", certificate of ", peer_);
+  here_.log.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program, peer_.empty() ? "" : ", certificate of ",
+                 peer_);
 }
 
 // ---- servers
@@ -89,7 +89,8 @@ void ServerRouter::onBind(wire::Bind::Reader bind) {
   const auto number = bind.getBinding();
   if (bindings_.contains(number)) throw ProtocolError(FarewellCode::PROTOCOL, fmt::format("binding {} is open already", number));
   if (bindings_.size() >= kMaxBindings) return refuse(number, fmt::format("more than {} bindings", kMaxBindings));
-  if (!isServerName(bind.getServer())) return refuse(number, fmt::format("\"{}\" is no server's name", forPeople(bind.getServer())));
+  if (!isServerName(bind.getServer()))
+    return refuse(number, fmt::format("\"{}\" is not a valid name of a server", forPeople(bind.getServer())));
   const ServerName name{bind.getLocation(), toStd(bind.getServer())};
   const auto* serve = served(name);
   if (serve == nullptr) return refuse(number, fmt::format("server {} at location {} is not for this peer", name.server, name.location));
@@ -111,7 +112,7 @@ void ServerRouter::countAll() {
 }
 
 void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
-  here_.refusalLog.warn("{}: {}", address_, why);
+  here_.log.warn("{}: {}", address_, why);
   line_->send([number, why](wire::Item::Builder item) {
     auto server = item.initServer();
     server.setBinding(number);
@@ -121,7 +122,7 @@ void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
 }
 
 void ServerRouter::refuseClient(std::uint32_t number, const std::string& why) {
-  here_.refusalLog.warn("{}: a client is refused: {}", address_, why);
+  here_.log.warn("{}: a client is refused: {}", address_, why);
   line_->send([number, why](wire::Item::Builder item) {
     auto refusal = item.initRefuse();
     refusal.setClient(number);
@@ -138,8 +139,8 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
   const bool isThere = binding.presence->look();
   const bool hasFailed = !isThere && binding.presence->isDoubtful();
   if (hasFailed && !binding.failureSaid) {
-    here_.refusalLog.warn("{} at location {} cannot be offered to {}: {}", binding.name.server, binding.name.location, address_,
-                          binding.presence->problem());
+    here_.log.warn("{} at location {} cannot be offered to {}: {}", binding.name.server, binding.name.location, address_,
+                   binding.presence->problem());
   }
   binding.failureSaid = hasFailed;
   if (isThere && binding.told == binding.presence->incarnation()) return;
@@ -347,7 +348,7 @@ void ServerRouter::onRoom() {
 
 // What was asked for has been done, but what came of it cannot be said.
 void ServerRouter::onUnsendable(const Carried& carried, const std::string& why, wire::Item::Builder instead) {
-  here_.lostLog.warn("a reply to {} is lost: {}", address_, why);
+  here_.log.warn("a reply to {} is lost: {}", address_, why);
   // The window that it took comes back from nobody else.
   if (const auto client = clients_.find(carried.client); client != clients_.end()) client->second->credit(windowBytesOf(carried.message));
   if (!carried.isFirst) return;

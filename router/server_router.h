@@ -32,6 +32,7 @@ class ServerRouter final : public Line::Owner, public FarClient::Owner {
   // Until the line has ended.
   [[nodiscard]] kj::Promise<void> run();
   void stop();
+  [[nodiscard]] bool hasGreeted() const noexcept { return line_->hasGreeted(); }
   // What is served or allowed has changed.
   void onConfig();
   // Servers may have come or gone.

@@ -7,14 +7,13 @@
 #include <kj/async-io.h>
 #include <kj/async-unix.h>
 #include <memory>
-#include <spdlog/logger.h>
 
 #include <mpf/router/config.h>
 #include <mpf/router/presences.h>
-#include <mpf/router/seldom_log.h>
 #include <mpf/router/statistics.h>
 #include <mpf/router/tls.h>
 #include <mpf/schema/router.capnp.h>
+#include <mpf/server/programs/log.h>
 #include <mpf/shm/backplane.h>
 
 namespace mpf::router {
@@ -24,16 +23,12 @@ struct Surroundings {
   kj::Network& network;
   kj::Timer& timer;
   Backplane backplane;
-  spdlog::logger& log;
+  Log log;
   Statistics& statistics;
   Presences& presences;
   RouterConfig config;                 // as it is now; a reload changes it
   std::shared_ptr<Tls> tls;            // nullptr: nothing uses TLS
   std::uint64_t incarnation = 0;       // which life of this router
-  // What callers cause, of all together: who calls again and again has no log of his own to fill.
-  SeldomLog sessionLog{log};           // they come and go
-  SeldomLog refusalLog{log};           // they do not get something
-  SeldomLog lostLog{log};              // they do not get what they asked for
 };
 
 // Options of every TCP connection, before TLS.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include <mpf/router/kj_text.h>
 #include <mpf/router/tls_files.h>
 
 namespace mpf::router {
@@ -34,14 +35,16 @@ kj::TlsContext contextOf(const TlsTexts& texts, Side side) {
   return kj::TlsContext(options);
 }
 
-constexpr const char* kLeft = "the peer left in the midst of TLS";
+constexpr const char* kNoTls = "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers";
+constexpr const char* kNotVersion13 = "the peer does not support TLS 1.3, the only version that routers use";
+constexpr const char* kLeft = "the peer closed the connection during the TLS handshake";
 
 struct Trouble {
   std::string_view said;  // by OpenSSL or kj
   std::string_view means;
 };
 constexpr std::array kTroubles{
-    Trouble{"peer did not return a certificate", "the peer showed no certificate"},
+    Trouble{"peer did not return a certificate", "the peer sent no certificate"},
     Trouble{"certificate verify failed", "the peer's certificate was not signed by one of our authorities, or is not valid now"},
     Trouble{"reason = certificate has expired", "the peer's certificate has expired"},
     Trouble{"reason = certificate is not yet valid", "the peer's certificate is not valid yet"},
@@ -51,16 +54,16 @@ constexpr std::array kTroubles{
     Trouble{"alert certificate expired", "the peer refused our certificate: it has expired"},
     Trouble{"alert unknown ca", "the peer refused our certificate: its authorities did not sign it"},
     Trouble{"alert bad certificate", "the peer refused our certificate"},
-    Trouble{"alert certificate required", "the peer wants a certificate, and we showed none"},
-    Trouble{"alert protocol version", "the peer speaks no TLS version that we speak: 1.3"},
-    Trouble{"unsupported protocol", "the peer speaks no TLS version that we speak: 1.3"},
+    Trouble{"alert certificate required", "the peer requires a certificate, and this router has sent none"},
+    Trouble{"alert protocol version", kNotVersion13},
+    Trouble{"unsupported protocol", kNotVersion13},
     Trouble{"unable to continue I/O", kLeft},
-    Trouble{"wrong version number", "the peer speaks no TLS"},
-    Trouble{"http request", "the peer speaks no TLS"},
-    Trouble{"packet length too long", "the peer speaks no TLS"},
-    Trouble{"record layer failure", "the peer speaks no TLS"},
-    Trouble{"unexpected message", "the peer speaks no TLS"},
-    Trouble{"operation timed out", "the peer did not end the TLS handshake in time"},
+    Trouble{"wrong version number", kNoTls},
+    Trouble{"http request", kNoTls},
+    Trouble{"packet length too long", kNoTls},
+    Trouble{"record layer failure", kNoTls},
+    Trouble{"unexpected message", kNoTls},
+    Trouble{"operation timed out", "the peer did not finish the TLS handshake in time (handshake-time)"},
 };
 
 }  // namespace
@@ -105,7 +108,7 @@ std::string peerName(kj::PeerIdentity& peer) {
 std::string tlsTrouble(const kj::Exception& error) {
   const std::string said = error.getDescription().cStr();
   const auto* const trouble = std::ranges::find_if(kTroubles, [&](const Trouble& one) { return said.find(one.said) != std::string::npos; });
-  return trouble != kTroubles.end() ? std::string(trouble->means) : said;
+  return trouble != kTroubles.end() ? std::string(trouble->means) : reasonOf(error);
 }
 
 }  // namespace mpf::router

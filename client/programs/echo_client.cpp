@@ -12,6 +12,7 @@
 #include <mpf/base/command_line.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/latency_recorder.h>
+#include <mpf/base/log_limiter.h>
 #include <mpf/base/print_error.h>
 #include <mpf/base/run_main.h>
 #include <mpf/client/sync_client.h>
@@ -37,10 +38,13 @@ class EchoStatistics {
   void add(std::int64_t roundTripNs) { roundTrips_->add(static_cast<std::uint64_t>(roundTripNs)); }
   void fail(const std::string& why) {
     ++failures_;
-    printError("{}\n", why);
+    const auto nowNs = Clock::nowNs();
+    if (limiter_.dueNs() <= nowNs) say(limiter_.takeDue(nowNs));
+    if (limiter_.admit({}, 0, why, nowNs)) say({{0, why}});
   }
   // Returns the exit status: 0 when every message came back.
-  int report() const {
+  int report() {
+    say(limiter_.takeAll(Clock::nowNs()));
     const auto at = [&](double percent) { return durationText(static_cast<double>(roundTrips_->percentileNs(percent))); };
     fmt::print("{} came back, {} did not", roundTrips_->count(), failures_);
     if (roundTrips_->count() != 0) fmt::print("; round trip: p50 {}, p99 {}, max {}", at(50), at(99), at(100));
@@ -49,6 +53,11 @@ class EchoStatistics {
   }
 
  private:
+  static void say(const std::vector<LogLimiter::Line>& lines) {
+    for (const auto& line : lines) printError("{}\n", line.text);
+  }
+
+  LogLimiter limiter_;  // of failures: there may be as many as messages
   std::unique_ptr<LatencyRecorder> roundTrips_ = std::make_unique<LatencyRecorder>();
   std::uint64_t failures_ = 0;
 };

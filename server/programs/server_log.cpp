@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/server/programs/server_log.h>
 
-#include <spdlog/async.h>
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <spdlog/logger.h>
+#include <thread>
 #include <utility>
 
 #include <mpf/base/signals_blocked.h>
@@ -14,13 +19,107 @@ constexpr std::size_t kLinesThatMayWait = 1024;
 
 }  // namespace
 
-ServerLog::ServerLog(const std::string& program, const std::string& level) {
-  const SignalsBlocked blocked;  // for the thread that writes
-  writer_ = std::make_shared<spdlog::details::thread_pool>(kLinesThatMayWait, 1);
-  auto errors = std::make_shared<PrintableSink>();
-  logger_ = std::make_shared<spdlog::async_logger>(program, std::move(errors), writer_, spdlog::async_overflow_policy::overrun_oldest);
-  logger_->set_level(spdlog::level::from_str(level));
-  logger_->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
+// The queue, and the thread that empties it.
+class ServerLog::Writer {
+ public:
+  explicit Writer(const std::string& program) : logger_(program, std::make_shared<PrintableSink>()) {
+    logger_.set_level(Log::Level::trace);
+    logger_.set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
+  }
+
+  void start(const Log& log) {
+    const SignalsBlocked blocked;
+    thread_ = std::thread([this, log] { run(log); });
+  }
+  // Returns when the queue is empty.
+  void finish() {
+    {
+      const std::scoped_lock guard(lock_);
+      ends_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+
+  void add(Log::Level level, std::string text) noexcept try {
+    {
+      const std::scoped_lock guard(lock_);
+      if (queue_.size() == kLinesThatMayWait) {
+        queue_.pop_front();
+        ++dropped_;
+      }
+      queue_.push_back({spdlog::log_clock::now(), level, std::move(text)});
+    }
+    changed_.notify_one();
+  } catch (...) {  // no memory for a line: the program is worth more than its log
+  }
+
+  void wakeAt(std::int64_t dueNs) noexcept {
+    {
+      const std::scoped_lock guard(lock_);
+      dueNs_ = std::min(dueNs_, dueNs);
+    }
+    changed_.notify_one();
+  }
+
+ private:
+  struct Line {
+    spdlog::log_clock::time_point time;
+    Log::Level level;
+    std::string text;
+  };
+
+  void run(const Log& log) {
+    std::unique_lock guard(lock_);
+    for (;;) {
+      if (!queue_.empty()) {
+        writeQueue(guard);
+      } else if (ends_) {
+        return;
+      } else if (dueNs_ <= Clock::nowNs()) {
+        dueNs_ = INT64_MAX;
+        guard.unlock();
+        const auto nextNs = log.writeDue();
+        guard.lock();
+        dueNs_ = std::min(dueNs_, nextNs);
+      } else if (dueNs_ == INT64_MAX) {
+        changed_.wait(guard);
+      } else {
+        changed_.wait_for(guard, Deadline::atNs(dueNs_).left());
+      }
+    }
+  }
+
+  void writeQueue(std::unique_lock<std::mutex>& guard) {
+    const auto lines = std::exchange(queue_, {});
+    const auto dropped = std::exchange(dropped_, 0);
+    guard.unlock();
+    if (dropped != 0) logger_.warn("{} lines are missing here: nobody read stderr in time", dropped);
+    for (const auto& line : lines) logger_.log(line.time, spdlog::source_loc{}, line.level, line.text);
+    guard.lock();
+  }
+
+  spdlog::logger logger_;
+  std::mutex lock_;
+  std::condition_variable changed_;
+  std::deque<Line> queue_;
+  std::uint64_t dropped_ = 0;
+  std::int64_t dueNs_ = INT64_MAX;  // when the limit has lines to write
+  bool ends_ = false;
+  std::thread thread_;
+};
+
+// A Log that outlives this object keeps the queue, whose lines nobody writes any more.
+ServerLog::ServerLog(const std::string& program, const std::string& level)
+    : writer_(std::make_shared<Writer>(program)),
+      log_([writer = writer_](Log::Level of, std::string text) { writer->add(of, std::move(text)); }, spdlog::level::from_str(level)) {
+  log_.onHeld([writer = writer_](std::int64_t dueNs) { writer->wakeAt(dueNs); });
+  writer_->start(log_);
+}
+
+ServerLog::~ServerLog() {
+  log_.writeHeld();
+  writer_->finish();
 }
 
 const std::vector<std::string>& ServerLog::levels() {

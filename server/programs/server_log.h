@@ -3,15 +3,18 @@
 //
 //   2024-05-01 12:00:00.000 info mpf-serial-server: /dev/ttyS0 is lost: read /dev/ttyS0: Input/output error
 //
-// Threads  any may log; none waits for stderr. When nobody reads that, the oldest lines that wait are dropped.
-// Crash    lines that were not written yet are lost.
+//   threads ─► Log (limits lines of one kind) ─► queue ─► one thread ─► stderr
+//
+// Threads  any may log; none waits for stderr. When nobody reads stderr, the oldest lines in the queue
+//          are dropped, and a line says how many.
+// Crash    lines in the queue, and lines that the limit holds, are lost.
 #pragma once
 
 #include <memory>
-#include <spdlog/async_logger.h>
-#include <spdlog/logger.h>
 #include <string>
 #include <vector>
+
+#include <mpf/server/programs/log.h>
 
 namespace mpf {
 
@@ -19,16 +22,22 @@ class ServerLog {
  public:
   // `level`: one of levels().
   ServerLog(const std::string& program, const std::string& level);
+  // Writes everything that was logged.
+  ~ServerLog();
+  ServerLog(const ServerLog&) = delete;
+  ServerLog& operator=(const ServerLog&) = delete;
 
   // log->info("{} is back", port);
-  spdlog::logger* operator->() const noexcept { return logger_.get(); }
+  const Log* operator->() const noexcept { return &log_; }
+  const Log& operator*() const noexcept { return log_; }
 
   // trace, debug, info, warning, error, critical, off.
   static const std::vector<std::string>& levels();
 
  private:
-  std::shared_ptr<spdlog::logger> logger_;
-  std::shared_ptr<spdlog::details::thread_pool> writer_;  // last: ends first, after it has written what waits
+  class Writer;
+  std::shared_ptr<Writer> writer_;
+  Log log_;
 };
 
 }  // namespace mpf

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iostream>
-#include <spdlog/sinks/null_sink.h>
 
 #include <mpf/tests/fuzz/hostile_files.h>
 
@@ -53,13 +52,12 @@ void check(bool isRight, const char* what) {
 
 RouterScene::RouterScene()
     : backplane(fuzzBackplane()),
-      log("fuzz", std::make_shared<spdlog::sinks::null_sink_mt>()),
       statistics(backplane, "fuzz"),
       here{.port = io.unixEventPort,
            .network = io.provider->getNetwork(),
            .timer = io.provider->getTimer(),
            .backplane = backplane,
-           .log = log,
+           .log = Log([](Log::Level, const std::string&) {}),
            .statistics = statistics,
            .presences = presences,
            .config = configOf(backplane),

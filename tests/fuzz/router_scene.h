@@ -7,7 +7,6 @@
 #include <functional>
 #include <kj/async-io.h>
 #include <map>
-#include <spdlog/logger.h>
 #include <utility>
 
 #include <mpf/router/frame_reader.h>
@@ -27,7 +26,6 @@ struct RouterScene {
 
   kj::AsyncIoContext io = kj::setupAsyncIo();
   Backplane backplane;
-  spdlog::logger log;
   router::Statistics statistics;
   std::function<void()> onServers = [] {};  // called when they may have come or gone
   router::Presences presences{backplane, io.unixEventPort, [this] { onServers(); }};

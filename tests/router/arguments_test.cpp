@@ -123,10 +123,10 @@ TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
        "nothing to do: write --serve and --listen for servers of this host that clients elsewhere use, or --remote for servers elsewhere "
        "that clients of this host use"},
       {{"--serve", "1"}, "--serve 1: what is served cannot be reached: write --listen, too"},
-      {{"--serve", "one"}, "--serve: \"one\" is no location: write an integer"},
-      {{"--serve", "1="}, "--serve: \"\" is no location: write an integer"},
+      {{"--serve", "one"}, "--serve: \"one\" is not a location: write an integer"},
+      {{"--serve", "1="}, "--serve: \"\" is not a location: write an integer"},
       {{"--remote", "ioc1:9900"}, "--remote: \"ioc1:9900\": write LOCATION[,LOCATION]=HOST:PORT"},
-      {{"--remote", "1,=ioc1:9900"}, "--remote: \"\" is no location: write an integer"},
+      {{"--remote", "1,=ioc1:9900"}, "--remote: \"\" is not a location: write an integer"},
       {{"--remote", "1=ioc1"},
        "--remote: \"ioc1\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, [fd00::7]:9900 or, to listen, *:9900"},
       {{"--remote", "1=a:1", "--remote", "1=b:1", "--plain"}, "--remote 1=b:1: location 1 is reached twice; write it once"},
@@ -219,7 +219,7 @@ security = "plain"
                                       "certificate ioc1, valid until 20"));
   EXPECT_THAT(started.out,
               HasSubstr("\nlimits      queue-size 100 buffer-size 1MiB max-message-size 64MiB window-size 4MiB max-clients 16000 "
-                        "max-connections 1000 dead-time 2s first-retry 100ms last-retry 5s\n"));
+                        "max-connections 1000 dead-time 2s handshake-time 5s first-retry 100ms last-retry 5s\n"));
 }
 
 }  // namespace

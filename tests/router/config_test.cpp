@@ -71,6 +71,7 @@ window-size = "64KiB"
 max-clients = 10
 max-connections = 3
 dead-time = "1min"
+handshake-time = "4s"
 first-retry = "50ms"
 last-retry = "2s"
 
@@ -114,7 +115,7 @@ servers = "Int32"
   EXPECT_TRUE(config.allowPublicPlain);
   EXPECT_EQ(config.tls, (TlsFiles{folder_.file("ours.pem"), folder_.file("ours.key"), folder_.file("all.pem")}))
       << "paths are meant from where the file is";
-  EXPECT_EQ(config.limits, (Limits{40, 1500, 8u << 20, 64u << 10, 10, 3, 60s, 50ms, 2s}));
+  EXPECT_EQ(config.limits, (Limits{40, 1500, 8u << 20, 64u << 10, 10, 3, 60s, 4s, 50ms, 2s}));
   EXPECT_THAT(config.serve, ElementsAre(Serve{1, 0}, Serve{3, 3}));
   EXPECT_THAT(config.listen, ElementsAre(Listen{{"*", 9900}, Security::tls}, Listen{{"192.0.2.1", 9901}, Security::plain}));
   EXPECT_THAT(config.remotes, ElementsAre(Remote{{-7, 2}, {"fd00::7", 9900}, Security::tls, "ioc7.lab"},

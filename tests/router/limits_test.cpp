@@ -35,12 +35,12 @@ TEST(RouterLimits, AreReadAsTheyAreWritten) {
   Limits changed;
   const std::vector<std::pair<std::string, std::string>> texts{
       {"queue-size", "40"},     {"buffer-size", "1500"}, {"max-message-size", "8MiB"}, {"window-size", "65KiB"}, {"max-clients", "7"},
-      {"max-connections", "9"}, {"dead-time", "1500ms"}, {"first-retry", "1s"},        {"last-retry", "2min"}};
+      {"max-connections", "9"}, {"dead-time", "1500ms"}, {"handshake-time", "3s"},     {"first-retry", "1s"},    {"last-retry", "2min"}};
   ASSERT_EQ(texts.size(), limitNames().size());
 
   for (const auto& [name, text] : texts) setLimit(changed, name, text);
 
-  EXPECT_EQ(changed, (Limits{40, 1500, 8u << 20, 65u << 10, 7, 9, 1500ms, 1s, 2min}));
+  EXPECT_EQ(changed, (Limits{40, 1500, 8u << 20, 65u << 10, 7, 9, 1500ms, 3s, 1s, 2min}));
   for (const auto& [name, text] : texts) EXPECT_EQ(limitText(changed, name), text);
 }
 

@@ -28,7 +28,7 @@ using router::ProtocolError;
 
 class LineTest : public testing::Test, public Line::Owner {
  protected:
-  LineTest() { limits_.deadTime = std::chrono::minutes(10); }  // no pings but those that a test asks for
+  LineTest() { limits_.deadTime = limits_.handshakeTime = std::chrono::minutes(10); }  // no pings but those that a test asks for
   ~LineTest() noexcept override = default;
 
   void TearDown() override { hangUp(); }

@@ -20,6 +20,21 @@ TEST_F(LineTest, EndsWhenNoGreetingComes) {
   EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for 1"));
 }
 
+// They are signs of life, and no greeting.
+TEST_F(LineTest, EndsWhenOnlyEmptyFramesCome) {
+  pipe_ = io_.provider->newTwoWayPipe();  // the kernel's, which keeps what is written
+  peer_ = kj::mv(pipe_.ends[1]);
+  limits_.handshakeTime = 100ms;
+  start();
+
+  while (end_.empty()) {
+    send(frameOf({}));
+    io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
+  }
+
+  EXPECT_EQ(end_, "the peer sent no greeting within 100 ms (handshake-time)");
+}
+
 TEST_F(LineTest, EndsWhenThePeerFallsSilentAndDoesNotReadEither) {
   limits_.deadTime = 100ms;
   startGreeted();

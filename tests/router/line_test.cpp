@@ -40,8 +40,8 @@ TEST_P(NoGreetingTest, EndsTheLine) {
 
   send(frameOf({GetParam(), greeting()}));
 
-  EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("no greeting")));
-  EXPECT_THAT(end_, HasSubstr("no greeting"));
+  EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("is not a greeting")));
+  EXPECT_THAT(end_, HasSubstr("is not a greeting"));
   EXPECT_THAT(said_, IsEmpty());
 }
 INSTANTIATE_TEST_SUITE_P(AsFirstItem, NoGreetingTest,
@@ -55,7 +55,7 @@ TEST_F(LineTest, EndsAtAnotherMajorVersion) {
   send(frameOf({greeting([](auto greeting) { greeting.setProtocolMajor(2); })}));
 
   EXPECT_THAT(farewell(), AllOf(HasSubstr("code = version"), HasSubstr("protocol 2.0")));
-  EXPECT_THAT(end_, HasSubstr("this router speaks 1.x"));
+  EXPECT_THAT(end_, HasSubstr("this router 1.x"));
 }
 
 TEST_F(LineTest, TakesAnyMinorVersion) {
@@ -69,6 +69,29 @@ TEST_F(LineTest, EndsWhenThePeerReadsShortFramesOnly) {
   send(frameOf({greeting([](auto greeting) { greeting.setMaxFrameBytes(65'535); })}));
 
   EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("65535")));
+}
+
+// The beginning of a handshake, and the alert by which TLS answers a plain greeting.
+TEST_F(LineTest, SaysThatThePeerUsesTls) {
+  for (const Bytes& bytes : {Bytes{0x16, 3, 1, 2, 0, 1}, Bytes{0x15, 3, 1, 0, 2, 2, 70}}) {
+    start();
+    receive();
+
+    send(bytes);
+
+    EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("the peer uses TLS")));
+    restart();
+  }
+}
+
+TEST_F(LineTest, SaysWhatMayBeWrongWithAPeerThatClosesBeforeItsGreeting) {
+  start();
+  receive();
+
+  peer_ = nullptr;
+  settle();
+
+  EXPECT_THAT(end_, StartsWith("the peer closed the connection before its greeting: is it a router"));
 }
 
 // Before it has said who it is, nobody gets memory.
@@ -149,7 +172,7 @@ TEST_F(LineTest, EndsWithAFarewellWhenAFrameIsNone) {
   send(bytes);
 
   EXPECT_THAT(farewell(), HasSubstr("code = protocol"));
-  EXPECT_THAT(end_, HasSubstr("a frame that is none"));
+  EXPECT_THAT(end_, HasSubstr("a frame that cannot be read"));
 }
 
 TEST_F(LineTest, EndsWithTheCodeThatItsOwnerThrows) {

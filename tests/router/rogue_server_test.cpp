@@ -24,7 +24,7 @@ TEST_F(RogueServerTest, ThatDoesNotGreetIsLeftAndCalledAgain) {
   for (int i = 0; i < 3; ++i) {
     auto peer = host_.accept();
     peer.sendItems({server(1, wire::Server::State::THERE)});
-    EXPECT_THAT(peer.farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("no greeting")));
+    EXPECT_THAT(peer.farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("is not a greeting")));
   }
   auto peer = rogue();
   const auto id = asked(peer);

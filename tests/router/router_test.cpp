@@ -7,12 +7,9 @@
 #include <kj/debug.h>
 #include <memory>
 #include <optional>
-#include <spdlog/details/null_mutex.h>
-#include <spdlog/sinks/base_sink.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <sstream>
 #include <stdexcept>
 
+#include <mpf/router/kj_text.h>
 #include <mpf/tests/router/held_network.h>
 #include <mpf/tests/support/test_backplane.h>
 #include <mpf/tests/support/watchdog.h>
@@ -49,8 +46,12 @@ class HeldRouterTest : public testing::Test {
 
   const mpf::test::Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
   const mpf::test::TestBackplane backplane_;
-  std::ostringstream said_;
-  spdlog::logger log_{"router", std::make_shared<spdlog::sinks::ostream_sink_st>(said_)};
+  std::string said_;
+  bool isFull_ = false;  // there is no room for another line
+  const Log log_{[this](Log::Level, const std::string& text) {
+    if (isFull_) throw std::runtime_error("no room");
+    said_ += text + '\n';
+  }};
   HeldIo io_;
   std::optional<Router> router_{std::in_place, io_.context(), config(), log_};
 };
@@ -65,7 +66,7 @@ TEST_F(SlowLookupTest, EndsWithAListenerThatAReloadNamesNoMore) {
   EXPECT_FALSE(lookups()[0]->isWaiting());
   fail(0);
 
-  EXPECT_EQ(said_.str(), "");
+  EXPECT_EQ(said_, "");
 }
 
 TEST_F(SlowLookupTest, EndsWithTheRouter) {
@@ -75,7 +76,7 @@ TEST_F(SlowLookupTest, EndsWithTheRouter) {
   ASSERT_FALSE(lookups()[0]->isWaiting());
 
   stopped.wait(io_.context().waitScope);
-  EXPECT_EQ(said_.str(), "");
+  EXPECT_EQ(said_, "");
 }
 
 // At start-up, when somebody waits for it.
@@ -92,7 +93,7 @@ TEST_F(SlowLookupTest, EndsWithARouterThatHasYetToStart) {
 TEST_F(SlowLookupTest, ThatFailsIsToldAndTheNextReloadTriesItAgain) {
   router_->reload(withListener());
   fail(0);
-  EXPECT_THAT(said_.str(), testing::HasSubstr("slow.lab:9900: no such name"));
+  EXPECT_THAT(said_, testing::HasSubstr("slow.lab:9900: no such name"));
   EXPECT_TRUE(router_->listening().empty());
 
   router_->reload(withListener());
@@ -115,17 +116,28 @@ TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
   EXPECT_EQ(router_->listening().size(), 1u);
 }
 
+TEST_F(SlowLookupTest, ThatFailsNamesItsStepAndTheReason) {
+  router_->reload(withRemote());
+  lookups()[0]->reject(
+      KJ_EXCEPTION(FAILED, "DNS lookup failed.; params.host = slow.lab; gai_strerror(status) = Name or service not known"));
+  io_.run();
+
+  EXPECT_EQ(said_, "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
+}
+
+TEST(ReasonOf, LeavesOutTheNamesOfCallsAndVariables) {
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "connect(): Connection refused")), "Connection refused");
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "::bind(sockfd, &addr, length): Address already in use; toString() = 127.0.0.1:1")),
+            "Address already in use");
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(OVERLOADED, "operation timed out")), kTimeout);
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "something else; whatever")), "something else; whatever");
+}
+
 // A line end that cannot be told, say: the remote would be called no more, and nobody would know.
 using RemoteTest = HeldRouterTest;
 
-class FullSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
-  void sink_it_(const spdlog::details::log_msg& /*message*/) override { throw std::runtime_error("no room"); }
-  void flush_() override {}
-};
-
 TEST_F(RemoteTest, ThatCannotGoOnEndsTheProgram) {
-  log_.sinks() = {std::make_shared<FullSink>()};
-  log_.set_error_handler([](const std::string& why) { throw std::runtime_error(why); });
+  isFull_ = true;
   router_->reload(withRemote());
   ASSERT_EQ(lookups().size(), 1u);
 

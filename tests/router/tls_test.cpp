@@ -23,6 +23,8 @@ using testing::HasSubstr;
 
 const std::string kNotOurs = "the peer's certificate was not signed by one of our authorities";
 
+const std::string kNoTls = "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers";
+
 class TlsTest : public testing::Test {
  public:
   ~TlsTest() noexcept override = default;  // what kj has may throw as it goes
@@ -188,19 +190,19 @@ TEST_F(TlsTest, RefusesAClientWithoutCertificate) {
   connected.wait(io_.waitScope);
   EXPECT_THAT(sides.client.trouble, HasSubstr("was not signed")) << "nor does it know us";
   accepted.wait(io_.waitScope);
-  EXPECT_EQ(sides.server.trouble, "the peer showed no certificate");
+  EXPECT_EQ(sides.server.trouble, "the peer sent no certificate");
 }
 
 TEST_F(TlsTest, RefusesWhoSpeaksSomethingElse) {
-  EXPECT_EQ(troubleOfAccepting("GET / HTTP/1.1\r\n\r\n"), "the peer speaks no TLS");
-  EXPECT_EQ(troubleOfAccepting("hello, hello, hello\n"), "the peer speaks no TLS");
+  EXPECT_EQ(troubleOfAccepting("GET / HTTP/1.1\r\n\r\n"), kNoTls);
+  EXPECT_EQ(troubleOfAccepting("hello, hello, hello\n"), kNoTls);
   const std::string frame("\0\0\0\0\x09\0\0\0\0\0\0\0\x01\0\0\0", 16);  // as a plain router begins
-  EXPECT_EQ(troubleOfAccepting(kj::StringPtr(frame.c_str(), frame.size())), "the peer speaks no TLS");
+  EXPECT_EQ(troubleOfAccepting(kj::StringPtr(frame.c_str(), frame.size())), kNoTls);
 }
 
 TEST_F(TlsTest, RefusesWhoLeavesEarly) {
-  EXPECT_EQ(troubleOfAccepting(""), "the peer left in the midst of TLS");
-  EXPECT_EQ(troubleOfAccepting(kj::StringPtr("\x16\x03\x01", 3)), "the peer left in the midst of TLS");
+  EXPECT_EQ(troubleOfAccepting(""), "the peer closed the connection during the TLS handshake");
+  EXPECT_EQ(troubleOfAccepting(kj::StringPtr("\x16\x03\x01", 3)), "the peer closed the connection during the TLS handshake");
 }
 
 // Another program's TLS, also with the version before.
@@ -221,7 +223,7 @@ TEST_F(TlsTest, SpeaksVersion13AndNoOlderOne) {
   const auto older = tryWith("-tls1_2");
 
   EXPECT_EQ(nameOf(current), "client");
-  EXPECT_EQ(older.trouble, "the peer speaks no TLS version that we speak: 1.3");
+  EXPECT_EQ(older.trouble, "the peer does not support TLS 1.3, the only version that routers use");
 }
 
 // Time stands still until the test lets it go on.
@@ -241,8 +243,8 @@ TEST_F(TlsTest, WaitsForTheHandshakeNoLongerThanItShould) {
 
   accepted.wait(io_.waitScope);
   connected.wait(io_.waitScope);
-  EXPECT_EQ(sides.server.trouble, "the peer did not end the TLS handshake in time");
-  EXPECT_EQ(sides.client.trouble, "the peer did not end the TLS handshake in time");
+  EXPECT_EQ(sides.server.trouble, "the peer did not finish the TLS handshake in time (handshake-time)");
+  EXPECT_EQ(sides.client.trouble, "the peer did not finish the TLS handshake in time (handshake-time)");
 }
 
 // A reloaded configuration replaces the Tls; what is connected goes on.

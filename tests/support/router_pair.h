@@ -111,6 +111,7 @@ class RouterPair {
     options.insert(options.end(), more.begin(), more.end());
     // Where many want the processors, a router may not run for seconds: that is for those tests to count that mean it.
     if (std::ranges::find(more, "--dead-time") == more.end()) options.insert(options.end(), {"--dead-time", "60s"});
+    if (std::ranges::find(more, "--handshake-time") == more.end()) options.insert(options.end(), {"--handshake-time", "60s"});
     return std::make_unique<RouterProcess>(options, enter);
   }
   TestBackplane near_;

@@ -72,7 +72,7 @@ TEST_F(RouterLimitsTest, ClientsBeyondTheLimitAreRefusedUntilOthersLeave) {
   third.send(Int32Message());
   runUntil([&] { return !third.messages.empty(); });
   EXPECT_EQ(fateOf(third.take()), Fate::refused);
-  routers_.nearRouter().waitUntilSaid("takes 2 clients and no more");
+  routers_.nearRouter().waitUntilSaid("accepts at most 2 clients");
   expectAnswer();
 
   second.reset();

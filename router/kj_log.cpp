@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/router/kj_log.h>
+
+#include <mpf/router/kj_text.h>
+
+namespace mpf::router {
+
+void KjLog::logMessage(kj::LogSeverity severity, const char* /*file*/, int /*line*/, int /*contextDepth*/, kj::String&& text) {
+  const auto said = forPeople(kj::StringPtr(text));
+  if (severity == kj::LogSeverity::ERROR || severity == kj::LogSeverity::FATAL) log_.error("Cap'n Proto: {}", said);
+  else if (severity == kj::LogSeverity::WARNING) log_.warn("Cap'n Proto: {}", said);
+  else log_.debug("Cap'n Proto: {}", said);
+}
+
+kj::Function<void(kj::Function<void()>)> KjLog::getThreadInitializer() {
+  return [log = log_](kj::Function<void()> run) {
+    const KjLog ofThisThread(log);
+    try {
+      run();
+    } catch (const kj::Exception& error) {
+      if (error.getType() != kj::Exception::Type::DISCONNECTED) throw;
+      log.debug("a look-up of a name ended after nobody waited for it any more");
+    }
+  };
+}
+
+}  // namespace mpf::router

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// Log: what a program says to people, with a limit on lines of one kind (LogLimiter).
+//
+//   log.info("{} is back", port)
+//   const Log ofThisRemote = log.forObject();    // its lines have limits of their own
+//
+// A kind is one statement in the source and one object. Statements that other users can cause share the
+// limits of their object, so do not give objects that others create a Log of their own.
+//
+// Threads  any may log. `write` is called under a lock, in the order of the lines.
+#pragma once
+
+#include <atomic>
+#include <fmt/format.h>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <source_location>
+#include <spdlog/common.h>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include <mpf/base/clock.h>
+#include <mpf/base/log_limiter.h>
+
+namespace mpf {
+
+// A format, and the statement that it stands in.
+template <class... Arguments>
+struct LogFormat {
+  template <class Text>
+  consteval LogFormat(const Text& text,  // NOLINT(google-explicit-constructor): a string literal
+                      std::source_location where = std::source_location::current())
+      : format(text), at(where) {}
+  fmt::format_string<Arguments...> format;
+  std::source_location at;
+};
+
+class Log {
+ public:
+  using Level = spdlog::level::level_enum;
+  using Write = std::function<void(Level, std::string)>;
+  using Now = std::function<std::int64_t()>;  // [ns]
+
+  explicit Log(Write write, Level least = Level::info, Now now = Clock::nowNs);
+
+  // A log with limits of its own, for an object of the configuration.
+  [[nodiscard]] Log forObject() const;
+
+  template <class... Arguments>
+  void debug(LogFormat<std::type_identity_t<Arguments>...> format, Arguments&&... arguments) const {
+    say(Level::debug, format, std::forward<Arguments>(arguments)...);
+  }
+  template <class... Arguments>
+  void info(LogFormat<std::type_identity_t<Arguments>...> format, Arguments&&... arguments) const {
+    say(Level::info, format, std::forward<Arguments>(arguments)...);
+  }
+  template <class... Arguments>
+  void warn(LogFormat<std::type_identity_t<Arguments>...> format, Arguments&&... arguments) const {
+    say(Level::warn, format, std::forward<Arguments>(arguments)...);
+  }
+  template <class... Arguments>
+  void error(LogFormat<std::type_identity_t<Arguments>...> format, Arguments&&... arguments) const {
+    say(Level::err, format, std::forward<Arguments>(arguments)...);
+  }
+  template <class... Arguments>
+  void critical(LogFormat<std::type_identity_t<Arguments>...> format, Arguments&&... arguments) const {
+    say(Level::critical, format, std::forward<Arguments>(arguments)...);
+  }
+
+  // One of ServerLog::levels().
+  void setLevel(const std::string& name) const;
+
+  // Calls `held` with the time at which writeDue() has something to write, whenever that is earlier
+  // than it was. Under the lock: `held` calls no Log.
+  void onHeld(std::function<void(std::int64_t dueNs)> held) const;
+  // Writes what is due. Returns the time of the next call; INT64_MAX: nothing is held.
+  std::int64_t writeDue() const;
+  // Writes all that is held: before the program ends.
+  void writeHeld() const;
+
+ private:
+  struct Core {
+    std::mutex lock;
+    std::atomic<Level> least;
+    Write write;
+    Now now;
+    LogLimiter limiter;
+    std::function<void(std::int64_t)> held;
+    std::uint64_t lastObject = 0;
+  };
+
+  template <class... Arguments>
+  void say(Level level, const LogFormat<std::type_identity_t<Arguments>...>& format, Arguments&&... arguments) const {
+    if (level < core_->least.load(std::memory_order_relaxed)) return;
+    sayText(level, format.at, fmt::format(format.format, std::forward<Arguments>(arguments)...));
+  }
+  void sayText(Level level, const std::source_location& at, std::string text) const;
+
+  std::shared_ptr<Core> core_;
+  std::uint64_t object_ = 0;
+};
+
+}  // namespace mpf
