@@ -300,6 +300,7 @@ void Binding::nudge(std::int64_t nowNs) {
       return disconnect("the server ended before it had accepted the client", Ending::serverGone);
     } else {
       link.peer()->knock(link.header().incarnation);
+      if (const auto why = shortageAt(link.peer()->control()); !why.empty()) setReason(why);
       if (dispatcher_.endpoint().window().isNameless())
         setReason(
             "somebody removed this process's files from /dev/shm (RemoveIPC of systemd-logind?): no server finds it until it starts again");

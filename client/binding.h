@@ -72,6 +72,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void makeChannel(const std::shared_ptr<PeerWindow>& server);
   void wish();
   void setReason(const std::string& reason);
+  [[nodiscard]] std::string shortageAt(const layout::WindowControl& server) const;
   void wakeAt(std::int64_t ns) noexcept;
   void noteFull() noexcept;
   static constexpr std::int64_t kRetryNs = 1'000'000'000;

@@ -56,8 +56,26 @@ void Binding::tryConnect() try {
   wakeAt(Clock::nowNs() + kRetryNs);
 }
 
+// Why a server that lacks something does not accept the client; empty when it lacks nothing.
+std::string Binding::shortageAt(const layout::WindowControl& server) const {
+  switch (server.shortage.load(std::memory_order_relaxed)) {
+    case layout::Shortage::descriptors:
+      return fmt::format(
+          "server \"{}\" cannot accept the client: its process has no file descriptor left; "
+          "start it with a higher limit (ulimit -n)",
+          server_);
+    case layout::Shortage::openFiles:
+      return fmt::format("server \"{}\" cannot accept the client: its host has no open file left; raise fs.file-max", server_);
+    case layout::Shortage::memory:
+      return fmt::format("server \"{}\" cannot accept the client: it has no memory left", server_);
+    default:
+      return {};
+  }
+}
+
 void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
   auto& endpoint = dispatcher_.endpoint();
+  endpoint.window().admit(Link::rightsAt(*server));  // it writes our hints
   auto link = Link::create(endpoint.backplane().name(), endpoint.window(), index_, server);
   auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding);
   auto channel = std::make_shared<MessageLink>(std::move(link), lock_);

@@ -44,6 +44,7 @@ class ServerCore {
   [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
   [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
   int descriptor();
+  void onShortage(std::function<void(const std::string&)> tell) { tellShortage_ = std::move(tell); }
   void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }
 
   struct Counts {
@@ -73,6 +74,7 @@ class ServerCore {
   void closeAll() noexcept;
   void removeLinkOfDead(const Connection& connection) noexcept;
   void removeLink(const std::string& name, std::uint64_t incarnation) noexcept;
+  void noteShortage(layout::Shortage shortage, const std::string& why);
   void closeIfClientDid(Connection& connection) noexcept;
   bool take(Connection& connection, Message& message) noexcept;
   bool hasExpired(const Envelope& envelope) noexcept;
@@ -87,6 +89,9 @@ class ServerCore {
   std::vector<Connection::Pointer> connections_;  // by index in the window
   std::map<std::uint64_t, Connection*> byLink_;
   std::function<void(std::uint64_t, bool)> clientNews_;
+  std::function<void(const std::string&)> tellShortage_;
+  std::int64_t rescanFromNs_ = 0;  // no look for links by name before
+  bool rescanDue_ = false;
   Deadline takeBefore_ = Deadline::never();  // of the request taken last
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;

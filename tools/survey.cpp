@@ -118,6 +118,8 @@ class Surveyor {
         return;
       case NameKind::router:
         return router(name);
+      case NameKind::reaper:  // of a moment, and without content
+        return;
     }
   }
 
