@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <mpf/base/signals_blocked.h>
+#include <mpf/server/message_server.h>
 
 namespace mpf {
 namespace {
@@ -21,6 +22,13 @@ ServerLog::ServerLog(const std::string& program, const std::string& level) {
   logger_ = std::make_shared<spdlog::async_logger>(program, std::move(errors), writer_, spdlog::async_overflow_policy::overrun_oldest);
   logger_->set_level(spdlog::level::from_str(level));
   logger_->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
+}
+
+void logShortages(MessageServer& server, const ServerLog& log) {
+  server.onShortage([&log, name = server.getName()](const std::string& why) {
+    if (why.empty()) return log->info(R"("{}" accepts clients again)", name);
+    log->warn(R"("{}" cannot accept another client: {}; start it with higher limits (ulimit -n))", name, why);
+  });
 }
 
 const std::vector<std::string>& ServerLog::levels() {

@@ -31,4 +31,10 @@ class ServerLog {
   std::shared_ptr<spdlog::details::thread_pool> writer_;  // last: ends first, after it has written what waits
 };
 
+class MessageServer;
+
+// Says when `server` cannot accept clients for lack of descriptors or memory, and when it can again.
+//   log  outlives the server
+void logShortages(MessageServer& server, const ServerLog& log);
+
 }  // namespace mpf

@@ -60,6 +60,7 @@ int main(int argc, char** argv) try {
   mpf::MessageServer server(backplane, name + "Out", arguments.messages);
   const auto stop = [](void* outputs) noexcept { static_cast<mpf::MessageServer*>(outputs)->interrupt(); };
   const mpf::StopSignals signals(stop, &server);  // before anybody has an answer, and may stop us
+  mpf::logShortages(server, log);
   const mpf::DigitalOutputServer outputs(server, io, log);
   mpf::ProgramFailure failure;
   const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log, [&] { failure.report(); });
