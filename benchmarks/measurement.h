@@ -53,6 +53,7 @@ struct Result {
 [[nodiscard]] std::vector<Measurement> floorMeasurements();
 [[nodiscard]] std::vector<Measurement> peerMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> scaleMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> deathMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> tappedMeasurements(const std::string& runName);
 
 inline constexpr const char* kBounce = "cache-line bounce";

@@ -79,6 +79,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void wish();
   [[nodiscard]] std::string notAcceptedBecause(const PeerWindow& server) const;
   void setReason(const std::string& reason);
+  [[nodiscard]] std::string shortageAt(const layout::WindowControl& server) const;
   void wakeAt(std::int64_t ns) noexcept;
   void noteFull() noexcept;
   static constexpr std::int64_t kRetryNs = 1'000'000'000;

@@ -81,9 +81,27 @@ void Binding::tryConnect() try {
   wakeAt(Clock::nowNs() + kRetryNs);
 }
 
+// Why a server that lacks something does not accept the client; empty when it lacks nothing.
+std::string Binding::shortageAt(const layout::WindowControl& server) const {
+  switch (server.shortage.load(std::memory_order_relaxed)) {
+    case layout::Shortage::descriptors:
+      return fmt::format(
+          "server \"{}\" cannot accept the client: its process has no file descriptor left; "
+          "start it with a higher limit (ulimit -n)",
+          server_);
+    case layout::Shortage::openFiles:
+      return fmt::format("server \"{}\" cannot accept the client: its host has no open file left; raise fs.file-max", server_);
+    case layout::Shortage::memory:
+      return fmt::format("server \"{}\" cannot accept the client: it has no memory left", server_);
+    default:
+      return {};
+  }
+}
+
 // A server that works on a request accepts nobody meanwhile.
 std::string Binding::notAcceptedBecause(const PeerWindow& server) const {
   const auto& control = server.control();
+  if (auto shortage = shortageAt(control); !shortage.empty()) return shortage;
   const auto handling = Handling::of(control.handling.load(std::memory_order_relaxed));
   const auto sinceNs = static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));
   const auto busyNs = Clock::nowNs() - sinceNs;
@@ -96,6 +114,7 @@ std::string Binding::notAcceptedBecause(const PeerWindow& server) const {
 
 void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
   auto& endpoint = dispatcher_.endpoint();
+  endpoint.window().admit(Link::rightsAt(*server));  // it writes our hints
   auto link = Link::create(endpoint.backplane().name(), endpoint.window(), index_, server);
   auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding, requests_ ? requests_->lastId() : 0);
   auto channel = std::make_shared<MessageLink>(std::move(link), lock_);

@@ -15,6 +15,8 @@ namespace mpf {
 namespace {
 
 constexpr int kBatch = 16;  // messages of one link before the others have their turn
+// Of a window whose owner has no server yet: everybody may read it, as tools and routers do.
+constexpr mode_t kEverybodyReads = 0644;
 constexpr std::uint32_t kLooksInVain = 64;  // at news that is none, between looks at the clock
 
 class Inside {
@@ -31,7 +33,7 @@ class Inside {
 }  // namespace
 
 Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
-    : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {}, Rights{0666, ~std::uint32_t{0}}, options.waitMode,
+    : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {}, Rights{.mode = kEverybodyReads}, options.waitMode,
                 [&](layout::SegmentHeader& header) { options.label.copy(header.name.data(), header.name.size() - 1); }) {}
 
 Dispatcher::Impl::~Impl() {

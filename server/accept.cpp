@@ -18,21 +18,43 @@ namespace {
 
 constexpr std::chrono::milliseconds kToTakeTheRest{100};
 constexpr std::chrono::microseconds kLookAtThem{500};
+constexpr std::size_t kMostOfRescan = 1024;  // links to accept
+constexpr std::int64_t kRestAfterRescan = 9;  // as long as the look took, so many times
 
-// Of ours: of memory or descriptors.
-bool isLack(const std::exception& error) {
-  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return true;
+// What this process lacks, if that is why something failed.
+layout::Shortage shortageOf(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return layout::Shortage::memory;
   const auto* failed = dynamic_cast<const std::system_error*>(&error);
-  return failed != nullptr && (failed->code().value() == EMFILE || failed->code().value() == ENFILE || failed->code().value() == ENOMEM);
+  switch (failed != nullptr ? failed->code().value() : 0) {
+    case EMFILE:
+      return layout::Shortage::descriptors;
+    case ENFILE:
+      return layout::Shortage::openFiles;
+    case ENOMEM:
+      return layout::Shortage::memory;
+    default:
+      return layout::Shortage::none;
+  }
 }
 
 }  // namespace
 
+// Any user may fill /dev/shm with names, and every client may ask for this: the looks take a tenth of the server's time at most. A
+// client that is not found knocks again.
 void ServerCore::acceptAll() {
+  const auto fromNs = Clock::nowNs();
+  if (fromNs < rescanFromNs_) return;
+  rescanDue_ = false;
   const auto prefix = SegmentName::linkPrefix(endpoint_.backplane().name(), endpoint_.window().header().incarnation);
+  std::size_t accepted = 0;
   for (const auto& name : segments::list(prefix)) {
-    if (const auto parsed = SegmentName::tryParse(name)) accept(parsed->incarnation);
+    const auto parsed = SegmentName::tryParse(name);
+    if (!parsed || byLink_.contains(parsed->incarnation)) continue;
+    if (++accepted > kMostOfRescan) break;
+    accept(parsed->incarnation);
   }
+  const auto nowNs = Clock::nowNs();
+  rescanFromNs_ = nowNs + kRestAfterRescan * (nowNs - fromNs);
 }
 
 void ServerCore::accept(std::uint64_t incarnation) {
@@ -49,8 +71,21 @@ void ServerCore::accept(std::uint64_t incarnation) {
     if (!client && segments::probeOwner(window) == segments::Owner::absent) removeLink(name, incarnation);
   } catch (const std::exception& error) {
     // Its client sees that nobody accepts it, and knocks again; we go on.
-    if (!isLack(error)) count(endpoint_.control().protocolErrors);
+    const auto shortage = shortageOf(error);
+    if (shortage == layout::Shortage::none) return count(endpoint_.control().protocolErrors);
+    noteShortage(shortage, error.what());
   }
+}
+
+// One that begins is one alarm, however many clients it keeps away.
+void ServerCore::noteShortage(layout::Shortage shortage, const std::string& why) {
+  auto& control = endpoint_.control();
+  const auto was = control.shortage.load(std::memory_order_relaxed);
+  if (was == shortage) return;
+  control.shortage.store(shortage, std::memory_order_relaxed);
+  const bool isOver = shortage == layout::Shortage::none;
+  if (!isOver && was == layout::Shortage::none) countAlarm();
+  if (tellShortage_) tellShortage_(isOver ? std::string() : why);
 }
 
 void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client) {
@@ -74,6 +109,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
     connection.channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
   }
   MPF_STEP(link_opened);
+  noteShortage(layout::Shortage::none, {});
   byLink_[opened.header().incarnation] = &connection;
   endpoint_.attach(*index, opened);
   count(endpoint_.control().linksOpened);

@@ -107,6 +107,7 @@ int MessageServer::runUntilSignal() {
   return 0;
 }
 
+void MessageServer::onShortage(std::function<void(const std::string&)> tell) { impl_->core.onShortage(std::move(tell)); }
 void MessageServer::countAlarm() noexcept { impl_->core.countAlarm(); }
 
 void MessageServer::report() const {

@@ -138,6 +138,11 @@ class MessageServer {
   // Memory to build the body of a reply to one in. Throws std::bad_alloc.
   [[nodiscard]] BodyBytes allocateBody(std::uint64_t client, std::size_t bytes);
 
+  // Calls `tell` with the reason when no more clients can be accepted because this process lacks file
+  // descriptors or memory, and with an empty text once they can be: once each, from within receive()
+  // and waitForMessage(). An alarm is counted with or without it. Before the first of them.
+  void onShortage(std::function<void(const std::string& why)> tell);
+
   // For servers that drive hardware: one more of its faults, for `mpf msr`. Any thread.
   void countAlarm() noexcept;
 

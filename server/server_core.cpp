@@ -164,7 +164,8 @@ void ServerCore::lookAround() {
     if (!incarnation) break;
     accept(*incarnation);
   }
-  if (endpoint_.takeRescan()) acceptAll();
+  rescanDue_ = endpoint_.takeRescan() || rescanDue_;
+  if (rescanDue_) acceptAll();
   if (endpoint_.takeLocalNews() && endpoint_.takePeerDeath()) closeDead();
 }
 

@@ -51,6 +51,7 @@ class ServerCore {
   int descriptor();
   // Leaves the descriptor readable: not all that there is was received.
   void callAgain() noexcept;
+  void onShortage(std::function<void(const std::string&)> tell) { tellShortage_ = std::move(tell); }
   void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }
 
   struct Counts {
@@ -80,6 +81,7 @@ class ServerCore {
   void closeAll() noexcept;
   void removeLinkOfDead(const Connection& connection) noexcept;
   void removeLink(const std::string& name, std::uint64_t incarnation) noexcept;
+  void noteShortage(layout::Shortage shortage, const std::string& why);
   void closeIfClientDid(Connection& connection) noexcept;
   void tell(std::uint64_t client, bool isThere) noexcept;
   void throwNext();
@@ -99,6 +101,9 @@ class ServerCore {
   std::map<std::uint64_t, Connection*> byLink_;
   std::function<void(std::uint64_t, bool)> clientNews_;
   std::deque<std::exception_ptr> thrown_;  // by clientNews_; receive() throws them, one each time
+  std::function<void(const std::string&)> tellShortage_;
+  std::int64_t rescanFromNs_ = 0;  // no look for links by name before
+  bool rescanDue_ = false;
   Deadline takeBefore_ = Deadline::never();  // of the request taken last
   bool isHandling_ = false;          // the window shows a request
   bool isSlow_ = false;              // requests take so long that a look at the clock for each costs nothing

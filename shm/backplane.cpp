@@ -37,6 +37,18 @@ std::string environmentOr(const char* variable, const char* otherwise) {
   return value != nullptr && *value != '\0' ? value : otherwise;
 }
 
+// Files of a backplane that a process looks at when it attaches. Up to so many it removes all that is dead; `mpf clean` always does.
+constexpr std::size_t kLooksOfWhoAttaches = 4096;
+
+std::vector<std::string> removeAll(std::vector<remains::Judged> judged) {
+  MPF_STEP(survey_begun);
+  std::vector<std::string> removed;
+  for (auto& file : judged) {
+    if (remains::tryRemove(file)) removed.push_back(std::move(file.name));
+  }
+  return removed;
+}
+
 }  // namespace
 
 Backplane::Backplane(std::string name) : state_(std::make_shared<State>(std::move(name))) {}
@@ -49,7 +61,7 @@ Backplane Backplane::named(const std::string& name) {
 
 Backplane Backplane::attach(const std::string& name) {
   auto backplane = named(name);
-  static_cast<void>(backplane.removeDead());
+  static_cast<void>(removeAll(remains::judgeSome(backplane.name(), kLooksOfWhoAttaches)));
   return backplane;
 }
 
@@ -76,24 +88,20 @@ std::vector<std::string> Backplane::names() {
   return {names.begin(), names.end()};
 }
 
-std::vector<std::string> Backplane::removeDead() const {
-  auto judged = remains::judge(name());
-  MPF_STEP(survey_begun);
-  std::vector<std::string> removed;
-  for (auto& file : judged) {
-    if (remains::tryRemove(file)) removed.push_back(std::move(file.name));
-  }
-  return removed;
-}
+std::vector<std::string> Backplane::removeDead() const { return removeAll(remains::judge(name())); }
 
 void removeDeadWindow(const std::string& backplane, const std::string& name, std::uint64_t incarnation) {
+  const bool isDead = segments::probeOwner(name, incarnation) == segments::Owner::dead;
+  const auto hints = SegmentName::keyed(backplane, NameKind::hints, incarnation);
+  const bool ownsHints = isDead && segments::haveSameUser(name, hints);
   if (name == SegmentName::keyed(backplane, NameKind::clientWindow, incarnation)) {
     segments::removeKeyedIfOwnerless(name);
-  } else if (segments::probeOwner(name, incarnation) == segments::Owner::dead) {
+  } else if (isDead) {
     segments::removeIfOwnerless(name);
   }
   MPF_STEP(dead_window_removed);
-  if (segments::removeKeyedIfOwnerless(SegmentName::keyed(backplane, NameKind::hints, incarnation))) {
+  // Every peer may lock the hints: their lock tells only when there is no window to ask.
+  if (ownsHints ? segments::remove(hints) : segments::removeKeyedIfOwnerless(hints)) {
     segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
   }
 }

@@ -109,6 +109,8 @@ static_assert(sizeof(Histogram) == sizeof(std::uint64_t) * (kHistogramBuckets + 
 
 enum class WindowState : std::uint32_t { open = 1, closed = 2 };
 enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2 };
+// What a server lacks to accept another client. Since 1.1.
+enum class Shortage : std::uint32_t { none = 0, descriptors = 1, openFiles = 2, memory = 3 };
 
 // What a window's owner says of itself. At offset 512 of a server or client window. Every word is written by the owner.
 struct WindowControl {
@@ -117,7 +119,7 @@ struct WindowControl {
   alignas(kPairBytes) std::atomic<WindowState> state;
   Word32 linkCount;
   Word32 queueSize;  // requests of one client that may wait, for links made from now on (server windows)
-  Word32 reserved0;
+  std::atomic<Shortage> shortage;  // of a server that cannot accept a client; none once it can
   Word64 progress;  // grows with every message handled
   Word64 progressAtNs;  // CLOCK_MONOTONIC when `progress` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken

@@ -62,14 +62,19 @@ LinkGeometry LinkGeometry::forQueue(std::uint32_t queueSize) noexcept {
   return {ringSlotsFor(queueSize), ringSlotsFor(maxOutstanding + streamed), maxOutstanding};
 }
 
+Rights Link::rightsAt(const PeerWindow& server) {
+  Rights rights{server.header().linkMode & 0666, server.header().linkGroup};
+  // Root opens anybody's window, but the server could not open root's link.
+  if (::geteuid() == 0 && (rights.mode & 0006u) != 0006u) rights.user = server.user();
+  return rights;
+}
+
 std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
                                    std::shared_ptr<PeerWindow> server) {
   const auto& offer = server->header();
   const auto queueSize = std::clamp(server->control().queueSize.load(std::memory_order_relaxed), 1u, LinkGeometry::kMaxQueueSize);
   const auto geometry = LinkGeometry::forQueue(queueSize);
-  Rights rights{offer.linkMode & 0666, offer.linkGroup};
-  // Root opens anybody's window, but the server could not open root's link.
-  if (::geteuid() == 0 && (rights.mode & 0006u) != 0006u) rights.user = server->user();
+  const auto rights = rightsAt(*server);
   auto segment = Segment::create(layout::linkBytes(geometry.queueSlots, geometry.replySlots), layout::SegmentKind::link, backplane, rights);
   auto& header = segment.sharedHeader();
   header.ownerWindow = own.header().incarnation;

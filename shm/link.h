@@ -45,6 +45,8 @@ class Link {
   //   throws  std::system_error (no memory, no right), SegmentError (the server's window offers nonsense)
   static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
                                       std::shared_ptr<PeerWindow> server);
+  // Rights of a link to `server`: what its processes need to open it.
+  [[nodiscard]] static Rights rightsAt(const PeerWindow& server);
   // Maps a link that a client made for us; nullptr when it is gone.
   //   throws  SegmentError, std::system_error: the link is not usable, ignore it
   static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name, const OwnWindow& own);

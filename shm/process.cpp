@@ -1,35 +1,59 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/process.h>
 
+#include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
-#include <fstream>
+#include <charconv>
+#include <cstdio>
 #include <mutex>
-#include <sstream>
+#include <string_view>
 
 namespace mpf {
 namespace {
 
-// Field 22 of /proc/<pid>/stat; the program name before it may hold blanks and brackets. 0 when there is no such process.
-std::uint64_t startTicksOf(const std::string& pid) {
-  std::ifstream file("/proc/" + pid + "/stat");
-  std::string line;
-  if (!std::getline(file, line)) return 0;
-  std::istringstream fields(line.substr(line.rfind(')') + 1));
-  std::string skipped;
-  for (int field = 3; field < 22; ++field) fields >> skipped;
+// Field 22 of /proc/<pid>/stat; the program name before it may hold blanks and brackets. 0 when it cannot be read.
+std::uint64_t startTicksIn(const char* path) {
+  const FileDescriptor file(::open(path, O_RDONLY | O_CLOEXEC));
+  std::array<char, 1024> text;
+  const auto got = file ? ::read(file.get(), text.data(), text.size()) : -1;
+  if (got <= 0) return 0;
+  std::string_view fields(text.data(), static_cast<std::size_t>(got));
+  fields.remove_prefix(std::min(fields.rfind(')'), fields.size()));
+  for (int field = 2; field < 22; ++field) fields.remove_prefix(std::min(fields.find(' ') + 1, fields.size()));
   std::uint64_t ticks = 0;
-  fields >> ticks;
+  std::from_chars(fields.data(), fields.data() + fields.size(), ticks);
   return ticks;
+}
+
+// 0 also when /proc shows the pids of another namespace than this process's.
+std::uint64_t startTicksOf(std::int32_t pid) {
+  std::array<char, 32> text{};
+  std::int32_t self = 0;
+  if (const auto length = ::readlink("/proc/self", text.data(), text.size() - 1); length > 0)
+    std::from_chars(text.data(), text.data() + length, self);
+  if (self != ::getpid()) return 0;
+  std::snprintf(text.data(), text.size(), "/proc/%d/stat", pid);
+  return startTicksIn(text.data());
 }
 
 std::uint64_t ownPidNamespace() {
   struct stat status{};
   return ::stat("/proc/self/ns/pid", &status) == 0 ? status.st_ino : 0;
 }
+
+// Whether a header names a process that can be looked for from here.
+bool isNamed(const layout::SegmentHeader& header) {
+  return header.ownerPid > 0 && header.ownerStartTicks != 0 && header.pidNamespace == ownPidNamespace();
+}
+
+FileDescriptor openProcess(std::int32_t pid) { return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0))); }
 
 }  // namespace
 
@@ -40,7 +64,7 @@ Process Process::self() {
   if (self.pid == ::getpid()) return self;
   self.pid = ::getpid();
   self.uid = ::getuid();
-  self.startTicks = startTicksOf("self");
+  self.startTicks = startTicksIn("/proc/self/stat");
   self.pidNamespace = ownPidNamespace();
   self.program = ::program_invocation_short_name;
   return self;
@@ -55,11 +79,22 @@ void Process::describe(layout::SegmentHeader& header) const {
 }
 
 FileDescriptor Process::openOwner(const layout::SegmentHeader& header) {
-  if (header.ownerPid <= 0 || header.pidNamespace != ownPidNamespace()) return {};
-  FileDescriptor descriptor(static_cast<int>(::syscall(SYS_pidfd_open, header.ownerPid, 0)));
+  if (!isNamed(header)) return {};
+  auto descriptor = openProcess(header.ownerPid);
   // Looked at after the open: if the start time is right now, the descriptor is that process's.
-  if (descriptor && startTicksOf(std::to_string(header.ownerPid)) != header.ownerStartTicks) descriptor.reset();
+  if (descriptor && startTicksOf(header.ownerPid) != header.ownerStartTicks) descriptor.reset();
   return descriptor;
+}
+
+bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
+  if (!isNamed(header)) return false;
+  const auto descriptor = openProcess(header.ownerPid);
+  if (!descriptor) return errno == ESRCH;
+  // A process that has ended and was not waited for still has its pid and its start time.
+  pollfd ended{descriptor.get(), POLLIN, 0};
+  if (::poll(&ended, 1, 0) == 1) return true;
+  const auto ticks = startTicksOf(header.ownerPid);
+  return ticks != 0 && ticks != header.ownerStartTicks;
 }
 
 }  // namespace mpf

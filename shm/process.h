@@ -24,6 +24,9 @@ struct Process {
   // A descriptor that becomes readable when the owner in `header` ends; empty when it cannot be told from here (gone already,
   // another pid namespace, a pid that somebody else has now).
   static FileDescriptor openOwner(const layout::SegmentHeader& header);
+  // Whether the owner in `header` is known to have ended. False also when this process cannot
+  // tell: the header names no process, or one of another pid namespace, or /proc does not show it.
+  static bool hasEnded(const layout::SegmentHeader& header) noexcept;
 };
 
 }  // namespace mpf

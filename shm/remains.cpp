@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/remains.h>
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <iterator>
 #include <map>
+#include <random>
 
+#include <mpf/shm/owner_lock.h>
 #include <mpf/shm/segment.h>
 #include <mpf/shm/segment_name.h>
 
@@ -26,6 +30,7 @@ Finding judgeKeyed(const std::string& name) {
     case segments::Owner::alive:
       return {Verdict::alive, fmt::format("the lock of {} is held", name)};
     case segments::Owner::dead:
+      if (segments::isLocked(name)) return {Verdict::dead, fmt::format("its owner has ended; another process holds a lock on {}", name)};
       return {Verdict::dead, fmt::format("nobody holds the lock of {}", name)};
     case segments::Owner::absent:
       break;
@@ -41,6 +46,8 @@ Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
     case segments::Owner::alive:
       return {Verdict::alive, fmt::format("{} holds the lock of {}", ownerText(*header), name)};
     case segments::Owner::dead:
+      if (segments::isLocked(name))
+        return {Verdict::dead, fmt::format("{} has ended; another process holds a lock on {}", ownerText(*header), name)};
       return {Verdict::dead, fmt::format("nobody holds the lock of {}; {} did", name, ownerText(*header))};
     case segments::Owner::absent:
       break;
@@ -57,14 +64,15 @@ Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
 
 class Judge {
  public:
-  explicit Judge(std::string backplane) : backplane_(std::move(backplane)) {}
+  // With a `choice`, the names are not all that there are.
+  Judge(std::string backplane, std::vector<std::string> names, bool isChoice)
+      : backplane_(std::move(backplane)), names_(std::move(names)), isChoice_(isChoice) {}
 
   std::vector<Judged> run() {
-    const auto names = segments::list(SegmentName::prefix(backplane_));
-    for (const auto step : {&Judge::withLock, &Judge::ofWindow, &Judge::last}) {
-      for (const auto& name : names) {
+    for (const auto step : {&Judge::withLock, &Judge::hints, &Judge::ofWindow, &Judge::last}) {
+      for (const auto& name : names_) {
         if (const auto parsed = SegmentName::tryParse(name)) (this->*step)(name, *parsed);
-        else if (step == &Judge::last) add(name, {Verdict::unknown, "not a name that MPF gives"});
+        else if (step == &Judge::last && !isChoice_) add(name, {Verdict::unknown, "not a name that MPF gives"});
       }
     }
     return std::move(judged_);
@@ -77,14 +85,36 @@ class Judge {
 
   void withLock(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::serverWindow) {
-      add(name, judgeWindow(name, layout::SegmentKind::serverWindow));
+      auto finding = judgeWindow(name, layout::SegmentKind::serverWindow);
+      if (finding.verdict == Verdict::dead) noteDead(name, layout::SegmentKind::serverWindow);
+      add(name, std::move(finding));
     } else if (parsed.kind == NameKind::clientWindow) {
-      add(name, clients_[parsed.incarnation] = judgeWindow(name, layout::SegmentKind::clientWindow));
-    } else if (parsed.kind == NameKind::hints) {
-      add(name, hints_[parsed.incarnation] = judgeKeyed(name));  // every peer may write over their header
-    } else if (parsed.kind == NameKind::router) {
+      const auto& finding = clients_[parsed.incarnation] = judgeWindow(name, layout::SegmentKind::clientWindow);
+      if (finding.verdict == Verdict::dead) deadWindows_.emplace(parsed.incarnation, name);
+      add(name, finding);
+    } else if (parsed.kind == NameKind::router || parsed.kind == NameKind::reaper) {
       add(name, judgeKeyed(name));
     }
+  }
+
+  // Remembers a dead server window by its incarnation.
+  void noteDead(const std::string& name, layout::SegmentKind kind) try {
+    if (const auto header = segments::tryReadHeader(name, kind)) deadWindows_.emplace(header->incarnation, name);
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): it went away or was replaced: then it says nothing of hints
+  }
+
+  void hints(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::hints) add(name, hints_[parsed.incarnation] = judgeHints(name, parsed.incarnation));
+  }
+
+  // Hints are as dead as their window: every peer may write over their header and lock them. A window says nothing of another
+  // user's hints: anybody may make a file that claims their incarnation.
+  Finding judgeHints(const std::string& name, std::uint64_t incarnation) const {
+    const auto [first, last] = deadWindows_.equal_range(incarnation);
+    const auto isTheirs = [&](const auto& window) { return segments::haveSameUser(window.second, name); };
+    if (const auto window = std::find_if(first, last, isTheirs); window != last)
+      return {Verdict::dead, fmt::format("the owner of {} is dead", window->second)};
+    return judgeKeyed(name);
   }
 
   void ofWindow(const std::string& name, const Parsed& parsed) {
@@ -109,6 +139,7 @@ class Judge {
   void last(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::bulk) {
       const auto link = links_.find(parsed.incarnation);
+      if (link == links_.end() && isChoice_) return;
       add(name, link == links_.end() ? Finding{Verdict::dead, fmt::format("its link {:x} is gone", parsed.incarnation)} : link->second);
     } else if (parsed.kind == NameKind::fifo) {
       add(name, ownerOf(hints_, NameKind::hints, parsed.incarnation));
@@ -129,7 +160,10 @@ class Judge {
   }
 
   std::string backplane_;
+  std::vector<std::string> names_;
+  bool isChoice_;
   std::map<std::uint64_t, Finding> clients_;  // by incarnation of the window, as the next
+  std::multimap<std::uint64_t, std::string> deadWindows_;  // their names
   std::map<std::uint64_t, Finding> hints_;
   std::map<std::uint64_t, Finding> links_;
   std::vector<Judged> judged_;
@@ -137,16 +171,33 @@ class Judge {
 
 }  // namespace
 
-std::vector<Judged> judge(const std::string& backplane) { return Judge(backplane).run(); }
+std::vector<Judged> judge(const std::string& backplane) {
+  return Judge(backplane, segments::list(SegmentName::prefix(backplane)), false).run();
+}
+
+std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most) {
+  auto names = segments::list(SegmentName::prefix(backplane));
+  if (names.size() <= most) return Judge(backplane, std::move(names), false).run();
+  std::vector<std::string> chosen;
+  std::ranges::sample(names, std::back_inserter(chosen), static_cast<std::ptrdiff_t>(most), std::minstd_rand(std::random_device()()));
+  return Judge(backplane, std::move(chosen), true).run();
+}
 
 bool tryRemove(const Judged& file) {
   const auto parsed = SegmentName::tryParse(file.name);
   if (file.verdict != Verdict::dead || !parsed) return false;
-  // The name of a server window may be a successor's by now: the lock is asked again, and held until the name is gone.
-  if (parsed->kind == NameKind::hints || parsed->kind == NameKind::clientWindow || parsed->kind == NameKind::router) {
-    return segments::removeKeyedIfOwnerless(file.name);
+  switch (parsed->kind) {
+    case NameKind::serverWindow:
+      // Its name may be a successor's by now: the lock is asked again, and held until the name is gone.
+      return segments::removeIfOwnerless(file.name);
+    case NameKind::clientWindow:
+    case NameKind::router:
+      return segments::removeKeyedIfOwnerless(file.name);
+    case NameKind::reaper:
+      return owner_lock::removeReaperFile(file.name);
+    default:
+      return segments::remove(file.name);
   }
-  return parsed->kind == NameKind::serverWindow ? segments::removeIfOwnerless(file.name) : segments::remove(file.name);
 }
 
 }  // namespace mpf::remains

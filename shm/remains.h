@@ -25,6 +25,10 @@ struct Judged {
 // Every file of a backplane: windows and hints first, then what hangs on them. One that goes away meanwhile may be missing.
 std::vector<Judged> judge(const std::string& backplane);
 
+// The same of `most` files, chosen at random, when there are more. Any user may fill /dev/shm with names, and whoever begins work here
+// must not wait for all of them. Names that MPF does not give are left out, and pools whose link was not chosen.
+std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most);
+
 // Removes a file that was found dead. False: somebody was quicker, or this user may not.
 bool tryRemove(const Judged& file);
 

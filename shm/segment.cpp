@@ -15,7 +15,9 @@
 #include <mpf/base/clock.h>
 #include <mpf/base/step.h>
 #include <mpf/base/system_call.h>
+#include <mpf/shm/owner_lock.h>
 #include <mpf/shm/process.h>
+#include <mpf/shm/segment_name.h>
 
 namespace mpf {
 namespace {
@@ -23,35 +25,6 @@ namespace {
 namespace ipc = boost::interprocess;
 
 constexpr const char* kDirectory = "/dev/shm";
-
-// An owner locks the whole file, a reaper its second byte: it cannot while there is an owner, and who asks for the first byte does not
-// take it for one.
-constexpr off_t kOwnersByte = 0;
-constexpr off_t kReapersByte = 1;
-
-struct flock64 writeLock(off_t from, off_t bytes) {
-  struct flock64 lock{};
-  lock.l_type = F_WRLCK;
-  lock.l_whence = SEEK_SET;
-  lock.l_start = from;
-  lock.l_len = bytes;
-  return lock;
-}
-
-bool tryLockAsOwner(int fd) {
-  auto lock = writeLock(0, 0);  // to the end, wherever it is
-  return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
-}
-
-bool tryLockAsReaper(int fd) {
-  auto lock = writeLock(kReapersByte, 1);
-  return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
-}
-
-bool isOwned(int fd) {
-  auto lock = writeLock(kOwnersByte, 1);
-  return ::fcntl(fd, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;  // a failure proves nothing
-}
 
 // Older kernels end a long reservation at any signal and undo it; small pieces get done between two ticks of a timer.
 int reserve(int fd, std::size_t bytes) {
@@ -107,17 +80,32 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
   return file;
 }
 
-// The file of that name with its owner's lock; empty when somebody else has the lock or the name.
-FileDescriptor lockOwnerless(const std::string& name) {
-  auto file = openByName(name, O_RDWR);
-  if (!file || !tryLockAsReaper(file.get())) return {};
-  MPF_STEP(reclaim_locked);
-  // With the lock of this very file held, its name can only be taken away by us: check that the name is still this file's.
-  struct stat locked{};
+// The header that says whose a file is. Empty when it cannot say: every peer may write over the header of hints, and other files may be
+// anything.
+layout::SegmentHeader ownersHeader(int fd, const std::string& name) {
+  layout::SegmentHeader header{};
+  const auto parsed = SegmentName::tryParse(name);
+  if (parsed && parsed->kind == NameKind::hints) return {};
+  if (::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) return {};
+  return header.magic == layout::kMagic ? header : layout::SegmentHeader{};
+}
+
+bool isOwned(int fd, const std::string& name) { return owner_lock::isHeldByOwner(fd, ownersHeader(fd, name)); }
+
+// Whether the name still leads to this regular file.
+bool isNameOf(int fd, const std::string& name) {
+  struct stat opened{};
   struct stat named{};
-  if (::fstat(file.get(), &locked) != 0 || !S_ISREG(locked.st_mode)) return {};
-  if (::stat(segments::path(name).c_str(), &named) != 0 || locked.st_ino != named.st_ino) return {};
-  return file;
+  if (::fstat(fd, &opened) != 0 || !S_ISREG(opened.st_mode)) return false;
+  return ::stat(segments::path(name).c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+}
+
+// Of the reaper that removes what is under this name now.
+std::string reaperFileOf(int fd, const std::string& name) {
+  const auto parsed = SegmentName::tryParse(name);
+  const auto header = ownersHeader(fd, name);
+  if (!parsed || header.incarnation == 0) return {};
+  return SegmentName::keyed(parsed->backplane, NameKind::reaper, header.incarnation);
 }
 
 // Whether a file is a segment of some kind that this program can use.
@@ -133,14 +121,18 @@ bool isKnown(int fd, const std::string& name) try {
 
 }  // namespace
 
-Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights) {
-  Segment segment;
-  segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600), "create a segment in", kDirectory));
-  const int fd = segment.file_.get();
+void setRights(int fd, const Rights& rights) {
   constexpr auto kOwn = ~std::uint32_t{0};
   if (rights.group != kOwn) checkCall(::fchown(fd, kOwn, rights.group), "give a segment to group", std::to_string(rights.group));
   if (rights.user != kOwn) checkCall(::fchown(fd, rights.user, kOwn), "give a segment to user", std::to_string(rights.user));
   checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
+}
+
+Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights) {
+  Segment segment;
+  segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600), "create a segment in", kDirectory));
+  const int fd = segment.file_.get();
+  mpf::setRights(fd, rights);
   if (const int shortage = reserve(fd, bytes); shortage != 0)
     throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
   segment.mapping_ = Mapping(fd, bytes, Access::readWrite);
@@ -165,7 +157,7 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
 }
 
 void Segment::lockForLife() {
-  if (!tryLockAsOwner(file_.get())) throwSystemError(errno, "lock the new segment", name_);
+  if (!owner_lock::trySet(file_.get())) throwSystemError(errno, "lock the new segment", name_);
   mapping_.growBy(file_.get());
 }
 
@@ -188,7 +180,7 @@ std::uint32_t Segment::fileUser() const {
   return status.st_uid;
 }
 
-bool Segment::hasOwner() const noexcept { return isOwned(file_.get()); }
+bool Segment::hasOwner() const noexcept { return owner_lock::isHeldByOwner(file_.get(), header_); }
 
 std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
   Segment segment;
@@ -206,7 +198,7 @@ std::optional<Segment> Segment::tryOpenShared(const std::string& name, std::size
   segment.file_ = openRegular(name, O_RDWR, fileBytes);
   if (!segment.file_) return std::nullopt;
   const int file = segment.file_.get();
-  if (fileBytes < bytes && (!isOwned(file) || reserve(file, bytes) != 0))
+  if (fileBytes < bytes && (!owner_lock::isHeld(file) || reserve(file, bytes) != 0))
     throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", segments::path(name), fileBytes, bytes));
   segment.mapping_ = Mapping(file, bytes, Access::readWrite);
   segment.mapping_.growAt(file, segments::path(name));
@@ -254,20 +246,38 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
     const auto got = ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
     if (got != sizeof found || found != incarnation) return Owner::absent;
   }
-  return isOwned(file.get()) ? Owner::alive : Owner::dead;
+  return isOwned(file.get(), name) ? Owner::alive : Owner::dead;
+}
+
+bool haveSameUser(const std::string& one, const std::string& other) {
+  struct stat first{};
+  struct stat second{};
+  return ::lstat(path(one).c_str(), &first) == 0 && ::lstat(path(other).c_str(), &second) == 0 && first.st_uid == second.st_uid;
+}
+
+bool isLocked(const std::string& name) {
+  const auto file = openByName(name, O_RDONLY);
+  return file && owner_lock::isHeld(file.get());
 }
 
 bool removeIfOwnerless(const std::string& name) {
-  const auto file = lockOwnerless(name);
+  const auto file = openByName(name, O_RDWR);
+  if (!file || isOwned(file.get(), name)) return false;
+  const owner_lock::Reaper reaper(file, reaperFileOf(file.get(), name));
+  if (!reaper.mayRemove()) return false;
+  MPF_STEP(reclaim_locked);
+  // No other process takes away the name of this very file now: check that the name is still this file's.
+  if (!isNameOf(file.get(), name)) return false;
   // Of anything but a segment that we know, a free lock proves nothing.
-  if (!file || !isKnown(file.get(), name)) return false;
+  if (!isKnown(file.get(), name)) return false;
   MPF_STEP(reclaim_proved);
   return remove(name);
 }
 
+// No lock is needed: nothing else will ever have this name, and a second removal finds nothing.
 bool removeKeyedIfOwnerless(const std::string& name) {
-  const auto file = lockOwnerless(name);
-  if (!file) return false;
+  const auto file = openByName(name, O_RDONLY);
+  if (!file || isOwned(file.get(), name) || !isNameOf(file.get(), name)) return false;
   MPF_STEP(reclaim_proved);
   return remove(name);
 }

@@ -48,6 +48,10 @@ struct Rights {
   bool operator==(const Rights&) const = default;
 };
 
+// Gives an open file these rights.
+//   throws  std::system_error: only root gives files away, and to a group only its members do
+void setRights(int fd, const Rights& rights);
+
 class Segment {
  public:
   using Access = Mapping::Access;
@@ -89,8 +93,10 @@ class Segment {
 
   // Whose file it is. Needs the file.
   [[nodiscard]] std::uint32_t fileUser() const;
-  // Whether somebody holds the owner's lock, whatever became of the name. Needs the file.
+  // Whether the owner lives, as probeOwner() says, whatever became of the name. Needs the file.
   [[nodiscard]] bool hasOwner() const noexcept;
+  // Needs the file.
+  void setRights(const Rights& rights) const { mpf::setRights(file_.get(), rights); }
   // Lets go of the file, not of the mapping. A segment without lock needs it no longer.
   void closeFile() { file_.reset(); }
 
@@ -112,9 +118,13 @@ bool remove(const std::string& name);
 std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name, layout::SegmentKind kind);
 
 enum class Owner { alive, dead, absent };
-// Asks the kernel whether somebody holds the owner's lock of a window. With an incarnation: `absent` when the name has
-// another one's window now.
+// Asks the kernel whether the owner of a window lives: a process holds the owner's lock, and the process that the header names has not
+// ended, as far as this process can tell. With an incarnation: `absent` when the name has another one's window now.
 [[nodiscard]] Owner probeOwner(const std::string& name, std::uint64_t incarnation = 0);
+// Whether two files are there and belong to the same user.
+[[nodiscard]] bool haveSameUser(const std::string& one, const std::string& other);
+// Whether any process holds a write lock where an owner has one.
+[[nodiscard]] bool isLocked(const std::string& name);
 // Removes a window whose owner is proven dead. Two processes may try at once; a window that was replaced meanwhile stays, and so does
 // what is no window of a version that we know: its lock may mean something else.
 bool removeIfOwnerless(const std::string& name);

@@ -128,6 +128,7 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
     case NameKind::hints:
     case NameKind::wish:
     case NameKind::router:
+    case NameKind::reaper:
     case NameKind::fifo: {
       const auto incarnation = tryHex(parts[3]);
       if (!incarnation || parts.size() != (parsed.kind == NameKind::bulk ? 6u : 4u)) return std::nullopt;

@@ -18,7 +18,8 @@ enum class NameKind : char {
   bulk = 'b',
   wish = 'w',
   fifo = 'f',
-  router = 'r'
+  router = 'r',
+  reaper = 'k'
 };
 
 struct SegmentName {

@@ -9,6 +9,8 @@
 
 #include <array>
 #include <cstring>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include <mpf/base/signals_blocked.h>
@@ -24,6 +26,13 @@ constexpr Watcher::Token kStop = 1;
 constexpr Watcher::Token kTimer = 2;
 constexpr Watcher::Token kNames = 3;
 constexpr long kPollNs = 100'000'000;
+
+// The kernel takes some 15 ms to close an inotify instance, and the watcher's thread has deaths to tell.
+void closeElsewhere(FileDescriptor names) noexcept try {
+  const SignalsBlocked blocked;
+  std::thread([closing = std::move(names)] {}).detach();
+} catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch): no thread left: closed here, by then
+}
 
 void add(int epoll, int fd, Watcher::Token token) {
   epoll_event event{};
@@ -81,9 +90,11 @@ Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback cal
   start();
   const auto token = next_++;
   auto process = Process::openOwner(peer->header());
+  const bool isPolled = !process;
   if (process) add(epoll_.get(), process.get(), token);
   peers_.emplace(token, Peer{std::move(peer), std::move(callback), std::move(process)});
   updateTimer();
+  if (isPolled) pollAtOnce();  // it may have died just now
   return token;
 }
 
@@ -111,7 +122,7 @@ void Watcher::forget(Token token) {
   peers_.erase(token);
   if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty() && names_) {
     ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, names_.get(), nullptr);
-    unused_ = std::move(names_);
+    closeElsewhere(std::move(names_));
   }
   updateTimer();
 }
@@ -123,9 +134,7 @@ void Watcher::run() {
     for (int i = 0; i < count; ++i) {
       const auto token = events[static_cast<std::size_t>(i)].data.u64;
       if (token == kStop) return;
-      FileDescriptor closing;  // after the lock is free: the kernel takes some 15 ms to close an inotify instance
       const std::lock_guard lock(mutex_);
-      closing = std::move(unused_);
       handle(token);
     }
   }
@@ -186,12 +195,22 @@ void Watcher::poll() {
   if (!names_) tellOfNames([](NameKind) { return true; });
 }
 
+void Watcher::pollAtOnce() {
+  itimerspec spec{};
+  spec.it_value.tv_nsec = 1;
+  spec.it_interval.tv_nsec = kPollNs;
+  ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
+  polls_ = true;
+}
+
+// A timer that runs goes on as it is: changes that come often must not put it off.
 void Watcher::updateTimer() {
   bool needed = !names_ && !nameCallbacks_.empty();
   for (const auto& [token, peer] : peers_) needed = needed || !peer.process;
+  if (needed == polls_) return;
+  polls_ = needed;
   itimerspec spec{};
   if (needed) spec.it_value.tv_nsec = spec.it_interval.tv_nsec = kPollNs;
-  if (unused_) spec.it_value.tv_nsec = 1;
   ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
 }
 

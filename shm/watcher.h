@@ -61,6 +61,7 @@ class Watcher {
   };
   void tellOfNames(const std::function<bool(NameKind)>& isNew);
   void poll();
+  void pollAtOnce();
   void updateTimer();
 
   Origin origin_;
@@ -68,12 +69,12 @@ class Watcher {
   FileDescriptor epoll_;
   FileDescriptor stop_;
   FileDescriptor timer_;
-  FileDescriptor names_;   // inotify, while somebody waits for names; empty: polled
-  FileDescriptor unused_;  // what names_ was, for our thread to close
+  FileDescriptor names_;  // inotify, while somebody waits for names; empty: polled
   std::recursive_mutex mutex_;  // callbacks run under it, so that forget() can promise what it does
   Token next_ = 16;             // below: our own descriptors
   std::map<Token, Peer> peers_;
   std::map<Token, Names> nameCallbacks_;
+  bool polls_ = false;  // the timer runs
   std::thread thread_;
 };
 

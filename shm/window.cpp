@@ -2,6 +2,7 @@
 #include <mpf/shm/window.h>
 
 #include <sched.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -46,11 +47,25 @@ void checkInTheWay(const std::string& name, layout::SegmentKind kind) {
   }
 }
 
+// Of a pipe: whoever may only read the hints must not take rings out of the pipe.
+mode_t pipeMode(mode_t hints) { return 0600 | ((hints & 0020) != 0 ? 0060u : 0u) | ((hints & 0002) != 0 ? 0006u : 0u); }
+
+// The least rights that include both.
+Rights joined(const Rights& now, Rights added) {
+  constexpr auto kOwn = ~std::uint32_t{0};
+  if (added.user == ::geteuid()) added.user = kOwn;
+  if ((added.mode & 0022) == 0 && added.user == kOwn) return now;
+  added.mode |= now.mode;
+  if ((now.mode & 0022) == 0 && now.user == kOwn) return added;
+  if (now.user == added.user && (now.group == added.group || (added.mode & 0060) == 0)) return added;
+  return {.mode = 0666, .group = now.group, .user = now.user};
+}
+
 }  // namespace
 
 OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
                      const std::function<void(layout::SegmentHeader&)>& describe)
-    : backplane_(backplane), rights_(rights) {
+    : backplane_(backplane), rights_(rights), admitted_(rights) {
   window_ = Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
   window_.lockForLife();
   MPF_STEP(window_locked);
@@ -68,7 +83,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
   if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation))) throw NameInUse("an incarnation number came twice");
   const auto fifo = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   try {
-    fifo_ = doorbell::createFifo(fifo, rights.mode, rights.group);
+    fifo_ = doorbell::createFifo(fifo, pipeMode(rights.mode), rights.group);
     MPF_STEP(window_complete);
     publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : name);
   } catch (...) {
@@ -98,6 +113,14 @@ OwnWindow::~OwnWindow() {
   segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
   segments::remove(hints_.name());
   segments::remove(window_.name());
+}
+
+void OwnWindow::admit(const Rights& peers) {
+  const auto wanted = joined(admitted_, peers);
+  if (wanted == admitted_) return;
+  hints_.setRights(wanted);
+  setRights(fifo_.get(), {.mode = pipeMode(wanted.mode), .group = wanted.group, .user = wanted.user});
+  admitted_ = wanted;
 }
 
 void OwnWindow::ring() const noexcept {

@@ -50,6 +50,11 @@ class OwnWindow {
   // Whether somebody took its name away: who comes now does not find it.
   [[nodiscard]] bool isNameless() const { return segments::probeOwner(window_.name(), header().incarnation) == segments::Owner::absent; }
 
+  // Lets the processes of a server write the hints and the pipe: those that have these rights to the
+  // link. Rights are only added; when no single user or group has them all, everybody gets them.
+  //   throws  std::system_error when this process may not give a file to that group or user
+  void admit(const Rights& peers);
+
   // Wakes the owner. Async-signal-safe.
   void ring() const noexcept;
 
@@ -58,6 +63,7 @@ class OwnWindow {
   Origin origin_;
   std::string backplane_;
   Rights rights_;
+  Rights admitted_;  // of the hints
   Segment window_;
   Segment hints_;
   FileDescriptor fifo_;

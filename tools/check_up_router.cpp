@@ -8,6 +8,7 @@
 #include <mpf/base/clock.h>
 #include <mpf/base/duration_text.h>
 #include <mpf/base/file_descriptor.h>
+#include <mpf/shm/owner_lock.h>
 #include <mpf/shm/segment_name.h>
 #include <mpf/tools/check_up.h>
 #include <mpf/tools/router_view.h>
@@ -18,19 +19,14 @@ namespace {
 
 constexpr std::int64_t kLongNs = 60'000'000'000;  // a restart, a cable that was pulled and plugged in again take less
 
-// Whether the router's process lives: it holds the lock of its segment.
-bool isLocked(const std::filesystem::path& path) {
+bool hasOwner(const std::filesystem::path& path, const SegmentImage& image) {
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
-  struct flock lock{};
-  lock.l_type = F_WRLCK;
-  lock.l_whence = SEEK_SET;
-  lock.l_len = 1;
-  return file && ::fcntl(file.get(), F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+  return file && owner_lock::isHeldByOwner(file.get(), image.header());
 }
 
 std::vector<RouterLineView> linesOf(const std::filesystem::path& path) try {
   const auto image = SegmentImage::tryReadFile(path.string());
-  return image && isLocked(path) ? routerLines(*image, path.string()) : std::vector<RouterLineView>();
+  return image && hasOwner(path, *image) ? routerLines(*image, path.string()) : std::vector<RouterLineView>();
 } catch (const std::exception&) {
   return {};  // not ours to read; `rights of segments` says so
 }

@@ -119,6 +119,8 @@ class Surveyor {
         return;
       case NameKind::router:
         return router(name);
+      case NameKind::reaper:  // of a moment, and without content
+        return;
     }
   }
 

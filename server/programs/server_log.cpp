@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <mpf/base/signals_blocked.h>
+#include <mpf/server/message_server.h>
 #include <mpf/server/programs/printable_sink.h>
 
 namespace mpf {
@@ -120,6 +121,13 @@ ServerLog::ServerLog(const std::string& program, const std::string& level)
 ServerLog::~ServerLog() {
   log_.writeHeld();
   writer_->finish();
+}
+
+void logShortages(MessageServer& server, const ServerLog& log) {
+  server.onShortage([&log, name = server.getName()](const std::string& why) {
+    if (why.empty()) return log->info(R"("{}" accepts clients again)", name);
+    log->warn(R"("{}" cannot accept another client: {}; start it with higher limits (ulimit -n))", name, why);
+  });
 }
 
 const std::vector<std::string>& ServerLog::levels() {

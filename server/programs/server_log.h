@@ -40,4 +40,10 @@ class ServerLog {
   Log log_;
 };
 
+class MessageServer;
+
+// Says when `server` cannot accept clients for lack of descriptors or memory, and when it can again.
+//   log  outlives the server
+void logShortages(MessageServer& server, const ServerLog& log);
+
 }  // namespace mpf

@@ -2,17 +2,22 @@
 // Reclaim: who wants a server's name, who removes what a dead one left under it; each may be killed before any step.
 //
 //   file made ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
-//   reaper: open by name ─ lock a byte of that file that its owner would have locked, too ─ does the name still lead to it? ─ remove the
-//   name ─ unlock
+//   reaper: open by name ─ lock byte 1 of that file, or a reaper's file of its own beside the locks of strangers ─ does the name still lead to
+//   it? ─ remove the name ─ unlock
 //
-//   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless tryLockAsOwner tryLockAsReaper isOwned probeOwner
+//   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless isOwned isNameOf probeOwner
+//   MODELS  shm/owner_lock.cpp: trySet isHeld isHeldByOwner Reaper tryBesideStrangers lockReaperFile isReaperFileLocked findWriteLock
 //   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
 //   HOLDS   the name of a living window is removed by nobody but its owner
 //   HOLDS   never do two that live own the name
-//   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked
+//   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked, and no stranger
+//           who locks the file of a dead owner and keeps the lock
 //   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after its holder died
+//   ASSUMES to lock a reaper's file and to see that it still has its name is one step: lockReaperFile() gives up when it has not
 //   ASSUMES a starter outwaits a reaper that removes a dead window, and the kernel (it waits 50 ms for some microseconds)
-//   ASSUMES three starters, each also a reaper, and one that only reaps; two of them are killed; nobody else removes names
+//   ASSUMES three starters, each also a reaper, and one of layout 1.0 that only reaps, and knows of no reaper's file; two of them are killed;
+//           nobody else removes names
+//   ASSUMES a stranger places read locks, and write locks only while the reaper of layout 1.0 is not at work
 //   BREAK   NO_COMPARE    a reaper does not look whether the name still leads to the file that it locked
 //   BREAK   NO_LOCK       a reaper asks for the lock and does not take it
 //   BREAK   ONE_LOCK      a reaper locks the file as an owner does
@@ -20,6 +25,8 @@
 //   BREAK   LOCK_LATE     a starter locks its window after it got its name
 //   BREAK   LEAVE_LATE    who leaves lets go of the lock before it removes its name
 //   BREAK   NO_REAPING    a starter waits for others to remove what is dead
+//   BREAK   NO_BESIDE     there is no reaper's file: a reaper needs byte 1
+//   BREAK   NO_SHARED     a reaper beside readers takes no read lock
 #define STARTERS 3
 #define REAPER 3
 #define PROCESSES 4
@@ -30,6 +37,11 @@
 byte name = NO_FILE;       // the file that the name leads to
 byte lock[STARTERS + 1];   // of each file: its owner
 byte reaper[STARTERS + 1]; // of each file: who is about to remove its name
+byte beside[STARTERS + 1]; // of each file: who has its reaper's file
+byte shared[STARTERS + 1]; // of each file: the reaper that has a read lock on byte 1
+mtype = { nothing, reads, writes };
+mtype stranger[STARTERS + 1]; // of each file: what lock a stranger has on all of it
+bool oldReaperEnded;
 bool left[STARTERS];
 bool dead[PROCESSES];
 
@@ -49,23 +61,67 @@ inline removeName(mayBe) {
   }
 }
 
+#define isByteFree(file) (lock[file] == FREE && reaperOf[file] == FREE && shared[file] == FREE && stranger[file] == nothing)
+
+// Byte 1, or the reaper's file. Sets `mine`.
+inline becomeReaper(me) {
+  if
+#ifdef NO_LOCK
+  :: isByteFree(file) -> mine = true
+#else
+  :: d_step { isByteFree(file) -> reaperOf[file] = me } ->
+    if
+    :: beside[file] == FREE -> mine = true
+    :: else -> reaperOf[file] = FREE
+    fi
+#endif
+#if !defined(NO_BESIDE) && !defined(NO_LOCK)
+  :: d_step { lock[file] == FREE && !isByteFree(file) && beside[file] == FREE -> beside[file] = me } ->
+    if
+#ifdef NO_SHARED
+    :: reaperOf[file] == FREE && stranger[file] != writes -> mine = true
+#else
+    :: d_step { reaperOf[file] == FREE && stranger[file] != writes && shared[file] == FREE -> shared[file] = me } -> mine = true
+#endif
+    :: reaperOf[file] == FREE && stranger[file] == writes -> mine = true
+    :: reaperOf[file] != FREE -> beside[file] = FREE
+    fi
+#endif
+  :: else
+  fi
+}
+
+inline stopReaping(me) {
+  d_step {
+    if
+    :: reaperOf[file] == me -> reaperOf[file] = FREE
+    :: else
+    fi;
+    if
+    :: shared[file] == me -> shared[file] = FREE
+    :: else
+    fi;
+    if
+    :: beside[file] == me -> beside[file] = FREE
+    :: else
+    fi
+  }
+}
+
 inline removeIfOwnerless(me) {
   file = name;  // open
   if
   :: file == NO_FILE
   :: file != NO_FILE ->
+    becomeReaper(me);
     if
-#ifdef NO_LOCK
-    :: lock[file] == FREE ->
-#else
-    :: d_step { lock[file] == FREE && reaperOf[file] == FREE -> reaperOf[file] = me } ->
-#endif
+    :: mine ->
 #ifndef NO_COMPARE
       if
       :: name == file ->
 #endif
 #ifdef UNLOCK_EARLY
-        reaperOf[file] = FREE;
+        stopReaping(me);
 #endif
         removeName(NO_FILE)
 #ifndef NO_COMPARE
@@ -74,19 +130,43 @@ inline removeIfOwnerless(me) {
 #else
       ;
 #endif
-#if !defined(UNLOCK_EARLY) && !defined(NO_LOCK)
-      reaperOf[file] = FREE
-#else
-      skip
-#endif
+      stopReaping(me)
+    :: else
+    fi
+  fi;
+  mine = false;
+  file = NO_FILE
+}
+
+// As layout 1.0 has it.
+inline removeAsOfOld(me) {
+  file = name;  // open
+  if
+  :: file == NO_FILE
+  :: file != NO_FILE ->
+    if
+    :: d_step { isByteFree(file) -> reaperOf[file] = me } ->
+      if
+      :: name == file -> removeName(NO_FILE)
+      :: name != file
+      fi;
+      d_step { reaperOf[file] == me -> reaperOf[file] = FREE }
     :: else
     fi
   fi;
   file = NO_FILE
 }
 
+// Whether a reaper may go on: what another reaper has it lets go of, or the kernel does.
+#ifdef NO_BESIDE
+#define isReapable(file) (lock[file] == FREE && stranger[file] == nothing)
+#else
+#define isReapable(file) (lock[file] == FREE)
+#endif
+
 proctype Starter(byte me) {
   byte file;
+  bool mine;
   {
 #ifndef LOCK_LATE
     lock[fileOf(me)] = me;
@@ -95,7 +175,7 @@ proctype Starter(byte me) {
     :: d_step { name == NO_FILE -> name = fileOf(me) } -> goto owner
     :: atomic { isLocked -> assert(isLiving(name)) } -> goto refused
 #ifndef NO_REAPING
-    :: name != NO_FILE && lock[name] == FREE -> removeIfOwnerless(me)
+    :: name != NO_FILE && isReapable(name) -> removeIfOwnerless(me)
 #endif
     od;
 owner:
@@ -124,8 +204,25 @@ refused:
 active proctype Reaper() {
   byte file;
   {
-    removeIfOwnerless(REAPER)
+    removeAsOfOld(REAPER);
+    oldReaperEnded = true
   } unless { dead[REAPER] }
+}
+
+// Whoever may read the first starter's file, or write it, locks it once and lets go, or never does.
+#define LOCKED 1
+active proctype Stranger() {
+  if
+  :: d_step { name == LOCKED && lock[LOCKED] == FREE && reaperOf[LOCKED] == FREE -> stranger[LOCKED] = reads }
+  :: d_step { name == LOCKED && isByteFree(LOCKED) && (oldReaperEnded || dead[REAPER]) -> stranger[LOCKED] = writes }
+  :: skip -> goto done
+  fi;
+  if
+  :: stranger[LOCKED] = nothing
+  :: skip
+  fi;
+done:
+  skip
 }
 
 inline kill(process) {
@@ -140,6 +237,14 @@ inline kill(process) {
       fi;
       if
       :: reaper[file] == process -> reaper[file] = FREE
+      :: else
+      fi;
+      if
+      :: beside[file] == process -> beside[file] = FREE
+      :: else
+      fi;
+      if
+      :: shared[file] == process -> shared[file] = FREE
       :: else
       fi;
       file++
@@ -167,6 +272,15 @@ init {
     reaper[1] = FREE;
     reaper[2] = FREE;
     reaper[3] = FREE;
+    beside[1] = FREE;
+    beside[2] = FREE;
+    beside[3] = FREE;
+    shared[1] = FREE;
+    shared[2] = FREE;
+    shared[3] = FREE;
+    stranger[1] = nothing;
+    stranger[2] = nothing;
+    stranger[3] = nothing;
     run Starter(0);
     run Starter(1);
     run Starter(2)

@@ -49,6 +49,18 @@ class BackplaneTest : public ShmTest {
   }
 };
 
+// Up to 4096 files it looks at all; beyond that, other users' names must not keep it waiting.
+TEST_F(BackplaneTest, WhoeverAttachesToACrowdOfNamesLooksAtSome) {
+  for (std::uint64_t number = 1; number <= 5000; ++number) {
+    std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::wish, number))};
+  }
+
+  Backplane::attach(name());
+
+  EXPECT_EQ(backplane_.segmentNames().size(), 5000U - 4096U);
+  EXPECT_EQ(backplane_.removeDead().size(), 5000U - 4096U);
+}
+
 TEST_F(BackplaneTest, IsNamedByItsUserByTheEnvironmentOrDefault) {
   ::setenv("MPF_BACKPLANE", name().c_str(), 1);
   EXPECT_EQ(Backplane::attach().name(), name());

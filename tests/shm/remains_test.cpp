@@ -140,5 +140,30 @@ TEST_F(RemainsTest, ASuccessorThatTookTheNameStays) {
   EXPECT_EQ(segments::probeOwner(serverName(), successor.header().incarnation), segments::Owner::alive);
 }
 
+// Any user may fill /dev/shm with names.
+TEST_F(RemainsTest, OfManyNamesAsManyAreJudgedAsWasAskedFor) {
+  for (std::uint64_t number = 1; number <= 200; ++number) std::ofstream(segments::path(keyed(NameKind::wish, number)));
+
+  EXPECT_EQ(remains::judgeSome(name(), 50).size(), 50U);
+  EXPECT_EQ(remains::judgeSome(name(), 200).size(), 200U);
+  EXPECT_EQ(backplane_.removeDead().size(), 200U);
+}
+
+// A pool hangs on its link: when that was not looked at, nothing is known of the pool.
+TEST_F(RemainsTest, APoolWhoseLinkWasNotLookedAtIsNotJudged) {
+  const auto client = makeClient();
+  const auto link = SegmentName::link(name(), 1, 2);
+  leave(link, SegmentKind::link, client.header().incarnation);
+  const auto bulk = SegmentName::bulk(name(), 2, 0, 0);
+  leave(bulk, SegmentKind::bulk, client.header().incarnation);
+
+  for (int round = 0; round < 100; ++round) {
+    for (const auto& file : remains::judgeSome(name(), 2)) EXPECT_EQ(file.verdict, Verdict::alive) << file.name;
+  }
+
+  segments::remove(link);
+  segments::remove(bulk);
+}
+
 }  // namespace
 }  // namespace mpf::test

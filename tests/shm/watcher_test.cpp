@@ -199,7 +199,7 @@ TEST_F(WatcherTest, AStoppedProcessIsNotDead) {
 
 class HiddenOwners : public WatcherTest, public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
-// Where no pidfd can be had, or it would be another process's, the lock alone tells.
+// Where the header names no process that can be looked for, the lock alone tells.
 TEST_P(HiddenOwners, AreWatchedByTheirLocks) {
   const auto server = startServer("server", GetParam());
   const auto peer = open("server");
@@ -215,8 +215,7 @@ TEST_P(HiddenOwners, AreWatchedByTheirLocks) {
 }
 INSTANTIATE_TEST_SUITE_P(Hidden, HiddenOwners,
                          testing::Values([](layout::SegmentHeader& header) { ++header.pidNamespace; },
-                                         [](layout::SegmentHeader& header) { ++header.ownerStartTicks; },
-                                         [](layout::SegmentHeader& header) { header.ownerPid = 1; },
+                                         [](layout::SegmentHeader& header) { header.ownerStartTicks = 0; },
                                          [](layout::SegmentHeader& header) { header.ownerPid = 0; },
                                          [](layout::SegmentHeader& header) { header.ownerPid = INT32_MIN; }));
 

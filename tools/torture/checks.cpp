@@ -44,6 +44,7 @@ bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living&
     case NameKind::fifo:
       return living.windows.contains(parsed.incarnation);
     case NameKind::router:
+    case NameKind::reaper:
       return segments::probeOwner(name) == segments::Owner::alive;
     case NameKind::wish:
       return living.windows.contains(ownerOf(name, layout::SegmentKind::wish));

@@ -19,6 +19,7 @@ DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::st
     : io_(io), log_(log), server_(backplane, name, options), faults_(server_, log) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
   answerOtherTypes<Int32>(server_, [this](MessageType type) { log_->debug("inputs: a request of type {}: status -1", toString(type)); });
+  logShortages(server_, log_);
   subscription_ = io.subscribe([this](const DigitalIoNews& news) { hear(news); });
   thread_.start(log, [this] { run(); }, std::move(failed));
 }

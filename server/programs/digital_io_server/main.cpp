@@ -58,6 +58,7 @@ int serve(int argc, char** argv) {
   mpf::MessageServer server(backplane, name + "Out", arguments.messages);
   const auto stop = [](void* outputs) noexcept { static_cast<mpf::MessageServer*>(outputs)->interrupt(); };
   const mpf::StopSignals signals(stop, &server);  // before anybody has an answer, and may stop us
+  mpf::logShortages(server, log);
   const mpf::DigitalOutputServer outputs(server, io, log);
   mpf::ProgramFailure failure;
   const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log, [&] { failure.report(); });

@@ -106,7 +106,7 @@ class Segment:
 
     def is_locked(self):
         # struct flock: l_type, l_whence, l_start, l_len, l_pid
-        asked = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, 0, 1, 0)
+        asked = struct.pack("hhqqi4x", fcntl.F_RDLCK, os.SEEK_SET, 0, 1, 0)
         try:
             answer = fcntl.fcntl(self.fd, fcntl.F_OFD_GETLK, asked)
         except OSError:

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/shm/owner_lock.h>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <optional>
+#include <utility>
+
+#include <mpf/shm/process.h>
+#include <mpf/shm/segment.h>
+
+namespace mpf::owner_lock {
+namespace {
+
+constexpr off_t kOwnersByte = 0;
+constexpr off_t kReapersByte = 1;
+
+struct flock64 lockOf(short type, off_t from, off_t bytes) noexcept {
+  struct flock64 lock{};
+  lock.l_type = type;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = from;
+  lock.l_len = bytes;
+  return lock;
+}
+
+bool tryLock(int fd, short type, off_t from, off_t bytes) noexcept {
+  auto lock = lockOf(type, from, bytes);
+  return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
+}
+
+// Another process's write lock on that byte; nullopt on an error. Asking for a read lock finds
+// write locks only.
+std::optional<struct flock64> findWriteLock(int fd, off_t byte) noexcept {
+  auto lock = lockOf(F_RDLCK, byte, 1);
+  if (::fcntl(fd, F_OFD_GETLK, &lock) != 0) return std::nullopt;
+  return lock;
+}
+
+// Opens a reaper's file and locks it. Empty: another reaper has it, or it cannot be had.
+FileDescriptor lockReaperFile(const std::string& name, int flags) {
+  const auto path = segments::path(name);
+  constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
+  FileDescriptor file(::open(path.c_str(), kFlags | flags, 0600));
+  struct stat opened{};
+  struct stat named{};
+  if (!file || !tryLock(file.get(), F_WRLCK, 0, 0)) return {};
+  // The reaper that had it before may have removed its name: then others lock another file.
+  if (::fstat(file.get(), &opened) != 0 || ::lstat(path.c_str(), &named) != 0) return {};
+  if (!S_ISREG(opened.st_mode) || opened.st_ino != named.st_ino) return {};
+  return file;
+}
+
+bool isReaperFileLocked(const std::string& name) {
+  const FileDescriptor file(::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  return file && isHeld(file.get());
+}
+
+}  // namespace
+
+bool trySet(int fd) noexcept { return tryLock(fd, F_WRLCK, 0, 0); }  // to the end, wherever it is
+
+bool isHeld(int fd) noexcept {
+  const auto lock = findWriteLock(fd, kOwnersByte);
+  if (!lock) return true;
+  // Locks of open files have no pid. One that has a pid is no owner's.
+  return lock->l_type == F_WRLCK && lock->l_pid == -1;
+}
+
+bool isHeldByOwner(int fd, const layout::SegmentHeader& header) noexcept { return isHeld(fd) && !Process::hasEnded(header); }
+
+Reaper::Reaper(const FileDescriptor& file, std::string reaperFile) : reaperFile_(std::move(reaperFile)) {
+  const bool isAlone = tryLock(file.get(), F_WRLCK, kReapersByte, 1);
+  if (reaperFile_.empty()) {
+    mayRemove_ = isAlone;
+  } else {
+    mayRemove_ = isAlone ? !isReaperFileLocked(reaperFile_) : tryBesideStrangers(file.get());
+  }
+}
+
+Reaper::~Reaper() {
+  if (ownLock_) segments::remove(reaperFile_);
+}
+
+bool Reaper::tryBesideStrangers(int fd) {
+  ownLock_ = lockReaperFile(reaperFile_, O_CREAT);
+  if (!ownLock_) return false;
+  // Root works for the window's user, who must be able to open the file if root's process is killed.
+  struct stat window{};
+  if (::fstat(fd, &window) == 0 && ::geteuid() == 0) static_cast<void>(::fchown(ownLock_.get(), window.st_uid, window.st_gid) == 0);
+  const auto writer = findWriteLock(fd, kReapersByte);
+  if (!writer) return false;
+  // Readers alone: with a read lock beside theirs no other process gets the write lock.
+  if (writer->l_type == F_UNLCK) return tryLock(fd, F_RDLCK, kReapersByte, 1);
+  return writer->l_start != kReapersByte || writer->l_len != 1;  // else another reaper is at work
+}
+
+bool removeReaperFile(const std::string& name) {
+  const auto lock = lockReaperFile(name, 0);
+  return lock && segments::remove(name);
+}
+
+}  // namespace mpf::owner_lock

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+// Locks of processes that own nothing: they neither keep the dead alive nor block what the dead left.
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <atomic>
+#include <semaphore>
+
+#include <mpf/shm/owner_lock.h>
+#include <mpf/shm/remains.h>
+#include <mpf/shm/watcher.h>
+#include <mpf/shm/window.h>
+#include <mpf/tests/shm/child.h>
+#include <mpf/tests/shm/shm_fixture.h>
+
+namespace mpf::test {
+namespace {
+
+using layout::SegmentKind;
+using remains::Verdict;
+using segments::Owner;
+
+// How a stranger locks a whole file.
+struct Grip {
+  const char* name;
+  int access;
+  short type;
+
+  friend std::ostream& operator<<(std::ostream& out, const Grip& grip) { return out << grip.name; }
+};
+constexpr Grip kReads{"ReadLock", O_RDONLY, F_RDLCK};
+constexpr Grip kWrites{"WriteLock", O_RDWR, F_WRLCK};
+
+class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
+ protected:
+  void TearDown() override {
+    stranger_.reset();
+    static_cast<void>(backplane_.removeDead());
+    ShmTest::TearDown();
+  }
+  std::unique_ptr<Child> startOwner(SegmentKind kind) const {
+    return std::make_unique<Child>([this, kind](Child::Self& self) {
+      const OwnWindow window(name(), kind, kind == SegmentKind::serverWindow ? serverName() : "", {}, [](layout::SegmentHeader&) {});
+      self.stay();
+    });
+  }
+  // A process that waits for a lock on the file. It says once more that it is ready when it has it.
+  void startStranger(const std::string& file, const Grip& grip = GetParam()) {
+    stranger_ = std::make_unique<Child>([path = segments::path(file), grip](Child::Self& self) {
+      const FileDescriptor opened(checkCall(::open(path.c_str(), grip.access | O_CLOEXEC), "open"));
+      self.ready();
+      struct flock64 lock{};
+      lock.l_type = grip.type;
+      lock.l_whence = SEEK_SET;
+      checkCall(::fcntl(opened.get(), F_OFD_SETLKW, &lock), "lock");
+      self.stay();
+    });
+    stranger_->go();
+  }
+  void killOwner(const std::unique_ptr<Child>& owner) {
+    owner->end(SIGKILL);
+    ASSERT_TRUE(stranger_->waitUntilReady()) << "it has the lock now";
+  }
+  // The only name of that kind.
+  [[nodiscard]] std::string nameOf(NameKind kind) const {
+    const auto names = backplane_.segmentNames();
+    const auto found = std::ranges::find_if(names, [&](const auto& one) { return SegmentName::tryParse(one)->kind == kind; });
+    return found == names.end() ? std::string() : *found;
+  }
+  [[nodiscard]] std::unique_ptr<OwnWindow> makeServer() const {
+    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), Rights{}, [](layout::SegmentHeader&) {});
+  }
+  std::unique_ptr<Child> stranger_;
+};
+
+TEST_P(ForeignLock, OnAServersWindowLeavesItsNameToASuccessor) {
+  const auto owner = startOwner(SegmentKind::serverWindow);
+  const auto old = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
+  startStranger(serverName());
+  EXPECT_EQ(segments::probeOwner(serverName()), Owner::alive);
+
+  killOwner(owner);
+
+  EXPECT_FALSE(old->hasOwner());
+  EXPECT_EQ(segments::probeOwner(serverName()), Owner::dead);
+  const auto server = makeServer();
+  EXPECT_NE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation, old->header().incarnation);
+  EXPECT_EQ(nameOf(NameKind::reaper), "") << "a reaper's file goes with its reaper";
+}
+
+TEST_P(ForeignLock, OnAnyFileOfTheDeadLeavesItToWhoeverCleans) {
+  for (const auto kind : {SegmentKind::serverWindow, SegmentKind::clientWindow}) {
+    for (const auto locked : {kind == SegmentKind::serverWindow ? NameKind::serverWindow : NameKind::clientWindow, NameKind::hints}) {
+      const auto owner = startOwner(kind);
+      startStranger(nameOf(locked));
+
+      killOwner(owner);
+
+      const auto judged = remains::judge(name());
+      EXPECT_EQ(judged.size(), 3U);
+      for (const auto& file : judged) EXPECT_EQ(file.verdict, Verdict::dead) << file.name << ": " << file.reason;
+      EXPECT_EQ(backplane_.removeDead().size(), 3U);
+      EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
+    }
+  }
+}
+
+TEST_P(ForeignLock, OnAWindowHidesNoDeathFromAWatcher) {
+  const auto owner = startOwner(SegmentKind::serverWindow);
+  const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
+  std::binary_semaphore died{0};
+  const auto token = backplane_.watcher().watchPeer(peer, [&] { died.release(); });
+  startStranger(serverName());
+
+  killOwner(owner);
+
+  died.acquire();
+  EXPECT_TRUE(peer->isDead());
+  backplane_.watcher().forget(token);
+}
+
+// In another pid namespace only the lock tells, and a read lock is no owner's.
+TEST_P(ForeignLock, OfAReaderCountsNowhere) {
+  if (GetParam().type != F_RDLCK) GTEST_SKIP() << "a write lock looks like the owner's there";
+  const auto owner = std::make_unique<Child>([this](Child::Self& self) {
+    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
+                           [](layout::SegmentHeader& header) { ++header.pidNamespace; });
+    self.stay();
+  });
+  startStranger(serverName());
+  EXPECT_EQ(segments::probeOwner(serverName()), Owner::alive);
+
+  killOwner(owner);
+
+  EXPECT_EQ(segments::probeOwner(serverName()), Owner::dead);
+  EXPECT_TRUE(makeServer());
+}
+
+TEST_P(ForeignLock, OnALivingWindowTakesNothingFromItsOwner) {
+  const auto server = makeServer();
+  startStranger(serverName());
+
+  EXPECT_FALSE(segments::removeIfOwnerless(serverName()));
+  EXPECT_THAT(backplane_.removeDead(), testing::IsEmpty());
+
+  EXPECT_EQ(segments::probeOwner(serverName()), Owner::alive);
+}
+
+INSTANTIATE_TEST_SUITE_P(Whole, ForeignLock, testing::Values(kReads, kWrites), testing::PrintToStringParamName());
+
+// A reaper that was killed beside strangers leaves a file of its own. The next one uses it, and takes it away.
+TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
+  const auto owner = startOwner(SegmentKind::serverWindow);
+  const auto incarnation = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation;
+  startStranger(serverName(), kReads);
+  killOwner(owner);
+  const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, incarnation);
+  Child killed([&](Child::Self& self) {
+    const FileDescriptor window(checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
+    const owner_lock::Reaper reaper(window, reaperFile);
+    if (!reaper.mayRemove()) ::_exit(4);
+    self.stay();
+  });
+  EXPECT_FALSE(segments::removeIfOwnerless(serverName())) << "another reaper is at work";
+  EXPECT_FALSE(owner_lock::removeReaperFile(reaperFile));
+
+  killed.end(SIGKILL);
+
+  EXPECT_EQ(nameOf(NameKind::reaper), reaperFile);
+  EXPECT_TRUE(segments::removeIfOwnerless(serverName()));
+  EXPECT_EQ(nameOf(NameKind::reaper), "");
+}
+
+TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
+  const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, 7);
+  const FileDescriptor made(checkCall(::open(segments::path(reaperFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "create"));
+
+  EXPECT_THAT(backplane_.removeDead(), testing::ElementsAre(reaperFile));
+}
+
+// A stranger's file that claims to be the dead window of living hints proves nothing.
+TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+  const OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
+  auto fake = Segment::create(layout::kWindowBytes, SegmentKind::serverWindow, name(), {.mode = 0644, .user = 65534});
+  fake.sharedHeader().incarnation = client.header().incarnation;
+  ASSERT_TRUE(fake.tryPublish(serverName("fake")));
+  fake = {};
+
+  EXPECT_THAT(backplane_.removeDead(), testing::ElementsAre(serverName("fake")));
+
+  EXPECT_EQ(backplane_.segmentNames().size(), 3U);
+}
+
+// Whose process it was tells more than a lock: its pid, and when it started.
+TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessIsOfTheDead) {
+  const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
+                         [](layout::SegmentHeader& header) { ++header.ownerStartTicks; });
+
+  EXPECT_EQ(segments::probeOwner(serverName()), Owner::dead);
+}
+
+class AdmittedPeers : public ShmTest {
+ protected:
+  [[nodiscard]] std::string rightsOf(NameKind kind) const {
+    struct stat status{};
+    checkCall(::stat(segments::path(SegmentName::keyed(name(), kind, client_.header().incarnation)).c_str(), &status), "stat");
+    std::array<char, 32> text;
+    std::snprintf(text.data(), text.size(), "%04o %u", status.st_mode & 07777u, status.st_gid);
+    return text.data();
+  }
+  void TearDown() override {}
+  static constexpr std::uint32_t kOperators = 54321;
+  OwnWindow client_{name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
+};
+
+TEST_F(AdmittedPeers, AreNobodyAtFirst) {
+  EXPECT_THAT(rightsOf(NameKind::clientWindow), testing::StartsWith("0644"));
+  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
+  EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0600"));
+}
+
+TEST_F(AdmittedPeers, OfTheSameUserNeedNoMore) {
+  client_.admit({.mode = 0600});
+
+  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
+}
+
+TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndPipe) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
+  client_.admit({.mode = 0660, .group = kOperators});
+
+  EXPECT_EQ(rightsOf(NameKind::hints), "0664 54321");
+  EXPECT_EQ(rightsOf(NameKind::fifo), "0660 54321");
+}
+
+TEST_F(AdmittedPeers, OfTwoGroupsAreEverybody) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
+  client_.admit({.mode = 0660, .group = kOperators});
+  client_.admit({.mode = 0660, .group = kOperators + 1});
+
+  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0666"));
+  EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0666"));
+}
+
+}  // namespace
+}  // namespace mpf::test
