@@ -103,7 +103,8 @@ TEST_F(ReportTest, ADeadServerIsDead) {
   victim.end(SIGKILL);
 
   EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "dead");
-  EXPECT_THAT(inOneLine(run({"mrr", "--interval", "1"}).out), HasSubstr("] dead (removed by the next program that attaches) queueSize 32 "));
+  EXPECT_THAT(inOneLine(run({"mrr", "--interval", "1"}).out),
+              HasSubstr("] dead (removed by the next program that attaches) queueSize 32 "));
   EXPECT_THAT(run({"msr", "echo"}).out, HasSubstr("              state dead, pid "));
   static_cast<void>(backplane_.removeDead());
 }
