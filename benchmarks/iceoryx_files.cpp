@@ -34,14 +34,14 @@ FileDescriptor tryLock(const fs::path& path) {
   return file;
 }
 
-void remove(const fs::path& path) {
+void removeFile(const fs::path& path) {
   std::error_code ignored;
   fs::remove(path, ignored);
 }
 
 void removeSocket(const fs::path& path) {
   std::error_code ignored;
-  if (fs::is_socket(path, ignored)) remove(path);
+  if (fs::is_socket(path, ignored)) removeFile(path);
 }
 
 }  // namespace
@@ -50,7 +50,7 @@ void removeIceoryxFiles(const fs::path& folder) {
   for (auto lock : locksIn(folder)) {
     const auto held = tryLock(lock);
     if (!held) continue;
-    remove(lock);
+    removeFile(lock);
     removeSocket(lock.replace_extension());
   }
 }
@@ -58,11 +58,11 @@ void removeIceoryxFiles(const fs::path& folder) {
 void removeRouDiFiles(const fs::path& folder, const fs::path& sharedMemory) {
   const auto held = tryLock(folder / "iox-unique-roudi.lock");  // another RouDi cannot start meanwhile
   if (!held) return;
-  remove(sharedMemory / "iceoryx_mgmt");
-  if (const auto* group = ::getgrgid(::getegid()); group != nullptr) remove(sharedMemory / group->gr_name);
+  removeFile(sharedMemory / "iceoryx_mgmt");
+  if (const auto* group = ::getgrgid(::getegid()); group != nullptr) removeFile(sharedMemory / group->gr_name);
   removeSocket(folder / "roudi");
-  remove(folder / "roudi.lock");
-  remove(folder / "iox-unique-roudi.lock");
+  removeFile(folder / "roudi.lock");
+  removeFile(folder / "iox-unique-roudi.lock");
 }
 
 }  // namespace mpf::bench

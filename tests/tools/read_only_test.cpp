@@ -152,7 +152,7 @@ TEST_F(ReadOnlyTest, NoNameOfAFileCommandsATerminal) {
 
     EXPECT_THAT(ended.out + ended.err, testing::Not(testing::AnyOf(HasSubstr("\x1b"), HasSubstr("\xc2\x9b")))) << arguments.front();
   }
-  EXPECT_THAT(inOneLine(run({"clean", "--dry-run"}).out), HasSubstr(".?[2J?? stays: not a name that MPF gives"));
+  EXPECT_THAT(inOneLine(run({"clean", "--dry-run"}).out), HasSubstr(R"(.\x1b[2J\u009b stays: not a name that MPF gives)"));
   std::filesystem::remove(path);
 }
 

@@ -108,9 +108,14 @@ TEST_F(RouterReportTest, WhatIsLocalStaysAsItWas) {
   const auto remote = connectedRemote(statistics_, {1});
   const auto after = mrr();
 
-  ASSERT_THAT(before, SizeIs(8)) << testing::PrintToString(before);
-  EXPECT_EQ(std::vector(after.begin(), after.begin() + 5), std::vector(before.begin(), before.begin() + 5));
-  EXPECT_EQ(std::vector(after.end() - 3, after.end()), std::vector(before.end() - 3, before.end()));
+  EXPECT_THAT(before, testing::Contains(testing::StartsWith(" 1 local[")));
+  EXPECT_GT(after.size(), before.size());
+  auto at = after.begin();
+  for (const auto& line : before) {  // in the same order
+    at = std::find(at, after.end(), line);
+    ASSERT_NE(at, after.end()) << line << testing::PrintToString(after);
+    ++at;
+  }
 }
 
 TEST_F(RouterReportTest, MrrSaysWhyThereIsNoConnection) {
@@ -199,7 +204,7 @@ TEST_F(RouterReportTest, InspectShowsEachRowOfARouter) {
   EXPECT_EQ(json.at(0).at("kind"), "router");
   ASSERT_THAT(json.at(0).at("lines"), SizeIs(2));
   EXPECT_EQ(json.at(0).at("lines").at(0).at("locations"), "1, 2");
-  EXPECT_EQ(json.at(0).at("lines").at(1).at("problem"), "no ?[2J route");
+  EXPECT_EQ(json.at(0).at("lines").at(1).at("problem"), R"(no \x1b[2J route)");
 }
 
 TEST_F(RouterReportTest, InspectsSummaryHasRoutersAndWhoWaits) {
