@@ -76,6 +76,8 @@ class PolledSerialPort : public SerialPort {
   void send();
   void receive();
   void deliver(const LineByte& byte);
+  void takeOverruns();
+  void fail(LineFault fault, std::uint64_t count);
   void act(ByteHandlerResult result);
   void endRead(SerialPortStatus status);
   void end(SerialPortStatus status);
@@ -88,6 +90,7 @@ class PolledSerialPort : public SerialPort {
   ByteHandler* handler_ = nullptr;  // this and below: the port's thread
   Request* request_ = nullptr;
   std::vector<LineByte> received_;
+  std::uint64_t overrunsToTell_ = 0;  // counted; the byte after the gap has not been delivered yet
   Counters counters_{};
   std::atomic<SerialPortStatus> status_{SerialPortStatus::success};
   std::jthread thread_;  // last: ends before what it uses

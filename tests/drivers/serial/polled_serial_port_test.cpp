@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
+#include <mpf/base/file_descriptor.h>
+#include <mpf/base/system_call.h>
 #include <mpf/tests/drivers/serial/line_collector.h>
 
 namespace mpf::test {
