@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fmt/format.h>
 #include <utility>
 #include <vector>
 
@@ -37,7 +38,11 @@ std::int32_t statusOf(SerialPortStatus status) {
 }  // namespace
 
 SerialServer::SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log)
-    : server_(server), log_(log), reader_(options.bufferBytes, options.eom, options.circularBuffer), port_(port, reader_) {
+    : server_(server),
+      log_(log),
+      faults_(server, port, log),
+      reader_(options.bufferBytes, options.eom, options.circularBuffer, [this] { faults_.look(); }),
+      port_(port, reader_) {
   server.on<Char8Array>([this](Char8ArrayMessage&& request) { handle(std::move(request)); });
   server.on<SerialConfig>([this](SerialConfigMessage&& request) { configure(std::move(request)); });
   answerOtherTypes<Char8Array, SerialConfig>(server,
@@ -56,11 +61,18 @@ void SerialServer::noteRequest() {
 
 void SerialServer::noteStatus(const Char8Array& request, std::int32_t status) {
   log_->debug("cmd {:#x}, timeout {}: status {}", request.cmd, request.timeout, status);
-  const bool fails = status == serialServerStatusError;
+  faults_.look();
+  const bool fails = status == serialServerStatusError && !faults_.hasAnswerFaults();  // of faults of the line `faults_` tells
   if (fails == std::exchange(isFailing_, fails)) return;
   if (!fails) return log_->info("requests succeed again");
-  const auto because = port_->unpluggedBecause();
-  log_->warn("requests fail: {}", because.empty() ? "the line damaged bytes, or the request is no command" : because);
+  log_->warn("requests fail: {}", whyFailed(request));
+}
+
+std::string SerialServer::whyFailed(const Char8Array& request) const {
+  if (auto because = port_->unpluggedBecause(); !because.empty()) return because;
+  const auto command = request.cmd & cmdCommandMask;
+  if (command == cmdRead || command == cmdWrite || command == cmdWriteRead) return "the line was lost, and is there again";
+  return fmt::format("cmd {:#x} has none of the commands 1 (read), 2 (write) and 3 (write and read)", request.cmd);
 }
 
 void SerialServer::applyOptions(const Char8Array& request) {
@@ -71,6 +83,7 @@ void SerialServer::applyOptions(const Char8Array& request) {
 }
 
 std::int32_t SerialServer::attempt(const Char8Array& request, SerialPort::Bytes data, std::string& answer) {
+  faults_.setAnswer(0);
   const auto timeout = timeoutOf(request);
   const auto command = request.cmd & cmdCommandMask;
   if (command == cmdWrite) return statusOf(port_->write(data, timeout));
@@ -85,7 +98,8 @@ std::int32_t SerialServer::attempt(const Char8Array& request, SerialPort::Bytes 
   }
   auto read = reader_.takeAnswer();
   answer = std::move(read.bytes);
-  return read.overflow ? serialServerStatusOverflow : statusOf(status);
+  faults_.setAnswer(read.faults);
+  return faults_.statusOf(read.overflow ? serialServerStatusOverflow : statusOf(status));
 }
 
 void SerialServer::handle(Char8ArrayMessage&& request) {
@@ -105,6 +119,7 @@ void SerialServer::handle(Char8ArrayMessage&& request) {
   reply.setSize(answer.size());
   std::copy(answer.begin(), answer.end(), reply.value().begin());
   reply->status = status;
+  faults_.describe(*reply);
   static_cast<void>(server_.reply(std::move(reply)));
 }
 

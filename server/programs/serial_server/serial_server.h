@@ -9,6 +9,7 @@
 
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/server/message_server.h>
+#include <mpf/server/programs/serial_server/line_faults.h>
 #include <mpf/server/programs/serial_server/line_reader.h>
 #include <mpf/server/programs/server_log.h>
 
@@ -35,12 +36,14 @@ class SerialServer {
   void configure(SerialConfigMessage&& request);
   void noteRequest();
   void noteStatus(const Char8Array& request, std::int32_t status);
+  [[nodiscard]] std::string whyFailed(const Char8Array& request) const;
   void applyOptions(const Char8Array& request);
   // One attempt. Returns a serialServerStatus; `answer` is what was read.
   std::int32_t attempt(const Char8Array& request, SerialPort::Bytes data, std::string& answer);
 
   MessageServer& server_;
   const ServerLog& log_;
+  LineFaults faults_;  // of the line
   LineReader reader_;
   BoundSerialPort port_;
   bool isAsked_ = false;  // there was a request
