@@ -37,6 +37,7 @@ struct Finding {
 [[nodiscard]] Finding checkMaps(const Host& host);
 [[nodiscard]] Finding checkAddressSpace(const Host& host);
 [[nodiscard]] Finding checkInotify(const Host& host);
+[[nodiscard]] Finding checkRealTime(const Host& host);
 // Other hosts (check_up_router.cpp).
 [[nodiscard]] Finding checkRouters(const Host& host);
 // Processors and clocks (check_up_machine.cpp).

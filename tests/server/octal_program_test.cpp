@@ -167,6 +167,13 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
 
+TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
+  const auto server =
+      start({"dmm", "x", "--real-time", "0", "--carrier", "ipac=model", "--octal-uart", "U,ipac,IP_a,8", "--octal-port", "x,U,0"});
+  EXPECT_NE(lineWith(*server, "interrupts are served at ordinary priority, as --real-time 0 says"), "");
+  EXPECT_EQ(server->end(SIGTERM), 0);
+}
+
 // A module that is not there keeps nobody waiting but who wants its ports, and they are told so.
 TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
   const auto path = folder_.file("line");

@@ -75,18 +75,18 @@ void LineFaults::tell(std::int64_t nowNs) {
   const auto counts = std::exchange(untold_, {});
   const auto forNs = static_cast<double>(nowNs - untoldSinceNs_);
   const auto when = forNs > 0 ? fmt::format(" within {}", durationText(forNs)) : std::string();
-  log_->warn("{}: the line failed: {}{}", port_.description(), textOf(counts), when);
+  log_->warn("{}: the line lost or damaged bytes: {}", port_.description(), textOf(counts, when));
   nextLineNs_ = nowNs + quiet_.count();
 }
 
-std::string LineFaults::textOf(const Counts& counts) {
+std::string LineFaults::textOf(const Counts& counts, const std::string& when) {
   std::vector<std::string> kinds;
   if (counts.overruns > 0) kinds.push_back(withCount(counts.overruns, "overrun", "overruns"));
   if (counts.parity > 0) kinds.push_back(withCount(counts.parity, "parity error", "parity errors"));
   if (counts.framing > 0) kinds.push_back(withCount(counts.framing, "framing error", "framing errors"));
   if (counts.breaks > 0) kinds.push_back(withCount(counts.breaks, "break", "breaks"));
-  auto text = fmt::format("{}", fmt::join(kinds, ", "));
-  if (counts.overruns > 0) text += "; bytes are lost when this program gets no processor in time (mpf doctor)";
+  auto text = fmt::format("{}{}", fmt::join(kinds, ", "), when);
+  if (counts.overruns > 0) text += "; this program got no processor in time, see mpf doctor";
   if (counts.parity + counts.framing > 0) text += "; do both ends have the same settings, and is the cable good?";
   return text;
 }

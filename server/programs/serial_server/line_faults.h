@@ -54,7 +54,7 @@ class LineFaults {
   };
   [[nodiscard]] Counts counted() const;
   void tell(std::int64_t nowNs);
-  [[nodiscard]] static std::string textOf(const Counts& counts);
+  [[nodiscard]] static std::string textOf(const Counts& counts, const std::string& when);
 
   MessageServer& server_;
   const SerialPort& port_;
