@@ -60,7 +60,7 @@ struct Figures {
   double writesPerSecond = kNotLookedAt;  // system calls that write; see Meter
   double idleServer = kNotLookedAt;       // share of time that the server's CPUs had nothing to do, 0 to 1
   double idleRequester = kNotLookedAt;    // the same of the requester's
-  LineFaultFigures lineFaults;            // of serial lines
+  LineFaultFigures lineFaults{};          // of serial lines
   std::array<double, 4> more{};           // what else a row finds out that several rows tell of; from its last round
 };
 
