@@ -87,6 +87,7 @@ inline constexpr const char* kScanning =
     "An IP330 that scans 32 channels at 1 kHz, its model in real time: one scan server, no client asks";
 inline constexpr const char* kSerial =
     "100 characters to each of eight serial ports at 38400 baud (manual, \"octalSerialPort performance\")";
+inline constexpr const char* kShortAnswers = "answers";  // unit of a row about answers that were not whole
 inline constexpr const char* kEcho = "mpf-int32-server, the echo";
 inline constexpr const char* kManualLocal = "the manual's, local";
 inline constexpr const char* kManualRemote = "the manual's, remote";

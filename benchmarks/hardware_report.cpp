@@ -12,13 +12,23 @@ namespace {
 constexpr const char* kHardwareLine = "  {:<54} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}  {}\n";
 constexpr const char* kOne = "  {:<54} {}\n";
 
+// What the replies said of answers that were not whole.
+std::string faultsText(const LineFaultFigures& faults) {
+  const auto unnamed = faults.overruns + faults.parity + faults.framing + faults.breaks == 0 && faults.shortAnswers > 0;
+  return fmt::format("; with overruns {}, parity errors {}, framing errors {}, breaks {}{}", faults.overruns, faults.parity, faults.framing,
+                     faults.breaks, unnamed ? ": the server saw no fault of the line" : "");
+}
+
 std::string hardwareLineOf(const Result& result) {
   const auto& what = result.measurement;
   const auto& figures = result.figures;
   if (!what.skipped.empty()) return fmt::format(kOne, what.name, "left out: " + what.skipped);
   if (!result.error.empty()) return fmt::format(kOne, what.name, "failed: " + result.error);
-  if (!what.unit.empty())
-    return fmt::format("  {:<54} {:>8.4g} {}{}{}\n", what.name, figures.value, what.unit, what.detail.empty() ? "" : ", ", what.detail);
+  if (!what.unit.empty()) {
+    const bool isOfFaults = what.unit == kShortAnswers;
+    return fmt::format("  {:<54} {:>8.4g} {}{}{}{}\n", what.name, figures.value, what.unit, what.detail.empty() ? "" : ", ", what.detail,
+                       isOfFaults ? faultsText(figures.lineFaults) : "");
+  }
   const bool isMeasured = figures.latency.count() != 0;
   const auto at = [&](double percent) {
     return isMeasured ? durationText(static_cast<double>(figures.latency.percentileNs(percent))) : "";

@@ -20,14 +20,12 @@ constexpr const char* kPercentOfCpu = "% of one CPU";
 
 // What one look finds out, in Figures::more.
 constexpr std::size_t kServerCpu = 0;  // percent of one CPU
-constexpr std::size_t kLost = 1;       // answers
 
 // One request on its way at each port.
 void measurePorts(const Scene& scene, const HardwareServers& servers, bool awaitsEcho) {
   const Stopwatch watch;
   std::array<std::uint64_t, kPorts> sentAt{};
   LatencyRecorder recorder;
-  std::uint64_t lost = 0;
   PortClients* sender = nullptr;
   const auto send = [&](std::size_t port) {
     sentAt.at(port) = Stopwatch::start();
@@ -35,7 +33,6 @@ void measurePorts(const Scene& scene, const HardwareServers& servers, bool await
   };
   PortClients clients(servers.bench(), kPorts, kCharacters, awaitsEcho, [&](std::size_t port, bool isWhole) {
     if (isWhole) recorder.add(watch.elapsedNs(sentAt.at(port), Stopwatch::stop()));
-    if (!isWhole) ++lost;
     send(port);
   });
   sender = &clients;
@@ -46,14 +43,14 @@ void measurePorts(const Scene& scene, const HardwareServers& servers, bool await
   goOn(scene.budget().warmUp);
 
   recorder = {};
-  lost = 0;
+  static_cast<void>(clients.takeFaults());  // of the warm-up
   const auto cpuBefore = cpuNsOf(servers.pid());
   const auto fromNs = Clock::nowNs();
   goOn(std::max<Nanoseconds>(scene.budget().measure, kTrafficAtLeast));
   const auto elapsedNs = static_cast<double>(Clock::nowNs() - fromNs);
   auto& figures = scene.figures();
   figures.more[kServerCpu] = 100 * (cpuNsOf(servers.pid()) - cpuBefore) / elapsedNs;
-  figures.more[kLost] = static_cast<double>(lost);
+  if (awaitsEcho) figures.lineFaults = clients.takeFaults();
   figures.latency = recorder;
   figures.count = recorder.count();
   figures.perSecond = static_cast<double>(figures.count) * 1e9 / elapsedNs;
@@ -127,7 +124,14 @@ std::vector<Measurement> rowsAbout(const Bench& bench, const std::string& name, 
     return row;
   };
   std::vector<Measurement> rows{rate, more(": CPU, model included", kPercentOfCpu, kServerCpu)};
-  if (takesTime && awaitsEcho) rows.push_back(more(": characters were lost", "answers", kLost));
+  if (awaitsEcho) {
+    rows.push_back(more(": characters were lost", kShortAnswers, kServerCpu));
+    rows.back().run = [=](const Stage& stage) {
+      auto outcome = run(stage);
+      outcome.figures.value = outcome.figures.lineFaults.shortAnswers;
+      return outcome;
+    };
+  }
   return rows;
 }
 

@@ -10,6 +10,13 @@ using Json = nlohmann::ordered_json;
 
 void addFigures(Json& object, const Result& result) {
   const auto& latency = result.figures.latency;
+  if (const auto& faults = result.figures.lineFaults; faults.shortAnswers >= 0) {
+    object["short_answers"] = faults.shortAnswers;
+    object["overrun_answers"] = faults.overruns;
+    object["parity_answers"] = faults.parity;
+    object["framing_answers"] = faults.framing;
+    object["break_answers"] = faults.breaks;
+  }
   if (!result.measurement.unit.empty()) {
     object["value"] = result.figures.value;
     object["unit"] = result.measurement.unit;

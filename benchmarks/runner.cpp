@@ -27,6 +27,7 @@ class Rounds {
     writes_.push_back(figures.writesPerSecond);
     idleServer_.push_back(figures.idleServer);
     idleRequester_.push_back(figures.idleRequester);
+    lineFaults_ = figures.lineFaults;
     if (floorNs <= 0) return;
     floors_.push_back(floorNs);
     ratios_.push_back(costNs(figures) / floorNs);
@@ -40,6 +41,7 @@ class Rounds {
                       median(writes_),
                       median(idleServer_),
                       median(idleRequester_)};
+    result.figures.lineFaults = lineFaults_;
     result.floorNs = median(floors_);
     result.ratioToFloor = median(ratios_);
   }
@@ -47,6 +49,7 @@ class Rounds {
  private:
   LatencyRecorder latency_;
   std::uint64_t count_ = 0;
+  LineFaultFigures lineFaults_;  // of the last round: rows of serial lines have one
   std::vector<double> typical_, perSecond_, values_, writes_, idleServer_, idleRequester_, floors_, ratios_;
 };
 

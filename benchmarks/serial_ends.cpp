@@ -116,9 +116,21 @@ void PortClients::take(std::size_t port, const Message& message) {
   const auto read = message.valueAs<Char8Array>().size();
   if (reply->status == serial::serialServerStatusOK && (!awaitsEcho_ || read == characters_)) return onReply_(port, true);
   if (!awaitsEcho_) throw std::runtime_error(fmt::format("port {}: status {}", port, reply->status));
+  countFaults(*reply);
   // The rest of this echo is not the beginning of the next one.
   settles_.at(port) = true;
   ask(port, serial::cmdRead, 0, kSettleMs);
 }
+
+void PortClients::countFaults(const Char8Array& reply) noexcept {
+  ++faults_.shortAnswers;
+  if (reply.status != serial::serialServerStatusOverflow && reply.status != serial::serialServerStatusError) return;
+  if ((reply.extra & serial::serialFaultOverrun) != 0) ++faults_.overruns;
+  if ((reply.extra & serial::serialFaultParity) != 0) ++faults_.parity;
+  if ((reply.extra & serial::serialFaultFraming) != 0) ++faults_.framing;
+  if ((reply.extra & serial::serialFaultBreak) != 0) ++faults_.breaks;
+}
+
+LineFaultFigures PortClients::takeFaults() noexcept { return std::exchange(faults_, {.shortAnswers = 0}); }
 
 }  // namespace mpf::bench

@@ -51,15 +51,19 @@ class PortClients {
   // Throws std::runtime_error when a reply is not what it should be.
   void runOnce() { dispatcher_.runOnce(); }
   [[nodiscard]] std::size_t size() const noexcept { return clients_.size(); }
+  // Of the answers since the last call.
+  [[nodiscard]] LineFaultFigures takeFaults() noexcept;
 
  private:
   void ask(std::size_t port, std::int32_t command, std::size_t characters, int timeoutMs);
   void take(std::size_t port, const Message& message);
+  void countFaults(const Char8Array& reply) noexcept;
 
   const std::size_t characters_;
   const bool awaitsEcho_;
   OnReply onReply_;
   std::array<bool, kPorts> settles_{};  // what comes late after a loss is waited for
+  LineFaultFigures faults_{.shortAnswers = 0};
   Dispatcher dispatcher_;
   std::deque<MessageClient> clients_;
 };

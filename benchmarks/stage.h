@@ -41,6 +41,15 @@ struct Budget {
 
 inline constexpr double kNotLookedAt = -1;
 
+// Answers over serial lines that were not whole, and how many of them had which fault, as their replies say; one may have several.
+struct LineFaultFigures {
+  double shortAnswers = kNotLookedAt;
+  double overruns = 0;
+  double parity = 0;
+  double framing = 0;
+  double breaks = 0;
+};
+
 // What the requester found out. Plain data in shared memory.
 struct Figures {
   LatencyRecorder latency;   // each message timed by itself
@@ -51,6 +60,7 @@ struct Figures {
   double writesPerSecond = kNotLookedAt;  // system calls that write; see Meter
   double idleServer = kNotLookedAt;       // share of time that the server's CPUs had nothing to do, 0 to 1
   double idleRequester = kNotLookedAt;    // the same of the requester's
+  LineFaultFigures lineFaults{};          // of serial lines
   std::array<double, 4> more{};           // what else a row finds out that several rows tell of; from its last round
 };
 

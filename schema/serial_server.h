@@ -25,8 +25,18 @@ inline constexpr std::int32_t cmdTimeoutMilliseconds = 0x100;  // `timeout` is i
 // `status` of the reply. Whatever was read is in it, the end of message included, whatever the status.
 inline constexpr std::int32_t serialServerStatusOK = 0;
 inline constexpr std::int32_t serialServerStatusTimeout = 1;
-inline constexpr std::int32_t serialServerStatusOverflow = 2;
+inline constexpr std::int32_t serialServerStatusOverflow = 2;  // the answer is longer than the buffer, or the UART's buffer overflowed
 inline constexpr std::int32_t serialServerStatusError = 3;
+
+// `extra` of a reply with status Overflow or Error: a bit for each kind of fault that the line had within the answer or right before
+// it. 0: none; the status has another reason. With any other status `extra` is that of the request.
+// Faults that the line has while nobody reads count as well: the answer whose bytes are damaged or missing has their bits.
+// Of these alone only serialFaultOverrun makes the status Overflow, the others make it Error.
+inline constexpr std::int32_t serialFaultOverrun = 1;   // bytes are missing: the UART or its driver was not read in time
+inline constexpr std::int32_t serialFaultParity = 2;    // a byte with a parity error, which is not in the answer
+inline constexpr std::int32_t serialFaultFraming = 4;   // a byte without a stop bit, which is not in the answer
+inline constexpr std::int32_t serialFaultBreak = 8;     // a break
+inline constexpr std::int32_t serialFaultUnplugged = 16;  // the line was lost
 
 // NOLINTEND(readability-identifier-naming)
 

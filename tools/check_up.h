@@ -37,6 +37,7 @@ struct Finding {
 [[nodiscard]] Finding checkMaps(const Host& host);
 [[nodiscard]] Finding checkAddressSpace(const Host& host);
 [[nodiscard]] Finding checkInotify(const Host& host);
+[[nodiscard]] Finding checkRealTime(const Host& host);
 // Servers that run (check_up_server.cpp).
 [[nodiscard]] Finding checkServers(const Host& host);
 // Other hosts (check_up_router.cpp).

@@ -113,7 +113,7 @@ std::vector<Finding> checkUp(const Host& host) {
   std::vector<Finding> findings;
   for (const auto check :
        {checkMount, checkSpace, checkRights, checkSegments, checkNamespaces, checkRemoveIpc, checkHidepid, checkPidfd, checkOpenFiles,
-        checkMaps, checkAddressSpace, checkInotify, checkCpus, checkClock, checkGovernor, checkServers, checkRouters}) {
+        checkMaps, checkAddressSpace, checkInotify, checkRealTime, checkCpus, checkClock, checkGovernor, checkServers, checkRouters}) {
     findings.push_back(check(host));
   }
   return findings;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Check-up of what the kernel lets processes see and have.
+#include <cstdlib>
 #include <fmt/format.h>
 
+#include <mpf/base/real_time_priority.h>
 #include <mpf/tools/check_up.h>
 
 namespace mpf::tools {
@@ -14,6 +16,12 @@ Finding checkAtLeast(const char* name, std::optional<std::uint64_t> value, std::
   if (*value == UINT64_MAX) return {name, Health::ok, "no limit", {}};
   if (*value >= enough) return {name, Health::ok, fmt::to_string(*value), {}};
   return {name, Health::warning, fmt::format("{}: {}", *value, purpose), remedy};
+}
+
+bool hasCapability(const Host& host, unsigned number) {
+  const auto text = host.ofProcess("CapEff");
+  if (!text) return false;
+  return (std::strtoull(text->c_str(), nullptr, 16) >> number & 1) != 0;
 }
 
 }  // namespace
@@ -59,6 +67,26 @@ Finding checkInotify(const Host& host) {
   return checkAtLeast("inotify instances", host.number("proc/sys/fs/inotify/max_user_instances"), 128,
                       "each process of a user whose servers are not there takes one; others look every 0.1 s",
                       "sysctl fs.inotify.max_user_instances=512");
+}
+
+Finding checkRealTime(const Host& host) {
+  constexpr const char* kName = "real-time priority";
+  constexpr unsigned kSysNice = 23;  // CAP_SYS_NICE
+  const auto limit = host.limit("Max realtime priority");
+  if (host.tryRead("proc/sys/kernel/sched_rt_runtime_us") == "0") {
+    return {kName, Health::warning, "the kernel gives real-time threads no time at all: programs of hardware use ordinary threads",
+            "sysctl kernel.sched_rt_runtime_us=950000"};
+  }
+  if (hasCapability(host, kSysNice)) return {kName, Health::ok, "allowed by CAP_SYS_NICE", {}};
+  if (!limit) return {kName, Health::unknown, "it cannot be read", {}};
+  if (*limit >= kInterruptPriority) return {kName, Health::ok, fmt::format("allowed up to {} by RLIMIT_RTPRIO", *limit), {}};
+  return {kName, Health::warning,
+          fmt::format("this user may have {}, of {} that programs of hardware ask for: interrupts wait for busy processors, and an octal "
+                      "UART loses characters when one waits for a millisecond",
+                      *limit, kInterruptPriority),
+          fmt::format("LimitRTPRIO={0} or AmbientCapabilities=CAP_SYS_NICE in the systemd unit; \"USER - rtprio {0}\" in a file of "
+                      "/etc/security/limits.d, then log in again",
+                      kInterruptPriority)};
 }
 
 }  // namespace mpf::tools

@@ -78,7 +78,10 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
       rising_(options.rising & kind_.inputs),
       falling_(options.falling & kind_.inputs) {
   static_cast<void>(setUp());
-  if (!usesInterrupts_) noInterrupt_ = std::make_unique<NoInterrupt>();
+  if (!usesInterrupts_) {
+    noInterrupt_ = std::make_unique<NoInterrupt>();
+    noInterrupt_->setPriority(module.interrupt(0).priority());
+  }
   auto threadOptions = options.storm;
   threadOptions.pollEvery = options.pollEvery;
   thread_ = std::make_unique<InterruptThread>(usesInterrupts_ ? module.interrupt(0) : *noInterrupt_, threadOptions,

@@ -13,9 +13,11 @@
 // Threads  any. The descriptor lives as long as this object.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include <mpf/base/file_descriptor.h>
+#include <mpf/base/real_time_priority.h>
 
 namespace mpf {
 
@@ -38,12 +40,17 @@ class Interrupt {
   // The carrier looks for it from time to time, because nothing tells it; that may begin while it is used. Any thread.
   [[nodiscard]] virtual bool isPolled() const noexcept { return false; }
 
+  // The real-time priority of the threads that serve this line, 1 to 99; 0: none. Set it before the first enable().
+  void setPriority(int priority) noexcept { priority_.store(priority, std::memory_order_relaxed); }
+  [[nodiscard]] int priority() const noexcept { return priority_.load(std::memory_order_relaxed); }
+
  protected:
   // For the carrier, when it has seen the line active and masked it. Async-signal-safe.
   void announce() noexcept;
 
  private:
   FileDescriptor event_;
+  std::atomic<int> priority_{kInterruptPriority};
 };
 
 }  // namespace mpf

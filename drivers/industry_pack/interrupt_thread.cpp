@@ -8,6 +8,7 @@
 #include <array>
 #include <utility>
 
+#include <mpf/base/real_time_priority.h>
 #include <mpf/base/signals_blocked.h>
 #include <mpf/base/system_call.h>
 
@@ -46,6 +47,7 @@ InterruptThread::Counters InterruptThread::counters() const noexcept {
 }
 
 void InterruptThread::run(const std::stop_token& stop) {
+  RealTimePriority priority(interrupt_.priority());
   goOn();
   while (!stop.stop_requested()) {
     wait();
@@ -56,6 +58,7 @@ void InterruptThread::run(const std::stop_token& stop) {
     if (isWoken || pollAt_.hasPassed()) servePoll();
     if (isPaused() && pausedUntil_.hasPassed()) goOn();
     followPolling();
+    priority.check();
   }
 }
 

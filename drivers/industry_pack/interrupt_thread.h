@@ -12,6 +12,7 @@
 // A driver that wants to tell of a storm, a dead line or one that is polled now passes a second function, told once each time that one begins.
 //
 // Threads  both functions run on this object's thread, one at a time, with all signals blocked; it must not destroy this object.
+//          The thread has the real-time priority of its interrupt, where the process may have it; see RealTimePriority.
 // Crash    the carrier masks the line when it is opened again.
 #pragma once
 

@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include <mpf/base/real_time_priority.h>
 #include <mpf/base/signals_blocked.h>
 #include <mpf/base/system_call.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
@@ -92,7 +93,7 @@ class Tpci200Site final : public IndustryPackSite {
       const std::lock_guard lock(mutex_);
       setEnabled(enabled_ | 1U << line);
     }
-    carrier_.watch();
+    carrier_.watch(lines_[static_cast<std::size_t>(line)].priority());
   }
   void disable(int line) noexcept {
     const std::lock_guard lock(mutex_);
@@ -179,23 +180,25 @@ void Tpci200::claim(std::size_t number) {
   board_.setLines(number, 0);  // whoever had it may have been killed
 }
 
-void Tpci200::watch() {
+void Tpci200::watch(int priority) {
   const std::lock_guard lock(sitesMutex_);
   if (!thread_.joinable()) {
     const SignalsBlocked blocked;
-    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+    thread_ = std::jthread([this, priority](const std::stop_token& stop) { run(stop, priority); });
   } else if (isPolled_.load(std::memory_order_relaxed)) {
     ::eventfd_write(wakeUp_.get(), 1);
   }
 }
 
-void Tpci200::run(const std::stop_token& stop) {
+void Tpci200::run(const std::stop_token& stop, int priority) {
+  RealTimePriority realTime(priority);
   while (!stop.stop_requested()) {
     if (!interrupt_) serve();
     wait();
     eventfd_t wakes = 0;
     ::eventfd_read(wakeUp_.get(), &wakes);
     if (interrupt_) takeInterrupt();
+    realTime.check();
   }
 }
 

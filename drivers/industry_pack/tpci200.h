@@ -9,7 +9,8 @@
 // Without uio_pci_generic the thread looks at the status every `pollEvery` instead; remark() says so. When it is taken away later, Interrupt does.
 // A cycle that no module ends reads ones.
 //
-// Threads  any; accesses of one process to one board take turns. The thread starts with the first enable() of an interrupt.
+// Threads  any; accesses of one process to one board take turns. The thread starts with the first enable() of an interrupt,
+//          and has the real-time priority of that interrupt, where the process may have it.
 // Crash    site() takes a site for this process, by a lock that ends with it, and masks its interrupts. Lines of a site that nobody has are
 //          masked by whoever else uses the board.
 // Trust    processes that may use one board can spoil each other's sites: it protects none.
@@ -64,9 +65,9 @@ class Tpci200 final : public IndustryPackCarrier {
   friend class Tpci200Site;
   void openInterrupt();
   void claim(std::size_t number);
-  // A line was enabled: the thread has something to do.
-  void watch();
-  void run(const std::stop_token& stop);
+  // A line with that priority was enabled: the thread has something to do.
+  void watch(int priority);
+  void run(const std::stop_token& stop, int priority);
   void wait();
   void takeInterrupt();
   // Announces what asks. Returns whether something else asks as well.

@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include <mpf/base/inheriting_mutex.h>
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
 #include <mpf/drivers/industry_pack/module.h>
 #include <mpf/drivers/octal_uart/octal_uart_channel.h>
@@ -107,7 +108,8 @@ class OctalUart {
   const OctalUartOptions options_;
   const bool isRs485_;
 
-  mutable std::mutex mutex_;  // the chip's, and all below but the last
+  // Of the chip, and of all below but the last. A port's thread that holds it must not be slower than the interrupt.
+  mutable InheritingMutex mutex_;
   bool isReady_ = false;  // set up, and there
   std::array<std::uint8_t, scc2698b::kBlocks> imr_{};
   std::vector<OctalUartChannel> channels_;

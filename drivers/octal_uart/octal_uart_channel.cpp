@@ -47,7 +47,8 @@ void OctalUartChannel::setMask(std::uint8_t bits, bool on) {
 void OctalUartChannel::open(const SerialSettings& settings) {
   close();
   received_.clear();
-  overruns_ = 0;
+  overruns_ = gaps_ = 0;
+  isCut_ = false;
   lostBecause_.clear();
   isOpen_ = true;
   configure(settings);
@@ -95,6 +96,7 @@ bool OctalUartChannel::serve(std::uint8_t isr, bool isThere) {
     receive(sr);
     sr = read(kSr);
   }
+  noteEmpty(sr);
   const bool sends = (isr & kIsrTxRdy) != 0;
   if (sends && !isOnes(sr)) sr = transmit(sr, isThere);
   if (unsent_.empty()) setMask(kIsrTxRdy, false);
@@ -117,14 +119,35 @@ std::uint8_t OctalUartChannel::transmit(std::uint8_t sr, bool isThere) {
 // The errors are reset before the byte is read: afterwards they would be those of the next one.
 void OctalUartChannel::receive(std::uint8_t sr) {
   if ((sr & kSrErrors) != 0) command(kCrResetErrors);
-  if ((sr & kSrOverrun) != 0) ++overruns_;
+  if ((sr & kSrOverrun) != 0) noteOverrun();
   const auto value = read(kRhr);
+  const bool followsGap = takeGap();
   if (!isOpen_) return;
   if (received_.size() < kMaxReceived) {
-    received_.push_back({value, faultOf(sr)});
+    received_.push_back({value, faultOf(sr), followsGap || std::exchange(isCut_, false)});
   } else {
     ++overruns_;
+    isCut_ = true;
   }
+}
+
+// The chip says so as soon as it has lost the byte in its shift register, and keeps the three in its FIFO. One of the three may have been
+// read since the status was read last: what came instead of the lost byte is the third or the fourth byte from now on.
+void OctalUartChannel::noteOverrun() {
+  constexpr unsigned kThirdAndFourth = 0b1100;
+  ++overruns_;
+  gaps_ |= kThirdAndFourth;
+}
+
+bool OctalUartChannel::takeGap() noexcept {
+  const bool isHere = (gaps_ & 1) != 0;
+  gaps_ >>= 1;
+  return isHere;
+}
+
+// All has been read that came before now, the byte after the gap included.
+void OctalUartChannel::noteEmpty(std::uint8_t sr) noexcept {
+  if ((sr & kSrRxRdy) == 0) gaps_ = 0;
 }
 
 void OctalUartChannel::take(std::vector<LineByte>& bytes) {

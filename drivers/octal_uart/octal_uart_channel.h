@@ -58,6 +58,7 @@ class OctalUartChannel {
   //   returns  false at a status of all ones, otherwise: is it there?
   [[nodiscard]] bool serve(std::uint8_t isr, bool isThere);
 
+  // What was received. A byte that follows a gap says so; after an overrun in the chip two bytes may, of which one does.
   void take(std::vector<LineByte>& bytes);
   [[nodiscard]] std::uint64_t takeOverruns() noexcept;
   // Returns how many of `bytes` it had room for.
@@ -78,6 +79,9 @@ class OctalUartChannel {
   void setMask(std::uint8_t bits, bool on);
   void talk();
   void receive(std::uint8_t sr);
+  void noteOverrun();
+  bool takeGap() noexcept;
+  void noteEmpty(std::uint8_t sr) noexcept;
   std::uint8_t transmit(std::uint8_t sr, bool isThere);
   [[nodiscard]] bool isAllOut() { return unsent_.empty() && (read(scc2698b::kSr) & scc2698b::kSrTxEmt) != 0; }
   void ring() const noexcept;
@@ -97,6 +101,8 @@ class OctalUartChannel {
   std::vector<LineByte> received_;
   std::deque<std::uint8_t> unsent_;
   std::uint64_t overruns_ = 0;
+  unsigned gaps_ = 0;      // bit n: bytes may be missing before the byte that is n bytes behind the next one in the chip
+  bool isCut_ = false;     // received_ had no room: bytes are missing before the next one that goes into it
 };
 
 }  // namespace mpf

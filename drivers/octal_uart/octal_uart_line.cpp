@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <stdexcept>
+#include <utility>
 
 #include <mpf/base/system_call.h>
 
@@ -63,6 +64,7 @@ bool OctalUartLine::isThere(OctalUartChannel& channel) {
 bool OctalUartLine::tryRead(std::vector<LineByte>& bytes) {
   return uart_.with(number_, [&](OctalUartChannel& channel) {
     channel.take(bytes);
+    overruns_ += channel.takeOverruns();  // with the bytes: none of a gap that is in later ones
     turnOrWait(channel);
     return isThere(channel);
   });
@@ -98,9 +100,7 @@ void OctalUartLine::discardUnsent() noexcept {
   uart_.with(number_, [](OctalUartChannel& channel) { channel.discardUnsent(); });
 }
 
-std::uint64_t OctalUartLine::takeOverruns() noexcept {
-  return uart_.with(number_, [](OctalUartChannel& channel) { return channel.takeOverruns(); });
-}
+std::uint64_t OctalUartLine::takeOverruns() noexcept { return std::exchange(overruns_, 0); }
 
 std::string OctalUartLine::tryConfigure(const SerialSettings& settings) {
   if (auto refused = octalUartProblemOf(settings, uart_.isRs485()); !refused.empty()) return refused;

@@ -46,6 +46,7 @@ class OctalUartLine final : public SerialLine {
   const std::string description_;
   SerialSettings settings_;
   std::string problem_;
+  std::uint64_t overruns_ = 0;  // of what tryRead() has given
   FileDescriptor timer_;   // when an RS-485 line may have to be turned
   FileDescriptor events_;  // epoll over the channel's bell and the timer: never writable, unlike a bell
 };

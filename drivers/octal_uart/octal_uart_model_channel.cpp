@@ -14,6 +14,8 @@ using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data she
 std::uint8_t statusOf(LineFault fault) {
   switch (fault) {
     case LineFault::none:
+    case LineFault::overrun:  // arrive() sees to it
+    case LineFault::unplugged:
       return 0;
     case LineFault::parity:
       return kSrParity;

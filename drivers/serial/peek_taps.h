@@ -18,7 +18,9 @@ namespace mpf {
 enum class ByteDirection : std::uint8_t { sent, received };
 
 // What the line did to a received byte. Parity and framing may be told apart only where the driver counts them.
-enum class LineFault : std::uint8_t { none, parity, framing, breakSignal };
+// The last two are faults of the line and of no byte: overrun, bytes came and were lost before anybody read them;
+// unplugged, the line was away for some time.
+enum class LineFault : std::uint8_t { none, parity, framing, breakSignal, overrun, unplugged };
 
 struct PeekedByte {
   std::int64_t atNs = 0;  // CLOCK_MONOTONIC, when the port had handed it to the kernel or got it from there

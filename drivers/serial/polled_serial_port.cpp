@@ -183,12 +183,10 @@ void PolledSerialPort::receive() {
   if (!keeper_.isOpen()) return;
   received_.clear();
   const bool alive = keeper_.line().tryRead(received_);
+  takeOverruns();
   if (!received_.empty()) {
-    const auto overruns = keeper_.line().takeOverruns();
     add(counters_.bytesIn, received_.size());
-    add(counters_.overruns, overruns);
     show(ByteDirection::received, received_);
-    if (overruns > 0) act(ByteHandlerResult::error);  // an answer with a gap is none
     for (const auto& byte : received_) deliver(byte);
   }
   if (!alive) loseLine();
@@ -203,13 +201,32 @@ void PolledSerialPort::receiveAll() {
   }
 }
 
+// A line that does not say where bytes are missing may miss them anywhere in what has come.
+void PolledSerialPort::takeOverruns() {
+  const auto overruns = keeper_.line().takeOverruns();
+  if (overruns == 0) return;
+  add(counters_.overruns, overruns);
+  const bool isPlaceKnown = std::ranges::any_of(received_, &LineByte::followsGap);
+  if (isPlaceKnown) {
+    overrunsToTell_ += overruns;
+  } else {
+    fail(LineFault::overrun, overruns);
+  }
+}
+
 void PolledSerialPort::deliver(const LineByte& byte) {
+  if (byte.followsGap) fail(LineFault::overrun, std::exchange(overrunsToTell_, 0));
   if (byte.fault != LineFault::none) {
     countFault(byte.fault);
-    act(ByteHandlerResult::error);
+    fail(byte.fault, 1);
   } else if (handler_ != nullptr) {
     act(handler_->byteReceived(byte.value));
   }
+}
+
+void PolledSerialPort::fail(LineFault fault, std::uint64_t count) {
+  if (handler_ != nullptr) handler_->lineFailed(fault, count);
+  act(ByteHandlerResult::error);
 }
 
 void PolledSerialPort::act(ByteHandlerResult result) {
@@ -236,6 +253,7 @@ void PolledSerialPort::end(SerialPortStatus status) {
 
 void PolledSerialPort::loseLine() {
   add(counters_.unplugs);
+  if (handler_ != nullptr) handler_->lineFailed(LineFault::unplugged, 1);
   keeper_.lose();
   end(SerialPortStatus::failure);
 }
@@ -252,6 +270,9 @@ void PolledSerialPort::countFault(LineFault fault) {
       break;
     case LineFault::breakSignal:
       add(counters_.breaks);
+      break;
+    case LineFault::overrun:  // counted by takeOverruns() and loseLine()
+    case LineFault::unplugged:
       break;
   }
 }

@@ -80,6 +80,8 @@ class PolledSerialPort : public SerialPort {
   void receiveAll();
   void giveUp(const Request& request);
   void deliver(const LineByte& byte);
+  void takeOverruns();
+  void fail(LineFault fault, std::uint64_t count);
   void act(ByteHandlerResult result);
   void endRead(SerialPortStatus status);
   void end(SerialPortStatus status);
@@ -93,6 +95,7 @@ class PolledSerialPort : public SerialPort {
   ByteHandler* handler_ = nullptr;  // this and below: the port's thread
   Request* request_ = nullptr;
   std::vector<LineByte> received_;
+  std::uint64_t overrunsToTell_ = 0;  // counted; the byte after the gap has not been delivered yet
   Counters counters_{};
   std::atomic<SerialPortStatus> status_{SerialPortStatus::success};
   std::jthread thread_;  // last: ends before what it uses

@@ -25,6 +25,7 @@ namespace mpf {
 struct LineByte {
   std::uint8_t value = 0;
   LineFault fault = LineFault::none;
+  bool followsGap = false;  // bytes may be missing between the byte before and this one
 
   friend bool operator==(const LineByte&, const LineByte&) = default;
 };
@@ -59,7 +60,7 @@ class SerialLine {
   // Bytes that the kernel has taken and not sent yet, as the time that they need; 0 when all are out or nobody knows.
   [[nodiscard]] virtual std::chrono::milliseconds timeToSend() const { return {}; }
   virtual void discardUnsent() noexcept {}
-  // Bytes lost on the way since the last call.
+  // Bytes lost on the way since the last call. Where they are missing, LineByte::followsGap says as exactly as the line can.
   [[nodiscard]] virtual std::uint64_t takeOverruns() noexcept { return 0; }
 
   // Returns empty, or what this line does not accept; then nothing has changed. Settings are applied again by each tryOpen().

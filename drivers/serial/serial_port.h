@@ -43,13 +43,18 @@ class ByteHandler {
  public:
   virtual ~ByteHandler() = default;
   // For each byte received, also when no read is outstanding. Bytes that the line damaged are not passed: they end the read with
-  // failure, and so do bytes that got lost.
+  // failure, and so do bytes that got lost; see lineFailed().
   [[nodiscard]] virtual ByteHandlerResult byteReceived(std::uint8_t byte) = 0;
   // A read begins; what had come before has been passed, and nothing of the request is sent yet. endRead: what is kept already satisfies it.
   // error: the read fails, and nothing is sent.
   [[nodiscard]] virtual ByteHandlerResult readBegins() { return ByteHandlerResult::ok; }
   // The kernel has taken the first byte of a writeRead(); bytes passed from here on arrived after that.
   virtual void sendBegins() {}
+  // Bytes may be missing between the ones passed before this call and the ones passed after it, also when no read is outstanding.
+  // A read that is outstanding ends with failure right after this call.
+  //   fault  what happened; never none
+  //   count  bytes or breaks that counters() counts for it; 0: one more place where bytes that are counted already may be missing
+  virtual void lineFailed(LineFault /*fault*/, std::uint64_t /*count*/) {}
   // That read is over; bytes that come from here on belong to none.
   virtual void readEnds(SerialPortStatus /*status*/) {}
 };

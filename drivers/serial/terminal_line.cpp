@@ -41,7 +41,7 @@ SerialLine::OpenState TerminalLine::tryOpen() {
     return OpenState::failed;
   }
   decoder_ = {};
-  seen_ = errorCounts().value_or(ErrorCounts{});
+  errors_.begin(errorCounts());
   return OpenState::open;
 }
 
@@ -67,12 +67,21 @@ bool TerminalLine::tryRead(std::vector<LineByte>& bytes) {
   std::array<std::uint8_t, kReadBytes> raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
   const auto length = retryInterrupted([&] { return ::read(fd_.get(), raw.data(), raw.size()); });
   if (length > 0) {
-    decoder_.decode(std::span(raw).first(static_cast<std::size_t>(length)), takeErrorCounts(), bytes);
+    append(std::span(raw).first(static_cast<std::size_t>(length)), bytes);
     return true;
   }
   if (length < 0 && errno == EAGAIN) return true;
   note("read", length == 0 ? 0 : errno);
   return false;
+}
+
+void TerminalLine::append(std::span<const std::uint8_t> raw, std::vector<LineByte>& bytes) {
+  const bool hasParity = settings_.parity == 'E' || settings_.parity == 'O';
+  const auto damage = errors_.take(errorCounts(), hasParity);
+  const auto before = static_cast<std::ptrdiff_t>(bytes.size());
+  decoder_.decode(raw, damage, bytes);
+  if (!errors_.mayFollowGap()) return;
+  std::for_each(bytes.begin() + before, bytes.end(), [](LineByte& byte) { byte.followsGap = true; });
 }
 
 std::optional<std::size_t> TerminalLine::tryWrite(std::span<const std::uint8_t> bytes) {
@@ -92,24 +101,14 @@ std::chrono::milliseconds TerminalLine::timeToSend() const {
 
 void TerminalLine::discardUnsent() noexcept { ::ioctl(fd_.get(), TCFLSH, kFlushOutputQueue); }
 
-std::optional<TerminalLine::ErrorCounts> TerminalLine::errorCounts() const noexcept {
+std::optional<TerminalErrors::Counts> TerminalLine::errorCounts() const noexcept {
   serial_icounter_struct counts{};
   if (::ioctl(fd_.get(), TIOCGICOUNT, &counts) < 0) return std::nullopt;
-  return ErrorCounts{static_cast<unsigned>(counts.frame),
-                     static_cast<unsigned>(counts.overrun) + static_cast<unsigned>(counts.buf_overrun)};
+  return TerminalErrors::Counts{static_cast<unsigned>(counts.frame),
+                                static_cast<unsigned>(counts.overrun) + static_cast<unsigned>(counts.buf_overrun)};
 }
 
-// Adds what the driver lost since the last call; returns what has damaged bytes meanwhile, if any are.
-LineFault TerminalLine::takeErrorCounts() noexcept {
-  const bool hasParity = settings_.parity == 'E' || settings_.parity == 'O';
-  const auto counts = errorCounts();
-  if (!counts) return hasParity ? LineFault::parity : LineFault::framing;
-  const auto before = std::exchange(seen_, *counts);
-  overruns_ += counts->overruns - before.overruns;
-  return hasParity && counts->framing == before.framing ? LineFault::parity : LineFault::framing;
-}
-
-std::uint64_t TerminalLine::takeOverruns() noexcept { return std::exchange(overruns_, 0); }
+std::uint64_t TerminalLine::takeOverruns() noexcept { return errors_.takeOverruns(); }
 
 std::string TerminalLine::tryConfigure(const SerialSettings& settings) {
   auto refused = terminal::tryApply(fd_.get(), settings);

@@ -13,6 +13,7 @@
 #include <mpf/base/file_descriptor.h>
 #include <mpf/drivers/serial/mark_decoder.h>
 #include <mpf/drivers/serial/serial_line.h>
+#include <mpf/drivers/serial/terminal_errors.h>
 
 namespace mpf {
 
@@ -37,13 +38,9 @@ class TerminalLine : public SerialLine {
   [[nodiscard]] bool trySetBreak(bool on) noexcept override;
 
  private:
-  struct ErrorCounts {  // the driver's, since the device was plugged in
-    std::uint64_t framing = 0;
-    std::uint64_t overruns = 0;
-  };
   [[nodiscard]] std::string tryPrepare() const;
-  [[nodiscard]] std::optional<ErrorCounts> errorCounts() const noexcept;
-  LineFault takeErrorCounts() noexcept;
+  [[nodiscard]] std::optional<TerminalErrors::Counts> errorCounts() const noexcept;
+  void append(std::span<const std::uint8_t> raw, std::vector<LineByte>& bytes);
   void closeDevice() noexcept;
   void note(const char* call, int error);
 
@@ -52,8 +49,7 @@ class TerminalLine : public SerialLine {
   std::string problem_;
   FileDescriptor fd_;
   MarkDecoder decoder_;
-  ErrorCounts seen_;
-  std::uint64_t overruns_ = 0;
+  TerminalErrors errors_;
 };
 
 }  // namespace mpf

@@ -63,6 +63,21 @@ TEST(HardwareTable, HasAHeadingOnceAndValuesWithTheirUnit) {
   EXPECT_THAT(text, Not(HasSubstr("p99")));
 }
 
+// A row about lost characters says which faults the server has seen.
+TEST(HardwareTable, SaysWhyCharactersWereLost) {
+  Result lost;
+  lost.measurement.question = kSerial;
+  lost.measurement.name = "written, echo read: characters were lost";
+  lost.measurement.unit = kShortAnswers;
+  lost.figures.value = 3;
+  lost.figures.lineFaults = {.shortAnswers = 3, .overruns = 2, .framing = 1};
+  auto unexplained = lost;
+  unexplained.figures.lineFaults = {.shortAnswers = 3};
+
+  EXPECT_THAT(hardwareTable({lost}), HasSubstr(" 3 answers; with overruns 2, parity errors 0, framing errors 1, breaks 0\n"));
+  EXPECT_THAT(hardwareTable({unexplained}), HasSubstr("breaks 0: the server saw no fault of the line\n"));
+}
+
 TEST(HardwareTable, NamesWhatWasLeftOutAndWhatFailed) {
   auto leftOut = askedRow(kServers, "one", 1, 1);
   leftOut.measurement.skipped = "mpf-ip330-server is not there";

@@ -161,6 +161,16 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
 
+TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
+  const auto server =
+      start({"dmm", "x", "--real-time", "0", "--carrier", "ipac=model", "--octal-uart", "U,ipac,IP_a,8", "--octal-port", "x,U,0"});
+  SyncClient client(backplane_, "dmm");
+  EXPECT_TRUE(client.connectWait(60s));
+
+  EXPECT_EQ(server->end(SIGTERM), 0);
+  EXPECT_THAT(server->errors(), HasSubstr("interrupts are served at ordinary priority, as --real-time 0 says"));
+}
+
 // A module that is not there keeps nobody waiting but who wants its ports, and they are told so.
 TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
   const auto path = folder_.file("line");

@@ -73,6 +73,13 @@ TEST_F(SerialServerTest, AnAnswerLongerThanTheBufferOverflows) {
   EXPECT_EQ(reply.text, "much ");
 }
 
+TEST_F(SerialServerTest, NoByteIsLostBehindAnAnswerThatOverflows) {
+  start({.bufferBytes = 5, .eom = "\r\n", .circularBuffer = true});
+
+  EXPECT_EQ(ask("ECHO much too\n", fieldsOf(cmdWriteRead)), (Reply{serialServerStatusOverflow, "much "}));
+  EXPECT_EQ(ask("", fieldsOf(cmdRead)), (Reply{serialServerStatusOK, "too\r\n"}));
+}
+
 TEST_F(SerialServerTest, ANewTerminatorHoldsForLaterRequests) {
   start();
   auto fields = fieldsOf(cmdWriteRead | cmdSetEom);

@@ -44,7 +44,8 @@ class CheckUp : public testing::Test {
     write("proc/self/limits",
           "Limit                     Soft Limit           Hard Limit           Units     \n"
           "Max open files            4096                 524288               files     \n"
-          "Max address space         unlimited            unlimited            bytes     \n");
+          "Max address space         unlimited            unlimited            bytes     \n"
+          "Max realtime priority     20                   20                   \n");
     write("proc/self/cgroup", "0::/user.slice/lab.service\n");
     write("proc/self/ns/pid", "");
     write("proc/sys/kernel/osrelease", "6.1.0-18-amd64\n");
@@ -233,6 +234,16 @@ TEST_F(CheckUp, TightLimitsAreWarnings) {
   expect(checkAddressSpace(host_), Health::warning, "1073741824", "ulimit -v");
   expect(checkMaps(host_), Health::warning, "1000", "vm.max_map_count");
   expect(checkInotify(host_), Health::warning, "8", "max_user_instances");
+}
+
+TEST_F(CheckUp, RealTimePriorityNeedsALimitOrACapability) {
+  expect(checkRealTime(host_), Health::ok, "up to 20 by RLIMIT_RTPRIO");
+  write("proc/self/limits", "Max realtime priority     0                    0                    \n");
+  expect(checkRealTime(host_), Health::warning, "may have 0, of 20", "LimitRTPRIO=20");
+  append("proc/self/status", "CapEff:\t0000000000800000\n");
+  expect(checkRealTime(host_), Health::ok, "CAP_SYS_NICE");
+  write("proc/sys/kernel/sched_rt_runtime_us", "0\n");
+  expect(checkRealTime(host_), Health::warning, "no time at all", "sched_rt_runtime_us=950000");
 }
 
 TEST_F(CheckUp, LimitsThatAreNoNumbersAreUnknown) {

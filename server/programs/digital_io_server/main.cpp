@@ -53,6 +53,7 @@ int serve(int argc, char** argv) {
   if (model != nullptr && hardware.wires() != nullptr)
     watcher = std::make_unique<mpf::ModelWireWatcher>(*hardware.wires(), [model] { model->look(); });
   if (options.io.vector != 0) hardware.modules().takeVector(options.io.vector, *module);
+  if (options.io.vector != 0) hardware.logPriority(log);
   mpf::DigitalIo io(*module, options.io);
   const auto backplane = mpf::Backplane::attach(arguments.backplane);
   mpf::MessageServer server(backplane, name + "Out", arguments.messages);

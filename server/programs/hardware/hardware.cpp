@@ -48,6 +48,10 @@ void Hardware::addTo(CLI::App& app) {
   app.add_flag("--wait", waits_, "Start even if the board is not there, and wait for it");
   app.add_option("--wires", wiresPath_, "File by which models of several programs are wired to each other; the first one makes it")
       ->type_name("FILE");
+  app.add_option("--real-time", priority_, "Real-time priority of the threads that serve interrupts, where the user may have it; 0: none")
+      ->type_name("N")
+      ->check(CLI::Range(0, 99))
+      ->capture_default_str();
 }
 
 ModelWires* Hardware::wires() {
@@ -87,7 +91,20 @@ bool Hardware::isForGood(const std::runtime_error& error) {
 IndustryPackModule& Hardware::openNow(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel, const ServerLog& log) {
   createCarrierOf(place, log);
   plugModel(place, makeModel);
-  return modules_.create(place.name, place.carrier, place.site, kind);
+  auto& module = modules_.create(place.name, place.carrier, place.site, kind);
+  for (const int line : {0, 1}) module.interrupt(line).setPriority(priority_);
+  return module;
+}
+
+void Hardware::logPriority(const ServerLog& log) const {
+  if (priority_ == 0) {
+    log->info("interrupts are served at ordinary priority, as --real-time 0 says");
+  } else if (RealTimePriority::isAllowed(priority_)) {
+    log->info("interrupts are served at real-time priority {}", priority_);
+  } else {
+    log->info("interrupts are served at ordinary priority: this user may not have real-time priority {}; mpf doctor says what helps",
+              priority_);
+  }
 }
 
 void Hardware::createCarrierOf(const ModulePlace& place, const ServerLog& log) {

@@ -5,7 +5,7 @@
 //   mpf-dac128v-server dac ipac IP_a --carrier ipac=model
 //
 //   Hardware hardware;
-//   hardware.addTo(app);                              // --carrier NAME=KIND[:PARAMETERS], --wait, --wires FILE
+//   hardware.addTo(app);                              // --carrier NAME=KIND[:PARAMETERS], --wait, --wires FILE, --real-time N
 //   ... parse ...
 //   auto* const module = hardware.open({"dac", "ipac", "IP_a"}, kDac128v, [] { return std::make_unique<Dac128vModel>(); }, log);
 //   if (module == nullptr) return 0;                  // told to stop while it waited
@@ -21,6 +21,7 @@
 #include <stdexcept>
 #include <string>
 
+#include <mpf/base/real_time_priority.h>
 #include <mpf/drivers/industry_pack/carrier.h>
 #include <mpf/drivers/industry_pack/device_model.h>
 #include <mpf/drivers/industry_pack/model_wires.h>
@@ -71,6 +72,9 @@ class Hardware {
   // Wrong parameters and a bus that this host does not have: what is no use to wait for.
   [[nodiscard]] static bool isForGood(const std::runtime_error& error);
 
+  // Says at which priority the interrupts of modules are served, for a driver that has interrupts.
+  void logPriority(const ServerLog& log) const;
+
   // --wait
   [[nodiscard]] bool waits() const noexcept { return waits_; }
   [[nodiscard]] IndustryPackModules& modules() noexcept { return modules_; }
@@ -85,6 +89,7 @@ class Hardware {
 
   std::map<std::string, std::string> kinds_;  // NAME to KIND[:PARAMETERS]
   bool waits_ = false;
+  int priority_ = kInterruptPriority;  // --real-time
   std::string wiresPath_;
   std::unique_ptr<ModelWires> wires_;  // before the carriers, whose models use it
   IndustryPackCarriers carriers_;

@@ -68,6 +68,7 @@ int serve(int argc, char** argv) {
   const mpf::ServerLog log(kProgram, options.arguments.logLevel);
   auto* const module = hardware.open(options.place, mpf::kIp330, [&] { return makeAdc(options, hardware.wires()); }, log);
   if (module == nullptr) return 0;
+  hardware.logPriority(log);
   if (options.settings.vector != 0) hardware.modules().takeVector(options.settings.vector, *module);
   std::map<std::string, mpf::Dac128v> dacs;
   mpf::ProgramFailure failure;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <mpf/server/programs/serial_server/line_faults.h>
+
 namespace mpf {
 namespace {
 
@@ -11,8 +13,14 @@ constexpr std::chrono::milliseconds kAskEvery{20};
 
 }  // namespace
 
-LineReader::LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits, SurplusHandler onSurplus)
-    : bufferBytes_(bufferBytes), eom_(std::move(eom)), circular_(circular), onSurplus_(std::move(onSurplus)), sync_(limits) {}
+LineReader::LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits, SurplusHandler onSurplus,
+                       std::function<void()> onFault)
+    : onFault_(std::move(onFault)),
+      bufferBytes_(bufferBytes),
+      eom_(std::move(eom)),
+      circular_(circular),
+      onSurplus_(std::move(onSurplus)),
+      sync_(limits) {}
 
 void LineReader::setEom(std::string eom) {
   const std::lock_guard lock(mutex_);
@@ -131,6 +139,7 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
   if (input_.size() >= bufferBytes_) {
     if (isRead) {
       answer_.overflow = true;
+      input_.push_back(static_cast<char>(byte));  // behind what the answer has: the next one begins with it
       return ByteHandlerResult::endRead;
     }
     if (phase_ == Phase::lingering) {
@@ -177,13 +186,15 @@ void LineReader::readEnds(SerialPortStatus status) {
   phase_ = Phase::idle;
   continues_ = false;
   const auto complete = completeBytes();
-  const auto bytes = complete != 0 ? complete : input_.size();
+  auto bytes = complete != 0 ? complete : input_.size();
+  if (answer_.overflow) bytes = std::min(bytes, bufferBytes_);
   answer_.bytes = input_.substr(0, bytes);
+  answer_.faults = static_cast<std::uint8_t>(answer_.faults | input_.faultsOfFirst(bytes));
   if (!wasSent) {
     input_.erase(0, bytes);
     return;
   }
-  if (complete != 0 && status == SerialPortStatus::success) {
+  if (complete != 0 && status == SerialPortStatus::success && answer_.faults == 0) {
     sync_.answered();
   } else {
     sync_.unanswered(Clock::nowNs());
@@ -194,6 +205,20 @@ void LineReader::readEnds(SerialPortStatus status) {
   } else {
     input_.erase(0, bytes);
   }
+}
+
+void LineReader::lineFailed(LineFault fault, std::uint64_t /*count*/) {
+  {
+    const std::lock_guard lock(mutex_);
+    // A line that was away has cut off only what had not come in full.
+    const bool isBetweenAnswers = input_.empty() || (!eom_.empty() && input_.endsWith(eom_));
+    const bool cuts = fault != LineFault::unplugged || !isBetweenAnswers;
+    const bool isKept = phase_ == Phase::reading || phase_ == Phase::lingering || (phase_ == Phase::idle && circular_);
+    if (cuts && isKept) input_.mark(faultBit(fault));
+    if (phase_ == Phase::reading) answer_.faults = static_cast<std::uint8_t>(answer_.faults | faultBit(fault));
+    if (fault != LineFault::unplugged) sync_.disturbed(Clock::nowNs());
+  }
+  if (onFault_) onFault_();
 }
 
 }  // namespace mpf

@@ -3,6 +3,7 @@
 // answers of others.
 //
 //   bytes ─► input, at most bufferBytes ─► first end of message, `extra` bytes, or overflow ─► answer
+//   lost or damaged bytes ─► a mark in the input ─► the faults of each answer that spans it
 //
 //   read        (cmd 1)   may begin with what was received before it: the circular buffer
 //   write-read  (cmd 3)   tryGetInStep() ─► port.writeRead() ─► takeAnswer()
@@ -21,6 +22,7 @@
 #include <mpf/base/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/server/programs/serial_server/line_sync.h>
+#include <mpf/server/programs/serial_server/marked_input.h>
 
 namespace mpf {
 
@@ -31,7 +33,9 @@ class LineReader final : public ByteHandler {
   using SurplusHandler = std::function<void()>;
 
   // `eom`: 0 to 2 bytes that end an answer. `circular`: keep what is received while nobody reads.
-  LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits = {}, SurplusHandler onSurplus = {});
+  // `onFault`: called after each fault of the line, on the port's thread.
+  LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits = {}, SurplusHandler onSurplus = {},
+             std::function<void()> onFault = {});
 
   void setEom(std::string eom);
   void setCircular(bool circular);
@@ -60,6 +64,7 @@ class LineReader final : public ByteHandler {
     std::string bytes;
     bool overflow = false;
     bool wasDisturbed = false;  // input arrived before the question was sent: it was not sent
+    std::uint8_t faults = 0;  // bits of serial_server.h: bytes are missing or were damaged within it or right before it
   };
   // Of the read that has ended.
   Answer takeAnswer();
@@ -68,6 +73,7 @@ class LineReader final : public ByteHandler {
   ByteHandlerResult readBegins() override;
   void sendBegins() override;
   void readEnds(SerialPortStatus status) override;
+  void lineFailed(LineFault fault, std::uint64_t count) override;
 
  private:
   enum class Phase : std::uint8_t {
@@ -83,6 +89,7 @@ class LineReader final : public ByteHandler {
   void noteSurplus();
   void stopLingering();
 
+  const std::function<void()> onFault_;
   std::mutex mutex_;
   std::condition_variable answerSeen_;
   std::size_t bufferBytes_;
@@ -97,7 +104,7 @@ class LineReader final : public ByteHandler {
   bool flush_ = false;
   bool isSurplusTold_ = false;
   std::size_t maxBytes_ = 0;
-  std::string input_;
+  MarkedInput input_;
   Answer answer_;
 };
 

@@ -31,6 +31,8 @@ class LineSync {
   void written(std::int64_t nowNs) noexcept;
   // A byte arrived.
   void received(std::uint8_t byte, std::int64_t nowNs);
+  // The line lost or damaged bytes: it is not silent.
+  void disturbed(std::int64_t nowNs) noexcept { activeNs_ = nowNs; }
   // Input was thrown away that no request had read.
   void noteSurplus() noexcept { hasSurplus_ = true; }
 

@@ -61,6 +61,7 @@ OctalUart& SerialPorts::openUart(const OctalUartStart& start) {
   auto* const known = modules.find(name);
   auto& module = known != nullptr ? *known : openModule(start);
   if (start.vector) modules.takeVector(*start.vector, module);
+  options_.hardware.logPriority(log_);
   auto uart = std::make_unique<OctalUart>(module, OctalUartOptions{.ports = start.ports, .vector = start.vector.value_or(0)});
   if (alarmHandler_) follow(*uart, name);
   return *uarts_.emplace(name, std::move(uart)).first->second;

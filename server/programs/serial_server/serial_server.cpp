@@ -47,7 +47,9 @@ SerialServer::SerialServer(MessageServer& server, SerialPort& port, const Serial
     : server_(server),
       log_(log),
       limits_(options.limits),
-      reader_(options.bufferBytes, options.eom, options.circularBuffer, options.limits, [this] { noteSurplus(); }),
+      faults_(server, port, log),
+      reader_(
+          options.bufferBytes, options.eom, options.circularBuffer, options.limits, [this] { noteSurplus(); }, [this] { faults_.look(); }),
       port_(port, reader_) {
   server.on<Char8Array>([this](Char8ArrayMessage&& request) { handle(std::move(request)); });
   server.on<SerialConfig>([this](SerialConfigMessage&& request) { configure(std::move(request)); });
@@ -69,12 +71,17 @@ void SerialServer::noteRequest() {
 
 void SerialServer::noteStatus(const Work& work) {
   log_->debug("cmd {:#x}, timeout {}: status {}", work.fields.cmd, work.fields.timeout, work.status);
-  const bool fails = work.status == serialServerStatusError;
+  faults_.look();
+  const bool fails = work.status == serialServerStatusError && !faults_.hasAnswerFaults();  // `faults_` reports those of the line
   if (fails == std::exchange(isFailing_, fails)) return;
   if (!fails) return log_->info("requests succeed again");
-  if (!work.problem.empty()) return log_->warn("requests fail: {}", work.problem);
-  const auto because = port_->unpluggedBecause();
-  log_->warn("requests fail: {}", because.empty() ? "the line damaged or lost bytes" : because);
+  log_->warn("requests fail: {}", whyFailed(work));
+}
+
+std::string SerialServer::whyFailed(const Work& work) const {
+  if (!work.problem.empty()) return work.problem;
+  if (auto because = port_->unpluggedBecause(); !because.empty()) return because;
+  return "the line was lost, and is there again";
 }
 
 void SerialServer::noteSurplus() {
@@ -136,6 +143,7 @@ void SerialServer::reply(const Char8ArrayMessage& request, const Work& work) {
   reply.setSize(work.answer.size());
   std::copy(work.answer.begin(), work.answer.end(), reply.value().begin());
   reply->status = work.status;
+  faults_.describe(*reply);
   static_cast<void>(server_.reply(std::move(reply)));
 }
 
@@ -159,6 +167,7 @@ void SerialServer::serve(Work& work) {
 }
 
 void SerialServer::attempt(Work& work) {
+  faults_.setAnswer(0);
   switch (commandOf(work.fields)) {
     case cmdRead:
       return read(work);
@@ -210,7 +219,8 @@ void SerialServer::takeLateAnswer(Work& work) {
 bool SerialServer::takeAnswer(Work& work, SerialPortStatus status) {
   auto read = reader_.takeAnswer();
   work.answer = std::move(read.bytes);
-  work.status = read.overflow ? serialServerStatusOverflow : statusOf(status);
+  faults_.setAnswer(read.faults);
+  work.status = faults_.statusOf(read.overflow ? serialServerStatusOverflow : statusOf(status));
   work.problem.clear();
   return !read.wasDisturbed;
 }

@@ -22,6 +22,7 @@
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/server/message_server.h>
 #include <mpf/server/programs/rare_log.h>
+#include <mpf/server/programs/serial_server/line_faults.h>
 #include <mpf/server/programs/serial_server/line_reader.h>
 #include <mpf/server/programs/server_log.h>
 
@@ -77,6 +78,7 @@ class SerialServer {
 
   void noteRequest();
   void noteStatus(const Work& work);
+  [[nodiscard]] std::string whyFailed(const Work& work) const;
   void noteSurplus();
   void noteLimits(const Char8Array& request);
 
@@ -85,6 +87,7 @@ class SerialServer {
   const LineLimits limits_;
   RareLog surplusLog_;  // under the reader's mutex
   RareLog limitLog_;
+  LineFaults faults_;  // of the line
   bool isAsked_ = false;  // there was a request
   bool isFailing_ = false;  // the last one was an error
   Deadline writeEnds_ = Deadline::never();  // of a plain write whose client is gone

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
 
+#include <sched.h>
+
 #include <atomic>
 #include <gtest/gtest.h>
 #include <semaphore>
+#include <thread>
 
 #include <mpf/tests/support/watchdog.h>
 
@@ -45,6 +48,35 @@ TEST_F(InterruptThreadTest, ServesOneThatWasThereBefore) {
   io().write16(0, 1);
   InterruptThread thread(carrier_.site(0).interrupt(0), {}, serve());
   served_.acquire();
+}
+
+TEST_F(InterruptThreadTest, HasThePriorityOfItsInterruptWhereItMay) {
+  for (const int priority : {kInterruptPriority, 0}) {
+    const bool mayHave = priority > 0 && RealTimePriority::isAllowed(priority);
+    std::atomic<int> policy{-1};
+    carrier_.site(0).interrupt(0).setPriority(priority);
+    InterruptThread thread(carrier_.site(0).interrupt(0), {}, [&](InterruptThread::Cause) {
+      policy = ::sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
+      return true;
+    });
+
+    thread.wake();
+
+    while (policy == -1) std::this_thread::yield();
+    EXPECT_EQ(policy, mayHave ? SCHED_FIFO : SCHED_OTHER);
+  }
+}
+
+// The handler always has something to do: no storm ends it, and what it waits for may need the same processor.
+TEST_F(InterruptThreadTest, OneThatNeverSleepsLosesItsPriority) {
+  std::atomic<bool> isOrdinary{false};
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+  InterruptThread thread(carrier_.site(0).interrupt(0), {}, [&](InterruptThread::Cause) {
+    if ((::sched_getscheduler(0) & ~SCHED_RESET_ON_FORK) == SCHED_OTHER) isOrdinary = true;
+    return true;
+  });
+
+  while (!isOrdinary) std::this_thread::yield();
 }
 
 TEST_F(InterruptThreadTest, PollsForOneThatNeverComes) {

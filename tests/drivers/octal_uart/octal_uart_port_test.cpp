@@ -124,6 +124,22 @@ TEST_F(OctalUartPortTest, AnOverrunIsCountedAndCostsNoOtherByte) {
   EXPECT_EQ(bound.port.counters().overruns, 1U);
 }
 
+// The chip says that it has lost bytes, and the driver that they are missing before the third or the fourth byte from there on.
+TEST_F(OctalUartPortTest, AnOverrunIsToldWhereBytesAreMissing) {
+  BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
+  const auto pass = [&](int bytes) {
+    model_->advance(bytes * byteTime(kFast));
+    model_->waitUntilServed();
+  };
+  model_->say(0, "12345678abcdef\rnext");
+  for (int i = 0; i < 8; ++i) pass(1);
+  pass(7);
+  for (int i = 0; i < 4; ++i) pass(1);
+
+  EXPECT_TRUE(bound.collector.waitForAll("12345678abc\rnext"));
+  EXPECT_THAT(bound.collector.faults(), ElementsAre(ToldFault{10, LineFault::overrun, 1}, ToldFault{11, LineFault::overrun, 0}));
+}
+
 TEST_F(OctalUartPortTest, NobodyLosesWhatFitsIntoTheChip) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
   model_->say(0, "abcd");

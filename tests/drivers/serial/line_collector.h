@@ -26,6 +26,14 @@ inline std::span<const std::uint8_t> bytesOf(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
+// What a port has told of a fault, and how many bytes had come before.
+struct ToldFault {
+  std::size_t at = 0;
+  LineFault fault = LineFault::none;
+  std::uint64_t count = 0;
+  friend bool operator==(const ToldFault&, const ToldFault&) = default;
+};
+
 class LineCollector : public ByteHandler {
  public:
   explicit LineCollector(std::string end = "\r\n", std::string error = {}) : end_(std::move(end)), error_(std::move(error)) {}
@@ -50,6 +58,11 @@ class LineCollector : public ByteHandler {
     ends_.push_back(status);
   }
 
+  void lineFailed(LineFault fault, std::uint64_t count) override {
+    const std::lock_guard lock(mutex_);
+    faults_.push_back({all_.size(), fault, count});
+  }
+
   void clear() {
     const std::lock_guard lock(mutex_);
     all_.clear();
@@ -60,6 +73,7 @@ class LineCollector : public ByteHandler {
   [[nodiscard]] std::string answer() const { return copyOf(answer_); }
   [[nodiscard]] std::string all() const { return copyOf(all_); }
   [[nodiscard]] std::vector<SerialPortStatus> ends() const { return copyOf(ends_); }
+  [[nodiscard]] std::vector<ToldFault> faults() const { return copyOf(faults_); }
   [[nodiscard]] int readsBegun() const { return copyOf(readsBegun_); }
   [[nodiscard]] bool waitForAll(std::string_view text) const {
     std::unique_lock lock(mutex_);
@@ -86,6 +100,7 @@ class LineCollector : public ByteHandler {
   std::size_t start_ = 0;
   int readsBegun_ = 0;
   std::vector<SerialPortStatus> ends_;
+  std::vector<ToldFault> faults_;
 };
 
 }  // namespace mpf::test

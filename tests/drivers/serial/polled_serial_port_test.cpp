@@ -152,6 +152,27 @@ TEST_F(PolledSerialPortTest, AnAnswerWithAGapFailsTheRead) {
   EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::failure);
 }
 
+TEST_F(PolledSerialPortTest, AGapIsToldBetweenTheBytesWhereItIs) {
+  script_.arrive({{'a'}, {'b', LineFault::none, true}, {'c'}, {'d', LineFault::none, true}}, 3);
+
+  EXPECT_TRUE(collector_.waitForAll("abcd"));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{1, LineFault::overrun, 3}, ToldFault{3, LineFault::overrun, 0}));
+}
+
+TEST_F(PolledSerialPortTest, AGapThatMayBeAnywhereIsToldBeforeTheBytes) {
+  script_.arrive({{'a'}, {'b'}}, 2);
+
+  EXPECT_TRUE(collector_.waitForAll("ab"));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{0, LineFault::overrun, 2}));
+}
+
+TEST_F(PolledSerialPortTest, DamageIsToldWhereTheByteWas) {
+  script_.arrive({{'a'}, {'b', LineFault::framing}, {'c'}});
+
+  EXPECT_TRUE(collector_.waitForAll("ac"));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{1, LineFault::framing, 1}));
+}
+
 TEST_F(PolledSerialPortTest, AWriteThatTheLineHoldsUpIsLateAndDiscarded) {
   script_.isHeldUp = true;
 

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+// LineFaults: tells people and clients what a serial line has lost and damaged.
+//
+//   port's counters ── look() ──► alarms, one for each fault     log, at most one line in `quiet`, with the counts since the line before
+//   an answer's faults ──► status and `extra` of its reply (schema/serial_server.h)
+//
+// Threads  look() from any: the port's thread after each fault, the server's thread after each request. setAnswer() and what tells a
+//          reply: the server's thread.
+// Trust    a line that does nothing but fail costs one line of log each `quiet`.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include <mpf/base/clock.h>
+#include <mpf/drivers/serial/serial_port.h>
+#include <mpf/schema/message_types.h>
+#include <mpf/server/message_server.h>
+#include <mpf/server/programs/server_log.h>
+
+namespace mpf {
+
+// The bit of serial_server.h that says so in a reply; 0 for none.
+[[nodiscard]] std::uint8_t faultBit(LineFault fault) noexcept;
+
+class LineFaults {
+ public:
+  static constexpr std::chrono::seconds kQuiet{10};
+
+  // What has happened until now is not told. All that is passed must outlive this.
+  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log, std::chrono::milliseconds quiet = kQuiet);
+  // Tells the rest.
+  ~LineFaults();
+  LineFaults(const LineFaults&) = delete;
+  LineFaults& operator=(const LineFaults&) = delete;
+
+  // Takes what the port has counted since the last time.
+  void look();
+
+  // The bits of the answer that is about to be sent; 0 at the beginning of each attempt.
+  void setAnswer(std::uint8_t faults) noexcept { answer_ = faults; }
+  [[nodiscard]] bool hasAnswerFaults() const noexcept { return answer_ != 0; }
+  // The status of an answer that would have had `status` without its faults.
+  [[nodiscard]] std::int32_t statusOf(std::int32_t status) const noexcept;
+  // Sets `extra`, by the status that `reply` has.
+  void describe(Char8Array& reply) const noexcept;
+
+ private:
+  struct Counts {
+    std::uint64_t overruns = 0, parity = 0, framing = 0, breaks = 0;
+    [[nodiscard]] std::uint64_t sum() const noexcept { return overruns + parity + framing + breaks; }
+  };
+  [[nodiscard]] Counts counted() const;
+  void tell(std::int64_t nowNs);
+  [[nodiscard]] static std::string textOf(const Counts& counts, const std::string& when);
+
+  MessageServer& server_;
+  const SerialPort& port_;
+  const ServerLog& log_;
+  const Nanoseconds quiet_;
+  std::uint8_t answer_ = 0;
+  std::mutex mutex_;  // all below
+  Counts seen_;
+  Counts untold_;
+  std::int64_t untoldSinceNs_ = 0;
+  std::int64_t nextLineNs_ = 0;
+};
+
+}  // namespace mpf
