@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/shm/window.h>
 
+#include <fcntl.h>
 #include <sched.h>
 #include <unistd.h>
 
@@ -27,8 +28,9 @@ std::optional<Segment> openInTheWay(const std::string& name, layout::SegmentKind
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 }
 
-// Throws what keeps us from a name; returns when it has gone meanwhile.
-void checkInTheWay(const std::string& name, layout::SegmentKind kind) {
+// Throws what keeps this process from a name; returns when that has gone or is about to go.
+//   reaperIsLate  until then, another process that removes a dead window is waited for
+void checkInTheWay(const std::string& name, layout::SegmentKind kind, Deadline reaperIsLate) {
   const auto window = openInTheWay(name, kind);
   if (!window) return;
   const auto& header = window->header();
@@ -41,6 +43,7 @@ void checkInTheWay(const std::string& name, layout::SegmentKind kind) {
                                   header.ownerPid));
     case segments::Owner::dead:
       if (segments::removeIfOwnerless(name)) return;
+      if (!reaperIsLate.hasPassed() && ::faccessat(AT_FDCWD, segments::path(name).c_str(), W_OK, AT_EACCESS) == 0) return;
       throw SegmentError(
           fmt::format("{}: left by a dead process of user {}, who must remove it; if somebody is about to, that process does not go on",
                       segments::path(name), header.ownerUid));
@@ -94,15 +97,14 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
 }
 
 void OwnWindow::publish(const std::string& name) {
-  // Its owner may be dying, or somebody else be removing what it left: that takes some microseconds.
+  // Its owner may be dying, or another process may remove what it left. Both take microseconds, once they have a processor: on a busy
+  // host, a process that removes a window was without one for more than 50 ms.
   const auto patience = Deadline::after(std::chrono::milliseconds(50));
+  const auto reaperIsLate = Deadline::after(std::chrono::seconds(2));
   while (!window_.tryPublish(name)) {
     if (segments::removeIfOwnerless(name)) continue;
-    if (patience.hasPassed()) {
-      checkInTheWay(name, header().kind);
-    } else {
-      ::sched_yield();
-    }
+    if (patience.hasPassed()) checkInTheWay(name, header().kind, reaperIsLate);
+    ::sched_yield();
   }
 }
 

@@ -2,15 +2,18 @@
 #include <mpf/tests/fuzz/hostile_files.h>
 
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
 #include <iostream>
+#include <string_view>
 
 #include <mpf/base/system_call.h>
 #include <mpf/shm/segment.h>
@@ -47,11 +50,15 @@ std::vector<std::byte> contentOf(int file) {
 
 }  // namespace
 
+// Removes what runs left that crashed. Files of a run that goes on, beside this one, say anything, also that their owners are dead.
 Backplane fuzzBackplane() {
+  constexpr std::string_view kPrefix = "fuzz-";
   for (const auto& name : Backplane::names()) {
-    if (name.starts_with("fuzz-")) Backplane::attach(name);
+    if (!name.starts_with(kPrefix)) continue;
+    const auto run = static_cast<pid_t>(std::atol(name.c_str() + kPrefix.size()));
+    if (::kill(run, 0) != 0 && errno == ESRCH) Backplane::attach(name);
   }
-  return Backplane::attach(fmt::format("fuzz-{:x}", segments::newIncarnation()));
+  return Backplane::attach(fmt::format("{}{}-{:x}", kPrefix, ::getpid(), segments::newIncarnation()));
 }
 
 HostileFiles::HostileFiles(const Backplane& backplane, const std::vector<std::string>& names)

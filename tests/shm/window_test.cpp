@@ -129,6 +129,31 @@ TEST_F(WindowTest, WhoeverRemovesADeadOneIsNotTakenForItsOwner) {
   static_cast<void>(backplane_.removeDead());
 }
 
+// It has the lock, and no processor.
+TEST_F(WindowTest, ASuccessorWaitsForAProcessThatIsSlowToRemoveADeadOne) {
+  Child child([&](Child::Self& self) {
+    const auto server = makeServer();
+    self.stay();
+  });
+  child.end(SIGKILL);
+  FileDescriptor reaper(checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
+  struct flock64 lock{};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = 1;
+  lock.l_len = 1;
+  checkCall(::fcntl(reaper.get(), F_OFD_SETLK, &lock), "lock");
+  std::jthread slow([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    reaper.reset();
+  });
+
+  EXPECT_TRUE(makeServer());
+
+  slow.join();
+  static_cast<void>(backplane_.removeDead());
+}
+
 TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerWins) {
   for (int round = 0; round < 20; ++round) {
     Child child([&](Child::Self& self) {

@@ -76,6 +76,11 @@ class Victim {
   }
 
   void signal(int number) const { ::kill(pid_, number); }
+  // Returns when it stands still: a signal alone may find it in the middle of something, on another processor.
+  void stop() const {
+    signal(SIGSTOP);
+    checkCall(::waitpid(pid_, nullptr, WUNTRACED), "waitpid");
+  }
   // Sends the signal and waits for the end. Returns the status of waitpid().
   int end(int number) {
     if (pid_ == 0) return 0;

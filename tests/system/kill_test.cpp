@@ -170,6 +170,7 @@ TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {
 
     server.end(SIGKILL);
     Victim successor("serve", backplaneName());
+    ASSERT_EQ(successor.line(), "open");
 
     Answer answer = client.call(Float64Message({.value = 2}), 60s);
     while (!answer) answer = client.call(Float64Message({.value = 2}), 60s);  // the fate of a call that met the death
@@ -213,7 +214,7 @@ TEST_F(KillTest, AStoppedServerIsNotDead) {
   SyncClient client(backplane_, "echo");
   ASSERT_TRUE(client.call(Float64Message({.value = 1}), 60s));
 
-  server.signal(SIGSTOP);
+  server.stop();
   auto late = client.call(Float64Message({.value = 2}), 100ms);
   EXPECT_FALSE(late);
   EXPECT_TRUE(client.client().isConnected());

@@ -47,8 +47,7 @@ TEST_F(RouterPressureTest, AStoppedServerFillsItsOwnQueueAndNobodyElseWaits) {
   runUntil([&] { return caller.isConnected(); });
   expectAnswers("stopped", 1);
   expectAnswers("other", 1);
-  stopped.signal(SIGSTOP);
-  ::waitpid(stopped.pid(), nullptr, WUNTRACED);
+  stopped.stop();
 
   for (int value = 0; value < kQueueSize; ++value) caller.send(Int32Message({.value = value}));
   waitUntilTaken("stopped", kQueueSize + 1);

@@ -230,10 +230,7 @@ TEST_F(WorldTest, ProcessesThatAllStoodStillGoOn) {
   Victim crowd("crowd", backplane_.name(), {"20"});
   EXPECT_THAT(crowd.line(), testing::StartsWith("waiting: "));
   Victim server("serve", backplane_.name());
-  for (const auto* const process : {&server, &crowd}) {
-    process->signal(SIGSTOP);
-    EXPECT_EQ(::waitpid(process->pid(), nullptr, WUNTRACED), process->pid());
-  }
+  for (const auto* const process : {&server, &crowd}) process->stop();
 
   for (const auto* const process : {&crowd, &server}) process->signal(SIGCONT);
 

@@ -30,7 +30,7 @@ class CleanTest : public ToolsTest {
     ASSERT_EQ(server.line(), "open");
     Victim flood("flood", backplane_.name());
     ASSERT_EQ(flood.line(), "connected");
-    server.signal(SIGSTOP);
+    server.stop();
     flood.end(SIGKILL);
     server.end(SIGKILL);
   }
@@ -89,7 +89,7 @@ TEST_F(CleanTest, AThousandLinksOfADeadClientAreRemoved) {
   Victim server("serve", backplane_.name());
   Victim crowd("crowd", backplane_.name(), {"1000"});
   while (!crowd.line().starts_with("answered ")) continue;
-  server.signal(SIGSTOP);
+  server.stop();
   crowd.end(SIGKILL);
 
   const auto ended = run({"clean"});

@@ -240,7 +240,7 @@ TEST_F(InspectTest, WhatTwoDeadProcessesLeftCanBeLookedInto) {
   Victim flood("flood", backplane_.name());
   ASSERT_EQ(flood.line(), "connected");
   while (entryOf(ls().at("servers"), "name", "echo").at("received") == 0) continue;
-  server.signal(SIGSTOP);
+  server.stop();
   flood.end(SIGKILL);
   server.end(SIGKILL);
 

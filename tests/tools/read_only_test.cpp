@@ -35,11 +35,7 @@ class ReadOnlyTest : public ToolsTest {
     client_ = Victim("flood", backplane_.name());
     EXPECT_EQ(client_.line(), "connected");
     while (entryOf(ls().at("servers"), "name", "echo").at("received") == 0) continue;
-    for (const auto& victim : {&server_, &client_}) {
-      victim->signal(SIGSTOP);
-      int status = 0;
-      EXPECT_EQ(::waitpid(victim->pid(), &status, WUNTRACED), victim->pid());
-    }
+    for (const auto& victim : {&server_, &client_}) victim->stop();
   }
   // A server whose process was killed.
   void leaveDeadServer(const std::string& name) const {
