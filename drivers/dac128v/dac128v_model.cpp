@@ -6,7 +6,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint16_t kNotKept = 0xf000;  // bits that nothing drives; the carrier pulls them up
+constexpr std::uint16_t kNotKept = 0xf000;  // bits that the module does not drive; the carrier pulls them up
 
 }  // namespace
 
