@@ -77,19 +77,19 @@ TEST_F(Tpci200Test, IsFoundByAddressNumberOrAsTheFirst) {
 }
 
 TEST_F(Tpci200Test, ThatIsNotThereIsAClearError) {
-  EXPECT_THAT(problem(), HasSubstr("there is no TPCI200 (PCI id 0x1498:0x30c8) in this host"));
+  EXPECT_THAT(problem(), HasSubstr("this host has no TPCI200 (PCI id 0x1498:0x30c8)"));
   pci_.add(kBoard);
   pci_.add("0000:02:00.0", "0x8086", "0x100e");
-  EXPECT_THAT(problem("1"), HasSubstr("there is no TPCI200 number 1, counted from 0; there are: 0000:03:00.0"));
-  EXPECT_THAT(problem("04:00.0"), HasSubstr("there is no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
-  EXPECT_THAT(problem("02:00.0"), HasSubstr("the PCI device at 0000:02:00.0 is no TPCI200: its id is 0x8086:0x100e"));
+  EXPECT_THAT(problem("1"), HasSubstr("this host has no TPCI200 number 1, counted from 0; its boards: 0000:03:00.0"));
+  EXPECT_THAT(problem("04:00.0"), HasSubstr("no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
+  EXPECT_THAT(problem("02:00.0"), HasSubstr("the PCI device at 0000:02:00.0 is not a TPCI200: its id is 0x8086:0x100e"));
 }
 
 TEST_F(Tpci200Test, ThatAnotherDriverHasIsAnErrorThatSaysHowToGetIt) {
   pci_.add(kBoard);
   pci_.setDriver(kBoard, "tpci200");
   const auto said = problem();
-  EXPECT_THAT(said, HasSubstr("the kernel's driver tpci200 has it"));
+  EXPECT_THAT(said, HasSubstr("the board is bound to the kernel's driver tpci200"));
   EXPECT_THAT(said, HasSubstr("echo 0000:03:00.0 > " + pci_.file(kBoard, "driver/unbind")));
   EXPECT_THAT(said, HasSubstr("modprobe uio_pci_generic; echo uio_pci_generic > " + pci_.file(kBoard, "driver_override")));
 }
@@ -99,7 +99,7 @@ TEST_F(Tpci200Test, WithoutTheRightToItIsAnErrorThatNamesTheFile) {
   std::filesystem::permissions(pci_.file(kBoard, "resource2"), std::filesystem::perms::none);
   const NoRoot noRoot;
   const auto said = problem();
-  EXPECT_THAT(said, HasSubstr("no right to read and write " + pci_.file(kBoard, "resource2")));
+  EXPECT_THAT(said, HasSubstr("no permission to read and write " + pci_.file(kBoard, "resource2")));
   EXPECT_THAT(said, HasSubstr("chgrp GROUP"));
 }
 
