@@ -78,7 +78,7 @@ TEST_P(Ip330CalibrationTest, TakesTheErrorsAwayToOneAndAHalfCodes) {
                                                                                  .isRealTime = false});
   if (cannotBeCalibrated(range, gain, offsets[static_cast<std::size_t>(gain)])) {
     EXPECT_FALSE(with.board.trySetGain(0, gain));
-    EXPECT_TRUE(with.notes.has("+calibration fails: the converter gives nothing, nonsense, or the end of its range"));
+    EXPECT_TRUE(with.notes.has("+calibration fails: the converter gives no codes, implausible codes, or the end of its range"));
     return;
   }
   for (int i = 0; i < kTestVoltages; ++i) {

@@ -82,7 +82,7 @@ TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
 TEST(Ip330Settings, SayWhatCannotBe) {
   EXPECT_EQ(Ip330Settings().problem(), "");
   EXPECT_THAT((Ip330Settings{.type = Ip330Type::differential, .lastChannel = 16}.problem()), HasSubstr("use 0 to 15"));
-  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()), HasSubstr("the first one first"));
+  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()), HasSubstr("in ascending order"));
   EXPECT_THAT((Ip330Settings{.vector = 256}.problem()), HasSubstr("use 0 to 255"));
   EXPECT_THAT((Ip330Settings{.maxClients = 0}.problem()), HasSubstr("use 1 or more"));
   EXPECT_THAT((Ip330Settings{.microsecondsPerScan = 1}.problem()), HasSubstr("us per scan"));
