@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 using Status = IndustryPackStatus;
 
-// "6000 6080 d0000000+8192K 1,2" of each site that there is.
+// "6000 6080 d0000000+8192K 1,2" for each site.
 std::string textOf(const CarrierParameters& carrier) {
   std::string text;
   for (const auto& site : carrier.sites) {
@@ -181,7 +181,8 @@ TEST(CarrierParametersTest, OfAnUnknownKindNameTheKnownOnes) {
   EXPECT_THROW(static_cast<void>(parseCarrierParameters("vipc999", "")), std::invalid_argument);
 }
 
-// A kind of carrier that this host cannot reach is checked all the same, so that a wrong line is found before it is moved to another host.
+// The parameters of a carrier that MPF cannot reach are checked nevertheless, so that an error in an old startup
+// file is found.
 TEST(CreateCarrierTest, SaysThatThisHostReachesNoVmeAndWhatToUse) {
   const auto problemOf = [](const char* kind, const char* parameters) {
     try {

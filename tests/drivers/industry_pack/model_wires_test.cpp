@@ -64,7 +64,7 @@ TEST_F(ModelWiresTest, AreThereForWhoComesLater) {
 TEST_F(ModelWiresTest, ReachAnotherProcess) {
   std::array<int, 2> go{};
   ASSERT_EQ(::pipe(go.data()), 0);
-  const auto child = ::fork();  // while there is one thread
+  const auto child = ::fork();  // while the process has one thread
   if (child == 0) {
     char byte = 0;
     if (::read(go[0], &byte, 1) == 1) ModelWires(path_).wire("there").set(42);
@@ -97,7 +97,7 @@ TEST_F(ModelWiresTest, TellNobodyWhenNothingChanged) {
   EXPECT_EQ(told, 0);
 }
 
-// However many make the file at once, all have the same wires, and a name is one wire.
+// When many processes create the file at once, all have the same wires, and each name is one wire.
 TEST_F(ModelWiresTest, AreMadeOnceByManyAtOnce) {
   for (int round = 0; round < 20; ++round) {
     std::filesystem::remove(path_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The carrier on files in place of a board: which one it finds, what it says when it may not, where its windows are, how interrupts pass.
-// On QEMU's model of the board: tests/system/tpci200.
+// The carrier with files in place of a board: selection of a board, error messages, windows, interrupts.
+// tests/tpci200 runs it on QEMU's model of the board.
 #include <mpf/drivers/industry_pack/tpci200.h>
 
 #include <poll.h>
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 constexpr const char* kBoard = "0000:03:00.0";
 constexpr std::size_t kInPage = FakePci::kInPage;
 
-// Files are opened as by somebody who is not root.
+// Opens files without the privileges of root.
 class NoRoot {
  public:
   NoRoot() { ::setfsuid(65534); }
@@ -234,7 +234,7 @@ TEST_F(Tpci200Test, PassesNoInterruptThatIsNotEnabled) {
   pci_.giveInterrupt(kBoard);
   Tpci200 carrier(options());
   auto& wanted = carrier.site(0).interrupt(1);
-  auto& other = carrier.site(0).interrupt(0);  // looked at first
+  auto& other = carrier.site(0).interrupt(0);  // served first
   other.enable();
   other.disable();
   wanted.enable();
@@ -255,7 +255,7 @@ TEST_F(Tpci200Test, SilencesTheSiteOfNobodyButNotThatOfAnother) {
   line.enable();
   setControl(2, 0x40);
   setControl(3, 0x40);
-  setStatus(0x51);  // of sites A, C and D
+  setStatus(0x51);  // lines of sites A, C and D
   pci_.interrupt();
   waitFor(line);
   while (control(3) != 0) std::this_thread::yield();
