@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: MIT
-// Reclaim: who wants a server's name, who removes what a dead one left under it; each may be killed before any step.
+// Reclaim: starters, which take the name of a server, and reapers, which remove the window that a dead owner left
+// under it. Each may be killed before any step.
 //
-//   file made ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
-//   reaper: open by name ─ lock a byte of that file that its owner would have locked, too ─ does the name still lead to it? ─ remove the
-//   name ─ unlock
+//   file created ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
+//   reaper: open by name ─ lock a byte that a living owner has locked ─ does the name still refer to this file?
+//           ─ remove the name ─ unlock
 //
 //   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless tryLockAsOwner tryLockAsReaper isOwned probeOwner
 //   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
-//   HOLDS   the name of a living window is removed by nobody but its owner
-//   HOLDS   never do two that live own the name
-//   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked
-//   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after its holder died
-//   ASSUMES a starter outwaits a reaper that removes a dead window, and the kernel (it waits 50 ms for some microseconds)
-//   ASSUMES three starters, each also a reaper, and one that only reaps; two of them are killed; nobody else removes names
-//   BREAK   NO_COMPARE    a reaper does not look whether the name still leads to the file that it locked
-//   BREAK   NO_LOCK       a reaper asks for the lock and does not take it
+//   HOLDS   only its owner removes the name of a living window
+//   HOLDS   two living processes never own the name at the same time
+//   HOLDS   a starter gets the name, or is refused because a living process has it: no death blocks the name
+//   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after the death of its holder
+//   ASSUMES a starter waits longer than a reaper or the kernel needs (50 ms for some microseconds)
+//   ASSUMES three starters, each also a reaper, and one reaper; two of them are killed; no other process removes names
+//   BREAK   NO_COMPARE    a reaper does not check whether the name still refers to the file that it locked
+//   BREAK   NO_LOCK       a reaper tests the lock and does not take it
 //   BREAK   ONE_LOCK      a reaper locks the file as an owner does
-//   BREAK   UNLOCK_EARLY  a reaper lets go of the lock before it removes the name
-//   BREAK   LOCK_LATE     a starter locks its window after it got its name
-//   BREAK   LEAVE_LATE    who leaves lets go of the lock before it removes its name
-//   BREAK   NO_REAPING    a starter waits for others to remove what is dead
+//   BREAK   UNLOCK_EARLY  a reaper releases the lock before it removes the name
+//   BREAK   LOCK_LATE     a starter locks its window after the window has its name
+//   BREAK   LEAVE_LATE    a leaving owner releases the lock before it removes the name
+//   BREAK   NO_REAPING    a starter waits until another process has removed a dead window
 #define STARTERS 3
 #define REAPER 3
 #define PROCESSES 4
@@ -27,9 +28,9 @@
 #define FREE 255
 #define fileOf(starter) ((starter) + 1)
 
-byte name = NO_FILE;       // the file that the name leads to
-byte lock[STARTERS + 1];   // of each file: its owner
-byte reaper[STARTERS + 1]; // of each file: who is about to remove its name
+byte name = NO_FILE;       // the file that the name refers to
+byte lock[STARTERS + 1];   // index: file; the owner that holds its lock
+byte reaper[STARTERS + 1]; // index: file; the reaper that is about to remove its name
 bool left[STARTERS];
 bool dead[PROCESSES];
 
@@ -102,10 +103,10 @@ owner:
 #ifdef LOCK_LATE
     lock[fileOf(me)] = me;
 #endif
-    // Two owners would be two that live and got the name.
+    // Two owners would be two living processes that got the name.
     assert(name == fileOf(me));
     if
-    :: skip  // leaves, at any time
+    :: skip  // may leave at any time
     :: dead[me]
     fi;
 #ifdef LEAVE_LATE
