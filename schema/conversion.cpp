@@ -89,8 +89,8 @@ void putValue(Building& to, capnp::uint at, std::span<const Element> value, cons
   } else {
     auto list = to.pointers[at].initAs<capnp::List<Element>>(count);
     if constexpr (std::endian::native == std::endian::little) {
-      // The memory of the list has the format of the array, so one copy replaces `count` stores (a third of the
-      // time).
+      // The memory of the list has the format of the array, so one copy replaces `count` stores (a
+      // third of the time).
       const auto raw = capnp::AnyList::Reader(list.asReader()).getRawBytes();
       if (count != 0) std::memcpy(const_cast<kj::byte*>(raw.begin()), value.data(), value.size_bytes());
     } else {
@@ -130,7 +130,8 @@ MessageOf<T> takeValue(const Reading& from, capnp::uint at, const ConversionLimi
 template <class T>
 void toWire(const Message& message, capnp::AnyStruct::Builder envelope, const ConversionLimits& limits, std::string_view& at) {
   const auto& places = WirePlaces<T>::get();
-  if (!message.isSound()) throw Refusal{ConversionFault::unsound, "a body of " + std::to_string(message.body().size()) + " bytes is none"};
+  if (!message.isSound())
+    throw Refusal{ConversionFault::unsound, "a body of " + std::to_string(message.body().size()) + " bytes is invalid"};
   const T body = *message.tryAs<T>();
   storeLittle(envelope.getDataSection(), places.whichAt, places.which);
   auto into = envelope.getPointerSection()[places.memberAt].initAsAnyStruct(places.dataWords, places.pointers);
@@ -209,7 +210,7 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const C
     return guarded(T::kName, at, ConversionFault::tooLarge, error, [&] { toWire<T>(message, capnp::toAny(envelope), limits, at); });
   });
   if (!known) {
-    error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is none of ours"};
+    error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is unknown"};
   }
   return done;
 }
@@ -217,7 +218,8 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const C
 std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
                                    const Allocate& allocate) {
   error = {};
-  // The members of the union are in the order of MessageType, from 1 on; message_types_test checks this.
+  // The members of the union are in the order of MessageType, from 1 on; message_types_test checks
+  // this.
   const auto number = static_cast<unsigned>(envelope.which()) + 1;
   bool known = false;
   std::optional<Message> result;
@@ -227,7 +229,7 @@ std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const Conver
     return guarded(T::kName, at, ConversionFault::malformed, error,
                    [&] { result = fromWire<T>(capnp::toAny(envelope), limits, allocate, at); });
   });
-  if (!known) error = {ConversionFault::unknownType, "type " + std::to_string(number) + " is none of ours: the peer is newer"};
+  if (!known) error = {ConversionFault::unknownType, "type " + std::to_string(number) + " is unknown: the peer is newer"};
   if (result) {
     result->setClientType(envelope.getClientType());
     result->setClientExtra(envelope.getClientExtra());

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Conversion: between a message in shared memory and the Envelope of message.capnp, which is sent to
-// another host.
+// Conversion: between a message in shared memory and the Envelope of message.capnp, which is sent
+// to another host.
 //
-// Both directions use the descriptions in message_types.h by field name; no type has code of its own. All
-// bits of numbers are kept, also NaN payloads and -0.0. An unknown enum value of a newer peer is kept as a
-// number.
+// Both directions use the descriptions in message_types.h by field name; no type has code of its
+// own. All bits of numbers are kept, also NaN payloads and -0.0. An unknown enum value of a newer
+// peer is kept as a number.
 //
 // Threads  any number of callers at a time, each with its own messages.
-// Trust    an Envelope may contain anything. Invalid data is refused with an error that names type and
-//          field; nothing larger than the limit is allocated.
+// Trust    an Envelope may contain anything. Invalid data is refused with an error that names type
+//          and field; nothing larger than the limit is allocated.
 #pragma once
 
 #include <capnp/message.h>

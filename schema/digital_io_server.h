@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The messages between a digital I/O server and its clients. All messages are Int32. Each request gets a
-// reply with status 0, or with -1 if nothing was done. Bits are numbered as in the module: bits 0 to 23 for
-// 24 lines.
+// The messages between a digital I/O server and its clients. All messages are Int32. Each request
+// gets a reply with status 0, or with -1 if nothing was done. Bits are numbered as in the module:
+// bits 0 to 23 for 24 lines.
 //
 //   server <module>Out                                        server <module>In
 //     cmdSetBits    address=mask                                cmdStartMonitor  address=mask, 0: all
@@ -22,12 +22,13 @@
 //     cmd=cmdStopMonitor  ──►
 //                         ◄── status=0                                     the last message
 //
-// The messages of a monitor are further replies to the same request. A client has one monitor: another
-// cmdStartMonitor replaces it. Any number of clients may have monitors. A client that does not take its
-// messages loses its monitor when a reply cannot be delivered; no other client is affected.
+// The messages of a monitor are further replies to the same request. A client has one monitor:
+// another cmdStartMonitor replaces it. Any number of clients may have monitors. A client that does
+// not take its messages loses its monitor when a reply cannot be delivered; no other client is
+// affected.
 //
-// Source  the numbers and meanings of cmdSetBits to cmdSetDAC are those of the original MPF; the other
-//         commands are additions.
+// Source  the numbers and meanings of cmdSetBits to cmdSetDAC are those of the original MPF; the
+//         other commands are additions.
 #pragma once
 
 #include <cstdint>
@@ -45,7 +46,8 @@ inline constexpr std::int32_t cmdSetDAC = 5;
 inline constexpr std::int32_t cmdWriteBits = 6;    // sets and clears the bits of the mask at once
 inline constexpr std::int32_t cmdReadBits = 7;     // bits & mask
 inline constexpr std::int32_t cmdReadBits16 = 8;   // (bits >> extra) & mask & 0xffff, extra 0 to 16: for 16-bit records
-inline constexpr std::int32_t cmdSetEdges = 9;     // selects the edges that interrupt, for all clients
+// selects the edges that interrupt, for all clients
+inline constexpr std::int32_t cmdSetEdges = 9;
 
 // NOLINTEND(readability-identifier-naming)
 

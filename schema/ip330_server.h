@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The messages between the servers of an Acromag IP330 and their clients. A request with an invalid `cmd`,
-// channel or value gets status -1.
+// The messages between the servers of an Acromag IP330 and their clients. A request with an invalid
+// `cmd`, channel or value gets status -1.
 //
 //            request                                              reply
 //   scan     Int32 address=channel value=gain code 0..3           value=0..0xffff, status 0 or -1
@@ -17,14 +17,17 @@ namespace mpf::ip330server {
 
 // NOLINTBEGIN(readability-identifier-naming): names of the EPICS modules ip330, mca and std
 
-inline constexpr std::int32_t cmdSetSecondsBetweenCalibrate = 0;  // also calibrates now; 0: only now; negative: never, values are raw
+// also calibrates now; 0: only now; negative: never, values are raw
+inline constexpr std::int32_t cmdSetSecondsBetweenCalibrate = 0;
 inline constexpr std::int32_t cmdCalibrate = 1;
 inline constexpr std::int32_t cmdSetScanMode = 2;  // 0 to 5 as configIp330
-inline constexpr std::int32_t cmdSetMicrosecondsPerScan = 3;  // the value of the reply is the time that the timer gives, rounded
-inline constexpr std::int32_t cmdStartConvert = 4;  // starts a scan in the single modes; status -1 in others
+// the value of the reply is the time that the timer gives, rounded
+inline constexpr std::int32_t cmdSetMicrosecondsPerScan = 3;
+// starts a scan in the single modes; status -1 in others
+inline constexpr std::int32_t cmdStartConvert = 4;
 
-// Commands of a sweep, with the numbers of mca.h. Commands without a meaning for a sweep are accepted and have
-// no effect.
+// Commands of a sweep, with the numbers of mca.h. Commands without a meaning for a sweep are
+// accepted and have no effect.
 inline constexpr std::int32_t msgAcquire = 0;
 inline constexpr std::int32_t msgRead = 1;  // the reply is an Int32Array: all points of the channel
 inline constexpr std::int32_t msgSetChannelAdvanceInternal = 2;

@@ -3,9 +3,9 @@
 //
 //   {"type": "float64", "clientType": 0, "clientExtra": 0, "timeout": 0, ..., "value": 1.5}
 //
-// Values that JSON cannot express as numbers are strings: "nan", "inf", "-inf". A string of bytes has one
-// character for each byte, U+0000 to U+00FF; the bytes of a user message are hexadecimal digits. An invalid
-// body, or one of an unknown type, has "bytes", its size, in place of fields.
+// Values that JSON cannot express as numbers are strings: "nan", "inf", "-inf". A string of bytes
+// has one character for each byte, U+0000 to U+00FF; the bytes of a user message are hexadecimal
+// digits. An invalid body, or one of an unknown type, has "bytes", its size, in place of fields.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
-# The message types of MPF as they are sent to another host. In shared memory they are the plain structs
-# of message_types.h, whose descriptions use the same field names; a test compares the two. Numbers (@n)
-# of published fields never change; new fields are added at the end.
+# The message types of MPF as they are sent to another host. In shared memory they are the plain
+# structs of message_types.h, whose descriptions use the same field names; a test compares the two.
+# Numbers (@n) of published fields never change; new fields are added at the end.
 @0xd3a1c6f8b0e24795;
 
 using Cxx = import "/capnp/c++.capnp";

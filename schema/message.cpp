@@ -41,7 +41,8 @@ Message Message::copyOf(MessageType type, std::span<const std::byte> bytes) {
 Message Message::duplicate() const {
   Message copy = copyOf(getType(), body());
   const BodyLayout layout = layoutOf(getType());
-  if (isSound() && layout.elementBytes != 0) {  // the checked length; a peer may have changed the one in the body
+  // the checked length; a peer may have changed the one in the body
+  if (isSound() && layout.elementBytes != 0) {
     std::memcpy(copy.data() + layout.lengthOffset, &state_.length, sizeof state_.length);
     copy.check();
   }

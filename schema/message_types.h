@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Message types: the body of each type of message in shared memory, with a description of its fields, from
-// which sizes, checks, printing, parsing and the wire format are derived.
+// Message types: the body of each type of message in shared memory, with a description of its
+// fields, from which sizes, checks, printing, parsing and the wire format are derived.
 //
 //   scalar   | Int32 |                                    fixed fields only
 //   array    | Int32Array: fields, length | value[0] | value[1] | ...      elements follow the header, 8-aligned
 //
-// The structs have fixed widths and the byte order of the host, since both ends are on one host. Another host
-// gets the structs of message.capnp instead.
+// The structs have fixed widths and the byte order of the host, since both ends are on one host.
+// Another host gets the structs of message.capnp instead.
 //
 // CONTRIBUTING.md says how to add a type. schema_test compares the structs with message.capnp.
 //
-// Trust    a peer may write to a body while it is read, so `length` in the header must not be used as the
-//          length of an array; use MessageOf::value().
+// Trust    a peer may write to a body while it is read, so `length` in the header must not be used
+//          as the length of an array; use MessageOf::value().
 // Source   manual, "StandardFieldsMessage"; the names of types and fields are those of the manual.
 #pragma once
 
@@ -40,12 +40,13 @@ enum class MessageType : std::uint16_t {
   user = 10,
 };
 
-// The status of a ConnectMessage (manual, "ConnectMessage"). Old clients treat every value other than
-// connectYes as a disconnect.
+// The status of a ConnectMessage (manual, "ConnectMessage"). Old clients treat every value other
+// than connectYes as a disconnect.
 enum class ConnectStatus : std::int32_t {
   connectNo = 0,         // no server yet, or the server is gone
   connectYes = 1,        // messages reach the server
-  connectQueueFull = 2,  // the server's queue was full: a message was refused, the client stays connected
+  // the server's queue was full: a message was refused, the client stays connected
+  connectQueueFull = 2,
   connectRefused = 3,    // the server does not accept this client
 };
 inline constexpr std::array<std::string_view, 4> kConnectStatusNames{"connectNo", "connectYes", "connectQueueFull", "connectRefused"};
@@ -54,7 +55,8 @@ inline constexpr std::array<std::string_view, 4> kConnectStatusNames{"connectNo"
 enum class Fate : std::int32_t {
   refused = 0,         // not accepted: queue full, too large, a type that the server does not take
   neverTaken = 1,      // the server went away before it took the request: nothing was done
-  outcomeUnknown = 2,  // the server took it and then went away, or did not reply: it may have been done
+  // the server took it and then went away, or did not reply: it may have been done
+  outcomeUnknown = 2,
   expired = 3,         // its deadline passed before it was taken: nothing was done
   cancelled = 4,       // the client cancelled it
 };
@@ -90,14 +92,15 @@ constexpr auto standardFields() {
 // The name of the elements of an array in message.capnp and in texts.
 inline constexpr std::string_view kValueName = "value";
 
-// ---- the types; client and server agree on the meaning of timeout [s], cmd, status, address and extra
-// (manual, "StandardFieldsMessage")
+// ---- the types; client and server agree on the meaning of timeout [s], cmd, status, address and
+// extra (manual, "StandardFieldsMessage")
 
 // Sent by MPF to a client: connected, disconnected, or a queue was full.
 struct Connect {
   ConnectStatus status{};
   std::uint32_t reserved{};
-  std::uint64_t incarnation{};  // identifies one life of the server; another number: it was restarted
+  // identifies one life of the server; another number: it was restarted
+  std::uint64_t incarnation{};
 
   static constexpr auto kType = MessageType::connect;
   static constexpr std::string_view kName = "connect";
@@ -151,7 +154,8 @@ struct Char8Array {
   std::array<char, 4> eomString{};
   std::uint32_t reserved{};
 
-  // The end-of-message string; eomLen, which a peer may have written, is limited to the size of eomString.
+  // The end-of-message string; eomLen, which a peer may have written, is limited to the size of
+  // eomString.
   [[nodiscard]] std::string_view eom() const noexcept {
     const std::int32_t used = *static_cast<const volatile std::int32_t*>(&eomLen);  // read once: a peer may change it
     return {eomString.data(), static_cast<std::size_t>(std::clamp(used, 0, static_cast<std::int32_t>(eomString.size())))};
@@ -202,8 +206,8 @@ struct RequestFate {
   static constexpr auto fields() { return std::tuple{Field{"fate", &RequestFate::fate}, Field{"requestId", &RequestFate::requestId}}; }
 };
 
-// A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place. MPF forwards
-// it without reading it.
+// A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place.
+// MPF forwards it without reading it.
 struct alignas(8) User {
   std::uint32_t length{};  // number of bytes that follow; set by setSize() only
   std::uint32_t reserved{};
@@ -235,7 +239,8 @@ template <class T>
 concept ScalarBody = MessageBody<T> && !ArrayBody<T>;
 
 template <class T>
-concept CountedInBytes = ArrayBody<T> && sizeof(typename T::Element) == 1;  // has setSize(), the others setLength(), as in the manual
+// has setSize(), the others setLength(), as in the manual
+concept CountedInBytes = ArrayBody<T> && sizeof(typename T::Element) == 1;
 
 template <class T>
 concept CountedInElements = ArrayBody<T> && !CountedInBytes<T>;

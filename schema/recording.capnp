@@ -1,6 +1,6 @@
-# The file that `mpf tap --write` writes and `mpf replay` sends again: Records, each in a standard Cap'n
-# Proto stream frame. `capnp decode recording.capnp Record --short <file` shows it. New fields are added at
-# the end; published numbers never change.
+# The file that `mpf tap --write` writes and `mpf replay` sends again: Records, each in a standard
+# Cap'n Proto stream frame. `capnp decode recording.capnp Record --short <file` shows it. New fields
+# are added at the end; published numbers never change.
 @0xb077ea0582919f50;
 
 using Cxx = import "/capnp/c++.capnp";

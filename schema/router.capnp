@@ -1,13 +1,13 @@
-# The protocol between two routers over one TCP connection, with or without TLS. docs/wire-format.md says
-# when each item is sent and what each side must do.
+# The protocol between two routers over one TCP connection, with or without TLS. docs/wire-format.md
+# says when each item is sent and what each side must do.
 #
 # The side that connected is the client router: it has clients. The side that accepted is the server
-# router: it has servers. Each side sends Frames, each in a standard Cap'n Proto stream frame, not packed.
-# The first Frame of each side has its greeting and nothing else.
+# router: it has servers. Each side sends Frames, each in a standard Cap'n Proto stream frame, not
+# packed. The first Frame of each side has its greeting and nothing else.
 #
-# Versions: routers of different major versions end the connection after the greeting. Within a major
-# version new fields and new kinds of items are added at the end; a reader ignores an item of an unknown
-# kind. Published numbers never change.
+# Versions: routers of different major versions end the connection after the greeting. Within a
+# major version new fields and new kinds of items are added at the end; a reader ignores an item of
+# an unknown kind. Published numbers never change.
 @0xe5b2d0a94c7f1683;
 
 using Cxx = import "/capnp/c++.capnp";

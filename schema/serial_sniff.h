@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The messages between a serial server and the listeners of its line (manual, "serialPortSniff"; here any
-// number of listeners in any process).
+// The messages between a serial server and the listeners of its line (manual, "serialPortSniff";
+// here any number of listeners in any process).
 //
 //   listener                      server "<serial server>.sniff"
 //     Int32 cmd=cmdSniffStart ──►
@@ -13,18 +13,21 @@
 // Each Char8Array has
 //   value    `extra` records in the order of the line, see SniffRecord
 //   extra    number of records, 1 or more
-//   address  number of bytes that are missing before this message, because the listener did not take its
-//            messages or the server was too slow; at most 2^31 - 1, the rest follows in the next message
-// The server collects records for at most about 20 ms, so a slow line gives small messages and a fast line
-// large ones.
+//   address  number of bytes that are missing before this message, because the listener did not
+//            take its messages or the server was too slow; at most 2^31 - 1, the rest follows in
+//            the next message
+// The server collects records for at most about 20 ms, so a slow line gives small messages and a
+// fast line large ones.
 //
 // The replies to start and stop are Int32 with
-//   status   sniffStatusOK; sniffStatusNotListening: stop without start; sniffStatusError: unknown cmd
+//   status   sniffStatusOK; sniffStatusNotListening: stop without start; sniffStatusError: unknown
+//            cmd
 //   address  for stop: number of bytes before the stop that are missing at the end
 //
-// If a client starts again while it listens, later records go to the new request; no record is sent twice. A
-// client that goes away need not stop first. A client that does not take its messages loses bytes; neither
-// the line nor other listeners wait for it. When the server ends, the listener gets a ConnectMessage.
+// If a client starts again while it listens, later records go to the new request; no record is sent
+// twice. A client that goes away need not stop first. A client that does not take its messages
+// loses bytes; neither the line nor other listeners wait for it. When the server ends, the listener
+// gets a ConnectMessage.
 #pragma once
 
 #include <cstddef>
@@ -68,7 +71,8 @@ enum class SniffKind : char {
 struct SniffRecord {
   static constexpr std::size_t kBytes = 10;
 
-  std::int64_t atNs = 0;  // CLOCK_MONOTONIC of the server's host when the kernel took or delivered the byte
+  // CLOCK_MONOTONIC of the server's host when the kernel took or delivered the byte
+  std::int64_t atNs = 0;
   SniffKind kind = SniffKind::sent;
   std::uint8_t value = 0;
 
@@ -79,8 +83,8 @@ struct SniffRecord {
   friend bool operator==(const SniffRecord&, const SniffRecord&) = default;
 };
 
-// Returns the records of a reply; nullopt when the reply is invalid: its size does not match `extra`, or a kind
-// is unknown.
+// Returns the records of a reply; nullopt when the reply is invalid: its size does not match
+// `extra`, or a kind is unknown.
 [[nodiscard]] std::optional<std::vector<SniffRecord>> tryReadRecords(const Char8ArrayMessage& reply);
 
 }  // namespace mpf::serial

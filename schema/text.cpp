@@ -320,7 +320,7 @@ std::string typeNames() {
 }
 
 std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error) {
-  error = "type " + std::to_string(static_cast<unsigned>(type)) + " is none of ours";
+  error = "type " + std::to_string(static_cast<unsigned>(type)) + " is unknown";
   std::optional<Message> message;
   withType(type, [&]<class T>(std::type_identity<T>) { return (message = parseAs<T>(words, error)).has_value(); });
   if (message) error.clear();

@@ -4,8 +4,9 @@
 //   int32Array timeout=0 cmd=2 status=0 address=3 extra=0 value=1,2,3
 //   char8Array timeout=1 ... eomLen=2 eomString="\r\n" value="*IDN?"
 //
-// Bytes are written as C strings, with \xHH of exactly two digits; those of a user message as hexadecimal
-// digits. tryParse() reads everything that print() has written in full (a NaN loses its payload).
+// Bytes are written as C strings, with \xHH of exactly two digits; those of a user message as
+// hexadecimal digits. tryParse() reads everything that print() has written in full (a NaN loses its
+// payload).
 //
 // Threads  any number of callers at a time.
 #pragma once
@@ -21,8 +22,8 @@
 
 namespace mpf {
 
-// Prints a message as one line. An array of more than maxElements ends in ",... (5000)"; an invalid body is
-// reported as such. clientType and clientExtra are shown unless they are 0.
+// Prints a message as one line. An array of more than maxElements ends in ",... (5000)"; an invalid
+// body is reported as such. clientType and clientExtra are shown unless they are 0.
 [[nodiscard]] std::string print(const Message& message, std::size_t maxElements = 16);
 
 // Returns the type with this name; nullopt for an unknown name.
@@ -33,9 +34,9 @@ namespace mpf {
 
 // Creates a message from words of the form `field=value`; other fields are 0, arrays empty.
 //
-//   words     integers are decimal, or hexadecimal bit patterns (0xffffffff is -1 in 32 bits); numbers as
-//             for strtod; statuses by name; characters plain or escaped; arrays as `value=1,2,3`; strings
-//             C-escaped, with or without quotes; eomString also sets eomLen
+//   words     integers are decimal, or hexadecimal bit patterns (0xffffffff is -1 in 32 bits);
+//             numbers as for strtod; statuses by name; characters plain or escaped; arrays as
+//             `value=1,2,3`; strings C-escaped, with or without quotes; eomString also sets eomLen
 //   error     "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, clientType, clientExtra"
 //   returns   nullopt with `error` set
 [[nodiscard]] std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// UserBuilder, UserReader: build and read a UserMessage, which has a Cap'n Proto struct of the user's own
-// schema in standard segment framing.
+// UserBuilder, UserReader: build and read a UserMessage, which has a Cap'n Proto struct of the
+// user's own schema in standard segment framing.
 //
 //   | User | segment table (1 word) | segment |          MPF and its routers forward these bytes unread
 //
@@ -12,8 +12,8 @@
 //   auto spectrum = reader.getRoot<Spectrum>();
 //
 // Threads  one at a time.
-// Trust    Cap'n Proto checks what it reads, but a peer may change the bytes after the check: read a
-//          duplicate() of a message from a peer that is not trusted.
+// Trust    Cap'n Proto checks what it reads, but a peer may change the bytes after the check: read
+//          a duplicate() of a message from a peer that is not trusted.
 #pragma once
 
 #include <capnp/message.h>
@@ -33,7 +33,8 @@ class UserBuilder {
   typename Root::Builder initRoot() {
     return builder_.initRoot<Root>();
   }
-  // Returns the message, with the size that was used. The builders of its structs are invalid afterwards.
+  // Returns the message, with the size that was used. The builders of its structs are invalid
+  // afterwards.
   [[nodiscard]] UserMessage finish() &&;
 
  private:

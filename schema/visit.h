@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// withType(), visitFields(): run code for the type of a message, or for each of its fields, using the
-// descriptions in message_types.h.
+// withType(), visitFields(): run code for the type of a message, or for each of its fields, using
+// the descriptions in message_types.h.
 #pragma once
 
 #include <span>
@@ -12,8 +12,8 @@
 
 namespace mpf {
 
-// Calls act(std::type_identity<T>{}) for the type with this number and returns its result; false for an unknown
-// number.
+// Calls act(std::type_identity<T>{}) for the type with this number and returns its result; false
+// for an unknown number.
 template <class Act>
 bool withType(MessageType type, Act&& act) {
   return [&]<class... T>(std::type_identity<std::tuple<T...>>) {

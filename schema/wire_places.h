@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// WirePlaces: the places of the fields of a message type in its Cap'n Proto struct; looked up in the schema by
-// name, once.
+// WirePlaces: the places of the fields of a message type in its Cap'n Proto struct; looked up in
+// the schema by name, once.
 //
 //   struct = | data section: numbers at multiples of their size | pointers |          a union member: a number and a pointer
 //
-// Setting a field by its place costs a store; looking it up by name costs a microsecond for each message.
+// Setting a field by its place costs a store; looking it up by name costs a microsecond for each
+// message.
 //
 // Threads  any number of callers at a time.
-// Trust    a struct of another version may be shorter: missing fields read as zero, the default of every
-//          field in message.capnp.
+// Trust    a struct of another version may be shorter: missing fields read as zero, the default of
+//          every field in message.capnp.
 #pragma once
 
 #include <algorithm>

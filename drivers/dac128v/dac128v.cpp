@@ -57,9 +57,9 @@ bool Dac128v::isReady() noexcept {
   return module_.problem().empty() && tryRestore();
 }
 
-// Checks one channel that was written: preferably one whose code is neither the power-up code nor all
-// ones, since a reset or an absent module would not change that reading. Without a written channel the
-// result is false.
+// Checks one channel that was written: preferably one whose code is neither the power-up code nor
+// all ones, since a reset or an absent module would not change that reading. Without a written
+// channel the result is false.
 bool Dac128v::holdsWhatWasWritten() noexcept {
   auto found = std::ranges::find_if(written_, [](const auto& code) { return code && *code != kPowerUpCode && *code != kMaxCode; });
   if (found == written_.end()) found = std::ranges::find_if(written_, [](const auto& code) { return code && *code != kPowerUpCode; });

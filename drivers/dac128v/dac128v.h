@@ -6,20 +6,20 @@
 //   if (dac.tryWrite(3, 2048) != Dac128vStatus::success) ...
 //
 // Each write is read back, so a register that does not store the code is detected. The constructor
-// writes nothing: the outputs keep their values when one program ends and another starts. After power-up
-// they have code 2048, the middle of the range.
+// writes nothing: the outputs keep their values when one program ends and another starts. After
+// power-up they have code 2048, the middle of the range.
 //
-// A module that was reset, or pulled out and put back, is detected by the next write, because a register
-// that was written holds another code. If the ID PROM is the right one, each channel gets its last
-// written code again; if not, nothing is written.
+// A module that was reset, or pulled out and put back, is detected by the next write, because a
+// register that was written holds another code. If the ID PROM is the right one, each channel gets
+// its last written code again; if not, nothing is written.
 //
 // Threads  any number of callers at a time; a write and its read-back are one step.
 // Crash    the outputs keep their values.
-// Trust    values that the module returns are only compared. The upper four bits of a register may be
-//          anything. The ID PROM is read again when a register reads as all ones, as code 4095 may, or
-//          has changed by itself.
-// Source   Systran DAC128V: one 16-bit word for each channel from offset 0 of the I/O space, readable and
-//          writable.
+// Trust    values that the module returns are only compared. The upper four bits of a register may
+//          be anything. The ID PROM is read again when a register reads as all ones, as code 4095
+//          may, or has changed by itself.
+// Source   Systran DAC128V: one 16-bit word for each channel from offset 0 of the I/O space,
+//          readable and writable.
 #pragma once
 
 #include <array>
@@ -66,8 +66,8 @@ class Dac128v {
   //   code      0 to 4095; Dac128vRange converts between codes and volts
   //   returns   success once the register holds the code
   [[nodiscard]] Dac128vStatus tryWrite(int channel, int code) noexcept;
-  // Returns the code in the register, 0 to 4095; nullopt when the channel is not 0 to 7, or the module is
-  // absent or replaced.
+  // Returns the code in the register, 0 to 4095; nullopt when the channel is not 0 to 7, or the
+  // module is absent or replaced.
   [[nodiscard]] std::optional<int> tryRead(int channel) noexcept;
   // How often the outputs were restored after a reset of the module.
   [[nodiscard]] std::uint64_t restorations() const noexcept { return restorations_.load(std::memory_order_relaxed); }
@@ -81,7 +81,8 @@ class Dac128v {
   IndustryPackModule& module_;
   Registers& registers_;
   std::mutex mutex_;  // guards the registers and written_
-  std::array<std::optional<int>, kChannels> written_;  // the last code that each register has stored
+  // the last code that each register has stored
+  std::array<std::optional<int>, kChannels> written_;
   std::atomic<std::uint64_t> restorations_{0};
 };
 

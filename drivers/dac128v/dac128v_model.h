@@ -17,8 +17,8 @@ namespace mpf {
 
 class Dac128vModel final : public DeviceModel {
  public:
-  // Called with the voltage of an output: for each channel at power-up, then at each write, in order. The
-  // model is locked during the call, so the function must not call it.
+  // Called with the voltage of an output: for each channel at power-up, then at each write, in
+  // order. The model is locked during the call, so the function must not call it.
   using OnVolts = std::function<void(int channel, double volts)>;
 
   explicit Dac128vModel(const Dac128vRanges& ranges = {}, OnVolts onVolts = {});

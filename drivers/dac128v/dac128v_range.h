@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Dac128vRange: the output range of a group of four channels, as the jumpers set it; converts between
-// codes and volts.
+// Dac128vRange: the output range of a group of four channels, as the jumpers set it; converts
+// between codes and volts.
 //
-// Source  Systran DAC128V: each group of four channels has a lower and an upper reference of -10, -5, 0,
-//         +5 or +10 V. A step is 1/4096 of the span, so the highest code is one step below the upper
-//         reference, and code 2048 is the middle.
+// Source  Systran DAC128V: each group of four channels has a lower and an upper reference of -10,
+//         -5, 0, +5 or +10 V. A step is 1/4096 of the span, so the highest code is one step below
+//         the upper reference, and code 2048 is the middle.
 #pragma once
 
 #include <array>

@@ -28,8 +28,8 @@ const DigitalIoKind& kindOf(const IndustryPackModule& module) {
   return *kind;
 }
 
-// Bits of a register whose value after setUp() differs from that after power-up; they show a reset. No
-// bits: setUp() writes nothing but outputs.
+// Bits of a register whose value after setUp() differs from that after power-up; they show a reset.
+// No bits: setUp() writes nothing but outputs.
 struct Telling {
   std::size_t word = 0;
   std::uint16_t bits = 0;
@@ -155,7 +155,8 @@ DigitalIoStatus DigitalIo::tryWriteBits(std::uint32_t mask, std::uint32_t bits) 
     marks_ = readMarks();
     return DigitalIoStatus::readBackDiffers;
   }
-  // A line that was written is an output from now on. It is switched on last, when it drives the right value.
+  // A line that was written is an output from now on. It is switched on last, when it drives the
+  // right value.
   if (kind_.driver == DigitalIoKind::Driver::switched)
     registers_.write(word::kOutputEnable, mask, registers_.read(word::kOutputEnable, mask) | mask);
   writtenMask_ |= mask;
@@ -227,8 +228,8 @@ bool DigitalIo::lookLocked() {
   return hadEdges;
 }
 
-// Programs the module when it is back or was reset. Returns false when it is gone, or when all changes
-// have been reported already.
+// Programs the module when it is back or was reset. Returns false when it is gone, or when all
+// changes have been reported already.
 bool DigitalIo::tend() {
   if (state_.isThere && readMarks() == marks_) {
     const auto inputs = registers_.read(word::kInput, kind_.inputs);
@@ -243,8 +244,8 @@ bool DigitalIo::tend() {
   return false;
 }
 
-// Clears pending edges and arms each line for its next edge, until no input changes. Returns the bits
-// that have changed.
+// Clears pending edges and arms each line for its next edge, until no input changes. Returns the
+// bits that have changed.
 std::uint32_t DigitalIo::followInputs(bool& hadEdges) {
   std::uint32_t changed = 0;
   for (int look = 0; look < kMaxLooks; ++look) {
@@ -261,8 +262,8 @@ std::uint32_t DigitalIo::followInputs(bool& hadEdges) {
   return changed;
 }
 
-// An edge that a poll finds may be so recent that its interrupt is under way; the interrupt is lost if it
-// has not come by the next poll.
+// An edge that a poll finds may be so recent that its interrupt is under way; the interrupt is lost
+// if it has not come by the next poll.
 void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
   if (cause == InterruptThread::Cause::interrupt) {
     mayBeLost_ = false;
@@ -273,8 +274,8 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
   noteStorms();
 }
 
-// Called at each poll. A stuck line causes a storm after each pause; all these count as one storm until
-// no spurious interrupt comes between two polls.
+// Called at each poll. A stuck line causes a storm after each pause; all these count as one storm
+// until no spurious interrupt comes between two polls.
 void DigitalIo::noteStorms() {
   // PAIR(dio-thread): null while the constructor creates the thread.
   const auto* const thread = running_.load(std::memory_order_acquire);

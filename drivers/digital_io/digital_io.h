@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DigitalIo: driver of a module with up to 32 digital lines, GreenSpring IP-Unidig or Systran DIO316I.
+// DigitalIo: driver of a module with up to 32 digital lines, GreenSpring IP-Unidig or Systran
+// DIO316I.
 //
 //   DigitalIo io(module, {.vector = 116, .rising = 0xff, .falling = 0xff});
 //   io.trySetBits(0x3);
@@ -8,23 +9,23 @@
 //   an edge ──► interrupt ─┐
 //   pollEvery ─────────────┴► look: pending edges, inputs ──► changes ──► each subscriber
 //
-// The chip detects one direction of a line at a time. For both directions, each look sets the polarity
-// from the inputs and then reads the inputs again, so a line that changes in between is noticed, and the
-// polarity always fits the level.
+// The chip detects one direction of a line at a time. For both directions, each look sets the
+// polarity from the inputs and then reads the inputs again, so a line that changes in between is
+// noticed, and the polarity always fits the level.
 //
-// The constructor does not write the outputs: they keep their values when one program ends and another
-// starts. After power-up all outputs are ones.
+// The constructor does not write the outputs: they keep their values when one program ends and
+// another starts. After power-up all outputs are ones.
 //
-// Each look also reads a register that a reset changes, and the outputs that were written. When these
-// have changed by themselves and the ID PROM is the right one, the module was reset or is back: outputs,
-// output enables, threshold and edges are programmed again. While the module is absent, or another module
-// is in its place, nothing is written.
+// Each look also reads a register that a reset changes, and the outputs that were written. When
+// these have changed by themselves and the ID PROM is the right one, the module was reset or is
+// back: outputs, output enables, threshold and edges are programmed again. While the module is
+// absent, or another module is in its place, nothing is written.
 //
 // Threads  any number of callers at a time. A subscriber is called by the driver's thread or by the
 //          thread that calls this object, one call at a time; it must not call this object.
 // Crash    the outputs keep their values; the carrier masks the interrupt when it is opened again.
-// Trust    values that the module returns are only compared. All ones may mean an absent module, so the
-//          ID PROM is read then. Bits without a function may have any value.
+// Trust    values that the module returns are only compared. All ones may mean an absent module, so
+//          the ID PROM is read then. Bits without a function may have any value.
 // Source   digital_io_kind.h.
 #pragma once
 
@@ -77,7 +78,8 @@ struct DigitalIoNews {
     gone,  // the module is absent or replaced
     back,  // the module is back or was reset; it is programmed again, outputs included
     lostInterrupt,  // a poll found an edge whose interrupt did not come
-    storm,  // the request line is stuck: interrupts are masked for a while, repeatedly; reported once
+    // the request line is stuck: interrupts are masked for a while, repeatedly; reported once
+    storm,
   };
   Kind kind = Kind::inputs;
   std::uint32_t inputs = 0;  // all inputs; for `gone` their last values
@@ -87,15 +89,15 @@ struct DigitalIoNews {
 class DigitalIo {
  public:
   using Listener = std::function<void(const DigitalIoNews& news)>;
-  // Ends when it is destroyed: the listener is not running then and does not run again. A listener must
-  // not destroy a subscription.
+  // Ends when it is destroyed: the listener is not running then and does not run again. A listener
+  // must not destroy a subscription.
   class Subscription;
 
   // Programs the module and starts the driver's thread. Outputs keep their values.
   //
   //   module    must outlive this object
-  //   throws    std::invalid_argument when the module is of another kind, IndustryPackError badVector,
-  //             std::system_error when the thread cannot be started
+  //   throws    std::invalid_argument when the module is of another kind, IndustryPackError
+  //             badVector, std::system_error when the thread cannot be started
   explicit DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options = {});
   // Stops the thread and disables the interrupts of the module, if it is present.
   ~DigitalIo();
@@ -105,8 +107,8 @@ class DigitalIo {
   [[nodiscard]] const DigitalIoKind& kind() const noexcept { return kind_; }
   [[nodiscard]] bool usesInterrupts() const noexcept { return usesInterrupts_; }
 
-  // Sets the outputs in `mask` to `bits` and reads them back; other outputs keep their values. A line with
-  // an output enable becomes an output.
+  // Sets the outputs in `mask` to `bits` and reads them back; other outputs keep their values. A
+  // line with an output enable becomes an output.
   [[nodiscard]] DigitalIoStatus tryWriteBits(std::uint32_t mask, std::uint32_t bits) noexcept;
   [[nodiscard]] DigitalIoStatus trySetBits(std::uint32_t mask) noexcept { return tryWriteBits(mask, mask); }
   [[nodiscard]] DigitalIoStatus tryClearBits(std::uint32_t mask) noexcept { return tryWriteBits(mask, 0); }
@@ -124,12 +126,12 @@ class DigitalIo {
     bool isThere = false;
     std::uint32_t inputs = 0;
   };
-  // Looks at the module now. All changes are reported to the subscribers before this returns the state
-  // that was last reported.
+  // Looks at the module now. All changes are reported to the subscribers before this returns the
+  // state that was last reported.
   State look();
 
-  // Calls `listener` for each change from now on, until the subscription is destroyed. This object must
-  // outlive the subscription.
+  // Calls `listener` for each change from now on, until the subscription is destroyed. This object
+  // must outlive the subscription.
   [[nodiscard]] Subscription subscribe(Listener listener);
   [[nodiscard]] InterruptThread::Counters counters() const noexcept;
 
@@ -147,8 +149,8 @@ class DigitalIo {
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
   [[nodiscard]] std::uint32_t armed() const noexcept { return (rising_ & ~falling_) | (rising_ & falling_ & ~state_.inputs); }
 
-  // Register values that a reset would change. These are the values that were read, not those that were
-  // written, since a register may be broken.
+  // Register values that a reset would change. These are the values that were read, not those that
+  // were written, since a register may be broken.
   struct Marks {
     std::uint16_t setUp = 0;
     std::uint32_t outputs = 0, enables = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DigitalIoKind: the properties of each supported model of digital I/O module, GreenSpring IP-Unidig and
-// Systran DIO316I.
+// DigitalIoKind: the properties of each supported model of digital I/O module, GreenSpring
+// IP-Unidig and Systran DIO316I.
 //
 // Bits are numbered as in the registers: bit 0 is the lowest of the low word, bit 16 the lowest of the high one.
 //

@@ -16,8 +16,8 @@ constexpr std::uint32_t bitOf(std::size_t bit) noexcept { return std::uint32_t{1
 
 std::uint16_t half(std::uint32_t bits, std::size_t which) noexcept { return static_cast<std::uint16_t>(bits >> (16 * which)); }
 
-// The value read from a register that has only the bits in `mask`: the module does not drive the others,
-// and the carrier pulls them up.
+// The value read from a register that has only the bits in `mask`: the module does not drive the
+// others, and the carrier pulls them up.
 std::uint16_t half(std::uint32_t bits, std::uint32_t mask, std::size_t which) noexcept { return half(bits | ~mask, which); }
 
 template <class Word>
@@ -145,10 +145,11 @@ std::uint32_t DigitalIoModel::levels() const {
   return levels;
 }
 
-// Brings the model up to date: reports outputs, reads the lines into the inputs, turns edges into pending
-// bits and those into the interrupt request.
+// Brings the model up to date: reports outputs, reads the lines into the inputs, turns edges into
+// pending bits and those into the interrupt request.
 void DigitalIoModel::follow() {
-  const auto high = ~(drivenLocked() & ~registers_.output);  // a line that is not driven is pulled up
+  // a line that is not driven is pulled up
+  const auto high = ~(drivenLocked() & ~registers_.output);
   const auto news = std::exchange(told_, high) ^ high;
   for (std::size_t bit = 0; onOutput_ && bit < outside_.size(); ++bit) {
     if ((news & kind_.outputs & bitOf(bit)) != 0) onOutput_(static_cast<int>(bit), (high & bitOf(bit)) != 0 ? kHighVolts : 0);

@@ -8,8 +8,8 @@
 //   outputs, enables ─► driver ─┐
 //   outside: 5 V, 0 V, a wire ──┴► line ─► comparator ─► inputs ─► enabled edge ─► pending ─► IntReq0*
 //
-// A line that is not driven is pulled up. The outputs of the DIO316I and of the -HV and -12I12O models are
-// not inputs: use OnOutput to see them and connect() to drive inputs.
+// A line that is not driven is pulled up. The outputs of the DIO316I and of the -HV and -12I12O
+// models are not inputs: use OnOutput to see them and connect() to drive inputs.
 //
 // Threads  as DeviceModel; the other functions may be called by any thread.
 #pragma once
@@ -29,8 +29,8 @@ class DigitalIoModel final : public DeviceModel {
   static constexpr double kHighVolts = 5;
   static constexpr double kTtlThresholdVolts = 1.5;
 
-  // Called with the voltage of an output, at power-up and at each change. The model is locked during the
-  // call, so the function must not call it.
+  // Called with the voltage of an output, at power-up and at each change. The model is locked
+  // during the call, so the function must not call it.
   using OnOutput = std::function<void(int bit, double volts)>;
   using Volts = std::function<double()>;
 
@@ -41,8 +41,8 @@ class DigitalIoModel final : public DeviceModel {
 
   // Drives the lines in `mask` from outside: high where `bits` has a 1, else low.
   void setInputs(std::uint32_t mask, std::uint32_t bits);
-  // Drives a line from outside with the voltage that volts() returns; called at each bus cycle and at
-  // look().
+  // Drives a line from outside with the voltage that volts() returns; called at each bus cycle and
+  // at look().
   void connect(int bit, Volts volts);
   // Reads the connected voltages again; call it when one has changed.
   void look();
@@ -72,7 +72,8 @@ class DigitalIoModel final : public DeviceModel {
   Registers registers_;
   std::array<Volts, 32> outside_{};
   std::uint32_t inputs_ = 0;      // at the last follow()
-  std::uint32_t told_ = 0;        // outputs that were reported as high; 0 at first, so that all are reported
+  // outputs that were reported as high; 0 at first, so that all are reported
+  std::uint32_t told_ = 0;
   std::uint32_t stuck_ = 0;
 };
 

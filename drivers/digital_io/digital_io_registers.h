@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DigitalIoRegisters: reads and writes pairs of 16-bit registers as one value of 32 bits; accesses only
-// the halves that the kind of module has.
+// DigitalIoRegisters: reads and writes pairs of 16-bit registers as one value of 32 bits; accesses
+// only the halves that the kind of module has.
 //
 // Threads  one at a time: the owner holds a lock.
 #pragma once
@@ -16,8 +16,8 @@ class DigitalIoRegisters {
  public:
   DigitalIoRegisters(Registers& io, const DigitalIoKind& kind) noexcept : io_(io), kind_(kind) {}
 
-  // Accesses the pair that begins at `word`. A half without a bit in `mask` is not accessed, since the
-  // module may have another register there.
+  // Accesses the pair that begins at `word`. A half without a bit in `mask` is not accessed, since
+  // the module may have another register there.
   [[nodiscard]] std::uint32_t read(std::size_t word, std::uint32_t mask) {
     std::uint32_t bits = 0;
     if (low(mask) != 0) bits = readWord(word);

@@ -22,16 +22,16 @@ void IndustryPackCarriers::add(const std::string& name, std::unique_ptr<Industry
   if (carriers_.contains(name))
     throw std::invalid_argument(fmt::format("carrier \"{}\" exists already: {}; choose another name", name, find(name).description()));
   if (carriers_.size() == kMaxCarriers) {
-    throw IndustryPackError(IndustryPackStatus::tooMany,
-                            fmt::format("carrier \"{}\" cannot be added: {} carriers exist already, which is the limit", name, kMaxCarriers));
+    throw IndustryPackError(
+        IndustryPackStatus::tooMany,
+        fmt::format("carrier \"{}\" cannot be added: {} carriers exist already, which is the limit", name, kMaxCarriers));
   }
   carriers_.emplace(name, std::move(carrier));
 }
 
 IndustryPackCarrier& IndustryPackCarriers::find(const std::string& name) const {
   const auto found = carriers_.find(name);
-  if (found == carriers_.end())
-    throw std::invalid_argument(fmt::format("no carrier \"{}\"; carriers: {}", name, fmt::join(names(), ", ")));
+  if (found == carriers_.end()) throw std::invalid_argument(fmt::format("no carrier \"{}\"; carriers: {}", name, fmt::join(names(), ", ")));
   return *found->second;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CarrierParameters: reads and checks the parameter strings of the VME and ISA carriers of old startup
-// files.
+// CarrierParameters: reads and checks the parameter strings of the VME and ISA carriers of old
+// startup files.
 //
 //   const auto carrier = parseCarrierParameters("vipc616_01", "0x3000,0xa0000000");   // ipacAddCarrier(&vipc616_01, "0x3000,0xa0000000")
 //   carrier.sites[1].memory                                                           // 0xa0800000, in VME A32
@@ -42,15 +42,15 @@ struct CarrierParameters {
   bool releasesOnAcknowledge = false; // the request ends in the acknowledge cycle; else at a register access
 };
 
-// Returns whether `kind` names such a carrier: a symbol of drvIpac ("&vipc616_01", "ipmv162") or a command
-// ("ipacAddVIPC616_01"), in upper or lower case.
+// Returns whether `kind` names such a carrier: a symbol of drvIpac ("&vipc616_01", "ipmv162") or a
+// command ("ipacAddVIPC616_01"), in upper or lower case.
 [[nodiscard]] bool isParameterKind(std::string_view kind);
 // The symbols of all such carriers: "vipc310", ....
 [[nodiscard]] std::vector<std::string> parameterKinds();
 
 // Reads the parameter string of a carrier.
-//   throws  IndustryPackError badAddress or badIntLevel, which names the invalid part of `parameters`;
-//           std::invalid_argument when the kind is unknown
+//   throws  IndustryPackError badAddress or badIntLevel, which names the invalid part of
+//           `parameters`; std::invalid_argument when the kind is unknown
 [[nodiscard]] CarrierParameters parseCarrierParameters(std::string_view kind, std::string_view parameters);
 
 }  // namespace mpf

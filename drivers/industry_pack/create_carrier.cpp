@@ -33,7 +33,8 @@ constexpr std::array kKinds{
     Kind{"model", "", "four sites with models of the modules that a program drives", createModel},
     Kind{"tpci200", "[ADDRESS|NUMBER][,poll=US]", "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", createTpci200}};
 
-// Checks the parameters nevertheless, so that an error in an old startup file is found on this host.
+// Checks the parameters nevertheless, so that an error in an old startup file is found on this
+// host.
 [[noreturn]] void refuseOutOfReach(const std::string& kind, const std::string& parameters) {
   const auto carrier = parseCarrierParameters(kind, parameters);
   throw IndustryPackError(

@@ -14,8 +14,8 @@ namespace mpf {
 //   kind        "model" or another kind of carrierKinds()
 //   parameters  as the kind defines them; for VME and ISA carriers the strings of drvIpac
 //   throws      std::invalid_argument for an unknown kind;
-//               IndustryPackError badAddress or badIntLevel for invalid parameters, notImplemented for a
-//               valid carrier on a bus that MPF cannot reach;
+//               IndustryPackError badAddress or badIntLevel for invalid parameters, notImplemented
+//               for a valid carrier on a bus that MPF cannot reach;
 //               std::runtime_error when the board is absent or this process may not use it
 [[nodiscard]] std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind, const std::string& parameters);
 

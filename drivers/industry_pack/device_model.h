@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// DeviceModel: base class of device models. A model behaves like the chips of a module, side effects of
-// reads and writes and interrupts included.
+// DeviceModel: base class of device models. A model behaves like the chips of a module, side
+// effects of reads and writes and interrupts included.
 //
 //   class Dac128vModel : public DeviceModel { ... };
 //   auto carrier = std::make_unique<ModelCarrier>();
 //   auto& dac = carrier->plug("IP_a", std::make_unique<Dac128vModel>());   // like a real module
 //
-// A model receives bus cycles, not register accesses: each cycle transfers a 16-bit word, in which one or
-// both byte lanes take part, as on the connector of the module.
+// A model receives bus cycles, not register accesses: each cycle transfers a 16-bit word, in which
+// one or both byte lanes take part, as on the connector of the module.
 //
 // Threads  cycles come from any thread, also two at a time, so a model needs a lock of its own.
 //          setInterrupt() may be called by any thread.
@@ -26,8 +26,8 @@ namespace mpf {
 class DeviceModel {
  public:
   enum class Space : std::uint8_t { io, memory };
-  // The half of the data bus that takes part: D15..8 is the byte at the even address, D7..0 the byte at the
-  // odd address.
+  // The half of the data bus that takes part: D15..8 is the byte at the even address, D7..0 the
+  // byte at the odd address.
   enum Lanes : std::uint16_t { kHigh = 0xff00, kLow = 0x00ff, kBoth = 0xffff };
 
   explicit DeviceModel(IdProm id) : id_(id) {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// FileLocks: divides numbered resources between processes; each belongs to one process at a time. The
-// kernel drops the lock when the process ends, in whatever way.
+// FileLocks: divides numbered resources between processes; each belongs to one process at a time.
+// The kernel drops the lock when the process ends, in whatever way.
 //
 // Each lock is on one byte of a file (fcntl F_OFD_SETLK); the contents of the file are not used.
 //
@@ -20,7 +20,8 @@ class FileLocks {
   // `file` must be open for reading and writing.
   explicit FileLocks(FileDescriptor file) noexcept : file_(std::move(file)) {}
 
-  // Returns false when another process or object holds the lock; true also when this object holds it.
+  // Returns false when another process or object holds the lock; true also when this object holds
+  // it.
   [[nodiscard]] bool tryLock(int number) noexcept { return set(number, F_WRLCK); }
   void unlock(int number) noexcept { set(number, F_UNLCK); }
 

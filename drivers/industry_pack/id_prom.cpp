@@ -157,8 +157,8 @@ IdProm readIdProm(Registers& idSpace, const std::string& where) {
   if (reader.word(0) == kNothing && reader.word(1) == kNothing) {
     throw IndustryPackError(IndustryPackStatus::noModule, fmt::format("no module at {}", where));
   }
-  throw IndustryPackError(IndustryPackStatus::noIpacId,
-                          fmt::format("the module at {} has no valid ID PROM: it begins with {:04x} {:04x}", where, reader.word(0), reader.word(1)));
+  throw IndustryPackError(IndustryPackStatus::noIpacId, fmt::format("the module at {} has no valid ID PROM: it begins with {:04x} {:04x}",
+                                                                    where, reader.word(0), reader.word(1)));
 }
 
 std::vector<std::uint16_t> wordsOf(const IdProm& prom) {

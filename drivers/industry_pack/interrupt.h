@@ -28,19 +28,19 @@ class Interrupt {
   Interrupt& operator=(const Interrupt&) = delete;
   virtual ~Interrupt() = default;
 
-  // For poll() and the like: readable when an interrupt has come. Read it with take() only. Valid as long
-  // as this object.
+  // For poll() and the like: readable when an interrupt has come. Read it with take() only. Valid
+  // as long as this object.
   [[nodiscard]] int descriptor() const noexcept { return event_.get(); }
-  // Returns the number of interrupts since the last call, without waiting: 0 or 1, or more if enable() was
-  // called in between.
+  // Returns the number of interrupts since the last call, without waiting: 0 or 1, or more if
+  // enable() was called in between.
   std::uint64_t take() noexcept;
 
   // Unmasks the line for one interrupt.
   virtual void enable() = 0;
   // Masks the line: no interrupt comes after return. One that has come before can still be taken.
   virtual void disable() noexcept = 0;
-  // Returns whether the carrier polls the line because it cannot get an interrupt. This may become true at
-  // any time.
+  // Returns whether the carrier polls the line because it cannot get an interrupt. This may become
+  // true at any time.
   [[nodiscard]] virtual bool isPolled() const noexcept { return false; }
 
  protected:

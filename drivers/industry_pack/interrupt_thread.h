@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// InterruptThread: serves the interrupts of one module on a thread of its own; detects stuck lines and
-// lost interrupts.
+// InterruptThread: serves the interrupts of one module on a thread of its own; detects stuck lines
+// and lost interrupts.
 //
 //   InterruptThread thread(module.interrupt(0), {.pollEvery = 100ms}, [&](InterruptThread::Cause) { return chip.serve(); });
 //
@@ -9,12 +9,13 @@
 //   stormLimit spurious interrupts ──► the line is masked for stormPause, and polled meanwhile
 //   lateLimit polls find a request ──► the line is dead
 //
-// Traffic does not hide a stuck line: an interrupt with a request compensates only two spurious ones.
-// A driver can pass a second function, which is called once each time when trouble begins: a storm, a
-// dead line, or a carrier that polls from now on.
+// Traffic does not hide a stuck line: an interrupt with a request compensates only two spurious
+// ones. A driver can pass a second function, which is called once each time when trouble begins: a
+// storm, a dead line, or a carrier that polls from now on.
 //
-// Threads  both functions run on this object's thread, one call at a time, with all signals blocked; they
-//          must not destroy this object. The other functions may be called by any thread.
+// Threads  both functions run on this object's thread, one call at a time, with all signals
+//          blocked; they must not destroy this object. The other functions may be called by any
+//          thread.
 // Crash    the carrier masks the line when it is opened again.
 #pragma once
 
@@ -40,7 +41,8 @@ struct InterruptThreadOptions {
 enum class InterruptTrouble : std::uint8_t {
   storm,  // the line is stuck; storms within ten pauses are reported as one
   polled,  // the carrier gets no interrupts any more and polls from now on
-  never,  // the chip has requests, but no interrupt comes; ends with the next interrupt. Not during a storm
+  // the chip has requests, but no interrupt comes; ends with the next interrupt. Not during a storm
+  never,
 };
 
 class InterruptThread {
@@ -85,7 +87,8 @@ class InterruptThread {
   Handler handler_;
   TroubleHandler trouble_;
   FileDescriptor wakeUp_;
-  int inVain_ = 0;  // spurious interrupts less compensation; this and below: used by the thread only
+  // spurious interrupts less compensation; this and below: used by the thread only
+  int inVain_ = 0;
   int lateInRow_ = 0;  // polls in a row that found a request
   bool isPolled_;
   Deadline pausedUntil_ = Deadline::never();

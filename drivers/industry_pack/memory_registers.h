@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// MemoryRegisters: registers in a mapped window of a carrier, for example a PCI resource. Each access is
-// volatile and has exactly the requested width; the bus behind the window is big-endian.
+// MemoryRegisters: registers in a mapped window of a carrier, for example a PCI resource. Each
+// access is volatile and has exactly the requested width; the bus behind the window is big-endian.
 //
 // Threads  any number of callers at a time.
 #pragma once

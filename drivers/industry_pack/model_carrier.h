@@ -6,8 +6,8 @@
 //   carrier.unplug("IP_a");                                    // all bits read as ones from now on
 //   carrier.setFault("IP_a", ModelFault::interruptStorm);
 //
-// Threads  plug() and unplug() one at a time; bus cycles and setFault() by any thread. A model that was
-//          unplugged exists until the carrier is destroyed, but gets no bus cycles.
+// Threads  plug() and unplug() one at a time; bus cycles and setFault() by any thread. A model that
+//          was unplugged exists until the carrier is destroyed, but gets no bus cycles.
 #pragma once
 
 #include <array>
@@ -33,12 +33,13 @@ class ModelSite;
 
 class ModelCarrier final : public IndustryPackCarrier {
  public:
-  //   memoryBytes  size of the memory space of each site; jumpers or parameters set it on a real carrier
+  //   memoryBytes  size of the memory space of each site; jumpers or parameters set it on a real
+  //                carrier
   explicit ModelCarrier(std::size_t sites = 4, std::size_t memoryBytes = 65536);
   ~ModelCarrier() override;
 
-  // Puts a model into a site. The carrier owns it from now on; the returned reference is valid as long as
-  // the carrier.
+  // Puts a model into a site. The carrier owns it from now on; the returned reference is valid as
+  // long as the carrier.
   //   throws  std::invalid_argument when the site does not exist or already has a model
   template <class Model>
   Model& plug(const std::string& siteName, std::unique_ptr<Model> model) {

@@ -48,7 +48,8 @@ struct ModelWiresFile {
   std::atomic<std::uint64_t> magic{0};  // written last
   std::uint32_t version = 0;
   std::uint32_t capacity = 0;
-  std::atomic<std::uint32_t> changes{0};  // incremented at each change; the futex of waiting processes
+  // incremented at each change; the futex of waiting processes
+  std::atomic<std::uint32_t> changes{0};
   std::array<std::uint32_t, 11> reserved{};
   std::array<Wire, kCapacity> wires{};
 
@@ -139,7 +140,8 @@ void ModelWires::map() {
   file_ = static_cast<ModelWiresFile*>(mapped);
 }
 
-// Completes the header of a file that contains only zeroes, which is new or was left by a killed process.
+// Completes the header of a file that contains only zeroes, which is new or was left by a killed
+// process.
 void ModelWires::prepare() {
   // PAIR(wires-made): the rest of the header is complete.
   const auto magic = file_->magic.load(std::memory_order_acquire);

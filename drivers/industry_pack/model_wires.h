@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ModelWires: wires between device models of different processes: named voltages in a file that all of the
-// processes map.
+// ModelWires: wires between device models of different processes: named voltages in a file that all
+// of the processes map.
 //
 //   DAC model ── "dac.0" = 2.5 V ──► file ──► ADC model
 //   DIO model ── "dio.5" = 5 V ────► file ──► DIO model
@@ -11,14 +11,14 @@
 //
 //   | magic, version, capacity, changes | wire 0: state, name, value | wire 1 | ... |     in the byte order of the host
 //
-// The first process creates the file. It stays, with the last values, when all processes have ended;
-// remove it to start with all wires at 0.
+// The first process creates the file. It stays, with the last values, when all processes have
+// ended; remove it to start with all wires at 0.
 //
 // Threads  any, in any process: values are atomic, and the last one that was set counts.
-// Crash    a process that is killed while it creates the file or adds a wire leaves nothing incomplete in
-//          use; the next process completes it.
-// Trust    processes that may write the file are trusted not to truncate it while it is used. A file with
-//          other contents is refused at the start.
+// Crash    a process that is killed while it creates the file or adds a wire leaves nothing
+//          incomplete in use; the next process completes it.
+// Trust    processes that may write the file are trusted not to truncate it while it is used. A
+//          file with other contents is refused at the start.
 #pragma once
 
 #include <atomic>
@@ -52,8 +52,8 @@ class ModelWire {
 class ModelWires {
  public:
   // Maps the file, and creates it if needed.
-  //   throws  std::system_error; std::runtime_error when the file has other contents, is damaged or has
-  //           another version
+  //   throws  std::system_error; std::runtime_error when the file has other contents, is damaged or
+  //           has another version
   explicit ModelWires(std::string path);
   ~ModelWires();
   ModelWires(const ModelWires&) = delete;
@@ -77,8 +77,8 @@ class ModelWires {
   ModelWiresFile* file_ = nullptr;
 };
 
-// Calls a function on a thread of its own after a wire has changed, in any process; one call may report
-// several changes.
+// Calls a function on a thread of its own after a wire has changed, in any process; one call may
+// report several changes.
 class ModelWireWatcher {
  public:
   // `wires` must outlive this object.

@@ -54,8 +54,8 @@ std::string IndustryPackModule::problem() {
   try {
     const auto now = readChecked(site_, kind_, where_);
     if (now.manufacturer == prom_.manufacturer && now.model == prom_.model) return {};
-    return fmt::format("{} has another {}: 0x{:02x}/0x{:02x} in place of 0x{:02x}/0x{:02x}; put the first one back, or restart the program", where_,
-                       kind_.name, now.manufacturer, now.model, prom_.manufacturer, prom_.model);
+    return fmt::format("{} has another {}: 0x{:02x}/0x{:02x} in place of 0x{:02x}/0x{:02x}; put the first one back, or restart the program",
+                       where_, kind_.name, now.manufacturer, now.model, prom_.manufacturer, prom_.model);
   } catch (const IndustryPackError& error) {
     return error.what();
   }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// IndustryPackModule: a module in a site of a carrier, checked to be of the kind that its driver expects.
-// IndustryPackModules: the modules of a program, by name (manual, "IndustryPackModule").
+// IndustryPackModule: a module in a site of a carrier, checked to be of the kind that its driver
+// expects. IndustryPackModules: the modules of a program, by name (manual, "IndustryPackModule").
 //
 //   IndustryPackModules modules(carriers);
-//   auto& module = modules.create("Ip330_1", "ipac", "IP_a", kIp330);   // throws if the site is empty or has another module
+//   auto& module = modules.create("Ip330_1", "ipac", "IP_a", kIp330);   // throws if the site is
+//                                                                       empty or has another module
 //   module.io().write16(0, control);
 //
 // Threads  create all modules first, by one thread; afterwards any number of callers at a time.
@@ -33,8 +34,8 @@ struct ModuleKind {
     std::uint32_t manufacturer = 0;
     std::vector<std::uint16_t> models;
   };
-  // Other manufacturers of modules for the same driver. Without {}, g++ requires this member in each
-  // initializer.
+  // Other manufacturers of modules for the same driver. Without {}, g++ requires this member in
+  // each initializer.
   std::vector<Maker> others{};  // NOLINT(readability-redundant-member-init)
 };
 
@@ -61,8 +62,8 @@ class IndustryPackModule {
   [[nodiscard]] Interrupt& interrupt(int number) { return site_.interrupt(number); }
 
   // Reads the ID PROM again.
-  //   returns   a sentence that says what is wrong; empty when a module of the same manufacturer and model
-  //             is present
+  //   returns   a sentence that says what is wrong; empty when a module of the same manufacturer
+  //             and model is present
   [[nodiscard]] std::string problem();
 
   // Returns `vector`, which is checked.
@@ -84,8 +85,8 @@ class IndustryPackModules {
   explicit IndustryPackModules(const IndustryPackCarriers& carriers) : carriers_(carriers) {}
 
   // Opens the module in a site and checks its ID PROM. The module is valid as long as this object.
-  //   throws  IndustryPackError noModule, noIpacId, badCrc, badModule; std::invalid_argument when the name or
-  //           the site is in use, or the carrier or site does not exist
+  //   throws  IndustryPackError noModule, noIpacId, badCrc, badModule; std::invalid_argument when
+  //           the name or the site is in use, or the carrier or site does not exist
   IndustryPackModule& create(const std::string& name, const std::string& carrierName, const std::string& siteName, const ModuleKind& kind);
   // Returns nullptr when no such module was created.
   [[nodiscard]] IndustryPackModule* find(const std::string& name) const noexcept;

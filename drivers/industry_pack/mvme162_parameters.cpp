@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Parameters of the sites on a Motorola MVME162 or MVME172, which are behind its IPIC chip. For each site
-// the string has its letter and then, in any order,
+// Parameters of the sites on a Motorola MVME162 or MVME172, which are behind its IPIC chip. For
+// each site the string has its letter and then, in any order,
 //   l=n[,n]       interrupt levels
 //   m=base,sizeK  memory
 //   r=us          recovery time
@@ -41,7 +41,8 @@ void readWidth(ParameterText& text, std::vector<SiteParameters>& sites, std::siz
   const auto width = text.number("width");
   if (width != 8 && width != 16 && width != 32) text.refuse(fmt::format("width {}: use 8, 16 or 32", width));
   if (width == 32 && site % 2 != 0)
-    text.refuse(fmt::format("width 32 at site {}: use it only at A and C, which also use the memory of the next site", static_cast<char>('A' + site)));
+    text.refuse(fmt::format("width 32 at site {}: use it only at A and C, which also use the memory of the next site",
+                            static_cast<char>('A' + site)));
   sites[site].widthBits = static_cast<int>(width);
   if (width == 32) sites[site + 1].memoryBytes = 0;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One parser for each kind of carrier, for parseCarrierParameters(). Each reads all parameters of its kind;
-// the caller refuses the rest of the text.
+// One parser for each kind of carrier, for parseCarrierParameters(). Each reads all parameters of
+// its kind; the caller refuses the rest of the text.
 #pragma once
 
 #include <mpf/drivers/industry_pack/carrier_parameters.h>
@@ -19,8 +19,8 @@ CarrierParameters parseHytec(ParameterText& text);
 CarrierParameters parseAvme96xx(ParameterText& text);
 CarrierParameters parseAtc40(ParameterText& text);
 
-// `count` sites from address `base`, in the layout of all these carriers: 0x100 bytes for each site, with
-// the ID PROM in the upper half.
+// `count` sites from address `base`, in the layout of all these carriers: 0x100 bytes for each
+// site, with the ID PROM in the upper half.
 std::vector<SiteParameters> makeSites(std::size_t count, std::uint32_t base);
 
 // Checks that the memory spaces of the sites are disjoint.

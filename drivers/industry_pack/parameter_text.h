@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ParameterText: reads the parameter string of a carrier from left to right. An error names the board, the
-// string and the invalid part.
+// ParameterText: reads the parameter string of a carrier from left to right. An error names the
+// board, the string and the invalid part.
 //
 //   const auto base = text.hex("I/O address", {.multipleOf = 0x400, .most = 0xfc00});
 //   if (text.trySkip(',')) ...
@@ -35,8 +35,8 @@ class ParameterText {
   char take() noexcept;
   // Takes `character` if it is next.
   bool trySkip(char character) noexcept;
-  // Takes `character`; it is an error if another one is next. `after` names the part before it, for the
-  // message.
+  // Takes `character`; it is an error if another one is next. `after` names the part before it, for
+  // the message.
   void expect(char character, std::string_view after);
   void expectEnd();
   // Takes `separator` if it is next and a number follows.
@@ -52,7 +52,8 @@ class ParameterText {
   // Takes a VME interrupt level, 0 to 7.
   [[nodiscard]] int level(std::string_view what);
 
-  //   throws  IndustryPackError with the board, the whole string and `problem`: `VIPC616 "6001": ...`
+  //   throws  IndustryPackError with the board, the whole string and `problem`: `VIPC616 "6001":
+  //           ...`
   [[noreturn]] void refuse(const std::string& problem, IndustryPackStatus status = IndustryPackStatus::badAddress) const;
 
  private:

@@ -47,9 +47,9 @@ std::string chooseByNumber(const PciKind& kind, const std::vector<std::string>& 
   std::size_t n = 0;
   std::from_chars(number.data(), number.data() + number.size(), n);
   if (n < boards.size()) return boards[n];
-  throw std::runtime_error(boards.empty()
-                               ? fmt::format("this host has no {} (PCI id {})", kind.name, idText(kind.vendor, kind.device))
-                               : fmt::format("this host has no {} number {}, counted from 0; its boards: {}", kind.name, number, orNone(boards)));
+  throw std::runtime_error(
+      boards.empty() ? fmt::format("this host has no {} (PCI id {})", kind.name, idText(kind.vendor, kind.device))
+                     : fmt::format("this host has no {} number {}, counted from 0; its boards: {}", kind.name, number, orNone(boards)));
 }
 
 std::string choose(const PciPlaces& places, const PciKind& kind, const std::string& which) {
@@ -123,8 +123,8 @@ void PciDevice::expectNoOtherDriver() const {
   std::error_code none;
   const auto driver = fs::read_symlink(file("driver"), none).filename().string();
   if (driver.empty() || driver == kInterruptDriver) return;
-  throw std::runtime_error(fmt::format("{}: the board is bound to the kernel's driver {}. As root: echo {} > {}/unbind; {}", description(), driver,
-                                       address_, file("driver"), howToGetInterrupts()));
+  throw std::runtime_error(fmt::format("{}: the board is bound to the kernel's driver {}. As root: echo {} > {}/unbind; {}", description(),
+                                       driver, address_, file("driver"), howToGetInterrupts()));
 }
 
 // A board that is not bound to a driver may be disabled.
@@ -151,8 +151,8 @@ PciWindow PciDevice::map(int number, std::size_t offset, std::size_t bytes) cons
   auto* const pages = ::mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED, opened.get(), static_cast<off_t>(first - inPage));
   if (pages == MAP_FAILED) {
     throw std::runtime_error(
-        fmt::format("{}: {} cannot be mapped ({}). Check that kernel lockdown is off and that no other driver uses the board", description(),
-                    file(name), std::strerror(errno)));
+        fmt::format("{}: {} cannot be mapped ({}). Check that kernel lockdown is off and that no other driver uses the board",
+                    description(), file(name), std::strerror(errno)));
   }
   return {pages, length, inPage, bytes};
 }

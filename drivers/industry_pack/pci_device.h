@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PciDevice: access to one PCI board of this host through the files that Linux has for it; needs no kernel
-// driver of its own.
+// PciDevice: access to one PCI board of this host through the files that Linux has for it; needs no
+// kernel driver of its own.
 //
 //   /sys/bus/pci/devices/0000:03:00.0/   vendor device driver enable   IDs, bound driver
 //                                        resource resource0 ... 5      the windows (BARs)
@@ -8,10 +8,10 @@
 //                                        uio/uio0                      with driver uio_pci_generic: /dev/uio0, the interrupt
 //
 // Threads  any number of callers at a time.
-// Crash    if the kernel removes the board (echo 1 > remove), the next access to a mapped window raises
-//          SIGBUS, which ends the process.
-// Trust    the permissions of these files control access. A process that may write `config` and the windows
-//          can use the board without restriction.
+// Crash    if the kernel removes the board (echo 1 > remove), the next access to a mapped window
+//          raises SIGBUS, which ends the process.
+// Trust    the permissions of these files control access. A process that may write `config` and the
+//          windows can use the board without restriction.
 // Source   Linux, Documentation/PCI/sysfs-pci.rst and the UIO howto.
 #pragma once
 
@@ -60,10 +60,10 @@ class PciDevice {
  public:
   // Finds and enables a board.
   //
-  //   which   the address ("0000:03:00.0", "03:00.0"), or the number of the board among those of this kind,
-  //           counted from "0"; empty: the first
-  //   throws  std::runtime_error when the board is absent, of another kind, bound to another kernel driver,
-  //           or not accessible; the message says what to do
+  //   which   the address ("0000:03:00.0", "03:00.0"), or the number of the board among those of
+  //           this kind, counted from "0"; empty: the first
+  //   throws  std::runtime_error when the board is absent, of another kind, bound to another kernel
+  //           driver, or not accessible; the message says what to do
   PciDevice(PciPlaces places, PciKind kind, const std::string& which);
 
   [[nodiscard]] const std::string& address() const noexcept { return address_; }

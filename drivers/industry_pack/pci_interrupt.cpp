@@ -15,7 +15,8 @@
 namespace mpf {
 namespace {
 
-constexpr off_t kCommand = 4;                       // offset in the configuration registers: 16 bits, little-endian
+// offset in the configuration registers: 16 bits, little-endian
+constexpr off_t kCommand = 4;
 constexpr std::uint16_t kInterruptMasked = 0x0400;  // the bit "interrupt disable"
 
 FileDescriptor openFile(const PciDevice& device, const std::string& name) {
@@ -41,7 +42,8 @@ bool PciInterrupt::tryTake() {
   throwSystemError(bytes < 0 ? errno : ENODEV, "read", name_);
 }
 
-// Writes the whole register: QEMU notices a change of this bit only when the lower byte is written, too.
+// Writes the whole register: QEMU notices a change of this bit only when the lower byte is written,
+// too.
 void PciInterrupt::unmask() noexcept {
   std::uint16_t command = 0;
   if (::pread(config_.get(), &command, sizeof(command), kCommand) != sizeof(command)) return;

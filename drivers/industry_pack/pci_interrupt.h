@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// PciInterrupt: the interrupt of a PCI board through uio_pci_generic. /dev/uioN reports it; the kernel masks
-// it first.
+// PciInterrupt: the interrupt of a PCI board through uio_pci_generic. /dev/uioN reports it; the
+// kernel masks it first.
 //
 //   poll(interrupt.descriptor());           // readable when it has come
 //   if (interrupt.tryTake()) { ...; interrupt.unmask(); }
 //
-// Several processes may have such an object for the same board: each gets the interrupt, and each unmasks
-// it when it is done.
+// Several processes may have such an object for the same board: each gets the interrupt, and each
+// unmasks it when it is done.
 //
 // Threads  one calls tryTake(); any may call unmask().
 // Crash    the constructor unmasks an interrupt that a killed process left masked.
@@ -22,8 +22,8 @@ namespace mpf {
 
 class PciInterrupt {
  public:
-  //   throws  std::runtime_error when the board is not bound to uio_pci_generic, or the permission for its
-  //           files is missing; the message says what to do
+  //   throws  std::runtime_error when the board is not bound to uio_pci_generic, or the permission
+  //           for its files is missing; the message says what to do
   explicit PciInterrupt(const PciDevice& device);
 
   [[nodiscard]] int descriptor() const noexcept { return file_.get(); }

@@ -129,7 +129,8 @@ void expectNoOverlap(const ParameterText& text, const std::vector<SiteParameters
       const auto& b = sites[j];
       if (a.memoryBytes == 0 || b.memoryBytes == 0) continue;
       if (a.memory < std::uint64_t{b.memory} + b.memoryBytes && b.memory < std::uint64_t{a.memory} + a.memoryBytes)
-        text.refuse(fmt::format("the memory of site {} overlaps with that of site {}", static_cast<char>('A' + i), static_cast<char>('A' + j)));
+        text.refuse(
+            fmt::format("the memory of site {} overlaps with that of site {}", static_cast<char>('A' + i), static_cast<char>('A' + j)));
     }
   }
 }
@@ -145,8 +146,7 @@ CarrierParameters parseTvme200(ParameterText& text) {
   const auto second = (switches >> 16) & 0xf;
   const auto levels = (switches >> 12) & 0xf;
   if (second % 4 != 0) text.refuse(fmt::format("switch S2 at {:X}: use 0, 4, 8 or C", second));
-  if (levels >= kSwitchedLevels.size())
-    text.refuse(fmt::format("switch S3 at {:X}: use 0 to 4", levels), IndustryPackStatus::badIntLevel);
+  if (levels >= kSwitchedLevels.size()) text.refuse(fmt::format("switch S3 at {:X}: use 0 to 4", levels), IndustryPackStatus::badIntLevel);
   CarrierParameters carrier;
   carrier.sites = makeSites(4, base | second << 8);
   for (std::size_t i = 0; i < carrier.sites.size(); ++i) carrier.sites[i].interruptLevels = kSwitchedLevels[levels][i];

@@ -55,7 +55,8 @@ Tpci200Options Tpci200Options::parse(const std::string& parameters) {
   return options;
 }
 
-// An interrupt request line of a module. It passes on one interrupt and is then masked until enable().
+// An interrupt request line of a module. It passes on one interrupt and is then masked until
+// enable().
 class Tpci200Line final : public Interrupt {
  public:
   Tpci200Line(Tpci200Site& site, int number) : site_(site), number_(number) {}

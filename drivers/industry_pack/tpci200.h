@@ -7,20 +7,22 @@
 //   request of a chip ──► status bit ──► PCI interrupt ──► /dev/uioN, masked by the kernel
 //     ──► thread: acknowledge, mask the line, announce, unmask the PCI interrupt
 //
-// Without uio_pci_generic the thread reads the status every `pollEvery` instead, and remark() says so. If
-// the board is unbound from uio_pci_generic later, Interrupt::isPolled() becomes true. A bus cycle that no
-// module answers reads ones.
+// Without uio_pci_generic the thread reads the status every `pollEvery` instead, and remark() says
+// so. If the board is unbound from uio_pci_generic later, Interrupt::isPolled() becomes true. A bus
+// cycle that no module answers reads ones.
 //
-// Threads  any number of callers at a time; accesses of one process to one board are serialised. The
-//          thread starts with the first enable() of an interrupt.
-// Crash    site() locks the site for this process, until the process ends, and masks its interrupts. The
-//          other processes on the board mask the lines of a site that has no process.
-// Trust    processes with access to the board can disturb each other's sites; the board does not protect
-//          them.
-// Source   Linux drivers/ipack/carriers/tpci200. Tested on QEMU's model, not on a real board. The model
-//          reads zeroes without a module, sets no time-out bits, and loses a request that comes while its
-//          line is masked (pollEvery of InterruptThread finds it). The bridge of the board follows PCI 2.2,
-//          uio_pci_generic requires 2.3; where it refuses the board, interrupts are polled.
+// Threads  any number of callers at a time; accesses of one process to one board are serialised.
+//          The thread starts with the first enable() of an interrupt.
+// Crash    site() locks the site for this process, until the process ends, and masks its
+//          interrupts. The other processes on the board mask the lines of a site that has no
+//          process.
+// Trust    processes with access to the board can disturb each other's sites; the board does not
+//          protect them.
+// Source   Linux drivers/ipack/carriers/tpci200. Tested on QEMU's model, not on a real board. The
+//          model reads zeroes without a module, sets no time-out bits, and loses a request that
+//          comes while its line is masked (pollEvery of InterruptThread finds it). The bridge of
+//          the board follows PCI 2.2, uio_pci_generic requires 2.3; where it refuses the board,
+//          interrupts are polled.
 #pragma once
 
 #include <array>
@@ -56,8 +58,8 @@ class Tpci200 final : public IndustryPackCarrier {
   static constexpr std::size_t kSites = 4;
 
   // Opens the board.
-  //   throws  std::runtime_error when the board is absent, not accessible, or bound to another driver; the
-  //           message says what to do
+  //   throws  std::runtime_error when the board is absent, not accessible, or bound to another
+  //           driver; the message says what to do
   explicit Tpci200(const Tpci200Options& options);
   ~Tpci200() override;
 
@@ -76,7 +78,8 @@ class Tpci200 final : public IndustryPackCarrier {
   void run(const std::stop_token& stop);
   void wait();
   void takeInterrupt();
-  // Announces the active lines of this process's sites. Returns whether lines of other sites are active.
+  // Announces the active lines of this process's sites. Returns whether lines of other sites are
+  // active.
   bool serve();
   void silenceIfNobodys(std::size_t number);
   void pollFromNowOn() noexcept { isPolled_.store(true, std::memory_order_relaxed); }

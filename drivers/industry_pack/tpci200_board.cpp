@@ -85,8 +85,8 @@ Value Tpci200Registers::read(Read read) {
   return board_.takeTimeOut(site_) ? static_cast<Value>(~Value{0}) : value;
 }
 
-// A write is still under way when the store returns. Reading the status waits for its end, so that its
-// time-out is not attributed to the next access.
+// A write is still under way when the store returns. Reading the status waits for its end, so that
+// its time-out is not attributed to the next access.
 template <class Write>
 void Tpci200Registers::write(Write write) {
   const std::lock_guard lock(board_.mutex_);

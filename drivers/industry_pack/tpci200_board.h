@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tpci200Board: the registers of a TPCI200 and the windows of its sites. Tpci200 decides which process uses
-// them.
+// Tpci200Board: the registers of a TPCI200 and the windows of its sites. Tpci200 decides which
+// process uses them.
 //
 //   window (BAR)  0  the bridge, a PLX PCI9030: sets which windows swap the byte order
 //                 2  the board: revision 0x00, control of sites A to D 0x02 to 0x08, reset 0x0a,
@@ -8,11 +8,11 @@
 //                 3  0x100 bytes for each site: I/O 0x00, ID 0x80, interrupt acknowledge 0xc0
 //                 4  8 MiB for each site: memory, 16 bits wide
 //
-// The constructor makes windows 3 and 4 swap the byte order, so that bytes have the addresses of the
-// modules' bus, which is big-endian.
+// The constructor makes windows 3 and 4 swap the byte order, so that bytes have the addresses of
+// the modules' bus, which is big-endian.
 //
-// Threads  any number of callers at a time. Accesses are serialised, since a time-out bit belongs to the last
-//          access to its site.
+// Threads  any number of callers at a time. Accesses are serialised, since a time-out bit belongs
+//          to the last access to its site.
 // Source   Linux drivers/ipack/carriers/tpci200 and the PCI9030 data book
 #pragma once
 
@@ -36,7 +36,8 @@ class Tpci200Board {
   static constexpr int kMemoryWindow = 4;
   static constexpr std::size_t kMemoryBytes = 8U << 20;  // of a site
 
-  //   throws  std::runtime_error when a window cannot be mapped, or all bits of the bridge read as ones
+  //   throws  std::runtime_error when a window cannot be mapped, or all bits of the bridge read as
+  //           ones
   explicit Tpci200Board(const PciDevice& pci);
 
   // Status bit 2 * site + line: the line is active and enabled.
@@ -45,15 +46,16 @@ class Tpci200Board {
   }
   [[nodiscard]] std::uint16_t status();
 
-  // Passes on interrupts of these lines only; bit 0: IntReq0*, bit 1: IntReq1*. All other settings of the
-  // site become those after power-up, for example a clock of 8 MHz.
+  // Passes on interrupts of these lines only; bit 0: IntReq0*, bit 1: IntReq1*. All other settings
+  // of the site become those after power-up, for example a clock of 8 MHz.
   void setLines(std::size_t site, unsigned lines);
   // Sends the interrupt acknowledge cycle to the module, which may then release the line.
   void acknowledge(std::size_t site, int line);
 
  private:
   friend class Tpci200Registers;
-  // Returns whether the last access to the site timed out, and clears the time-out. Call with mutex_ held.
+  // Returns whether the last access to the site timed out, and clears the time-out. Call with
+  // mutex_ held.
   bool takeTimeOut(std::size_t site);
   std::uint16_t read(std::size_t offset) const noexcept;
   void write(std::size_t offset, std::uint16_t value) noexcept;

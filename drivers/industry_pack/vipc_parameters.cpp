@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Parameters of GreenSpring VIPC310, VIPC610, VIPC616: registers in A16, memory in A24 or A32; the interrupt
-// levels are fixed.
+// Parameters of GreenSpring VIPC310, VIPC610, VIPC616: registers in A16, memory in A24 or A32; the
+// interrupt levels are fixed.
 //   310, 610  base[,memoryK]                            memory in A24, at 256 times the base
 //   616       base | base,memoryA32 | base,memoryA24,memoryK
 #include <bit>
@@ -35,8 +35,8 @@ std::uint32_t memoryBytes(ParameterText& text) {
   return kilobytes << 10;
 }
 
-// The carrier decodes one block for all sites and compares only the address bits above the block. If `base`
-// is not on a block boundary, the first sites would be below `base`; they get no memory.
+// The carrier decodes one block for all sites and compares only the address bits above the block.
+// If `base` is not on a block boundary, the first sites would be below `base`; they get no memory.
 void giveMemory(CarrierParameters& carrier, std::uint32_t base, std::uint32_t bytes) {
   if (bytes == 0) return;
   const auto block = base & ~(bytes * static_cast<std::uint32_t>(carrier.sites.size()) - 1);

@@ -75,8 +75,8 @@ std::chrono::nanoseconds Ip330::patience() const noexcept {
 
 // ---- the board
 
-// Returns whether the board is present and programmed. A board that has lost its settings may have been
-// replaced, even by another module, so nothing is written until the keeper has checked it.
+// Returns whether the board is present and programmed. A board that has lost its settings may have
+// been replaced, even by another module, so nothing is written until the keeper has checked it.
 bool Ip330::isReady() { return !faults_.has(Ip330Fault::absent) && chip_.presence() == Ip330Chip::Presence::asProgrammed; }
 
 void Ip330::start() {
@@ -114,7 +114,8 @@ bool Ip330::trySet(std::uint8_t& channelsGain, std::uint8_t gain) {
   Gains gains{};
   gains[gain] = true;
   if (calibrate(gains)) return true;
-  refusedUntil_[gain] = Deadline::after(limits_.silence);  // repeated requests for this gain must not stop the scans of other clients
+  // repeated requests for this gain must not stop the scans of other clients
+  refusedUntil_[gain] = Deadline::after(limits_.silence);
   channelsGain = before;
   start();
   return false;
@@ -152,7 +153,8 @@ bool Ip330::tryCalibrate() {
     const Lock lock(mutex_);
     isGood = calibrate(gainsInUse());
     const auto period = settings_.secondsBetweenCalibrate;
-    calibrateAt_ = period > 0 ? Deadline::after(std::chrono::seconds(period)) : Deadline::never();  // counted from the end of the calibration
+    // counted from the end of the calibration
+    calibrateAt_ = period > 0 ? Deadline::after(std::chrono::seconds(period)) : Deadline::never();
     if (isGood) refusedUntil_ = notRefused();
     if (!isGood) calibrateSoon();
   }
@@ -264,7 +266,9 @@ void Ip330::deliver(const Ip330Sample& sample) {
 Ip330::Subscription Ip330::subscribe(Subscriber subscriber) {
   const auto most = static_cast<std::size_t>(settings().maxClients);
   const Lock lock(subscribersMutex_);
-  if (subscribers_.size() >= most) throw std::length_error(fmt::format("{} already has {} clients, which is the limit; raise the maximum number of clients", module_.name(), most));
+  if (subscribers_.size() >= most)
+    throw std::length_error(
+        fmt::format("{} already has {} clients, which is the limit; raise the maximum number of clients", module_.name(), most));
   const auto at = subscribers_.insert(subscribers_.end(), std::move(subscriber));
   return {nullptr, [this, at](void*) {
             const Lock ending(subscribersMutex_);

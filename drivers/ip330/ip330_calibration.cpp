@@ -13,8 +13,8 @@ namespace {
 constexpr double kCodes = 65536;
 // The largest plausible difference of a slope from 1; the chip guarantees a much smaller one.
 constexpr double kMostSlopeError = 0.2;
-// The least distance of a mean from both ends of the range: noise of three codes that is clipped at an end then
-// shifts the mean by less than 1.5 codes.
+// The least distance of a mean from both ends of the range: noise of three codes that is clipped at
+// an end then shifts the mean by less than 1.5 codes.
 constexpr double kEndCodes = 1;
 
 constexpr Ip330CalibrationPoint kZero{0, ip330::kSourceAutoZero};

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Ip330Calibration: corrects the codes of the converter, using its codes for two reference voltages of the
-// board.
+// Ip330Calibration: corrects the codes of the converter, using its codes for two reference voltages
+// of the board.
 //
-//   corrected = slope * (raw + offset), 0 to 65535 covers the range; a perfect converter has slope 1, offset 0
+//   corrected = slope * (raw + offset), 0 to 65535 covers the range; a perfect converter has slope
+//   1, offset 0
 //
-// Range 0to5 at gain code 3 (a gain of 8): the lowest reference above 0 V is nearly at the end of the range,
-// so 0 V must be the lower reference. A converter with a negative offset gives code 0 for 0 V, whatever the
-// offset is, so the offset cannot be measured and this gain is refused.
+// Range 0to5 at gain code 3 (a gain of 8): the lowest reference above 0 V is nearly at the end of
+// the range, so 0 V must be the lower reference. A converter with a negative offset gives code 0
+// for 0 V, whatever the offset is, so the offset cannot be measured and this gain is refused.
 //
 // Threads  any number of callers at a time.
 // Source   IP330 manual, "Calibration", which gives the two voltages for each range and gain.
@@ -39,8 +40,8 @@ struct Ip330Correction {
 };
 
 // Computes the correction from the mean codes of both reference voltages.
-//   returns  nullopt when no working converter gives such codes, or when a mean is at an end of the range:
-//            there the voltage may be beyond the range, and noise is clipped on one side
+//   returns  nullopt when no working converter gives such codes, or when a mean is at an end of the
+//            range: there the voltage may be beyond the range, and noise is clipped on one side
 [[nodiscard]] std::optional<Ip330Correction> correctionOf(Ip330Range range, int gain, double lowCode, double highCode) noexcept;
 
 // The code that a client gets: rounded and clamped to 0 to 0xffff.

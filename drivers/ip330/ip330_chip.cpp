@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::uint16_t kAllOnes = 0xffff;
 constexpr int kMailboxesOfHalf = 16;
-constexpr std::chrono::microseconds kLookAgainAfter{50};  // a conversion of all channels takes 480 us
+// a conversion of all channels takes 480 us
+constexpr std::chrono::microseconds kLookAgainAfter{50};
 constexpr std::chrono::microseconds kConversion{static_cast<int>(kIp330MicrosecondsPerConversion)};
 
 std::uint16_t sourceOf(Ip330Type type) { return type == Ip330Type::differential ? ip330::kSourceDifferential : ip330::kSourceSingleEnded; }
@@ -39,7 +40,8 @@ void Ip330Chip::start(const Ip330Settings& settings, const std::array<std::uint8
   stop();
   settle(settings, limit);
   const auto timer = ip330TimerOf(settings.scanMode, settings.channels(), settings.microsecondsPerScan);
-  io_.write8(ip330::kInterruptVector, static_cast<std::uint8_t>(settings.vector));  // before a trigger can cause an interrupt
+  // before a trigger can cause an interrupt
+  io_.write8(ip330::kInterruptVector, static_cast<std::uint8_t>(settings.vector));
   io_.write8(ip330::kTimerPrescaler, timer.prescaler);
   io_.write16(ip330::kConversionTimer, timer.conversion);
   io_.write8(ip330::kStartChannel, static_cast<std::uint8_t>(settings.firstChannel));

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Ip330Chip: the register sequences of one board: start scans, take their results, measure a calibration
-// voltage.
+// Ip330Chip: the register sequences of one board: start scans, take their results, measure a
+// calibration voltage.
 //
-// With differential inputs the results of successive scans alternate between mailboxes 0-15 and 16-31. The
-// object remembers which half is next and checks its new-data flags, so a scan that was not taken in time
-// does not swap the halves.
+// With differential inputs the results of successive scans alternate between mailboxes 0-15 and
+// 16-31. The object remembers which half is next and checks its new-data flags, so a scan that was
+// not taken in time does not swap the halves.
 //
 // Threads  one at a time: the owner holds a lock.
-// Source   IP330 manual. EPICS ip330 R1-4 read only the lower half, and when calibrating waited only for
-//          flags of the upper half.
+// Source   IP330 manual. EPICS ip330 R1-4 read only the lower half, and when calibrating waited
+//          only for flags of the upper half.
 #pragma once
 
 #include <array>
@@ -35,13 +35,13 @@ class Ip330Chip {
 
   explicit Ip330Chip(Registers& io) : io_(io) {}
 
-  // Writes all registers, interrupt control last, and starts continuous scans. After a change of the input
-  // source one conversion of all channels is discarded first.
+  // Writes all registers, interrupt control last, and starts continuous scans. After a change of
+  // the input source one conversion of all channels is discarded first.
   //   settings  must be valid: problem() is empty
   //   limit     longest wait for that conversion
   void start(const Ip330Settings& settings, const std::array<std::uint8_t, kIp330Channels>& gains, std::chrono::nanoseconds limit);
-  // Stops scans and interrupts, and discards all results. Waits for the end of a burst that has begun, since
-  // its codes have the previous gains.
+  // Stops scans and interrupts, and discards all results. Waits for the end of a burst that has
+  // begun, since its codes have the previous gains.
   void stop();
   // Sends a software trigger, for the single modes.
   void startConvert();
@@ -50,8 +50,8 @@ class Ip330Chip {
   [[nodiscard]] Presence presence();
   // Takes the scans that are ready; the reads end the interrupt request of the board.
   void take(const Ip330Settings& settings, Scans& scans);
-  // Measures a calibration voltage; call stop() first. The first conversion is discarded, since the converter
-  // settles.
+  // Measures a calibration voltage; call stop() first. The first conversion is discarded, since the
+  // converter settles.
   //   source   calibration voltage, bits of the control register
   //   limit    longest wait for each of the two conversions
   //   returns  the mean code of all channels; nullopt when a conversion does not end

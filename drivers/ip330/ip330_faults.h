@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Ip330Faults: the current faults of a board; calls a hook when a fault begins or ends.
 //
-// Threads  any number of callers at a time. The hook runs on the thread that noticed the change, with no lock
-//          of the driver held.
+// Threads  any number of callers at a time. The hook runs on the thread that noticed the change,
+//          with no lock of the driver held.
 #pragma once
 
 #include <array>
@@ -18,7 +18,8 @@ enum class Ip330Fault : std::uint8_t {
   silent,          // no scan ends
   interruptsLost,  // scans end without an interrupt; they are found by polling
   storm,           // interrupts without a scan
-  notCalibrated,   // a calibration voltage gives no codes, implausible codes, or the end of the range
+  // a calibration voltage gives no codes, implausible codes, or the end of the range
+  notCalibrated,
 };
 
 class Ip330Faults {

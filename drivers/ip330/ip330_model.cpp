@@ -260,7 +260,8 @@ void Ip330Model::run(const std::stop_token& stop) {
     }
     seconds_ = next_;
     scan();
-    next_ = std::max(next_ + periodSeconds(), clockSeconds() + kLeastPauseSeconds);  // after a delay the model does not catch up
+    // after a delay the model does not catch up
+    next_ = std::max(next_ + periodSeconds(), clockSeconds() + kLeastPauseSeconds);
   }
 }
 

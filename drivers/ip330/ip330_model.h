@@ -6,10 +6,11 @@
 //   model.setSignal(0, sineSignal(5, 2));
 //   model.step();                            // one period of the timer
 //
-// In real time a thread of the model runs the timer; otherwise step() does. Single scans and calibration take
-// no time. After a change of the input source the first conversion has wrong codes, since the converter
-// settles. A real board ends its interrupt request in the acknowledge cycle of the carrier, which a model
-// does not get; the model ends it when the mailbox of the last channel is read, or interrupts are disabled.
+// In real time a thread of the model runs the timer; otherwise step() does. Single scans and
+// calibration take no time. After a change of the input source the first conversion has wrong
+// codes, since the converter settles. A real board ends its interrupt request in the acknowledge
+// cycle of the carrier, which a model does not get; the model ends it when the mailbox of the last
+// channel is read, or interrupts are disabled.
 //
 // Threads  any number of callers at a time.
 // Source   IP330 manual; EPICS ip330 for the mailboxes of differential inputs.
@@ -52,8 +53,8 @@ class Ip330Model final : public DeviceModel {
   void externalTrigger();
   // Simulates a fault: no conversion ends, calibration included.
   void setStuck(bool isStuck);
-  // Simulates a race: when scans are disabled next, a scan has begun, which ends a little later with the
-  // gains of the time when scans were disabled.
+  // Simulates a race: when scans are disabled next, a scan has begun, which ends a little later
+  // with the gains of the time when scans were disabled.
   void beginScanBeforeDisable();
   // Returns whether the scan of beginScanBeforeDisable() has not ended yet.
   [[nodiscard]] bool isEndingScan();

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Ip330Pid: fast feedback from a channel of the board to an output. Each step uses one scan or the mean of
-// several scans.
+// Ip330Pid: fast feedback from a channel of the board to an output. Each step uses one scan or the
+// mean of several scans.
 //
-// While no scans come, or the channel is not calibrated, the output keeps its value. A change of the gain of
-// the channel also changes the loop.
+// While no scans come, or the channel is not calibrated, the output keeps its value. A change of
+// the gain of the channel also changes the loop.
 //
-// Threads  any number of callers at a time. The interrupt thread of the board reads and writes the output.
+// Threads  any number of callers at a time. The interrupt thread of the board reads and writes the
+//          output.
 // Crash    the output keeps its value.
 // Source   ip330PID, fastPID (std R1-3).
 #pragma once
@@ -26,7 +27,8 @@ class Ip330Pid {
   //
   //   board, output    must outlive this object
   //   lowest, highest  first limits of the loop [codes]
-  //   hook             called when the output fails and when it answers again, like that of Ip330Faults
+  //   hook             called when the output fails and when it answers again, like that of
+  //                    Ip330Faults
   //   throws           std::invalid_argument, std::length_error as Ip330Scan
   Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowest, double highest, Ip330Faults::Hook hook = {});
   Ip330Pid(const Ip330Pid&) = delete;
@@ -37,8 +39,8 @@ class Ip330Pid {
   void stop();
   // Changes the parameters of the loop; `change` must not call this object.
   void set(const std::function<void(PidLoop&)>& change);
-  // Sets the time of a step; it is rounded to whole scans, at least one. Returns false for a negative time or
-  // NaN.
+  // Sets the time of a step; it is rounded to whole scans, at least one. Returns false for a
+  // negative time or NaN.
   [[nodiscard]] bool trySetSecondsPerScan(double seconds);
 
   struct Status {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Registers of the Acromag IP330, with the names of its manual: byte offsets in the I/O space, and bits of
-// the control register.
-// Source   IP330 manual, "Memory map"; on the big-endian bus the prescaler is at 02 and the vector at 03.
+// Registers of the Acromag IP330, with the names of its manual: byte offsets in the I/O space, and
+// bits of the control register.
+// Source   IP330 manual, "Memory map"; on the big-endian bus the prescaler is at 02 and the vector
+//          at 03.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +16,10 @@ inline constexpr std::size_t kInterruptVector = 0x03;  // 8
 inline constexpr std::size_t kConversionTimer = 0x04;  // 16
 inline constexpr std::size_t kEndChannel = 0x06;       // 8
 inline constexpr std::size_t kStartChannel = 0x07;     // 8
-inline constexpr std::size_t kNewData = 0x08;          // 16, a bit for each mailbox 0 to 15, at 0x0a 16 to 31; a read clears it
-inline constexpr std::size_t kMissedData = 0x0c;       // as kNewData: a mailbox was overwritten before it was read
+// 16, a bit for each mailbox 0 to 15, at 0x0a 16 to 31; a read clears it
+inline constexpr std::size_t kNewData = 0x08;
+// as kNewData: a mailbox was overwritten before it was read
+inline constexpr std::size_t kMissedData = 0x0c;
 inline constexpr std::size_t kStartConvert = 0x10;     // 16; writing bit 0 starts
 inline constexpr std::size_t kGainSelect = 0x20;       // 8 bits for each of 32 channels, 0 to 3
 inline constexpr std::size_t kMailBox = 0x40;          // 16 bits, 32 of them

@@ -18,8 +18,8 @@ constexpr std::chrono::milliseconds kLookAtBoard{10};
 void expectIp330Channels(const Ip330& board, int first, int last) {
   const auto settings = board.settings();
   if (settings.has(first) && settings.has(last) && first <= last) return;
-  throw std::invalid_argument(
-      fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last, settings.firstChannel, settings.lastChannel));
+  throw std::invalid_argument(fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
+                                          settings.firstChannel, settings.lastChannel));
 }
 
 Ip330Scan::Ip330Scan(Ip330& board, int first, int last) : board_(board), first_(first), last_(last) {
@@ -52,7 +52,8 @@ void Ip330Scan::stop() {
   came_.notify_all();
 }
 
-// The number of samples in a time; 0 means all since the last reading. nullopt: the time is invalid.
+// The number of samples in a time; 0 means all since the last reading. nullopt: the time is
+// invalid.
 std::optional<std::uint64_t> Ip330Scan::samplesOf(std::chrono::milliseconds average) const {
   if (average.count() < 0) return std::nullopt;
   if (average.count() == 0) return 0;

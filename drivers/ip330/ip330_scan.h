@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Ip330Scan: the mean of a channel over a time that each reader chooses (manual, "ip330Scan").
 //
-// Readers with different times on one channel do not disturb each other. With a time of 0 the mean covers all
-// samples since the last such reading of the channel; without new samples it is the last sample.
+// Readers with different times on one channel do not disturb each other. With a time of 0 the mean
+// covers all samples since the last such reading of the channel; without new samples it is the last
+// sample.
 //
-// Threads  any number of callers at a time. A reading waits for the first sample of a gain; stop() ends the
-//          wait.
+// Threads  any number of callers at a time. A reading waits for the first sample of a gain; stop()
+//          ends the wait.
 #pragma once
 
 #include <atomic>
@@ -25,19 +26,20 @@ inline constexpr std::uint64_t kIp330LongestMean = 65536;  // samples
 class Ip330Scan {
  public:
   // Reads channels `first` to `last` of the board, which must outlive this object.
-  //   throws  std::invalid_argument when the board does not scan these channels, std::length_error as
-  //           Ip330::subscribe()
+  //   throws  std::invalid_argument when the board does not scan these channels, std::length_error
+  //           as Ip330::subscribe()
   Ip330Scan(Ip330& board, int first, int last);
   Ip330Scan(const Ip330Scan&) = delete;
   Ip330Scan& operator=(const Ip330Scan&) = delete;
 
-  // Returns the mean over the last `average` [ms], or over the shorter time for which the board has scanned
-  // with this gain and in this mode. Another reader may set another gain of the channel at the same time;
-  // the reading may then fail.
+  // Returns the mean over the last `average` [ms], or over the shorter time for which the board has
+  // scanned with this gain and in this mode. Another reader may set another gain of the channel at
+  // the same time; the reading may then fail.
   //
   //   gain     code 0 to 3; the channel is set to it if needed
-  //   returns  0 to 0xffff; nullopt when the channel or gain does not exist, the time is negative or needs
-  //            more than kIp330LongestMean samples, the gain cannot be calibrated, or no samples come
+  //   returns  0 to 0xffff; nullopt when the channel or gain does not exist, the time is negative
+  //            or needs more than kIp330LongestMean samples, the gain cannot be calibrated, or no
+  //            samples come
   [[nodiscard]] std::optional<int> tryRead(int channel, int gain, std::chrono::milliseconds average);
   // Ends all waiting readings; later readings do not wait.
   void stop();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ip330Settings: wiring, range and scan mode of a board, with the values of initIp330 and configIp330
-// (manual, "ip330Scan").
+// Ip330Settings: wiring, range and scan mode of a board, with the values of initIp330 and
+// configIp330 (manual, "ip330Scan").
 #pragma once
 
 #include <array>

@@ -53,7 +53,8 @@ Ip330Signal parseSignal(const std::string& text, const std::map<std::string, Ip3
 
 int parseChannel(const std::string& text) {
   const int channel = parseNumber<int>(text);
-  if (channel < 0 || channel >= kIp330Channels) throw std::invalid_argument(fmt::format("no channel {}; use 0 to {}", channel, kIp330Channels - 1));
+  if (channel < 0 || channel >= kIp330Channels)
+    throw std::invalid_argument(fmt::format("no channel {}; use 0 to {}", channel, kIp330Channels - 1));
   return channel;
 }
 

@@ -11,7 +11,8 @@
 namespace mpf {
 namespace {
 
-constexpr int kMostPoints = 1 << 23;  // an array of all points is at most half the limit of a message
+// an array of all points is at most half the limit of a message
+constexpr int kMostPoints = 1 << 23;
 
 bool isTime(double seconds) { return std::isfinite(seconds) && seconds >= 0; }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Ip330Sweep: records several channels over time, like a digitiser, into arrays of points. Each point is the
-// mean of the scans in its dwell time.
+// Ip330Sweep: records several channels over time, like a digitiser, into arrays of points. Each
+// point is the mean of the scans in its dwell time.
 //
-// A point consists of whole scans of all channels `first` to `last`. A sweep ends when the arrays are full or
-// at a preset time.
+// A point consists of whole scans of all channels `first` to `last`. A sweep ends when the arrays
+// are full or at a preset time.
 //
 // Threads  any number of callers at a time.
-// Source   fastSweep and ip330Sweep. There the number of points was undefined until it was set, the last
-//          channel was not averaged, and one point too many was recorded.
+// Source   fastSweep and ip330Sweep. There the number of points was undefined until it was set, the
+//          last channel was not averaged, and one point too many was recorded.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ namespace mpf {
 
 class Ip330Sweep {
  public:
-  // Creates arrays of `maxPoints` points; all of them are used until trySetPoints() says otherwise. `board`
-  // must outlive this object.
+  // Creates arrays of `maxPoints` points; all of them are used until trySetPoints() says otherwise.
+  // `board` must outlive this object.
   //   throws  std::invalid_argument, std::length_error as Ip330Scan
   Ip330Sweep(Ip330& board, int first, int last, int maxPoints);
   Ip330Sweep(const Ip330Sweep&) = delete;
@@ -36,7 +36,8 @@ class Ip330Sweep {
 
   // Sets the number of points of a sweep. Returns false unless it is 1 to maxPoints.
   [[nodiscard]] bool trySetPoints(double points);
-  // Sets the dwell time; it is rounded to whole scans, at least one. Returns false for a negative time or NaN.
+  // Sets the dwell time; it is rounded to whole scans, at least one. Returns false for a negative
+  // time or NaN.
   [[nodiscard]] bool trySetSecondsPerPoint(double seconds);
   // Sets the time after which a sweep ends; 0: no limit. Returns false for a negative time or NaN.
   [[nodiscard]] bool trySetPreset(double seconds);
@@ -48,8 +49,8 @@ class Ip330Sweep {
     int acquired = 0;  // complete points
   };
   [[nodiscard]] Status status();
-  // Returns all points of a channel, 0 for points that are not complete yet; nullopt when the sweep does not
-  // include the channel.
+  // Returns all points of a channel, 0 for points that are not complete yet; nullopt when the sweep
+  // does not include the channel.
   [[nodiscard]] std::optional<std::vector<std::int32_t>> tryRead(int channel);
 
  private:

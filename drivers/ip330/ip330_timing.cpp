@@ -15,7 +15,8 @@ constexpr double kMostConversion = 0xffff;
 constexpr double kLeastTimer = kLeastPrescaler / kTicksPerMicrosecond;
 constexpr double kMostTimer = kMostPrescaler * kMostConversion / kTicksPerMicrosecond;
 
-// Chooses the smallest prescaler for which the conversion register is large enough: it has the finest steps.
+// Chooses the smallest prescaler for which the conversion register is large enough: it has the
+// finest steps.
 void setTimer(Ip330Timer& timer, double microseconds) {
   const double ticks = std::max(microseconds, kLeastTimer) * kTicksPerMicrosecond;
   double prescaler = std::clamp(std::ceil(ticks / kMostConversion), kLeastPrescaler, kMostPrescaler);
@@ -49,7 +50,8 @@ Ip330Timer ip330TimerOf(Ip330ScanMode mode, int channels, double microsecondsPer
   const auto shape = shapeOf(mode, channels);
   const double least = shape.fixed + shape.periods * shape.least;
   const double most = shape.fixed + shape.periods * kMostTimer;
-  const bool isPossible = microsecondsPerScan >= least && microsecondsPerScan <= most;  // false for NaN, too
+  // false for NaN, too
+  const bool isPossible = microsecondsPerScan >= least && microsecondsPerScan <= most;
   if (!isPossible) {
     timer.problem = fmt::format("{} us per scan of {} channels in mode {}: use {} to {} us", microsecondsPerScan, channels, toString(mode),
                                 least, std::floor(most));

@@ -4,13 +4,14 @@
 //   error = setPoint - actual
 //   P = KP * error      I += KP * KI * error * dt      D = KP * KD * change of error / dt      output = P + I + D, within its limits
 //
-// I does not change towards a limit while the output is at that limit, and is itself within the limits. When
-// feedback is turned on, I starts with the present output, so that the output does not jump. I does not change
-// while feedback is off. With KI = 0, I is the low limit, or the high limit if KP is not positive; this is used
-// to tune P alone.
+// I does not change towards a limit while the output is at that limit, and is itself within the
+// limits. When feedback is turned on, I starts with the present output, so that the output does not
+// jump. I does not change while feedback is off. With KI = 0, I is the low limit, or the high limit
+// if KP is not positive; this is used to tune P alone.
 //
 // Threads  one at a time.
-// Source   EPICS fastPID (std R1-3), where the first change of error was computed from uninitialised memory.
+// Source   EPICS fastPID (std R1-3), where the first change of error was computed from
+//          uninitialised memory.
 #pragma once
 
 namespace mpf {

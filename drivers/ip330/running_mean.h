@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // RunningMean: the mean of the last n samples, for any number of readers with different n.
 //
-// A ring holds the sums of all samples since restart(); a mean is the difference of two sums. The sums are
-// integers that wrap around, so rounding errors do not accumulate.
+// A ring holds the sums of all samples since restart(); a mean is the difference of two sums. The
+// sums are integers that wrap around, so rounding errors do not accumulate.
 //
 // Threads  one at a time: the owner holds a lock.
 #pragma once
@@ -42,7 +42,8 @@ class RunningMean {
     sums_ = std::move(larger);
     oldest_ = count_ - kept;
   }
-  // Returns the mean of the last n samples, or of all samples if fewer are stored. n and count() must not be 0.
+  // Returns the mean of the last n samples, or of all samples if fewer are stored. n and count()
+  // must not be 0.
   [[nodiscard]] double mean(std::uint64_t n) const noexcept {
     n = std::min({n, count_ - oldest_, mask()});
     return static_cast<double>(static_cast<std::int64_t>(sum_ - sums_[(count_ - n) & mask()])) / kScale / static_cast<double>(n);
@@ -52,7 +53,8 @@ class RunningMean {
   static constexpr double kScale = 65536;
   [[nodiscard]] std::uint64_t mask() const noexcept { return sums_.size() - 1; }
 
-  std::vector<std::uint64_t> sums_ = std::vector<std::uint64_t>(64);  // the sum of the first i samples is at index i modulo size
+  // the sum of the first i samples is at index i modulo size
+  std::vector<std::uint64_t> sums_ = std::vector<std::uint64_t>(64);
   std::uint64_t count_ = 0;
   std::uint64_t oldest_ = 0;  // sums before this one were dropped while the ring was smaller
   std::uint64_t sum_ = 0;

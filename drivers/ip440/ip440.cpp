@@ -17,7 +17,8 @@ std::optional<std::uint32_t> Ip440::tryRead() noexcept {
   std::uint32_t bits = 0;
   for (std::size_t port = 0; port < kPorts; ++port) bits |= std::uint32_t{registers_.read8(offsetOf(port))} << (8 * port);
   const bool isDoubtful = isGone_ || registers_.read8(kNotUsed) != 0;
-  if (isDoubtful) isGone_ = !module_.problem().empty();  // the site may be empty, or have another module
+  // the site may be empty, or have another module
+  if (isDoubtful) isGone_ = !module_.problem().empty();
   return isGone_ ? std::nullopt : std::optional(bits);
 }
 

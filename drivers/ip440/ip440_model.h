@@ -21,7 +21,8 @@ class Ip440Model final : public DeviceModel {
  public:
   // Returns the voltage [V] at a connected input.
   using Volts = std::function<double()>;
-  static constexpr double kOnVolts = 2.5;  // of this model; the threshold of a real module depends on its version
+  // of this model; the threshold of a real module depends on its version
+  static constexpr double kOnVolts = 2.5;
 
   explicit Ip440Model(std::uint32_t inputs = 0) : DeviceModel({.manufacturer = kAcromag, .model = Ip440::kModel}), inputs_(inputs) {}
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// DemoDevices: a client of four servers, which calls each of them once in a round: a DAC, the ADC that its
-// output is wired to, digital lines that are wired to each other, and an instrument on a serial line.
+// DemoDevices: a client of four servers, which calls each of them once in a round: a DAC, the ADC
+// that its output is wired to, digital lines that are wired to each other, and an instrument on a
+// serial line.
 //
 //   give() ─► sets all outputs ─► the caller pauses ─► look() ─► reads all inputs
 //
@@ -27,7 +28,8 @@ struct Sample {
 
 class DemoDevices {
  public:
-  //   patience  longest wait for an answer, so that a server that is restarted does not delay the others
+  //   patience  longest wait for an answer, so that a server that is restarted does not delay the
+  //             others
   DemoDevices(const Backplane& backplane, std::chrono::milliseconds patience);
 
   // Sets the DAC to `volts` and the digital outputs to `bits`.

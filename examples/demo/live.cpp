@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// mpf-demo: writes to a DAC and to digital lines, reads the inputs that are wired to them and an instrument, and
-// draws the values until q is pressed. Without a terminal it prints lines for some seconds.
-// examples/demo/hardware starts the servers.
+// mpf-demo: writes to a DAC and to digital lines, reads the inputs that are wired to them and an
+// instrument, and draws the values until q is pressed. Without a terminal it prints lines for some
+// seconds. examples/demo/hardware starts the servers.
 //
-// A slow host does not make a run fail: the run succeeds once each of the three was seen to work, and whenever
-// the user ends it.
+// A slow host does not make a run fail: the run succeeds once each of the three was seen to work,
+// and whenever the user ends it.
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -31,7 +31,8 @@ namespace {
 using namespace std::chrono_literals;
 using mpf::demo::Sample;
 
-constexpr auto kPause = 40ms;  // between writing and reading; longer than the averaging time of the ADC
+// between writing and reading; longer than the averaging time of the ADC
+constexpr auto kPause = 40ms;
 constexpr double kPeriodSeconds = 4, kAmplitudeVolts = 4;
 constexpr int kRoundsPerLine = 10;
 constexpr double kCloseVolts = 0.05;
@@ -83,7 +84,8 @@ class Rounds {
   }
   [[nodiscard]] std::string line() const { return picture_.line(devices_.told()); }
   [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
-  // True when the user has ended the run, or when the time is over and all parts were seen or no rounds are left.
+  // True when the user has ended the run, or when the time is over and all parts were seen or no
+  // rounds are left.
   [[nodiscard]] bool areOver() const {
     if (isStopped.load(std::memory_order_relaxed)) return true;
     return end_.hasPassed() && (verdict_.isGood() || late_ >= kMoreRounds);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Picture: the last rounds of the demo as lines of text: a chart of DAC and ADC, lamps for the digital lines, a
-// chart of the instrument.
+// Picture: the last rounds of the demo as lines of text: a chart of DAC and ADC, lamps for the
+// digital lines, a chart of the instrument.
 //
 // Threads  one.
 #pragma once

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Attach: processes that attach remove what a dead client left, while the client may be starting, alive, leaving
-// or dying.
+// Attach: processes that attach remove what a dead client left, while the client may be starting,
+// alive, leaving or dying.
 //
 //   client    window: locked, named ─ link: named ─ bulk segment: named ─ ... ─ bulk, link, window: names removed ─ lock free
 //   attacher  list all names ─ which windows live? ─ remove links of the others ─ remove bulk without a link
@@ -8,7 +8,8 @@
 //   MODELS  shm/remains.cpp: judge tryRemove judgeWindow judgeOwned ownerOf
 //   MODELS  shm/segment.cpp: list removeIfOwnerless
 //   HOLDS   only the client itself removes names of a living client
-//   HOLDS   no name of a dead client is left once a process has attached after its death and after all other attachers
+//   HOLDS   no name of a dead client is left once a process has attached after its death and after
+//           all other attachers
 //   ASSUMES a listing that shows a name shows every older name that still exists (true for tmpfs)
 //   ASSUMES one client with one link, which may be killed before any step; two attachers at any time, one at the end
 //   BREAK   LIST_LATE    an attacher lists the names of links after it has looked which windows live
@@ -48,7 +49,8 @@ inline removeDead() {
   windowLives = false;
   if
   :: d_step { windowListed && windowNamed && !locked -> assert(!lives); windowNamed = false }
-  :: windowListed && (!windowNamed || locked) -> windowLives = true  // a window that is gone counts as living
+  // a window that is gone counts as living
+  :: windowListed && (!windowNamed || locked) -> windowLives = true
   :: !windowListed
   fi;
 #ifdef LIST_LATE
@@ -58,7 +60,8 @@ inline removeDead() {
 #ifndef WINDOWS_ONLY
   if
   :: linkListed && linkNamed && !windowLives -> d_step { assert(!linkNamed || !lives); linkNamed = false }
-  :: linkListed && (!linkNamed || windowLives) -> linkLives = true  // a link that is gone need not be removed
+  // a link that is gone need not be removed
+  :: linkListed && (!linkNamed || windowLives) -> linkLives = true
   :: !linkListed
   fi;
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Connect: a client finds a server, creates a link and knocks; the server accepts; the client sends a request.
-// Either process may be killed before any step.
+// Connect: a client finds a server, creates a link and knocks; the server accepts; the client sends
+// a request. Either process may be killed before any step.
 //
 //   client  look up name ─ link: created, open, named ─ knock ─ (nudge) ─ connected ─ request ─ reply or fate ─ link closed, name removed
 //   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply        a second life follows the first
@@ -11,13 +11,14 @@
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer
 //   HOLDS   a living client connects to a living server, whichever hints are lost
-//   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never taken"; a reply that
-//           was sent is not lost
+//   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never
+//           taken"; a reply that was sent is not lost
 //   HOLDS   a server accepts a link once, and releases it when the client has ended
-//   ASSUMES sequentially consistent memory: link states use release and acquire, names are system calls (ring.pml and
+//   ASSUMES sequentially consistent memory: link states use release and acquire, names are system
+//   calls (ring.pml and
 //           doorbell.pml have weak memory)
-//   ASSUMES a timer expires when nothing else can happen; one client, two lives of a server, one request for each connection
-//   ASSUMES another process clears each hint once
+//   ASSUMES a timer expires when nothing else can happen; one client, two lives of a server, one
+//   request for each connection ASSUMES another process clears each hint once
 //   BREAK   NO_NUDGE        the client knocks once
 //   BREAK   NUDGE_BLIND     the client knocks again without checking whether it has been accepted
 //   BREAK   ACCEPT_TWICE    a server does not remember which links it has accepted

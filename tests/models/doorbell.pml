@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Doorbell: an owner that announces its sleep, two peers that send and wake, a watcher that reports deaths; with weak
-// memory.
+// Doorbell: an owner that announces its sleep, two peers that send and wake, a watcher that reports
+// deaths; with weak memory.
 //
 //   owner  announce ─ fence ─ look again ─ sleep                peer  message ─ fence ─ announced? ─ bell, wake
 //
 //   MODELS  shm/endpoint.cpp: sleep announce hasNews interrupt takeLocalNews arm disarm
 //   MODELS  shm/window.cpp: wakeIfAsleep ring
 //   MODELS  shm/doorbell.cpp: sleep ring tryRingFifo drainFifo
-//   HOLDS   no wake-up is lost: the owner does not sleep for ever while a message or a reported death is pending
-//   HOLDS   the same on the futex and on the descriptor, also when a peer is killed between message and ring
-//   ASSUMES FUTEX_WAIT compares the bell and sleeps in one step; FUTEX_WAKE is a fence for its caller
-//   ASSUMES two messages of one peer and one of the other; an owner without a deadline that polls no link
+//   HOLDS   no wake-up is lost: the owner does not sleep for ever while a message or a reported
+//           death is pending
+//   HOLDS   the same on the futex and on the descriptor, also when a peer is killed between message
+//           and ring
+//   ASSUMES FUTEX_WAIT compares the bell and sleeps in one step; FUTEX_WAKE is a fence for its
+//   caller ASSUMES two messages of one peer and one of the other; an owner without a deadline that
+//   polls no link
 //   BREAK   NO_PEER_FENCE    the peer reads the announcement before its message is visible
 //   BREAK   NO_OWNER_FENCE   the owner looks again before its announcement is visible
 //   BREAK   NO_LOOK          the owner does not look again
@@ -76,7 +79,8 @@ inline ringBell(process) {
   asleep = false
 }
 
-// Only peer 0 sends twice and so may have rung before; its values after the last message are not used.
+// Only peer 0 sends twice and so may have rung before; its values after the last message are not
+// used.
 inline forget(process) {
   d_step {
     state = AWAKE;
@@ -121,7 +125,8 @@ inline newNumber() {
 #ifdef NUMBER_KEPT
   sleeps = 1
 #else
-  // Numbers matter only where a peer compares them, so a number that no peer has read need not change.
+  // Numbers matter only where a peer compares them, so a number that no peer has read need not
+  // change.
   if
   :: sleeps == 0 || sleeps == number || sleeps == rungFor -> sleeps++
   :: else

@@ -8,10 +8,11 @@
 //   fence         waits until all earlier stores of its process are visible
 //   load          the newest value that this process can see
 //
-// A word has one writer; a store waits until the previous value of the word is visible. Loads happen in program
-// order; where the source needs an acquire for that, its model has a variant that does the later load early.
-// Locked instructions change plain variables of the model at once; those with release semantics first wait for
-// isVisible(). A killed process stores nothing more, but its earlier stores become visible.
+// A word has one writer; a store waits until the previous value of the word is visible. Loads
+// happen in program order; where the source needs an acquire for that, its model has a variant that
+// does the later load early. Locked instructions change plain variables of the model at once; those
+// with release semantics first wait for isVisible(). A killed process stores nothing more, but its
+// earlier stores become visible.
 //
 // The model defines WORDS (at most 16), PROCESSES and FLUSH_ALL, one FLUSH(process, word) for each word.
 byte memory[WORDS];

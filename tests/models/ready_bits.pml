@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ready bits: two levels of hints that say which links have messages, and links that the owner polls instead; with
-// weak memory.
+// Ready bits: two levels of hints that say which links have messages, and links that the owner
+// polls instead; with weak memory.
 //
 //   peer    message ─ fence ─ unwatched? ─ bit of the link ─ bit of its word
 //   owner   clear bit of the word ─ read bits ─ clear bit of the link ─ more left? set bit of the word ─ poll or revisit link
@@ -8,11 +8,12 @@
 //   MODELS  shm/link.cpp: afterPush setWatched
 //   MODELS  shm/window.cpp: notify
 //   MODELS  shm/endpoint.cpp: nextReady takeReadyBit heat cool setReadyBit hasNews isRevisitDue
-//   HOLDS   for each link with a message, a hint is set, the link is polled, or it is due for a revisit; this does not
-//           need the scan of all links that an owner makes before it sleeps
+//   HOLDS   for each link with a message, a hint is set, the link is polled, or it is due for a
+//           revisit; this does not need the scan of all links that an owner makes before it sleeps
 //   HOLDS   no link is forgotten, in whatever order links begin and cease to be polled
 //   ASSUMES two links of one word, two messages each; one link at a time may be polled
-//   ASSUMES no process overwrites the hints; the scan of all links repairs that (tests/shm/endpoint_hints_test.cpp)
+//   ASSUMES no process overwrites the hints; the scan of all links repairs that
+//   (tests/shm/endpoint_hints_test.cpp)
 //   BREAK   NO_WATCH_FENCE   the peer looks whether the link is polled before its message is visible
 //   BREAK   NO_COOL_FENCE    the owner looks for messages before its "not polled any more" is visible
 //   BREAK   NO_COOL_LOOK     the owner does not look when it stops polling

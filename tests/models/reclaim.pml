@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reclaim: starters, which take the name of a server, and reapers, which remove the window that a dead owner left
-// under it. Each may be killed before any step.
+// Reclaim: starters, which take the name of a server, and reapers, which remove the window that a
+// dead owner left under it. Each may be killed before any step.
 //
 //   file created ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
 //   reaper: open by name ─ lock a byte that a living owner has locked ─ does the name still refer to this file?
@@ -10,10 +10,12 @@
 //   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
 //   HOLDS   only its owner removes the name of a living window
 //   HOLDS   two living processes never own the name at the same time
-//   HOLDS   a starter gets the name, or is refused because a living process has it: no death blocks the name
-//   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after the death of its holder
-//   ASSUMES a starter waits longer than a reaper or the kernel needs (50 ms for some microseconds)
-//   ASSUMES three starters, each also a reaper, and one reaper; two of them are killed; no other process removes names
+//   HOLDS   a starter gets the name, or is refused because a living process has it: no death blocks
+//           the name
+//   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time
+//   after the death of its holder ASSUMES a starter waits longer than a reaper or the kernel needs
+//   (50 ms for some microseconds) ASSUMES three starters, each also a reaper, and one reaper; two
+//   of them are killed; no other process removes names
 //   BREAK   NO_COMPARE    a reaper does not check whether the name still refers to the file that it locked
 //   BREAK   NO_LOCK       a reaper tests the lock and does not take it
 //   BREAK   ONE_LOCK      a reaper locks the file as an owner does

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Ring: messages of 1 or 2 slots from one producer to one consumer, with weak memory. Either may be killed before
-// any step.
+// Ring: messages of 1 or 2 slots from one producer to one consumer, with weak memory. Either may be
+// killed before any step.
 //
 //   MODELS  shm/ring.h: RingProducer tryPush hasFree waiting isTaken
 //   MODELS  shm/ring.h: RingConsumer hasMessage begin copyBody end
-//   HOLDS   each message arrives once, whole and in order, as long as both live; no message waits for ever for slots
-//   HOLDS   after the death of a producer, exactly the messages with a completed release store arrive
-//   HOLDS   a killed consumer has not looked at any message that is not counted as taken ("never taken" is true)
-//   ASSUMES a ring of 4 slots, handed back two at a time, and 4 messages: positions wrap around twice, messages cross the end of the ring
-//   ASSUMES both ends follow the protocol (tests/shm/ring_trust_test.cpp tests invalid data)
+//   HOLDS   each message arrives once, whole and in order, as long as both live; no message waits
+//           for ever for slots
+//   HOLDS   after the death of a producer, exactly the messages with a completed release store
+//           arrive
+//   HOLDS   a killed consumer has not looked at any message that is not counted as taken ("never
+//           taken" is true)
+//   ASSUMES a ring of 4 slots, handed back two at a time, and 4 messages: positions wrap around
+//   twice, messages cross the end of the ring ASSUMES both ends follow the protocol
+//   (tests/shm/ring_trust_test.cpp tests invalid data)
 //   BREAK   SEQUENCE_RELAXED   the sequence is stored without release
 //   BREAK   SEQUENCE_FIRST     the sequence is stored before the body
 //   BREAK   NO_ACQUIRE         the body is loaded before the sequence
@@ -90,7 +94,8 @@ active proctype Producer() {
       d_step { pushed = pushed + slots; message++; slots = 0 }
     od;
 judge:
-    // The fates after the death of a consumer: a message that is not counted as taken was never acted on.
+    // The fates after the death of a consumer: a message that is not counted as taken was never
+    // acted on.
     if
     :: d_step { isGone(CONSUMER) -> assert(acted <= memory[TAKEN]) }
     :: !dead[CONSUMER] && acted == MESSAGES

@@ -163,7 +163,8 @@ TEST(Conversion, ReadsUpToTheLimitWithItsReaderOptions) {
 TEST(Conversion, NamesATypeFromANewerPeer) {
   capnp::MallocMessageBuilder builder;
   builder.initRoot<wire::Envelope>().initUser();
-  // The discriminant is the 16-bit word with the number of `user`, the last member; the next number is unknown.
+  // The discriminant is the 16-bit word with the number of `user`, the last member; the next number
+  // is unknown.
   auto data = capnp::AnyStruct::Builder(builder.getRoot<capnp::AnyStruct>()).getDataSection();
   const unsigned offset = capnp::Schema::from<wire::Envelope>().getProto().getStruct().getDiscriminantOffset() * 2;
   ASSERT_EQ(data[offset], 9);
@@ -174,7 +175,7 @@ TEST(Conversion, NamesATypeFromANewerPeer) {
 
   EXPECT_FALSE(message);
   EXPECT_EQ(error.fault, ConversionFault::unknownType);
-  EXPECT_EQ(error.text, "type 11 is none of ours: the peer is newer");
+  EXPECT_EQ(error.text, "type 11 is unknown: the peer is newer");
   data[offset] = 0xff;
   data[offset + 1] = 0xff;
   EXPECT_FALSE(fromFrame(capnp::messageToFlatArray(builder), error));
@@ -193,7 +194,7 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   const std::array<std::byte, 10> shortBody{};
   EXPECT_FALSE(tryToWire(Message::copyOf(MessageType::int32, shortBody), envelope, {}, error));
   EXPECT_EQ(error.fault, ConversionFault::unsound);
-  EXPECT_EQ(error.text, "int32: a body of 10 bytes is none");
+  EXPECT_EQ(error.text, "int32: a body of 10 bytes is invalid");
   EXPECT_FALSE(tryToWire(MessageOf(RequestFate{.fate = Fate{-3}}), envelope, {}, error));
   EXPECT_EQ(error.text, "requestFate.fate: -3 is no such value");
 }

@@ -292,7 +292,8 @@ TEST(Message, DuplicatesItsMarksAndRoute) {
   EXPECT_EQ(copy.route().flags, 5U);
 }
 
-// With any bytes and any type, all spans that are handed out are within the body; sanitizers check the reads.
+// With any bytes and any type, all spans that are handed out are within the body; sanitizers check
+// the reads.
 TEST(Message, IsSafeWithAnyBytes) {
   const auto seed = std::random_device()();
   SCOPED_TRACE("seed " + std::to_string(seed));

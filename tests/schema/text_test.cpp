@@ -110,7 +110,7 @@ TEST(Text, NamesTheBadFieldAndTheAllowedOnes) {
             "connect: field 'status' is one of connectNo connectYes connectQueueFull connectRefused, not 'yes'");
   EXPECT_EQ(refusal(MessageType::char8Array, {"eomString=12345"}),
             "char8Array: field 'eomString' is a C-escaped string of at most 4 bytes, not '12345'");
-  EXPECT_EQ(refusal(MessageType{77}, {}), "type 77 is none of ours");
+  EXPECT_EQ(refusal(MessageType{77}, {}), "type 77 is unknown");
 }
 
 TEST(Text, RefusesWordsThatAreNotQuiteNumbers) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The bytes of each message on the wire are those of wire_bytes.txt, on hosts of either byte order and in
-// every release.
+// The bytes of each message on the wire are those of wire_bytes.txt, on hosts of either byte order
+// and in every release.
 #include <capnp/serialize.h>
 #include <fmt/format.h>
 #include <fstream>

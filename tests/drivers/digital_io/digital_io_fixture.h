@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DigitalIoTest: a device model on a carrier, its driver, and a listener that records what it reports.
+// DigitalIoTest: a device model on a carrier, its driver, and a listener that records what it
+// reports.
 #pragma once
 
 #include <condition_variable>
@@ -66,8 +67,8 @@ class DigitalIoTest : public testing::Test {
   using Kind = DigitalIoNews::Kind;
   static constexpr auto kNever = std::chrono::hours(1);  // period of polls
 
-  // Starts a module with this name and its driver, in place of the previous one, whose listeners must have
-  // ended.
+  // Starts a module with this name and its driver, in place of the previous one, whose listeners
+  // must have ended.
   DigitalIo& start(const std::string& name, const DigitalIoOptions& options = {.pollEvery = kNever}) {
     io_.reset();
     carrier_.unplug("IP_a");

@@ -38,7 +38,8 @@ TEST_F(DigitalIoTest, SeesBothEdgesByInterrupt) {
 }
 
 TEST_F(DigitalIoTest, SeesOnlyTheEdgesThatItIsTold) {
-  auto& io = start("IP-Unidig-I", interruptsOnly(0x5, 0x6));  // bit 0 rising, bit 1 falling, bit 2 both, bit 3 no edges
+  // bit 0 rising, bit 1 falling, bit 2 both, bit 3 no edges
+  auto& io = start("IP-Unidig-I", interruptsOnly(0x5, 0x6));
   model_->setInputs(0xf, 0x0);
   io.look();
   DigitalIoListener listener(io);
@@ -100,7 +101,8 @@ TEST_F(DigitalIoTest, IsSilentAfterItsEnd) {
   EXPECT_EQ(word(10) & 0xff, 0);
 }
 
-// However the lines change, the last report has their final state; without polls, by interrupts alone.
+// However the lines change, the last report has their final state; without polls, by interrupts
+// alone.
 TEST_F(DigitalIoTest, NeverGetsOutOfStepWithLinesThatMoveAtAnyTime) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE(seed);

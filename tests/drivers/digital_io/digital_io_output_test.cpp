@@ -117,7 +117,8 @@ TEST_F(DigitalIoTest, RefusesBitsThatAModelCannotWriteAndChangesNothing) {
   }
 }
 
-// The first EPICS driver omitted one of the four models, had another one twice, and accepted any value.
+// The first EPICS driver omitted one of the four models, had another one twice, and accepted any
+// value.
 TEST_F(DigitalIoTest, SetsTheThresholdOfModelsThatHaveOne) {
   for (const auto* const name : {"IP-Unidig-HV-16I8O", "IP-Unidig-HV-8I16O", "IP-Unidig-I-HV-16I8O", "IP-Unidig-I-HV-8I16O"}) {
     auto& io = start(name);
@@ -180,7 +181,8 @@ TEST_F(DigitalIoTest, RefusesVectorsThatCannotBe) {
   }
 }
 
-// Outputs, enables and threshold are restored after a loss of power; bits that were never written are not.
+// Outputs, enables and threshold are restored after a loss of power; bits that were never written
+// are not.
 TEST_F(DigitalIoTest, GivesAModuleThatComesBackWhatWasWritten) {
   auto& io = start("IP-Unidig-I-D", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   DigitalIoListener listener(io);

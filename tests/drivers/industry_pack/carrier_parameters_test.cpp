@@ -181,8 +181,8 @@ TEST(CarrierParametersTest, OfAnUnknownKindNameTheKnownOnes) {
   EXPECT_THROW(static_cast<void>(parseCarrierParameters("vipc999", "")), std::invalid_argument);
 }
 
-// The parameters of a carrier that MPF cannot reach are checked nevertheless, so that an error in an old startup
-// file is found.
+// The parameters of a carrier that MPF cannot reach are checked nevertheless, so that an error in
+// an old startup file is found.
 TEST(CreateCarrierTest, SaysThatThisHostReachesNoVmeAndWhatToUse) {
   const auto problemOf = [](const char* kind, const char* parameters) {
     try {

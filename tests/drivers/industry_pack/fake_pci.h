@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// FakePci: a folder with plain files in place of those that Linux has for PCI boards. Windows are memory that
-// keeps what is written.
+// FakePci: a folder with plain files in place of those that Linux has for PCI boards. Windows are
+// memory that keeps what is written.
 #pragma once
 
 #include <fcntl.h>
@@ -26,7 +26,8 @@ class FakePci {
 
   FakePci() {
     std::filesystem::create_directories(folder_.path() / "dev");
-    std::filesystem::permissions(folder_.path(), std::filesystem::perms::all);  // tests change the permissions of the files inside
+    // tests change the permissions of the files inside
+    std::filesystem::permissions(folder_.path(), std::filesystem::perms::all);
   }
 
   [[nodiscard]] PciPlaces places() const {
@@ -76,7 +77,8 @@ class FakePci {
 
   void takeInterruptAway() { interrupt_.reset(); }
 
-  // Access to the registers from the side of the board. It uses the file, since another thread uses the mapping.
+  // Access to the registers from the side of the board. It uses the file, since another thread uses
+  // the mapping.
   template <class Value>
   [[nodiscard]] Value get(const std::string& address, const std::string& name, std::size_t offset) const {
     const FileDescriptor opened(::open(file(address, name).c_str(), O_RDONLY | O_CLOEXEC));

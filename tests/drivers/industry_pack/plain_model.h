@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PlainModel: device model with 16-bit words that keep what is written. Bit 0 of word 0 drives an interrupt
-// request line.
+// PlainModel: device model with 16-bit words that keep what is written. Bit 0 of word 0 drives an
+// interrupt request line.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Carriers in startup files of real users. MPF_CORPUS is their folder; without it the test looks beside this
-// tree.
+// Carriers in startup files of real users. MPF_CORPUS is their folder; without it the test looks
+// beside this tree.
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The carrier with files in place of a board: selection of a board, error messages, windows, interrupts.
-// tests/tpci200 runs it on QEMU's model of the board.
+// The carrier with files in place of a board: selection of a board, error messages, windows,
+// interrupts. tests/tpci200 runs it on QEMU's model of the board.
 #include <mpf/drivers/industry_pack/tpci200.h>
 
 #include <poll.h>

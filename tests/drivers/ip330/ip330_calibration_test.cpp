@@ -43,11 +43,12 @@ std::array<double, kIp330Gains> times(double factor, std::array<double, kIp330Ga
   return values;
 }
 
-// The error of such a converter cannot be measured: the only other voltage in the range is 0 V, the end of
-// the range.
+// The error of such a converter cannot be measured: the only other voltage in the range is 0 V, the
+// end of the range.
 bool cannotBeCalibrated(Ip330Range range, int gain, double offset) { return range == Ip330Range::from0to5 && gain == 3 && offset < 1; }
 
-// Voltages in the inner 96 % of the input range: at the ends, a converter with errors runs out of codes.
+// Voltages in the inner 96 % of the input range: at the ends, a converter with errors runs out of
+// codes.
 double voltageOf(Ip330Range range, int gain, int number) {
   const auto [zero, span] = spanOf(range);
   return (zero + span * (0.02 + 0.96 * number / (kTestVoltages - 1))) / kIp330Gain[static_cast<std::size_t>(gain)];
@@ -115,7 +116,8 @@ TEST(Ip330Correction, RefusesWhatNoConverterGives) {
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 40000, 30000));
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 33000, 65535));
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 32768, 50000));  // half of the right slope
-  EXPECT_FALSE(correctionOf(Ip330Range::from0to5, 3, 0, 64225));  // the offset may be any value below 0
+  // the offset may be any value below 0
+  EXPECT_FALSE(correctionOf(Ip330Range::from0to5, 3, 0, 64225));
   EXPECT_FALSE(correctionOf(Ip330Range::from0to5, 3, 90, 65535));
   EXPECT_TRUE(correctionOf(Ip330Range::from0to5, 3, 90, 64315));
 }
@@ -221,8 +223,8 @@ TEST(Ip330Calibration, IsTriedAgainUntilItSucceeds) {
   EXPECT_TRUE(with.board.trySetGain(0, 2));
 }
 
-// Calibration, changes of gain and scans at the same time: no sample has codes of a calibration voltage, or of
-// a gain other than the one that it reports.
+// Calibration, changes of gain and scans at the same time: no sample has codes of a calibration
+// voltage, or of a gain other than the one that it reports.
 TEST(Ip330Calibration, DoesNotMixWithScans) {
   Ip330Board with({.type = Ip330Type::differential, .lastChannel = 3, .microsecondsPerScan = 300, .secondsBetweenCalibrate = 0},
                   {.isRealTime = true}, {.conversion = 1h, .silence = 1h, .lookEvery = 1h});

@@ -47,7 +47,8 @@ TEST_F(Ip330ChipTest, WritesAllThatIsSet) {
 
   start(Ip330Type::singleEnded);
 
-  EXPECT_EQ(io_.read16(ip330::kControl), 0x2b0a);  // interrupt after all channels, timer, burst continuous, single ended, straight binary
+  // interrupt after all channels, timer, burst continuous, single ended, straight binary
+  EXPECT_EQ(io_.read16(ip330::kControl), 0x2b0a);
   EXPECT_EQ(io_.read8(ip330::kTimerPrescaler), 64);
   EXPECT_EQ(io_.read8(ip330::kInterruptVector), 0x5a);
   EXPECT_EQ(io_.read16(ip330::kConversionTimer), 114);  // 1000 us less 6 conversions

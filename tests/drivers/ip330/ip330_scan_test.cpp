@@ -56,7 +56,8 @@ TEST_F(Ip330ScanTest, EachReaderHasItsOwnTime) {
   EXPECT_EQ(scan_.tryRead(5, 0, 51ms), 32768 + 2550);  // the mean of all samples
 }
 
-// EPICS ip330 R1-7 returned the corrected value of code 0 when no sample had come since the last reading.
+// EPICS ip330 R1-7 returned the corrected value of code 0 when no sample had come since the last
+// reading.
 TEST_F(Ip330ScanTest, WithoutATimeItIsWhatCameSinceTheLastReadingAndNeverNothing) {
   ramp();
   with_.scan(3);
@@ -85,7 +86,8 @@ TEST_F(Ip330ScanTest, AfterAChangeOfGainWaitsForASampleWithIt) {
   scanning.join();
 }
 
-// Two readers want different gains and one gets its gain; no scan comes, so neither has a sample yet.
+// Two readers want different gains and one gets its gain; no scan comes, so neither has a sample
+// yet.
 TEST_F(Ip330ScanTest, WhoseGainIsTakenAwayByAnotherWaitsNoMore) {
   Ip330Scan other(with_.board, 2, 5);
   std::atomic<int> ended{0};
@@ -150,7 +152,8 @@ TEST_F(Ip330ScanTest, ReadsNothingOfBeforeAnotherMode) {
   EXPECT_EQ(scan_.tryRead(5, 0, 100ms), 32768 + 550);
 }
 
-// With an offset of 200 codes, voltages just outside the range would have corrected codes outside 0 to 0xffff.
+// With an offset of 200 codes, voltages just outside the range would have corrected codes outside 0
+// to 0xffff.
 TEST(Ip330Scan, GivesCodesWithinTheRange) {
   Ip330Board with({.secondsBetweenCalibrate = 0}, {.gainError = {-0.02}, .offsetError = {700}, .isRealTime = false});
   Ip330Scan scan(with.board, 0, 1);

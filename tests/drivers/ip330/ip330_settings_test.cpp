@@ -36,7 +36,8 @@ TEST_P(Ip330TimerTest, MakesTheTimeAskedFor) {
   EXPECT_DOUBLE_EQ(timer.microsecondsPerScan, row.made);
 }
 
-// The first two are the board of the manual: EPICS ip330 R1-4 needed 1240 and 1480 us instead of 1 ms.
+// The first two are the board of the manual: EPICS ip330 R1-4 needed 1240 and 1480 us instead of 1
+// ms.
 INSTANTIATE_TEST_SUITE_P(Table, Ip330TimerTest,
                          testing::Values(TimerRow{Mode::burstContinuous, 16, 1000, 64, 95, 1000},
                                          TimerRow{Mode::burstContinuous, 32, 1000, 64, 65, 1000},

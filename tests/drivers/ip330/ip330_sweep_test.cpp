@@ -99,7 +99,8 @@ TEST_F(Ip330SweepTest, RefusesWhatIsNotThere) {
   EXPECT_FALSE(sweep_.trySetPreset(INFINITY));
   EXPECT_THROW(Ip330Sweep(with_.board, 0, 8, 4), std::invalid_argument);
   EXPECT_THROW(Ip330Sweep(with_.board, 0, 7, 0), std::invalid_argument);
-  EXPECT_THROW(Ip330Sweep(with_.board, 0, 7, 1 << 24), std::invalid_argument);  // more points than a message can have
+  // more points than a message can have
+  EXPECT_THROW(Ip330Sweep(with_.board, 0, 7, 1 << 24), std::invalid_argument);
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ TEST(Ip330, TakesAsManySubscribersAsItWasTold) {
   EXPECT_THROW(static_cast<void>(with.board.subscribe([](const Ip330Sample&) {})), std::length_error);
 }
 
-// EPICS ip330 R1-4 read only one half of the mailboxes: a mean of 200 samples had only 100 different ones.
+// EPICS ip330 R1-4 read only one half of the mailboxes: a mean of 200 samples had only 100
+// different ones.
 TEST(Ip330, DifferentialSamplesOfARampAreAllDistinct) {
   Ip330Board with({.type = Ip330Type::differential, .lastChannel = 15, .secondsBetweenCalibrate = 0});
   for (int i = 0; i < 16; ++i) with.model.setSignal(i, [](double seconds) { return seconds * 5; });
