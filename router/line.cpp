@@ -113,8 +113,8 @@ std::string Line::closed() const {
 
 // What comes behind our own farewell matters no more, but for its end.
 kj::Promise<void> Line::readAndDiscard() {
-  constexpr std::size_t kAtOnce = std::size_t{64} << 10;
-  auto room = kj::heapArray<kj::byte>(kAtOnce);
+  constexpr std::size_t kReadBytes = std::size_t{64} << 10;
+  auto room = kj::heapArray<kj::byte>(kReadBytes);
   auto read = stream_->tryRead(room.begin(), 1, room.size());
   return read.attach(kj::mv(room)).then([this](std::size_t bytes) -> kj::Promise<void> {
     if (bytes != 0) return readAndDiscard();

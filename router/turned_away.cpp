@@ -14,8 +14,8 @@ constexpr auto kMoment = 500 * kj::MILLISECONDS;
 
 // What it sends does not matter any more. Unread, it would make the kernel take the farewell back.
 kj::Promise<void> readToEnd(kj::AsyncIoStream& caller) {
-  constexpr std::size_t kAtOnce = 4096;
-  auto room = kj::heapArray<kj::byte>(kAtOnce);
+  constexpr std::size_t kReadBytes = 4096;
+  auto room = kj::heapArray<kj::byte>(kReadBytes);
   auto read = caller.tryRead(room.begin(), 1, room.size());
   return read.attach(kj::mv(room)).then([&caller](std::size_t bytes) -> kj::Promise<void> {
     if (bytes == 0) return kj::READY_NOW;

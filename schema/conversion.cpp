@@ -13,7 +13,7 @@ namespace {
 
 using Allocate = std::function<BodyBytes(std::size_t)>;
 
-// Ends a conversion from within.
+// Ends a conversion; guarded() catches it.
 struct Refusal {
   ConversionFault fault;
   std::string text;
@@ -25,9 +25,9 @@ void checkBytes(std::size_t bytes, const ConversionLimits& limits) {
   }
 }
 
-// ---- one field; `at` is its place
+// ---- one field; `at` is its place in the struct
 
-// A struct under way: its data section and its pointers.
+// A struct that is being converted: its data section and its pointers.
 struct Building {
   kj::ArrayPtr<kj::byte> data;
   capnp::List<capnp::AnyPointer>::Builder pointers;
@@ -89,7 +89,8 @@ void putValue(Building& to, capnp::uint at, std::span<const Element> value, cons
   } else {
     auto list = to.pointers[at].initAs<capnp::List<Element>>(count);
     if constexpr (std::endian::native == std::endian::little) {
-      // The list's memory is the array as it is, and ours to write: one copy in place of `count` stores (a third of the time).
+      // The memory of the list has the format of the array, so one copy replaces `count` stores (a
+      // third of the time).
       const auto raw = capnp::AnyList::Reader(list.asReader()).getRawBytes();
       if (count != 0) std::memcpy(const_cast<kj::byte*>(raw.begin()), value.data(), value.size_bytes());
     } else {
@@ -117,19 +118,20 @@ MessageOf<T> takeValue(const Reading& from, capnp::uint at, const ConversionLimi
     const capnp::AnyList::Reader any(list);
     if (std::endian::native == std::endian::little && any.getElementSize() == kElementSize<Element>) {
       if (list.size() != 0) std::memcpy(value.data(), any.getRawBytes().begin(), value.size_bytes());
-    } else {  // another byte order, or a list of structs of a newer peer
+    } else {  // another byte order, or a list of structs from a newer peer
       for (capnp::uint i = 0; i < list.size(); ++i) value[i] = list[i];
     }
     return message;
   }
 }
 
-// ---- one type; `at` is the field being converted, for the error
+// ---- one type; `at` is the name of the current field, for the error
 
 template <class T>
 void toWire(const Message& message, capnp::AnyStruct::Builder envelope, const ConversionLimits& limits, std::string_view& at) {
   const auto& places = WirePlaces<T>::get();
-  if (!message.isSound()) throw Refusal{ConversionFault::unsound, "a body of " + std::to_string(message.body().size()) + " bytes is none"};
+  if (!message.isSound())
+    throw Refusal{ConversionFault::unsound, "a body of " + std::to_string(message.body().size()) + " bytes is invalid"};
   const T body = *message.tryAs<T>();
   storeLittle(envelope.getDataSection(), places.whichAt, places.which);
   auto into = envelope.getPointerSection()[places.memberAt].initAsAnyStruct(places.dataWords, places.pointers);
@@ -171,7 +173,7 @@ Message fromWire(capnp::AnyStruct::Reader envelope, const ConversionLimits& limi
   }
 }
 
-// Runs `convert`, and says what stopped it.
+// Runs `convert` and reports an error that ended it.
 template <class Convert>
 bool guarded(std::string_view type, const std::string_view& at, ConversionFault onNonsense, ConversionError& error, Convert&& convert) {
   const auto fail = [&](ConversionFault fault, std::string_view why) {
@@ -208,7 +210,7 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const C
     return guarded(T::kName, at, ConversionFault::tooLarge, error, [&] { toWire<T>(message, capnp::toAny(envelope), limits, at); });
   });
   if (!known) {
-    error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is none of ours"};
+    error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is unknown"};
   }
   return done;
 }
@@ -216,7 +218,8 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const C
 std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
                                    const Allocate& allocate) {
   error = {};
-  // The union's members stand in the order of MessageType, from 1 on; message_types_test holds them to it.
+  // The members of the union are in the order of MessageType, from 1 on; message_types_test checks
+  // this.
   const auto number = static_cast<unsigned>(envelope.which()) + 1;
   bool known = false;
   std::optional<Message> result;
@@ -226,7 +229,7 @@ std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const Conver
     return guarded(T::kName, at, ConversionFault::malformed, error,
                    [&] { result = fromWire<T>(capnp::toAny(envelope), limits, allocate, at); });
   });
-  if (!known) error = {ConversionFault::unknownType, "type " + std::to_string(number) + " is none of ours: the peer is newer"};
+  if (!known) error = {ConversionFault::unknownType, "type " + std::to_string(number) + " is unknown: the peer is newer"};
   if (result) {
     result->setClientType(envelope.getClientType());
     result->setClientExtra(envelope.getClientExtra());

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Conversion: a message in shared memory <-> the Envelope of message.capnp, for the way to another host.
+// Conversion: between a message in shared memory and the Envelope of message.capnp, which is sent
+// to another host.
 //
-// Both directions follow the descriptions in message_types.h by name; no type has code of its own. All bits of numbers survive: NaN
-// payloads, -0.0. An enum's value that only a newer peer knows is carried on as its number.
+// Both directions use the descriptions in message_types.h by field name; no type has code of its
+// own. All bits of numbers are kept, also NaN payloads and -0.0. An unknown enum value of a newer
+// peer is kept as a number.
 //
-// Trust    a reader may hold anything. What does not fit is refused with an error that names type and field; nothing larger than the
-//          limit is allocated.
+// Threads  any number of callers at a time, each with its own messages.
+// Trust    an Envelope may contain anything. Invalid data is refused with an error that names type
+//          and field; nothing larger than the limit is allocated.
 #pragma once
 
 #include <capnp/message.h>
@@ -20,18 +23,18 @@
 namespace mpf {
 
 struct ConversionLimits {
-  std::size_t maxValueBytes = std::size_t{64} << 20;  // of an array's elements
+  std::size_t maxValueBytes = std::size_t{64} << 20;  // of the elements of an array
 
-  // For the MessageReader of one Envelope: lets through what these limits allow, little more.
+  // Options for the MessageReader of one Envelope, which permit little more than these limits.
   [[nodiscard]] capnp::ReaderOptions readerOptions() const noexcept;
 };
 
 enum class ConversionFault {
   none,
-  unknownType,  // a newer peer's message: refuse it, the connection is sound
-  tooLarge,     // above the limit: refuse it
-  unsound,      // our side's body is no such message
-  malformed,    // the peer's bytes are no such message: do not believe the rest of them either
+  unknownType,  // a message of a newer peer: refuse it and keep the connection
+  tooLarge,     // above the limit: refuse the message
+  unsound,      // the body in memory is not a valid message
+  malformed,    // the peer sent invalid data: do not use the rest of it either
 };
 
 struct ConversionError {
@@ -39,12 +42,14 @@ struct ConversionError {
   std::string text;  // "float64Array.value: 134217728 bytes, the limit is 67108864"
 };
 
-// Fills `envelope`. False: see `error`; the envelope holds half a message.
+// Fills `envelope`. Returns false with `error` set; the envelope is then incomplete.
 [[nodiscard]] bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const ConversionLimits& limits,
                              ConversionError& error);
 
-// Makes the message that `envelope` holds; arrays on the heap. nullopt: see `error`. Throws std::bad_alloc.
-//   allocate  gives the memory for an array, as allocateHeapBody() does
+// Creates the message of `envelope`.
+//   allocate  allocates the memory of an array; by default on the heap
+//   returns   nullopt with `error` set when the envelope is invalid
+//   throws    std::bad_alloc
 [[nodiscard]] std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
                                                  const std::function<BodyBytes(std::size_t)>& allocate = allocateHeapBody);
 

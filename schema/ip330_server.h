@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
-// What clients of the servers over an Acromag IP330 say and hear. Requests whose `cmd`, channel or value cannot be get status -1.
+// The messages between the servers of an Acromag IP330 and their clients. A request with an invalid
+// `cmd`, channel or value gets status -1.
 //
-//   scan     Int32 address=channel value=gain 0..3 extra=averaging time [ms], 0: the server's own   ──► value=0..0xffff, status 0 or -1
-//   config   Int32 cmd, value                                                                       ──► status; value as said below
-//   sweep    Float64 cmd, address=channel, value                                                    ──► Float64; Int32Array or Float64Array where said
-//   PID      Float64 cmd, value                                                                     ──► Float64; Float64Array where said
+//            request                                              reply
+//   scan     Int32 address=channel value=gain code 0..3           value=0..0xffff, status 0 or -1
+//            extra=averaging time [ms], 0: the server's default
+//   config   Int32 cmd, value                                     Int32 status; value as below
+//   sweep    Float64 cmd, address=channel, value                  Float64; Int32Array or Float64Array as below
+//   PID      Float64 cmd, value                                   Float64; Float64Array as below
 #pragma once
 
 #include <cstddef>
@@ -12,20 +15,24 @@
 
 namespace mpf::ip330server {
 
-// NOLINTBEGIN(readability-identifier-naming): the words of ip330, mca and std
+// NOLINTBEGIN(readability-identifier-naming): names of the EPICS modules ip330, mca and std
 
-inline constexpr std::int32_t cmdSetSecondsBetweenCalibrate = 0;  // and calibrates now, once if 0; negative: never, values are raw
+// also calibrates now; 0: only now; negative: never, values are raw
+inline constexpr std::int32_t cmdSetSecondsBetweenCalibrate = 0;
 inline constexpr std::int32_t cmdCalibrate = 1;
 inline constexpr std::int32_t cmdSetScanMode = 2;  // 0 to 5 as configIp330
-inline constexpr std::int32_t cmdSetMicrosecondsPerScan = 3;  // the reply's value is what the timer makes of it, rounded
-inline constexpr std::int32_t cmdStartConvert = 4;  // a scan, in the single modes; status -1 in others
+// the value of the reply is the time that the timer gives, rounded
+inline constexpr std::int32_t cmdSetMicrosecondsPerScan = 3;
+// starts a scan in the single modes; status -1 in others
+inline constexpr std::int32_t cmdStartConvert = 4;
 
-// A sweep's, as mca.h has them. Those that mean nothing to a sweep are accepted and do nothing.
+// Commands of a sweep, with the numbers of mca.h. Commands without a meaning for a sweep are
+// accepted and have no effect.
 inline constexpr std::int32_t msgAcquire = 0;
 inline constexpr std::int32_t msgRead = 1;  // the reply is an Int32Array: all points of the channel
 inline constexpr std::int32_t msgSetChannelAdvanceInternal = 2;
 inline constexpr std::int32_t msgSetChannelAdvanceExternal = 3;
-inline constexpr std::int32_t msgSetNChan = 4;  // points
+inline constexpr std::int32_t msgSetNChan = 4;  // number of points
 inline constexpr std::int32_t msgSetDwell = 5;  // seconds per point
 inline constexpr std::int32_t msgSetRealTime = 6;
 inline constexpr std::int32_t msgSetLiveTime = 7;
@@ -53,7 +60,7 @@ inline constexpr std::int32_t cmdSetKD = 6;
 inline constexpr std::int32_t cmdSetI = 7;
 inline constexpr std::int32_t cmdSetSecondsPerScan = 8;
 inline constexpr std::int32_t cmdSetSetPoint = 9;
-inline constexpr std::int32_t cmdGetParams = 10;  // the reply is a Float64Array of these
+inline constexpr std::int32_t cmdGetParams = 10;  // the reply is a Float64Array with these elements
 
 inline constexpr std::size_t offsetActual = 0;
 inline constexpr std::size_t offsetError = 1;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// JSON: a message as nlohmann::json, for programs that read it.
+// JSON: converts a message to nlohmann::json, for programs that read it.
 //
 //   {"type": "float64", "clientType": 0, "clientExtra": 0, "timeout": 0, ..., "value": 1.5}
 //
-// What JSON has no number for is a string: "nan", "inf", "-inf". A string of bytes has one character per byte, U+0000 to U+00FF; the bytes
-// of a user message are hexadecimal digits. A body that is no message of ours has "bytes", its size, in place of fields.
+// Values that JSON cannot express as numbers are strings: "nan", "inf", "-inf". A string of bytes
+// has one character for each byte, U+0000 to U+00FF; the bytes of a user message are hexadecimal
+// digits. An invalid body, or one of an unknown type, has "bytes", its size, in place of fields.
 #pragma once
 
 #include <cmath>
@@ -18,7 +19,7 @@ namespace mpf {
 
 namespace detail {
 
-// One character per byte, as UTF-8.
+// Converts each byte to one character, in UTF-8.
 inline std::string latin1(std::string_view bytes) {
   std::string text;
   for (const char c : bytes) {

@@ -1,14 +1,15 @@
-# The message types of MPF as they travel to another host. In shared memory they are the plain structs of message_types.h, whose
-# descriptions name these fields; a test compares the two. Numbers (@n) of published fields never change; new fields are added at the end.
+# The message types of MPF as they are sent to another host. In shared memory they are the plain
+# structs of message_types.h, whose descriptions use the same field names; a test compares the two.
+# Numbers (@n) of published fields never change; new fields are added at the end.
 @0xd3a1c6f8b0e24795;
 
 using Cxx = import "/capnp/c++.capnp";
 $Cxx.namespace("mpf::wire");
 
-# One message with what every message has. The members of the union stand in the order of mpf::MessageType, from connect = 1 on:
-# a reader that meets a discriminant it does not know has met a newer peer.
+# One message with the fields that every message has. The members of the union are in the order of
+# mpf::MessageType, from connect = 1 on. An unknown discriminant comes from a newer peer.
 struct Envelope {
-  clientType @0 :Int32;   # whatever the client put there; copied into the replies
+  clientType @0 :Int32;   # set by the client; copied into the replies
   clientExtra @1 :Int32;
   union {
     connect @2 :Connect;
@@ -25,18 +26,19 @@ struct Envelope {
 }
 
 enum ConnectStatus {
-  connectNo @0;         # no server, or it went away
+  connectNo @0;         # no server, or the server is gone
   connectYes @1;
-  connectQueueFull @2;  # the server's queue was full: a message was refused, the connection stands
-  connectRefused @3;    # the server is there and does not want this client
+  connectQueueFull @2;  # the server's queue was full: a message was refused, the client stays connected
+  connectRefused @3;    # the server does not accept this client
 }
 
 struct Connect {
   status @0 :ConnectStatus;
-  incarnation @1 :UInt64;  # which life of the server this is about; another number means that it was restarted
+  incarnation @1 :UInt64;  # identifies one life of the server; another number means that it was restarted
 }
 
-# timeout, cmd, status, address and extra are the standard fields: client and server agree on what they mean.
+# timeout, cmd, status, address and extra are the standard fields: client and server agree on their
+# meaning.
 struct Int32Value {
   timeout @0 :Int32;
   cmd @1 :Int32;
@@ -81,11 +83,11 @@ struct Char8Array {
   extra @4 :Int32;
   numberRetrys @5 :Int32;  # sic
   eomLen @6 :Int32;
-  eomString @7 :Data;      # at most 4 bytes, of which eomLen count
+  eomString @7 :Data;      # at most 4 bytes; the first eomLen of them are used
   value @8 :Data;
 }
 
-struct SerialConfig {  # 0: leave as it is
+struct SerialConfig {  # 0 in a field: keep the setting
   baud @0 :Int32;
   stopBits @1 :Int32;
   bitsPerChar @2 :Int32;
@@ -93,7 +95,7 @@ struct SerialConfig {  # 0: leave as it is
   flowControl @4 :UInt8;  # 'H', 'N'
 }
 
-struct OutOfBand {  # from a server to a client, in answer to nothing
+struct OutOfBand {  # from a server to a client, without a request
   timeout @0 :Int32;
   cmd @1 :Int32;
   status @2 :Int32;
@@ -116,5 +118,5 @@ struct RequestFate {
 }
 
 struct User {
-  value @0 :Data;  # a whole Cap'n Proto message of the user's own schema, in standard segment framing
+  value @0 :Data;  # a complete Cap'n Proto message of the user's own schema, in standard segment framing
 }

@@ -13,7 +13,7 @@ namespace {
 class HeapLender final : public BodyLender {
  public:
   void takeBack(std::byte* data, std::size_t) noexcept override {
-    std::free(data);  // NOLINT(cppcoreguidelines-no-malloc): the owner of what allocateHeapBody() gave
+    std::free(data);  // NOLINT(cppcoreguidelines-no-malloc): owner of the memory of allocateHeapBody()
   }
 };
 
@@ -41,14 +41,15 @@ Message Message::copyOf(MessageType type, std::span<const std::byte> bytes) {
 Message Message::duplicate() const {
   Message copy = copyOf(getType(), body());
   const BodyLayout layout = layoutOf(getType());
-  if (isSound() && layout.elementBytes != 0) {  // the length that was checked, whatever a peer has written there since
+  // the checked length; a peer may have changed the one in the body
+  if (isSound() && layout.elementBytes != 0) {
     std::memcpy(copy.data() + layout.lengthOffset, &state_.length, sizeof state_.length);
     copy.check();
   }
   copy.state_.clientType = state_.clientType;
   copy.state_.clientExtra = state_.clientExtra;
   copy.state_.route = state_.route;
-  copy.state_.route.keeper = nullptr;  // the first handle stays the one that owes an answer
+  copy.state_.route.keeper = nullptr;  // only the first handle reports a request that is dropped
   return copy;
 }
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Message: the one owner of a message on its way, whatever its type. MessageOf<T>: the same, with its type known.
+// Message: a handle that owns one message of any type. MessageOf<T>: a handle of a message of type T.
 //
-//   Message = | type, clientType, clientExtra | route | body: up to 32 bytes inside, or elsewhere in its lender's memory |
+//   Message = | type, clientType, clientExtra | route | body: up to 32 bytes inline, or in memory of a lender |
 //
-// Who holds the handle owns the message: sending moves it away, what is received is the receiver's. A server may change a request and
-// reply with it, or allocate another. A moved-from handle is empty. Copying does not compile; duplicate() says what it costs.
+// Sending moves the message away; a received message belongs to the receiver. A server may change a request
+// and reply with it, or allocate another message. Handles cannot be copied; duplicate() copies a message.
 //
-// Threads  a handle belongs to one thread at a time; its lender may be told from any thread.
-// Trust    a body may come from a peer that lies and goes on writing. adopt() and copyOf() check it once against its type and keep the
-//          array length that they checked; tryAs(), value() and setLength() use that, never the bytes again.
+// Threads  one at a time for a handle; the lender of the body is called by any thread.
+// Trust    a peer may write anything to a body, at any time. adopt() and copyOf() check the body once and
+//          store its array length; tryAs(), value() and setLength() use only the stored length.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,8 @@
 
 namespace mpf {
 
-// Whose memory a body is in: a link's pool, the heap. Told once per body, when its handle dies, from the thread where that happens.
+// Owner of the memory of out-of-line bodies: a link's pool, the heap. The handle that ends calls
+// takeBack() once for its body, on its own thread.
 class BodyLender {
  public:
   virtual void takeBack(std::byte* data, std::size_t capacity) noexcept = 0;
@@ -33,19 +34,19 @@ class BodyLender {
   ~BodyLender() = default;
 };
 
-// A body outside its handle, as transports pass it around. Owns nothing by itself: one of adopt() or takeBack() follows.
+// An out-of-line body, for transports. It owns nothing: pass it to adopt() or takeBack() exactly once.
 struct BodyBytes {
-  std::byte* data = nullptr;  // 8-aligned at least
-  std::size_t size = 0;       // bytes that are there
-  std::size_t capacity = 0;   // bytes that would fit
+  std::byte* data = nullptr;  // aligned to 8 bytes or more
+  std::size_t size = 0;       // bytes in use
+  std::size_t capacity = 0;   // bytes in all
   BodyLender* lender = nullptr;
 };
 
-// Memory of our own process, 64-aligned. Throws std::bad_alloc.
+// Allocates memory of this process, aligned to 64 bytes. Throws std::bad_alloc.
 [[nodiscard]] BodyBytes allocateHeapBody(std::size_t bytes);
 [[nodiscard]] BodyLender& heapLender() noexcept;
 
-// Who must know when the handle of a request dies that nobody answered. Lives longer than every handle.
+// Is told when the handle of a request is destroyed without a reply. Must outlive every handle.
 struct Route;
 class RouteKeeper {
  public:
@@ -55,18 +56,19 @@ class RouteKeeper {
   ~RouteKeeper() = default;
 };
 
-inline constexpr std::uint32_t kEndsRequest = 1;  // in the flags of what a client got: it ended its request
-// Where a reply to this message goes. For transports; copied into replies, carried through servers, never interpreted by them.
+inline constexpr std::uint32_t kEndsRequest = 1;  // in the flags of a message that a client received: it ended its request
+// Where a reply to this message goes. For transports: servers copy it into replies and do not read it.
 struct Route {
   std::uint64_t link{};
   std::uint32_t requestId{};
   std::uint32_t flags{};
-  RouteKeeper* keeper = nullptr;  // of a request only
+  RouteKeeper* keeper = nullptr;  // of requests only
 };
 
 class Message {
  public:
-  // Bodies up to this size live in the handle: all scalars do, and a pointer into them ends with the handle.
+  // Bodies up to this size, all scalars included, are in the handle; pointers to them are valid as long as
+  // the handle.
   static constexpr std::size_t kInlineBytes = 32;
 
   Message() noexcept = default;
@@ -84,17 +86,17 @@ class Message {
   Message& operator=(const Message&) = delete;
   ~Message() { giveBack(); }
 
-  // False: empty, moved away.
+  // False for an empty or moved-from handle.
   explicit operator bool() const noexcept { return state_.type != MessageType::none; }
   [[nodiscard]] MessageType getType() const noexcept { return state_.type; }
 
-  // The client's own marks; replies carry them back (manual, "Message"). Classes derived from DevMpf leave clientType alone.
+  // Marks of the client, which replies return (manual, "Message"). DevMpf uses clientType for itself.
   [[nodiscard]] std::int32_t getClientType() const noexcept { return state_.clientType; }
   void setClientType(std::int32_t type) noexcept { state_.clientType = type; }
   [[nodiscard]] std::int32_t getClientExtra() const noexcept { return state_.clientExtra; }
   void setClientExtra(std::int32_t extra) noexcept { state_.clientExtra = extra; }
 
-  // The fields, or nullptr when the message is of another type or its body is no such thing. An array's elements: valueAs().
+  // The fields; nullptr when the message is of another type or its body is invalid.
   template <MessageBody T>
   [[nodiscard]] T* tryAs() noexcept {
     return isA<T>() ? reinterpret_cast<T*>(data()) : nullptr;
@@ -115,13 +117,13 @@ class Message {
     return {reinterpret_cast<const typename T::Element*>(data() + sizeof(T)), state_.length};
   }
 
-  // False: too short for its type, misaligned, an array longer than its body, or a type that this program does not know.
+  // False when the body is too short, misaligned or shorter than its array, or the type is unknown.
   [[nodiscard]] bool isSound() const noexcept { return state_.sound; }
-  // Elements of an array, 0 for other types.
+  // Number of elements of an array; 0 for other types.
   [[nodiscard]] std::uint32_t arrayLength() const noexcept { return state_.length; }
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {data(), size()}; }
 
-  // A second message with the same type, marks, route and bytes; large bodies on the heap (std::bad_alloc).
+  // A copy with the same type, marks, route and bytes; large bodies on the heap (std::bad_alloc).
   [[nodiscard]] Message duplicate() const;
 
   // ---- for transports
@@ -129,7 +131,7 @@ class Message {
   [[nodiscard]] const Route& route() const noexcept { return state_.route; }
   void setRoute(const Route& route) noexcept { state_.route = route; }
 
-  // Takes a body over, and checks it once.
+  // Takes over a body and checks it.
   [[nodiscard]] static Message adopt(MessageType type, BodyBytes body) noexcept {
     Message message;
     message.state_.type = type;
@@ -138,9 +140,9 @@ class Message {
     message.check();
     return message;
   }
-  // Copies bytes, into the handle or onto the heap (std::bad_alloc, only above kInlineBytes), and checks the copy.
+  // Copies a body into the handle, or to the heap above kInlineBytes (std::bad_alloc), and checks the copy.
   [[nodiscard]] static Message copyOf(MessageType type, std::span<const std::byte> bytes);
-  // The same for bytes that fit into the handle, and nothing else.
+  // The same for at most kInlineBytes bytes.
   [[nodiscard]] static Message copyInline(MessageType type, std::span<const std::byte> bytes) noexcept {
     Message message;
     message.state_.type = type;
@@ -149,8 +151,7 @@ class Message {
     message.check();
     return message;
   }
-  // The same in two steps, into this handle, for the path where every copy counts: `fill` gets the kInlineBytes of the handle and
-  // writes `size` of them.
+  // The same without a copy: `fill` gets the kInlineBytes bytes of this handle and writes `size` of them.
   template <class Fill>
   void assignInline(MessageType type, std::size_t size, Fill&& fill) noexcept {
     reset();
@@ -159,17 +160,17 @@ class Message {
     fill(std::span<std::byte, kInlineBytes>(state_.at.inside));
     check();
   }
-  // Empties the handle: the body goes back.
+  // Empties the handle and returns the body to its lender.
   void reset() noexcept {
     giveBack();
     forget();
   }
-  // Who must get the body back; nullptr when it is inside the handle.
+  // Owner of an out-of-line body; nullptr for an inline body.
   [[nodiscard]] BodyLender* lender() const noexcept { return state_.isOutside() ? state_.at.body.lender : nullptr; }
   [[nodiscard]] bool isInline() const noexcept { return !state_.isOutside(); }
   // NOLINTNEXTLINE(clang-analyzer-core.uninitialized.UndefReturn): the analyzer does not follow the copy of the body word by word
   [[nodiscard]] std::size_t capacity() const noexcept { return state_.isOutside() ? state_.at.body.capacity : kInlineBytes; }
-  // Hands an outside body over and leaves the handle empty. Of a body inside the handle nothing is left: data is nullptr.
+  // Hands over an out-of-line body and empties the handle. An inline body is lost: data is nullptr.
   [[nodiscard]] BodyBytes releaseBody() noexcept {
     const BodyBytes body = state_.isOutside() ? state_.at.body : BodyBytes{};
     forget();
@@ -192,7 +193,7 @@ class Message {
     if (!isA<T>()) return 0;
     return std::min<std::size_t>((capacity() - sizeof(T)) / sizeof(typename T::Element), UINT32_MAX);
   }
-  // Sets the length here, in the header, and the size of the body. False, and nothing is changed: no room.
+  // Sets the array length and the size of the body. Returns false, and changes nothing, if there is no room.
   template <ArrayBody T>
   [[nodiscard]] bool trySetArrayLength(std::size_t length) noexcept {
     if (!isA<T>() || length > maxLength<T>()) return false;
@@ -221,11 +222,11 @@ class Message {
   struct State {
     Where at;
     Route route{};
-    std::uint32_t length = 0;  // of an array: checked, or set by us; the peer cannot reach it
+    std::uint32_t length = 0;  // of an array; checked, and not accessible to the peer
     std::int32_t clientType = 0;
     std::int32_t clientExtra = 0;
     MessageType type = MessageType::none;
-    std::uint8_t inlineSize = 0;  // kOutside: the body is elsewhere
+    std::uint8_t inlineSize = 0;  // kOutside: the body is out of line
     bool sound = false;
 
     [[nodiscard]] bool isOutside() const noexcept { return inlineSize == kOutside; }
@@ -253,7 +254,7 @@ class Message {
     const std::byte* const bytes = data();
     state_.sound = layout.headerBytes != 0 && size() >= layout.headerBytes && reinterpret_cast<std::uintptr_t>(bytes) % 8 == 0;
     if (!state_.sound || layout.elementBytes == 0) return;
-    // Read once: what a peer writes there afterwards is of no interest.
+    // Read once, since a peer may change it.
     const std::uint32_t length = *reinterpret_cast<const volatile std::uint32_t*>(bytes + layout.lengthOffset);
     state_.sound = length <= (size() - layout.headerBytes) / layout.elementBytes;
     if (state_.sound) state_.length = length;
@@ -276,7 +277,7 @@ class Message {
 };
 static_assert(sizeof(Message) <= 72);
 
-// A message whose type is known. `MessageOf(Int32{.address = 3, .value = 5})`; `Int32ArrayMessage::allocValue(1000)`.
+// A message of type T: `MessageOf(Int32{.address = 3, .value = 5})`; `Int32ArrayMessage::allocValue(1000)`.
 template <MessageBody T>
 class MessageOf : public Message {
  public:
@@ -291,21 +292,20 @@ class MessageOf : public Message {
     static_assert(sizeof(T) <= kInlineBytes);
   }
 
-  // An array with room for n elements and that length, on the heap. The fields are zero, the elements whatever the memory held.
-  // Throws std::bad_alloc.
+  // An array of n elements on the heap: fields zero, elements not initialised. Throws std::bad_alloc.
   [[nodiscard]] static MessageOf allocValue(std::size_t n)
     requires ArrayBody<T>
   {
     if (n > UINT32_MAX) refuseLength(T::kType, n, UINT32_MAX);
     return inBuffer(allocateHeapBody(bytesFor(n)), n);
   }
-  // Bytes that an array of n elements needs; what to ask a lender for.
+  // Bytes that an array of n elements needs, to be requested from a lender.
   [[nodiscard]] static constexpr std::size_t bytesFor(std::size_t n) noexcept
     requires ArrayBody<T>
   {
     return sizeof(T) + n * sizeof(typename T::Element);
   }
-  // The same in a lender's memory, built in place; n elements must fit, or the memory goes back and std::length_error says so.
+  // As allocValue() in memory of a lender; if n elements do not fit, returns it and throws std::length_error.
   [[nodiscard]] static MessageOf inBuffer(BodyBytes buffer, std::size_t n)
     requires ArrayBody<T>
   {
@@ -319,19 +319,19 @@ class MessageOf : public Message {
     message.setCount(n);
     return message;
   }
-  // The typed handle of a message; nullopt, and `message` is as it was, when it is of another type or unsound.
+  // The typed handle of a message; nullopt, with `message` unchanged, for another type or an invalid body.
   [[nodiscard]] static std::optional<MessageOf> tryFrom(Message&& message) noexcept {
     if (message.tryAs<T>() == nullptr) return std::nullopt;
     return MessageOf(std::move(message), Known{});
   }
 
-  // The fields. Not of an empty (moved-from) handle.
+  // The fields. The handle must not be empty.
   [[nodiscard]] T& operator*() noexcept { return *reinterpret_cast<T*>(data()); }
   [[nodiscard]] const T& operator*() const noexcept { return *reinterpret_cast<const T*>(data()); }
   [[nodiscard]] T* operator->() noexcept { return &**this; }
   [[nodiscard]] const T* operator->() const noexcept { return &**this; }
 
-  // The elements, getLength() of them.
+  // The elements of the array.
   [[nodiscard]] auto value() noexcept
     requires ArrayBody<T>
   {

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Message types: what the body of a message looks like in shared memory, and the one description of each type that everything else
-// (sizes, checks, printing, parsing, the wire form) is derived from.
+// Message types: the body of each type of message in shared memory, with a description of its
+// fields, from which sizes, checks, printing, parsing and the wire format are derived.
 //
 //   scalar   | Int32 |                                    fixed fields only
 //   array    | Int32Array: fields, length | value[0] | value[1] | ...      elements follow the header, 8-aligned
 //
-// Plain structs, fixed width, native byte order: both ends are on one host. Another host gets the structs of message.capnp instead.
+// The structs have fixed widths and the byte order of the host, since both ends are on one host.
+// Another host gets the structs of message.capnp instead.
 //
-// A new type is: its struct in message.capnp and a member of Envelope's union; here its number in MessageType, its struct with kType,
-// kName (the union's member) and fields() (the same names), and its place in MessageTypes. schema_test compares both sides.
+// CONTRIBUTING.md says how to add a type. schema_test compares the structs with message.capnp.
 //
-// Trust    a body may be written by a peer while we read it: a header's `length` is never an array's length, see MessageOf::value().
+// Trust    a peer may write to a body while it is read, so `length` in the header must not be used
+//          as the length of an array; use MessageOf::value().
+// Source   manual, "StandardFieldsMessage"; the names of types and fields are those of the manual.
 #pragma once
 
 #include <algorithm>
@@ -38,28 +40,31 @@ enum class MessageType : std::uint16_t {
   user = 10,
 };
 
-// What a ConnectMessage says (manual, "ConnectMessage"). Old clients compare with connectYes and take anything else for a disconnect.
+// The status of a ConnectMessage (manual, "ConnectMessage"). Old clients treat every value other
+// than connectYes as a disconnect.
 enum class ConnectStatus : std::int32_t {
-  connectNo = 0,         // no server yet, or it went away
+  connectNo = 0,         // no server yet, or the server is gone
   connectYes = 1,        // messages reach the server
-  connectQueueFull = 2,  // the server's queue was full: a message was refused, the connection stands
-  connectRefused = 3,    // the server is there and does not want this client
+  // the server's queue was full: a message was refused, the client stays connected
+  connectQueueFull = 2,
+  connectRefused = 3,    // the server does not accept this client
 };
 inline constexpr std::array<std::string_view, 4> kConnectStatusNames{"connectNo", "connectYes", "connectQueueFull", "connectRefused"};
 
-// The end of a request that gets no reply.
+// How a request without a reply ended.
 enum class Fate : std::int32_t {
   refused = 0,         // not accepted: queue full, too large, a type that the server does not take
   neverTaken = 1,      // the server went away before it took the request: nothing was done
-  outcomeUnknown = 2,  // the server took it and went away: it may have been done
+  // the server took it and then went away, or did not reply: it may have been done
+  outcomeUnknown = 2,
   expired = 3,         // its deadline passed before it was taken: nothing was done
-  cancelled = 4,       // the client took it back
+  cancelled = 4,       // the client cancelled it
 };
 inline constexpr std::array<std::string_view, 5> kFateNames{"refused", "neverTaken", "outcomeUnknown", "expired", "cancelled"};
 
-// ---- how a type describes itself
+// ---- the description of a type
 
-// A field: its name, the same in message.capnp and in texts, and where it is.
+// A field: its name, which is the same in message.capnp and in texts, and the member.
 template <class Body, class Value>
 struct Field {
   std::string_view name;
@@ -68,7 +73,7 @@ struct Field {
 template <class Body, class Value>
 Field(std::string_view, Value Body::*) -> Field<Body, Value>;
 
-// A short byte string inside the struct, of which the first `*used` bytes count.
+// A short byte string inside the struct; the member `used` is the number of bytes in use.
 template <class Body, std::size_t room>
 struct BytesField {
   std::string_view name;
@@ -84,16 +89,18 @@ constexpr auto standardFields() {
                     Field{"address", &Body::address}, Field{"extra", &Body::extra}};
 }
 
-// The elements behind an array's header are called this, in message.capnp and in texts.
+// The name of the elements of an array in message.capnp and in texts.
 inline constexpr std::string_view kValueName = "value";
 
-// ---- the types; timeout [s], cmd, status, address and extra mean what client and server agree on (manual, "StandardFieldsMessage")
+// ---- the types; client and server agree on the meaning of timeout [s], cmd, status, address and
+// extra (manual, "StandardFieldsMessage")
 
-// From MPF itself to a client: a connection was made or broken, or a queue was full.
+// Sent by MPF to a client: connected, disconnected, or a queue was full.
 struct Connect {
   ConnectStatus status{};
   std::uint32_t reserved{};
-  std::uint64_t incarnation{};  // which life of the server this is about; another number: it was restarted
+  // identifies one life of the server; another number: it was restarted
+  std::uint64_t incarnation{};
 
   static constexpr auto kType = MessageType::connect;
   static constexpr std::string_view kName = "connect";
@@ -110,7 +117,7 @@ struct Int32 {
 
 struct Int32Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
-  std::uint32_t length{};  // elements that follow; through setLength() only
+  std::uint32_t length{};  // number of elements that follow; set by setLength() only
 
   using Element = std::int32_t;
   static constexpr auto kType = MessageType::int32Array;
@@ -130,7 +137,7 @@ struct Float64 {
 
 struct alignas(8) Float64Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
-  std::uint32_t length{};  // elements that follow; through setLength() only
+  std::uint32_t length{};  // number of elements that follow; set by setLength() only
 
   using Element = double;
   static constexpr auto kType = MessageType::float64Array;
@@ -138,16 +145,17 @@ struct alignas(8) Float64Array {
   static constexpr auto fields() { return standardFields<Float64Array>(); }
 };
 
-// Bytes; no character means anything to MPF.
+// Bytes or text; MPF does not interpret them.
 struct Char8Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
-  std::uint32_t length{};  // bytes that follow; through setSize() only
+  std::uint32_t length{};  // number of bytes that follow; set by setSize() only
   std::int32_t numberRetrys{};
   std::int32_t eomLen{};
   std::array<char, 4> eomString{};
   std::uint32_t reserved{};
 
-  // The end-of-message string, never longer than its room, whatever a peer wrote into eomLen.
+  // The end-of-message string; eomLen, which a peer may have written, is limited to the size of
+  // eomString.
   [[nodiscard]] std::string_view eom() const noexcept {
     const std::int32_t used = *static_cast<const volatile std::int32_t*>(&eomLen);  // read once: a peer may change it
     return {eomString.data(), static_cast<std::size_t>(std::clamp(used, 0, static_cast<std::int32_t>(eomString.size())))};
@@ -163,7 +171,7 @@ struct Char8Array {
   }
 };
 
-// 0 in any field: leave it as it is.
+// 0 in a field: keep the setting.
 struct SerialConfig {
   std::int32_t baud{}, stopBits{}, bitsPerChar{};
   char parity{};       // 'E', 'O', 'N'
@@ -179,7 +187,7 @@ struct SerialConfig {
   }
 };
 
-// Like Int32; from a server to a client, in answer to nothing.
+// Like Int32; sent by a server to a client without a request.
 struct OutOfBand {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{}, value{};
 
@@ -188,7 +196,7 @@ struct OutOfBand {
   static constexpr auto fields() { return std::tuple_cat(standardFields<OutOfBand>(), std::tuple{Field{kValueName, &OutOfBand::value}}); }
 };
 
-// From MPF itself to a client: how a request ended that gets no reply.
+// Sent by MPF to a client: how a request without a reply ended.
 struct RequestFate {
   Fate fate{};
   std::uint32_t requestId{};
@@ -198,9 +206,10 @@ struct RequestFate {
   static constexpr auto fields() { return std::tuple{Field{"fate", &RequestFate::fate}, Field{"requestId", &RequestFate::requestId}}; }
 };
 
-// A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place. MPF forwards it and never looks inside.
+// A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place.
+// MPF forwards it without reading it.
 struct alignas(8) User {
-  std::uint32_t length{};  // bytes that follow; through setSize() only
+  std::uint32_t length{};  // number of bytes that follow; set by setSize() only
   std::uint32_t reserved{};
 
   using Element = std::byte;
@@ -216,7 +225,7 @@ static_assert(sizeof(Connect) == 16 && sizeof(Int32) == 24 && sizeof(Float64) ==
 static_assert(sizeof(OutOfBand) == 24 && sizeof(RequestFate) == 8);
 static_assert(sizeof(Int32Array) == 24 && sizeof(Float64Array) == 24 && sizeof(Char8Array) == 40 && sizeof(User) == 8);
 
-// ---- what follows from the descriptions
+// ---- derived from the descriptions
 
 template <class T>
 concept ArrayBody = requires { typename T::Element; };
@@ -230,12 +239,13 @@ template <class T>
 concept ScalarBody = MessageBody<T> && !ArrayBody<T>;
 
 template <class T>
-concept CountedInBytes = ArrayBody<T> && sizeof(typename T::Element) == 1;  // setSize; the others setLength, as the manual has it
+// has setSize(), the others setLength(), as in the manual
+concept CountedInBytes = ArrayBody<T> && sizeof(typename T::Element) == 1;
 
 template <class T>
 concept CountedInElements = ArrayBody<T> && !CountedInBytes<T>;
 
-// What a receiver must know of a type to check a body. All zero: a type that this program does not know.
+// The sizes that are needed to check a body. All are zero for an unknown type.
 struct BodyLayout {
   std::uint32_t headerBytes = 0;
   std::uint32_t elementBytes = 0;  // 0: not an array
@@ -273,7 +283,7 @@ inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
   return at < detail::kLayouts.size() ? detail::kLayouts[at] : detail::kUnknownLayout;
 }
 
-// The name of a type, a status, a fate; "unknown" when a newer peer said something that this program does not know.
+// The name of a type, a status or a fate; "unknown" for a value of a newer peer.
 [[nodiscard]] constexpr std::string_view toString(MessageType type) noexcept { return layoutOf(type).name; }
 [[nodiscard]] constexpr std::string_view toString(ConnectStatus status) noexcept {
   const auto at = static_cast<std::size_t>(status);

@@ -1,10 +1,13 @@
-# What routers say to each other over one TCP connection (or TLS over it). docs/wire-format.md says when, and what each side must do.
+# The protocol between two routers over one TCP connection, with or without TLS. docs/wire-format.md
+# says when each item is sent and what each side must do.
 #
-# The side that connected is the client router: it has clients. The side that accepted is the server router: it has servers.
-# Each side sends Frames, one standard Cap'n Proto stream frame each, unpacked. The first one of each side holds its greeting and nothing else.
+# The side that connected is the client router: it has clients. The side that accepted is the server
+# router: it has servers. Each side sends Frames, each in a standard Cap'n Proto stream frame, not
+# packed. The first Frame of each side has its greeting and nothing else.
 #
-# Versions: the same major version, or the greeting ends the connection. Within it new fields and new kinds of items are added at the
-# end; a reader ignores an item whose kind it does not know. Published numbers never change.
+# Versions: routers of different major versions end the connection after the greeting. Within a
+# major version new fields and new kinds of items are added at the end; a reader ignores an item of
+# an unknown kind. Published numbers never change.
 @0xe5b2d0a94c7f1683;
 
 using Cxx = import "/capnp/c++.capnp";
@@ -15,43 +18,43 @@ const protocolMajor :UInt16 = 1;
 const protocolMinor :UInt16 = 0;
 
 struct Frame {
-  items @0 :List(Item);  # in order; what happened first stands first
+  items @0 :List(Item);  # in the order in which they happened
 }
 
 struct Item {
   union {
-    none @0 :Void;          # nothing; says that its sender lives, as every frame does
-    greeting @1 :Greeting;  # both, first
-    farewell @2 :Farewell;  # both, last
-    ping @3 :Ping;          # both
-    pong @4 :Ping;          # both: a ping sent back as it was
+    none @0 :Void;          # no content; a sign of life, as every frame is
+    greeting @1 :Greeting;  # sent by both, first
+    farewell @2 :Farewell;  # sent by both, last
+    ping @3 :Ping;          # sent by both
+    pong @4 :Ping;          # sent by both: the answer to a ping, with the same stamp
 
-    bind @5 :Bind;          # client router: tell me of this server
-    unbind @6 :UInt32;      # client router: binding; no more of it, all its clients are gone
-    server @7 :Server;      # server router: the server of a binding is there, or not
+    bind @5 :Bind;          # client router: asks for the state of a server and its changes
+    unbind @6 :UInt32;      # client router: closes a binding (its number) and all its clients
+    server @7 :Server;      # server router: the state of the server of a binding
 
-    open @8 :Open;          # client router: one more client of a binding
-    close @9 :UInt32;       # client router: client; it is gone
-    refuse @10 :Refusal;    # server router: the client cannot be; each of its requests will end as refused
+    open @8 :Open;          # client router: opens a client of a binding
+    close @9 :UInt32;       # client router: closes a client (its number)
+    refuse @10 :Refusal;    # server router: the server does not accept the client; all its requests end as refused
 
     request @11 :Request;   # client router
     reply @12 :Reply;       # server router
-    fate @13 :RequestEnd;   # server router: a request that gets no reply
-    queueFull @14 :UInt32;  # server router: client; a request of it found the server's queue full, and ends as refused
-    credit @15 :Credit;     # client router: so much of the replies was taken
+    fate @13 :RequestEnd;   # server router: ends a request that gets no reply
+    queueFull @14 :UInt32;  # server router: a request of this client was refused, since the server's queue was full
+    credit @15 :Credit;     # client router: bytes of replies that the client has taken
   }
 }
 
 struct Greeting {
   protocolMajor @0 :UInt16;
   protocolMinor @1 :UInt16;
-  router @2 :Text;            # what people call the sender
+  router @2 :Text;            # the name of the sender, for people
   program @3 :Text;           # "mpf-router 0.1.0"
-  incarnation @4 :UInt64;     # which life of the sender
-  locations @5 :List(Int32);  # server router: those that it serves
-  maxFrameBytes @6 :UInt64;   # the longest frame that the sender of this reads, with its segment table
-  maxMessageBytes @7 :UInt64; # the largest body of a message that it takes
-  deadTimeMs @8 :UInt32;      # it cuts a connection on which it hears nothing for so long
+  incarnation @4 :UInt64;     # identifies one life of the sender
+  locations @5 :List(Int32);  # server router: the locations that it serves
+  maxFrameBytes @6 :UInt64;   # the longest frame that the sender reads, segment table included
+  maxMessageBytes @7 :UInt64; # the largest body of a message that the sender accepts
+  deadTimeMs @8 :UInt32;      # the sender ends a connection that is silent for this time
   maxClients @9 :UInt32;      # server router: clients that may be open at once
 }
 
@@ -59,17 +62,17 @@ struct Farewell {
   reason @0 :Text;  # for people
   code @1 :Code;
   enum Code {
-    stopping @0;     # the router ends, or its configuration does not name the peer any more
+    stopping @0;     # the router ends, or its configuration no longer names the peer
     version @1;      # another major version
-    protocol @2;     # the peer sent what cannot be
+    protocol @2;     # the peer sent invalid data
     limit @3;        # the peer sent more than the greeting allows
-    silence @4;      # the peer was not heard of for too long
+    silence @4;      # the peer was silent for too long
     notAllowed @5;   # this peer may not connect
   }
 }
 
 struct Ping {
-  stamp @0 :UInt64;  # the sender's own
+  stamp @0 :UInt64;  # chosen by the sender
 }
 
 struct Bind {
@@ -81,23 +84,23 @@ struct Bind {
 struct Server {
   binding @0 :UInt32;
   state @1 :State;
-  incarnation @2 :UInt64;      # there: which life of the server
-  queueSize @3 :UInt32;        # there: requests of one client that may wait
-  maxMessageBytes @4 :UInt64;  # there: of a request or a reply
-  reason @5 :Text;             # absent, refused: why, for people
-  maxOutstanding @6 :UInt32;   # there: requests of one client that may be unanswered
+  incarnation @2 :UInt64;      # there: identifies one life of the server
+  queueSize @3 :UInt32;        # there: requests of one client that the server has not taken, at most
+  maxMessageBytes @4 :UInt64;  # there: limit of a request or a reply
+  reason @5 :Text;             # absent, refused: the reason, for people
+  maxOutstanding @6 :UInt32;   # there: unanswered requests of one client, at most
   enum State {
-    absent @0;   # not there; `server` comes again when that changes. All its clients are closed by this
+    absent @0;   # closes all clients of the binding; `server` follows again when the state changes
     there @1;
-    refused @2;  # this peer may not bind to it; the binding is closed by this
+    refused @2;  # this peer may not bind to the server; closes the binding
   }
 }
 
 struct Open {
   client @0 :UInt32;   # a new number, chosen by the client router
   binding @1 :UInt32;
-  incarnation @2 :UInt64;  # of the server that it is meant for; if that is another one by now, it is closed as if it had gone
-  window @3 :UInt32;       # bytes of replies that may be on their way; see Credit
+  incarnation @2 :UInt64;  # of the server; if another one is there by now, each request ends as neverTaken
+  window @3 :UInt32;       # bytes of replies that may be under way; see Credit
 }
 
 struct Refusal {
@@ -107,7 +110,7 @@ struct Refusal {
 
 struct Request {
   client @0 :UInt32;
-  requestId @1 :UInt32;       # not 0; differs from those of unanswered requests modulo the power of two from Server.maxOutstanding on
+  requestId @1 :UInt32;       # not 0; docs/wire-format.md says which ids are valid together
   takeWithinNs @2 :UInt64;    # not 0: a request that the server has not taken by then ends as expired
   message @3 :Message.Envelope;
 }
@@ -115,7 +118,7 @@ struct Request {
 struct Reply {
   client @0 :UInt32;
   requestId @1 :UInt32;
-  isFirst @2 :Bool;  # it ends the request; of each request exactly one reply or fate does
+  isFirst @2 :Bool;  # ends the request; each request ends in exactly one reply or fate
   message @3 :Message.Envelope;
 }
 

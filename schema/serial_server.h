@@ -1,28 +1,34 @@
 // SPDX-License-Identifier: MIT
-// What clients of a serial server say and hear (manual, "serialServer"). The numbers are ours: no public source tells the original's.
+// The commands and statuses of serial servers (manual, "serialServer"). The numbers are those of
+// this project; no public source gives the original ones.
 //
-// A server that ends answers the request that is on the line with serialServerStatusError; those that it has not taken yet end as
-// `neverTaken`, and nothing of them was sent. How to listen to the line: serial_sniff.h.
+// When a server ends, the request that is on the line gets serialServerStatusError. Requests that
+// it has not taken end as `neverTaken`, and nothing of them was sent. serial_sniff.h describes how
+// to listen to the line.
 #pragma once
 
 #include <cstdint>
 
 namespace mpf::serial {
 
-// NOLINTBEGIN(readability-identifier-naming): the manual's words
+// NOLINTBEGIN(readability-identifier-naming): names of the manual
 
-// `cmd` of a Char8ArrayMessage: one command and any options.
+// `cmd` of a Char8ArrayMessage: one command, OR-ed with any options.
 inline constexpr std::int32_t cmdRead = 1;
 inline constexpr std::int32_t cmdWrite = 2;
 inline constexpr std::int32_t cmdWriteRead = cmdRead | cmdWrite;  // input is enabled before the first byte is sent
 inline constexpr std::int32_t cmdCommandMask = 0xf;
-inline constexpr std::int32_t cmdFlush = 0x10;                // drop what was received before
-inline constexpr std::int32_t cmdStartCircularBuffer = 0x20;  // keep what is received while nobody reads
+// first drop all bytes that were received before
+inline constexpr std::int32_t cmdFlush = 0x10;
+// store bytes that are received outside of reads
+inline constexpr std::int32_t cmdStartCircularBuffer = 0x20;
 inline constexpr std::int32_t cmdStopCircularBuffer = 0x40;
-inline constexpr std::int32_t cmdSetEom = 0x80;               // eomLen and eomString are the end of message from now on, for all clients
+// eomLen and eomString set the end of message, for all clients
+inline constexpr std::int32_t cmdSetEom = 0x80;
 inline constexpr std::int32_t cmdTimeoutMilliseconds = 0x100;  // `timeout` is in milliseconds, not in seconds
 
-// `status` of the reply. Whatever was read is in it, the end of message included, whatever the status.
+// `status` of the reply. With any status, the reply has all bytes that were read, end of message
+// included.
 inline constexpr std::int32_t serialServerStatusOK = 0;
 inline constexpr std::int32_t serialServerStatusTimeout = 1;
 inline constexpr std::int32_t serialServerStatusOverflow = 2;  // the answer is longer than the buffer, or the UART's buffer overflowed

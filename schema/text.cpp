@@ -69,7 +69,7 @@ struct Printer {
   void add(std::string_view name, std::string_view value) const { line.append(" ").append(name).append("=").append(value); }
 };
 
-// ---- parsing. Each returns an empty string, or what was expected.
+// ---- parsing: each function returns an empty string, or a description of what was expected
 
 using Expected = std::string;
 
@@ -177,7 +177,7 @@ struct Marks {
 };
 constexpr std::tuple kMarks{Field{"clientType", &Marks::clientType}, Field{"clientExtra", &Marks::clientExtra}};
 
-// Looks for the field `name`; nullopt when there is none.
+// Finds the field `name`; nullopt when the type has no such field.
 template <class Body, class Fields>
 std::optional<Expected> tryParseField(Body& body, const Fields& fields, std::string_view name, std::string_view text) {
   std::optional<Expected> found;
@@ -320,7 +320,7 @@ std::string typeNames() {
 }
 
 std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error) {
-  error = "type " + std::to_string(static_cast<unsigned>(type)) + " is none of ours";
+  error = "type " + std::to_string(static_cast<unsigned>(type)) + " is unknown";
   std::optional<Message> message;
   withType(type, [&]<class T>(std::type_identity<T>) { return (message = parseAs<T>(words, error)).has_value(); });
   if (message) error.clear();

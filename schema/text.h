@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Text: a message as one line that a person reads, and words that a person types as a message.
+// Text: prints a message as one line, and creates a message from words that a person types.
 //
 //   int32Array timeout=0 cmd=2 status=0 address=3 extra=0 value=1,2,3
 //   char8Array timeout=1 ... eomLen=2 eomString="\r\n" value="*IDN?"
 //
-// Bytes are written as C strings, with \xHH of exactly two digits; those of a user message as hexadecimal digits. What print() wrote in
-// full, tryParse() reads back (a NaN loses its payload).
+// Bytes are written as C strings, with \xHH of exactly two digits; those of a user message as
+// hexadecimal digits. tryParse() reads everything that print() has written in full (a NaN loses its
+// payload).
+//
+// Threads  any number of callers at a time.
 #pragma once
 
 #include <cstddef>
@@ -19,30 +22,31 @@
 
 namespace mpf {
 
-// One line. An array of more than maxElements ends in ",... (5000)"; a body that is none says so. clientType and clientExtra are shown
-// unless 0.
+// Prints a message as one line. An array of more than maxElements ends in ",... (5000)"; an invalid
+// body is reported as such. clientType and clientExtra are shown unless they are 0.
 [[nodiscard]] std::string print(const Message& message, std::size_t maxElements = 16);
 
-// The type of that name; nullopt for a name that is none.
+// Returns the type with this name; nullopt for an unknown name.
 [[nodiscard]] std::optional<MessageType> tryParseType(std::string_view name) noexcept;
 
-// "connect, int32, int32Array, ..." for messages to the user.
+// The names of all types for messages to the user: "connect, int32, int32Array, ...".
 [[nodiscard]] std::string typeNames();
 
-// Makes a message from words `field=value`; fields not named are 0, arrays empty.
+// Creates a message from words of the form `field=value`; other fields are 0, arrays empty.
 //
-//   words     integers decimal, or hexadecimal as bits: 0xffffffff is -1 of 32 bits; numbers as strtod; statuses by name; characters as
-//             themselves or escaped; `value=1,2,3`; strings C-escaped, quotes around them optional; eomString sets eomLen too
+//   words     integers are decimal, or hexadecimal bit patterns (0xffffffff is -1 in 32 bits);
+//             numbers as for strtod; statuses by name; characters plain or escaped; arrays as
+//             `value=1,2,3`; strings C-escaped, with or without quotes; eomString also sets eomLen
 //   error     "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, clientType, clientExtra"
 //   returns   nullopt with `error` set
 [[nodiscard]] std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error);
 
 // C-escapes bytes, without quotes: "\r\n", "\x00".
 [[nodiscard]] std::string escape(std::string_view bytes);
-// The inverse; nullopt for a backslash that starts nothing known.
+// The inverse of escape(); nullopt for an unknown escape sequence.
 [[nodiscard]] std::optional<std::string> tryUnescape(std::string_view text);
 
-// The shortest text that reads back as the same number; nan, inf, -inf.
+// Returns the shortest text that reads back as the same number; nan, inf, -inf.
 [[nodiscard]] std::string printNumber(double value);
 
 }  // namespace mpf

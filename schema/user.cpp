@@ -11,7 +11,7 @@ auto wordsOf(std::span<Byte> bytes) {
   return kj::ArrayPtr<Word>(reinterpret_cast<Word*>(bytes.data()), bytes.size() / sizeof(capnp::word));
 }
 
-// Everything behind the segment table, zeroed.
+// The memory after the segment table, filled with zeroes.
 kj::ArrayPtr<capnp::word> segmentOf(UserMessage& message) {
   message.setSize(message.getMaxSize() / sizeof(capnp::word) * sizeof(capnp::word));
   const auto bytes = message.value();
@@ -26,7 +26,8 @@ UserBuilder::UserBuilder(UserMessage message) : message_(std::move(message)), bu
 
 UserMessage UserBuilder::finish() && {
   const auto words = static_cast<std::uint32_t>(builder_.getSegmentsForOutput()[0].size());
-  std::array<std::uint8_t, 8> table{};  // one segment (count less one), its words; little-endian
+  // number of segments less one, then the words of the segment; little-endian
+  std::array<std::uint8_t, 8> table{};
   for (std::size_t i = 0; i < 4; ++i) table[4 + i] = static_cast<std::uint8_t>(words >> 8 * i);
   std::memcpy(message_.value().data(), table.data(), table.size());
   message_.setSize((words + std::size_t{1}) * sizeof(capnp::word));

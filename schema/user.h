@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// User messages: a Cap'n Proto struct of the user's own schema, in standard segment framing, inside a UserMessage.
+// UserBuilder, UserReader: build and read a UserMessage, which has a Cap'n Proto struct of the
+// user's own schema in standard segment framing.
 //
-//   | User | segment table (1 word) | segment |          MPF and its routers forward these bytes and never look inside
+//   | User | segment table (1 word) | segment |          MPF and its routers forward these bytes unread
 //
 //   mpf::UserBuilder builder(mpf::UserMessage::allocValue(4096));      // or in a link's pool: UserMessage::inBuffer
 //   builder.initRoot<Spectrum>().setGain(3);
@@ -10,7 +11,9 @@
 //   mpf::UserReader reader(message);
 //   auto spectrum = reader.getRoot<Spectrum>();
 //
-// Trust    Cap'n Proto checks what it reads, but not against a peer that changes it meanwhile: read a duplicate() of such a peer's message.
+// Threads  one at a time.
+// Trust    Cap'n Proto checks what it reads, but a peer may change the bytes after the check: read
+//          a duplicate() of a message from a peer that is not trusted.
 #pragma once
 
 #include <capnp/message.h>
@@ -20,17 +23,18 @@
 
 namespace mpf {
 
-// Builds in place, in one segment. More than the message has room for: kj::Exception from the setter that needed it.
+// Builds in place, in one segment. A setter throws kj::Exception when the message has no room.
 class UserBuilder {
  public:
-  // Zeroes the whole room, as Cap'n Proto needs it.
+  // Fills the memory of the message with zeroes, as Cap'n Proto requires.
   explicit UserBuilder(UserMessage message);
 
   template <class Root>
   typename Root::Builder initRoot() {
     return builder_.initRoot<Root>();
   }
-  // The message, its size what was built. The builders of its structs are dead afterwards.
+  // Returns the message, with the size that was used. The builders of its structs are invalid
+  // afterwards.
   [[nodiscard]] UserMessage finish() &&;
 
  private:
@@ -41,7 +45,8 @@ class UserBuilder {
 // Copies any Cap'n Proto message into a UserMessage on the heap.
 [[nodiscard]] UserMessage toUserMessage(capnp::MessageBuilder& builder);
 
-// Reads in place; throws kj::Exception when the bytes are no Cap'n Proto message. The UserMessage must outlive it.
+// Reads in place. The UserMessage must outlive this object.
+//   throws  kj::Exception when the bytes are not a Cap'n Proto message
 class UserReader : public capnp::FlatArrayMessageReader {
  public:
   explicit UserReader(const UserMessage& message, capnp::ReaderOptions limits = {});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Visiting: runs code for a message's type, or for each of its fields, from the descriptions in message_types.h.
+// withType(), visitFields(): run code for the type of a message, or for each of its fields, using
+// the descriptions in message_types.h.
 #pragma once
 
 #include <span>
@@ -11,7 +12,8 @@
 
 namespace mpf {
 
-// Calls act(std::type_identity<T>{}) for the type with this number and returns what it returned; false for a number that is none.
+// Calls act(std::type_identity<T>{}) for the type with this number and returns its result; false
+// for an unknown number.
 template <class Act>
 bool withType(MessageType type, Act&& act) {
   return [&]<class... T>(std::type_identity<std::tuple<T...>>) {
@@ -35,11 +37,12 @@ void visitField(const Body& body, const BytesField<Body, room>& field, Visit&& v
 
 }  // namespace detail
 
-// Calls visit(name, value) for each field of a message and at last for an array's elements. False: unknown type or unsound body.
+// Calls visit(name, value) for each field of a message and then for the elements of an array.
 //
-//   value   std::int32_t, std::uint32_t, std::uint64_t, double, char, ConnectStatus, Fate, std::string_view (the used bytes of a short
-//           string), std::span<const Element>
-//   trust   fields are visited in a private copy; elements stand where they are
+//   value    std::int32_t, std::uint32_t, std::uint64_t, double, char, ConnectStatus, Fate,
+//            std::string_view (the used bytes of a short string), std::span<const Element>
+//   returns  false for an unknown type or an invalid body
+//   trust    fields are visited in a private copy, elements in the memory of the message
 template <class Visit>
 bool visitFields(const Message& message, Visit&& visit) {
   return withType(message.getType(), [&]<class T>(std::type_identity<T>) {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
-// WirePlaces: where the fields of a message type are in its Cap'n Proto struct, found by name in the schema, once.
+// WirePlaces: the places of the fields of a message type in its Cap'n Proto struct; looked up in
+// the schema by name, once.
 //
-//   struct = | data section: numbers at multiples of their size | pointers |          a union's member: its number, its pointer
+//   struct = | data section: numbers at multiples of their size | pointers |          a union member: a number and a pointer
 //
-// Setting a field by its place costs a store. By name, for each message anew, it cost a microsecond (docs/decisions/0014-router.md).
+// Setting a field by its place costs a store; looking it up by name costs a microsecond for each
+// message.
 //
-// Threads  any.
-// Trust    a struct of another version may be shorter: what is not there is zero, which is every field's default in message.capnp.
+// Threads  any number of callers at a time.
+// Trust    a struct of another version may be shorter: missing fields read as zero, the default of
+//          every field in message.capnp.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +27,7 @@ namespace mpf {
 
 [[nodiscard]] inline kj::StringPtr toKj(std::string_view literal) { return {literal.data(), literal.size()}; }
 
-// Numbers of a data section: little-endian, whatever the host is.
+// Access to numbers of a data section, which are little-endian on every host.
 template <class Value>
 void storeLittle(kj::ArrayPtr<kj::byte> data, std::size_t at, Value value) {
   auto bytes = std::bit_cast<std::array<kj::byte, sizeof(Value)>>(value);
@@ -40,7 +43,7 @@ template <class Value>
   return std::bit_cast<Value>(bytes);
 }
 
-// How a value of ours travels.
+// The type that represents a value in the Cap'n Proto struct.
 template <class Value>
 struct Travels {
   using As = Value;
@@ -55,7 +58,7 @@ struct Travels<char> {
   using As = std::uint8_t;
 };
 
-// Of the struct of one type, and of its member in Envelope's union.
+// The places in the struct of one type, and of its member in the union of Envelope.
 template <class T>
 class WirePlaces {
  public:
@@ -66,13 +69,13 @@ class WirePlaces {
     return places;
   }
 
-  std::size_t whichAt = 0;     // of the union's number, in bytes of the envelope's data section
-  std::uint16_t which = 0;     // this type's
-  capnp::uint memberAt = 0;    // of its pointer
+  std::size_t whichAt = 0;     // place of the union's number: byte of the envelope's data section
+  std::uint16_t which = 0;     // the number of this type
+  capnp::uint memberAt = 0;    // index of the member's pointer
   std::uint16_t dataWords = 0;
   std::uint16_t pointers = 0;
-  std::array<std::size_t, kFields> fields{};  // bytes of the data section, or index of the pointer
-  capnp::uint value = 0;                      // of an array's elements: index of the pointer
+  std::array<std::size_t, kFields> fields{};  // byte of the data section, or index of the pointer
+  capnp::uint value = 0;                      // elements of an array: index of the pointer
 
  private:
   using Proto = capnp::schema::Field::Reader;

@@ -6,11 +6,11 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint16_t kOnes = 0xffff;  // nothing answers, or it is code 4095
+constexpr std::uint16_t kOnes = 0xffff;  // no module answers, or the code is 4095
 
 bool isChannel(int channel) noexcept { return channel >= 0 && channel < Dac128v::kChannels; }
 std::size_t offsetOf(std::size_t channel) noexcept { return channel * 2; }
-// The upper four bits are not wired to anything that keeps them.
+// The module does not store the upper four bits; they read as anything.
 int codeIn(std::uint16_t word) noexcept { return word & Dac128v::kMaxCode; }
 
 }  // namespace
@@ -20,13 +20,13 @@ const char* toString(Dac128vStatus status) noexcept {
     case Dac128vStatus::success:
       return "success";
     case Dac128vStatus::noChannel:
-      return "there is no such channel: they are 0 to 7";
+      return "no such channel; channels are 0 to 7";
     case Dac128vStatus::outOfRange:
       return "out of range: codes are 0 to 4095";
     case Dac128vStatus::readBackDiffers:
       return "the register does not hold what was written";
     case Dac128vStatus::gone:
-      return "nothing answers, or another module does";
+      return "the module is absent, or another module is in its place";
   }
   return "unknown";
 }
@@ -50,13 +50,16 @@ std::optional<int> Dac128v::tryRead(int channel) noexcept {
   return word == kOnes && !module_.problem().empty() ? std::nullopt : std::optional(codeIn(word));
 }
 
-// Whether it may be written to. What is not as it was left may be another module, or this one after a reset: then its outputs come first.
+// Returns whether the module may be written to. A register that has changed by itself means another
+// module, or this one after a reset; after a reset the outputs are restored first.
 bool Dac128v::isReady() noexcept {
   if (holdsWhatWasWritten()) return true;
   return module_.problem().empty() && tryRestore();
 }
 
-// One channel tells: best one that is not where power-up leaves it, nor all ones. Where none was written, nothing can be said.
+// Checks one channel that was written: preferably one whose code is neither the power-up code nor
+// all ones, since a reset or an absent module would not change that reading. Without a written
+// channel the result is false.
 bool Dac128v::holdsWhatWasWritten() noexcept {
   auto found = std::ranges::find_if(written_, [](const auto& code) { return code && *code != kPowerUpCode && *code != kMaxCode; });
   if (found == written_.end()) found = std::ranges::find_if(written_, [](const auto& code) { return code && *code != kPowerUpCode; });
@@ -66,7 +69,7 @@ bool Dac128v::holdsWhatWasWritten() noexcept {
   return word != kOnes && *found == codeIn(word);
 }
 
-// Gives the channels what was written to them. False: it is gone again.
+// Writes the last code of each channel again. Returns false when the module is gone again.
 bool Dac128v::tryRestore() noexcept {
   bool isNews = false;
   for (std::size_t channel = 0; channel < written_.size(); ++channel) {
@@ -75,13 +78,13 @@ bool Dac128v::tryRestore() noexcept {
     isNews = true;
     const auto held = writeAndReadBack(channel, *code);
     if (!held) return false;
-    if (held != code) code.reset();  // the register is broken: it is not asked again whether there was a reset
+    if (held != code) code.reset();  // the register is broken and can no longer show a reset
   }
   if (isNews) restorations_.fetch_add(1, std::memory_order_relaxed);
   return true;
 }
 
-// What the register holds then; empty: it is gone.
+// Returns the code that the register then holds; nullopt when the module is gone.
 std::optional<int> Dac128v::writeAndReadBack(std::size_t channel, int code) noexcept {
   registers_.write16(offsetOf(channel), static_cast<std::uint16_t>(code));
   const auto word = registers_.read16(offsetOf(channel));

@@ -6,7 +6,8 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint16_t kNotKept = 0xf000;  // bits that nothing drives; the carrier pulls them up
+// bits that the module does not drive; the carrier pulls them up
+constexpr std::uint16_t kNotKept = 0xf000;
 
 }  // namespace
 

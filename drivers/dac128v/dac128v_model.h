@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Dac128vModel: a Systran DAC128V that is not there.
+// Dac128vModel: device model of a Systran DAC128V.
 //
-//   Dac128vModel model({.onVolts = [](int channel, double volts) { ... }});
+//   Dac128vModel model({}, [](int channel, double volts) { ... });
 //
 // Threads  as DeviceModel.
 #pragma once
@@ -17,7 +17,8 @@ namespace mpf {
 
 class Dac128vModel final : public DeviceModel {
  public:
-  // Told of what an output gives: of each channel at power-up, and then at each write, in their order. It must not touch the model.
+  // Called with the voltage of an output: for each channel at power-up, then at each write, in
+  // order. The model is locked during the call, so the function must not call it.
   using OnVolts = std::function<void(int channel, double volts)>;
 
   explicit Dac128vModel(const Dac128vRanges& ranges = {}, OnVolts onVolts = {});
@@ -25,9 +26,10 @@ class Dac128vModel final : public DeviceModel {
   std::uint16_t read(Space space, std::size_t offset, Lanes lanes) override;
   void write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) override;
 
-  // What an output gives now.
+  // Returns the voltage [V] of an output. `channel` is 0 to 7.
   [[nodiscard]] double volts(int channel) const;
-  // Bits of a channel's register that are stuck at 0: a fault.
+  // Simulates a fault: these bits of the channel's register are stuck at 0.
+  //   throws  std::out_of_range unless channel is 0 to 7
   void setStuck(int channel, std::uint16_t bits);
 
  private:

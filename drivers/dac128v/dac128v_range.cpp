@@ -29,7 +29,7 @@ Dac128vRange parseOne(const std::string& text) {
     const auto high = tryReference(std::string_view(text).substr(to + 2));
     if (low && high && *low < *high) return {*low, *high};
   }
-  throw std::invalid_argument("\"" + text + "\" is no range; use LOWtoHIGH of -10, -5, 0, 5 and 10, as in -10to10");
+  throw std::invalid_argument("\"" + text + "\" is not an output range; use LOWtoHIGH with -10, -5, 0, 5 or 10 V, for example -10to10");
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 namespace word = digital_io_word;
 
-// Of a line that moves all the time: the rest is for the next interrupt.
+// Limits the work for a line that changes all the time; the next interrupt continues.
 constexpr int kMaxLooks = 8;
 constexpr std::uint16_t kMaxVector = 255;
 
@@ -24,11 +24,12 @@ class NoInterrupt final : public Interrupt {
 
 const DigitalIoKind& kindOf(const IndustryPackModule& module) {
   const auto* const kind = findDigitalIoKind(module.idProm().manufacturer, module.idProm().model);
-  if (kind == nullptr) throw std::invalid_argument(module.where() + " is no module of digital lines");
+  if (kind == nullptr) throw std::invalid_argument(module.where() + " is not a supported module of digital lines");
   return *kind;
 }
 
-// Bits of a register that are not after power-up what setUp() makes of them. No bits: there is nothing to set up but outputs.
+// Bits of a register whose value after setUp() differs from that after power-up; they show a reset.
+// No bits: setUp() writes nothing but outputs.
 struct Telling {
   std::size_t word = 0;
   std::uint16_t bits = 0;
@@ -53,17 +54,17 @@ const char* toString(DigitalIoStatus status) noexcept {
     case DigitalIoStatus::success:
       return "success";
     case DigitalIoStatus::noSuchBits:
-      return "this model has no such outputs";
+      return "this model has no outputs at some of these bits";
     case DigitalIoStatus::outOfRange:
       return "out of range: a threshold is 0 to 4095";
     case DigitalIoStatus::noThreshold:
-      return "this model's inputs have no threshold to set";
+      return "the inputs of this model have no threshold";
     case DigitalIoStatus::noInterrupts:
       return "interrupts are not used";
     case DigitalIoStatus::readBackDiffers:
       return "the register does not hold what was written";
     case DigitalIoStatus::gone:
-      return "nothing answers, or another module does";
+      return "the module is absent, or another module is in its place";
   }
   return "unknown";
 }
@@ -86,7 +87,7 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
   threadOptions.pollEvery = options.pollEvery;
   thread_ = std::make_unique<InterruptThread>(usesInterrupts_ ? module.interrupt(0) : *noInterrupt_, threadOptions,
                                               [this](InterruptThread::Cause cause) { return serve(cause); });
-  // PAIR(dio-thread): it is complete.
+  // PAIR(dio-thread): the thread object is complete.
   running_.store(thread_.get(), std::memory_order_release);
 }
 
@@ -96,11 +97,12 @@ DigitalIo::~DigitalIo() {
   if (usesInterrupts_ && state_.isThere && module_.problem().empty()) registers_.write(word::kInterruptEnable, kind_.inputs, 0);
 }
 
-// Puts the module in order; outputs that were never written stay. False: it is not there, or another one is, and nothing was written.
+// Programs the module; outputs that were never written keep their values. Returns false, and writes
+// nothing, when the module is absent or replaced.
 bool DigitalIo::setUp() {
   state_.isThere = module_.problem().empty();
   if (!state_.isThere) return false;
-  restoreOutputs();  // before anything drives them
+  restoreOutputs();  // before the drivers are switched on
   registers_.setUp(threshold_);
   if (usesInterrupts_) {
     registers_.write(word::kInterruptEnable, kind_.inputs, 0);
@@ -110,10 +112,10 @@ bool DigitalIo::setUp() {
   if (usesInterrupts_) {
     polarity_ = armed();
     registers_.write(word::kPolarity, kind_.inputs, polarity_);
-    registers_.write(word::kPending, kind_.inputs, kind_.inputs);  // edges of the time before
+    registers_.write(word::kPending, kind_.inputs, kind_.inputs);  // clears edges from before
     registers_.write(word::kInterruptEnable, kind_.inputs, edges());
     bool hadEdges = false;
-    followInputs(hadEdges);  // what moved meanwhile
+    followInputs(hadEdges);  // finds inputs that have changed meanwhile
   }
   marks_ = readMarks();
   return true;
@@ -135,7 +137,7 @@ DigitalIo::Marks DigitalIo::readMarks() {
           .enables = registers_.read(word::kOutputEnable, enables) & enables};
 }
 
-// Before something is written: what is not as it was left may be another module.
+// Called before a write: a register that has changed by itself may be that of another module.
 bool DigitalIo::isReady() {
   if (!state_.isThere || readMarks() != marks_) tend();
   return state_.isThere;
@@ -151,12 +153,13 @@ DigitalIoStatus DigitalIo::tryWriteBits(std::uint32_t mask, std::uint32_t bits) 
   const auto readBack = registers_.read(word::kOutput, mask);
   if (mask != 0 && DigitalIoRegisters::isAllOnes(readBack, mask) && !module_.problem().empty()) return DigitalIoStatus::gone;
   if (((readBack ^ after) & mask) != 0) {
-    writtenMask_ &= ~mask;  // nobody knows what they are to be
+    writtenMask_ &= ~mask;  // their values are unknown now, so they are not restored
     writtenBits_ &= ~mask;
     marks_ = readMarks();
     return DigitalIoStatus::readBackDiffers;
   }
-  // Who writes a line means it to be an output, for ever; only now, as it drives what was written.
+  // A line that was written is an output from now on. It is switched on last, when it drives the
+  // right value.
   if (kind_.driver == DigitalIoKind::Driver::switched)
     registers_.write(word::kOutputEnable, mask, registers_.read(word::kOutputEnable, mask) | mask);
   writtenMask_ |= mask;
@@ -219,7 +222,7 @@ bool DigitalIo::serve(InterruptThread::Cause cause) {
   return hadEdges;
 }
 
-// Tells what is new. Returns whether the chip had asked.
+// Reports all changes to the subscribers. Returns whether the chip had pending edges.
 bool DigitalIo::lookLocked() {
   if (!tend()) return false;
   bool hadEdges = false;
@@ -228,7 +231,8 @@ bool DigitalIo::lookLocked() {
   return hadEdges;
 }
 
-// Sets the module up when it is back or was reset. False: it is gone, or all that is new of it was told.
+// Programs the module when it is back or was reset. Returns false when it is gone, or when all
+// changes have been reported already.
 bool DigitalIo::tend() {
   if (state_.isThere && readMarks() == marks_) {
     const auto inputs = registers_.read(word::kInput, kind_.inputs);
@@ -243,7 +247,8 @@ bool DigitalIo::tend() {
   return false;
 }
 
-// Clears what is pending and arms each line for its next edge, until nothing moves. Returns the bits that moved.
+// Clears pending edges and arms each line for its next edge, until no input changes. Returns the
+// bits that have changed.
 std::uint32_t DigitalIo::followInputs(bool& hadEdges) {
   std::uint32_t changed = 0;
   for (int look = 0; look < kMaxLooks; ++look) {
@@ -260,7 +265,8 @@ std::uint32_t DigitalIo::followInputs(bool& hadEdges) {
   return changed;
 }
 
-// An edge that a poll finds may have come just now: it is lost when no interrupt follows until the next poll.
+// An edge that a poll finds may be so recent that its interrupt is under way; the interrupt is lost
+// if it has not come by the next poll.
 void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
   if (cause == InterruptThread::Cause::interrupt) {
     mayBeLost_ = false;
@@ -271,9 +277,10 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
   noteStorms();
 }
 
-// At each poll. A line that is stuck makes one storm after each pause: all of them are one until a time between two polls was calm.
+// Called at each poll. A stuck line causes a storm after each pause; all these count as one storm
+// until no spurious interrupt comes between two polls.
 void DigitalIo::noteStorms() {
-  // PAIR(dio-thread): while it is being made there is none to ask.
+  // PAIR(dio-thread): null while the constructor creates the thread.
   const auto* const thread = running_.load(std::memory_order_acquire);
   const auto counters = thread == nullptr ? InterruptThread::Counters() : thread->counters();
   const bool isCalm = std::exchange(spurious_, counters.spurious) == counters.spurious;

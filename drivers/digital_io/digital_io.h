@@ -1,26 +1,32 @@
 // SPDX-License-Identifier: MIT
-// DigitalIo: a module of digital lines, GreenSpring IP-Unidig or Systran DIO316I, in up to 32 bits.
+// DigitalIo: driver of a module with up to 32 digital lines, GreenSpring IP-Unidig or Systran
+// DIO316I.
 //
 //   DigitalIo io(module, {.vector = 116, .rising = 0xff, .falling = 0xff});
 //   io.trySetBits(0x3);
 //   const auto subscription = io.subscribe([](const DigitalIoNews& news) { ... });
 //
 //   an edge ──► interrupt ─┐
-//   pollEvery ─────────────┴► look: pending edges, inputs ──► what is new ──► each subscriber
+//   pollEvery ─────────────┴► look: pending edges, inputs ──► changes ──► each subscriber
 //
-// The chip tells of one direction of a line at a time. For both, the polarity is set anew at each look, from the inputs, and the inputs are
-// read again afterwards: a line that moves in between is seen, and no toggling gets out of step.
+// The chip detects one direction of a line at a time. For both directions, each look sets the
+// polarity from the inputs and then reads the inputs again, so a line that changes in between is
+// noticed, and the polarity always fits the level.
 //
-// Outputs are not written at start: they stay as they were while a program ends and another begins. After power-up all are ones.
+// The constructor does not write the outputs: they keep their values when one program ends and
+// another starts. After power-up all outputs are ones.
 //
-// Each look also asks a register that power-up changes, and the outputs that were written. When they are not as they were left, and the
-// ID PROM is the right one, the module was reset or is back: outputs, enables, threshold and edges become what they were set to. While it
-// is gone, or another module is in its place, nothing is written.
+// Each look also reads a register that a reset changes, and the outputs that were written. When
+// these have changed by themselves and the ID PROM is the right one, the module was reset or is
+// back: outputs, output enables, threshold and edges are programmed again. While the module is
+// absent, or another module is in its place, nothing is written.
 //
-// Threads  any. Subscribers are called from the driver's thread or the one that looks, one at a time, and must not call this object.
-// Crash    outputs stay; the carrier masks the interrupt when it is opened again.
-// Trust    what the module says is compared, nothing else. All ones may be a module that is gone: then its ID PROM is asked. Registers may
-//          have anything in bits without a function.
+// Threads  any number of callers at a time. A subscriber is called by the driver's thread or by the
+//          thread that calls this object, one call at a time; it must not call this object.
+// Crash    the outputs keep their values; the carrier masks the interrupt when it is opened again.
+// Trust    values that the module returns are only compared. All ones may mean an absent module, so
+//          the ID PROM is read then. Bits without a function may have any value.
+// Source   digital_io_kind.h.
 #pragma once
 
 #include <atomic>
@@ -42,52 +48,58 @@
 namespace mpf {
 
 struct DigitalIoOptions {
-  std::chrono::milliseconds pollEvery{100};
-  int vector = 0;  // 0: no interrupts
+  std::chrono::milliseconds pollEvery{100};  // longest time between two looks
+  int vector = 0;  // interrupt vector, 1 to 255; 0: no interrupts
   std::uint32_t rising = 0;  // bits that interrupt when they go high
-  std::uint32_t falling = 0;  // when they go low; in both: either way
-  InterruptThreadOptions storm{};  // its pollEvery does not count
+  std::uint32_t falling = 0;  // bits that interrupt when they go low; may overlap with rising
+  InterruptThreadOptions storm{};  // limits of the interrupt thread; its pollEvery is ignored
 };
 
 enum class DigitalIoStatus : std::uint8_t {
   success,
-  noSuchBits,  // this model cannot write them; nothing was written
-  outOfRange,  // of the threshold; nothing was written
-  noThreshold,  // this model has none
-  noInterrupts,  // this model has none, or they are not used
-  readBackDiffers,  // the register holds something else than was written
-  gone,  // nothing answers, or another module does
+  noSuchBits,  // some of the bits are not outputs of this model; nothing was written
+  outOfRange,  // the threshold is out of range; nothing was written
+  noThreshold,  // this model has no threshold
+  noInterrupts,  // this model has no interrupts, or they are not used
+  readBackDiffers,  // the register does not hold the written value
+  gone,  // the module is absent, or another module is in its place
 };
+// A sentence for messages to people.
 [[nodiscard]] const char* toString(DigitalIoStatus status) noexcept;
-// Whether that is the module's fault, not the caller's.
+// Returns true for a fault of the module, false for success and for errors of the caller.
 [[nodiscard]] constexpr bool isFault(DigitalIoStatus status) noexcept {
   return status == DigitalIoStatus::readBackDiffers || status == DigitalIoStatus::gone;
 }
 
-// What a subscriber hears.
+// A change that is reported to subscribers.
 struct DigitalIoNews {
   enum class Kind : std::uint8_t {
-    inputs,  // they have changed, or an edge came and went
-    gone,  // nothing answers any more
-    back,  // it answers again, or was reset: it is set up anew, with what was written to its outputs
-    lostInterrupt,  // an edge was found by the poll: the interrupt did not come
-    storm,  // the line is stuck: interrupts are masked for a while, again and again; told when that begins
+    inputs,  // inputs have changed, or had an edge and changed back
+    gone,  // the module is absent or replaced
+    back,  // the module is back or was reset; it is programmed again, outputs included
+    lostInterrupt,  // a poll found an edge whose interrupt did not come
+    // the request line is stuck: interrupts are masked for a while, repeatedly; reported once
+    storm,
   };
   Kind kind = Kind::inputs;
-  std::uint32_t inputs = 0;  // as they are; of `gone`: as they were
-  std::uint32_t changed = 0;  // bits that are different or had an edge
+  std::uint32_t inputs = 0;  // all inputs; for `gone` their last values
+  std::uint32_t changed = 0;  // inputs that have changed or had an edge
 };
 
 class DigitalIo {
  public:
   using Listener = std::function<void(const DigitalIoNews& news)>;
-  // Ends when it is destroyed: the listener does not run any more. Not from within a listener.
+  // Ends when it is destroyed: the listener is not running then and does not run again. A listener
+  // must not destroy a subscription.
   class Subscription;
 
-  // Sets the module up; `module` must outlive this.
-  //   throws  std::system_error; std::invalid_argument when it is no such module; IndustryPackError badVector
+  // Programs the module and starts the driver's thread. Outputs keep their values.
+  //
+  //   module    must outlive this object
+  //   throws    std::invalid_argument when the module is of another kind, IndustryPackError
+  //             badVector, std::system_error when the thread cannot be started
   explicit DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options = {});
-  // The module, if it is still there, interrupts no more.
+  // Stops the thread and disables the interrupts of the module, if it is present.
   ~DigitalIo();
   DigitalIo(const DigitalIo&) = delete;
   DigitalIo& operator=(const DigitalIo&) = delete;
@@ -95,16 +107,18 @@ class DigitalIo {
   [[nodiscard]] const DigitalIoKind& kind() const noexcept { return kind_; }
   [[nodiscard]] bool usesInterrupts() const noexcept { return usesInterrupts_; }
 
-  // The bits of `mask` become those of `bits`; others stay.
+  // Sets the outputs in `mask` to `bits` and reads them back; other outputs keep their values. A
+  // line with an output enable becomes an output.
   [[nodiscard]] DigitalIoStatus tryWriteBits(std::uint32_t mask, std::uint32_t bits) noexcept;
   [[nodiscard]] DigitalIoStatus trySetBits(std::uint32_t mask) noexcept { return tryWriteBits(mask, mask); }
   [[nodiscard]] DigitalIoStatus tryClearBits(std::uint32_t mask) noexcept { return tryWriteBits(mask, 0); }
-  // From which voltage on an input is high, in steps of kThresholdStepVolts.
+  // Sets the voltage above which an input is high.
+  //   code  0 to kMaxThreshold, in steps of kThresholdStepVolts
   [[nodiscard]] DigitalIoStatus trySetThreshold(int code) noexcept;
-  // Which edges interrupt from now on; bits that are no inputs are ignored.
+  // Sets the edges that interrupt from now on; bits that are not inputs are ignored.
   [[nodiscard]] DigitalIoStatus trySetEdges(std::uint32_t rising, std::uint32_t falling) noexcept;
 
-  // From the registers, now. Empty: it is gone.
+  // Reads the registers. Returns nullopt when the module is absent or replaced.
   [[nodiscard]] std::optional<std::uint32_t> tryReadInputs() noexcept;
   [[nodiscard]] std::optional<std::uint32_t> tryReadOutputs() noexcept;
 
@@ -112,9 +126,12 @@ class DigitalIo {
     bool isThere = false;
     std::uint32_t inputs = 0;
   };
-  // Looks at once, so that subscribers know all that is new, and says what they know.
+  // Looks at the module now. All changes are reported to the subscribers before this returns the
+  // state that was last reported.
   State look();
 
+  // Calls `listener` for each change from now on, until the subscription is destroyed. This object
+  // must outlive the subscription.
   [[nodiscard]] Subscription subscribe(Listener listener);
   [[nodiscard]] InterruptThread::Counters counters() const noexcept;
 
@@ -132,7 +149,8 @@ class DigitalIo {
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
   [[nodiscard]] std::uint32_t armed() const noexcept { return (rising_ & ~falling_) | (rising_ & falling_ & ~state_.inputs); }
 
-  // What a reset would change, as it is read; not as it was written, for a register may be broken.
+  // Register values that a reset would change. These are the values that were read, not those that
+  // were written, since a register may be broken.
   struct Marks {
     std::uint16_t setUp = 0;
     std::uint32_t outputs = 0, enables = 0;
@@ -145,17 +163,17 @@ class DigitalIo {
   const int vector_;
   const bool usesInterrupts_;
   const std::chrono::milliseconds stormPause_;
-  mutable std::mutex mutex_;  // guards the registers and what follows
+  mutable std::mutex mutex_;  // guards the registers and the members below
   DigitalIoRegisters registers_;
   std::uint32_t rising_ = 0, falling_ = 0, polarity_ = 0;
-  std::uint32_t writtenMask_ = 0, writtenBits_ = 0;  // of outputs, as long as they are to be kept
+  std::uint32_t writtenMask_ = 0, writtenBits_ = 0;  // the outputs to restore after a reset
   int threshold_ = kThresholdAtStart;
-  Marks marks_;  // when it was set up or written to
+  Marks marks_;  // as read after the last setUp() or write
   State state_;
-  bool mayBeLost_ = false;  // the last poll found an edge whose interrupt may still be on its way
-  bool isLosing_ = false;  // told so
-  bool isStorming_ = false;  // told so
-  bool goesOn_ = false;  // the last poll came after the pause
+  bool mayBeLost_ = false;  // the last poll found an edge whose interrupt may still be under way
+  bool isLosing_ = false;  // lostInterrupt was reported
+  bool isStorming_ = false;  // storm was reported
+  bool goesOn_ = false;  // the last poll was after the pause
   Deadline pauseEnds_ = Deadline::never();
   std::uint64_t storms_ = 0, spurious_ = 0;  // as counted at the last poll
   struct Subscriber {
@@ -164,9 +182,9 @@ class DigitalIo {
   };
   std::vector<Subscriber> subscribers_;
   std::uint64_t lastId_ = 0;
-  std::unique_ptr<Interrupt> noInterrupt_;  // where the module has none
+  std::unique_ptr<Interrupt> noInterrupt_;  // in place of that of a module without interrupts
   std::atomic<InterruptThread*> running_{nullptr};
-  std::unique_ptr<InterruptThread> thread_;  // last: ends before what it uses
+  std::unique_ptr<InterruptThread> thread_;  // last: ends before the members that it uses
 };
 
 class DigitalIo::Subscription {

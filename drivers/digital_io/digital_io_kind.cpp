@@ -10,7 +10,7 @@ namespace {
 using enum DigitalIoKind::Driver;
 
 constexpr std::uint32_t k24 = 0xffffff;
-constexpr std::uint16_t kDriversOn = 4;  // of the optical models' control word
+constexpr std::uint16_t kDriversOn = 4;  // bit of the control word of the optical models
 
 // name, manufacturer, model, inputs, outputs, driver, interrupts, threshold, control
 constexpr std::array kKinds{
@@ -19,7 +19,8 @@ constexpr std::array kKinds{
     DigitalIoKind{"IP-Unidig-D", kGreenSpring, 0x62, k24, k24, switched},
     DigitalIoKind{"IP-Unidig-O-24IO", kGreenSpring, 0x63, k24, k24, openCollector, false, false, kDriversOn},
     DigitalIoKind{"IP-Unidig-HV-16I8O", kGreenSpring, 0x64, 0xffff, 0xff0000, separate, false, true},
-    DigitalIoKind{"IP-Unidig-E48", kGreenSpring, 0x65, k24, k24},  // its other 24 lines are elsewhere
+    // its other 24 lines are not at these registers
+    DigitalIoKind{"IP-Unidig-E48", kGreenSpring, 0x65, k24, k24},
     DigitalIoKind{"IP-Unidig-I-O-24I", kGreenSpring, 0x66, k24, 0, none, true},
     DigitalIoKind{"IP-Unidig-I-E", kGreenSpring, 0x67, k24, k24, openCollector, true},
     DigitalIoKind{"IP-Unidig-I", kGreenSpring, 0x68, k24, k24, openCollector, true},

@@ -16,7 +16,8 @@ constexpr std::uint32_t bitOf(std::size_t bit) noexcept { return std::uint32_t{1
 
 std::uint16_t half(std::uint32_t bits, std::size_t which) noexcept { return static_cast<std::uint16_t>(bits >> (16 * which)); }
 
-// What one reads of a register that has only the bits of `mask`: nothing drives the others, the carrier pulls them up.
+// The value read from a register that has only the bits in `mask`: the module does not drive the
+// others, and the carrier pulls them up.
 std::uint16_t half(std::uint32_t bits, std::uint32_t mask, std::size_t which) noexcept { return half(bits | ~mask, which); }
 
 template <class Word>
@@ -42,7 +43,7 @@ std::uint16_t DigitalIoModel::read(Space space, std::size_t offset, Lanes /*lane
 void DigitalIoModel::write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) {
   if (space != Space::io) return;
   const std::lock_guard lock(mutex_);
-  follow();  // edges of the time before belong to the masks of the time before
+  follow();  // earlier edges are subject to the masks before this write
   writeWord(offset / 2, value, lanes);
   follow();
 }
@@ -113,7 +114,7 @@ void DigitalIoModel::writeWord(std::size_t at, std::uint16_t value, Lanes lanes)
     registers_.pending &= ~(std::uint32_t{static_cast<std::uint16_t>(value & lanes)} << (16 * (at - word::kPending)));
 }
 
-// Lines that the module's drivers hold, one way or the other.
+// Lines that the module drives, high or low.
 std::uint32_t DigitalIoModel::drivenLocked() const {
   if (kind_.controlBits != 0 && (registers_.control & kind_.controlBits) != kind_.controlBits) return 0;
   switch (kind_.driver) {
@@ -144,9 +145,11 @@ std::uint32_t DigitalIoModel::levels() const {
   return levels;
 }
 
-// Outputs to whoever is connected, lines to inputs, edges to what is pending, that to the request line.
+// Brings the model up to date: reports outputs, reads the lines into the inputs, turns edges into
+// pending bits and those into the interrupt request.
 void DigitalIoModel::follow() {
-  const auto high = ~(drivenLocked() & ~registers_.output);  // what is not driven is pulled up
+  // a line that is not driven is pulled up
+  const auto high = ~(drivenLocked() & ~registers_.output);
   const auto news = std::exchange(told_, high) ^ high;
   for (std::size_t bit = 0; onOutput_ && bit < outside_.size(); ++bit) {
     if ((news & kind_.outputs & bitOf(bit)) != 0) onOutput_(static_cast<int>(bit), (high & bitOf(bit)) != 0 ? kHighVolts : 0);

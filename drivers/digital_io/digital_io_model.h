@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// DigitalIoModel: a module of digital lines that is not there.
+// DigitalIoModel: device model of a module of digital lines.
 //
 //   DigitalIoModel model(*findDigitalIoKind("IP-Unidig-I"));
-//   model.setInputs(0x3, 0x1);                       // bit 0 is high, somebody pulls bit 1 down
+//   model.setInputs(0x3, 0x1);                       // bit 0 is high, bit 1 is pulled down
 //   model.connect(5, [wire] { return wire.get(); });  // bit 5 follows a wire, in volts
 //
 //   outputs, enables ─► driver ─┐
-//   outside: 5 V, 0 V, a wire ──┴► line ─► comparator ─► inputs ─► edge that is wanted ─► pending ─► IntReq0*
+//   outside: 5 V, 0 V, a wire ──┴► line ─► comparator ─► inputs ─► enabled edge ─► pending ─► IntReq0*
 //
-// A line that nobody drives is pulled up. Lines of the DIO316I's and the -HV and -12I12O models' outputs cannot be read: connect() them.
+// A line that is not driven is pulled up. The outputs of the DIO316I and of the -HV and -12I12O
+// models are not inputs: use OnOutput to see them and connect() to drive inputs.
 //
-// Threads  as DeviceModel; all else any.
+// Threads  as DeviceModel; the other functions may be called by any thread.
 #pragma once
 
 #include <array>
@@ -28,7 +29,8 @@ class DigitalIoModel final : public DeviceModel {
   static constexpr double kHighVolts = 5;
   static constexpr double kTtlThresholdVolts = 1.5;
 
-  // What an output gives, at power-up and whenever it changes. It must not touch the model.
+  // Called with the voltage of an output, at power-up and at each change. The model is locked
+  // during the call, so the function must not call it.
   using OnOutput = std::function<void(int bit, double volts)>;
   using Volts = std::function<double()>;
 
@@ -37,18 +39,19 @@ class DigitalIoModel final : public DeviceModel {
   std::uint16_t read(Space space, std::size_t offset, Lanes lanes) override;
   void write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) override;
 
-  // From outside, the bits of `mask` are high or low as in `bits`.
+  // Drives the lines in `mask` from outside: high where `bits` has a 1, else low.
   void setInputs(std::uint32_t mask, std::uint32_t bits);
-  // From outside, that bit is at so many volts; asked at each cycle and at look().
+  // Drives a line from outside with the voltage that volts() returns; called at each bus cycle and
+  // at look().
   void connect(int bit, Volts volts);
-  // Tells the model that what it is connected to has changed.
+  // Reads the connected voltages again; call it when one has changed.
   void look();
 
-  [[nodiscard]] std::uint32_t inputs() const;   // as one would read them
-  [[nodiscard]] std::uint32_t outputs() const;  // the register
+  [[nodiscard]] std::uint32_t inputs() const;   // the inputs as a driver would read them
+  [[nodiscard]] std::uint32_t outputs() const;  // the output registers
   [[nodiscard]] std::uint32_t driven() const;   // lines that are outputs now
   [[nodiscard]] int vector() const;
-  // Bits of the output registers that are stuck at 0: a fault.
+  // Simulates a fault: these bits of the output registers are stuck at 0.
   void setStuck(std::uint32_t bits);
 
  private:
@@ -68,8 +71,9 @@ class DigitalIoModel final : public DeviceModel {
   mutable std::mutex mutex_;
   Registers registers_;
   std::array<Volts, 32> outside_{};
-  std::uint32_t inputs_ = 0;      // as seen last
-  std::uint32_t told_ = 0;        // outputs that were told as high; none yet: all are news
+  std::uint32_t inputs_ = 0;      // at the last follow()
+  // outputs that were reported as high; 0 at first, so that all are reported
+  std::uint32_t told_ = 0;
   std::uint32_t stuck_ = 0;
 };
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// DigitalIoRegisters: pairs of 16-bit registers as 32 bits, of those halves that a kind of module has.
+// DigitalIoRegisters: reads and writes pairs of 16-bit registers as one value of 32 bits; accesses
+// only the halves that the kind of module has.
 //
-// Threads  who uses it locks.
+// Threads  one at a time: the owner holds a lock.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@ class DigitalIoRegisters {
  public:
   DigitalIoRegisters(Registers& io, const DigitalIoKind& kind) noexcept : io_(io), kind_(kind) {}
 
-  // Of the pair that begins at `word`, halves without any of the bits in `mask` left out, which may be something else there.
+  // Accesses the pair that begins at `word`. A half without a bit in `mask` is not accessed, since
+  // the module may have another register there.
   [[nodiscard]] std::uint32_t read(std::size_t word, std::uint32_t mask) {
     std::uint32_t bits = 0;
     if (low(mask) != 0) bits = readWord(word);
@@ -29,12 +31,12 @@ class DigitalIoRegisters {
   [[nodiscard]] std::uint16_t readWord(std::size_t word) { return io_.read16(word * 2); }
   void writeWord(std::size_t word, std::uint16_t value) { io_.write16(word * 2, value); }
 
-  // Whether all the halves that `mask` has something of are ones: what one reads where there is nothing.
+  // Returns whether each half with a bit in `mask` is all ones, as an absent module reads.
   [[nodiscard]] static bool isAllOnes(std::uint32_t bits, std::uint32_t mask) noexcept {
     return (low(mask) == 0 || low(bits) == 0xffff) && (high(mask) == 0 || high(bits) == 0xffff);
   }
 
-  // Control words and the threshold, in steps: the outputs can be driven.
+  // Programs the control words and the threshold; after this the outputs can be driven.
   void setUp(int threshold);
 
  private:

@@ -11,7 +11,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::size_t kMaxCarriers = 21;  // as drvIpac has it
+constexpr std::size_t kMaxCarriers = 21;  // the limit of drvIpac
 
 }  // namespace
 
@@ -20,18 +20,18 @@ std::string siteName(std::size_t number) { return fmt::format("IP_{}", static_ca
 void IndustryPackCarriers::add(const std::string& name, std::unique_ptr<IndustryPackCarrier> carrier) {
   if (name.empty()) throw std::invalid_argument("a carrier needs a name");
   if (carriers_.contains(name))
-    throw std::invalid_argument(fmt::format("there is a carrier \"{}\" already: {}", name, find(name).description()));
+    throw std::invalid_argument(fmt::format("carrier \"{}\" exists already: {}; choose another name", name, find(name).description()));
   if (carriers_.size() == kMaxCarriers) {
-    throw IndustryPackError(IndustryPackStatus::tooMany,
-                            fmt::format("carrier \"{}\": there are {} already, which is the most", name, kMaxCarriers));
+    throw IndustryPackError(
+        IndustryPackStatus::tooMany,
+        fmt::format("carrier \"{}\" cannot be added: {} carriers exist already, which is the limit", name, kMaxCarriers));
   }
   carriers_.emplace(name, std::move(carrier));
 }
 
 IndustryPackCarrier& IndustryPackCarriers::find(const std::string& name) const {
   const auto found = carriers_.find(name);
-  if (found == carriers_.end())
-    throw std::invalid_argument(fmt::format("no carrier \"{}\"; there are: {}", name, fmt::join(names(), ", ")));
+  if (found == carriers_.end()) throw std::invalid_argument(fmt::format("no carrier \"{}\"; carriers: {}", name, fmt::join(names(), ", ")));
   return *found->second;
 }
 

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
-// IndustryPackCarrier: a board with sites for Industry Pack modules; IndustryPackSite: one of them (manual, "IndustryPackCarrier").
+// IndustryPackCarrier: a board with sites for Industry Pack modules. IndustryPackSite: one site of
+// it. IndustryPackCarriers: the carriers of a program, by name (manual, "IndustryPackCarrier").
 //
-//   IndustryPackCarriers carriers;                                 // main() owns it
+//   IndustryPackCarriers carriers;                                 // owned by main()
 //   carriers.add("ipac", createCarrier("tpci200", "0000:03:00.0"));
 //   auto& site = carriers.site("ipac", "IP_a");
 //
-// Threads  carriers are added before they are used; afterwards any thread.
-// Crash    a carrier leaves interrupts of its own sites disabled when it is destroyed; after a kill the next opening does it.
-// Trust    the rights of the files under /sys and /dev say who may; a refused one is an error that names the file and the right.
+// Threads  add all carriers first, by one thread; afterwards any number of callers at a time.
+// Crash    a carrier disables the interrupts of its sites when it is destroyed; after a kill, the
+//          program that opens the site next disables them.
+// Trust    access is controlled by the rights of files under /sys and /dev; an error names the file
+//          and the missing right.
+// Source   ANSI/VITA 4-1995; EPICS drvIpac for names and limits.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +32,12 @@ class IndustryPackSite {
   IndustryPackSite& operator=(const IndustryPackSite&) = delete;
   virtual ~IndustryPackSite() = default;
 
+  // The ID space, the I/O space and the memory space of the site, valid as long as the carrier.
   [[nodiscard]] virtual Registers& id() = 0;
   [[nodiscard]] virtual Registers& io() = 0;
-  // Of size 0 where the carrier gives this site none.
+  // Has size 0 when the carrier has no memory space for this site.
   [[nodiscard]] virtual Registers& memory() = 0;
-  // IntReq0*, IntReq1*.
+  // The interrupt request line IntReq0* or IntReq1*.
   //   throws  std::out_of_range unless number is 0 or 1
   [[nodiscard]] virtual Interrupt& interrupt(int number) = 0;
 };
@@ -44,24 +49,28 @@ class IndustryPackCarrier {
   IndustryPackCarrier& operator=(const IndustryPackCarrier&) = delete;
   virtual ~IndustryPackCarrier() = default;
 
-  // The kind and where it is, for messages to people: "TPCI200 at 0000:03:00.0".
+  // Kind and address, for messages to people: "TPCI200 at 0000:03:00.0".
   [[nodiscard]] virtual std::string description() const = 0;
-  // What whoever uses it should know, in a sentence: "its interrupts are polled: ..."; empty: nothing.
+  // A limitation that the user should know, as a sentence: "its interrupts are polled: ..."; or
+  // empty.
   [[nodiscard]] virtual std::string remark() const { return {}; }
-  // "IP_a", "IP_b", ...; in their order.
   [[nodiscard]] virtual std::size_t siteCount() const noexcept = 0;
+  // Returns site 0 ("IP_a"), 1 ("IP_b"), ...; valid as long as the carrier.
+  //   throws  std::out_of_range unless number < siteCount(); std::runtime_error when another
+  //           process has it
   [[nodiscard]] virtual IndustryPackSite& site(std::size_t number) = 0;
 };
 
-// The name of site 0, 1, ...: "IP_a", "IP_b", ....
+// The name of a site by its number: "IP_a" for 0, "IP_b" for 1, ....
 [[nodiscard]] std::string siteName(std::size_t number);
 
-// Carriers by name.
+// The carriers of a program, by name.
 class IndustryPackCarriers {
  public:
-  // throws  IndustryPackError tooMany (21 there may be), std::invalid_argument when the name is empty or another's
+  //   throws  IndustryPackError tooMany above 21 carriers; std::invalid_argument when the name is
+  //           empty or in use
   void add(const std::string& name, std::unique_ptr<IndustryPackCarrier> carrier);
-  // throws  std::invalid_argument that names the ones that there are
+  //   throws  std::invalid_argument, which lists the existing names
   [[nodiscard]] IndustryPackCarrier& find(const std::string& name) const;
   [[nodiscard]] IndustryPackSite& site(const std::string& carrierName, const std::string& siteName) const;
   [[nodiscard]] std::vector<std::string> names() const;

@@ -60,7 +60,7 @@ std::vector<std::string> parameterKinds() {
 CarrierParameters parseCarrierParameters(std::string_view kind, std::string_view parameters) {
   const auto* const known = findKind(kind);
   if (known == nullptr)
-    throw std::invalid_argument(fmt::format("no carrier \"{}\" has such parameters, but: {}", kind, fmt::join(parameterKinds(), ", ")));
+    throw std::invalid_argument(fmt::format("unknown carrier kind \"{}\"; use one of {}", kind, fmt::join(parameterKinds(), ", ")));
   ParameterText text(known->board, parameters);
   auto carrier = known->parse(text);
   text.expectEnd();

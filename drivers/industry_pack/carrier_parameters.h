@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// CarrierParameters: the parameter strings of the VME and ISA carriers of old startup files, checked, and what they say.
+// CarrierParameters: reads and checks the parameter strings of the VME and ISA carriers of old
+// startup files.
 //
 //   const auto carrier = parseCarrierParameters("vipc616_01", "0x3000,0xa0000000");   // ipacAddCarrier(&vipc616_01, "0x3000,0xa0000000")
 //   carrier.sites[1].memory                                                           // 0xa0800000, in VME A32
 //
-// Nothing is opened: whoever has a crate knows from here where its modules are.
+// Nothing is opened: MPF cannot reach these buses. The result gives the addresses of the modules.
 //
-// Source  EPICS ipac (drvIpac.html and the carriers' drivers), releases 2.3 to 2.16
+// Source  EPICS ipac (drvIpac.html and the drivers of the carriers), releases 2.3 to 2.16
 #pragma once
 
 #include <array>
@@ -18,17 +19,17 @@
 
 namespace mpf {
 
-// Where an address counts.
+// The address space of an address.
 enum class BusSpace : std::uint8_t { vmeA16, vmeA24, vmeA32, local, isa };
 
 struct SiteParameters {
-  std::uint32_t io = 0;
+  std::uint32_t io = 0;  // addresses of the three spaces on the carrier's bus
   std::uint32_t id = 0;
   std::uint32_t memory = 0;
-  std::uint32_t memoryBytes = 0;           // 0: this site has none
-  std::array<int, 2> interruptLevels{};    // of IntReq0* and IntReq1*; 0: none
-  int widthBits = 16;                      // of the memory space
-  int recoveryUs = 0;                      // between two accesses
+  std::uint32_t memoryBytes = 0;           // 0: the site has no memory space
+  std::array<int, 2> interruptLevels{};    // bus levels of IntReq0* and IntReq1*; 0: not connected
+  int widthBits = 16;                      // data width of the memory space
+  int recoveryUs = 0;                      // least time between two accesses
 };
 
 struct CarrierParameters {
@@ -36,17 +37,20 @@ struct CarrierParameters {
   BusSpace registers = BusSpace::vmeA16;
   BusSpace memory = BusSpace::vmeA24;
   std::vector<SiteParameters> sites;
-  bool isReset = false;               // before use
-  std::optional<int> clockMHz;        // of all modules; nothing: as each says in its ID PROM
-  bool releasesOnAcknowledge = false; // the interrupt request; otherwise when the module's registers are served
+  bool isReset = false;               // the board is reset before use
+  std::optional<int> clockMHz;        // of all modules; nullopt: as the ID PROM of each module says
+  bool releasesOnAcknowledge = false; // the request ends in the acknowledge cycle; else at a register access
 };
 
-// Whether `kind` is one of these carriers: drvIpac's symbol ("&vipc616_01", "ipmv162"), its command ("ipacAddVIPC616_01"), in any case.
+// Returns whether `kind` names such a carrier: a symbol of drvIpac ("&vipc616_01", "ipmv162") or a
+// command ("ipacAddVIPC616_01"), in upper or lower case.
 [[nodiscard]] bool isParameterKind(std::string_view kind);
-// Their symbols: "vipc310", ....
+// The symbols of all such carriers: "vipc310", ....
 [[nodiscard]] std::vector<std::string> parameterKinds();
 
-//   throws  IndustryPackError badAddress or badIntLevel that names the part of `parameters` that cannot be, std::invalid_argument for another kind
+// Reads the parameter string of a carrier.
+//   throws  IndustryPackError badAddress or badIntLevel, which names the invalid part of
+//           `parameters`; std::invalid_argument when the kind is unknown
 [[nodiscard]] CarrierParameters parseCarrierParameters(std::string_view kind, std::string_view parameters);
 
 }  // namespace mpf

@@ -33,13 +33,14 @@ constexpr std::array kKinds{
     Kind{"model", "", "four sites with models of the modules that a program drives", createModel},
     Kind{"tpci200", "[ADDRESS|NUMBER][,poll=US]", "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", createTpci200}};
 
-// A wrong line is found here all the same, before it is moved to a host that has the board.
+// Checks the parameters nevertheless, so that an error in an old startup file is found on this
+// host.
 [[noreturn]] void refuseOutOfReach(const std::string& kind, const std::string& parameters) {
   const auto carrier = parseCarrierParameters(kind, parameters);
   throw IndustryPackError(
       IndustryPackStatus::notImplemented,
-      fmt::format("{}: \"{}\" is right, but this host has no access to {}. Put the modules on a PCI carrier and use kind "
-                  "tpci200, or use kind model, which has models of them",
+      fmt::format("{}: \"{}\" is valid, but this host has no access to {}. Put the modules on a PCI carrier and use kind "
+                  "tpci200, or use kind model, which has models of the modules",
                   carrier.board, parameters, carrier.registers == BusSpace::isa ? "an ISA bus" : "a VME crate"));
 }
 
@@ -50,14 +51,14 @@ std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind, cons
     if (known.name == kind) return known.create(parameters);
   }
   if (isParameterKind(kind)) refuseOutOfReach(kind, parameters);
-  throw std::invalid_argument(fmt::format("no kind of carrier \"{}\"; there are:\n{}", kind, carrierKinds()));
+  throw std::invalid_argument(fmt::format("unknown carrier kind \"{}\"; the kinds are:\n{}", kind, carrierKinds()));
 }
 
 std::string carrierKinds() {
   std::string text;
   for (const auto& kind : kKinds)
     text += fmt::format("  {}{}{}  {}\n", kind.name, *kind.parameters == '\0' ? "" : ":", kind.parameters, kind.what);
-  return text + "  vipc616_01, ipmv162, tvme200 and others of VME and ISA  are checked; no program here reaches such a bus\n";
+  return text + "  vipc616_01, ipmv162, tvme200 and other VME and ISA carriers: only their parameters are checked\n";
 }
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// createCarrier(): a carrier of any kind, by the name of the kind and its parameters.
+// createCarrier(): creates a carrier by the name of its kind and its parameters.
 #pragma once
 
 #include <memory>
@@ -9,14 +9,17 @@
 
 namespace mpf {
 
-//   kind        "model", or what carrierKinds() says
-//   parameters  as that kind has them; of VME carriers drvIpac's strings
-//   throws      std::invalid_argument when there is no such kind, IndustryPackError badAddress or badIntLevel when the parameters cannot be,
-//               notImplemented when they can, but this host does not reach such a carrier,
-//               std::runtime_error in plain words when it is not there or this process may not use it
+// Creates and opens a carrier.
+//
+//   kind        "model" or another kind of carrierKinds()
+//   parameters  as the kind defines them; for VME and ISA carriers the strings of drvIpac
+//   throws      std::invalid_argument for an unknown kind;
+//               IndustryPackError badAddress or badIntLevel for invalid parameters, notImplemented
+//               for a valid carrier on a bus that MPF cannot reach;
+//               std::runtime_error when the board is absent or this process may not use it
 [[nodiscard]] std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind, const std::string& parameters);
 
-// A line for each kind: its name, its parameters, what it is. For --help.
+// One line for each kind, for --help: name, parameters, description.
 [[nodiscard]] std::string carrierKinds();
 
 }  // namespace mpf

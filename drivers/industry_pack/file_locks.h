@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
-// FileLocks: numbered things of which each belongs to one process at a time. A lock ends with the process, however that ends.
-// They are locks on single bytes of a file, whose bytes nobody touches (fcntl F_OFD_SETLK).
-// Threads  any.
+// FileLocks: divides numbered resources between processes; each belongs to one process at a time.
+// The kernel drops the lock when the process ends, in whatever way.
+//
+// Each lock is on one byte of a file (fcntl F_OFD_SETLK); the contents of the file are not used.
+//
+// Threads  any number of callers at a time.
 #pragma once
 
 #include <fcntl.h>
@@ -14,10 +17,11 @@ namespace mpf {
 
 class FileLocks {
  public:
-  // `file` is open for reading and writing.
+  // `file` must be open for reading and writing.
   explicit FileLocks(FileDescriptor file) noexcept : file_(std::move(file)) {}
 
-  // False: somebody else has it. What this object has already it gets again.
+  // Returns false when another process or object holds the lock; true also when this object holds
+  // it.
   [[nodiscard]] bool tryLock(int number) noexcept { return set(number, F_WRLCK); }
   void unlock(int number) noexcept { set(number, F_UNLCK); }
 

@@ -11,7 +11,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::size_t kCrcOfOne = 11;  // words
+constexpr std::size_t kCrcOfOne = 11;  // index in words
 constexpr std::size_t kCrcOfTwo = 12;
 constexpr std::uint16_t kNothing = 0xffff;
 
@@ -28,7 +28,7 @@ std::uint16_t crc16(std::span<const std::uint8_t> bytes) noexcept {
   return static_cast<std::uint16_t>(~crc);
 }
 
-// The bytes that the CRC of a format II PROM covers; its own word counts as 0.
+// The CRC of a format II PROM; the word of the CRC itself counts as 0.
 std::uint16_t crcOfFormatTwo(std::span<const std::uint16_t> words) {
   std::vector<std::uint8_t> bytes;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -157,8 +157,8 @@ IdProm readIdProm(Registers& idSpace, const std::string& where) {
   if (reader.word(0) == kNothing && reader.word(1) == kNothing) {
     throw IndustryPackError(IndustryPackStatus::noModule, fmt::format("no module at {}", where));
   }
-  throw IndustryPackError(IndustryPackStatus::noIpacId,
-                          fmt::format("what is at {} has no ID PROM: it begins with {:04x} {:04x}", where, reader.word(0), reader.word(1)));
+  throw IndustryPackError(IndustryPackStatus::noIpacId, fmt::format("the module at {} has no valid ID PROM: it begins with {:04x} {:04x}",
+                                                                    where, reader.word(0), reader.word(1)));
 }
 
 std::vector<std::uint16_t> wordsOf(const IdProm& prom) {

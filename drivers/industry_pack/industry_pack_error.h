@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// IndustryPackError: what can be wrong with a carrier or a module, with the status that drvIpac has for it.
+// IndustryPackError: an error of a carrier or a module, with the status that drvIpac uses for it.
 #pragma once
 
 #include <cstdint>
@@ -8,28 +8,28 @@
 
 namespace mpf {
 
-// drvIpac.h; there each is OR-ed with 600 << 16.
+// The numbers of drvIpac.h, where each is OR-ed with 600 << 16.
 enum class IndustryPackStatus : std::uint8_t {
   badTable = 1,
-  tooMany = 2,         // carriers
-  badAddress = 3,      // a carrier's parameters cannot be
+  tooMany = 2,         // more than 21 carriers
+  badAddress = 3,      // the parameters of a carrier are invalid
   badDriver = 4,
-  noModule = 5,        // nothing answers at that site
-  noIpacId = 6,        // what answers has no ID PROM
-  badCrc = 7,
-  badModule = 8,       // it is another module
-  notImplemented = 9,  // by this carrier
-  badVector = 10,      // not 0 to 255
-  vectorInUse = 11,
-  badIntLevel = 12,
+  noModule = 5,        // nothing answers at the site
+  noIpacId = 6,        // the module has no ID PROM
+  badCrc = 7,          // the CRC of the ID PROM is wrong
+  badModule = 8,       // the site has another module
+  notImplemented = 9,  // MPF cannot reach such a carrier
+  badVector = 10,      // the vector is not 0 to 255
+  vectorInUse = 11,    // another module has the vector
+  badIntLevel = 12,    // the interrupt level is not 0 to 7
 };
 
-// "S_IPAC_badAddress"
+// The name in drvIpac.h, for example "S_IPAC_badAddress".
 [[nodiscard]] const char* toString(IndustryPackStatus status) noexcept;
 
 class IndustryPackError : public std::runtime_error {
  public:
-  // `what` names the carrier, the site or the module, and says what to do.
+  // `what` names the carrier, site or module and says what to do.
   IndustryPackError(IndustryPackStatus status, const std::string& what) : std::runtime_error(what), status_(status) {}
   [[nodiscard]] IndustryPackStatus status() const noexcept { return status_; }
 

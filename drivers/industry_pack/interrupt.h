@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Interrupt: one interrupt request line of a module, as a file descriptor to wait on.
+// Interrupt: one interrupt request line of a module, with a file descriptor to wait on.
 //
 //   interrupt.enable();
-//   poll(interrupt.descriptor());      // readable: the line was active
+//   poll(interrupt.descriptor());      // readable once the line has been active
 //   if (interrupt.take() > 0) {
 //     ...                              // make the chip release the line
-//     interrupt.enable();              // it was masked at the carrier when it came
+//     interrupt.enable();              // the carrier has masked the line
 //   }
 //
-// The line is level-sensitive: when it is still active at enable(), it comes again at once.
+// The line is level-sensitive: if it is still active at enable(), the next interrupt comes at once.
 //
-// Threads  any. The descriptor lives as long as this object.
+// Threads  any number of callers at a time.
+// Crash    the carrier masks the line when it is opened again.
 #pragma once
 
 #include <atomic>
@@ -23,21 +24,25 @@ namespace mpf {
 
 class Interrupt {
  public:
-  // Throws std::system_error when there is no descriptor left.
+  //   throws  std::system_error when no descriptor can be created
   Interrupt();
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
   virtual ~Interrupt() = default;
 
-  // Poll it for reading. Somebody else reads it: take().
+  // For poll() and the like: readable when an interrupt has come. Read it with take() only. Valid
+  // as long as this object.
   [[nodiscard]] int descriptor() const noexcept { return event_.get(); }
-  // Takes what has come, without waiting. Returns how many interrupts: 0 or 1, more when enable() was called in between.
+  // Returns the number of interrupts since the last call, without waiting: 0 or 1, or more if
+  // enable() was called in between.
   std::uint64_t take() noexcept;
 
+  // Unmasks the line for one interrupt.
   virtual void enable() = 0;
-  // After return none comes any more; one that has come already can still be taken.
+  // Masks the line: no interrupt comes after return. One that has come before can still be taken.
   virtual void disable() noexcept = 0;
-  // The carrier looks for it from time to time, because nothing tells it; that may begin while it is used. Any thread.
+  // Returns whether the carrier polls the line because it cannot get an interrupt. This may become
+  // true at any time.
   [[nodiscard]] virtual bool isPolled() const noexcept { return false; }
 
   // The real-time priority of the threads that serve this line, 1 to 99; 0: none. Set it before the first enable().
@@ -45,7 +50,7 @@ class Interrupt {
   [[nodiscard]] int priority() const noexcept { return priority_.load(std::memory_order_relaxed); }
 
  protected:
-  // For the carrier, when it has seen the line active and masked it. Async-signal-safe.
+  // Called by the carrier when it has seen the line active and has masked it. Async-signal-safe.
   void announce() noexcept;
 
  private:

@@ -27,7 +27,7 @@ InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions op
       handler_(std::move(handler)),
       trouble_(std::move(trouble)),
       wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt thread")),
-      isPolled_(interrupt_.isPolled()) {  // a carrier that begins so says it itself
+      isPolled_(interrupt_.isPolled()) {  // a carrier that polls from the start reports that itself
   const SignalsBlocked blocked;
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
@@ -83,7 +83,7 @@ void InterruptThread::servePoll() {
   pollAt_ = period.count() == 0 ? Deadline::never() : Deadline::after(period);
 }
 
-// The line stays masked, as it was when it came.
+// The carrier has masked the line when the interrupt came; it stays masked during the pause.
 void InterruptThread::pause() {
   storms_.fetch_add(1, std::memory_order_relaxed);
   pausedUntil_ = Deadline::after(options_.stormPause);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// MemoryRegisters: registers in a window of this process's memory that a carrier gave: a PCI resource, a UIO mapping.
-// Each access is volatile and of exactly the width asked for; the bus behind the window is big-endian.
-// The window must outlive this object.
+// MemoryRegisters: registers in a mapped window of a carrier, for example a PCI resource. Each
+// access is volatile and has exactly the requested width; the bus behind the window is big-endian.
+//
+// Threads  any number of callers at a time.
 #pragma once
 
 #include <mpf/drivers/industry_pack/registers.h>
@@ -10,6 +11,7 @@ namespace mpf {
 
 class MemoryRegisters final : public Registers {
  public:
+  // `window` must outlive this object.
   MemoryRegisters(volatile void* window, std::size_t bytes) noexcept : window_(static_cast<volatile std::byte*>(window)), bytes_(bytes) {}
   [[nodiscard]] std::size_t size() const noexcept override { return bytes_; }
 

@@ -7,14 +7,14 @@
 #include <utility>
 
 namespace mpf {
-// Not anonymous: ModelSite, which the header names, is made of these.
+// A named namespace, because ModelSite, which the header declares, has members of these types.
 namespace model_site {
 
 constexpr std::size_t kIoBytes = 128;
 constexpr std::size_t kIdBytes = 128;
 constexpr std::uint16_t kOnes = 0xffff;
 
-// A line of a model as a carrier passes it on: once, and then masked until enabled again.
+// An interrupt request line of a model: passes on one interrupt and is then masked until enable().
 class ModelInterrupt final : public Interrupt {
  public:
   void enable() override {
@@ -49,7 +49,7 @@ class ModelInterrupt final : public Interrupt {
   ModelFault fault_ = ModelFault::none;
 };
 
-// Where the modules of a site are looked up, at each cycle: they may be pulled out.
+// The model in a site; looked up at each bus cycle, since it may be unplugged at any time.
 struct Socket {
   std::atomic<DeviceModel*> model{nullptr};
   std::atomic<bool> isBroken{false};  // busError
@@ -60,7 +60,7 @@ struct Socket {
   }
 };
 
-// One space of a model, by 16-bit cycles.
+// One address space of a model; turns accesses into 16-bit cycles.
 class ModelRegisters : public Registers {
  public:
   explicit ModelRegisters(std::size_t bytes) : bytes_(bytes) {}
@@ -146,7 +146,7 @@ class ModelSite final : public IndustryPackSite {
   void plug(std::unique_ptr<DeviceModel> model) {
     owned_ = std::move(model);
     owned_->connectInterrupts([this](int number, bool active) { line(number).setLine(active); });
-    // PAIR(model-plugged): whoever finds it may use it.
+    // PAIR(model-plugged): the model is complete before it can be found.
     socket_.model.store(owned_.get(), std::memory_order_release);
   }
   std::unique_ptr<DeviceModel> unplug() {
@@ -186,17 +186,17 @@ ModelSite& ModelCarrier::find(const std::string& siteName) const {
     if (mpf::siteName(i) == siteName) return *sites_[i];
   }
   throw std::invalid_argument(
-      fmt::format("no site \"{}\"; there are {} to {}", siteName, mpf::siteName(0), mpf::siteName(sites_.size() - 1)));
+      fmt::format("no site \"{}\"; the sites are {} to {}", siteName, mpf::siteName(0), mpf::siteName(sites_.size() - 1)));
 }
 
 void ModelCarrier::plugAny(const std::string& siteName, std::unique_ptr<DeviceModel> model) {
   auto& site = find(siteName);
-  if (site.isTaken()) throw std::invalid_argument(fmt::format("site {} is taken", siteName));
+  if (site.isTaken()) throw std::invalid_argument(fmt::format("site {} already has a model; unplug it first", siteName));
   site.plug(std::move(model));
 }
 
 void ModelCarrier::unplug(const std::string& siteName) {
-  // Who is in the middle of a cycle may go on.
+  // Keeps the model, since another thread may be in a bus cycle.
   if (auto model = find(siteName).unplug()) unplugged_.push_back(std::move(model));
 }
 

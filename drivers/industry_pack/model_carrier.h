@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// ModelCarrier: a carrier with models instead of modules, and what can go wrong with real ones.
+// ModelCarrier: a carrier with device models instead of modules; simulates faults of real ones.
 //
 //   ModelCarrier carrier;
 //   carrier.plug("IP_a", std::make_unique<Ip330Model>(...));
 //   carrier.unplug("IP_a");                                    // all bits read as ones from now on
 //   carrier.setFault("IP_a", ModelFault::interruptStorm);
 //
-// Threads  any. A model that is unplugged lives on, unheard, until the carrier ends.
+// Threads  plug() and unplug() one at a time; bus cycles and setFault() by any thread. A model that
+//          was unplugged exists until the carrier is destroyed, but gets no bus cycles.
 #pragma once
 
 #include <array>
@@ -24,29 +25,32 @@ namespace mpf {
 enum class ModelFault : std::uint8_t {
   none,
   interruptStorm,   // the request lines are stuck active
-  interruptsLost,   // none ever comes
-  busError,         // every access reads ones, as if it were pulled out
+  interruptsLost,   // no interrupt comes
+  busError,         // every read returns ones, as if the module were pulled out
 };
 
 class ModelSite;
 
 class ModelCarrier final : public IndustryPackCarrier {
  public:
-  // Memory space of each site, in bytes; a real carrier's jumpers or parameters say how much.
+  //   memoryBytes  size of the memory space of each site; jumpers or parameters set it on a real
+  //                carrier
   explicit ModelCarrier(std::size_t sites = 4, std::size_t memoryBytes = 65536);
   ~ModelCarrier() override;
 
-  // Returns `model`, which this carrier owns from now on.
-  //   throws  std::invalid_argument when there is no such site or it is taken
+  // Puts a model into a site. The carrier owns it from now on; the returned reference is valid as
+  // long as the carrier.
+  //   throws  std::invalid_argument when the site does not exist or already has a model
   template <class Model>
   Model& plug(const std::string& siteName, std::unique_ptr<Model> model) {
     auto& plugged = *model;
     plugAny(siteName, std::move(model));
     return plugged;
   }
+  // Takes the model out of a site: all reads return ones from now on.
   void unplug(const std::string& siteName);
   void setFault(const std::string& siteName, ModelFault fault);
-  // A fault of the request lines, of one of them only.
+  // Sets a fault of one interrupt request line only, 0 or 1.
   void setFault(const std::string& siteName, ModelFault fault, int line);
 
   [[nodiscard]] std::string description() const override { return "a carrier of models"; }

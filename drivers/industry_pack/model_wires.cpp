@@ -33,12 +33,12 @@ constexpr std::size_t kNameBytes = 44;
 
 struct ModelWiresFile {
   struct Wire {
-    std::atomic<std::uint32_t> isNamed{0};  // 1 once the name is in; never 0 again
+    std::atomic<std::uint32_t> isNamed{0};  // 1 once the name is complete; then never 0 again
     std::array<char, kNameBytes> name{};    // ends with a zero
-    std::atomic<std::uint64_t> value{0};    // a double's bits
+    std::atomic<std::uint64_t> value{0};    // the bits of a double
     std::uint64_t reserved = 0;
 
-    // Empty: the name is none.
+    // Returns the name; empty when it is invalid.
     [[nodiscard]] std::string_view text() const noexcept {
       const auto* const end = std::find(name.begin(), name.end(), '\0');
       return end == name.end() ? std::string_view() : std::string_view(name.data(), static_cast<std::size_t>(end - name.begin()));
@@ -48,16 +48,17 @@ struct ModelWiresFile {
   std::atomic<std::uint64_t> magic{0};  // written last
   std::uint32_t version = 0;
   std::uint32_t capacity = 0;
-  std::atomic<std::uint32_t> changes{0};  // one more after each change; the futex of who waits for one
+  // incremented at each change; the futex of waiting processes
+  std::atomic<std::uint32_t> changes{0};
   std::array<std::uint32_t, 11> reserved{};
   std::array<Wire, kCapacity> wires{};
 
   void announce() noexcept {
-    // PAIR(wire-changed): who sees this number sees the value.
+    // PAIR(wire-changed): a reader of this number also sees the new value.
     changes.fetch_add(1, std::memory_order_release);
     ::syscall(SYS_futex, &changes, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
   }
-  // Waits until there were more than `seen`.
+  // Waits until `changes` differs from `seen`.
   void waitForMore(std::uint32_t seen) noexcept { ::syscall(SYS_futex, &changes, FUTEX_WAIT, seen, nullptr, nullptr, 0); }
 };
 static_assert(offsetof(ModelWiresFile, changes) == 16 && offsetof(ModelWiresFile, wires) == 64);
@@ -66,7 +67,7 @@ static_assert(std::is_standard_layout_v<ModelWiresFile> && std::atomic<std::uint
 
 namespace {
 
-// Between processes; the kernel ends it when its holder dies.
+// A lock between processes; the kernel releases it when the process ends.
 class FileLock {
  public:
   FileLock(int fd, const std::string& path) : fd_(fd) {
@@ -81,7 +82,7 @@ class FileLock {
 };
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-  throw std::runtime_error(fmt::format("{} is no file of wires between models: {}; remove it or name another", path, why));
+  throw std::runtime_error(fmt::format("{} is not a file of model wires: {}; remove it or name another file", path, why));
 }
 
 bool isWireName(std::string_view name) {
@@ -94,7 +95,7 @@ bool isZero(const std::byte* bytes, std::size_t size) {
 
 void check(const ModelWiresFile& file, const std::string& path) {
   if (file.version != kVersion) refuse(path, fmt::format("its version is {}, not {}", file.version, kVersion));
-  if (file.capacity != kCapacity) refuse(path, fmt::format("it says that it has {} wires, not {}", file.capacity, kCapacity));
+  if (file.capacity != kCapacity) refuse(path, fmt::format("its capacity is {} wires, not {}", file.capacity, kCapacity));
   for (std::size_t i = 0; i < kCapacity; ++i) {
     const auto& wire = file.wires[i];
     const auto isNamed = wire.isNamed.load(std::memory_order_relaxed);
@@ -129,7 +130,7 @@ void ModelWires::map() {
   if (!S_ISREG(status.st_mode)) refuse(path_, "it is not a regular file");
   const auto bytes = static_cast<std::size_t>(status.st_size);
   if (bytes != 0 && bytes != sizeof(ModelWiresFile)) refuse(path_, fmt::format("it has {} bytes, not {}", bytes, sizeof(ModelWiresFile)));
-  // Not ftruncate(): without room on the disk, writing to the mapping would be a SIGBUS.
+  // Not ftruncate(): on a full disk, a write to the mapping would raise SIGBUS.
   if (bytes == 0) {
     const auto error = ::posix_fallocate(fd_.get(), 0, sizeof(ModelWiresFile));
     if (error != 0) throwSystemError(error, "make", path_);
@@ -139,48 +140,49 @@ void ModelWires::map() {
   file_ = static_cast<ModelWiresFile*>(mapped);
 }
 
-// A file of zeroes is one that its maker did not finish.
+// Completes the header of a file that contains only zeroes, which is new or was left by a killed
+// process.
 void ModelWires::prepare() {
-  // PAIR(wires-made): the rest of the header is written.
+  // PAIR(wires-made): the rest of the header is complete.
   const auto magic = file_->magic.load(std::memory_order_acquire);
   if (magic == kMagic) return check(*file_, path_);
   const auto* const wires = reinterpret_cast<const std::byte*>(file_->wires.data());
-  if (magic != 0 || !isZero(wires, sizeof file_->wires)) refuse(path_, "it begins with something else");
+  if (magic != 0 || !isZero(wires, sizeof file_->wires)) refuse(path_, "its contents are invalid");
   file_->version = kVersion;
   file_->capacity = kCapacity;
-  // PAIR(wires-made): last.
+  // PAIR(wires-made): stored after the rest of the header.
   file_->magic.store(kMagic, std::memory_order_release);
 }
 
 ModelWire ModelWires::wire(std::string_view name) {
   if (!isWireName(name)) {
     throw std::invalid_argument(
-        fmt::format("\"{}\" is no name of a wire; use 1 to {} printable characters without spaces", name, kNameBytes - 1));
+        fmt::format("\"{}\" is not a valid name of a wire; use 1 to {} printable characters without spaces", name, kNameBytes - 1));
   }
   const std::lock_guard inProcess(mutex_);
   const FileLock lock(fd_.get(), path_);
   for (auto& wire : file_->wires) {
-    // PAIR(wire-named): the name is in.
+    // PAIR(wire-named): the name is complete.
     if (wire.isNamed.load(std::memory_order_acquire) == 0) {
       wire.name = {};
       std::copy(name.begin(), name.end(), wire.name.begin());
-      // PAIR(wire-named): last.
+      // PAIR(wire-named): stored after the name.
       wire.isNamed.store(1, std::memory_order_release);
     }
     if (wire.text() == name) return {*file_, wire.value};
   }
-  throw std::runtime_error(fmt::format("{} has {} wires already: there is no room for \"{}\"", path_, kCapacity, name));
+  throw std::runtime_error(fmt::format("{} already has {} wires, which is the limit: wire \"{}\" cannot be added", path_, kCapacity, name));
 }
 
 ModelWireWatcher::ModelWireWatcher(ModelWires& wires, std::function<void()> changed) : file_(*wires.file_) {
   const SignalsBlocked blocked;
-  // PAIR(wire-changed): what changes after this is told.
+  // PAIR(wire-changed): every change after this is reported.
   auto seen = file_.changes.load(std::memory_order_acquire);
   thread_ = std::jthread([this, seen, changed = std::move(changed)](const std::stop_token& stop) mutable {
     for (;;) {
       file_.waitForMore(seen);
       if (stop.stop_requested()) return;
-      // PAIR(wire-changed): the values that came before.
+      // PAIR(wire-changed): the values of the changes up to this number are visible.
       const auto now = file_.changes.load(std::memory_order_acquire);
       if (std::exchange(seen, now) != now) changed();
     }

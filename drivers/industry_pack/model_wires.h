@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: MIT
-// ModelWires: what models in different processes share in place of wires: numbers with names, in a file that all of them map.
+// ModelWires: wires between device models of different processes: named voltages in a file that all
+// of the processes map.
 //
 //   DAC model ── "dac.0" = 2.5 V ──► file ──► ADC model
-//   DIO model ── "dio.5" = 5 V ────► file ──► the same or another DIO model
+//   DIO model ── "dio.5" = 5 V ────► file ──► DIO model
 //
 //   ModelWires wires("/tmp/wires");
 //   auto output = wires.wire("dac.0");
 //   output.set(2.5);
 //
-//   | magic, version, capacity, changes | wire 0: state, name, value | wire 1 | ... |     little- or big-endian as the host is
+//   | magic, version, capacity, changes | wire 0: state, name, value | wire 1 | ... |     in the byte order of the host
 //
-// The first one makes the file; it stays when all are gone, with the last values, as charge on a wire would not: who wants none removes it.
+// The first process creates the file. It stays, with the last values, when all processes have
+// ended; remove it to start with all wires at 0.
 //
-// Threads  any, in any process: values are atomic, the last one set counts.
-// Crash    killed while it makes the file or adds a wire, a process has made or added nothing; the next one goes on.
-// Trust    whoever may write the file is trusted not to cut it while it is used; what is no such file at the start is an error.
+// Threads  any, in any process: values are atomic, and the last one that was set counts.
+// Crash    a process that is killed while it creates the file or adds a wire leaves nothing
+//          incomplete in use; the next process completes it.
+// Trust    processes that may write the file are trusted not to truncate it while it is used. A
+//          file with other contents is refused at the start.
 #pragma once
 
 #include <atomic>
@@ -30,9 +34,9 @@
 
 namespace mpf {
 
-struct ModelWiresFile;  // the layout
+struct ModelWiresFile;  // the layout of the file
 
-// One of them. Valid as long as the ModelWires that it is from.
+// One wire. Valid as long as its ModelWires.
 class ModelWire {
  public:
   [[nodiscard]] double get() const noexcept { return std::bit_cast<double>(value_->load(std::memory_order_relaxed)); }
@@ -47,15 +51,17 @@ class ModelWire {
 
 class ModelWires {
  public:
-  //   throws  std::system_error; std::runtime_error when the file is another's, damaged or of another version
+  // Maps the file, and creates it if needed.
+  //   throws  std::system_error; std::runtime_error when the file has other contents, is damaged or
+  //           has another version
   explicit ModelWires(std::string path);
   ~ModelWires();
   ModelWires(const ModelWires&) = delete;
   ModelWires& operator=(const ModelWires&) = delete;
 
-  // The wire of that name; a new one carries 0.
+  // Returns the wire with this name; a new wire has the value 0.
   //   name    1 to 43 printable characters without spaces
-  //   throws  std::invalid_argument, std::runtime_error when there is no room for one more
+  //   throws  std::invalid_argument for an invalid name, std::runtime_error above 1024 wires
   [[nodiscard]] ModelWire wire(std::string_view name);
 
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
@@ -67,16 +73,17 @@ class ModelWires {
 
   std::string path_;
   FileDescriptor fd_;
-  std::mutex mutex_;  // flock() is between processes
+  std::mutex mutex_;  // between threads; flock() works only between processes
   ModelWiresFile* file_ = nullptr;
 };
 
-// Calls a function on a thread of its own after any wire has changed, in any process; several changes may be one call.
+// Calls a function on a thread of its own after a wire has changed, in any process; one call may
+// report several changes.
 class ModelWireWatcher {
  public:
-  // `wires` must outlive this.
+  // `wires` must outlive this object.
   ModelWireWatcher(ModelWires& wires, std::function<void()> changed);
-  // After return the function does not run any more.
+  // The function does not run after return.
   ~ModelWireWatcher();
   ModelWireWatcher(const ModelWireWatcher&) = delete;
   ModelWireWatcher& operator=(const ModelWireWatcher&) = delete;

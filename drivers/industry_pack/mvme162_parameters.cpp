@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Sites on a Motorola MVME162 or MVME172 itself, behind its IPIC chip: for each site its letter and then, in any order,
+// Parameters of the sites on a Motorola MVME162 or MVME172, which are behind its IPIC chip. For
+// each site the string has its letter and then, in any order,
 //   l=n[,n]       interrupt levels
 //   m=base,sizeK  memory
 //   r=us          recovery time
-//   w=8|16|32     width; 32 takes the memory of the next site as well
-// All other characters are skipped, as drvIpac does. "A:l=3,3 m=0xe0000000,64;B:l=3,3"
+//   w=8|16|32     width; 32 also uses the memory of the next site
+// Like drvIpac, the parser skips all other characters. "A:l=3,3 m=0xe0000000,64;B:l=3,3"
 #include <fmt/format.h>
 
 #include <mpf/drivers/industry_pack/parameter_parsers.h>
@@ -13,7 +14,7 @@ namespace mpf::parameters {
 namespace {
 
 constexpr std::uint32_t kRegisters = 0xfff58000;
-constexpr std::uint32_t kMemoryEnd = 0xfff00000;  // what is above is the board's own
+constexpr std::uint32_t kMemoryEnd = 0xfff00000;  // higher addresses are used by the board itself
 
 void readLevels(ParameterText& text, SiteParameters& site) {
   text.expect('=', "l");
@@ -27,7 +28,7 @@ void readMemory(ParameterText& text, SiteParameters& site) {
   text.expect(',', "memory address");
   site.memoryBytes = text.number("memory size [K]", {.multipleOf = 64, .least = 64, .most = 16384}) << 10;
   if (site.memoryBytes > kMemoryEnd - site.memory)
-    text.refuse(fmt::format("memory at 0x{:x}, {} K: it goes beyond 0x{:x}", site.memory, site.memoryBytes >> 10, kMemoryEnd));
+    text.refuse(fmt::format("memory at 0x{:x}, {} K: the end is above 0x{:x}", site.memory, site.memoryBytes >> 10, kMemoryEnd));
 }
 
 void readRecovery(ParameterText& text, SiteParameters& site) {
@@ -38,9 +39,10 @@ void readRecovery(ParameterText& text, SiteParameters& site) {
 void readWidth(ParameterText& text, std::vector<SiteParameters>& sites, std::size_t site) {
   text.expect('=', "w");
   const auto width = text.number("width");
-  if (width != 8 && width != 16 && width != 32) text.refuse(fmt::format("width {}: 8, 16 or 32 it may be", width));
+  if (width != 8 && width != 16 && width != 32) text.refuse(fmt::format("width {}: use 8, 16 or 32", width));
   if (width == 32 && site % 2 != 0)
-    text.refuse(fmt::format("width 32 at site {}: it may be at A and C, which take the next site as well", static_cast<char>('A' + site)));
+    text.refuse(fmt::format("width 32 at site {}: use it only at A and C, which also use the memory of the next site",
+                            static_cast<char>('A' + site)));
   sites[site].widthBits = static_cast<int>(width);
   if (width == 32) sites[site + 1].memoryBytes = 0;
 }

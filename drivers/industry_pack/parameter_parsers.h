@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The parser of each kind of carrier, for parseCarrierParameters(). Each reads all that its kind has; what is left is refused by the caller.
+// One parser for each kind of carrier, for parseCarrierParameters(). Each reads all parameters of
+// its kind; the caller refuses the rest of the text.
 #pragma once
 
 #include <mpf/drivers/industry_pack/carrier_parameters.h>
@@ -18,10 +19,12 @@ CarrierParameters parseHytec(ParameterText& text);
 CarrierParameters parseAvme96xx(ParameterText& text);
 CarrierParameters parseAtc40(ParameterText& text);
 
-// `count` sites from `base`, in the layout that all these carriers have: 0x100 bytes a site, the ID PROM in the upper half.
+// `count` sites from address `base`, in the layout of all these carriers: 0x100 bytes for each
+// site, with the ID PROM in the upper half.
 std::vector<SiteParameters> makeSites(std::size_t count, std::uint32_t base);
 
-//   throws  IndustryPackError badAddress that names the first site whose memory lies in another's
+// Checks that the memory spaces of the sites are disjoint.
+//   throws  IndustryPackError badAddress, which names the first site that overlaps with another one
 void expectNoOverlap(const ParameterText& text, const std::vector<SiteParameters>& sites);
 
 }  // namespace mpf::parameters

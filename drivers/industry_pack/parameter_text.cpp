@@ -13,7 +13,7 @@ bool isLetter(char character) noexcept { return std::isalpha(static_cast<unsigne
 bool isDigit(char character) noexcept { return character >= '0' && character <= '9'; }
 bool hasPrefix(std::string_view text) noexcept { return text.starts_with("0x") || text.starts_with("0X"); }
 
-// "0x6000" of an address, "128" of a size.
+// "0x6000" in base 16, "128" in base 10.
 std::string inBase(std::uint32_t value, int base) { return base == 16 ? fmt::format("0x{:x}", value) : fmt::format("{}", value); }
 
 std::string allowed(const ParameterLimits& limits, int base) {
@@ -78,7 +78,7 @@ std::uint32_t ParameterText::number(std::string_view what, const ParameterLimits
 
 int ParameterText::level(std::string_view what) {
   const auto level = number(what);
-  if (level > 7) refuse(fmt::format("{} {}: 0 to 7, where 0 is none", what, level), IndustryPackStatus::badIntLevel);
+  if (level > 7) refuse(fmt::format("{} {}: use 1 to 7, or 0 for no interrupt", what, level), IndustryPackStatus::badIntLevel);
   return static_cast<int>(level);
 }
 
@@ -90,11 +90,11 @@ std::uint32_t ParameterText::digits(std::string_view what, int base, const Param
   std::uint32_t value = 0;
   const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value, base);
   if (error == std::errc::invalid_argument)
-    refuse(rest_.empty() ? fmt::format("the {} is missing", what) : fmt::format("the {} is no number: \"{}\"", what, rest_));
+    refuse(rest_.empty() ? fmt::format("the {} is missing", what) : fmt::format("the {} is not a number: \"{}\"", what, rest_));
   if (error != std::errc() || value % limits.multipleOf != 0 || value < limits.least || value > limits.most) {
     const auto length = static_cast<std::size_t>(end - rest_.data());
     const auto text = error != std::errc() ? std::string(rest_.substr(0, length)) : inBase(value, base);
-    refuse(fmt::format("{} {}: {} it may be", what, text, allowed(limits, base)));
+    refuse(fmt::format("{} {}: use {}", what, text, allowed(limits, base)));
   }
   rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
   return value;

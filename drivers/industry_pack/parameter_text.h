@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
-// ParameterText: reads a carrier's parameter string from left to right. What cannot be is an error that names the board, the string and the part.
+// ParameterText: reads the parameter string of a carrier from left to right. An error names the
+// board, the string and the invalid part.
 //
 //   const auto base = text.hex("I/O address", {.multipleOf = 0x400, .most = 0xfc00});
 //   if (text.trySkip(',')) ...
 //
 // Blanks before each part are skipped.
+//
+// Threads  one at a time.
 #pragma once
 
 #include <cstdint>
@@ -26,28 +29,31 @@ class ParameterText {
   ParameterText(std::string_view board, std::string_view text) noexcept : board_(board), whole_(text), rest_(text) {}
 
   [[nodiscard]] bool atEnd() noexcept { return peek() == '\0'; }
-  // The next character that is no blank; '\0' at the end.
+  // Returns the next character that is not a blank, without taking it; '\0' at the end.
   [[nodiscard]] char peek() noexcept;
-  // The next character, whatever it is. Not at the end.
+  // Takes the next character, also a blank. Must not be called at the end.
   char take() noexcept;
+  // Takes `character` if it is next.
   bool trySkip(char character) noexcept;
-  // `after` is what stands before it, for the message.
+  // Takes `character`; it is an error if another one is next. `after` names the part before it, for
+  // the message.
   void expect(char character, std::string_view after);
   void expectEnd();
-  // Whether a number follows `separator`; then that is skipped.
+  // Takes `separator` if it is next and a number follows.
   bool trySkipBeforeNumber(char separator) noexcept;
-  // Letters, as they are; empty when none are next.
+  // Takes the letters that are next; empty if there are no letters.
   [[nodiscard]] std::string_view word() noexcept;
   [[nodiscard]] std::string_view rest() const noexcept { return rest_; }
 
-  // With or without 0x.
+  // Takes a hexadecimal number, with or without 0x. `what` names it in error messages.
   [[nodiscard]] std::uint32_t hex(std::string_view what, const ParameterLimits& limits = {});
-  // Decimal; hexadecimal with 0x.
+  // Takes a decimal number, or a hexadecimal one with 0x.
   [[nodiscard]] std::uint32_t number(std::string_view what, const ParameterLimits& limits = {});
-  // A VME interrupt level, 0 to 7.
+  // Takes a VME interrupt level, 0 to 7.
   [[nodiscard]] int level(std::string_view what);
 
-  //   throws  IndustryPackError: `VIPC616 "6001": ` and then `problem`
+  //   throws  IndustryPackError with the board, the whole string and `problem`: `VIPC616 "6001":
+  //           ...`
   [[noreturn]] void refuse(const std::string& problem, IndustryPackStatus status = IndustryPackStatus::badAddress) const;
 
  private:

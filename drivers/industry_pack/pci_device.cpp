@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kInterruptDriver = "uio_pci_generic";
 
-// The first word of a file; empty when it cannot be read.
+// Returns the first word of a file; empty when the file cannot be read.
 std::string wordOf(const std::string& file) {
   std::string word;
   std::ifstream(file) >> word;
@@ -47,9 +47,9 @@ std::string chooseByNumber(const PciKind& kind, const std::vector<std::string>& 
   std::size_t n = 0;
   std::from_chars(number.data(), number.data() + number.size(), n);
   if (n < boards.size()) return boards[n];
-  throw std::runtime_error(boards.empty()
-                               ? fmt::format("there is no {} (PCI id {}) in this host", kind.name, idText(kind.vendor, kind.device))
-                               : fmt::format("there is no {} number {}, counted from 0; there are: {}", kind.name, number, orNone(boards)));
+  throw std::runtime_error(
+      boards.empty() ? fmt::format("this host has no {} (PCI id {})", kind.name, idText(kind.vendor, kind.device))
+                     : fmt::format("this host has no {} number {}, counted from 0; its boards: {}", kind.name, number, orNone(boards)));
 }
 
 std::string choose(const PciPlaces& places, const PciKind& kind, const std::string& which) {
@@ -57,7 +57,7 @@ std::string choose(const PciPlaces& places, const PciKind& kind, const std::stri
   if (which.empty() || isNumber(which)) return chooseByNumber(kind, boards, which.empty() ? "0" : which);
   auto address = std::ranges::count(which, ':') == 1 ? "0000:" + which : which;
   if (which.find('/') == std::string::npos && fs::exists(places.devices + "/" + address)) return address;
-  throw std::runtime_error(fmt::format("there is no PCI device at {}; boards of kind {}: {}", which, kind.name, orNone(boards)));
+  throw std::runtime_error(fmt::format("no PCI device at {}; boards of kind {}: {}", which, kind.name, orNone(boards)));
 }
 
 struct Range {
@@ -116,31 +116,31 @@ void PciDevice::expectKind() const {
   const auto found = idOf(places_.devices + "/" + address_);
   const auto wanted = idText(kind_.vendor, kind_.device);
   if (found != wanted)
-    throw std::runtime_error(fmt::format("the PCI device at {} is no {}: its id is {}, not {}", address_, kind_.name, found, wanted));
+    throw std::runtime_error(fmt::format("the PCI device at {} is not a {}: its id is {}, not {}", address_, kind_.name, found, wanted));
 }
 
 void PciDevice::expectNoOtherDriver() const {
   std::error_code none;
   const auto driver = fs::read_symlink(file("driver"), none).filename().string();
   if (driver.empty() || driver == kInterruptDriver) return;
-  throw std::runtime_error(fmt::format("{}: the kernel's driver {} has it. As root: echo {} > {}/unbind; {}", description(), driver,
-                                       address_, file("driver"), howToGetInterrupts()));
+  throw std::runtime_error(fmt::format("{}: the board is bound to the kernel's driver {}. As root: echo {} > {}/unbind; {}", description(),
+                                       driver, address_, file("driver"), howToGetInterrupts()));
 }
 
-// A board that no driver has may be switched off.
+// A board that is not bound to a driver may be disabled.
 void PciDevice::enable() const {
   if (wordOf(file("enable")) != "0") return;
   const auto attribute = open("enable");
   if (::write(attribute.get(), "1", 1) == 1) return;
   throw std::runtime_error(
-      fmt::format("{}: cannot be switched on ({}). As root: echo 1 > {}", description(), std::strerror(errno), file("enable")));
+      fmt::format("{}: the board cannot be enabled ({}). As root: echo 1 > {}", description(), std::strerror(errno), file("enable")));
 }
 
 PciWindow PciDevice::map(int number, std::size_t offset, std::size_t bytes) const {
   const auto name = fmt::format("resource{}", number);
   const auto range = windowRange(file("resource"), number);
   if (range.begin + offset + bytes > range.end + 1)
-    throw std::runtime_error(fmt::format("{}: window {} is too small for {} bytes at 0x{:x}; {} says what it has", description(), number,
+    throw std::runtime_error(fmt::format("{}: window {} is too small for {} bytes at 0x{:x}; {} lists the windows", description(), number,
                                          bytes, offset, file("resource")));
   const auto opened = open(name);
   // A small window may begin in the middle of a page.
@@ -151,8 +151,8 @@ PciWindow PciDevice::map(int number, std::size_t offset, std::size_t bytes) cons
   auto* const pages = ::mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED, opened.get(), static_cast<off_t>(first - inPage));
   if (pages == MAP_FAILED) {
     throw std::runtime_error(
-        fmt::format("{}: {} cannot be mapped ({}). Does this kernel allow it (no lockdown), has no other driver the board?", description(),
-                    file(name), std::strerror(errno)));
+        fmt::format("{}: {} cannot be mapped ({}). Check that kernel lockdown is off and that no other driver uses the board",
+                    description(), file(name), std::strerror(errno)));
   }
   return {pages, length, inPage, bytes};
 }
@@ -165,8 +165,8 @@ FileDescriptor PciDevice::open(const std::string& name) const {
   if (reason != EACCES && reason != EPERM)
     throw std::runtime_error(fmt::format("{}: {} cannot be opened: {}", description(), path, std::strerror(reason)));
   throw std::runtime_error(
-      fmt::format("{0}: no right to read and write {1}. As root, for a GROUP that you are in: chgrp GROUP {2}/resource? {2}/config && "
-                  "chmod g+rw {2}/resource? {2}/config; a udev rule does it at every start",
+      fmt::format("{0}: no permission to read and write {1}. As root, for a GROUP that you are in: chgrp GROUP {2}/resource? {2}/config && "
+                  "chmod g+rw {2}/resource? {2}/config; a udev rule does this at every boot",
                   description(), path, places_.devices + "/" + address_));
 }
 

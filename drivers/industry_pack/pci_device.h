@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT
-// PciDevice: one PCI board of this host, through the files that Linux has for it; without a kernel driver of ours.
+// PciDevice: access to one PCI board of this host through the files that Linux has for it; needs no
+// kernel driver of its own.
 //
-//   /sys/bus/pci/devices/0000:03:00.0/   vendor device driver enable   what it is, who has it
-//                                        resource resource0 ... 5      its windows
-//                                        config                        its configuration registers
-//                                        uio/uio0                      with driver uio_pci_generic: /dev/uio0, its interrupt
+//   /sys/bus/pci/devices/0000:03:00.0/   vendor device driver enable   IDs, bound driver
+//                                        resource resource0 ... 5      the windows (BARs)
+//                                        config                        the configuration registers
+//                                        uio/uio0                      with driver uio_pci_generic: /dev/uio0, the interrupt
 //
-// Threads  any, after construction.
-// Crash    a mapped window of a board that the kernel removes (echo 1 > remove) kills the process that touches it, by SIGBUS.
-// Trust    the rights of these files say who may use the board. Who may write `config` and the windows may do whatever the board can.
+// Threads  any number of callers at a time.
+// Crash    if the kernel removes the board (echo 1 > remove), the next access to a mapped window
+//          raises SIGBUS, which ends the process.
+// Trust    the permissions of these files control access. A process that may write `config` and the
+//          windows can use the board without restriction.
+// Source   Linux, Documentation/PCI/sysfs-pci.rst and the UIO howto.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +24,7 @@
 
 namespace mpf {
 
-// Where those files are. Elsewhere in tests.
+// The folders of these files; tests use others.
 struct PciPlaces {
   std::string devices = "/sys/bus/pci/devices";
   std::string dev = "/dev";
@@ -32,7 +36,7 @@ struct PciKind {
   std::uint16_t device = 0;
 };
 
-// A part of a board's memory in this process.
+// A mapped part of a window of a board; unmapped when it is destroyed.
 class PciWindow {
  public:
   PciWindow() = default;
@@ -54,23 +58,27 @@ class PciWindow {
 
 class PciDevice {
  public:
-  //   which   its address ("0000:03:00.0", "03:00.0"), or its number among the boards of this kind, from "0"; empty: the first
-  //   throws  std::runtime_error in plain words: none there, another kind of board, a kernel driver that has it, no right to use it
+  // Finds and enables a board.
+  //
+  //   which   the address ("0000:03:00.0", "03:00.0"), or the number of the board among those of
+  //           this kind, counted from "0"; empty: the first
+  //   throws  std::runtime_error when the board is absent, of another kind, bound to another kernel
+  //           driver, or not accessible; the message says what to do
   PciDevice(PciPlaces places, PciKind kind, const std::string& which);
 
   [[nodiscard]] const std::string& address() const noexcept { return address_; }
-  // "TPCI200 at 0000:03:00.0"
+  // For messages to people: "TPCI200 at 0000:03:00.0".
   [[nodiscard]] std::string description() const;
 
-  // `bytes` bytes from `offset` in window (BAR) `number`.
-  //   throws  std::runtime_error in plain words
+  // Maps `bytes` bytes from `offset` in window (BAR) `number`.
+  //   throws  std::runtime_error when the window is too small or cannot be mapped
   [[nodiscard]] PciWindow map(int number, std::size_t offset, std::size_t bytes) const;
-  // A file of this board, for reading and writing; "resource3", "config".
-  //   throws  std::runtime_error that says what to do when this process has no right to
+  // Opens a file of this board, "resource3" or "config", for reading and writing.
+  //   throws  std::runtime_error, which says what to do when the permission is missing
   [[nodiscard]] FileDescriptor open(const std::string& name) const;
-  // The device file of its interrupt; empty when uio_pci_generic has not got the board.
+  // The device file of the interrupt; empty when the board is not bound to uio_pci_generic.
   [[nodiscard]] std::string interruptFile() const;
-  // The shell commands that give the board to uio_pci_generic.
+  // The shell commands that bind the board to uio_pci_generic.
   [[nodiscard]] std::string howToGetInterrupts() const;
 
  private:
@@ -84,7 +92,7 @@ class PciDevice {
   std::string address_;
 };
 
-// The addresses of all boards of that kind, sorted.
+// The addresses of all boards of this kind, sorted.
 [[nodiscard]] std::vector<std::string> findPciDevices(const PciPlaces& places, const PciKind& kind);
 
 }  // namespace mpf

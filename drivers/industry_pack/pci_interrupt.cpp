@@ -15,11 +15,12 @@
 namespace mpf {
 namespace {
 
-constexpr off_t kCommand = 4;                       // in the configuration registers: 16 bits, little-endian
-constexpr std::uint16_t kInterruptMasked = 0x0400;  // "interrupt disable"
+// offset in the configuration registers: 16 bits, little-endian
+constexpr off_t kCommand = 4;
+constexpr std::uint16_t kInterruptMasked = 0x0400;  // the bit "interrupt disable"
 
 FileDescriptor openFile(const PciDevice& device, const std::string& name) {
-  if (name.empty()) throw std::runtime_error("uio_pci_generic has not got the board; as root: " + device.howToGetInterrupts());
+  if (name.empty()) throw std::runtime_error("the board is not bound to uio_pci_generic; as root: " + device.howToGetInterrupts());
   FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file) return file;
   throw std::runtime_error(fmt::format("{} cannot be opened ({}); as root, for a GROUP that you are in: chgrp GROUP {} && chmod g+r {}",
@@ -41,7 +42,8 @@ bool PciInterrupt::tryTake() {
   throwSystemError(bytes < 0 ? errno : ENODEV, "read", name_);
 }
 
-// The whole register: QEMU hears of that bit only when the byte before it is written, too.
+// Writes the whole register: QEMU notices a change of this bit only when the lower byte is written,
+// too.
 void PciInterrupt::unmask() noexcept {
   std::uint16_t command = 0;
   if (::pread(config_.get(), &command, sizeof(command), kCommand) != sizeof(command)) return;

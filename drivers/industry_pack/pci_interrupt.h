@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// PciInterrupt: a PCI board's interrupt through uio_pci_generic: /dev/uioN tells of it, and the kernel has masked it by then.
+// PciInterrupt: the interrupt of a PCI board through uio_pci_generic. /dev/uioN reports it; the
+// kernel masks it first.
 //
-//   poll(interrupt.descriptor());           // readable: it came
+//   poll(interrupt.descriptor());           // readable when it has come
 //   if (interrupt.tryTake()) { ...; interrupt.unmask(); }
 //
-// Several processes may each have one for the same board: each is told, whoever is ready unmasks it.
+// Several processes may have such an object for the same board: each gets the interrupt, and each
+// unmasks it when it is done.
 //
-// Threads  one takes; unmask() from any.
-// Crash    an interrupt that a killed process left masked is unmasked by the next construction.
+// Threads  one calls tryTake(); any may call unmask().
+// Crash    the constructor unmasks an interrupt that a killed process left masked.
+// Source   Linux, UIO howto, "uio_pci_generic"; PCI 2.3, bit "interrupt disable".
 #pragma once
 
 #include <string>
@@ -19,13 +22,14 @@ namespace mpf {
 
 class PciInterrupt {
  public:
-  //   throws  std::runtime_error in plain words when uio_pci_generic has not got the board, or there is no right to its files
+  //   throws  std::runtime_error when the board is not bound to uio_pci_generic, or the permission
+  //           for its files is missing; the message says what to do
   explicit PciInterrupt(const PciDevice& device);
 
   [[nodiscard]] int descriptor() const noexcept { return file_.get(); }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  // False: it did not come.
-  //   throws  std::system_error when it never will any more
+  // Takes an interrupt, without waiting. Returns false when no interrupt has come.
+  //   throws  std::system_error when no interrupt can come any more (the board was unbound)
   [[nodiscard]] bool tryTake();
   void unmask() noexcept;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Carriers whose addresses and interrupt levels are set with switches or by software:
-//   TEWS TVME200        its six rotary switches, "6010D0"
+// Parameters of carriers whose addresses and interrupt levels are set with switches or by software:
+//   TEWS TVME200        the settings of its six rotary switches, "6010D0"
 //   Hytec 8002, 8004    slot,level [IPMEM=1|2|4|8] [MEMBASE=high half of the address] [IPCLK=8|32] [ROAK=0|1]
 //   Acromag AVME-96xx   base,level [R] [A=megabytes,address] ...
 //   SBS ATC40 (ISA)     address [16384 [irq]]
@@ -13,7 +13,7 @@
 namespace mpf::parameters {
 namespace {
 
-// TVME200: what switch S3 stands for.
+// TVME200: the interrupt levels of the sites for each setting of switch S3.
 constexpr std::array<std::array<std::array<int, 2>, 4>, 5> kSwitchedLevels{{
     {{{0, 0}, {0, 0}, {0, 0}, {0, 0}}},
     {{{1, 2}, {3, 4}, {5, 6}, {7, 0}}},
@@ -40,34 +40,34 @@ bool isSize(std::uint32_t megabytes) noexcept { return megabytes == 1 || megabyt
 
 std::uint32_t readMegabytes(ParameterText& text, std::string_view what) {
   const auto megabytes = text.number(what);
-  if (!isSize(megabytes)) text.refuse(fmt::format("{} {}: 1, 2, 4 or 8 it may be", what, megabytes));
+  if (!isSize(megabytes)) text.refuse(fmt::format("{} {}: use 1, 2, 4 or 8", what, megabytes));
   return megabytes;
 }
 
-// Switches S4 to S6 of a TVME200: how much memory, and where.
+// Switches S4 to S6 of a TVME200: size and address of the memory.
 void readSwitchedMemory(const ParameterText& text, CarrierParameters& carrier, std::uint32_t size, std::uint32_t high) {
   if (size == 0) return;
-  if (size > 7 && size != 0xf) text.refuse(fmt::format("switch S4 at {:X}: 0 to 7 or F it may be", size));
+  if (size > 7 && size != 0xf) text.refuse(fmt::format("switch S4 at {:X}: use 0 to 7 or F", size));
   const bool isA32 = size == 0xf;
   const auto base = isA32 ? high << 24 : high << 16;
   const auto bytes = isA32 ? 8 * kMegabyte : 16384U << size;
   if (base % (4 * bytes) != 0)
     text.refuse(
-        fmt::format("switches S5 and S6 at {:02X}: 0x{:x} is no multiple of 0x{:x}, the memory of four sites", high, base, 4 * bytes));
+        fmt::format("switches S5 and S6 at {:02X}: 0x{:x} is not a multiple of 0x{:x}, the memory of four sites", high, base, 4 * bytes));
   carrier.memory = isA32 ? BusSpace::vmeA32 : BusSpace::vmeA24;
   giveMemory(carrier.sites, base, bytes);
 }
 
 struct HytecMemory {
   std::uint32_t megabytes = 1;
-  std::optional<std::uint32_t> high;  // bits 31 to 16 of its address
+  std::optional<std::uint32_t> high;  // bits 31 to 16 of the address
 };
 
 void readHytecOption(ParameterText& text, CarrierParameters& carrier, HytecMemory& memory) {
   const auto at = text.rest();
   const auto name = text.word();
   if (name != "IPMEM" && name != "MEMBASE" && name != "IPCLK" && name != "IPCLCK" && name != "ROAK")
-    text.refuse(fmt::format("\"{}\": IPMEM, MEMBASE, IPCLK or ROAK may stand there", at));
+    text.refuse(fmt::format("\"{}\": use IPMEM, MEMBASE, IPCLK or ROAK", at));
   text.expect('=', name);
   if (name == "IPMEM") {
     memory.megabytes = readMegabytes(text, name);
@@ -77,20 +77,20 @@ void readHytecOption(ParameterText& text, CarrierParameters& carrier, HytecMemor
     carrier.releasesOnAcknowledge = text.number(name, {.most = 1}) == 1;
   } else {
     const auto clock = text.number(name);
-    if (clock != 8 && clock != 32) text.refuse(fmt::format("{} {}: 8 or 32 it may be", name, clock));
+    if (clock != 8 && clock != 32) text.refuse(fmt::format("{} {}: use 8 or 32", name, clock));
     carrier.clockMHz = static_cast<int>(clock);
   }
 }
 
-// Where no MEMBASE says it, the slot does.
+// Without a MEMBASE the slot determines the address.
 std::uint32_t hytecMemoryBase(const ParameterText& text, std::uint32_t slot, const HytecMemory& memory) {
   if (memory.high) {
     const auto base = *memory.high << 16;
     const auto all = 4 * memory.megabytes * kMegabyte;
     if (base % all != 0)
-      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: a multiple of 0x{:x} it may be", *memory.high, memory.megabytes, all >> 16));
+      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: use a multiple of 0x{:x}", *memory.high, memory.megabytes, all >> 16));
     if (*memory.high + (all >> 16) > 0xffff)
-      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: it goes beyond A32", *memory.high, memory.megabytes));
+      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: the end is beyond A32", *memory.high, memory.megabytes));
     return base;
   }
   if (memory.megabytes == 4) text.refuse("IPMEM 4 needs a MEMBASE");
@@ -101,7 +101,7 @@ std::uint32_t hytecMemoryBase(const ParameterText& text, std::uint32_t slot, con
 void readAvmeMemory(ParameterText& text, std::vector<SiteParameters>& sites) {
   const auto at = std::string(text.rest());
   const int letter = std::toupper(static_cast<unsigned char>(text.peek()));
-  if (letter < 'A' || letter > 'D') text.refuse(fmt::format("\"{}\": A, B, C or D may stand there, and R before them", at));
+  if (letter < 'A' || letter > 'D') text.refuse(fmt::format("\"{}\": use the sites A, B, C or D, and R before them", at));
   static_cast<void>(text.take());
   auto& site = sites[static_cast<std::size_t>(letter - 'A')];
   text.expect('=', "site");
@@ -129,7 +129,8 @@ void expectNoOverlap(const ParameterText& text, const std::vector<SiteParameters
       const auto& b = sites[j];
       if (a.memoryBytes == 0 || b.memoryBytes == 0) continue;
       if (a.memory < std::uint64_t{b.memory} + b.memoryBytes && b.memory < std::uint64_t{a.memory} + a.memoryBytes)
-        text.refuse(fmt::format("the memory of site {} lies in that of {}", static_cast<char>('A' + i), static_cast<char>('A' + j)));
+        text.refuse(
+            fmt::format("the memory of site {} overlaps with that of site {}", static_cast<char>('A' + i), static_cast<char>('A' + j)));
     }
   }
 }
@@ -139,14 +140,13 @@ CarrierParameters parseTvme200(ParameterText& text) {
   const auto digits = text.rest();
   const auto isHex = [](unsigned char digit) { return std::isxdigit(digit) != 0; };
   if (digits.size() != 6 || !std::ranges::all_of(digits, isHex))
-    text.refuse("six hexadecimal digits it may be, one for each of the switches S1 to S6");
+    text.refuse("use six hexadecimal digits, one for each of the switches S1 to S6");
   const auto switches = text.hex("switches");
   const auto base = (switches >> 8) & 0xf000;
   const auto second = (switches >> 16) & 0xf;
   const auto levels = (switches >> 12) & 0xf;
-  if (second % 4 != 0) text.refuse(fmt::format("switch S2 at {:X}: 0, 4, 8 or C it may be", second));
-  if (levels >= kSwitchedLevels.size())
-    text.refuse(fmt::format("switch S3 at {:X}: 0 to 4 it may be", levels), IndustryPackStatus::badIntLevel);
+  if (second % 4 != 0) text.refuse(fmt::format("switch S2 at {:X}: use 0, 4, 8 or C", second));
+  if (levels >= kSwitchedLevels.size()) text.refuse(fmt::format("switch S3 at {:X}: use 0 to 4", levels), IndustryPackStatus::badIntLevel);
   CarrierParameters carrier;
   carrier.sites = makeSites(4, base | second << 8);
   for (std::size_t i = 0; i < carrier.sites.size(); ++i) carrier.sites[i].interruptLevels = kSwitchedLevels[levels][i];
@@ -182,10 +182,10 @@ CarrierParameters parseAtc40(ParameterText& text) {
   constexpr std::uint32_t kWindow = 0x4000;  // bytes
   constexpr std::uint32_t kMostIrq = 15;
   const auto base = text.atEnd() ? 0xa0000 : text.hex("address", {.multipleOf = 0x100, .most = 0x1000000 - kWindow});
-  if (text.peek() == ',') text.refuse("blanks stand between its parameters, not commas");
+  if (text.peek() == ',') text.refuse("separate the parameters with blanks, not commas");
   if (!text.atEnd()) static_cast<void>(text.number("size [bytes]", {.least = kWindow, .most = kWindow}));
   const auto irq = text.atEnd() ? 11 : text.number("interrupt request");
-  if (irq > kMostIrq) text.refuse(fmt::format("interrupt request {}: 0 to {} it may be", irq, kMostIrq), IndustryPackStatus::badIntLevel);
+  if (irq > kMostIrq) text.refuse(fmt::format("interrupt request {}: use 0 to {}", irq, kMostIrq), IndustryPackStatus::badIntLevel);
   CarrierParameters carrier;
   carrier.registers = BusSpace::isa;
   carrier.memory = BusSpace::isa;

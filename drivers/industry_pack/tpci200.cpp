@@ -21,10 +21,10 @@ namespace {
 
 const PciKind kTpci200{.name = "TPCI200", .vendor = 0x1498, .device = 0x30c8};
 
-// Another process may look whether a site is anybody's, for an instant.
+// Another process may hold the lock of a site for a moment, in silenceIfNobodys().
 constexpr int kClaims = 50;
 constexpr std::chrono::milliseconds kClaimAgain{1};
-// Time for another process to mask its line before the interrupt is let through again.
+// Time for another process to mask its line before the interrupt is unmasked again.
 constexpr std::chrono::microseconds kForOthers{100};
 
 timespec toTimespec(std::chrono::nanoseconds time) noexcept {
@@ -37,13 +37,13 @@ Tpci200Options Tpci200Options::parse(const std::string& parameters) {
   constexpr std::string_view kPoll = "poll=";
   const auto refuse = [&](const std::string& problem) {
     throw IndustryPackError(IndustryPackStatus::badAddress,
-                            fmt::format("TPCI200 \"{}\": {}; [ADDRESS|NUMBER][,poll=MICROSECONDS] it may be", parameters, problem));
+                            fmt::format("TPCI200 \"{}\": {}; use [ADDRESS|NUMBER][,poll=MICROSECONDS]", parameters, problem));
   };
   Tpci200Options options;
   const auto comma = parameters.find(',');
   options.board = parameters.substr(0, comma);
   if (options.board.find_first_not_of("0123456789abcdefABCDEF:.") != std::string::npos)
-    refuse(fmt::format("\"{}\" is no PCI address", options.board));
+    refuse(fmt::format("\"{}\" is not a PCI address", options.board));
   if (comma == std::string::npos) return options;
   const auto rest = parameters.substr(comma + 1);
   if (!rest.starts_with(kPoll)) refuse(fmt::format("\"{}\" has no meaning", rest));
@@ -51,12 +51,13 @@ Tpci200Options Tpci200Options::parse(const std::string& parameters) {
   const auto* const end = rest.data() + rest.size();
   const auto [stop, error] = std::from_chars(rest.data() + kPoll.size(), end, microseconds);
   if (error != std::errc() || stop != end || microseconds < 1 || microseconds > 1'000'000)
-    refuse(fmt::format("\"{}\": 1 to 1000000 microseconds", rest));
+    refuse(fmt::format("\"{}\": use 1 to 1000000 microseconds", rest));
   options.pollEvery = std::chrono::microseconds(microseconds);
   return options;
 }
 
-// A request line of a module. It passes on one interrupt, and is masked then until enable().
+// An interrupt request line of a module. It passes on one interrupt and is then masked until
+// enable().
 class Tpci200Line final : public Interrupt {
  public:
   Tpci200Line(Tpci200Site& site, int number) : site_(site), number_(number) {}
@@ -104,7 +105,7 @@ class Tpci200Site final : public IndustryPackSite {
     const std::lock_guard lock(mutex_);
     return enabled_ != 0;
   }
-  // Announces those of its lines that ask, by the board's status.
+  // Announces the enabled lines that are active in the status of the board.
   void serve(std::uint16_t status) {
     const std::lock_guard lock(mutex_);
     for (int line = 0; line < 2; ++line) {
@@ -174,10 +175,10 @@ IndustryPackSite& Tpci200::site(std::size_t number) {
 
 void Tpci200::claim(std::size_t number) {
   for (int i = 0; !locks_.tryLock(static_cast<int>(number)); ++i) {
-    if (i == kClaims) throw std::runtime_error(fmt::format("{}: another process has site {}", description(), siteName(number)));
+    if (i == kClaims) throw std::runtime_error(fmt::format("{}: site {} is in use by another process", description(), siteName(number)));
     std::this_thread::sleep_for(kClaimAgain);
   }
-  board_.setLines(number, 0);  // whoever had it may have been killed
+  board_.setLines(number, 0);  // the previous process may have been killed
 }
 
 void Tpci200::watch(int priority) {
@@ -220,7 +221,7 @@ void Tpci200::takeInterrupt() {
     if (!interrupt_->tryTake()) return;
   } catch (const std::system_error&) {
     interrupt_.reset();
-    pollFromNowOn();  // uio_pci_generic was told to leave the board
+    pollFromNowOn();  // the board was unbound from uio_pci_generic
     return;
   }
   if (serve()) {

@@ -1,22 +1,29 @@
 // SPDX-License-Identifier: MIT
-// Tpci200: the TEWS TPCI200, a PCI board with four sites.
+// Tpci200: the TEWS TPCI200, a PCI board with four sites, as a carrier.
 //
 //   Tpci200 carrier({.board = "0000:03:00.0"});
 //   auto& site = carrier.site(0);
 //
-//   chip asks ──► status bit ──► PCI interrupt ──► /dev/uioN, masked by the kernel ──► thread: acknowledge, mask the line, announce, unmask PCI
+//   request of a chip ──► status bit ──► PCI interrupt ──► /dev/uioN, masked by the kernel
+//     ──► thread: acknowledge, mask the line, announce, unmask the PCI interrupt
 //
-// Without uio_pci_generic the thread looks at the status every `pollEvery` instead; remark() says so. When it is taken away later, Interrupt does.
-// A cycle that no module ends reads ones.
+// Without uio_pci_generic the thread reads the status every `pollEvery` instead, and remark() says
+// so. If the board is unbound from uio_pci_generic later, Interrupt::isPolled() becomes true. A bus
+// cycle that no module answers reads ones.
 //
-// Threads  any; accesses of one process to one board take turns. The thread starts with the first enable() of an interrupt,
-//          and has the real-time priority of that interrupt, where the process may have it.
-// Crash    site() takes a site for this process, by a lock that ends with it, and masks its interrupts. Lines of a site that nobody has are
-//          masked by whoever else uses the board.
-// Trust    processes that may use one board can spoil each other's sites: it protects none.
-// Source   Linux drivers/ipack/carriers/tpci200; QEMU's model, on which this is tested, not a real board. That model reads zeroes where no
-//          module is, sets no time-out, and forgets a request that comes while its line is masked: pollEvery of InterruptThread finds it.
-//          The board's bridge is of PCI 2.2, uio_pci_generic wants 2.3: where it refuses the board, interrupts are polled.
+// Threads  any number of callers at a time; accesses of one process to one board are serialised.
+//          The thread starts with the first enable() of an interrupt and has the real-time priority
+//          of that interrupt where the process may set it.
+// Crash    site() locks the site for this process, until the process ends, and masks its
+//          interrupts. The other processes on the board mask the lines of a site that has no
+//          process.
+// Trust    processes with access to the board can disturb each other's sites; the board does not
+//          protect them.
+// Source   Linux drivers/ipack/carriers/tpci200. Tested on QEMU's model, not on a real board. The
+//          model reads zeroes without a module, sets no time-out bits, and loses a request that
+//          comes while its line is masked (pollEvery of InterruptThread finds it). The bridge of
+//          the board follows PCI 2.2, uio_pci_generic requires 2.3; where it refuses the board,
+//          interrupts are polled.
 #pragma once
 
 #include <array>
@@ -36,12 +43,12 @@
 namespace mpf {
 
 struct Tpci200Options {
-  std::string board;  // as PciDevice has it
-  std::chrono::microseconds pollEvery{1000};  // where there are no interrupts
+  std::string board;  // `which` of PciDevice
+  std::chrono::microseconds pollEvery{1000};  // used without PCI interrupts
   PciPlaces places;
 
-  // "[ADDRESS|NUMBER][,poll=MICROSECONDS]"
-  //   throws  IndustryPackError badAddress that names what is wrong
+  // Reads "[ADDRESS|NUMBER][,poll=MICROSECONDS]".
+  //   throws  IndustryPackError badAddress, which names the invalid part
   [[nodiscard]] static Tpci200Options parse(const std::string& parameters);
 };
 
@@ -51,26 +58,29 @@ class Tpci200 final : public IndustryPackCarrier {
  public:
   static constexpr std::size_t kSites = 4;
 
-  //   throws  std::runtime_error in plain words: no board, no right, another driver has it
+  // Opens the board.
+  //   throws  std::runtime_error when the board is absent, not accessible, or bound to another
+  //           driver; the message says what to do
   explicit Tpci200(const Tpci200Options& options);
   ~Tpci200() override;
 
   [[nodiscard]] std::string description() const override { return pci_.description(); }
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] std::size_t siteCount() const noexcept override { return kSites; }
-  //   throws  std::runtime_error when another process has it
+  //   throws  std::runtime_error when another process has the site
   [[nodiscard]] IndustryPackSite& site(std::size_t number) override;
 
  private:
   friend class Tpci200Site;
   void openInterrupt();
   void claim(std::size_t number);
-  // A line with that priority was enabled: the thread has something to do.
+  // Called when a line with that priority was enabled: starts or wakes the thread.
   void watch(int priority);
   void run(const std::stop_token& stop, int priority);
   void wait();
   void takeInterrupt();
-  // Announces what asks. Returns whether something else asks as well.
+  // Announces the active lines of this process's sites. Returns whether lines of other sites are
+  // active.
   bool serve();
   void silenceIfNobodys(std::size_t number);
   void pollFromNowOn() noexcept { isPolled_.store(true, std::memory_order_relaxed); }
@@ -79,14 +89,14 @@ class Tpci200 final : public IndustryPackCarrier {
   PciDevice pci_;
   std::chrono::microseconds pollEvery_;
   Tpci200Board board_;
-  FileLocks locks_;  // of sites
-  std::unique_ptr<PciInterrupt> interrupt_;  // after start: the thread's
+  FileLocks locks_;  // one lock for each site
+  std::unique_ptr<PciInterrupt> interrupt_;  // used by the thread only, once it runs
   std::atomic<bool> isPolled_{false};
   std::string remark_;
   FileDescriptor wakeUp_;
   std::mutex sitesMutex_;
   std::array<std::unique_ptr<Tpci200Site>, kSites> sites_;
-  std::jthread thread_;  // last: ends before what it uses
+  std::jthread thread_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

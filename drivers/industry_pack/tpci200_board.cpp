@@ -10,7 +10,7 @@ namespace {
 constexpr int kBridgeWindow = 0;
 constexpr int kBoardWindow = 2;
 
-// The bridge's descriptors of local spaces 0, 1 and 2, which are windows 2, 3 and 4.
+// The bridge's descriptors of the local spaces 0, 1 and 2, which are the windows 2, 3 and 4.
 constexpr std::size_t kBridgeBytes = 0x80;
 constexpr std::size_t kSpace0 = 0x28;
 constexpr std::size_t kSpace1 = 0x2c;
@@ -18,12 +18,12 @@ constexpr std::size_t kSpace2 = 0x30;
 constexpr std::uint32_t kBigEndian = 1U << 24;
 
 constexpr std::size_t kBoardBytes = 0x10;
-constexpr std::size_t kControl = 0x02;  // of site A; 2 bytes a site
+constexpr std::size_t kControl = 0x02;  // of site A; 2 bytes for each site
 constexpr std::size_t kStatus = 0x0c;
-constexpr unsigned kPassLine0 = 1U << 6;  // in a control register; line 1 follows
-constexpr unsigned kTimeOut = 1U << 12;   // in the status, of site A
+constexpr unsigned kPassLine0 = 1U << 6;  // in a control register; the next bit is line 1
+constexpr unsigned kTimeOut = 1U << 12;   // in the status; of site A
 
-constexpr std::size_t kAcknowledge = 0xc0;  // 2 bytes a line
+constexpr std::size_t kAcknowledge = 0xc0;  // 2 bytes for each line
 constexpr std::size_t kAllSites = 4 * Tpci200Board::kSiteBytes;
 
 template <class Value>
@@ -43,7 +43,7 @@ Tpci200Board::Tpci200Board(const PciDevice& pci)
     : window_(pci.map(kBoardWindow, 0, kBoardBytes)), sites_(pci.map(kSitesWindow, 0, kAllSites)) {
   const auto bridge = pci.map(kBridgeWindow, 0, kBridgeBytes);
   if (at<std::uint32_t>(bridge, kSpace1) == UINT32_MAX)
-    throw std::runtime_error(pci.description() + " does not answer: all bits of its bridge read as ones");
+    throw std::runtime_error(pci.description() + " does not answer: all bits of its bridge read as ones; check the board and the bus");
   setByteOrder(bridge, kSpace0, false);
   setByteOrder(bridge, kSpace1, true);
   setByteOrder(bridge, kSpace2, true);
@@ -60,14 +60,14 @@ std::uint16_t Tpci200Board::status() {
 void Tpci200Board::setLines(std::size_t site, unsigned lines) {
   const std::lock_guard lock(mutex_);
   write(kControl + 2 * site, static_cast<std::uint16_t>(lines * kPassLine0));
-  static_cast<void>(read(kStatus));  // the write has arrived when this returns
+  static_cast<void>(read(kStatus));  // the read makes sure that the write has arrived
 }
 
 void Tpci200Board::acknowledge(std::size_t site, int line) {
   const std::lock_guard lock(mutex_);
   [[maybe_unused]] const std::uint16_t vector =
       at<std::uint16_t>(sites_, site * kSiteBytes + kAcknowledge + 2 * static_cast<std::size_t>(line));
-  takeTimeOut(site);  // a module need not answer
+  takeTimeOut(site);  // a module may leave this cycle unanswered
   write(kStatus, statusBit(site, line));
 }
 
@@ -85,7 +85,8 @@ Value Tpci200Registers::read(Read read) {
   return board_.takeTimeOut(site_) ? static_cast<Value>(~Value{0}) : value;
 }
 
-// Writes are on their way when they return; looking for a time-out waits for their end, so that it is not taken for the next access's.
+// A write is still under way when the store returns. Reading the status waits for its end, so that
+// its time-out is not attributed to the next access.
 template <class Write>
 void Tpci200Registers::write(Write write) {
   const std::lock_guard lock(board_.mutex_);

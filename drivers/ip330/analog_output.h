@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// AnalogOutput: one channel of a converter that a control loop drives, whichever it is.
+// AnalogOutput: one output channel that a control loop drives, of any converter.
+//
+// Threads  one at a time.
 #pragma once
 
 #include <optional>
@@ -13,9 +15,9 @@ class AnalogOutput {
   AnalogOutput& operator=(const AnalogOutput&) = delete;
   virtual ~AnalogOutput() = default;
 
-  // What it puts out now, in codes; nullopt when it does not answer.
+  // Returns the present output [codes]; nullopt when the converter does not answer.
   [[nodiscard]] virtual std::optional<double> tryRead() = 0;
-  // False: it did not take it.
+  // Sets the output [codes]. Returns false when the converter did not accept it.
   [[nodiscard]] virtual bool tryWrite(double codes) = 0;
 };
 

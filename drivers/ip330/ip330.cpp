@@ -75,8 +75,8 @@ std::chrono::nanoseconds Ip330::patience() const noexcept {
 
 // ---- the board
 
-// Whether the board is there as the keeper has left it. One that has forgotten what was programmed may be another one, or another module whose
-// registers are not ours to write: the keeper looks.
+// Returns whether the board is present and programmed. A board that has lost its settings may have
+// been replaced, even by another module, so nothing is written until the keeper has checked it.
 bool Ip330::isReady() { return !faults_.has(Ip330Fault::absent) && chip_.presence() == Ip330Chip::Presence::asProgrammed; }
 
 void Ip330::start() {
@@ -86,7 +86,7 @@ void Ip330::start() {
   startNs_ = Clock::nowNs();
 }
 
-// A start after which earlier samples mean nothing any more.
+// Starts a new epoch: earlier samples are not comparable with those that follow.
 void Ip330::begin() {
   epoch_.fetch_add(1, std::memory_order_relaxed);
   start();
@@ -114,7 +114,8 @@ bool Ip330::trySet(std::uint8_t& channelsGain, std::uint8_t gain) {
   Gains gains{};
   gains[gain] = true;
   if (calibrate(gains)) return true;
-  refusedUntil_[gain] = Deadline::after(limits_.silence);  // who asks for it again and again shall not stop the scans of others
+  // repeated requests for this gain must not stop the scans of other clients
+  refusedUntil_[gain] = Deadline::after(limits_.silence);
   channelsGain = before;
   start();
   return false;
@@ -127,7 +128,7 @@ std::string Ip330::tryConfigure(Ip330ScanMode mode, Ip330Trigger trigger, double
   wanted.trigger = trigger;
   wanted.microsecondsPerScan = microsecondsPerScan;
   if (auto problem = wanted.problem(); !problem.empty()) return problem;
-  if (!isReady()) return "the board is gone";
+  if (!isReady()) return "the board is absent or not programmed yet";
   settings_ = wanted;
   begin();
   return {};
@@ -152,7 +153,8 @@ bool Ip330::tryCalibrate() {
     const Lock lock(mutex_);
     isGood = calibrate(gainsInUse());
     const auto period = settings_.secondsBetweenCalibrate;
-    calibrateAt_ = period > 0 ? Deadline::after(std::chrono::seconds(period)) : Deadline::never();  // counted from the end of it
+    // counted from the end of the calibration
+    calibrateAt_ = period > 0 ? Deadline::after(std::chrono::seconds(period)) : Deadline::never();
     if (isGood) refusedUntil_ = notRefused();
     if (!isGood) calibrateSoon();
   }
@@ -163,7 +165,7 @@ bool Ip330::tryCalibrate() {
 bool Ip330::calibrate(const Gains& gains) {
   if (!isReady()) return calibrateSoon(), false;
   bool isGood = true;
-  bool ends = true;  // conversion; if one does not, the others would not either
+  bool ends = true;  // if one conversion does not end, the others are not tried
   chip_.stop();
   for (int gain = 0; gain < kIp330Gains && ends; ++gain) {
     if (!gains[static_cast<std::size_t>(gain)]) continue;
@@ -177,7 +179,7 @@ bool Ip330::calibrate(const Gains& gains) {
   return isGood;
 }
 
-// Whether the codes make sense; nullopt when conversion does not end.
+// Returns whether the codes are plausible; nullopt when a conversion does not end.
 std::optional<bool> Ip330::calibrate(int gain) {
   const auto [low, high] = calibrationPointsOf(settings_.range, gain);
   const auto lowCode = chip_.tryMeasure(low.source, gain, limits_.conversion);
@@ -188,7 +190,7 @@ std::optional<bool> Ip330::calibrate(int gain) {
   return correction.has_value();
 }
 
-// The keeper tries again.
+// Makes the keeper calibrate again after the delay of a retry.
 void Ip330::calibrateSoon() { calibrateAt_ = std::min(calibrateAt_, Deadline::after(limits_.silence)); }
 
 Ip330::Gains Ip330::gainsInUse() const {
@@ -217,7 +219,7 @@ bool Ip330::serve(InterruptThread::Cause cause) {
   Ip330Chip::Scans scans;
   {
     const Lock lock(mutex_);
-    if (!isReady()) return false;  // the keeper sees to that
+    if (!isReady()) return false;  // the keeper handles this
     chip_.take(settings_, scans);
     for (std::size_t i = 0; i < scans.count && scans.isSettled; ++i) correct(scans.codes[i], samples[i]);
   }
@@ -264,7 +266,9 @@ void Ip330::deliver(const Ip330Sample& sample) {
 Ip330::Subscription Ip330::subscribe(Subscriber subscriber) {
   const auto most = static_cast<std::size_t>(settings().maxClients);
   const Lock lock(subscribersMutex_);
-  if (subscribers_.size() >= most) throw std::length_error(fmt::format("{} has {} clients already; allow more", module_.name(), most));
+  if (subscribers_.size() >= most)
+    throw std::length_error(
+        fmt::format("{} already has {} clients, which is the limit; raise the maximum number of clients", module_.name(), most));
   const auto at = subscribers_.insert(subscribers_.end(), std::move(subscriber));
   return {nullptr, [this, at](void*) {
             const Lock ending(subscribersMutex_);
@@ -298,7 +302,7 @@ void Ip330::lookForBoard() {
     if (isReady()) return;
     seen = chip_.presence();
     if (seen != Presence::absent && !module_.problem().empty()) seen = Presence::absent;
-    if (seen == Presence::reset) corrections_ = {};  // it may be another one
+    if (seen == Presence::reset) corrections_ = {};  // it may be another board
     if (seen != Presence::absent) begin();
   }
   faults_.set(Ip330Fault::absent, seen == Presence::absent);
@@ -317,7 +321,7 @@ void Ip330::lookForScans() {
       start();
     }
   }
-  // After a start it is not known yet: as it was.
+  // After a start the state is unknown until a scan comes, so the fault stays unchanged.
   if (isSilent || scans_.load(std::memory_order_relaxed) != scansSeen_) faults_.set(Ip330Fault::silent, isSilent);
   scansSeen_ = scans_.load(std::memory_order_relaxed);
 }

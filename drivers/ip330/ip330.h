@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Ip330: an Acromag IP330 that scans its inputs and calibrates itself (manual, "ip330Scan").
+// Ip330: driver of the Acromag IP330; scans the inputs and calibrates the converter (manual,
+// "ip330Scan").
 //
 //   interrupt ─► interrupt thread ─► mailboxes ─► corrected codes ─► every subscriber, scan by scan
-//   keeper thread: calibrates every so often; looks whether the board is there, scans, and is as it was programmed
+//   keeper thread: calibrates periodically; checks that the board is present, scans and is
+//   programmed
 //
 //   Ip330 board(module, {.type = parseIp330Type("D"), .lastChannel = 15});
 //   const auto subscription = board.subscribe([&](const Ip330Sample& sample) { ...sample.corrected[3]... });
 //
-// Calibration is kept by gain: a change to a gain that was calibrated before costs no measurement. It holds the lock that the interrupt thread
-// needs, with the board's interrupts off: neither sees the other's mailboxes.
+// A calibration is stored for each gain, so a change to a gain that was calibrated before needs no
+// measurement. Calibration holds the lock that the interrupt thread needs, and the interrupts of
+// the board are off meanwhile: scans and calibration never read each other's mailboxes.
 //
-// Threads  any. Subscribers are called by the interrupt thread, one at a time.
-// Crash    the board goes on scanning until the carrier is opened again; nobody reads it.
-// Trust    codes of a board that is broken may be anything; they are numbers and never an index.
-// Source   IP330 manual; ip330 R1-7 for what clients expect, its races and silent clamping aside.
+// Threads  any number of callers at a time. Subscribers are called by the interrupt thread, one at
+//          a time.
+// Crash    the board continues to scan, unread, until the carrier is opened again.
+// Trust    a broken board may return any codes; they are used as numbers, never as an index.
+// Source   IP330 manual; EPICS ip330 R1-7 for what clients expect, without its races and its silent
+//          clamping.
 #pragma once
 
 #include <array>
@@ -41,24 +46,27 @@ namespace mpf {
 
 inline const ModuleKind kIp330{.name = "Acromag IP330", .manufacturer = kAcromag, .models = {0x11}};
 
-// What one scan gave; index: channel.
+// The result of one scan. The arrays are indexed by channel.
 struct Ip330Sample {
-  std::array<double, kIp330Channels> corrected{};  // codes, neither rounded nor clamped: for means. clampedCode() makes a value of it
-  Ip330Chip::Codes raw{};
-  std::array<std::uint8_t, kIp330Channels> gain{};
-  std::uint32_t valid = 0;  // bit n: channel n is scanned, and calibrated unless calibration is off
-  std::uint64_t epoch = 0;  // Ip330::epoch() when it was taken
+  // codes, neither rounded nor clamped, for means; see clampedCode()
+  std::array<double, kIp330Channels> corrected{};
+  Ip330Chip::Codes raw{};  // codes of the converter
+  std::array<std::uint8_t, kIp330Channels> gain{};  // codes 0 to 3
+  std::uint32_t valid = 0;  // bit n: channel n is scanned, and calibrated if calibration is on
+  std::uint64_t epoch = 0;  // Ip330::epoch() at the time of the scan
 
   [[nodiscard]] bool isValid(int channel) const noexcept { return (valid >> channel & 1) != 0; }
 };
 
-// How long what may take; for tests to change.
+// Times and limits of the driver; tests use others.
 struct Ip330Limits {
-  std::chrono::milliseconds conversion{100};  // of all channels: the chip needs half a millisecond
-  std::chrono::milliseconds silence{2000};  // without a scan, beside ten periods of it; and until what failed is tried again
-  std::chrono::milliseconds lookEvery{100};  // the keeper
-  std::chrono::milliseconds pollEvery{10};  // for scans whose interrupt did not come
-  int stormLimit = 16;
+  // longest conversion of all channels; the chip needs 0.5 ms
+  std::chrono::milliseconds conversion{100};
+  // longest time without a scan, plus ten periods; also the delay before a retry
+  std::chrono::milliseconds silence{2000};
+  std::chrono::milliseconds lookEvery{100};  // period of the keeper thread
+  std::chrono::milliseconds pollEvery{10};  // finds scans whose interrupt was lost
+  int stormLimit = 16;  // see InterruptThreadOptions
   std::chrono::milliseconds stormPause{1000};
 };
 
@@ -66,60 +74,75 @@ class Ip330 {
  public:
   using Subscriber = std::function<void(const Ip330Sample&)>;
 
-  // Programs and calibrates the board, and starts to scan. A board that cannot be calibrated is a fault, not an error.
-  //   module  must outlive this
-  //   throws  std::invalid_argument with settings.problem()
+  // Programs and calibrates the board, and starts to scan. A failed calibration is a fault, not an
+  // error.
+  //
+  //   module  must outlive this object
+  //   hook    called when a fault begins or ends, see Ip330Faults
+  //   throws  std::invalid_argument with settings.problem(); std::system_error when a thread cannot
+  //           be started
   Ip330(IndustryPackModule& module, const Ip330Settings& settings, Ip330Faults::Hook hook = {}, const Ip330Limits& limits = {});
-  // The board's interrupts are off and it does not scan, if it is there. No subscription is left.
+  // Stops scans and interrupts of the board, if it is present. All subscriptions must have ended.
   ~Ip330();
   Ip330(const Ip330&) = delete;
   Ip330& operator=(const Ip330&) = delete;
 
   [[nodiscard]] Ip330Settings settings() const;
   [[nodiscard]] int gain(int channel) const;
-  // What the timer makes of the time asked for; 0 when only triggers know.
+  // The period of the scans [us] that the timer registers give; 0 when it depends on triggers.
   [[nodiscard]] double microsecondsPerScan() const noexcept { return microsecondsPerScan_.load(std::memory_order_relaxed); }
-  // Changes when earlier samples mean nothing any more: another scan mode or time, a board that was gone or silent.
+  // Changes when earlier samples are no longer comparable: after a change of scan mode or time, or
+  // after the board was absent or silent.
   [[nodiscard]] std::uint64_t epoch() const noexcept { return epoch_.load(std::memory_order_relaxed); }
-  // Without a scan for that long something is wrong.
+  // The longest time without a scan in normal operation.
   [[nodiscard]] std::chrono::nanoseconds patience() const noexcept;
-  // Whether scans come: false when the board is gone, or silent.
+  // Returns false while the board is absent or silent.
   [[nodiscard]] bool isDelivering() const noexcept { return !faults_.has(Ip330Fault::absent) && !faults_.has(Ip330Fault::silent); }
-  // Empty, or what is wrong, in a sentence.
+  // Returns a sentence about the worst fault; empty without a fault.
   [[nodiscard]] std::string problem() const { return faults_.describe(); }
 
-  // False: there is no such channel or gain, this gain cannot be calibrated, or the board is gone; then the channel keeps the gain that it has.
-  // A gain that could not be calibrated is tried again after Ip330Limits::silence, or when calibration has succeeded. Samples after it have
-  // that gain.
+  // Sets the gain of a channel; later samples have this gain. A gain that could not be calibrated
+  // is tried again after Ip330Limits::silence, or after a successful tryCalibrate().
+  //
+  //   gain     code 0 to 3, see kIp330Gain
+  //   returns  false when the channel or gain does not exist, the gain cannot be calibrated, or the
+  //            board is absent; the channel then keeps its gain
   [[nodiscard]] bool trySetGain(int channel, int gain);
-  // Empty, or why not; then all is as it was.
+  // Changes the scan mode.
+  //   returns  a sentence that says why the change is impossible, with nothing changed; empty on
+  //            success
   [[nodiscard]] std::string tryConfigure(Ip330ScanMode mode, Ip330Trigger trigger, double microsecondsPerScan);
-  // Also calibrates now, unless it is negative. False: that failed.
+  // Sets the period of calibration and calibrates now, unless `seconds` is negative. Returns false
+  // when this calibration failed.
   bool trySetSecondsBetweenCalibrate(int seconds);
-  // All gains in use. False: one of them gave nonsense or nothing, and keeps the correction that it had; or the board is gone.
+  // Calibrates all gains in use. Returns false when the board is absent, or a gain could not be
+  // calibrated because its codes were invalid or missing; such a gain keeps its previous
+  // correction.
   bool tryCalibrate();
-  // A scan, in the single modes. False: another mode, or the board is gone.
+  // Starts a scan in a single mode. Returns false in other modes and when the board is absent.
   [[nodiscard]] bool tryStartConvert();
 
   struct Counters {
     std::uint64_t scans = 0;
-    std::uint64_t missed = 0;  // times that scans were overwritten before they were read
+    std::uint64_t missed = 0;  // how often scans were overwritten before they were read
     std::uint64_t calibrations = 0;
     InterruptThread::Counters interrupts;
   };
   [[nodiscard]] Counters counters() const noexcept;
 
-  // Ends a subscription when it is destroyed: then its subscriber is not running, and does not run any more.
+  // Ends the subscription when it is destroyed: the subscriber is not running then and does not run
+  // again.
   using Subscription = std::shared_ptr<void>;
-  // The subscriber must not subscribe, end subscriptions, or wait for who does.
-  //   throws  std::length_error when there are settings.maxClients already
+  // Calls `subscriber` for each scan from now on. It must not subscribe, end a subscription, or
+  // wait for a thread that does. This object must outlive the subscription.
+  //   throws  std::length_error when settings.maxClients subscriptions exist already
   [[nodiscard]] Subscription subscribe(Subscriber subscriber);
 
  private:
   using Lock = std::lock_guard<std::mutex>;
   using Gains = std::array<bool, kIp330Gains>;
 
-  // Locked: mutex_.
+  // Called with mutex_ held.
   [[nodiscard]] bool isReady();
   void start();
   void begin();
@@ -145,7 +168,7 @@ class Ip330 {
   const Ip330Limits limits_;
   Ip330Faults faults_;
 
-  mutable std::mutex mutex_;  // this and below: the board
+  mutable std::mutex mutex_;  // guards the board and the members below
   Ip330Settings settings_;
   Ip330Chip chip_;
   std::array<std::uint8_t, kIp330Channels> gains_{};
@@ -156,21 +179,20 @@ class Ip330 {
 
   std::atomic<double> microsecondsPerScan_{0};
   std::atomic<std::uint64_t> epoch_{0};
-  std::atomic<std::int64_t> lastScanNs_{
-      0};  // or the beginning of an epoch; not each start, of which there may be one for each failed calibration
+  std::atomic<std::int64_t> lastScanNs_{0};  // or the begin of an epoch; not of each start, since a failed calibration also starts
   std::atomic<std::uint64_t> scans_{0}, missed_{0}, calibrations_{0};
-  std::atomic<int> lateInRow_{0};  // scans found by looking, since the last interrupt
+  std::atomic<int> lateInRow_{0};  // scans found by polling since the last interrupt
 
   std::mutex subscribersMutex_;
   std::list<Subscriber> subscribers_;
 
-  std::uint64_t stormsSeen_ = 0;  // the keeper's, as those below
+  std::uint64_t stormsSeen_ = 0;  // this and below: used by the keeper thread
   std::uint64_t scansSeen_ = 0;
   Deadline stormOver_ = Deadline::never();
   std::mutex keeperMutex_;
   std::condition_variable_any keeperWakes_;
   std::unique_ptr<InterruptThread> interruptThread_;
-  std::jthread keeper_;  // last
+  std::jthread keeper_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

@@ -11,9 +11,10 @@ namespace mpf {
 namespace {
 
 constexpr double kCodes = 65536;
-// How far a slope may be from 1 before it is nonsense; the chip promises far less.
+// The largest plausible difference of a slope from 1; the chip guarantees a much smaller one.
 constexpr double kMostSlopeError = 0.2;
-// A mean at least that far from both ends: noise of three codes that is cut off there makes less than 1.5 of it.
+// The least distance of a mean from both ends of the range: noise of three codes that is clipped at
+// an end then shifts the mean by less than 1.5 codes.
 constexpr double kEndCodes = 1;
 
 constexpr Ip330CalibrationPoint kZero{0, ip330::kSourceAutoZero};

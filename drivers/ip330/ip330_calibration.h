@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Ip330Calibration: from what the converter gives for two voltages that the board has itself, what its codes should have been.
+// Ip330Calibration: corrects the codes of the converter, using its codes for two reference voltages
+// of the board.
 //
-//   corrected = slope * (raw + offset), of which 0 to 65535 are the range's ends; a perfect converter has slope 1, offset 0
+//   corrected = slope * (raw + offset), 0 to 65535 covers the range; a perfect converter has slope
+//   1, offset 0
 //
-// Range 0to5 at gain code 3 (8): the lowest voltage of the board but 0 V is nearly the end of the range, so 0 V must serve. A converter whose
-// offset is below 0 gives code 0 for it, whatever the offset is: nothing on such a board tells, and this gain is refused.
+// Range 0to5 at gain code 3 (a gain of 8): the lowest reference above 0 V is nearly at the end of
+// the range, so 0 V must be the lower reference. A converter with a negative offset gives code 0
+// for 0 V, whatever the offset is, so the offset cannot be measured and this gain is refused.
 //
-// Source   IP330 manual, "Calibration"; which two voltages serve for which range and gain.
+// Threads  any number of callers at a time.
+// Source   IP330 manual, "Calibration", which gives the two voltages for each range and gain.
 #pragma once
 
 #include <cstdint>
@@ -18,27 +22,29 @@ namespace mpf {
 
 struct Ip330CalibrationPoint {
   double volts;
-  std::uint16_t source;  // bits of the control register
+  std::uint16_t source;  // bits of the control register that select the voltage
 };
 
 struct Ip330CalibrationPoints {
   Ip330CalibrationPoint low, high;
 };
 
+// The reference voltages for a range and a gain code of 0 to 3.
 [[nodiscard]] Ip330CalibrationPoints calibrationPointsOf(Ip330Range range, int gain) noexcept;
 
 struct Ip330Correction {
   double slope = 1;
-  double offset = 0;
+  double offset = 0;  // codes
 
   [[nodiscard]] double apply(double raw) const noexcept { return slope * (raw + offset); }
 };
 
-// From the means of both points' codes; nullopt when no converter gives such codes: it is dead or absent; or when one is at an end of the range,
-// where nobody knows how far beyond it is, and noise is cut off on one side.
+// Computes the correction from the mean codes of both reference voltages.
+//   returns  nullopt when no working converter gives such codes, or when a mean is at an end of the
+//            range: there the voltage may be beyond the range, and noise is clipped on one side
 [[nodiscard]] std::optional<Ip330Correction> correctionOf(Ip330Range range, int gain, double lowCode, double highCode) noexcept;
 
-// The code that a client gets: rounded, and within 0 to 0xffff.
+// The code that a client gets: rounded and clamped to 0 to 0xffff.
 [[nodiscard]] int clampedCode(double corrected) noexcept;
 
 }  // namespace mpf

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::uint16_t kAllOnes = 0xffff;
 constexpr int kMailboxesOfHalf = 16;
-constexpr std::chrono::microseconds kLookAgainAfter{50};  // a set takes 480 us
+// a conversion of all channels takes 480 us
+constexpr std::chrono::microseconds kLookAgainAfter{50};
 constexpr std::chrono::microseconds kConversion{static_cast<int>(kIp330MicrosecondsPerConversion)};
 
 std::uint16_t sourceOf(Ip330Type type) { return type == Ip330Type::differential ? ip330::kSourceDifferential : ip330::kSourceSingleEnded; }
@@ -39,7 +40,8 @@ void Ip330Chip::start(const Ip330Settings& settings, const std::array<std::uint8
   stop();
   settle(settings, limit);
   const auto timer = ip330TimerOf(settings.scanMode, settings.channels(), settings.microsecondsPerScan);
-  io_.write8(ip330::kInterruptVector, static_cast<std::uint8_t>(settings.vector));  // before any trigger can make it interrupt
+  // before a trigger can cause an interrupt
+  io_.write8(ip330::kInterruptVector, static_cast<std::uint8_t>(settings.vector));
   io_.write8(ip330::kTimerPrescaler, timer.prescaler);
   io_.write16(ip330::kConversionTimer, timer.conversion);
   io_.write8(ip330::kStartChannel, static_cast<std::uint8_t>(settings.firstChannel));
@@ -80,7 +82,7 @@ void Ip330Chip::take(const Ip330Settings& settings, Scans& scans) {
   if (scans.count > 0) isSettled_ = true;
 }
 
-// A scan is there when its last channel is.
+// A scan is complete when its last channel has new data.
 bool Ip330Chip::takeHalf(const Ip330Settings& settings, int half, Scans& scans) {
   const auto first = static_cast<std::size_t>(half) * kMailboxesOfHalf;
   const auto last = first + static_cast<std::size_t>(settings.lastChannel);
@@ -99,7 +101,7 @@ std::optional<double> Ip330Chip::tryMeasure(std::uint16_t source, int gain, std:
   for (std::size_t i = 0; i < kIp330Channels; ++i) io_.write8(ip330::kGainSelect + i, static_cast<std::uint8_t>(gain));
   prepareSingle(source, kIp330Channels);
   if (!tryConvert(kIp330Channels, limit)) return std::nullopt;
-  static_cast<void>(readAllMailboxes());  // and with that the flags
+  static_cast<void>(readAllMailboxes());  // this also clears the flags
   if (!tryConvert(kIp330Channels, limit)) return std::nullopt;
   return readAllMailboxes() / static_cast<double>(kIp330Channels);
 }
@@ -112,7 +114,7 @@ void Ip330Chip::settle(const Ip330Settings& settings, std::chrono::nanoseconds l
   stop();
 }
 
-// A burst of channels 0 to channels - 1, without interrupts.
+// Prepares a burst of channels 0 to channels - 1, without interrupts.
 void Ip330Chip::prepareSingle(std::uint16_t source, int channels) {
   const auto burstSingle = static_cast<std::uint16_t>(static_cast<unsigned>(Ip330ScanMode::burstSingle) << ip330::kScanModeShift);
   io_.write8(ip330::kStartChannel, 0);
@@ -128,7 +130,7 @@ bool Ip330Chip::tryConvert(int channels, std::chrono::nanoseconds limit) {
     const bool isUpperThere = channels <= kMailboxesOfHalf || io_.read16(ip330::kNewData + 2) == kAllOnes;
     if (isUpperThere && io_.read16(ip330::kNewData) == kAllOnes) return true;
     if (isLast) return false;
-    std::this_thread::sleep_for(kLookAgainAfter);  // the chip says it in no other way: interrupts are off
+    std::this_thread::sleep_for(kLookAgainAfter);  // polls, since interrupts are off
   }
 }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Ip330Chip: the registers of one board, in steps: start a scan, take what it gave, measure a calibration voltage.
+// Ip330Chip: the register sequences of one board: start scans, take their results, measure a
+// calibration voltage.
 //
-// Differential inputs: the results of successive scans alternate between mailboxes 0-15 and 16-31. Which half is next is remembered, and the
-// new-data flags say whether it is there: a scan that nobody took in time does not turn the halves round.
+// With differential inputs the results of successive scans alternate between mailboxes 0-15 and
+// 16-31. The object remembers which half is next and checks its new-data flags, so a scan that was
+// not taken in time does not swap the halves.
 //
-// Threads  one at a time: the owner has a lock.
-// Source   IP330 manual; the original read only the lower half in release 1-4, and waited for flags of the upper half alone when calibrating.
+// Threads  one at a time: the owner holds a lock.
+// Source   IP330 manual. EPICS ip330 R1-4 read only the lower half, and when calibrating waited
+//          only for flags of the upper half.
 #pragma once
 
 #include <array>
@@ -22,31 +25,36 @@ class Ip330Chip {
  public:
   enum class Presence : std::uint8_t { asProgrammed, reset, absent };
   using Codes = std::array<std::uint16_t, kIp330Channels>;
-  // Scans that were waiting, the older one first.
+  // The scans that were ready, the older one first.
   struct Scans {
     std::array<Codes, 2> codes{};  // index: channel
     std::size_t count = 0;
-    bool isMissing = false;  // one before them was overwritten
-    bool isSettled = true;  // false: the converter had not settled, the codes are worth nothing
+    bool isMissing = false;  // an earlier scan was overwritten
+    bool isSettled = true;  // false: the converter had not settled, so the codes are invalid
   };
 
   explicit Ip330Chip(Registers& io) : io_(io) {}
 
-  // Writes all registers, interrupt control last, and starts continuous scans. After another input source a set of codes is thrown away first.
-  //   settings  with no problem()
-  //   limit     longest wait for that set
+  // Writes all registers, interrupt control last, and starts continuous scans. After a change of
+  // the input source one conversion of all channels is discarded first.
+  //   settings  must be valid: problem() is empty
+  //   limit     longest wait for that conversion
   void start(const Ip330Settings& settings, const std::array<std::uint8_t, kIp330Channels>& gains, std::chrono::nanoseconds limit);
-  // No scan, no interrupt; forgets what was measured so far. Waits until a burst that had begun is over: its codes have the gains of before.
+  // Stops scans and interrupts, and discards all results. Waits for the end of a burst that has
+  // begun, since its codes have the previous gains.
   void stop();
-  // A software trigger, for the single modes.
+  // Sends a software trigger, for the single modes.
   void startConvert();
 
+  // Compares registers with what start() wrote.
   [[nodiscard]] Presence presence();
-  // Takes what is there; reading makes the board take its request back.
+  // Takes the scans that are ready; the reads end the interrupt request of the board.
   void take(const Ip330Settings& settings, Scans& scans);
-  // The mean code of all channels on a calibration voltage, after start() to be stopped. The first set of codes is thrown away: the converter settles.
-  //   limit    longest wait for each set
-  //   returns  nullopt when conversion does not end
+  // Measures a calibration voltage; call stop() first. The first conversion is discarded, since the
+  // converter settles.
+  //   source   calibration voltage, bits of the control register
+  //   limit    longest wait for each of the two conversions
+  //   returns  the mean code of all channels; nullopt when a conversion does not end
   [[nodiscard]] std::optional<double> tryMeasure(std::uint16_t source, int gain, std::chrono::nanoseconds limit);
 
  private:
@@ -58,10 +66,10 @@ class Ip330Chip {
   [[nodiscard]] std::uint32_t readAllMailboxes();
 
   Registers& io_;
-  std::uint16_t control_ = 0;  // what is in the register
-  int half_ = 0;  // differential: where the next scan is
-  bool isSettled_ = true;  // false: the first scan is worth nothing
-  int converting_ = 0;  // channels of which a scan may have begun
+  std::uint16_t control_ = 0;  // last value written to the register
+  int half_ = 0;  // differential: the half of the next scan
+  bool isSettled_ = true;  // false: the next scan is invalid
+  int converting_ = 0;  // number of channels of a scan that may have begun
 };
 
 }  // namespace mpf

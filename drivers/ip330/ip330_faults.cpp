@@ -10,11 +10,11 @@ struct FaultText {
 };
 
 constexpr std::array<FaultText, 5> kTexts{{
-    {"the board is gone: all bits read as ones, or another module is in its place", "the board is there again"},
+    {"the board is gone: all bits read as ones, or another module is in its place", "the board is present again"},
     {"the board does not scan", "the board scans again"},
-    {"the board's interrupts do not come: it is looked at instead", "the board's interrupts come again"},
-    {"the board interrupts without a reason: its interrupt is off for a while", "the board's interrupt is quiet again"},
-    {"calibration fails: the converter gives nothing, nonsense, or the end of its range", "calibration succeeds again"},
+    {"the board's interrupts do not come: the board is polled instead", "the board's interrupts come again"},
+    {"the board interrupts without a reason: its interrupt is masked for a while", "the board's interrupt is quiet again"},
+    {"calibration fails: the converter gives no codes, implausible codes, or the end of its range", "calibration succeeds again"},
 }};
 
 }  // namespace

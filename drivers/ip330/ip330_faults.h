@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Ip330Faults: what is wrong with a board now, and a hook for each time that something begins or ends to be.
+// Ip330Faults: the current faults of a board; calls a hook when a fault begins or ends.
 //
-// Threads  any; the hook runs on the thread that noticed, without any lock of the driver.
+// Threads  any number of callers at a time. The hook runs on the thread that noticed the change,
+//          with no lock of the driver held.
 #pragma once
 
 #include <array>
@@ -13,17 +14,18 @@
 namespace mpf {
 
 enum class Ip330Fault : std::uint8_t {
-  absent,          // all bits read as ones, or another module is there
+  absent,          // all bits read as ones, or another module is in its place
   silent,          // no scan ends
-  interruptsLost,  // scans end, and no interrupt says so: found by looking
-  storm,           // interrupts for which the board has nothing
-  notCalibrated,   // conversion of a calibration voltage does not end, gives nonsense, or the end of the range
+  interruptsLost,  // scans end without an interrupt; they are found by polling
+  storm,           // interrupts without a scan
+  // a calibration voltage gives no codes, implausible codes, or the end of the range
+  notCalibrated,
 };
 
 class Ip330Faults {
  public:
-  //   text     a sentence for people
-  //   isThere  false: it is over
+  //   text     a sentence about the fault, or about its end
+  //   isThere  true when the fault begins, false when it ends
   using Hook = std::function<void(const std::string& text, bool isThere)>;
 
   explicit Ip330Faults(Hook hook) : hook_(std::move(hook)) {}
@@ -32,7 +34,7 @@ class Ip330Faults {
   [[nodiscard]] bool has(Ip330Fault fault) const noexcept {
     return isThere_[static_cast<std::size_t>(fault)].load(std::memory_order_relaxed);
   }
-  // Empty, or the worst of them in a sentence.
+  // Returns a sentence about the worst fault; empty without a fault.
   [[nodiscard]] std::string describe() const;
 
  private:

@@ -17,16 +17,16 @@ namespace {
 
 constexpr IdProm kIp330Id{.manufacturer = kAcromag, .model = 0x11};
 constexpr double kSecondsPerConversion = kIp330MicrosecondsPerConversion / 1e6;
-// How far off the codes are before the converter has settled.
+// Error of the codes before the converter has settled.
 constexpr double kSettlingCodes = 300;
-// Between two scans others get at the registers, whatever the timer says.
+// Least pause between two scans, so that other threads can access the registers.
 constexpr double kLeastPauseSeconds = 20e-6;
 constexpr std::size_t kNewDataWord = ip330::kNewData / 2;
 constexpr std::size_t kMissedDataWord = ip330::kMissedData / 2;
 constexpr std::size_t kMailBoxWord = ip330::kMailBox / 2;
 constexpr std::size_t kHalf = 16;
 
-// Volts of a calibration source; of the inputs, nothing.
+// The voltage of a calibration source; 0 for the inputs.
 double voltsOf(std::uint16_t source) noexcept {
   switch (source) {
     case ip330::kSource4V9000:
@@ -260,7 +260,8 @@ void Ip330Model::run(const std::stop_token& stop) {
     }
     seconds_ = next_;
     scan();
-    next_ = std::max(next_ + periodSeconds(), clockSeconds() + kLeastPauseSeconds);  // who was held up does not catch up
+    // after a delay the model does not catch up
+    next_ = std::max(next_ + periodSeconds(), clockSeconds() + kLeastPauseSeconds);
   }
 }
 

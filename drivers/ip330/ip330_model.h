@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Ip330Model: an Acromag IP330 that is not there: registers, timer, converter with its errors, mailboxes, interrupts.
+// Ip330Model: device model of an Acromag IP330: registers, timer, converter with errors, mailboxes,
+// interrupts.
 //
 //   Ip330Model model({.range = Ip330Range::minus5to5, .gainError = {0.01}, .noise = 0.4, .isRealTime = false});
 //   model.setSignal(0, sineSignal(5, 2));
 //   model.step();                            // one period of the timer
 //
-// In real time a thread of the model lets the timer run; otherwise step() does. Single scans and calibration take no time at all.
-// After a change of the input source the first set of codes is off, as the converter settles.
-// A real board takes its interrupt request back in the carrier's acknowledge cycle, which a model does not see: this one does when the mailbox
-// of the last channel is read, or interrupts are disabled.
+// In real time a thread of the model runs the timer; otherwise step() does. Single scans and
+// calibration take no time. After a change of the input source the first conversion has wrong
+// codes, since the converter settles. A real board ends its interrupt request in the acknowledge
+// cycle of the carrier, which a model does not get; the model ends it when the mailbox of the last
+// channel is read, or interrupts are disabled.
 //
-// Threads  any.
-// Source   IP330 manual; what differential inputs do to the mailboxes is from the old driver.
+// Threads  any number of callers at a time.
+// Source   IP330 manual; EPICS ip330 for the mailboxes of differential inputs.
 #pragma once
 
 #include <array>
@@ -30,9 +32,9 @@
 namespace mpf {
 
 struct Ip330ModelOptions {
-  Ip330Range range = Ip330Range::minus5to5;  // its DIP switches
-  std::array<double, kIp330Gains> gainError{};  // of each gain; 0.01: one percent too much
-  std::array<double, kIp330Gains> offsetError{};  // codes
+  Ip330Range range = Ip330Range::minus5to5;  // as set by the DIP switches
+  std::array<double, kIp330Gains> gainError{};  // by gain code; 0.01: codes are 1 % too high
+  std::array<double, kIp330Gains> offsetError{};  // by gain code; in codes
   double noise = 0;  // standard deviation, codes
   std::uint64_t seed = 1;
   bool isRealTime = true;
@@ -43,21 +45,22 @@ class Ip330Model final : public DeviceModel {
   explicit Ip330Model(const Ip330ModelOptions& options = {});
   ~Ip330Model() override;
 
-  // What is on an input, at first 0 V. In differential mode channel n is the pair n.
+  // Sets the signal at an input; 0 V at first. In differential mode channel n is the pair n.
   void setSignal(int channel, Ip330Signal signal);
-  // Lets the timer pass `scans` periods, when this model has no time of its own.
+  // Runs `scans` periods of the timer; for a model that is not in real time.
   void step(int scans = 1);
-  // A pulse at the external trigger's pin.
+  // Simulates a pulse at the pin of the external trigger.
   void externalTrigger();
-  // From now on no conversion ends, calibration included.
+  // Simulates a fault: no conversion ends, calibration included.
   void setStuck(bool isStuck);
-  // When scans are disabled next, one has begun: it ends a little later, with the gains of then.
+  // Simulates a race: when scans are disabled next, a scan has begun, which ends a little later
+  // with the gains of the time when scans were disabled.
   void beginScanBeforeDisable();
-  // Whether that one is still to end.
+  // Returns whether the scan of beginScanBeforeDisable() has not ended yet.
   [[nodiscard]] bool isEndingScan();
-  // All registers as after power-up.
+  // Sets all registers to their values after power-up.
   void powerCycle();
-  // What the code of a perfect converter would be: of 0 to 65536, not rounded.
+  // The code of a perfect converter: 0 to 65536, not rounded.
   [[nodiscard]] static double idealCode(Ip330Range range, int gain, double volts) noexcept;
 
   std::uint16_t read(Space space, std::size_t offset, Lanes lanes) override;
@@ -67,7 +70,7 @@ class Ip330Model final : public DeviceModel {
   static constexpr std::size_t kWords = 64;
   using Lock = std::lock_guard<std::mutex>;
 
-  // All below: locked.
+  // The functions below are called with mutex_ held.
   [[nodiscard]] std::uint16_t control() const noexcept { return words_[0]; }
   [[nodiscard]] Ip330ScanMode scanMode() const noexcept;
   [[nodiscard]] int startChannel() const noexcept { return words_[3] & 0x1f; }
@@ -101,17 +104,17 @@ class Ip330Model final : public DeviceModel {
   bool isRunning_ = false;  // continuous scans
   bool isStuck_ = false;
   bool isSettling_ = false;  // no scan has ended since the input source was changed
-  bool leavesScan_ = false;  // beginScanBeforeDisable()
+  bool leavesScan_ = false;  // beginScanBeforeDisable() was called
   std::vector<std::pair<std::size_t, std::uint16_t>> left_;  // mailboxes and codes of that scan
   std::int64_t leftUntilNs_ = 0;
   unsigned starts_ = 0;
-  int half_ = 0;  // differential: which half of the mailboxes comes next
-  int triggered_ = -1;  // converted last by an external trigger
-  double seconds_ = 0;  // now
-  double next_ = 0;  // when the next scan is due, in real time
+  int half_ = 0;  // differential: the half of the mailboxes for the next scan
+  int triggered_ = -1;  // the last channel that an external trigger converted
+  double seconds_ = 0;  // time of the signals
+  double next_ = 0;  // time of the next scan, in real time
   std::int64_t bornNs_;
   std::condition_variable_any changed_;
-  std::jthread thread_;  // last
+  std::jthread thread_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

@@ -36,7 +36,7 @@ void Ip330Pid::take(const Ip330Sample& sample) {
   if (hook_) hook_(isFailing ? "the output of the feedback does not answer" : "the output of the feedback answers again", isFailing);
 }
 
-// False: the output does not answer; what is there stays.
+// Returns false when the output does not answer; it then keeps its value.
 bool Ip330Pid::step(double actual) {
   if (isWanted_ && !loop_.isOn()) {
     const auto now = output_.tryRead();
@@ -45,7 +45,7 @@ bool Ip330Pid::step(double actual) {
   }
   const double output = loop_.step(actual, scansPerStep() * board_.microsecondsPerScan() / 1e6);
   if (!loop_.isOn() || output_.tryWrite(output)) return true;
-  loop_.turnOff();  // it goes on from what is there then
+  loop_.turnOff();  // feedback continues from the present output later
   return false;
 }
 

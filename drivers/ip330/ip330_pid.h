@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Ip330Pid: fast feedback: a channel of the board is read scan by scan, or as the mean of several, and an output is driven.
+// Ip330Pid: fast feedback from a channel of the board to an output. Each step uses one scan or the
+// mean of several scans.
 //
-// While no scans come, or the channel is not calibrated, the output stays as it is. Who changes the gain of the channel changes the loop.
+// While no scans come, or the channel is not calibrated, the output keeps its value. A change of
+// the gain of the channel also changes the loop.
 //
-// Threads  any. The output is read and written by the board's interrupt thread.
+// Threads  any number of callers at a time. The interrupt thread of the board reads and writes the
+//          output.
+// Crash    the output keeps its value.
 // Source   ip330PID, fastPID (std R1-3).
 #pragma once
 
@@ -19,20 +23,24 @@ namespace mpf {
 
 class Ip330Pid {
  public:
-  //   output   must outlive this, as the board
-  //   limits   of the output, in codes; they are the loop's at first
-  //   hook     when the output fails, and when it answers again: as Ip330Faults
-  //   throws   std::invalid_argument, std::length_error as Ip330Scan
+  // Feedback is off at first.
+  //
+  //   board, output    must outlive this object
+  //   lowest, highest  first limits of the loop [codes]
+  //   hook             called when the output fails and when it answers again, like that of
+  //                    Ip330Faults
+  //   throws           std::invalid_argument, std::length_error as Ip330Scan
   Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowest, double highest, Ip330Faults::Hook hook = {});
   Ip330Pid(const Ip330Pid&) = delete;
   Ip330Pid& operator=(const Ip330Pid&) = delete;
 
-  // Feedback begins with the next scan, from what the output is then.
+  // Starts feedback with the next scan, from the value of the output at that time.
   void start();
   void stop();
-  // The loop's parameters; `change` must not call this object.
+  // Changes the parameters of the loop; `change` must not call this object.
   void set(const std::function<void(PidLoop&)>& change);
-  // Rounded to whole scans, at least one. False: negative, or no number.
+  // Sets the time of a step; it is rounded to whole scans, at least one. Returns false for a
+  // negative time or NaN.
   [[nodiscard]] bool trySetSecondsPerScan(double seconds);
 
   struct Status {
@@ -53,13 +61,13 @@ class Ip330Pid {
   Ip330Faults::Hook hook_;
   std::mutex mutex_;
   PidLoop loop_;
-  bool isWanted_ = false;  // feedback
-  bool isFailing_ = false;  // the output
-  bool isValid_ = true;     // the last sample
+  bool isWanted_ = false;  // feedback is switched on
+  bool isFailing_ = false;  // the output does not answer
+  bool isValid_ = true;     // the last sample was valid
   double seconds_ = 0;
   double sum_ = 0;
   int scans_ = 0;
-  Ip330::Subscription subscription_;  // last
+  Ip330::Subscription subscription_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

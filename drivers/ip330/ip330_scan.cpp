@@ -10,7 +10,7 @@
 namespace mpf {
 namespace {
 
-// How often who waits for a sample looks whether the board still scans.
+// How often a waiting reader checks that the board still scans.
 constexpr std::chrono::milliseconds kLookAtBoard{10};
 
 }  // namespace
@@ -18,8 +18,8 @@ constexpr std::chrono::milliseconds kLookAtBoard{10};
 void expectIp330Channels(const Ip330& board, int first, int last) {
   const auto settings = board.settings();
   if (settings.has(first) && settings.has(last) && first <= last) return;
-  throw std::invalid_argument(
-      fmt::format("channels {} to {}: the board scans {} to {}", first, last, settings.firstChannel, settings.lastChannel));
+  throw std::invalid_argument(fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
+                                          settings.firstChannel, settings.lastChannel));
 }
 
 Ip330Scan::Ip330Scan(Ip330& board, int first, int last) : board_(board), first_(first), last_(last) {
@@ -52,7 +52,8 @@ void Ip330Scan::stop() {
   came_.notify_all();
 }
 
-// 0: since the last reading. nullopt: too many.
+// The number of samples in a time; 0 means all since the last reading. nullopt: the time is
+// invalid.
 std::optional<std::uint64_t> Ip330Scan::samplesOf(std::chrono::milliseconds average) const {
   if (average.count() < 0) return std::nullopt;
   if (average.count() == 0) return 0;
@@ -63,13 +64,13 @@ std::optional<std::uint64_t> Ip330Scan::samplesOf(std::chrono::milliseconds aver
   return static_cast<std::uint64_t>(samples);
 }
 
-// Locked.
+// Called with mutex_ held.
 bool Ip330Scan::hasSample(int channel, int gain) const {
   const auto& state = channels_[static_cast<std::size_t>(channel - first_)];
   return state.gain == gain && state.epoch == board_.epoch() && state.mean.count() != 0;
 }
 
-// Not locked: the board calls take() while it is.
+// Called without mutex_: the board calls take() while it holds its own lock.
 bool Ip330Scan::comes(int channel, int gain) const {
   return board_.isDelivering() && isContinuous(board_.settings().scanMode) && board_.gain(channel) == gain;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Ip330Scan: the mean of a channel over the time that who asks wants (manual, "ip330Scan").
+// Ip330Scan: the mean of a channel over a time that each reader chooses (manual, "ip330Scan").
 //
-// Each reader says how long: two with different times on one channel do not disturb each other. With 0 it is what came since the last such
-// reading of that channel, and the last sample when nothing came: never a mean of nothing.
+// Readers with different times on one channel do not disturb each other. With a time of 0 the mean
+// covers all samples since the last such reading of the channel; without new samples it is the last
+// sample.
 //
-// Threads  any. A reading waits for the first sample of a gain; stop() ends that.
+// Threads  any number of callers at a time. A reading waits for the first sample of a gain; stop()
+//          ends the wait.
 #pragma once
 
 #include <atomic>
@@ -23,19 +25,23 @@ inline constexpr std::uint64_t kIp330LongestMean = 65536;  // samples
 
 class Ip330Scan {
  public:
-  // For channels `first` to `last` of the board, which must outlive this.
-  //   throws  std::invalid_argument when it does not scan them, std::length_error as Ip330::subscribe()
+  // Reads channels `first` to `last` of the board, which must outlive this object.
+  //   throws  std::invalid_argument when the board does not scan these channels, std::length_error
+  //           as Ip330::subscribe()
   Ip330Scan(Ip330& board, int first, int last);
   Ip330Scan(const Ip330Scan&) = delete;
   Ip330Scan& operator=(const Ip330Scan&) = delete;
 
-  // The mean over the last `average` [ms]: of as many samples as came in that time, or since the board began to scan with this gain and in
-  // this mode. Who wants another gain of the channel at the same time may take it away: then there is no mean.
-  //   gain     code 0 to 3; the board is set to it when it has another
-  //   returns  0 to 0xffff; nullopt when there is no such channel or gain, the time is negative or takes more samples than kIp330LongestMean,
-  //            the gain cannot be calibrated, or no samples come with it
+  // Returns the mean over the last `average` [ms], or over the shorter time for which the board has
+  // scanned with this gain and in this mode. Another reader may set another gain of the channel at
+  // the same time; the reading may then fail.
+  //
+  //   gain     code 0 to 3; the channel is set to it if needed
+  //   returns  0 to 0xffff; nullopt when the channel or gain does not exist, the time is negative
+  //            or needs more than kIp330LongestMean samples, the gain cannot be calibrated, or no
+  //            samples come
   [[nodiscard]] std::optional<int> tryRead(int channel, int gain, std::chrono::milliseconds average);
-  // Readings that wait end, and none waits any more.
+  // Ends all waiting readings; later readings do not wait.
   void stop();
 
  private:
@@ -43,7 +49,7 @@ class Ip330Scan {
     RunningMean mean;
     int gain = 0;
     std::uint64_t epoch = 0;
-    std::uint64_t readAt = 0;  // samples when it was read without a time
+    std::uint64_t readAt = 0;  // number of samples at the last reading with time 0
   };
 
   void take(const Ip330Sample& sample);
@@ -59,11 +65,11 @@ class Ip330Scan {
   std::condition_variable came_;
   bool isStopped_ = false;
   std::vector<Channel> channels_;
-  Ip330::Subscription subscription_;  // last
+  Ip330::Subscription subscription_;  // last: ends before the members that it uses
 };
 
-// What Ip330Scan, Ip330Sweep and Ip330Pid say of channels that the board does not scan.
-//   throws  std::invalid_argument
+// Checks channels for Ip330Scan, Ip330Sweep and Ip330Pid.
+//   throws  std::invalid_argument when the board does not scan them
 void expectIp330Channels(const Ip330& board, int first, int last);
 
 }  // namespace mpf

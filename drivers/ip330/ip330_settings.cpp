@@ -60,9 +60,9 @@ Ip330ScanMode parseIp330ScanMode(int number) {
 std::string Ip330Settings::problem() const {
   const int end = channelsOf(type);
   if (firstChannel < 0 || lastChannel >= end || firstChannel > lastChannel)
-    return fmt::format("channels {} to {}: use 0 to {}, the first one first", firstChannel, lastChannel, end - 1);
+    return fmt::format("channels {} to {}: use 0 to {}, in ascending order", firstChannel, lastChannel, end - 1);
   if (vector < 0 || vector > 255) return fmt::format("interrupt vector {}: use 0 to 255", vector);
-  if (maxClients < 1) return fmt::format("{} clients: use 1 or more", maxClients);
+  if (maxClients < 1) return fmt::format("maximum number of clients {}: use 1 or more", maxClients);
   return ip330TimerOf(scanMode, channels(), microsecondsPerScan).problem;
 }
 

@@ -29,7 +29,7 @@ Number parseNumber(const std::string& text) {
   Number number{};
   const auto* const end = text.data() + text.size();
   const auto [at, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc() || at != end) throw std::invalid_argument(fmt::format("\"{}\" is no number", text));
+  if (error != std::errc() || at != end) throw std::invalid_argument(fmt::format("\"{}\" is not a number", text));
   return number;
 }
 
@@ -48,12 +48,13 @@ Ip330Signal parseSignal(const std::string& text, const std::map<std::string, Ip3
   if (kind == "dc") return parseDc(parameters);
   if (kind == "sine") return parseSine(parameters);
   if (const auto other = others.find(kind); other != others.end()) return other->second(parameters);
-  throw std::invalid_argument(fmt::format("there is no kind of signal \"{}\"; there are dc and sine", kind));
+  throw std::invalid_argument(fmt::format("unknown kind of signal \"{}\"; use dc or sine", kind));
 }
 
 int parseChannel(const std::string& text) {
   const int channel = parseNumber<int>(text);
-  if (channel < 0 || channel >= kIp330Channels) throw std::invalid_argument(fmt::format("there is no channel {}", channel));
+  if (channel < 0 || channel >= kIp330Channels)
+    throw std::invalid_argument(fmt::format("no channel {}; use 0 to {}", channel, kIp330Channels - 1));
   return channel;
 }
 

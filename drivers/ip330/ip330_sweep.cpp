@@ -11,7 +11,8 @@
 namespace mpf {
 namespace {
 
-constexpr int kMostPoints = 1 << 23;  // half of what a message may have: an array of all points always fits into one
+// an array of all points is at most half the limit of a message
+constexpr int kMostPoints = 1 << 23;
 
 bool isTime(double seconds) { return std::isfinite(seconds) && seconds >= 0; }
 
@@ -88,7 +89,7 @@ void Ip330Sweep::erase() {
 }
 
 bool Ip330Sweep::trySetPoints(double points) {
-  const bool isPossible = points >= 1 && points <= maxPoints_;  // no number is not, either
+  const bool isPossible = points >= 1 && points <= maxPoints_;  // false for NaN, too
   if (!isPossible) return false;
   const std::lock_guard lock(mutex_);
   points_ = static_cast<int>(points);

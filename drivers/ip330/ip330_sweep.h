@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Ip330Sweep: several channels over time, as a digitiser: arrays of points, each the mean of the scans in its dwell time.
+// Ip330Sweep: records several channels over time, like a digitiser, into arrays of points. Each
+// point is the mean of the scans in its dwell time.
 //
-// Points are whole scans of all channels `first` to `last`. It ends when the arrays are full, or at a preset time.
+// A point consists of whole scans of all channels `first` to `last`. A sweep ends when the arrays
+// are full or at a preset time.
 //
-// Threads  any.
-// Source   fastSweep and ip330Sweep: there the number of points was undefined until it was set, the last channel was not averaged, and it went
-//          on by one point after the last.
+// Threads  any number of callers at a time.
+// Source   fastSweep and ip330Sweep. There the number of points was undefined until it was set, the
+//          last channel was not averaged, and one point too many was recorded.
 #pragma once
 
 #include <cstdint>
@@ -19,33 +21,36 @@ namespace mpf {
 
 class Ip330Sweep {
  public:
-  // For arrays of at most `maxPoints`, and that many at first.
+  // Creates arrays of `maxPoints` points; all of them are used until trySetPoints() says otherwise.
+  // `board` must outlive this object.
   //   throws  std::invalid_argument, std::length_error as Ip330Scan
   Ip330Sweep(Ip330& board, int first, int last, int maxPoints);
   Ip330Sweep(const Ip330Sweep&) = delete;
   Ip330Sweep& operator=(const Ip330Sweep&) = delete;
 
-  // Goes on where it stopped; does nothing while it acquires, or when the arrays are full.
+  // Starts, or continues after stop(). Has no effect during a sweep or when the arrays are full.
   void start();
   void stop();
-  // All points are 0, and the next is the first.
+  // Sets all points to 0; the next point is the first.
   void erase();
 
-  // False: outside 1 to maxPoints.
+  // Sets the number of points of a sweep. Returns false unless it is 1 to maxPoints.
   [[nodiscard]] bool trySetPoints(double points);
-  // Rounded to whole scans, at least one. False: negative, or no number.
+  // Sets the dwell time; it is rounded to whole scans, at least one. Returns false for a negative
+  // time or NaN.
   [[nodiscard]] bool trySetSecondsPerPoint(double seconds);
-  // It ends after that time; 0: it does not. False: negative, or no number.
+  // Sets the time after which a sweep ends; 0: no limit. Returns false for a negative time or NaN.
   [[nodiscard]] bool trySetPreset(double seconds);
 
   struct Status {
     bool isAcquiring = false;
     double elapsedSeconds = 0;
     double secondsPerPoint = 0;
-    int acquired = 0;  // points
+    int acquired = 0;  // complete points
   };
   [[nodiscard]] Status status();
-  // All points of a channel, those that are not there yet as 0; nullopt when it has no such channel.
+  // Returns all points of a channel, 0 for points that are not complete yet; nullopt when the sweep
+  // does not include the channel.
   [[nodiscard]] std::optional<std::vector<std::int32_t>> tryRead(int channel);
 
  private:
@@ -64,12 +69,12 @@ class Ip330Sweep {
   double presetSeconds_ = 0;
   bool isAcquiring_ = false;
   std::int64_t startNs_ = 0;
-  double elapsedSeconds_ = 0;  // of what has ended
+  double elapsedSeconds_ = 0;  // of the parts before the last start()
   int acquired_ = 0;
-  int scans_ = 0;  // of the point that grows
-  std::vector<double> sums_;  // of it, by channel - first_
+  int scans_ = 0;  // of the incomplete point
+  std::vector<double> sums_;  // of the incomplete point; index: channel - first_
   std::vector<std::vector<std::int32_t>> data_;
-  Ip330::Subscription subscription_;  // last
+  Ip330::Subscription subscription_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

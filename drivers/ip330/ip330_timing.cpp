@@ -15,7 +15,8 @@ constexpr double kMostConversion = 0xffff;
 constexpr double kLeastTimer = kLeastPrescaler / kTicksPerMicrosecond;
 constexpr double kMostTimer = kMostPrescaler * kMostConversion / kTicksPerMicrosecond;
 
-// The smallest prescaler that leaves room for the rest: the finest steps.
+// Chooses the smallest prescaler for which the conversion register is large enough: it has the
+// finest steps.
 void setTimer(Ip330Timer& timer, double microseconds) {
   const double ticks = std::max(microseconds, kLeastTimer) * kTicksPerMicrosecond;
   double prescaler = std::clamp(std::ceil(ticks / kMostConversion), kLeastPrescaler, kMostPrescaler);
@@ -24,7 +25,7 @@ void setTimer(Ip330Timer& timer, double microseconds) {
   timer.conversion = static_cast<std::uint16_t>(std::clamp(std::round(ticks / prescaler), 1.0, kMostConversion));
 }
 
-// What a scan takes beside its timer periods, how many of those it has, and the shortest of them.
+// The time of a scan: `fixed` plus `periods` periods of the timer, each at least `least` [us].
 struct Shape {
   double fixed;
   double periods;
@@ -49,7 +50,8 @@ Ip330Timer ip330TimerOf(Ip330ScanMode mode, int channels, double microsecondsPer
   const auto shape = shapeOf(mode, channels);
   const double least = shape.fixed + shape.periods * shape.least;
   const double most = shape.fixed + shape.periods * kMostTimer;
-  const bool isPossible = microsecondsPerScan >= least && microsecondsPerScan <= most;  // no number is not, either
+  // false for NaN, too
+  const bool isPossible = microsecondsPerScan >= least && microsecondsPerScan <= most;
   if (!isPossible) {
     timer.problem = fmt::format("{} us per scan of {} channels in mode {}: use {} to {} us", microsecondsPerScan, channels, toString(mode),
                                 least, std::floor(most));

@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: MIT
-// PidLoop: one step of a control loop after the other, without any device.
+// PidLoop: computes the steps of a PID control loop; independent of any device.
 //
 //   error = setPoint - actual
 //   P = KP * error      I += KP * KI * error * dt      D = KP * KD * change of error / dt      output = P + I + D, within its limits
 //
-// I grows no more while the output is at the limit towards which it grows, and stays within the limits itself. It begins with what the output is
-// when feedback is turned on, so that nothing jumps; it does not change while feedback is off. KI of 0 makes it the low limit, or the high one
-// when KP is not positive: so one tunes P alone.
+// I does not change towards a limit while the output is at that limit, and is itself within the
+// limits. When feedback is turned on, I starts with the present output, so that the output does not
+// jump. I does not change while feedback is off. With KI = 0, I is the low limit, or the high limit
+// if KP is not positive; this is used to tune P alone.
 //
 // Threads  one at a time.
-// Source   fastPID (std R1-3); there the first change of error was of whatever the memory held.
+// Source   EPICS fastPID (std R1-3), where the first change of error was computed from
+//          uninitialised memory.
 #pragma once
 
 namespace mpf {
 
 class PidLoop {
  public:
-  double kp = 1, ki = 0, kd = 0;
+  double kp = 1, ki = 0, kd = 0;  // ki [1/s], kd [s]
   double setPoint = 0;
   double lowLimit = 0, highLimit = 0;
 
@@ -26,7 +28,7 @@ class PidLoop {
   [[nodiscard]] const Terms& terms() const noexcept { return terms_; }
   void setI(double value) noexcept { terms_.i = value; }
 
-  // Feedback goes on with the output as it is.
+  // Turns feedback on; it starts from `output`, the present value.
   void turnOn(double output) noexcept {
     terms_.i = output;
     isOn_ = isSeeded_ = true;
@@ -34,8 +36,8 @@ class PidLoop {
   void turnOff() noexcept { isOn_ = false; }
   [[nodiscard]] bool isOn() const noexcept { return isOn_; }
 
-  // What the output shall be; it is written only while feedback is on.
-  //   seconds  since the last step
+  // Computes a step and returns the new output, which the caller writes only while feedback is on.
+  //   seconds  time since the last step
   double step(double actual, double seconds) noexcept;
 
  private:
@@ -43,7 +45,7 @@ class PidLoop {
 
   Terms terms_;
   bool isOn_ = false;
-  bool isSeeded_ = false;  // this step's I is what turnOn() said
+  bool isSeeded_ = false;  // turnOn() has set I; the next step keeps it
   bool hasError_ = false;
 };
 

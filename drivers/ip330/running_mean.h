@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// RunningMean: the mean of the last so many samples, for any number of readers that each want another number of them.
+// RunningMean: the mean of the last n samples, for any number of readers with different n.
 //
-// Sums since the beginning in a ring; a mean is the difference of two. They are whole numbers that wrap around, so that no error adds up.
+// A ring holds the sums of all samples since restart(); a mean is the difference of two sums. The
+// sums are integers that wrap around, so rounding errors do not accumulate.
 //
-// Threads  one at a time: the owner has a lock.
+// Threads  one at a time: the owner holds a lock.
 #pragma once
 
 #include <algorithm>
@@ -24,14 +25,15 @@ class RunningMean {
     oldest_ = 0;
     sums_[0] = 0;
   }
-  // Samples of at most 2^40.
+  // Adds a sample; its magnitude is at most 2^40.
   void add(double sample) noexcept {
     sum_ += static_cast<std::uint64_t>(std::llround(sample * kScale));
     sums_[++count_ & mask()] = sum_;
   }
-  // Since restart().
+  // The number of samples since restart().
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
-  // Means of n samples are wanted. Throws std::bad_alloc.
+  // Makes room for means of n samples; samples that were dropped earlier stay lost.
+  //   throws  std::bad_alloc
   void reserve(std::uint64_t n) {
     if (n < sums_.size()) return;
     std::vector<std::uint64_t> larger(std::bit_ceil(n + 1));
@@ -40,7 +42,8 @@ class RunningMean {
     sums_ = std::move(larger);
     oldest_ = count_ - kept;
   }
-  // Of the last n, or of as many as there are; there is one at least, and n is not 0.
+  // Returns the mean of the last n samples, or of all samples if fewer are stored. n and count()
+  // must not be 0.
   [[nodiscard]] double mean(std::uint64_t n) const noexcept {
     n = std::min({n, count_ - oldest_, mask()});
     return static_cast<double>(static_cast<std::int64_t>(sum_ - sums_[(count_ - n) & mask()])) / kScale / static_cast<double>(n);
@@ -50,9 +53,10 @@ class RunningMean {
   static constexpr double kScale = 65536;
   [[nodiscard]] std::uint64_t mask() const noexcept { return sums_.size() - 1; }
 
-  std::vector<std::uint64_t> sums_ = std::vector<std::uint64_t>(64);  // sum of the first i samples, at i modulo size
+  // the sum of the first i samples is at index i modulo size
+  std::vector<std::uint64_t> sums_ = std::vector<std::uint64_t>(64);
   std::uint64_t count_ = 0;
-  std::uint64_t oldest_ = 0;  // sums before it were dropped when the ring was smaller
+  std::uint64_t oldest_ = 0;  // sums before this one were dropped while the ring was smaller
   std::uint64_t sum_ = 0;
 };
 

@@ -5,9 +5,9 @@ namespace mpf {
 namespace {
 
 constexpr std::size_t kPorts = 4;
-constexpr std::size_t kNotUsed = 0x7f;  // reads as 0 while there is a module
+constexpr std::size_t kNotUsed = 0x7f;  // reads as 0 while a module is present, as 0xff without one
 
-// Ports are on the lower half of the data bus, which is the byte at the odd address.
+// A port is on the lower half of the 16-bit data bus, which is the byte at the odd address.
 std::size_t offsetOf(std::size_t port) noexcept { return 2 * port + 1; }
 
 }  // namespace
@@ -17,7 +17,8 @@ std::optional<std::uint32_t> Ip440::tryRead() noexcept {
   std::uint32_t bits = 0;
   for (std::size_t port = 0; port < kPorts; ++port) bits |= std::uint32_t{registers_.read8(offsetOf(port))} << (8 * port);
   const bool isDoubtful = isGone_ || registers_.read8(kNotUsed) != 0;
-  if (isDoubtful) isGone_ = !module_.problem().empty();  // or another module
+  // the site may be empty, or have another module
+  if (isDoubtful) isGone_ = !module_.problem().empty();
   return isGone_ ? std::nullopt : std::optional(bits);
 }
 

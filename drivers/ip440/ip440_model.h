@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Ip440Model: an Acromag IP440 that is not there, in its standard mode.
+// Ip440Model: device model of an Acromag IP440 in its standard mode.
 //
 //   auto& model = carrier.plug("IP_c", std::make_unique<Ip440Model>());
 //   model.setInputs(0x80000001);
 //   model.connect(3, [wire] { return wire.get(); });   // IN03 is on above kOnVolts
 //
-// Threads  as DeviceModel.
+// Threads  as DeviceModel; setInputs() and connect() may be called by any thread.
 #pragma once
 
 #include <array>
@@ -19,19 +19,23 @@ namespace mpf {
 
 class Ip440Model final : public DeviceModel {
  public:
-  // What is on an input that is connected.
+  // Returns the voltage [V] at a connected input.
   using Volts = std::function<double()>;
-  static constexpr double kOnVolts = 2.5;  // of this model; a real one has what its version says
+  // of this model; the threshold of a real module depends on its version
+  static constexpr double kOnVolts = 2.5;
 
   explicit Ip440Model(std::uint32_t inputs = 0) : DeviceModel({.manufacturer = kAcromag, .model = Ip440::kModel}), inputs_(inputs) {}
 
   std::uint16_t read(Space space, std::size_t offset, Lanes lanes) override;
-  // The ports must not be written to, the rest is for modes that this model does not have.
+  // Writes have no effect: the inputs are read-only, and the model has no other mode.
   void write(Space /*space*/, std::size_t /*offset*/, std::uint16_t /*value*/, Lanes /*lanes*/) override {}
 
-  // What is on those that are not connected; bit 0 is IN00, 1 is on.
+  // Sets the inputs that no wire drives; bit 0 is IN00, 1 is on.
   void setInputs(std::uint32_t bits);
-  //   throws  std::out_of_range unless input is 0 to 31
+  // From now on, input number `input` is on while volts() is above kOnVolts.
+  //
+  //   volts     called at each read, with the model locked
+  //   throws    std::out_of_range unless input is 0 to 31
   void connect(int input, Volts volts);
 
  private:

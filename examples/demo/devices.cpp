@@ -40,7 +40,7 @@ Sample DemoDevices::look() {
   auto sample = given_;
   sample.measured = measure();
   sample.inputs = followInputs();
-  sample.instrument = readInstrument();  // the slowest
+  sample.instrument = readInstrument();  // last, since it is the slowest
   return sample;
 }
 
@@ -55,7 +55,8 @@ std::optional<double> DemoDevices::measure() {
   return reply ? std::optional(kAdcLow + kAdcSpan * reply->value / 0xffff) : std::nullopt;
 }
 
-// The server tells each change; it is asked to once, and again when it was restarted.
+// The server reports each change. The monitor is started once, and again after a restart of the
+// server.
 std::optional<std::uint8_t> DemoDevices::followInputs() {
   while (const auto message = in_.receive(0s)) {
     const auto* const news = message.tryAs<Int32>();
@@ -74,7 +75,8 @@ std::optional<std::uint8_t> DemoDevices::followInputs() {
 std::optional<double> DemoDevices::readInstrument() {
   auto request = Char8ArrayMessage::allocValue(kQuestion.size());
   request->cmd = serial::cmdWriteRead | serial::cmdTimeoutMilliseconds;
-  request->timeout = static_cast<std::int32_t>((patience_ * 4 / 5).count());  // that there was no answer is told in time
+  // shorter than our own wait, so that the reply reports the timeout
+  request->timeout = static_cast<std::int32_t>((patience_ * 4 / 5).count());
   std::copy(kQuestion.begin(), kQuestion.end(), request.value().begin());
   auto answer = instrument_.call(std::move(request), patience_);
   const auto reply = answer ? answer.as<Char8Array>() : std::nullopt;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// DemoDevices: a client of four servers, which asks each of them once a round: a DAC, the ADC that its output is wired to, digital lines
-// that are wired to each other, and an instrument on a serial line.
+// DemoDevices: a client of four servers, which calls each of them once in a round: a DAC, the ADC
+// that its output is wired to, digital lines that are wired to each other, and an instrument on a
+// serial line.
 //
-//   give() ─► all outputs are set ─► a pause ─► look() ─► what the inputs make of them, which stay as they are meanwhile
+//   give() ─► sets all outputs ─► the caller pauses ─► look() ─► reads all inputs
 //
 // Threads  one.
 #pragma once
@@ -16,24 +17,25 @@
 
 namespace mpf::demo {
 
-// What a round gave; empty where there was no answer.
+// The values of a round; nullopt where a server did not answer.
 struct Sample {
-  std::optional<double> written;   // volts on the DAC's channel 0
-  std::optional<double> measured;  // the same, by the ADC's channel 0
+  std::optional<double> written;   // volts at channel 0 of the DAC
+  std::optional<double> measured;  // volts measured by channel 0 of the ADC
   std::optional<std::uint8_t> outputs;  // digital lines 8 to 15
-  std::optional<std::uint8_t> inputs;   // 0 to 7, as the server told last
+  std::optional<std::uint8_t> inputs;   // digital lines 0 to 7, as the server last reported
   std::optional<double> instrument;     // volts
 };
 
 class DemoDevices {
  public:
-  //   patience  longest wait for an answer: a server that is being restarted does not hold up the others for longer
+  //   patience  longest wait for an answer, so that a server that is restarted does not delay the
+  //             others
   DemoDevices(const Backplane& backplane, std::chrono::milliseconds patience);
 
-  // The DAC gives `volts`, the outputs are `bits`.
+  // Sets the DAC to `volts` and the digital outputs to `bits`.
   void give(double volts, std::uint8_t bits);
   Sample look();
-  // Messages that told of inputs so far, without being asked.
+  // Number of messages that reported changes of the inputs.
   [[nodiscard]] std::uint64_t told() const noexcept { return told_; }
 
  private:

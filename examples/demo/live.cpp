@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// mpf-demo: writes to a DAC and to digital lines, reads what comes back and an instrument, and draws it until q is pressed. Without a
-// terminal it prints lines for some seconds. demo/hardware starts the servers.
+// mpf-demo: writes to a DAC and to digital lines, reads the inputs that are wired to them and an
+// instrument, and draws the values until q is pressed. Without a terminal it prints lines for some
+// seconds. examples/demo/hardware starts the servers.
 //
-// Time that passes is no failure: a run ends well once each of the three was seen to work, and always when somebody ends it.
+// A slow host does not make a run fail: the run succeeds once each of the three was seen to work,
+// and whenever the user ends it.
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -29,12 +31,13 @@ namespace {
 using namespace std::chrono_literals;
 using mpf::demo::Sample;
 
-constexpr auto kPause = 40ms;  // from what is written to what is read; longer than the ADC's mean
+// between writing and reading; longer than the averaging time of the ADC
+constexpr auto kPause = 40ms;
 constexpr double kPeriodSeconds = 4, kAmplitudeVolts = 4;
 constexpr int kRoundsPerLine = 10;
 constexpr double kCloseVolts = 0.05;
-constexpr double kAwayVolts = 1;  // from 0 V, which an ADC without a wire measures, too
-constexpr int kMoreRounds = 100;  // when the time is over and something was not seen yet
+constexpr double kAwayVolts = 1;  // distance from 0 V, which an ADC without a wire also measures
+constexpr int kMoreRounds = 100;  // further rounds after the time if something was not seen yet
 
 struct Options {
   std::string backplane;
@@ -44,7 +47,7 @@ struct Options {
 
 std::atomic<bool> isStopped{false};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables): of a signal handler
 
-// What was seen to work.
+// The parts that were seen to work.
 struct Verdict {
   int followed = 0, measured = 0, measuredAway = 0, instrument = 0, rounds = 0;
 
@@ -60,7 +63,7 @@ struct Verdict {
   [[nodiscard]] bool isGood() const { return std::min({followed, measuredAway, instrument}) > 0; }
 };
 
-// A sine, and a bit that wanders.
+// A sine, and a bit that moves along the lines.
 class Rounds {
  public:
   Rounds(const std::string& backplane, std::chrono::milliseconds patience, mpf::Deadline end)
@@ -81,7 +84,8 @@ class Rounds {
   }
   [[nodiscard]] std::string line() const { return picture_.line(devices_.told()); }
   [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
-  // Somebody ended it, or the time is over, and all was seen or will not be.
+  // True when the user has ended the run, or when the time is over and all parts were seen or no
+  // rounds are left.
   [[nodiscard]] bool areOver() const {
     if (isStopped.load(std::memory_order_relaxed)) return true;
     return end_.hasPassed() && (verdict_.isGood() || late_ >= kMoreRounds);

@@ -18,7 +18,7 @@ constexpr double kBarVolts = 2.5;
 
 std::string voltsText(const std::optional<double>& volts) { return volts ? fmt::format("{:+7.4f} V", *volts) : "no answer"; }
 
-// Bit 0 to the right.
+// Bit 0 is on the right.
 std::string lamps(const std::optional<std::uint8_t>& bits, const char* on, const char* off) {
   if (!bits) return "no answer";
   std::string text;

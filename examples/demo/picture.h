@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Picture: the last rounds of the demo as lines of text: a chart of the DAC and the ADC, lamps for digital lines, a chart of the instrument.
+// Picture: the last rounds of the demo as lines of text: a chart of DAC and ADC, lamps for the
+// digital lines, a chart of the instrument.
 //
 // Threads  one.
 #pragma once
@@ -17,16 +18,16 @@ namespace mpf::demo {
 class Picture {
  public:
   void add(const Sample& sample);
-  // For a screen of so many rows and columns.
+  // The picture for a screen of this size.
   [[nodiscard]] std::vector<tools::TopLine> lines(int rows, int columns, std::uint64_t told) const;
-  // The last round in one line.
+  // The last round as one line.
   [[nodiscard]] std::string line(std::uint64_t told) const;
 
  private:
   [[nodiscard]] std::vector<std::string> chart(std::size_t rows, std::size_t columns) const;
   [[nodiscard]] std::string bars(std::size_t columns) const;
 
-  std::deque<Sample> samples_;  // the newest last
+  std::deque<Sample> samples_;  // oldest first
 };
 
 }  // namespace mpf::demo

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Attach: programs that attach remove what a dead client left, while it may be alive, coming, leaving or dying.
+// Attach: processes that attach remove what a dead client left, while the client may be starting,
+// alive, leaving or dying.
 //
 //   client    window: locked, named ─ link: named ─ bulk segment: named ─ ... ─ bulk, link, window: names removed ─ lock free
-//   attacher  list all names ─ which windows live? ─ links of the others away ─ bulk without a link away
+//   attacher  list all names ─ which windows live? ─ remove links of the others ─ remove bulk without a link
 //
 //   MODELS  shm/remains.cpp: judge tryRemove judgeWindow judgeOwned ownerOf
 //   MODELS  shm/segment.cpp: list removeIfOwnerless
-//   HOLDS   nothing of a living client is removed by anybody but that client
-//   HOLDS   nothing of a dead client keeps its name once somebody has attached after its death and after the others that attach
-//   ASSUMES a listing that shows a name shows every older name that is still there (so does tmpfs: new names come first, or last)
+//   HOLDS   only the client itself removes names of a living client
+//   HOLDS   no name of a dead client is left once a process has attached after its death and after
+//           all other attachers
+//   ASSUMES a listing that shows a name shows every older name that still exists (true for tmpfs)
 //   ASSUMES one client with one link, which may be killed before any step; two attachers at any time, one at the end
-//   BREAK   LIST_LATE    an attacher lists the names of links after it looked which windows live
-//   BREAK   LOCK_LATE    a client locks its window after it got its name
-//   BREAK   WINDOWS_ONLY an attacher leaves the links
+//   BREAK   LIST_LATE    an attacher lists the names of links after it has looked which windows live
+//   BREAK   LOCK_LATE    a client locks its window after the window has its name
+//   BREAK   WINDOWS_ONLY an attacher does not remove links
 bool windowNamed, linkNamed, bulkNamed;
-bool locked;  // the client's window, by the client
-bool isDead;  // the kernel may not have dropped the lock yet
+bool locked;  // the client has locked its window
+bool isDead;  // the client is dead; the kernel may not have dropped the lock yet
 bool hasLeft;
 
 #define lives (!isDead && !hasLeft)
@@ -47,7 +49,8 @@ inline removeDead() {
   windowLives = false;
   if
   :: d_step { windowListed && windowNamed && !locked -> assert(!lives); windowNamed = false }
-  :: windowListed && (!windowNamed || locked) -> windowLives = true  // one that is gone is taken for one that lives
+  // a window that is gone counts as living
+  :: windowListed && (!windowNamed || locked) -> windowLives = true
   :: !windowListed
   fi;
 #ifdef LIST_LATE
@@ -57,7 +60,8 @@ inline removeDead() {
 #ifndef WINDOWS_ONLY
   if
   :: linkListed && linkNamed && !windowLives -> d_step { assert(!linkNamed || !lives); linkNamed = false }
-  :: linkListed && (!linkNamed || windowLives) -> linkLives = true  // one that is gone is nobody's to remove
+  // a link that is gone need not be removed
+  :: linkListed && (!linkNamed || windowLives) -> linkLives = true
   :: !linkListed
   fi;
 #endif

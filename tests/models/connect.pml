@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Connect: a client finds a server, makes a link and knocks; the server accepts; a request goes out; either may be killed before any step.
+// Connect: a client finds a server, creates a link and knocks; the server accepts; the client sends
+// a request. Either process may be killed before any step.
 //
-//   client  look up name ─ link: made, open, named ─ knock ─ (nudge) ─ connected ─ request ─ reply or fate ─ link closed, name removed
+//   client  look up name ─ link: created, open, named ─ knock ─ (nudge) ─ connected ─ request ─ reply or fate ─ link closed, name removed
 //   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply        a second life follows the first
 //
 //   MODELS  client/connect.cpp: tryConnect wish
@@ -9,25 +10,28 @@
 //   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer
-//   HOLDS   as long as the client lives, it gets connected to whichever server lives, whatever hints get lost
-//   HOLDS   its request has exactly one end; "never taken" is told of none that a server acted on; a reply that was sent is not lost
-//   HOLDS   a server accepts a link once, and lets go of it when the client has ended
-//   ASSUMES memory in order: link states have release and acquire, and names are system calls (weak memory: ring.pml, doorbell.pml)
-//   ASSUMES a timer runs out when nothing else can happen; one client, two lives of a server, one request a connection
-//   ASSUMES a stranger takes each hint away once
+//   HOLDS   a living client connects to a living server, whichever hints are lost
+//   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never
+//           taken"; a reply that was sent is not lost
+//   HOLDS   a server accepts a link once, and releases it when the client has ended
+//   ASSUMES sequentially consistent memory: link states use release and acquire, names are system
+//   calls (ring.pml and
+//           doorbell.pml have weak memory)
+//   ASSUMES a timer expires when nothing else can happen; one client, two lives of a server, one
+//   request for each connection ASSUMES another process clears each hint once
 //   BREAK   NO_NUDGE        the client knocks once
-//   BREAK   NUDGE_BLIND     the client knocks again without a look whether it has been accepted
-//   BREAK   ACCEPT_TWICE    a server does not know which links it has accepted
-//   BREAK   NO_WATCH        a server does not watch whose link it accepts
-//   BREAK   NO_DRAIN        a client ends its request without a look for the reply of the dead server
-//   BREAK   TAKEN_LATE      a server counts a request as taken after it acted
-//   BREAK   NO_DEATH_NEWS   a client is not told of its server's death
+//   BREAK   NUDGE_BLIND     the client knocks again without checking whether it has been accepted
+//   BREAK   ACCEPT_TWICE    a server does not remember which links it has accepted
+//   BREAK   NO_WATCH        a server does not watch the clients of its links
+//   BREAK   NO_DRAIN        a client ends its request without looking for the reply of the dead server
+//   BREAK   TAKEN_LATE      a server counts a request as taken after it has acted
+//   BREAK   NO_DEATH_NEWS   a client is not told of the death of its server
 #define SERVERS 2
 #define CLIENT 2
 #define PROCESSES 3
-#define LINKS SERVERS  // the client makes one for each life of the server
+#define LINKS SERVERS  // the client creates one for each life of the server
 #define NONE 255
-#define STRANGER 9     // a link of somebody else
+#define STRANGER 9     // a link of another client
 #define NUDGES 3
 #define EARLY_NUDGES 1
 
@@ -35,26 +39,26 @@ typedef Link {
   bool named;
   bool clientOpen;
   bool serverOpen;
-  bool accepted;  // in its server's memory
-  bool sent;      // a request
-  bool taken;     // counted
-  bool acted;     // what really happened
+  bool accepted;  // in the memory of its server
+  bool sent;      // a request was sent
+  bool taken;     // the request counts as taken
+  bool acted;     // the server has acted on the request
   bool replied;
 }
-Link links[LINKS];  // by server
+Link links[LINKS];  // index: life of the server
 
 typedef Hints {
-  byte knock;     // a link + 1
+  byte knock;     // number of a link + 1
   bool knocked;
   bool rescan;
-  bool ready;     // the bit of the link
+  bool ready;     // the ready bit of the link
 }
 Hints hints[SERVERS];
 
-byte serverName = NONE;  // which life has it
+byte serverName = NONE;  // the life of the server that has the name
 bool dead[PROCESSES];
 bool clientLeft;
-bool news;               // the client's ready bit
+bool news;               // the ready bit of the client
 
 #define clientHasEnded (dead[CLIENT] || clientLeft)
 
@@ -69,7 +73,7 @@ inline knockAt(at, link) {
   hints[at].knocked = true
 }
 
-// What the link says now: accepted, replied.
+// The present state of the link: accepted, replied.
 inline look() {
   if
   :: links[server].serverOpen && !connected ->
@@ -208,7 +212,7 @@ over:
   } unless { dead[me] }
 }
 
-// Takes hints away, and knocks itself in the place of another knock.
+// Clears hints, and overwrites a knock with its own.
 active proctype Stranger() {
   if
   :: hints[0].knock = 0

@@ -1,26 +1,30 @@
 // SPDX-License-Identifier: MIT
-// Doorbell: an owner that announces its sleep, two peers that send and wake, a watcher that tells of deaths; over weak memory.
+// Doorbell: an owner that announces its sleep, two peers that send and wake, a watcher that reports
+// deaths; with weak memory.
 //
 //   owner  announce ─ fence ─ look again ─ sleep                peer  message ─ fence ─ announced? ─ bell, wake
 //
 //   MODELS  shm/endpoint.cpp: sleep announce hasNews interrupt takeLocalNews arm disarm
 //   MODELS  shm/window.cpp: wakeIfAsleep ring
 //   MODELS  shm/doorbell.cpp: sleep ring tryRingFifo drainFifo
-//   HOLDS   no wake-up is lost: the owner never sleeps for ever while a message or the news of a death waits for it
-//   HOLDS   so on the futex and on the descriptor, also when a peer is killed between its message and its ring
-//   ASSUMES the kernel compares the bell and puts to sleep in one step; FUTEX_WAKE is a fence for who calls it
-//   ASSUMES two messages of one peer and one of the other; an owner without deadline that polls no link
-//   BREAK   NO_PEER_FENCE    the peer looks whether somebody sleeps before its message is visible
+//   HOLDS   no wake-up is lost: the owner does not sleep for ever while a message or a reported
+//           death is pending
+//   HOLDS   the same on the futex and on the descriptor, also when a peer is killed between message
+//           and ring
+//   ASSUMES FUTEX_WAIT compares the bell and sleeps in one step; FUTEX_WAKE is a fence for its
+//   caller ASSUMES two messages of one peer and one of the other; an owner without a deadline that
+//   polls no link
+//   BREAK   NO_PEER_FENCE    the peer reads the announcement before its message is visible
 //   BREAK   NO_OWNER_FENCE   the owner looks again before its announcement is visible
 //   BREAK   NO_LOOK          the owner does not look again
-//   BREAK   BELL_READ_LATE   the owner reads the bell after its look
+//   BREAK   BELL_READ_LATE   the owner reads the bell after its last look
 //   BREAK   BELL_UNCHANGED   a peer wakes without changing the bell
-//   BREAK   BELL_RELAXED     the bell may change before the news for which it rings is visible
-//   BREAK   DRAIN_LATE       the descriptor is drained after the look
-//   BREAK   NO_DEATH_NEWS    nobody tells of a death
-//   BREAK   NUMBER_KEPT      a sleep has the number of the one before, for which a peer has rung
-//   BREAK   NUMBER_LATE      the number of a sleep is stored after the look
-//   BREAK   STATE_EARLY      a peer looks how the owner sleeps before it reads the number: it may ring another bell
+//   BREAK   BELL_RELAXED     the bell may change before the event that it reports is visible
+//   BREAK   DRAIN_LATE       the descriptor is drained after the last look
+//   BREAK   NO_DEATH_NEWS    no process reports a death
+//   BREAK   NUMBER_KEPT      a sleep has the number of the previous one, for which a peer has rung
+//   BREAK   NUMBER_LATE      the number of a sleep is stored after the last look
+//   BREAK   STATE_EARLY      a peer reads how the owner sleeps before it reads the number: it may ring the wrong bell
 #define PEERS 2
 #define OWNER 2
 #define WATCHER 3
@@ -38,17 +42,17 @@
 #define ON_FUTEX 1
 #define ON_DESCRIPTOR 2
 
-bool changed;   // the bell, since the owner read it
-bool asleep;    // in the kernel, on the bell
-bool readable;  // the FIFO
+bool changed;   // the bell has changed since the owner read it
+bool asleep;    // the owner sleeps in the kernel, on the bell
+bool readable;  // the FIFO is readable
 byte sent[PEERS];
 bool senderEnded[PEERS];
 
 byte taken[PEERS];
 bool deathSeen;
 byte sleeps;          // the number of the owner's sleep
-byte number;          // that peer 0 has read
-byte rungFor;         // the number for which it has rung
+byte number;          // the number that peer 0 has read
+byte rungFor;         // the number for which peer 0 has rung
 
 #define hasMessage (memory[SENT(0)] != taken[0] || memory[SENT(1)] != taken[1])
 #define hasLocalNews (memory[LOCAL_NEWS] == 1 && !deathSeen)
@@ -56,7 +60,7 @@ byte rungFor;         // the number for which it has rung
 #define allTaken (taken[0] == memory[SENT(0)] && taken[1] == memory[SENT(1)])
 #define allSeen (allTaken && senderEnded[0] && senderEnded[1] && isVisible(0) && isVisible(1) && deathSeen == (dead[0] || dead[1]))
 
-// FUTEX_WAIT: the kernel's comparison.
+// The comparison in FUTEX_WAIT.
 inline futexWait() {
   if
   :: atomic { !changed -> asleep = true }; !asleep || allSeen
@@ -75,7 +79,8 @@ inline ringBell(process) {
   asleep = false
 }
 
-// Peer 0 alone sends twice, and so may have rung before; what is known after its last message means nothing.
+// Only peer 0 sends twice and so may have rung before; its values after the last message are not
+// used.
 inline forget(process) {
   d_step {
     state = AWAKE;
@@ -120,7 +125,8 @@ inline newNumber() {
 #ifdef NUMBER_KEPT
   sleeps = 1
 #else
-  // Numbers matter only where a peer compares them: one that nobody has may stay.
+  // Numbers matter only where a peer compares them, so a number that no peer has read need not
+  // change.
   if
   :: sleeps == 0 || sleeps == number || sleeps == rungFor -> sleeps++
   :: else
@@ -195,7 +201,7 @@ active proctype Owner() {
   od
 }
 
-// The thread of the owner's process that waits for the pidfds of its peers.
+// The watcher: the thread of the owner's process that waits for the pidfds of its peers.
 active proctype Watcher() {
 end:
   (isGone(0) || isGone(1));

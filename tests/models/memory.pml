@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: MIT
-// Weak memory: what a process has stored, others see later, and in another order.
+// Weak memory: other processes see the stores of a process later and in another order.
 //
 //   store ─► pending (only its writer sees it) ─ any time later ─► memory (all see it)
 //
 //   store         visible after any time, before or after stores to other words: weaker than x86, as on ARM
-//   storeRelease  visible after all that its process stored before
-//   fence         waits until all that its process stored is visible
+//   storeRelease  visible after all earlier stores of its process
+//   fence         waits until all earlier stores of its process are visible
 //   load          the newest value that this process can see
 //
-// A word has one writer, and waits for its last value to be visible before it takes the next. Loads happen in program order; where that
-// hangs on an acquire, the model of it has a variant that does the later load early. Locked instructions act on plain variables of the
-// model at once; those that release wait for isVisible() first. Who is killed stores no more, but what was stored becomes visible.
+// A word has one writer; a store waits until the previous value of the word is visible. Loads
+// happen in program order; where the source needs an acquire for that, its model has a variant that
+// does the later load early. Locked instructions change plain variables of the model at once; those
+// with release semantics first wait for isVisible(). A killed process stores nothing more, but its
+// earlier stores become visible.
 //
 // The model defines WORDS (at most 16), PROCESSES and FLUSH_ALL, one FLUSH(process, word) for each word.
 byte memory[WORDS];
-byte pending[WORDS];       // value, 0 when there is none
-short before[WORDS];       // a release store: words that must become visible first
-short unseen[PROCESSES];   // words that are pending
+byte pending[WORDS];       // the pending value, or 0
+short before[WORDS];       // for a release store: words that must become visible first
+short unseen[PROCESSES];   // words with a pending store
 bool dead[PROCESSES];
 
 #define BIT(word) (1 << (word))
 #define isVisible(process) (unseen[process] == 0)
-#define isGone(process) (dead[process] && isVisible(process))  // the kernel's word on a death comes after the stores of the dead
+#define isGone(process) (dead[process] && isVisible(process))  // the kernel reports a death after all stores of the process are visible
 #define load(process, word) ((unseen[process] & BIT(word)) -> pending[word] : memory[word])
 
 inline storeAfter(process, word, value, others) {

@@ -1,28 +1,31 @@
 // SPDX-License-Identifier: MIT
-// Ready bits: two levels of hints that tell an owner which of its links to look at, and links that it polls instead; over weak memory.
+// Ready bits: two levels of hints that say which links have messages, and links that the owner
+// polls instead; with weak memory.
 //
 //   peer    message ─ fence ─ unwatched? ─ bit of the link ─ bit of its word
-//   owner   bit of the word off ─ read bits ─ bit of the link off ─ more left? word on again ─ poll this link, or revisit it
+//   owner   clear bit of the word ─ read bits ─ clear bit of the link ─ more left? set bit of the word ─ poll or revisit link
 //
 //   MODELS  shm/link.cpp: afterPush setWatched
 //   MODELS  shm/window.cpp: notify
 //   MODELS  shm/endpoint.cpp: nextReady takeReadyBit heat cool setReadyBit hasNews isRevisitDue
-//   HOLDS   without the look at all links that an owner makes before it sleeps: a message in a link is hinted at, polled for or due for a revisit
-//   HOLDS   so no link is forgotten, in whatever order links get polled and given up
+//   HOLDS   for each link with a message, a hint is set, the link is polled, or it is due for a
+//           revisit; this does not need the scan of all links that an owner makes before it sleeps
+//   HOLDS   no link is forgotten, in whatever order links begin and cease to be polled
 //   ASSUMES two links of one word, two messages each; one link at a time may be polled
-//   ASSUMES nobody scribbles over the hints; for that case the owner looks at all links (tests/shm/endpoint_hints_test.cpp)
-//   BREAK   NO_WATCH_FENCE   the peer looks whether it is polled before its message is visible
+//   ASSUMES no process overwrites the hints; the scan of all links repairs that
+//   (tests/shm/endpoint_hints_test.cpp)
+//   BREAK   NO_WATCH_FENCE   the peer looks whether the link is polled before its message is visible
 //   BREAK   NO_COOL_FENCE    the owner looks for messages before its "not polled any more" is visible
 //   BREAK   NO_COOL_LOOK     the owner does not look when it stops polling
 //   BREAK   WORD_FIRST       the peer sets the bit of the word before the bit of the link
-//   BREAK   WORD_OFF_LATE    the owner takes the bit of the word off after it read the bits
-//   BREAK   LEFT_FORGOTTEN   the owner leaves the bit of the word off when there are more
-//   BREAK   NO_REVISIT       a link that finds no place among the polled ones is looked at once
+//   BREAK   WORD_OFF_LATE    the owner clears the bit of the word after it has read the bits
+//   BREAK   LEFT_FORGOTTEN   the owner does not set the bit of the word again when more bits are set
+//   BREAK   NO_REVISIT       a link that is not added to the polled links is looked at once only
 #define LINKS 2
 #define OWNER 2
 #define PROCESSES 3
 #define SENT(link) (link)
-#define POLLED(link) (LINKS + (link))  // the layout's word is `unwatched`, its opposite
+#define POLLED(link) (LINKS + (link))  // the opposite of the word `unwatched` of the layout
 #define WORDS 4
 #define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, POLLED(0)) FLUSH(OWNER, POLLED(1))
 #include "memory.pml"
@@ -30,10 +33,10 @@
 #define MESSAGES 2
 #define NONE 2
 
-byte bits;  // bit i: link i has news
+byte bits;  // bit i: link i may have a message
 bool word;  // bits is not 0
 
-// Locked instructions; both release, so what came before is visible.
+// Locked instructions with release semantics: all earlier stores are visible.
 inline setBits(process, link) {
 #ifdef WORD_FIRST
   isVisible(process);
@@ -97,7 +100,7 @@ inline cool() {
   was = NONE
 }
 
-// Polls the link from now on, in place of another or not at all.
+// Polls the link from now on in place of another one, or does not poll it.
 inline heat(link) {
   if
   :: hot == link
@@ -143,7 +146,7 @@ active proctype Owner() {
   byte seen, link = NONE, was = NONE;
   do
   :: isHotReady -> takeOne(hot)
-  :: hot != NONE && !allTaken -> cool()  // looked in vain too often
+  :: hot != NONE && !allTaken -> cool()  // no message at too many looks
   :: isRevisitDue || word ->
     if
     :: isRevisitDue -> setBits(OWNER, revisit)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reclaim: who wants a server's name, who removes what a dead one left under it; each may be killed before any step.
+// Reclaim: starters, which take the name of a server, and reapers, which remove the window that a
+// dead owner left under it. Each may be killed before any step.
 //
 //   file made ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
 //   reaper: open by name ─ lock byte 1 of that file, or a reaper's file of its own beside the locks of strangers ─ does the name still lead to
@@ -182,10 +183,10 @@ owner:
 #ifdef LOCK_LATE
     lock[fileOf(me)] = me;
 #endif
-    // Two owners would be two that live and got the name.
+    // Two owners would be two living processes that got the name.
     assert(name == fileOf(me));
     if
-    :: skip  // leaves, at any time
+    :: skip  // may leave at any time
     :: dead[me]
     fi;
 #ifdef LEAVE_LATE

@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Ring: messages of 1 or 2 slots from one producer to one consumer, over weak memory; either may be killed before any step.
+// Ring: messages of 1 or 2 slots from one producer to one consumer, with weak memory. Either may be
+// killed before any step.
 //
 //   MODELS  shm/ring.h: RingProducer tryPush hasFree waiting isTaken
 //   MODELS  shm/ring.h: RingConsumer hasMessage begin copyBody end
-//   HOLDS   each message arrives once, whole and in order, as long as both live; none hangs for want of slots
-//   HOLDS   of a producer that was killed, exactly the messages arrive whose release store was made
-//   HOLDS   of a consumer that was killed, a message that is not counted as taken was not looked at ("never taken" is true)
-//   ASSUMES a ring of 4 slots, handed back two at a time, and 4 messages: positions go round twice, messages lie across the end
-//   ASSUMES both ends play by the rules; what nonsense does is tested (tests/shm/ring_trust_test.cpp)
+//   HOLDS   each message arrives once, whole and in order, as long as both live; no message waits
+//           for ever for slots
+//   HOLDS   after the death of a producer, exactly the messages with a completed release store
+//           arrive
+//   HOLDS   a killed consumer has not looked at any message that is not counted as taken ("never
+//           taken" is true)
+//   ASSUMES a ring of 4 slots, handed back two at a time, and 4 messages: positions wrap around
+//   twice, messages cross the end of the ring ASSUMES both ends follow the protocol
+//   (tests/shm/ring_trust_test.cpp tests invalid data)
 //   BREAK   SEQUENCE_RELAXED   the sequence is stored without release
 //   BREAK   SEQUENCE_FIRST     the sequence is stored before the body
 //   BREAK   NO_ACQUIRE         the body is loaded before the sequence
 //   BREAK   FREED_EARLY        slots are handed back before they are read
 //   BREAK   ONE_SLOT_TOO_MANY  the producer takes one slot that is not free
-//   BREAK   TAKEN_LATE         a message is counted as taken after the look at it
+//   BREAK   TAKEN_LATE         a message is counted as taken after the consumer has looked at it
 #define CAPACITY 4
 #define BATCH 2
 #define MESSAGES 4
@@ -37,11 +42,11 @@
   FLUSH(CONSUMER, FREED) FLUSH(CONSUMER, TAKEN)
 #include "memory.pml"
 
-byte sent;   // messages whose release store was made
+byte sent;   // messages with a completed release store
 byte acted;  // messages that the consumer has looked at
 
 #define hasFree(slots) (pushed + slots - freedSeen <= USABLE)
-// A body says which message it is of and how many slots that has.
+// A body contains the number of its message and the number of its slots.
 #define bodyOf(message, slots) (2 * (message) + (slots) - 1)
 
 inline publish() {
@@ -89,7 +94,8 @@ active proctype Producer() {
       d_step { pushed = pushed + slots; message++; slots = 0 }
     od;
 judge:
-    // The fate of what a dead consumer left: what is not counted as taken was never acted on.
+    // The fates after the death of a consumer: a message that is not counted as taken was never
+    // acted on.
     if
     :: d_step { isGone(CONSUMER) -> assert(acted <= memory[TAKEN]) }
     :: !dead[CONSUMER] && acted == MESSAGES

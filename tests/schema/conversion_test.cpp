@@ -30,7 +30,7 @@ std::optional<Message> fromFrame(kj::ArrayPtr<const capnp::word> frame, Conversi
   return tryFromWire(reader.getRoot<wire::Envelope>(), limits, error);
 }
 
-// To the wire and back.
+// Converts a message to an Envelope and back.
 template <class T>
 MessageOf<T> roundTrip(const MessageOf<T>& message) {
   ConversionError error;
@@ -42,7 +42,7 @@ MessageOf<T> roundTrip(const MessageOf<T>& message) {
   return std::move(typed.value());
 }
 
-// Fields come back as they were, bit by bit.
+// All bits of all fields are kept.
 template <class T>
 void expectSame(const MessageOf<T>& message) {
   const auto back = roundTrip(message);
@@ -163,7 +163,8 @@ TEST(Conversion, ReadsUpToTheLimitWithItsReaderOptions) {
 TEST(Conversion, NamesATypeFromANewerPeer) {
   capnp::MallocMessageBuilder builder;
   builder.initRoot<wire::Envelope>().initUser();
-  // The discriminant is the 16-bit word that says `user`, the last member; the next one is not ours.
+  // The discriminant is the 16-bit word with the number of `user`, the last member; the next number
+  // is unknown.
   auto data = capnp::AnyStruct::Builder(builder.getRoot<capnp::AnyStruct>()).getDataSection();
   const unsigned offset = capnp::Schema::from<wire::Envelope>().getProto().getStruct().getDiscriminantOffset() * 2;
   ASSERT_EQ(data[offset], 9);
@@ -174,7 +175,7 @@ TEST(Conversion, NamesATypeFromANewerPeer) {
 
   EXPECT_FALSE(message);
   EXPECT_EQ(error.fault, ConversionFault::unknownType);
-  EXPECT_EQ(error.text, "type 11 is none of ours: the peer is newer");
+  EXPECT_EQ(error.text, "type 11 is unknown: the peer is newer");
   data[offset] = 0xff;
   data[offset + 1] = 0xff;
   EXPECT_FALSE(fromFrame(capnp::messageToFlatArray(builder), error));
@@ -193,7 +194,7 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   const std::array<std::byte, 10> shortBody{};
   EXPECT_FALSE(tryToWire(Message::copyOf(MessageType::int32, shortBody), envelope, {}, error));
   EXPECT_EQ(error.fault, ConversionFault::unsound);
-  EXPECT_EQ(error.text, "int32: a body of 10 bytes is none");
+  EXPECT_EQ(error.text, "int32: a body of 10 bytes is invalid");
   EXPECT_FALSE(tryToWire(MessageOf(RequestFate{.fate = Fate{-3}}), envelope, {}, error));
   EXPECT_EQ(error.text, "requestFate.fate: -3 is no such value");
 }
@@ -222,7 +223,7 @@ TEST(Conversion, TakesAMissingStructForZeros) {
   EXPECT_EQ(message->getType(), MessageType::connect);
 }
 
-// Frames with flipped bits: a message, or an error with a text; never anything else.
+// A frame with flipped bits gives a message, or an error with a text.
 TEST(Conversion, SurvivesAnyDamage) {
   const auto seed = std::random_device()();
   SCOPED_TRACE("seed " + std::to_string(seed));
@@ -239,7 +240,7 @@ TEST(Conversion, SurvivesAnyDamage) {
       ASSERT_EQ(message.has_value(), error.fault == ConversionFault::none);
       ASSERT_EQ(message.has_value(), error.text.empty());
       refused += !message;
-    } catch (const kj::Exception&) {  // from the caller's getRoot(), not from us
+    } catch (const kj::Exception&) {  // thrown by getRoot(), before the conversion
       ++refused;
     }
   }

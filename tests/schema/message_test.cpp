@@ -20,7 +20,7 @@ static_assert(std::is_nothrow_move_constructible_v<Message> && std::is_nothrow_m
 static_assert(std::is_nothrow_move_constructible_v<Float64ArrayMessage> && std::is_nothrow_constructible_v<Int32Message, Int32>);
 static_assert(noexcept(Message::adopt(MessageType::none, {})) && noexcept(Int32Message::tryFrom(Message())));
 
-// A stretch of memory that stands for a link's pool, and counts what comes back.
+// A block of memory in place of a link's pool; counts the bodies that are returned.
 struct Pool final : BodyLender {
   alignas(64) std::array<std::byte, 4096> memory{};
   int returned = 0;
@@ -76,7 +76,7 @@ TEST(Message, IsEmptyWhenDefaultOrMovedFrom) {
 TEST(Message, IsOfOneTypeOnly) {
   Message message = MessageOf(Int32{.value = 5});
 
-  EXPECT_EQ(message.tryAs<OutOfBand>(), nullptr);  // the same layout is not the same type
+  EXPECT_EQ(message.tryAs<OutOfBand>(), nullptr);  // another type, although the layout is the same
   EXPECT_EQ(message.tryAs<Int32Array>(), nullptr);
   EXPECT_FALSE(Float64Message::tryFrom(std::move(message)));
   EXPECT_TRUE(message) << "a refused message stays with its owner";  // NOLINT(bugprone-use-after-move)
@@ -292,7 +292,8 @@ TEST(Message, DuplicatesItsMarksAndRoute) {
   EXPECT_EQ(copy.route().flags, 5U);
 }
 
-// Any bytes under any type: what is handed out lies within the body. The sanitizers watch the reads.
+// With any bytes and any type, all spans that are handed out are within the body; sanitizers check
+// the reads.
 TEST(Message, IsSafeWithAnyBytes) {
   const auto seed = std::random_device()();
   SCOPED_TRACE("seed " + std::to_string(seed));

@@ -25,7 +25,7 @@ std::vector<std::string> describedFields() {
   return names;
 }
 
-// The union of Envelope has exactly our types, in the order of their numbers.
+// The union of Envelope has exactly the types of MessageTypes, in the order of their numbers.
 TEST(MessageTypes, StandInTheEnvelopeInTheirOrder) {
   const auto members = capnp::Schema::from<wire::Envelope>().getUnionFields();
 

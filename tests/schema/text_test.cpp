@@ -69,7 +69,7 @@ TEST(Text, ParsesTheWordsOfAShell) {
   EXPECT_EQ(message.getClientExtra(), 4);
 }
 
-// A mask is all bits of a field, whatever its sign.
+// A hexadecimal number gives all bits of a field, the sign bit included.
 TEST(Text, TakesHexadecimalAsBits) {
   EXPECT_EQ(parsed<Int32>({"address=0xffffffff"})->address, -1);
   EXPECT_EQ(parsed<Int32>({"address=0x80000000"})->address, INT32_MIN);
@@ -110,7 +110,7 @@ TEST(Text, NamesTheBadFieldAndTheAllowedOnes) {
             "connect: field 'status' is one of connectNo connectYes connectQueueFull connectRefused, not 'yes'");
   EXPECT_EQ(refusal(MessageType::char8Array, {"eomString=12345"}),
             "char8Array: field 'eomString' is a C-escaped string of at most 4 bytes, not '12345'");
-  EXPECT_EQ(refusal(MessageType{77}, {}), "type 77 is none of ours");
+  EXPECT_EQ(refusal(MessageType{77}, {}), "type 77 is unknown");
 }
 
 TEST(Text, RefusesWordsThatAreNotQuiteNumbers) {
@@ -134,7 +134,7 @@ TEST(Text, FindsTypesByName) {
   EXPECT_EQ(typeNames(), "connect, int32, int32Array, float64, float64Array, char8Array, serialConfig, outOfBand, requestFate, user");
 }
 
-// What print() wrote, tryParse() reads: for each type, its fields set to odd values.
+// tryParse() reads what print() has written, for each type with unusual values in its fields.
 TEST(Text, ReadsBackWhatItPrinted) {
   const std::vector<std::pair<MessageType, Words>> messages{
       {MessageType::connect, {"status=connectQueueFull", "incarnation=18446744073709551615"}},
@@ -152,7 +152,7 @@ TEST(Text, ReadsBackWhatItPrinted) {
     const auto first = tryParse(type, words, error);
     ASSERT_TRUE(first) << error;
     const auto line = print(*first);
-    Words again;  // fields begin at " name="; none of the values above holds such a thing
+    Words again;  // a field begins at " name="; no value above contains this
     for (std::size_t at = line.find(' '); at != line.npos;) {
       std::size_t next = line.find(' ', at + 1);
       while (next != line.npos && line.find('=', next) == line.npos) next = line.find(' ', next + 1);

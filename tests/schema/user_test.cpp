@@ -11,7 +11,7 @@
 namespace {
 
 using namespace mpf;
-using Struct = wire::Int32Array;  // stands for a user's own
+using Struct = wire::Int32Array;  // in place of a user's own struct
 
 TEST(User, IsBuiltAndReadInPlace) {
   UserBuilder builder(UserMessage::allocValue(4096));

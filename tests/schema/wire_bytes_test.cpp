@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The bytes of every message on the wire are those of wire_bytes.txt: on hosts of each byte order, and in every release.
+// The bytes of each message on the wire are those of wire_bytes.txt, on hosts of either byte order
+// and in every release.
 #include <capnp/serialize.h>
 #include <fmt/format.h>
 #include <fstream>
@@ -17,7 +18,7 @@ using namespace mpf;
 
 class WireBytes : public testing::Test {
  protected:
-  // Each Envelope in standard segment framing, as toText() writes it.
+  // Each Envelope in standard segment framing, in the format of toText().
   static std::vector<std::string> expected() {
     std::ifstream file(MPF_TEST_WIRE_BYTES);
     std::vector<std::string> frames;
@@ -26,7 +27,7 @@ class WireBytes : public testing::Test {
     }
     return frames;
   }
-  // Hexadecimal digits in groups of a word.
+  // Hexadecimal digits in groups of one word.
   static std::string toText(const Message& message) {
     capnp::MallocMessageBuilder builder;
     ConversionError error;
@@ -67,7 +68,7 @@ TEST_F(WireBytes, AreReadAsTheSameMessageOnEveryHost) {
   }
 }
 
-// What a user wrote into a struct of his own, he reads.
+// A user's own struct is read with the values that were written.
 TEST_F(WireBytes, OfAUsersStructHoldWhatWasWrittenIntoIt) {
   const auto message = test::userStruct();
 

@@ -145,7 +145,7 @@ TEST_F(Ip330ProgramTest, SaysWhatIsWrongWithItsArguments) {
            {{"--config", "a,1,2"}, "\"2\" is too much"},
            {{"--pid", "p,0,dac,2"}, "no --dac is named dac"},
            {{"--dac", "d,ipac,IP_b", "--pid", "p,16,d,2"}, "channel 16: the board"},
-           {{"--signal", "0=square:1"}, "no kind of signal \"square\""},
+           {{"--signal", "0=square:1"}, "unknown kind of signal \"square\""},
            {{"--scan", "a,0,20"}, "the board scans 0 to 15"}}) {
     std::vector<std::string> all{"adc", "ipac", "IP_a"};
     all.insert(all.end(), options.begin(), options.end());

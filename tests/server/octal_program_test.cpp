@@ -157,7 +157,7 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
     EXPECT_THAT(server->errors(), HasSubstr(complaint));
   }
   const auto server = startWith("tpci200:9");
-  EXPECT_THAT(server->waitForLine("the board is not there yet"), HasSubstr("there is no TPCI200"));
+  EXPECT_THAT(server->waitForLine("the board is not there yet"), HasSubstr("this host has no TPCI200"));
   EXPECT_NE(server->waitForLine("the line is not there yet"), "");
   EXPECT_EQ(ask("dmm", "*IDN?\n"), "refused");
   EXPECT_EQ(server->end(SIGTERM), 0);
@@ -185,7 +185,7 @@ TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   const auto said = server->errors();
-  EXPECT_THAT(said, HasSubstr("the line is not there yet: there is no TPCI200"));
+  EXPECT_THAT(said, HasSubstr("the line is not there yet: this host has no TPCI200"));
   EXPECT_THAT(said, HasSubstr("serving port 0 of U (carrier ipac, site IP_a)"));
 }
 

@@ -62,7 +62,7 @@ TEST(PolledBoard, BelongsToRoot) {
     const Tpci200 carrier({});
     ADD_FAILURE() << "nobody may use it";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no right to read and write /sys/bus/pci/devices/"));
+    EXPECT_THAT(error.what(), HasSubstr("no permission to read and write /sys/bus/pci/devices/"));
   }
   ::setfsuid(0);
 }
@@ -139,7 +139,7 @@ TEST(Board, KeepsASiteForOneProcessUntilThatEnds) {
     static_cast<void>(carrier.site(0));
     ADD_FAILURE() << "two have it";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("another process has site IP_a"));
+    EXPECT_THAT(error.what(), HasSubstr("site IP_a is in use by another process"));
   }
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);

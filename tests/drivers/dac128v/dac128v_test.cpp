@@ -29,7 +29,7 @@ class Dac128vTest : public testing::Test {
   Dac128v dac_{module_};
 
   Dac128vModel& plug() { return carrier_.plug("IP_a", std::make_unique<Dac128vModel>(kRanges)); }
-  // What the register holds, past the driver.
+  // The contents of the register, read without the driver.
   int code(int channel) { return carrier_.site(0).io().read16(2 * static_cast<std::size_t>(channel)) & 0xfff; }
 };
 
@@ -101,7 +101,7 @@ TEST_F(Dac128vTest, WritesNothingToAModuleThatIsNoDac) {
   for (std::size_t offset = 0; offset < 16; offset += 2) EXPECT_EQ(other.read(DeviceModel::Space::io, offset, DeviceModel::kBoth), 0);
 }
 
-// The first write of all, too: nothing is known of the registers then.
+// This also holds for the first write, when the contents of the registers are unknown.
 TEST_F(Dac128vTest, WritesNothingToAModuleThatCameBeforeItsFirstWrite) {
   carrier_.unplug("IP_a");
   auto& other = carrier_.plug("IP_a", std::make_unique<PlainModel>());

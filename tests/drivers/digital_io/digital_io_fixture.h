@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DigitalIoTest: a model of a digital module on a carrier, its driver, and what it tells.
+// DigitalIoTest: a device model on a carrier, its driver, and a listener that records what it
+// reports.
 #pragma once
 
 #include <condition_variable>
@@ -17,12 +18,12 @@
 
 namespace mpf::test {
 
-// Keeps what it hears.
+// Records all reports of the driver.
 class DigitalIoListener {
  public:
   explicit DigitalIoListener(DigitalIo& io) : subscription_(io.subscribe([this](const DigitalIoNews& news) { hear(news); })) {}
 
-  // Waits for the next news.
+  // Waits for the next report.
   DigitalIoNews next() {
     std::unique_lock lock(mutex_);
     came_.wait(lock, [&] { return !news_.empty(); });
@@ -30,13 +31,13 @@ class DigitalIoListener {
     news_.pop_front();
     return news;
   }
-  // Waits for one of that kind.
+  // Waits for a report of this kind.
   DigitalIoNews next(DigitalIoNews::Kind kind) {
     for (;;) {
       if (const auto news = next(); news.kind == kind) return news;
     }
   }
-  // Waits until the inputs are told to be these. Returns all bits that changed until then.
+  // Waits for a report of these inputs. Returns all bits that have changed until then.
   std::uint32_t waitForInputs(std::uint32_t inputs) {
     for (std::uint32_t changed = 0;;) {
       const auto news = next();
@@ -58,15 +59,16 @@ class DigitalIoListener {
   std::mutex mutex_;
   std::condition_variable came_;
   std::deque<DigitalIoNews> news_;
-  DigitalIo::Subscription subscription_;  // last: ends before what it uses
+  DigitalIo::Subscription subscription_;  // last: ends before the members that it uses
 };
 
 class DigitalIoTest : public testing::Test {
  protected:
   using Kind = DigitalIoNews::Kind;
-  static constexpr auto kNever = std::chrono::hours(1);  // polls
+  static constexpr auto kNever = std::chrono::hours(1);  // period of polls
 
-  // A module of that name with its driver, in place of the one before. Who listens to that must have ended.
+  // Starts a module with this name and its driver, in place of the previous one, whose listeners
+  // must have ended.
   DigitalIo& start(const std::string& name, const DigitalIoOptions& options = {.pollEvery = kNever}) {
     io_.reset();
     carrier_.unplug("IP_a");
@@ -80,13 +82,13 @@ class DigitalIoTest : public testing::Test {
     model_ = &carrier_.plug("IP_a", std::make_unique<DigitalIoModel>(*findDigitalIoKind(name)));
     return *model_;
   }
-  // Power goes and comes.
+  // Switches the power of the module off and on.
   void plugAgain(const std::string& name) {
     carrier_.unplug("IP_a");
     plug(name);
   }
   int threshold() { return word(digital_io_word::kThreshold) & kMaxThreshold; }
-  // Reads a register past the driver.
+  // Reads a register without the driver.
   std::uint16_t word(std::size_t at) { return carrier_.site(0).io().read16(2 * at); }
 
   Watchdog watchdog_{"digital io test"};

@@ -38,7 +38,8 @@ TEST_F(DigitalIoTest, SeesBothEdgesByInterrupt) {
 }
 
 TEST_F(DigitalIoTest, SeesOnlyTheEdgesThatItIsTold) {
-  auto& io = start("IP-Unidig-I", interruptsOnly(0x5, 0x6));  // bit 0 rising, bit 1 falling, bit 2 both, bit 3 none
+  // bit 0 rising, bit 1 falling, bit 2 both, bit 3 no edges
+  auto& io = start("IP-Unidig-I", interruptsOnly(0x5, 0x6));
   model_->setInputs(0xf, 0x0);
   io.look();
   DigitalIoListener listener(io);
@@ -48,7 +49,7 @@ TEST_F(DigitalIoTest, SeesOnlyTheEdgesThatItIsTold) {
   EXPECT_EQ(word(0xd), 0);
   model_->setInputs(0x1, 0x1);
 
-  EXPECT_EQ(listener.next().changed, 0xbu);  // what changed unheard comes along
+  EXPECT_EQ(listener.next().changed, 0xbu);  // includes changes that caused no interrupt
   model_->setInputs(0x1, 0x0);
   EXPECT_EQ(word(0xd), 0);
   model_->setInputs(0x2, 0x0);
@@ -100,7 +101,8 @@ TEST_F(DigitalIoTest, IsSilentAfterItsEnd) {
   EXPECT_EQ(word(10) & 0xff, 0);
 }
 
-// However lines move, what was told last is how they are; interrupts alone, so no poll mends it.
+// However the lines change, the last report has their final state; without polls, by interrupts
+// alone.
 TEST_F(DigitalIoTest, NeverGetsOutOfStepWithLinesThatMoveAtAnyTime) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE(seed);
@@ -181,7 +183,7 @@ TEST_F(DigitalIoTest, TellsOfAStormOnceUntilItWasCalm) {
 
   for (bool isToldAgain = false; !isToldAgain;) {
     carrier_.setFault("IP_a", ModelFault::interruptsLost);
-    for (std::uint32_t i = 0; i < 10; ++i) {  // each is seen by a poll
+    for (std::uint32_t i = 0; i < 10; ++i) {  // each change is found by a poll
       model_->setInputs(1, i & 1);
       listener.waitForInputs(0xfffffe | (i & 1));
     }
@@ -212,7 +214,7 @@ TEST_F(DigitalIoTest, TellsWhenItIsGoneAndBackAndGoesOn) {
   EXPECT_EQ(back.kind, Kind::back);
   EXPECT_EQ(back.inputs, 0xffffffu);
   EXPECT_EQ(back.changed, 0xf0u);
-  EXPECT_EQ(model_->vector(), 0x74);  // set up anew
+  EXPECT_EQ(model_->vector(), 0x74);  // programmed again
   const auto interrupts = io.counters().interrupts;
   model_->setInputs(1, 0);
   EXPECT_EQ(listener.next().inputs, 0xfffffeu);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The model, register by register: what it is to be is in digital_io_kind.h.
+// The device model, register by register; digital_io_kind.h describes the registers.
 #include <mpf/drivers/industry_pack/model_wires.h>
 #include <mpf/tests/support/temporary_folder.h>
 
@@ -26,7 +26,7 @@ class DigitalIoModelTest : public testing::Test {
   bool isAsking_ = false;
 };
 
-// Bits that have no function are ones, for nothing drives them.
+// Bits without a function read as ones, since nothing drives them.
 TEST_F(DigitalIoModelTest, HasOnesInItsOutputsAtPowerUpAndZeroesElsewhere) {
   write(at::kOutput + 1, 0);
   model_.setInputs(0xffffffff, 0);
@@ -97,7 +97,7 @@ TEST(DigitalIoModel, TellsWhatItsOutputsGive) {
   EXPECT_THAT(told, ElementsAre(Pair(16, 0.0), Pair(20, 0.0), Pair(16, 5.0), Pair(21, 0.0), Pair(22, 0.0), Pair(23, 0.0)));
 }
 
-// Two modules, two programs: bits of one follow those of the other.
+// Two modules, as in two programs: inputs of one follow outputs of the other.
 TEST_F(DigitalIoTest, FollowsAnotherModuleOverWires) {
   const TemporaryFolder folder;
   ModelWires wires(folder.file("wires"));
@@ -112,7 +112,7 @@ TEST_F(DigitalIoTest, FollowsAnotherModuleOverWires) {
     other.write(DeviceModel::Space::io, 2, i % 2 == 0 ? 0 : 2, DeviceModel::kBoth);
     EXPECT_EQ(listener.next().inputs & 4, i % 2 == 0 ? 0u : 4u);
   }
-  model_->connect(2, {});  // the wires end first
+  model_->connect(2, {});  // the wires are destroyed before the model
 }
 
 }  // namespace

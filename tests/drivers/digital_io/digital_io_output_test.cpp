@@ -65,7 +65,7 @@ TEST_F(DigitalIoTest, ReadsWhatOthersDriveOnLinesThatItLetsGo) {
   EXPECT_EQ(io.tryReadInputs(), 0xffff0cu);
 }
 
-// The first driver for EPICS wrote the low enables to word 8, which is the interrupt vector.
+// The first EPICS driver wrote the low enables to word 8, which is the interrupt vector.
 TEST_F(DigitalIoTest, EnablesSwitchedDriversInTheirOwnRegister) {
   auto& io = start("IP-Unidig-I-D", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   EXPECT_EQ(model_->driven(), 0u);
@@ -117,7 +117,8 @@ TEST_F(DigitalIoTest, RefusesBitsThatAModelCannotWriteAndChangesNothing) {
   }
 }
 
-// The first driver left one of the four models out, another one twice in, and took any value.
+// The first EPICS driver omitted one of the four models, had another one twice, and accepted any
+// value.
 TEST_F(DigitalIoTest, SetsTheThresholdOfModelsThatHaveOne) {
   for (const auto* const name : {"IP-Unidig-HV-16I8O", "IP-Unidig-HV-8I16O", "IP-Unidig-I-HV-16I8O", "IP-Unidig-I-HV-8I16O"}) {
     auto& io = start(name);
@@ -133,7 +134,7 @@ TEST_F(DigitalIoTest, SetsTheThresholdOfModelsThatHaveOne) {
   EXPECT_EQ(start("IP-Unidig-I").trySetThreshold(100), DigitalIoStatus::noThreshold);
 }
 
-// Word E is the threshold there: clearing interrupts must not change it.
+// Word e of these models is the threshold: clearing interrupts must not change it.
 TEST_F(DigitalIoTest, KeepsTheThresholdWhileItServesInterrupts) {
   auto& io = start("IP-Unidig-I-HV-16I8O", {.pollEvery = kNever, .vector = 5, .rising = 0xffffff, .falling = 0xffffff});
   DigitalIoListener listener(io);
@@ -152,7 +153,7 @@ TEST_F(DigitalIoTest, SaysWhenTheRegisterHoldsSomethingElse) {
   EXPECT_EQ(io.trySetBits(0x200), kSuccess);
 }
 
-// All ones are what is written, and what is read where there is nothing.
+// All ones may be a written value, or the reading of an absent module.
 TEST_F(DigitalIoTest, SaysWhenNothingAnswers) {
   for (const auto* const name : {"IP-Unidig-HV-16I8O", "DIO316I"}) {
     auto& io = start(name);
@@ -180,7 +181,8 @@ TEST_F(DigitalIoTest, RefusesVectorsThatCannotBe) {
   }
 }
 
-// A module that lost its power gets its outputs, enables and threshold again; bits that nobody wrote are left.
+// Outputs, enables and threshold are restored after a loss of power; bits that were never written
+// are not.
 TEST_F(DigitalIoTest, GivesAModuleThatComesBackWhatWasWritten) {
   auto& io = start("IP-Unidig-I-D", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   DigitalIoListener listener(io);
@@ -204,7 +206,7 @@ TEST_F(DigitalIoTest, GivesAModuleThatComesBackItsThreshold) {
   EXPECT_EQ(threshold(), 1601);
 }
 
-// A reset that no poll saw as an absence: one register tells, in each kind of module.
+// A reset between two polls is detected by one register, in each kind of module.
 TEST_F(DigitalIoTest, SeesThatAModuleWasReset) {
   for (const auto& kind : digitalIoKinds()) {
     if (kind.outputs == 0) continue;
@@ -227,7 +229,7 @@ TEST_F(DigitalIoTest, SeesThatAModuleWasReset) {
   }
 }
 
-// Not even those bits get lost that stand in the same register.
+// Other bits of the same register are kept, too.
 TEST_F(DigitalIoTest, MendsAModuleThatWasResetBeforeItWritesToIt) {
   auto& io = start("IP-Unidig-I-O-24IO", {.pollEvery = kNever, .vector = 1});
   ASSERT_EQ(io.tryClearBits(0x1), kSuccess);
@@ -273,7 +275,7 @@ TEST_F(DigitalIoTest, WritesNothingToAModuleThatIsNoneOfDigitalLines) {
     EXPECT_EQ(other.read(DeviceModel::Space::io, offset, DeviceModel::kBoth), 0) << offset;
 }
 
-// Its end writes, too: that nobody looked in between does not matter.
+// The destructor writes, too; it must check the module itself, since there was no look in between.
 TEST_F(DigitalIoTest, WritesNothingAtItsEndToAnotherModule) {
   start("IP-Unidig-I", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   carrier_.unplug("IP_a");

@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 using Status = IndustryPackStatus;
 
-// "6000 6080 d0000000+8192K 1,2" of each site that there is.
+// "6000 6080 d0000000+8192K 1,2" for each site.
 std::string textOf(const CarrierParameters& carrier) {
   std::string text;
   for (const auto& site : carrier.sites) {
@@ -90,60 +90,60 @@ struct BadParameters {
 };
 
 constexpr BadParameters kBad[]{
-    {"vipc310", "0x6100", Status::badAddress, "I/O address 0x6100: a multiple of 0x200, 0x0 to 0xfe00 it may be"},
+    {"vipc310", "0x6100", Status::badAddress, "I/O address 0x6100: use a multiple of 0x200, 0x0 to 0xfe00"},
     {"vipc310", "0x10000", Status::badAddress, "I/O address 0x10000"},
     {"vipc310", "0x6000,100", Status::badAddress, "memory size [K] 100"},
     {"vipc310", "0x6000,192", Status::badAddress, "memory size 192 K"},
-    {"vipc310", "0x6000,4096", Status::badAddress, "memory size [K] 4096: a multiple of 64, 0 to 2048 it may be"},
+    {"vipc310", "0x6000,4096", Status::badAddress, "memory size [K] 4096: use a multiple of 64, 0 to 2048"},
     {"vipc310", "0x6000,", Status::badAddress, "the memory size [K] is missing"},
-    {"vipc310", "ipac", Status::badAddress, "the I/O address is no number: \"ipac\""},
+    {"vipc310", "ipac", Status::badAddress, "the I/O address is not a number: \"ipac\""},
     {"vipc310", "0x6000,128,3", Status::badAddress, "\",3\" at the end has no meaning"},
     {"vipc610", "0xfe00", Status::badAddress, "I/O address 0xfe00"},
-    {"vipc610", "-0x6000", Status::badAddress, "the I/O address is no number"},
+    {"vipc610", "-0x6000", Status::badAddress, "the I/O address is not a number"},
     {"vipc616", "0x6200", Status::badAddress, "a multiple of 0x400"},
-    {"vipc616", "0x3000,0xa1000000", Status::badAddress, "memory address 0xa1000000: a multiple of 0x2000000 in A32"},
-    {"vipc616", "0x3000,D00000", Status::badAddress, "in A24 a size [K] has to follow"},
-    {"vipc616_01", "0x6000,0xa0000000,128", Status::badAddress, "memory address 0xa0000000: a multiple of 0x20000 in A24"},
+    {"vipc616", "0x3000,0xa1000000", Status::badAddress, "memory address 0xa1000000: use a multiple of 0x2000000 in A32"},
+    {"vipc616", "0x3000,D00000", Status::badAddress, "add a size [K] for A24"},
+    {"vipc616_01", "0x6000,0xa0000000,128", Status::badAddress, "memory address 0xa0000000: use a multiple of 0x20000 in A24"},
     {"vipc616", "0x3000,0x123456789", Status::badAddress, "memory address 123456789"},
-    {"ipmv162", "A:l=8", Status::badIntLevel, "interrupt level 8: 0 to 7"},
+    {"ipmv162", "A:l=8", Status::badIntLevel, "interrupt level 8: use 1 to 7, or 0"},
     {"ipmv162", "A:l=3,9", Status::badIntLevel, "second interrupt level 9"},
     {"ipmv162", "A:l", Status::badAddress, "no '=' after the l"},
     {"ipmv162", "A:m=0xe0000000", Status::badAddress, "no ',' after the memory address"},
-    {"ipmv162", "A:m=0xe0001000,64", Status::badAddress, "memory address 0xe0001000: a multiple of 0x10000"},
+    {"ipmv162", "A:m=0xe0001000,64", Status::badAddress, "memory address 0xe0001000: use a multiple of 0x10000"},
     {"ipmv162", "A:m=0xe0000000,32", Status::badAddress, "memory size [K] 32"},
     {"ipmv162", "A:m=0xe0000000,32768", Status::badAddress, "64 to 16384"},
-    {"ipmv162", "A:m=0xffe00000,2048", Status::badAddress, "it goes beyond 0xfff00000"},
-    {"ipmv162", "A:m=0xe0000000,128;B:m=0xe0010000,64", Status::badAddress, "the memory of site B lies in that of A"},
+    {"ipmv162", "A:m=0xffe00000,2048", Status::badAddress, "the end is above 0xfff00000"},
+    {"ipmv162", "A:m=0xe0000000,128;B:m=0xe0010000,64", Status::badAddress, "the memory of site B overlaps with that of site A"},
     {"ipmv162", "A:r=9", Status::badAddress, "recovery time [us] 9"},
-    {"ipmv162", "A:w=24", Status::badAddress, "width 24: 8, 16 or 32"},
+    {"ipmv162", "A:w=24", Status::badAddress, "width 24: use 8, 16 or 32"},
     {"ipmv162", "B:w=32", Status::badAddress, "width 32 at site B"},
     {"tvme200", "", Status::badAddress, "six hexadecimal digits"},
     {"tvme200", "0x6010D0", Status::badAddress, "six hexadecimal digits"},
-    {"tvme200", "6110D0", Status::badAddress, "switch S2 at 1: 0, 4, 8 or C"},
-    {"tvme200", "6050D0", Status::badIntLevel, "switch S3 at 5: 0 to 4"},
+    {"tvme200", "6110D0", Status::badAddress, "switch S2 at 1: use 0, 4, 8 or C"},
+    {"tvme200", "6050D0", Status::badIntLevel, "switch S3 at 5: use 0 to 4"},
     {"tvme200", "6018D0", Status::badAddress, "switch S4 at 8"},
-    {"tvme200", "102670", Status::badAddress, "switches S5 and S6 at 70: 0x700000 is no multiple of 0x400000"},
+    {"tvme200", "102670", Status::badAddress, "switches S5 and S6 at 70: 0x700000 is not a multiple of 0x400000"},
     {"hy8002", "", Status::badAddress, "the slot is missing"},
-    {"hy8002", "22,2", Status::badAddress, "slot 22: 0 to 21"},
+    {"hy8002", "22,2", Status::badAddress, "slot 22: use 0 to 21"},
     {"hy8002", "3", Status::badAddress, "no ',' after the slot"},
     {"hy8002", "3,8", Status::badIntLevel, "interrupt level 8"},
-    {"hy8002", "3,2 IPMEM=3", Status::badAddress, "IPMEM 3: 1, 2, 4 or 8"},
+    {"hy8002", "3,2 IPMEM=3", Status::badAddress, "IPMEM 3: use 1, 2, 4 or 8"},
     {"hy8002", "3,2 IPMEM=4", Status::badAddress, "IPMEM 4 needs a MEMBASE"},
     {"hy8002", "16,2 IPMEM=2", Status::badAddress, "IPMEM 2 in slot 16 needs a MEMBASE"},
     {"hy8002", "3,2 IPMEM=4 MEMBASE=0x9080", Status::badAddress, "a multiple of 0x100"},
     {"hy8002", "3,2 MEMBASE=0x10000", Status::badAddress, "MEMBASE 0x10000"},
-    {"hy8004", "3,2 IPCLK=16", Status::badAddress, "IPCLK 16: 8 or 32"},
+    {"hy8004", "3,2 IPCLK=16", Status::badAddress, "IPCLK 16: use 8 or 32"},
     {"hy8004", "3,2 ROAK=2", Status::badAddress, "ROAK 2"},
-    {"hy8004", "3,2 CLOCK=8", Status::badAddress, "\"CLOCK=8\": IPMEM, MEMBASE, IPCLK or ROAK"},
+    {"hy8004", "3,2 CLOCK=8", Status::badAddress, "\"CLOCK=8\": use IPMEM, MEMBASE, IPCLK or ROAK"},
     {"xy9660", "0x6000", Status::badAddress, "no ',' after the I/O address"},
     {"xy9660", "0x6000,8", Status::badIntLevel, "interrupt level 8"},
-    {"xy9660", "0x6000,4 E=1,800000", Status::badAddress, "\"E=1,800000\": A, B, C or D"},
+    {"xy9660", "0x6000,4 E=1,800000", Status::badAddress, "\"E=1,800000\": use the sites A, B, C or D"},
     {"xy9660", "0x6000,4 A=3,800000", Status::badAddress, "memory size [M] 3"},
-    {"xy9660", "0x6000,4 A=2,900000", Status::badAddress, "memory address 0x900000: a multiple of 0x200000"},
-    {"avme96xx", "0x6000,4 A=2,800000 B=1,900000", Status::badAddress, "the memory of site B lies in that of A"},
-    {"atc40", "0x1000,0x4000,11", Status::badAddress, "blanks stand between"},
+    {"xy9660", "0x6000,4 A=2,900000", Status::badAddress, "memory address 0x900000: use a multiple of 0x200000"},
+    {"avme96xx", "0x6000,4 A=2,800000 B=1,900000", Status::badAddress, "the memory of site B overlaps with that of site A"},
+    {"atc40", "0x1000,0x4000,11", Status::badAddress, "separate the parameters with blanks"},
     {"atc40", "0xa0000 512", Status::badAddress, "size [bytes] 512"},
-    {"atc40", "0xa0000 0x4000 16", Status::badIntLevel, "interrupt request 16: 0 to 15"},
+    {"atc40", "0xa0000 0x4000 16", Status::badIntLevel, "interrupt request 16: use 0 to 15"},
     {"atc40", "0x1000000", Status::badAddress, "address 0x1000000"},
 };
 
@@ -181,7 +181,8 @@ TEST(CarrierParametersTest, OfAnUnknownKindNameTheKnownOnes) {
   EXPECT_THROW(static_cast<void>(parseCarrierParameters("vipc999", "")), std::invalid_argument);
 }
 
-// A kind of carrier that this host cannot reach is checked all the same, so that a wrong line is found before it is moved to another host.
+// The parameters of a carrier that MPF cannot reach are checked nevertheless, so that an error in
+// an old startup file is found.
 TEST(CreateCarrierTest, SaysThatThisHostReachesNoVmeAndWhatToUse) {
   const auto problemOf = [](const char* kind, const char* parameters) {
     try {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// FakePci: a folder with the files that Linux has for PCI boards, plain ones: windows are memory that keeps what is written.
+// FakePci: a folder with plain files in place of those that Linux has for PCI boards. Windows are
+// memory that keeps what is written.
 #pragma once
 
 #include <fcntl.h>
@@ -20,12 +21,13 @@ namespace mpf::test {
 
 class FakePci {
  public:
-  // Where the board's small windows lie in their pages.
+  // The offset of the small windows in their pages.
   static constexpr std::size_t kInPage = 0x80;
 
   FakePci() {
     std::filesystem::create_directories(folder_.path() / "dev");
-    std::filesystem::permissions(folder_.path(), std::filesystem::perms::all);  // tests of rights are about the files in it
+    // tests change the permissions of the files inside
+    std::filesystem::permissions(folder_.path(), std::filesystem::perms::all);
   }
 
   [[nodiscard]] PciPlaces places() const {
@@ -39,7 +41,7 @@ class FakePci {
     std::ofstream(file(address, name)) << text;
   }
 
-  // A board without a driver, switched on.
+  // Adds an enabled board that is not bound to a driver.
   void add(const std::string& address, const std::string& vendor = "0x1498", const std::string& device = "0x30c8") const {
     std::filesystem::create_directories(places().devices + "/" + address);
     write(address, "vendor", vendor + "\n");
@@ -57,7 +59,7 @@ class FakePci {
       std::filesystem::resize_file(file(address, fmt::format("resource{}", number)), number == 4 ? 0x2000000 : 4096);
     }
   }
-  // uio_pci_generic has it, as /dev/uio7. What is written there is an interrupt.
+  // Binds the board to uio_pci_generic, as /dev/uio7. A write to that file is an interrupt.
   void giveInterrupt(const std::string& address) {
     setDriver(address, "uio_pci_generic");
     std::filesystem::create_directories(file(address, "uio/uio7"));
@@ -75,7 +77,8 @@ class FakePci {
 
   void takeInterruptAway() { interrupt_.reset(); }
 
-  // Registers as the board's side sees them. Not through a mapping of this process: another thread uses that.
+  // Access to the registers from the side of the board. It uses the file, since another thread uses
+  // the mapping.
   template <class Value>
   [[nodiscard]] Value get(const std::string& address, const std::string& name, std::size_t offset) const {
     const FileDescriptor opened(::open(file(address, name).c_str(), O_RDONLY | O_CLOEXEC));

@@ -25,7 +25,7 @@ TEST_P(IdPromCrc, IsThatOfTheModule) {
   EXPECT_EQ(wordsOf({.manufacturer = manufacturer, .model = model}).at(11), crc);
 }
 
-// The values for 12 bytes with revision, reserved and driver 0, by the rule of the standard.
+// The CRCs that the standard defines for 12 bytes with revision, reserved and driver 0.
 INSTANTIATE_TEST_SUITE_P(Known, IdPromCrc,
                          testing::Values(CrcVector{"Ip330", 0xa3, 0x11, 0x5a}, CrcVector{"Octal232", 0xf0, 0x22, 0x44},
                                          CrcVector{"Octal422", 0xf0, 0x2a, 0xe9}, CrcVector{"Octal485", 0xf0, 0x48, 0x10},

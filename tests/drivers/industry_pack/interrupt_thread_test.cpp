@@ -21,7 +21,7 @@ class InterruptThreadTest : public testing::Test {
  protected:
   InterruptThreadTest() { carrier_.plug("IP_a", std::make_unique<PlainModel>()); }
   Registers& io() { return carrier_.site(0).io(); }
-  // The handler of a chip that asks by bit 0 of word 0.
+  // The handler of a chip whose bit 0 of word 0 is its request.
   InterruptThread::Handler serve() {
     return [this](InterruptThread::Cause) {
       const bool asks = io().read16(0) != 0;
@@ -99,7 +99,7 @@ TEST_F(InterruptThreadTest, MasksAStormAndStillPolls) {
   EXPECT_EQ(thread.counters().interrupts, 10u);
 }
 
-// One interrupt of four is for something, as on a line that is stuck while the chip is busy.
+// One interrupt of four has a request, as on a stuck line while the chip is busy.
 TEST_F(InterruptThreadTest, MasksAStormThatTrafficInterrupts) {
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   std::counting_semaphore<> storms{0};
@@ -132,7 +132,7 @@ TEST_F(InterruptThreadTest, TellsOfAStormWhenItBeginsAndNotAfterEachPause) {
   while (thread.counters().storms < 10) std::this_thread::yield();
 
   EXPECT_GE(told, 1);
-  EXPECT_LT(told, 10);  // 1, unless the host forgot this process for a while
+  EXPECT_LT(told, 10);  // 1, unless this process did not run for a while
 }
 
 TEST_F(InterruptThreadTest, TellsOnceOfALineThatIsDead) {

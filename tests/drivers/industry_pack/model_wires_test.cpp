@@ -64,7 +64,7 @@ TEST_F(ModelWiresTest, AreThereForWhoComesLater) {
 TEST_F(ModelWiresTest, ReachAnotherProcess) {
   std::array<int, 2> go{};
   ASSERT_EQ(::pipe(go.data()), 0);
-  const auto child = ::fork();  // while there is one thread
+  const auto child = ::fork();  // while the process has one thread
   if (child == 0) {
     char byte = 0;
     if (::read(go[0], &byte, 1) == 1) ModelWires(path_).wire("there").set(42);
@@ -97,7 +97,7 @@ TEST_F(ModelWiresTest, TellNobodyWhenNothingChanged) {
   EXPECT_EQ(told, 0);
 }
 
-// However many make the file at once, all have the same wires, and a name is one wire.
+// When many processes create the file at once, all have the same wires, and each name is one wire.
 TEST_F(ModelWiresTest, AreMadeOnceByManyAtOnce) {
   for (int round = 0; round < 20; ++round) {
     std::filesystem::remove(path_);
@@ -144,9 +144,9 @@ TEST_F(ModelWiresTest, GoOnWhereANameWasHalfWritten) {
 
 TEST_F(ModelWiresTest, RefuseAFileThatIsNone) {
   folder_.write("wires", "a letter");
-  expectRefused("it has 8 bytes, not 65600; remove it or name another");
+  expectRefused("it has 8 bytes, not 65600; remove it or name another file");
   folder_.write("wires", std::string(65600, 'x'));
-  expectRefused("it begins with something else");
+  expectRefused("its contents are invalid");
 }
 
 TEST_F(ModelWiresTest, RefuseADamagedFile) {
@@ -156,7 +156,7 @@ TEST_F(ModelWiresTest, RefuseADamagedFile) {
   damage(8, std::string("\2\0\0\0", 4));
   expectRefused("its version is 2, not 1");
   damage(8, std::string("\1\0\0\0\1", 5));
-  expectRefused("it says that it has 1025 wires");
+  expectRefused("its capacity is 1025 wires");
   damage(12, std::string("\0\4\0\0", 4));
   {
     const ModelWires wires(path_);

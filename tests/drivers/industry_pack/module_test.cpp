@@ -48,7 +48,7 @@ TEST_F(ModuleTest, ThatIsAbsentIsAClearError) { expectError(IndustryPackStatus::
 
 TEST_F(ModuleTest, OfAnotherManufacturerIsAClearError) {
   model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0x45, .model = 0x11}));
-  expectError(IndustryPackStatus::badModule, "is no Acromag IP330: its manufacturer is 0x45, not 0xa3");
+  expectError(IndustryPackStatus::badModule, "is not the expected Acromag IP330: its manufacturer is 0x45, not 0xa3");
 }
 
 TEST_F(ModuleTest, OfAnotherModelIsAClearError) {

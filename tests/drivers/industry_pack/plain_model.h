@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PlainModel: a module of 16-bit words that keep what is written, and of a line that follows bit 0 of word 0.
+// PlainModel: device model with 16-bit words that keep what is written. Bit 0 of word 0 drives an
+// interrupt request line.
 #pragma once
 
 #include <array>

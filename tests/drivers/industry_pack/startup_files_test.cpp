@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Carriers in startup files of real users. Where those files are, MPF_CORPUS says; otherwise they are looked for beside this tree.
+// Carriers in startup files of real users. MPF_CORPUS is their folder; without it the test looks
+// beside this tree.
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
@@ -25,7 +26,7 @@ std::filesystem::path startupFolder() {
   return std::filesystem::path(said == nullptr ? MPF_CORPUS_NEARBY : said) / "startup";
 }
 
-// Lines that are commented out count: somebody had written and used them.
+// Lines that are commented out count, since users have written and used them.
 void addLinesOf(const std::filesystem::path& file, std::vector<CarrierLine>& found) {
   static const std::regex kCommand(R"re(ipacAddCarrier\s*\(?\s*&(\w+)\s*,\s*"([^"]*)")re");
   static const std::regex kCommandOfKind(R"re((ipacAdd(?!Carrier)\w+)\s*\(?\s*"([^"]*)")re");

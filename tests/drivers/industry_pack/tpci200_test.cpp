@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The carrier on files in place of a board: which one it finds, what it says when it may not, where its windows are, how interrupts pass.
-// On QEMU's model of the board: tests/system/tpci200.
+// The carrier with files in place of a board: selection of a board, error messages, windows,
+// interrupts. tests/tpci200 runs it on QEMU's model of the board.
 #include <mpf/drivers/industry_pack/tpci200.h>
 
 #include <poll.h>
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 constexpr const char* kBoard = "0000:03:00.0";
 constexpr std::size_t kInPage = FakePci::kInPage;
 
-// Files are opened as by somebody who is not root.
+// Opens files without the privileges of root.
 class NoRoot {
  public:
   NoRoot() { ::setfsuid(65534); }
@@ -77,19 +77,19 @@ TEST_F(Tpci200Test, IsFoundByAddressNumberOrAsTheFirst) {
 }
 
 TEST_F(Tpci200Test, ThatIsNotThereIsAClearError) {
-  EXPECT_THAT(problem(), HasSubstr("there is no TPCI200 (PCI id 0x1498:0x30c8) in this host"));
+  EXPECT_THAT(problem(), HasSubstr("this host has no TPCI200 (PCI id 0x1498:0x30c8)"));
   pci_.add(kBoard);
   pci_.add("0000:02:00.0", "0x8086", "0x100e");
-  EXPECT_THAT(problem("1"), HasSubstr("there is no TPCI200 number 1, counted from 0; there are: 0000:03:00.0"));
-  EXPECT_THAT(problem("04:00.0"), HasSubstr("there is no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
-  EXPECT_THAT(problem("02:00.0"), HasSubstr("the PCI device at 0000:02:00.0 is no TPCI200: its id is 0x8086:0x100e"));
+  EXPECT_THAT(problem("1"), HasSubstr("this host has no TPCI200 number 1, counted from 0; its boards: 0000:03:00.0"));
+  EXPECT_THAT(problem("04:00.0"), HasSubstr("no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
+  EXPECT_THAT(problem("02:00.0"), HasSubstr("the PCI device at 0000:02:00.0 is not a TPCI200: its id is 0x8086:0x100e"));
 }
 
 TEST_F(Tpci200Test, ThatAnotherDriverHasIsAnErrorThatSaysHowToGetIt) {
   pci_.add(kBoard);
   pci_.setDriver(kBoard, "tpci200");
   const auto said = problem();
-  EXPECT_THAT(said, HasSubstr("the kernel's driver tpci200 has it"));
+  EXPECT_THAT(said, HasSubstr("the board is bound to the kernel's driver tpci200"));
   EXPECT_THAT(said, HasSubstr("echo 0000:03:00.0 > " + pci_.file(kBoard, "driver/unbind")));
   EXPECT_THAT(said, HasSubstr("modprobe uio_pci_generic; echo uio_pci_generic > " + pci_.file(kBoard, "driver_override")));
 }
@@ -99,7 +99,7 @@ TEST_F(Tpci200Test, WithoutTheRightToItIsAnErrorThatNamesTheFile) {
   std::filesystem::permissions(pci_.file(kBoard, "resource2"), std::filesystem::perms::none);
   const NoRoot noRoot;
   const auto said = problem();
-  EXPECT_THAT(said, HasSubstr("no right to read and write " + pci_.file(kBoard, "resource2")));
+  EXPECT_THAT(said, HasSubstr("no permission to read and write " + pci_.file(kBoard, "resource2")));
   EXPECT_THAT(said, HasSubstr("chgrp GROUP"));
 }
 
@@ -234,7 +234,7 @@ TEST_F(Tpci200Test, PassesNoInterruptThatIsNotEnabled) {
   pci_.giveInterrupt(kBoard);
   Tpci200 carrier(options());
   auto& wanted = carrier.site(0).interrupt(1);
-  auto& other = carrier.site(0).interrupt(0);  // looked at first
+  auto& other = carrier.site(0).interrupt(0);  // served first
   other.enable();
   other.disable();
   wanted.enable();
@@ -255,7 +255,7 @@ TEST_F(Tpci200Test, SilencesTheSiteOfNobodyButNotThatOfAnother) {
   line.enable();
   setControl(2, 0x40);
   setControl(3, 0x40);
-  setStatus(0x51);  // of sites A, C and D
+  setStatus(0x51);  // lines of sites A, C and D
   pci_.interrupt();
   waitFor(line);
   while (control(3) != 0) std::this_thread::yield();

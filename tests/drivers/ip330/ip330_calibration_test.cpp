@@ -16,7 +16,7 @@ struct CalibrationCase {
   Ip330Type type;
   Ip330Range range;
   int gain;
-  double sign;  // of the converter's errors
+  double sign;  // sign of the converter's errors
 };
 
 std::vector<CalibrationCase> allCases() {
@@ -43,10 +43,12 @@ std::array<double, kIp330Gains> times(double factor, std::array<double, kIp330Ga
   return values;
 }
 
-// Nothing on the board says how far such a converter is off: the only voltage beside the high one that is in the range is 0 V, its end.
+// The error of such a converter cannot be measured: the only other voltage in the range is 0 V, the
+// end of the range.
 bool cannotBeCalibrated(Ip330Range range, int gain, double offset) { return range == Ip330Range::from0to5 && gain == 3 && offset < 1; }
 
-// Voltages over the inner 96 % of the input range: at its ends a wrong converter has no codes left.
+// Voltages in the inner 96 % of the input range: at the ends, a converter with errors runs out of
+// codes.
 double voltageOf(Ip330Range range, int gain, int number) {
   const auto [zero, span] = spanOf(range);
   return (zero + span * (0.02 + 0.96 * number / (kTestVoltages - 1))) / kIp330Gain[static_cast<std::size_t>(gain)];
@@ -54,7 +56,7 @@ double voltageOf(Ip330Range range, int gain, int number) {
 
 class Ip330CalibrationTest : public testing::TestWithParam<CalibrationCase> {};
 
-// The mean of enough samples that the converter's noise is out of it, per test voltage.
+// For each test voltage, the mean of enough samples to remove the noise of the converter.
 std::array<double, kTestVoltages> meansOf(Ip330Board& with, int scans) {
   std::array<double, kTestVoltages> sums{};
   {
@@ -78,7 +80,7 @@ TEST_P(Ip330CalibrationTest, TakesTheErrorsAwayToOneAndAHalfCodes) {
                                                                                  .isRealTime = false});
   if (cannotBeCalibrated(range, gain, offsets[static_cast<std::size_t>(gain)])) {
     EXPECT_FALSE(with.board.trySetGain(0, gain));
-    EXPECT_TRUE(with.notes.has("+calibration fails: the converter gives nothing, nonsense, or the end of its range"));
+    EXPECT_TRUE(with.notes.has("+calibration fails: the converter gives no codes, implausible codes, or the end of its range"));
     return;
   }
   for (int i = 0; i < kTestVoltages; ++i) {
@@ -113,8 +115,9 @@ TEST(Ip330Correction, RefusesWhatNoConverterGives) {
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 0, 0));
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 40000, 30000));
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 33000, 65535));
-  EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 32768, 50000));  // half of what it should be
-  EXPECT_FALSE(correctionOf(Ip330Range::from0to5, 3, 0, 64225));  // the offset is anything below 0
+  EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 32768, 50000));  // half of the right slope
+  // the offset may be any value below 0
+  EXPECT_FALSE(correctionOf(Ip330Range::from0to5, 3, 0, 64225));
   EXPECT_FALSE(correctionOf(Ip330Range::from0to5, 3, 90, 65535));
   EXPECT_TRUE(correctionOf(Ip330Range::from0to5, 3, 90, 64315));
 }
@@ -171,12 +174,12 @@ TEST(Ip330Calibration, ThatNeverEndsIsSaidAndTheBoardGoesOn) {
   EXPECT_TRUE(with.notes.has("+calibration fails"));
   with.model.setStuck(false);
   with.scan(1);  // the converter settles
-  EXPECT_NEAR(meansOf(with, 2)[0], 32768, 1);  // by what was measured before
+  EXPECT_NEAR(meansOf(with, 2)[0], 32768, 1);  // with the previous calibration
   EXPECT_TRUE(with.board.tryCalibrate());
   EXPECT_TRUE(with.notes.has("-calibration succeeds"));
 }
 
-// Of a gain that nobody has for now: the others need not be calibrated for it again and again.
+// A gain that is not in use fails; the other gains must not be calibrated repeatedly because of it.
 TEST(Ip330Calibration, OfAGainThatCannotBeLeavesTheChannelAsItWas) {
   Ip330Board with({.range = Ip330Range::from0to5, .secondsBetweenCalibrate = 0},
                   {.range = Ip330Range::from0to5, .offsetError = {5, 5, 5, -20}, .isRealTime = false});
@@ -220,7 +223,8 @@ TEST(Ip330Calibration, IsTriedAgainUntilItSucceeds) {
   EXPECT_TRUE(with.board.trySetGain(0, 2));
 }
 
-// Calibration, changes of gain and scans at once: no sample has codes of a calibration voltage, or of another gain than it says.
+// Calibration, changes of gain and scans at the same time: no sample has codes of a calibration
+// voltage, or of a gain other than the one that it reports.
 TEST(Ip330Calibration, DoesNotMixWithScans) {
   Ip330Board with({.type = Ip330Type::differential, .lastChannel = 3, .microsecondsPerScan = 300, .secondsBetweenCalibrate = 0},
                   {.isRealTime = true}, {.conversion = 1h, .silence = 1h, .lookEvery = 1h});
@@ -229,7 +233,7 @@ TEST(Ip330Calibration, DoesNotMixWithScans) {
   std::atomic<int> samples{0};
   std::atomic<int> wrong{0};
   const auto subscription = with.board.subscribe([&, epoch = with.board.epoch()](const Ip330Sample& sample) {
-    if (sample.epoch != epoch) return;  // of before the signals were there
+    if (sample.epoch != epoch) return;  // from before the signals were set
     for (int i = 0; i < 4; ++i) {
       const auto at = static_cast<std::size_t>(i);
       if (std::abs(sample.corrected[at] - Ip330Model::idealCode(Ip330Range::minus5to5, sample.gain[at], 0.3)) > 1.5) wrong.fetch_add(1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The chip's registers on its model, without threads: mailboxes, their flags, their halves.
+// The registers of the chip with the device model, without threads: mailboxes, flags, halves.
 #include <mpf/drivers/ip330/ip330_chip.h>
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ class Ip330ChipTest : public testing::Test {
   void start(Ip330Type type, Ip330ScanMode mode = Ip330ScanMode::burstContinuous) {
     settings_ = {.type = type, .firstChannel = 2, .lastChannel = 7, .vector = 0x5a, .scanMode = mode};
     chip_.start(settings_, gains_, 1h);
-    // Each scan gives the codes 100 above those of the one before.
+    // The codes of each scan are 100 higher than those of the previous scan.
     model_.setSignal(7, [this](double) { return -5 + ++conversions_ * 100 * 10 / 65536.0; });
   }
   std::vector<int> take() {
@@ -47,7 +47,8 @@ TEST_F(Ip330ChipTest, WritesAllThatIsSet) {
 
   start(Ip330Type::singleEnded);
 
-  EXPECT_EQ(io_.read16(ip330::kControl), 0x2b0a);  // after all selected, timer, burst continuous, single ended, straight binary
+  // interrupt after all channels, timer, burst continuous, single ended, straight binary
+  EXPECT_EQ(io_.read16(ip330::kControl), 0x2b0a);
   EXPECT_EQ(io_.read8(ip330::kTimerPrescaler), 64);
   EXPECT_EQ(io_.read8(ip330::kInterruptVector), 0x5a);
   EXPECT_EQ(io_.read16(ip330::kConversionTimer), 114);  // 1000 us less 6 conversions
@@ -136,12 +137,12 @@ TEST_F(Ip330ChipTest, DoesNotScanWhenDisabled) {
 TEST_F(Ip330ChipTest, MeasuresACalibrationVoltageWhateverIsOnTheInputs) {
   start(Ip330Type::differential);
   chip_.stop();
-  EXPECT_EQ(chip_.tryMeasure(ip330::kSource4V9000, 0, 1h), 64881);  // of 9.9 V of 10, rounded
+  EXPECT_EQ(chip_.tryMeasure(ip330::kSource4V9000, 0, 1h), 64881);  // 9.9 V of 10 V, rounded
   EXPECT_EQ(chip_.tryMeasure(ip330::kSourceAutoZero, 3, 1h), 32768);
   EXPECT_EQ(conversions_, 0);
 }
 
-// Release 1-0 gave a bad reading after each calibration.
+// EPICS ip330 R1-0 gave a wrong reading after each calibration.
 TEST_F(Ip330ChipTest, ThrowsAwayWhatTheConverterGivesBeforeItHasSettled) {
   start(Ip330Type::singleEnded);
   chip_.stop();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ip330Board: a driver on a model, scan by scan; Notes: what it says.
+// Ip330Board: a driver with its device model, which scans on request. Notes: the reported faults.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace mpf::test {
 
 using namespace std::chrono_literals;
 
-// What a hook was told; any thread.
+// Records the calls of a fault hook. Threads: any.
 class Notes {
  public:
   Ip330Faults::Hook hook() {
@@ -43,10 +43,10 @@ class Notes {
   std::vector<std::string> texts_;
 };
 
-// Nothing happens by itself: no polling, no patience that ends while a test is held up.
+// Limits for tests without timing: no polling, and no wait that ends while the test is delayed.
 inline constexpr Ip330Limits kPatient{
     .conversion = 1h, .silence = 1h, .lookEvery = 1h, .pollEvery = 0ms, .stormLimit = 16, .stormPause = 1h};
-// Faults are noticed soon.
+// Limits with which faults are noticed soon.
 inline constexpr Ip330Limits kWatchful{
     .conversion = 10ms, .silence = 50ms, .lookEvery = 1ms, .pollEvery = 1ms, .stormLimit = 16, .stormPause = 5ms};
 
@@ -57,7 +57,7 @@ struct Ip330Board {
         module("adc", "a model", carrier.site(0), kIp330),
         board(module, settings, notes.hook(), limits) {}
 
-  // Scans, each of which the driver has taken before the next.
+  // Runs scans; waits after each until the driver has taken it.
   void scan(int scans = 1) {
     for (; scans > 0; --scans) {
       const auto before = board.counters().scans;

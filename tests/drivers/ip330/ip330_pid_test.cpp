@@ -65,7 +65,7 @@ TEST(PidLoop, HasItsIntegralAtALimitWhenItHasNone) {
   EXPECT_DOUBLE_EQ(loop.terms().i, 100);
 }
 
-// A 12-bit output of -10 to 10 V; any thread.
+// An output of 12 bits and -10 to 10 V. Threads: any.
 class FakeOutput final : public AnalogOutput {
  public:
   std::optional<double> tryRead() override { return answers ? std::optional(code.load()) : std::nullopt; }
@@ -81,7 +81,7 @@ class FakeOutput final : public AnalogOutput {
 
 class Ip330PidTest : public testing::Test {
  protected:
-  // Channel 1 is what the output drives, a quarter of it and 0.2 V.
+  // The voltage at channel 1 is a quarter of the output plus 0.2 V.
   Ip330PidTest() {
     with_.model.setSignal(1, [this](double) { return 0.2 + (output_.code - 2048) * 20 / 4096 / 4; });
     pid_.set([](PidLoop& loop) {
@@ -123,7 +123,7 @@ TEST_F(Ip330PidTest, StepsAsSlowlyAsItIsTold) {
   EXPECT_FALSE(pid_.trySetSecondsPerScan(-1));
 }
 
-// The converter's gain 1 is far off: it cannot be calibrated.
+// Gain code 1 of the converter has such a large error that it cannot be calibrated.
 TEST(Ip330Pid, SaysThatItsChannelIsNotCalibrated) {
   FakeOutput output;
   Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.gainError = {-0.5}, .isRealTime = false});

@@ -38,7 +38,7 @@ TEST(RunningMean, IsOfWhatCameSinceTheRestart) {
 
 class Ip330ScanTest : public testing::Test {
  protected:
-  // Code of channel 5 in its n-th sample: 32768 + 100 n.
+  // Code of channel 5 in sample n: 32768 + 100 n.
   void ramp() {
     with_.model.setSignal(5, [this](double) { return 1000.0 / 65536 * ++conversions_; });
   }
@@ -53,10 +53,11 @@ TEST_F(Ip330ScanTest, EachReaderHasItsOwnTime) {
   EXPECT_EQ(scan_.tryRead(5, 0, 1ms), 32768 + 5000);
   EXPECT_EQ(scan_.tryRead(5, 0, 11ms), 32768 + 4500);
   EXPECT_EQ(scan_.tryRead(5, 0, 1ms), 32768 + 5000);
-  EXPECT_EQ(scan_.tryRead(5, 0, 51ms), 32768 + 2550);  // all there are
+  EXPECT_EQ(scan_.tryRead(5, 0, 51ms), 32768 + 2550);  // the mean of all samples
 }
 
-// Release 1-7 gave the correction of 0 when no sample had come since the last reading.
+// EPICS ip330 R1-7 returned the corrected value of code 0 when no sample had come since the last
+// reading.
 TEST_F(Ip330ScanTest, WithoutATimeItIsWhatCameSinceTheLastReadingAndNeverNothing) {
   ramp();
   with_.scan(3);
@@ -78,14 +79,15 @@ TEST_F(Ip330ScanTest, AfterAChangeOfGainWaitsForASampleWithIt) {
   EXPECT_NEAR(scan_.tryRead(3, 0, 100ms).value(), 32768 + 3277, 1);
   std::atomic<bool> isRead{false};
   std::thread scanning([&] {
-    while (!isRead) with_.model.step();  // the change of the gain throws some away
+    while (!isRead) with_.model.step();  // a change of the gain discards some scans
   });
   EXPECT_NEAR(scan_.tryRead(3, 2, 100ms).value(), 32768 + 4 * 3277, 2);
   isRead = true;
   scanning.join();
 }
 
-// One of two gets it; no scan comes, so none of them has a sample yet.
+// Two readers want different gains and one gets its gain; no scan comes, so neither has a sample
+// yet.
 TEST_F(Ip330ScanTest, WhoseGainIsTakenAwayByAnotherWaitsNoMore) {
   Ip330Scan other(with_.board, 2, 5);
   std::atomic<int> ended{0};
@@ -150,7 +152,8 @@ TEST_F(Ip330ScanTest, ReadsNothingOfBeforeAnotherMode) {
   EXPECT_EQ(scan_.tryRead(5, 0, 100ms), 32768 + 550);
 }
 
-// An offset of 200 codes: the corrected codes of voltages just outside the range would be outside 0 to 0xffff.
+// With an offset of 200 codes, voltages just outside the range would have corrected codes outside 0
+// to 0xffff.
 TEST(Ip330Scan, GivesCodesWithinTheRange) {
   Ip330Board with({.secondsBetweenCalibrate = 0}, {.gainError = {-0.02}, .offsetError = {700}, .isRealTime = false});
   Ip330Scan scan(with.board, 0, 1);

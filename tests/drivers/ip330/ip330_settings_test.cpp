@@ -36,7 +36,8 @@ TEST_P(Ip330TimerTest, MakesTheTimeAskedFor) {
   EXPECT_DOUBLE_EQ(timer.microsecondsPerScan, row.made);
 }
 
-// The first two are the manual's board: release 1-4 took 1240 and 1480 us for what it called 1 ms.
+// The first two are the board of the manual: EPICS ip330 R1-4 needed 1240 and 1480 us instead of 1
+// ms.
 INSTANTIATE_TEST_SUITE_P(Table, Ip330TimerTest,
                          testing::Values(TimerRow{Mode::burstContinuous, 16, 1000, 64, 95, 1000},
                                          TimerRow{Mode::burstContinuous, 32, 1000, 64, 65, 1000},
@@ -82,7 +83,7 @@ TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
 TEST(Ip330Settings, SayWhatCannotBe) {
   EXPECT_EQ(Ip330Settings().problem(), "");
   EXPECT_THAT((Ip330Settings{.type = Ip330Type::differential, .lastChannel = 16}.problem()), HasSubstr("use 0 to 15"));
-  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()), HasSubstr("the first one first"));
+  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()), HasSubstr("in ascending order"));
   EXPECT_THAT((Ip330Settings{.vector = 256}.problem()), HasSubstr("use 0 to 255"));
   EXPECT_THAT((Ip330Settings{.maxClients = 0}.problem()), HasSubstr("use 1 or more"));
   EXPECT_THAT((Ip330Settings{.microsecondsPerScan = 1}.problem()), HasSubstr("us per scan"));

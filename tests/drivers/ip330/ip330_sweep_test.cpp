@@ -15,13 +15,13 @@ class Ip330SweepTest : public testing::Test {
  protected:
   Ip330SweepTest() {
     for (int channel = 0; channel < 8; ++channel) {
-      // In its n-th sample 100 n above 32768 + 10 * channel.
+      // The code in sample n is 32768 + 10 * channel + 100 n.
       with_.model.setSignal(channel, [this, channel](double) {
         return (100 * ++conversions_[static_cast<std::size_t>(channel)] + 10 * channel) * 10 / 65536.0;
       });
     }
   }
-  // What a channel has beyond its first code.
+  // The differences to the first code of the channel.
   Points read(int channel) {
     auto points = sweep_.tryRead(channel).value();
     for (auto& point : points) point -= point == 0 ? 0 : 32768 + 10 * channel;
@@ -45,7 +45,7 @@ TEST_F(Ip330SweepTest, TakesAPointAScanUntilItIsFull) {
   EXPECT_EQ(sweep_.status().acquired, 4);
 }
 
-// The original left the last channel out.
+// EPICS ip330Sweep omitted the last channel.
 TEST_F(Ip330SweepTest, PointsAreMeansInEveryChannelTheLastIncluded) {
   ASSERT_TRUE(sweep_.trySetSecondsPerPoint(0.003));
   EXPECT_DOUBLE_EQ(sweep_.status().secondsPerPoint, 0.003);
@@ -99,7 +99,8 @@ TEST_F(Ip330SweepTest, RefusesWhatIsNotThere) {
   EXPECT_FALSE(sweep_.trySetPreset(INFINITY));
   EXPECT_THROW(Ip330Sweep(with_.board, 0, 8, 4), std::invalid_argument);
   EXPECT_THROW(Ip330Sweep(with_.board, 0, 7, 0), std::invalid_argument);
-  EXPECT_THROW(Ip330Sweep(with_.board, 0, 7, 1 << 24), std::invalid_argument);  // more than a message holds
+  // more points than a message can have
+  EXPECT_THROW(Ip330Sweep(with_.board, 0, 7, 1 << 24), std::invalid_argument);
 }
 
 }  // namespace

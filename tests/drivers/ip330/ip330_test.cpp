@@ -33,7 +33,8 @@ TEST(Ip330, TakesAsManySubscribersAsItWasTold) {
   EXPECT_THROW(static_cast<void>(with.board.subscribe([](const Ip330Sample&) {})), std::length_error);
 }
 
-// Release 1-4 read only one half of the mailboxes: a mean of 200 samples had 100 distinct ones.
+// EPICS ip330 R1-4 read only one half of the mailboxes: a mean of 200 samples had only 100
+// different ones.
 TEST(Ip330, DifferentialSamplesOfARampAreAllDistinct) {
   Ip330Board with({.type = Ip330Type::differential, .lastChannel = 15, .secondsBetweenCalibrate = 0});
   for (int i = 0; i < 16; ++i) with.model.setSignal(i, [](double seconds) { return seconds * 5; });
@@ -53,7 +54,7 @@ TEST(Ip330, RefusesGainsAndChannelsThatItHasNot) {
   Ip330Board with({.firstChannel = 2, .lastChannel = 5});
   EXPECT_TRUE(with.board.trySetGain(2, 3));
   EXPECT_EQ(with.board.gain(2), 3);
-  EXPECT_FALSE(with.board.trySetGain(2, 4));  // the original took this one
+  EXPECT_FALSE(with.board.trySetGain(2, 4));  // EPICS ip330 accepted this gain
   EXPECT_FALSE(with.board.trySetGain(2, -1));
   EXPECT_FALSE(with.board.trySetGain(1, 0));
   EXPECT_FALSE(with.board.trySetGain(6, 0));
@@ -138,11 +139,11 @@ TEST_F(Ip330FaultTest, ABoardThatReadsAllOnesIsGoneUntilItAnswers) {
   EXPECT_NE(with_.board.problem(), "");
   EXPECT_FALSE(with_.board.tryCalibrate());
   with_.carrier.setFault("IP_a", ModelFault::none);
-  with_.notes.waitFor("-the board is there again");
+  with_.notes.waitFor("-the board is present again");
   waitForScans(10);
 }
 
-// A module that is none of ours: what it holds is on its outputs.
+// The words of a foreign module drive its outputs, so nothing may be written to it.
 class OtherModel final : public DeviceModel {
  public:
   explicit OtherModel(std::atomic<int>& writes) : DeviceModel({.manufacturer = kSystran, .model = 0x69}), writes_(writes) {}
@@ -186,7 +187,7 @@ TEST(Ip330OfWhichTheModuleIsAnother, GoesOnWithTheNextBoardByItsOwnCalibration) 
 
   with.carrier.plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{.offsetError = {-90}}));
 
-  with.notes.waitFor("-the board is there again");
+  with.notes.waitFor("-the board is present again");
   while (samples.load() < 10) std::this_thread::yield();
   EXPECT_EQ(wrong.load(), 0);
   EXPECT_EQ(writes.load(), 0);
@@ -208,7 +209,7 @@ TEST_F(Ip330FaultTest, ABoardThatStopsScanningIsSilentUntilItDoes) {
   waitForScans(10);
 }
 
-// Each failed calibration starts the scans again: that is none.
+// Each failed calibration restarts the scans; a restart does not count as a scan.
 TEST_F(Ip330FaultTest, ABoardIsSilentThatIsCalibratedInVainAgainAndAgain) {
   with_.model.setStuck(true);
   while (!with_.notes.has("+the board does not scan")) EXPECT_FALSE(with_.board.tryCalibrate());
