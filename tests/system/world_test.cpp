@@ -219,6 +219,7 @@ TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
   EXPECT_LT(WallClock::asProgramsSeeIt(), before);
   server.end(SIGKILL);
   server = Victim("serve", backplane_.name());
+  ASSERT_EQ(server.line(), "open");
 
   EXPECT_THAT(answered(), testing::AllOf(testing::StartsWith("answered "), testing::Ne(first)));
   SyncClient client(backplane_, "echo");
