@@ -76,10 +76,11 @@ void Endpoint::release(std::uint32_t index, Link& link) noexcept {
 
 std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::SegmentKind kind) {
   dropPeers();
-  if (const auto found = peers_.find(name); found != peers_.end()) {
-    if (auto window = found->second.window.lock(); window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
-    backplane_.watcher().forget(found->second.token);
-    peers_.erase(found);
+  const auto [first, last] = peers_.equal_range(name);
+  for (auto peer = first; peer != last; ++peer) {
+    auto window = peer->second.window.lock();
+    // Links may still use a window that is closed or lost, so it stays watched: its owner may die before it has closed them.
+    if (window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
   }
   auto window = PeerWindow::tryOpen(name, kind);
   if (!window || window->isClosed() || !window->hasOwner()) return nullptr;
@@ -88,7 +89,7 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
     peerDied_.store(true, std::memory_order_relaxed);
     interrupt();
   };
-  peers_[name] = {window, backplane_.watcher().watchPeer(window, clean)};
+  peers_.emplace(name, Peer{window, backplane_.watcher().watchPeer(window, clean)});
   return window;
 }
 

@@ -137,7 +137,7 @@ class Endpoint {
     std::weak_ptr<PeerWindow> window;
     Watcher::Token token;
   };
-  std::map<std::string, Peer> peers_;
+  std::multimap<std::string, Peer> peers_;  // of one name: a new window, and those before it whose links have not ended yet
 };
 
 }  // namespace mpf

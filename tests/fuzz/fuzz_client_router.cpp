@@ -72,7 +72,7 @@ class Play {
   Play(RouterScene& scene, std::span<const std::uint8_t> input)
       : scene_(scene),
         choices_(input),
-        here_{scene.io.unixEventPort, network_,        scene.here.timer,  scene.backplane, scene.log,
+        here_{scene.io.unixEventPort, network_,        scene.here.timer,  scene.backplane, scene.here.log,
               scene.statistics,       scene.presences, scene.here.config, nullptr,         1},
         dispatcher_(scene.backplane),
         first_(std::make_unique<Local>(dispatcher_)),

@@ -271,6 +271,26 @@ TEST_F(EndpointTest, APeersDeathIsLocalNews) {
   EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "what the dead one left is removed";
 }
 
+// A server that is killed while it ends has closed its window, but not yet its links.
+TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
+  Child child([&](Child::Self& self) {
+    const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader&) {});
+    self.ready();
+    window.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+    self.stay();
+  });
+  End client(backplane_, "");
+  const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
+  child.go();
+  ASSERT_TRUE(child.waitUntilReady());
+  ASSERT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr) << "for a second client, which looks for it";
+
+  child.end(SIGKILL);
+
+  while (!client.endpoint.takePeerDeath()) ASSERT_TRUE(client.endpoint.wait(Deadline::never()));
+  EXPECT_TRUE(peer->isDead());
+}
+
 TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
   End server(backplane_, "server");
   End client(backplane_, "");
