@@ -92,6 +92,7 @@ class MessageClient {
   [[nodiscard]] std::string notConnectedBecause() const;
 
  private:
+  friend class SyncClient;  // isInherited()
   MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback);
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isInherited() const noexcept;

@@ -36,6 +36,7 @@ void SyncClient::take(Message&& message) {
 
 // The calling thread becomes the one that runs the dispatcher, whichever thread did so before.
 bool SyncClient::connectWait(Nanoseconds timeout) {
+  if (client_.isInherited()) return false;
   const auto deadline = Deadline::after(timeout);
   while (!client_.isConnected() && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
   return client_.isConnected();

@@ -53,6 +53,15 @@ bool isNamed(const layout::SegmentHeader& header) {
   return header.ownerPid > 0 && header.ownerStartTicks != 0 && header.pidNamespace == ownPidNamespace();
 }
 
+// Whether a process is known to have this process's time namespace: in another one its start time is another number.
+bool sharesOurClock(std::int32_t pid) noexcept {
+  std::array<char, 32> path{};
+  std::snprintf(path.data(), path.size(), "/proc/%d/ns/time", pid);
+  struct stat own{};
+  struct stat theirs{};
+  return ::stat("/proc/self/ns/time", &own) == 0 && ::stat(path.data(), &theirs) == 0 && own.st_ino == theirs.st_ino;
+}
+
 FileDescriptor openProcess(std::int32_t pid) { return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0))); }
 
 }  // namespace
@@ -94,7 +103,7 @@ bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
   pollfd ended{descriptor.get(), POLLIN, 0};
   if (::poll(&ended, 1, 0) == 1) return true;
   const auto ticks = startTicksOf(header.ownerPid);
-  return ticks != 0 && ticks != header.ownerStartTicks;
+  return ticks != 0 && ticks != header.ownerStartTicks && sharesOurClock(header.ownerPid);
 }
 
 }  // namespace mpf

@@ -223,7 +223,7 @@ TopTable topHelp() {
   add("r", "reverses; numbers begin with the largest");
   add("/", "filter: only rows that hold a text; Enter keeps it, Esc drops it");
   add("q", "quits");
-  add("red", "to be looked at: stalled, busy while requests wait, stopped, dead, refused, not connected");
+  add("red", "stalled, busy (requests wait), stopped, dead, refused, not connected");
   add("CONN", "connections; of a router, clients");
   add("QUEUED", "requests that wait; of a router, messages");
   add("OPEN REQ", "requests without reply or fate");

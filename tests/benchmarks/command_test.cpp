@@ -108,11 +108,12 @@ TEST(BenchCommand, MeasuresEightSerialPortsBesideTheManual) {
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   const auto rows = nlohmann::json::parse(ended.out);
-  ASSERT_EQ(rows.size(), 3u);
+  ASSERT_EQ(rows.size(), 4u);
   EXPECT_EQ(rows[0].at("per_s"), 159);
   EXPECT_GT(rows[1].at("per_s").get<double>(), 0);
   EXPECT_GT(rows[1].at("ratio_to_floor").get<double>(), 0);
   EXPECT_EQ(rows[2].at("unit"), "% of one CPU");
+  EXPECT_EQ(rows[3].at("unit"), "answers");
 }
 
 TEST(BenchCommand, LooksAtAModelThatScans) {

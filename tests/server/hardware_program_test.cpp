@@ -126,7 +126,7 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
            {{"dac", "ipac", "IP_a"}, "nothing says what carrier \"ipac\" is"},
            {{"dac", "ipac", "IP_x", "--carrier", "ipac=model"}, "no site \"IP_x\""},
            {{"dac", "ipac", "IP_a", "0", "--carrier", "ipac=model"}, "queuesize: 0 is out of range"},
-           {{"--carrier", "ipac=model", "dac", "ipac", "IP_a", "--ranges", "3to4"}, "\"3to4\" is no range"},
+           {{"--carrier", "ipac=model", "dac", "ipac", "IP_a", "--ranges", "3to4"}, "\"3to4\" is not an output range"},
            {{"dac", "ipac", "IP_a", "--carrier", "ipac=model", "--wires", notAFile}, "letter is not a file of model wires"}}) {
     expectFails(*start(MPF_TEST_DAC128V_SERVER, words), because);
   }

@@ -99,7 +99,7 @@ class CheckUp : public testing::Test {
 TEST_F(CheckUp, OnAGoodHostAllIsWell) {
   const auto findings = checkUp(host_);
 
-  EXPECT_EQ(findings.size(), 17U);
+  EXPECT_EQ(findings.size(), 18U);
   for (const auto& finding : findings) {
     EXPECT_STREQ(toString(finding.health), "ok") << finding.check << ": " << finding.seen;
     EXPECT_THAT(finding.check, Not(IsEmpty()));

@@ -78,7 +78,7 @@ TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
   EXPECT_EQ(ended.status, 0);
   const auto text = inOneLine(ended.out);
   for (const auto& name : dead) EXPECT_THAT(text, HasSubstr("removed " + segments::path(name) + ": "));
-  EXPECT_EQ(timesOf("removed ", text), dead.size());
+  EXPECT_EQ(timesOf("removed", text), dead.size());
   EXPECT_THAT(backplane_.segmentNames(), testing::UnorderedElementsAreArray(before));
   EXPECT_TRUE(client.call(Int32Message(), 60s));
   EXPECT_EQ(run({"clean"}).out, "nothing to remove: no dead process left anything\n");
@@ -95,7 +95,7 @@ TEST_F(CleanTest, AThousandLinksOfADeadClientAreRemoved) {
   const auto ended = run({"clean"});
 
   EXPECT_EQ(ended.status, 0);
-  EXPECT_GE(timesOf("removed ", ended.out), 1000U);
+  EXPECT_GE(timesOf("removed", ended.out), 1000U);
   EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "the server's window, hints and pipe";
   server.signal(SIGCONT);
   server.end(SIGTERM);

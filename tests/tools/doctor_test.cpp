@@ -15,7 +15,7 @@ TEST_F(DoctorTest, ItsExitStatusSaysWhetherThereIsAProblem) {
   const auto ended = run({"doctor", "--json"});
 
   const auto findings = nlohmann::json::parse(ended.out);
-  EXPECT_EQ(findings.size(), 17U);
+  EXPECT_EQ(findings.size(), 18U);
   bool isIll = false;
   for (const auto& finding : findings) {
     EXPECT_THAT(finding.at("verdict").get<std::string>(), AnyOf("ok", "warning", "problem", "unknown"));

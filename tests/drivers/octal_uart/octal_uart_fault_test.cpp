@@ -192,7 +192,7 @@ TEST_F(OctalUartFaultTest, SomethingElseInItsPlaceIsNotTouched) {
 
   plug({.model = 0x11});
 
-  while (bound.port.unpluggedBecause().find("no GreenSpring Octal") == std::string::npos) std::this_thread::yield();
+  while (bound.port.unpluggedBecause().find("is not the expected GreenSpring Octal") == std::string::npos) std::this_thread::yield();
   EXPECT_EQ(model_->vector(), 0x0f);
 }
 
