@@ -225,19 +225,29 @@ bool DigitalIo::serve(InterruptThread::Cause cause) {
 // Reports all changes to the subscribers. Returns whether the chip had pending edges.
 bool DigitalIo::lookLocked() {
   if (!tend()) return false;
+  const auto inputs = state_.inputs;
   bool hadEdges = false;
   const auto changed = followInputs(hadEdges);
+  if (changed != 0 && hasVanished()) {  // while it was read: the values are not those of its inputs
+    state_.inputs = inputs;
+    tend();
+    return false;
+  }
   if (changed != 0) tell({DigitalIoNews::Kind::inputs, state_.inputs, changed});
   return hadEdges;
+}
+
+// Whether the module is gone or was reset. An absent module reads as all ones.
+bool DigitalIo::hasVanished() {
+  if (readMarks() != marks_) return true;
+  const auto inputs = registers_.read(word::kInput, kind_.inputs);
+  return DigitalIoRegisters::isAllOnes(inputs, kind_.inputs) && !module_.problem().empty();
 }
 
 // Programs the module when it is back or was reset. Returns false when it is gone, or when all
 // changes have been reported already.
 bool DigitalIo::tend() {
-  if (state_.isThere && readMarks() == marks_) {
-    const auto inputs = registers_.read(word::kInput, kind_.inputs);
-    if (!DigitalIoRegisters::isAllOnes(inputs, kind_.inputs) || module_.problem().empty()) return true;
-  }
+  if (state_.isThere && !hasVanished()) return true;
   const auto before = state_;
   if (setUp()) {
     tell({DigitalIoNews::Kind::back, state_.inputs, state_.inputs ^ before.inputs});

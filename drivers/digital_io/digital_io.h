@@ -139,6 +139,7 @@ class DigitalIo {
   bool serve(InterruptThread::Cause cause);
   bool lookLocked();
   bool tend();
+  [[nodiscard]] bool hasVanished();
   [[nodiscard]] bool isReady();
   std::uint32_t followInputs(bool& hadEdges);
   bool setUp();
