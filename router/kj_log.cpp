@@ -12,16 +12,22 @@ void KjLog::logMessage(kj::LogSeverity severity, const char* /*file*/, int /*lin
   else log_.debug("Cap'n Proto: {}", said);
 }
 
+namespace {
+
+MPF_KEEPS_KJ_LOG void runInThread(const Log& log, kj::Function<void()>& run) {
+  const KjLog ofThisThread(log);
+  try {
+    run();
+  } catch (const kj::Exception& error) {
+    if (error.getType() != kj::Exception::Type::DISCONNECTED) throw;
+    log.debug("a look-up of a name ended after nobody waited for it any more");
+  }
+}
+
+}  // namespace
+
 kj::Function<void(kj::Function<void()>)> KjLog::getThreadInitializer() {
-  return [log = log_](kj::Function<void()> run) {
-    const KjLog ofThisThread(log);
-    try {
-      run();
-    } catch (const kj::Exception& error) {
-      if (error.getType() != kj::Exception::Type::DISCONNECTED) throw;
-      log.debug("a look-up of a name ended after nobody waited for it any more");
-    }
-  };
+  return [log = log_](kj::Function<void()> run) { runInThread(log, run); };
 }
 
 }  // namespace mpf::router

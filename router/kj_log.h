@@ -15,6 +15,9 @@
 
 namespace mpf::router {
 
+// For functions that make a KjLog: AddressSanitizer may put the variables of others beside the stack, where kj refuses it.
+#define MPF_KEEPS_KJ_LOG [[gnu::no_sanitize_address, gnu::noinline]]
+
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wnon-virtual-dtor"
 class KjLog final : public kj::ExceptionCallback {

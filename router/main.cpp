@@ -67,7 +67,7 @@ kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArg
   });
 }
 
-int run(const RouterArguments& arguments) {
+MPF_KEEPS_KJ_LOG int run(const RouterArguments& arguments) {
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kj::UnixEventPort::captureSignal(signal);  // before there are threads
   const mpf::ServerLog log("mpf-router", arguments.config().logLevel);
   const mpf::router::KjLog kjLog(*log);
