@@ -6,7 +6,7 @@ set(CMAKE_LIBRARY_ARCHITECTURE s390x-linux-gnu)
 set(CMAKE_C_COMPILER s390x-linux-gnu-gcc)
 set(CMAKE_CXX_COMPILER s390x-linux-gnu-g++)
 
-cmake_path(SET CMAKE_SYSROOT NORMALIZE "${CMAKE_CURRENT_LIST_DIR}/../build/big-endian-sysroot/root")
+cmake_path(SET CMAKE_SYSROOT NORMALIZE "${CMAKE_CURRENT_LIST_DIR}/../../build/big-endian-sysroot/root")
 if(NOT EXISTS "${CMAKE_SYSROOT}")
   message(FATAL_ERROR "There are no libraries in ${CMAKE_SYSROOT}: scripts/big-endian-sysroot fetches them")
 endif()
