@@ -53,6 +53,8 @@ bool isNamed(const layout::SegmentHeader& header) {
   return header.ownerPid > 0 && header.ownerStartTicks != 0 && header.pidNamespace == ownPidNamespace();
 }
 
+constexpr std::uint64_t kEmulatorTicks = 100;  // one second
+
 // Whether a process is known to have this process's time namespace: in another one its start time is another number.
 bool sharesOurClock(std::int32_t pid) noexcept {
   std::array<char, 32> path{};
@@ -103,7 +105,8 @@ bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
   pollfd ended{descriptor.get(), POLLIN, 0};
   if (::poll(&ended, 1, 0) == 1) return true;
   const auto ticks = startTicksOf(header.ownerPid);
-  return ticks != 0 && ticks != header.ownerStartTicks && sharesOurClock(header.ownerPid);
+  // A pid is taken over later. An emulator such as qemu shows its program another start time than /proc shows.
+  return ticks > header.ownerStartTicks + kEmulatorTicks && sharesOurClock(header.ownerPid);
 }
 
 }  // namespace mpf
