@@ -193,10 +193,10 @@ TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
   EXPECT_EQ(backplane_.segmentNames().size(), 3U);
 }
 
-// Whose process it was tells more than a lock: its pid, and when it started.
+// A start time tells a later process with the same pid from the owner. This header's owner started as the host booted.
 TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessIsOfTheDead) {
   const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
-                         [](layout::SegmentHeader& header) { ++header.ownerStartTicks; });
+                         [](layout::SegmentHeader& header) { header.ownerStartTicks = 1; });
 
   EXPECT_EQ(segments::probeOwner(serverName()), Owner::dead);
 }

@@ -155,7 +155,7 @@ TEST_F(TortureTest, AVerdictThatCannotBeWrittenEndsItAtOnce) {
   const auto ended = runTool({"torture", "--json", "/nowhere/verdict.json", "--duration", "1000000"}, "");
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_THAT(ended.err, HasSubstr("create /nowhere/verdict.json: No such file or directory"));
+  EXPECT_THAT(ended.err, HasSubstr("open /nowhere/verdict.json: No such file or directory"));
   EXPECT_EQ(ended.out, "");
 }
 

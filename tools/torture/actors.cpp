@@ -59,7 +59,7 @@ int playSteady(const Cast& cast) {
 
 int playMortal(const Cast& cast) {
   Echo echo(Backplane::attach(cast.backplane), "mortal", cast.world, waitModeOf(cast.seed));
-  if (cast.sabotage == Sabotage::keepName) leaveChildBehind(cast.world);
+  if (cast.sabotage == Sabotage::keepName) leaveChildBehind(cast.world, cast.backplane);
   auto& board = cast.world.mortal;
   echo.run(board, byDescriptor(cast.seed));
   board.isLeaving.store(1);

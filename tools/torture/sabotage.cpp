@@ -19,15 +19,20 @@
 namespace mpf::torture {
 namespace {
 
-// Links of this process's clients.
+// Windows or links of this process.
 template <class Visit>
-void forEachOwnLink(const std::string& backplane, Visit&& visit) {
+void forEachOwn(layout::SegmentKind kind, NameKind nameKind, const std::string& backplane, Visit&& visit) {
   for (const auto& name : segments::list(SegmentName::prefix(backplane))) {
     const auto parsed = SegmentName::tryParse(name);
-    if (!parsed || parsed->kind != NameKind::link) continue;
-    const auto link = Segment::tryOpen(name, layout::SegmentKind::link, Segment::Access::readWrite);
-    if (link && link->header().ownerPid == ::getpid()) visit(*link);
+    if (!parsed || parsed->kind != nameKind) continue;
+    const auto segment = Segment::tryOpen(name, kind, Segment::Access::readWrite);
+    if (segment && segment->header().ownerPid == ::getpid()) visit(*segment);
   }
+}
+
+template <class Visit>
+void forEachOwnLink(const std::string& backplane, Visit&& visit) {
+  forEachOwn(layout::SegmentKind::link, NameKind::link, backplane, visit);
 }
 
 // A link to a server that never was, of a client that lives.
@@ -49,7 +54,10 @@ void Saboteur::meddle(Talk& mortal, bool rests) {
   if (sabotage_ == Sabotage::stale && begins) leaveLink(backplane_);
 }
 
-void leaveChildBehind(const World& world) {
+void leaveChildBehind(const World& world, const std::string& backplane) {
+  // Without a pid in the header, the lock is the only evidence that the owner is alive.
+  forEachOwn(layout::SegmentKind::serverWindow, NameKind::serverWindow, backplane,
+             [](const Segment& window) { window.sharedHeader().ownerPid = 0; });
   // Without fork(), so that no handler closes anything: the lock of the parent's window stays when the parent dies.
   if (checkCall(::syscall(SYS_clone, SIGCHLD, nullptr, nullptr, nullptr, nullptr), "clone") != 0) return;
   const auto referee = world.referee;

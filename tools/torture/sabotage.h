@@ -30,8 +30,8 @@ class Saboteur {
   std::vector<FileDescriptor> leaked_;
 };
 
-// A child that lives on until the torture is over, with all that is open.
-void leaveChildBehind(const World& world);
+// Forks a child that keeps this process's open files, and with them its locks, until the torture ends.
+void leaveChildBehind(const World& world, const std::string& backplane);
 // On each link of this process's clients: the next slot counts as complete, whatever it holds.
 void publishHalfMessage(const std::string& backplane);
 
