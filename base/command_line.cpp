@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/command_line.h>
+#include "base/command_line.h"
 
 #include <CLI/CLI.hpp>
 #include <charconv>
@@ -7,9 +7,9 @@
 #include <limits>
 #include <system_error>
 
-#include <mpf/base/print_error.h>
-#include <mpf/base/run_main.h>
-#include <mpf/base/version.h>
+#include "base/print_error.h"
+#include "base/run_main.h"
+#include "base/version.h"
 
 namespace mpf {
 namespace {
@@ -36,7 +36,8 @@ std::string chosenCommand(const CLI::App& app) {
 void addExitStatus(CLI::App& app) {
   auto footer = app.get_footer();
   if (footer.find("Exit status") == std::string::npos) {
-    app.footer(footer + (footer.empty() ? "" : "\n") + "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.");
+    app.footer(footer + (footer.empty() ? "" : "\n") +
+               "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.");
   }
   for (auto* command : app.get_subcommands([](CLI::App*) { return true; })) addExitStatus(*command);
 }
@@ -45,10 +46,11 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
   const auto command = chosenCommand(app);
   const auto subcommands = subcommandsOf(app);
-  if (command != app.get_name() || subcommands.empty()) return refuseArguments(command, error.what());
+  if (command != app.get_name() || subcommands.empty())
+    return refuseArguments(command, error.what());
   if (const auto words = app.remaining(); !words.empty()) {
-    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n", command, words.front(), subcommands,
-               command);
+    printError("{}: no subcommand or option \"{}\"; there are {}; `{} --help` shows what they do\n",
+               command, words.front(), subcommands, command);
   } else {
     printError("{}", app.help());
   }
@@ -70,7 +72,8 @@ CLI::Validator inRange(Number least, Number most) {
         Number value{};
         const bool good = isNumber(text, value) && value >= least && value <= most;  // NaN is not
         if (good) return std::string();
-        if (most == std::numeric_limits<Number>::max()) return fmt::format("{} is out of range: use {} or more", text, least);
+        if (most == std::numeric_limits<Number>::max())
+          return fmt::format("{} is out of range: use {} or more", text, least);
         return fmt::format("{} is out of range: use {} to {}", text, least, most);
       },
       {});
@@ -80,7 +83,8 @@ CLI::Validator inRange(Number least, Number most) {
 
 std::optional<int> parseCommandLine(CLI::App& app, int argc, const char* const* argv) try {
   addExitStatus(app);
-  app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), kVersion), "Print the version");
+  app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), kVersion),
+                       "Print the version");
   app.parse(argc, argv);
   return std::nullopt;
 } catch (const CLI::ParseError& error) {

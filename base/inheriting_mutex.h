@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// InheritingMutex: a mutex whose owner runs at the priority of the most urgent thread that waits for it.
+// InheritingMutex: a mutex whose owner runs at the priority of the most urgent thread that waits
+// for it.
 //
-// With std::mutex an ordinary thread that holds the lock and gets no processor keeps a real-time thread waiting just as long.
+// With std::mutex an ordinary thread that holds the lock and gets no processor keeps a real-time
+// thread waiting just as long.
 //
 // Threads  any; of one process.
 #pragma once
 
 #include <pthread.h>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// LatencyRecorder: counts durations in log-linear buckets, as HdrHistogram does, and tells percentiles.
+// LatencyRecorder: counts durations in log-linear buckets, as HdrHistogram does, and tells
+// percentiles.
 //
-//   0 ... 255 ns exact, then 128 buckets per power of two: an error below 0.8 %. The maximum is exact.
+//   0 ... 255 ns exact, then 128 buckets per power of two: an error below 0.8 %. The maximum is
+//   exact.
 //
 // A plain struct without pointers: it can lie in memory that processes share.
 //
@@ -26,7 +28,8 @@ class LatencyRecorder {
     max_ = std::max(max_, ns);
   }
   void add(const LatencyRecorder& other) noexcept {
-    for (std::size_t index = 0; index < buckets_.size(); ++index) buckets_[index] += other.buckets_[index];
+    for (std::size_t index = 0; index < buckets_.size(); ++index)
+      buckets_[index] += other.buckets_[index];
     count_ += other.count_;
     sum_ += other.sum_;
     max_ = std::max(max_, other.max_);
@@ -34,11 +37,15 @@ class LatencyRecorder {
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] std::uint64_t maxNs() const noexcept { return max_; }
-  [[nodiscard]] double meanNs() const noexcept { return count_ == 0 ? 0.0 : static_cast<double>(sum_) / static_cast<double>(count_); }
+  [[nodiscard]] double meanNs() const noexcept {
+    return count_ == 0 ? 0.0 : static_cast<double>(sum_) / static_cast<double>(count_);
+  }
 
-  // The smallest duration that at least `percent` of a hundred samples do not exceed; 0 without samples.
+  // The smallest duration that at least `percent` of a hundred samples do not exceed; 0 without
+  // samples.
   [[nodiscard]] std::uint64_t percentileNs(double percent) const noexcept {
-    // In thousandths of a percent: 99.9 is no number that a double holds, and one sample too many would be the outlier itself.
+    // In thousandths of a percent: 99.9 is no number that a double holds, and one sample too many
+    // would be the outlier itself.
     const auto thousandths = static_cast<std::uint64_t>(std::llround(percent * 1000));
     const auto rank = std::max<std::uint64_t>(1, (count_ * thousandths + 99'999) / 100'000);
     std::uint64_t seen = 0;

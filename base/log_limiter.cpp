@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/log_limiter.h>
+#include "base/log_limiter.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -10,7 +10,8 @@ namespace mpf {
 // A line that comes while others of its kind are held is held behind them.
 bool LogLimiter::admit(const Kind& kind, int level, std::string_view text, std::int64_t nowNs) {
   constexpr auto kFullNs = kAtOnce * kEveryNs;
-  auto& state = states_.try_emplace(kind, State{.usedUntilNs = nowNs - kFullNs, .last = {}}).first->second;
+  auto& state =
+      states_.try_emplace(kind, State{.usedUntilNs = nowNs - kFullNs, .last = {}}).first->second;
   state.usedUntilNs = std::max(state.usedUntilNs, nowNs - kFullNs);
   if (state.held == 0 && state.nextNs() <= nowNs) {
     state.usedUntilNs += kEveryNs;
@@ -34,8 +35,9 @@ LogLimiter::Line LogLimiter::summary(State& state, std::int64_t nowNs) {
   const auto held = std::exchange(state.held, 0);
   auto text = std::exchange(state.last, {});
   if (held != 1) {
-    text += fmt::format(" ({} {} {} in {:.1f} s)", state.areAlike ? "repeated" : "the last of", held,
-                        state.areAlike ? "times" : "such lines", static_cast<double>(nowNs - state.heldSinceNs) / 1e9);
+    text += fmt::format(" ({} {} {} in {:.1f} s)", state.areAlike ? "repeated" : "the last of",
+                        held, state.areAlike ? "times" : "such lines",
+                        static_cast<double>(nowNs - state.heldSinceNs) / 1e9);
   }
   return {state.level, std::move(text)};
 }

@@ -5,9 +5,10 @@
 //                   └ false ─► held: counted, and the last one is kept
 //   held lines ─► takeDue() ─► "TEXT (repeated 9968 times in 10.0 s)"    one line of a kind each kEveryNs
 //
-// Lines of one kind come from one statement of the program, about one object. A kind regains the right
-// to one more line each kEveryNs, up to kAtOnce of them. The first line of a storm is written at once,
-// the last one with the count of those before it: the written lines and the counts add up to all lines.
+// Lines of one kind come from one statement of the program, about one object. A kind regains the
+// right to one more line each kEveryNs, up to kAtOnce of them. The first line of a storm is written
+// at once, the last one with the count of those before it: the written lines and the counts add up
+// to all lines.
 //
 // Threads  one.
 // Trust    memory grows with the number of kinds, not with the number or the contents of lines.
@@ -25,8 +26,8 @@ namespace mpf {
 class LogLimiter {
  public:
   struct Kind {
-    std::string_view file;     // with static lifetime
-    std::uint64_t line = 0;    // of the statement in that file
+    std::string_view file;  // with static lifetime
+    std::uint64_t line = 0;  // of the statement in that file
     std::uint64_t object = 0;  // what the statement speaks of; 0: there is only one
     auto operator<=>(const Kind&) const = default;
   };
@@ -49,10 +50,11 @@ class LogLimiter {
 
  private:
   struct State {
-    std::int64_t usedUntilNs = 0;  // kAtOnce lines are allowed once this lies kAtOnce * kEveryNs back
+    // kAtOnce lines are allowed once this lies kAtOnce * kEveryNs back
+    std::int64_t usedUntilNs = 0;
     std::uint64_t held = 0;
     bool areAlike = true;  // the texts that are held
-    int level = 0;         // the highest of them
+    int level = 0;  // the highest of them
     std::string last;
     std::int64_t heldSinceNs = 0;
     [[nodiscard]] std::int64_t nextNs() const noexcept { return usedUntilNs + kEveryNs; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/output_file.h>
+#include "base/output_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -7,30 +7,34 @@
 
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 
 OutputFile::OutputFile(std::string path, mode_t mode)
-    : path_(std::move(path)), file_(checkCall(::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, mode), "open", path_)) {
+    : path_(std::move(path)),
+      file_(checkCall(::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, mode), "open", path_)) {
   // A device that takes nothing, such as /dev/full, refuses even no bytes.
   checkCall(::write(file_.get(), "", 0), "write", path_);
 }
 
 void OutputFile::write(std::string_view bytes) {
   struct stat status{};
-  if (!std::exchange(isBegun_, true) && ::fstat(file_.get(), &status) == 0 && S_ISREG(status.st_mode)) {
+  if (!std::exchange(isBegun_, true) && ::fstat(file_.get(), &status) == 0 &&
+      S_ISREG(status.st_mode)) {
     checkCall(::ftruncate(file_.get(), 0), "truncate", path_);
   }
   while (!bytes.empty()) {
-    const auto written = retryInterrupted([&] { return ::write(file_.get(), bytes.data(), bytes.size()); });
+    const auto written =
+        retryInterrupted([&] { return ::write(file_.get(), bytes.data(), bytes.size()); });
     bytes.remove_prefix(static_cast<std::size_t>(checkCall(written, "write", path_)));
   }
 }
 
 void OutputFile::close() {
   write({});                                                  // a file without content is empty
-  checkCall(::close(file_.release()), "write", path_);  // some file systems tell only now that a disk is full
+  checkCall(::close(file_.release()), "write",
+            path_);  // some file systems tell only now that a disk is full
 }
 
 }  // namespace mpf

@@ -15,7 +15,7 @@
 #include <string>
 #include <string_view>
 
-#include <mpf/base/file_descriptor.h>
+#include <mpf/file_descriptor.h>
 
 namespace mpf {
 

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/print_error.h>
+#include "base/print_error.h"
 
 #include <unistd.h>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 
 void writeError(std::string_view bytes) noexcept {
   while (!bytes.empty()) {
-    const auto written = retryInterrupted([&]() noexcept { return ::write(STDERR_FILENO, bytes.data(), bytes.size()); });
+    const auto written = retryInterrupted(
+        [&]() noexcept { return ::write(STDERR_FILENO, bytes.data(), bytes.size()); });
     if (written <= 0) return;
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }

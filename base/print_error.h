@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <string_view>
 
-#include <mpf/base/printable.h>
+#include "base/printable.h"
 
 namespace mpf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/printable.h>
+#include "base/printable.h"
 
 #include <algorithm>
 #include <array>
@@ -15,11 +15,12 @@ struct Range {
 };
 
 // Control characters beyond ASCII, category Cf of Unicode 15.1, the two separators, and the tags.
-constexpr std::array<Range, 20> kUnprintable{{{0x80, 0x9f},       {0xad, 0xad},       {0x600, 0x605},     {0x61c, 0x61c},
-                                              {0x6dd, 0x6dd},     {0x70f, 0x70f},     {0x890, 0x891},     {0x8e2, 0x8e2},
-                                              {0x180e, 0x180e},   {0x200b, 0x200f},   {0x2028, 0x202e},   {0x2060, 0x206f},
-                                              {0xfeff, 0xfeff},   {0xfff9, 0xfffb},   {0x110bd, 0x110bd}, {0x110cd, 0x110cd},
-                                              {0x13430, 0x1343f}, {0x1bca0, 0x1bca3}, {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}}};
+constexpr std::array<Range, 20> kUnprintable{
+    {{0x80, 0x9f},       {0xad, 0xad},       {0x600, 0x605},     {0x61c, 0x61c},
+     {0x6dd, 0x6dd},     {0x70f, 0x70f},     {0x890, 0x891},     {0x8e2, 0x8e2},
+     {0x180e, 0x180e},   {0x200b, 0x200f},   {0x2028, 0x202e},   {0x2060, 0x206f},
+     {0xfeff, 0xfeff},   {0xfff9, 0xfffb},   {0x110bd, 0x110bd}, {0x110cd, 0x110cd},
+     {0x13430, 0x1343f}, {0x1bca0, 0x1bca3}, {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}}};
 
 // One character of a text, or one byte that is no part of any.
 struct Character {
@@ -50,7 +51,9 @@ bool isShown(const Character& character) noexcept {
   const auto code = character.code;
   if (!character.isValid || code < ' ' || code == 0x7f) return false;
   return code < 0x80 ||
-         std::ranges::none_of(kUnprintable, [code](const Range& range) { return code >= range.first && code <= range.last; });
+         std::ranges::none_of(
+             kUnprintable,
+             [code](const Range& range) { return code >= range.first && code <= range.last; });
 }
 
 std::string escaped(const Character& character) {
@@ -86,6 +89,8 @@ std::string replaced(std::string_view text, bool keepsLines, Escape escape) {
 
 std::string printable(std::string_view text) { return replaced(text, false, escaped); }
 std::string printableLines(std::string_view text) { return replaced(text, true, escaped); }
-std::string printableJson(std::string_view document) { return replaced(document, true, escapedForJson); }
+std::string printableJson(std::string_view document) {
+  return replaced(document, true, escapedForJson);
+}
 
 }  // namespace mpf

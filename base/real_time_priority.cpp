@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/real_time_priority.h>
+#include <mpf/real_time_priority.h>
 
 #include <sched.h>
 #include <time.h>
@@ -7,7 +7,7 @@
 #include <system_error>
 #include <thread>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 
 namespace mpf {
 namespace {
@@ -17,7 +17,8 @@ constexpr std::int64_t kPauseNs = 1'000'000'000;
 
 bool trySchedule(int policy, int priority) noexcept {
   const sched_param parameter{.sched_priority = priority};
-  return ::sched_setscheduler(0, policy | SCHED_RESET_ON_FORK, &parameter) == 0;  // 0: this thread alone
+  // 0: this thread alone
+  return ::sched_setscheduler(0, policy | SCHED_RESET_ON_FORK, &parameter) == 0;
 }
 
 std::int64_t usedNs() noexcept {

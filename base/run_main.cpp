@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/run_main.h>
+#include "base/run_main.h"
 
 #include <cerrno>
 #include <cstdio>
@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <system_error>
 
-#include <mpf/base/print_error.h>
-#include <mpf/base/standard_descriptors.h>
+#include "base/print_error.h"
+#include "base/standard_descriptors.h"
 
 namespace mpf {
 namespace {
@@ -19,14 +19,15 @@ int flushOutput(std::string_view program, int status) noexcept {
   const bool hadFailed = std::ferror(stdout) != 0;
   errno = 0;
   if (std::fflush(stdout) == 0 && !hadFailed) return status;
-  printError("{}: standard output: not everything could be written{}{}\n", program, errno == 0 ? "" : ": ",
-             errno == 0 ? "" : std::strerror(errno));
+  printError("{}: standard output: not everything could be written{}{}\n", program,
+             errno == 0 ? "" : ": ", errno == 0 ? "" : std::strerror(errno));
   return status == 0 ? kExitFailed : status;
 }
 
 // An exception of fmt::print() or of a stream does not name what it could not write.
 const char* placeOf(const std::exception& error) noexcept {
-  const bool isOfOutput = std::ferror(stdout) != 0 && dynamic_cast<const std::system_error*>(&error) != nullptr;
+  const bool isOfOutput =
+      std::ferror(stdout) != 0 && dynamic_cast<const std::system_error*>(&error) != nullptr;
   return isOfOutput ? "standard output: " : "";
 }
 

@@ -21,8 +21,8 @@ namespace mpf {
 inline constexpr int kExitFailed = 1;  // the message on stderr says what failed
 inline constexpr int kExitUsage = 2;   // wrong arguments, or a name or value that cannot be
 
-// Returns the exit status: what `work` returns; kExitUsage when it throws std::invalid_argument; kExitFailed when it throws
-// anything else, or when what it printed to stdout cannot be written.
+// Returns the exit status: what `work` returns; kExitUsage when it throws std::invalid_argument;
+// kExitFailed when it throws anything else, or when what it printed to stdout cannot be written.
 [[nodiscard]] int runMain(std::string_view program, const std::function<int()>& work) noexcept;
 
 }  // namespace mpf

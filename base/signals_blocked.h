@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// SignalsBlocked: while it lives, the calling thread gets no signals, and neither do threads that it starts: signals belong to the
-// program's own threads. Those of a thread's own faults stay: to block them is to be killed by them.
+// SignalsBlocked: while it lives, the calling thread gets no signals, and neither do threads that
+// it starts: signals belong to the program's own threads. Those of a thread's own faults stay: to
+// block them is to be killed by them.
 #pragma once
 
 #include <pthread.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/standard_descriptors.h>
+#include "base/standard_descriptors.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -20,7 +20,7 @@ void openStandardDescriptors() noexcept {
   for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
     if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
     const int file = openNothing(0);  // the lowest number that is free: this one
-    if (file < 0) return;             // no file can be opened, so no other file gets the number either
+    if (file < 0) return;  // no file can be opened, so no other file gets the number either
   }
 }
 

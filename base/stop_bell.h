@@ -13,23 +13,30 @@
 
 #include <chrono>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/stop_signals.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/stop_signals.h"
+#include "base/system_call.h"
 
 namespace mpf {
 
 class StopBell {
  public:
   //   throws  std::system_error, and as StopSignals
-  StopBell() : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for signals")), signals_(ring, &bell_) {}
+  StopBell()
+      : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for signals")),
+        signals_(ring, &bell_) {}
 
   void wait() noexcept { static_cast<void>(poll(-1)); }
   // Whether it rang by then.
-  [[nodiscard]] bool wait(std::chrono::milliseconds longest) noexcept { return poll(static_cast<int>(longest.count())); }
+  [[nodiscard]] bool wait(std::chrono::milliseconds longest) noexcept {
+    return poll(static_cast<int>(longest.count()));
+  }
 
  private:
-  static void ring(void* bell) noexcept { ::eventfd_write(static_cast<FileDescriptor*>(bell)->get(), 1); }
+  static void ring(void* bell) noexcept {
+    ::eventfd_write(static_cast<FileDescriptor*>(bell)->get(), 1);
+  }
   // A handler that ran in this thread has interrupted it, and rung.
   [[nodiscard]] bool poll(int milliseconds) noexcept {
     pollfd rung{.fd = bell_.get(), .events = POLLIN, .revents = 0};

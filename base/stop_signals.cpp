@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/stop_signals.h>
+#include "base/stop_signals.h"
 
 #include <pthread.h>
 #include <sched.h>
@@ -33,7 +33,8 @@ void stop(int) {
   handling.fetch_add(1, std::memory_order_seq_cst);
   for (auto& slot : slots) {
     // PAIR(stop-slot): the argument that was stored before the callback.
-    if (const auto callback = slot.callback.load(std::memory_order_seq_cst)) callback(slot.argument.load(std::memory_order_relaxed));
+    if (const auto callback = slot.callback.load(std::memory_order_seq_cst))
+      callback(slot.argument.load(std::memory_order_relaxed));
   }
   // PAIR(stop-handled): after the last use of what the callbacks' owners may destroy then.
   handling.fetch_sub(1, std::memory_order_release);
@@ -61,8 +62,10 @@ void uninstall() {
 
 StopSignals::StopSignals(Callback callback, void* argument) : slot_(0) {
   const std::lock_guard lock(installMutex);
-  while (slot_ < slots.size() && slots[slot_].used.exchange(true, std::memory_order_relaxed)) ++slot_;
-  if (slot_ == slots.size()) throw std::runtime_error("more than 64 wait for signals in one process");
+  while (slot_ < slots.size() && slots[slot_].used.exchange(true, std::memory_order_relaxed))
+    ++slot_;
+  if (slot_ == slots.size())
+    throw std::runtime_error("more than 64 wait for signals in one process");
   slots[slot_].argument.store(argument, std::memory_order_relaxed);
   // PAIR(stop-slot): after its argument.
   slots[slot_].callback.store(callback, std::memory_order_release);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// StopSignals: while it lives, SIGINT and SIGTERM call back. Several may live at once, in any threads.
+// StopSignals: while it lives, SIGINT and SIGTERM call back. Several may live at once, in any
+// threads.
 //
-// Threads  the callback runs in whatever thread the kernel chose for the signal. The destructor waits until it runs in none.
+// Threads  the callback runs in whatever thread the kernel chose for the signal. The destructor
+//          waits until it runs in none.
 #pragma once
 
 namespace mpf {

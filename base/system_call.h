@@ -10,13 +10,15 @@
 namespace mpf {
 
 // Throws std::system_error "<call> <object>: <reason>" for the errno `code`.
-[[noreturn]] inline void throwSystemError(int code, std::string_view call, std::string_view object) {
+[[noreturn]] inline void throwSystemError(int code, std::string_view call,
+                                          std::string_view object) {
   std::string what(call);
   if (!object.empty()) what.append(" ").append(object);
   throw std::system_error(code, std::generic_category(), what);
 }
 
-// Returns `result`, or throws when the call answered with a negative one. For the environment at start, not for the message path.
+// Returns `result`, or throws when the call answered with a negative one. For the environment at
+// start, not for the message path.
 template <class Result>
 Result checkCall(Result result, std::string_view call, std::string_view object = {}) {
   if (result < 0) throwSystemError(errno, call, object);

@@ -3,16 +3,18 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/run_main.h>
-#include <mpf/benchmarks/hardware.h>
-#include <mpf/benchmarks/local.h>
-#include <mpf/benchmarks/remote.h>
+#include "base/command_line.h"
+#include "base/run_main.h"
+#include "benchmarks/hardware/hardware.h"
+#include "benchmarks/local/local.h"
+#include "benchmarks/remote/remote.h"
 
 namespace {
 
 int bench(int argc, char** argv) {
-  CLI::App app("mpf bench - how fast messages are, beside the physical floors and other message systems", "mpf bench");
+  CLI::App app(
+      "mpf bench - how fast messages are, beside the physical floors and other message systems",
+      "mpf bench");
   auto& local = *app.add_subcommand("local", mpf::bench::kLocalHelp);
   auto& remote = *app.add_subcommand("remote", mpf::bench::kRemoteHelp);
   auto& hardware = *app.add_subcommand("hardware", mpf::bench::kHardwareHelp);

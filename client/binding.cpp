@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/binding.h>
+#include "client/binding.h"
 
 #include <fmt/format.h>
 #include <mutex>
 
-#include <mpf/base/step.h>
-#include <mpf/client/dispatcher_impl.h>
-#include <mpf/shm/histogram.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "client/dispatcher_impl.h"
+#include "shm/histogram.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
 
-// News of the connection is ours to tell, but for a queue that is full somewhere behind the server, and a fate is the end of the request
-// that it names.
+// News of the connection is ours to tell, but for a queue that is full somewhere behind the server,
+// and a fate is the end of the request that it names.
 bool isForServersToSend(const Message& message, const Request* request) noexcept {
-  if (const auto* news = message.tryAs<Connect>()) return request == nullptr && news->status == ConnectStatus::connectQueueFull;
+  if (const auto* news = message.tryAs<Connect>())
+    return request == nullptr && news->status == ConnectStatus::connectQueueFull;
   if (message.getType() != MessageType::requestFate) return true;
   const auto* fate = message.tryAs<RequestFate>();
-  return fate != nullptr && request != nullptr && fate->requestId == request->id.load(std::memory_order_relaxed);
+  return fate != nullptr && request != nullptr &&
+         fate->requestId == request->id.load(std::memory_order_relaxed);
 }
 
 }  // namespace
@@ -76,7 +78,8 @@ bool Binding::onLinkState() {
     return true;
   }
   if (state == layout::LinkState::open && !isConnected()) {
-    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
+    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) %
+                      layout::kMaxLinks);
     {
       const std::lock_guard lock(*lock_);
       fullTold_ = false;
@@ -107,8 +110,11 @@ bool Binding::onLinkState() {
 bool Binding::tryDeliverReply(const Envelope& envelope) {
   auto& control = dispatcher_.endpoint().control();
   count(control.received);
-  auto* request = (envelope.flags & layout::kSlotFirstReply) != 0 ? requests_->find(envelope.requestId) : nullptr;
-  if ((envelope.flags & layout::kSlotFirstReply) != 0 && (request == nullptr || request->isGivenUp)) {
+  auto* request = (envelope.flags & layout::kSlotFirstReply) != 0
+                      ? requests_->find(envelope.requestId)
+                      : nullptr;
+  if ((envelope.flags & layout::kSlotFirstReply) != 0 &&
+      (request == nullptr || request->isGivenUp)) {
     channel_->discard(envelope);
     if (request != nullptr) requests_->end(*request);
     return true;
@@ -124,7 +130,8 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
       break;
   }
   if (!isForServersToSend(message, request)) return false;
-  if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0)) noteTimes(envelope, request);
+  if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
+    noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
   if (auto* news = message.tryAs<Connect>()) news->incarnation = incarnation_;
   if (request != nullptr) {
@@ -135,7 +142,8 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
     }
     requests_->end(*request);
     MPF_STEP(request_ended);
-    channel_->link().control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
+    channel_->link().control().clientUnanswered.store(requests_->awaited(),
+                                                      std::memory_order_relaxed);
   }
   deliver(std::move(message));
   return true;
@@ -144,7 +152,8 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
 void Binding::noteTimes(const Envelope& envelope, const Request* request) noexcept {
   auto& endpoint = dispatcher_.endpoint();
   const auto nowNs = Clock::nowNs();
-  if (request != nullptr && request->sentNs != 0) record(endpoint.control().serviceNs, nowNs - request->sentNs);
+  if (request != nullptr && request->sentNs != 0)
+    record(endpoint.control().serviceNs, nowNs - request->sentNs);
   if (envelope.sentTick == 0) return;
   const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
   record(endpoint.control().queueWaitNs, waitedNs);
@@ -159,12 +168,15 @@ void Binding::deliver(Message&& message) try {
   throw;
 }
 
-void Binding::deliverConnect(ConnectStatus status) { deliver(ConnectMessage({.status = status, .incarnation = incarnation_})); }
+void Binding::deliverConnect(ConnectStatus status) {
+  deliver(ConnectMessage({.status = status, .incarnation = incarnation_}));
+}
 
 // A request that the server may still reply to keeps its entry until it has.
 void Binding::deliverFate(Request& request, Fate fate) {
   if (request.isGivenUp) return;
-  RequestFateMessage message({.fate = fate, .requestId = request.id.load(std::memory_order_relaxed)});
+  RequestFateMessage message(
+      {.fate = fate, .requestId = request.id.load(std::memory_order_relaxed)});
   message.setClientType(request.clientType);
   message.setClientExtra(request.clientExtra);
   message.setRoute({0, message->requestId, kEndsRequest, nullptr});
@@ -177,14 +189,18 @@ void Binding::deliverFate(Request& request, Fate fate) {
   deliver(std::move(message));
 }
 
-bool Binding::hasDeadPeer() const noexcept { return channel_ && !end_ && channel_->link().peer()->isDead(); }
+bool Binding::hasDeadPeer() const noexcept {
+  return channel_ && !end_ && channel_->link().peer()->isDead();
+}
 
-// What a server sent before it went. One that is not gone may send for ever: what fits its ring is all that it had sent.
+// What a server sent before it went. One that is not gone may send for ever: what fits its ring is
+// all that it had sent.
 void Binding::deliverTheRest(const MessageLink* channel) {
   Envelope envelope;
   while (channel_.get() == channel && end_->restSlots != 0) {
     --end_->restSlots;
-    if (channel_->tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope)) continue;
+    if (channel_->tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope))
+      continue;
     end_->restSlots = 0;
   }
 }
@@ -197,8 +213,9 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   }
   MPF_STEP(disconnecting);
   setReason(reason);
-  goOn();
-  end_ = {ending, wasConnected, ending == Ending::serverGone ? channel_->link().header().replySlots : 0};
+  resume();
+  end_ = {ending, wasConnected,
+          ending == Ending::serverGone ? channel_->link().header().replySlots : 0};
   resumeEnd();
 }
 
@@ -223,7 +240,9 @@ void Binding::endAll() {
   end_->isInterrupted = false;
   deliverTheRest(channel.get());
   requests->forEach([&](Request& request) {
-    deliverFate(request, ending != Ending::nonsense && !channel->link().isTaken(request.ordinal) ? Fate::neverTaken : Fate::outcomeUnknown);
+    deliverFate(request, ending != Ending::nonsense && !channel->link().isTaken(request.ordinal)
+                             ? Fate::neverTaken
+                             : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
   const bool wasConnected = end_->wasConnected;
@@ -247,12 +266,13 @@ void Binding::closeChannel() {
   link.setState(layout::LinkState::closed);
   // It may have accepted us without our having looked since.
   if (link.peerState() == layout::LinkState::open)
-    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
+    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) %
+                      layout::kMaxLinks);
   if (!serverDied) link.notifyPeer();
   removeBulk(endpoint.backplane().name(), link.header().incarnation);
   MPF_STEP(bulk_removed);
   segments::remove(link.name());
-  goOn();  // a callback may have paused us anew
+  resume();  // a callback may have paused us anew
   endpoint.detach(index_);
   dispatcher_.setLink(index_, nullptr);
   count(endpoint.control().linksClosed);
@@ -276,15 +296,15 @@ void Binding::pause() {
   dispatcher_.endpoint().hold(index_);
 }
 
-void Binding::goOn() {
+void Binding::resume() {
   if (std::exchange(paused_, false)) dispatcher_.endpoint().release(index_, channel_->link());
 }
 
 void Binding::leave() {
   left_ = true;
   if (channel_) disconnect("the client ended", Ending::serverGone);
-  if (wish_) segments::remove(wish_.name());
-  wish_ = {};
+  if (pendingBind_) segments::remove(pendingBind_.name());
+  pendingBind_ = {};
 }
 
 void Binding::onTime(std::int64_t nowNs) {
@@ -316,7 +336,8 @@ void Binding::expire(std::int64_t nowNs) {
     if (channel_ != channel || end_) return;  // a callback ran the dispatcher
     if (request.deadlineNs == 0 || request.isGivenUp) return;
     if (request.deadlineNs > nowNs) return wakeAt(request.deadlineNs);
-    // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the deadline has passed.
+    // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the
+    // deadline has passed.
     doorbell::fence();
     bool taken = false;
     {
@@ -327,7 +348,8 @@ void Binding::expire(std::int64_t nowNs) {
   });
 }
 
-// Hints may be lost to somebody who scribbles over them: while something is owed to us, ring again now and then.
+// Hints may be lost to somebody who scribbles over them: while something is owed to us, ring again
+// now and then.
 void Binding::nudge(std::int64_t nowNs) {
   const bool connected = isConnected();
   if (connected && endNudging()) {
@@ -338,7 +360,7 @@ void Binding::nudge(std::int64_t nowNs) {
     knockedNs_ = nowNs;
     nudgeEveryNs_ = std::min(2 * nudgeEveryNs_, kLastNudgeNs);
     auto& link = channel_->link();
-    link.peer()->doubtRing();
+    link.peer()->forceNextRing();
     if (connected) {
       link.notifyPeer();
     } else if (link.peer()->isClosed()) {
@@ -348,7 +370,8 @@ void Binding::nudge(std::int64_t nowNs) {
       setReason(notAcceptedBecause(*link.peer()));
       if (dispatcher_.endpoint().window().isNameless())
         setReason(
-            "somebody removed this process's files from /dev/shm (RemoveIPC of systemd-logind?): no server finds it until it starts again");
+            "somebody removed this process's files from /dev/shm (RemoveIPC of systemd-logind?): "
+            "no server finds it until it starts again");
     }
     takeOne();  // a reply, or what the server says of the link: we may not have been told
   }

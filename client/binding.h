@@ -4,7 +4,8 @@
 //   unbound ─bind─► waiting ─server there─► connecting ─accepted─► connected ─gone─► waiting ...
 //
 // Threads  send, cancel and the getters: any. The rest: the dispatcher's thread.
-// Crash    after the server's death: what it had sent is delivered, then a fate for each request, then the disconnect.
+// Crash    after the server's death: what it had sent is delivered, then a fate for each request,
+//          then the disconnect.
 // Trust    nonsense from the server ends the connection.
 #pragma once
 
@@ -16,22 +17,26 @@
 #include <optional>
 #include <string>
 
-#include <mpf/channel/message_link.h>
-#include <mpf/client/message_client.h>
-#include <mpf/client/request_table.h>
-#include <mpf/shm/endpoint.h>
+#include <mpf/message_client.h>
+
+#include "client/request_table.h"
+#include "shm/endpoint.h"
+#include "shm/messages/message_link.h"
 
 namespace mpf {
 
 class Binding : public std::enable_shared_from_this<Binding> {
  public:
-  Binding(Dispatcher::Impl& dispatcher, MessageClient::Callback callback) : dispatcher_(dispatcher), callback_(std::move(callback)) {}
+  Binding(Dispatcher::Impl& dispatcher, MessageClient::Callback callback)
+      : dispatcher_(dispatcher), callback_(std::move(callback)) {}
 
   // --- any thread ---
   // `requestId`: in, 0 or the id that the request shall have; out, its id when it was sent.
   SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
   BodyBytes allocate(std::size_t bytes);
-  [[nodiscard]] bool isConnected() const noexcept { return connected_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool isConnected() const noexcept {
+    return connected_.load(std::memory_order_relaxed);
+  }
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   [[nodiscard]] std::string notConnectedBecause() const;
   // PAIR(bound): whom to.
@@ -45,19 +50,21 @@ class Binding : public std::enable_shared_from_this<Binding> {
   bool takeOne();
   enum class Ending {
     serverGone,  // dead, or it closed the link: what it has not taken it never will
-    refused,     // it is there and does not want us: ask again later
-    nonsense,    // we end it: the server may go on taking for a while
+    refused,  // it is there and does not want us: ask again later
+    nonsense,  // we end it: the server may go on taking for a while
   };
   void disconnect(const std::string& reason, Ending ending);
   void cancel(std::uint32_t requestId);
   // What the server sends stays where it is until go on.
   void pause();
-  void goOn();
+  void resume();
   // No callback after this.
   void leave();
   // What is due at a time: expired requests, hints that may have been lost.
   void onTime(std::int64_t nowNs);
-  [[nodiscard]] std::int64_t dueNs() const noexcept { return dueNs_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::int64_t dueNs() const noexcept {
+    return dueNs_.load(std::memory_order_relaxed);
+  }
   [[nodiscard]] bool hasLeft() const noexcept { return left_; }
   [[nodiscard]] bool isWaiting() const noexcept { return !channel_ && isBound() && !left_; }
   [[nodiscard]] bool hasDeadPeer() const noexcept;
@@ -76,7 +83,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void noteTimes(const Envelope& envelope, const Request* request) noexcept;
   bool onLinkState();
   void makeChannel(const std::shared_ptr<PeerWindow>& server);
-  void wish();
+  void pendingBind();
   [[nodiscard]] std::string notAcceptedBecause(const PeerWindow& server) const;
   void setReason(const std::string& reason);
   [[nodiscard]] std::string shortageAt(const layout::WindowControl& server) const;
@@ -95,11 +102,11 @@ class Binding : public std::enable_shared_from_this<Binding> {
   std::int32_t location_ = 0;
   std::atomic<bool> bound_{false};
   std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
-  std::shared_ptr<MessageLink> channel_;     // written by the dispatcher's thread under lock_
-  std::shared_ptr<RequestTable> requests_;   // likewise
-  std::atomic<bool> connected_{false};       // under lock_
-  bool fullTold_ = false;                    // under lock_: this run of refusals has been reported
-  bool nudging_ = false;                     // under lock_: a time for the next nudge() is set
+  std::shared_ptr<MessageLink> channel_;  // written by the dispatcher's thread under lock_
+  std::shared_ptr<RequestTable> requests_;  // likewise
+  std::atomic<bool> connected_{false};  // under lock_
+  bool fullTold_ = false;  // under lock_: this run of refusals has been reported
+  bool nudging_ = false;  // under lock_: a time for the next nudge() is set
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::int64_t knockedNs_ = 0;
   std::int64_t nudgeEveryNs_ = 0;
@@ -115,7 +122,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
     bool isInterrupted = false;  // by an exception: resumeEnd() is due
   };
   std::optional<End> end_;
-  Segment wish_;
+  Segment pendingBind_;
   mutable std::mutex reasonMutex_;
   std::condition_variable connectedChanged_;
   std::string reason_ = "not bound to a server yet";

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/callback_errors.h>
+#include "client/callback_errors.h"
 
 #include <cstdio>
 #include <exception>
 #include <fmt/format.h>
 #include <utility>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 
 namespace mpf {
 namespace {
@@ -42,7 +42,8 @@ void CallbackErrors::report() noexcept try {
   const auto leftOut = std::exchange(leftOut_, 0);
   const auto more = leftOut == 0 ? "" : fmt::format(" ({} more since the last report)", leftOut);
   const auto text = fmt::format(
-      "mpf: the callback{} threw an exception: {}. The dispatcher continues; catch the exception in the "
+      "mpf: the callback{} threw an exception: {}. The dispatcher continues; catch the exception "
+      "in the "
       "callback.{}\n",
       client, textOfException(), more);
   std::fwrite(text.data(), 1, text.size(), stderr);

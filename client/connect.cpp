@@ -9,11 +9,11 @@
 #include <mutex>
 #include <utility>
 
-#include <mpf/base/step.h>
-#include <mpf/client/binding.h>
-#include <mpf/client/dispatcher_impl.h>
-#include <mpf/shm/handling.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "client/binding.h"
+#include "client/dispatcher_impl.h"
+#include "shm/handling.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 
@@ -37,7 +37,9 @@ void Binding::setServer(const std::string& server, std::int32_t location) {
   SegmentName::checkServer(server);
   {
     const std::lock_guard lock(reasonMutex_);
-    if (isBound()) throw std::logic_error(fmt::format("bind: the client is bound to server \"{}\" already", server_));
+    if (isBound())
+      throw std::logic_error(
+          fmt::format("bind: the client is bound to server \"{}\" already", server_));
     server_ = server;
     location_ = location;
     // PAIR(bound): whom to, which the dispatcher's thread looks at.
@@ -47,14 +49,17 @@ void Binding::setServer(const std::string& server, std::int32_t location) {
 }
 
 void Binding::tryConnect() try {
-  if (channel_ || left_) return;  // somebody was quicker: another thread's bind(), a callback that ran the dispatcher
+  // somebody was quicker: another thread's bind(), a callback that ran the dispatcher
+  if (channel_ || left_) return;
   auto& endpoint = dispatcher_.endpoint();
   const auto& backplane = endpoint.backplane().name();
-  auto server = endpoint.peer(SegmentName::serverWindow(backplane, location_, server_), layout::SegmentKind::serverWindow);
-  if (!server) return wish();
+  auto server = endpoint.peer(SegmentName::serverWindow(backplane, location_, server_),
+                              layout::SegmentKind::serverWindow);
+  if (!server) return pendingBind();
   const auto index = endpoint.tryReserve();
   if (!index) {
-    setReason(fmt::format("this process has {} clients on the backplane, no more are possible", layout::kMaxLinks));
+    setReason(fmt::format("this process has {} clients on the backplane, no more are possible",
+                          layout::kMaxLinks));
     return wakeAt(Clock::nowNs() + kRetryNs);
   }
   index_ = *index;
@@ -67,8 +72,8 @@ void Binding::tryConnect() try {
   auto& created = channel_->link();
   incarnation_ = server->header().incarnation;
   MPF_STEP(link_created);
-  if (wish_) segments::remove(wish_.name());
-  wish_ = {};
+  if (pendingBind_) segments::remove(pendingBind_.name());
+  pendingBind_ = {};
   endpoint.attach(index_, created);
   setReason(notAcceptedBecause(*server));
   server->knock(created.header().incarnation);
@@ -90,7 +95,10 @@ std::string Binding::shortageAt(const layout::WindowControl& server) const {
           "start it with a higher limit (ulimit -n)",
           server_);
     case layout::Shortage::openFiles:
-      return fmt::format("server \"{}\" cannot accept the client: its host has no open file left; raise fs.file-max", server_);
+      return fmt::format(
+          "server \"{}\" cannot accept the client: its host has no open file left; raise "
+          "fs.file-max",
+          server_);
     case layout::Shortage::memory:
       return fmt::format("server \"{}\" cannot accept the client: it has no memory left", server_);
     default:
@@ -103,20 +111,24 @@ std::string Binding::notAcceptedBecause(const PeerWindow& server) const {
   const auto& control = server.control();
   if (auto shortage = shortageAt(control); !shortage.empty()) return shortage;
   const auto handling = Handling::of(control.handling.load(std::memory_order_relaxed));
-  const auto sinceNs = static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));
+  const auto sinceNs =
+      static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));
   const auto busyNs = Clock::nowNs() - sinceNs;
   if (!handling || server.header().layoutMinor < Handling::kSinceMinor || busyNs < kBusyNs) {
     return fmt::format("server \"{}\" has not accepted the client yet", server_);
   }
-  return fmt::format("server \"{}\" is busy with a request, {} cmd={}, since {}, and has not accepted the client yet", server_,
-                     toString(static_cast<MessageType>(handling->type)), handling->cmd, timeText(busyNs));
+  return fmt::format(
+      "server \"{}\" is busy with a request, {} cmd={}, since {}, and has not accepted the client "
+      "yet",
+      server_, toString(static_cast<MessageType>(handling->type)), handling->cmd, timeText(busyNs));
 }
 
 void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
   auto& endpoint = dispatcher_.endpoint();
   endpoint.window().admit(Link::rightsAt(*server));  // it writes our hints
   auto link = Link::create(endpoint.backplane().name(), endpoint.window(), index_, server);
-  auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding, requests_ ? requests_->lastId() : 0);
+  auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding,
+                                                 requests_ ? requests_->lastId() : 0);
   auto channel = std::make_shared<MessageLink>(std::move(link), lock_);
   dispatcher_.setLink(index_, this);
   const std::lock_guard lock(*lock_);
@@ -126,21 +138,23 @@ void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
 }
 
 // Shows whom we wait for, and has us told when a server appears.
-void Binding::wish() {
+void Binding::pendingBind() {
   setReason(fmt::format("server \"{}\" at location {} is not there", server_, location_));
   dispatcher_.waitForNames(true);
-  if (wish_) return;
+  if (pendingBind_) return;
   auto& endpoint = dispatcher_.endpoint();
-  auto wish =
-      Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::wish, endpoint.backplane().name(), {0644, ~std::uint32_t{0}});
-  auto& header = wish.sharedHeader();
+  auto pendingBind =
+      Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::pendingBind,
+                      endpoint.backplane().name(), {0644, ~std::uint32_t{0}});
+  auto& header = pendingBind.sharedHeader();
   header.ownerWindow = endpoint.window().header().incarnation;
   header.location = location_;
   server_.copy(header.name.data(), header.name.size() - 1);
-  static_cast<void>(wish.tryPublish(SegmentName::keyed(endpoint.backplane().name(), NameKind::wish, header.incarnation)));
+  static_cast<void>(pendingBind.tryPublish(
+      SegmentName::keyed(endpoint.backplane().name(), NameKind::pendingBind, header.incarnation)));
   MPF_STEP(wish_named);
-  wish.closeFile();
-  wish_ = std::move(wish);
+  pendingBind.closeFile();
+  pendingBind_ = std::move(pendingBind);
 }
 
 }  // namespace mpf

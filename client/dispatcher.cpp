@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/dispatcher.h>
+#include <mpf/dispatcher.h>
 
 #include <pthread.h>
 
@@ -8,8 +8,8 @@
 #include <map>
 #include <utility>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/client/dispatcher_impl.h>
+#include "base/signals_blocked.h"
+#include "client/dispatcher_impl.h"
 
 namespace mpf {
 namespace {
@@ -19,12 +19,12 @@ constexpr int kBatch = 16;  // messages of one link before the others have their
 constexpr mode_t kEverybodyReads = 0644;
 constexpr std::uint32_t kLooksInVain = 64;  // at news that is none, between looks at the clock
 
-class Inside {
+class DepthGuard {
  public:
-  explicit Inside(int& depth) noexcept : depth_(depth) { ++depth_; }
-  ~Inside() { --depth_; }
-  Inside(const Inside&) = delete;
-  Inside& operator=(const Inside&) = delete;
+  explicit DepthGuard(int& depth) noexcept : depth_(depth) { ++depth_; }
+  ~DepthGuard() { --depth_; }
+  DepthGuard(const DepthGuard&) = delete;
+  DepthGuard& operator=(const DepthGuard&) = delete;
 
  private:
   int& depth_;
@@ -33,11 +33,14 @@ class Inside {
 }  // namespace
 
 Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
-    : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {}, Rights{.mode = kEverybodyReads}, options.waitMode,
-                [&](layout::SegmentHeader& header) { options.label.copy(header.name.data(), header.name.size() - 1); }) {}
+    : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {},
+                Rights{.mode = kEverybodyReads}, options.waitMode,
+                [&](layout::SegmentHeader& header) {
+                  options.label.copy(header.name.data(), header.name.size() - 1);
+                }) {}
 
 Dispatcher::Impl::~Impl() {
-  if (endpoint_.origin().isInherited()) return;
+  if (endpoint_.forkGuard().isInherited()) return;
   waitForNames(false);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
 }
@@ -61,7 +64,7 @@ void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
 
 void Dispatcher::Impl::endThread() {
   if (!thread_.joinable()) return;
-  if (endpoint_.origin().isInherited()) return Origin::abandon(thread_);
+  if (endpoint_.forkGuard().isInherited()) return ForkGuard::abandon(thread_);
   ended_.store(true, std::memory_order_relaxed);
   interrupt();
   // The last client may be destroyed by a callback: then the thread ends after it.
@@ -87,7 +90,7 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
 }
 
 RunnerTurn Dispatcher::Impl::enter() {
-  endpoint_.origin().check("Dispatcher");
+  endpoint_.forkGuard().check("Dispatcher");
   if (lock_.isMine()) return RunnerTurn(nullptr);
   if (hasThread_) RunnerLock::refuse();
   return enterAnyway();
@@ -132,7 +135,8 @@ bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
     dropKnocks();
     const bool hasNews = endpoint_.wait(std::min(deadline, nextDue()));
     // Peers may invent news for ever.
-    if ((!hasNews || ++vain % kLooksInVain == 0) && deadline.hasPassed() && !nextDue().hasPassed()) return false;
+    if ((!hasNews || ++vain % kLooksInVain == 0) && deadline.hasPassed() && !nextDue().hasPassed())
+      return false;
   }
 }
 
@@ -151,17 +155,19 @@ bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
 
 bool Dispatcher::Impl::tryStep() {
   // A callback may run us, too: whoever is being called back lives on.
-  const Inside inside(depth_);
+  const DepthGuard inside(depth_);
   if (depth_ == 1) removed_.clear();
   bool hasActed = endpoint_.takeLocalNews() && handleNews();
-  hasActed = goOnWithRounds() || hasActed;
+  hasActed = resumeRounds() || hasActed;
   if (const auto index = endpoint_.next()) {
     auto* binding = *index < byIndex_.size() ? byIndex_[*index] : nullptr;
     int taken = 0;
-    while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;  // a binding that leaves lives until the next step
+    // a binding that leaves lives until the next step
+    while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;
     if (taken != 0) return true;
   }
-  if (dueNs_.load(std::memory_order_relaxed) == INT64_MAX || !nextDue().hasPassed()) return hasActed;
+  if (dueNs_.load(std::memory_order_relaxed) == INT64_MAX || !nextDue().hasPassed())
+    return hasActed;
   handleDue();
   return true;
 }
@@ -210,13 +216,13 @@ void Dispatcher::Impl::runQuietly(const std::function<void()>& command) {
   command();
 }
 
-// The thread that runs the dispatcher may stop to do so before it has seen the command: then the caller
-// runs it.
+// The thread that runs the dispatcher may stop to do so before it has seen the command: then the
+// caller runs it.
 void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
   if (lock_.isMine()) return command();
   struct State {
     bool isStarted = false;  // under lock_
-    bool isDone = false;     // under mutex
+    bool isDone = false;  // under mutex
     std::mutex mutex;
     std::condition_variable changed;
   };
@@ -244,10 +250,12 @@ void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
 void Dispatcher::Impl::noteDue(std::int64_t ns) noexcept {
   auto due = dueNs_.load(std::memory_order_relaxed);
   // PAIR(ran-last): before we look which thread waits.
-  while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst, std::memory_order_relaxed)) {
+  while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst,
+                                                   std::memory_order_relaxed)) {
   }
   // PAIR(ran-last): after our time, which that thread looks at, or we see it here.
-  if (ns < due && ranLast_.load(std::memory_order_seq_cst) != std::this_thread::get_id()) endpoint_.interrupt();
+  if (ns < due && ranLast_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
+    endpoint_.interrupt();
 }
 
 void Dispatcher::Impl::noteThrower(const std::string& server, std::int32_t location) noexcept {
@@ -285,24 +293,27 @@ bool Dispatcher::Impl::handleNews() {
 }
 
 // True while there is more to do.
-bool Dispatcher::Impl::goOnWithRounds() {
+bool Dispatcher::Impl::resumeRounds() {
   if (dead_.isOver() && waiting_.isOver()) return false;
-  dead_.goOn([](Binding& binding) {
+  dead_.resume([](Binding& binding) {
     if (!binding.hasDeadPeer()) return false;
     binding.disconnect("the server's process ended", Binding::Ending::serverGone);
     return true;
   });
   if (waiting_.isOver()) return true;
-  waiting_.goOn([](Binding& binding) {
+  waiting_.resume([](Binding& binding) {
     if (!binding.isWaiting()) return false;
     binding.tryConnect();
     return true;
   });
-  if (waiting_.isOver()) waitForNames(std::ranges::any_of(bindings_, [](const auto& binding) { return binding->isWaiting(); }));
+  if (waiting_.isOver())
+    waitForNames(
+        std::ranges::any_of(bindings_, [](const auto& binding) { return binding->isWaiting(); }));
   return true;
 }
 
-// Those that there are now. Each is taken before it runs: when it throws, the others are still there.
+// Those that there are now. Each is taken before it runs: when it throws, the others are still
+// there.
 void Dispatcher::Impl::runCommands() {
   std::size_t left = 0;
   {
@@ -328,13 +339,14 @@ std::function<void()> Dispatcher::Impl::takeCommand() {
 void Dispatcher::Impl::handleDue() {
   if (due_.isOver()) {
     dueNs_.store(INT64_MAX, std::memory_order_relaxed);
-    // PAIR(due): a sender that stored its deadline before we withdrew ours is seen below; a later one lowers ours again.
+    // PAIR(due): a sender that stored its deadline before we withdrew ours is seen below; a later
+    // one lowers ours again.
     doorbell::fence();
     due_.begin(bindings_);
   }
   const auto nowNs = Clock::nowNs();
   try {
-    due_.goOn([nowNs](Binding& binding) {
+    due_.resume([nowNs](Binding& binding) {
       if (binding.dueNs() > nowNs) return false;
       binding.onTime(nowNs);
       return true;
@@ -347,7 +359,8 @@ void Dispatcher::Impl::handleDue() {
   for (const auto& binding : bindings_) noteDue(binding->dueNs());
 }
 
-Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& options) : impl_(std::make_shared<Impl>(backplane, options)) {}
+Dispatcher::Dispatcher(const Backplane& backplane, const DispatcherOptions& options)
+    : impl_(std::make_shared<Impl>(backplane, options)) {}
 Dispatcher::~Dispatcher() { impl_->endThread(); }
 
 std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
@@ -356,7 +369,7 @@ std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
   const std::lock_guard lock(mutex);
   auto& known = dispatchers[backplane.name()];
   auto dispatcher = known.lock();
-  if (!dispatcher || dispatcher->impl_->endpoint().origin().isInherited()) {
+  if (!dispatcher || dispatcher->impl_->endpoint().forkGuard().isInherited()) {
     dispatcher = std::make_shared<Dispatcher>(backplane);
     dispatcher->impl_->startThread(dispatcher->impl_);
     known = dispatcher;

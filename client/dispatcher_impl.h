@@ -15,11 +15,12 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/client/binding.h>
-#include <mpf/client/callback_errors.h>
-#include <mpf/client/dispatcher.h>
-#include <mpf/client/round.h>
-#include <mpf/client/runner_lock.h>
+#include <mpf/dispatcher.h>
+
+#include "client/binding.h"
+#include "client/callback_errors.h"
+#include "client/round.h"
+#include "client/runner_lock.h"
 
 namespace mpf {
 
@@ -42,8 +43,8 @@ class Dispatcher::Impl {
   bool runOnce(Deadline deadline);
   bool runPending(int most);
   int descriptor();
-  // Runs until `isDone` or the deadline, or until another thread wants to run the dispatcher. Returns
-  // false, and runs nothing, when callbacks belong on another thread.
+  // Runs until `isDone` or the deadline, or until another thread wants to run the dispatcher.
+  // Returns false, and runs nothing, when callbacks belong on another thread.
   [[nodiscard]] bool tryRunUntil(Deadline deadline, const std::function<bool()>& isDone);
 
   // --- any thread ---
@@ -52,13 +53,13 @@ class Dispatcher::Impl {
     // PAIR(ran-last): after the name of the thread that waits until then.
     return Deadline::atNs(dueNs_.load(std::memory_order_seq_cst));
   }
-  // Runs `command`, which may call back, on the thread that runs the dispatcher: now when that is the
-  // calling thread, else in the next step.
+  // Runs `command`, which may call back, on the thread that runs the dispatcher: now when that is
+  // the calling thread, else in the next step.
   void post(std::function<void()> command);
   // In the next step, and not before the callback that is running has returned.
   void postLater(std::function<void()> command);
-  // Runs `command`, which calls nobody back: now when no other thread runs the dispatcher, else in the
-  // next step.
+  // Runs `command`, which calls nobody back: now when no other thread runs the dispatcher, else in
+  // the next step.
   void runQuietly(const std::function<void()>& command);
   // The same, and waits until it has run.
   void runQuietlyAndWait(const std::function<void()>& command);
@@ -70,7 +71,8 @@ class Dispatcher::Impl {
   // The binding lives until no callback of it can be running.
   void remove(const std::shared_ptr<Binding>& binding);
   void setLink(std::uint32_t index, Binding* binding);
-  // Looks for servers whenever a new one may have appeared, while `waiting` bindings do not have theirs.
+  // Looks for servers whenever a new one may have appeared, while `waiting` bindings do not have
+  // theirs.
   void waitForNames(bool wait);
 
   // The dispatcher's own thread runs it, and no other.
@@ -87,7 +89,7 @@ class Dispatcher::Impl {
   bool tryStep();
   void dropKnocks() noexcept;
   bool handleNews();
-  bool goOnWithRounds();
+  bool resumeRounds();
   void handleDue();
   void runCommands();
   std::function<void()> takeCommand();
@@ -100,7 +102,7 @@ class Dispatcher::Impl {
   std::deque<std::function<void()>> commands_;  // under commandMutex_
   std::atomic<bool> hasCommands_{false};
   std::atomic<bool> namesChanged_{false};
-  Round dead_;     // of those whose server may have died
+  Round dead_;  // of those whose server may have died
   Round waiting_;  // of those whose server may be there
   Round due_;
   Watcher::Token namesToken_ = 0;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/message_client.h>
+#include <mpf/message_client.h>
 
 #include <algorithm>
 
-#include <mpf/client/binding.h>
-#include <mpf/client/dispatcher_impl.h>
+#include "client/binding.h"
+#include "client/dispatcher_impl.h"
 
 namespace mpf {
 
@@ -31,13 +31,16 @@ const char* toString(SendResult result) noexcept {
 MessageClient::MessageClient(const Backplane& backplane, Callback callback)
     : MessageClient(Dispatcher::shared(backplane), std::move(callback)) {}
 
-MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback) : MessageClient(*shared, std::move(callback)) {
+MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback)
+    : MessageClient(*shared, std::move(callback)) {
   shared_ = std::move(shared);
 }
 
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
-    : dispatcher_(dispatcher.impl_), binding_(std::make_shared<Binding>(*dispatcher_, std::move(callback))) {
-  dispatcher_->runQuietly([dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
+    : dispatcher_(dispatcher.impl_),
+      binding_(std::make_shared<Binding>(*dispatcher_, std::move(callback))) {
+  dispatcher_->runQuietly(
+      [dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
 }
 
 MessageClient::~MessageClient() {
@@ -49,12 +52,13 @@ MessageClient::~MessageClient() {
 }
 
 void MessageClient::bind(const std::string& server, std::int32_t location) {
-  dispatcher_->endpoint().origin().check("MessageClient");
+  dispatcher_->endpoint().forkGuard().check("MessageClient");
   binding_->setServer(server, location);
   dispatcher_->runQuietly([binding = binding_] { binding->tryConnect(); });
 }
 
-SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId) noexcept {
+SendResult MessageClient::send(Message&& message, Deadline takeBefore,
+                               std::uint32_t* requestId) noexcept {
   if (isInherited()) return SendResult::notConnected;
   std::uint32_t id = 0;
   const auto result = binding_->send(message, takeBefore, id);
@@ -62,13 +66,14 @@ SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint
   return result;
 }
 
-SendResult MessageClient::sendAs(std::uint32_t requestId, Message&& message, Deadline takeBefore) noexcept {
+SendResult MessageClient::sendAs(std::uint32_t requestId, Message&& message,
+                                 Deadline takeBefore) noexcept {
   if (isInherited()) return SendResult::notConnected;
   return binding_->send(message, takeBefore, requestId);
 }
 
 void MessageClient::pause() { binding_->pause(); }
-void MessageClient::goOn() { binding_->goOn(); }
+void MessageClient::resume() { binding_->resume(); }
 
 BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
 
@@ -77,11 +82,17 @@ void MessageClient::cancel(std::uint32_t requestId) {
   dispatcher_->post([binding = binding_, requestId] { binding->cancel(requestId); });
 }
 
-bool MessageClient::isInherited() const noexcept { return dispatcher_->endpoint().origin().isInherited(); }
-bool MessageClient::isConnected() const noexcept { return !isInherited() && binding_->isConnected(); }
-std::uint64_t MessageClient::maxMessageBytes() const noexcept { return isInherited() ? 0 : binding_->maxMessageBytes(); }
+bool MessageClient::isInherited() const noexcept {
+  return dispatcher_->endpoint().forkGuard().isInherited();
+}
+bool MessageClient::isConnected() const noexcept {
+  return !isInherited() && binding_->isConnected();
+}
+std::uint64_t MessageClient::maxMessageBytes() const noexcept {
+  return isInherited() ? 0 : binding_->maxMessageBytes();
+}
 std::string MessageClient::notConnectedBecause() const {
-  return isInherited() ? Origin::explain("MessageClient") : binding_->notConnectedBecause();
+  return isInherited() ? ForkGuard::explain("MessageClient") : binding_->notConnectedBecause();
 }
 
 bool MessageClient::connectWait(Nanoseconds timeout) {
@@ -92,7 +103,9 @@ bool MessageClient::connectWait(Nanoseconds timeout) {
     if (dispatcher_->tryRunUntil(deadline, isDone)) continue;
     // The thread that runs a dispatcher without a thread of its own may stop to do so.
     static_cast<void>(binding_->waitConnected(
-        dispatcher_->hasThread() ? deadline : std::min(deadline, Deadline::after(Dispatcher::Impl::kLookForRunner))));
+        dispatcher_->hasThread()
+            ? deadline
+            : std::min(deadline, Deadline::after(Dispatcher::Impl::kLookForRunner))));
   }
   return isConnected();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// RequestTable: the requests of one client that its server owes a reply. A request that was given up (cancelled, expired) has had its end,
-// and stays until the server is through with it: the server knows it by its place in the table, which nobody else may get before.
+// RequestTable: the requests of one client that its server owes a reply. A request that was given
+// up (cancelled, expired) has had its end, and stays until the server is through with it: the
+// server knows it by its place in the table, which nobody else may get before.
 //
 // Threads  add(): one thread at a time, under the client's lock. The rest: the dispatcher's thread.
 #pragma once
@@ -20,14 +21,18 @@ struct Request {
   std::uint64_t ordinal = 0;  // number of its message on the link
   std::int64_t deadlineNs = 0;
   std::int64_t sentNs = 0;  // of a timed request; else 0
-  bool isGivenUp = false;   // the dispatcher's
+  bool isGivenUp = false;  // the dispatcher's
 };
 
 class RequestTable {
  public:
-  // `lastId`: of the table before, so that a late cancel() does not meet a request of the next connection.
+  // `lastId`: of the table before, so that a late cancel() does not meet a request of the next
+  // connection.
   explicit RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId = 0)
-      : size_(std::bit_ceil(maxOutstanding)), max_(maxOutstanding), requests_(std::make_unique<Request[]>(size_)), lastId_(lastId) {}
+      : size_(std::bit_ceil(maxOutstanding)),
+        max_(maxOutstanding),
+        requests_(std::make_unique<Request[]>(size_)),
+        lastId_(lastId) {}
 
   [[nodiscard]] std::uint32_t lastId() const noexcept { return lastId_; }
 
@@ -36,10 +41,12 @@ class RequestTable {
   }
 
   // Without those that were given up.
-  [[nodiscard]] std::uint32_t awaited() const noexcept { return outstanding() - givenUp_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint32_t awaited() const noexcept {
+    return outstanding() - givenUp_.load(std::memory_order_relaxed);
+  }
 
-  // A free entry, not yet added, with the id asked for or, for 0, one of its own; nullptr when max are outstanding, or another one has
-  // that place.
+  // A free entry, not yet added, with the id asked for or, for 0, one of its own; nullptr when max
+  // are outstanding, or another one has that place.
   Request* tryReserve(std::uint32_t& id) noexcept {
     if (outstanding() >= max_) return nullptr;
     if (id != 0) {
@@ -77,7 +84,8 @@ class RequestTable {
     givenUp_.store(givenUp_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
   void end(Request& request) noexcept {
-    if (std::exchange(request.isGivenUp, false)) givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
+    if (std::exchange(request.isGivenUp, false))
+      givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
     ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     // PAIR(request-ended): we have finished with the entry.
     request.id.store(0, std::memory_order_release);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Round: all bindings of a dispatcher, some in each step. There may be thousands that have to connect anew, and others have their turn
-// meanwhile.
+// Round: all bindings of a dispatcher, some in each step. There may be thousands that have to
+// connect anew, and others have their turn meanwhile.
 //
 // Threads  one. Callbacks may come back in here, and destroy clients.
 #pragma once
@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include <mpf/client/binding.h>
+#include "client/binding.h"
 
 namespace mpf {
 
@@ -23,7 +23,7 @@ class Round {
   [[nodiscard]] bool isOver() const noexcept { return next_ == bindings_.size(); }
   // Goes on until `act` has had something to do, and said so, for some of them.
   template <class Act>
-  void goOn(const Act& act) {
+  void resume(const Act& act) {
     for (int acted = 0; acted < kInAStep && !isOver();) {
       const auto binding = bindings_[next_++].lock();
       if (binding && act(*binding)) ++acted;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/runner_lock.h>
+#include "client/runner_lock.h"
 
 #include <stdexcept>
 
@@ -14,7 +14,9 @@ const std::shared_ptr<void>& lifeOfThread() {
 
 }  // namespace
 
-bool RunnerLock::tryEnterAsGuest() noexcept { return !isWanted() && tryTake(thisThread() | kGuest); }
+bool RunnerLock::tryEnterAsGuest() noexcept {
+  return !isWanted() && tryTake(thisThread() | kGuest);
+}
 
 void RunnerLock::leave() noexcept {
   if ((owner_.load(std::memory_order_relaxed) & kGuest) == 0) {
@@ -32,12 +34,14 @@ void RunnerLock::leave() noexcept {
 
 bool RunnerLock::mayRunAsGuest() {
   const std::lock_guard lock(mutex_);
-  return lastRunner_.load(std::memory_order_relaxed) == thisThread() || lastRunnerIsAlive_.expired();
+  return lastRunner_.load(std::memory_order_relaxed) == thisThread() ||
+         lastRunnerIsAlive_.expired();
 }
 
 void RunnerLock::refuse() {
   throw std::logic_error(
-      "Dispatcher: another thread runs this dispatcher. Let one thread run it (a shared dispatcher has a "
+      "Dispatcher: another thread runs this dispatcher. Let one thread run it (a shared dispatcher "
+      "has a "
       "thread of its own); bind(), send() and cancel() work from every thread.");
 }
 

@@ -4,8 +4,8 @@
 //   free ── enter() ───────────► runOnce(), run(), runPending() ──────────── leave() ──► free
 //   free ── tryEnterAsGuest() ─► bind(), connectWait(), ~MessageClient() ─── leave() ──► free
 //
-// A guest leaves as soon as another thread waits in enter(). Two threads that both want to enter() are
-// an error of the program, and the second one gets an exception.
+// A guest leaves as soon as another thread waits in enter(). Two threads that both want to enter()
+// are an error of the program, and the second one gets an exception.
 //
 // Threads  any.
 #pragma once
@@ -20,7 +20,9 @@ namespace mpf {
 
 class RunnerLock {
  public:
-  [[nodiscard]] bool isMine() const noexcept { return (owner_.load(std::memory_order_relaxed) & ~kGuest) == thisThread(); }
+  [[nodiscard]] bool isMine() const noexcept {
+    return (owner_.load(std::memory_order_relaxed) & ~kGuest) == thisThread();
+  }
 
   // The calling thread, which does not have the lock, gets it and is the dispatcher's last runner.
   //   wakeGuest  makes a guest call isWanted()
@@ -66,17 +68,18 @@ class RunnerLock {
   bool tryTake(std::uintptr_t owner) noexcept {
     std::uintptr_t nobody = 0;
     // PAIR(runner): what the thread that had the lock before did.
-    return owner_.compare_exchange_strong(nobody, owner, std::memory_order_acquire, std::memory_order_relaxed);
+    return owner_.compare_exchange_strong(nobody, owner, std::memory_order_acquire,
+                                          std::memory_order_relaxed);
   }
   void waitForGuest();
   void noteLastRunner();
 
-  std::atomic<std::uintptr_t> owner_{0};       // thisThread() of the owner, with kGuest for a guest
-  std::atomic<int> waiters_{0};                // threads that wait in enter()
+  std::atomic<std::uintptr_t> owner_{0};  // thisThread() of the owner, with kGuest for a guest
+  std::atomic<int> waiters_{0};  // threads that wait in enter()
   std::atomic<std::uintptr_t> lastRunner_{0};  // written under mutex_
   std::mutex mutex_;
-  std::condition_variable left_;            // a guest has left
-  std::weak_ptr<void> lastRunnerIsAlive_;   // under mutex_; expires with the thread
+  std::condition_variable left_;  // a guest has left
+  std::weak_ptr<void> lastRunnerIsAlive_;  // under mutex_; expires with the thread
 };
 
 // Leaves the lock, if there is one, at the end of its life.

@@ -3,10 +3,10 @@
 #include <mutex>
 #include <utility>
 
-#include <mpf/base/step.h>
-#include <mpf/client/binding.h>
-#include <mpf/client/dispatcher_impl.h>
-#include <mpf/shm/histogram.h>
+#include "base/step.h"
+#include "client/binding.h"
+#include "client/dispatcher_impl.h"
+#include "shm/histogram.h"
 
 namespace mpf {
 
@@ -35,7 +35,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
     request->clientExtra = envelope.clientExtra;
     request->ordinal = link.sentMessages() + 1;
     request->deadlineNs = envelope.deadlineNs;
-    request->sentNs = link.shallBeTimed() ? Clock::nowNs() : 0;
+    request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
     if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
     // Before the message goes: its reply may be here before we are.
     requests_->add(*request, id);

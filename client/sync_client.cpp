@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/sync_client.h>
+#include <mpf/sync_client.h>
 
 namespace mpf {
 namespace {
 
 std::string limitExceeded(const Message& message, std::uint64_t maxBytes) {
-  return ": " + std::to_string(message.body().size()) + " bytes, the limit is " + std::to_string(maxBytes);
+  return ": " + std::to_string(message.body().size()) + " bytes, the limit is " +
+         std::to_string(maxBytes);
 }
 
 }  // namespace
@@ -16,8 +17,10 @@ std::string Answer::why() const {
   return {};
 }
 
-SyncClient::SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location, WaitMode waitMode)
-    : dispatcher_(backplane, {waitMode, {}}), client_(dispatcher_, [this](Message&& message) { take(std::move(message)); }) {
+SyncClient::SyncClient(const Backplane& backplane, const std::string& server, std::int32_t location,
+                       WaitMode waitMode)
+    : dispatcher_(backplane, {waitMode, {}}),
+      client_(dispatcher_, [this](Message&& message) { take(std::move(message)); }) {
   client_.bind(server, location);
 }
 
@@ -29,7 +32,8 @@ void SyncClient::take(Message&& message) {
     } else {
       answer_.emplace(std::move(message));
     }
-  } else if (message.getType() != MessageType::connect && message.getType() != MessageType::requestFate) {
+  } else if (message.getType() != MessageType::connect &&
+             message.getType() != MessageType::requestFate) {
     others_.push_back(std::move(message));
   }
 }
@@ -47,10 +51,12 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
   if (!client_.isConnected() && !connectWait(timeout)) return Answer(SendResult::notConnected);
   answer_.reset();
   // While the message is on its way, no reply to it can be taken: that is this thread's work.
-  if (const auto result = client_.send(std::move(message), deadline, &awaited_); result != SendResult::sent) {
+  if (const auto result = client_.send(std::move(message), deadline, &awaited_);
+      result != SendResult::sent) {
     awaited_ = 0;
     // NOLINTNEXTLINE(bugprone-use-after-move): not sent, it is as it was
-    if (result == SendResult::tooLarge) return Answer(result, limitExceeded(message, client_.maxMessageBytes()));
+    if (result == SendResult::tooLarge)
+      return Answer(result, limitExceeded(message, client_.maxMessageBytes()));
     return Answer(result);
   }
   while (!answer_ && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
@@ -71,7 +77,8 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
 Message SyncClient::receive(Nanoseconds timeout) {
   const auto deadline = Deadline::after(timeout);
   // Looks at least once: with a timeout of 0, what is there is taken.
-  for (bool isFirst = true; others_.empty() && (isFirst || !deadline.hasPassed()); isFirst = false) dispatcher_.runOnce(deadline);
+  for (bool isFirst = true; others_.empty() && (isFirst || !deadline.hasPassed()); isFirst = false)
+    dispatcher_.runOnce(deadline);
   if (others_.empty()) return {};
   auto message = std::move(others_.front());
   others_.pop_front();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Alarm: calls back once at a time, the earliest that it was set to. It may be set again from within: a kj promise that replaced itself
-// while it runs would be an error.
+// Alarm: calls back once at a time, the earliest that it was set to. It may be set again from
+// within: a kj promise that replaced itself while it runs would be an error.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -10,15 +10,17 @@
 #include <kj/timer.h>
 #include <set>
 
-#include <mpf/base/clock.h>
-#include <mpf/router/fatal_tasks.h>
-#include <mpf/router/kj_text.h>
+#include <mpf/clock.h>
+
+#include "router/fatal_tasks.h"
+#include "router/transport/kj_text.h"
 
 namespace mpf::router {
 
 class Alarm {
  public:
-  Alarm(kj::Timer& timer, std::function<void()> callback) : timer_(timer), callback_(std::move(callback)) {}
+  Alarm(kj::Timer& timer, std::function<void()> callback)
+      : timer_(timer), callback_(std::move(callback)) {}
 
   void setAt(Deadline due) {
     if (due.ns() >= dueNs_) return;

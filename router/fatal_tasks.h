@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// FatalTasks: what runs on the event loop and is to go on for as long as its owner. An exception that it lets through ends the program:
-// without it the router would seem to live, and be deaf in one ear.
+// FatalTasks: what runs on the event loop and is to go on for as long as its owner. An exception
+// that it lets through ends the program: without it the router would seem to live, and be deaf in
+// one ear.
 //
 // Threads  that of the event loop.
 #pragma once

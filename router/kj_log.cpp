@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/router/kj_log.h>
+#include "router/kj_log.h"
 
-#include <mpf/router/kj_text.h>
+#include "router/transport/kj_text.h"
 
 namespace mpf::router {
 
-void KjLog::logMessage(kj::LogSeverity severity, const char* /*file*/, int /*line*/, int /*contextDepth*/, kj::String&& text) {
+void KjLog::logMessage(kj::LogSeverity severity, const char* /*file*/, int /*line*/,
+                       int /*contextDepth*/, kj::String&& text) {
   const auto said = forPeople(kj::StringPtr(text));
-  if (severity == kj::LogSeverity::ERROR || severity == kj::LogSeverity::FATAL) log_.error("Cap'n Proto: {}", said);
+  if (severity == kj::LogSeverity::ERROR || severity == kj::LogSeverity::FATAL)
+    log_.error("Cap'n Proto: {}", said);
   else if (severity == kj::LogSeverity::WARNING) log_.warn("Cap'n Proto: {}", said);
   else log_.debug("Cap'n Proto: {}", said);
 }

@@ -7,14 +7,14 @@
 #include <exception>
 #include <stdexcept>
 
-#include <mpf/base/run_main.h>
-#include <mpf/base/standard_descriptors.h>
-#include <mpf/router/arguments.h>
-#include <mpf/router/kj_log.h>
-#include <mpf/router/kj_text.h>
-#include <mpf/router/router.h>
-#include <mpf/router/service_manager.h>
-#include <mpf/server/programs/server_log.h>
+#include "base/run_main.h"
+#include "base/standard_descriptors.h"
+#include "router/arguments.h"
+#include "router/kj_log.h"
+#include "router/router.h"
+#include "router/service_manager.h"
+#include "router/transport/kj_text.h"
+#include "server/programs/server_log.h"
 
 namespace {
 
@@ -25,7 +25,8 @@ using mpf::router::ServiceManager;
 constexpr auto kToStop = 2 * kj::SECONDS;  // for farewells
 constexpr unsigned kTurnsBetweenLooks = 32;  // at descriptors, timers and signals
 
-// Each listening address on a line of its own: for who starts us with port 0 and waits until we listen.
+// Each listening address on a line of its own: for who starts us with port 0 and waits until we
+// listen.
 void tellAddresses(int fd, Router& router) {
   if (fd < 0) return;
   std::string text;
@@ -42,7 +43,7 @@ void tellAddresses(int fd, Router& router) {
 void reload(Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
   ServiceManager::tellReloading();
   try {
-    router.reload(arguments.load());
+    router.reload(arguments.loadConfig());
     log->info("the configuration has been read again");
   } catch (const std::exception& error) {
     log->error("the configuration stays as it was: {}", error.what());
@@ -50,7 +51,8 @@ void reload(Router& router, const RouterArguments& arguments, const mpf::ServerL
   ServiceManager::tellReady();
 }
 
-kj::Promise<void> reloadAtHangup(kj::UnixEventPort& port, Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
+kj::Promise<void> reloadAtHangup(kj::UnixEventPort& port, Router& router,
+                                 const RouterArguments& arguments, const mpf::ServerLog& log) {
   return port.onSignal(SIGHUP).then([&](siginfo_t&&) {
     reload(router, arguments, log);
     return reloadAtHangup(port, router, arguments, log);
@@ -58,7 +60,8 @@ kj::Promise<void> reloadAtHangup(kj::UnixEventPort& port, Router& router, const 
 }
 
 // Never resolves.
-kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
+kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArguments& arguments,
+                        const mpf::ServerLog& log) {
   return router.start().then([&] {
     for (const auto& address : router.listening()) log->info("listening on {}", address.text());
     tellAddresses(arguments.readyDescriptor(), router);
@@ -68,15 +71,18 @@ kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArg
 }
 
 MPF_KEEPS_KJ_LOG int run(const RouterArguments& arguments) {
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kj::UnixEventPort::captureSignal(signal);  // before there are threads
+  // before there are threads
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kj::UnixEventPort::captureSignal(signal);
   const mpf::ServerLog log("mpf-router", arguments.config().logLevel);
   const mpf::router::KjLog kjLog(*log);
   auto io = kj::setupAsyncIo();
-  io.waitScope.setBusyPollInterval(kTurnsBetweenLooks);  // or a peer whose bytes come faster than they are read would be all that there is
+  // or a peer whose bytes come faster than they are read would be all that there is
+  io.waitScope.setBusyPollInterval(kTurnsBetweenLooks);
   auto& port = io.unixEventPort;
   Router router(io, arguments.config(), *log);
   auto toEnd = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
-  serve(port, router, arguments, log).exclusiveJoin(kj::mv(toEnd)).wait(io.waitScope);  // also while it starts; who ends reloads no more
+  // also while it starts; who ends reloads no more
+  serve(port, router, arguments, log).exclusiveJoin(kj::mv(toEnd)).wait(io.waitScope);
   ServiceManager::tellStopping();
   log->info("ends");
   router.stop().exclusiveJoin(io.provider->getTimer().afterDelay(kToStop)).wait(io.waitScope);

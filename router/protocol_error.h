@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include <mpf/schema/router.capnp.h>
+#include "schema/router.capnp.h"
 
 namespace mpf::router {
 
@@ -12,7 +12,8 @@ using FarewellCode = wire::Farewell::Code;
 
 class ProtocolError : public std::runtime_error {
  public:
-  ProtocolError(FarewellCode code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  ProtocolError(FarewellCode code, const std::string& text)
+      : std::runtime_error(text), code_(code) {}
   [[nodiscard]] FarewellCode code() const noexcept { return code_; }
 
  private:

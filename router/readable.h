@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Readable: calls back on the event loop whenever a descriptor has become readable. Bell: the same, rung by any thread.
+// Readable: calls back on the event loop whenever a descriptor has become readable. Bell: the same,
+// rung by any thread.
 //
 // Threads  that of the event loop; Bell::ring() any.
 #pragma once
@@ -10,9 +11,10 @@
 #include <functional>
 #include <kj/async-unix.h>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/router/fatal_tasks.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "router/fatal_tasks.h"
 
 namespace mpf::router {
 
@@ -20,13 +22,15 @@ class Readable {
  public:
   // `fd` outlives this. The callback runs once soon, and takes all that there is each time.
   Readable(kj::UnixEventPort& port, int fd, std::function<void()> callback)
-      : observer_(port, fd, kj::UnixEventPort::FdObserver::OBSERVE_READ), callback_(std::move(callback)) {
+      : observer_(port, fd, kj::UnixEventPort::FdObserver::OBSERVE_READ),
+        callback_(std::move(callback)) {
     loop_.add(kj::evalLater([this] { return loop(); }));
   }
 
  private:
   kj::Promise<void> loop() {
-    auto next = observer_.whenBecomesReadable();  // before we look: nothing that comes meanwhile is missed
+    // before we look: nothing that comes meanwhile is missed
+    auto next = observer_.whenBecomesReadable();
     callback_();
     return next.then([this] { return loop(); });
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/router/router.h>
+#include "router/router.h"
 
 #include <algorithm>
 #include <chrono>
@@ -8,13 +8,14 @@
 #include <system_error>
 #include <utility>
 
-#include <mpf/router/kj_text.h>
+#include "router/transport/kj_text.h"
 
 namespace mpf::router {
 namespace {
 
-constexpr auto kWishesAfter = std::chrono::milliseconds(5);  // a thousand clients that come at once are looked at together
-constexpr auto kWishesAgain = std::chrono::seconds(1);       // when not all could be seen
+// a thousand clients that come at once are looked at together
+constexpr auto kPendingBindsAfter = std::chrono::milliseconds(5);
+constexpr auto kPendingBindsAgain = std::chrono::seconds(1);       // when not all could be seen
 
 }  // namespace
 
@@ -31,26 +32,28 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& lo
             .tls = nullptr,
             .incarnation = segments::newIncarnation()},
       presences_(here_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
-      wishes_(here_.backplane),
-      bell_(io.unixEventPort, [this] { lookAtWishes(); }),
-      wishesDue_(here_.timer, [this] { readWishes(); }),
+      pendingBinds_(here_.backplane),
+      bell_(io.unixEventPort, [this] { lookAtPendingBinds(); }),
+      pendingBindsDue_(here_.timer, [this] { readPendingBinds(); }),
       turnedAway_(here_.timer),
       tasks_(*this) {
   openTls(config);
-  names_ = here_.backplane.watcher().watchNames(NameKind::wish, [this] { bell_.ring(); });
+  names_ = here_.backplane.watcher().watchNames(NameKind::pendingBind, [this] { bell_.ring(); });
 }
 
 Router::~Router() { here_.backplane.watcher().forget(names_); }
 
 void Router::openTls(const RouterConfig& config) {
-  if (!config.tls.certificate.empty()) here_.tls = std::make_shared<Tls>(config.tls, here_.timer, config.limits.handshakeTime);
+  if (!config.tls.certificate.empty())
+    here_.tls = std::make_shared<Tls>(config.tls, here_.timer, config.limits.handshakeTime);
 }
 
 kj::Promise<void> Router::start() {
   auto starts = kj::Vector<kj::Promise<void>>();
   for (const auto& each : here_.config.listen) starts.add(listen(each).start());
-  for (const auto& remote : here_.config.remotes) remotes_.push_back(std::make_unique<ClientRouter>(here_, remote));
-  lookAtWishes();
+  for (const auto& remote : here_.config.remotes)
+    remotes_.push_back(std::make_unique<ClientRouter>(here_, remote));
+  lookAtPendingBinds();
   return kj::joinPromises(starts.releaseAsArray());
 }
 
@@ -78,31 +81,44 @@ std::vector<Address> Router::listening() {
 
 void Router::onCaller(const Listen& listen, Listener::Caller caller) {
   if (sessions_.size() >= here_.config.limits.maxConnections && !tryMakeRoom()) {
-    here_.log.warn("{}: turned away: there are {} connections (max-connections)", caller.address, sessions_.size());
-    return turnedAway_.add(kj::mv(caller.stream), FarewellCode::LIMIT,
-                           fmt::format("this router has {} connections, its limit (max-connections)", sessions_.size()));
+    here_.log.warn("{}: turned away: there are {} connections (max-connections)", caller.address,
+                   sessions_.size());
+    return turnedAway_.add(
+        kj::mv(caller.stream), FarewellCode::LIMIT,
+        fmt::format("this router has {} connections, its limit (max-connections)",
+                    sessions_.size()));
   }
   auto end = kj::newPromiseAndFulfiller<void>();
-  sessions_.push_back({listen, std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name, caller.address, caller.isTls),
+  sessions_.push_back({listen,
+                       std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name,
+                                                      caller.address, caller.isTls),
                        hostOf(caller.address), kj::mv(end.fulfiller)});
   const auto session = std::prev(sessions_.end());
-  tasks_.add(session->router->run().exclusiveJoin(kj::mv(end.promise)).then([this, session] { sessions_.erase(session); }));
+  tasks_.add(session->router->run().exclusiveJoin(kj::mv(end.promise)).then([this, session] {
+    sessions_.erase(session);
+  }));
 }
 
-// Of the callers that have not greeted yet, the oldest one of the host with the most of them goes. Each
-// makes room once: it stays in the list until the event loop has closed it.
+// Of the callers that have not greeted yet, the oldest one of the host with the most of them goes.
+// Each makes room once: it stays in the list until the event loop has closed it.
 bool Router::tryMakeRoom() {
-  const auto isIdle = [](const Session& session) { return session.end && !session.router->hasGreeted(); };
+  const auto isIdle = [](const Session& session) {
+    return session.end && !session.router->hasGreeted();
+  };
   std::map<std::string, std::size_t> counts;
   for (const auto& session : sessions_) {
     if (isIdle(session)) ++counts[session.host];
   }
   if (counts.empty()) return false;
-  const auto most = std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; })->second;
-  const auto victim =
-      std::ranges::find_if(sessions_, [&](const Session& session) { return isIdle(session) && counts[session.host] == most; });
-  here_.log.warn("{} connections (max-connections), {} of them with {}, which has not greeted: the oldest one of these is closed",
-                 sessions_.size(), most, victim->host);
+  const auto most =
+      std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; })->second;
+  const auto victim = std::ranges::find_if(sessions_, [&](const Session& session) {
+    return isIdle(session) && counts[session.host] == most;
+  });
+  here_.log.warn(
+      "{} connections (max-connections), {} of them with {}, which has not greeted: the oldest one "
+      "of these is closed",
+      sessions_.size(), most, victim->host);
   std::exchange(victim->end, nullptr)->fulfill();
   return true;
 }
@@ -111,38 +127,45 @@ void Router::lookAtServers() {
   for (const auto& session : sessions_) session.router->lookAtAll();
 }
 
-void Router::lookAtWishes() { wishesDue_.setAt(Deadline::after(kWishesAfter)); }
+void Router::lookAtPendingBinds() { pendingBindsDue_.setAt(Deadline::after(kPendingBindsAfter)); }
 
-void Router::readWishes() {
+void Router::readPendingBinds() {
   std::string problem;
   try {
-    const auto wishes = wishes_.look();
-    for (const auto& remote : remotes_) remote->setWishes(wishes);
-    problem = wishes_.problem();
+    const auto pendingBinds = pendingBinds_.look();
+    for (const auto& remote : remotes_) remote->setPendingBinds(pendingBinds);
+    problem = pendingBinds_.problem();
   } catch (const std::system_error& error) {
     problem = error.what();
   }
   if (!problem.empty()) {
-    if (wishProblem_.empty()) here_.log.warn("cannot read which servers some clients wait for, trying again: {}", problem);
-    wishesDue_.setAt(Deadline::after(kWishesAgain));
+    if (pendingBindProblem_.empty())
+      here_.log.warn("cannot read which servers some clients wait for, trying again: {}", problem);
+    pendingBindsDue_.setAt(Deadline::after(kPendingBindsAgain));
   }
-  wishProblem_ = std::move(problem);
+  pendingBindProblem_ = std::move(problem);
 }
 
 void Router::reload(const RouterConfig& config) {
   openTls(config);
   if (config.backplane != here_.config.backplane || config.name != here_.config.name)
-    here_.log.warn("a new name or backplane takes effect when the router starts again: this is still {}", here_.config.name);
+    here_.log.warn(
+        "a new name or backplane takes effect when the router starts again: this is still {}",
+        here_.config.name);
   here_.log.setLevel(config.logLevel);
   here_.config = config;
-  std::erase_if(listeners_,
-                [&](const auto& listener) { return std::ranges::find(config.listen, listener->listen()) == config.listen.end(); });
+  std::erase_if(listeners_, [&](const auto& listener) {
+    return std::ranges::find(config.listen, listener->listen()) == config.listen.end();
+  });
   for (const auto& session : sessions_) {
-    if (std::ranges::find(config.listen, session.listen) == config.listen.end()) session.router->stop();
+    if (std::ranges::find(config.listen, session.listen) == config.listen.end())
+      session.router->stop();
     else session.router->onConfig();
   }
   for (const auto& each : config.listen) {
-    if (std::ranges::any_of(listeners_, [&](const auto& listener) { return listener->listen() == each; })) continue;
+    if (std::ranges::any_of(listeners_,
+                            [&](const auto& listener) { return listener->listen() == each; }))
+      continue;
     listenLate(each);
   }
   for (auto remote = remotes_.begin(); remote != remotes_.end();) {
@@ -156,10 +179,11 @@ void Router::reload(const RouterConfig& config) {
     remote = remotes_.erase(remote);
   }
   for (const auto& each : config.remotes) {
-    if (std::ranges::any_of(remotes_, [&](const auto& remote) { return remote->remote() == each; })) continue;
+    if (std::ranges::any_of(remotes_, [&](const auto& remote) { return remote->remote() == each; }))
+      continue;
     remotes_.push_back(std::make_unique<ClientRouter>(here_, each));
   }
-  lookAtWishes();
+  lookAtPendingBinds();
 }
 
 kj::Promise<void> Router::stop() {
@@ -171,6 +195,8 @@ kj::Promise<void> Router::stop() {
   return kj::joinPromises(ends.releaseAsArray());
 }
 
-void Router::taskFailed(kj::Exception&& error) { here_.log.error("{}", toStd(error.getDescription())); }
+void Router::taskFailed(kj::Exception&& error) {
+  here_.log.error("{}", toStd(error.getDescription()));
+}
 
 }  // namespace mpf::router

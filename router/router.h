@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Router: joins this host's backplane to those of others: a ClientRouter for each remote, a ServerRouter for each caller.
+// Router: joins this host's backplane to those of others: a ClientRouter for each remote, a
+// ServerRouter for each caller.
 //
-//   wishes here ─► ClientRouter ══ TCP ══ ServerRouter elsewhere
+//   pending binds here ─► ClientRouter ══ TCP ══ ServerRouter elsewhere
 //   servers here ◄── ServerRouter ══ TCP ══ ClientRouter elsewhere
 //
 // Threads  that of the event loop.
@@ -11,10 +12,10 @@
 #include <list>
 #include <memory>
 
-#include <mpf/router/alarm.h>
-#include <mpf/router/client_router.h>
-#include <mpf/router/listener.h>
-#include <mpf/router/server_router.h>
+#include "router/alarm.h"
+#include "router/incoming/server_router.h"
+#include "router/outgoing/client_router.h"
+#include "router/transport/listener.h"
 
 namespace mpf::router {
 
@@ -27,7 +28,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   // Resolves once it listens everywhere that it shall.
   [[nodiscard]] kj::Promise<void> start();
   [[nodiscard]] std::vector<Address> listening();
-  // Keeps what stays the same: its connections notice nothing. Limits and TLS files hold for connections made from now on.
+  // Keeps what stays the same: its connections notice nothing. Limits and TLS files hold for
+  // connections made from now on.
   //   throws  ConfigError (TLS files), and nothing has changed
   void reload(const RouterConfig& config);
   // Says farewell to everybody.
@@ -40,8 +42,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   void onCaller(const Listen& listen, Listener::Caller caller);
   bool tryMakeRoom();
   void lookAtServers();
-  void lookAtWishes();
-  void readWishes();
+  void lookAtPendingBinds();
+  void readPendingBinds();
   void taskFailed(kj::Exception&& error) override;
 
   struct Session {
@@ -54,14 +56,14 @@ class Router final : private kj::TaskSet::ErrorHandler {
   Statistics statistics_;
   Surroundings here_;
   Presences presences_;
-  Wishes wishes_;
+  PendingBinds pendingBinds_;
   Bell bell_;
   Watcher::Token names_;
   std::list<std::shared_ptr<Listener>> listeners_;
   std::list<std::unique_ptr<ClientRouter>> remotes_;
   std::list<Session> sessions_;
-  Alarm wishesDue_;
-  std::string wishProblem_;  // that was logged last
+  Alarm pendingBindsDue_;
+  std::string pendingBindProblem_;  // that was logged last
   TurnedAway turnedAway_;
   kj::TaskSet tasks_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/router/service_manager.h>
+#include "router/service_manager.h"
 
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -8,15 +8,18 @@
 #include <cstdlib>
 #include <cstring>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/file_descriptor.h>
+#include <mpf/clock.h>
+#include <mpf/file_descriptor.h>
 
 namespace mpf::router {
 
-void ServiceManager::tellReloading() noexcept { tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000)); }
+void ServiceManager::tellReloading() noexcept {
+  tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000));
+}
 
 void ServiceManager::tell(const std::string& state) noexcept {
-  const char* const path = std::getenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe): nobody sets it
+  const char* const path =
+      std::getenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path == nullptr || *path == '\0' || std::strlen(path) >= sizeof address.sun_path) return;
@@ -25,7 +28,8 @@ void ServiceManager::tell(const std::string& state) noexcept {
   if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // an abstract name
   const FileDescriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   // Whoever does not listen is no reason to stop.
-  static_cast<void>(::sendto(socket.get(), state.data(), state.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&address),
+  static_cast<void>(::sendto(socket.get(), state.data(), state.size(), MSG_NOSIGNAL,
+                             reinterpret_cast<const sockaddr*>(&address),
                              static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length)));
 }
 

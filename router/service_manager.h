@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ServiceManager: tells systemd how the program is doing (sd_notify(3), whose protocol is one datagram to $NOTIFY_SOCKET). Without a
-// service manager it tells nobody.
+// ServiceManager: tells systemd how the program is doing (sd_notify(3), whose protocol is one
+// datagram to $NOTIFY_SOCKET). Without a service manager it tells nobody.
 #pragma once
 
 #include <string>

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/router/statistics.h>
+#include "router/statistics.h"
 
 #include <cstring>
 
-#include <mpf/base/clock.h>
-#include <mpf/shm/segment_name.h>
+#include <mpf/clock.h>
+
+#include "shm/segment_name.h"
 
 namespace mpf::router {
 namespace {
@@ -13,8 +14,9 @@ constexpr mode_t kEverybodyReads = 0644;
 
 void zero(layout::RouterLine& line) noexcept {
   for (auto* count :
-       {&line.connects, &line.queueSize, &line.inQueue, &line.queueFull, &line.messagesSent, &line.messagesReceived, &line.framesSent,
-        &line.framesReceived, &line.bytesSent, &line.bytesReceived, &line.roundTripNs, &line.clients, &line.bindings}) {
+       {&line.connects, &line.queueSize, &line.inQueue, &line.queueFull, &line.messagesSent,
+        &line.messagesReceived, &line.framesSent, &line.framesReceived, &line.bytesSent,
+        &line.bytesReceived, &line.roundTripNs, &line.clients, &line.bindings}) {
     count->store(0, std::memory_order_relaxed);
   }
 }
@@ -49,15 +51,20 @@ void PeerRecord::setPeer(const std::string& name, const std::string& program) no
   setText(line_.program, program);
 }
 
-void PeerRecord::setAddress(const std::string& address) noexcept { setText(line_.address, address); }
+void PeerRecord::setAddress(const std::string& address) noexcept {
+  setText(line_.address, address);
+}
 
 void PeerRecord::setLocations(const std::vector<std::int32_t>& locations) {
   std::string text;
-  for (const auto location : locations) text += (text.empty() ? "" : ", ") + std::to_string(location);
+  for (const auto location : locations)
+    text += (text.empty() ? "" : ", ") + std::to_string(location);
   setText(line_.locations, text);
 }
 
-void PeerRecord::setProblem(const std::string& problem) noexcept { setText(line_.problem, problem); }
+void PeerRecord::setProblem(const std::string& problem) noexcept {
+  setText(line_.problem, problem);
+}
 
 void PeerRecord::clear() noexcept {
   setState(layout::RouterLineState::none);
@@ -70,11 +77,13 @@ void PeerRecord::clear() noexcept {
 }
 
 Statistics::Statistics(const Backplane& backplane, const std::string& name)
-    : segment_(Segment::create(layout::kRouterBytes, layout::SegmentKind::router, backplane.name(), {kEverybodyReads, ~std::uint32_t{0}})) {
+    : segment_(Segment::create(layout::kRouterBytes, layout::SegmentKind::router, backplane.name(),
+                               {kEverybodyReads, ~std::uint32_t{0}})) {
   segment_.lockForLife();
   auto& header = segment_.sharedHeader();
   name.copy(header.name.data(), header.name.size() - 1);
-  if (!segment_.tryPublish(SegmentName::keyed(backplane.name(), NameKind::router, header.incarnation))) {
+  if (!segment_.tryPublish(
+          SegmentName::keyed(backplane.name(), NameKind::router, header.incarnation))) {
     throw std::runtime_error("an incarnation number came twice");
   }
   for (std::size_t row = layout::kRouterLines; row-- != 0;) free_.push_back(row);
@@ -93,7 +102,8 @@ std::shared_ptr<PeerRecord> Statistics::add(layout::RouterRole role) {
   }
   const auto row = free_.back();
   free_.pop_back();
-  auto& line = segment_.at<layout::RouterLine>(layout::kRouterLinesOffset + row * sizeof(layout::RouterLine));
+  auto& line = segment_.at<layout::RouterLine>(layout::kRouterLinesOffset +
+                                               row * sizeof(layout::RouterLine));
   const std::shared_ptr<PeerRecord> record(new PeerRecord(line), [this, row](PeerRecord* old) {
     old->clear();
     delete old;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Statistics: what a router says of its connections, in a segment of its own, for `mpf mrr` and the like to read without asking it.
+// Statistics: what a router says of its connections, in a segment of its own, for `mpf mrr` and the
+// like to read without asking it.
 //
 // Threads  that of the event loop.
 // Crash    the segment is locked for the router's life; whoever cleans up removes it afterwards.
@@ -9,13 +10,15 @@
 #include <string>
 #include <vector>
 
-#include <mpf/shm/backplane.h>
-#include <mpf/shm/histogram.h>
-#include <mpf/shm/segment.h>
+#include <mpf/backplane.h>
+
+#include "shm/histogram.h"
+#include "shm/segment.h"
 
 namespace mpf::router {
 
-// One row. Counters are written in place; a connection beyond those that there are rows for counts where nobody sees it.
+// One row. Counters are written in place; a connection beyond those that there are rows for counts
+// where nobody sees it.
 class PeerRecord {
  public:
   explicit PeerRecord(layout::RouterLine& line) noexcept : line_(line) {}

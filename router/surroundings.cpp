@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/router/surroundings.h>
+#include "router/surroundings.h"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -8,17 +8,19 @@
 #include <fmt/format.h>
 #include <sstream>
 
-#include <mpf/base/version.h>
-#include <mpf/router/line.h>
+#include "base/version.h"
+#include "router/transport/line.h"
 
 namespace mpf::router {
 
 std::string hostForKj(const Address& address) {
-  return address.host.find(':') == std::string::npos ? address.host : fmt::format("[{}]", address.host);
+  return address.host.find(':') == std::string::npos ? address.host
+                                                     : fmt::format("[{}]", address.host);
 }
 
 void prepare(kj::AsyncIoStream& stream, const Limits& limits) {
-  // What a peer does not acknowledge or does not read for so long is lost: our own signs of life do not get through, either.
+  // What a peer does not acknowledge or does not read for so long is lost: our own signs of life do
+  // not get through, either.
   const auto timeoutMs = static_cast<unsigned>(2 * limits.deadTime.count());
   stream.setsockopt(IPPROTO_TCP, TCP_USER_TIMEOUT, &timeoutMs, sizeof timeoutMs);
   const int on = 1;
@@ -32,7 +34,8 @@ void checkPlain(kj::NetworkAddress& address, const RouterConfig& config) {
   for (std::string one; std::getline(each, one, ',');) {
     const auto parsed = parseAddress(one);
     if (isPublic(parsed.host)) {
-      throw std::runtime_error(fmt::format("{} is a public address: plain TCP there only with allow-public-plain = true", one));
+      throw std::runtime_error(fmt::format(
+          "{} is a public address: plain TCP there only with allow-public-plain = true", one));
     }
   }
 }

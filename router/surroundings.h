@@ -8,13 +8,14 @@
 #include <kj/async-unix.h>
 #include <memory>
 
-#include <mpf/router/config.h>
-#include <mpf/router/presences.h>
-#include <mpf/router/statistics.h>
-#include <mpf/router/tls.h>
-#include <mpf/schema/router.capnp.h>
-#include <mpf/server/programs/log.h>
-#include <mpf/shm/backplane.h>
+#include <mpf/backplane.h>
+
+#include "router/config/router_config.h"
+#include "router/incoming/presences.h"
+#include "router/statistics.h"
+#include "router/transport/tls.h"
+#include "schema/router.capnp.h"
+#include "server/programs/log.h"
 
 namespace mpf::router {
 

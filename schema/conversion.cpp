@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/conversion.h>
+#include "schema/conversion.h"
 
 #include <kj/exception.h>
 #include <limits>
 
-#include <mpf/schema/visit.h>
-#include <mpf/schema/wire_places.h>
+#include "schema/visit.h"
+#include "schema/wire_places.h"
 
 namespace mpf {
 
@@ -21,7 +21,8 @@ struct Refusal {
 
 void checkBytes(std::size_t bytes, const ConversionLimits& limits) {
   if (bytes > limits.maxValueBytes) {
-    throw Refusal{ConversionFault::tooLarge, std::to_string(bytes) + " bytes, the limit is " + std::to_string(limits.maxValueBytes)};
+    throw Refusal{ConversionFault::tooLarge, std::to_string(bytes) + " bytes, the limit is " +
+                                                 std::to_string(limits.maxValueBytes)};
   }
 }
 
@@ -38,10 +39,12 @@ struct Reading {
 
   template <class Value>
   [[nodiscard]] typename capnp::List<Value>::Reader list(capnp::uint at) const {
-    return at < pointers.size() ? pointers[at].getAs<capnp::List<Value>>() : typename capnp::List<Value>::Reader();
+    return at < pointers.size() ? pointers[at].getAs<capnp::List<Value>>()
+                                : typename capnp::List<Value>::Reader();
   }
   [[nodiscard]] capnp::Data::Reader bytes(std::size_t at) const {
-    return at < pointers.size() ? pointers[static_cast<capnp::uint>(at)].getAs<capnp::Data>() : capnp::Data::Reader();
+    return at < pointers.size() ? pointers[static_cast<capnp::uint>(at)].getAs<capnp::Data>()
+                                : capnp::Data::Reader();
   }
 };
 
@@ -50,7 +53,8 @@ void put(Building& to, std::size_t at, const Body& body, const Field<Body, Value
   const Value value = body.*field.member;
   if constexpr (std::is_enum_v<Value>) {
     const auto number = static_cast<std::int64_t>(value);
-    if (number < 0 || number > UINT16_MAX) throw Refusal{ConversionFault::unsound, std::to_string(number) + " is no such value"};
+    if (number < 0 || number > UINT16_MAX)
+      throw Refusal{ConversionFault::unsound, std::to_string(number) + " is no such value"};
   }
   storeLittle(to.data, at, static_cast<typename Travels<Value>::As>(value));
 }
@@ -69,7 +73,9 @@ template <class Body, std::size_t room>
 void take(const Reading& from, std::size_t at, Body& body, const BytesField<Body, room>& field) {
   const auto bytes = from.bytes(at);
   if (bytes.size() > room) {
-    throw Refusal{ConversionFault::malformed, std::to_string(bytes.size()) + " bytes, there is room for " + std::to_string(room)};
+    throw Refusal{
+        ConversionFault::malformed,
+        std::to_string(bytes.size()) + " bytes, there is room for " + std::to_string(room)};
   }
   if (bytes.size() != 0) std::memcpy((body.*field.member).data(), bytes.begin(), bytes.size());
 }
@@ -77,10 +83,12 @@ void take(const Reading& from, std::size_t at, Body& body, const BytesField<Body
 // ---- the elements of an array
 
 template <class Element>
-constexpr auto kElementSize = sizeof(Element) == 8 ? capnp::ElementSize::EIGHT_BYTES : capnp::ElementSize::FOUR_BYTES;
+constexpr auto kElementSize =
+    sizeof(Element) == 8 ? capnp::ElementSize::EIGHT_BYTES : capnp::ElementSize::FOUR_BYTES;
 
 template <class Element>
-void putValue(Building& to, capnp::uint at, std::span<const Element> value, const ConversionLimits& limits) {
+void putValue(Building& to, capnp::uint at, std::span<const Element> value,
+              const ConversionLimits& limits) {
   checkBytes(value.size_bytes(), limits);
   const auto count = static_cast<capnp::uint>(value.size());
   if constexpr (sizeof(Element) == 1) {
@@ -92,7 +100,8 @@ void putValue(Building& to, capnp::uint at, std::span<const Element> value, cons
       // The memory of the list has the format of the array, so one copy replaces `count` stores (a
       // third of the time).
       const auto raw = capnp::AnyList::Reader(list.asReader()).getRawBytes();
-      if (count != 0) std::memcpy(const_cast<kj::byte*>(raw.begin()), value.data(), value.size_bytes());
+      if (count != 0)
+        std::memcpy(const_cast<kj::byte*>(raw.begin()), value.data(), value.size_bytes());
     } else {
       for (capnp::uint i = 0; i < count; ++i) list.set(i, value[i]);
     }
@@ -100,7 +109,8 @@ void putValue(Building& to, capnp::uint at, std::span<const Element> value, cons
 }
 
 template <class T>
-MessageOf<T> takeValue(const Reading& from, capnp::uint at, const ConversionLimits& limits, const Allocate& allocate) {
+MessageOf<T> takeValue(const Reading& from, capnp::uint at, const ConversionLimits& limits,
+                       const Allocate& allocate) {
   using Element = typename T::Element;
   const auto elements = [&](std::size_t count) {
     checkBytes(count * sizeof(Element), limits);
@@ -116,8 +126,10 @@ MessageOf<T> takeValue(const Reading& from, capnp::uint at, const ConversionLimi
     auto message = elements(list.size());
     const auto value = message.value();
     const capnp::AnyList::Reader any(list);
-    if (std::endian::native == std::endian::little && any.getElementSize() == kElementSize<Element>) {
-      if (list.size() != 0) std::memcpy(value.data(), any.getRawBytes().begin(), value.size_bytes());
+    if (std::endian::native == std::endian::little &&
+        any.getElementSize() == kElementSize<Element>) {
+      if (list.size() != 0)
+        std::memcpy(value.data(), any.getRawBytes().begin(), value.size_bytes());
     } else {  // another byte order, or a list of structs from a newer peer
       for (capnp::uint i = 0; i < list.size(); ++i) value[i] = list[i];
     }
@@ -128,19 +140,24 @@ MessageOf<T> takeValue(const Reading& from, capnp::uint at, const ConversionLimi
 // ---- one type; `at` is the name of the current field, for the error
 
 template <class T>
-void toWire(const Message& message, capnp::AnyStruct::Builder envelope, const ConversionLimits& limits, std::string_view& at) {
+void toWire(const Message& message, capnp::AnyStruct::Builder envelope,
+            const ConversionLimits& limits, std::string_view& at) {
   const auto& places = WirePlaces<T>::get();
   if (!message.isSound())
-    throw Refusal{ConversionFault::unsound, "a body of " + std::to_string(message.body().size()) + " bytes is invalid"};
+    throw Refusal{ConversionFault::unsound,
+                  "a body of " + std::to_string(message.body().size()) + " bytes is invalid"};
   const T body = *message.tryAs<T>();
   storeLittle(envelope.getDataSection(), places.whichAt, places.which);
-  auto into = envelope.getPointerSection()[places.memberAt].initAsAnyStruct(places.dataWords, places.pointers);
+  auto into = envelope.getPointerSection()[places.memberAt].initAsAnyStruct(places.dataWords,
+                                                                            places.pointers);
   Building to{into.getDataSection(), into.getPointerSection()};
   const auto putOne = [&](std::size_t where, const auto& field) {
     at = field.name;
     put(to, where, body, field);
   };
-  std::apply([&, i = std::size_t{0}](const auto&... field) mutable { (putOne(places.fields[i++], field), ...); }, T::fields());
+  std::apply([&, i = std::size_t{0}](
+                 const auto&... field) mutable { (putOne(places.fields[i++], field), ...); },
+             T::fields());
   if constexpr (ArrayBody<T>) {
     at = kValueName;
     putValue(to, places.value, message.valueAs<T>(), limits);
@@ -148,18 +165,22 @@ void toWire(const Message& message, capnp::AnyStruct::Builder envelope, const Co
 }
 
 template <class T>
-Message fromWire(capnp::AnyStruct::Reader envelope, const ConversionLimits& limits, const Allocate& allocate, std::string_view& at) {
+Message fromWire(capnp::AnyStruct::Reader envelope, const ConversionLimits& limits,
+                 const Allocate& allocate, std::string_view& at) {
   const auto& places = WirePlaces<T>::get();
   const auto members = envelope.getPointerSection();
   capnp::AnyStruct::Reader member;
-  if (places.memberAt < members.size()) member = members[places.memberAt].template getAs<capnp::AnyStruct>();
+  if (places.memberAt < members.size())
+    member = members[places.memberAt].template getAs<capnp::AnyStruct>();
   const Reading from{member.getDataSection(), member.getPointerSection()};
   const auto takeFields = [&](T& body) {
     const auto takeOne = [&](std::size_t where, const auto& field) {
       at = field.name;
       take(from, where, body, field);
     };
-    std::apply([&, i = std::size_t{0}](const auto&... field) mutable { (takeOne(places.fields[i++], field), ...); }, T::fields());
+    std::apply([&, i = std::size_t{0}](
+                   const auto&... field) mutable { (takeOne(places.fields[i++], field), ...); },
+               T::fields());
   };
   if constexpr (ArrayBody<T>) {
     at = kValueName;
@@ -175,7 +196,8 @@ Message fromWire(capnp::AnyStruct::Reader envelope, const ConversionLimits& limi
 
 // Runs `convert` and reports an error that ended it.
 template <class Convert>
-bool guarded(std::string_view type, const std::string_view& at, ConversionFault onNonsense, ConversionError& error, Convert&& convert) {
+bool guarded(std::string_view type, const std::string_view& at, ConversionFault onNonsense,
+             ConversionError& error, Convert&& convert) {
   const auto fail = [&](ConversionFault fault, std::string_view why) {
     error.fault = fault;
     error.text.assign(type).append(at.empty() ? "" : ".").append(at).append(": ").append(why);
@@ -196,10 +218,12 @@ bool guarded(std::string_view type, const std::string_view& at, ConversionFault 
 
 capnp::ReaderOptions ConversionLimits::readerOptions() const noexcept {
   constexpr std::uint64_t kFieldsWords = 64;
-  return {.traversalLimitInWords = maxValueBytes / sizeof(capnp::word) + kFieldsWords, .nestingLimit = 8};
+  return {.traversalLimitInWords = maxValueBytes / sizeof(capnp::word) + kFieldsWords,
+          .nestingLimit = 8};
 }
 
-bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const ConversionLimits& limits, ConversionError& error) {
+bool tryToWire(const Message& message, wire::Envelope::Builder envelope,
+               const ConversionLimits& limits, ConversionError& error) {
   error = {};
   envelope.setClientType(message.getClientType());
   envelope.setClientExtra(message.getClientExtra());
@@ -207,29 +231,35 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const C
   const bool done = withType(message.getType(), [&]<class T>(std::type_identity<T>) {
     known = true;
     std::string_view at;
-    return guarded(T::kName, at, ConversionFault::tooLarge, error, [&] { toWire<T>(message, capnp::toAny(envelope), limits, at); });
+    return guarded(T::kName, at, ConversionFault::tooLarge, error,
+                   [&] { toWire<T>(message, capnp::toAny(envelope), limits, at); });
   });
   if (!known) {
-    error = {ConversionFault::unknownType, "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is unknown"};
+    error = {ConversionFault::unknownType,
+             "type " + std::to_string(static_cast<unsigned>(message.getType())) + " is unknown"};
   }
   return done;
 }
 
-std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
-                                   const Allocate& allocate) {
+std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits,
+                                   ConversionError& error, const Allocate& allocate) {
   error = {};
   // The members of the union are in the order of MessageType, from 1 on; message_types_test checks
   // this.
   const auto number = static_cast<unsigned>(envelope.which()) + 1;
   bool known = false;
   std::optional<Message> result;
-  withType(static_cast<MessageType>(std::min<unsigned>(number, UINT16_MAX)), [&]<class T>(std::type_identity<T>) {
-    known = true;
-    std::string_view at;
-    return guarded(T::kName, at, ConversionFault::malformed, error,
-                   [&] { result = fromWire<T>(capnp::toAny(envelope), limits, allocate, at); });
-  });
-  if (!known) error = {ConversionFault::unknownType, "type " + std::to_string(number) + " is unknown: the peer is newer"};
+  withType(static_cast<MessageType>(std::min<unsigned>(number, UINT16_MAX)),
+           [&]<class T>(std::type_identity<T>) {
+             known = true;
+             std::string_view at;
+             return guarded(T::kName, at, ConversionFault::malformed, error, [&] {
+               result = fromWire<T>(capnp::toAny(envelope), limits, allocate, at);
+             });
+           });
+  if (!known)
+    error = {ConversionFault::unknownType,
+             "type " + std::to_string(number) + " is unknown: the peer is newer"};
   if (result) {
     result->setClientType(envelope.getClientType());
     result->setClientExtra(envelope.getClientExtra());

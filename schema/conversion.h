@@ -17,8 +17,9 @@
 #include <optional>
 #include <string>
 
-#include <mpf/schema/message.capnp.h>
-#include <mpf/schema/message.h>
+#include <mpf/message.h>
+
+#include "schema/message.capnp.h"
 
 namespace mpf {
 
@@ -43,14 +44,15 @@ struct ConversionError {
 };
 
 // Fills `envelope`. Returns false with `error` set; the envelope is then incomplete.
-[[nodiscard]] bool tryToWire(const Message& message, wire::Envelope::Builder envelope, const ConversionLimits& limits,
-                             ConversionError& error);
+[[nodiscard]] bool tryToWire(const Message& message, wire::Envelope::Builder envelope,
+                             const ConversionLimits& limits, ConversionError& error);
 
 // Creates the message of `envelope`.
 //   allocate  allocates the memory of an array; by default on the heap
 //   returns   nullopt with `error` set when the envelope is invalid
 //   throws    std::bad_alloc
-[[nodiscard]] std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
-                                                 const std::function<BodyBytes(std::size_t)>& allocate = allocateHeapBody);
+[[nodiscard]] std::optional<Message> tryFromWire(
+    wire::Envelope::Reader envelope, const ConversionLimits& limits, ConversionError& error,
+    const std::function<BodyBytes(std::size_t)>& allocate = allocateHeapBody);
 
 }  // namespace mpf

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include <mpf/schema/text.h>
-#include <mpf/schema/visit.h>
+#include "schema/text.h"
+#include "schema/visit.h"
 
 namespace mpf {
 
@@ -30,9 +30,13 @@ inline std::string latin1(std::string_view bytes) {
   return text;
 }
 
-inline nlohmann::json toJson(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(printNumber(value)); }
+inline nlohmann::json toJson(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(printNumber(value));
+}
 inline nlohmann::json toJson(std::string_view bytes) { return latin1(bytes); }
-inline nlohmann::json toJson(std::span<const char> bytes) { return latin1({bytes.data(), bytes.size()}); }
+inline nlohmann::json toJson(std::span<const char> bytes) {
+  return latin1({bytes.data(), bytes.size()});
+}
 inline nlohmann::json toJson(char c) { return c == '\0' ? std::string() : latin1({&c, 1}); }
 inline nlohmann::json toJson(ConnectStatus status) { return toString(status); }
 inline nlohmann::json toJson(Fate fate) { return toString(fate); }
@@ -42,7 +46,9 @@ inline nlohmann::json toJson(std::uint64_t value) { return value; }
 inline nlohmann::json toJson(std::span<const std::byte> bytes) {
   constexpr std::string_view kHex = "0123456789abcdef";
   std::string text;
-  for (const auto byte : bytes) text += {kHex[std::to_integer<unsigned>(byte) / 16], kHex[std::to_integer<unsigned>(byte) % 16]};
+  for (const auto byte : bytes)
+    text +=
+        {kHex[std::to_integer<unsigned>(byte) / 16], kHex[std::to_integer<unsigned>(byte) % 16]};
   return text;
 }
 template <class Number>
@@ -55,9 +61,12 @@ nlohmann::json toJson(std::span<const Number> numbers) {
 }  // namespace detail
 
 [[nodiscard]] inline nlohmann::json toJson(const Message& message) {
-  nlohmann::json json{
-      {"type", toString(message.getType())}, {"clientType", message.getClientType()}, {"clientExtra", message.getClientExtra()}};
-  const auto add = [&](std::string_view name, const auto& value) { json[std::string(name)] = detail::toJson(value); };
+  nlohmann::json json{{"type", toString(message.getType())},
+                      {"clientType", message.getClientType()},
+                      {"clientExtra", message.getClientExtra()}};
+  const auto add = [&](std::string_view name, const auto& value) {
+    json[std::string(name)] = detail::toJson(value);
+  };
   const bool ours = visitFields(message, add);
   if (!ours) json["bytes"] = message.body().size();
   return json;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/message.h>
+#include <mpf/message.h>
 
 #include <cstdlib>
 #include <new>
@@ -13,7 +13,8 @@ namespace {
 class HeapLender final : public BodyLender {
  public:
   void takeBack(std::byte* data, std::size_t) noexcept override {
-    std::free(data);  // NOLINT(cppcoreguidelines-no-malloc): owner of the memory of allocateHeapBody()
+    std::free(
+        data);  // NOLINT(cppcoreguidelines-no-malloc): owner of the memory of allocateHeapBody()
   }
 };
 
@@ -26,7 +27,8 @@ BodyLender& heapLender() noexcept { return theHeap; }
 BodyBytes allocateHeapBody(std::size_t bytes) {
   constexpr std::size_t kAlignment = 64;
   if (bytes > PTRDIFF_MAX - kAlignment) throw std::bad_alloc();
-  auto* const data = static_cast<std::byte*>(std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment));
+  auto* const data = static_cast<std::byte*>(
+      std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment));
   if (data == nullptr) throw std::bad_alloc();
   return {.data = data, .size = bytes, .capacity = bytes, .lender = &theHeap};
 }
@@ -54,8 +56,8 @@ Message Message::duplicate() const {
 }
 
 void Message::refuseLength(MessageType type, std::size_t length, std::size_t room) {
-  throw std::length_error(std::string(toString(type)) + ": length " + std::to_string(length) + " was asked for, there is room for " +
-                          std::to_string(room));
+  throw std::length_error(std::string(toString(type)) + ": length " + std::to_string(length) +
+                          " was asked for, there is room for " + std::to_string(room));
 }
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/serial_sniff.h>
+#include <mpf/serial_sniff.h>
 
 namespace mpf::serial {
 namespace {
@@ -31,10 +31,12 @@ void SniffRecord::write(std::span<char, kBytes> bytes) const noexcept {
 
 std::optional<SniffRecord> SniffRecord::tryRead(std::span<const char, kBytes> bytes) noexcept {
   std::uint64_t at = 0;
-  for (std::size_t i = 0; i < kTimeBytes; ++i) at |= std::uint64_t{static_cast<std::uint8_t>(bytes[i])} << (8 * i);
+  for (std::size_t i = 0; i < kTimeBytes; ++i)
+    at |= std::uint64_t{static_cast<std::uint8_t>(bytes[i])} << (8 * i);
   const auto kind = static_cast<SniffKind>(bytes[kTimeBytes]);
   if (!isKnown(kind)) return std::nullopt;
-  return SniffRecord{static_cast<std::int64_t>(at), kind, static_cast<std::uint8_t>(bytes[kTimeBytes + 1])};
+  return SniffRecord{static_cast<std::int64_t>(at), kind,
+                     static_cast<std::uint8_t>(bytes[kTimeBytes + 1])};
 }
 
 std::optional<std::vector<SniffRecord>> tryReadRecords(const Char8ArrayMessage& reply) {
@@ -46,7 +48,8 @@ std::optional<std::vector<SniffRecord>> tryReadRecords(const Char8ArrayMessage& 
     records.push_back(*record);
   }
   const auto extra = reply->extra;
-  if (extra < 0 || records.size() != static_cast<std::size_t>(extra) || records.size() * SniffRecord::kBytes != value.size())
+  if (extra < 0 || records.size() != static_cast<std::size_t>(extra) ||
+      records.size() * SniffRecord::kBytes != value.size())
     return std::nullopt;
   return records;
 }

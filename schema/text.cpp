@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/text.h>
+#include "schema/text.h"
 
 #include <charconv>
 #include <cmath>
 #include <vector>
 
-#include <mpf/schema/visit.h>
+#include "schema/visit.h"
 
 namespace mpf {
 
 namespace {
 
 constexpr std::string_view kDigits = "0123456789abcdef";
-constexpr std::array<std::pair<char, char>, 8> kEscapes{
-    {{'\r', 'r'}, {'\n', 'n'}, {'\t', 't'}, {'\\', '\\'}, {'"', '"'}, {'\a', 'a'}, {'\b', 'b'}, {'\f', 'f'}}};
+constexpr std::array<std::pair<char, char>, 8> kEscapes{{{'\r', 'r'},
+                                                         {'\n', 'n'},
+                                                         {'\t', 't'},
+                                                         {'\\', '\\'},
+                                                         {'"', '"'},
+                                                         {'\a', 'a'},
+                                                         {'\b', 'b'},
+                                                         {'\f', 'f'}}};
 
 // ---- printing
 
@@ -32,7 +38,8 @@ std::string printed(Number value) {
 }
 
 std::string printedBytes(std::string_view bytes, std::size_t shown) {
-  return '"' + escape(bytes.substr(0, shown)) + '"' + (shown < bytes.size() ? "... (" + std::to_string(bytes.size()) + ")" : "");
+  return '"' + escape(bytes.substr(0, shown)) + '"' +
+         (shown < bytes.size() ? "... (" + std::to_string(bytes.size()) + ")" : "");
 }
 
 template <class Element>
@@ -55,18 +62,23 @@ struct Printer {
   std::string& line;
   std::size_t maxElements;
 
-  void operator()(std::string_view name, std::string_view bytes) const { add(name, printedBytes(bytes, bytes.size())); }
+  void operator()(std::string_view name, std::string_view bytes) const {
+    add(name, printedBytes(bytes, bytes.size()));
+  }
   template <class Value>
   void operator()(std::string_view name, const Value& value) const {
     if constexpr (requires { value.size(); }) {
       const auto shown = std::min(maxElements, value.size());
-      if constexpr (std::is_same_v<Value, std::span<const char>>) add(name, printedBytes({value.data(), value.size()}, shown));
+      if constexpr (std::is_same_v<Value, std::span<const char>>)
+        add(name, printedBytes({value.data(), value.size()}, shown));
       else add(name, printedElements(value, shown));
     } else {
       add(name, printed(value));
     }
   }
-  void add(std::string_view name, std::string_view value) const { line.append(" ").append(name).append("=").append(value); }
+  void add(std::string_view name, std::string_view value) const {
+    line.append(" ").append(name).append("=").append(value);
+  }
 };
 
 // ---- parsing: each function returns an empty string, or a description of what was expected
@@ -87,10 +99,14 @@ Expected parseInto(Integer& to, std::string_view text)
   const bool hexadecimal = digits.starts_with("0x") || digits.starts_with("0X");
   if (hexadecimal) digits.remove_prefix(2);
   std::uint64_t magnitude = 0;
-  const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), magnitude, hexadecimal ? 16 : 10);
+  const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(),
+                                              magnitude, hexadecimal ? 16 : 10);
   const auto most = static_cast<std::uint64_t>(std::numeric_limits<Integer>::max());
-  const auto allBits = static_cast<std::uint64_t>(std::numeric_limits<std::make_unsigned_t<Integer>>::max());
-  const auto limit = negative ? (std::is_signed_v<Integer> ? most + 1 : 0) : hexadecimal ? allBits : most;
+  const auto allBits =
+      static_cast<std::uint64_t>(std::numeric_limits<std::make_unsigned_t<Integer>>::max());
+  const auto limit = negative      ? (std::is_signed_v<Integer> ? most + 1 : 0)
+                     : hexadecimal ? allBits
+                                   : most;
   if (failure != std::errc{} || end != digits.data() + digits.size() || magnitude > limit) {
     return "an integer from " + std::to_string(std::numeric_limits<Integer>::min()) + " to " +
            std::to_string(std::numeric_limits<Integer>::max());
@@ -125,7 +141,9 @@ Expected parseEnum(Enum& to, std::string_view text, const std::array<std::string
   to = static_cast<Enum>(at - names.begin());
   return {};
 }
-Expected parseInto(ConnectStatus& to, std::string_view text) { return parseEnum(to, text, kConnectStatusNames); }
+Expected parseInto(ConnectStatus& to, std::string_view text) {
+  return parseEnum(to, text, kConnectStatusNames);
+}
 Expected parseInto(Fate& to, std::string_view text) { return parseEnum(to, text, kFateNames); }
 
 Expected parseElements(std::vector<char>& to, std::string_view text) {
@@ -151,7 +169,8 @@ template <class Number>
 Expected parseElements(std::vector<Number>& to, std::string_view text) {
   while (!text.empty()) {
     const auto comma = text.find(',');
-    if (auto expected = parseInto(to.emplace_back(), text.substr(0, comma)); !expected.empty()) return expected + ", separated by commas";
+    if (auto expected = parseInto(to.emplace_back(), text.substr(0, comma)); !expected.empty())
+      return expected + ", separated by commas";
     if (comma + 1 == text.size()) return "another element after the last comma";
     text = comma == text.npos ? "" : text.substr(comma + 1);
   }
@@ -165,7 +184,8 @@ Expected parseField(Body& body, const Field<Body, Value>& field, std::string_vie
 template <class Body, std::size_t room>
 Expected parseField(Body& body, const BytesField<Body, room>& field, std::string_view text) {
   const auto bytes = tryUnescape(unquoted(text));
-  if (!bytes || bytes->size() > room) return "a C-escaped string of at most " + std::to_string(room) + " bytes";
+  if (!bytes || bytes->size() > room)
+    return "a C-escaped string of at most " + std::to_string(room) + " bytes";
   std::copy(bytes->begin(), bytes->end(), (body.*field.member).begin());
   body.*field.used = static_cast<std::int32_t>(bytes->size());
   return {};
@@ -175,15 +195,19 @@ struct Marks {
   std::int32_t clientType = 0;
   std::int32_t clientExtra = 0;
 };
-constexpr std::tuple kMarks{Field{"clientType", &Marks::clientType}, Field{"clientExtra", &Marks::clientExtra}};
+constexpr std::tuple kMarks{Field{"clientType", &Marks::clientType},
+                            Field{"clientExtra", &Marks::clientExtra}};
 
 // Finds the field `name`; nullopt when the type has no such field.
 template <class Body, class Fields>
-std::optional<Expected> tryParseField(Body& body, const Fields& fields, std::string_view name, std::string_view text) {
+std::optional<Expected> tryParseField(Body& body, const Fields& fields, std::string_view name,
+                                      std::string_view text) {
   std::optional<Expected> found;
   std::apply(
       [&](const auto&... field) {
-        static_cast<void>(((field.name == name && (static_cast<void>(found = parseField(body, field, text)), true)) || ...));
+        static_cast<void>(((field.name == name &&
+                            (static_cast<void>(found = parseField(body, field, text)), true)) ||
+                           ...));
       },
       fields);
   return found;
@@ -192,7 +216,9 @@ std::optional<Expected> tryParseField(Body& body, const Fields& fields, std::str
 template <class T>
 std::string fieldNames() {
   std::string names;
-  const auto add = [&](std::string_view name) { names.append(names.empty() ? "" : ", ").append(name); };
+  const auto add = [&](std::string_view name) {
+    names.append(names.empty() ? "" : ", ").append(name);
+  };
   std::apply([&](const auto&... field) { (add(field.name), ...); }, T::fields());
   if constexpr (ArrayBody<T>) add(kValueName);
   std::apply([&](const auto&... field) { (add(field.name), ...); }, kMarks);
@@ -225,7 +251,9 @@ std::optional<Message> parseAs(std::span<const std::string> words, std::string& 
   T body{};
   Elements<T> elements;
   Marks marks;
-  const auto fail = [&](std::string why) { return error = std::string(T::kName) + ": " + std::move(why), std::nullopt; };
+  const auto fail = [&](std::string why) {
+    return error = std::string(T::kName) + ": " + std::move(why), std::nullopt;
+  };
   for (const std::string_view word : words) {
     const auto equals = word.find('=');
     if (equals == word.npos) return fail("'" + std::string(word) + "' is not field=value");
@@ -239,8 +267,11 @@ std::optional<Message> parseAs(std::span<const std::string> words, std::string& 
         expected = parseElements(elements.value, text);
       }
     }
-    if (!expected) return fail("no field '" + std::string(name) + "'; there are " + fieldNames<T>());
-    if (!expected->empty()) return fail("field '" + std::string(name) + "' is " + *expected + ", not '" + std::string(text) + "'");
+    if (!expected)
+      return fail("no field '" + std::string(name) + "'; there are " + fieldNames<T>());
+    if (!expected->empty())
+      return fail("field '" + std::string(name) + "' is " + *expected + ", not '" +
+                  std::string(text) + "'");
   }
   auto message = built<T>(body, elements);
   message.setClientType(marks.clientType);
@@ -260,7 +291,8 @@ std::string printNumber(double value) {
 std::string escape(std::string_view bytes) {
   std::string text;
   for (const char c : bytes) {
-    const auto* const known = std::find_if(kEscapes.begin(), kEscapes.end(), [c](const auto& pair) { return pair.first == c; });
+    const auto* const known = std::find_if(kEscapes.begin(), kEscapes.end(),
+                                           [c](const auto& pair) { return pair.first == c; });
     const auto byte = static_cast<unsigned char>(c);
     if (known != kEscapes.end()) text += {'\\', known->second};
     else if (byte >= 0x20 && byte < 0x7f) text += c;
@@ -277,7 +309,8 @@ std::optional<std::string> tryUnescape(std::string_view text) {
       continue;
     }
     if (++i == text.size()) return std::nullopt;
-    const auto* const known = std::find_if(kEscapes.begin(), kEscapes.end(), [&](const auto& pair) { return pair.second == text[i]; });
+    const auto* const known = std::find_if(
+        kEscapes.begin(), kEscapes.end(), [&](const auto& pair) { return pair.second == text[i]; });
     if (known != kEscapes.end()) {
       bytes += known->first;
     } else if (text[i] == '0') {
@@ -285,7 +318,8 @@ std::optional<std::string> tryUnescape(std::string_view text) {
     } else if (text[i] == 'x') {
       std::uint8_t byte = 0;
       const auto digits = text.substr(i + 1, 2);
-      const auto [end, failure] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
+      const auto [end, failure] =
+          std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
       if (failure != std::errc{}) return std::nullopt;
       bytes += static_cast<char>(byte);
       i += static_cast<std::size_t>(end - digits.data());
@@ -300,7 +334,8 @@ std::string print(const Message& message, std::size_t maxElements) {
   std::string line(toString(message.getType()));
   if (line == "unknown") line = "type " + std::to_string(static_cast<unsigned>(message.getType()));
   const Printer printer{line, maxElements};
-  if (!visitFields(message, printer) && message) line += ": not one of ours, a body of " + std::to_string(message.body().size()) + " bytes";
+  if (!visitFields(message, printer) && message)
+    line += ": not one of ours, a body of " + std::to_string(message.body().size()) + " bytes";
   if (message.getClientType() != 0) printer("clientType", message.getClientType());
   if (message.getClientExtra() != 0) printer("clientExtra", message.getClientExtra());
   return line;
@@ -315,14 +350,18 @@ std::optional<MessageType> tryParseType(std::string_view name) noexcept {
 
 std::string typeNames() {
   std::string names;
-  for (std::size_t i = 1; i < detail::kLayouts.size(); ++i) names.append(i == 1 ? "" : ", ").append(detail::kLayouts[i].name);
+  for (std::size_t i = 1; i < detail::kLayouts.size(); ++i)
+    names.append(i == 1 ? "" : ", ").append(detail::kLayouts[i].name);
   return names;
 }
 
-std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error) {
+std::optional<Message> tryParse(MessageType type, std::span<const std::string> words,
+                                std::string& error) {
   error = "type " + std::to_string(static_cast<unsigned>(type)) + " is unknown";
   std::optional<Message> message;
-  withType(type, [&]<class T>(std::type_identity<T>) { return (message = parseAs<T>(words, error)).has_value(); });
+  withType(type, [&]<class T>(std::type_identity<T>) {
+    return (message = parseAs<T>(words, error)).has_value();
+  });
   if (message) error.clear();
   return message;
 }

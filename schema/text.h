@@ -18,7 +18,7 @@
 #include <string>
 #include <string_view>
 
-#include <mpf/schema/message.h>
+#include <mpf/message.h>
 
 namespace mpf {
 
@@ -37,9 +37,11 @@ namespace mpf {
 //   words     integers are decimal, or hexadecimal bit patterns (0xffffffff is -1 in 32 bits);
 //             numbers as for strtod; statuses by name; characters plain or escaped; arrays as
 //             `value=1,2,3`; strings C-escaped, with or without quotes; eomString also sets eomLen
-//   error     "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, clientType, clientExtra"
+//   error     "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value,
+//             clientType, clientExtra"
 //   returns   nullopt with `error` set
-[[nodiscard]] std::optional<Message> tryParse(MessageType type, std::span<const std::string> words, std::string& error);
+[[nodiscard]] std::optional<Message> tryParse(MessageType type, std::span<const std::string> words,
+                                              std::string& error);
 
 // C-escapes bytes, without quotes: "\r\n", "\x00".
 [[nodiscard]] std::string escape(std::string_view bytes);

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <type_traits>
 
-#include <mpf/schema/message.h>
+#include <mpf/message.h>
 
 namespace mpf {
 
@@ -18,7 +18,9 @@ template <class Act>
 bool withType(MessageType type, Act&& act) {
   return [&]<class... T>(std::type_identity<std::tuple<T...>>) {
     bool result = false;
-    static_cast<void>(((T::kType == type && (static_cast<void>(result = act(std::type_identity<T>{})), true)) || ...));
+    static_cast<void>(
+        ((T::kType == type && (static_cast<void>(result = act(std::type_identity<T>{})), true)) ||
+         ...));
     return result;
   }(std::type_identity<MessageTypes>{});
 }
@@ -49,7 +51,8 @@ bool visitFields(const Message& message, Visit&& visit) {
     const T* const fields = message.tryAs<T>();
     if (fields == nullptr) return false;
     const T copy = *fields;
-    std::apply([&](const auto&... field) { (detail::visitField(copy, field, visit), ...); }, T::fields());
+    std::apply([&](const auto&... field) { (detail::visitField(copy, field, visit), ...); },
+               T::fields());
     if constexpr (ArrayBody<T>) visit(kValueName, message.valueAs<T>());
     return true;
   });

@@ -2,7 +2,8 @@
 // WirePlaces: the places of the fields of a message type in its Cap'n Proto struct; looked up in
 // the schema by name, once.
 //
-//   struct = | data section: numbers at multiples of their size | pointers |          a union member: a number and a pointer
+//   struct = | data section: numbers at multiples of their size | pointers |          a union
+//   member: a number and a pointer
 //
 // Setting a field by its place costs a store; looking it up by name costs a microsecond for each
 // message.
@@ -20,12 +21,15 @@
 #include <cstring>
 #include <kj/debug.h>
 
-#include <mpf/schema/message.capnp.h>
-#include <mpf/schema/message_types.h>
+#include <mpf/message_types.h>
+
+#include "schema/message.capnp.h"
 
 namespace mpf {
 
-[[nodiscard]] inline kj::StringPtr toKj(std::string_view literal) { return {literal.data(), literal.size()}; }
+[[nodiscard]] inline kj::StringPtr toKj(std::string_view literal) {
+  return {literal.data(), literal.size()};
+}
 
 // Access to numbers of a data section, which are little-endian on every host.
 template <class Value>
@@ -69,13 +73,13 @@ class WirePlaces {
     return places;
   }
 
-  std::size_t whichAt = 0;     // place of the union's number: byte of the envelope's data section
-  std::uint16_t which = 0;     // the number of this type
-  capnp::uint memberAt = 0;    // index of the member's pointer
+  std::size_t whichAt = 0;  // place of the union's number: byte of the envelope's data section
+  std::uint16_t which = 0;  // the number of this type
+  capnp::uint memberAt = 0;  // index of the member's pointer
   std::uint16_t dataWords = 0;
   std::uint16_t pointers = 0;
   std::array<std::size_t, kFields> fields{};  // byte of the data section, or index of the pointer
-  capnp::uint value = 0;                      // elements of an array: index of the pointer
+  capnp::uint value = 0;  // elements of an array: index of the pointer
 
  private:
   using Proto = capnp::schema::Field::Reader;
@@ -83,21 +87,29 @@ class WirePlaces {
   WirePlaces() {
     const auto envelope = capnp::Schema::from<wire::Envelope>();
     const auto member = envelope.getFieldByName(toKj(T::kName));
-    whichAt = std::size_t{envelope.getProto().getStruct().getDiscriminantOffset()} * sizeof(std::uint16_t);
+    whichAt = std::size_t{envelope.getProto().getStruct().getDiscriminantOffset()} *
+              sizeof(std::uint16_t);
     which = member.getProto().getDiscriminantValue();
     memberAt = member.getProto().getSlot().getOffset();
     const auto schema = member.getType().asStruct();
     dataWords = schema.getProto().getStruct().getDataWordCount();
     pointers = schema.getProto().getStruct().getPointerCount();
     std::size_t at = 0;
-    std::apply([&](const auto&... field) { ((fields[at++] = place(schema.getFieldByName(toKj(field.name)), field)), ...); }, T::fields());
-    if constexpr (ArrayBody<T>) value = schema.getFieldByName(toKj(kValueName)).getProto().getSlot().getOffset();
+    std::apply(
+        [&](const auto&... field) {
+          ((fields[at++] = place(schema.getFieldByName(toKj(field.name)), field)), ...);
+        },
+        T::fields());
+    if constexpr (ArrayBody<T>)
+      value = schema.getFieldByName(toKj(kValueName)).getProto().getSlot().getOffset();
   }
 
   template <class Body, class Value>
   static std::size_t place(capnp::StructSchema::Field at, const Field<Body, Value>& /*field*/) {
     const auto slot = at.getProto().getSlot();
-    KJ_REQUIRE(!slot.getHadExplicitDefault() && bytesOf(slot.getType()) == sizeof(typename Travels<Value>::As), at.getProto().getName());
+    KJ_REQUIRE(!slot.getHadExplicitDefault() &&
+                   bytesOf(slot.getType()) == sizeof(typename Travels<Value>::As),
+               at.getProto().getName());
     return slot.getOffset() * sizeof(typename Travels<Value>::As);
   }
   template <class Body, std::size_t room>

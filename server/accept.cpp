@@ -8,15 +8,16 @@
 #include <system_error>
 #include <thread>
 
-#include <mpf/base/step.h>
-#include <mpf/server/server_core.h>
-#include <mpf/shm/histogram.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "server/server_core.h"
+#include "shm/histogram.h"
+#include "shm/segment_name.h"
+#include "shm/stale_segments.h"
 
 namespace mpf {
 namespace {
 
-constexpr std::chrono::milliseconds kToTakeTheRest{100};
+constexpr std::chrono::milliseconds kDrainTimeout{100};
 constexpr std::chrono::microseconds kLookAtThem{500};
 constexpr std::size_t kMostOfRescan = 1024;  // links to accept
 constexpr std::int64_t kRestAfterRescan = 9;  // as long as the look took, so many times
@@ -39,13 +40,14 @@ layout::Shortage shortageOf(const std::exception& error) {
 
 }  // namespace
 
-// Any user may fill /dev/shm with names, and every client may ask for this: the looks take a tenth of the server's time at most. A
-// client that is not found knocks again.
+// Any user may fill /dev/shm with names, and every client may ask for this: the looks take a tenth
+// of the server's time at most. A client that is not found knocks again.
 void ServerCore::acceptAll() {
   const auto fromNs = Clock::nowNs();
   if (fromNs < rescanFromNs_) return;
   rescanDue_ = false;
-  const auto prefix = SegmentName::linkPrefix(endpoint_.backplane().name(), endpoint_.window().header().incarnation);
+  const auto prefix = SegmentName::linkPrefix(endpoint_.backplane().name(),
+                                              endpoint_.window().header().incarnation);
   std::size_t accepted = 0;
   for (const auto& name : segments::list(prefix)) {
     const auto parsed = SegmentName::tryParse(name);
@@ -61,14 +63,19 @@ void ServerCore::accept(std::uint64_t incarnation) {
   if (byLink_.contains(incarnation)) return;
   try {
     const auto& backplane = endpoint_.backplane().name();
-    const auto name = SegmentName::link(backplane, endpoint_.window().header().incarnation, incarnation);
+    const auto name =
+        SegmentName::link(backplane, endpoint_.window().header().incarnation, incarnation);
     auto link = Link::tryOpen(backplane, name, endpoint_.window());
     if (!link) return;
-    const auto window = SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
+    const auto window =
+        SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
     auto client = endpoint_.peer(window, layout::SegmentKind::clientWindow);
-    if (client && link->peerState() == layout::LinkState::open) return open(std::move(link), std::move(client));
-    // A client's window stands before its links do and goes after them: this client died while it knocked.
-    if (!client && segments::probeOwner(window) == segments::Owner::absent) removeLink(name, incarnation);
+    if (client && link->peerState() == layout::LinkState::open)
+      return open(std::move(link), std::move(client));
+    // A client's window stands before its links do and goes after them: this client died while it
+    // knocked.
+    if (!client && segments::probeOwner(window) == segments::Owner::absent)
+      removeLink(name, incarnation);
   } catch (const std::exception& error) {
     // Its client sees that nobody accepts it, and knocks again; we go on.
     const auto shortage = shortageOf(error);
@@ -104,7 +111,8 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
     const std::lock_guard lock(*connection.lock);
     connection.index = *index;
     connection.timedId = 0;
-    connection.unanswered = std::vector<std::atomic<std::uint32_t>>(std::bit_ceil(opened.header().maxOutstanding));
+    connection.unanswered =
+        std::vector<std::atomic<std::uint32_t>>(std::bit_ceil(opened.header().maxOutstanding));
     connection.unansweredMask = static_cast<std::uint32_t>(connection.unanswered.size() - 1);
     connection.channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
   }
@@ -160,16 +168,19 @@ void ServerCore::closeAll() noexcept {
     auto& link = connection->channel->link();
     if (!link.peer()->hasOwner()) {
       removeLinkOfDead(*connection);
-      removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(), link.peer()->header().incarnation);
+      stale_segments::removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(),
+                                       link.peer()->header().incarnation);
     } else if (!link.tryLeavePoolToClient()) {
       others.push_back(connection->channel);
     }
     close(*connection);
   }
-  // Clients of other users may not remove what is ours, and find it no more once we have: they have a moment to take what they were sent.
-  const auto patience = Deadline::after(kToTakeTheRest);
+  // Clients of other users may not remove what is ours, and find it no more once we have: they have
+  // a moment to take what they were sent.
+  const auto patience = Deadline::after(kDrainTimeout);
   const auto isTaking = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
-  while (std::ranges::any_of(others, isTaking) && !patience.hasPassed()) std::this_thread::sleep_for(kLookAtThem);
+  while (std::ranges::any_of(others, isTaking) && !patience.hasPassed())
+    std::this_thread::sleep_for(kLookAtThem);
 }
 
 void ServerCore::close(Connection& connection) noexcept {

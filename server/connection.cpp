@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/connection.h>
+#include "server/connection.h"
 
 #include <mutex>
 #include <utility>
@@ -15,7 +15,8 @@ Connection* freeConnections = nullptr;  // under freeMutex
 Connection::Pointer Connection::take() {
   {
     const std::lock_guard guard(freeMutex);
-    if (freeConnections != nullptr) return Pointer(std::exchange(freeConnections, freeConnections->nextFree));
+    if (freeConnections != nullptr)
+      return Pointer(std::exchange(freeConnections, freeConnections->nextFree));
   }
   return Pointer(new Connection);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // ServerCore: what its window says of the request that it works on.
-#include <mpf/shm/handling.h>
+#include "shm/handling.h"
 
 #include <array>
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-#include <mpf/server/server_core.h>
+#include "server/server_core.h"
 
 namespace mpf {
 namespace {
@@ -38,13 +38,15 @@ std::int32_t cmdOf(const Message& request) noexcept {
   static constexpr auto kTypes = typesWithCmd(std::type_identity<MessageTypes>{});
   const auto type = static_cast<std::size_t>(request.getType());
   std::int32_t cmd = 0;
-  if (type < kTypes.size() && kTypes[type]) std::memcpy(&cmd, request.body().data() + kCmdOffset, sizeof cmd);
+  if (type < kTypes.size() && kTypes[type])
+    std::memcpy(&cmd, request.body().data() + kCmdOffset, sizeof cmd);
   return cmd;
 }
 
 }  // namespace
 
-// A fast server looks at the clock for one request in 64, a slow one for each: so the time is at most 64 * kSlowNs too early.
+// A fast server looks at the clock for one request in 64, a slow one for each: so the time is at
+// most 64 * kSlowNs too early.
 void ServerCore::noteProgress(std::int64_t nowNs) noexcept {
   auto& control = endpoint_.control();
   const auto taken = control.received.load(std::memory_order_relaxed);
@@ -61,7 +63,8 @@ void ServerCore::beginHandling(const Message& request) noexcept {
 }
 
 void ServerCore::endHandling() noexcept {
-  if (std::exchange(isHandling_, false)) endpoint_.control().handling.store(0, std::memory_order_relaxed);
+  if (std::exchange(isHandling_, false))
+    endpoint_.control().handling.store(0, std::memory_order_relaxed);
 }
 
 }  // namespace mpf

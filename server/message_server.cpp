@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/message_server.h>
+#include <mpf/message_server.h>
 
 #include <fmt/format.h>
 #include <stdexcept>
 
-#include <mpf/base/stop_signals.h>
-#include <mpf/server/server_core.h>
+#include "base/stop_signals.h"
+#include "server/server_core.h"
 
 namespace mpf {
 
@@ -27,13 +27,15 @@ const char* toString(ReplyResult result) noexcept {
 
 class MessageServer::Impl {
  public:
-  Impl(const Backplane& backplane, const std::string& name, const ServerOptions& options) : core(backplane, name, options) {}
+  Impl(const Backplane& backplane, const std::string& name, const ServerOptions& options)
+      : core(backplane, name, options) {}
 
   ServerCore core;
   std::map<MessageType, std::function<void(Message&&)>> handlers;
 };
 
-MessageServer::MessageServer(const Backplane& backplane, const std::string& name, const ServerOptions& options)
+MessageServer::MessageServer(const Backplane& backplane, const std::string& name,
+                             const ServerOptions& options)
     : impl_(std::make_unique<Impl>(backplane, name, options)) {}
 
 MessageServer::~MessageServer() = default;
@@ -44,21 +46,34 @@ void MessageServer::setQueueSize(int size) { impl_->core.setQueueSize(size); }
 bool MessageServer::waitForMessage(Deadline deadline) { return impl_->core.wait(deadline); }
 Message MessageServer::receive() { return impl_->core.receive(); }
 void MessageServer::interrupt() noexcept { impl_->core.interrupt(); }
-std::uint64_t MessageServer::clientOf(const Message& request) const noexcept { return impl_->core.clientOf(request); }
-bool MessageServer::isAwaited(const Message& request) const noexcept { return impl_->core.isAwaited(request); }
+std::uint64_t MessageServer::clientOf(const Message& request) const noexcept {
+  return impl_->core.clientOf(request);
+}
+bool MessageServer::isAwaited(const Message& request) const noexcept {
+  return impl_->core.isAwaited(request);
+}
 ReplyResult MessageServer::reply(Message&& message) { return impl_->core.reply(message); }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
-BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) { return impl_->core.allocate(request.route(), bytes); }
+BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
+  return impl_->core.allocate(request.route(), bytes);
+}
 int MessageServer::descriptor() { return impl_->core.descriptor(); }
 
-void MessageServer::onClient(std::function<void(std::uint64_t, bool)> news) { impl_->core.onClient(std::move(news)); }
+void MessageServer::onClient(std::function<void(std::uint64_t, bool)> news) {
+  impl_->core.onClient(std::move(news));
+}
 Deadline MessageServer::takeBefore() const noexcept { return impl_->core.takeBefore(); }
-ReplyResult MessageServer::replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message) {
+ReplyResult MessageServer::replyTo(std::uint64_t client, std::uint32_t requestId,
+                                   Message&& message) {
   message.setRoute(impl_->core.routeTo(client, requestId));
   return impl_->core.reply(message);
 }
-bool MessageServer::owes(std::uint64_t client, std::uint32_t requestId) const noexcept { return impl_->core.owes(client, requestId); }
-std::vector<std::uint32_t> MessageServer::owed(std::uint64_t client) const { return impl_->core.owed(client); }
+bool MessageServer::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  return impl_->core.owes(client, requestId);
+}
+std::vector<std::uint32_t> MessageServer::owed(std::uint64_t client) const {
+  return impl_->core.owed(client);
+}
 BodyBytes MessageServer::allocateBody(std::uint64_t client, std::size_t bytes) {
   return impl_->core.allocate(impl_->core.routeTo(client, 0), bytes);
 }
@@ -71,9 +86,12 @@ void MessageServer::address(Message& reply, const Message& request) noexcept {
   reply.setClientExtra(request.getClientExtra());
 }
 
-void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) { impl_->handlers[type] = std::move(handler); }
+void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) {
+  impl_->handlers[type] = std::move(handler);
+}
 
-void MessageServer::callHandler(const std::function<void(Message&&)>& handler, Message&& request) try {
+void MessageServer::callHandler(const std::function<void(Message&&)>& handler,
+                                Message&& request) try {
   handler(std::move(request));
 } catch (...) {  // the request has been refused by now
   impl_->core.endHandling();
@@ -102,18 +120,22 @@ void MessageServer::run() {
 }
 
 int MessageServer::runUntilSignal() {
-  const StopSignals stop([](void* server) noexcept { static_cast<MessageServer*>(server)->interrupt(); }, this);
+  const StopSignals stop(
+      [](void* server) noexcept { static_cast<MessageServer*>(server)->interrupt(); }, this);
   run();
   return 0;
 }
 
-void MessageServer::onShortage(std::function<void(const std::string&)> tell) { impl_->core.onShortage(std::move(tell)); }
+void MessageServer::onShortage(std::function<void(const std::string&)> tell) {
+  impl_->core.onShortage(std::move(tell));
+}
 void MessageServer::countAlarm() noexcept { impl_->core.countAlarm(); }
 
 void MessageServer::report() const {
   const auto counts = impl_->core.counts();
-  fmt::print("{}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n", getName(), "queueSize", counts.queueSize, "inQueue",
-             counts.inQueue, "queueRequests", counts.requests, "queueFullResponses", counts.queueFull, "replyRequests", counts.replies);
+  fmt::print("{}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n{:>19} {}\n", getName(), "queueSize",
+             counts.queueSize, "inQueue", counts.inQueue, "queueRequests", counts.requests,
+             "queueFullResponses", counts.queueFull, "replyRequests", counts.replies);
 }
 
 }  // namespace mpf

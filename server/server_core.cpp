@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/server_core.h>
+#include "server/server_core.h"
 
 #include <fmt/format.h>
 #include <list>
@@ -8,13 +8,14 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/step.h>
-#include <mpf/shm/histogram.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "shm/histogram.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 
-// Handles of requests may outlive their server, so keepers are never freed: some bytes for each server of the process's life.
+// Handles of requests may outlive their server, so keepers are never freed: some bytes for each
+// server of the process's life.
 class ServerCore::Keeper final : public RouteKeeper {
  public:
   static Keeper* make(ServerCore& server) {
@@ -50,7 +51,8 @@ constexpr std::uint32_t kLooksInVain = 2 * layout::kMaxLinks;
 
 int checkedQueueSize(int size) {
   if (size < 1 || size > static_cast<int>(LinkGeometry::kMaxQueueSize)) {
-    throw std::invalid_argument(fmt::format("queue size {}: use 1 to {}", size, LinkGeometry::kMaxQueueSize));
+    throw std::invalid_argument(
+        fmt::format("queue size {}: use 1 to {}", size, LinkGeometry::kMaxQueueSize));
   }
   return size;
 }
@@ -62,26 +64,29 @@ std::string windowName(const Backplane& backplane, const std::string& name, std:
 
 }  // namespace
 
-ServerCore::ServerCore(const Backplane& backplane, const std::string& name, const ServerOptions& options)
+ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
+                       const ServerOptions& options)
     : name_(name),
       location_(options.location),
-      endpoint_(backplane, layout::SegmentKind::serverWindow, windowName(backplane, name, options.location), options.rights,
-                options.waitMode,
-                [&](layout::SegmentHeader& header) {
-                  const auto queueSize = static_cast<std::uint32_t>(checkedQueueSize(options.queueSize));
-                  header.location = options.location;
-                  name.copy(header.name.data(), header.name.size() - 1);
-                  header.queueSize = queueSize;
-                  header.maxMessageBytes = options.maxMessageBytes;
-                  header.maxPoolBytes = options.maxPoolBytes;
-                  auto* control = reinterpret_cast<std::byte*>(&header) + layout::kWindowControlOffset;
-                  reinterpret_cast<layout::WindowControl*>(control)->queueSize.store(queueSize, std::memory_order_relaxed);
-                }),
+      endpoint_(
+          backplane, layout::SegmentKind::serverWindow,
+          windowName(backplane, name, options.location), options.rights, options.waitMode,
+          [&](layout::SegmentHeader& header) {
+            const auto queueSize = static_cast<std::uint32_t>(checkedQueueSize(options.queueSize));
+            header.location = options.location;
+            name.copy(header.name.data(), header.name.size() - 1);
+            header.queueSize = queueSize;
+            header.maxMessageBytes = options.maxMessageBytes;
+            header.maxPoolBytes = options.maxPoolBytes;
+            auto* control = reinterpret_cast<std::byte*>(&header) + layout::kWindowControlOffset;
+            reinterpret_cast<layout::WindowControl*>(control)->queueSize.store(
+                queueSize, std::memory_order_relaxed);
+          }),
       keeper_(Keeper::make(*this)) {}
 
 ServerCore::~ServerCore() {
   keeper_->leave();
-  if (endpoint_.origin().isInherited()) return;
+  if (endpoint_.forkGuard().isInherited()) return;
   MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   clientNews_ = nullptr;
@@ -89,13 +94,17 @@ ServerCore::~ServerCore() {
 }
 
 void ServerCore::setQueueSize(int size) {
-  endpoint_.control().queueSize.store(static_cast<std::uint32_t>(checkedQueueSize(size)), std::memory_order_relaxed);
+  endpoint_.control().queueSize.store(static_cast<std::uint32_t>(checkedQueueSize(size)),
+                                      std::memory_order_relaxed);
 }
 
 bool ServerCore::wait(Deadline deadline) {
-  endpoint_.origin().check("MessageServer");
+  endpoint_.forkGuard().check("MessageServer");
   endHandling();
-  const auto stopped = [this] { return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed); };
+  const auto stopped = [this] {
+    return stop_.load(std::memory_order_relaxed) &&
+           stop_.exchange(false, std::memory_order_relaxed);
+  };
   return !stopped() && endpoint_.wait(deadline) && !stopped();
 }
 
@@ -126,7 +135,8 @@ bool ServerCore::isAwaited(const Message& request) const noexcept {
 Route ServerCore::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
   const auto number = client >> 32;
   if (number == 0 || number > connections_.size()) return {};
-  return {reinterpret_cast<std::uint64_t>(connections_[number - 1].get()), requestId, static_cast<std::uint32_t>(client), nullptr};
+  return {reinterpret_cast<std::uint64_t>(connections_[number - 1].get()), requestId,
+          static_cast<std::uint32_t>(client), nullptr};
 }
 
 bool ServerCore::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
@@ -170,7 +180,7 @@ void ServerCore::lookAround() {
 }
 
 Message ServerCore::receive() {
-  endpoint_.origin().check("MessageServer");
+  endpoint_.forkGuard().check("MessageServer");
   Message message;
   // Clients may invent news for ever: who receives gets its turn all the same.
   for (std::uint32_t looks = 0; looks < kLooksInVain; ++looks) {
@@ -237,7 +247,8 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   if (envelope.deadlineNs != 0 && hasExpired(envelope)) {
     count(control.expired);
     connection.channel->discard(envelope);
-    sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra, Fate::expired);
+    sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra,
+             Fate::expired);
     return false;
   }
   switch (connection.channel->tryFinish(envelope, message)) {
@@ -247,7 +258,8 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
       return false;
     case MessageLink::Finish::unavailable:
       count(control.refused);
-      sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra, Fate::refused);
+      sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra,
+               Fate::refused);
       return false;
     case MessageLink::Finish::message:
       break;
@@ -258,13 +270,15 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     noteProgress(Clock::nowNs());
   }
   beginHandling(message);
-  message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId, connection.generation, keeper_});
+  message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId,
+                    connection.generation, keeper_});
   takeBefore_ = envelope.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(envelope.deadlineNs);
   return true;
 }
 
 bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
-  // PAIR(taken-before-clock): the client sees that we counted the request as taken, or we see that its deadline has passed.
+  // PAIR(taken-before-clock): the client sees that we counted the request as taken, or we see that
+  // its deadline has passed.
   doorbell::fence();
   return Clock::nowNs() >= envelope.deadlineNs;
 }
@@ -281,7 +295,8 @@ void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noe
 }
 
 ReplyResult ServerCore::reply(Message& message) noexcept {
-  if (!message || message.route().link == 0 || endpoint_.origin().isInherited()) return ReplyResult::clientGone;
+  if (!message || message.route().link == 0 || endpoint_.forkGuard().isInherited())
+    return ReplyResult::clientGone;
   auto& connection = connectionOf(message.route());
   ReplyResult result{};
   {
@@ -298,7 +313,8 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
     return ReplyResult::clientGone;
   }
   auto& unanswered = connection.owed(route.requestId);
-  const bool first = route.requestId != 0 && unanswered.load(std::memory_order_relaxed) == route.requestId;
+  const bool first =
+      route.requestId != 0 && unanswered.load(std::memory_order_relaxed) == route.requestId;
   const auto maxOutstanding = connection.channel->link().header().maxOutstanding;
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
@@ -308,7 +324,7 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
   envelope.clientExtra = message.getClientExtra();
 
   auto& link = connection.channel->link();
-  if (link.shallBeTimed()) envelope.sentTick = Tick::of(Clock::nowNs());
+  if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
 
   auto unowned = route;
   unowned.keeper = nullptr;
@@ -332,12 +348,13 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
   return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
 }
 
-void ServerCore::sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType, std::int32_t clientExtra,
-                          Fate fate) noexcept {
+void ServerCore::sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType,
+                          std::int32_t clientExtra, Fate fate) noexcept {
   RequestFateMessage message({.fate = fate, .requestId = requestId});
   message.setClientType(clientType);
   message.setClientExtra(clientExtra);
-  message.setRoute({reinterpret_cast<std::uint64_t>(&connection), requestId, connection.generation, nullptr});
+  message.setRoute(
+      {reinterpret_cast<std::uint64_t>(&connection), requestId, connection.generation, nullptr});
   static_cast<void>(reply(message));
 }
 
@@ -363,7 +380,8 @@ BodyBytes ServerCore::allocate(const Route& route, std::size_t bytes) {
 
 ServerCore::Counts ServerCore::counts() const {
   const auto& control = endpoint_.control();
-  Counts counts{control.queueSize.load(std::memory_order_relaxed), 0, control.received.load(std::memory_order_relaxed), 0,
+  Counts counts{control.queueSize.load(std::memory_order_relaxed), 0,
+                control.received.load(std::memory_order_relaxed), 0,
                 control.sent.load(std::memory_order_relaxed)};
   for (const auto& connection : connections_) {
     const std::lock_guard lock(*connection->lock);

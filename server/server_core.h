@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ServerCore: what MessageServer does with links: accepts them, takes requests, sends replies, ends what must end.
+// ServerCore: what MessageServer does with links: accepts them, takes requests, sends replies, ends
+// what must end.
 //
 // Threads  as MessageServer: one owner thread, replies from any.
 // Crash    a dead client's links are closed and their names removed, here.
@@ -15,10 +16,11 @@
 #include <string>
 #include <vector>
 
-#include <mpf/schema/message.h>
-#include <mpf/server/connection.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/endpoint.h>
+#include <mpf/message.h>
+#include <mpf/message_server.h>
+
+#include "server/connection.h"
+#include "shm/endpoint.h"
 
 namespace mpf {
 
@@ -35,10 +37,13 @@ class ServerCore {
   Message receive();
   void interrupt() noexcept;
   // Whether the next wait() ends at once.
-  [[nodiscard]] bool isInterrupted() const noexcept { return stop_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool isInterrupted() const noexcept {
+    return stop_.load(std::memory_order_relaxed);
+  }
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   [[nodiscard]] bool isAwaited(const Message& request) const noexcept;
-  // The request received last is done with, or kept for later: the window does not show it any more.
+  // The request received last is done with, or kept for later: the window does not show it any
+  // more.
   void endHandling() noexcept;
   ReplyResult reply(Message& message) noexcept;
   BodyBytes allocate(const Route& route, std::size_t bytes);
@@ -91,7 +96,8 @@ class ServerCore {
   void noteProgress(std::int64_t nowNs) noexcept;
   void beginHandling(const Message& request) noexcept;
   ReplyResult sendReply(Connection& connection, Message& message) noexcept;
-  void sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType, std::int32_t clientExtra, Fate fate) noexcept;
+  void sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType,
+                std::int32_t clientExtra, Fate fate) noexcept;
 
   std::string name_;
   std::int32_t location_;
@@ -105,10 +111,10 @@ class ServerCore {
   std::int64_t rescanFromNs_ = 0;  // no look for links by name before
   bool rescanDue_ = false;
   Deadline takeBefore_ = Deadline::never();  // of the request taken last
-  bool isHandling_ = false;          // the window shows a request
-  bool isSlow_ = false;              // requests take so long that a look at the clock for each costs nothing
-  std::int64_t progressAtNs_ = 0;    // the last look at the clock,
-  std::uint64_t progressAt_ = 0;     // and the number of requests taken until then
+  bool isHandling_ = false;  // the window shows a request
+  bool isSlow_ = false;  // requests take so long that a look at the clock for each costs nothing
+  std::int64_t progressAtNs_ = 0;  // the last look at the clock,
+  std::uint64_t progressAt_ = 0;  // and the number of requests taken until then
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/backplane.h>
+#include <mpf/backplane.h>
 
 #include <charconv>
 #include <cstdlib>
@@ -9,10 +9,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/step.h>
-#include <mpf/shm/remains.h>
-#include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "shm/stale_segments.h"
+#include "shm/watcher.h"
 
 namespace mpf {
 
@@ -22,7 +23,8 @@ struct Backplane::State {
   Watcher& itsWatcher() {
     const std::lock_guard lock(mutex);
     // NOLINTNEXTLINE(bugprone-unused-return-value)
-    if (watcher->isInherited()) static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>(name)).release());
+    if (watcher->isInherited())
+      static_cast<void>(std::exchange(watcher, std::make_unique<Watcher>(name)).release());
     return *watcher;
   }
   std::string name;
@@ -37,14 +39,15 @@ std::string environmentOr(const char* variable, const char* otherwise) {
   return value != nullptr && *value != '\0' ? value : otherwise;
 }
 
-// Files of a backplane that a process looks at when it attaches. Up to so many it removes all that is dead; `mpf clean` always does.
+// Files of a backplane that a process looks at when it attaches. Up to so many it removes all that
+// is dead; `mpf clean` always does.
 constexpr std::size_t kLooksOfWhoAttaches = 4096;
 
-std::vector<std::string> removeAll(std::vector<remains::Judged> judged) {
+std::vector<std::string> removeAll(std::vector<stale_segments::Judged> judged) {
   MPF_STEP(survey_begun);
   std::vector<std::string> removed;
   for (auto& file : judged) {
-    if (remains::tryRemove(file)) removed.push_back(std::move(file.name));
+    if (stale_segments::tryRemove(file)) removed.push_back(std::move(file.name));
   }
   return removed;
 }
@@ -61,11 +64,13 @@ Backplane Backplane::named(const std::string& name) {
 
 Backplane Backplane::attach(const std::string& name) {
   auto backplane = named(name);
-  static_cast<void>(removeAll(remains::judgeSome(backplane.name(), kLooksOfWhoAttaches)));
+  static_cast<void>(removeAll(stale_segments::judgeSome(backplane.name(), kLooksOfWhoAttaches)));
   return backplane;
 }
 
-Backplane Backplane::isolated() { return Backplane(fmt::format("isolated-{:x}", segments::newIncarnation())); }
+Backplane Backplane::isolated() {
+  return Backplane(fmt::format("isolated-{:x}", segments::newIncarnation()));
+}
 
 const std::string& Backplane::name() const noexcept { return state_->name; }
 Watcher& Backplane::watcher() const noexcept { return state_->itsWatcher(); }
@@ -78,7 +83,9 @@ std::int32_t Backplane::defaultLocation() {
   throw std::invalid_argument(fmt::format("MPF_LOCATION \"{}\": use an integer", text));
 }
 
-std::vector<std::string> Backplane::segmentNames() const { return segments::list(SegmentName::prefix(name())); }
+std::vector<std::string> Backplane::segmentNames() const {
+  return segments::list(SegmentName::prefix(name()));
+}
 
 std::vector<std::string> Backplane::names() {
   std::set<std::string> names;
@@ -88,22 +95,8 @@ std::vector<std::string> Backplane::names() {
   return {names.begin(), names.end()};
 }
 
-std::vector<std::string> Backplane::removeDead() const { return removeAll(remains::judge(name())); }
-
-void removeDeadWindow(const std::string& backplane, const std::string& name, std::uint64_t incarnation) {
-  const bool isDead = segments::probeOwner(name, incarnation) == segments::Owner::dead;
-  const auto hints = SegmentName::keyed(backplane, NameKind::hints, incarnation);
-  const bool ownsHints = isDead && segments::haveSameUser(name, hints);
-  if (name == SegmentName::keyed(backplane, NameKind::clientWindow, incarnation)) {
-    segments::removeKeyedIfOwnerless(name);
-  } else if (isDead) {
-    segments::removeIfOwnerless(name);
-  }
-  MPF_STEP(dead_window_removed);
-  // Every peer may lock the hints: their lock tells only when there is no window to ask.
-  if (ownsHints ? segments::remove(hints) : segments::removeKeyedIfOwnerless(hints)) {
-    segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
-  }
+std::vector<std::string> Backplane::removeDead() const {
+  return removeAll(stale_segments::judge(name()));
 }
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/doorbell.h>
+#include "shm/doorbell.h"
 
 #include <fcntl.h>
 #include <linux/futex.h>
@@ -9,9 +9,9 @@
 
 #include <array>
 
-#include <mpf/base/step.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/segment.h>
+#include "base/step.h"
+#include "base/system_call.h"
+#include "shm/segment.h"
 
 namespace mpf::doorbell {
 
@@ -19,8 +19,10 @@ void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) no
   timespec until{};
   until.tv_sec = deadline.ns() / 1'000'000'000;
   until.tv_nsec = deadline.ns() % 1'000'000'000;
-  // FUTEX_WAIT_BITSET: an absolute CLOCK_MONOTONIC deadline, so that restarts after signals do not stretch the wait.
-  ::syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET, seen, deadline.isNever() ? nullptr : &until, nullptr, FUTEX_BITSET_MATCH_ANY);
+  // FUTEX_WAIT_BITSET: an absolute CLOCK_MONOTONIC deadline, so that restarts after signals do not
+  // stretch the wait.
+  ::syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET, seen, deadline.isNever() ? nullptr : &until,
+            nullptr, FUTEX_BITSET_MATCH_ANY);
 }
 
 void ring(layout::Word32& bell) noexcept {
@@ -34,17 +36,21 @@ FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t gr
   const auto path = segments::path(name);
   checkCall(::mkfifo(path.c_str(), 0600), "create", path);
   // Open for both directions: the read end never sees an end of file while peers come and go.
-  FileDescriptor fifo(checkCall(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", path));
-  if (group != ~std::uint32_t{0}) checkCall(::fchown(fifo.get(), static_cast<uid_t>(-1), group), "change the group of", path);
+  FileDescriptor fifo(
+      checkCall(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", path));
+  if (group != ~std::uint32_t{0})
+    checkCall(::fchown(fifo.get(), static_cast<uid_t>(-1), group), "change the group of", path);
   checkCall(::fchmod(fifo.get(), mode), "change the rights of", path);
   return fifo;
 }
 
 FileDescriptor tryOpenFifo(const std::string& name) noexcept {
   // For reading, too: a write must not raise SIGPIPE when the owner has died.
-  FileDescriptor fifo(::open(segments::path(name).c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
+  FileDescriptor fifo(
+      ::open(segments::path(name).c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
   struct stat status{};
-  if (fifo && (::fstat(fifo.get(), &status) != 0 || !S_ISFIFO(status.st_mode))) fifo.reset();  // anybody may put anything there
+  // anybody may put anything there
+  if (fifo && (::fstat(fifo.get(), &status) != 0 || !S_ISFIFO(status.st_mode))) fifo.reset();
   return fifo;
 }
 
@@ -56,7 +62,8 @@ bool tryRingFifo(const FileDescriptor& fifo) noexcept {
 void drainFifo(const FileDescriptor& fifo) noexcept {
   std::array<char, 256> discarded;
   // Less than there was room for: it is empty now, and what comes from now on is news again.
-  while (::read(fifo.get(), discarded.data(), discarded.size()) == static_cast<ssize_t>(discarded.size())) {
+  while (::read(fifo.get(), discarded.data(), discarded.size()) ==
+         static_cast<ssize_t>(discarded.size())) {
   }
 }
 

@@ -4,23 +4,28 @@
 //   owner   announce (sleeping = 1) ─ fence ─ look again ─ sleep on the bell ─ withdraw (sleeping = 0)
 //   peer    publish a message       ─ fence ─ sleeping? ─ change the bell, wake
 //
-// Of the two fences at least one side sees the other: either the owner finds the message or the peer finds the sleeper.
+// Of the two fences at least one side sees the other: either the owner finds the message or the
+// peer finds the sleeper.
 //
 // Threads  one owner thread; any number of ringers in any process.
-// Crash    a ringer killed between message and wake leaves a message that its death notice makes the owner look for.
-// Trust    the bell may be rung for nothing; it cannot be kept from ringing by anyone but the one who rings.
+// Crash    a ringer killed between message and wake leaves a message that its death notice makes
+//          the owner look for.
+// Trust    the bell may be rung for nothing; it cannot be kept from ringing by anyone but the one
+//          who rings.
 #pragma once
 
 #include <atomic>
 #include <string>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/file_descriptor.h>
-#include <mpf/shm/layout.h>
+#include <mpf/clock.h>
+#include <mpf/file_descriptor.h>
+
+#include "shm/layout.h"
 
 namespace mpf::doorbell {
 
-// Orders our stores before it with our loads after it. One half of PAIR(sleep-fence) and PAIR(watch-fence).
+// Orders our stores before it with our loads after it. One half of PAIR(sleep-fence) and
+// PAIR(watch-fence).
 inline void fence() noexcept {
 #ifdef __SANITIZE_THREAD__
   // ThreadSanitizer does not know fences; a locked instruction is one on the hosts that it runs on.
@@ -33,8 +38,9 @@ inline void fence() noexcept {
 #endif
 }
 
-// Sleeps while `bell` still has the value `seen`, until rung or until `deadline`. May return early, when a signal handler ran that was
-// installed without SA_RESTART for example; a handler that must end the sleep rings.
+// Sleeps while `bell` still has the value `seen`, until rung or until `deadline`. May return early,
+// when a signal handler ran that was installed without SA_RESTART for example; a handler that must
+// end the sleep rings.
 void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) noexcept;
 
 // Changes the bell and wakes who sleeps on it.

@@ -1,28 +1,33 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/endpoint.h>
+#include "shm/endpoint.h"
 
 #include <sched.h>
 
 #include <bit>
 
-#include <mpf/base/step.h>
-#include <mpf/shm/cpu_relax.h>
+#include "base/step.h"
+#include "shm/cpu_relax.h"
+#include "shm/stale_segments.h"
 
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kCoolAfter = 4096;      // looks in vain before a link is no longer polled
-constexpr std::uint32_t kReplaceAfter = 64;     // looks in vain before a busier link may take its place
-constexpr std::uint32_t kHintsEvery = 16;       // messages of polled links between looks at the hints
-constexpr std::uint32_t kClockEvery = 64;       // spins between looks at the clock
-constexpr std::uint32_t kYieldEvery = 1u << 14;  // spins between offers of the CPU, for peers that share it
+constexpr std::uint32_t kCoolAfter = 4096;  // looks in vain before a link is no longer polled
+// looks in vain before a busier link may take its place
+constexpr std::uint32_t kReplaceAfter = 64;
+constexpr std::uint32_t kHintsEvery = 16;  // messages of polled links between looks at the hints
+constexpr std::uint32_t kClockEvery = 64;  // spins between looks at the clock
+// spins between offers of the CPU, for peers that share it
+constexpr std::uint32_t kYieldEvery = 1u << 14;
 constexpr std::uint32_t kLookAtAllEvery = 1024;  // looks at the hints between looks at all links
-constexpr std::size_t kFewLinks = 64;           // cost nothing to look at; of more links a look takes its time
+// cost nothing to look at; of more links a look takes its time
+constexpr std::size_t kFewLinks = 64;
 constexpr std::int64_t kLookAtAllNs = 100'000'000;
 
 }  // namespace
 
-Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights, WaitMode mode,
+Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name,
+                   Rights rights, WaitMode mode,
                    const std::function<void(layout::SegmentHeader&)>& describe)
     : backplane_(std::move(backplane)),
       window_(backplane_.name(), kind, name, rights,
@@ -33,7 +38,7 @@ Endpoint::Endpoint(Backplane backplane, layout::SegmentKind kind, const std::str
       mode_(mode) {}
 
 Endpoint::~Endpoint() {
-  if (origin().isInherited()) return;
+  if (forkGuard().isInherited()) return;
   for (const auto& [name, peer] : peers_) backplane_.watcher().forget(peer.token);
 }
 
@@ -50,14 +55,16 @@ std::optional<std::uint32_t> Endpoint::tryReserve() noexcept {
 
 void Endpoint::attach(std::uint32_t index, Link& link) {
   links_[index] = &link;
-  control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) + 1,
+                            std::memory_order_relaxed);
   setReadyBit(index);
 }
 
 void Endpoint::detach(std::uint32_t index) noexcept {
   coolLink(index);
   if (links_[index] != nullptr) {
-    control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
+    control().linkCount.store(control().linkCount.load(std::memory_order_relaxed) - 1,
+                              std::memory_order_relaxed);
   }
   links_[index] = nullptr;
   freeIndices_.push_back(index);
@@ -79,13 +86,15 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
   const auto [first, last] = peers_.equal_range(name);
   for (auto peer = first; peer != last; ++peer) {
     auto window = peer->second.window.lock();
-    // Links may still use a window that is closed or lost, so it stays watched: its owner may die before it has closed them.
+    // Links may still use a window that is closed or lost, so it stays watched: its owner may die
+    // before it has closed them.
     if (window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
   }
   auto window = PeerWindow::tryOpen(name, kind);
   if (!window || window->isClosed() || !window->hasOwner()) return nullptr;
-  const auto clean = [this, backplane = backplane_.name(), name, incarnation = window->header().incarnation] {
-    removeDeadWindow(backplane, name, incarnation);
+  const auto clean = [this, backplane = backplane_.name(), name,
+                      incarnation = window->header().incarnation] {
+    stale_segments::removeDeadWindow(backplane, name, incarnation);
     peerDied_.store(true, std::memory_order_relaxed);
     interrupt();
   };
@@ -106,7 +115,8 @@ void Endpoint::dropPeers() noexcept {
 
 std::optional<std::uint32_t> Endpoint::next() noexcept {
   if (armed_) disarm();
-  // Polled links have had their turn each: now the others, which have none while all that may be polled are busy.
+  // Polled links have had their turn each: now the others, which have none while all that may be
+  // polled are busy.
   if (sinceHints_ >= (hotCount_ == kHotLinks ? kHotLinks : kHintsEvery)) {
     if (const auto index = nextCold()) return index;
   }
@@ -158,8 +168,10 @@ std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
 std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
   auto& hints = window_.hints();
   const auto wordBit = std::uint64_t{1} << (word % 64);
-  if ((hints.readyWords[word / 64].load(std::memory_order_relaxed) & wordBit) == 0) return std::nullopt;
-  // PAIR(ready-word): withdrawn before the bits are read; a peer that sets a bit later sets this one again.
+  if ((hints.readyWords[word / 64].load(std::memory_order_relaxed) & wordBit) == 0)
+    return std::nullopt;
+  // PAIR(ready-word): withdrawn before the bits are read; a peer that sets a bit later sets this
+  // one again.
   hints.readyWords[word / 64].fetch_and(~wordBit, std::memory_order_acq_rel);
   MPF_STEP(ready_word_taken);
   const auto bits = hints.readyBits[word].load(std::memory_order_relaxed);
@@ -168,7 +180,9 @@ std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
   const auto rotated = std::rotr(bits, static_cast<int>(start));
   const auto bit = (static_cast<std::uint32_t>(std::countr_zero(rotated)) + start) % 64;
   // PAIR(ready-bit): withdrawn before the link is looked at.
-  const auto left = hints.readyBits[word].fetch_and(~(std::uint64_t{1} << bit), std::memory_order_acq_rel) & ~(std::uint64_t{1} << bit);
+  const auto left =
+      hints.readyBits[word].fetch_and(~(std::uint64_t{1} << bit), std::memory_order_acq_rel) &
+      ~(std::uint64_t{1} << bit);
   MPF_STEP(ready_bit_taken);
   // PAIR(ready-word): the others are still to come.
   if (left != 0) hints.readyWords[word / 64].fetch_or(wordBit, std::memory_order_release);
@@ -241,7 +255,8 @@ std::optional<std::uint64_t> Endpoint::takeKnock() noexcept {
 
 bool Endpoint::takeRescan() noexcept {
   auto& rescan = window_.hints().rescan;
-  return rescan.load(std::memory_order_relaxed) != 0 && rescan.exchange(0, std::memory_order_relaxed) != 0;
+  return rescan.load(std::memory_order_relaxed) != 0 &&
+         rescan.exchange(0, std::memory_order_relaxed) != 0;
 }
 
 bool Endpoint::takeLocalNews() noexcept {
@@ -258,7 +273,8 @@ void Endpoint::interrupt() noexcept {
 
 bool Endpoint::hasReadyWords() const noexcept {
   const auto& words = window_.hints().readyWords;
-  return std::any_of(words.begin(), words.end(), [](const auto& word) { return word.load(std::memory_order_relaxed) != 0; });
+  return std::any_of(words.begin(), words.end(),
+                     [](const auto& word) { return word.load(std::memory_order_relaxed) != 0; });
 }
 
 bool Endpoint::hasHints() const noexcept { return hasReadyWords() || hasSideNews(); }
@@ -270,7 +286,9 @@ bool Endpoint::hasNews() const noexcept {
   return isRevisitDue() || hasHints();
 }
 
-bool Endpoint::isRevisitDue() const noexcept { return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasNews(); }
+bool Endpoint::isRevisitDue() const noexcept {
+  return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasNews();
+}
 
 bool Endpoint::wait(Deadline deadline) noexcept {
   slept_ = false;
@@ -307,22 +325,25 @@ void Endpoint::announce(layout::SleepState how) noexcept {
   control().sleepNumber.store(++sleepNumber_, std::memory_order_release);
   MPF_STEP(sleep_announced);
   // PAIR(sleep-fence): our announcement before, the last look after.
+  // PAIR(bell): sleep() has read the bell before this fence.
   doorbell::fence();
 }
 
 void Endpoint::sleep(Deadline deadline) noexcept {
   auto& bell = window_.hints().bell;
-  // PAIR(bell): together with the fence of announce().
+  // PAIR(bell): its acquire side is the fence in announce().
   const auto seen = bell.load(std::memory_order_relaxed);
   announce(layout::SleepState::onFutex);
-  const auto until = tryLookAtAll() ? deadline : std::min(deadline, Deadline::atNs(lookedAtAllNs_ + kLookAtAllNs));
+  const auto until =
+      tryLookAtAll() ? deadline : std::min(deadline, Deadline::atNs(lookedAtAllNs_ + kLookAtAllNs));
   if (!hasNews()) {
     const auto sleptFrom = mode_ == WaitMode::adaptive ? Clock::nowNs() : 0;
     MPF_STEP(falling_asleep);
     doorbell::sleep(bell, seen, until);
     MPF_STEP(woken);
     slept_ = true;
-    control().wakes.store(control().wakes.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    control().wakes.store(control().wakes.load(std::memory_order_relaxed) + 1,
+                          std::memory_order_relaxed);
     if (mode_ == WaitMode::adaptive) {
       spinShift_ = Clock::nowNs() - sleptFrom < 4 * wakeNs_ ? 0 : std::min(spinShift_ + 1, 5u);
     }
@@ -330,8 +351,9 @@ void Endpoint::sleep(Deadline deadline) noexcept {
   control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
 }
 
-// A peer that scribbles may have lost another one's ready bit. Who is about to sleep looks at every link; with many links, not more
-// often than kLookAtAllNs allows. False when that is to be made up for.
+// A peer that scribbles may have lost another one's ready bit. Who is about to sleep looks at every
+// link; with many links, not more often than kLookAtAllNs allows. False when that is to be made up
+// for.
 bool Endpoint::tryLookAtAll() noexcept {
   if (links_.size() > kFewLinks) {
     const auto nowNs = Clock::nowNs();

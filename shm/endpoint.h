@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Endpoint: a window with the links that end at it, and the wait for the next message of any of them.
+// Endpoint: a window with the links that end at it, and the wait for the next message of any of
+// them.
 //
 //   busy links are polled directly ─► then ready bits ─► nothing: spin for a while ─► announce, look again, sleep
 //
-// A thousand idle links cost nothing: they are looked at when their ready bit is set. Links take turns, one message each.
+// A thousand idle links cost nothing: they are looked at when their ready bit is set. Links take
+// turns, one message each.
 //
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
 // Crash    a peer's death comes through the watcher as local news.
@@ -18,23 +20,25 @@
 #include <optional>
 #include <vector>
 
-#include <mpf/shm/backplane.h>
-#include <mpf/shm/link.h>
+#include <mpf/backplane.h>
+
+#include "shm/link.h"
+#include "shm/watcher.h"
 
 namespace mpf {
 
 class Endpoint {
  public:
   // As OwnWindow. `mode` is what wait() does.
-  Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights, WaitMode mode,
-           const std::function<void(layout::SegmentHeader&)>& describe);
+  Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
+           WaitMode mode, const std::function<void(layout::SegmentHeader&)>& describe);
   ~Endpoint();
   Endpoint(const Endpoint&) = delete;
   Endpoint& operator=(const Endpoint&) = delete;
 
   [[nodiscard]] const Backplane& backplane() const noexcept { return backplane_; }
   [[nodiscard]] OwnWindow& window() noexcept { return window_; }
-  [[nodiscard]] const Origin& origin() const noexcept { return window_.origin(); }
+  [[nodiscard]] const ForkGuard& forkGuard() const noexcept { return window_.forkGuard(); }
   [[nodiscard]] layout::WindowControl& control() const noexcept { return window_.control(); }
 
   // --- links ---
@@ -45,16 +49,19 @@ class Endpoint {
   // What comes of a held link is no news until it is released.
   void hold(std::uint32_t index) noexcept;
   void release(std::uint32_t index, Link& link) noexcept;
-  // A peer's window, mapped once and watched: its death comes as local news, with peer()->isDead() on the links.
+  // A peer's window, mapped once and watched: its death comes as local news, with peer()->isDead()
+  // on the links.
   std::shared_ptr<PeerWindow> peer(const std::string& name, layout::SegmentKind kind);
 
   // --- what is new ---
-  // Index of a link that may have a message or a change of state; nullopt when there is none now. Take one message of it.
+  // Index of a link that may have a message or a change of state; nullopt when there is none now.
+  // Take one message of it.
   std::optional<std::uint32_t> next() noexcept;
   // Whether one of the next three may have something. Cheap: three loads.
   [[nodiscard]] bool hasSideNews() const noexcept {
     const auto& hints = window_.hints();
-    return hints.knocked.load(std::memory_order_relaxed) != knockedSeen_ || hints.rescan.load(std::memory_order_relaxed) != 0 ||
+    return hints.knocked.load(std::memory_order_relaxed) != knockedSeen_ ||
+           hints.rescan.load(std::memory_order_relaxed) != 0 ||
            localNews_.load(std::memory_order_relaxed) != 0 || knockCursor_ != layout::kKnocks;
   }
   // A link that wants to be accepted.
@@ -71,8 +78,8 @@ class Endpoint {
   // Ends the current or the next wait().
   void interrupt() noexcept;
 
-  // For event loops: a descriptor that is readable when there is news. arm() it before each wait in poll(); when it returns false
-  // there is news already.
+  // For event loops: a descriptor that is readable when there is news. arm() it before each wait in
+  // poll(); when it returns false there is news already.
   [[nodiscard]] int descriptor() const noexcept { return window_.fifo().get(); }
   bool arm() noexcept;
   void disarm() noexcept;
@@ -80,7 +87,9 @@ class Endpoint {
   void callAgain() noexcept { window_.ring(); }
 
   // What a wake-up costs, as seen from a message that ended a sleep.
-  void noteWake(std::int64_t ns) noexcept { wakeNs_ += (std::min<std::int64_t>(ns, 1'000'000) - wakeNs_) / 8; }
+  void noteWake(std::int64_t ns) noexcept {
+    wakeNs_ += (std::min<std::int64_t>(ns, 1'000'000) - wakeNs_) / 8;
+  }
   // Whether the last wait() slept.
   [[nodiscard]] bool slept() const noexcept { return slept_; }
 
@@ -119,9 +128,10 @@ class Endpoint {
   std::size_t hotCount_ = 0;
   std::size_t cursor_ = 0;
   std::uint32_t sinceHints_ = 0;  // messages of polled links
-  std::uint32_t sinceLook_ = 0;   // looks at the hints
+  std::uint32_t sinceLook_ = 0;  // looks at the hints
   std::uint32_t readyCursor_ = 0;
-  std::optional<std::uint32_t> revisit_;  // a cold link that may have more than the one message taken
+  // a cold link that may have more than the one message taken
+  std::optional<std::uint32_t> revisit_;
   std::uint32_t knockedSeen_ = 0;
   std::uint32_t knockCursor_ = layout::kKnocks;
   std::atomic<std::uint32_t> localNews_{0};
@@ -137,7 +147,8 @@ class Endpoint {
     std::weak_ptr<PeerWindow> window;
     Watcher::Token token;
   };
-  std::multimap<std::string, Peer> peers_;  // of one name: a new window, and those before it whose links have not ended yet
+  // of one name: a new window, and those before it whose links have not ended yet
+  std::multimap<std::string, Peer> peers_;
 };
 
 }  // namespace mpf

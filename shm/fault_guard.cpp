@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/fault_guard.h>
+#include "shm/fault_guard.h"
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -14,7 +14,7 @@
 #include <mutex>
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 #ifdef __SANITIZE_THREAD__
 extern "C" {
@@ -51,11 +51,14 @@ struct sigaction previousAction{};
 
 Range* findFaulty(std::uintptr_t address) noexcept {
   // PAIR(guard-block): its ranges, and the blocks before it.
-  for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr; block = block->next) {
+  for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr;
+       block = block->next) {
     for (auto& range : block->ranges) {
       // PAIR(guarded-range): its length and kind.
       const auto begin = range.begin.load(std::memory_order_acquire);
-      if (begin != 0 && address >= begin && address - begin < range.bytes.load(std::memory_order_relaxed)) return &range;
+      if (begin != 0 && address >= begin &&
+          address - begin < range.bytes.load(std::memory_order_relaxed))
+        return &range;
     }
   }
   return nullptr;
@@ -63,24 +66,28 @@ Range* findFaulty(std::uintptr_t address) noexcept {
 
 bool tryGrow(const Range& range) noexcept {
   const auto bytes = static_cast<off_t>(range.bytes.load(std::memory_order_relaxed));
-  if (const int file = range.file.load(std::memory_order_relaxed); file >= 0) return ::fallocate(file, 0, 0, bytes) == 0;
+  if (const int file = range.file.load(std::memory_order_relaxed); file >= 0)
+    return ::fallocate(file, 0, 0, bytes) == 0;
   // PAIR(guard-path): the path.
   const auto inode = range.inode.load(std::memory_order_acquire);
   if (inode == 0) return false;
   const int file = ::open(range.path.data(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
   if (file < 0) return false;
   struct stat status{};
-  const bool grown = ::fstat(file, &status) == 0 && status.st_ino == inode && ::fallocate(file, 0, 0, bytes) == 0;
+  const bool grown =
+      ::fstat(file, &status) == 0 && status.st_ino == inode && ::fallocate(file, 0, 0, bytes) == 0;
   ::close(file);
   return grown;
 }
 
-// As mmap() does it. For ThreadSanitizer mmap() writes to the whole range, which would race with those who read there; they see zeroes, or what was.
+// As mmap() does it. For ThreadSanitizer mmap() writes to the whole range, which would race with
+// those who read there; they see zeroes, or what was.
 void* mapZeroes(void* data, std::size_t bytes, int protection) noexcept {
 #ifdef __SANITIZE_THREAD__
   AnnotateIgnoreWritesBegin(__FILE__, __LINE__);
 #endif
-  auto* const mapped = ::mmap(data, bytes, protection, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0);
+  auto* const mapped =
+      ::mmap(data, bytes, protection, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0);
 #ifdef __SANITIZE_THREAD__
   AnnotateIgnoreWritesEnd(__FILE__, __LINE__);
 #endif
@@ -89,7 +96,8 @@ void* mapZeroes(void* data, std::size_t bytes, int protection) noexcept {
 
 // Zeroes in place of a file, at once for all threads.
 bool tryReplace(Range& range) noexcept {
-  const int protection = PROT_READ | (range.writable.load(std::memory_order_relaxed) ? PROT_WRITE : 0);
+  const int protection =
+      PROT_READ | (range.writable.load(std::memory_order_relaxed) ? PROT_WRITE : 0);
   // NOLINTNEXTLINE(performance-no-int-to-ptr): the address that was mapped
   auto* const data = reinterpret_cast<void*>(range.begin.load(std::memory_order_relaxed));
   const auto bytes = range.bytes.load(std::memory_order_relaxed);
@@ -100,10 +108,12 @@ bool tryReplace(Range& range) noexcept {
 
 // As the kernel would have done without us.
 void passOn(int signal, siginfo_t* fault, void* context) {
-  if ((previousAction.sa_flags & SA_SIGINFO) != 0) return previousAction.sa_sigaction(signal, fault, context);
+  if ((previousAction.sa_flags & SA_SIGINFO) != 0)
+    return previousAction.sa_sigaction(signal, fault, context);
   const bool isSent = fault->si_code <= 0;  // by a process, not by an access
   if (previousAction.sa_handler == SIG_IGN && isSent) return;
-  if (previousAction.sa_handler != SIG_DFL && previousAction.sa_handler != SIG_IGN) return previousAction.sa_handler(signal);
+  if (previousAction.sa_handler != SIG_DFL && previousAction.sa_handler != SIG_IGN)
+    return previousAction.sa_handler(signal);
   ::signal(signal, SIG_DFL);
   if (isSent) ::raise(signal);  // a faulty access comes again by itself
 }
@@ -112,14 +122,17 @@ void onFault(int signal, siginfo_t* fault, void* context) {
   if (!tryRepair(*fault)) passOn(signal, fault, context);
 }
 
-// The child of a fork: what it has of its parent's mappings becomes memory of its own, and its copies of the parent's locks go.
+// The child of a fork: what it has of its parent's mappings becomes memory of its own, and its
+// copies of the parent's locks go.
 void leaveToParent() noexcept {
   const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   // PAIR(guard-block): its ranges, and the blocks before it.
-  for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr; block = block->next) {
+  for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr;
+       block = block->next) {
     for (auto& range : block->ranges) {
       if (range.begin.load(std::memory_order_relaxed) == 0) continue;
-      if (const int file = range.file.exchange(-1, std::memory_order_relaxed); file >= 0) ::dup3(nothing, file, O_CLOEXEC);
+      if (const int file = range.file.exchange(-1, std::memory_order_relaxed); file >= 0)
+        ::dup3(nothing, file, O_CLOEXEC);
       range.inode.store(0, std::memory_order_relaxed);
       tryReplace(range);
     }
@@ -134,7 +147,8 @@ void watchForks() {
     leaveToParent();
     tableMutex.unlock();
   };
-  if (const int error = ::pthread_atfork(lock, unlock, unlockInChild); error != 0) throwSystemError(error, "pthread_atfork", {});
+  if (const int error = ::pthread_atfork(lock, unlock, unlockInChild); error != 0)
+    throwSystemError(error, "pthread_atfork", {});
 }
 
 bool install() {

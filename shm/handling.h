@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Handling: the request that a server works on, as one word of its window, so that others can say why it does nothing else.
+// Handling: the request that a server works on, as one word of its window, so that others can say
+// why it does nothing else.
 //
-//   bit 63: 1 | 48..62: 0 | 32..47: type of the message | 0..31: its cmd         the word 0: it works on none
+//   bit 63: 1 | 48..62: 0 | 32..47: type of the message | 0..31: its cmd         the word 0: it
+//   works on none
 //
 // Since when: WindowControl::progressAtNs, which is no later than the request was taken.
 //
@@ -12,7 +14,7 @@
 #include <cstdint>
 #include <optional>
 
-#include <mpf/shm/layout.h>
+#include "shm/layout.h"
 
 namespace mpf {
 
@@ -27,7 +29,8 @@ struct Handling {
   }
   [[nodiscard]] static constexpr std::optional<Handling> of(std::uint64_t word) noexcept {
     if ((word & kIsSet) == 0) return std::nullopt;
-    return Handling{static_cast<std::uint16_t>(word >> 32), static_cast<std::int32_t>(static_cast<std::uint32_t>(word))};
+    return Handling{static_cast<std::uint16_t>(word >> 32),
+                    static_cast<std::int32_t>(static_cast<std::uint32_t>(word))};
   }
 
  private:

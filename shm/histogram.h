@@ -8,7 +8,7 @@
 #include <bit>
 #include <cstdint>
 
-#include <mpf/shm/layout.h>
+#include "shm/layout.h"
 
 namespace mpf {
 
@@ -18,7 +18,8 @@ inline void count(layout::Word64& counter, std::uint64_t by = 1) noexcept {
 }
 
 struct HistogramBuckets {
-  static constexpr std::uint32_t kFirstPower = 4;  // bucket 0 starts at 0 and ends at 16 ns + a quarter
+  // bucket 0 starts at 0 and ends at 16 ns + a quarter
+  static constexpr std::uint32_t kFirstPower = 4;
 
   [[nodiscard]] static std::uint32_t indexOf(std::uint64_t ns) noexcept {
     if (ns < (1u << kFirstPower)) return 0;
@@ -36,7 +37,8 @@ struct HistogramBuckets {
 inline void record(layout::Histogram& histogram, std::int64_t ns) noexcept {
   const auto value = static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 0));
   count(histogram.buckets[HistogramBuckets::indexOf(value)]);
-  if (value > histogram.maxNs.load(std::memory_order_relaxed)) histogram.maxNs.store(value, std::memory_order_relaxed);
+  if (value > histogram.maxNs.load(std::memory_order_relaxed))
+    histogram.maxNs.store(value, std::memory_order_relaxed);
 }
 
 }  // namespace mpf

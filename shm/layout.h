@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: MIT
-// Layout: every byte that processes share. docs/shm-layout.md tells the same to writers of a second reader.
+// Layout: every byte that processes share. docs/shm-layout.md tells the same to writers of a second
+// reader.
 //
 // Each kind of segment is a file in /dev/shm that starts with a SegmentHeader:
 //
 //   mpf.<backplane>.s.<location>.<server>   server window   ┐ WindowControl: sleeping, state, counters, histograms.
 //   mpf.<backplane>.c.<incarnation>         client window   ┘ Written by the owner alone, mapped read-only by its peers.
-//   mpf.<backplane>.h.<incarnation>         hints           WindowHints of one window: bell, knocks, ready bits. Every peer writes.
-//   mpf.<backplane>.l.<server>.<link>       link            two rings of one client-server pair, mapped by these two alone.
-//   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks for messages that do not fit a ring; `side` writes.
-//   mpf.<backplane>.w.<incarnation>         wish            a client that waits for a server: the header alone.
-//   mpf.<backplane>.r.<incarnation>         router          a router's connections to others, for reports. Locked and written by the router.
+//   mpf.<backplane>.h.<incarnation>         hints           WindowHints of one window: bell,
+//   knocks, ready bits. Every peer writes. mpf.<backplane>.l.<server>.<link>       link
+//   two rings of one client-server pair, mapped by these two alone.
+//   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks for messages that do not fit a
+//   ring; `side` writes. mpf.<backplane>.w.<incarnation>         pending bind            a client
+//   that waits for a server: the header alone. mpf.<backplane>.r.<incarnation>         router
+//   a router's connections to others, for reports. Locked and written by the router.
 //
-// Threads  each word has one writing process, named next to it; WindowHints are the exception and only hints.
-// Crash    segments appear under their name complete and locked (or not at all); messages appear with one release store.
+// Threads  each word has one writing process, named next to it; WindowHints are the exception and
+//          only hints.
+// Crash    segments appear under their name complete and locked (or not at all); messages appear
+//          with one release store.
 // Trust    a reader checks or masks whatever it takes from here before use.
-// Version  a new minor version only fills reserved bytes; whatever else changes is a new major version.
+// Version  a new minor version only fills reserved bytes; whatever else changes is a new major
+//          version.
 #pragma once
 
 #include <array>
@@ -32,7 +38,8 @@ inline constexpr std::uint16_t kMinor = 1;
 inline constexpr std::uint16_t kOldestMajor = 1;  // oldest major version that this code reads
 
 inline constexpr std::size_t kCacheLineBytes = 64;
-inline constexpr std::size_t kPairBytes = 128;  // two lines: the adjacent-line prefetcher pulls both
+// two lines: the adjacent-line prefetcher pulls both
+inline constexpr std::size_t kPairBytes = 128;
 inline constexpr std::size_t kPageBytes = 4096;
 
 inline constexpr std::uint32_t kMaxLinks = 16384;  // links of one window
@@ -47,7 +54,15 @@ using Word64 = std::atomic<std::uint64_t>;
 static_assert(Word32::is_always_lock_free && sizeof(Word32) == 4);
 static_assert(Word64::is_always_lock_free && sizeof(Word64) == 8);
 
-enum class SegmentKind : std::uint32_t { serverWindow = 1, clientWindow = 2, hints = 3, link = 4, bulk = 5, wish = 6, router = 7 };
+enum class SegmentKind : std::uint32_t {
+  serverWindow = 1,
+  clientWindow = 2,
+  hints = 3,
+  link = 4,
+  bulk = 5,
+  pendingBind = 6,
+  router = 7
+};
 
 // First 512 bytes of every segment. Written before the segment gets its name, constant afterwards.
 struct SegmentHeader {
@@ -57,7 +72,8 @@ struct SegmentHeader {
   SegmentKind kind;
   std::uint64_t totalBytes;  // the file is at least this long
   std::uint64_t incarnation;  // unique on this host
-  std::uint64_t ownerWindow;  // incarnation of the window whose lock tells whether the owner lives; a window names itself
+  // incarnation of the window whose lock tells whether the owner lives; a window names itself
+  std::uint64_t ownerWindow;
   std::int32_t ownerPid;  // as seen in pidNamespace
   std::uint32_t ownerUid;
   std::uint64_t ownerStartTicks;  // field 22 of /proc/<pid>/stat
@@ -67,10 +83,12 @@ struct SegmentHeader {
   std::int32_t location;
   std::uint32_t reserved0;
   std::array<char, kBackplaneChars> backplane;
-  std::array<char, kNameChars> name;  // server window, wish, link: the server; client window: the client's label
+  // server window, pending bind, link: the server; client window: the client's label
+  std::array<char, kNameChars> name;
   std::array<char, kProgramChars> program;
 
-  // Geometry of rings and pools. A link has all of it; of a server window, the limits and rights are what it offers.
+  // Geometry of rings and pools. A link has all of it; of a server window, the limits and rights
+  // are what it offers.
   std::uint32_t queueSlots;  // slots of the request ring, a power of two
   std::uint32_t replySlots;  // slots of the reply ring, a power of two
   std::uint32_t queueSize;  // requests of one client that may wait
@@ -96,9 +114,11 @@ struct SegmentHeader {
 };
 static_assert(sizeof(SegmentHeader) == 512);
 static_assert(offsetof(SegmentHeader, backplane) == 88 && offsetof(SegmentHeader, name) == 128);
-static_assert(offsetof(SegmentHeader, queueSlots) == 224 && offsetof(SegmentHeader, chunkBytes) == 296);
+static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
+              offsetof(SegmentHeader, chunkBytes) == 296);
 
-// Log-linear histogram of nanoseconds: bucket = 4 per power of two, from 16 ns to 2^40 ns. Written by one thread.
+// Log-linear histogram of nanoseconds: bucket = 4 per power of two, from 16 ns to 2^40 ns. Written
+// by one thread.
 inline constexpr std::uint32_t kHistogramBuckets = 4 * 37;
 struct Histogram {
   std::array<Word64, kHistogramBuckets> buckets;
@@ -112,20 +132,25 @@ enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2
 // What a server lacks to accept another client. Since 1.1.
 enum class Shortage : std::uint32_t { none = 0, descriptors = 1, openFiles = 2, memory = 3 };
 
-// What a window's owner says of itself. At offset 512 of a server or client window. Every word is written by the owner.
+// What a window's owner says of itself. At offset 512 of a server or client window. Every word is
+// written by the owner.
 struct WindowControl {
-  alignas(kPairBytes) std::atomic<SleepState> sleeping;  // announced before a sleep, withdrawn after it
-  Word64 sleepNumber;  // of the sleep that is announced: who has rung for it need not ring again; 0: nobody says
+  // announced before a sleep, withdrawn after it
+  alignas(kPairBytes) std::atomic<SleepState> sleeping;
+  // of the sleep that is announced: who has rung for it need not ring again; 0: nobody says
+  Word64 sleepNumber;
   alignas(kPairBytes) std::atomic<WindowState> state;
   Word32 linkCount;
-  Word32 queueSize;  // requests of one client that may wait, for links made from now on (server windows)
+  // requests of one client that may wait, for links made from now on (server windows)
+  Word32 queueSize;
   std::atomic<Shortage> shortage;  // of a server that cannot accept a client; none once it can
   Word64 progress;  // grows with every message handled
   Word64 progressAtNs;  // CLOCK_MONOTONIC when `progress` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken
   Word64 sent;  // messages pushed
   Word64 replyQueueFull;  // replies refused because the client did not take them
-  Word64 queueFull;  // sends refused because the server's queue was full or owed too many replies (client windows)
+  // sends refused because the server's queue was full or owed too many replies (client windows)
+  Word64 queueFull;
   Word64 expired;  // requests that were dropped because their deadline had passed
   Word64 refused;  // requests answered with the fate `refused`
   Word64 wakes;  // times that the owner slept and was woken
@@ -133,7 +158,8 @@ struct WindowControl {
   Word64 linksClosed;
   Word64 peersDied;
   Word64 protocolErrors;  // nonsense read from a peer; each costs that link
-  Word64 alarms;  // server windows: faults of the hardware; client windows: exceptions that nobody could catch
+  // server windows: faults of the hardware; client windows: exceptions that nobody could catch
+  Word64 alarms;
   Word64 handling;  // the request that a server works on, see Handling; 0: none. Since layout 1.1
   std::array<Word64, (kHistogramBuckets / 4) - 2> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
@@ -142,21 +168,26 @@ struct WindowControl {
 inline constexpr std::size_t kWindowControlOffset = 512;
 inline constexpr std::size_t kWindowBytes = kWindowControlOffset + sizeof(WindowControl);
 
-// Hints of a window, written by every peer and by the owner. Losing or inventing one costs a wake-up, never a message.
+// Hints of a window, written by every peer and by the owner. Losing or inventing one costs a
+// wake-up, never a message.
 struct WindowHints {
   SegmentHeader header;
   alignas(kPairBytes) Word32 bell;  // changes with every ring; the futex that the owner sleeps on
   alignas(kPairBytes) Word32 knocked;  // changes with every knock
   Word32 rescan;  // not 0: a knock was overwritten, look for new links by name
-  alignas(kPairBytes) std::array<Word64, kKnocks> knocks;  // incarnations of links that wait to be accepted
-  alignas(kPairBytes) std::array<Word64, kMaxLinks / 64 / 64> readyWords;  // bit w: readyBits[w] is not zero
+  // incarnations of links that wait to be accepted
+  alignas(kPairBytes) std::array<Word64, kKnocks> knocks;
+  // bit w: readyBits[w] is not zero
+  alignas(kPairBytes) std::array<Word64, kMaxLinks / 64 / 64> readyWords;
   alignas(kPairBytes) std::array<Word64, kMaxLinks / 64> readyBits;  // bit i: link i has news
 };
 static_assert(offsetof(WindowHints, bell) == 512);
 
-// One 64-byte slot. A message is one first slot and up to three more; only the first one's sequence says that it is there.
+// One 64-byte slot. A message is one first slot and up to three more; only the first one's sequence
+// says that it is there.
 struct alignas(kCacheLineBytes) Slot {
-  Word64 sequence;  // written by the producer, last: position + 1 once the message that starts here is complete
+  // written by the producer, last: position + 1 once the message that starts here is complete
+  Word64 sequence;
   std::uint16_t type;
   std::uint8_t slots;  // 1 to kMaxMessageSlots
   std::uint8_t flags;  // kSlot...
@@ -179,7 +210,9 @@ static_assert(sizeof(MoreSlot) == sizeof(Slot));
 
 inline constexpr std::uint32_t kMaxMessageSlots = 4;
 inline constexpr std::size_t kFirstSlotBodyBytes = sizeof(Slot::body);
-inline constexpr std::size_t kInlineBodyBytes = kFirstSlotBodyBytes + (kMaxMessageSlots - 1) * sizeof(MoreSlot::body);  // 192
+// 192
+inline constexpr std::size_t kInlineBodyBytes =
+    kFirstSlotBodyBytes + (kMaxMessageSlots - 1) * sizeof(MoreSlot::body);
 
 inline constexpr std::uint8_t kSlotChunk = 1;  // the body is a ChunkRef to a bulk segment
 inline constexpr std::uint8_t kSlotFirstReply = 2;  // ends the request that it answers
@@ -204,7 +237,8 @@ struct RingControl {
 inline constexpr std::uint32_t kReturnSlots = 256;
 struct ReturnRing {
   alignas(kPairBytes) Word64 returned;  // borrower
-  std::array<Word64, kReturnSlots> chunks;  // segment << 32 | chunk; a pool never lends more than kReturnSlots
+  // segment << 32 | chunk; a pool never lends more than kReturnSlots
+  std::array<Word64, kReturnSlots> chunks;
 };
 
 enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused = 3 };
@@ -246,7 +280,8 @@ struct RouterLine {
   Word64 connects;  // times that it was connected
   Word64 queueSize;  // messages that may wait for the line
   Word64 inQueue;  // and that do
-  Word64 queueFull;  // requests that found a far server's queue full (client), or a server's here (server)
+  // requests that found a far server's queue full (client), or a server's here (server)
+  Word64 queueFull;
   Word64 messagesSent;
   Word64 messagesReceived;
   Word64 framesSent;  // each one write
@@ -269,7 +304,8 @@ inline constexpr std::size_t kRouterLinesOffset = 512;
 inline constexpr std::size_t kRouterBytes = kRouterLinesOffset + kRouterLines * sizeof(RouterLine);
 
 // Nothing above has a constructor that does work, a pointer, a bool or a size_t.
-static_assert(std::is_standard_layout_v<SegmentHeader> && std::is_trivially_copyable_v<SegmentHeader>);
+static_assert(std::is_standard_layout_v<SegmentHeader> &&
+              std::is_trivially_copyable_v<SegmentHeader>);
 static_assert(std::is_standard_layout_v<WindowControl> && std::is_standard_layout_v<WindowHints>);
 static_assert(std::is_standard_layout_v<LinkControl> && std::is_standard_layout_v<Slot>);
 

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/link.h>
+#include "shm/link.h"
 
 #include <unistd.h>
 
 #include <bit>
 #include <fmt/format.h>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/step.h>
-#include <mpf/shm/segment_name.h>
+#include <mpf/clock.h>
+
+#include "base/step.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
 
-// Of messages to a peer that polls, one of so many is timed: a clock call costs as much as a quarter of a round trip. Messages to
-// a peer that must be woken are all timed.
+// Of messages to a peer that polls, one of so many is timed: a clock call costs as much as a
+// quarter of a round trip. Messages to a peer that must be woken are all timed.
 constexpr std::uint64_t kSampleEvery = 64;
 
 layout::Slot* slotsOf(const Segment& segment, LinkSide producer) {
@@ -36,7 +37,9 @@ layout::ReturnRing& returnRing(const Segment& segment, LinkSide poolOwner) {
   return poolOwner == LinkSide::client ? control.requestChunks : control.replyChunks;
 }
 
-LinkSide other(LinkSide side) { return side == LinkSide::client ? LinkSide::server : LinkSide::client; }
+LinkSide other(LinkSide side) {
+  return side == LinkSide::client ? LinkSide::server : LinkSide::client;
+}
 
 PoolPlace poolPlace(const Segment& segment, const std::string& backplane, LinkSide side) {
   const auto& header = segment.header();
@@ -47,10 +50,12 @@ PoolPlace poolPlace(const Segment& segment, const std::string& backplane, LinkSi
 void checkGeometry(const layout::SegmentHeader& header, const std::string& name) {
   const auto queueSize = std::clamp(header.queueSize, 1u, LinkGeometry::kMaxQueueSize);
   const auto expected = LinkGeometry::forQueue(queueSize);
-  if (header.queueSize != queueSize || header.queueSlots != expected.queueSlots || header.replySlots != expected.replySlots ||
+  if (header.queueSize != queueSize || header.queueSlots != expected.queueSlots ||
+      header.replySlots != expected.replySlots ||
       header.maxOutstanding != expected.maxOutstanding) {
-    throw SegmentError(fmt::format("{}: rings of {} and {} slots for a queue of {} make no sense", segments::path(name), header.queueSlots,
-                                   header.replySlots, header.queueSize));
+    throw SegmentError(fmt::format("{}: rings of {} and {} slots for a queue of {} make no sense",
+                                   segments::path(name), header.queueSlots, header.replySlots,
+                                   header.queueSize));
   }
 }
 
@@ -69,13 +74,15 @@ Rights Link::rightsAt(const PeerWindow& server) {
   return rights;
 }
 
-std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
-                                   std::shared_ptr<PeerWindow> server) {
+std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow& own,
+                                   std::uint32_t index, std::shared_ptr<PeerWindow> server) {
   const auto& offer = server->header();
-  const auto queueSize = std::clamp(server->control().queueSize.load(std::memory_order_relaxed), 1u, LinkGeometry::kMaxQueueSize);
+  const auto queueSize = std::clamp(server->control().queueSize.load(std::memory_order_relaxed), 1u,
+                                    LinkGeometry::kMaxQueueSize);
   const auto geometry = LinkGeometry::forQueue(queueSize);
   const auto rights = rightsAt(*server);
-  auto segment = Segment::create(layout::linkBytes(geometry.queueSlots, geometry.replySlots), layout::SegmentKind::link, backplane, rights);
+  auto segment = Segment::create(layout::linkBytes(geometry.queueSlots, geometry.replySlots),
+                                 layout::SegmentKind::link, backplane, rights);
   auto& header = segment.sharedHeader();
   header.ownerWindow = own.header().incarnation;
   header.clientWindow = own.header().incarnation;
@@ -101,12 +108,14 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   }
   MPF_STEP(link_named);
   segment.closeFile();
-  auto link = std::unique_ptr<Link>(new Link(std::move(segment), backplane, LinkSide::client, rights));
+  auto link =
+      std::unique_ptr<Link>(new Link(std::move(segment), backplane, LinkSide::client, rights));
   link->attachPeer(std::move(server), 0);
   return link;
 }
 
-std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::string& name, const OwnWindow& own) {
+std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::string& name,
+                                    const OwnWindow& own) {
   auto segment = Segment::tryOpen(name, layout::SegmentKind::link, Segment::Access::readWrite);
   if (!segment) return nullptr;
   const auto& header = segment->header();
@@ -118,7 +127,8 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   }
   MPF_STEP(link_mapped);
   segment->closeFile();
-  return std::unique_ptr<Link>(new Link(std::move(*segment), backplane, LinkSide::server, own.rights()));
+  return std::unique_ptr<Link>(
+      new Link(std::move(*segment), backplane, LinkSide::server, own.rights()));
 }
 
 Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights)
@@ -127,15 +137,19 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       side_(side),
       outControl_(ringControl(segment_, side)),
       out_(slotsOf(segment_, side), slotCount(segment_, side), outControl_),
-      in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)), ringControl(segment_, other(side))),
-      pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user}, segment_.header().maxPoolBytes,
-            returnRing(segment_, side)),
-      borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes, returnRing(segment_, other(side))) {}
+      in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
+          ringControl(segment_, other(side))),
+      pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user},
+            segment_.header().maxPoolBytes, returnRing(segment_, side)),
+      borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes,
+                returnRing(segment_, other(side))) {}
 
 Link::~Link() {
-  if (side_ == LinkSide::client && !origin_.isInherited()) segments::remove(segment_.name());
-  // A client that has ended the link may have removed what there was before our last: then it is for us to remove.
-  if (leavesPool_ && peerState() == layout::LinkState::open && peer_->hasOwner()) pool_.leaveNames();
+  if (side_ == LinkSide::client && !forkGuard_.isInherited()) segments::remove(segment_.name());
+  // A client that has ended the link may have removed what there was before our last: then it is
+  // for us to remove.
+  if (leavesPool_ && peerState() == layout::LinkState::open && peer_->hasOwner())
+    pool_.leaveNames();
 }
 
 void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept {
@@ -163,23 +177,30 @@ bool Link::tryLeavePoolToClient() noexcept {
   return leavesPool_;
 }
 
-bool Link::hasPeerEnded() const noexcept { return peerState() >= layout::LinkState::closed || peer_->isDead() || !peer_->hasOwner(); }
+bool Link::hasPeerEnded() const noexcept {
+  return peerState() >= layout::LinkState::closed || peer_->isDead() || !peer_->hasOwner();
+}
 
 void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
-bool Link::shallBeTimed() const noexcept {
-  return outControl_.unwatched.load(std::memory_order_relaxed) != 0 || out_.messages() % kSampleEvery == 0;
+bool Link::shouldSampleTime() const noexcept {
+  return outControl_.unwatched.load(std::memory_order_relaxed) != 0 ||
+         out_.messages() % kSampleEvery == 0;
 }
 
-LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, const Limits& limits) noexcept {
+LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body,
+                       const Limits& limits) noexcept {
   if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
-  if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting && out_.waiting() >= limits.waiting) return LinkSend::full;
+  if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting &&
+      out_.waiting() >= limits.waiting)
+    return LinkSend::full;
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
 
   const auto slots = slotsFor(body.size());
-  // Every message that the queue may still take needs one slot; only what is left over may be spent on longer ones.
+  // Every message that the queue may still take needs one slot; only what is left over may be spent
+  // on longer ones.
   const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
   const auto queueLeft = limits.waiting > queued + 1 ? limits.waiting - queued - 1 : 0;
   const auto needed = slots == 1 ? limits.reserve : std::max(limits.longReserve, queueLeft);
@@ -203,7 +224,9 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body, cons
   MPF_STEP(chunk_lent);
   envelope.flags |= layout::kSlotChunk;
   const auto ref = own ? *own : *foreign;
-  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve)) return LinkSend::full;  // hasFree() said that it fits
+  // hasFree() said that it fits
+  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve))
+    return LinkSend::full;
   afterPush();
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
@@ -231,7 +254,8 @@ std::optional<Chunk> Link::tryChunk(const Envelope& envelope) {
   layout::ChunkRef ref{};
   if (inlineCapacity() == 0) return std::nullopt;
   copyBody(std::as_writable_bytes(std::span(&ref, 1)));
-  auto chunk = ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
+  auto chunk =
+      ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
   if (!chunk || envelope.bodyBytes > chunk->capacity) return std::nullopt;
   return chunk;
 }
@@ -240,7 +264,9 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
   try {
     auto chunk = borrowed_.tryBorrow(ref);
     if (chunk || !hasPeerEnded()) return chunk;
-  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): no descriptor, no memory: so it is unavailable
+  } catch (
+      const std::
+          exception&) {  // NOLINT(bugprone-empty-catch): no descriptor, no memory: so it is unavailable
   }
   borrowed_.giveBack(ref);
   throw ChunkUnavailable();

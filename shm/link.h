@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Link: the private segment of one client-server pair, from one side: a ring out, a ring in, a pool of our own, the peer's.
+// Link: the private segment of one client-server pair, from one side: a ring out, a ring in, a pool
+// of our own, the peer's.
 //
 //   client side ── requests ring, client's pool ──► server side
 //               ◄── replies ring, server's pool ──
 //
-// Threads  one thread receives (hasMessage, begin, copyBody, end). Everything else that is not const is serialised by the caller.
+// Threads  one thread receives (hasMessage, begin, copyBody, end). Everything else that is not
+//          const is serialised by the caller.
 // Crash    the client owns the segment; a server removes it once the client's window is ownerless.
-// Trust    the peer may write every byte; geometry was copied and checked at the start, the rest is checked at use.
+// Trust    the peer may write every byte; geometry was copied and checked at the start, the rest is
+//          checked at use.
 #pragma once
 
 #include <algorithm>
@@ -16,18 +19,20 @@
 #include <span>
 #include <string>
 
-#include <mpf/shm/pool.h>
-#include <mpf/shm/ring.h>
-#include <mpf/shm/window.h>
+#include "shm/pool.h"
+#include "shm/ring.h"
+#include "shm/window.h"
 
 namespace mpf {
 
 enum class LinkSide : std::uint32_t { client = 0, server = 1 };
 
-// Whether a message was sent. `sentInPlace`: the chunk that held the body is the peer's now; after all others the caller keeps it.
+// Whether a message was sent. `sentInPlace`: the chunk that held the body is the peer's now; after
+// all others the caller keeps it.
 enum class LinkSend { sent, sentInPlace, full, tooLarge, noMemory };
 
-// Memory that a peer lent us went with the peer, or we lack the descriptors or the memory to look at it.
+// Memory that a peer lent us went with the peer, or we lack the descriptors or the memory to look
+// at it.
 class ChunkUnavailable final : public std::exception {};
 
 // Sizes of a link that follow from the length of its queue.
@@ -42,19 +47,23 @@ struct LinkGeometry {
 class Link {
  public:
   // A new link of ours to `server`, not yet accepted. `index` is its bit in our own window.
-  //   throws  std::system_error (no memory, no right), SegmentError (the server's window offers nonsense)
-  static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own, std::uint32_t index,
-                                      std::shared_ptr<PeerWindow> server);
+  //   throws  std::system_error (no memory, no right), SegmentError (the server's window offers
+  //           nonsense)
+  static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own,
+                                      std::uint32_t index, std::shared_ptr<PeerWindow> server);
   // Rights of a link to `server`: what its processes need to open it.
   [[nodiscard]] static Rights rightsAt(const PeerWindow& server);
   // Maps a link that a client made for us; nullptr when it is gone.
   //   throws  SegmentError, std::system_error: the link is not usable, ignore it
-  static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name, const OwnWindow& own);
+  static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name,
+                                       const OwnWindow& own);
   ~Link();
 
   [[nodiscard]] LinkSide side() const noexcept { return side_; }
   [[nodiscard]] const layout::SegmentHeader& header() const noexcept { return segment_.header(); }
-  [[nodiscard]] layout::LinkControl& control() const noexcept { return segment_.at<layout::LinkControl>(layout::kLinkControlOffset); }
+  [[nodiscard]] layout::LinkControl& control() const noexcept {
+    return segment_.at<layout::LinkControl>(layout::kLinkControlOffset);
+  }
   [[nodiscard]] const std::string& name() const noexcept { return segment_.name(); }
 
   [[nodiscard]] const std::shared_ptr<PeerWindow>& peer() const noexcept { return peer_; }
@@ -66,23 +75,30 @@ class Link {
   // Our half of the state, and the peer's as it says.
   void setState(layout::LinkState state) noexcept;
   [[nodiscard]] layout::LinkState peerState() const noexcept;
-  // The peer has ended the link, or itself: what it left in the rings may speak of memory that is gone.
+  // The peer has ended the link, or itself: what it left in the rings may speak of memory that is
+  // gone.
   [[nodiscard]] bool hasPeerEnded() const noexcept;
-  // For a server that ends: its client finds the memory of what it has yet to take, and removes it. False: that of this user may not.
+  // For a server that ends: its client finds the memory of what it has yet to take, and removes it.
+  // False: that of this user may not.
   [[nodiscard]] bool tryLeavePoolToClient() noexcept;
   // Tells the peer to look at this link, whether it polls it or not.
   void notifyPeer() noexcept;
 
   // --- sending ---
-  struct Limits {  // handed on by reference: packed into registers, they would be read before they are stored
-    std::uint32_t waiting = 0;      // longest queue of messages that the peer has not taken; 0: what the ring holds
-    std::uint32_t reserve = 0;      // slots to leave free
-    std::uint32_t longReserve = 0;  // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
+  // handed on by reference: packed into registers, they would be read before they are stored
+  struct Limits {
+    // longest queue of messages that the peer has not taken; 0: what the ring holds
+    std::uint32_t waiting = 0;
+    std::uint32_t reserve = 0;  // slots to leave free
+    // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
+    std::uint32_t longReserve = 0;
   };
-  // Sends a body (its length and flags are added to `envelope`): in line, or as the chunk that it lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
-  LinkSend trySend(Envelope& envelope, std::span<const std::byte> body, const Limits& limits) noexcept;
+  // Sends a body (its length and flags are added to `envelope`): in line, or as the chunk that it
+  // lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
+  LinkSend trySend(Envelope& envelope, std::span<const std::byte> body,
+                   const Limits& limits) noexcept;
   // Whether the next message is one of those that carry their time (Envelope::sentTick).
-  [[nodiscard]] bool shallBeTimed() const noexcept;
+  [[nodiscard]] bool shouldSampleTime() const noexcept;
   // Number of the last message sent, from 1.
   [[nodiscard]] std::uint64_t sentMessages() const noexcept { return out_.messages(); }
   // Whether the peer has taken message number `ordinal`.
@@ -95,13 +111,18 @@ class Link {
 
   // --- receiving ---
   [[nodiscard]] bool hasMessage() const noexcept { return in_.hasMessage(); }
-  // The same, or the peer has ended the link: one hint may have told of both, and only the first was looked at.
-  [[nodiscard]] bool hasNews() const noexcept { return hasMessage() || peerState() >= layout::LinkState::closed; }
+  // The same, or the peer has ended the link: one hint may have told of both, and only the first
+  // was looked at.
+  [[nodiscard]] bool hasNews() const noexcept {
+    return hasMessage() || peerState() >= layout::LinkState::closed;
+  }
   [[nodiscard]] Envelope begin() noexcept { return in_.begin(); }
   [[nodiscard]] std::size_t inlineCapacity() const noexcept { return in_.inlineCapacity(); }
   void copyBody(std::span<std::byte> body) const noexcept { in_.copyBody(body); }
   // All that the first slot of the message begun may hold.
-  void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept { in_.copyFirst(body); }
+  void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
+    in_.copyFirst(body);
+  }
   // The chunk of a kSlotChunk message begun: borrowed, or our own come back. nullopt: nonsense.
   //   throws  ChunkUnavailable: its memory cannot be had, and the chunk has been given back
   std::optional<Chunk> tryChunk(const Envelope& envelope);
@@ -121,7 +142,7 @@ class Link {
   void afterPush() noexcept;
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
-  Origin origin_;
+  ForkGuard forkGuard_;
   Segment segment_;
   std::string backplane_;
   LinkSide side_;

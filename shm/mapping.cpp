@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/mapping.h>
+#include "shm/mapping.h"
 
 #include <boost/interprocess/shared_memory_object.hpp>
 #include <fmt/format.h>
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -24,7 +24,8 @@ class OpenFile {
 };
 
 ipc::mapped_region mapRegion(int file, std::size_t bytes, Mapping::Access access) try {
-  return {OpenFile(file), access == Mapping::Access::readOnly ? ipc::read_only : ipc::read_write, 0, bytes};
+  return {OpenFile(file), access == Mapping::Access::readOnly ? ipc::read_only : ipc::read_write, 0,
+          bytes};
 } catch (const ipc::interprocess_exception& error) {
   throwSystemError(error.get_native_error(), fmt::format("map {} bytes of a segment", bytes), {});
 }
@@ -33,9 +34,11 @@ ipc::mapped_region mapRegion(int file, std::size_t bytes, Mapping::Access access
 
 Mapping::Mapping(int file, std::size_t bytes, Access access)
     : region_(mapRegion(file, bytes, access)),
-      range_(fault_guard::add(region_.get_address(), region_.get_size(), access == Access::readWrite)) {}
+      range_(fault_guard::add(region_.get_address(), region_.get_size(),
+                              access == Access::readWrite)) {}
 
-Mapping::Mapping(Mapping&& other) noexcept : region_(std::move(other.region_)), range_(std::exchange(other.range_, nullptr)) {}
+Mapping::Mapping(Mapping&& other) noexcept
+    : region_(std::move(other.region_)), range_(std::exchange(other.range_, nullptr)) {}
 
 Mapping& Mapping::operator=(Mapping&& other) noexcept {
   unguard();

@@ -3,14 +3,15 @@
 //
 // Threads  one thread makes and destroys it; any uses the memory.
 // Crash    the kernel unmaps.
-// Trust    whoever may write the file may cut it: then it is grown again, or isLost() and holds zeroes.
+// Trust    whoever may write the file may cut it: then it is grown again, or isLost() and holds
+//          zeroes.
 #pragma once
 
 #include <boost/interprocess/mapped_region.hpp>
 #include <cstddef>
 #include <string>
 
-#include <mpf/shm/fault_guard.h>
+#include "shm/fault_guard.h"
 
 namespace mpf {
 
@@ -28,13 +29,19 @@ class Mapping {
   Mapping(const Mapping&) = delete;
   Mapping& operator=(const Mapping&) = delete;
 
-  [[nodiscard]] std::byte* data() const noexcept { return static_cast<std::byte*>(region_.get_address()); }
+  [[nodiscard]] std::byte* data() const noexcept {
+    return static_cast<std::byte*>(region_.get_address());
+  }
   [[nodiscard]] std::size_t bytes() const noexcept { return region_.get_size(); }
-  [[nodiscard]] bool isLost() const noexcept { return range_ != nullptr && fault_guard::isLost(*range_); }
+  [[nodiscard]] bool isLost() const noexcept {
+    return range_ != nullptr && fault_guard::isLost(*range_);
+  }
 
   // As fault_guard says.
   void growBy(int file) noexcept { fault_guard::growBy(*range_, file); }
-  void growAt(int file, const std::string& path) noexcept { fault_guard::growAt(*range_, file, path); }
+  void growAt(int file, const std::string& path) noexcept {
+    fault_guard::growAt(*range_, file, path);
+  }
 
  private:
   void unguard() noexcept;

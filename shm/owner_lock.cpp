@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/owner_lock.h>
+#include "shm/owner_lock.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include <mpf/shm/process.h>
-#include <mpf/shm/segment.h>
+#include "shm/process.h"
+#include "shm/segment.h"
 
 namespace mpf::owner_lock {
 namespace {
@@ -53,7 +53,8 @@ FileDescriptor lockReaperFile(const std::string& name, int flags) {
 }
 
 bool isReaperFileLocked(const std::string& name) {
-  const FileDescriptor file(::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  const FileDescriptor file(
+      ::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   return file && isHeld(file.get());
 }
 
@@ -68,9 +69,12 @@ bool isHeld(int fd) noexcept {
   return lock->l_type == F_WRLCK && lock->l_pid == -1;
 }
 
-bool isHeldByOwner(int fd, const layout::SegmentHeader& header) noexcept { return isHeld(fd) && !Process::hasEnded(header); }
+bool isHeldByOwner(int fd, const layout::SegmentHeader& header) noexcept {
+  return isHeld(fd) && !Process::hasEnded(header);
+}
 
-Reaper::Reaper(const FileDescriptor& file, std::string reaperFile) : reaperFile_(std::move(reaperFile)) {
+Reaper::Reaper(const FileDescriptor& file, std::string reaperFile)
+    : reaperFile_(std::move(reaperFile)) {
   const bool isAlone = tryLock(file.get(), F_WRLCK, kReapersByte, 1);
   if (reaperFile_.empty()) {
     mayRemove_ = isAlone;
@@ -86,9 +90,11 @@ Reaper::~Reaper() {
 bool Reaper::tryBesideStrangers(int fd) {
   ownLock_ = lockReaperFile(reaperFile_, O_CREAT);
   if (!ownLock_) return false;
-  // Root works for the window's user, who must be able to open the file if root's process is killed.
+  // Root works for the window's user, who must be able to open the file if root's process is
+  // killed.
   struct stat window{};
-  if (::fstat(fd, &window) == 0 && ::geteuid() == 0) static_cast<void>(::fchown(ownLock_.get(), window.st_uid, window.st_gid) == 0);
+  if (::fstat(fd, &window) == 0 && ::geteuid() == 0)
+    static_cast<void>(::fchown(ownLock_.get(), window.st_uid, window.st_gid) == 0);
   const auto writer = findWriteLock(fd, kReapersByte);
   if (!writer) return false;
   // Readers alone: with a read lock beside theirs no other process gets the write lock.

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/pool.h>
+#include "shm/pool.h"
 
 #include <algorithm>
 #include <bit>
 #include <ranges>
 #include <utility>
 
-#include <mpf/base/step.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint32_t kMaxBulks = 256;  // bulk segments of one side of a link
 constexpr std::size_t kMaxChunkBytes = UINT32_MAX;  // as Slot::bodyBytes can say
 
-// A power of two of elements plus room for the header of a message, so that 1 MiB of data does not need 2 MiB.
+// A power of two of elements plus room for the header of a message, so that 1 MiB of data does not
+// need 2 MiB.
 std::size_t chunkBytesFor(std::size_t bytes) {
   constexpr std::size_t kHeaderRoom = 128;
   const auto power = std::bit_ceil(std::max<std::size_t>(bytes, 512 + kHeaderRoom) - kHeaderRoom);
@@ -31,11 +32,12 @@ std::uint32_t chunkCountFor(std::size_t chunkBytes) {
 
 }  // namespace
 
-PoolOwner::PoolOwner(PoolPlace place, Rights rights, std::uint64_t maxBytes, layout::ReturnRing& returns)
+PoolOwner::PoolOwner(PoolPlace place, Rights rights, std::uint64_t maxBytes,
+                     layout::ReturnRing& returns)
     : place_(std::move(place)), rights_(rights), maxBytes_(maxBytes), returns_(&returns) {}
 
 PoolOwner::~PoolOwner() {
-  if (origin_.isInherited() || leavesNames_) return;
+  if (forkGuard_.isInherited() || leavesNames_) return;
   for (const auto& bulk : std::views::reverse(bulks_)) segments::remove(bulk.segment.name());
 }
 
@@ -63,7 +65,8 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
   const auto room = maxBytes_ - bytes_;  // the last segment of a pool may be a small one
   if (bulks_.size() >= kMaxBulks || room < layout::kBulkChunksOffset + chunkBytes) return false;
   const auto fitting = (room - layout::kBulkChunksOffset) / chunkBytes;
-  const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(chunkCountFor(chunkBytes), fitting));
+  const auto count =
+      static_cast<std::uint32_t>(std::min<std::uint64_t>(chunkCountFor(chunkBytes), fitting));
   const auto bytes = layout::kBulkChunksOffset + count * chunkBytes;
   auto segment = Segment::create(bytes, layout::SegmentKind::bulk, place_.backplane, rights_);
   auto& header = segment.sharedHeader();
@@ -71,7 +74,8 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
   header.chunkBytes = chunkBytes;
   header.chunkCount = count;
   header.bulkSide = place_.side;
-  if (!segment.tryPublish(SegmentName::bulk(place_.backplane, place_.link, place_.side, static_cast<std::uint32_t>(bulks_.size())))) {
+  if (!segment.tryPublish(SegmentName::bulk(place_.backplane, place_.link, place_.side,
+                                            static_cast<std::uint32_t>(bulks_.size())))) {
     return false;
   }
   segment.closeFile();
@@ -86,11 +90,14 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
 }
 
 bool PoolOwner::isState(const layout::ChunkRef& ref, ChunkState state) const noexcept {
-  return ref.side == place_.side && ref.segment < bulks_.size() && ref.chunk < bulks_[ref.segment].states.size() &&
+  return ref.side == place_.side && ref.segment < bulks_.size() &&
+         ref.chunk < bulks_[ref.segment].states.size() &&
          bulks_[ref.segment].states[ref.chunk] == state;
 }
 
-void PoolOwner::lend(const layout::ChunkRef& ref) noexcept { bulks_[ref.segment].states[ref.chunk] = ChunkState::lent; }
+void PoolOwner::lend(const layout::ChunkRef& ref) noexcept {
+  bulks_[ref.segment].states[ref.chunk] = ChunkState::lent;
+}
 
 std::optional<Chunk> PoolOwner::tryReceiveBack(const layout::ChunkRef& ref) noexcept {
   if (!isState(ref, ChunkState::lent)) return std::nullopt;
@@ -112,8 +119,10 @@ void PoolOwner::collectReturned() noexcept {
   const auto returned = returns_->returned.load(std::memory_order_acquire);
   const auto end = std::min(returned, collected_ + layout::kReturnSlots);  // more is nonsense
   for (; collected_ < end; ++collected_) {
-    const auto packed = returns_->chunks[collected_ % layout::kReturnSlots].load(std::memory_order_relaxed);
-    const layout::ChunkRef ref{static_cast<std::uint32_t>(packed >> 32), static_cast<std::uint32_t>(packed), place_.side, 0};
+    const auto packed =
+        returns_->chunks[collected_ % layout::kReturnSlots].load(std::memory_order_relaxed);
+    const layout::ChunkRef ref{static_cast<std::uint32_t>(packed >> 32),
+                               static_cast<std::uint32_t>(packed), place_.side, 0};
     if (tryReceiveBack(ref)) free(ref);
   }
 }
@@ -123,17 +132,22 @@ std::optional<layout::ChunkRef> PoolOwner::tryFind(const std::byte* data) const 
     const auto& bulk = bulks_[segment];
     const auto* start = bulk.segment.data() + layout::kBulkChunksOffset;
     if (data < start || data >= bulk.segment.data() + bulk.segment.bytes()) continue;
-    return layout::ChunkRef{segment, static_cast<std::uint32_t>(static_cast<std::size_t>(data - start) / bulk.chunkBytes), place_.side, 0};
+    return layout::ChunkRef{
+        segment,
+        static_cast<std::uint32_t>(static_cast<std::size_t>(data - start) / bulk.chunkBytes),
+        place_.side, 0};
   }
   return std::nullopt;
 }
 
 bool PoolBorrower::tryMap(std::uint32_t number) {
-  auto segment = Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, number), layout::SegmentKind::bulk,
-                                  Segment::Access::readWrite);
+  auto segment =
+      Segment::tryOpen(SegmentName::bulk(place_.backplane, place_.link, place_.side, number),
+                       layout::SegmentKind::bulk, Segment::Access::readWrite);
   if (!segment || segment->bytes() > maxBytes_ - bytes_) return false;
   const auto header = segment->header();
-  const auto room = segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
+  const auto room =
+      segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
   if (header.chunkBytes == 0 || header.chunkBytes % layout::kCacheLineBytes != 0) return false;
   if (header.chunkCount > room / header.chunkBytes) return false;
   segment->closeFile();
@@ -148,13 +162,15 @@ std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) try {
   const auto& bulk = bulks_[ref.segment];
   if (!bulk.segment && !tryMap(ref.segment)) return std::nullopt;
   if (ref.chunk >= bulk.chunkCount || bulk.segment.isLost()) return std::nullopt;
-  return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + ref.chunk * bulk.chunkBytes, bulk.chunkBytes, ref};
+  return Chunk{bulk.segment.data() + layout::kBulkChunksOffset + ref.chunk * bulk.chunkBytes,
+               bulk.chunkBytes, ref};
 } catch (const SegmentError&) {
   return std::nullopt;
 }
 
 void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
-  returns_->chunks[returned_ % layout::kReturnSlots].store(std::uint64_t{ref.segment} << 32 | ref.chunk, std::memory_order_relaxed);
+  returns_->chunks[returned_ % layout::kReturnSlots].store(
+      std::uint64_t{ref.segment} << 32 | ref.chunk, std::memory_order_relaxed);
   MPF_STEP(chunk_noted);
   // PAIR(chunk-returned): we have finished with the chunk.
   returns_->returned.store(++returned_, std::memory_order_release);
@@ -164,9 +180,13 @@ void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
 std::optional<layout::ChunkRef> PoolBorrower::tryFind(const std::byte* data) const noexcept {
   for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
     const auto& bulk = bulks_[segment];
-    if (!bulk.segment || data < bulk.segment.data() || data >= bulk.segment.data() + bulk.segment.bytes()) continue;
-    const auto offset = static_cast<std::size_t>(data - bulk.segment.data()) - layout::kBulkChunksOffset;
-    return layout::ChunkRef{segment, static_cast<std::uint32_t>(offset / bulk.chunkBytes), place_.side, 0};
+    if (!bulk.segment || data < bulk.segment.data() ||
+        data >= bulk.segment.data() + bulk.segment.bytes())
+      continue;
+    const auto offset =
+        static_cast<std::size_t>(data - bulk.segment.data()) - layout::kBulkChunksOffset;
+    return layout::ChunkRef{segment, static_cast<std::uint32_t>(offset / bulk.chunkBytes),
+                            place_.side, 0};
   }
   return std::nullopt;
 }

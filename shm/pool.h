@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Pool: memory for messages that do not fit a ring. Each side of a link owns one pool and borrows from the other's.
+// Pool: memory for messages that do not fit a ring. Each side of a link owns one pool and borrows
+// from the other's.
 //
 //   owner  alloc ─► build in place ─► ChunkRef through the ring ─► borrower reads in place ─► give back (ReturnRing)
 //                                                              └► or sends it back in a reply
 //
-// Bulk segments hold chunks of one size, a power of two and a bit for headers; they are created when first needed, so a link that
-// sends small messages costs nothing here.
+// Bulk segments hold chunks of one size, a power of two and a bit for headers; they are created
+// when first needed, so a link that sends small messages costs nothing here.
 //
 // Threads  callers serialise; Link does.
 // Crash    bulk segments belong to their link and go with it.
@@ -17,9 +18,9 @@
 #include <string>
 #include <vector>
 
-#include <mpf/shm/layout.h>
-#include <mpf/shm/origin.h>
-#include <mpf/shm/segment.h>
+#include "shm/fork_guard.h"
+#include "shm/layout.h"
+#include "shm/segment.h"
 
 namespace mpf {
 
@@ -64,13 +65,15 @@ class PoolOwner {
     std::size_t chunkBytes{};
     std::vector<ChunkState> states;
     std::vector<std::uint32_t> free;
-    [[nodiscard]] std::byte* chunk(std::uint32_t index) const { return segment.data() + layout::kBulkChunksOffset + index * chunkBytes; }
+    [[nodiscard]] std::byte* chunk(std::uint32_t index) const {
+      return segment.data() + layout::kBulkChunksOffset + index * chunkBytes;
+    }
   };
   void collectReturned() noexcept;
   bool addBulk(std::size_t chunkBytes);
   bool isState(const layout::ChunkRef& ref, ChunkState state) const noexcept;
 
-  Origin origin_;
+  ForkGuard forkGuard_;
   PoolPlace place_;
   Rights rights_;
   std::uint64_t maxBytes_;
@@ -88,7 +91,8 @@ class PoolBorrower {
       : place_(std::move(place)), maxBytes_(maxBytes), returns_(&returns) {}
 
   // The memory of a chunk that the peer sent; nullopt when there is no such chunk.
-  //   throws  std::system_error, std::bad_alloc: it cannot be looked at, for lack of descriptors or memory
+  //   throws  std::system_error, std::bad_alloc: it cannot be looked at, for lack of descriptors or
+  //           memory
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
   void giveBack(const layout::ChunkRef& ref) noexcept;
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
@@ -108,8 +112,8 @@ class PoolBorrower {
   std::vector<Bulk> bulks_;  // index = segment number; empty where not mapped
 };
 
-// Removes the bulk segments of a link, of both sides; the last ones first, as their owner does: whoever is killed meanwhile leaves no gap in
-// their numbers, behind which nobody would look.
+// Removes the bulk segments of a link, of both sides; the last ones first, as their owner does:
+// whoever is killed meanwhile leaves no gap in their numbers, behind which nobody would look.
 void removeBulk(const std::string& backplane, std::uint64_t link);
 
 }  // namespace mpf

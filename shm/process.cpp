@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/process.h>
+#include "shm/process.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -18,7 +18,8 @@
 namespace mpf {
 namespace {
 
-// Field 22 of /proc/<pid>/stat; the program name before it may hold blanks and brackets. 0 when it cannot be read.
+// Field 22 of /proc/<pid>/stat; the program name before it may hold blanks and brackets. 0 when it
+// cannot be read.
 std::uint64_t startTicksIn(const char* path) {
   const FileDescriptor file(::open(path, O_RDONLY | O_CLOEXEC));
   std::array<char, 1024> text;
@@ -26,7 +27,8 @@ std::uint64_t startTicksIn(const char* path) {
   if (got <= 0) return 0;
   std::string_view fields(text.data(), static_cast<std::size_t>(got));
   fields.remove_prefix(std::min(fields.rfind(')'), fields.size()));
-  for (int field = 2; field < 22; ++field) fields.remove_prefix(std::min(fields.find(' ') + 1, fields.size()));
+  for (int field = 2; field < 22; ++field)
+    fields.remove_prefix(std::min(fields.find(' ') + 1, fields.size()));
   std::uint64_t ticks = 0;
   std::from_chars(fields.data(), fields.data() + fields.size(), ticks);
   return ticks;
@@ -50,21 +52,26 @@ std::uint64_t ownPidNamespace() {
 
 // Whether a header names a process that can be looked for from here.
 bool isNamed(const layout::SegmentHeader& header) {
-  return header.ownerPid > 0 && header.ownerStartTicks != 0 && header.pidNamespace == ownPidNamespace();
+  return header.ownerPid > 0 && header.ownerStartTicks != 0 &&
+         header.pidNamespace == ownPidNamespace();
 }
 
 constexpr std::uint64_t kEmulatorTicks = 100;  // one second
 
-// Whether a process is known to have this process's time namespace: in another one its start time is another number.
+// Whether a process is known to have this process's time namespace: in another one its start time
+// is another number.
 bool sharesOurClock(std::int32_t pid) noexcept {
   std::array<char, 32> path{};
   std::snprintf(path.data(), path.size(), "/proc/%d/ns/time", pid);
   struct stat own{};
   struct stat theirs{};
-  return ::stat("/proc/self/ns/time", &own) == 0 && ::stat(path.data(), &theirs) == 0 && own.st_ino == theirs.st_ino;
+  return ::stat("/proc/self/ns/time", &own) == 0 && ::stat(path.data(), &theirs) == 0 &&
+         own.st_ino == theirs.st_ino;
 }
 
-FileDescriptor openProcess(std::int32_t pid) { return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0))); }
+FileDescriptor openProcess(std::int32_t pid) {
+  return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
+}
 
 }  // namespace
 
@@ -105,7 +112,8 @@ bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
   pollfd ended{descriptor.get(), POLLIN, 0};
   if (::poll(&ended, 1, 0) == 1) return true;
   const auto ticks = startTicksOf(header.ownerPid);
-  // A pid is taken over later. An emulator such as qemu shows its program another start time than /proc shows.
+  // A pid is taken over later. An emulator such as qemu shows its program another start time than
+  // /proc shows.
   return ticks > header.ownerStartTicks + kEmulatorTicks && sharesOurClock(header.ownerPid);
 }
 

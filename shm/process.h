@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/shm/layout.h>
+#include <mpf/file_descriptor.h>
+
+#include "shm/layout.h"
 
 namespace mpf {
 
@@ -21,8 +22,8 @@ struct Process {
   static Process self();
   void describe(layout::SegmentHeader& header) const;
 
-  // A descriptor that becomes readable when the owner in `header` ends; empty when it cannot be told from here (gone already,
-  // another pid namespace, a pid that somebody else has now).
+  // A descriptor that becomes readable when the owner in `header` ends; empty when it cannot be
+  // told from here (gone already, another pid namespace, a pid that somebody else has now).
   static FileDescriptor openOwner(const layout::SegmentHeader& header);
   // Whether the owner in `header` is known to have ended. False also when this process cannot
   // tell: the header names no process, or one of another pid namespace, or /proc does not show it.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/rights_text.h>
+#include "shm/rights_text.h"
 
 #include <cerrno>
 #include <charconv>
@@ -24,15 +24,18 @@ mode_t parseMode(const std::string& text) {
       (mode & kOwnerReadsAndWrites) == kOwnerReadsAndWrites) {
     return mode;
   }
-  throw std::invalid_argument(fmt::format("{}: use an octal number between 0600 and 0666, such as 0660", text));
+  throw std::invalid_argument(
+      fmt::format("{}: use an octal number between 0600 and 0666, such as 0660", text));
 }
 
 std::uint32_t parseGroup(const std::string& name) {
   group entry{};
   group* found = nullptr;
   std::vector<char> room(1024);
-  while (::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found) == ERANGE) room.resize(2 * room.size());
-  if (found == nullptr) throw std::invalid_argument(fmt::format("{}: there is no group of this name", name));
+  while (::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found) == ERANGE)
+    room.resize(2 * room.size());
+  if (found == nullptr)
+    throw std::invalid_argument(fmt::format("{}: there is no group of this name", name));
   return found->gr_gid;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RightsText: who may open what a process creates, as people write it in options and configurations.
+// RightsText: who may open what a process creates, as people write it in options and
+// configurations.
 #pragma once
 
 #include <sys/types.h>

@@ -4,9 +4,10 @@
 //   | slot 0 | slot 1 | ... | slot capacity-1 |     first slot = sequence + envelope + 24 bytes, further ones 56 bytes each
 //
 // Threads  one thread pushes, one thread takes.
-// Crash    a producer killed before its release store has pushed nothing; a consumer killed after it counted a message as
-//          taken may or may not have acted on it.
-// Trust    both ends keep positions of their own; what the other side writes is range-checked and costs messages at most.
+// Crash    a producer killed before its release store has pushed nothing; a consumer killed after
+//          it counted a message as taken may or may not have acted on it.
+// Trust    both ends keep positions of their own; what the other side writes is range-checked and
+//          costs messages at most.
 #pragma once
 
 #include <algorithm>
@@ -14,15 +15,18 @@
 #include <cstring>
 #include <span>
 
-#include <mpf/base/copy_words.h>
-#include <mpf/base/step.h>
-#include <mpf/shm/layout.h>
+#include <mpf/detail/copy_words.h>
+
+#include "base/step.h"
+#include "shm/layout.h"
 
 namespace mpf {
 
 // CLOCK_MONOTONIC in units of 16 ns, low 32 bits, never 0: fits a slot and spans a minute.
 struct Tick {
-  [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept { return static_cast<std::uint32_t>(ns >> 4) | 1u; }
+  [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept {
+    return static_cast<std::uint32_t>(ns >> 4) | 1u;
+  }
   [[nodiscard]] static std::int64_t nsSince(std::uint32_t tick, std::int64_t nowNs) noexcept {
     return static_cast<std::int64_t>(of(nowNs) - tick) * 16;
   }
@@ -43,7 +47,8 @@ struct Envelope {
 [[nodiscard]] constexpr std::uint32_t slotsFor(std::size_t inlineBytes) noexcept {
   if (inlineBytes <= layout::kFirstSlotBodyBytes) return 1;
   const auto more = inlineBytes - layout::kFirstSlotBodyBytes;
-  return 1 + static_cast<std::uint32_t>((more + sizeof(layout::MoreSlot::body) - 1) / sizeof(layout::MoreSlot::body));
+  return 1 + static_cast<std::uint32_t>((more + sizeof(layout::MoreSlot::body) - 1) /
+                                        sizeof(layout::MoreSlot::body));
 }
 
 // The consumer hands slots back when it has this part of the ring, or all there is.
@@ -56,12 +61,14 @@ inline constexpr std::uint32_t kFreeFraction = 8;
 
 class RingProducer {
  public:
-  RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer) noexcept
+  RingProducer(layout::Slot* slots, std::uint32_t capacity,
+               const layout::RingControl& consumer) noexcept
       : slots_(slots), capacity_(capacity), consumer_(consumer) {}
 
-  // Pushes `body` (at most layout::kInlineBodyBytes) and returns true, or changes nothing and returns false when it does not fit
-  // beside `reserve` free slots.
-  [[nodiscard]] bool tryPush(const Envelope& envelope, std::span<const std::byte> body, std::uint32_t reserve = 0) noexcept {
+  // Pushes `body` (at most layout::kInlineBodyBytes) and returns true, or changes nothing and
+  // returns false when it does not fit beside `reserve` free slots.
+  [[nodiscard]] bool tryPush(const Envelope& envelope, std::span<const std::byte> body,
+                             std::uint32_t reserve = 0) noexcept {
     const auto count = slotsFor(body.size());
     if (!hasFree(count + reserve)) return false;
     auto& first = slot(pushed_);
@@ -95,7 +102,9 @@ class RingProducer {
   // As waiting(), from the last look: too many, never too few.
   [[nodiscard]] std::uint64_t waitingAtMost() const noexcept { return messages_ - takenSeen_; }
   // Whether message number `ordinal` (the first is 1) has been taken.
-  [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept { return messages_ - waiting() >= ordinal; }
+  [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept {
+    return messages_ - waiting() >= ordinal;
+  }
 
   [[nodiscard]] bool hasFree(std::uint32_t count) noexcept {
     if (pushed_ + count - freedSeen_ <= capacity_) return true;
@@ -105,10 +114,13 @@ class RingProducer {
   }
 
  private:
-  layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & (capacity_ - 1)]; }
+  layout::Slot& slot(std::uint64_t position) const noexcept {
+    return slots_[position & (capacity_ - 1)];
+  }
 
   void copyBody(layout::Slot& first, std::span<const std::byte> body) const noexcept {
-    if (body.size() == layout::kFirstSlotBodyBytes) return copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
+    if (body.size() == layout::kFirstSlotBodyBytes)
+      return copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     const auto head = std::min(body.size(), first.body.size());
     if (head != 0) std::memcpy(first.body.data(), body.data(), head);
     body = body.subspan(head);
@@ -123,7 +135,7 @@ class RingProducer {
   layout::Slot* slots_;
   std::uint64_t capacity_;
   const layout::RingControl& consumer_;
-  std::uint64_t pushed_ = 0;     // slots
+  std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
@@ -139,8 +151,8 @@ class RingConsumer {
     return slot(taken_).sequence.load(std::memory_order_acquire) == taken_ + 1;
   }
 
-  // Counts the next message as taken and copies its envelope; call only after hasMessage(). From here on the sender knows that
-  // we may have acted on it.
+  // Counts the next message as taken and copies its envelope; call only after hasMessage(). From
+  // here on the sender knows that we may have acted on it.
   [[nodiscard]] Envelope begin() noexcept {
     ++messages_;
     // PAIR(message-taken): before we look at the message.
@@ -190,7 +202,9 @@ class RingConsumer {
   [[nodiscard]] layout::RingControl& control() const noexcept { return own_; }
 
  private:
-  layout::Slot& slot(std::uint64_t position) const noexcept { return slots_[position & (capacity_ - 1)]; }
+  layout::Slot& slot(std::uint64_t position) const noexcept {
+    return slots_[position & (capacity_ - 1)];
+  }
 
   layout::Slot* slots_;
   std::uint64_t capacity_;

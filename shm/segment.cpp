@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/segment.h>
+#include "shm/segment.h"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -12,12 +12,13 @@
 #include <fmt/format.h>
 #include <memory>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/step.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/owner_lock.h>
-#include <mpf/shm/process.h>
-#include <mpf/shm/segment_name.h>
+#include <mpf/clock.h>
+
+#include "base/step.h"
+#include "base/system_call.h"
+#include "shm/owner_lock.h"
+#include "shm/process.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
@@ -26,29 +27,34 @@ namespace ipc = boost::interprocess;
 
 constexpr const char* kDirectory = "/dev/shm";
 
-// Older kernels end a long reservation at any signal and undo it; small pieces get done between two ticks of a timer.
+// Older kernels end a long reservation at any signal and undo it; small pieces get done between two
+// ticks of a timer.
 int reserve(int fd, std::size_t bytes) {
   constexpr std::size_t kPiece = std::size_t{1} << 20;
   int shortage = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
   if (shortage != EINTR) return shortage;
   for (std::size_t at = 0; at < bytes;) {
-    shortage = ::posix_fallocate(fd, static_cast<off_t>(at), static_cast<off_t>(std::min(kPiece, bytes - at)));
+    shortage = ::posix_fallocate(fd, static_cast<off_t>(at),
+                                 static_cast<off_t>(std::min(kPiece, bytes - at)));
     if (shortage != 0 && shortage != EINTR) return shortage;
     if (shortage == 0) at += kPiece;
   }
   return 0;
 }
 
-// Anybody may put anything under a name in /dev/shm: O_NONBLOCK, so that a pipe does not keep us waiting.
+// Anybody may put anything under a name in /dev/shm: O_NONBLOCK, so that a pipe does not keep us
+// waiting.
 FileDescriptor openByName(const std::string& name, int flags) {
-  return FileDescriptor(::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  return FileDescriptor(
+      ::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
 }
 
 // " (mode 0600, user 0, group 0)": what somebody lacks who may not open it.
 std::string rightsInWords(const std::string& name) {
   struct stat status{};
   if (::lstat(segments::path(name).c_str(), &status) != 0) return {};
-  return fmt::format(" (mode {:04o}, user {}, group {})", status.st_mode & 07777u, status.st_uid, status.st_gid);
+  return fmt::format(" (mode {:04o}, user {}, group {})", status.st_mode & 07777u, status.st_uid,
+                     status.st_gid);
 }
 
 // Opens a regular file; empty when there is none of that name. Throws as Segment::tryOpen.
@@ -62,26 +68,30 @@ FileDescriptor openRegular(const std::string& name, int flags, std::size_t& file
   }
   struct stat status{};
   checkCall(::fstat(file.get(), &status), "look at", path);
-  if (!S_ISREG(status.st_mode)) throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", path));
+  if (!S_ISREG(status.st_mode))
+    throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", path));
   fileBytes = static_cast<std::size_t>(status.st_size);
   return file;
 }
 
-// Opens a segment and copies its header; empty when there is none of that name. Throws as Segment::tryOpen.
-FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags, layout::SegmentHeader& header) {
+// Opens a segment and copies its header; empty when there is none of that name. Throws as
+// Segment::tryOpen.
+FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags,
+                           layout::SegmentHeader& header) {
   std::size_t fileBytes = 0;
   auto file = openRegular(name, flags, fileBytes);
   if (!file) return {};
   const auto path = segments::path(name);
   if (::pread(file.get(), &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) {
-    throw SegmentError(fmt::format("{}: truncated, {} bytes are too few for a header", path, fileBytes));
+    throw SegmentError(
+        fmt::format("{}: truncated, {} bytes are too few for a header", path, fileBytes));
   }
   segments::check(header, fileBytes, kind, path);
   return file;
 }
 
-// The header that says whose a file is. Empty when it cannot say: every peer may write over the header of hints, and other files may be
-// anything.
+// The header that says whose a file is. Empty when it cannot say: every peer may write over the
+// header of hints, and other files may be anything.
 layout::SegmentHeader ownersHeader(int fd, const std::string& name) {
   layout::SegmentHeader header{};
   const auto parsed = SegmentName::tryParse(name);
@@ -90,7 +100,9 @@ layout::SegmentHeader ownersHeader(int fd, const std::string& name) {
   return header.magic == layout::kMagic ? header : layout::SegmentHeader{};
 }
 
-bool isOwned(int fd, const std::string& name) { return owner_lock::isHeldByOwner(fd, ownersHeader(fd, name)); }
+bool isOwned(int fd, const std::string& name) {
+  return owner_lock::isHeldByOwner(fd, ownersHeader(fd, name));
+}
 
 // Whether the name still leads to this regular file.
 bool isNameOf(int fd, const std::string& name) {
@@ -112,8 +124,11 @@ std::string reaperFileOf(int fd, const std::string& name) {
 bool isKnown(int fd, const std::string& name) try {
   layout::SegmentHeader header{};
   struct stat status{};
-  if (::fstat(fd, &status) != 0 || ::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) return false;
-  segments::check(header, static_cast<std::size_t>(status.st_size), header.kind, segments::path(name));
+  if (::fstat(fd, &status) != 0 ||
+      ::pread(fd, &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header))
+    return false;
+  segments::check(header, static_cast<std::size_t>(status.st_size), header.kind,
+                  segments::path(name));
   return true;
 } catch (const SegmentError&) {
   return false;
@@ -123,14 +138,20 @@ bool isKnown(int fd, const std::string& name) try {
 
 void setRights(int fd, const Rights& rights) {
   constexpr auto kOwn = ~std::uint32_t{0};
-  if (rights.group != kOwn) checkCall(::fchown(fd, kOwn, rights.group), "give a segment to group", std::to_string(rights.group));
-  if (rights.user != kOwn) checkCall(::fchown(fd, rights.user, kOwn), "give a segment to user", std::to_string(rights.user));
+  if (rights.group != kOwn)
+    checkCall(::fchown(fd, kOwn, rights.group), "give a segment to group",
+              std::to_string(rights.group));
+  if (rights.user != kOwn)
+    checkCall(::fchown(fd, rights.user, kOwn), "give a segment to user",
+              std::to_string(rights.user));
   checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
 }
 
-Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane, Rights rights) {
+Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
+                        Rights rights) {
   Segment segment;
-  segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600), "create a segment in", kDirectory));
+  segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600),
+                                "create a segment in", kDirectory));
   const int fd = segment.file_.get();
   mpf::setRights(fd, rights);
   if (const int shortage = reserve(fd, bytes); shortage != 0)
@@ -165,7 +186,8 @@ bool Segment::tryPublish(const std::string& name) {
   header_ = sharedHeader();  // before a peer can write to it
   MPF_STEP(segment_complete);
   const auto self = fmt::format("/proc/self/fd/{}", file_.get());
-  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) == 0) {
+  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) ==
+      0) {
     MPF_STEP(segment_named);
     name_ = name;
     return true;
@@ -182,10 +204,12 @@ std::uint32_t Segment::fileUser() const {
 
 bool Segment::hasOwner() const noexcept { return owner_lock::isHeldByOwner(file_.get(), header_); }
 
-std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind, Access access) {
+std::optional<Segment> Segment::tryOpen(const std::string& name, layout::SegmentKind kind,
+                                        Access access) {
   Segment segment;
   segment.name_ = name;
-  segment.file_ = openChecked(name, kind, access == Access::readOnly ? O_RDONLY : O_RDWR, segment.header_);
+  segment.file_ =
+      openChecked(name, kind, access == Access::readOnly ? O_RDONLY : O_RDWR, segment.header_);
   if (!segment.file_) return std::nullopt;
   segment.mapping_ = Mapping(segment.file_.get(), segment.header_.totalBytes, access);
   return segment;
@@ -199,7 +223,8 @@ std::optional<Segment> Segment::tryOpenShared(const std::string& name, std::size
   if (!segment.file_) return std::nullopt;
   const int file = segment.file_.get();
   if (fileBytes < bytes && (!owner_lock::isHeld(file) || reserve(file, bytes) != 0))
-    throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", segments::path(name), fileBytes, bytes));
+    throw SegmentError(
+        fmt::format("{}: truncated, {} bytes of {}", segments::path(name), fileBytes, bytes));
   segment.mapping_ = Mapping(file, bytes, Access::readWrite);
   segment.mapping_.growAt(file, segments::path(name));
   return segment;
@@ -217,22 +242,27 @@ bool remove(const std::string& name) {
 
 bool exists(const std::string& name) { return ::access(path(name).c_str(), F_OK) == 0; }
 
-void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind, const std::string& path) {
-  if (header.magic != layout::kMagic) throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path));
+void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind,
+           const std::string& path) {
+  if (header.magic != layout::kMagic)
+    throw SegmentError(fmt::format("{}: not a segment of MPF (foreign magic)", path));
   if (header.layoutMajor < layout::kOldestMajor || header.layoutMajor > layout::kMajor) {
-    throw VersionError(
-        fmt::format("{}: layout {}, this program speaks {}-{}", path, header.layoutMajor, layout::kOldestMajor, layout::kMajor));
+    throw VersionError(fmt::format("{}: layout {}, this program speaks {}-{}", path,
+                                   header.layoutMajor, layout::kOldestMajor, layout::kMajor));
   }
   if (header.kind != kind) {
-    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path, static_cast<std::uint32_t>(header.kind),
+    throw SegmentError(fmt::format("{}: a segment of kind {}, expected kind {}", path,
+                                   static_cast<std::uint32_t>(header.kind),
                                    static_cast<std::uint32_t>(kind)));
   }
   if (header.totalBytes < sizeof(layout::SegmentHeader) || fileBytes < header.totalBytes) {
-    throw SegmentError(fmt::format("{}: truncated, {} bytes of {}", path, fileBytes, header.totalBytes));
+    throw SegmentError(
+        fmt::format("{}: truncated, {} bytes of {}", path, fileBytes, header.totalBytes));
   }
 }
 
-std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name, layout::SegmentKind kind) {
+std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name,
+                                                   layout::SegmentKind kind) {
   layout::SegmentHeader header{};
   if (!openChecked(name, kind, O_RDONLY, header)) return std::nullopt;
   return header;
@@ -240,10 +270,12 @@ std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name, layo
 
 Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
   const auto file = openByName(name, O_RDONLY);
-  if (!file) return errno == ENOENT ? Owner::absent : Owner::alive;  // not ours to judge: it may be somebody's
+  // not ours to judge: it may be somebody's
+  if (!file) return errno == ENOENT ? Owner::absent : Owner::alive;
   if (incarnation != 0) {
     std::uint64_t found = 0;
-    const auto got = ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
+    const auto got =
+        ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
     if (got != sizeof found || found != incarnation) return Owner::absent;
   }
   return isOwned(file.get(), name) ? Owner::alive : Owner::dead;
@@ -252,7 +284,8 @@ Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
 bool haveSameUser(const std::string& one, const std::string& other) {
   struct stat first{};
   struct stat second{};
-  return ::lstat(path(one).c_str(), &first) == 0 && ::lstat(path(other).c_str(), &second) == 0 && first.st_uid == second.st_uid;
+  return ::lstat(path(one).c_str(), &first) == 0 && ::lstat(path(other).c_str(), &second) == 0 &&
+         first.st_uid == second.st_uid;
 }
 
 bool isLocked(const std::string& name) {
@@ -266,7 +299,8 @@ bool removeIfOwnerless(const std::string& name) {
   const owner_lock::Reaper reaper(file, reaperFileOf(file.get(), name));
   if (!reaper.mayRemove()) return false;
   MPF_STEP(reclaim_locked);
-  // No other process takes away the name of this very file now: check that the name is still this file's.
+  // No other process takes away the name of this very file now: check that the name is still this
+  // file's.
   if (!isNameOf(file.get(), name)) return false;
   // Of anything but a segment that we know, a free lock proves nothing.
   if (!isKnown(file.get(), name)) return false;
@@ -284,10 +318,12 @@ bool removeKeyedIfOwnerless(const std::string& name) {
 
 std::vector<std::string> list(const std::string& prefix) {
   std::vector<std::string> names;
-  const std::unique_ptr<DIR, int (*)(DIR*)> directory(::opendir(kDirectory), [](DIR* open) { return ::closedir(open); });
+  const std::unique_ptr<DIR, int (*)(DIR*)> directory(::opendir(kDirectory),
+                                                      [](DIR* open) { return ::closedir(open); });
   if (!directory) throwSystemError(errno, "list", kDirectory);
   while (const auto* entry = ::readdir(directory.get())) {
-    if (std::strncmp(entry->d_name, prefix.c_str(), prefix.size()) == 0) names.emplace_back(entry->d_name);
+    if (std::strncmp(entry->d_name, prefix.c_str(), prefix.size()) == 0)
+      names.emplace_back(entry->d_name);
   }
   return names;
 }
@@ -295,7 +331,8 @@ std::vector<std::string> list(const std::string& prefix) {
 std::uint64_t newIncarnation() {
   std::uint64_t incarnation = 0;
   while (incarnation == 0) {
-    checkCall(retryInterrupted([&] { return ::getrandom(&incarnation, sizeof incarnation, 0); }), "getrandom");
+    checkCall(retryInterrupted([&] { return ::getrandom(&incarnation, sizeof incarnation, 0); }),
+              "getrandom");
   }
   return incarnation;
 }

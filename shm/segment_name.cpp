@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/segment_name.h>
+#include "shm/segment_name.h"
 
 #include <algorithm>
 #include <charconv>
@@ -7,14 +7,18 @@
 #include <stdexcept>
 #include <vector>
 
-#include <mpf/shm/layout.h>
+#include "shm/layout.h"
 
 namespace mpf {
 namespace {
 
-bool isPlain(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-'; }
+bool isPlain(char c) {
+  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' ||
+         c == '-';
+}
 
-// Server names hold brackets, slashes and dots ("serial[0]", "AIM1/1"); file names of this grammar do not.
+// Server names hold brackets, slashes and dots ("serial[0]", "AIM1/1"); file names of this grammar
+// do not.
 std::string encode(std::string_view name) {
   std::string encoded;
   for (const char c : name) {
@@ -45,10 +49,13 @@ std::optional<Number> tryNumber(std::string_view text, int base) {
   return value;
 }
 
-std::optional<std::uint64_t> tryHex(std::string_view text) { return tryNumber<std::uint64_t>(text, 16); }
+std::optional<std::uint64_t> tryHex(std::string_view text) {
+  return tryNumber<std::uint64_t>(text, 16);
+}
 
 bool isBackplane(std::string_view name) {
-  return !name.empty() && name.size() < layout::kBackplaneChars && std::all_of(name.begin(), name.end(), isPlain);
+  return !name.empty() && name.size() < layout::kBackplaneChars &&
+         std::all_of(name.begin(), name.end(), isPlain);
 }
 
 // Whether encode() could have made it.
@@ -56,7 +63,9 @@ bool isEncoded(std::string_view name) {
   const auto isUpperHex = [](char c) { return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'F'); };
   for (std::size_t at = 0; at < name.size(); ++at) {
     if (isPlain(name[at]) || name[at] == '[' || name[at] == ']') continue;
-    if (name[at] != '%' || name.size() - at < 3 || !isUpperHex(name[at + 1]) || !isUpperHex(name[at + 2])) return false;
+    if (name[at] != '%' || name.size() - at < 3 || !isUpperHex(name[at + 1]) ||
+        !isUpperHex(name[at + 2]))
+      return false;
     at += 2;
   }
   return !name.empty();
@@ -67,15 +76,18 @@ bool isEncoded(std::string_view name) {
 void SegmentName::checkBackplane(std::string_view backplane) {
   if (!isBackplane(backplane)) {
     throw std::invalid_argument(
-        fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -", backplane, layout::kBackplaneChars - 1));
+        fmt::format("backplane name \"{}\": use 1 to {} of the characters A-Z a-z 0-9 _ -",
+                    backplane, layout::kBackplaneChars - 1));
   }
 }
 
 void SegmentName::checkServer(std::string_view server) {
   const auto isControl = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; };
-  if (server.empty() || server.size() >= layout::kNameChars || std::any_of(server.begin(), server.end(), isControl)) {
+  if (server.empty() || server.size() >= layout::kNameChars ||
+      std::any_of(server.begin(), server.end(), isControl)) {
     throw std::invalid_argument(
-        fmt::format("server name \"{}\": use 1 to {} bytes without control characters", server, layout::kNameChars - 1));
+        fmt::format("server name \"{}\": use 1 to {} bytes without control characters", server,
+                    layout::kNameChars - 1));
   }
 }
 
@@ -83,11 +95,13 @@ std::string SegmentName::prefix(std::string_view backplane) {
   return backplane.empty() ? std::string("mpf.") : fmt::format("mpf.{}.", backplane);
 }
 
-std::string SegmentName::serverWindow(std::string_view backplane, std::int32_t location, std::string_view server) {
+std::string SegmentName::serverWindow(std::string_view backplane, std::int32_t location,
+                                      std::string_view server) {
   return fmt::format("mpf.{}.s.{}.{}", backplane, location, encode(server));
 }
 
-std::string SegmentName::keyed(std::string_view backplane, NameKind kind, std::uint64_t incarnation) {
+std::string SegmentName::keyed(std::string_view backplane, NameKind kind,
+                               std::uint64_t incarnation) {
   return fmt::format("mpf.{}.{}.{:x}", backplane, static_cast<char>(kind), incarnation);
 }
 
@@ -95,23 +109,27 @@ std::string SegmentName::linkPrefix(std::string_view backplane, std::uint64_t se
   return fmt::format("mpf.{}.l.{:x}.", backplane, serverWindow);
 }
 
-std::string SegmentName::link(std::string_view backplane, std::uint64_t serverWindow, std::uint64_t link) {
+std::string SegmentName::link(std::string_view backplane, std::uint64_t serverWindow,
+                              std::uint64_t link) {
   return fmt::format("{}{:x}", linkPrefix(backplane, serverWindow), link);
 }
 
-std::string SegmentName::bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side, std::uint32_t segment) {
+std::string SegmentName::bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side,
+                              std::uint32_t segment) {
   return fmt::format("mpf.{}.b.{:x}.{}.{}", backplane, link, side, segment);
 }
 
 std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) {
   const auto parts = split(name);
-  if (parts.size() < 4 || parts[0] != "mpf" || !isBackplane(parts[1]) || parts[2].size() != 1) return std::nullopt;
+  if (parts.size() < 4 || parts[0] != "mpf" || !isBackplane(parts[1]) || parts[2].size() != 1)
+    return std::nullopt;
   Parsed parsed;
   parsed.backplane = parts[1];
   parsed.kind = static_cast<NameKind>(parts[2][0]);
   switch (parsed.kind) {
     case NameKind::serverWindow:
-      if (parts.size() != 5 || !tryNumber<std::int32_t>(parts[3], 10) || !isEncoded(parts[4])) return std::nullopt;
+      if (parts.size() != 5 || !tryNumber<std::int32_t>(parts[3], 10) || !isEncoded(parts[4]))
+        return std::nullopt;
       return parsed;
     case NameKind::link: {
       const auto server = tryHex(parts[3]);
@@ -122,16 +140,19 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
       return parsed;
     }
     case NameKind::bulk:
-      if (parts.size() != 6 || (parts[4] != "0" && parts[4] != "1") || !tryNumber<std::uint32_t>(parts[5], 10)) return std::nullopt;
+      if (parts.size() != 6 || (parts[4] != "0" && parts[4] != "1") ||
+          !tryNumber<std::uint32_t>(parts[5], 10))
+        return std::nullopt;
       [[fallthrough]];
     case NameKind::clientWindow:
     case NameKind::hints:
-    case NameKind::wish:
+    case NameKind::pendingBind:
     case NameKind::router:
     case NameKind::reaper:
     case NameKind::fifo: {
       const auto incarnation = tryHex(parts[3]);
-      if (!incarnation || parts.size() != (parsed.kind == NameKind::bulk ? 6u : 4u)) return std::nullopt;
+      if (!incarnation || parts.size() != (parsed.kind == NameKind::bulk ? 6u : 4u))
+        return std::nullopt;
       parsed.incarnation = *incarnation;
       return parsed;
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SegmentName: the names of segments in /dev/shm, built and taken apart. The grammar is in layout.h.
+// SegmentName: the names of segments in /dev/shm, built and taken apart. The grammar is in
+// layout.h.
 #pragma once
 
 #include <cstdint>
@@ -16,22 +17,27 @@ enum class NameKind : char {
   hints = 'h',
   link = 'l',
   bulk = 'b',
-  wish = 'w',
+  pendingBind = 'w',
   fifo = 'f',
   router = 'r',
   reaper = 'k'
 };
 
 struct SegmentName {
-  // Throws std::invalid_argument, naming it, when a backplane name is empty, too long or has other characters than [A-Za-z0-9_-].
+  // Throws std::invalid_argument, naming it, when a backplane name is empty, too long or has other
+  // characters than [A-Za-z0-9_-].
   static void checkBackplane(std::string_view backplane);
-  // Throws std::invalid_argument, naming it, when a server name is empty, longer than 63 bytes or holds control characters.
+  // Throws std::invalid_argument, naming it, when a server name is empty, longer than 63 bytes or
+  // holds control characters.
   static void checkServer(std::string_view server);
 
-  static std::string serverWindow(std::string_view backplane, std::int32_t location, std::string_view server);
+  static std::string serverWindow(std::string_view backplane, std::int32_t location,
+                                  std::string_view server);
   static std::string keyed(std::string_view backplane, NameKind kind, std::uint64_t incarnation);
-  static std::string link(std::string_view backplane, std::uint64_t serverWindow, std::uint64_t link);
-  static std::string bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side, std::uint32_t segment);
+  static std::string link(std::string_view backplane, std::uint64_t serverWindow,
+                          std::uint64_t link);
+  static std::string bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side,
+                          std::uint32_t segment);
 
   // Everything of one backplane, or of all when `backplane` is empty, starts so.
   static std::string prefix(std::string_view backplane);
@@ -41,7 +47,8 @@ struct SegmentName {
   struct Parsed {
     std::string backplane;
     NameKind kind{};
-    std::uint64_t incarnation{};   // of the segment itself; 0 for a server window, whose name is the server's
+    // of the segment itself; 0 for a server window, whose name is the server's
+    std::uint64_t incarnation{};
     std::uint64_t serverWindow{};  // link only
   };
   static std::optional<Parsed> tryParse(std::string_view name);

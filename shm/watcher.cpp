@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/watcher.h>
+#include "shm/watcher.h"
 
 #include <pthread.h>
 #include <sys/epoll.h>
@@ -13,11 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/step.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/process.h>
-#include <mpf/shm/segment_name.h>
+#include "base/signals_blocked.h"
+#include "base/step.h"
+#include "base/system_call.h"
+#include "shm/process.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
@@ -27,11 +27,13 @@ constexpr Watcher::Token kTimer = 2;
 constexpr Watcher::Token kNames = 3;
 constexpr long kPollNs = 100'000'000;
 
-// The kernel takes some 15 ms to close an inotify instance, and the watcher's thread has deaths to tell.
+// The kernel takes some 15 ms to close an inotify instance, and the watcher's thread has deaths to
+// tell.
 void closeElsewhere(FileDescriptor names) noexcept try {
   const SignalsBlocked blocked;
   std::thread([closing = std::move(names)] {}).detach();
-} catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch): no thread left: closed here, by then
+} catch (const std::
+             system_error&) {  // NOLINT(bugprone-empty-catch): no thread left: closed here, by then
 }
 
 void add(int epoll, int fd, Watcher::Token token) {
@@ -41,7 +43,8 @@ void add(int epoll, int fd, Watcher::Token token) {
   checkCall(::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
 }
 
-// The kinds of the backplane's new names that an inotify buffer tells of; of so many that some were lost, `*`.
+// The kinds of the backplane's new names that an inotify buffer tells of; of so many that some were
+// lost, `*`.
 std::string kindsIn(const char* events, std::size_t bytes, const std::string& backplane) {
   std::string kinds;
   for (std::size_t at = 0; at < bytes;) {
@@ -64,14 +67,15 @@ Watcher::Watcher(std::string backplane)
     : backplane_(std::move(backplane)),
       epoll_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
       stop_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")),
-      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create")) {
+      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK),
+                       "timerfd_create")) {
   add(epoll_.get(), stop_.get(), kStop);
   add(epoll_.get(), timer_.get(), kTimer);
 }
 
 Watcher::~Watcher() {
   if (isInherited()) {
-    Origin::abandon(thread_);
+    ForkGuard::abandon(thread_);
   } else if (thread_.joinable()) {
     ::eventfd_write(stop_.get(), 1);
     thread_.join();
@@ -108,11 +112,13 @@ Watcher::Token Watcher::watchNames(NameKind kind, Callback callback) {
   return token;
 }
 
-// A user has few inotify instances (128 by default), so we hold one only while somebody waits, and do without when there is none left.
+// A user has few inotify instances (128 by default), so we hold one only while somebody waits, and
+// do without when there is none left.
 void Watcher::openNames() {
   names_.reset(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
   if (!names_) return;
-  if (::inotify_add_watch(names_.get(), segments::path("").c_str(), IN_CREATE) < 0) return names_.reset();
+  if (::inotify_add_watch(names_.get(), segments::path("").c_str(), IN_CREATE) < 0)
+    return names_.reset();
   add(epoll_.get(), names_.get(), kNames);
 }
 
@@ -130,7 +136,8 @@ void Watcher::forget(Token token) {
 void Watcher::run() {
   std::array<epoll_event, 32> events{};
   for (;;) {
-    const auto count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), -1);
+    const auto count =
+        ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), -1);
     for (int i = 0; i < count; ++i) {
       const auto token = events[static_cast<std::size_t>(i)].data.u64;
       if (token == kStop) return;
@@ -147,13 +154,16 @@ void Watcher::handle(Token token) {
     readNames();
   } else if (const auto found = peers_.find(token); found != peers_.end()) {
     if (isGone(found->second)) return report(token);
-    // The process ended, yet the lock is held: a child inherited it. The lock decides, so go on asking for it.
+    // The process ended, yet the lock is held: a child inherited it. The lock decides, so go on
+    // asking for it.
     found->second.process.reset();
     updateTimer();
   }
 }
 
-bool Watcher::isGone(const Peer& peer) const { return peer.window->isClosed() || !peer.window->hasOwner(); }
+bool Watcher::isGone(const Peer& peer) const {
+  return peer.window->isClosed() || !peer.window->hasOwner();
+}
 
 void Watcher::report(Token token) {
   const auto found = peers_.find(token);
@@ -165,14 +175,17 @@ void Watcher::report(Token token) {
   peer.callback();
 }
 
-// A buffer of them a turn: who fills /dev/shm with names, as every user may, keeps nobody from the lock.
+// A buffer of them a turn: who fills /dev/shm with names, as every user may, keeps nobody from the
+// lock.
 void Watcher::readNames() {
   alignas(inotify_event) std::array<char, 4096> events;
   const auto got = ::read(names_.get(), events.data(), events.size());
   if (got <= 0) return;
   const auto kinds = kindsIn(events.data(), static_cast<std::size_t>(got), backplane_);
   const bool someLost = kinds.find('*') != std::string::npos;
-  tellOfNames([&](NameKind kind) { return someLost || kinds.find(static_cast<char>(kind)) != std::string::npos; });
+  tellOfNames([&](NameKind kind) {
+    return someLost || kinds.find(static_cast<char>(kind)) != std::string::npos;
+  });
 }
 
 void Watcher::tellOfNames(const std::function<bool(NameKind)>& isNew) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/shm/window.h>
+#include "shm/window.h"
 
 #include <fcntl.h>
 #include <sched.h>
@@ -11,20 +11,24 @@
 #include <optional>
 #include <system_error>
 
-#include <mpf/base/step.h>
-#include <mpf/shm/segment_name.h>
+#include "base/step.h"
+#include "shm/segment_name.h"
 
 namespace mpf {
 namespace {
 
-// What stands under a name that we want; nullopt when nothing does. Throws what to do about anything that is no window.
+// What stands under a name that we want; nullopt when nothing does. Throws what to do about
+// anything that is no window.
 std::optional<Segment> openInTheWay(const std::string& name, layout::SegmentKind kind) try {
   return Segment::tryOpen(name, kind, Segment::Access::readOnly);
 } catch (const std::system_error& error) {
-  if (error.code().value() == EACCES) throw NameInUse(fmt::format("{}: in use by another user: {}", segments::path(name), error.what()));
+  if (error.code().value() == EACCES)
+    throw NameInUse(
+        fmt::format("{}: in use by another user: {}", segments::path(name), error.what()));
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 } catch (const SegmentError& error) {
-  if (segments::probeOwner(name) == segments::Owner::alive) throw NameInUse(fmt::format("in use by another program: {}", error.what()));
+  if (segments::probeOwner(name) == segments::Owner::alive)
+    throw NameInUse(fmt::format("in use by another program: {}", error.what()));
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 }
 
@@ -38,20 +42,27 @@ void checkInTheWay(const std::string& name, layout::SegmentKind kind, Deadline r
     case segments::Owner::absent:
       return;
     case segments::Owner::alive:
-      throw NameInUse(fmt::format("{}: in use by {} (pid {})", segments::path(name),
-                                  std::string(header.program.data(), ::strnlen(header.program.data(), header.program.size())),
-                                  header.ownerPid));
+      throw NameInUse(
+          fmt::format("{}: in use by {} (pid {})", segments::path(name),
+                      std::string(header.program.data(),
+                                  ::strnlen(header.program.data(), header.program.size())),
+                      header.ownerPid));
     case segments::Owner::dead:
       if (segments::removeIfOwnerless(name)) return;
-      if (!reaperIsLate.hasPassed() && ::faccessat(AT_FDCWD, segments::path(name).c_str(), W_OK, AT_EACCESS) == 0) return;
+      if (!reaperIsLate.hasPassed() &&
+          ::faccessat(AT_FDCWD, segments::path(name).c_str(), W_OK, AT_EACCESS) == 0)
+        return;
       throw SegmentError(
-          fmt::format("{}: left by a dead process of user {}, who must remove it; if somebody is about to, that process does not go on",
+          fmt::format("{}: left by a dead process of user {}, who must remove it; if somebody is "
+                      "about to, that process does not go on",
                       segments::path(name), header.ownerUid));
   }
 }
 
 // Of a pipe: whoever may only read the hints must not take rings out of the pipe.
-mode_t pipeMode(mode_t hints) { return 0600 | ((hints & 0020) != 0 ? 0060u : 0u) | ((hints & 0002) != 0 ? 0006u : 0u); }
+mode_t pipeMode(mode_t hints) {
+  return 0600 | ((hints & 0020) != 0 ? 0060u : 0u) | ((hints & 0002) != 0 ? 0006u : 0u);
+}
 
 // The least rights that include both.
 Rights joined(const Rights& now, Rights added) {
@@ -60,16 +71,19 @@ Rights joined(const Rights& now, Rights added) {
   if ((added.mode & 0022) == 0 && added.user == kOwn) return now;
   added.mode |= now.mode;
   if ((now.mode & 0022) == 0 && now.user == kOwn) return added;
-  if (now.user == added.user && (now.group == added.group || (added.mode & 0060) == 0)) return added;
+  if (now.user == added.user && (now.group == added.group || (added.mode & 0060) == 0))
+    return added;
   return {.mode = 0666, .group = now.group, .user = now.user};
 }
 
 }  // namespace
 
-OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
+OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
+                     const std::string& name, Rights rights,
                      const std::function<void(layout::SegmentHeader&)>& describe)
     : backplane_(backplane), rights_(rights), admitted_(rights) {
-  window_ = Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
+  window_ =
+      Segment::create(layout::kWindowBytes, kind, backplane, {rights.mode & 0644, rights.group});
   window_.lockForLife();
   MPF_STEP(window_locked);
   auto& header = window_.sharedHeader();
@@ -80,15 +94,18 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
   control().state.store(layout::WindowState::open, std::memory_order_relaxed);
   control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
 
-  hints_ = Segment::create(sizeof(layout::WindowHints), layout::SegmentKind::hints, backplane, rights);
+  hints_ =
+      Segment::create(sizeof(layout::WindowHints), layout::SegmentKind::hints, backplane, rights);
   hints_.lockForLife();
   hints_.sharedHeader().ownerWindow = incarnation;
-  if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation))) throw NameInUse("an incarnation number came twice");
+  if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation)))
+    throw NameInUse("an incarnation number came twice");
   const auto fifo = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   try {
     fifo_ = doorbell::createFifo(fifo, pipeMode(rights.mode), rights.group);
     MPF_STEP(window_complete);
-    publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation) : name);
+    publish(name.empty() ? SegmentName::keyed(backplane, NameKind::clientWindow, incarnation)
+                         : name);
   } catch (...) {
     segments::remove(fifo);
     segments::remove(hints_.name());
@@ -97,8 +114,9 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind, con
 }
 
 void OwnWindow::publish(const std::string& name) {
-  // Its owner may be dying, or another process may remove what it left. Both take microseconds, once they have a processor: on a busy
-  // host, a process that removes a window was without one for more than 50 ms.
+  // Its owner may be dying, or another process may remove what it left. Both take microseconds,
+  // once they have a processor: on a busy host, a process that removes a window was without one for
+  // more than 50 ms.
   const auto patience = Deadline::after(std::chrono::milliseconds(50));
   const auto reaperIsLate = Deadline::after(std::chrono::seconds(2));
   while (!window_.tryPublish(name)) {
@@ -109,7 +127,7 @@ void OwnWindow::publish(const std::string& name) {
 }
 
 OwnWindow::~OwnWindow() {
-  if (origin_.isInherited()) return;
+  if (forkGuard_.isInherited()) return;
   control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
   MPF_STEP(window_closed);
   segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
@@ -121,12 +139,13 @@ void OwnWindow::admit(const Rights& peers) {
   const auto wanted = joined(admitted_, peers);
   if (wanted == admitted_) return;
   hints_.setRights(wanted);
-  setRights(fifo_.get(), {.mode = pipeMode(wanted.mode), .group = wanted.group, .user = wanted.user});
+  setRights(fifo_.get(),
+            {.mode = pipeMode(wanted.mode), .group = wanted.group, .user = wanted.user});
   admitted_ = wanted;
 }
 
 void OwnWindow::ring() const noexcept {
-  if (origin_.isInherited()) return;
+  if (forkGuard_.isInherited()) return;
   doorbell::ring(hints().bell);
   static_cast<void>(doorbell::tryRingFifo(fifo_));
 }
@@ -134,21 +153,26 @@ void OwnWindow::ring() const noexcept {
 std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout::SegmentKind kind) {
   auto window = Segment::tryOpen(name, kind, Segment::Access::readOnly);
   if (!window) return nullptr;
-  if (window->bytes() < layout::kWindowBytes) throw SegmentError(fmt::format("{}: truncated", segments::path(name)));
+  if (window->bytes() < layout::kWindowBytes)
+    throw SegmentError(fmt::format("{}: truncated", segments::path(name)));
   if (window->bytes() > layout::kWindowBytes)
-    throw SegmentError(fmt::format("{}: {} bytes are no window", segments::path(name), window->bytes()));
+    throw SegmentError(
+        fmt::format("{}: {} bytes are no window", segments::path(name), window->bytes()));
   const auto parsed = SegmentName::tryParse(name);
   if (!parsed) throw SegmentError(fmt::format("{}: no name of a window", segments::path(name)));
-  // Any peer may have written nonsense over their header; the window's, which it cannot write, is enough.
-  auto hints = Segment::tryOpenShared(SegmentName::keyed(parsed->backplane, NameKind::hints, window->header().incarnation),
-                                      sizeof(layout::WindowHints));
+  // Any peer may have written nonsense over their header; the window's, which it cannot write, is
+  // enough.
+  auto hints = Segment::tryOpenShared(
+      SegmentName::keyed(parsed->backplane, NameKind::hints, window->header().incarnation),
+      sizeof(layout::WindowHints));
   if (!hints) return nullptr;
   hints->closeFile();
   MPF_STEP(peer_mapped);
   auto peer = std::make_shared<PeerWindow>();
   peer->window_ = std::move(*window);
   peer->hints_ = std::move(*hints);
-  peer->fifoName_ = SegmentName::keyed(parsed->backplane, NameKind::fifo, peer->header().incarnation);
+  peer->fifoName_ =
+      SegmentName::keyed(parsed->backplane, NameKind::fifo, peer->header().incarnation);
   return peer;
 }
 
@@ -167,8 +191,10 @@ void PeerWindow::notify(std::uint32_t index) noexcept {
 void PeerWindow::knock(std::uint64_t incarnation) noexcept {
   auto& hint = hints();
   // PAIR(knock): who sees the incarnation finds the link under its name.
-  const auto overwritten = hint.knocks[incarnation % layout::kKnocks].exchange(incarnation, std::memory_order_acq_rel);
-  if (overwritten != 0 && overwritten != incarnation) hint.rescan.store(1, std::memory_order_relaxed);
+  const auto overwritten =
+      hint.knocks[incarnation % layout::kKnocks].exchange(incarnation, std::memory_order_acq_rel);
+  if (overwritten != 0 && overwritten != incarnation)
+    hint.rescan.store(1, std::memory_order_relaxed);
   MPF_STEP(knock_placed);
   // PAIR(knocked): who sees the new count finds the knock.
   hint.knocked.fetch_add(1, std::memory_order_release);
@@ -184,9 +210,10 @@ void PeerWindow::wakeIfAsleep() noexcept {
   const auto number = control().sleepNumber.load(std::memory_order_acquire);
   const auto sleeping = control().sleeping.load(std::memory_order_relaxed);
   if (sleeping == layout::SleepState::awake) return;
-  // Who has been woken and has not run yet still looks asleep: one ring for each sleep is enough. It must be one of our own, which is
-  // complete; another process may be stopped in the middle of its. An owner that has gone to sleep anew meanwhile, and whose number we do
-  // not see yet, will see our news: its fence comes after ours.
+  // Who has been woken and has not run yet still looks asleep: one ring for each sleep is enough.
+  // It must be one of our own, which is complete; another process may be stopped in the middle of
+  // its. An owner that has gone to sleep anew meanwhile, and whose number we do not see yet, will
+  // see our news: its fence comes after ours.
   if (number != 0 && rungFor_.load(std::memory_order_relaxed) == number) return;
   if (tryRing(sleeping)) rungFor_.store(number, std::memory_order_relaxed);
 }

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 
 namespace mpf::tools {
 
@@ -20,7 +20,8 @@ void addServer(CLI::App& app, ServerArguments& arguments);
 void addBackplane(CLI::App& app, std::string& backplane, const std::string& otherwise);
 void addJson(CLI::App& app, bool& json);
 // A time in seconds that is shown with its default; 0 only if that means something.
-void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text, bool mayBeZero);
+void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text,
+                bool mayBeZero);
 [[nodiscard]] Nanoseconds ofSeconds(double seconds);
 
 }  // namespace mpf::tools

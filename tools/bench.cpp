@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf bench: hands over to mpf-bench, a program of its own so that `mpf` needs none of the libraries that it compares us with.
+// mpf bench: hands over to mpf-bench, a program of its own so that `mpf` needs none of the
+// libraries that it compares us with.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -10,32 +11,37 @@
 #include <memory>
 #include <vector>
 
-#include <mpf/base/print_error.h>
-#include <mpf/tools/commands.h>
+#include "base/print_error.h"
+#include "tools/commands.h"
 
 namespace mpf::tools {
 namespace {
 
 int bench(std::vector<std::string> words) {
-  const auto program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mpf-bench").string();
+  const auto program =
+      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mpf-bench").string();
   words.insert(words.begin(), program);
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
   for (auto& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   ::execv(program.c_str(), arguments.data());
-  printError("mpf bench: cannot start {}: {}; it is there when MPF was built with MPF_BUILD_BENCHMARKS=ON\n", program,
-             std::strerror(errno));
+  printError(
+      "mpf bench: cannot start {}: {}; it is there when MPF was built with "
+      "MPF_BUILD_BENCHMARKS=ON\n",
+      program, std::strerror(errno));
   return 1;
 }
 
 }  // namespace
 
 void addBench(CLI::App& app, Run& run) {
-  auto& command = *app.add_subcommand("bench", "How fast messages are; `mpf bench --help` says more");
+  auto& command =
+      *app.add_subcommand("bench", "How fast messages are; `mpf bench --help` says more");
   command.prefix_command();
   command.set_help_flag();
-  command.callback([&command, &run] { run = [words = command.remaining()] { return bench(words); }; });
+  command.callback(
+      [&command, &run] { run = [words = command.remaining()] { return bench(words); }; });
 }
 
 }  // namespace mpf::tools

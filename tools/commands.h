@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Commands: the subcommands of `mpf`. Each adds itself to the command line; the one that was called sets `run`.
+// Commands: the subcommands of `mpf`. Each adds itself to the command line; the one that was called
+// sets `run`.
 #pragma once
 
 #include <functional>

@@ -2,20 +2,22 @@
 // mpf: looks at backplanes, servers and clients, and talks to them from the shell.
 #include <CLI/CLI.hpp>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/run_main.h>
-#include <mpf/tools/commands.h>
-#include <mpf/tools/wrap.h>
+#include "base/command_line.h"
+#include "base/run_main.h"
+#include "tools/commands.h"
+#include "tools/text/wrap.h"
 
 namespace {
 
 constexpr const char* kFooter =
-    "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work when a process is stopped or dead.\n"
+    "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work "
+    "when a process is stopped or dead.\n"
     "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
     "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.";
 
 int runSubcommand(int argc, char** argv) {
-  CLI::App app("mpf - looks at backplanes, servers and clients, and talks to them from the shell", "mpf");
+  CLI::App app("mpf - looks at backplanes, servers and clients, and talks to them from the shell",
+               "mpf");
   mpf::tools::Run run;
   mpf::tools::addLs(app, run);
   mpf::tools::addMrr(app, run);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 
-#include <mpf/client/programs/echo_client.h>
+#include "client/programs/echo_client.h"
 
 namespace {
 
@@ -18,7 +18,8 @@ int main(int argc, char** argv) {
   };
   echo.isEcho = [](int i, std::size_t bytes, const mpf::Message& reply) {
     const auto value = reply.valueAs<mpf::Char8Array>();
-    return value.size() == bytes && std::ranges::all_of(value, [i](char c) { return c == letter(i); });
+    return value.size() == bytes &&
+           std::ranges::all_of(value, [i](char c) { return c == letter(i); });
   };
   return mpf::runEchoClient(argc, argv, echo);
 }

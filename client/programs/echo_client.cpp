@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/programs/echo_client.h>
+#include "client/programs/echo_client.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -9,13 +9,14 @@
 #include <limits>
 #include <memory>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/duration_text.h>
-#include <mpf/base/latency_recorder.h>
-#include <mpf/base/log_limiter.h>
-#include <mpf/base/print_error.h>
-#include <mpf/base/run_main.h>
-#include <mpf/client/sync_client.h>
+#include <mpf/sync_client.h>
+
+#include "base/command_line.h"
+#include "base/duration_text.h"
+#include "base/latency_recorder.h"
+#include "base/log_limiter.h"
+#include "base/print_error.h"
+#include "base/run_main.h"
 
 namespace mpf {
 namespace {
@@ -45,9 +46,12 @@ class EchoStatistics {
   // Returns the exit status: 0 when every message came back.
   int report() {
     say(limiter_.takeAll(Clock::nowNs()));
-    const auto at = [&](double percent) { return durationText(static_cast<double>(roundTrips_->percentileNs(percent))); };
+    const auto at = [&](double percent) {
+      return durationText(static_cast<double>(roundTrips_->percentileNs(percent)));
+    };
     fmt::print("{} came back, {} did not", roundTrips_->count(), failures_);
-    if (roundTrips_->count() != 0) fmt::print("; round trip: p50 {}, p99 {}, max {}", at(50), at(99), at(100));
+    if (roundTrips_->count() != 0)
+      fmt::print("; round trip: p50 {}, p99 {}, max {}", at(50), at(99), at(100));
     fmt::print("\n");
     return failures_ == 0 ? 0 : 1;
   }
@@ -67,10 +71,12 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
   EchoStatistics statistics;
   for (int i = 0; i < options.count; ++i) {
     const auto sentNs = Clock::nowNs();
-    auto answer = client.call(echo.make(i, options.bytes), std::chrono::milliseconds(options.timeoutMs));
+    auto answer =
+        client.call(echo.make(i, options.bytes), std::chrono::milliseconds(options.timeoutMs));
     if (!answer) {
       const auto why = client.client().notConnectedBecause();
-      statistics.fail(fmt::format("message {}: {}{}{}", i, answer.why(), why.empty() ? "" : ": ", why));
+      statistics.fail(
+          fmt::format("message {}: {}{}{}", i, answer.why(), why.empty() ? "" : ": ", why));
     } else if (!echo.isEcho(i, options.bytes, answer.message())) {
       statistics.fail(fmt::format("message {}: the reply is not its echo", i));
     } else {
@@ -81,15 +87,25 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
 }
 
 int callServer(int argc, char** argv, const EchoClient& echo) {
-  CLI::App app(fmt::format("{} - sends {}s to an echo server and checks what comes back", echo.program, echo.what), echo.program);
+  CLI::App app(fmt::format("{} - sends {}s to an echo server and checks what comes back",
+                           echo.program, echo.what),
+               echo.program);
   EchoOptions options;
   options.server = echo.server;
   app.add_option("server", options.server, "Name of the server")->capture_default_str();
-  app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
-  app.add_option("--location", options.location, "Location of the server; default: $MPF_LOCATION, or 0");
-  app.add_option("--count", options.count, "Messages to send")->capture_default_str()->check(wholeNumber(1, kMost));
-  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")->capture_default_str()->check(wholeNumber(1, kMost));
-  app.add_option("--bytes", options.bytes, "Length of an array message")->capture_default_str()->check(wholeNumber(0, kMostBytes));
+  app.add_option("--backplane", options.backplane,
+                 "Backplane; default: $MPF_BACKPLANE, or \"default\"");
+  app.add_option("--location", options.location,
+                 "Location of the server; default: $MPF_LOCATION, or 0");
+  app.add_option("--count", options.count, "Messages to send")
+      ->capture_default_str()
+      ->check(wholeNumber(1, kMost));
+  app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")
+      ->capture_default_str()
+      ->check(wholeNumber(1, kMost));
+  app.add_option("--bytes", options.bytes, "Length of an array message")
+      ->capture_default_str()
+      ->check(wholeNumber(0, kMostBytes));
   if (const auto status = parseCommandLine(app, argc, argv)) return *status;
   return callEchoServer(options, echo);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/client/programs/echo_client.h>
+#include "client/programs/echo_client.h"
 
 int main(int argc, char** argv) {
   mpf::EchoClient echo{"mpf-int32-client", "Int32", "Int32 message", {}, {}};

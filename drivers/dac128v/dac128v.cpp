@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/dac128v/dac128v.h>
+#include <mpf/drivers/dac128v.h>
 
 #include <algorithm>
 
@@ -61,9 +61,14 @@ bool Dac128v::isReady() noexcept {
 // all ones, since a reset or an absent module would not change that reading. Without a written
 // channel the result is false.
 bool Dac128v::holdsWhatWasWritten() noexcept {
-  auto found = std::ranges::find_if(written_, [](const auto& code) { return code && *code != kPowerUpCode && *code != kMaxCode; });
-  if (found == written_.end()) found = std::ranges::find_if(written_, [](const auto& code) { return code && *code != kPowerUpCode; });
-  if (found == written_.end()) found = std::ranges::find_if(written_, [](const auto& code) { return code.has_value(); });
+  auto found = std::ranges::find_if(written_, [](const auto& code) {
+    return code && *code != kPowerUpCode && *code != kMaxCode;
+  });
+  if (found == written_.end())
+    found = std::ranges::find_if(written_,
+                                 [](const auto& code) { return code && *code != kPowerUpCode; });
+  if (found == written_.end())
+    found = std::ranges::find_if(written_, [](const auto& code) { return code.has_value(); });
   if (found == written_.end()) return false;
   const auto word = registers_.read16(offsetOf(static_cast<std::size_t>(found - written_.begin())));
   return word != kOnes && *found == codeIn(word);

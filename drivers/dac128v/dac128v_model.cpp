@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/dac128v/dac128v_model.h>
+#include "drivers/dac128v/dac128v_model.h"
 
 #include <utility>
 
@@ -12,15 +12,20 @@ constexpr std::uint16_t kNotKept = 0xf000;
 }  // namespace
 
 Dac128vModel::Dac128vModel(const Dac128vRanges& ranges, OnVolts onVolts)
-    : DeviceModel({.manufacturer = kSystran, .model = 0x69, .revision = 0x10}), ranges_(ranges), onVolts_(std::move(onVolts)) {
+    : DeviceModel({.manufacturer = kSystran, .model = 0x69, .revision = 0x10}),
+      ranges_(ranges),
+      onVolts_(std::move(onVolts)) {
   codes_.fill(Dac128v::kPowerUpCode);
-  for (std::size_t channel = 0; onVolts_ && channel < codes_.size(); ++channel) onVolts_(static_cast<int>(channel), voltsOf(channel));
+  for (std::size_t channel = 0; onVolts_ && channel < codes_.size(); ++channel)
+    onVolts_(static_cast<int>(channel), voltsOf(channel));
 }
 
 std::uint16_t Dac128vModel::read(Space space, std::size_t offset, Lanes /*lanes*/) {
   const std::lock_guard lock(mutex_);
   const auto channel = offset / 2;
-  return space == Space::io && channel < codes_.size() ? static_cast<std::uint16_t>(codes_[channel] | kNotKept) : 0;
+  return space == Space::io && channel < codes_.size()
+             ? static_cast<std::uint16_t>(codes_[channel] | kNotKept)
+             : 0;
 }
 
 void Dac128vModel::write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) {

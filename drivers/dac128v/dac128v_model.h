@@ -10,7 +10,7 @@
 #include <functional>
 #include <mutex>
 
-#include <mpf/drivers/dac128v/dac128v.h>
+#include <mpf/drivers/dac128v.h>
 #include <mpf/drivers/industry_pack/device_model.h>
 
 namespace mpf {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/dac128v/dac128v_range.h>
+#include <mpf/drivers/dac128v_range.h>
 
 #include <cmath>
 #include <stdexcept>
@@ -12,7 +12,8 @@ struct Reference {
   std::string_view name;
   double volts;
 };
-constexpr std::array kReferences{Reference{"-10", -10}, Reference{"-5", -5}, Reference{"0", 0}, Reference{"5", 5}, Reference{"10", 10}};
+constexpr std::array kReferences{Reference{"-10", -10}, Reference{"-5", -5}, Reference{"0", 0},
+                                 Reference{"5", 5}, Reference{"10", 10}};
 
 std::optional<double> tryReference(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
@@ -29,7 +30,9 @@ Dac128vRange parseOne(const std::string& text) {
     const auto high = tryReference(std::string_view(text).substr(to + 2));
     if (low && high && *low < *high) return {*low, *high};
   }
-  throw std::invalid_argument("\"" + text + "\" is not an output range; use LOWtoHIGH with -10, -5, 0, 5 or 10 V, for example -10to10");
+  throw std::invalid_argument(
+      "\"" + text +
+      "\" is not an output range; use LOWtoHIGH with -10, -5, 0, 5 or 10 V, for example -10to10");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/digital_io/digital_io.h>
+#include "drivers/digital_io/digital_io.h"
 
 #include <fmt/format.h>
 #include <stdexcept>
@@ -24,7 +24,8 @@ class NoInterrupt final : public Interrupt {
 
 const DigitalIoKind& kindOf(const IndustryPackModule& module) {
   const auto* const kind = findDigitalIoKind(module.idProm().manufacturer, module.idProm().model);
-  if (kind == nullptr) throw std::invalid_argument(module.where() + " is not a supported module of digital lines");
+  if (kind == nullptr)
+    throw std::invalid_argument(module.where() + " is not a supported module of digital lines");
   return *kind;
 }
 
@@ -43,8 +44,9 @@ Telling tellingOf(const DigitalIoKind& kind, bool usesInterrupts) {
 
 int checkVector(int vector, const IndustryPackModule& module) {
   if (vector >= 0 && vector <= kMaxVector) return vector;
-  throw IndustryPackError(IndustryPackStatus::badVector,
-                          fmt::format("module \"{}\": interrupt vector {} is not 0 to 255", module.name(), vector));
+  throw IndustryPackError(
+      IndustryPackStatus::badVector,
+      fmt::format("module \"{}\": interrupt vector {} is not 0 to 255", module.name(), vector));
 }
 
 }  // namespace
@@ -85,8 +87,9 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
   }
   auto threadOptions = options.storm;
   threadOptions.pollEvery = options.pollEvery;
-  thread_ = std::make_unique<InterruptThread>(usesInterrupts_ ? module.interrupt(0) : *noInterrupt_, threadOptions,
-                                              [this](InterruptThread::Cause cause) { return serve(cause); });
+  thread_ = std::make_unique<InterruptThread>(
+      usesInterrupts_ ? module.interrupt(0) : *noInterrupt_, threadOptions,
+      [this](InterruptThread::Cause cause) { return serve(cause); });
   // PAIR(dio-thread): the thread object is complete.
   running_.store(thread_.get(), std::memory_order_release);
 }
@@ -94,7 +97,8 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
 DigitalIo::~DigitalIo() {
   running_.store(nullptr, std::memory_order_relaxed);
   thread_.reset();
-  if (usesInterrupts_ && state_.isThere && module_.problem().empty()) registers_.write(word::kInterruptEnable, kind_.inputs, 0);
+  if (usesInterrupts_ && state_.isThere && module_.problem().empty())
+    registers_.write(word::kInterruptEnable, kind_.inputs, 0);
 }
 
 // Programs the module; outputs that were never written keep their values. Returns false, and writes
@@ -125,7 +129,8 @@ void DigitalIo::restoreOutputs() {
   const auto now = registers_.read(word::kOutput, writtenMask_);
   registers_.write(word::kOutput, writtenMask_, (now & ~writtenMask_) | writtenBits_);
   if (kind_.driver == DigitalIoKind::Driver::switched)
-    registers_.write(word::kOutputEnable, writtenMask_, registers_.read(word::kOutputEnable, writtenMask_) | writtenMask_);
+    registers_.write(word::kOutputEnable, writtenMask_,
+                     registers_.read(word::kOutputEnable, writtenMask_) | writtenMask_);
 }
 
 DigitalIo::Marks DigitalIo::readMarks() {
@@ -151,7 +156,8 @@ DigitalIoStatus DigitalIo::tryWriteBits(std::uint32_t mask, std::uint32_t bits) 
   const auto after = (before & ~mask) | (bits & mask);
   registers_.write(word::kOutput, mask, after);
   const auto readBack = registers_.read(word::kOutput, mask);
-  if (mask != 0 && DigitalIoRegisters::isAllOnes(readBack, mask) && !module_.problem().empty()) return DigitalIoStatus::gone;
+  if (mask != 0 && DigitalIoRegisters::isAllOnes(readBack, mask) && !module_.problem().empty())
+    return DigitalIoStatus::gone;
   if (((readBack ^ after) & mask) != 0) {
     writtenMask_ &= ~mask;  // their values are unknown now, so they are not restored
     writtenBits_ &= ~mask;
@@ -196,14 +202,18 @@ DigitalIoStatus DigitalIo::trySetEdges(std::uint32_t rising, std::uint32_t falli
 std::optional<std::uint32_t> DigitalIo::tryReadInputs() noexcept {
   const std::lock_guard lock(mutex_);
   const auto bits = registers_.read(word::kInput, kind_.inputs);
-  if ((!state_.isThere || DigitalIoRegisters::isAllOnes(bits, kind_.inputs)) && !module_.problem().empty()) return std::nullopt;
+  if ((!state_.isThere || DigitalIoRegisters::isAllOnes(bits, kind_.inputs)) &&
+      !module_.problem().empty())
+    return std::nullopt;
   return bits & kind_.inputs;
 }
 
 std::optional<std::uint32_t> DigitalIo::tryReadOutputs() noexcept {
   const std::lock_guard lock(mutex_);
   const auto bits = registers_.read(word::kOutput, kind_.outputs);
-  if ((!state_.isThere || DigitalIoRegisters::isAllOnes(bits, kind_.outputs)) && !module_.problem().empty()) return std::nullopt;
+  if ((!state_.isThere || DigitalIoRegisters::isAllOnes(bits, kind_.outputs)) &&
+      !module_.problem().empty())
+    return std::nullopt;
   return bits & kind_.outputs;
 }
 
@@ -262,7 +272,8 @@ bool DigitalIo::tend() {
 std::uint32_t DigitalIo::followInputs(bool& hadEdges) {
   std::uint32_t changed = 0;
   for (int look = 0; look < kMaxLooks; ++look) {
-    const auto pending = usesInterrupts_ ? registers_.read(word::kPending, kind_.inputs) & edges() : 0;
+    const auto pending =
+        usesInterrupts_ ? registers_.read(word::kPending, kind_.inputs) & edges() : 0;
     if (pending != 0) registers_.write(word::kPending, kind_.inputs, pending);
     const auto inputs = registers_.read(word::kInput, kind_.inputs) & kind_.inputs;
     changed |= pending | (inputs ^ state_.inputs);
@@ -283,7 +294,8 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
     if (hadEdges) isLosing_ = false;
     return;
   }
-  if (std::exchange(mayBeLost_, hadEdges) && !std::exchange(isLosing_, true)) tell({DigitalIoNews::Kind::lostInterrupt, state_.inputs, 0});
+  if (std::exchange(mayBeLost_, hadEdges) && !std::exchange(isLosing_, true))
+    tell({DigitalIoNews::Kind::lostInterrupt, state_.inputs, 0});
   noteStorms();
 }
 
@@ -324,7 +336,8 @@ void DigitalIo::Subscription::end() noexcept {
   auto* const io = std::exchange(io_, nullptr);
   if (io == nullptr) return;
   const std::lock_guard lock(io->mutex_);
-  std::erase_if(io->subscribers_, [&](const Subscriber& subscriber) { return subscriber.id == id_; });
+  std::erase_if(io->subscribers_,
+                [&](const Subscriber& subscriber) { return subscriber.id == id_; });
 }
 
 }  // namespace mpf

@@ -39,11 +39,12 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/clock.h>
-#include <mpf/drivers/digital_io/digital_io_kind.h>
-#include <mpf/drivers/digital_io/digital_io_registers.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
 #include <mpf/drivers/industry_pack/module.h>
+
+#include "drivers/digital_io/digital_io_kind.h"
+#include "drivers/digital_io/digital_io_registers.h"
 
 namespace mpf {
 
@@ -110,8 +111,12 @@ class DigitalIo {
   // Sets the outputs in `mask` to `bits` and reads them back; other outputs keep their values. A
   // line with an output enable becomes an output.
   [[nodiscard]] DigitalIoStatus tryWriteBits(std::uint32_t mask, std::uint32_t bits) noexcept;
-  [[nodiscard]] DigitalIoStatus trySetBits(std::uint32_t mask) noexcept { return tryWriteBits(mask, mask); }
-  [[nodiscard]] DigitalIoStatus tryClearBits(std::uint32_t mask) noexcept { return tryWriteBits(mask, 0); }
+  [[nodiscard]] DigitalIoStatus trySetBits(std::uint32_t mask) noexcept {
+    return tryWriteBits(mask, mask);
+  }
+  [[nodiscard]] DigitalIoStatus tryClearBits(std::uint32_t mask) noexcept {
+    return tryWriteBits(mask, 0);
+  }
   // Sets the voltage above which an input is high.
   //   code  0 to kMaxThreshold, in steps of kThresholdStepVolts
   [[nodiscard]] DigitalIoStatus trySetThreshold(int code) noexcept;
@@ -148,7 +153,9 @@ class DigitalIo {
   void noteStorms();
   void tell(const DigitalIoNews& news);
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
-  [[nodiscard]] std::uint32_t armed() const noexcept { return (rising_ & ~falling_) | (rising_ & falling_ & ~state_.inputs); }
+  [[nodiscard]] std::uint32_t armed() const noexcept {
+    return (rising_ & ~falling_) | (rising_ & falling_ & ~state_.inputs);
+  }
 
   // Register values that a reset would change. These are the values that were read, not those that
   // were written, since a register may be broken.
@@ -192,7 +199,8 @@ class DigitalIo::Subscription {
  public:
   Subscription() = default;
   Subscription(DigitalIo& io, std::uint64_t id) noexcept : io_(&io), id_(id) {}
-  Subscription(Subscription&& other) noexcept : io_(std::exchange(other.io_, nullptr)), id_(other.id_) {}
+  Subscription(Subscription&& other) noexcept
+      : io_(std::exchange(other.io_, nullptr)), id_(other.id_) {}
   Subscription& operator=(Subscription&& other) noexcept;
   ~Subscription() { end(); }
 

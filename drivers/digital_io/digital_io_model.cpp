@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/digital_io/digital_io_model.h>
+#include "drivers/digital_io/digital_io_model.h"
 
 #include <utility>
 
@@ -14,11 +14,15 @@ constexpr std::uint16_t kVectorBits = 0xff;
 
 constexpr std::uint32_t bitOf(std::size_t bit) noexcept { return std::uint32_t{1} << bit; }
 
-std::uint16_t half(std::uint32_t bits, std::size_t which) noexcept { return static_cast<std::uint16_t>(bits >> (16 * which)); }
+std::uint16_t half(std::uint32_t bits, std::size_t which) noexcept {
+  return static_cast<std::uint16_t>(bits >> (16 * which));
+}
 
 // The value read from a register that has only the bits in `mask`: the module does not drive the
 // others, and the carrier pulls them up.
-std::uint16_t half(std::uint32_t bits, std::uint32_t mask, std::size_t which) noexcept { return half(bits | ~mask, which); }
+std::uint16_t half(std::uint32_t bits, std::uint32_t mask, std::size_t which) noexcept {
+  return half(bits | ~mask, which);
+}
 
 template <class Word>
 void merge(Word& into, std::uint32_t value, std::uint32_t mask) noexcept {
@@ -28,7 +32,9 @@ void merge(Word& into, std::uint32_t value, std::uint32_t mask) noexcept {
 }  // namespace
 
 DigitalIoModel::DigitalIoModel(const DigitalIoKind& kind, OnOutput onOutput)
-    : DeviceModel({.manufacturer = kind.manufacturer, .model = kind.model, .revision = 0xa1}), kind_(kind), onOutput_(std::move(onOutput)) {
+    : DeviceModel({.manufacturer = kind.manufacturer, .model = kind.model, .revision = 0xa1}),
+      kind_(kind),
+      onOutput_(std::move(onOutput)) {
   const std::lock_guard lock(mutex_);
   follow();
 }
@@ -54,7 +60,8 @@ std::uint16_t DigitalIoModel::readWord(std::size_t at) const {
     if (at == word::kSystranDirection) return registers_.direction;
     if (at > word::kSystranDirection) return kOnes;
   }
-  if (at == word::kThreshold && kind_.hasThreshold) return half(registers_.threshold, kMaxThreshold, 0);
+  if (at == word::kThreshold && kind_.hasThreshold)
+    return half(registers_.threshold, kMaxThreshold, 0);
   const auto edges = kind_.hasInterrupts ? kind_.inputs : 0;
   switch (at) {
     case word::kOutput:
@@ -65,7 +72,8 @@ std::uint16_t DigitalIoModel::readWord(std::size_t at) const {
       return half(inputs_, kind_.inputs, at - word::kInput);
     case word::kOutputEnable:
     case word::kOutputEnable + 1:
-      return half(registers_.outputEnable, kind_.driver == Driver::switched ? kind_.outputs : 0, at - word::kOutputEnable);
+      return half(registers_.outputEnable, kind_.driver == Driver::switched ? kind_.outputs : 0,
+                  at - word::kOutputEnable);
     case word::kControl:
       return registers_.control;
     case word::kVector:
@@ -85,7 +93,9 @@ std::uint16_t DigitalIoModel::readWord(std::size_t at) const {
 }
 
 void DigitalIoModel::writeWord(std::size_t at, std::uint16_t value, Lanes lanes) {
-  const auto whole = [&](std::uint16_t& reg, std::uint32_t mask) { merge(reg, value, mask & lanes); };
+  const auto whole = [&](std::uint16_t& reg, std::uint32_t mask) {
+    merge(reg, value, mask & lanes);
+  };
   const auto pair = [&](std::uint32_t& reg, std::size_t which, std::uint32_t mask) {
     merge(reg, std::uint32_t{value} << (16 * which), (std::uint32_t{lanes} << (16 * which)) & mask);
   };
@@ -99,24 +109,29 @@ void DigitalIoModel::writeWord(std::size_t at, std::uint16_t value, Lanes lanes)
     if (at == word::kSystranDirection) whole(registers_.direction, 0xffff);
     return;
   }
-  if (at == word::kThreshold && kind_.hasThreshold) return whole(registers_.threshold, kMaxThreshold);
+  if (at == word::kThreshold && kind_.hasThreshold)
+    return whole(registers_.threshold, kMaxThreshold);
   if (at == word::kControl) return whole(registers_.control, 0xffff);
   if (at == word::kOutputEnable || at == word::kOutputEnable + 1) {
-    if (kind_.driver == Driver::switched) pair(registers_.outputEnable, at - word::kOutputEnable, kind_.outputs);
+    if (kind_.driver == Driver::switched)
+      pair(registers_.outputEnable, at - word::kOutputEnable, kind_.outputs);
     return;
   }
   if (!kind_.hasInterrupts) return;
   if (at == word::kVector) return whole(registers_.vector, kVectorBits);
   if (at == word::kInterruptEnable || at == word::kInterruptEnable + 1)
     return pair(registers_.interruptEnable, at - word::kInterruptEnable, kind_.inputs);
-  if (at == word::kPolarity || at == word::kPolarity + 1) return pair(registers_.polarity, at - word::kPolarity, kind_.inputs);
+  if (at == word::kPolarity || at == word::kPolarity + 1)
+    return pair(registers_.polarity, at - word::kPolarity, kind_.inputs);
   if (at == word::kPending || at == word::kPending + 1)
-    registers_.pending &= ~(std::uint32_t{static_cast<std::uint16_t>(value & lanes)} << (16 * (at - word::kPending)));
+    registers_.pending &=
+        ~(std::uint32_t{static_cast<std::uint16_t>(value & lanes)} << (16 * (at - word::kPending)));
 }
 
 // Lines that the module drives, high or low.
 std::uint32_t DigitalIoModel::drivenLocked() const {
-  if (kind_.controlBits != 0 && (registers_.control & kind_.controlBits) != kind_.controlBits) return 0;
+  if (kind_.controlBits != 0 && (registers_.control & kind_.controlBits) != kind_.controlBits)
+    return 0;
   switch (kind_.driver) {
     case Driver::none:
       return 0;
@@ -132,12 +147,14 @@ std::uint32_t DigitalIoModel::drivenLocked() const {
 
 double DigitalIoModel::voltsOf(std::size_t bit) const {
   const bool isReadBack = kind_.driver == Driver::openCollector || kind_.driver == Driver::switched;
-  if (isReadBack && (drivenLocked() & bitOf(bit)) != 0) return (registers_.output & bitOf(bit)) != 0 ? kHighVolts : 0;
+  if (isReadBack && (drivenLocked() & bitOf(bit)) != 0)
+    return (registers_.output & bitOf(bit)) != 0 ? kHighVolts : 0;
   return outside_[bit] ? outside_[bit]() : kHighVolts;
 }
 
 std::uint32_t DigitalIoModel::levels() const {
-  const auto threshold = kind_.hasThreshold ? registers_.threshold * kThresholdStepVolts : kTtlThresholdVolts;
+  const auto threshold =
+      kind_.hasThreshold ? registers_.threshold * kThresholdStepVolts : kTtlThresholdVolts;
   std::uint32_t levels = 0;
   for (std::size_t bit = 0; bit < outside_.size(); ++bit) {
     if ((kind_.inputs & bitOf(bit)) != 0 && voltsOf(bit) >= threshold) levels |= bitOf(bit);
@@ -152,7 +169,8 @@ void DigitalIoModel::follow() {
   const auto high = ~(drivenLocked() & ~registers_.output);
   const auto news = std::exchange(told_, high) ^ high;
   for (std::size_t bit = 0; onOutput_ && bit < outside_.size(); ++bit) {
-    if ((news & kind_.outputs & bitOf(bit)) != 0) onOutput_(static_cast<int>(bit), (high & bitOf(bit)) != 0 ? kHighVolts : 0);
+    if ((news & kind_.outputs & bitOf(bit)) != 0)
+      onOutput_(static_cast<int>(bit), (high & bitOf(bit)) != 0 ? kHighVolts : 0);
   }
   const auto before = std::exchange(inputs_, levels());
   const auto wanted = (inputs_ & registers_.polarity) | (~inputs_ & ~registers_.polarity);

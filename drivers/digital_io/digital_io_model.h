@@ -19,8 +19,9 @@
 #include <functional>
 #include <mutex>
 
-#include <mpf/drivers/digital_io/digital_io_kind.h>
 #include <mpf/drivers/industry_pack/device_model.h>
+
+#include "drivers/digital_io/digital_io_kind.h"
 
 namespace mpf {
 
@@ -47,16 +48,17 @@ class DigitalIoModel final : public DeviceModel {
   // Reads the connected voltages again; call it when one has changed.
   void look();
 
-  [[nodiscard]] std::uint32_t inputs() const;   // the inputs as a driver would read them
+  [[nodiscard]] std::uint32_t inputs() const;  // the inputs as a driver would read them
   [[nodiscard]] std::uint32_t outputs() const;  // the output registers
-  [[nodiscard]] std::uint32_t driven() const;   // lines that are outputs now
+  [[nodiscard]] std::uint32_t driven() const;  // lines that are outputs now
   [[nodiscard]] int vector() const;
   // Simulates a fault: these bits of the output registers are stuck at 0.
   void setStuck(std::uint32_t bits);
 
  private:
   struct Registers {
-    std::uint32_t output = 0xffffffff, outputEnable = 0, interruptEnable = 0, polarity = 0, pending = 0;
+    std::uint32_t output = 0xffffffff, outputEnable = 0, interruptEnable = 0, polarity = 0,
+                  pending = 0;
     std::uint16_t control = 0, direction = 0, vector = 0, threshold = 0;
   };
   [[nodiscard]] std::uint16_t readWord(std::size_t at) const;
@@ -71,7 +73,7 @@ class DigitalIoModel final : public DeviceModel {
   mutable std::mutex mutex_;
   Registers registers_;
   std::array<Volts, 32> outside_{};
-  std::uint32_t inputs_ = 0;      // at the last follow()
+  std::uint32_t inputs_ = 0;  // at the last follow()
   // outputs that were reported as high; 0 at first, so that all are reported
   std::uint32_t told_ = 0;
   std::uint32_t stuck_ = 0;

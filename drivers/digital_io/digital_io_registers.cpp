@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/digital_io/digital_io_registers.h>
+#include "drivers/digital_io/digital_io_registers.h"
 
 namespace mpf {
 
@@ -11,7 +11,8 @@ void DigitalIoRegisters::setUp(int threshold) {
     writeWord(word::kSystranDirection, readWord(word::kSystranDirection) | word::kSystranPortsOut);
     return;
   }
-  if (kind_.controlBits != 0) writeWord(word::kControl, readWord(word::kControl) | kind_.controlBits);
+  if (kind_.controlBits != 0)
+    writeWord(word::kControl, readWord(word::kControl) | kind_.controlBits);
   if (kind_.hasThreshold) writeWord(word::kThreshold, static_cast<std::uint16_t>(threshold));
 }
 

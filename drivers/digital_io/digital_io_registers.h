@@ -7,8 +7,9 @@
 
 #include <cstdint>
 
-#include <mpf/drivers/digital_io/digital_io_kind.h>
 #include <mpf/drivers/industry_pack/registers.h>
+
+#include "drivers/digital_io/digital_io_kind.h"
 
 namespace mpf {
 
@@ -41,7 +42,9 @@ class DigitalIoRegisters {
 
  private:
   static std::uint16_t low(std::uint32_t bits) noexcept { return static_cast<std::uint16_t>(bits); }
-  static std::uint16_t high(std::uint32_t bits) noexcept { return static_cast<std::uint16_t>(bits >> 16); }
+  static std::uint16_t high(std::uint32_t bits) noexcept {
+    return static_cast<std::uint16_t>(bits >> 16);
+  }
 
   Registers& io_;
   const DigitalIoKind& kind_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/industry_pack/carrier_parameters.h>
+#include "drivers/industry_pack/carrier_parameters.h"
 
 #include <algorithm>
 #include <cctype>
@@ -7,7 +7,7 @@
 #include <fmt/ranges.h>
 #include <stdexcept>
 
-#include <mpf/drivers/industry_pack/parameter_parsers.h>
+#include "drivers/industry_pack/parameter_parsers.h"
 
 namespace mpf {
 namespace {
@@ -37,12 +37,15 @@ constexpr std::array kParameterKinds{
 std::string symbolOf(std::string_view kind) {
   constexpr std::string_view kCommand = "ipacadd";
   std::string symbol(kind.substr(kind.starts_with('&') ? 1 : 0));
-  std::ranges::transform(symbol, symbol.begin(), [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  std::ranges::transform(symbol, symbol.begin(), [](unsigned char letter) {
+    return static_cast<char>(std::tolower(letter));
+  });
   return symbol.starts_with(kCommand) ? symbol.substr(kCommand.size()) : symbol;
 }
 
 const ParameterKind* findKind(std::string_view kind) {
-  const auto* const found = std::ranges::find(kParameterKinds, symbolOf(kind), &ParameterKind::symbol);
+  const auto* const found =
+      std::ranges::find(kParameterKinds, symbolOf(kind), &ParameterKind::symbol);
   return found == kParameterKinds.end() ? nullptr : found;
 }
 
@@ -60,7 +63,8 @@ std::vector<std::string> parameterKinds() {
 CarrierParameters parseCarrierParameters(std::string_view kind, std::string_view parameters) {
   const auto* const known = findKind(kind);
   if (known == nullptr)
-    throw std::invalid_argument(fmt::format("unknown carrier kind \"{}\"; use one of {}", kind, fmt::join(parameterKinds(), ", ")));
+    throw std::invalid_argument(fmt::format("unknown carrier kind \"{}\"; use one of {}", kind,
+                                            fmt::join(parameterKinds(), ", ")));
   ParameterText text(known->board, parameters);
   auto carrier = known->parse(text);
   text.expectEnd();

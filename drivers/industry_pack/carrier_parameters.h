@@ -2,8 +2,9 @@
 // CarrierParameters: reads and checks the parameter strings of the VME and ISA carriers of old
 // startup files.
 //
-//   const auto carrier = parseCarrierParameters("vipc616_01", "0x3000,0xa0000000");   // ipacAddCarrier(&vipc616_01, "0x3000,0xa0000000")
-//   carrier.sites[1].memory                                                           // 0xa0800000, in VME A32
+//   const auto carrier = parseCarrierParameters("vipc616_01", "0x3000,0xa0000000");   //
+//   ipacAddCarrier(&vipc616_01, "0x3000,0xa0000000") carrier.sites[1].memory
+//   // 0xa0800000, in VME A32
 //
 // Nothing is opened: MPF cannot reach these buses. The result gives the addresses of the modules.
 //
@@ -26,10 +27,10 @@ struct SiteParameters {
   std::uint32_t io = 0;  // addresses of the three spaces on the carrier's bus
   std::uint32_t id = 0;
   std::uint32_t memory = 0;
-  std::uint32_t memoryBytes = 0;           // 0: the site has no memory space
-  std::array<int, 2> interruptLevels{};    // bus levels of IntReq0* and IntReq1*; 0: not connected
-  int widthBits = 16;                      // data width of the memory space
-  int recoveryUs = 0;                      // least time between two accesses
+  std::uint32_t memoryBytes = 0;  // 0: the site has no memory space
+  std::array<int, 2> interruptLevels{};  // bus levels of IntReq0* and IntReq1*; 0: not connected
+  int widthBits = 16;  // data width of the memory space
+  int recoveryUs = 0;  // least time between two accesses
 };
 
 struct CarrierParameters {
@@ -37,9 +38,10 @@ struct CarrierParameters {
   BusSpace registers = BusSpace::vmeA16;
   BusSpace memory = BusSpace::vmeA24;
   std::vector<SiteParameters> sites;
-  bool isReset = false;               // the board is reset before use
-  std::optional<int> clockMHz;        // of all modules; nullopt: as the ID PROM of each module says
-  bool releasesOnAcknowledge = false; // the request ends in the acknowledge cycle; else at a register access
+  bool isReset = false;  // the board is reset before use
+  std::optional<int> clockMHz;  // of all modules; nullopt: as the ID PROM of each module says
+  // the request ends in the acknowledge cycle; else at a register access
+  bool releasesOnAcknowledge = false;
 };
 
 // Returns whether `kind` names such a carrier: a symbol of drvIpac ("&vipc616_01", "ipmv162") or a
@@ -51,6 +53,7 @@ struct CarrierParameters {
 // Reads the parameter string of a carrier.
 //   throws  IndustryPackError badAddress or badIntLevel, which names the invalid part of
 //           `parameters`; std::invalid_argument when the kind is unknown
-[[nodiscard]] CarrierParameters parseCarrierParameters(std::string_view kind, std::string_view parameters);
+[[nodiscard]] CarrierParameters parseCarrierParameters(std::string_view kind,
+                                                       std::string_view parameters);
 
 }  // namespace mpf

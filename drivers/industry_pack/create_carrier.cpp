@@ -5,10 +5,11 @@
 #include <fmt/format.h>
 #include <stdexcept>
 
-#include <mpf/drivers/industry_pack/carrier_parameters.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 #include <mpf/drivers/industry_pack/model_carrier.h>
-#include <mpf/drivers/industry_pack/tpci200.h>
+
+#include "drivers/industry_pack/carrier_parameters.h"
+#include "drivers/industry_pack/tpci200.h"
 
 namespace mpf {
 namespace {
@@ -31,7 +32,8 @@ std::unique_ptr<IndustryPackCarrier> createTpci200(const std::string& parameters
 
 constexpr std::array kKinds{
     Kind{"model", "", "four sites with models of the modules that a program drives", createModel},
-    Kind{"tpci200", "[ADDRESS|NUMBER][,poll=US]", "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", createTpci200}};
+    Kind{"tpci200", "[ADDRESS|NUMBER][,poll=US]",
+         "TEWS TPCI200, a PCI board: at ADDRESS (lspci), or the NUMBERth from 0", createTpci200}};
 
 // Checks the parameters nevertheless, so that an error in an old startup file is found on this
 // host.
@@ -39,26 +41,33 @@ constexpr std::array kKinds{
   const auto carrier = parseCarrierParameters(kind, parameters);
   throw IndustryPackError(
       IndustryPackStatus::notImplemented,
-      fmt::format("{}: \"{}\" is valid, but this host has no access to {}. Put the modules on a PCI carrier and use kind "
+      fmt::format("{}: \"{}\" is valid, but this host has no access to {}. Put the modules on a "
+                  "PCI carrier and use kind "
                   "tpci200, or use kind model, which has models of the modules",
-                  carrier.board, parameters, carrier.registers == BusSpace::isa ? "an ISA bus" : "a VME crate"));
+                  carrier.board, parameters,
+                  carrier.registers == BusSpace::isa ? "an ISA bus" : "a VME crate"));
 }
 
 }  // namespace
 
-std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind, const std::string& parameters) {
+std::unique_ptr<IndustryPackCarrier> createCarrier(const std::string& kind,
+                                                   const std::string& parameters) {
   for (const auto& known : kKinds) {
     if (known.name == kind) return known.create(parameters);
   }
   if (isParameterKind(kind)) refuseOutOfReach(kind, parameters);
-  throw std::invalid_argument(fmt::format("unknown carrier kind \"{}\"; the kinds are:\n{}", kind, carrierKinds()));
+  throw std::invalid_argument(
+      fmt::format("unknown carrier kind \"{}\"; the kinds are:\n{}", kind, carrierKinds()));
 }
 
 std::string carrierKinds() {
   std::string text;
   for (const auto& kind : kKinds)
-    text += fmt::format("  {}{}{}  {}\n", kind.name, *kind.parameters == '\0' ? "" : ":", kind.parameters, kind.what);
-  return text + "  vipc616_01, ipmv162, tvme200 and other VME and ISA carriers: only their parameters are checked\n";
+    text += fmt::format("  {}{}{}  {}\n", kind.name, *kind.parameters == '\0' ? "" : ":",
+                        kind.parameters, kind.what);
+  return text +
+         "  vipc616_01, ipmv162, tvme200 and other VME and ISA carriers: only their parameters are "
+         "checked\n";
 }
 
 }  // namespace mpf

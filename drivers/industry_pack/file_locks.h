@@ -11,7 +11,7 @@
 
 #include <utility>
 
-#include <mpf/base/file_descriptor.h>
+#include <mpf/file_descriptor.h>
 
 namespace mpf {
 

@@ -42,7 +42,9 @@ std::uint16_t crcOfFormatTwo(std::span<const std::uint16_t> words) {
 class Reader {
  public:
   explicit Reader(Registers& space) : space_(space) {}
-  std::uint16_t word(std::size_t i) { return 2 * i + 2 <= space_.size() ? space_.read16(2 * i) : kNothing; }
+  std::uint16_t word(std::size_t i) {
+    return 2 * i + 2 <= space_.size() ? space_.read16(2 * i) : kNothing;
+  }
   std::uint8_t byte(std::size_t i) { return static_cast<std::uint8_t>(word(i)); }
   std::size_t words() const { return space_.size() / 2; }
 
@@ -157,8 +159,10 @@ IdProm readIdProm(Registers& idSpace, const std::string& where) {
   if (reader.word(0) == kNothing && reader.word(1) == kNothing) {
     throw IndustryPackError(IndustryPackStatus::noModule, fmt::format("no module at {}", where));
   }
-  throw IndustryPackError(IndustryPackStatus::noIpacId, fmt::format("the module at {} has no valid ID PROM: it begins with {:04x} {:04x}",
-                                                                    where, reader.word(0), reader.word(1)));
+  throw IndustryPackError(
+      IndustryPackStatus::noIpacId,
+      fmt::format("the module at {} has no valid ID PROM: it begins with {:04x} {:04x}", where,
+                  reader.word(0), reader.word(1)));
 }
 
 std::vector<std::uint16_t> wordsOf(const IdProm& prom) {

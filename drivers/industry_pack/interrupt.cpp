@@ -3,11 +3,12 @@
 
 #include <sys/eventfd.h>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 
-Interrupt::Interrupt() : event_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt")) {}
+Interrupt::Interrupt()
+    : event_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt")) {}
 
 std::uint64_t Interrupt::take() noexcept {
   eventfd_t count = 0;

@@ -8,9 +8,10 @@
 #include <array>
 #include <utility>
 
-#include <mpf/base/real_time_priority.h>
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/system_call.h>
+#include <mpf/real_time_priority.h>
+
+#include "base/signals_blocked.h"
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -21,12 +22,14 @@ constexpr int kPausesToCalm = 10;
 
 }  // namespace
 
-InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions options, Handler handler, TroubleHandler trouble)
+InterruptThread::InterruptThread(Interrupt& interrupt, InterruptThreadOptions options,
+                                 Handler handler, TroubleHandler trouble)
     : interrupt_(interrupt),
       options_(options),
       handler_(std::move(handler)),
       trouble_(std::move(trouble)),
-      wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for an interrupt thread")),
+      wakeUp_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd",
+                        "for an interrupt thread")),
       isPolled_(interrupt_.isPolled()) {  // a carrier that polls from the start reports that itself
   const SignalsBlocked blocked;
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
@@ -42,13 +45,18 @@ InterruptThread::~InterruptThread() {
 void InterruptThread::wake() noexcept { ::eventfd_write(wakeUp_.get(), 1); }
 
 InterruptThread::Counters InterruptThread::counters() const noexcept {
-  const auto count = [](const std::atomic<std::uint64_t>& counter) { return counter.load(std::memory_order_relaxed); };
-  return {.interrupts = count(interrupts_), .spurious = count(spurious_), .late = count(late_), .storms = count(storms_)};
+  const auto count = [](const std::atomic<std::uint64_t>& counter) {
+    return counter.load(std::memory_order_relaxed);
+  };
+  return {.interrupts = count(interrupts_),
+          .spurious = count(spurious_),
+          .late = count(late_),
+          .storms = count(storms_)};
 }
 
 void InterruptThread::run(const std::stop_token& stop) {
   RealTimePriority priority(interrupt_.priority());
-  goOn();
+  resume();
   while (!stop.stop_requested()) {
     wait();
     if (stop.stop_requested()) return;
@@ -56,7 +64,7 @@ void InterruptThread::run(const std::stop_token& stop) {
     eventfd_t wakes = 0;
     const bool isWoken = ::eventfd_read(wakeUp_.get(), &wakes) == 0;
     if (isWoken || pollAt_.hasPassed()) servePoll();
-    if (isPaused() && pausedUntil_.hasPassed()) goOn();
+    if (isPaused() && pausedUntil_.hasPassed()) resume();
     followPolling();
     priority.check();
   }
@@ -79,7 +87,8 @@ void InterruptThread::servePoll() {
     late_.fetch_add(1, std::memory_order_relaxed);
     if (!isPaused() && ++lateInRow_ == options_.lateLimit) tell(InterruptTrouble::never);
   }
-  const auto period = isPaused() && options_.pollEvery.count() == 0 ? kPollWhilePaused : options_.pollEvery;
+  const auto period =
+      isPaused() && options_.pollEvery.count() == 0 ? kPollWhilePaused : options_.pollEvery;
   pollAt_ = period.count() == 0 ? Deadline::never() : Deadline::after(period);
 }
 
@@ -92,10 +101,11 @@ void InterruptThread::pause() {
   servePoll();
 }
 
-void InterruptThread::goOn() {
+void InterruptThread::resume() {
   inVain_ = lateInRow_ = 0;
   pausedUntil_ = Deadline::never();
-  pollAt_ = options_.pollEvery.count() == 0 ? Deadline::never() : Deadline::after(options_.pollEvery);
+  pollAt_ =
+      options_.pollEvery.count() == 0 ? Deadline::never() : Deadline::after(options_.pollEvery);
   interrupt_.enable();
 }
 
@@ -110,8 +120,8 @@ void InterruptThread::tell(InterruptTrouble trouble) const {
 }
 
 void InterruptThread::wait() const {
-  std::array<pollfd, 2> events{
-      {{.fd = interrupt_.descriptor(), .events = POLLIN, .revents = 0}, {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0}}};
+  std::array<pollfd, 2> events{{{.fd = interrupt_.descriptor(), .events = POLLIN, .revents = 0},
+                                {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0}}};
   const auto next = std::min(pollAt_, pausedUntil_);
   const auto left = next.left().count();
   const timespec timeout{.tv_sec = left / 1'000'000'000, .tv_nsec = left % 1'000'000'000};

@@ -39,7 +39,8 @@ class ModelInterrupt final : public Interrupt {
 
  private:
   void passOn() noexcept {
-    const bool comes = fault_ == ModelFault::interruptStorm || (isActive_ && fault_ == ModelFault::none);
+    const bool comes =
+        fault_ == ModelFault::interruptStorm || (isActive_ && fault_ == ModelFault::none);
     if (comes && std::exchange(isEnabled_, false)) announce();
   }
 
@@ -56,7 +57,8 @@ struct Socket {
 
   DeviceModel* plugged() const noexcept {
     // PAIR(model-plugged): the model is complete.
-    return isBroken.load(std::memory_order_relaxed) ? nullptr : model.load(std::memory_order_acquire);
+    return isBroken.load(std::memory_order_relaxed) ? nullptr
+                                                    : model.load(std::memory_order_acquire);
   }
 };
 
@@ -76,7 +78,9 @@ class ModelRegisters : public Registers {
     if (isOdd(offset)) return static_cast<std::uint8_t>(readCycle(offset - 1, DeviceModel::kLow));
     return static_cast<std::uint8_t>(readCycle(offset, DeviceModel::kHigh) >> 8);
   }
-  std::uint16_t doRead16(std::size_t offset) override { return readCycle(offset, DeviceModel::kBoth); }
+  std::uint16_t doRead16(std::size_t offset) override {
+    return readCycle(offset, DeviceModel::kBoth);
+  }
   std::uint32_t doRead32(std::size_t offset) override {
     const std::uint32_t high = readCycle(offset, DeviceModel::kBoth);
     return high << 16 | readCycle(offset + 2, DeviceModel::kBoth);
@@ -85,7 +89,9 @@ class ModelRegisters : public Registers {
     if (isOdd(offset)) return writeCycle(offset - 1, value, DeviceModel::kLow);
     writeCycle(offset, static_cast<std::uint16_t>(value << 8), DeviceModel::kHigh);
   }
-  void doWrite16(std::size_t offset, std::uint16_t value) override { writeCycle(offset, value, DeviceModel::kBoth); }
+  void doWrite16(std::size_t offset, std::uint16_t value) override {
+    writeCycle(offset, value, DeviceModel::kBoth);
+  }
   void doWrite32(std::size_t offset, std::uint32_t value) override {
     writeCycle(offset, static_cast<std::uint16_t>(value >> 16), DeviceModel::kBoth);
     writeCycle(offset + 2, static_cast<std::uint16_t>(value), DeviceModel::kBoth);
@@ -121,10 +127,12 @@ class IdRegisters final : public ModelRegisters {
     auto* const model = socket_.plugged();
     if (model == nullptr) return kOnes;
     const auto words = wordsOf(model->id());
-    const std::uint16_t unused = model->id().format == IdProm::Format::one ? 0xff00 : 0;  // an 8-bit PROM drives D7..0 only
+    // an 8-bit PROM drives D7..0 only
+    const std::uint16_t unused = model->id().format == IdProm::Format::one ? 0xff00 : 0;
     return offset / 2 < words.size() ? words[offset / 2] | unused : unused;
   }
-  void writeCycle(std::size_t /*offset*/, std::uint16_t /*value*/, DeviceModel::Lanes /*lanes*/) override {}
+  void writeCycle(std::size_t /*offset*/, std::uint16_t /*value*/,
+                  DeviceModel::Lanes /*lanes*/) override {}
 
   const Socket& socket_;
 };
@@ -163,7 +171,9 @@ class ModelSite final : public IndustryPackSite {
   [[nodiscard]] bool isTaken() const noexcept { return owned_ != nullptr; }
 
  private:
-  model_site::ModelInterrupt& line(int number) { return lines_.at(static_cast<std::size_t>(number)); }
+  model_site::ModelInterrupt& line(int number) {
+    return lines_.at(static_cast<std::size_t>(number));
+  }
 
   model_site::Socket socket_;
   model_site::IdRegisters id_;
@@ -174,7 +184,8 @@ class ModelSite final : public IndustryPackSite {
 };
 
 ModelCarrier::ModelCarrier(std::size_t sites, std::size_t memoryBytes) {
-  for (std::size_t i = 0; i < sites; ++i) sites_.push_back(std::make_unique<ModelSite>(memoryBytes));
+  for (std::size_t i = 0; i < sites; ++i)
+    sites_.push_back(std::make_unique<ModelSite>(memoryBytes));
 }
 
 ModelCarrier::~ModelCarrier() = default;
@@ -185,13 +196,15 @@ ModelSite& ModelCarrier::find(const std::string& siteName) const {
   for (std::size_t i = 0; i < sites_.size(); ++i) {
     if (mpf::siteName(i) == siteName) return *sites_[i];
   }
-  throw std::invalid_argument(
-      fmt::format("no site \"{}\"; the sites are {} to {}", siteName, mpf::siteName(0), mpf::siteName(sites_.size() - 1)));
+  throw std::invalid_argument(fmt::format("no site \"{}\"; the sites are {} to {}", siteName,
+                                          mpf::siteName(0), mpf::siteName(sites_.size() - 1)));
 }
 
 void ModelCarrier::plugAny(const std::string& siteName, std::unique_ptr<DeviceModel> model) {
   auto& site = find(siteName);
-  if (site.isTaken()) throw std::invalid_argument(fmt::format("site {} already has a model; unplug it first", siteName));
+  if (site.isTaken())
+    throw std::invalid_argument(
+        fmt::format("site {} already has a model; unplug it first", siteName));
   site.plug(std::move(model));
 }
 
@@ -200,8 +213,12 @@ void ModelCarrier::unplug(const std::string& siteName) {
   if (auto model = find(siteName).unplug()) unplugged_.push_back(std::move(model));
 }
 
-void ModelCarrier::setFault(const std::string& siteName, ModelFault fault) { find(siteName).setFault(fault); }
+void ModelCarrier::setFault(const std::string& siteName, ModelFault fault) {
+  find(siteName).setFault(fault);
+}
 
-void ModelCarrier::setFault(const std::string& siteName, ModelFault fault, int line) { find(siteName).setFault(fault, line); }
+void ModelCarrier::setFault(const std::string& siteName, ModelFault fault, int line) {
+  find(siteName).setFault(fault, line);
+}
 
 }  // namespace mpf

@@ -18,8 +18,8 @@
 #include <type_traits>
 #include <utility>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/system_call.h>
+#include "base/signals_blocked.h"
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -34,14 +34,16 @@ constexpr std::size_t kNameBytes = 44;
 struct ModelWiresFile {
   struct Wire {
     std::atomic<std::uint32_t> isNamed{0};  // 1 once the name is complete; then never 0 again
-    std::array<char, kNameBytes> name{};    // ends with a zero
-    std::atomic<std::uint64_t> value{0};    // the bits of a double
+    std::array<char, kNameBytes> name{};  // ends with a zero
+    std::atomic<std::uint64_t> value{0};  // the bits of a double
     std::uint64_t reserved = 0;
 
     // Returns the name; empty when it is invalid.
     [[nodiscard]] std::string_view text() const noexcept {
       const auto* const end = std::find(name.begin(), name.end(), '\0');
-      return end == name.end() ? std::string_view() : std::string_view(name.data(), static_cast<std::size_t>(end - name.begin()));
+      return end == name.end()
+                 ? std::string_view()
+                 : std::string_view(name.data(), static_cast<std::size_t>(end - name.begin()));
     }
   };
 
@@ -59,11 +61,14 @@ struct ModelWiresFile {
     ::syscall(SYS_futex, &changes, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
   }
   // Waits until `changes` differs from `seen`.
-  void waitForMore(std::uint32_t seen) noexcept { ::syscall(SYS_futex, &changes, FUTEX_WAIT, seen, nullptr, nullptr, 0); }
+  void waitForMore(std::uint32_t seen) noexcept {
+    ::syscall(SYS_futex, &changes, FUTEX_WAIT, seen, nullptr, nullptr, 0);
+  }
 };
 static_assert(offsetof(ModelWiresFile, changes) == 16 && offsetof(ModelWiresFile, wires) == 64);
 static_assert(sizeof(ModelWiresFile::Wire) == 64 && offsetof(ModelWiresFile::Wire, value) == 48);
-static_assert(std::is_standard_layout_v<ModelWiresFile> && std::atomic<std::uint64_t>::is_always_lock_free);
+static_assert(std::is_standard_layout_v<ModelWiresFile> &&
+              std::atomic<std::uint64_t>::is_always_lock_free);
 
 namespace {
 
@@ -82,11 +87,13 @@ class FileLock {
 };
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-  throw std::runtime_error(fmt::format("{} is not a file of model wires: {}; remove it or name another file", path, why));
+  throw std::runtime_error(fmt::format(
+      "{} is not a file of model wires: {}; remove it or name another file", path, why));
 }
 
 bool isWireName(std::string_view name) {
-  return !name.empty() && name.size() < kNameBytes && std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < 0x7f; });
+  return !name.empty() && name.size() < kNameBytes &&
+         std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < 0x7f; });
 }
 
 bool isZero(const std::byte* bytes, std::size_t size) {
@@ -94,12 +101,15 @@ bool isZero(const std::byte* bytes, std::size_t size) {
 }
 
 void check(const ModelWiresFile& file, const std::string& path) {
-  if (file.version != kVersion) refuse(path, fmt::format("its version is {}, not {}", file.version, kVersion));
-  if (file.capacity != kCapacity) refuse(path, fmt::format("its capacity is {} wires, not {}", file.capacity, kCapacity));
+  if (file.version != kVersion)
+    refuse(path, fmt::format("its version is {}, not {}", file.version, kVersion));
+  if (file.capacity != kCapacity)
+    refuse(path, fmt::format("its capacity is {} wires, not {}", file.capacity, kCapacity));
   for (std::size_t i = 0; i < kCapacity; ++i) {
     const auto& wire = file.wires[i];
     const auto isNamed = wire.isNamed.load(std::memory_order_relaxed);
-    if (isNamed > 1 || (isNamed == 1 && !isWireName(wire.text()))) refuse(path, fmt::format("wire {} has a damaged name", i));
+    if (isNamed > 1 || (isNamed == 1 && !isWireName(wire.text())))
+      refuse(path, fmt::format("wire {} has a damaged name", i));
   }
 }
 
@@ -129,13 +139,15 @@ void ModelWires::map() {
   checkCall(::fstat(fd_.get(), &status), "look at", path_);
   if (!S_ISREG(status.st_mode)) refuse(path_, "it is not a regular file");
   const auto bytes = static_cast<std::size_t>(status.st_size);
-  if (bytes != 0 && bytes != sizeof(ModelWiresFile)) refuse(path_, fmt::format("it has {} bytes, not {}", bytes, sizeof(ModelWiresFile)));
+  if (bytes != 0 && bytes != sizeof(ModelWiresFile))
+    refuse(path_, fmt::format("it has {} bytes, not {}", bytes, sizeof(ModelWiresFile)));
   // Not ftruncate(): on a full disk, a write to the mapping would raise SIGBUS.
   if (bytes == 0) {
     const auto error = ::posix_fallocate(fd_.get(), 0, sizeof(ModelWiresFile));
     if (error != 0) throwSystemError(error, "make", path_);
   }
-  auto* const mapped = ::mmap(nullptr, sizeof(ModelWiresFile), PROT_READ | PROT_WRITE, MAP_SHARED, fd_.get(), 0);
+  auto* const mapped =
+      ::mmap(nullptr, sizeof(ModelWiresFile), PROT_READ | PROT_WRITE, MAP_SHARED, fd_.get(), 0);
   if (mapped == MAP_FAILED) throwSystemError(errno, "map", path_);
   file_ = static_cast<ModelWiresFile*>(mapped);
 }
@@ -156,8 +168,9 @@ void ModelWires::prepare() {
 
 ModelWire ModelWires::wire(std::string_view name) {
   if (!isWireName(name)) {
-    throw std::invalid_argument(
-        fmt::format("\"{}\" is not a valid name of a wire; use 1 to {} printable characters without spaces", name, kNameBytes - 1));
+    throw std::invalid_argument(fmt::format(
+        "\"{}\" is not a valid name of a wire; use 1 to {} printable characters without spaces",
+        name, kNameBytes - 1));
   }
   const std::lock_guard inProcess(mutex_);
   const FileLock lock(fd_.get(), path_);
@@ -171,22 +184,26 @@ ModelWire ModelWires::wire(std::string_view name) {
     }
     if (wire.text() == name) return {*file_, wire.value};
   }
-  throw std::runtime_error(fmt::format("{} already has {} wires, which is the limit: wire \"{}\" cannot be added", path_, kCapacity, name));
+  throw std::runtime_error(
+      fmt::format("{} already has {} wires, which is the limit: wire \"{}\" cannot be added", path_,
+                  kCapacity, name));
 }
 
-ModelWireWatcher::ModelWireWatcher(ModelWires& wires, std::function<void()> changed) : file_(*wires.file_) {
+ModelWireWatcher::ModelWireWatcher(ModelWires& wires, std::function<void()> changed)
+    : file_(*wires.file_) {
   const SignalsBlocked blocked;
   // PAIR(wire-changed): every change after this is reported.
   auto seen = file_.changes.load(std::memory_order_acquire);
-  thread_ = std::jthread([this, seen, changed = std::move(changed)](const std::stop_token& stop) mutable {
-    for (;;) {
-      file_.waitForMore(seen);
-      if (stop.stop_requested()) return;
-      // PAIR(wire-changed): the values of the changes up to this number are visible.
-      const auto now = file_.changes.load(std::memory_order_acquire);
-      if (std::exchange(seen, now) != now) changed();
-    }
-  });
+  thread_ =
+      std::jthread([this, seen, changed = std::move(changed)](const std::stop_token& stop) mutable {
+        for (;;) {
+          file_.waitForMore(seen);
+          if (stop.stop_requested()) return;
+          // PAIR(wire-changed): the values of the changes up to this number are visible.
+          const auto now = file_.changes.load(std::memory_order_acquire);
+          if (std::exchange(seen, now) != now) changed();
+        }
+      });
 }
 
 ModelWireWatcher::~ModelWireWatcher() {

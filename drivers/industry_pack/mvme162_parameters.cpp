@@ -8,7 +8,7 @@
 // Like drvIpac, the parser skips all other characters. "A:l=3,3 m=0xe0000000,64;B:l=3,3"
 #include <fmt/format.h>
 
-#include <mpf/drivers/industry_pack/parameter_parsers.h>
+#include "drivers/industry_pack/parameter_parsers.h"
 
 namespace mpf::parameters {
 namespace {
@@ -24,11 +24,14 @@ void readLevels(ParameterText& text, SiteParameters& site) {
 
 void readMemory(ParameterText& text, SiteParameters& site) {
   text.expect('=', "m");
-  site.memory = text.hex("memory address", {.multipleOf = 0x10000, .least = 0x10000, .most = kMemoryEnd});
+  site.memory =
+      text.hex("memory address", {.multipleOf = 0x10000, .least = 0x10000, .most = kMemoryEnd});
   text.expect(',', "memory address");
-  site.memoryBytes = text.number("memory size [K]", {.multipleOf = 64, .least = 64, .most = 16384}) << 10;
+  site.memoryBytes = text.number("memory size [K]", {.multipleOf = 64, .least = 64, .most = 16384})
+                     << 10;
   if (site.memoryBytes > kMemoryEnd - site.memory)
-    text.refuse(fmt::format("memory at 0x{:x}, {} K: the end is above 0x{:x}", site.memory, site.memoryBytes >> 10, kMemoryEnd));
+    text.refuse(fmt::format("memory at 0x{:x}, {} K: the end is above 0x{:x}", site.memory,
+                            site.memoryBytes >> 10, kMemoryEnd));
 }
 
 void readRecovery(ParameterText& text, SiteParameters& site) {
@@ -39,10 +42,12 @@ void readRecovery(ParameterText& text, SiteParameters& site) {
 void readWidth(ParameterText& text, std::vector<SiteParameters>& sites, std::size_t site) {
   text.expect('=', "w");
   const auto width = text.number("width");
-  if (width != 8 && width != 16 && width != 32) text.refuse(fmt::format("width {}: use 8, 16 or 32", width));
+  if (width != 8 && width != 16 && width != 32)
+    text.refuse(fmt::format("width {}: use 8, 16 or 32", width));
   if (width == 32 && site % 2 != 0)
-    text.refuse(fmt::format("width 32 at site {}: use it only at A and C, which also use the memory of the next site",
-                            static_cast<char>('A' + site)));
+    text.refuse(fmt::format(
+        "width 32 at site {}: use it only at A and C, which also use the memory of the next site",
+        static_cast<char>('A' + site)));
   sites[site].widthBits = static_cast<int>(width);
   if (width == 32) sites[site + 1].memoryBytes = 0;
 }

@@ -3,8 +3,8 @@
 // its kind; the caller refuses the rest of the text.
 #pragma once
 
-#include <mpf/drivers/industry_pack/carrier_parameters.h>
-#include <mpf/drivers/industry_pack/parameter_text.h>
+#include "drivers/industry_pack/carrier_parameters.h"
+#include "drivers/industry_pack/parameter_text.h"
 
 namespace mpf::parameters {
 

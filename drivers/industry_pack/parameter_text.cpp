@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/industry_pack/parameter_text.h>
+#include "drivers/industry_pack/parameter_text.h"
 
 #include <cctype>
 #include <charconv>
@@ -8,16 +8,26 @@
 namespace mpf {
 namespace {
 
-bool isBlank(char character) noexcept { return std::isspace(static_cast<unsigned char>(character)) != 0; }
-bool isLetter(char character) noexcept { return std::isalpha(static_cast<unsigned char>(character)) != 0; }
+bool isBlank(char character) noexcept {
+  return std::isspace(static_cast<unsigned char>(character)) != 0;
+}
+bool isLetter(char character) noexcept {
+  return std::isalpha(static_cast<unsigned char>(character)) != 0;
+}
 bool isDigit(char character) noexcept { return character >= '0' && character <= '9'; }
-bool hasPrefix(std::string_view text) noexcept { return text.starts_with("0x") || text.starts_with("0X"); }
+bool hasPrefix(std::string_view text) noexcept {
+  return text.starts_with("0x") || text.starts_with("0X");
+}
 
 // "0x6000" in base 16, "128" in base 10.
-std::string inBase(std::uint32_t value, int base) { return base == 16 ? fmt::format("0x{:x}", value) : fmt::format("{}", value); }
+std::string inBase(std::uint32_t value, int base) {
+  return base == 16 ? fmt::format("0x{:x}", value) : fmt::format("{}", value);
+}
 
 std::string allowed(const ParameterLimits& limits, int base) {
-  std::string text = limits.multipleOf == 1 ? "" : fmt::format("a multiple of {}, ", inBase(limits.multipleOf, base));
+  std::string text = limits.multipleOf == 1
+                         ? ""
+                         : fmt::format("a multiple of {}, ", inBase(limits.multipleOf, base));
   return text + fmt::format("{} to {}", inBase(limits.least, base), inBase(limits.most, base));
 }
 
@@ -41,7 +51,8 @@ bool ParameterText::trySkip(char character) noexcept {
 }
 
 void ParameterText::expect(char character, std::string_view after) {
-  if (!trySkip(character)) refuse(fmt::format("no '{}' after the {}, but \"{}\"", character, after, rest_));
+  if (!trySkip(character))
+    refuse(fmt::format("no '{}' after the {}, but \"{}\"", character, after, rest_));
 }
 
 void ParameterText::expectEnd() {
@@ -78,7 +89,9 @@ std::uint32_t ParameterText::number(std::string_view what, const ParameterLimits
 
 int ParameterText::level(std::string_view what) {
   const auto level = number(what);
-  if (level > 7) refuse(fmt::format("{} {}: use 1 to 7, or 0 for no interrupt", what, level), IndustryPackStatus::badIntLevel);
+  if (level > 7)
+    refuse(fmt::format("{} {}: use 1 to 7, or 0 for no interrupt", what, level),
+           IndustryPackStatus::badIntLevel);
   return static_cast<int>(level);
 }
 
@@ -86,14 +99,18 @@ void ParameterText::refuse(const std::string& problem, IndustryPackStatus status
   throw IndustryPackError(status, fmt::format("{} \"{}\": {}", board_, whole_, problem));
 }
 
-std::uint32_t ParameterText::digits(std::string_view what, int base, const ParameterLimits& limits) {
+std::uint32_t ParameterText::digits(std::string_view what, int base,
+                                    const ParameterLimits& limits) {
   std::uint32_t value = 0;
   const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value, base);
   if (error == std::errc::invalid_argument)
-    refuse(rest_.empty() ? fmt::format("the {} is missing", what) : fmt::format("the {} is not a number: \"{}\"", what, rest_));
-  if (error != std::errc() || value % limits.multipleOf != 0 || value < limits.least || value > limits.most) {
+    refuse(rest_.empty() ? fmt::format("the {} is missing", what)
+                         : fmt::format("the {} is not a number: \"{}\"", what, rest_));
+  if (error != std::errc() || value % limits.multipleOf != 0 || value < limits.least ||
+      value > limits.most) {
     const auto length = static_cast<std::size_t>(end - rest_.data());
-    const auto text = error != std::errc() ? std::string(rest_.substr(0, length)) : inBase(value, base);
+    const auto text =
+        error != std::errc() ? std::string(rest_.substr(0, length)) : inBase(value, base);
     refuse(fmt::format("{} {}: use {}", what, text, allowed(limits, base)));
   }
   rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));

@@ -26,7 +26,8 @@ struct ParameterLimits {
 
 class ParameterText {
  public:
-  ParameterText(std::string_view board, std::string_view text) noexcept : board_(board), whole_(text), rest_(text) {}
+  ParameterText(std::string_view board, std::string_view text) noexcept
+      : board_(board), whole_(text), rest_(text) {}
 
   [[nodiscard]] bool atEnd() noexcept { return peek() == '\0'; }
   // Returns the next character that is not a blank, without taking it; '\0' at the end.
@@ -54,10 +55,12 @@ class ParameterText {
 
   //   throws  IndustryPackError with the board, the whole string and `problem`: `VIPC616 "6001":
   //           ...`
-  [[noreturn]] void refuse(const std::string& problem, IndustryPackStatus status = IndustryPackStatus::badAddress) const;
+  [[noreturn]] void refuse(const std::string& problem,
+                           IndustryPackStatus status = IndustryPackStatus::badAddress) const;
 
  private:
-  [[nodiscard]] std::uint32_t digits(std::string_view what, int base, const ParameterLimits& limits);
+  [[nodiscard]] std::uint32_t digits(std::string_view what, int base,
+                                     const ParameterLimits& limits);
 
   std::string_view board_;
   std::string_view whole_;

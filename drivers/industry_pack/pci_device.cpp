@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/industry_pack/pci_device.h>
+#include "drivers/industry_pack/pci_device.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -32,32 +32,43 @@ std::string wordOf(const std::string& file) {
   return word;
 }
 
-std::string idText(std::uint16_t vendor, std::uint16_t device) { return fmt::format("0x{:04x}:0x{:04x}", vendor, device); }
-std::string idOf(const std::string& folder) { return wordOf(folder + "/vendor") + ":" + wordOf(folder + "/device"); }
+std::string idText(std::uint16_t vendor, std::uint16_t device) {
+  return fmt::format("0x{:04x}:0x{:04x}", vendor, device);
+}
+std::string idOf(const std::string& folder) {
+  return wordOf(folder + "/vendor") + ":" + wordOf(folder + "/device");
+}
 
 bool isNumber(const std::string& text) {
-  return !text.empty() && std::ranges::all_of(text, [](unsigned char digit) { return std::isdigit(digit) != 0; });
+  return !text.empty() &&
+         std::ranges::all_of(text, [](unsigned char digit) { return std::isdigit(digit) != 0; });
 }
 
 std::string orNone(const std::vector<std::string>& addresses) {
   return addresses.empty() ? "none" : fmt::format("{}", fmt::join(addresses, ", "));
 }
 
-std::string chooseByNumber(const PciKind& kind, const std::vector<std::string>& boards, const std::string& number) {
+std::string chooseByNumber(const PciKind& kind, const std::vector<std::string>& boards,
+                           const std::string& number) {
   std::size_t n = 0;
   std::from_chars(number.data(), number.data() + number.size(), n);
   if (n < boards.size()) return boards[n];
   throw std::runtime_error(
-      boards.empty() ? fmt::format("this host has no {} (PCI id {})", kind.name, idText(kind.vendor, kind.device))
-                     : fmt::format("this host has no {} number {}, counted from 0; its boards: {}", kind.name, number, orNone(boards)));
+      boards.empty() ? fmt::format("this host has no {} (PCI id {})", kind.name,
+                                   idText(kind.vendor, kind.device))
+                     : fmt::format("this host has no {} number {}, counted from 0; its boards: {}",
+                                   kind.name, number, orNone(boards)));
 }
 
 std::string choose(const PciPlaces& places, const PciKind& kind, const std::string& which) {
   const auto boards = findPciDevices(places, kind);
-  if (which.empty() || isNumber(which)) return chooseByNumber(kind, boards, which.empty() ? "0" : which);
+  if (which.empty() || isNumber(which))
+    return chooseByNumber(kind, boards, which.empty() ? "0" : which);
   auto address = std::ranges::count(which, ':') == 1 ? "0000:" + which : which;
-  if (which.find('/') == std::string::npos && fs::exists(places.devices + "/" + address)) return address;
-  throw std::runtime_error(fmt::format("no PCI device at {}; boards of kind {}: {}", which, kind.name, orNone(boards)));
+  if (which.find('/') == std::string::npos && fs::exists(places.devices + "/" + address))
+    return address;
+  throw std::runtime_error(
+      fmt::format("no PCI device at {}; boards of kind {}: {}", which, kind.name, orNone(boards)));
 }
 
 struct Range {
@@ -79,7 +90,10 @@ Range windowRange(const std::string& file, int number) {
 }  // namespace
 
 PciWindow::PciWindow(PciWindow&& other) noexcept
-    : pages_(std::exchange(other.pages_, nullptr)), pageBytes_(other.pageBytes_), offset_(other.offset_), bytes_(other.bytes_) {}
+    : pages_(std::exchange(other.pages_, nullptr)),
+      pageBytes_(other.pageBytes_),
+      offset_(other.offset_),
+      bytes_(other.bytes_) {}
 
 PciWindow& PciWindow::operator=(PciWindow&& other) noexcept {
   std::swap(pages_, other.pages_);
@@ -97,7 +111,8 @@ std::vector<std::string> findPciDevices(const PciPlaces& places, const PciKind& 
   std::vector<std::string> found;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(places.devices, ignored)) {
-    if (idOf(entry.path().string()) == idText(kind.vendor, kind.device)) found.push_back(entry.path().filename().string());
+    if (idOf(entry.path().string()) == idText(kind.vendor, kind.device))
+      found.push_back(entry.path().filename().string());
   }
   std::ranges::sort(found);
   return found;
@@ -116,15 +131,17 @@ void PciDevice::expectKind() const {
   const auto found = idOf(places_.devices + "/" + address_);
   const auto wanted = idText(kind_.vendor, kind_.device);
   if (found != wanted)
-    throw std::runtime_error(fmt::format("the PCI device at {} is not a {}: its id is {}, not {}", address_, kind_.name, found, wanted));
+    throw std::runtime_error(fmt::format("the PCI device at {} is not a {}: its id is {}, not {}",
+                                         address_, kind_.name, found, wanted));
 }
 
 void PciDevice::expectNoOtherDriver() const {
   std::error_code none;
   const auto driver = fs::read_symlink(file("driver"), none).filename().string();
   if (driver.empty() || driver == kInterruptDriver) return;
-  throw std::runtime_error(fmt::format("{}: the board is bound to the kernel's driver {}. As root: echo {} > {}/unbind; {}", description(),
-                                       driver, address_, file("driver"), howToGetInterrupts()));
+  throw std::runtime_error(fmt::format(
+      "{}: the board is bound to the kernel's driver {}. As root: echo {} > {}/unbind; {}",
+      description(), driver, address_, file("driver"), howToGetInterrupts()));
 }
 
 // A board that is not bound to a driver may be disabled.
@@ -132,26 +149,29 @@ void PciDevice::enable() const {
   if (wordOf(file("enable")) != "0") return;
   const auto attribute = open("enable");
   if (::write(attribute.get(), "1", 1) == 1) return;
-  throw std::runtime_error(
-      fmt::format("{}: the board cannot be enabled ({}). As root: echo 1 > {}", description(), std::strerror(errno), file("enable")));
+  throw std::runtime_error(fmt::format("{}: the board cannot be enabled ({}). As root: echo 1 > {}",
+                                       description(), std::strerror(errno), file("enable")));
 }
 
 PciWindow PciDevice::map(int number, std::size_t offset, std::size_t bytes) const {
   const auto name = fmt::format("resource{}", number);
   const auto range = windowRange(file("resource"), number);
   if (range.begin + offset + bytes > range.end + 1)
-    throw std::runtime_error(fmt::format("{}: window {} is too small for {} bytes at 0x{:x}; {} lists the windows", description(), number,
-                                         bytes, offset, file("resource")));
+    throw std::runtime_error(
+        fmt::format("{}: window {} is too small for {} bytes at 0x{:x}; {} lists the windows",
+                    description(), number, bytes, offset, file("resource")));
   const auto opened = open(name);
   // A small window may begin in the middle of a page.
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   const auto first = range.begin % page + offset;
   const auto inPage = first % page;
   const auto length = (inPage + bytes + page - 1) / page * page;
-  auto* const pages = ::mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED, opened.get(), static_cast<off_t>(first - inPage));
+  auto* const pages = ::mmap(nullptr, length, PROT_READ | PROT_WRITE, MAP_SHARED, opened.get(),
+                             static_cast<off_t>(first - inPage));
   if (pages == MAP_FAILED) {
     throw std::runtime_error(
-        fmt::format("{}: {} cannot be mapped ({}). Check that kernel lockdown is off and that no other driver uses the board",
+        fmt::format("{}: {} cannot be mapped ({}). Check that kernel lockdown is off and that no "
+                    "other driver uses the board",
                     description(), file(name), std::strerror(errno)));
   }
   return {pages, length, inPage, bytes};
@@ -163,21 +183,25 @@ FileDescriptor PciDevice::open(const std::string& name) const {
   if (opened) return opened;
   const int reason = errno;
   if (reason != EACCES && reason != EPERM)
-    throw std::runtime_error(fmt::format("{}: {} cannot be opened: {}", description(), path, std::strerror(reason)));
+    throw std::runtime_error(
+        fmt::format("{}: {} cannot be opened: {}", description(), path, std::strerror(reason)));
   throw std::runtime_error(
-      fmt::format("{0}: no permission to read and write {1}. As root, for a GROUP that you are in: chgrp GROUP {2}/resource? {2}/config && "
+      fmt::format("{0}: no permission to read and write {1}. As root, for a GROUP that you are in: "
+                  "chgrp GROUP {2}/resource? {2}/config && "
                   "chmod g+rw {2}/resource? {2}/config; a udev rule does this at every boot",
                   description(), path, places_.devices + "/" + address_));
 }
 
 std::string PciDevice::interruptFile() const {
   std::error_code none;
-  for (const auto& entry : fs::directory_iterator(file("uio"), none)) return places_.dev + "/" + entry.path().filename().string();
+  for (const auto& entry : fs::directory_iterator(file("uio"), none))
+    return places_.dev + "/" + entry.path().filename().string();
   return {};
 }
 
 std::string PciDevice::howToGetInterrupts() const {
-  return fmt::format("modprobe {0}; echo {0} > {1}; echo {2} > {3}", kInterruptDriver, file("driver_override"), address_,
+  return fmt::format("modprobe {0}; echo {0} > {1}; echo {2} > {3}", kInterruptDriver,
+                     file("driver_override"), address_,
                      (fs::path(places_.devices).parent_path() / "drivers_probe").string());
 }
 

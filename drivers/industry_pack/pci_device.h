@@ -5,7 +5,8 @@
 //   /sys/bus/pci/devices/0000:03:00.0/   vendor device driver enable   IDs, bound driver
 //                                        resource resource0 ... 5      the windows (BARs)
 //                                        config                        the configuration registers
-//                                        uio/uio0                      with driver uio_pci_generic: /dev/uio0, the interrupt
+//                                        uio/uio0                      with driver uio_pci_generic:
+//                                        /dev/uio0, the interrupt
 //
 // Threads  any number of callers at a time.
 // Crash    if the kernel removes the board (echo 1 > remove), the next access to a mapped window
@@ -20,7 +21,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
+#include <mpf/file_descriptor.h>
 
 namespace mpf {
 
@@ -46,7 +47,9 @@ class PciWindow {
   PciWindow& operator=(PciWindow&& other) noexcept;
   ~PciWindow();
 
-  [[nodiscard]] volatile std::byte* data() const noexcept { return static_cast<volatile std::byte*>(pages_) + offset_; }
+  [[nodiscard]] volatile std::byte* data() const noexcept {
+    return static_cast<volatile std::byte*>(pages_) + offset_;
+  }
   [[nodiscard]] std::size_t size() const noexcept { return bytes_; }
 
  private:
@@ -82,7 +85,9 @@ class PciDevice {
   [[nodiscard]] std::string howToGetInterrupts() const;
 
  private:
-  [[nodiscard]] std::string file(const std::string& name) const { return places_.devices + "/" + address_ + "/" + name; }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return places_.devices + "/" + address_ + "/" + name;
+  }
   void expectKind() const;
   void expectNoOtherDriver() const;
   void enable() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/industry_pack/pci_interrupt.h>
+#include "drivers/industry_pack/pci_interrupt.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <stdexcept>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -20,17 +20,23 @@ constexpr off_t kCommand = 4;
 constexpr std::uint16_t kInterruptMasked = 0x0400;  // the bit "interrupt disable"
 
 FileDescriptor openFile(const PciDevice& device, const std::string& name) {
-  if (name.empty()) throw std::runtime_error("the board is not bound to uio_pci_generic; as root: " + device.howToGetInterrupts());
+  if (name.empty())
+    throw std::runtime_error("the board is not bound to uio_pci_generic; as root: " +
+                             device.howToGetInterrupts());
   FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file) return file;
-  throw std::runtime_error(fmt::format("{} cannot be opened ({}); as root, for a GROUP that you are in: chgrp GROUP {} && chmod g+r {}",
-                                       name, std::strerror(errno), name, name));
+  throw std::runtime_error(
+      fmt::format("{} cannot be opened ({}); as root, for a GROUP that you are in: chgrp GROUP {} "
+                  "&& chmod g+r {}",
+                  name, std::strerror(errno), name, name));
 }
 
 }  // namespace
 
 PciInterrupt::PciInterrupt(const PciDevice& device)
-    : name_(device.interruptFile()), file_(openFile(device, name_)), config_(device.open("config")) {
+    : name_(device.interruptFile()),
+      file_(openFile(device, name_)),
+      config_(device.open("config")) {
   unmask();
 }
 

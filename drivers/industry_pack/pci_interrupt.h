@@ -15,8 +15,9 @@
 
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/drivers/industry_pack/pci_device.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/industry_pack/pci_device.h"
 
 namespace mpf {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Parameters of carriers whose addresses and interrupt levels are set with switches or by software:
 //   TEWS TVME200        the settings of its six rotary switches, "6010D0"
-//   Hytec 8002, 8004    slot,level [IPMEM=1|2|4|8] [MEMBASE=high half of the address] [IPCLK=8|32] [ROAK=0|1]
-//   Acromag AVME-96xx   base,level [R] [A=megabytes,address] ...
-//   SBS ATC40 (ISA)     address [16384 [irq]]
+//   Hytec 8002, 8004    slot,level [IPMEM=1|2|4|8] [MEMBASE=high half of the address] [IPCLK=8|32]
+//   [ROAK=0|1] Acromag AVME-96xx   base,level [R] [A=megabytes,address] ... SBS ATC40 (ISA)
+//   address [16384 [irq]]
 #include <algorithm>
 #include <cctype>
 #include <fmt/format.h>
 
-#include <mpf/drivers/industry_pack/parameter_parsers.h>
+#include "drivers/industry_pack/parameter_parsers.h"
 
 namespace mpf::parameters {
 namespace {
@@ -36,7 +36,9 @@ void giveMemory(std::vector<SiteParameters>& sites, std::uint32_t base, std::uin
   }
 }
 
-bool isSize(std::uint32_t megabytes) noexcept { return megabytes == 1 || megabytes == 2 || megabytes == 4 || megabytes == 8; }
+bool isSize(std::uint32_t megabytes) noexcept {
+  return megabytes == 1 || megabytes == 2 || megabytes == 4 || megabytes == 8;
+}
 
 std::uint32_t readMegabytes(ParameterText& text, std::string_view what) {
   const auto megabytes = text.number(what);
@@ -45,7 +47,8 @@ std::uint32_t readMegabytes(ParameterText& text, std::string_view what) {
 }
 
 // Switches S4 to S6 of a TVME200: size and address of the memory.
-void readSwitchedMemory(const ParameterText& text, CarrierParameters& carrier, std::uint32_t size, std::uint32_t high) {
+void readSwitchedMemory(const ParameterText& text, CarrierParameters& carrier, std::uint32_t size,
+                        std::uint32_t high) {
   if (size == 0) return;
   if (size > 7 && size != 0xf) text.refuse(fmt::format("switch S4 at {:X}: use 0 to 7 or F", size));
   const bool isA32 = size == 0xf;
@@ -53,7 +56,9 @@ void readSwitchedMemory(const ParameterText& text, CarrierParameters& carrier, s
   const auto bytes = isA32 ? 8 * kMegabyte : 16384U << size;
   if (base % (4 * bytes) != 0)
     text.refuse(
-        fmt::format("switches S5 and S6 at {:02X}: 0x{:x} is not a multiple of 0x{:x}, the memory of four sites", high, base, 4 * bytes));
+        fmt::format("switches S5 and S6 at {:02X}: 0x{:x} is not a multiple of 0x{:x}, the memory "
+                    "of four sites",
+                    high, base, 4 * bytes));
   carrier.memory = isA32 ? BusSpace::vmeA32 : BusSpace::vmeA24;
   giveMemory(carrier.sites, base, bytes);
 }
@@ -83,31 +88,37 @@ void readHytecOption(ParameterText& text, CarrierParameters& carrier, HytecMemor
 }
 
 // Without a MEMBASE the slot determines the address.
-std::uint32_t hytecMemoryBase(const ParameterText& text, std::uint32_t slot, const HytecMemory& memory) {
+std::uint32_t hytecMemoryBase(const ParameterText& text, std::uint32_t slot,
+                              const HytecMemory& memory) {
   if (memory.high) {
     const auto base = *memory.high << 16;
     const auto all = 4 * memory.megabytes * kMegabyte;
     if (base % all != 0)
-      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: use a multiple of 0x{:x}", *memory.high, memory.megabytes, all >> 16));
+      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: use a multiple of 0x{:x}",
+                              *memory.high, memory.megabytes, all >> 16));
     if (*memory.high + (all >> 16) > 0xffff)
-      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: the end is beyond A32", *memory.high, memory.megabytes));
+      text.refuse(fmt::format("MEMBASE 0x{:x} with IPMEM {}: the end is beyond A32", *memory.high,
+                              memory.megabytes));
     return base;
   }
   if (memory.megabytes == 4) text.refuse("IPMEM 4 needs a MEMBASE");
-  if (memory.megabytes == 2 && slot > 15) text.refuse(fmt::format("IPMEM 2 in slot {} needs a MEMBASE", slot));
+  if (memory.megabytes == 2 && slot > 15)
+    text.refuse(fmt::format("IPMEM 2 in slot {} needs a MEMBASE", slot));
   return memory.megabytes == 8 ? slot << 27 : slot * 4 * memory.megabytes * kMegabyte;
 }
 
 void readAvmeMemory(ParameterText& text, std::vector<SiteParameters>& sites) {
   const auto at = std::string(text.rest());
   const int letter = std::toupper(static_cast<unsigned char>(text.peek()));
-  if (letter < 'A' || letter > 'D') text.refuse(fmt::format("\"{}\": use the sites A, B, C or D, and R before them", at));
+  if (letter < 'A' || letter > 'D')
+    text.refuse(fmt::format("\"{}\": use the sites A, B, C or D, and R before them", at));
   static_cast<void>(text.take());
   auto& site = sites[static_cast<std::size_t>(letter - 'A')];
   text.expect('=', "site");
   site.memoryBytes = readMegabytes(text, "memory size [M]") * kMegabyte;
   text.expect(',', "memory size");
-  site.memory = text.hex("memory address", {.multipleOf = site.memoryBytes, .most = 0x1000000 - site.memoryBytes});
+  site.memory = text.hex("memory address",
+                         {.multipleOf = site.memoryBytes, .most = 0x1000000 - site.memoryBytes});
 }
 
 }  // namespace
@@ -128,9 +139,10 @@ void expectNoOverlap(const ParameterText& text, const std::vector<SiteParameters
       const auto& a = sites[i];
       const auto& b = sites[j];
       if (a.memoryBytes == 0 || b.memoryBytes == 0) continue;
-      if (a.memory < std::uint64_t{b.memory} + b.memoryBytes && b.memory < std::uint64_t{a.memory} + a.memoryBytes)
-        text.refuse(
-            fmt::format("the memory of site {} overlaps with that of site {}", static_cast<char>('A' + i), static_cast<char>('A' + j)));
+      if (a.memory < std::uint64_t{b.memory} + b.memoryBytes &&
+          b.memory < std::uint64_t{a.memory} + a.memoryBytes)
+        text.refuse(fmt::format("the memory of site {} overlaps with that of site {}",
+                                static_cast<char>('A' + i), static_cast<char>('A' + j)));
     }
   }
 }
@@ -146,10 +158,13 @@ CarrierParameters parseTvme200(ParameterText& text) {
   const auto second = (switches >> 16) & 0xf;
   const auto levels = (switches >> 12) & 0xf;
   if (second % 4 != 0) text.refuse(fmt::format("switch S2 at {:X}: use 0, 4, 8 or C", second));
-  if (levels >= kSwitchedLevels.size()) text.refuse(fmt::format("switch S3 at {:X}: use 0 to 4", levels), IndustryPackStatus::badIntLevel);
+  if (levels >= kSwitchedLevels.size())
+    text.refuse(fmt::format("switch S3 at {:X}: use 0 to 4", levels),
+                IndustryPackStatus::badIntLevel);
   CarrierParameters carrier;
   carrier.sites = makeSites(4, base | second << 8);
-  for (std::size_t i = 0; i < carrier.sites.size(); ++i) carrier.sites[i].interruptLevels = kSwitchedLevels[levels][i];
+  for (std::size_t i = 0; i < carrier.sites.size(); ++i)
+    carrier.sites[i].interruptLevels = kSwitchedLevels[levels][i];
   readSwitchedMemory(text, carrier, (switches >> 8) & 0xf, switches & 0xff);
   return carrier;
 }
@@ -181,11 +196,16 @@ CarrierParameters parseAvme96xx(ParameterText& text) {
 CarrierParameters parseAtc40(ParameterText& text) {
   constexpr std::uint32_t kWindow = 0x4000;  // bytes
   constexpr std::uint32_t kMostIrq = 15;
-  const auto base = text.atEnd() ? 0xa0000 : text.hex("address", {.multipleOf = 0x100, .most = 0x1000000 - kWindow});
+  const auto base = text.atEnd()
+                        ? 0xa0000
+                        : text.hex("address", {.multipleOf = 0x100, .most = 0x1000000 - kWindow});
   if (text.peek() == ',') text.refuse("separate the parameters with blanks, not commas");
-  if (!text.atEnd()) static_cast<void>(text.number("size [bytes]", {.least = kWindow, .most = kWindow}));
+  if (!text.atEnd())
+    static_cast<void>(text.number("size [bytes]", {.least = kWindow, .most = kWindow}));
   const auto irq = text.atEnd() ? 11 : text.number("interrupt request");
-  if (irq > kMostIrq) text.refuse(fmt::format("interrupt request {}: use 0 to {}", irq, kMostIrq), IndustryPackStatus::badIntLevel);
+  if (irq > kMostIrq)
+    text.refuse(fmt::format("interrupt request {}: use 0 to {}", irq, kMostIrq),
+                IndustryPackStatus::badIntLevel);
   CarrierParameters carrier;
   carrier.registers = BusSpace::isa;
   carrier.memory = BusSpace::isa;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/industry_pack/tpci200.h>
+#include "drivers/industry_pack/tpci200.h"
 
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -11,10 +11,11 @@
 #include <system_error>
 #include <utility>
 
-#include <mpf/base/real_time_priority.h>
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/system_call.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
+#include <mpf/real_time_priority.h>
+
+#include "base/signals_blocked.h"
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -36,8 +37,10 @@ timespec toTimespec(std::chrono::nanoseconds time) noexcept {
 Tpci200Options Tpci200Options::parse(const std::string& parameters) {
   constexpr std::string_view kPoll = "poll=";
   const auto refuse = [&](const std::string& problem) {
-    throw IndustryPackError(IndustryPackStatus::badAddress,
-                            fmt::format("TPCI200 \"{}\": {}; use [ADDRESS|NUMBER][,poll=MICROSECONDS]", parameters, problem));
+    throw IndustryPackError(
+        IndustryPackStatus::badAddress,
+        fmt::format("TPCI200 \"{}\": {}; use [ADDRESS|NUMBER][,poll=MICROSECONDS]", parameters,
+                    problem));
   };
   Tpci200Options options;
   const auto comma = parameters.find(',');
@@ -77,17 +80,22 @@ class Tpci200Site final : public IndustryPackSite {
       : carrier_(carrier),
         number_(number),
         id_(carrier.board_, number,
-            carrier.pci_.map(Tpci200Board::kSitesWindow, number * Tpci200Board::kSiteBytes + Tpci200Board::kIoBytes,
+            carrier.pci_.map(Tpci200Board::kSitesWindow,
+                             number * Tpci200Board::kSiteBytes + Tpci200Board::kIoBytes,
                              Tpci200Board::kIdBytes)),
         io_(carrier.board_, number,
-            carrier.pci_.map(Tpci200Board::kSitesWindow, number * Tpci200Board::kSiteBytes, Tpci200Board::kIoBytes)),
+            carrier.pci_.map(Tpci200Board::kSitesWindow, number * Tpci200Board::kSiteBytes,
+                             Tpci200Board::kIoBytes)),
         memory_(carrier.board_, number,
-                carrier.pci_.map(Tpci200Board::kMemoryWindow, number * Tpci200Board::kMemoryBytes, Tpci200Board::kMemoryBytes)) {}
+                carrier.pci_.map(Tpci200Board::kMemoryWindow, number * Tpci200Board::kMemoryBytes,
+                                 Tpci200Board::kMemoryBytes)) {}
 
   [[nodiscard]] Registers& id() override { return id_; }
   [[nodiscard]] Registers& io() override { return io_; }
   [[nodiscard]] Registers& memory() override { return memory_; }
-  [[nodiscard]] Interrupt& interrupt(int number) override { return lines_.at(static_cast<std::size_t>(number)); }
+  [[nodiscard]] Interrupt& interrupt(int number) override {
+    return lines_.at(static_cast<std::size_t>(number));
+  }
 
   void enable(int line) {
     {
@@ -100,7 +108,9 @@ class Tpci200Site final : public IndustryPackSite {
     const std::lock_guard lock(mutex_);
     setEnabled(enabled_ & ~(1U << line));
   }
-  [[nodiscard]] bool isPolled() const noexcept { return carrier_.isPolled_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool isPolled() const noexcept {
+    return carrier_.isPolled_.load(std::memory_order_relaxed);
+  }
   [[nodiscard]] bool isAnyEnabled() {
     const std::lock_guard lock(mutex_);
     return enabled_ != 0;
@@ -109,7 +119,8 @@ class Tpci200Site final : public IndustryPackSite {
   void serve(std::uint16_t status) {
     const std::lock_guard lock(mutex_);
     for (int line = 0; line < 2; ++line) {
-      if ((status & Tpci200Board::statusBit(number_, line)) == 0 || (enabled_ & 1U << line) == 0) continue;
+      if ((status & Tpci200Board::statusBit(number_, line)) == 0 || (enabled_ & 1U << line) == 0)
+        continue;
       carrier_.board_.acknowledge(number_, line);
       setEnabled(enabled_ & ~(1U << line));
       lines_[static_cast<std::size_t>(line)].pass();
@@ -159,7 +170,8 @@ void Tpci200::openInterrupt() {
     interrupt_ = std::make_unique<PciInterrupt>(pci_);
   } catch (const std::runtime_error& error) {
     pollFromNowOn();
-    remark_ = fmt::format("its interrupts are polled, every {} us: {}", pollEvery_.count(), error.what());
+    remark_ =
+        fmt::format("its interrupts are polled, every {} us: {}", pollEvery_.count(), error.what());
   }
 }
 
@@ -175,7 +187,9 @@ IndustryPackSite& Tpci200::site(std::size_t number) {
 
 void Tpci200::claim(std::size_t number) {
   for (int i = 0; !locks_.tryLock(static_cast<int>(number)); ++i) {
-    if (i == kClaims) throw std::runtime_error(fmt::format("{}: site {} is in use by another process", description(), siteName(number)));
+    if (i == kClaims)
+      throw std::runtime_error(
+          fmt::format("{}: site {} is in use by another process", description(), siteName(number)));
     std::this_thread::sleep_for(kClaimAgain);
   }
   board_.setLines(number, 0);  // the previous process may have been killed
@@ -204,8 +218,9 @@ void Tpci200::run(const std::stop_token& stop, int priority) {
 }
 
 void Tpci200::wait() {
-  std::array<pollfd, 2> events{{{.fd = wakeUp_.get(), .events = POLLIN, .revents = 0},
-                                {.fd = interrupt_ ? interrupt_->descriptor() : -1, .events = POLLIN, .revents = 0}}};
+  std::array<pollfd, 2> events{
+      {{.fd = wakeUp_.get(), .events = POLLIN, .revents = 0},
+       {.fd = interrupt_ ? interrupt_->descriptor() : -1, .events = POLLIN, .revents = 0}}};
   const auto timeout = toTimespec(pollEvery_);
   ::ppoll(events.data(), events.size(), hasSomethingToPoll() ? &timeout : nullptr, nullptr);
 }

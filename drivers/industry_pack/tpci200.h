@@ -34,11 +34,12 @@
 #include <string>
 #include <thread>
 
-#include <mpf/base/file_descriptor.h>
 #include <mpf/drivers/industry_pack/carrier.h>
-#include <mpf/drivers/industry_pack/file_locks.h>
-#include <mpf/drivers/industry_pack/pci_interrupt.h>
-#include <mpf/drivers/industry_pack/tpci200_board.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/industry_pack/file_locks.h"
+#include "drivers/industry_pack/pci_interrupt.h"
+#include "drivers/industry_pack/tpci200_board.h"
 
 namespace mpf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/industry_pack/tpci200_board.h>
+#include "drivers/industry_pack/tpci200_board.h"
 
 #include <endian.h>
 #include <stdexcept>
@@ -43,14 +43,20 @@ Tpci200Board::Tpci200Board(const PciDevice& pci)
     : window_(pci.map(kBoardWindow, 0, kBoardBytes)), sites_(pci.map(kSitesWindow, 0, kAllSites)) {
   const auto bridge = pci.map(kBridgeWindow, 0, kBridgeBytes);
   if (at<std::uint32_t>(bridge, kSpace1) == UINT32_MAX)
-    throw std::runtime_error(pci.description() + " does not answer: all bits of its bridge read as ones; check the board and the bus");
+    throw std::runtime_error(
+        pci.description() +
+        " does not answer: all bits of its bridge read as ones; check the board and the bus");
   setByteOrder(bridge, kSpace0, false);
   setByteOrder(bridge, kSpace1, true);
   setByteOrder(bridge, kSpace2, true);
 }
 
-std::uint16_t Tpci200Board::read(std::size_t offset) const noexcept { return le16toh(at<std::uint16_t>(window_, offset)); }
-void Tpci200Board::write(std::size_t offset, std::uint16_t value) noexcept { at<std::uint16_t>(window_, offset) = htole16(value); }
+std::uint16_t Tpci200Board::read(std::size_t offset) const noexcept {
+  return le16toh(at<std::uint16_t>(window_, offset));
+}
+void Tpci200Board::write(std::size_t offset, std::uint16_t value) noexcept {
+  at<std::uint16_t>(window_, offset) = htole16(value);
+}
 
 std::uint16_t Tpci200Board::status() {
   const std::lock_guard lock(mutex_);
@@ -65,8 +71,8 @@ void Tpci200Board::setLines(std::size_t site, unsigned lines) {
 
 void Tpci200Board::acknowledge(std::size_t site, int line) {
   const std::lock_guard lock(mutex_);
-  [[maybe_unused]] const std::uint16_t vector =
-      at<std::uint16_t>(sites_, site * kSiteBytes + kAcknowledge + 2 * static_cast<std::size_t>(line));
+  [[maybe_unused]] const std::uint16_t vector = at<std::uint16_t>(
+      sites_, site * kSiteBytes + kAcknowledge + 2 * static_cast<std::size_t>(line));
   takeTimeOut(site);  // a module may leave this cycle unanswered
   write(kStatus, statusBit(site, line));
 }

@@ -21,7 +21,8 @@
 #include <mutex>
 
 #include <mpf/drivers/industry_pack/memory_registers.h>
-#include <mpf/drivers/industry_pack/pci_device.h>
+
+#include "drivers/industry_pack/pci_device.h"
 
 namespace mpf {
 
@@ -69,7 +70,10 @@ class Tpci200Board {
 class Tpci200Registers final : public Registers {
  public:
   Tpci200Registers(Tpci200Board& board, std::size_t site, PciWindow window)
-      : board_(board), site_(site), window_(std::move(window)), registers_(window_.data(), window_.size()) {}
+      : board_(board),
+        site_(site),
+        window_(std::move(window)),
+        registers_(window_.data(), window_.size()) {}
   [[nodiscard]] std::size_t size() const noexcept override { return window_.size(); }
 
  private:

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <span>
 
-#include <mpf/drivers/industry_pack/parameter_parsers.h>
+#include "drivers/industry_pack/parameter_parsers.h"
 
 namespace mpf::parameters {
 namespace {
@@ -48,8 +48,10 @@ void giveMemory(CarrierParameters& carrier, std::uint32_t base, std::uint32_t by
   }
 }
 
-CarrierParameters parseSmall(ParameterText& text, std::span<const Levels> levels, std::uint32_t mostBase, std::uint32_t registerMask) {
-  const auto base = text.atEnd() ? kFactoryBase : text.hex("I/O address", {.multipleOf = 0x200, .most = mostBase});
+CarrierParameters parseSmall(ParameterText& text, std::span<const Levels> levels,
+                             std::uint32_t mostBase, std::uint32_t registerMask) {
+  const auto base = text.atEnd() ? kFactoryBase
+                                 : text.hex("I/O address", {.multipleOf = 0x200, .most = mostBase});
   auto carrier = makeCarrier(base & registerMask, levels);
   if (text.trySkip(',')) giveMemory(carrier, base << 8, memoryBytes(text));
   return carrier;
@@ -57,17 +59,22 @@ CarrierParameters parseSmall(ParameterText& text, std::span<const Levels> levels
 
 CarrierParameters parse616(ParameterText& text, std::span<const Levels> levels) {
   const bool isAsMade = text.atEnd();
-  auto carrier = makeCarrier(isAsMade ? kFactoryBase : text.hex("I/O address", {.multipleOf = 0x400, .most = 0xfc00}), levels);
+  auto carrier = makeCarrier(
+      isAsMade ? kFactoryBase : text.hex("I/O address", {.multipleOf = 0x400, .most = 0xfc00}),
+      levels);
   if (!isAsMade && !text.trySkip(',')) return carrier;
   const auto memory = isAsMade ? kFactoryMemory : text.hex("memory address");
   if (text.trySkip(',')) {
     if ((memory & 0xff01ffff) != 0)
-      text.refuse(fmt::format("memory address 0x{:x}: use a multiple of 0x20000 in A24, at most 0xfe0000", memory));
+      text.refuse(fmt::format(
+          "memory address 0x{:x}: use a multiple of 0x20000 in A24, at most 0xfe0000", memory));
     giveMemory(carrier, memory, memoryBytes(text));
     return carrier;
   }
   if ((memory & 0x01ffffff) != 0)
-    text.refuse(fmt::format("memory address 0x{:x}: use a multiple of 0x2000000 in A32, or add a size [K] for A24", memory));
+    text.refuse(fmt::format(
+        "memory address 0x{:x}: use a multiple of 0x2000000 in A32, or add a size [K] for A24",
+        memory));
   carrier.memory = BusSpace::vmeA32;
   giveMemory(carrier, memory, kMemoryInA32);
   return carrier;
@@ -75,10 +82,16 @@ CarrierParameters parse616(ParameterText& text, std::span<const Levels> levels) 
 
 }  // namespace
 
-CarrierParameters parseVipc310(ParameterText& text) { return parseSmall(text, kLevels310, 0xfe00, 0xfe00); }
+CarrierParameters parseVipc310(ParameterText& text) {
+  return parseSmall(text, kLevels310, 0xfe00, 0xfe00);
+}
 // Address line 9 selects memory only.
-CarrierParameters parseVipc610(ParameterText& text) { return parseSmall(text, kLevels, 0xfc00, 0xfc00); }
-CarrierParameters parseVipc610Dash01(ParameterText& text) { return parseSmall(text, kLevelsDash01, 0xfc00, 0xfc00); }
+CarrierParameters parseVipc610(ParameterText& text) {
+  return parseSmall(text, kLevels, 0xfc00, 0xfc00);
+}
+CarrierParameters parseVipc610Dash01(ParameterText& text) {
+  return parseSmall(text, kLevelsDash01, 0xfc00, 0xfc00);
+}
 CarrierParameters parseVipc616(ParameterText& text) { return parse616(text, kLevels); }
 CarrierParameters parseVipc616Dash01(ParameterText& text) { return parse616(text, kLevelsDash01); }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330.h>
+#include "drivers/ip330/ip330.h"
 
 #include <algorithm>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/drivers/ip330/ip330_timing.h>
+#include "base/signals_blocked.h"
+#include "drivers/ip330/ip330_timing.h"
 
 namespace mpf {
 namespace {
@@ -15,7 +15,8 @@ namespace {
 constexpr int kLateInRow = 3;
 
 Ip330Settings checked(const Ip330Settings& settings) {
-  if (const auto problem = settings.problem(); !problem.empty()) throw std::invalid_argument(problem);
+  if (const auto problem = settings.problem(); !problem.empty())
+    throw std::invalid_argument(problem);
   return settings;
 }
 
@@ -26,7 +27,8 @@ std::array<Deadline, kIp330Gains> notRefused() {
 
 }  // namespace
 
-Ip330::Ip330(IndustryPackModule& module, const Ip330Settings& settings, Ip330Faults::Hook hook, const Ip330Limits& limits)
+Ip330::Ip330(IndustryPackModule& module, const Ip330Settings& settings, Ip330Faults::Hook hook,
+             const Ip330Limits& limits)
     : module_(module),
       limits_(limits),
       faults_(std::move(hook)),
@@ -38,9 +40,11 @@ Ip330::Ip330(IndustryPackModule& module, const Ip330Settings& settings, Ip330Fau
     begin();
   }
   trySetSecondsBetweenCalibrate(settings_.secondsBetweenCalibrate);
-  const InterruptThreadOptions options{.pollEvery = limits_.pollEvery, .stormLimit = limits_.stormLimit, .stormPause = limits_.stormPause};
-  interruptThread_ =
-      std::make_unique<InterruptThread>(module_.interrupt(0), options, [this](InterruptThread::Cause cause) { return serve(cause); });
+  const InterruptThreadOptions options{.pollEvery = limits_.pollEvery,
+                                       .stormLimit = limits_.stormLimit,
+                                       .stormPause = limits_.stormPause};
+  interruptThread_ = std::make_unique<InterruptThread>(
+      module_.interrupt(0), options, [this](InterruptThread::Cause cause) { return serve(cause); });
   const SignalsBlocked blocked;
   keeper_ = std::jthread([this](const std::stop_token& stop) { keep(stop); });
 }
@@ -70,18 +74,23 @@ Ip330::Counters Ip330::counters() const noexcept {
 }
 
 std::chrono::nanoseconds Ip330::patience() const noexcept {
-  return limits_.silence + std::chrono::nanoseconds(static_cast<std::int64_t>(10'000 * microsecondsPerScan()));
+  return limits_.silence +
+         std::chrono::nanoseconds(static_cast<std::int64_t>(10'000 * microsecondsPerScan()));
 }
 
 // ---- the board
 
 // Returns whether the board is present and programmed. A board that has lost its settings may have
 // been replaced, even by another module, so nothing is written until the keeper has checked it.
-bool Ip330::isReady() { return !faults_.has(Ip330Fault::absent) && chip_.presence() == Ip330Chip::Presence::asProgrammed; }
+bool Ip330::isReady() {
+  return !faults_.has(Ip330Fault::absent) && chip_.presence() == Ip330Chip::Presence::asProgrammed;
+}
 
 void Ip330::start() {
-  microsecondsPerScan_.store(ip330TimerOf(settings_.scanMode, settings_.channels(), settings_.microsecondsPerScan).microsecondsPerScan,
-                             std::memory_order_relaxed);
+  microsecondsPerScan_.store(
+      ip330TimerOf(settings_.scanMode, settings_.channels(), settings_.microsecondsPerScan)
+          .microsecondsPerScan,
+      std::memory_order_relaxed);
   chip_.start(settings_, gains_, limits_.conversion);
   startNs_ = Clock::nowNs();
 }
@@ -121,7 +130,8 @@ bool Ip330::trySet(std::uint8_t& channelsGain, std::uint8_t gain) {
   return false;
 }
 
-std::string Ip330::tryConfigure(Ip330ScanMode mode, Ip330Trigger trigger, double microsecondsPerScan) {
+std::string Ip330::tryConfigure(Ip330ScanMode mode, Ip330Trigger trigger,
+                                double microsecondsPerScan) {
   const Lock lock(mutex_);
   auto wanted = settings_;
   wanted.scanMode = mode;
@@ -183,7 +193,8 @@ bool Ip330::calibrate(const Gains& gains) {
 std::optional<bool> Ip330::calibrate(int gain) {
   const auto [low, high] = calibrationPointsOf(settings_.range, gain);
   const auto lowCode = chip_.tryMeasure(low.source, gain, limits_.conversion);
-  const auto highCode = lowCode ? chip_.tryMeasure(high.source, gain, limits_.conversion) : std::nullopt;
+  const auto highCode =
+      lowCode ? chip_.tryMeasure(high.source, gain, limits_.conversion) : std::nullopt;
   if (!highCode) return std::nullopt;
   const auto correction = correctionOf(settings_.range, gain, *lowCode, *highCode);
   if (correction) corrections_[static_cast<std::size_t>(gain)] = correction;
@@ -191,7 +202,9 @@ std::optional<bool> Ip330::calibrate(int gain) {
 }
 
 // Makes the keeper calibrate again after the delay of a retry.
-void Ip330::calibrateSoon() { calibrateAt_ = std::min(calibrateAt_, Deadline::after(limits_.silence)); }
+void Ip330::calibrateSoon() {
+  calibrateAt_ = std::min(calibrateAt_, Deadline::after(limits_.silence));
+}
 
 Ip330::Gains Ip330::gainsInUse() const {
   Gains gains{};
@@ -202,7 +215,8 @@ Ip330::Gains Ip330::gainsInUse() const {
 }
 
 bool Ip330::isCalibrated(int gain) const {
-  return settings_.secondsBetweenCalibrate < 0 || corrections_[static_cast<std::size_t>(gain)].has_value();
+  return settings_.secondsBetweenCalibrate < 0 ||
+         corrections_[static_cast<std::size_t>(gain)].has_value();
 }
 
 bool Ip330::tryStartConvert() {
@@ -221,7 +235,8 @@ bool Ip330::serve(InterruptThread::Cause cause) {
     const Lock lock(mutex_);
     if (!isReady()) return false;  // the keeper handles this
     chip_.take(settings_, scans);
-    for (std::size_t i = 0; i < scans.count && scans.isSettled; ++i) correct(scans.codes[i], samples[i]);
+    for (std::size_t i = 0; i < scans.count && scans.isSettled; ++i)
+      correct(scans.codes[i], samples[i]);
   }
   if (scans.count == 0) return false;
   noteCause(cause);
@@ -244,7 +259,8 @@ void Ip330::correct(const Ip330Chip::Codes& codes, Ip330Sample& sample) const {
   sample.gain = gains_;
   sample.epoch = epoch();
   sample.valid = 0;
-  for (auto i = static_cast<std::size_t>(settings_.firstChannel); i <= static_cast<std::size_t>(settings_.lastChannel); ++i) {
+  for (auto i = static_cast<std::size_t>(settings_.firstChannel);
+       i <= static_cast<std::size_t>(settings_.lastChannel); ++i) {
     const auto& correction = corrections_[gains_[i]];
     if (settings_.secondsBetweenCalibrate < 0) {
       sample.corrected[i] = codes[i];
@@ -267,8 +283,9 @@ Ip330::Subscription Ip330::subscribe(Subscriber subscriber) {
   const auto most = static_cast<std::size_t>(settings().maxClients);
   const Lock lock(subscribersMutex_);
   if (subscribers_.size() >= most)
-    throw std::length_error(
-        fmt::format("{} already has {} clients, which is the limit; raise the maximum number of clients", module_.name(), most));
+    throw std::length_error(fmt::format(
+        "{} already has {} clients, which is the limit; raise the maximum number of clients",
+        module_.name(), most));
   const auto at = subscribers_.insert(subscribers_.end(), std::move(subscriber));
   return {nullptr, [this, at](void*) {
             const Lock ending(subscribersMutex_);
@@ -315,14 +332,16 @@ void Ip330::lookForScans() {
   {
     const Lock lock(mutex_);
     const auto latest = Clock::nowNs() - patience().count();
-    isSilent = isContinuous(settings_.scanMode) && lastScanNs_.load(std::memory_order_relaxed) < latest;
+    isSilent =
+        isContinuous(settings_.scanMode) && lastScanNs_.load(std::memory_order_relaxed) < latest;
     if (isSilent && startNs_ < latest && isReady()) {
       epoch_.fetch_add(1, std::memory_order_relaxed);
       start();
     }
   }
   // After a start the state is unknown until a scan comes, so the fault stays unchanged.
-  if (isSilent || scans_.load(std::memory_order_relaxed) != scansSeen_) faults_.set(Ip330Fault::silent, isSilent);
+  if (isSilent || scans_.load(std::memory_order_relaxed) != scansSeen_)
+    faults_.set(Ip330Fault::silent, isSilent);
   scansSeen_ = scans_.load(std::memory_order_relaxed);
 }
 

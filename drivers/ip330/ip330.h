@@ -7,7 +7,8 @@
 //   programmed
 //
 //   Ip330 board(module, {.type = parseIp330Type("D"), .lastChannel = 15});
-//   const auto subscription = board.subscribe([&](const Ip330Sample& sample) { ...sample.corrected[3]... });
+//   const auto subscription = board.subscribe([&](const Ip330Sample& sample) {
+//   ...sample.corrected[3]... });
 //
 // A calibration is stored for each gain, so a change to a gain that was calibrated before needs no
 // measurement. Calibration holds the lock that the interrupt thread needs, and the interrupts of
@@ -34,13 +35,14 @@
 #include <string>
 #include <thread>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
 #include <mpf/drivers/industry_pack/module.h>
-#include <mpf/drivers/ip330/ip330_calibration.h>
-#include <mpf/drivers/ip330/ip330_chip.h>
-#include <mpf/drivers/ip330/ip330_faults.h>
-#include <mpf/drivers/ip330/ip330_settings.h>
+
+#include "drivers/ip330/ip330_calibration.h"
+#include "drivers/ip330/ip330_chip.h"
+#include "drivers/ip330/ip330_faults.h"
+#include "drivers/ip330/ip330_settings.h"
 
 namespace mpf {
 
@@ -81,7 +83,8 @@ class Ip330 {
   //   hook    called when a fault begins or ends, see Ip330Faults
   //   throws  std::invalid_argument with settings.problem(); std::system_error when a thread cannot
   //           be started
-  Ip330(IndustryPackModule& module, const Ip330Settings& settings, Ip330Faults::Hook hook = {}, const Ip330Limits& limits = {});
+  Ip330(IndustryPackModule& module, const Ip330Settings& settings, Ip330Faults::Hook hook = {},
+        const Ip330Limits& limits = {});
   // Stops scans and interrupts of the board, if it is present. All subscriptions must have ended.
   ~Ip330();
   Ip330(const Ip330&) = delete;
@@ -90,14 +93,20 @@ class Ip330 {
   [[nodiscard]] Ip330Settings settings() const;
   [[nodiscard]] int gain(int channel) const;
   // The period of the scans [us] that the timer registers give; 0 when it depends on triggers.
-  [[nodiscard]] double microsecondsPerScan() const noexcept { return microsecondsPerScan_.load(std::memory_order_relaxed); }
+  [[nodiscard]] double microsecondsPerScan() const noexcept {
+    return microsecondsPerScan_.load(std::memory_order_relaxed);
+  }
   // Changes when earlier samples are no longer comparable: after a change of scan mode or time, or
   // after the board was absent or silent.
-  [[nodiscard]] std::uint64_t epoch() const noexcept { return epoch_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t epoch() const noexcept {
+    return epoch_.load(std::memory_order_relaxed);
+  }
   // The longest time without a scan in normal operation.
   [[nodiscard]] std::chrono::nanoseconds patience() const noexcept;
   // Returns false while the board is absent or silent.
-  [[nodiscard]] bool isDelivering() const noexcept { return !faults_.has(Ip330Fault::absent) && !faults_.has(Ip330Fault::silent); }
+  [[nodiscard]] bool isDelivering() const noexcept {
+    return !faults_.has(Ip330Fault::absent) && !faults_.has(Ip330Fault::silent);
+  }
   // Returns a sentence about the worst fault; empty without a fault.
   [[nodiscard]] std::string problem() const { return faults_.describe(); }
 
@@ -111,7 +120,8 @@ class Ip330 {
   // Changes the scan mode.
   //   returns  a sentence that says why the change is impossible, with nothing changed; empty on
   //            success
-  [[nodiscard]] std::string tryConfigure(Ip330ScanMode mode, Ip330Trigger trigger, double microsecondsPerScan);
+  [[nodiscard]] std::string tryConfigure(Ip330ScanMode mode, Ip330Trigger trigger,
+                                         double microsecondsPerScan);
   // Sets the period of calibration and calibrates now, unless `seconds` is negative. Returns false
   // when this calibration failed.
   bool trySetSecondsBetweenCalibrate(int seconds);
@@ -179,7 +189,8 @@ class Ip330 {
 
   std::atomic<double> microsecondsPerScan_{0};
   std::atomic<std::uint64_t> epoch_{0};
-  std::atomic<std::int64_t> lastScanNs_{0};  // or the begin of an epoch; not of each start, since a failed calibration also starts
+  // or the begin of an epoch; not of each start, since a failed calibration also starts
+  std::atomic<std::int64_t> lastScanNs_{0};
   std::atomic<std::uint64_t> scans_{0}, missed_{0}, calibrations_{0};
   std::atomic<int> lateInRow_{0};  // scans found by polling since the last interrupt
 

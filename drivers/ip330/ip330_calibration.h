@@ -16,7 +16,7 @@
 #include <cstdint>
 #include <optional>
 
-#include <mpf/drivers/ip330/ip330_settings.h>
+#include "drivers/ip330/ip330_settings.h"
 
 namespace mpf {
 
@@ -42,7 +42,8 @@ struct Ip330Correction {
 // Computes the correction from the mean codes of both reference voltages.
 //   returns  nullopt when no working converter gives such codes, or when a mean is at an end of the
 //            range: there the voltage may be beyond the range, and noise is clipped on one side
-[[nodiscard]] std::optional<Ip330Correction> correctionOf(Ip330Range range, int gain, double lowCode, double highCode) noexcept;
+[[nodiscard]] std::optional<Ip330Correction> correctionOf(Ip330Range range, int gain,
+                                                          double lowCode, double highCode) noexcept;
 
 // The code that a client gets: rounded and clamped to 0 to 0xffff.
 [[nodiscard]] int clampedCode(double corrected) noexcept;

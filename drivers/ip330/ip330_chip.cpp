@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_chip.h>
+#include "drivers/ip330/ip330_chip.h"
 
 #include <thread>
 #include <utility>
 
-#include <mpf/base/clock.h>
-#include <mpf/drivers/ip330/ip330_registers.h>
-#include <mpf/drivers/ip330/ip330_timing.h>
+#include <mpf/clock.h>
+
+#include "drivers/ip330/ip330_registers.h"
+#include "drivers/ip330/ip330_timing.h"
 
 namespace mpf {
 namespace {
@@ -17,14 +18,18 @@ constexpr int kMailboxesOfHalf = 16;
 constexpr std::chrono::microseconds kLookAgainAfter{50};
 constexpr std::chrono::microseconds kConversion{static_cast<int>(kIp330MicrosecondsPerConversion)};
 
-std::uint16_t sourceOf(Ip330Type type) { return type == Ip330Type::differential ? ip330::kSourceDifferential : ip330::kSourceSingleEnded; }
+std::uint16_t sourceOf(Ip330Type type) {
+  return type == Ip330Type::differential ? ip330::kSourceDifferential : ip330::kSourceSingleEnded;
+}
 
 std::uint16_t controlOf(const Ip330Settings& settings) {
   std::uint16_t control = ip330::kStraightBinary | ip330::kInterruptAfterAll;
   control |= sourceOf(settings.type);
-  control |= static_cast<std::uint16_t>(static_cast<unsigned>(settings.scanMode) << ip330::kScanModeShift);
+  control |=
+      static_cast<std::uint16_t>(static_cast<unsigned>(settings.scanMode) << ip330::kScanModeShift);
   if (settings.trigger == Ip330Trigger::output) control |= ip330::kTriggerOutput;
-  if (ip330TimerOf(settings.scanMode, settings.channels(), settings.microsecondsPerScan).isUsed) control |= ip330::kTimerEnable;
+  if (ip330TimerOf(settings.scanMode, settings.channels(), settings.microsecondsPerScan).isUsed)
+    control |= ip330::kTimerEnable;
   return control;
 }
 
@@ -35,11 +40,13 @@ void Ip330Chip::writeControl(std::uint16_t control) {
   io_.write16(ip330::kControl, control);
 }
 
-void Ip330Chip::start(const Ip330Settings& settings, const std::array<std::uint8_t, kIp330Channels>& gains,
+void Ip330Chip::start(const Ip330Settings& settings,
+                      const std::array<std::uint8_t, kIp330Channels>& gains,
                       std::chrono::nanoseconds limit) {
   stop();
   settle(settings, limit);
-  const auto timer = ip330TimerOf(settings.scanMode, settings.channels(), settings.microsecondsPerScan);
+  const auto timer =
+      ip330TimerOf(settings.scanMode, settings.channels(), settings.microsecondsPerScan);
   // before a trigger can cause an interrupt
   io_.write8(ip330::kInterruptVector, static_cast<std::uint8_t>(settings.vector));
   io_.write8(ip330::kTimerPrescaler, timer.prescaler);
@@ -54,8 +61,10 @@ void Ip330Chip::start(const Ip330Settings& settings, const std::array<std::uint8
 }
 
 void Ip330Chip::stop() {
-  writeControl(static_cast<std::uint16_t>(control_ & ~(ip330::kScanMode | ip330::kInterruptControl)));
-  if (const int channels = std::exchange(converting_, 0); channels > 0) std::this_thread::sleep_for(channels * kConversion);
+  writeControl(
+      static_cast<std::uint16_t>(control_ & ~(ip330::kScanMode | ip330::kInterruptControl)));
+  if (const int channels = std::exchange(converting_, 0); channels > 0)
+    std::this_thread::sleep_for(channels * kConversion);
   static_cast<void>(readAllMailboxes());
 }
 
@@ -91,14 +100,17 @@ bool Ip330Chip::takeHalf(const Ip330Settings& settings, int half, Scans& scans) 
   if ((io_.read16(ip330::kNewData + flagsAt) & flag) == 0) return false;
   if ((io_.read16(ip330::kMissedData + flagsAt) & flag) != 0) scans.isMissing = true;
   auto& codes = scans.codes[scans.count++];
-  for (auto channel = static_cast<std::size_t>(settings.firstChannel); first + channel <= last; ++channel) {
+  for (auto channel = static_cast<std::size_t>(settings.firstChannel); first + channel <= last;
+       ++channel) {
     codes[channel] = io_.read16(ip330::kMailBox + 2 * (first + channel));
   }
   return true;
 }
 
-std::optional<double> Ip330Chip::tryMeasure(std::uint16_t source, int gain, std::chrono::nanoseconds limit) {
-  for (std::size_t i = 0; i < kIp330Channels; ++i) io_.write8(ip330::kGainSelect + i, static_cast<std::uint8_t>(gain));
+std::optional<double> Ip330Chip::tryMeasure(std::uint16_t source, int gain,
+                                            std::chrono::nanoseconds limit) {
+  for (std::size_t i = 0; i < kIp330Channels; ++i)
+    io_.write8(ip330::kGainSelect + i, static_cast<std::uint8_t>(gain));
   prepareSingle(source, kIp330Channels);
   if (!tryConvert(kIp330Channels, limit)) return std::nullopt;
   static_cast<void>(readAllMailboxes());  // this also clears the flags
@@ -116,7 +128,8 @@ void Ip330Chip::settle(const Ip330Settings& settings, std::chrono::nanoseconds l
 
 // Prepares a burst of channels 0 to channels - 1, without interrupts.
 void Ip330Chip::prepareSingle(std::uint16_t source, int channels) {
-  const auto burstSingle = static_cast<std::uint16_t>(static_cast<unsigned>(Ip330ScanMode::burstSingle) << ip330::kScanModeShift);
+  const auto burstSingle = static_cast<std::uint16_t>(
+      static_cast<unsigned>(Ip330ScanMode::burstSingle) << ip330::kScanModeShift);
   io_.write8(ip330::kStartChannel, 0);
   io_.write8(ip330::kEndChannel, static_cast<std::uint8_t>(channels - 1));
   writeControl(static_cast<std::uint16_t>(burstSingle | ip330::kStraightBinary | source));
@@ -127,7 +140,8 @@ bool Ip330Chip::tryConvert(int channels, std::chrono::nanoseconds limit) {
   const auto deadline = Deadline::after(limit);
   for (;;) {
     const bool isLast = deadline.hasPassed();
-    const bool isUpperThere = channels <= kMailboxesOfHalf || io_.read16(ip330::kNewData + 2) == kAllOnes;
+    const bool isUpperThere =
+        channels <= kMailboxesOfHalf || io_.read16(ip330::kNewData + 2) == kAllOnes;
     if (isUpperThere && io_.read16(ip330::kNewData) == kAllOnes) return true;
     if (isLast) return false;
     std::this_thread::sleep_for(kLookAgainAfter);  // polls, since interrupts are off

@@ -17,7 +17,8 @@
 #include <optional>
 
 #include <mpf/drivers/industry_pack/registers.h>
-#include <mpf/drivers/ip330/ip330_settings.h>
+
+#include "drivers/ip330/ip330_settings.h"
 
 namespace mpf {
 
@@ -39,7 +40,8 @@ class Ip330Chip {
   // the input source one conversion of all channels is discarded first.
   //   settings  must be valid: problem() is empty
   //   limit     longest wait for that conversion
-  void start(const Ip330Settings& settings, const std::array<std::uint8_t, kIp330Channels>& gains, std::chrono::nanoseconds limit);
+  void start(const Ip330Settings& settings, const std::array<std::uint8_t, kIp330Channels>& gains,
+             std::chrono::nanoseconds limit);
   // Stops scans and interrupts, and discards all results. Waits for the end of a burst that has
   // begun, since its codes have the previous gains.
   void stop();
@@ -55,7 +57,8 @@ class Ip330Chip {
   //   source   calibration voltage, bits of the control register
   //   limit    longest wait for each of the two conversions
   //   returns  the mean code of all channels; nullopt when a conversion does not end
-  [[nodiscard]] std::optional<double> tryMeasure(std::uint16_t source, int gain, std::chrono::nanoseconds limit);
+  [[nodiscard]] std::optional<double> tryMeasure(std::uint16_t source, int gain,
+                                                 std::chrono::nanoseconds limit);
 
  private:
   void writeControl(std::uint16_t control);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_faults.h>
+#include "drivers/ip330/ip330_faults.h"
 
 namespace mpf {
 namespace {
@@ -10,11 +10,15 @@ struct FaultText {
 };
 
 constexpr std::array<FaultText, 5> kTexts{{
-    {"the board is gone: all bits read as ones, or another module is in its place", "the board is present again"},
+    {"the board is gone: all bits read as ones, or another module is in its place",
+     "the board is present again"},
     {"the board does not scan", "the board scans again"},
-    {"the board's interrupts do not come: the board is polled instead", "the board's interrupts come again"},
-    {"the board interrupts without a reason: its interrupt is masked for a while", "the board's interrupt is quiet again"},
-    {"calibration fails: the converter gives no codes, implausible codes, or the end of its range", "calibration succeeds again"},
+    {"the board's interrupts do not come: the board is polled instead",
+     "the board's interrupts come again"},
+    {"the board interrupts without a reason: its interrupt is masked for a while",
+     "the board's interrupt is quiet again"},
+    {"calibration fails: the converter gives no codes, implausible codes, or the end of its range",
+     "calibration succeeds again"},
 }};
 
 }  // namespace

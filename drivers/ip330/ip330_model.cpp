@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_model.h>
+#include "drivers/ip330/ip330_model.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/signals_blocked.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/industry_pack/module.h>
-#include <mpf/drivers/ip330/ip330_registers.h>
-#include <mpf/drivers/ip330/ip330_timing.h>
+
+#include "base/signals_blocked.h"
+#include "drivers/ip330/ip330_registers.h"
+#include "drivers/ip330/ip330_timing.h"
 
 namespace mpf {
 namespace {
@@ -42,7 +43,9 @@ double voltsOf(std::uint16_t source) noexcept {
   }
 }
 
-bool isInput(std::uint16_t source) noexcept { return source == ip330::kSourceDifferential || source == ip330::kSourceSingleEnded; }
+bool isInput(std::uint16_t source) noexcept {
+  return source == ip330::kSourceDifferential || source == ip330::kSourceSingleEnded;
+}
 
 }  // namespace
 
@@ -85,7 +88,8 @@ void Ip330Model::leaveScan() {
   for (int channel = startChannel(); channel <= endChannel(); ++channel) {
     left_.emplace_back(mailboxOf(channel), codeOf(channel, clockSeconds()));
   }
-  leftUntilNs_ = Clock::nowNs() + static_cast<std::int64_t>(static_cast<double>(left_.size()) * kSecondsPerConversion * 1e9);
+  leftUntilNs_ = Clock::nowNs() + static_cast<std::int64_t>(static_cast<double>(left_.size()) *
+                                                            kSecondsPerConversion * 1e9);
 }
 
 void Ip330Model::finishScan() {
@@ -113,7 +117,8 @@ void Ip330Model::externalTrigger() {
   const Lock lock(mutex_);
   if ((control() & ip330::kTriggerOutput) != 0) return;
   if (scanMode() != Ip330ScanMode::convertOnExternalTriggerOnly) return start();
-  triggered_ = triggered_ < startChannel() || triggered_ >= endChannel() ? startChannel() : triggered_ + 1;
+  triggered_ =
+      triggered_ < startChannel() || triggered_ >= endChannel() ? startChannel() : triggered_ + 1;
   if (isStuck_) return;
   convert(triggered_, clockSeconds());
   if (triggered_ == endChannel()) endScan();
@@ -131,7 +136,8 @@ int Ip330Model::gainOf(int channel) const noexcept {
 double Ip330Model::conversionSeconds() const noexcept {
   const double timer = (words_[1] >> 8) * static_cast<double>(words_[2]) / 8e6;
   const auto mode = scanMode();
-  const bool isUniform = mode == Ip330ScanMode::uniformContinuous || mode == Ip330ScanMode::uniformSingle;
+  const bool isUniform =
+      mode == Ip330ScanMode::uniformContinuous || mode == Ip330ScanMode::uniformSingle;
   return isUniform ? std::max(timer, kSecondsPerConversion) : kSecondsPerConversion;
 }
 
@@ -179,10 +185,13 @@ void Ip330Model::scan() {
 
 std::size_t Ip330Model::mailboxOf(int channel) const noexcept {
   const bool isDifferential = (control() & ip330::kInputSource) == ip330::kSourceDifferential;
-  return isDifferential ? static_cast<std::size_t>(channel) % kHalf + (half_ != 0 ? kHalf : 0) : static_cast<std::size_t>(channel);
+  return isDifferential ? static_cast<std::size_t>(channel) % kHalf + (half_ != 0 ? kHalf : 0)
+                        : static_cast<std::size_t>(channel);
 }
 
-void Ip330Model::convert(int channel, double seconds) { deliver(mailboxOf(channel), codeOf(channel, seconds)); }
+void Ip330Model::convert(int channel, double seconds) {
+  deliver(mailboxOf(channel), codeOf(channel, seconds));
+}
 
 void Ip330Model::deliver(std::size_t mailbox, std::uint16_t code) {
   words_[kMailBoxWord + mailbox] = code;
@@ -211,13 +220,16 @@ std::uint16_t Ip330Model::readMailbox(std::size_t mailbox) {
   setFlag(kMissedDataWord, mailbox, false);
   const auto last = static_cast<std::size_t>(endChannel());
   const bool isDifferential = (control() & ip330::kInputSource) == ip330::kSourceDifferential;
-  if (mailbox == last || (isDifferential && mailbox % kHalf == last % kHalf)) setInterrupt(0, false);
+  if (mailbox == last || (isDifferential && mailbox % kHalf == last % kHalf))
+    setInterrupt(0, false);
   return words_[kMailBoxWord + mailbox];
 }
 
 void Ip330Model::obeyControl(std::uint16_t before) {
   if (((before ^ control()) & ip330::kInputSource) != 0) isSettling_ = true;
-  if (!isContinuous(scanMode()) && std::exchange(isRunning_, false) && std::exchange(leavesScan_, false)) leaveScan();
+  if (!isContinuous(scanMode()) && std::exchange(isRunning_, false) &&
+      std::exchange(leavesScan_, false))
+    leaveScan();
   if ((control() & ip330::kInterruptControl) == 0) setInterrupt(0, false);
 }
 
@@ -233,12 +245,15 @@ void Ip330Model::write(Space space, std::size_t offset, std::uint16_t value, Lan
   const Lock lock(mutex_);
   finishScan();
   const auto word = offset / 2;
-  if (space != Space::io || word >= kMailBoxWord || (word >= kNewDataWord && word < kMissedDataWord + 2)) return;
+  if (space != Space::io || word >= kMailBoxWord ||
+      (word >= kNewDataWord && word < kMissedDataWord + 2))
+    return;
   if (offset == ip330::kStartConvert) {
     if ((value & lanes & 1) != 0) start();
     return;
   }
-  const auto before = std::exchange(words_[word], static_cast<std::uint16_t>((words_[word] & ~lanes) | (value & lanes)));
+  const auto before = std::exchange(
+      words_[word], static_cast<std::uint16_t>((words_[word] & ~lanes) | (value & lanes)));
   if (offset == ip330::kControl) obeyControl(before);
 }
 
@@ -255,7 +270,8 @@ void Ip330Model::run(const std::stop_token& stop) {
     }
     const auto left = next_ - clockSeconds();
     if (left > 0) {
-      changed_.wait_for(lock, stop, std::chrono::duration<double>(left), [&, seen = starts_] { return starts_ != seen; });
+      changed_.wait_for(lock, stop, std::chrono::duration<double>(left),
+                        [&, seen = starts_] { return starts_ != seen; });
       continue;
     }
     seconds_ = next_;

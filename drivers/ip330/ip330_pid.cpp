@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_pid.h>
+#include "drivers/ip330/ip330_pid.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <mpf/drivers/ip330/ip330_scan.h>
+#include "drivers/ip330/ip330_scan.h"
 
 namespace mpf {
 
-Ip330Pid::Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowest, double highest, Ip330Faults::Hook hook)
+Ip330Pid::Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowest, double highest,
+                   Ip330Faults::Hook hook)
     : board_(board), channel_(channel), output_(output), hook_(std::move(hook)) {
   expectIp330Channels(board, channel, channel);
   loop_.lowLimit = lowest;
@@ -19,7 +20,8 @@ Ip330Pid::Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowes
 
 int Ip330Pid::scansPerStep() const {
   const double period = board_.microsecondsPerScan();
-  return period > 0 ? static_cast<int>(std::clamp(std::round(seconds_ * 1e6 / period), 1.0, 1e9)) : 1;
+  return period > 0 ? static_cast<int>(std::clamp(std::round(seconds_ * 1e6 / period), 1.0, 1e9))
+                    : 1;
 }
 
 void Ip330Pid::take(const Ip330Sample& sample) {
@@ -33,7 +35,10 @@ void Ip330Pid::take(const Ip330Sample& sample) {
     isFailing = !step(std::exchange(sum_, 0) / std::exchange(scans_, 0));
     if (std::exchange(isFailing_, isFailing) == isFailing) return;
   }
-  if (hook_) hook_(isFailing ? "the output of the feedback does not answer" : "the output of the feedback answers again", isFailing);
+  if (hook_)
+    hook_(isFailing ? "the output of the feedback does not answer"
+                    : "the output of the feedback answers again",
+          isFailing);
 }
 
 // Returns false when the output does not answer; it then keeps its value.

@@ -15,9 +15,9 @@
 #include <mutex>
 #include <string>
 
-#include <mpf/drivers/ip330/analog_output.h>
-#include <mpf/drivers/ip330/ip330.h>
-#include <mpf/drivers/ip330/pid_loop.h>
+#include "drivers/ip330/analog_output.h"
+#include "drivers/ip330/ip330.h"
+#include "drivers/ip330/pid_loop.h"
 
 namespace mpf {
 
@@ -30,7 +30,8 @@ class Ip330Pid {
   //   hook             called when the output fails and when it answers again, like that of
   //                    Ip330Faults
   //   throws           std::invalid_argument, std::length_error as Ip330Scan
-  Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowest, double highest, Ip330Faults::Hook hook = {});
+  Ip330Pid(Ip330& board, int channel, AnalogOutput& output, double lowest, double highest,
+           Ip330Faults::Hook hook = {});
   Ip330Pid(const Ip330Pid&) = delete;
   Ip330Pid& operator=(const Ip330Pid&) = delete;
 
@@ -46,7 +47,8 @@ class Ip330Pid {
   struct Status {
     PidLoop::Terms terms;
     double secondsPerScan = 0;
-    bool isGood = false;  // scans come, the last one was of a calibrated channel, and the output answers
+    // scans come, the last one was of a calibrated channel, and the output answers
+    bool isGood = false;
   };
   [[nodiscard]] Status status();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_scan.h>
+#include "drivers/ip330/ip330_scan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,11 +18,13 @@ constexpr std::chrono::milliseconds kLookAtBoard{10};
 void expectIp330Channels(const Ip330& board, int first, int last) {
   const auto settings = board.settings();
   if (settings.has(first) && settings.has(last) && first <= last) return;
-  throw std::invalid_argument(fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
-                                          settings.firstChannel, settings.lastChannel));
+  throw std::invalid_argument(
+      fmt::format("channels {} to {} are not available: the board scans {} to {}", first, last,
+                  settings.firstChannel, settings.lastChannel));
 }
 
-Ip330Scan::Ip330Scan(Ip330& board, int first, int last) : board_(board), first_(first), last_(last) {
+Ip330Scan::Ip330Scan(Ip330& board, int first, int last)
+    : board_(board), first_(first), last_(last) {
   expectIp330Channels(board, first, last);
   channels_.resize(static_cast<std::size_t>(last) - static_cast<std::size_t>(first) + 1);
   subscription_ = board.subscribe([this](const Ip330Sample& sample) { take(sample); });
@@ -59,7 +61,8 @@ std::optional<std::uint64_t> Ip330Scan::samplesOf(std::chrono::milliseconds aver
   if (average.count() == 0) return 0;
   const double period = board_.microsecondsPerScan();
   if (period <= 0) return 1;
-  const double samples = std::max(std::round(static_cast<double>(average.count()) * 1000 / period), 1.0);
+  const double samples =
+      std::max(std::round(static_cast<double>(average.count()) * 1000 / period), 1.0);
   if (samples > static_cast<double>(kIp330LongestMean)) return std::nullopt;
   return static_cast<std::uint64_t>(samples);
 }
@@ -72,7 +75,8 @@ bool Ip330Scan::hasSample(int channel, int gain) const {
 
 // Called without mutex_: the board calls take() while it holds its own lock.
 bool Ip330Scan::comes(int channel, int gain) const {
-  return board_.isDelivering() && isContinuous(board_.settings().scanMode) && board_.gain(channel) == gain;
+  return board_.isDelivering() && isContinuous(board_.settings().scanMode) &&
+         board_.gain(channel) == gain;
 }
 
 bool Ip330Scan::waitForSample(std::unique_lock<std::mutex>& lock, int channel, int gain) {
@@ -91,7 +95,9 @@ bool Ip330Scan::waitForSample(std::unique_lock<std::mutex>& lock, int channel, i
 
 std::optional<int> Ip330Scan::tryRead(int channel, int gain, std::chrono::milliseconds average) {
   const auto samples = samplesOf(average);
-  if (channel < first_ || channel > last_ || !samples || !board_.isDelivering() || !board_.trySetGain(channel, gain)) return std::nullopt;
+  if (channel < first_ || channel > last_ || !samples || !board_.isDelivering() ||
+      !board_.trySetGain(channel, gain))
+    return std::nullopt;
   auto& state = channels_[static_cast<std::size_t>(channel - first_)];
   std::unique_lock lock(mutex_);
   state.mean.reserve(*samples);

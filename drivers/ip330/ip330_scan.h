@@ -16,8 +16,8 @@
 #include <optional>
 #include <vector>
 
-#include <mpf/drivers/ip330/ip330.h>
-#include <mpf/drivers/ip330/running_mean.h>
+#include "drivers/ip330/ip330.h"
+#include "drivers/ip330/running_mean.h"
 
 namespace mpf {
 
@@ -40,7 +40,8 @@ class Ip330Scan {
   //   returns  0 to 0xffff; nullopt when the channel or gain does not exist, the time is negative
   //            or needs more than kIp330LongestMean samples, the gain cannot be calibrated, or no
   //            samples come
-  [[nodiscard]] std::optional<int> tryRead(int channel, int gain, std::chrono::milliseconds average);
+  [[nodiscard]] std::optional<int> tryRead(int channel, int gain,
+                                           std::chrono::milliseconds average);
   // Ends all waiting readings; later readings do not wait.
   void stop();
 

@@ -13,8 +13,13 @@ inline constexpr int kIp330Channels = 32;  // 16 with differential inputs
 inline constexpr int kIp330Gains = 4;
 
 enum class Ip330Type : std::uint8_t { differential, singleEnded };                    // "D", "S"
-enum class Ip330Range : std::uint8_t { minus5to5, minus10to10, from0to5, from0to10 };  // as set by DIP switches: "-5to5", ...
-enum class Ip330Trigger : std::uint8_t { input, output };                              // "Input", "Output"
+enum class Ip330Range : std::uint8_t {
+  minus5to5,
+  minus10to10,
+  from0to5,
+  from0to10
+};  // as set by DIP switches: "-5to5", ...
+enum class Ip330Trigger : std::uint8_t { input, output };  // "Input", "Output"
 enum class Ip330ScanMode : std::uint8_t {
   disable,  // no scans
   uniformContinuous,  // the channels one after the other, evenly over the period
@@ -40,7 +45,9 @@ struct Ip330Span {
 [[nodiscard]] const char* toString(Ip330ScanMode mode) noexcept;
 
 // The number of channels of a board of this type.
-[[nodiscard]] constexpr int channelsOf(Ip330Type type) noexcept { return type == Ip330Type::differential ? 16 : kIp330Channels; }
+[[nodiscard]] constexpr int channelsOf(Ip330Type type) noexcept {
+  return type == Ip330Type::differential ? 16 : kIp330Channels;
+}
 // Returns whether the board scans repeatedly without triggers.
 [[nodiscard]] constexpr bool isContinuous(Ip330ScanMode mode) noexcept {
   return mode == Ip330ScanMode::uniformContinuous || mode == Ip330ScanMode::burstContinuous;
@@ -70,7 +77,9 @@ struct Ip330Settings {
   int secondsBetweenCalibrate = 60;  // 0: once at start; negative: never, codes are not corrected
 
   [[nodiscard]] int channels() const noexcept { return lastChannel - firstChannel + 1; }
-  [[nodiscard]] bool has(int channel) const noexcept { return channel >= firstChannel && channel <= lastChannel; }
+  [[nodiscard]] bool has(int channel) const noexcept {
+    return channel >= firstChannel && channel <= lastChannel;
+  }
   // Returns a sentence about the first invalid setting; empty when all are valid.
   [[nodiscard]] std::string problem() const;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_signals.h>
+#include "drivers/ip330/ip330_signals.h"
 
 #include <charconv>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include <mpf/drivers/ip330/ip330_settings.h>
+#include "drivers/ip330/ip330_settings.h"
 
 namespace mpf {
 namespace {
@@ -29,19 +29,25 @@ Number parseNumber(const std::string& text) {
   Number number{};
   const auto* const end = text.data() + text.size();
   const auto [at, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc() || at != end) throw std::invalid_argument(fmt::format("\"{}\" is not a number", text));
+  if (error != std::errc() || at != end)
+    throw std::invalid_argument(fmt::format("\"{}\" is not a number", text));
   return number;
 }
 
-Ip330Signal parseDc(const std::string& parameters) { return dcSignal(parseNumber<double>(parameters)); }
+Ip330Signal parseDc(const std::string& parameters) {
+  return dcSignal(parseNumber<double>(parameters));
+}
 
 Ip330Signal parseSine(const std::string& parameters) {
   const auto parts = split(parameters, ':');
-  if (parts.size() < 2 || parts.size() > 3) throw std::invalid_argument("use sine:FREQUENCY:AMPLITUDE[:OFFSET]");
-  return sineSignal(parseNumber<double>(parts[0]), parseNumber<double>(parts[1]), parts.size() == 3 ? parseNumber<double>(parts[2]) : 0);
+  if (parts.size() < 2 || parts.size() > 3)
+    throw std::invalid_argument("use sine:FREQUENCY:AMPLITUDE[:OFFSET]");
+  return sineSignal(parseNumber<double>(parts[0]), parseNumber<double>(parts[1]),
+                    parts.size() == 3 ? parseNumber<double>(parts[2]) : 0);
 }
 
-Ip330Signal parseSignal(const std::string& text, const std::map<std::string, Ip330SignalKind>& others) {
+Ip330Signal parseSignal(const std::string& text,
+                        const std::map<std::string, Ip330SignalKind>& others) {
   const auto colon = text.find(':');
   const auto kind = text.substr(0, colon);
   const auto parameters = colon == std::string::npos ? std::string() : text.substr(colon + 1);
@@ -54,7 +60,8 @@ Ip330Signal parseSignal(const std::string& text, const std::map<std::string, Ip3
 int parseChannel(const std::string& text) {
   const int channel = parseNumber<int>(text);
   if (channel < 0 || channel >= kIp330Channels)
-    throw std::invalid_argument(fmt::format("no channel {}; use 0 to {}", channel, kIp330Channels - 1));
+    throw std::invalid_argument(
+        fmt::format("no channel {}; use 0 to {}", channel, kIp330Channels - 1));
   return channel;
 }
 
@@ -65,10 +72,13 @@ Ip330Signal dcSignal(double volts) {
 }
 
 Ip330Signal sineSignal(double hertz, double amplitude, double offset) {
-  return [=](double seconds) { return offset + amplitude * std::sin(2 * std::numbers::pi * hertz * seconds); };
+  return [=](double seconds) {
+    return offset + amplitude * std::sin(2 * std::numbers::pi * hertz * seconds);
+  };
 }
 
-std::map<int, Ip330Signal> parseIp330Signals(const std::string& text, const std::map<std::string, Ip330SignalKind>& others) {
+std::map<int, Ip330Signal> parseIp330Signals(const std::string& text,
+                                             const std::map<std::string, Ip330SignalKind>& others) {
   std::map<int, Ip330Signal> signals;
   for (const auto& part : split(text, ',')) {
     const auto equals = part.find('=');

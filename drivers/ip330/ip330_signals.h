@@ -26,7 +26,7 @@ using Ip330SignalKind = std::function<Ip330Signal(const std::string& parameters)
 // Reads signals; the result is indexed by channel. `others` are more kinds than dc and sine, by
 // name, for example wires to other models.
 //   throws  std::invalid_argument, which names the invalid part
-[[nodiscard]] std::map<int, Ip330Signal> parseIp330Signals(const std::string& text,
-                                                           const std::map<std::string, Ip330SignalKind>& others = {});
+[[nodiscard]] std::map<int, Ip330Signal> parseIp330Signals(
+    const std::string& text, const std::map<std::string, Ip330SignalKind>& others = {});
 
 }  // namespace mpf

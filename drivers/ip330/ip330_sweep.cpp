@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_sweep.h>
+#include "drivers/ip330/ip330_sweep.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <stdexcept>
 
-#include <mpf/drivers/ip330/ip330_scan.h>
+#include "drivers/ip330/ip330_scan.h"
 
 namespace mpf {
 namespace {
@@ -18,7 +18,9 @@ bool isTime(double seconds) { return std::isfinite(seconds) && seconds >= 0; }
 
 int scansPerPoint(const Ip330& board, double secondsPerPoint) {
   const double period = board.microsecondsPerScan();
-  return period > 0 ? static_cast<int>(std::clamp(std::round(secondsPerPoint * 1e6 / period), 1.0, 1e9)) : 1;
+  return period > 0
+             ? static_cast<int>(std::clamp(std::round(secondsPerPoint * 1e6 / period), 1.0, 1e9))
+             : 1;
 }
 
 }  // namespace
@@ -26,7 +28,8 @@ int scansPerPoint(const Ip330& board, double secondsPerPoint) {
 Ip330Sweep::Ip330Sweep(Ip330& board, int first, int last, int maxPoints)
     : board_(board), first_(first), last_(last), maxPoints_(maxPoints), points_(maxPoints) {
   expectIp330Channels(board, first, last);
-  if (maxPoints < 1 || maxPoints > kMostPoints) throw std::invalid_argument(fmt::format("{} points: use 1 to {}", maxPoints, kMostPoints));
+  if (maxPoints < 1 || maxPoints > kMostPoints)
+    throw std::invalid_argument(fmt::format("{} points: use 1 to {}", maxPoints, kMostPoints));
   const auto channels = static_cast<std::size_t>(last) - static_cast<std::size_t>(first) + 1;
   sums_.resize(channels);
   data_.assign(channels, std::vector<std::int32_t>(static_cast<std::size_t>(maxPoints)));
@@ -40,7 +43,8 @@ void Ip330Sweep::take(const Ip330Sample& sample) {
   for (int channel = first_; channel <= last_; ++channel) {
     if (!sample.isValid(channel)) return;
   }
-  for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += sample.corrected[static_cast<std::size_t>(first_) + i];
+  for (std::size_t i = 0; i < sums_.size(); ++i)
+    sums_[i] += sample.corrected[static_cast<std::size_t>(first_) + i];
   if (++scans_ >= scansPerPoint(board_, secondsPerPoint_)) addPoint();
 }
 
@@ -61,7 +65,9 @@ void Ip330Sweep::endWhenDue() {
   isAcquiring_ = false;
 }
 
-double Ip330Sweep::secondsSinceStart() const { return isAcquiring_ ? static_cast<double>(Clock::nowNs() - startNs_) / 1e9 : 0; }
+double Ip330Sweep::secondsSinceStart() const {
+  return isAcquiring_ ? static_cast<double>(Clock::nowNs() - startNs_) / 1e9 : 0;
+}
 
 void Ip330Sweep::start() {
   const std::lock_guard lock(mutex_);
@@ -118,7 +124,8 @@ Ip330Sweep::Status Ip330Sweep::status() {
   endWhenDue();
   return {.isAcquiring = isAcquiring_,
           .elapsedSeconds = elapsedSeconds_ + secondsSinceStart(),
-          .secondsPerPoint = scansPerPoint(board_, secondsPerPoint_) * board_.microsecondsPerScan() / 1e6,
+          .secondsPerPoint =
+              scansPerPoint(board_, secondsPerPoint_) * board_.microsecondsPerScan() / 1e6,
           .acquired = acquired_};
 }
 

@@ -15,7 +15,7 @@
 #include <optional>
 #include <vector>
 
-#include <mpf/drivers/ip330/ip330.h>
+#include "drivers/ip330/ip330.h"
 
 namespace mpf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_timing.h>
+#include "drivers/ip330/ip330_timing.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,10 +19,13 @@ constexpr double kMostTimer = kMostPrescaler * kMostConversion / kTicksPerMicros
 // finest steps.
 void setTimer(Ip330Timer& timer, double microseconds) {
   const double ticks = std::max(microseconds, kLeastTimer) * kTicksPerMicrosecond;
-  double prescaler = std::clamp(std::ceil(ticks / kMostConversion), kLeastPrescaler, kMostPrescaler);
-  if (std::round(ticks / prescaler) > kMostConversion) prescaler = std::min(prescaler + 1, kMostPrescaler);
+  double prescaler =
+      std::clamp(std::ceil(ticks / kMostConversion), kLeastPrescaler, kMostPrescaler);
+  if (std::round(ticks / prescaler) > kMostConversion)
+    prescaler = std::min(prescaler + 1, kMostPrescaler);
   timer.prescaler = static_cast<std::uint8_t>(prescaler);
-  timer.conversion = static_cast<std::uint16_t>(std::clamp(std::round(ticks / prescaler), 1.0, kMostConversion));
+  timer.conversion =
+      static_cast<std::uint16_t>(std::clamp(std::round(ticks / prescaler), 1.0, kMostConversion));
 }
 
 // The time of a scan: `fixed` plus `periods` periods of the timer, each at least `least` [us].
@@ -33,19 +36,22 @@ struct Shape {
 };
 
 Shape shapeOf(Ip330ScanMode mode, int channels) {
-  if (mode == Ip330ScanMode::burstContinuous) return {channels * kIp330MicrosecondsPerConversion, 1, kLeastTimer};
+  if (mode == Ip330ScanMode::burstContinuous)
+    return {channels * kIp330MicrosecondsPerConversion, 1, kLeastTimer};
   return {0, static_cast<double>(channels), kIp330MicrosecondsPerConversion};
 }
 
 bool usesTimer(Ip330ScanMode mode) {
-  return mode == Ip330ScanMode::uniformContinuous || mode == Ip330ScanMode::uniformSingle || mode == Ip330ScanMode::burstContinuous;
+  return mode == Ip330ScanMode::uniformContinuous || mode == Ip330ScanMode::uniformSingle ||
+         mode == Ip330ScanMode::burstContinuous;
 }
 
 }  // namespace
 
 Ip330Timer ip330TimerOf(Ip330ScanMode mode, int channels, double microsecondsPerScan) {
   Ip330Timer timer;
-  if (mode == Ip330ScanMode::burstSingle) timer.microsecondsPerScan = channels * kIp330MicrosecondsPerConversion;
+  if (mode == Ip330ScanMode::burstSingle)
+    timer.microsecondsPerScan = channels * kIp330MicrosecondsPerConversion;
   if (!usesTimer(mode)) return timer;
   const auto shape = shapeOf(mode, channels);
   const double least = shape.fixed + shape.periods * shape.least;
@@ -53,8 +59,9 @@ Ip330Timer ip330TimerOf(Ip330ScanMode mode, int channels, double microsecondsPer
   // false for NaN, too
   const bool isPossible = microsecondsPerScan >= least && microsecondsPerScan <= most;
   if (!isPossible) {
-    timer.problem = fmt::format("{} us per scan of {} channels in mode {}: use {} to {} us", microsecondsPerScan, channels, toString(mode),
-                                least, std::floor(most));
+    timer.problem =
+        fmt::format("{} us per scan of {} channels in mode {}: use {} to {} us",
+                    microsecondsPerScan, channels, toString(mode), least, std::floor(most));
     return timer;
   }
   timer.isUsed = true;

@@ -2,8 +2,10 @@
 // Ip330Timer: the two timer registers of the chip for a time per scan, and the exact time that they
 // give.
 //
-//   uniform   each timer period converts one channel                          period of a scan = channels * timer
-//   burst     each timer period converts all channels, then the timer runs    period of a scan = channels * 15 us + timer
+//   uniform   each timer period converts one channel                          period of a scan =
+//             channels * timer
+//   burst     each timer period converts all channels, then the timer runs    period of a scan =
+//             channels * 15 us + timer
 //   timer = prescaler * conversion / 8 us (clock 8 MHz); prescaler 64 to 255, conversion 1 to 65535
 //
 // Threads  any number of callers at a time.
@@ -14,7 +16,7 @@
 #include <cstdint>
 #include <string>
 
-#include <mpf/drivers/ip330/ip330_settings.h>
+#include "drivers/ip330/ip330_settings.h"
 
 namespace mpf {
 
@@ -28,7 +30,9 @@ struct Ip330Timer {
   double microsecondsPerScan = 0;
   std::string problem;  // why no register values give this time; empty if valid
 
-  [[nodiscard]] double microseconds() const noexcept { return prescaler * static_cast<double>(conversion) / 8; }
+  [[nodiscard]] double microseconds() const noexcept {
+    return prescaler * static_cast<double>(conversion) / 8;
+  }
 };
 
 // Returns the timer for a number of channels and a time per scan [us].

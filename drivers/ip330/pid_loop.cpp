@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/pid_loop.h>
+#include "drivers/ip330/pid_loop.h"
 
 #include <algorithm>
 #include <utility>
@@ -7,7 +7,9 @@
 namespace mpf {
 namespace {
 
-double within(double value, double low, double high) { return std::max(low, std::min(value, high)); }
+double within(double value, double low, double high) {
+  return std::max(low, std::min(value, high));
+}
 
 }  // namespace
 

@@ -2,7 +2,8 @@
 // PidLoop: computes the steps of a PID control loop; independent of any device.
 //
 //   error = setPoint - actual
-//   P = KP * error      I += KP * KI * error * dt      D = KP * KD * change of error / dt      output = P + I + D, within its limits
+//   P = KP * error      I += KP * KI * error * dt      D = KP * KD * change of error / dt
+//   output = P + I + D, within its limits
 //
 // I does not change towards a limit while the output is at that limit, and is itself within the
 // limits. When feedback is turned on, I starts with the present output, so that the output does not

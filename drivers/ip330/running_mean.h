@@ -38,7 +38,8 @@ class RunningMean {
     if (n < sums_.size()) return;
     std::vector<std::uint64_t> larger(std::bit_ceil(n + 1));
     const auto kept = std::min<std::uint64_t>(count_, mask());
-    for (auto i = count_ - kept; i <= count_; ++i) larger[i & (larger.size() - 1)] = sums_[i & mask()];
+    for (auto i = count_ - kept; i <= count_; ++i)
+      larger[i & (larger.size() - 1)] = sums_[i & mask()];
     sums_ = std::move(larger);
     oldest_ = count_ - kept;
   }
@@ -46,7 +47,8 @@ class RunningMean {
   // must not be 0.
   [[nodiscard]] double mean(std::uint64_t n) const noexcept {
     n = std::min({n, count_ - oldest_, mask()});
-    return static_cast<double>(static_cast<std::int64_t>(sum_ - sums_[(count_ - n) & mask()])) / kScale / static_cast<double>(n);
+    return static_cast<double>(static_cast<std::int64_t>(sum_ - sums_[(count_ - n) & mask()])) /
+           kScale / static_cast<double>(n);
   }
 
  private:

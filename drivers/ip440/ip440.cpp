@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip440/ip440.h>
+#include "drivers/ip440/ip440.h"
 
 namespace mpf {
 namespace {
@@ -15,7 +15,8 @@ std::size_t offsetOf(std::size_t port) noexcept { return 2 * port + 1; }
 std::optional<std::uint32_t> Ip440::tryRead() noexcept {
   const std::lock_guard lock(mutex_);
   std::uint32_t bits = 0;
-  for (std::size_t port = 0; port < kPorts; ++port) bits |= std::uint32_t{registers_.read8(offsetOf(port))} << (8 * port);
+  for (std::size_t port = 0; port < kPorts; ++port)
+    bits |= std::uint32_t{registers_.read8(offsetOf(port))} << (8 * port);
   const bool isDoubtful = isGone_ || registers_.read8(kNotUsed) != 0;
   // the site may be empty, or have another module
   if (isDoubtful) isGone_ = !module_.problem().empty();

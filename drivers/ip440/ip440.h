@@ -3,7 +3,8 @@
 // on request; it does not use the module's events and interrupts.
 //
 //   Ip440 inputs(modules.create("door", "ipac", "IP_c", Ip440::kind()));
-//   if (const auto bits = inputs.tryRead()) ...                            // bit 0 is IN00, 1 is on
+//   if (const auto bits = inputs.tryRead()) ...                            // bit 0 is IN00, 1 is
+//   on
 //
 // Threads  any number of callers at a time.
 // Crash    the driver never writes to the module, so a crash leaves nothing behind.
@@ -28,7 +29,9 @@ class Ip440 {
   static constexpr std::uint16_t kModel = 0x10;
 
   // The ID PROM that IndustryPackModules::create() requires.
-  [[nodiscard]] static ModuleKind kind() { return {.name = "Acromag IP440", .manufacturer = kAcromag, .models = {kModel}}; }
+  [[nodiscard]] static ModuleKind kind() {
+    return {.name = "Acromag IP440", .manufacturer = kAcromag, .models = {kModel}};
+  }
 
   // `module` must outlive this object.
   explicit Ip440(IndustryPackModule& module) : module_(module), registers_(module.io()) {}
@@ -42,7 +45,7 @@ class Ip440 {
  private:
   IndustryPackModule& module_;
   Registers& registers_;
-  std::mutex mutex_;      // guards the registers and isGone_
+  std::mutex mutex_;  // guards the registers and isGone_
   bool isGone_ = false;  // the last read failed: the next one checks the ID PROM first
 };
 

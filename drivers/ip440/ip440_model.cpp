@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip440/ip440_model.h>
+#include "drivers/ip440/ip440_model.h"
 
 #include <utility>
 
@@ -7,7 +7,8 @@ namespace mpf {
 namespace {
 
 constexpr std::size_t kBytesOfPorts = 8;
-constexpr std::uint16_t kNotDriven = 0xff00;  // the upper half of the data bus; the carrier pulls it up
+// the upper half of the data bus; the carrier pulls it up
+constexpr std::uint16_t kNotDriven = 0xff00;
 
 }  // namespace
 

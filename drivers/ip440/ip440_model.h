@@ -13,7 +13,8 @@
 #include <mutex>
 
 #include <mpf/drivers/industry_pack/device_model.h>
-#include <mpf/drivers/ip440/ip440.h>
+
+#include "drivers/ip440/ip440.h"
 
 namespace mpf {
 
@@ -24,11 +25,13 @@ class Ip440Model final : public DeviceModel {
   // of this model; the threshold of a real module depends on its version
   static constexpr double kOnVolts = 2.5;
 
-  explicit Ip440Model(std::uint32_t inputs = 0) : DeviceModel({.manufacturer = kAcromag, .model = Ip440::kModel}), inputs_(inputs) {}
+  explicit Ip440Model(std::uint32_t inputs = 0)
+      : DeviceModel({.manufacturer = kAcromag, .model = Ip440::kModel}), inputs_(inputs) {}
 
   std::uint16_t read(Space space, std::size_t offset, Lanes lanes) override;
   // Writes have no effect: the inputs are read-only, and the model has no other mode.
-  void write(Space /*space*/, std::size_t /*offset*/, std::uint16_t /*value*/, Lanes /*lanes*/) override {}
+  void write(Space /*space*/, std::size_t /*offset*/, std::uint16_t /*value*/,
+             Lanes /*lanes*/) override {}
 
   // Sets the inputs that no wire drives; bit 0 is IN00, 1 is on.
   void setInputs(std::uint32_t bits);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart.h>
+#include "drivers/octal_uart/octal_uart.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -21,13 +21,15 @@ constexpr std::size_t kMostAlarmsToBeTold = 100;  // to a handler that may come
 
 OctalUartOptions checked(const OctalUartOptions& options, IndustryPackModule& module) {
   if (options.ports != 4 && options.ports != 8)
-    throw std::invalid_argument(fmt::format("module \"{}\": {} ports: there are modules of 4 and of 8", module.name(), options.ports));
+    throw std::invalid_argument(fmt::format(
+        "module \"{}\": {} ports: there are modules of 4 and of 8", module.name(), options.ports));
   static_cast<void>(module.checkedVector(options.vector));
   if (module.memory().size() == 0) {
-    throw IndustryPackError(IndustryPackStatus::badAddress,
-                            fmt::format("module \"{}\": the carrier gives {} no memory, where its interrupt vector is; "
-                                        "its parameters say how much memory a site has",
-                                        module.name(), module.where()));
+    throw IndustryPackError(
+        IndustryPackStatus::badAddress,
+        fmt::format("module \"{}\": the carrier gives {} no memory, where its interrupt vector is; "
+                    "its parameters say how much memory a site has",
+                    module.name(), module.where()));
   }
   return options;
 }
@@ -41,7 +43,8 @@ OctalUart::OctalUart(IndustryPackModule& module, const OctalUartOptions& options
       isRs485_(module.idProm().model == kOctal485),
       isTaken_(static_cast<std::size_t>(options.ports)) {
   channels_.reserve(kChannels);
-  for (int i = 0; i < kChannels; ++i) channels_.emplace_back(io_, i, isRs485_, imr_.at(static_cast<std::size_t>(i / 2)));
+  for (int i = 0; i < kChannels; ++i)
+    channels_.emplace_back(io_, i, isRs485_, imr_.at(static_cast<std::size_t>(i / 2)));
   setUp();
   for (const int line : {1, 0}) startThread(line);
 }
@@ -55,10 +58,14 @@ OctalUart::~OctalUart() {
 }
 
 void OctalUart::startThread(int line) {
-  InterruptThreadOptions options{.pollEvery = options_.pollEvery, .stormLimit = options_.stormLimit, .stormPause = options_.stormPause};
-  if (line * kPortsPerLine >= options_.ports) options.pollEvery = {};  // nothing is there to be found
+  InterruptThreadOptions options{.pollEvery = options_.pollEvery,
+                                 .stormLimit = options_.stormLimit,
+                                 .stormPause = options_.stormPause};
+  // nothing is there to be found
+  if (line * kPortsPerLine >= options_.ports) options.pollEvery = {};
   threads_.at(static_cast<std::size_t>(line)) = std::make_unique<InterruptThread>(
-      module_.interrupt(line), options, [this, line](InterruptThread::Cause cause) { return serve(line, cause); },
+      module_.interrupt(line), options,
+      [this, line](InterruptThread::Cause cause) { return serve(line, cause); },
       [this, line](InterruptTrouble trouble) { note(line, trouble); });
 }
 
@@ -83,10 +90,12 @@ OctalUart::Counters OctalUart::counters() const {
 void OctalUart::takePort(int number) {
   const std::lock_guard lock(mutex_);
   if (number < 0 || number >= options_.ports) {
-    throw std::invalid_argument(fmt::format("module \"{}\": port {}: its ports are 0 to {}", module_.name(), number, options_.ports - 1));
+    throw std::invalid_argument(fmt::format("module \"{}\": port {}: its ports are 0 to {}",
+                                            module_.name(), number, options_.ports - 1));
   }
   if (isTaken_[static_cast<std::size_t>(number)])
-    throw std::invalid_argument(fmt::format("module \"{}\": port {} is in use already", module_.name(), number));
+    throw std::invalid_argument(
+        fmt::format("module \"{}\": port {} is in use already", module_.name(), number));
   isTaken_[static_cast<std::size_t>(number)] = true;
 }
 
@@ -107,7 +116,8 @@ std::string OctalUart::tryOpen(int number, const SerialSettings& settings) {
   return {};
 }
 
-// All channels, used or not, also those behind the ports of a Quad module: one that floats must not interrupt.
+// All channels, used or not, also those behind the ports of a Quad module: one that floats must not
+// interrupt.
 void OctalUart::setUp() {
   for (int block = 0; block < kBlocks; ++block) {
     imr_.at(static_cast<std::size_t>(block)) = 0;
@@ -126,7 +136,8 @@ bool OctalUart::serve(int line, InterruptThread::Cause cause) {
   bool hadSomething = false;
   {
     const std::lock_guard lock(mutex_);
-    hadSomething = cause == InterruptThread::Cause::interrupt ? serveInterrupt(line) : servePoll(line);
+    hadSomething =
+        cause == InterruptThread::Cause::interrupt ? serveInterrupt(line) : servePoll(line);
   }
   tellAlarms();
   return hadSomething;
@@ -147,33 +158,42 @@ bool OctalUart::servePoll(int line) {
 void OctalUart::note(int line, InterruptTrouble trouble) {
   {
     const std::lock_guard lock(mutex_);
-    raise(trouble == InterruptTrouble::storm ? OctalUartAlarm::storm : OctalUartAlarm::noInterrupts, textOf(line, trouble));
+    raise(trouble == InterruptTrouble::storm ? OctalUartAlarm::storm : OctalUartAlarm::noInterrupts,
+          textOf(line, trouble));
   }
   tellAlarms();
 }
 
 std::string OctalUart::textOf(int line, InterruptTrouble trouble) const {
-  auto which = fmt::format("module \"{}\" ({}), ports {} to {}: interrupt line {}", module_.name(), module_.where(), line * kPortsPerLine,
+  auto which = fmt::format("module \"{}\" ({}), ports {} to {}: interrupt line {}", module_.name(),
+                           module_.where(), line * kPortsPerLine,
                            line * kPortsPerLine + kPortsPerLine - 1, line);
   switch (trouble) {
     case InterruptTrouble::storm:
-      return fmt::format("{} asks without end and wants nothing: masked for {} ms, again and again until that ends", which,
-                         options_.stormPause.count());
+      return fmt::format(
+          "{} asks without end and wants nothing: masked for {} ms, again and again until that "
+          "ends",
+          which, options_.stormPause.count());
     case InterruptTrouble::polled:
-      return fmt::format("{} is polled by its carrier from now on, which is too slow for fast lines", which);
+      return fmt::format(
+          "{} is polled by its carrier from now on, which is too slow for fast lines", which);
     case InterruptTrouble::never:
-      return fmt::format("{} does not come when they have something: polled every {} ms, which is too slow for fast lines", which,
-                         options_.pollEvery.count());
+      return fmt::format(
+          "{} does not come when they have something: polled every {} ms, which is too slow for "
+          "fast lines",
+          which, options_.pollEvery.count());
   }
   return which;
 }
 
-// Until it asks for nothing. A block at a time would let the others wait for as long as one has something.
+// Until it asks for nothing. A block at a time would let the others wait for as long as one has
+// something.
 bool OctalUart::serveBlocks(int first, int count) {
   bool hadSomething = false;
   for (int pass = 0; pass < kMostPasses && isReady_; ++pass) {
     bool asks = false;
-    for (int block = first; block < std::min(first + count, options_.ports / 2) && isReady_; ++block) {
+    for (int block = first; block < std::min(first + count, options_.ports / 2) && isReady_;
+         ++block) {
       const auto pending = pendingOf(block);
       if (pending == 0) continue;
       asks = true;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_channel.h>
+#include "drivers/octal_uart/octal_uart_channel.h"
 
 #include <sys/eventfd.h>
 
 #include <algorithm>
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -32,7 +32,8 @@ OctalUartChannel::OctalUartChannel(Registers& io, int number, bool isRs485, std:
       imr_(imr),
       bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for a serial port")) {}
 
-// The chip wants some clocks between two commands to a channel: reading from it takes longer than that, and passes no bridge before the write.
+// The chip wants some clocks between two commands to a channel: reading from it takes longer than
+// that, and passes no bridge before the write.
 void OctalUartChannel::command(unsigned value) {
   write(kCr, static_cast<std::uint8_t>(value));
   static_cast<void>(read(kSr));
@@ -63,7 +64,8 @@ void OctalUartChannel::configure(const SerialSettings& settings) {
   write(kMr, mode_.mr2);
   write(kCsr, mode_.csr);
   // Of RS-485 RTS is the transmitter's switch.
-  command((isRs485_ && !isTalking_ ? kCrNegateRts : kCrAssertRts) | (isTalking_ ? kCrDisableRx : kCrEnableRx) | kCrEnableTx);
+  command((isRs485_ && !isTalking_ ? kCrNegateRts : kCrAssertRts) |
+          (isTalking_ ? kCrDisableRx : kCrEnableRx) | kCrEnableTx);
 }
 
 void OctalUartChannel::close() {
@@ -108,7 +110,9 @@ bool OctalUartChannel::serve(std::uint8_t isr, bool isThere) {
 
 // Gives the chip what it takes now. Returns its status then.
 std::uint8_t OctalUartChannel::transmit(std::uint8_t sr, bool isThere) {
-  for (int i = 0; i < kMostAtOnce && (sr & kSrTxRdy) != 0 && (isThere || sr != kOnes) && !unsent_.empty(); ++i) {
+  for (int i = 0;
+       i < kMostAtOnce && (sr & kSrTxRdy) != 0 && (isThere || sr != kOnes) && !unsent_.empty();
+       ++i) {
     write(kThr, unsent_.front());
     unsent_.pop_front();
     sr = read(kSr);
@@ -131,8 +135,9 @@ void OctalUartChannel::receive(std::uint8_t sr) {
   }
 }
 
-// The chip says so as soon as it has lost the byte in its shift register, and keeps the three in its FIFO. One of the three may have been
-// read since the status was read last: what came instead of the lost byte is the third or the fourth byte from now on.
+// The chip says so as soon as it has lost the byte in its shift register, and keeps the three in
+// its FIFO. One of the three may have been read since the status was read last: what came instead
+// of the lost byte is the third or the fourth byte from now on.
 void OctalUartChannel::noteOverrun() {
   constexpr unsigned kThirdAndFourth = 0b1100;
   ++overruns_;

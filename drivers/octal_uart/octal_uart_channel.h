@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// OctalUartChannel: one of a chip's serial channels, between its registers and what a port has received and wants to send.
+// OctalUartChannel: one of a chip's serial channels, between its registers and what a port has
+// received and wants to send.
 //
 //   chip ── serve() ──► received ──► take()        port's thread
 //   chip ◄── serve() ── unsent ◄──── put()         bell: rung when there is something to take, room to put, nothing
 //                                                          left to send, or the line is lost
 //
-// RS-485: the transmitter is switched on by put() and off by tryTurn(), the receiver the other way round: who talks does not hear itself.
+// RS-485: the transmitter is switched on by put() and off by tryTurn(), the receiver the other way
+// round: who talks does not hear itself.
 //
-// Threads  none of its own: who calls holds the lock of the chip (OctalUart). The bell may be polled by any.
+// Threads  none of its own: who calls holds the lock of the chip (OctalUart). The bell may be
+//          polled by any.
 // Trust    a chip that says for ever that it has a byte costs a bounded time per serve().
 // Source   SCC2698B data sheet; order of commands as drvIpac's tyGSOctal has them.
 #pragma once
@@ -19,17 +22,19 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
 #include <mpf/drivers/industry_pack/registers.h>
-#include <mpf/drivers/octal_uart/octal_uart_settings.h>
-#include <mpf/drivers/octal_uart/scc2698b.h>
-#include <mpf/drivers/serial/serial_line.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/octal_uart/octal_uart_settings.h"
+#include "drivers/octal_uart/scc2698b.h"
+#include "drivers/serial/serial_line.h"
 
 namespace mpf {
 
 class OctalUartChannel {
  public:
-  // As many bytes may wait for a port's thread: 17 s at 38400 baud. Further ones are lost, and counted.
+  // As many bytes may wait for a port's thread: 17 s at 38400 baud. Further ones are lost, and
+  // counted.
   static constexpr std::size_t kMaxReceived = 65536;
   static constexpr std::size_t kMaxUnsent = 4096;
 
@@ -58,7 +63,8 @@ class OctalUartChannel {
   //   returns  false at a status of all ones, otherwise: is it there?
   [[nodiscard]] bool serve(std::uint8_t isr, bool isThere);
 
-  // What was received. A byte that follows a gap says so; after an overrun in the chip two bytes may, of which one does.
+  // What was received. A byte that follows a gap says so; after an overrun in the chip two bytes
+  // may, of which one does.
   void take(std::vector<LineByte>& bytes);
   [[nodiscard]] std::uint64_t takeOverruns() noexcept;
   // Returns how many of `bytes` it had room for.
@@ -68,13 +74,18 @@ class OctalUartChannel {
 
   // How long until all is out, at least; 0 when it is. What a lost line had to send is never out.
   [[nodiscard]] std::chrono::nanoseconds timeToSend();
-  // RS-485: whether the transmitter is on and to be switched off by tryTurn(), which does it when all is out.
+  // RS-485: whether the transmitter is on and to be switched off by tryTurn(), which does it when
+  // all is out.
   [[nodiscard]] bool waitsForTurn() const noexcept { return isTalking_ && !isBreaking_; }
   void tryTurn();
 
  private:
-  [[nodiscard]] std::uint8_t read(scc2698b::ChannelRegister which) { return io_.read8(scc2698b::at(number_, which)); }
-  void write(scc2698b::ChannelRegister which, std::uint8_t value) { io_.write8(scc2698b::at(number_, which), value); }
+  [[nodiscard]] std::uint8_t read(scc2698b::ChannelRegister which) {
+    return io_.read8(scc2698b::at(number_, which));
+  }
+  void write(scc2698b::ChannelRegister which, std::uint8_t value) {
+    io_.write8(scc2698b::at(number_, which), value);
+  }
   void command(unsigned value);
   void setMask(std::uint8_t bits, bool on);
   void talk();
@@ -83,7 +94,9 @@ class OctalUartChannel {
   bool takeGap() noexcept;
   void noteEmpty(std::uint8_t sr) noexcept;
   std::uint8_t transmit(std::uint8_t sr, bool isThere);
-  [[nodiscard]] bool isAllOut() { return unsent_.empty() && (read(scc2698b::kSr) & scc2698b::kSrTxEmt) != 0; }
+  [[nodiscard]] bool isAllOut() {
+    return unsent_.empty() && (read(scc2698b::kSr) & scc2698b::kSrTxEmt) != 0;
+  }
   void ring() const noexcept;
 
   Registers& io_;
@@ -101,8 +114,10 @@ class OctalUartChannel {
   std::vector<LineByte> received_;
   std::deque<std::uint8_t> unsent_;
   std::uint64_t overruns_ = 0;
-  unsigned gaps_ = 0;      // bit n: bytes may be missing before the byte that is n bytes behind the next one in the chip
-  bool isCut_ = false;     // received_ had no room: bytes are missing before the next one that goes into it
+  // bit n: bytes may be missing before the byte that is n bytes behind the next one in the chip
+  unsigned gaps_ = 0;
+  // received_ had no room: bytes are missing before the next one that goes into it
+  bool isCut_ = false;
 };
 
 }  // namespace mpf

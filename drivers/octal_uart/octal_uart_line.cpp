@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_line.h>
+#include "drivers/octal_uart/octal_uart_line.h"
 
 #include <sys/epoll.h>
 #include <sys/timerfd.h>
@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -21,7 +21,8 @@ constexpr std::chrono::milliseconds kLongestDrainCheck{20};
 
 void watch(const FileDescriptor& events, int descriptor) {
   epoll_event event{.events = EPOLLIN, .data = {.fd = descriptor}};
-  checkCall(::epoll_ctl(events.get(), EPOLL_CTL_ADD, descriptor, &event), "epoll_ctl", "for a serial port");
+  checkCall(::epoll_ctl(events.get(), EPOLL_CTL_ADD, descriptor, &event), "epoll_ctl",
+            "for a serial port");
 }
 
 }  // namespace
@@ -29,9 +30,11 @@ void watch(const FileDescriptor& events, int descriptor) {
 OctalUartLine::OctalUartLine(OctalUart& uart, int number, const SerialSettings& settings)
     : uart_(uart),
       number_(number),
-      description_(fmt::format("port {} of {} ({})", number, uart.module().name(), uart.module().where())),
+      description_(
+          fmt::format("port {} of {} ({})", number, uart.module().name(), uart.module().where())),
       settings_(merged(kUsual, settings)),
-      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "timerfd_create", "for a serial port")),
+      timer_(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK),
+                       "timerfd_create", "for a serial port")),
       events_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1", "for a serial port")) {
   if (const auto refused = octalUartProblemOf(settings, uart.isRs485()); !refused.empty())
     throw std::invalid_argument(fmt::format("{}: {}", description_, refused));
@@ -91,9 +94,11 @@ void OctalUartLine::turnOrWait(OctalUartChannel& channel) const {
 }
 
 std::chrono::milliseconds OctalUartLine::timeToSend() const {
-  const auto needed = uart_.with(number_, [](OctalUartChannel& channel) { return channel.timeToSend(); });
+  const auto needed =
+      uart_.with(number_, [](OctalUartChannel& channel) { return channel.timeToSend(); });
   if (needed.count() == 0) return {};
-  return std::clamp(std::chrono::duration_cast<std::chrono::milliseconds>(needed), kShortestDrainCheck, kLongestDrainCheck);
+  return std::clamp(std::chrono::duration_cast<std::chrono::milliseconds>(needed),
+                    kShortestDrainCheck, kLongestDrainCheck);
 }
 
 void OctalUartLine::discardUnsent() noexcept {
@@ -103,7 +108,8 @@ void OctalUartLine::discardUnsent() noexcept {
 std::uint64_t OctalUartLine::takeOverruns() noexcept { return std::exchange(overruns_, 0); }
 
 std::string OctalUartLine::tryConfigure(const SerialSettings& settings) {
-  if (auto refused = octalUartProblemOf(settings, uart_.isRs485()); !refused.empty()) return refused;
+  if (auto refused = octalUartProblemOf(settings, uart_.isRs485()); !refused.empty())
+    return refused;
   settings_ = merged(settings_, settings);
   uart_.with(number_, [&](OctalUartChannel& channel) {
     if (channel.isOpen()) channel.configure(settings_);

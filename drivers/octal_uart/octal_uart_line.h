@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// OctalUartLine: the line of an OctalUartPort: a channel of a chip, with a bell and, for RS-485, a timer in one descriptor.
+// OctalUartLine: the line of an OctalUartPort: a channel of a chip, with a bell and, for RS-485, a
+// timer in one descriptor.
 //
 // Threads  the port's thread.
 // Crash    see OctalUart.
@@ -9,9 +10,10 @@
 #include <optional>
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/drivers/octal_uart/octal_uart.h>
-#include <mpf/drivers/serial/serial_line.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/octal_uart/octal_uart.h"
+#include "drivers/serial/serial_line.h"
 
 namespace mpf {
 
@@ -19,7 +21,8 @@ class OctalUartLine final : public SerialLine {
  public:
   //   uart      outlives this
   //   settings  0 in a field: 9600 baud, 8 bits, no parity, 1 stop bit, no flow control
-  //   throws    std::invalid_argument for settings that the chip does not have, for a port that is not there or is taken
+  //   throws    std::invalid_argument for settings that the chip does not have, for a port that is
+  //             not there or is taken
   OctalUartLine(OctalUart& uart, int number, const SerialSettings& settings);
   ~OctalUartLine() override;
 
@@ -47,8 +50,9 @@ class OctalUartLine final : public SerialLine {
   SerialSettings settings_;
   std::string problem_;
   std::uint64_t overruns_ = 0;  // of what tryRead() has given
-  FileDescriptor timer_;   // when an RS-485 line may have to be turned
-  FileDescriptor events_;  // epoll over the channel's bell and the timer: never writable, unlike a bell
+  FileDescriptor timer_;  // when an RS-485 line may have to be turned
+  // epoll over the channel's bell and the timer: never writable, unlike a bell
+  FileDescriptor events_;
 };
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
+#include "drivers/octal_uart/octal_uart_model.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -11,10 +11,11 @@
 #include <algorithm>
 #include <span>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/system_call.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/industry_pack/module.h>
+
+#include "base/signals_blocked.h"
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -47,14 +48,18 @@ OctalUartModel::~OctalUartModel() {
 
 OctalUartModel::Terminal OctalUartModel::openTerminal() {
   Terminal terminal;
-  terminal.master.reset(checkCall(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK), "posix_openpt"));
+  terminal.master.reset(
+      checkCall(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK), "posix_openpt"));
   checkCall(::grantpt(terminal.master.get()), "grantpt");
   checkCall(::unlockpt(terminal.master.get()), "unlockpt");
   terminal.path.resize(64);
-  if (const int error = ::ptsname_r(terminal.master.get(), terminal.path.data(), terminal.path.size()); error != 0)
+  if (const int error =
+          ::ptsname_r(terminal.master.get(), terminal.path.data(), terminal.path.size());
+      error != 0)
     throwSystemError(error, "ptsname_r", "of a pseudo-terminal");
   terminal.path.resize(terminal.path.find('\0'));
-  terminal.slave.reset(checkCall(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC), "open", terminal.path));
+  terminal.slave.reset(checkCall(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC),
+                                 "open", terminal.path));
   termios raw{};
   checkCall(::tcgetattr(terminal.slave.get(), &raw), "tcgetattr", terminal.path);
   ::cfmakeraw(&raw);
@@ -99,7 +104,9 @@ std::uint8_t OctalUartModel::readRegister(std::size_t offset) {
     case kRhr:
       return channel.readRhr();
     case kIsr:
-      return offset / kChannelBytes % 2 == 0 ? isrOfBlock(static_cast<int>(offset / kChannelBytes / 2)) : 0;
+      return offset / kChannelBytes % 2 == 0
+                 ? isrOfBlock(static_cast<int>(offset / kChannelBytes / 2))
+                 : 0;
     default:
       return 0;
   }
@@ -156,7 +163,9 @@ void OctalUartModel::reset() {
 
 // ---- what follows from an access, or from time
 
-std::int64_t OctalUartModel::nowNs() const { return options_.time == OctalUartModelTime::clock ? Clock::nowNs() : steppedNs_; }
+std::int64_t OctalUartModel::nowNs() const {
+  return options_.time == OctalUartModelTime::clock ? Clock::nowNs() : steppedNs_;
+}
 
 void OctalUartModel::proceed() {
   const bool takesTime = options_.time != OctalUartModelTime::instant;
@@ -170,7 +179,8 @@ void OctalUartModel::proceed() {
   sendToTerminals();
   followInterrupts();
   changed_.notify_all();
-  if (mayLag && next != INT64_MAX && thread_.get_id() != std::this_thread::get_id()) ::eventfd_write(wakeUp_.get(), 1);
+  if (mayLag && next != INT64_MAX && thread_.get_id() != std::this_thread::get_id())
+    ::eventfd_write(wakeUp_.get(), 1);
 }
 
 void OctalUartModel::sendToTerminals() {
@@ -178,7 +188,8 @@ void OctalUartModel::sendToTerminals() {
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     auto& bytes = channels_.at(i).outgoing;
     if (bytes.empty()) continue;
-    [[maybe_unused]] const auto written = ::write(terminals_.at(i).master.get(), bytes.data(), bytes.size());
+    [[maybe_unused]] const auto written =
+        ::write(terminals_.at(i).master.get(), bytes.data(), bytes.size());
     bytes.clear();
   }
 }
@@ -186,7 +197,8 @@ void OctalUartModel::sendToTerminals() {
 void OctalUartModel::followInterrupts() {
   for (int line = 0; line < 2; ++line) {
     bool active = false;
-    for (const int block : {2 * line, 2 * line + 1}) active = active || (isrOfBlock(block) & imr_.at(index(block))) != 0;
+    for (const int block : {2 * line, 2 * line + 1})
+      active = active || (isrOfBlock(block) & imr_.at(index(block))) != 0;
     if (std::exchange(isActive_.at(index(line)), active) == active) continue;
     waitsSinceNs_.at(index(line)) = nowNs();
     setInterrupt(line, active);
@@ -204,7 +216,8 @@ void OctalUartModel::noteAccess(std::size_t offset) {
 
 void OctalUartModel::say(int port, std::string_view text, LineFault fault) {
   const std::lock_guard lock(mutex_);
-  for (const char byte : text) channels_.at(index(port)).incoming.push_back({static_cast<std::uint8_t>(byte), fault});
+  for (const char byte : text)
+    channels_.at(index(port)).incoming.push_back({static_cast<std::uint8_t>(byte), fault});
   proceed();
 }
 
@@ -242,9 +255,11 @@ void OctalUartModel::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto wait = Deadline::atNs(wakeAtNs());
     for (std::size_t i = 0; i < terminals_.size(); ++i) {
-      const bool mayRead =
-          options_.terminals && with(static_cast<int>(i), [](const auto& channel) { return channel.incoming.size() < kMostIncoming; });
-      entries.at(i) = {.fd = mayRead ? terminals_.at(i).master.get() : -1, .events = POLLIN, .revents = 0};
+      const bool mayRead = options_.terminals && with(static_cast<int>(i), [](const auto& channel) {
+                             return channel.incoming.size() < kMostIncoming;
+                           });
+      entries.at(i) = {
+          .fd = mayRead ? terminals_.at(i).master.get() : -1, .events = POLLIN, .revents = 0};
     }
     entries.back() = {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0};
     const auto left = wait.left().count();
@@ -264,18 +279,21 @@ std::int64_t OctalUartModel::wakeAtNs() {
   auto next = INT64_MAX;
   for (const auto& channel : channels_) {
     if (options_.time == OctalUartModelTime::clock) next = std::min(next, channel.nextEventNs());
-    if (channel.incoming.size() >= kMostIncoming) next = std::min(next, Clock::nowNs() + kLookAgainNs);
+    if (channel.incoming.size() >= kMostIncoming)
+      next = std::min(next, Clock::nowNs() + kLookAgainNs);
   }
   return next;
 }
 
 void OctalUartModel::readTerminals(std::span<const short> events) {
   const std::lock_guard lock(mutex_);
-  std::array<std::uint8_t, 1024> bytes;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
+  std::array<std::uint8_t, 1024>
+      bytes;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
   for (std::size_t i = 0; i < events.size(); ++i) {
     if ((events[i] & POLLIN) == 0) continue;
     const auto length = ::read(terminals_.at(i).master.get(), bytes.data(), bytes.size());
-    for (ssize_t k = 0; k < length; ++k) channels_.at(i).incoming.push_back({bytes.at(static_cast<std::size_t>(k)), LineFault::none});
+    for (ssize_t k = 0; k < length; ++k)
+      channels_.at(i).incoming.push_back({bytes.at(static_cast<std::size_t>(k)), LineFault::none});
   }
   proceed();
 }

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// OctalUartModel: an Octal 232, 422 or 485 that is not there, with a line at each of its eight ports.
+// OctalUartModel: an Octal 232, 422 or 485 that is not there, with a line at each of its eight
+// ports.
 //
-//   auto& uart = carrier.plug("IP_a", std::make_unique<OctalUartModel>(OctalUartModelOptions{.terminals = true}));
-//   uart.terminal(3)                    // /dev/pts/7: what an instrument's program opens
+//   auto& uart = carrier.plug("IP_a",
+//   std::make_unique<OctalUartModel>(OctalUartModelOptions{.terminals = true})); uart.terminal(3)
+//   // /dev/pts/7: what an instrument's program opens
 //
 //   uart.say(3, "1.234\r");             // or without terminals: the far end in memory
 //   uart.waitUntilHeard(3, "MEAS?\r");
 //
-// Time: bytes are instant, and none is ever lost; or take what the baud rate says, by the clock or by a test's hand.
+// Time: bytes are instant, and none is ever lost; or take what the baud rate says, by the clock or
+// by a test's hand.
 //
 // Threads  any; one of its own for the clock and terminals.
 // Source   SCC2698B data sheet. Not modelled: counter, input pins, auto-echo, remote loopback.
@@ -23,10 +26,11 @@
 #include <string_view>
 #include <thread>
 
-#include <mpf/base/file_descriptor.h>
 #include <mpf/drivers/industry_pack/device_model.h>
-#include <mpf/drivers/octal_uart/octal_uart_model_channel.h>
-#include <mpf/drivers/octal_uart/scc2698b.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/octal_uart/octal_uart_model_channel.h"
+#include "drivers/octal_uart/scc2698b.h"
 
 namespace mpf {
 
@@ -52,8 +56,11 @@ class OctalUartModel final : public DeviceModel {
   void write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) override;
 
   // --- the far ends
-  // The path of a port's pseudo-terminal. Bytes that nobody reads there are lost when its buffer is full.
-  [[nodiscard]] const std::string& terminal(int port) const { return terminals_.at(index(port)).path; }
+  // The path of a port's pseudo-terminal. Bytes that nobody reads there are lost when its buffer is
+  // full.
+  [[nodiscard]] const std::string& terminal(int port) const {
+    return terminals_.at(index(port)).path;
+  }
   // Sends `text`; what `fault` is not none damages each of its bytes.
   void say(int port, std::string_view text, LineFault fault = LineFault::none);
   // All that has come from that port.
@@ -62,13 +69,14 @@ class OctalUartModel final : public DeviceModel {
   void setClearToSend(int port, bool clear);
 
   // A look at, or at any time a change of, a channel.
-  template <class Look>
-  auto with(int port, Look look) const {
+  template <class SnapshotDelta>
+  auto with(int port, SnapshotDelta look) const {
     const std::lock_guard lock(mutex_);
     return look(std::as_const(channels_.at(index(port))));
   }
   [[nodiscard]] std::uint8_t vector() const;
-  // The longest time that it asked for something and nobody touched that half of it, since the last call; by the clock.
+  // The longest time that it asked for something and nobody touched that half of it, since the last
+  // call; by the clock.
   [[nodiscard]] std::chrono::nanoseconds takeLongestWait();
   // How often something was written to it.
   [[nodiscard]] std::uint64_t writes() const;
@@ -108,7 +116,8 @@ class OctalUartModel final : public DeviceModel {
   std::array<OctalUartModelChannel, scc2698b::kChannels> channels_;
   std::array<std::uint8_t, scc2698b::kBlocks> imr_{};
   std::array<bool, 2> isActive_{};  // request lines
-  std::array<std::int64_t, 2> waitsSinceNs_{};  // of a line that is active: when it became so, or its half was touched
+  // of a line that is active: when it became so, or its half was touched
+  std::array<std::int64_t, 2> waitsSinceNs_{};
   std::int64_t longestWaitNs_ = 0;
   std::uint8_t vector_ = 0x0f;
   std::uint64_t writes_ = 0;

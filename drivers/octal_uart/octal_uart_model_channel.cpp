@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_model_channel.h>
+#include "drivers/octal_uart/octal_uart_model_channel.h"
 
 #include <algorithm>
 #include <utility>
 
-#include <mpf/drivers/octal_uart/scc2698b.h>
+#include "drivers/octal_uart/scc2698b.h"
 
 namespace mpf {
 namespace {
@@ -31,9 +31,13 @@ std::uint8_t statusOf(LineFault fault) {
 
 // ---- registers
 
-std::uint8_t OctalUartModelChannel::readMr() { return std::exchange(pointsToMr2_, true) ? mode_.mr2 : mode_.mr1; }
+std::uint8_t OctalUartModelChannel::readMr() {
+  return std::exchange(pointsToMr2_, true) ? mode_.mr2 : mode_.mr1;
+}
 
-void OctalUartModelChannel::writeMr(std::uint8_t value) { (std::exchange(pointsToMr2_, true) ? mode_.mr2 : mode_.mr1) = value; }
+void OctalUartModelChannel::writeMr(std::uint8_t value) {
+  (std::exchange(pointsToMr2_, true) ? mode_.mr2 : mode_.mr1) = value;
+}
 
 std::uint8_t OctalUartModelChannel::readSr() const {
   unsigned sr = 0;
@@ -60,7 +64,8 @@ void OctalUartModelChannel::writeThr(std::uint8_t value) {
 std::uint8_t OctalUartModelChannel::isr() const {
   unsigned isr = 0;
   if (isTxEnabled_ && !thr_) isr |= kIsrTxRdy;
-  if ((mode_.mr1 & kMr1RxIntFull) != 0 ? fifo_.size() == kFifoBytes : !fifo_.empty()) isr |= kIsrRxRdy;
+  if ((mode_.mr1 & kMr1RxIntFull) != 0 ? fifo_.size() == kFifoBytes : !fifo_.empty())
+    isr |= kIsrRxRdy;
   if (hasBreakChanged_) isr |= kIsrBreakChange;
   return static_cast<std::uint8_t>(isr);
 }
@@ -98,7 +103,8 @@ void OctalUartModelChannel::writeCr(std::uint8_t value) {
     default:
       break;
   }
-  // A reset and an enabling of the same half in one write contradict each other: the data sheet forbids it, and here the reset counts.
+  // A reset and an enabling of the same half in one write contradict each other: the data sheet
+  // forbids it, and here the reset counts.
   if ((value & kCrEnableRx) != 0 && (value & 0xf0) != kCrResetRx) isRxEnabled_ = true;
   if ((value & kCrDisableRx) != 0) isRxEnabled_ = false;
   if ((value & kCrEnableTx) != 0 && (value & 0xf0) != kCrResetTx) isTxEnabled_ = true;
@@ -116,9 +122,13 @@ void OctalUartModelChannel::setBreak(bool on) {
 
 bool OctalUartModelChannel::isLooped() const { return (mode_.mr2 & kMr2Mode) == kMr2LocalLoopback; }
 
-bool OctalUartModelChannel::requestsToSend() const { return rts_ && ((mode_.mr1 & kMr1RxRts) == 0 || fifo_.size() < kFifoBytes); }
+bool OctalUartModelChannel::requestsToSend() const {
+  return rts_ && ((mode_.mr1 & kMr1RxRts) == 0 || fifo_.size() < kFifoBytes);
+}
 
-bool OctalUartModelChannel::maySend() const { return !isBreaking_ && (clearToSend_ || (mode_.mr2 & kMr2TxCts) == 0); }
+bool OctalUartModelChannel::maySend() const {
+  return !isBreaking_ && (clearToSend_ || (mode_.mr2 & kMr2TxCts) == 0);
+}
 
 void OctalUartModelChannel::fillFifo() {
   if (fifo_.size() == kFifoBytes || !rxShift_) return;
@@ -132,7 +142,8 @@ void OctalUartModelChannel::arrive(LineByte byte) {
     return;
   }
   const auto bits = 5 + (mode_.mr1 & kMr1Bits);
-  const Received received{static_cast<std::uint8_t>(byte.value & ((1U << bits) - 1)), statusOf(byte.fault)};
+  const Received received{static_cast<std::uint8_t>(byte.value & ((1U << bits) - 1)),
+                          statusOf(byte.fault)};
   if (byte.fault == LineFault::breakSignal) hasBreakChanged_ = true;
   if (rxShift_) {  // what is in the FIFO stays
     hasOverrun_ = true;
@@ -174,7 +185,9 @@ void OctalUartModelChannel::runInstantly() {
 
 void OctalUartModelChannel::runUntil(std::int64_t nowNs, bool takesTime, bool mayLag) {
   if (!takesTime) return runInstantly();
-  const auto follow = [&](std::int64_t atNs) { return mayLag ? std::max(atNs, nowNs - byteNs()) : atNs; };
+  const auto follow = [&](std::int64_t atNs) {
+    return mayLag ? std::max(atNs, nowNs - byteNs()) : atNs;
+  };
   start(nowNs);
   while (txShift_ && sentAtNs_ <= nowNs) {
     finish();

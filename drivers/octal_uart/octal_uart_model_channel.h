@@ -11,8 +11,8 @@
 #include <optional>
 #include <string>
 
-#include <mpf/drivers/octal_uart/octal_uart_settings.h>
-#include <mpf/drivers/serial/serial_line.h>
+#include "drivers/octal_uart/octal_uart_settings.h"
+#include "drivers/serial/serial_line.h"
 
 namespace mpf {
 
@@ -46,10 +46,13 @@ class OctalUartModelChannel {
   [[nodiscard]] SerialSettings settings() const { return settingsOf(mode_); }
 
   // --- time
-  // Lets happen what happens until then. A byte takes no time and comes when there is room for it, or the time that it takes on the line.
-  //   mayLag  time that nobody looked did not pass: late bytes come one after the other, not all at once
+  // Lets happen what happens until then. A byte takes no time and comes when there is room for it,
+  // or the time that it takes on the line.
+  //   mayLag  time that nobody looked did not pass: late bytes come one after the other, not all at
+  //           once
   void runUntil(std::int64_t nowNs, bool takesTime, bool mayLag);
-  // When the next byte has come or gone, at the speeds that are set; INT64_MAX: never, as it looks now.
+  // When the next byte has come or gone, at the speeds that are set; INT64_MAX: never, as it looks
+  // now.
   [[nodiscard]] std::int64_t nextEventNs() const;
 
  private:

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_settings.h>
+#include "drivers/octal_uart/octal_uart_settings.h"
 
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <mpf/drivers/octal_uart/scc2698b.h>
+#include "drivers/octal_uart/scc2698b.h"
 
 namespace mpf {
 namespace {
@@ -23,12 +23,14 @@ std::string octalUartProblemOf(const SerialSettings& settings, bool isRs485) {
     std::ranges::sort(bauds);
     return fmt::format("baud {}: this chip makes {}", settings.baud, fmt::join(bauds, ", "));
   }
-  if (isRs485 && settings.flowControl == 'H') return "flow control 'H': an RS-485 line has no lines for it";
+  if (isRs485 && settings.flowControl == 'H')
+    return "flow control 'H': an RS-485 line has no lines for it";
   return {};
 }
 
 OctalUartMode octalUartModeOf(const SerialSettings& settings) {
-  const auto code = static_cast<unsigned>(std::ranges::find(kBauds, settings.baud) - kBauds.begin());
+  const auto code =
+      static_cast<unsigned>(std::ranges::find(kBauds, settings.baud) - kBauds.begin());
   unsigned mr1 = static_cast<unsigned>(settings.bitsPerChar - kShortest);
   unsigned mr2 = settings.stopBits == 2 ? kMr2TwoStop : kMr2OneStop;
   if (settings.parity == 'O') mr1 |= kMr1Odd;
@@ -37,7 +39,9 @@ OctalUartMode octalUartModeOf(const SerialSettings& settings) {
     mr1 |= kMr1RxRts;
     mr2 |= kMr2TxCts;
   }
-  return {.mr1 = static_cast<std::uint8_t>(mr1), .mr2 = static_cast<std::uint8_t>(mr2), .csr = static_cast<std::uint8_t>(code << 4 | code)};
+  return {.mr1 = static_cast<std::uint8_t>(mr1),
+          .mr2 = static_cast<std::uint8_t>(mr2),
+          .csr = static_cast<std::uint8_t>(code << 4 | code)};
 }
 
 SerialSettings settingsOf(const OctalUartMode& mode) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// LateLine: a line that can be made only once its hardware is there. Until then it cannot be opened, and says what is missing.
+// LateLine: a line that can be made only once its hardware is there. Until then it cannot be
+// opened, and says what is missing.
 //
-//   PolledSerialPort port(std::make_unique<LateLine>("port 3 of UART0", [&] { return std::make_unique<OctalUartLine>(uart(), 3, settings); }), true);
+//   PolledSerialPort port(std::make_unique<LateLine>("port 3 of UART0", [&] { return
+//   std::make_unique<OctalUartLine>(uart(), 3, settings); }), true);
 //
 // Threads  the port's thread.
 // Trust    as that of the line that is made.
@@ -11,13 +13,14 @@
 #include <memory>
 #include <string>
 
-#include <mpf/drivers/serial/serial_line.h>
+#include "drivers/serial/serial_line.h"
 
 namespace mpf {
 
 class LateLine final : public SerialLine {
  public:
-  // Runs at each attempt to open the line, until it does not throw; what it throws, a std::exception, says what is missing.
+  // Runs at each attempt to open the line, until it does not throw; what it throws, a
+  // std::exception, says what is missing.
   using Make = std::function<std::unique_ptr<SerialLine>()>;
 
   LateLine(std::string description, Make make);

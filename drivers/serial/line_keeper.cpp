@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/line_keeper.h>
+#include "drivers/serial/line_keeper.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -13,9 +13,13 @@ constexpr Nanoseconds kLastBackoff = std::chrono::seconds(1);
 
 }  // namespace
 
-pollfd LineKeeper::waitsFor() const noexcept { return phase_ == Phase::closed ? pollfd{-1, 0, 0} : line_->waitsFor(); }
+pollfd LineKeeper::waitsFor() const noexcept {
+  return phase_ == Phase::closed ? pollfd{-1, 0, 0} : line_->waitsFor();
+}
 
-Deadline LineKeeper::wakeAt() const noexcept { return phase_ == Phase::open ? Deadline::never() : attemptAt_; }
+Deadline LineKeeper::wakeAt() const noexcept {
+  return phase_ == Phase::open ? Deadline::never() : attemptAt_;
+}
 
 void LineKeeper::service(short readyEvents) {
   if (phase_ == Phase::open) return;
@@ -25,7 +29,8 @@ void LineKeeper::service(short readyEvents) {
   }
   if (phase_ == Phase::opening && readyEvents != 0) return proceed();
   if (phase_ == Phase::opening && attemptAt_.hasPassed()) {
-    retryLater(fmt::format("{}: no answer within {} ms", line_->description(), line_->openTimeout().count()));
+    retryLater(fmt::format("{}: no answer within {} ms", line_->description(),
+                           line_->openTimeout().count()));
   }
 }
 

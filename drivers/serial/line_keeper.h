@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// LineKeeper: keeps a line open: opens it, and after a loss tries again, ever less often, until it is back.
+// LineKeeper: keeps a line open: opens it, and after a loss tries again, ever less often, until it
+// is back.
 //
 //   tryOpen ──► open ──► lost ──► 20 ms ──► tryOpen ──► 40 ms ──► tryOpen ──► ... ──► every second
 //                 └─ after a second up, the next loss starts at 20 ms again
@@ -13,9 +14,10 @@
 #include <mutex>
 #include <string>
 
-#include <mpf/base/clock.h>
-#include <mpf/drivers/serial/serial_line.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
+
+#include "drivers/serial/serial_line.h"
 
 namespace mpf {
 
@@ -23,7 +25,8 @@ class LineKeeper {
  public:
   explicit LineKeeper(std::unique_ptr<SerialLine> line) : line_(std::move(line)) {}
 
-  // For the port's thread: what to poll and until when; then service() with what poll said, which opens when it is time.
+  // For the port's thread: what to poll and until when; then service() with what poll said, which
+  // opens when it is time.
   [[nodiscard]] pollfd waitsFor() const noexcept;
   [[nodiscard]] Deadline wakeAt() const noexcept;
   void service(short readyEvents);
@@ -49,16 +52,17 @@ class LineKeeper {
 
   std::unique_ptr<SerialLine> line_;
   Phase phase_ = Phase::closed;
-  Deadline attemptAt_ = Deadline::atNs(0);  // when closed: the next attempt; when opening: the end of this one
-  Nanoseconds backoff_{};                    // before the next attempt
+  // when closed: the next attempt; when opening: the end of this one
+  Deadline attemptAt_ = Deadline::atNs(0);
+  Nanoseconds backoff_{};  // before the next attempt
   std::int64_t openedAtNs_ = 0;
 
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   SerialPortState state_ = SerialPortState::unplugged;  // under mutex_
-  std::string reason_ = "not opened yet";               // under mutex_
-  bool attempted_ = false;                              // under mutex_
-  StateHandler stateHandler_;                           // under mutex_, also while it runs
+  std::string reason_ = "not opened yet";  // under mutex_
+  bool attempted_ = false;  // under mutex_
+  StateHandler stateHandler_;  // under mutex_, also while it runs
 };
 
 }  // namespace mpf

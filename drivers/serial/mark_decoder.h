@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// MarkDecoder: takes the marks out of a terminal's bytes, which PARMRK puts before those that the line damaged (termios(3)).
+// MarkDecoder: takes the marks out of a terminal's bytes, which PARMRK puts before those that the
+// line damaged (termios(3)).
 //
 //   x            x                      ff 00 x    x, damaged
 //   ff ff        ff                     ff 00 00   a break
@@ -11,13 +12,14 @@
 #include <span>
 #include <vector>
 
-#include <mpf/drivers/serial/serial_line.h>
+#include "drivers/serial/serial_line.h"
 
 namespace mpf {
 
 class MarkDecoder {
  public:
-  // Appends what `raw` says. The kernel does not tell parity from framing: damaged bytes come as `damage`.
+  // Appends what `raw` says. The kernel does not tell parity from framing: damaged bytes come as
+  // `damage`.
   void decode(std::span<const std::uint8_t> raw, LineFault damage, std::vector<LineByte>& bytes) {
     for (const auto value : raw) decode(value, damage, bytes);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/name_lookup.h>
+#include "drivers/serial/name_lookup.h"
 
 #include <netdb.h>
 #include <sys/eventfd.h>
@@ -11,8 +11,9 @@
 #include <thread>
 #include <utility>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -23,7 +24,8 @@ NameLookup::Result lookUp(const TcpAddress& address) {
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* list = nullptr;
   const int code = ::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &list);
-  if (code != 0) return {{}, fmt::format("resolve {}: {}", address.toString(), ::gai_strerror(code))};
+  if (code != 0)
+    return {{}, fmt::format("resolve {}: {}", address.toString(), ::gai_strerror(code))};
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(list, &::freeaddrinfo);
   NameLookup::Result result;
   for (const auto* entry = list; entry != nullptr; entry = entry->ai_next) {
@@ -50,8 +52,9 @@ NameLookup::NameLookup(const TcpAddress& address) : answer_(std::make_shared<Ans
       answer->result = std::move(result);
     }
     const std::uint64_t one = 1;
-    static_cast<void>(
-        retryInterrupted([&] { return ::write(answer->ready.get(), &one, sizeof one); }));  // a first write to an eventfd succeeds
+    static_cast<void>(retryInterrupted([&] {
+      return ::write(answer->ready.get(), &one, sizeof one);
+    }));  // a first write to an eventfd succeeds
   }).detach();
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// NameLookup: getaddrinfo() that keeps nobody waiting: it runs in a thread of its own, which may outlive this object.
+// NameLookup: getaddrinfo() that keeps nobody waiting: it runs in a thread of its own, which may
+// outlive this object.
 //
 //   NameLookup ──► answer ◄── thread in getaddrinfo()        both hold the answer; the descriptor becomes readable
 //
@@ -14,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/serial/tcp_address.h>
+#include "drivers/serial/tcp_address.h"
 
 namespace mpf {
 

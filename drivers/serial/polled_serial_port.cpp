@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/polled_serial_port.h>
+#include "drivers/serial/polled_serial_port.h"
 
 #include <poll.h>
 
@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/system_call.h>
+#include "base/signals_blocked.h"
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -19,23 +19,30 @@ void pollUntil(std::span<pollfd> entries, Deadline deadline) noexcept {
   constexpr std::int64_t kNsPerSecond = 1'000'000'000;
   const auto leftNs = deadline.left().count();
   const timespec left{.tv_sec = leftNs / kNsPerSecond, .tv_nsec = leftNs % kNsPerSecond};
-  if (::ppoll(entries.data(), entries.size(), deadline.isNever() ? nullptr : &left, nullptr) >= 0) return;
+  if (::ppoll(entries.data(), entries.size(), deadline.isNever() ? nullptr : &left, nullptr) >= 0)
+    return;
   for (auto& entry : entries) entry.revents = 0;
 }
 
-void add(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept { counter.fetch_add(n, std::memory_order_relaxed); }
+void add(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
+  counter.fetch_add(n, std::memory_order_relaxed);
+}
 
-std::uint64_t valueOf(const std::atomic<std::uint64_t>& counter) noexcept { return counter.load(std::memory_order_relaxed); }
+std::uint64_t valueOf(const std::atomic<std::uint64_t>& counter) noexcept {
+  return counter.load(std::memory_order_relaxed);
+}
 
 }  // namespace
 
-PolledSerialPort::PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayComeLater) : keeper_(std::move(line)) {
+PolledSerialPort::PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayComeLater)
+    : keeper_(std::move(line)) {
   {
     const SignalsBlocked blocked;
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
   if (mayComeLater) return;
-  if (const auto problem = keeper_.waitForFirstAttempt(); !problem.empty()) throw std::runtime_error(problem);
+  if (const auto problem = keeper_.waitForFirstAttempt(); !problem.empty())
+    throw std::runtime_error(problem);
 }
 
 PolledSerialPort::~PolledSerialPort() = default;
@@ -48,7 +55,8 @@ void PolledSerialPort::bind(ByteHandler& handler) {
     isFree = handler_ == nullptr;
     if (isFree) handler_ = &handler;
   });
-  if (!isFree) throw std::runtime_error(fmt::format("serial port {} is bound already", description()));
+  if (!isFree)
+    throw std::runtime_error(fmt::format("serial port {} is bound already", description()));
 }
 
 void PolledSerialPort::release() {
@@ -87,13 +95,16 @@ void PolledSerialPort::giveUp(const Request& request) {
   });
 }
 
-SerialPortStatus PolledSerialPort::getStatus() const noexcept { return status_.load(std::memory_order_relaxed); }
+SerialPortStatus PolledSerialPort::getStatus() const noexcept {
+  return status_.load(std::memory_order_relaxed);
+}
 
 std::string PolledSerialPort::config(const SerialSettings& settings) {
   auto problem = problemOf(settings);
   if (!problem.empty()) return problem;
   tasks_.call([&] {
-    problem = keeper_.isOpen() ? keeper_.line().tryConfigure(settings) : fmt::format("unplugged, nothing changed: {}", unpluggedBecause());
+    problem = keeper_.isOpen() ? keeper_.line().tryConfigure(settings)
+                               : fmt::format("unplugged, nothing changed: {}", unpluggedBecause());
   });
   return problem;
 }
@@ -134,7 +145,8 @@ Deadline PolledSerialPort::wakeAt() const {
   auto next = keeper_.wakeAt();
   if (request_ == nullptr) return next;
   next = std::min(next, request_->deadline);
-  if (request_->awaitsIdleLine && request_->unsent.empty()) next = std::min(next, Deadline::after(keeper_.line().timeToSend()));
+  if (request_->awaitsIdleLine && request_->unsent.empty())
+    next = std::min(next, Deadline::after(keeper_.line().timeToSend()));
   return next;
 }
 
@@ -156,7 +168,8 @@ void PolledSerialPort::begin(Request& request) {
 void PolledSerialPort::advance() {
   if (request_ == nullptr) return;
   auto& request = *request_;
-  if (request.awaitsIdleLine && request.unsent.empty()) request.awaitsIdleLine = keeper_.line().timeToSend().count() > 0;
+  if (request.awaitsIdleLine && request.unsent.empty())
+    request.awaitsIdleLine = keeper_.line().timeToSend().count() > 0;
   const bool complete = request.unsent.empty() && !request.awaitsAnswer && !request.awaitsIdleLine;
   const bool late = request.deadline.hasPassed();
   if (request.isBreak ? late : complete) return end(SerialPortStatus::success);
@@ -172,7 +185,8 @@ void PolledSerialPort::send() {
     add(counters_.bytesOut, *taken);
     if (!taps().isEmpty()) {
       std::vector<LineByte> sent;
-      for (const auto value : request_->unsent.first(*taken)) sent.push_back({value, LineFault::none});
+      for (const auto value : request_->unsent.first(*taken))
+        sent.push_back({value, LineFault::none});
       show(ByteDirection::sent, sent);
     }
     request_->unsent = request_->unsent.subspan(*taken);

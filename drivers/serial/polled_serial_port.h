@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
-// PolledSerialPort: what is the same for all ports: one thread that polls the line and does everything with it.
+// PolledSerialPort: what is the same for all ports: one thread that polls the line and does
+// everything with it.
 //
 //   poll(tasks, line, next deadline)
 //     ├─ tasks    begin a request, bind, release, configure
 //     ├─ line     open ── send what is left ── receive ── taps, byte handler
 //     └─ time     requests that are late, attempts to open
 //
-// Because one thread sends, receives and shows, taps see bytes in the order of the line, and a request needs no lock.
+// Because one thread sends, receives and shows, taps see bytes in the order of the line, and a
+// request needs no lock.
 //
-// Threads  the port's own, with all signals blocked; callers wait for it, and it waits for none of them.
+// Threads  the port's own, with all signals blocked; callers wait for it, and it waits for none of
+//          them.
 // Crash    nothing here survives the process.
 // Trust    see SerialPort.
 #pragma once
@@ -21,16 +24,18 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/drivers/serial/line_keeper.h>
-#include <mpf/drivers/serial/port_tasks.h>
 #include <mpf/drivers/serial/serial_port.h>
+
+#include "drivers/serial/line_keeper.h"
+#include "drivers/serial/port_tasks.h"
 
 namespace mpf {
 
 class PolledSerialPort : public SerialPort {
  public:
   // Opens `line`.
-  //   mayComeLater  when it cannot be opened: true waits for it, unplugged, and returns at once; false throws
+  //   mayComeLater  when it cannot be opened: true waits for it, unplugged, and returns at once;
+  //                 false throws
   //   throws        std::runtime_error that names the call, the object and the reason
   PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayComeLater);
   // Ends a request that is outstanding with failure.
@@ -38,14 +43,18 @@ class PolledSerialPort : public SerialPort {
 
   void bind(ByteHandler& handler) override;
   void release() override;
-  void giveUpWhen(std::function<bool()> isHopeless) override { isHopeless_ = std::move(isHopeless); }
+  void giveUpWhen(std::function<bool()> isHopeless) override {
+    isHopeless_ = std::move(isHopeless);
+  }
   SerialPortStatus sendBreak(Milliseconds duration) override;
   [[nodiscard]] SerialPortStatus getStatus() const noexcept override;
   [[nodiscard]] std::string config(const SerialSettings& settings) override;
   [[nodiscard]] SerialPortCounters counters() const noexcept override;
   [[nodiscard]] SerialPortState state() const override { return keeper_.state(); }
   [[nodiscard]] std::string unpluggedBecause() const override { return keeper_.unpluggedBecause(); }
-  [[nodiscard]] bool waitForState(SerialPortState state, Deadline deadline) const override { return keeper_.waitForState(state, deadline); }
+  [[nodiscard]] bool waitForState(SerialPortState state, Deadline deadline) const override {
+    return keeper_.waitForState(state, deadline);
+  }
   void onStateChange(StateHandler handler) override { keeper_.onStateChange(std::move(handler)); }
   [[nodiscard]] std::string description() const override { return keeper_.line().description(); }
 
@@ -66,7 +75,8 @@ class PolledSerialPort : public SerialPort {
   };
   // Written by the port's thread.
   struct Counters {
-    std::atomic<std::uint64_t> bytesIn, bytesOut, timeouts, failures, overruns, parityErrors, framingErrors, breaks, unplugs;
+    std::atomic<std::uint64_t> bytesIn, bytesOut, timeouts, failures, overruns, parityErrors,
+        framingErrors, breaks, unplugs;
   };
 
   void run(const std::stop_token& stop);

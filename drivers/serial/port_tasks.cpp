@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/port_tasks.h>
+#include "drivers/serial/port_tasks.h"
 
 #include <sys/eventfd.h>
 
 #include <cstdint>
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 
@@ -14,10 +14,12 @@ PortTasks::PortTasks() : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK
 
 void PortTasks::wake() const noexcept {
   const std::uint64_t one = 1;
-  static_cast<void>(retryInterrupted([&] { return ::write(bell_.get(), &one, sizeof one); }));  // full: it is awake already
+  // full: it is awake already
+  static_cast<void>(retryInterrupted([&] { return ::write(bell_.get(), &one, sizeof one); }));
 }
 
-void PortTasks::callUntil(const bool& done, std::function<void()> begin, const std::function<void()>& whileWaiting) {
+void PortTasks::callUntil(const bool& done, std::function<void()> begin,
+                          const std::function<void()>& whileWaiting) {
   std::unique_lock lock(mutex_);
   waiting_.push_back(std::move(begin));
   wake();
@@ -40,7 +42,8 @@ void PortTasks::call(const std::function<void()>& task) {
 
 void PortTasks::runAll() {
   std::uint64_t rings = 0;
-  static_cast<void>(retryInterrupted([&] { return ::read(bell_.get(), &rings, sizeof rings); }));  // nothing to read: not rung
+  // nothing to read: not rung
+  static_cast<void>(retryInterrupted([&] { return ::read(bell_.get(), &rings, sizeof rings); }));
   std::vector<std::function<void()>> tasks;
   {
     const std::lock_guard lock(mutex_);
@@ -50,7 +53,8 @@ void PortTasks::runAll() {
 }
 
 void PortTasks::finish(bool& done) {
-  const std::lock_guard lock(mutex_);  // notified under the lock: `done` lives in the caller's frame, which may go right after
+  // notified under the lock: `done` lives in the caller's frame, which may go right after
+  const std::lock_guard lock(mutex_);
   done = true;
   finished_.notify_all();
 }

@@ -5,7 +5,8 @@
 //                                                   └─ callUntil: asks now and then
 //   port's thread        poll(descriptor()) ──► runAll(): task ... finish(done) ┘
 //
-// Threads  any may call; one runs the tasks and never blocks in one, so a caller waits as long as its task says.
+// Threads  any may call; one runs the tasks and never blocks in one, so a caller waits as long as
+//          its task says.
 #pragma once
 
 #include <chrono>
@@ -14,7 +15,7 @@
 #include <mutex>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
+#include <mpf/file_descriptor.h>
 
 namespace mpf {
 
@@ -26,9 +27,12 @@ class PortTasks {
   [[nodiscard]] int descriptor() const noexcept { return bell_.get(); }
   void wake() const noexcept;
 
-  // Runs `begin` on the port's thread and returns once `done`, which the port's thread sets by finish().
-  //   whileWaiting  runs on the caller's thread every kAskEvery as long as the wait lasts; it may call()
-  void callUntil(const bool& done, std::function<void()> begin, const std::function<void()>& whileWaiting = {});
+  // Runs `begin` on the port's thread and returns once `done`, which the port's thread sets by
+  // finish().
+  //   whileWaiting  runs on the caller's thread every kAskEvery as long as the wait lasts; it may
+  //                 call()
+  void callUntil(const bool& done, std::function<void()> begin,
+                 const std::function<void()>& whileWaiting = {});
   static constexpr std::chrono::milliseconds kAskEvery{20};
   void call(const std::function<void()>& task);
 
@@ -40,7 +44,7 @@ class PortTasks {
   std::mutex mutex_;
   std::condition_variable finished_;
   std::vector<std::function<void()>> waiting_;  // under mutex_
-  FileDescriptor bell_;                         // eventfd
+  FileDescriptor bell_;  // eventfd
 };
 
 }  // namespace mpf

@@ -56,14 +56,18 @@ class SerialLine {
   // Appends what has come, without waiting. Returns false when the line is gone.
   [[nodiscard]] virtual bool tryRead(std::vector<LineByte>& bytes) = 0;
   // Returns how many bytes the kernel took, nullopt when the line is gone.
-  [[nodiscard]] virtual std::optional<std::size_t> tryWrite(std::span<const std::uint8_t> bytes) = 0;
-  // Bytes that the kernel has taken and not sent yet, as the time that they need; 0 when all are out or nobody knows.
+  [[nodiscard]] virtual std::optional<std::size_t> tryWrite(
+      std::span<const std::uint8_t> bytes) = 0;
+  // Bytes that the kernel has taken and not sent yet, as the time that they need; 0 when all are
+  // out or nobody knows.
   [[nodiscard]] virtual std::chrono::milliseconds timeToSend() const { return {}; }
   virtual void discardUnsent() noexcept {}
-  // Bytes lost on the way since the last call. Where they are missing, LineByte::followsGap says as exactly as the line can.
+  // Bytes lost on the way since the last call. Where they are missing, LineByte::followsGap says as
+  // exactly as the line can.
   [[nodiscard]] virtual std::uint64_t takeOverruns() noexcept { return 0; }
 
-  // Returns empty, or what this line does not accept; then nothing has changed. Settings are applied again by each tryOpen().
+  // Returns empty, or what this line does not accept; then nothing has changed. Settings are
+  // applied again by each tryOpen().
   [[nodiscard]] virtual std::string tryConfigure(const SerialSettings& settings) = 0;
   [[nodiscard]] virtual bool trySetBreak(bool on) noexcept = 0;
 };

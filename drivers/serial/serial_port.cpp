@@ -17,10 +17,13 @@ const char* toString(SerialPortStatus status) noexcept {
   return "?";
 }
 
-const char* toString(SerialPortState state) noexcept { return state == SerialPortState::plugged ? "plugged" : "unplugged"; }
+const char* toString(SerialPortState state) noexcept {
+  return state == SerialPortState::plugged ? "plugged" : "unplugged";
+}
 
 Deadline SerialPort::deadlineAfter(Milliseconds timeout) noexcept {
-  if (timeout > std::chrono::duration_cast<Milliseconds>(Nanoseconds::max())) return Deadline::never();
+  if (timeout > std::chrono::duration_cast<Milliseconds>(Nanoseconds::max()))
+    return Deadline::never();
   return Deadline::after(std::max(timeout, Milliseconds(0)));
 }
 

@@ -7,7 +7,8 @@
 
 namespace mpf {
 
-void SerialPortRegistry::registerName(const std::string& portName, std::shared_ptr<SerialPort> port) {
+void SerialPortRegistry::registerName(const std::string& portName,
+                                      std::shared_ptr<SerialPort> port) {
   if (portName.empty()) throw std::invalid_argument("a serial port needs a name");
   const std::lock_guard lock(mutex_);
   if (!ports_.emplace(portName, std::move(port)).second) {

@@ -7,11 +7,14 @@
 namespace mpf {
 namespace {
 
-bool isOneOf(char value, std::string_view values) noexcept { return value == 0 || values.find(value) != std::string_view::npos; }
+bool isOneOf(char value, std::string_view values) noexcept {
+  return value == 0 || values.find(value) != std::string_view::npos;
+}
 
 // A client may send any byte: one that does not print is shown by its number.
 std::string shown(char value) {
-  return value > ' ' && value <= '~' ? fmt::format("'{}'", value) : fmt::format("0x{:02x}", static_cast<unsigned char>(value));
+  return value > ' ' && value <= '~' ? fmt::format("'{}'", value)
+                                     : fmt::format("0x{:02x}", static_cast<unsigned char>(value));
 }
 
 }  // namespace
@@ -20,9 +23,12 @@ std::string problemOf(const SerialSettings& settings) {
   const auto& [baud, stopBits, bitsPerChar, parity, flowControl] = settings;
   if (baud < 0) return fmt::format("baud {}: must be positive", baud);
   if (stopBits < 0 || stopBits > 2) return fmt::format("stop bits {}: must be 1 or 2", stopBits);
-  if (bitsPerChar != 0 && (bitsPerChar < 5 || bitsPerChar > 8)) return fmt::format("bits per character {}: must be 5 to 8", bitsPerChar);
-  if (!isOneOf(parity, "EON")) return fmt::format("parity {}: must be 'E', 'O' or 'N'", shown(parity));
-  if (!isOneOf(flowControl, "HN")) return fmt::format("flow control {}: must be 'H' or 'N'", shown(flowControl));
+  if (bitsPerChar != 0 && (bitsPerChar < 5 || bitsPerChar > 8))
+    return fmt::format("bits per character {}: must be 5 to 8", bitsPerChar);
+  if (!isOneOf(parity, "EON"))
+    return fmt::format("parity {}: must be 'E', 'O' or 'N'", shown(parity));
+  if (!isOneOf(flowControl, "HN"))
+    return fmt::format("flow control {}: must be 'H' or 'N'", shown(flowControl));
   return {};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/tcp_line.h>
+#include "drivers/serial/tcp_line.h"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -9,7 +9,7 @@
 #include <array>
 #include <fmt/format.h>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -21,7 +21,9 @@ constexpr int kUnacknowledgedMs = 25'000;
 
 // A socket without one of these still works, so nobody is told.
 void setOptions(int socket) noexcept {
-  const auto set = [&](int level, int option, int value) { ::setsockopt(socket, level, option, &value, sizeof value); };
+  const auto set = [&](int level, int option, int value) {
+    ::setsockopt(socket, level, option, &value, sizeof value);
+  };
   set(IPPROTO_TCP, TCP_NODELAY, 1);
   set(SOL_SOCKET, SO_KEEPALIVE, 1);
   set(IPPROTO_TCP, TCP_KEEPIDLE, kKeepAliveIdleSeconds);
@@ -59,14 +61,16 @@ SerialLine::OpenState TcpLine::connectNext() {
   while (!untried_.empty()) {
     const auto address = untried_.back();
     untried_.pop_back();
-    socket_.reset(::socket(address.storage.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    socket_.reset(
+        ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!socket_) {
       note("socket for", errno);
       continue;
     }
     setOptions(socket_.get());
     const auto* to = reinterpret_cast<const sockaddr*>(&address.storage);
-    if (::connect(socket_.get(), to, address.length) == 0 || errno == EINPROGRESS || errno == EINTR) return OpenState::opening;
+    if (::connect(socket_.get(), to, address.length) == 0 || errno == EINPROGRESS || errno == EINTR)
+      return OpenState::opening;
     note("connect to", errno);
     socket_.reset();
   }
@@ -99,20 +103,26 @@ pollfd TcpLine::waitsFor() const noexcept {
 }
 
 void TcpLine::note(const char* call, int error) {
-  problem_ = fmt::format("{} {}: {}", call, address_.toString(), error == 0 ? "hung up" : std::generic_category().message(error));
+  problem_ = fmt::format("{} {}: {}", call, address_.toString(),
+                         error == 0 ? "hung up" : std::generic_category().message(error));
 }
 
 bool TcpLine::tryRead(std::vector<LineByte>& bytes) {
-  std::array<std::uint8_t, kReadBytes> raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): recv() fills it
-  const auto length = retryInterrupted([&] { return ::recv(socket_.get(), raw.data(), raw.size(), 0); });
-  for (const auto value : std::span(raw).first(static_cast<std::size_t>(std::max<ssize_t>(length, 0)))) bytes.push_back({value});
+  std::array<std::uint8_t, kReadBytes>
+      raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): recv() fills it
+  const auto length =
+      retryInterrupted([&] { return ::recv(socket_.get(), raw.data(), raw.size(), 0); });
+  for (const auto value :
+       std::span(raw).first(static_cast<std::size_t>(std::max<ssize_t>(length, 0))))
+    bytes.push_back({value});
   if (length > 0 || (length < 0 && errno == EAGAIN)) return true;
   note("read from", length == 0 ? 0 : errno);
   return false;
 }
 
 std::optional<std::size_t> TcpLine::tryWrite(std::span<const std::uint8_t> bytes) {
-  const auto length = retryInterrupted([&] { return ::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL); });
+  const auto length = retryInterrupted(
+      [&] { return ::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL); });
   if (length >= 0) return static_cast<std::size_t>(length);
   if (errno == EAGAIN) return 0;
   note("write to", errno);
@@ -121,7 +131,8 @@ std::optional<std::size_t> TcpLine::tryWrite(std::span<const std::uint8_t> bytes
 
 std::string TcpLine::tryConfigure(const SerialSettings& settings) {
   if (settings == SerialSettings{}) return {};
-  return fmt::format("not supported over TCP: set it on the terminal server {}", address_.toString());
+  return fmt::format("not supported over TCP: set it on the terminal server {}",
+                     address_.toString());
 }
 
 }  // namespace mpf

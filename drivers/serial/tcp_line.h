@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// TcpLine: the line of a TcpSerialPort: a TCP connection to a port of a terminal server, in raw mode.
+// TcpLine: the line of a TcpSerialPort: a TCP connection to a port of a terminal server, in raw
+// mode.
 //
 //   look the name up ──► connect to its first address ──► refused: the next one ──► connected
 //                                        └── no answer: the next attempt goes on with the next one
 //
 // Threads  the port's thread.
-// Trust    a peer that vanished without a word is noticed by keepalive, or by bytes that nobody acknowledges, within half a minute.
+// Trust    a peer that vanished without a word is noticed by keepalive, or by bytes that nobody
+//          acknowledges, within half a minute.
 #pragma once
 
 #include <chrono>
@@ -13,16 +15,18 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/drivers/serial/name_lookup.h>
-#include <mpf/drivers/serial/serial_line.h>
-#include <mpf/drivers/serial/tcp_address.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/serial/name_lookup.h"
+#include "drivers/serial/serial_line.h"
+#include "drivers/serial/tcp_address.h"
 
 namespace mpf {
 
 class TcpLine : public SerialLine {
  public:
-  TcpLine(TcpAddress address, std::chrono::milliseconds connectTimeout) : address_(std::move(address)), connectTimeout_(connectTimeout) {}
+  TcpLine(TcpAddress address, std::chrono::milliseconds connectTimeout)
+      : address_(std::move(address)), connectTimeout_(connectTimeout) {}
 
   [[nodiscard]] std::string description() const override { return address_.toString(); }
   [[nodiscard]] std::string problem() const override { return problem_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/terminal_line.h>
+#include "drivers/serial/terminal_line.h"
 
 #include <fcntl.h>
 #include <linux/serial.h>
@@ -13,8 +13,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/system_call.h>
-#include <mpf/drivers/serial/terminal_settings.h>
+#include "base/system_call.h"
+#include "drivers/serial/terminal_settings.h"
 
 namespace mpf {
 namespace {
@@ -25,14 +25,19 @@ constexpr int kFlushOutputQueue = 1;  // TCOFLUSH, which is in <termios.h>
 
 }  // namespace
 
-TerminalLine::TerminalLine(std::string device, const SerialSettings& settings) : device_(std::move(device)), settings_(settings) {
-  if (const auto problem = problemOf(settings); !problem.empty()) throw std::invalid_argument(fmt::format("{}: {}", device_, problem));
+TerminalLine::TerminalLine(std::string device, const SerialSettings& settings)
+    : device_(std::move(device)), settings_(settings) {
+  if (const auto problem = problemOf(settings); !problem.empty())
+    throw std::invalid_argument(fmt::format("{}: {}", device_, problem));
 }
 
 SerialLine::OpenState TerminalLine::tryOpen() {
-  fd_.reset(retryInterrupted([&] { return ::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); }));
+  fd_.reset(retryInterrupted(
+      [&] { return ::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); }));
   if (!fd_) {
-    problem_ = fmt::format("open {}: {}", device_, errno == EBUSY ? "in use by another program" : std::generic_category().message(errno));
+    problem_ = fmt::format(
+        "open {}: {}", device_,
+        errno == EBUSY ? "in use by another program" : std::generic_category().message(errno));
     return OpenState::failed;
   }
   if (const auto reason = tryPrepare(); !reason.empty()) {
@@ -49,22 +54,30 @@ SerialLine::OpenState TerminalLine::tryOpen() {
 std::string TerminalLine::tryPrepare() const {
   if (::isatty(fd_.get()) == 0) return "not a terminal";
   if (::flock(fd_.get(), LOCK_EX | LOCK_NB) < 0) return "in use by another program";
-  if (::ioctl(fd_.get(), TIOCEXCL) < 0) return "TIOCEXCL: " + std::generic_category().message(errno);
+  if (::ioctl(fd_.get(), TIOCEXCL) < 0)
+    return "TIOCEXCL: " + std::generic_category().message(errno);
   if (auto reason = terminal::tryMakeRaw(fd_.get()); !reason.empty()) return reason;
   return terminal::tryApply(fd_.get(), settings_);
 }
 
 void TerminalLine::closeDevice() noexcept {
-  if (fd_) ::ioctl(fd_.get(), TIOCNXCL);  // or it would stay exclusive while somebody else has it open; a device that is gone does not mind
+  if (fd_)
+    ::ioctl(
+        fd_.get(),
+        // or it would stay exclusive while somebody else has it open; a device that is gone does
+        // not mind
+        TIOCNXCL);
   fd_.reset();
 }
 
 void TerminalLine::note(const char* call, int error) {
-  problem_ = fmt::format("{} {}: {}", call, device_, error == 0 ? "hung up" : std::generic_category().message(error));
+  problem_ = fmt::format("{} {}: {}", call, device_,
+                         error == 0 ? "hung up" : std::generic_category().message(error));
 }
 
 bool TerminalLine::tryRead(std::vector<LineByte>& bytes) {
-  std::array<std::uint8_t, kReadBytes> raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
+  std::array<std::uint8_t, kReadBytes>
+      raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
   const auto length = retryInterrupted([&] { return ::read(fd_.get(), raw.data(), raw.size()); });
   if (length > 0) {
     append(std::span(raw).first(static_cast<std::size_t>(length)), bytes);
@@ -81,11 +94,13 @@ void TerminalLine::append(std::span<const std::uint8_t> raw, std::vector<LineByt
   const auto before = static_cast<std::ptrdiff_t>(bytes.size());
   decoder_.decode(raw, damage, bytes);
   if (!errors_.mayFollowGap()) return;
-  std::for_each(bytes.begin() + before, bytes.end(), [](LineByte& byte) { byte.followsGap = true; });
+  std::for_each(bytes.begin() + before, bytes.end(),
+                [](LineByte& byte) { byte.followsGap = true; });
 }
 
 std::optional<std::size_t> TerminalLine::tryWrite(std::span<const std::uint8_t> bytes) {
-  const auto length = retryInterrupted([&] { return ::write(fd_.get(), bytes.data(), bytes.size()); });
+  const auto length =
+      retryInterrupted([&] { return ::write(fd_.get(), bytes.data(), bytes.size()); });
   if (length >= 0) return static_cast<std::size_t>(length);
   if (errno == EAGAIN) return 0;
   note("write", errno);
@@ -95,7 +110,8 @@ std::optional<std::size_t> TerminalLine::tryWrite(std::span<const std::uint8_t> 
 std::chrono::milliseconds TerminalLine::timeToSend() const {
   int unsent = 0;
   if (::ioctl(fd_.get(), TIOCOUTQ, &unsent) < 0 || unsent <= 0) return {};
-  const auto needed = std::chrono::duration_cast<std::chrono::milliseconds>(terminal::timeFor(fd_.get(), unsent));
+  const auto needed =
+      std::chrono::duration_cast<std::chrono::milliseconds>(terminal::timeFor(fd_.get(), unsent));
   return std::clamp(needed, kShortestDrainCheck, kLongestDrainCheck);
 }
 
@@ -104,8 +120,9 @@ void TerminalLine::discardUnsent() noexcept { ::ioctl(fd_.get(), TCFLSH, kFlushO
 std::optional<TerminalErrors::Counts> TerminalLine::errorCounts() const noexcept {
   serial_icounter_struct counts{};
   if (::ioctl(fd_.get(), TIOCGICOUNT, &counts) < 0) return std::nullopt;
-  return TerminalErrors::Counts{static_cast<unsigned>(counts.frame),
-                                static_cast<unsigned>(counts.overrun) + static_cast<unsigned>(counts.buf_overrun)};
+  return TerminalErrors::Counts{
+      static_cast<unsigned>(counts.frame),
+      static_cast<unsigned>(counts.overrun) + static_cast<unsigned>(counts.buf_overrun)};
 }
 
 std::uint64_t TerminalLine::takeOverruns() noexcept { return errors_.takeOverruns(); }
@@ -116,6 +133,8 @@ std::string TerminalLine::tryConfigure(const SerialSettings& settings) {
   return refused;
 }
 
-bool TerminalLine::trySetBreak(bool on) noexcept { return ::ioctl(fd_.get(), on ? TIOCSBRK : TIOCCBRK) == 0; }
+bool TerminalLine::trySetBreak(bool on) noexcept {
+  return ::ioctl(fd_.get(), on ? TIOCSBRK : TIOCCBRK) == 0;
+}
 
 }  // namespace mpf

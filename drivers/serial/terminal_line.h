@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: MIT
-// TerminalLine: the line of a PosixTerminalPort: a terminal device, opened exclusively, raw, with its settings.
+// TerminalLine: the line of a PosixTerminalPort: a terminal device, opened exclusively, raw, with
+// its settings.
 //
 //   open ─ is it a terminal? ─ lock ─ TIOCEXCL ─ raw ─ settings         read: 0, EIO, ENXIO: the device is gone
 //
 // Threads  the port's thread.
 // Crash    the kernel closes the device, which ends lock and exclusiveness.
-// Trust    the lock keeps out other ports of ours and the programs that flock() terminals; TIOCEXCL all others but root's.
+// Trust    the lock keeps out other ports of ours and the programs that flock() terminals; TIOCEXCL
+//          all others but root's.
 #pragma once
 
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/drivers/serial/mark_decoder.h>
-#include <mpf/drivers/serial/serial_line.h>
-#include <mpf/drivers/serial/terminal_errors.h>
+#include <mpf/file_descriptor.h>
+
+#include "drivers/serial/mark_decoder.h"
+#include "drivers/serial/serial_line.h"
+#include "drivers/serial/terminal_errors.h"
 
 namespace mpf {
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// doubling_client VALUE: asks doubling_server, which may start before or after, and prints the answer.
+// doubling_client VALUE: asks doubling_server, which may start before or after, and prints the
+// answer.
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
 
-#include <mpf/client/sync_client.h>
+#include <mpf/sync_client.h>
 
 int main(int argc, char** argv) {
   using namespace std::chrono_literals;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // doubling_server: answers each Int32 message with twice its value, until SIGTERM or SIGINT.
-#include <mpf/server/message_server.h>
+#include <mpf/message_server.h>
 
 int main() {
   mpf::MessageServer server(mpf::Backplane::attach(), "doubler");

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT
-// event_loop_client COUNT: sends COUNT requests to doubling_server from a poll() loop and prints the replies and fates.
+// event_loop_client COUNT: sends COUNT requests to doubling_server from a poll() loop and prints
+// the replies and fates.
 #include <poll.h>
 
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
 
-#include <mpf/client/message_client.h>
+#include <mpf/message_client.h>
 
 namespace {
 
-// How long poll() may wait: until the dispatcher has something to do by itself, such as a request that expires.
+// How long poll() may wait: until the dispatcher has something to do by itself, such as a request
+// that expires.
 int pollTimeoutMs(const mpf::Dispatcher& dispatcher) {
   const auto deadline = dispatcher.nextDeadline();
   if (deadline.isNever()) return -1;
@@ -28,9 +30,12 @@ int main(int argc, char** argv) {
   int left = std::atoi(argv[1]);
   mpf::Dispatcher dispatcher(mpf::Backplane::attach());
   mpf::MessageClient client(dispatcher, [&](mpf::Message&& message) {
-    if (const auto* connect = message.tryAs<mpf::Connect>(); connect != nullptr && connect->status == mpf::ConnectStatus::connectYes) {
+    if (const auto* connect = message.tryAs<mpf::Connect>();
+        connect != nullptr && connect->status == mpf::ConnectStatus::connectYes) {
       for (int value = 1; value <= left; ++value) {
-        if (client.send(mpf::Int32Message({.value = value}), mpf::Deadline::after(5s)) != mpf::SendResult::sent) std::abort();
+        if (client.send(mpf::Int32Message({.value = value}), mpf::Deadline::after(5s)) !=
+            mpf::SendResult::sent)
+          std::abort();
       }
     } else if (const auto* reply = message.tryAs<mpf::Int32>()) {
       std::cout << "reply " << reply->value << '\n';

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <iostream>
 
-#include <mpf/client/sync_client.h>
+#include <mpf/sync_client.h>
 
 int main(int argc, char** argv) {
   using namespace std::chrono_literals;
@@ -14,14 +14,16 @@ int main(int argc, char** argv) {
     return 2;
   }
   mpf::SyncClient client(mpf::Backplane::attach(), "waveform");
-  auto first = client.call(mpf::Int32Message(), 5s);  // the first reply ends the request; the server goes on sending
+  auto first = client.call(mpf::Int32Message(),
+                           5s);  // the first reply ends the request; the server goes on sending
   if (!first) {
     std::cerr << "waveform_client: " << first.why() << '\n';
     return 1;
   }
   auto waveform = std::move(first.message());
   for (int left = std::atoi(argv[1]); left > 0; --left) {
-    const auto samples = waveform.valueAs<mpf::Float64Array>();  // in shared memory, until the message is destroyed
+    // in shared memory, until the message is destroyed
+    const auto samples = waveform.valueAs<mpf::Float64Array>();
     if (samples.empty()) {
       std::cerr << "waveform_client: no waveform within 5 s\n";
       return 1;

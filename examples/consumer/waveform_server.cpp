@@ -5,7 +5,7 @@
 #include <csignal>
 #include <vector>
 
-#include <mpf/server/message_server.h>
+#include <mpf/message_server.h>
 
 namespace {
 
@@ -21,7 +21,8 @@ void stop(int /*signal*/) {
 
 // Returns false when the subscriber is gone. A full queue costs the subscriber this waveform only.
 bool sendWaveform(mpf::MessageServer& server, const mpf::Message& request, double phase) {
-  auto reply = server.allocReplyMessage<mpf::Float64Array>(request, kSamples);  // in the memory that the client reads
+  // in the memory that the client reads
+  auto reply = server.allocReplyMessage<mpf::Float64Array>(request, kSamples);
   double x = phase;
   for (auto& sample : reply.value()) sample = std::sin(x += 0.01);
   return server.reply(std::move(reply)) != mpf::ReplyResult::clientGone;
@@ -32,8 +33,10 @@ bool sendWaveform(mpf::MessageServer& server, const mpf::Message& request, doubl
 int main() {
   using namespace std::chrono_literals;
   mpf::MessageServer server(mpf::Backplane::attach(), "waveform");
-  std::vector<mpf::Message> subscribers;  // a request that the server keeps may be answered any number of times
-  server.on<mpf::Int32>([&](mpf::Int32Message&& request) { subscribers.push_back(std::move(request)); });
+  // a request that the server keeps may be answered any number of times
+  std::vector<mpf::Message> subscribers;
+  server.on<mpf::Int32>(
+      [&](mpf::Int32Message&& request) { subscribers.push_back(std::move(request)); });
   running = &server;
   std::signal(SIGTERM, stop);
   std::signal(SIGINT, stop);
@@ -45,7 +48,8 @@ int main() {
       while (server.handleOne()) {
       }
     }
-    std::erase_if(subscribers, [&](const auto& request) { return !sendWaveform(server, request, phase); });
+    std::erase_if(subscribers,
+                  [&](const auto& request) { return !sendWaveform(server, request, phase); });
     phase += 0.1;
   }
 }

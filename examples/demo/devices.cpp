@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
+#include "devices.h"
+
 #include <charconv>
 #include <cmath>
 #include <string_view>
 
-#include <mpf/drivers/dac128v/dac128v_range.h>
-#include <mpf/schema/digital_io_server.h>
-#include <mpf/schema/serial_server.h>
-
-#include "devices.h"
+#include <mpf/digital_io_commands.h>
+#include <mpf/drivers/dac128v_range.h>
+#include <mpf/serial_commands.h>
 
 namespace mpf::demo {
 namespace {
@@ -33,7 +33,8 @@ void DemoDevices::give(double volts, std::uint8_t bits) {
   given_ = {};
   const auto code = kDacRange.tryCodeOf(volts).value_or(0);
   if (call(dac_, {.address = 0, .value = code})) given_.written = kDacRange.voltsOf(code);
-  if (call(out_, {.cmd = digital::cmdWriteBits, .address = 0xff00, .value = bits << 8})) given_.outputs = bits;
+  if (call(out_, {.cmd = digital::cmdWriteBits, .address = 0xff00, .value = bits << 8}))
+    given_.outputs = bits;
 }
 
 Sample DemoDevices::look() {
@@ -62,7 +63,8 @@ std::optional<std::uint8_t> DemoDevices::followInputs() {
     const auto* const news = message.tryAs<Int32>();
     if (news == nullptr) continue;
     ++told_;
-    inputs_ = news->status == 0 ? std::optional(static_cast<std::uint8_t>(news->value)) : std::nullopt;
+    inputs_ =
+        news->status == 0 ? std::optional(static_cast<std::uint8_t>(news->value)) : std::nullopt;
   }
   if (!in_.client().isConnected()) isMonitoring_ = false;
   if (isMonitoring_) return inputs_;

@@ -13,7 +13,7 @@
 #include <optional>
 #include <string>
 
-#include <mpf/client/sync_client.h>
+#include <mpf/sync_client.h>
 
 namespace mpf::demo {
 

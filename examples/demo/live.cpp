@@ -17,14 +17,14 @@
 #include <numbers>
 #include <thread>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/command_line.h>
-#include <mpf/base/run_main.h>
-#include <mpf/base/stop_signals.h>
-#include <mpf/tools/screen.h>
+#include <mpf/clock.h>
 
+#include "base/command_line.h"
+#include "base/run_main.h"
+#include "base/stop_signals.h"
 #include "devices.h"
 #include "picture.h"
+#include "tools/report/screen.h"
 
 namespace {
 
@@ -45,7 +45,8 @@ struct Options {
   double patience = 0.25;
 };
 
-std::atomic<bool> isStopped{false};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables): of a signal handler
+std::atomic<bool> isStopped{
+    false};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables): of a signal handler
 
 // The parts that were seen to work.
 struct Verdict {
@@ -54,7 +55,8 @@ struct Verdict {
   void add(const Sample& sample) {
     ++rounds;
     if (sample.inputs && sample.inputs == sample.outputs) ++followed;
-    if (sample.written && sample.measured && std::abs(*sample.written - *sample.measured) < kCloseVolts) {
+    if (sample.written && sample.measured &&
+        std::abs(*sample.written - *sample.measured) < kCloseVolts) {
       ++measured;
       if (std::abs(*sample.written) > kAwayVolts) ++measuredAway;
     }
@@ -132,22 +134,31 @@ Duration durationOf(double seconds) {
 int run(const Options& options) {
   const bool hasTerminal = ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0;
   const auto seconds = options.seconds > 0 || hasTerminal ? options.seconds : 5;
-  const auto end = seconds > 0 ? mpf::Deadline::after(durationOf<mpf::Nanoseconds>(seconds)) : mpf::Deadline::never();
-  const mpf::StopSignals stop([](void*) noexcept { isStopped.store(true, std::memory_order_relaxed); }, nullptr);
+  const auto end = seconds > 0 ? mpf::Deadline::after(durationOf<mpf::Nanoseconds>(seconds))
+                               : mpf::Deadline::never();
+  const mpf::StopSignals stop(
+      [](void*) noexcept { isStopped.store(true, std::memory_order_relaxed); }, nullptr);
   Rounds rounds(options.backplane, durationOf<std::chrono::milliseconds>(options.patience), end);
   (hasTerminal ? draw : print)(rounds);
   const auto& verdict = rounds.verdict();
-  fmt::print("of {} rounds: the ADC measured what the DAC gave in {}, inputs followed outputs in {}, the voltmeter answered in {}\n",
-             verdict.rounds, verdict.measured, verdict.followed, verdict.instrument);
+  fmt::print(
+      "of {} rounds: the ADC measured what the DAC gave in {}, inputs followed outputs in {}, the "
+      "voltmeter answered in {}\n",
+      verdict.rounds, verdict.measured, verdict.followed, verdict.instrument);
   return verdict.isGood() || isStopped.load(std::memory_order_relaxed) ? 0 : 1;
 }
 
 int demo(int argc, char** argv) {
   Options options;
-  CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws what they say", "mpf-demo");
-  app.add_option("--backplane", options.backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
-  app.add_option("--seconds", options.seconds, "End after so long; without a terminal 5, else with q")->check(mpf::number(0.1, 1e9));
-  app.add_option("--patience", options.patience, "Wait so long for an answer [s]; default 0.25")->check(mpf::number(0.001, 1e6));
+  CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws what they say",
+               "mpf-demo");
+  app.add_option("--backplane", options.backplane,
+                 "Backplane; default: $MPF_BACKPLANE, or \"default\"");
+  app.add_option("--seconds", options.seconds,
+                 "End after so long; without a terminal 5, else with q")
+      ->check(mpf::number(0.1, 1e9));
+  app.add_option("--patience", options.patience, "Wait so long for an answer [s]; default 0.25")
+      ->check(mpf::number(0.001, 1e6));
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
   return run(options);
 }

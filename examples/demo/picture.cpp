@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include "picture.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-
-#include "picture.h"
 
 namespace mpf::demo {
 namespace {
@@ -16,7 +16,9 @@ constexpr double kFullVolts = 5;
 constexpr std::array kBars{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
 constexpr double kBarVolts = 2.5;
 
-std::string voltsText(const std::optional<double>& volts) { return volts ? fmt::format("{:+7.4f} V", *volts) : "no answer"; }
+std::string voltsText(const std::optional<double>& volts) {
+  return volts ? fmt::format("{:+7.4f} V", *volts) : "no answer";
+}
 
 // Bit 0 is on the right.
 std::string lamps(const std::optional<std::uint8_t>& bits, const char* on, const char* off) {
@@ -48,7 +50,8 @@ std::vector<std::string> Picture::chart(std::size_t rows, std::size_t columns) c
   }
   std::vector<std::string> lines;
   for (std::size_t row = 0; row < rows; ++row) {
-    const auto top = kFullVolts - 2 * kFullVolts * static_cast<double>(row) / static_cast<double>(rows);
+    const auto top =
+        kFullVolts - 2 * kFullVolts * static_cast<double>(row) / static_cast<double>(rows);
     std::string text = row == 0 || row == rows / 2 ? fmt::format("{:+3.0f} V │", top) : "      │";
     for (const auto* const cell : cells[row]) text += cell;
     lines.push_back(text);
@@ -72,16 +75,21 @@ std::vector<tools::TopLine> Picture::lines(int rows, int columns, std::uint64_t 
   const auto& last = samples_.back();
   const auto width = static_cast<std::size_t>(std::max(columns - 7, 10));
   std::vector<tools::TopLine> lines{
-      {"MPF: four servers, each in a process of its own; this is a client of all of them", Style::title},
+      {"MPF: four servers, each in a process of its own; this is a client of all of them",
+       Style::title},
       {"", Style::plain},
-      {fmt::format("DAC channel 0 · {}   ── a wire ──►   ADC channel 0 ● {}", voltsText(last.written), voltsText(last.measured)),
+      {fmt::format("DAC channel 0 · {}   ── a wire ──►   ADC channel 0 ● {}",
+                   voltsText(last.written), voltsText(last.measured)),
        Style::heading}};
   for (auto& text : chart(static_cast<std::size_t>(std::clamp(rows - kOtherRows, 4, 21)), width))
     lines.push_back({std::move(text), Style::plain});
-  lines.push_back({fmt::format("digital lines 15..8  {}  outputs", lamps(last.outputs, "● ", "○ ")), Style::plain});
-  lines.push_back(
-      {fmt::format("               7..0  {}  inputs, wired to them: {} changes told", lamps(last.inputs, "● ", "○ "), told), Style::plain});
-  lines.push_back({fmt::format("a voltmeter on a serial line  {}", voltsText(last.instrument)), Style::heading});
+  lines.push_back({fmt::format("digital lines 15..8  {}  outputs", lamps(last.outputs, "● ", "○ ")),
+                   Style::plain});
+  lines.push_back({fmt::format("               7..0  {}  inputs, wired to them: {} changes told",
+                               lamps(last.inputs, "● ", "○ "), told),
+                   Style::plain});
+  lines.push_back({fmt::format("a voltmeter on a serial line  {}", voltsText(last.instrument)),
+                   Style::heading});
   lines.push_back({"      " + bars(width), Style::plain});
   lines.push_back({"q quit", Style::keys});
   return lines;
@@ -89,8 +97,10 @@ std::vector<tools::TopLine> Picture::lines(int rows, int columns, std::uint64_t 
 
 std::string Picture::line(std::uint64_t told) const {
   const auto& last = samples_.back();
-  return fmt::format("DAC {}  ADC {}  outputs {}  inputs {}  told {:4}  voltmeter {}", voltsText(last.written), voltsText(last.measured),
-                     lamps(last.outputs, "1", "0"), lamps(last.inputs, "1", "0"), told, voltsText(last.instrument));
+  return fmt::format("DAC {}  ADC {}  outputs {}  inputs {}  told {:4}  voltmeter {}",
+                     voltsText(last.written), voltsText(last.measured),
+                     lamps(last.outputs, "1", "0"), lamps(last.inputs, "1", "0"), told,
+                     voltsText(last.instrument));
 }
 
 }  // namespace mpf::demo

@@ -9,9 +9,8 @@
 #include <string>
 #include <vector>
 
-#include <mpf/tools/top_view.h>
-
 #include "devices.h"
+#include "tools/report/top_view.h"
 
 namespace mpf::demo {
 

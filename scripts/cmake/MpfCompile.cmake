@@ -8,12 +8,8 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 # All programs stand in one place, where the demo, the tests and `make bench` find them.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
-# Sources say #include <mpf/shm/window.h>, in this tree and in programs that use the installed one.
-set(MPF_INCLUDE_ROOT "${CMAKE_BINARY_DIR}/include")
-file(MAKE_DIRECTORY "${MPF_INCLUDE_ROOT}/mpf")
-foreach(folder base schema shm channel client server drivers router tools tests benchmarks)
-  file(CREATE_LINK "${CMAKE_SOURCE_DIR}/${folder}" "${MPF_INCLUDE_ROOT}/mpf/${folder}" SYMBOLIC)
-endforeach()
+# Public headers are included as users do: <mpf/message.h>. All others are named from the root: "shm/link.h".
+add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}" "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
 
 add_library(mpf_warnings INTERFACE)
 target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Werror)

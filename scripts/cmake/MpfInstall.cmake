@@ -18,11 +18,10 @@ function(mpf_find_targets out folder type)
 endfunction()
 
 # The libraries that other repositories link, as one archive libmpf.a: no link order to know, one name to write. Those of drivers/ are all public.
-set(publicLibraries mpf_base mpf_schema mpf_shm mpf_channel mpf_client mpf_server)
+set(publicLibraries mpf_base mpf_schema mpf_shm mpf_message_link mpf_client mpf_server)
 if(drivers IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/drivers/CMakeLists.txt")
   mpf_find_targets(publicLibraries "${CMAKE_SOURCE_DIR}/drivers" STATIC_LIBRARY)
 endif()
-set(publicFolders base schema shm channel client server drivers)
 
 # What those may link from outside, and how a consumer finds it: target, find_package() arguments, pkg-config name ("-": none needed).
 set(outsideTargets Threads::Threads Boost::headers CapnProto::capnp CapnProto::kj fmt::fmt spdlog::spdlog)
@@ -81,13 +80,8 @@ target_include_directories(mpf_all INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL
 
 # ---- headers and packages
 
-foreach(folder IN LISTS publicFolders)
-  foreach(origin "${CMAKE_SOURCE_DIR}/${folder}/" "${CMAKE_BINARY_DIR}/generated/mpf/${folder}/")
-    install(DIRECTORY "${origin}" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mpf/${folder} OPTIONAL
-      FILES_MATCHING PATTERN "*.h" PATTERN "*.capnp" PATTERN programs EXCLUDE
-      PATTERN command_line.h EXCLUDE) # of programs; not in the archive
-  endforeach()
-endforeach()
+install(DIRECTORY "${CMAKE_SOURCE_DIR}/include/mpf" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(FILES schema/message.capnp schema/router.capnp schema/recording.capnp DESTINATION ${CMAKE_INSTALL_DATADIR}/mpf) # for other implementations
 
 set(packageFolder ${CMAKE_INSTALL_LIBDIR}/cmake/mpf)
 install(TARGETS mpf_all EXPORT mpfTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/echo_server.h>
+#include "server/programs/echo_server.h"
 
 int main(int argc, char** argv) {
-  return mpf::runEchoServer(argc, argv, {"mpf-char8-array-server", "Char8Array", "Char8Array message", [](mpf::MessageServer& server) {
-                                           server.on<mpf::Char8Array>([](mpf::Char8ArrayMessage&) {});
-                                         }});
+  return mpf::runEchoServer(argc, argv,
+                            {"mpf-char8-array-server", "Char8Array", "Char8Array message",
+                             [](mpf::MessageServer& server) {
+                               server.on<mpf::Char8Array>([](mpf::Char8ArrayMessage&) {});
+                             }});
 }

@@ -1,28 +1,30 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/echo_server.h>
+#include "server/programs/echo_server.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <fmt/format.h>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/run_main.h>
-#include <mpf/server/programs/server_arguments.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/shm/link.h>
+#include "base/command_line.h"
+#include "base/run_main.h"
+#include "server/programs/server_arguments.h"
+#include "server/programs/server_log.h"
+#include "shm/link.h"
 
 namespace mpf {
 
 namespace {
 
 int serve(int argc, char** argv, const EchoServer& echo) {
-  CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what), echo.program);
+  CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what),
+               echo.program);
   std::string name = echo.server;
   ServerArguments arguments;
   app.add_option("server", name, "Name under which clients find it")->capture_default_str();
-  app.add_option("--queue-size", arguments.messages.queueSize,
-                 fmt::format("Requests of one client that may wait, 1 to {}", LinkGeometry::kMaxQueueSize))
+  app.add_option(
+         "--queue-size", arguments.messages.queueSize,
+         fmt::format("Requests of one client that may wait, 1 to {}", LinkGeometry::kMaxQueueSize))
       ->capture_default_str()
       ->check(wholeNumber(1, LinkGeometry::kMaxQueueSize));
   arguments.addTo(app);

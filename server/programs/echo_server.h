@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include <mpf/server/message_server.h>
+#include <mpf/message_server.h>
 
 namespace mpf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/log.h>
+#include "server/programs/log.h"
 
 namespace mpf {
 
@@ -16,7 +16,9 @@ Log Log::forObject() const {
   return other;
 }
 
-void Log::setLevel(const std::string& name) const { core_->least.store(spdlog::level::from_str(name), std::memory_order_relaxed); }
+void Log::setLevel(const std::string& name) const {
+  core_->least.store(spdlog::level::from_str(name), std::memory_order_relaxed);
+}
 
 void Log::onHeld(std::function<void(std::int64_t)> held) const {
   const std::scoped_lock guard(core_->lock);

@@ -4,8 +4,8 @@
 //   log.info("{} is back", port)
 //   const Log ofThisRemote = log.forObject();    // its lines have limits of their own
 //
-// A kind is one statement in the source and one object. Statements that other users can cause share the
-// limits of their object, so do not give objects that others create a Log of their own.
+// A kind is one statement in the source and one object. Statements that other users can cause share
+// the limits of their object, so do not give objects that others create a Log of their own.
 //
 // Threads  any may log. `write` is called under a lock, in the order of the lines.
 #pragma once
@@ -21,8 +21,9 @@
 #include <type_traits>
 #include <utility>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/log_limiter.h>
+#include <mpf/clock.h>
+
+#include "base/log_limiter.h"
 
 namespace mpf {
 
@@ -65,7 +66,8 @@ class Log {
     say(Level::err, format, std::forward<Arguments>(arguments)...);
   }
   template <class... Arguments>
-  void critical(LogFormat<std::type_identity_t<Arguments>...> format, Arguments&&... arguments) const {
+  void critical(LogFormat<std::type_identity_t<Arguments>...> format,
+                Arguments&&... arguments) const {
     say(Level::critical, format, std::forward<Arguments>(arguments)...);
   }
 
@@ -92,7 +94,8 @@ class Log {
   };
 
   template <class... Arguments>
-  void say(Level level, const LogFormat<std::type_identity_t<Arguments>...>& format, Arguments&&... arguments) const {
+  void say(Level level, const LogFormat<std::type_identity_t<Arguments>...>& format,
+           Arguments&&... arguments) const {
     if (level < core_->least.load(std::memory_order_relaxed)) return;
     sayText(level, format.at, fmt::format(format.format, std::forward<Arguments>(arguments)...));
   }

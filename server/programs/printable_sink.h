@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PrintableSink: where the log of a program goes to: stderr, one line for each message, printable().
+// PrintableSink: where the log of a program goes to: stderr, one line for each message,
+// printable().
 //
 // Threads  any.
 // Crash    a line is one call of write(); what stderr does not take is lost, and nothing fails.
@@ -9,7 +10,7 @@
 #include <mutex>
 #include <spdlog/sinks/base_sink.h>
 
-#include <mpf/base/print_error.h>
+#include "base/print_error.h"
 
 namespace mpf {
 

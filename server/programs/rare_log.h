@@ -11,14 +11,14 @@
 #include <optional>
 #include <utility>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 
 namespace mpf {
 
 class RareLog {
  public:
-  // Counts one event. Returns how many there were since the last one that was logged, this one included,
-  // when this one should be logged.
+  // Counts one event. Returns how many there were since the last one that was logged, this one
+  // included, when this one should be logged.
   std::optional<std::uint64_t> note() noexcept {
     ++times_;
     if (!next_.hasPassed()) return std::nullopt;

@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/server_arguments.h>
+#include "server/programs/server_arguments.h"
 
 #include <CLI/CLI.hpp>
 #include <map>
 #include <stdexcept>
 
-#include <mpf/base/command_line.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/shm/link.h>
-#include <mpf/shm/rights_text.h>
+#include "base/command_line.h"
+#include "server/programs/server_log.h"
+#include "shm/link.h"
+#include "shm/rights_text.h"
 
 namespace mpf {
 namespace {
 
 constexpr int kQueueSizeAsBefore = 20;
-const std::map<std::string, WaitMode> kWaitModes{{"spin", WaitMode::spin}, {"adaptive", WaitMode::adaptive}, {"block", WaitMode::block}};
+const std::map<std::string, WaitMode> kWaitModes{
+    {"spin", WaitMode::spin}, {"adaptive", WaitMode::adaptive}, {"block", WaitMode::block}};
 
 // What `parse` makes of the value of `option`.
 template <class Value>
-void take(const char* option, const std::string& text, Value (*parse)(const std::string&), Value& into) try {
+void take(const char* option, const std::string& text, Value (*parse)(const std::string&),
+          Value& into) try {
   into = parse(text);
 } catch (const std::invalid_argument& error) {
   throw CLI::ValidationError(option, error.what());
@@ -37,16 +39,25 @@ void ServerArguments::addTo(CLI::App& app) {
   app.add_option("--backplane", backplane, "Backplane; default: $MPF_BACKPLANE, or \"default\"");
   app.add_option("--location", messages.location, "Location; default: $MPF_LOCATION, or 0");
   app.add_option_function<std::string>(
-         "--wait-mode", [this](const std::string& name) { messages.waitMode = kWaitModes.at(name); },
-         "How it waits for requests: spin takes a processor, block sleeps at once, adaptive spins for a while")
+         "--wait-mode",
+         [this](const std::string& name) { messages.waitMode = kWaitModes.at(name); },
+         "How it waits for requests: spin takes a processor, block sleeps at once, adaptive spins "
+         "for a while")
       ->check(CLI::IsMember(kWaitModes))
       ->default_str("adaptive");
   auto* const mode = app.add_option_function<std::string>(
-                            "--mode", [this](const std::string& text) { take("--mode", text, parseMode, messages.rights.mode); },
-                            "Who may be a client, octal as for chmod: 0600 its own user, 0660 also the group, 0666 everybody")
+                            "--mode",
+                            [this](const std::string& text) {
+                              take("--mode", text, parseMode, messages.rights.mode);
+                            },
+                            "Who may be a client, octal as for chmod: 0600 its own user, 0660 also "
+                            "the group, 0666 everybody")
                          ->default_str("0600");
   app.add_option_function<std::string>(
-         "--group", [this](const std::string& name) { take("--group", name, parseGroup, messages.rights.group); },
+         "--group",
+         [this](const std::string& name) {
+           take("--group", name, parseGroup, messages.rights.group);
+         },
          "The group that --mode speaks of; default: the user's own")
       ->needs(mode);
   app.add_option("--log-level", logLevel, "Least weight of what it says on stderr")

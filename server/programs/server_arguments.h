@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // ServerArguments: the options that all server programs have.
 //
-//   --backplane NAME   --location N   --wait-mode spin|adaptive|block   --mode 0660   --group NAME   --log-level info
+//   --backplane NAME   --location N   --wait-mode spin|adaptive|block   --mode 0660   --group NAME
+//   --log-level info
 #pragma once
 
 #include <string>
 
-#include <mpf/server/message_server.h>
+#include <mpf/message_server.h>
 
 namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
 class App;
@@ -19,8 +20,8 @@ struct ServerArguments {
   std::string logLevel = "info";
   ServerOptions messages;
 
-  // Adds the options to `app`, which fills this object when it parses and must not outlive it. A value that is none is a
-  // CLI::ValidationError that says which values there are.
+  // Adds the options to `app`, which fills this object when it parses and must not outlive it. A
+  // value that is none is a CLI::ValidationError that says which values there are.
   void addTo(CLI::App& app);
   // Adds what old commands call queuesize, an argument that may be left out.
   void addQueueSizeTo(CLI::App& app);

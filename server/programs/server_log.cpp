@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/server_log.h>
+#include "server/programs/server_log.h"
 
 #include <algorithm>
 #include <condition_variable>
@@ -9,9 +9,10 @@
 #include <thread>
 #include <utility>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/printable_sink.h>
+#include <mpf/message_server.h>
+
+#include "base/signals_blocked.h"
+#include "server/programs/printable_sink.h"
 
 namespace mpf {
 namespace {
@@ -23,7 +24,8 @@ constexpr std::size_t kLinesThatMayWait = 1024;
 // The queue, and the thread that empties it.
 class ServerLog::Writer {
  public:
-  explicit Writer(const std::string& program) : logger_(program, std::make_shared<PrintableSink>()) {
+  explicit Writer(const std::string& program)
+      : logger_(program, std::make_shared<PrintableSink>()) {
     logger_.set_level(Log::Level::trace);
     logger_.set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
   }
@@ -95,8 +97,10 @@ class ServerLog::Writer {
     const auto lines = std::exchange(queue_, {});
     const auto dropped = std::exchange(dropped_, 0);
     guard.unlock();
-    if (dropped != 0) logger_.warn("{} lines are missing here: nobody read stderr in time", dropped);
-    for (const auto& line : lines) logger_.log(line.time, spdlog::source_loc{}, line.level, line.text);
+    if (dropped != 0)
+      logger_.warn("{} lines are missing here: nobody read stderr in time", dropped);
+    for (const auto& line : lines)
+      logger_.log(line.time, spdlog::source_loc{}, line.level, line.text);
     guard.lock();
   }
 
@@ -113,7 +117,9 @@ class ServerLog::Writer {
 // A Log that outlives this object keeps the queue, whose lines nobody writes any more.
 ServerLog::ServerLog(const std::string& program, const std::string& level)
     : writer_(std::make_shared<Writer>(program)),
-      log_([writer = writer_](Log::Level of, std::string text) { writer->add(of, std::move(text)); }, spdlog::level::from_str(level)) {
+      log_(
+          [writer = writer_](Log::Level of, std::string text) { writer->add(of, std::move(text)); },
+          spdlog::level::from_str(level)) {
   log_.onHeld([writer = writer_](std::int64_t dueNs) { writer->wakeAt(dueNs); });
   writer_->start(log_);
 }
@@ -126,12 +132,14 @@ ServerLog::~ServerLog() {
 void logShortages(MessageServer& server, const ServerLog& log) {
   server.onShortage([&log, name = server.getName()](const std::string& why) {
     if (why.empty()) return log->info(R"("{}" accepts clients again)", name);
-    log->warn(R"("{}" cannot accept another client: {}; start it with higher limits (ulimit -n))", name, why);
+    log->warn(R"("{}" cannot accept another client: {}; start it with higher limits (ulimit -n))",
+              name, why);
   });
 }
 
 const std::vector<std::string>& ServerLog::levels() {
-  static const std::vector<std::string> names{"trace", "debug", "info", "warning", "error", "critical", "off"};
+  static const std::vector<std::string> names{"trace", "debug",    "info", "warning",
+                                              "error", "critical", "off"};
   return names;
 }
 

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // ServerLog: what a server program says to people, on stderr.
 //
-//   2024-05-01 12:00:00.000 info mpf-serial-server: /dev/ttyS0 is lost: read /dev/ttyS0: Input/output error
+//   2024-05-01 12:00:00.000 info mpf-serial-server: /dev/ttyS0 is lost: read /dev/ttyS0:
+//   Input/output error
 //
 //   threads ─► Log (limits lines of one kind) ─► queue ─► one thread ─► stderr
 //
-// Threads  any may log; none waits for stderr. When nobody reads stderr, the oldest lines in the queue
-//          are dropped, and a line says how many.
+// Threads  any may log; none waits for stderr. When nobody reads stderr, the oldest lines in the
+//          queue are dropped, and a line says how many.
 // Crash    lines in the queue, and lines that the limit holds, are lost.
 #pragma once
 
@@ -14,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/server/programs/log.h>
+#include "server/programs/log.h"
 
 namespace mpf {
 
@@ -42,7 +43,8 @@ class ServerLog {
 
 class MessageServer;
 
-// Says when `server` cannot accept clients for lack of descriptors or memory, and when it can again.
+// Says when `server` cannot accept clients for lack of descriptors or memory, and when it can
+// again.
 //   log  outlives the server
 void logShortages(MessageServer& server, const ServerLog& log);
 

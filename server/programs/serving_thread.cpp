@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serving_thread.h>
+#include "server/programs/serving_thread.h"
 
 #include <signal.h>
 #include <unistd.h>
@@ -7,11 +7,12 @@
 #include <exception>
 #include <utility>
 
-#include <mpf/base/signals_blocked.h>
+#include "base/signals_blocked.h"
 
 namespace mpf {
 
-void ServingThread::start(const ServerLog& log, std::function<void()> serve, std::function<void()> failed) {
+void ServingThread::start(const ServerLog& log, std::function<void()> serve,
+                          std::function<void()> failed) {
   const SignalsBlocked blocked;
   thread_ = std::thread([&log, serve = std::move(serve), failed = std::move(failed)] {
     try {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// ServingThread: a thread that serves. When that ends by an exception, the log says why and the program ends: a window that stays open while
-// nobody serves it would take requests and never answer them.
+// ServingThread: a thread that serves. When that ends by an exception, the log says why and the
+// program ends: a window that stays open while nobody serves it would take requests and never
+// answer them.
 //
 //   ProgramFailure failure;                                        // main()'s
 //   ServingThread thread;
@@ -16,7 +17,7 @@
 #include <functional>
 #include <thread>
 
-#include <mpf/server/programs/server_log.h>
+#include "server/programs/server_log.h"
 
 namespace mpf {
 
@@ -27,7 +28,8 @@ class ServingThread {
   ServingThread(const ServingThread&) = delete;
   ServingThread& operator=(const ServingThread&) = delete;
 
-  // `serve` runs with all signals blocked, until whoever started it has told it to return; `failed` after it has thrown.
+  // `serve` runs with all signals blocked, until whoever started it has told it to return; `failed`
+  // after it has thrown.
   //   log  outlives the thread
   void start(const ServerLog& log, std::function<void()> serve, std::function<void()> failed);
   // Waits for its end; returns at once when it was not started.
@@ -41,7 +43,9 @@ class ServingThread {
 class ProgramFailure {
  public:
   void report() noexcept;
-  [[nodiscard]] int exitStatus() const noexcept { return isReported_.load(std::memory_order_relaxed) ? 1 : 0; }
+  [[nodiscard]] int exitStatus() const noexcept {
+    return isReported_.load(std::memory_order_relaxed) ? 1 : 0;
+  }
 
  private:
   std::atomic<bool> isReported_{false};

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // What all programs do alike with their arguments: what is said, where, and with which exit status.
-#include <mpf/base/command_line.h>
+#include "base/command_line.h"
 
 #include <CLI/CLI.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <vector>
 
-#include <mpf/base/version.h>
+#include "base/version.h"
 
 namespace mpf::test {
 namespace {
@@ -47,7 +47,8 @@ class CommandLine : public testing::Test {
 };
 
 TEST_F(CommandLine, ThatIsRightIsTakenInSilence) {
-  const auto outcome = parse({"--count", "10", "--more", "18446744073709551615", "--speed", "1e-3"});
+  const auto outcome =
+      parse({"--count", "10", "--more", "18446744073709551615", "--speed", "1e-3"});
 
   EXPECT_EQ(outcome.status, std::nullopt);
   EXPECT_EQ(count_, 10U);
@@ -76,7 +77,8 @@ TEST_F(CommandLine, ThatIsWrongIsNamedOnStderrAndEndsWith2) {
       {{"--count", "1.5"}, "--count: 1.5 is out of range: use 1 to 10"},
       {{"--count", "4294967297"}, "--count: 4294967297 is out of range: use 1 to 10"},
       {{"--more", "0"}, "--more: 0 is out of range: use 1 or more"},
-      {{"--more", "18446744073709551616"}, "--more: 18446744073709551616 is out of range: use 1 or more"},
+      {{"--more", "18446744073709551616"},
+       "--more: 18446744073709551616 is out of range: use 1 or more"},
       {{"--speed", "nan"}, "--speed: nan is out of range: use 0 to 1.5"},
       {{"--speed", "-0.1"}, "--speed: -0.1 is out of range: use 0 to 1.5"},
       {{"--speed", "fast"}, "--speed: fast is out of range: use 0 to 1.5"},
@@ -99,8 +101,11 @@ TEST_F(CommandLine, OfASubcommandNamesIt) {
   app.require_subcommand(1);
 
   EXPECT_EQ(parse(app, {"one", "--count", "11"}).err,
-            "mpf-y one: --count: 11 is out of range: use 1 to 10; `mpf-y one --help` shows how to use it\n");
-  EXPECT_EQ(parse(app, {"three"}).err, "mpf-y: no subcommand or option \"three\"; there are one, two; `mpf-y --help` shows what they do\n");
+            "mpf-y one: --count: 11 is out of range: use 1 to 10; `mpf-y one --help` shows how to "
+            "use it\n");
+  EXPECT_EQ(parse(app, {"three"}).err,
+            "mpf-y: no subcommand or option \"three\"; there are one, two; `mpf-y --help` shows "
+            "what they do\n");
   const auto nothing = parse(app, {});
   EXPECT_EQ(nothing.status, 2);
   EXPECT_THAT(nothing.err, StartsWith("mpf-y - what it is for"));

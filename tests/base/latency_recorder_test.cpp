@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/latency_recorder.h>
+#include "base/latency_recorder.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Storms of log lines: which lines are written, and that the counts add up. The test is the clock.
-#include <mpf/base/log_limiter.h>
+#include "base/log_limiter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -50,7 +50,8 @@ TEST_F(LogLimiterTest, CountsLinesThatAreAlike) {
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("status -1"));
   nowNs_ += kEveryNs;
 
-  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)), ElementsAre("status -1 (repeated 1000 times in 10.0 s)"));
+  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)),
+              ElementsAre("status -1 (repeated 1000 times in 10.0 s)"));
   EXPECT_EQ(limiter_.dueNs(), INT64_MAX);
 }
 
@@ -59,7 +60,8 @@ TEST_F(LogLimiterTest, KeepsTheLastOfLinesThatDiffer) {
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("request " + std::to_string(i)));
   nowNs_ += kEveryNs;
 
-  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)), ElementsAre("request 999 (the last of 1000 such lines in 10.0 s)"));
+  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)),
+              ElementsAre("request 999 (the last of 1000 such lines in 10.0 s)"));
 }
 
 TEST_F(LogLimiterTest, WritesASingleHeldLineAsItIs) {
@@ -100,7 +102,8 @@ TEST_F(LogLimiterTest, HoldsALineBehindHeldOnes) {
 
   EXPECT_FALSE(admit("third"));
 
-  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)), ElementsAre("third (the last of 2 such lines in 10.0 s)"));
+  EXPECT_THAT(texts(limiter_.takeDue(nowNs_)),
+              ElementsAre("third (the last of 2 such lines in 10.0 s)"));
 }
 
 TEST_F(LogLimiterTest, GivesAKindItsLinesBackWithTime) {
@@ -139,7 +142,8 @@ TEST_F(LogLimiterTest, WritesFewLinesOfALongStormAndLosesNone) {
         ++counted;
       }
     }
-    nowNs_ += random() % 100 == 0 ? 60'000'000'000 : static_cast<std::int64_t>(random() % 3'000'000'000);
+    nowNs_ +=
+        random() % 100 == 0 ? 60'000'000'000 : static_cast<std::int64_t>(random() % 3'000'000'000);
     if (limiter_.dueNs() <= nowNs_) note(limiter_.takeDue(nowNs_));
   }
   note(limiter_.takeAll(nowNs_));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Files in which no failed write goes unnoticed.
-#include <mpf/base/output_file.h>
+#include "base/output_file.h"
 
 #include <filesystem>
 #include <fstream>
@@ -9,7 +9,7 @@
 #include <sstream>
 #include <system_error>
 
-#include <mpf/tests/support/temporary_folder.h>
+#include "tests/support/temporary_folder.h"
 
 namespace mpf {
 namespace {
@@ -56,7 +56,8 @@ TEST(OutputFile, SaysBeforeTheWorkThatItCannotBeWritten) {
 
   EXPECT_EQ(errorOf([] { OutputFile("/dev/full"); }), "write /dev/full: No space left on device");
   const auto missing = folder.file("none/x");
-  EXPECT_EQ(errorOf([&] { OutputFile{missing}; }), "open " + missing + ": No such file or directory");
+  EXPECT_EQ(errorOf([&] { OutputFile{missing}; }),
+            "open " + missing + ": No such file or directory");
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Text of other processes and hosts, made safe to show.
-#include <mpf/base/printable.h>
+#include "base/printable.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,8 @@ namespace mpf {
 namespace {
 
 TEST(Printable, LeavesTextAsItIs) {
-  for (const std::string text : {"", "dac", "Ofen-Süd °C", "電圧", "\U0001F525", "a\\b \"c\" ~"}) EXPECT_EQ(printable(text), text);
+  for (const std::string text : {"", "dac", "Ofen-Süd °C", "電圧", "\U0001F525", "a\\b \"c\" ~"})
+    EXPECT_EQ(printable(text), text);
 }
 
 TEST(Printable, EscapesControlCharacters) {
@@ -41,7 +42,8 @@ TEST(Printable, EscapesEachByteThatIsNotUtf8) {
 TEST(Printable, OfLinesKeepsTheirEnds) { EXPECT_EQ(printableLines("a\r\nb\n"), "a\\r\nb\n"); }
 
 TEST(Printable, OfADocumentIsWhatItWasToAProgram) {
-  EXPECT_EQ(printableJson("{\n \"a\": \"b\u202e\x7f\u00fc\"\n}"), "{\n \"a\": \"b\\u202e\\u007f\u00fc\"\n}");
+  EXPECT_EQ(printableJson("{\n \"a\": \"b\u202e\x7f\u00fc\"\n}"),
+            "{\n \"a\": \"b\\u202e\\u007f\u00fc\"\n}");
   EXPECT_EQ(printableJson("\"\U000e0041\""), "\"\\udb40\\udc41\"");
 }
 

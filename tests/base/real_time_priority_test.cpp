@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // These tests need a user who may have real-time priority; others skip them.
-#include <mpf/base/real_time_priority.h>
+#include <mpf/real_time_priority.h>
 
 #include <sched.h>
 
@@ -8,7 +8,7 @@
 #include <mutex>
 #include <thread>
 
-#include <mpf/base/inheriting_mutex.h>
+#include "base/inheriting_mutex.h"
 
 namespace mpf {
 namespace {
@@ -20,7 +20,8 @@ int policyOfThisThread() { return ::sched_getscheduler(0) & ~SCHED_RESET_ON_FORK
 class RealTimePriorityTest : public testing::Test {
  protected:
   void SetUp() override {
-    if (!RealTimePriority::isAllowed(kPriority)) GTEST_SKIP() << "this user may not have real-time priority";
+    if (!RealTimePriority::isAllowed(kPriority))
+      GTEST_SKIP() << "this user may not have real-time priority";
   }
 };
 
@@ -29,7 +30,9 @@ TEST_F(RealTimePriorityTest, IsThatOfTheThreadAlone) {
     const RealTimePriority priority(kPriority);
     EXPECT_TRUE(priority.isHeld());
     EXPECT_EQ(policyOfThisThread(), SCHED_FIFO);
-    std::thread([] { EXPECT_EQ(policyOfThisThread(), SCHED_OTHER) << "threads that it starts do not inherit it"; }).join();
+    std::thread([] {
+      EXPECT_EQ(policyOfThisThread(), SCHED_OTHER) << "threads that it starts do not inherit it";
+    }).join();
   }).join();
 
   EXPECT_EQ(policyOfThisThread(), SCHED_OTHER);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What every main() does around its work, in a child process whose descriptors are closed or full.
-#include <mpf/base/run_main.h>
+#include "base/run_main.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -15,9 +15,10 @@
 #include <stdexcept>
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/standard_descriptors.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/standard_descriptors.h"
+#include "base/system_call.h"
 
 namespace mpf {
 namespace {
@@ -36,7 +37,8 @@ int endOf(const std::function<int()>& act) {
 
 bool isNull(int descriptor) {
   struct stat status{};
-  return ::fstat(descriptor, &status) == 0 && S_ISCHR(status.st_mode) && status.st_rdev == makedev(1, 3);
+  return ::fstat(descriptor, &status) == 0 && S_ISCHR(status.st_mode) &&
+         status.st_rdev == makedev(1, 3);
 }
 
 void closeAll(unsigned subset) {
@@ -90,8 +92,12 @@ TEST(RunMain, LeavesOpenDescriptorsAlone) {
 TEST(RunMain, AnExceptionIsALineAndAStatus) {
   const Errors errors;
 
-  const auto failed = endOf([&] { return errors.take(), runMain("x", []() -> int { throw std::runtime_error("bad \x1b[2J"); }); });
-  const auto wrong = endOf([&] { return errors.take(), runMain("x", []() -> int { throw std::invalid_argument("odd"); }); });
+  const auto failed = endOf([&] {
+    return errors.take(), runMain("x", []() -> int { throw std::runtime_error("bad \x1b[2J"); });
+  });
+  const auto wrong = endOf([&] {
+    return errors.take(), runMain("x", []() -> int { throw std::invalid_argument("odd"); });
+  });
   const auto unknown = endOf([&] { return errors.take(), runMain("x", []() -> int { throw 1; }); });
 
   EXPECT_EQ(failed, kExitFailed);
@@ -101,7 +107,9 @@ TEST(RunMain, AnExceptionIsALineAndAStatus) {
 }
 
 TEST(RunMain, ToReportAnErrorNeverFails) {
-  const auto fail = [] { return runMain("x", []() -> int { throw std::invalid_argument("odd"); }); };
+  const auto fail = [] {
+    return runMain("x", []() -> int { throw std::invalid_argument("odd"); });
+  };
 
   EXPECT_EQ(endOf([&] { return closeAll(4), fail(); }), kExitUsage);
   EXPECT_EQ(endOf([&] { return redirect(STDERR_FILENO, "/dev/full"), fail(); }), kExitUsage);
@@ -114,11 +122,13 @@ TEST(RunMain, OutputThatCannotBeWrittenIsAFailure) {
   const auto end = endOf([&] {
     errors.take();
     redirect(STDOUT_FILENO, "/dev/full");
-    return runMain("x", [] { return std::printf("a line that waits in the buffer\n") > 0 ? 0 : kGood; });
+    return runMain("x",
+                   [] { return std::printf("a line that waits in the buffer\n") > 0 ? 0 : kGood; });
   });
 
   EXPECT_EQ(end, kExitFailed);
-  EXPECT_EQ(errors.text(), "x: standard output: not everything could be written: No space left on device\n");
+  EXPECT_EQ(errors.text(),
+            "x: standard output: not everything could be written: No space left on device\n");
 }
 
 TEST(CloseDescriptor, KeepsAStandardNumberInUse) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/stop_bell.h>
+#include "base/stop_bell.h"
 
 #include <signal.h>
 
 #include <gtest/gtest.h>
 #include <thread>
 
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/base/stop_signals.h>
+#include "base/stop_signals.h"
 
 #include <pthread.h>
 #include <signal.h>
@@ -12,8 +12,8 @@
 #include <optional>
 #include <thread>
 
-#include <mpf/base/system_call.h>
-#include <mpf/tests/support/watchdog.h>
+#include "base/system_call.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -27,7 +27,8 @@ class StopSignalsTest : public testing::Test {
   // Returns once the other thread is in `callback`.
   void interruptOther(StopSignals::Callback callback) {
     signals.emplace(callback, this);
-    ::pthread_kill(other.native_handle(), SIGTERM);  // NOLINT(bugprone-bad-signal-to-kill-thread): it is handled
+    ::pthread_kill(other.native_handle(),
+                   SIGTERM);  // NOLINT(bugprone-bad-signal-to-kill-thread): it is handled
     while (!entered) std::this_thread::yield();
   }
 
@@ -47,7 +48,8 @@ TEST_F(StopSignalsTest, EndOnceNoThreadIsInTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
     self.entered = true;
-    const timespec aWhile{.tv_sec = 0, .tv_nsec = 20'000'000};  // for an end that does not wait to come first
+    // for an end that does not wait to come first
+    const timespec aWhile{.tv_sec = 0, .tv_nsec = 20'000'000};
     ::nanosleep(&aWhile, nullptr);
     self.wasGone = self.isGone;
   });

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <mpf/tests/tools/tool.h>
+#include "tests/tools/tool.h"
 
 namespace mpf::test {
 namespace {
@@ -31,15 +31,19 @@ TEST(BenchCommand, ListsTheManualsTableAtBothPlaces) {
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   for (const auto* place : {"One host, loopback", "Two network namespaces, veth"}) {
-    for (const auto* row : {"raw TCP, no buffer", "raw TCP, 100 in one write", "MPF remote, no buffer", "MPF remote, 100 buffered",
-                            "MPF remote, 1000 buffered"})
-      EXPECT_THAT(ended.out, HasSubstr(std::string(place) + ": round trips of an Int32: " + row + ","));
+    for (const auto* row :
+         {"raw TCP, no buffer", "raw TCP, 100 in one write", "MPF remote, no buffer",
+          "MPF remote, 100 buffered", "MPF remote, 1000 buffered"})
+      EXPECT_THAT(ended.out,
+                  HasSubstr(std::string(place) + ": round trips of an Int32: " + row + ","));
   }
-  EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF local, no buffer"), HasSubstr("MPF local, 1000 buffered")));
+  EXPECT_THAT(ended.out,
+              AllOf(HasSubstr("MPF local, no buffer"), HasSubstr("MPF local, 1000 buffered")));
 }
 
 TEST(BenchCommand, MeasuresOnLoopback) {
-  const auto ended = bench({"remote", "--quick", "--json", "-", "--only", "loopback: round trips of an Int32: raw TCP, no buffer", "--only",
+  const auto ended = bench({"remote", "--quick", "--json", "-", "--only",
+                            "loopback: round trips of an Int32: raw TCP, no buffer", "--only",
                             "MPF local, 100 buffered"});
 
   EXPECT_EQ(ended.status, 0) << ended.err;
@@ -58,7 +62,10 @@ TEST(BenchCommand, LeavesOutNamespacesByNameForWhoMayNotMakeThem) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
   constexpr uid_t kNobody = 65534;
 
-  const auto ended = Tool({"bench", "remote", "--list", "--only", "veth: round trips of an Int32: raw TCP"}, {}, kNobody).end();
+  const auto ended =
+      Tool({"bench", "remote", "--list", "--only", "veth: round trips of an Int32: raw TCP"}, {},
+           kNobody)
+          .end();
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   EXPECT_THAT(ended.out, HasSubstr("(left out: unshare"));
@@ -68,8 +75,10 @@ TEST(BenchCommand, ListsEachServerOverHardware) {
   const auto ended = bench({"hardware", "--list"});
 
   EXPECT_EQ(ended.status, 0) << ended.err;
-  for (const auto* program : {"mpf-int32-server", "mpf-dac128v-server", "mpf-ip330-server", "mpf-digital-io-server", "mpf-serial-server"})
-    EXPECT_THAT(ended.out, HasSubstr(std::string("Round trips with a server over a model: ") + program));
+  for (const auto* program : {"mpf-int32-server", "mpf-dac128v-server", "mpf-ip330-server",
+                              "mpf-digital-io-server", "mpf-serial-server"})
+    EXPECT_THAT(ended.out,
+                HasSubstr(std::string("Round trips with a server over a model: ") + program));
   EXPECT_THAT(ended.out, AllOf(HasSubstr("the driver's thread"), HasSubstr("the manual's, local")));
 }
 
@@ -104,7 +113,8 @@ TEST(BenchCommand, MeasuresAServerOverAModelBesideTheEcho) {
 }
 
 TEST(BenchCommand, MeasuresEightSerialPortsBesideTheManual) {
-  const auto ended = bench({"hardware", "--quick", "--json", "-", "--only", "echo read, no line time"});
+  const auto ended =
+      bench({"hardware", "--quick", "--json", "-", "--only", "echo read, no line time"});
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   const auto rows = nlohmann::json::parse(ended.out);
@@ -117,7 +127,8 @@ TEST(BenchCommand, MeasuresEightSerialPortsBesideTheManual) {
 }
 
 TEST(BenchCommand, LooksAtAModelThatScans) {
-  const auto ended = bench({"hardware", "--quick", "--json", "-", "--only", "scans read", "--only", "driver's thread"});
+  const auto ended = bench(
+      {"hardware", "--quick", "--json", "-", "--only", "scans read", "--only", "driver's thread"});
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   const auto rows = nlohmann::json::parse(ended.out);

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
-// mpf_test_ask BACKPLANE SERVER LOCATION: sends every message to an echo, has it refuse, stall and die, and says what comes of each.
-// mpf_test_ask BACKPLANE SERVER LOCATION why: says why it is not connected, each time that this is something else.
+// mpf_test_ask BACKPLANE SERVER LOCATION: sends every message to an echo, has it refuse, stall and
+// die, and says what comes of each. mpf_test_ask BACKPLANE SERVER LOCATION why: says why it is not
+// connected, each time that this is something else.
 #include <cstddef>
 #include <deque>
 #include <string>
 #include <utility>
 
-#include <mpf/client/message_client.h>
-#include <mpf/schema/text.h>
-#include <mpf/tests/byte_order/talk.h>
-#include <mpf/tests/support/every_message.h>
+#include <mpf/message_client.h>
+
+#include "schema/text.h"
+#include "tests/byte_order/talk.h"
+#include "tests/support/every_message.h"
 
 namespace mpf::test {
 namespace {
@@ -17,7 +19,8 @@ namespace {
 class Asker {
  public:
   Asker(const std::string& backplane, const std::string& server, std::int32_t location)
-      : dispatcher_(Backplane::attach(backplane)), client_(dispatcher_, [this](Message&& message) { got_.push_back(std::move(message)); }) {
+      : dispatcher_(Backplane::attach(backplane)),
+        client_(dispatcher_, [this](Message&& message) { got_.push_back(std::move(message)); }) {
     client_.bind(server, location);
   }
 
@@ -31,7 +34,8 @@ class Asker {
   }
 
   void sayWhy() {
-    for (std::string said; got_.empty(); dispatcher_.runOnce(Deadline::after(std::chrono::milliseconds(10)))) {
+    for (std::string said; got_.empty();
+         dispatcher_.runOnce(Deadline::after(std::chrono::milliseconds(10)))) {
       if (const auto why = client_.notConnectedBecause(); why != said) say("{}", said = why);
     }
   }
@@ -47,12 +51,14 @@ class Asker {
   void sayNext() { say("{}", describe(next())); }
   // Without the numbers that differ each time.
   static std::string describe(const Message& message) {
-    if (const auto* fate = message.tryAs<RequestFate>()) return fmt::format("fate {}", toString(fate->fate));
+    if (const auto* fate = message.tryAs<RequestFate>())
+      return fmt::format("fate {}", toString(fate->fate));
     if (const auto* news = message.tryAs<Connect>()) return std::string(toString(news->status));
     return print(message);
   }
   void send(Message message) {
-    if (const auto result = client_.send(std::move(message)); result != SendResult::sent) say("not sent: {}", toString(result));
+    if (const auto result = client_.send(std::move(message)); result != SendResult::sent)
+      say("not sent: {}", toString(result));
   }
   // Returns which life of the server it is.
   std::uint64_t sayConnected() {

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Every message there and back unchanged: on hosts of each byte order, and between them. `make test-big-endian` sets
-// MPF_TEST_BIG_ENDIAN to a build for the other byte order; without it, only what takes hosts like this one runs.
+// Every message there and back unchanged: on hosts of each byte order, and between them. `make
+// test-big-endian` sets MPF_TEST_BIG_ENDIAN to a build for the other byte order; without it, only
+// what takes hosts like this one runs.
 #include <cstdlib>
 #include <gmock/gmock.h>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <mpf/schema/text.h>
-#include <mpf/tests/byte_order/talk.h>
-#include <mpf/tests/support/every_message.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include "schema/text.h"
+#include "tests/byte_order/talk.h"
+#include "tests/support/every_message.h"
+#include "tests/support/program.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace {
 
@@ -30,9 +31,11 @@ class Host {
   Host(Order order, const Backplane& backplane) : order_(order), backplane_(backplane.name()) {}
 
   [[nodiscard]] const std::string& backplane() const noexcept { return backplane_; }
-  [[nodiscard]] std::unique_ptr<Program> start(const std::string& program, const std::vector<std::string>& arguments) const {
+  [[nodiscard]] std::unique_ptr<Program> start(const std::string& program,
+                                               const std::vector<std::string>& arguments) const {
     const std::string build = order_ == Order::ours ? "" : std::getenv("MPF_TEST_BIG_ENDIAN");
-    std::vector<std::string> command{(build.empty() ? MPF_TEST_PROGRAMS : build + "/bin") + ("/" + program)};
+    std::vector<std::string> command{(build.empty() ? MPF_TEST_PROGRAMS : build + "/bin") +
+                                     ("/" + program)};
     if (!build.empty()) command.insert(command.begin(), build + "/run");
     command.insert(command.end(), arguments.begin(), arguments.end());
     return std::make_unique<Program>(command);
@@ -42,7 +45,9 @@ class Host {
     EXPECT_EQ(echo->line(), "serving");
     return echo;
   }
-  [[nodiscard]] std::unique_ptr<Program> startAsker() const { return start("mpf_test_ask", {backplane_, kServer, kLocation}); }
+  [[nodiscard]] std::unique_ptr<Program> startAsker() const {
+    return start("mpf_test_ask", {backplane_, kServer, kLocation});
+  }
 
   static constexpr auto kServer = "echo";
   static constexpr auto kLocation = "66051";  // 0x00010203
@@ -55,7 +60,8 @@ class Host {
 // What a line of `program` that holds `text` says behind it.
 std::string after(const Program& program, const std::string& text) {
   const auto line = program.waitForLine(text);
-  if (const auto at = line.find(text); at != std::string::npos) return line.substr(at + text.size());
+  if (const auto at = line.find(text); at != std::string::npos)
+    return line.substr(at + text.size());
   ADD_FAILURE() << "it ended without saying: " << text;
   return {};
 }
@@ -81,14 +87,16 @@ void expectEverythingThereAndBack(const Host& near, const Host& far) {
   EXPECT_EQ(asker->line(), "connectYes");
   EXPECT_THAT(lines(*asker, right.size()), ElementsAreArray(right));
   EXPECT_THAT(lines(*echo, right.size()), ElementsAreArray(right));
-  EXPECT_EQ(asker->line(), print(MessageOf(test::withStandardFields(OutOfBand{.value = 0x01020304}))));
+  EXPECT_EQ(asker->line(),
+            print(MessageOf(test::withStandardFields(OutOfBand{.value = 0x01020304}))));
   EXPECT_EQ(asker->line(), "fate refused");
   EXPECT_EQ(asker->line(), "the queue is full");
   echo->signal(SIGUSR1);
   EXPECT_EQ(asker->line(), "each request has ended");
   EXPECT_EQ(asker->line(), "it will die");
   echo->signal(SIGUSR1);
-  EXPECT_THAT(lines(*asker, 3), UnorderedElementsAre("fate outcomeUnknown", "fate neverTaken", "fate neverTaken"));
+  EXPECT_THAT(lines(*asker, 3),
+              UnorderedElementsAre("fate outcomeUnknown", "fate neverTaken", "fate neverTaken"));
   EXPECT_EQ(asker->line(), "connectNo");
   EXPECT_EQ(WEXITSTATUS(echo->wait()), 0);
   echo = far.startEcho();
@@ -107,15 +115,20 @@ class ByteOrder : public testing::TestWithParam<Hosts> {
     if (needsOther() && std::getenv("MPF_TEST_BIG_ENDIAN") == nullptr)
       GTEST_SKIP() << "no build for the other byte order: make test-big-endian";
   }
-  // What a program of the other byte order left as it was killed, only one of its kind can judge; it does as it attaches.
+  // What a program of the other byte order left as it was killed, only one of its kind can judge;
+  // it does as it attaches.
   void TearDown() override {
     if (!needsOther() || IsSkipped()) return;
     for (const auto* backplane : {&nearBackplane_, &farBackplane_}) {
-      const auto another = Host(Order::other, *backplane).start("mpf_test_ask", {backplane->name(), "nobody", Host::kLocation, "why"});
+      const auto another =
+          Host(Order::other, *backplane)
+              .start("mpf_test_ask", {backplane->name(), "nobody", Host::kLocation, "why"});
       EXPECT_THAT(another->line(), HasSubstr("\"nobody\""));
     }
   }
-  static bool needsOther() { return GetParam().near == Order::other || GetParam().far == Order::other; }
+  static bool needsOther() {
+    return GetParam().near == Order::other || GetParam().far == Order::other;
+  }
   const test::Watchdog watchdog_{"a host of another byte order"};
   const test::TestBackplane nearBackplane_;
   const test::TestBackplane farBackplane_;
@@ -135,23 +148,28 @@ TEST_P(TwoHosts, EchoEveryMessageUnchanged) {
   const Host near(GetParam().near, nearBackplane_);
   const Host far(GetParam().far, farBackplane_);
   const auto serving =
-      far.start("mpf-router", {"--backplane", far.backplane(), "--serve", Host::kLocation, "--listen", "127.0.0.1:0", "--plain"});
+      far.start("mpf-router", {"--backplane", far.backplane(), "--serve", Host::kLocation,
+                               "--listen", "127.0.0.1:0", "--plain"});
   const auto address = after(*serving, "listening on ");
   const auto calling =
-      near.start("mpf-router", {"--backplane", near.backplane(), "--remote", std::string(Host::kLocation) + "=" + address, "--plain"});
+      near.start("mpf-router", {"--backplane", near.backplane(), "--remote",
+                                std::string(Host::kLocation) + "=" + address, "--plain"});
 
   expectEverythingThereAndBack(near, far);
 }
 
-// Memory of a host of the other byte order, as an emulator has it, is refused by name and left alone.
+// Memory of a host of the other byte order, as an emulator has it, is refused by name and left
+// alone.
 TEST_P(ForeignWindow, IsRefusedByName) {
   const Host one(GetParam().near, nearBackplane_);
   const Host other(GetParam().far, nearBackplane_);
   const auto right = allRight();
   const auto echo = one.startEcho();
 
-  const auto second = other.start("mpf_test_echo", {other.backplane(), Host::kServer, Host::kLocation});
-  const auto client = other.start("mpf_test_ask", {other.backplane(), Host::kServer, Host::kLocation, "why"});
+  const auto second =
+      other.start("mpf_test_echo", {other.backplane(), Host::kServer, Host::kLocation});
+  const auto client =
+      other.start("mpf_test_ask", {other.backplane(), Host::kServer, Host::kLocation, "why"});
 
   EXPECT_THAT(second->line(), HasSubstr("foreign magic"));
   EXPECT_THAT(client->line(), HasSubstr("foreign magic"));
@@ -162,14 +180,18 @@ TEST_P(ForeignWindow, IsRefusedByName) {
 
 constexpr auto kName = [](const auto& info) { return std::string(info.param.name); };
 INSTANTIATE_TEST_SUITE_P(Of, OneHost,
-                         testing::Values(Hosts{"OurByteOrder", Order::ours, Order::ours}, Hosts{"TheOther", Order::other, Order::other}),
+                         testing::Values(Hosts{"OurByteOrder", Order::ours, Order::ours},
+                                         Hosts{"TheOther", Order::other, Order::other}),
                          kName);
 INSTANTIATE_TEST_SUITE_P(Of, TwoHosts,
-                         testing::Values(Hosts{"OurByteOrder", Order::ours, Order::ours}, Hosts{"TheOtherFar", Order::ours, Order::other},
-                                         Hosts{"TheOtherNear", Order::other, Order::ours}, Hosts{"TheOther", Order::other, Order::other}),
+                         testing::Values(Hosts{"OurByteOrder", Order::ours, Order::ours},
+                                         Hosts{"TheOtherFar", Order::ours, Order::other},
+                                         Hosts{"TheOtherNear", Order::other, Order::ours},
+                                         Hosts{"TheOther", Order::other, Order::other}),
                          kName);
 INSTANTIATE_TEST_SUITE_P(Of, ForeignWindow,
-                         testing::Values(Hosts{"OurByteOrder", Order::ours, Order::other}, Hosts{"TheOther", Order::other, Order::ours}),
+                         testing::Values(Hosts{"OurByteOrder", Order::ours, Order::other},
+                                         Hosts{"TheOther", Order::other, Order::ours}),
                          kName);
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf_test_echo BACKPLANE SERVER LOCATION: sends back whatever it gets, unchanged, and says whether it is what an asker sends.
+// mpf_test_echo BACKPLANE SERVER LOCATION: sends back whatever it gets, unchanged, and says whether
+// it is what an asker sends.
 #include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
@@ -11,11 +12,12 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/system_call.h>
-#include <mpf/schema/text.h>
-#include <mpf/server/message_server.h>
-#include <mpf/tests/byte_order/talk.h>
-#include <mpf/tests/support/every_message.h>
+#include <mpf/message_server.h>
+
+#include "base/system_call.h"
+#include "schema/text.h"
+#include "tests/byte_order/talk.h"
+#include "tests/support/every_message.h"
 
 namespace mpf::test {
 namespace {
@@ -32,7 +34,8 @@ void catchSignals() {
 class Echo {
  public:
   Echo(const std::string& backplane, const std::string& name, std::int32_t location)
-      : server_(Backplane::attach(backplane), name, {.location = location, .queueSize = kQueueSize}) {}
+      : server_(Backplane::attach(backplane), name,
+                {.location = location, .queueSize = kQueueSize}) {}
 
   void run() {
     while (server_.waitForMessage()) {

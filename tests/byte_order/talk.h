@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What mpf_test_ask and mpf_test_echo agree on: Int32 messages that are not echoed but obeyed, and a way to tell the test.
+// What mpf_test_ask and mpf_test_echo agree on: Int32 messages that are not echoed but obeyed, and
+// a way to tell the test.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +8,7 @@
 #include <fmt/format.h>
 #include <optional>
 
-#include <mpf/schema/message.h>
+#include <mpf/message.h>
 
 namespace mpf::test {
 
@@ -19,10 +20,13 @@ enum class Command : std::int32_t {
 };
 inline constexpr std::int32_t kQueueSize = 4;
 
-inline Int32Message toMessage(Command command) { return Int32Message({.cmd = static_cast<std::int32_t>(command)}); }
+inline Int32Message toMessage(Command command) {
+  return Int32Message({.cmd = static_cast<std::int32_t>(command)});
+}
 inline std::optional<Command> toCommand(const Message& message) {
   const auto* body = message.tryAs<Int32>();
-  if (body == nullptr || body->cmd < static_cast<std::int32_t>(Command::sendOutOfBand)) return std::nullopt;
+  if (body == nullptr || body->cmd < static_cast<std::int32_t>(Command::sendOutOfBand))
+    return std::nullopt;
   return static_cast<Command>(body->cmd);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Exceptions that leave callbacks of clients and handlers of servers: they leave the call that runs the
-// callback, no request is lost, and the next call continues.
+// Exceptions that leave callbacks of clients and handlers of servers: they leave the call that runs
+// the callback, no request is lost, and the next call continues.
 #include <poll.h>
 
 #include <atomic>
@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/tests/client/client_fixture.h>
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -22,16 +22,17 @@ class CallbackErrorTest : public ClientTest {
  protected:
   // A client whose callback notes each message and then throws, if `mayThrow` says so.
   MessageClient& makeThrower(std::function<bool(const Message&)> mayThrow) {
-    thrower_ = std::make_unique<MessageClient>(dispatcher_, [this, mayThrow](const Message& message) {
-      if (const auto* connect = message.tryAs<Connect>()) {
-        told_.push_back(toString(connect->status));
-      } else if (const auto fate = fateOf(message)) {
-        told_.emplace_back(toString(*fate));
-      } else {
-        told_.emplace_back("reply");
-      }
-      if (mayThrow(message)) throw Thrown();
-    });
+    thrower_ =
+        std::make_unique<MessageClient>(dispatcher_, [this, mayThrow](const Message& message) {
+          if (const auto* connect = message.tryAs<Connect>()) {
+            told_.push_back(toString(connect->status));
+          } else if (const auto fate = fateOf(message)) {
+            told_.emplace_back(toString(*fate));
+          } else {
+            told_.emplace_back("reply");
+          }
+          if (mayThrow(message)) throw Thrown();
+        });
     thrower_->bind("device[0]/a");
     return *thrower_;
   }
@@ -99,7 +100,8 @@ TEST_F(CallbackErrorTest, EachRequestOfADisconnectHasItsEndAndTheClientConnectsA
   runCatching([&] { return told_.size() == 8; });
 
   const auto unknown = toString(Fate::outcomeUnknown);
-  EXPECT_THAT(told_, testing::ElementsAre("connectYes", unknown, unknown, unknown, unknown, unknown, "connectNo", "connectYes"));
+  EXPECT_THAT(told_, testing::ElementsAre("connectYes", unknown, unknown, unknown, unknown, unknown,
+                                          "connectNo", "connectYes"));
   EXPECT_EQ(caught_, 8);
   EXPECT_TRUE(client.isConnected());
 }
@@ -115,7 +117,8 @@ TEST_F(CallbackErrorTest, RepliesOfAServerThatWentAreNotLost) {
   server_.reset();
   runCatching([&] { return told_.back() == "connectNo"; });
 
-  EXPECT_THAT(told_, testing::ElementsAre("connectYes", "reply", "reply", "reply", toString(Fate::neverTaken), "connectNo"));
+  EXPECT_THAT(told_, testing::ElementsAre("connectYes", "reply", "reply", "reply",
+                                          toString(Fate::neverTaken), "connectNo"));
   EXPECT_EQ(caught_, 6);
 }
 
@@ -188,7 +191,8 @@ TEST_F(CallbackErrorTest, OtherClientsHearOfTheirServersDeath) {
 
 TEST_F(CallbackErrorTest, TheDescriptorOfADispatcherStaysReadableAfterAnException) {
   startServer();
-  auto& client = makeThrower([](const Message& message) { return message.tryAs<Connect>() == nullptr; });
+  auto& client =
+      makeThrower([](const Message& message) { return message.tryAs<Connect>() == nullptr; });
   pollfd fd{dispatcher_.descriptor(), POLLIN, 0};
   holdRequests(client, 2);
   while (!dispatcher_.runPending()) {
@@ -237,7 +241,8 @@ TEST_F(CallbackErrorTest, ASharedDispatcherReportsTheExceptionAndContinues) {
   const auto written = testing::internal::GetCapturedStderr();
 
   EXPECT_EQ(replies, kRequests);
-  EXPECT_THAT(written, testing::AllOf(testing::HasSubstr("device[0]/a"), testing::HasSubstr("thrown by a test")));
+  EXPECT_THAT(written, testing::AllOf(testing::HasSubstr("device[0]/a"),
+                                      testing::HasSubstr("thrown by a test")));
   server_->interrupt();
   serving.join();
 }

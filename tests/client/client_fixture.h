@@ -16,20 +16,22 @@
 #include <optional>
 #include <vector>
 
-#include <mpf/base/system_call.h>
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "shm/window.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
 using namespace std::chrono_literals;
 
 #ifdef __SANITIZE_THREAD__
-#define MPF_NEEDS_A_CHILD GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some"
+#define MPF_NEEDS_A_CHILD \
+  GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some"
 #else
 #define MPF_NEEDS_A_CHILD
 #endif
@@ -88,16 +90,21 @@ class ClientTest : public testing::Test {
     return message;
   }
   // By all that are on the backplane.
-  [[nodiscard]] std::uint64_t nonsenseRead() const { return sumOf(&layout::WindowControl::protocolErrors); }
+  [[nodiscard]] std::uint64_t nonsenseRead() const {
+    return sumOf(&layout::WindowControl::protocolErrors);
+  }
   // A counter of all windows.
   template <class Counter>
   [[nodiscard]] std::uint64_t sumOf(Counter layout::WindowControl::* counter) const {
     std::uint64_t sum = 0;
     for (const auto& name : backplane_.segmentNames()) {
       const auto parsed = SegmentName::tryParse(name);
-      if (!parsed || (parsed->kind != NameKind::serverWindow && parsed->kind != NameKind::clientWindow)) continue;
+      if (!parsed ||
+          (parsed->kind != NameKind::serverWindow && parsed->kind != NameKind::clientWindow))
+        continue;
       const bool isServer = parsed->kind == NameKind::serverWindow;
-      const auto window = PeerWindow::tryOpen(name, isServer ? layout::SegmentKind::serverWindow : layout::SegmentKind::clientWindow);
+      const auto window = PeerWindow::tryOpen(
+          name, isServer ? layout::SegmentKind::serverWindow : layout::SegmentKind::clientWindow);
       sum += (window->control().*counter).load(std::memory_order_relaxed);
     }
     return sum;

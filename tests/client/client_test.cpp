@@ -4,7 +4,7 @@
 #include <cmath>
 #include <thread>
 
-#include <mpf/tests/client/client_fixture.h>
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -30,7 +30,8 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
   startServer();
   runUntil([&] { return client_.isConnected(); });
 
-  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo, ConnectStatus::connectYes));
+  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo,
+                                          ConnectStatus::connectYes));
 }
 
 // In a process that lives on: nothing dies, and there is no link that it could close.
@@ -76,7 +77,8 @@ TEST_F(ClientTest, AClientHearsOfAServerThatWentRightBehindItsReplies) {
       dispatcher_.runOnce(Deadline::after(100us));
     }
     while (!request) request = server.receive();
-    for (std::size_t extra = 1; extra < replies; ++extra) static_cast<void>(server.reply(request.duplicate()));
+    for (std::size_t extra = 1; extra < replies; ++extra)
+      static_cast<void>(server.reply(request.duplicate()));
     static_cast<void>(server.reply(std::move(request)));
 
     server_.reset();
@@ -94,7 +96,8 @@ TEST_F(ClientTest, EchoesEveryScalarTypeWithItsMarks) {
   server.on<OutOfBand>([](OutOfBand&) {});
   bind();
 
-  Int32Message sent({.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = INT32_MIN});
+  Int32Message sent(
+      {.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = INT32_MIN});
   sent.setClientType(-7);
   sent.setClientExtra(77);
   ASSERT_EQ(client_.send(std::move(sent)), SendResult::sent);
@@ -134,9 +137,12 @@ TEST_P(ArraySizes, ArriveAndComeBackWhole) {
   auto reply = Int32ArrayMessage::tryFrom(next());
   ASSERT_TRUE(reply);
   ASSERT_EQ(reply->getLength(), length);
-  for (std::size_t i = 0; i < length; i += 1 + length / 100) ASSERT_EQ(reply->value()[i], static_cast<std::int32_t>(i * 3));
+  for (std::size_t i = 0; i < length; i += 1 + length / 100)
+    ASSERT_EQ(reply->value()[i], static_cast<std::int32_t>(i * 3));
 }
-INSTANTIATE_TEST_SUITE_P(InLineInChunksAndLarge, ArraySizes, testing::Values(0, 1, 2, 3, 30, 42, 43, 1000, 100'000, (64u << 20) / 4 - 6));
+INSTANTIATE_TEST_SUITE_P(InLineInChunksAndLarge, ArraySizes,
+                         testing::Values(0, 1, 2, 3, 30, 42, 43, 1000, 100'000,
+                                         (64u << 20) / 4 - 6));
 
 TEST_F(ClientTest, ARequestComesBackInTheMemoryItWasBuiltIn) {
   auto& server = startServer();
@@ -155,7 +161,8 @@ TEST_F(ClientTest, ARequestComesBackInTheMemoryItWasBuiltIn) {
 TEST_F(ClientTest, MemoryOfLargeMessagesIsUsedAgain) {
   auto& server = startServer({.maxPoolBytes = 4 << 20});
   server.on<Float64Array>([&](Float64ArrayMessage&& request) {
-    EXPECT_EQ(server.reply(server.allocReplyMessage<Float64Array>(request, 20'000)), ReplyResult::sent);
+    EXPECT_EQ(server.reply(server.allocReplyMessage<Float64Array>(request, 20'000)),
+              ReplyResult::sent);
   });
   bind();
 
@@ -260,7 +267,8 @@ TEST_F(ClientTest, ANameIsServedOnceAtALocation) {
   EXPECT_EQ(elsewhere.location(), 7);
 }
 
-// A server that many wait for: some connect in a step, so that whatever else the dispatcher has to do gets its turn.
+// A server that many wait for: some connect in a step, so that whatever else the dispatcher has to
+// do gets its turn.
 TEST_F(ClientTest, ManyThatConnectAtOnceDoSoInSteps) {
   constexpr int kCrowd = 100;
   std::vector<std::unique_ptr<MessageClient>> crowd;
@@ -273,7 +281,9 @@ TEST_F(ClientTest, ManyThatConnectAtOnceDoSoInSteps) {
   while (countNames(backplane_, NameKind::link) == 0) dispatcher_.runOnce(Deadline::after(100us));
 
   EXPECT_LT(countNames(backplane_, NameKind::link), kCrowd);
-  runUntil([&] { return std::ranges::all_of(crowd, [](const auto& client) { return client->isConnected(); }); });
+  runUntil([&] {
+    return std::ranges::all_of(crowd, [](const auto& client) { return client->isConnected(); });
+  });
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What constructors throw when memory or threads are short. This file stands between the program and the
-// answers of the kernel.
+// What constructors throw when memory or threads are short. This file stands between the program
+// and the answers of the kernel.
 #include <fcntl.h>
 #include <pthread.h>
 
@@ -9,12 +9,12 @@
 #include <functional>
 #include <system_error>
 
-#include <mpf/tests/client/client_fixture.h>
-#include <mpf/tests/support/sanitized.h>
+#include "tests/client/client_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace {
 
-int reserving = 0;       // what the kernel answers; 0: it reserves memory
+int reserving = 0;  // what the kernel answers; 0: it reserves memory
 int startingThread = 0;  // likewise
 
 }  // namespace
@@ -25,9 +25,11 @@ extern "C" int posix_fallocate(int fd, off_t offset, off_t bytes) noexcept(false
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*start)(void*), void* argument) noexcept {
+extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes,
+                              void* (*start)(void*), void* argument) noexcept {
   if (startingThread != 0) return startingThread;
-  static const auto real = reinterpret_cast<decltype(&pthread_create)>(::dlsym(RTLD_NEXT, "pthread_create"));
+  static const auto real =
+      reinterpret_cast<decltype(&pthread_create)>(::dlsym(RTLD_NEXT, "pthread_create"));
   return real(thread, attributes, start, argument);
 }
 #endif

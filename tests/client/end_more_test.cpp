@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The ends of links, continued: no descriptors left, paused clients, callbacks that run the dispatcher.
+// The ends of links, continued: no descriptors left, paused clients, callbacks that run the
+// dispatcher.
 #include <fcntl.h>
 #include <sys/inotify.h>
 #include <sys/resource.h>
@@ -8,9 +9,10 @@
 #include <atomic>
 #include <thread>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/tests/client/client_fixture.h>
-#include <mpf/tests/support/sanitized.h>
+#include <mpf/file_descriptor.h>
+
+#include "tests/client/client_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace mpf::test {
 namespace {
@@ -84,7 +86,8 @@ TEST_F(EndMoreTest, AClientWithoutDescriptorsKeepsTheServerOfALargeReply) {
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// A client that ends within its callback lives until that returns, although the dispatcher runs on meanwhile.
+// A client that ends within its callback lives until that returns, although the dispatcher runs on
+// meanwhile.
 TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItReturns) {
   startServer().on<Int32>([](Int32&) {});
   MessageClient other(dispatcher_, [](const Message&) {});
@@ -106,7 +109,8 @@ TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItR
   runUntil([&] { return done; });
 }
 
-// Who is paused finds what was sent before the end, and then hears of it; the successor comes after.
+// Who is paused finds what was sent before the end, and then hears of it; the successor comes
+// after.
 TEST_F(EndMoreTest, APausedClientGetsWhatAServerThatEndedSent) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
@@ -126,15 +130,17 @@ TEST_F(EndMoreTest, APausedClientGetsWhatAServerThatEndedSent) {
   for (int i = 0; i < 5; ++i) dispatcher_.runOnce(Deadline::after(1ms));
   EXPECT_THAT(messages_, testing::IsEmpty());
 
-  client_.goOn();
+  client_.resume();
 
-  for (int i = 0; i < 3; ++i) EXPECT_THAT(next().valueAs<Float64Array>(), testing::SizeIs(kBeyondRings << i));
+  for (int i = 0; i < 3; ++i)
+    EXPECT_THAT(next().valueAs<Float64Array>(), testing::SizeIs(kBeyondRings << i));
   EXPECT_NE(next().tryAs<Int32>(), nullptr);
   runUntil([&] { return news_.size() == 3; });
   EXPECT_EQ(nonsenseRead(), 0u);
 }
 
-// A handle keeps a link beyond its server's end; its client dies before it has seen that end. The last one goes.
+// A handle keeps a link beyond its server's end; its client dies before it has seen that end. The
+// last one goes.
 TEST_F(EndMoreTest, AHandleThatOutlivesItsServerAndItsClientLeavesNoPool) {
   MPF_NEEDS_A_CHILD;
   auto& server = startServer();
@@ -165,7 +171,8 @@ TEST_F(EndMoreTest, AHandleThatOutlivesItsServerAndItsClientLeavesNoPool) {
   EXPECT_EQ(countNames(backplane_, NameKind::bulk), 0);
 }
 
-// An inotify instance that tells of names that go. A user has few of them, and tests beside this one have some: it waits for one.
+// An inotify instance that tells of names that go. A user has few of them, and tests beside this
+// one have some: it waits for one.
 FileDescriptor watchRemovals() {
   FileDescriptor watch;
   while (!watch) {
@@ -173,18 +180,22 @@ FileDescriptor watchRemovals() {
     if (!watch && errno != EMFILE) throwSystemError(errno, "inotify_init1", "the test");
     std::this_thread::yield();
   }
-  checkCall(::inotify_add_watch(watch.get(), "/dev/shm", IN_DELETE), "inotify_add_watch", "/dev/shm");
+  checkCall(::inotify_add_watch(watch.get(), "/dev/shm", IN_DELETE), "inotify_add_watch",
+            "/dev/shm");
   return watch;
 }
 
 // Whoever is killed meanwhile leaves no gap in their numbers, behind which nobody would look.
 TEST_F(EndMoreTest, NamesOfAPoolGoLastOneFirst) {
   startServer().on<Float64Array>([](Float64Array&) {});
-  std::optional<MessageClient> leaver(std::in_place, dispatcher_, [this](Message&& message) { messages_.push_back(std::move(message)); });
+  std::optional<MessageClient> leaver(std::in_place, dispatcher_, [this](Message&& message) {
+    messages_.push_back(std::move(message));
+  });
   leaver->bind("device[0]/a");
   runUntil([&] { return leaver->isConnected(); });
   messages_.clear();
-  for (int i = 0; i < 2; ++i) ASSERT_EQ(leaver->send(leaver->alloc<Float64Array>(kBeyondRings << (4 * i))), SendResult::sent);
+  for (int i = 0; i < 2; ++i)
+    ASSERT_EQ(leaver->send(leaver->alloc<Float64Array>(kBeyondRings << (4 * i))), SendResult::sent);
   for (int i = 0; i < 2; ++i) EXPECT_NE(next().tryAs<Float64Array>(), nullptr);
   const auto watch = watchRemovals();
 
@@ -196,7 +207,8 @@ TEST_F(EndMoreTest, NamesOfAPoolGoLastOneFirst) {
     for (ssize_t at = 0; at < bytes;) {
       const auto* event = reinterpret_cast<const inotify_event*>(events.data() + at);
       const std::string name(event->name);
-      if (name.starts_with(SegmentName::prefix(backplane_.name())) && SegmentName::tryParse(name)->kind == NameKind::bulk)
+      if (name.starts_with(SegmentName::prefix(backplane_.name())) &&
+          SegmentName::tryParse(name)->kind == NameKind::bulk)
         removed.push_back(name);
       at += static_cast<ssize_t>(sizeof *event + event->len);
     }
@@ -238,7 +250,8 @@ TEST_F(EndMoreTest, ACallbackMayWaitForTheNextConnection) {
   EXPECT_EQ(sumOf(&layout::WindowControl::linkCount), 2u) << "its end and the server's";
 }
 
-// Another thread binds a client while the dispatcher tells of an end, after which it looks for servers of its own accord.
+// Another thread binds a client while the dispatcher tells of an end, after which it looks for
+// servers of its own accord.
 TEST(EndOfOthers, AClientThatIsBoundMeanwhileConnectsOnce) {
   MPF_NEEDS_A_CHILD;
   const Watchdog watchdog("bound meanwhile");
@@ -260,7 +273,9 @@ TEST(EndOfOthers, AClientThatIsBoundMeanwhileConnectsOnce) {
       blocked.notify_one();
       goesOn.wait(false);
     });
-    MessageClient second(backplane, [&](const Message& message) { replies += message.tryAs<Int32>() != nullptr ? 1 : 0; });
+    MessageClient second(backplane, [&](const Message& message) {
+      replies += message.tryAs<Int32>() != nullptr ? 1 : 0;
+    });
     first.bind("mortal");
     EXPECT_TRUE(first.connectWait(100s));
     ::kill(child, SIGKILL);
@@ -273,7 +288,8 @@ TEST(EndOfOthers, AClientThatIsBoundMeanwhileConnectsOnce) {
 
     while (!second.isConnected()) server.handleOne();
     const auto window =
-        PeerWindow::tryOpen(SegmentName::serverWindow(backplane.name(), 0, "device[0]/a"), layout::SegmentKind::serverWindow);
+        PeerWindow::tryOpen(SegmentName::serverWindow(backplane.name(), 0, "device[0]/a"),
+                            layout::SegmentKind::serverWindow);
     EXPECT_EQ(second.send(Int32Message()), SendResult::sent);
     while (replies == 0) server.handleOne();
     EXPECT_EQ(countNames(backplane, NameKind::link), 1);

@@ -5,15 +5,16 @@
 #include <atomic>
 #include <filesystem>
 
-#include <mpf/tests/client/client_fixture.h>
-#include <mpf/tests/support/sanitized.h>
+#include "tests/client/client_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace mpf::test {
 namespace {
 
 std::size_t openDescriptors() {
   std::size_t count = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) ++count;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
+    ++count;
   return count;
 }
 
@@ -36,7 +37,8 @@ class EndTest : public ClientTest {
       const auto parsed = SegmentName::tryParse(name);
       if (!parsed || parsed->kind != NameKind::clientWindow) continue;
       auto window = PeerWindow::tryOpen(name, layout::SegmentKind::clientWindow);
-      if (window && window->header().ownerPid == process) return backplane_.watcher().watchPeer(std::move(window), std::move(callback));
+      if (window && window->header().ownerPid == process)
+        return backplane_.watcher().watchPeer(std::move(window), std::move(callback));
     }
     return 0;
   }
@@ -53,7 +55,8 @@ TEST_F(EndTest, AReplyInThePoolOfAServerThatEndsArrives) {
   server_.reset();
 
   const auto arrived = next();
-  EXPECT_THAT(arrived.valueAs<Float64Array>(), testing::AllOf(testing::SizeIs(kBeyondRings), testing::Each(2.5)));
+  EXPECT_THAT(arrived.valueAs<Float64Array>(),
+              testing::AllOf(testing::SizeIs(kBeyondRings), testing::Each(2.5)));
   runUntil([&] { return news_.size() == 2; });
   EXPECT_EQ(nonsenseRead(), 0u);
 }
@@ -63,7 +66,9 @@ TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoNonsense) {
   auto& server = startServer();
   int handled = 0;
   server.on<Float64Array>([&](Float64ArrayMessage&&) { ++handled; });
-  withLeaver([](auto& leaver, auto&) { ASSERT_EQ(leaver.send(leaver.template alloc<Float64Array>(kBeyondRings)), SendResult::sent); });
+  withLeaver([](auto& leaver, auto&) {
+    ASSERT_EQ(leaver.send(leaver.template alloc<Float64Array>(kBeyondRings)), SendResult::sent);
+  });
 
   server.handleOne();
 
@@ -71,7 +76,8 @@ TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoNonsense) {
   EXPECT_EQ(nonsenseRead(), 0u);
 }
 
-// A window of a client that is gone is of no use to the server, although the client's process goes on.
+// A window of a client that is gone is of no use to the server, although the client's process goes
+// on.
 TEST_F(EndTest, AServerLetsGoOfTheWindowsOfClientsThatLeft) {
   startServer();
   withLeaver([](auto&, auto&) {});
@@ -107,7 +113,10 @@ TEST_F(EndTest, AConnectThatFailsCostsNoPlace) {
   client_.bind("device[0]/a");
 
   EXPECT_THAT(client_.notConnectedBecause(), testing::HasSubstr("not accepted"));
-  runUntil([&] { return client_.isConnected() || client_.notConnectedBecause().find("no more are possible") != std::string::npos; });
+  runUntil([&] {
+    return client_.isConnected() ||
+           client_.notConnectedBecause().find("no more are possible") != std::string::npos;
+  });
   EXPECT_TRUE(client_.isConnected());
 }
 
@@ -145,7 +154,8 @@ TEST(EndOfUsers, NothingIsLeftOfAServerAndItsClientOfAnotherUser) {
   EXPECT_THAT(backplane.segmentNames(), testing::IsEmpty());
 }
 
-// The server takes what is in the ring of a client that ended in order, whether or not its process has ended, too.
+// The server takes what is in the ring of a client that ended in order, whether or not its process
+// has ended, too.
 TEST_F(EndTest, WhatAClientSentBeforeItAndItsProcessEndedIsTaken) {
   MPF_NEEDS_A_CHILD;
   auto& server = startServer();
@@ -195,7 +205,8 @@ TEST_F(EndTest, WhatAClientThatEndedSentBehindALargeRequestIsTaken) {
   EXPECT_EQ(handled, 2);
 }
 
-// A callback may wait for another client's connection: the dispatcher then runs within the end of this one.
+// A callback may wait for another client's connection: the dispatcher then runs within the end of
+// this one.
 TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllNewsOfAnEnd) {
   std::vector<int> told;  // 0: a fate, 1: connected, 2: disconnected
   bool nested = false;
@@ -225,7 +236,8 @@ TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllNewsOfAnEnd) {
   held.clear();
 }
 
-// A server object follows another one in the same process; somebody still holds a request of the first.
+// A server object follows another one in the same process; somebody still holds a request of the
+// first.
 TEST_F(EndTest, ARequestOfAServerThatIsGoneCannotBeAnsweredByItsSuccessor) {
   startServer();
   auto held = heldRequest();

@@ -2,7 +2,7 @@
 // Requests that end without a reply: refused, expired, cancelled, lost.
 #include <vector>
 
-#include <mpf/tests/client/client_fixture.h>
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -41,7 +41,8 @@ TEST_F(ClientTest, AFullQueueRefusesAtOnceAndSaysSoOnce) {
   EXPECT_EQ(client_.send(std::move(sixth)), SendResult::queueFull);
 
   runUntil([&] { return news_.size() == 2; });
-  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
+  EXPECT_THAT(news_,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
   serverRuns_ = true;
   for (int i = 0; i < 5; ++i) EXPECT_EQ(next().tryAs<Int32>()->value, i);
   EXPECT_EQ(client_.send(std::move(sixth)), SendResult::sent);
@@ -92,7 +93,8 @@ TEST_F(ClientTest, ALateReplyOfACancelledRequestIsNotDelivered) {
   EXPECT_NE(next().tryAs<Float64>(), nullptr);
 }
 
-// The server knows a request by its place in a table; a cancelled one that it holds has its place until it answers.
+// The server knows a request by its place in a table; a cancelled one that it holds has its place
+// until it answers.
 TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
   auto& server = startServer({.queueSize = 4});
   std::vector<Message> held;
@@ -117,11 +119,13 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
 
   for (auto& request : held) EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent);
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
-  for (int i = 0; i < 8; ++i) ASSERT_EQ(client_.send(Float64Message()), i < 4 ? SendResult::sent : SendResult::queueFull);
+  for (int i = 0; i < 8; ++i)
+    ASSERT_EQ(client_.send(Float64Message()), i < 4 ? SendResult::sent : SendResult::queueFull);
   for (int i = 0; i < 4; ++i) EXPECT_NE(next().tryAs<Float64>(), nullptr);
 }
 
-// What the server holds is bounded by what may be outstanding, cancelled or not: its replies have their room.
+// What the server holds is bounded by what may be outstanding, cancelled or not: its replies have
+// their room.
 TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
   auto& server = startServer({.queueSize = 4});
   std::vector<Message> held;
@@ -138,7 +142,8 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
   EXPECT_EQ(client_.send(Int32Message()), SendResult::tooManyOutstanding);
   held.clear();  // refused
 
-  runUntil([&] { return client_.send(Int32Message(), Deadline::never(), &id) == SendResult::sent; });
+  runUntil(
+      [&] { return client_.send(Int32Message(), Deadline::never(), &id) == SendResult::sent; });
   runUntil([&] { return !held.empty(); });
   held.clear();
   EXPECT_EQ(fateOf(next()), Fate::refused);

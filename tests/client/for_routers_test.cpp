@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What routers need of clients and servers: to speak in the name of others.
-#include <mpf/tests/client/client_fixture.h>
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -9,7 +9,8 @@ class ForRoutersTest : public ClientTest {
  protected:
   MessageServer& startWatched() {
     auto& server = startServer({.queueSize = 4});
-    server.onClient([this](std::uint64_t client, bool isThere) { comings_.emplace_back(client, isThere); });
+    server.onClient(
+        [this](std::uint64_t client, bool isThere) { comings_.emplace_back(client, isThere); });
     serverRuns_ = false;
     return server;
   }
@@ -90,7 +91,8 @@ TEST_F(ForRoutersTest, ARequestHasTheIdThatWasAskedFor) {
   EXPECT_EQ(request.route().requestId, 77u);
   static_cast<void>(server_->reply(std::move(request)));
   EXPECT_EQ(next().route().requestId, 77u);
-  EXPECT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent) << "its place is free again";
+  EXPECT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent)
+      << "its place is free again";
   static_cast<void>(server_->reply(take()));
   static_cast<void>(next());
 }
@@ -126,7 +128,7 @@ TEST_F(ForRoutersTest, APausedClientLeavesRepliesWhereTheyAre) {
   for (int looks = 0; looks < 10; ++looks) dispatcher_.runOnce(Deadline::after(1ms));
   EXPECT_THAT(messages_, testing::IsEmpty());
 
-  client_.goOn();
+  client_.resume();
   for (int got = 0; got < sent; ++got) EXPECT_EQ(next().tryAs<Int32>()->value, got);
 }
 
@@ -138,9 +140,11 @@ TEST_F(ForRoutersTest, AServerMayTellThatAQueueIsFull) {
   auto request = take();
   const auto client = server.clientOf(request);
 
-  EXPECT_EQ(server.replyTo(client, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull})), ReplyResult::sent);
+  EXPECT_EQ(server.replyTo(client, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull})),
+            ReplyResult::sent);
   runUntil([&] { return news_.size() == 2; });
-  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
+  EXPECT_THAT(news_,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
   static_cast<void>(server.reply(std::move(request)));
   static_cast<void>(next());
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Something else lies where a window should be: clients and servers say what it is, and go on once it is gone.
+// Something else lies where a window should be: clients and servers say what it is, and go on once
+// it is gone.
 #include <fcntl.h>
 #include <sys/fsuid.h>
 #include <sys/stat.h>
@@ -8,16 +9,17 @@
 #include <fstream>
 #include <functional>
 
-#include <mpf/base/system_call.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/client/client_fixture.h>
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "shm/window.h"
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
 
 void writeFile(const std::string& path, const void* bytes, std::size_t size) {
-  std::ofstream(path, std::ios::binary).write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
+  std::ofstream(path, std::ios::binary)
+      .write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
 }
 
 // A window whose owner is dead, with one thing changed.
@@ -39,12 +41,15 @@ struct Foreign {
   const char* saying;  // part of the reason
   std::function<void(const std::string& path)> put;
 
-  friend std::ostream& operator<<(std::ostream& out, const Foreign& foreign) { return out << foreign.name; }
+  friend std::ostream& operator<<(std::ostream& out, const Foreign& foreign) {
+    return out << foreign.name;
+  }
 };
 
 class ForeignWindow : public ClientTest, public testing::WithParamInterface<Foreign> {
  protected:
-  ForeignWindow() : path_(segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"))) {}
+  ForeignWindow()
+      : path_(segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"))) {}
   void TearDown() override {
     std::filesystem::remove(path_);
     ClientTest::TearDown();
@@ -57,7 +62,8 @@ TEST_P(ForeignWindow, IsNamedByTheClientWhichGoesOnOnceItIsGone) {
 
   client_.bind("device[0]/a", 0);
 
-  EXPECT_THAT(client_.notConnectedBecause(), testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(GetParam().saying)));
+  EXPECT_THAT(client_.notConnectedBecause(),
+              testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(GetParam().saying)));
   EXPECT_FALSE(client_.connectWait(1ms));
   std::filesystem::remove(path_);
   startServer({.location = 0});
@@ -73,28 +79,42 @@ TEST_P(ForeignWindow, IsNamedToTheServerThatWantsItsPlace) {
     FAIL() << "it took the place of something that is not a dead server's window";
   } catch (const std::exception& error) {
     EXPECT_THAT(error.what(),
-                testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(GetParam().saying), testing::HasSubstr("remove")));
+                testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(GetParam().saying),
+                               testing::HasSubstr("remove")));
   }
 
-  EXPECT_TRUE(std::filesystem::exists(std::filesystem::symlink_status(path_))) << "it is not ours to remove";
-  EXPECT_THAT(backplane_.removeDead(), testing::Not(testing::Contains(std::filesystem::path(path_).filename())));
+  EXPECT_TRUE(std::filesystem::exists(std::filesystem::symlink_status(path_)))
+      << "it is not ours to remove";
+  EXPECT_THAT(backplane_.removeDead(),
+              testing::Not(testing::Contains(std::filesystem::path(path_).filename())));
   std::filesystem::remove(path_);
   EXPECT_NO_THROW(startServer({.location = 0}));
 }
 
 const Foreign kForeigners[] = {
     {"NewerLayout", "layout 9, this program speaks 1-1",
-     [](const std::string& path) { writeWindow(path, [](layout::SegmentHeader& header) { header.layoutMajor = 9; }); }},
+     [](const std::string& path) {
+       writeWindow(path, [](layout::SegmentHeader& header) { header.layoutMajor = 9; });
+     }},
     {"OlderLayout", "layout 0, this program speaks 1-1",
-     [](const std::string& path) { writeWindow(path, [](layout::SegmentHeader& header) { header.layoutMajor = 0; }); }},
+     [](const std::string& path) {
+       writeWindow(path, [](layout::SegmentHeader& header) { header.layoutMajor = 0; });
+     }},
     {"ForeignMagic", "foreign magic",
-     [](const std::string& path) { writeWindow(path, [](layout::SegmentHeader& header) { header.magic = 0x1234; }); }},
-    {"CutInItsHeader", "truncated", [](const std::string& path) { writeWindow(path, [](layout::SegmentHeader&) {}, 100); }},
+     [](const std::string& path) {
+       writeWindow(path, [](layout::SegmentHeader& header) { header.magic = 0x1234; });
+     }},
+    {"CutInItsHeader", "truncated",
+     [](const std::string& path) { writeWindow(path, [](layout::SegmentHeader&) {}, 100); }},
     {"CutBehindItsHeader", "truncated",
-     [](const std::string& path) { writeWindow(path, [](layout::SegmentHeader&) {}, layout::kWindowBytes - 1); }},
+     [](const std::string& path) {
+       writeWindow(path, [](layout::SegmentHeader&) {}, layout::kWindowBytes - 1);
+     }},
     {"Empty", "truncated", [](const std::string& path) { writeFile(path, "", 0); }},
-    {"Directory", "no regular file", [](const std::string& path) { std::filesystem::create_directory(path); }},
-    {"Fifo", "no regular file", [](const std::string& path) { checkCall(::mkfifo(path.c_str(), 0600), "mkfifo", path); }},
+    {"Directory", "no regular file",
+     [](const std::string& path) { std::filesystem::create_directory(path); }},
+    {"Fifo", "no regular file",
+     [](const std::string& path) { checkCall(::mkfifo(path.c_str(), 0600), "mkfifo", path); }},
     {"SymbolicLink", "Too many levels of symbolic links",
      [](const std::string& path) { std::filesystem::create_symlink("/dev/null", path); }},
 };
@@ -111,7 +131,9 @@ class JunkTest : public ClientTest {
     ClientTest::TearDown();
   }
   // The path of something named with the number 77.
-  std::string junk(NameKind kind) const { return segments::path(SegmentName::keyed(backplane_.name(), kind, 0x77)); }
+  std::string junk(NameKind kind) const {
+    return segments::path(SegmentName::keyed(backplane_.name(), kind, 0x77));
+  }
 };
 
 // Its header makes sense, but no window is that small.
@@ -128,14 +150,17 @@ TEST_F(JunkTest, AWindowThatIsTooSmallIsNamedByTheClient) {
 TEST_F(JunkTest, HintsOfAServerThatAreCutAreNamedByTheClient) {
   const auto& server = startServer({.location = 0});
   const auto window =
-      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, server.getName()), layout::SegmentKind::serverWindow);
-  const auto hints = segments::path(SegmentName::keyed(backplane_.name(), NameKind::hints, window->header().incarnation));
+      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, server.getName()),
+                          layout::SegmentKind::serverWindow);
+  const auto hints = segments::path(
+      SegmentName::keyed(backplane_.name(), NameKind::hints, window->header().incarnation));
   std::filesystem::rename(hints, junk(NameKind::hints));
   writeFile(hints, "", 0);
 
   client_.bind("device[0]/a", 0);
 
-  EXPECT_THAT(client_.notConnectedBecause(), testing::AllOf(testing::HasSubstr(hints), testing::HasSubstr("truncated")));
+  EXPECT_THAT(client_.notConnectedBecause(),
+              testing::AllOf(testing::HasSubstr(hints), testing::HasSubstr("truncated")));
   std::filesystem::rename(junk(NameKind::hints), hints);
   runUntil([&] { return client_.isConnected(); });
 }
@@ -146,14 +171,17 @@ TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
   server.on<Int32>([](Int32&) {});
   bind();
   const auto window =
-      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, server.getName()), layout::SegmentKind::serverWindow);
+      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, server.getName()),
+                          layout::SegmentKind::serverWindow);
   const auto link = [&](std::uint64_t number) {
-    return segments::path(SegmentName::link(backplane_.name(), window->header().incarnation, number));
+    return segments::path(
+        SegmentName::link(backplane_.name(), window->header().incarnation, number));
   };
   writeFile(link(0x771), "", 0);
   writeFile(link(0x772), "a text of some length", 21);
   writeWindow(link(0x773), [](layout::SegmentHeader&) {});
-  writeWindow(link(0x774), [](layout::SegmentHeader& header) { header.kind = layout::SegmentKind::link; });
+  writeWindow(link(0x774),
+              [](layout::SegmentHeader& header) { header.kind = layout::SegmentKind::link; });
   writeWindow(link(0x775), [&](layout::SegmentHeader& header) {
     header.kind = layout::SegmentKind::link;
     header.serverWindow = window->header().incarnation;
@@ -187,14 +215,19 @@ TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
   dead->bind("device[0]/a", 0);
   runUntil([&] { return dead->isConnected(); });
   const auto window =
-      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"), layout::SegmentKind::serverWindow);
-  const auto name = segments::list(SegmentName::linkPrefix(backplane_.name(), window->header().incarnation)).at(0);
+      PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"),
+                          layout::SegmentKind::serverWindow);
+  const auto name =
+      segments::list(SegmentName::linkPrefix(backplane_.name(), window->header().incarnation))
+          .at(0);
   std::filesystem::copy_file(segments::path(name), junk(NameKind::link));
   dead.reset();
   runUntil([&] { return window->control().linksClosed.load() == 1; });
   const FileDescriptor image(::open(junk(NameKind::link).c_str(), O_WRONLY | O_CLOEXEC));
   const std::uint64_t nobody = 0x77;
-  checkCall(::pwrite(image.get(), &nobody, sizeof nobody, offsetof(layout::SegmentHeader, clientWindow)), "pwrite");
+  checkCall(
+      ::pwrite(image.get(), &nobody, sizeof nobody, offsetof(layout::SegmentHeader, clientWindow)),
+      "pwrite");
   std::filesystem::rename(junk(NameKind::link), segments::path(name));
 
   window->knock(SegmentName::tryParse(name)->incarnation);
@@ -203,7 +236,9 @@ TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
 }
 
 TEST_F(JunkTest, WhoAttachesRemovesWhatNobodyCanUseAndLeavesOtherLayoutsAlone) {
-  const auto link = [&](std::uint64_t number) { return SegmentName::link(backplane_.name(), 0x77, number); };
+  const auto link = [&](std::uint64_t number) {
+    return SegmentName::link(backplane_.name(), 0x77, number);
+  };
   writeFile(segments::path(link(0x771)), "", 0);
   writeWindow(segments::path(link(0x772)), [](layout::SegmentHeader& header) {
     header.kind = layout::SegmentKind::link;
@@ -215,7 +250,8 @@ TEST_F(JunkTest, WhoAttachesRemovesWhatNobodyCanUseAndLeavesOtherLayoutsAlone) {
   const auto removed = backplane_.removeDead();
 
   EXPECT_THAT(removed, testing::IsSupersetOf({link(0x771), link(0x773)}));
-  EXPECT_THAT(backplane_.segmentNames(), testing::IsSupersetOf({link(0x772), link(0x774)})) << "a program of another version may use it";
+  EXPECT_THAT(backplane_.segmentNames(), testing::IsSupersetOf({link(0x772), link(0x774)}))
+      << "a program of another version may use it";
 }
 
 // For the thread that it lives in, files are those of somebody else who is not root.
@@ -236,7 +272,8 @@ class SomebodyElsesWindow : public ClientTest {
     std::filesystem::remove(path_);
     ClientTest::TearDown();
   }
-  std::string path_ = segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
+  std::string path_ =
+      segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
 };
 
 TEST_F(SomebodyElsesWindow, ThatCannotBeReadIsNamedByTheClient) {
@@ -247,7 +284,8 @@ TEST_F(SomebodyElsesWindow, ThatCannotBeReadIsNamedByTheClient) {
 
     client_.bind("device[0]/a", 0);
 
-    EXPECT_THAT(client_.notConnectedBecause(), testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr("Permission denied")));
+    EXPECT_THAT(client_.notConnectedBecause(),
+                testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr("Permission denied")));
   }
   std::filesystem::remove(path_);
   startServer({.location = 0});
@@ -265,8 +303,9 @@ TEST_F(SomebodyElsesWindow, ThatCannotBeRemovedIsNamedToTheServer) {
       FAIL() << "it took the place of another user's window";
     } catch (const std::exception& error) {
       // One that cannot even be read may be in use.
-      EXPECT_THAT(error.what(),
-                  testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(mode == 0600 ? "Permission denied" : "remove")));
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr(path_),
+                                               testing::HasSubstr(mode == 0600 ? "Permission denied"
+                                                                               : "remove")));
     }
   }
 }

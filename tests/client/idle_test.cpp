@@ -12,14 +12,15 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/client/message_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/wait_modes.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/file_descriptor.h>
+#include <mpf/message_client.h>
+#include <mpf/message_server.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/wait_modes.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -64,14 +65,17 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
   void SetUp() override {
     server_.on<Int32>([](Int32&) {});
     serving_ = std::thread([this] { server_.run(); });
-    for (int i = 0; i < 50; ++i) clients_.push_back(std::make_unique<IdleClient>(backplane_, GetParam()));
+    for (int i = 0; i < 50; ++i)
+      clients_.push_back(std::make_unique<IdleClient>(backplane_, GetParam()));
     for (const auto& client : clients_) {
       while (client->answers() == 0) std::this_thread::yield();
     }
     for (const auto& name : backplane_.segmentNames()) {
       const auto kind = SegmentName::tryParse(name)->kind;
-      if (kind == NameKind::serverWindow) windows_.push_back(PeerWindow::tryOpen(name, layout::SegmentKind::serverWindow));
-      if (kind == NameKind::clientWindow) windows_.push_back(PeerWindow::tryOpen(name, layout::SegmentKind::clientWindow));
+      if (kind == NameKind::serverWindow)
+        windows_.push_back(PeerWindow::tryOpen(name, layout::SegmentKind::serverWindow));
+      if (kind == NameKind::clientWindow)
+        windows_.push_back(PeerWindow::tryOpen(name, layout::SegmentKind::clientWindow));
     }
     ASSERT_EQ(windows_.size(), 51u);
   }
@@ -88,7 +92,8 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
     }
     return wakes;
   }
-  // Waits until all sleep: twice in a row, for one that is seen asleep may be about to be woken by one that was not looked at yet.
+  // Waits until all sleep: twice in a row, for one that is seen asleep may be about to be woken by
+  // one that was not looked at yet.
   Wakes waitUntilAllSleep() const {
     for (;;) {
       const auto wakes = wakesOfSleepers();
@@ -98,7 +103,8 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
   }
   // Longer than the longest time after which a client asks again for what it is owed.
   static void waitForTick() {
-    const FileDescriptor timer(checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timerfd_create"));
+    const FileDescriptor timer(
+        checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timerfd_create"));
     itimerspec spec{};
     spec.it_value = {.tv_sec = 1, .tv_nsec = 200'000'000};
     checkCall(::timerfd_settime(timer.get(), 0, &spec, nullptr), "timerfd_settime");
@@ -106,8 +112,8 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
     checkCall(retryInterrupted([&] { return ::poll(&tick, 1, -1); }), "poll");
   }
 
-  // A client looks once more after its last reply; then there is a tick in which nothing happens. Something that polls or beats would
-  // go on for ever.
+  // A client looks once more after its last reply; then there is a tick in which nothing happens.
+  // Something that polls or beats would go on for ever.
   Wakes waitUntilIdle() const {
     auto before = waitUntilAllSleep();
     for (waitForTick(); wakesOfSleepers() != before; waitForTick()) before = waitUntilAllSleep();
@@ -127,7 +133,8 @@ TEST_P(IdleTest, NobodyIsWokenWhileNobodySends) { EXPECT_EQ(waitUntilIdle().size
 TEST_P(IdleTest, OneThatSendsWakesTheServerAndNoOtherClient) {
   auto before = waitUntilIdle();
 
-  for (int i = 0; i < 20; ++i) ASSERT_EQ(clients_[7]->client().send(Int32Message()), SendResult::sent);
+  for (int i = 0; i < 20; ++i)
+    ASSERT_EQ(clients_[7]->client().send(Int32Message()), SendResult::sent);
 
   while (clients_[7]->answers() != 21) std::this_thread::yield();
   std::size_t woken = 0;
@@ -135,7 +142,8 @@ TEST_P(IdleTest, OneThatSendsWakesTheServerAndNoOtherClient) {
   EXPECT_EQ(woken, 2u);
 }
 
-INSTANTIATE_TEST_SUITE_P(InModesThatSleep, IdleTest, testing::Values(WaitMode::adaptive, WaitMode::block), nameOfWaitMode);
+INSTANTIATE_TEST_SUITE_P(InModesThatSleep, IdleTest,
+                         testing::Values(WaitMode::adaptive, WaitMode::block), nameOfWaitMode);
 
 }  // namespace
 }  // namespace mpf::test

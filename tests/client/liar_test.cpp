@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A server that says what is not its to say: it is treated as one that sends nonsense.
-#include <mpf/tests/client/client_fixture.h>
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {

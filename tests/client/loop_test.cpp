@@ -6,8 +6,8 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/tests/client/client_fixture.h>
-#include <mpf/tests/support/test_backplane.h>
+#include "tests/client/client_fixture.h"
+#include "tests/support/test_backplane.h"
 
 namespace mpf::test {
 namespace {
@@ -181,7 +181,8 @@ TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
   // A server that was not on a processor in that time has not taken it.
   auto patience = 50ms;
   auto unknown = client.call(Int32Message(), patience);
-  for (; unknown.fate() == Fate::expired; unknown = client.call(Int32Message(), patience)) patience *= 2;
+  for (; unknown.fate() == Fate::expired; unknown = client.call(Int32Message(), patience))
+    patience *= 2;
   server.interrupt();
   serving.join();
   auto expired = client.call(Int32Message(), 5ms);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Hints are written by every peer, and so can be lost or invented by any: that costs time, never a message.
+// Hints are written by every peer, and so can be lost or invented by any: that costs time, never a
+// message.
 #include <poll.h>
 
 #include <thread>
 
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/client/client_fixture.h>
+#include "shm/segment_name.h"
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -22,8 +23,8 @@ class LostHintTest : public ClientTest {
     for (const auto& name : backplane_.segmentNames()) {
       if (name.find(mark) == std::string::npos) continue;
       const auto incarnation = PeerWindow::tryOpen(name, kind)->header().incarnation;
-      return *Segment::tryOpen(SegmentName::keyed(backplane_.name(), NameKind::hints, incarnation), layout::SegmentKind::hints,
-                               Segment::Access::readWrite);
+      return *Segment::tryOpen(SegmentName::keyed(backplane_.name(), NameKind::hints, incarnation),
+                               layout::SegmentKind::hints, Segment::Access::readWrite);
     }
     return {};
   }
@@ -91,7 +92,8 @@ TEST_F(LostHintTest, ARingThatSomebodyElseTookIsRepeated) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const auto incarnation = hintsOf(layout::SegmentKind::serverWindow).header().ownerWindow;
-  const auto fifo = doorbell::tryOpenFifo(SegmentName::keyed(backplane_.name(), NameKind::fifo, incarnation));
+  const auto fifo =
+      doorbell::tryOpenFifo(SegmentName::keyed(backplane_.name(), NameKind::fifo, incarnation));
   ASSERT_TRUE(fifo);
   pollfd readable{server_->descriptor(), POLLIN, 0};
   EXPECT_FALSE(server_->receive());

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Queues that are full: refused at once, counted, told in order; nothing is lost and nobody else notices.
+// Queues that are full: refused at once, counted, told in order; nothing is lost and nobody else
+// notices.
 #include <algorithm>
 #include <numeric>
 #include <string>
 
-#include <mpf/shm/window.h>
-#include <mpf/tests/client/client_fixture.h>
+#include "shm/window.h"
+#include "tests/client/client_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -14,11 +15,14 @@ class QueueTest : public ClientTest {
  protected:
   // A second client of the same server, on a dispatcher of its own.
   struct Other {
-    explicit Other(const Backplane& backplane) : dispatcher(backplane) { client.bind("device[0]/a"); }
+    explicit Other(const Backplane& backplane) : dispatcher(backplane) {
+      client.bind("device[0]/a");
+    }
     Dispatcher dispatcher;
     std::vector<std::int32_t> replies;
     MessageClient client{dispatcher, [this](const Message& message) {
-                           if (const auto* reply = message.tryAs<Int32>()) replies.push_back(reply->value);
+                           if (const auto* reply = message.tryAs<Int32>())
+                             replies.push_back(reply->value);
                          }};
   };
   template <class Condition>
@@ -73,7 +77,8 @@ TEST_F(QueueTest, RequestsWithoutReplyHaveALimitAndRefusalsAreCounted) {
   server.on<Int32>([&](Int32Message&& request) { held.push_back(std::move(request)); });
   bind();
   std::size_t sent = 0;
-  while (send(static_cast<std::int32_t>(sent)) == SendResult::sent) runUntil([&, before = sent++] { return held.size() > before; });
+  while (send(static_cast<std::int32_t>(sent)) == SendResult::sent)
+    runUntil([&, before = sent++] { return held.size() > before; });
 
   EXPECT_EQ(send(0), SendResult::tooManyOutstanding);
 
@@ -113,7 +118,8 @@ TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
     EXPECT_EQ(send(2), SendResult::queueFull);
     EXPECT_EQ(send(2), SendResult::queueFull);
     runUntil([&] { return news_.size() == 1 + run; });
-    EXPECT_THAT(messages_, testing::IsEmpty()) << "the refusal comes before the replies that the server has yet to send";
+    EXPECT_THAT(messages_, testing::IsEmpty())
+        << "the refusal comes before the replies that the server has yet to send";
     serverRuns_ = true;
     EXPECT_EQ(nextValues(2), numbers(2));
   }
@@ -121,8 +127,10 @@ TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
   server_.reset();
   runUntil([&] { return !client_.isConnected(); });
 
-  EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull, ConnectStatus::connectQueueFull,
-                                          ConnectStatus::connectQueueFull, ConnectStatus::connectNo));
+  EXPECT_THAT(news_,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull,
+                                   ConnectStatus::connectQueueFull, ConnectStatus::connectQueueFull,
+                                   ConnectStatus::connectNo));
 }
 
 TEST_F(QueueTest, ANewQueueSizeIsForLaterClients) {
@@ -134,7 +142,8 @@ TEST_F(QueueTest, ANewQueueSizeIsForLaterClients) {
 
   Other later(backplane_);
   runWith(later, [&] { return later.client.isConnected(); });
-  for (int i = 0; i < 2; ++i) EXPECT_EQ(later.client.send(Int32Message({.value = i})), SendResult::sent);
+  for (int i = 0; i < 2; ++i)
+    EXPECT_EQ(later.client.send(Int32Message({.value = i})), SendResult::sent);
   EXPECT_EQ(later.client.send(Int32Message()), SendResult::queueFull);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(send(i), SendResult::sent);
   EXPECT_EQ(send(5), SendResult::queueFull);
@@ -159,7 +168,8 @@ TEST_F(QueueTest, RepliesThatAClientDoesNotTakeAreRefusedCountedAndHurtNobodyEls
     if (request->cmd == 1) {
       held = std::move(request);
     } else {
-      EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent) << "a first reply always has room";
+      EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent)
+          << "a first reply always has room";
     }
   });
   bind();
@@ -210,7 +220,8 @@ TEST_F(QueueTest, AFullQueueOfOneClientDoesNotDelayOthers) {
   while (client_.send(Int32Message({.address = 1})) == SendResult::sent) {
   }
 
-  for (const auto& other : others) ASSERT_EQ(other->client.send(Int32Message({.address = 2})), SendResult::sent);
+  for (const auto& other : others)
+    ASSERT_EQ(other->client.send(Int32Message({.address = 2})), SendResult::sent);
 
   while (server.handleOne()) {
   }

@@ -11,11 +11,12 @@
 #include <optional>
 #include <thread>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/wait_modes.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "tests/support/test_backplane.h"
+#include "tests/support/wait_modes.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -65,7 +66,9 @@ class SignalTest : public testing::TestWithParam<WaitMode> {
     ::sigaction(SIGUSR1, &action, &before_);
   }
   void TearDown() override { ::sigaction(SIGUSR1, &before_, nullptr); }
-  MessageServer makeServer() const { return {backplane_, "device", {.location = 0, .waitMode = GetParam()}}; }
+  MessageServer makeServer() const {
+    return {backplane_, "device", {.location = 0, .waitMode = GetParam()}};
+  }
   // Runs `server` beside the test, undisturbed by signals.
   struct Running {
     explicit Running(MessageServer& itsServer) : server(itsServer), thread([&] { server.run(); }) {}
@@ -103,7 +106,8 @@ TEST_P(SignalTest, AServerThatWaitsForEverGetsItsMessage) {
   waiting.join();
 
   EXPECT_EQ(ended, 0) << "a wait without a deadline was ended by a signal";
-  EXPECT_LT(inVain, kSignals / 10) << "a client that connects ends a wait now and then, signals do not";
+  EXPECT_LT(inVain, kSignals / 10)
+      << "a client that connects ends a wait now and then, signals do not";
   EXPECT_EQ(got.tryAs<Int32>()->value, 7);
 }
 
@@ -211,7 +215,8 @@ TEST_P(SignalTest, ACallWithoutReplyEndsInItsTime) {
   });
   calling.join();
 
-  EXPECT_THAT(answer->fate(), testing::AnyOf(Fate::outcomeUnknown, Fate::expired)) << answer->why();  // expired: the server was slower
+  // expired: the server was slower
+  EXPECT_THAT(answer->fate(), testing::AnyOf(Fate::outcomeUnknown, Fate::expired)) << answer->why();
   EXPECT_GE(endedNs, deadlineNs);
 }
 

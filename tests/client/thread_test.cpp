@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Any thread may bind, send, cancel and wait, whichever kind of dispatcher the client has; callbacks run on
-// the thread that runs the dispatcher, and each request that was accepted has one end.
+// Any thread may bind, send, cancel and wait, whichever kind of dispatcher the client has;
+// callbacks run on the thread that runs the dispatcher, and each request that was accepted has one
+// end.
 #include <thread>
 
 #include <array>
@@ -10,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include <mpf/tests/client/client_fixture.h>
-#include <mpf/tests/support/sanitized.h>
+#include "tests/client/client_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace mpf::test {
 namespace {
@@ -140,7 +141,8 @@ TEST_P(ThreadTest, ManyThreadsBindWaitAndEndTheirClients) {
         connected += client->connectWait(60s) ? 1 : 0;
         std::uint32_t id = 0;
         Int32Message request;
-        if (client->send(std::move(request), Deadline::never(), &id) == SendResult::sent) client->cancel(id);
+        if (client->send(std::move(request), Deadline::never(), &id) == SendResult::sent)
+          client->cancel(id);
         client.reset();
         isOneThread = isOneThread && seen.isOneThread;
         isOneThread = isOneThread && seen.thread != std::this_thread::get_id();
@@ -153,7 +155,10 @@ TEST_P(ThreadTest, ManyThreadsBindWaitAndEndTheirClients) {
   EXPECT_TRUE(isOneThread);
 }
 
-INSTANTIATE_TEST_SUITE_P(OfEachKind, ThreadTest, testing::Values(Kind::ownThread, Kind::run, Kind::runOnce, Kind::runPending), nameOfKind);
+INSTANTIATE_TEST_SUITE_P(OfEachKind, ThreadTest,
+                         testing::Values(Kind::ownThread, Kind::run, Kind::runOnce,
+                                         Kind::runPending),
+                         nameOfKind);
 
 // The callback belongs to the thread that runs the dispatcher, which here does so later.
 TEST_F(ClientTest, CancelLeavesTheFateToTheThreadThatRunsTheDispatcher) {

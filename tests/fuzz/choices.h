@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Choices: a fuzzer's input as a run of choices; zeros, and what stands behind its end, choose the usual.
+// Choices: a fuzzer's input as a run of choices; zeros, and what stands behind its end, choose the
+// usual.
 //
 // Threads  one.
 #pragma once
@@ -15,7 +16,9 @@ class Choices {
 
   [[nodiscard]] bool isOver() const noexcept { return input_.empty(); }
   // 0 to end - 1.
-  std::uint64_t below(std::uint64_t end) noexcept { return take(end <= 256 ? 1 : end <= 65536 ? 2 : 8) % end; }
+  std::uint64_t below(std::uint64_t end) noexcept {
+    return take(end <= 256 ? 1 : end <= 65536 ? 2 : 8) % end;
+  }
   bool oneIn(std::uint64_t n) noexcept { return below(n) == n - 1; }
   std::uint64_t bits() noexcept { return take(8); }
   // Numbers of all magnitudes.
@@ -28,7 +31,8 @@ class Choices {
  private:
   std::uint64_t take(int bytes) noexcept {
     std::uint64_t value = 0;
-    for (int i = 0; i < bytes && !input_.empty(); ++i, input_ = input_.subspan(1)) value = value << 8 | input_.front();
+    for (int i = 0; i < bytes && !input_.empty(); ++i, input_ = input_.subspan(1))
+      value = value << 8 | input_.front();
     return value;
   }
   std::span<const std::uint8_t> input_;

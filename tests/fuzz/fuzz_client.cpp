@@ -3,11 +3,11 @@
 //   files: 0 server window, 1 its hints, 2 the link, once there is one
 #include <optional>
 
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/hostile_files.h>
-#include <mpf/tests/fuzz/scene.h>
-#include <mpf/tests/fuzz/talk.h>
+#include "shm/segment_name.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/hostile_files.h"
+#include "tests/fuzz/scene.h"
+#include "tests/fuzz/talk.h"
 
 namespace mpf::test {
 namespace {
@@ -28,7 +28,8 @@ class Client {
     const auto peer = PeerWindow::tryOpen(scene_.serverName(), layout::SegmentKind::serverWindow);
     if (!peer || peer->isClosed() || !peer->hasOwner()) return;
     static_cast<void>(peer->user());
-    auto link = Link::create(scene_.backplaneName(), scene_.client, static_cast<std::uint32_t>(value), peer);
+    auto link = Link::create(scene_.backplaneName(), scene_.client,
+                             static_cast<std::uint32_t>(value), peer);
     files_.add(link->name());
     peer->knock(link->header().incarnation);
     talk_.emplace(std::move(link));

@@ -4,10 +4,11 @@
 #include <set>
 #include <vector>
 
-#include <mpf/client/message_client.h>
-#include <mpf/router/client_router.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/router_scene.h>
+#include <mpf/message_client.h>
+
+#include "router/outgoing/client_router.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/router_scene.h"
 
 namespace mpf::test {
 namespace {
@@ -22,8 +23,11 @@ class PretendedNetwork final : public kj::Network {
   kj::Promise<kj::Own<kj::NetworkAddress>> parseAddress(kj::StringPtr, kj::uint) override {
     return kj::Own<kj::NetworkAddress>(kj::heap<Address>(connect_));
   }
-  kj::Own<kj::NetworkAddress> getSockaddr(const void*, kj::uint) override { return kj::heap<Address>(connect_); }
-  kj::Own<kj::Network> restrictPeers(kj::ArrayPtr<const kj::StringPtr>, kj::ArrayPtr<const kj::StringPtr>) override {
+  kj::Own<kj::NetworkAddress> getSockaddr(const void*, kj::uint) override {
+    return kj::heap<Address>(connect_);
+  }
+  kj::Own<kj::Network> restrictPeers(kj::ArrayPtr<const kj::StringPtr>,
+                                     kj::ArrayPtr<const kj::StringPtr>) override {
     return kj::heap<PretendedNetwork>(connect_);
   }
 
@@ -45,21 +49,25 @@ class PretendedNetwork final : public kj::Network {
 // A client and its requests: each has one end.
 class Local {
  public:
-  explicit Local(Dispatcher& dispatcher) : client_(dispatcher, [this](Message&& message) { note(std::move(message)); }) {
+  explicit Local(Dispatcher& dispatcher)
+      : client_(dispatcher, [this](Message&& message) { note(std::move(message)); }) {
     client_.bind("echo", kLocation);
   }
   void send(Choices& choices) {
     std::uint32_t id = 0;
-    const auto takeBefore = choices.oneIn(8) ? Deadline::after(Nanoseconds(choices.nasty() >> 1)) : Deadline::never();
+    const auto takeBefore =
+        choices.oneIn(8) ? Deadline::after(Nanoseconds(choices.nasty() >> 1)) : Deadline::never();
     const auto elements = choices.oneIn(8) ? choices.below(10'000) : 0;
-    auto message = elements == 0 ? Message(Int32Message({.value = 1})) : Message(client_.alloc<Int32Array>(elements));
+    auto message = elements == 0 ? Message(Int32Message({.value = 1}))
+                                 : Message(client_.alloc<Int32Array>(elements));
     if (client_.send(std::move(message), takeBefore, &id) == SendResult::sent) open_.insert(id);
     if (choices.oneIn(16)) client_.cancel(id);
   }
 
  private:
   void note(Message&& message) {
-    if (MessageClient::endsRequest(message) && open_.erase(message.route().requestId) == 0) std::abort();
+    if (MessageClient::endsRequest(message) && open_.erase(message.route().requestId) == 0)
+      std::abort();
     kept_ = std::move(message);
   }
   std::set<std::uint32_t> open_;
@@ -72,15 +80,25 @@ class Play {
   Play(RouterScene& scene, std::span<const std::uint8_t> input)
       : scene_(scene),
         choices_(input),
-        here_{scene.io.unixEventPort, network_,        scene.here.timer,  scene.backplane, scene.here.log,
-              scene.statistics,       scene.presences, scene.here.config, nullptr,         1},
+        here_{scene.io.unixEventPort,
+              network_,
+              scene.here.timer,
+              scene.backplane,
+              scene.here.log,
+              scene.statistics,
+              scene.presences,
+              scene.here.config,
+              nullptr,
+              1},
         dispatcher_(scene.backplane),
         first_(std::make_unique<Local>(dispatcher_)),
         second_(std::make_unique<Local>(dispatcher_)),
         router_(std::make_unique<router::ClientRouter>(
-            here_,
-            router::Remote{.locations = {kLocation}, .address = {"127.0.0.1", 1}, .security = router::Security::plain, .tlsName = {}})) {
-    router_->setWishes({{kLocation, "echo"}});
+            here_, router::Remote{.locations = {kLocation},
+                                  .address = {"127.0.0.1", 1},
+                                  .security = router::Security::plain,
+                                  .tlsName = {}})) {
+    router_->setPendingBinds({{kLocation, "echo"}});
     scene_.settle();
   }
   ~Play() {

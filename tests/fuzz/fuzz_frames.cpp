@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Whatever comes over a line, cut into frames, and all that is in them read. The input is what comes, behind a byte that says in which parts.
+// Whatever comes over a line, cut into frames, and all that is in them read. The input is what
+// comes, behind a byte that says in which parts.
 #include <algorithm>
 #include <capnp/message.h>
 #include <cstring>
 #include <kj/exception.h>
 #include <stdexcept>
 
-#include <mpf/router/frame_reader.h>
-#include <mpf/router/kj_text.h>
-#include <mpf/schema/conversion.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/talk.h>
+#include "router/transport/frame_reader.h"
+#include "router/transport/kj_text.h"
+#include "schema/conversion.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/talk.h"
 
 namespace mpf::test {
 namespace {
@@ -68,7 +69,8 @@ void play(std::span<const std::uint8_t> input) try {
       for (const auto item : frame->getRoot<wire::Frame>().getItems()) look(item);
     }
   }
-} catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): it costs the peer its connection
+} catch (
+    const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): it costs the peer its connection
 } catch (const kj::Exception&) {  // NOLINT(bugprone-empty-catch): likewise
 }
 

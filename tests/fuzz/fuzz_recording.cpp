@@ -6,12 +6,13 @@
 #include <fmt/format.h>
 #include <stdexcept>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/schema/conversion.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/talk.h>
-#include <mpf/tools/recording.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "schema/conversion.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/talk.h"
+#include "tools/tap/recording.h"
 
 namespace mpf::test {
 namespace {
@@ -21,14 +22,16 @@ void take(wire::Record::Reader record) {
   if (record.isOpened()) static_cast<void>(std::string(record.getOpened().getServer().cStr()));
   if (!record.isMessage()) return;
   ConversionError error;
-  const auto message = tryFromWire(record.getMessage().getEnvelope(), {.maxValueBytes = SIZE_MAX}, error);
+  const auto message =
+      tryFromWire(record.getMessage().getEnvelope(), {.maxValueBytes = SIZE_MAX}, error);
   if (message) lookAt(*message);
 }
 
 }  // namespace
 
 void play(std::span<const std::uint8_t> input) try {
-  static const FileDescriptor file(checkCall(::memfd_create("recording", MFD_CLOEXEC), "create a file"));
+  static const FileDescriptor file(
+      checkCall(::memfd_create("recording", MFD_CLOEXEC), "create a file"));
   checkCall(::ftruncate(file.get(), static_cast<off_t>(input.size())), "cut a file");
   checkCall(::pwrite(file.get(), input.data(), input.size(), 0), "write to a file");
   tools::RecordingReader reader(fmt::format("/proc/self/fd/{}", file.get()));

@@ -3,11 +3,11 @@
 //   files: 0 link, 1 client window, 2 its hints, 3 the client's pool, 4 the server's hints
 #include <optional>
 
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/hostile_files.h>
-#include <mpf/tests/fuzz/scene.h>
-#include <mpf/tests/fuzz/talk.h>
+#include "shm/segment_name.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/hostile_files.h"
+#include "tests/fuzz/scene.h"
+#include "tests/fuzz/talk.h"
 
 namespace mpf::test {
 namespace {
@@ -25,9 +25,11 @@ class Server {
 
  private:
   void attach() {
-    auto link = Link::tryOpen(scene_.backplaneName(), scene_.clientLink->link().name(), scene_.server);
+    auto link =
+        Link::tryOpen(scene_.backplaneName(), scene_.clientLink->link().name(), scene_.server);
     if (!link) return;
-    const auto window = SegmentName::keyed(scene_.backplaneName(), NameKind::clientWindow, link->header().clientWindow);
+    const auto window = SegmentName::keyed(scene_.backplaneName(), NameKind::clientWindow,
+                                           link->header().clientWindow);
     auto client = PeerWindow::tryOpen(window, layout::SegmentKind::clientWindow);
     if (!client || client->isClosed() || !client->hasOwner()) return;
     link->attachPeer(std::move(client), link->header().clientIndex);
@@ -45,8 +47,10 @@ void play(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files = [] {
     scene.serverLink.reset();  // ours comes in its place
-    return HostileFiles(scene.backplane, {scene.clientLink->link().name(), scene.clientName(), scene.hintsOf(scene.client),
-                                          scene.bulkName(LinkSide::client), scene.hintsOf(scene.server)});
+    return HostileFiles(
+        scene.backplane,
+        {scene.clientLink->link().name(), scene.clientName(), scene.hintsOf(scene.client),
+         scene.bulkName(LinkSide::client), scene.hintsOf(scene.server)});
   }();
   files.play(input, [] { return Server(scene); });
 }

@@ -2,10 +2,11 @@
 // A server router, a server that its peer may use, and a peer that sends anything.
 #include <memory>
 
-#include <mpf/router/server_router.h>
-#include <mpf/server/message_server.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/router_scene.h>
+#include <mpf/message_server.h>
+
+#include "router/incoming/server_router.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/router_scene.h"
 
 namespace mpf::test {
 namespace {
@@ -17,7 +18,8 @@ class Play {
         choices_(input),
         connection_(makeConnection()),
         far_(kj::mv(connection_.ends[1]), items_),
-        router_(std::make_unique<router::ServerRouter>(scene.here, kj::mv(connection_.ends[0]), "", "fuzz", false)),
+        router_(std::make_unique<router::ServerRouter>(scene.here, kj::mv(connection_.ends[0]), "",
+                                                       "fuzz", false)),
         run_(router_->run().then([this] { over_ = true; }).eagerlyEvaluate(nullptr)) {
     openServer();
     scene_.onServers = [this] { router_->lookAtAll(); };
@@ -55,7 +57,9 @@ class Play {
     }
   }
   void openServer() {
-    if (!server_) server_ = std::make_unique<MessageServer>(scene_.backplane, "echo", ServerOptions{.location = 0, .queueSize = 4});
+    if (!server_)
+      server_ = std::make_unique<MessageServer>(scene_.backplane, "echo",
+                                                ServerOptions{.location = 0, .queueSize = 4});
   }
   // What an honest server may do with each request.
   void serve() {
@@ -68,7 +72,8 @@ class Play {
           static_cast<void>(server_->reply(std::move(request)));
           break;
         case 1:
-          static_cast<void>(server_->reply(server_->allocReplyMessage<Float64Array>(request, choices_.below(4096))));
+          static_cast<void>(server_->reply(
+              server_->allocReplyMessage<Float64Array>(request, choices_.below(4096))));
           static_cast<void>(server_->reply(std::move(request)));
           break;
         case 2:

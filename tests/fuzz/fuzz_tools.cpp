@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
 // The tools look at the files of a server and a client that lie both: mpf inspect, ls, top and tap.
-//   files: 0 link, 1 server window, 2 client window, 3 and 4 their hints, 5 and 6 the client's and the server's pool
+//   files: 0 link, 1 server window, 2 client window, 3 and 4 their hints, 5 and 6 the client's and
+//   the server's pool
 #include <memory>
 #include <vector>
 
-#include <mpf/shm/segment.h>
-#include <mpf/tests/fuzz/fuzzer.h>
-#include <mpf/tests/fuzz/hostile_files.h>
-#include <mpf/tests/fuzz/scene.h>
-#include <mpf/tests/fuzz/talk.h>
-#include <mpf/tools/link_follower.h>
-#include <mpf/tools/outline.h>
-#include <mpf/tools/survey.h>
+#include "shm/segment.h"
+#include "tests/fuzz/fuzzer.h"
+#include "tests/fuzz/hostile_files.h"
+#include "tests/fuzz/scene.h"
+#include "tests/fuzz/talk.h"
+#include "tools/inspect/outline.h"
+#include "tools/report/snapshot.h"
+#include "tools/tap/link_follower.h"
 
 namespace mpf::test {
 namespace {
@@ -22,21 +23,23 @@ class Onlooker {
 
   void turn(std::uint64_t value) {
     const auto what = value % 16;
-    if (what == 15) static_cast<void>(tools::Survey::take(scene_.backplaneName()));
+    if (what == 15) static_cast<void>(tools::Snapshot::take(scene_.backplaneName()));
     else if (what >= 8) dissect(what - 8, value);
     else follow(value);
   }
 
  private:
   void dissect(std::size_t file, std::uint64_t value) try {
-    const auto tree = tools::tryDissect(segments::path(files_.name(file)), {.last = value / 16 % 16, .raw = value / 256 % 8 == 7});
+    const auto tree = tools::tryDissect(segments::path(files_.name(file)),
+                                        {.last = value / 16 % 16, .raw = value / 256 % 8 == 7});
     if (tree) static_cast<void>(tools::outline(*tree));
   } catch (const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool says so, and goes on
   }
 
   void follow(std::uint64_t value) try {
     const auto from = value % 2 == 0 ? tools::FollowFrom::first : tools::FollowFrom::newest;
-    if (!follower_) follower_ = tools::LinkFollower::tryOpen(scene_.backplaneName(), files_.name(0), from);
+    if (!follower_)
+      follower_ = tools::LinkFollower::tryOpen(scene_.backplaneName(), files_.name(0), from);
     if (!follower_) return;
     std::vector<tools::TappedMessage> messages;
     follower_->take(messages);
@@ -56,9 +59,10 @@ class Onlooker {
 
 void play(std::span<const std::uint8_t> input) {
   static Scene scene;
-  static HostileFiles files(scene.backplane,
-                            {scene.clientLink->link().name(), scene.serverName(), scene.clientName(), scene.hintsOf(scene.server),
-                             scene.hintsOf(scene.client), scene.bulkName(LinkSide::client), scene.bulkName(LinkSide::server)});
+  static HostileFiles files(
+      scene.backplane, {scene.clientLink->link().name(), scene.serverName(), scene.clientName(),
+                        scene.hintsOf(scene.server), scene.hintsOf(scene.client),
+                        scene.bulkName(LinkSide::client), scene.bulkName(LinkSide::server)});
   files.play(input, [] { return Onlooker(scene, files); });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/fuzz/fuzzer.h>
+#include "tests/fuzz/fuzzer.h"
 
 // NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

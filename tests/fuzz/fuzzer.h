@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What each fuzzer is: a function of its own that plays one input (fuzzer.cpp hands it to libFuzzer, or to replay.cpp).
+// What each fuzzer is: a function of its own that plays one input (fuzzer.cpp hands it to
+// libFuzzer, or to replay.cpp).
 #pragma once
 
 #include <cstdint>

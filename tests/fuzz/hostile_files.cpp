@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/fuzz/hostile_files.h>
+#include "tests/fuzz/hostile_files.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -15,9 +15,9 @@
 #include <iostream>
 #include <string_view>
 
-#include <mpf/base/system_call.h>
-#include <mpf/shm/segment.h>
-#include <mpf/tests/support/usage.h>
+#include "base/system_call.h"
+#include "shm/segment.h"
+#include "tests/support/usage.h"
 
 namespace mpf::test {
 namespace {
@@ -30,7 +30,8 @@ std::vector<std::string> sortedNames(const Backplane& backplane) {
   return names;
 }
 
-// Descriptors and mappings of segments that this process has. Others are none of ours: the sanitizer has its own.
+// Descriptors and mappings of segments that this process has. Others are none of ours: the
+// sanitizer has its own.
 std::size_t segmentsInUse() {
   std::size_t used = Usage::of(::getpid()).segments;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -50,7 +51,8 @@ std::vector<std::byte> contentOf(int file) {
 
 }  // namespace
 
-// Removes what runs left that crashed. Files of a run that goes on, beside this one, say anything, also that their owners are dead.
+// Removes what runs left that crashed. Files of a run that goes on, beside this one, say anything,
+// also that their owners are dead.
 Backplane fuzzBackplane() {
   constexpr std::string_view kPrefix = "fuzz-";
   for (const auto& name : Backplane::names()) {
@@ -58,7 +60,8 @@ Backplane fuzzBackplane() {
     const auto run = static_cast<pid_t>(std::atol(name.c_str() + kPrefix.size()));
     if (::kill(run, 0) != 0 && errno == ESRCH) Backplane::attach(name);
   }
-  return Backplane::attach(fmt::format("{}{}-{:x}", kPrefix, ::getpid(), segments::newIncarnation()));
+  return Backplane::attach(
+      fmt::format("{}{}-{:x}", kPrefix, ::getpid(), segments::newIncarnation()));
 }
 
 HostileFiles::HostileFiles(const Backplane& backplane, const std::vector<std::string>& names)
@@ -67,12 +70,14 @@ HostileFiles::HostileFiles(const Backplane& backplane, const std::vector<std::st
 }
 
 void HostileFiles::add(const std::string& name) {
-  FileDescriptor file(checkCall(::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC), "open", name));
+  FileDescriptor file(
+      checkCall(::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC), "open", name));
   auto content = contentOf(file.get());
   files_.push_back({name, std::move(file), std::move(content)});
 }
 
-void HostileFiles::deceive(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn) {
+void HostileFiles::deceive(std::span<const std::uint8_t> input,
+                           const std::function<void(std::uint64_t)>& turn) {
   for (; input.size() >= Deed::kBytes; input = input.subspan(Deed::kBytes)) {
     const Deed deed(input.first<Deed::kBytes>());
     if (deed.what == Deed::What::turn) turn(deed.value);
@@ -93,8 +98,10 @@ void HostileFiles::act(const Deed& deed) {
 void HostileFiles::restore() {
   files_.erase(files_.begin() + static_cast<std::ptrdiff_t>(lasting_), files_.end());
   for (const auto& file : files_) {
-    checkCall(::ftruncate(file.file.get(), static_cast<off_t>(file.before.size())), "restore a file");
-    checkCall(::pwrite(file.file.get(), file.before.data(), file.before.size(), 0), "restore a file");
+    checkCall(::ftruncate(file.file.get(), static_cast<off_t>(file.before.size())),
+              "restore a file");
+    checkCall(::pwrite(file.file.get(), file.before.data(), file.before.size(), 0),
+              "restore a file");
   }
   if (++runs_ % kCheckEvery == 0) checkNothingLeft();
 }
@@ -107,8 +114,8 @@ void HostileFiles::checkNothingLeft() {
     names_ = names;
   }
   if (used == used_ && names == names_) return;
-  std::cerr << "after " << runs_ << " inputs: " << used << " segments in use, were " << used_ << "; " << names.size() << " names, were "
-            << names_.size() << '\n';
+  std::cerr << "after " << runs_ << " inputs: " << used << " segments in use, were " << used_
+            << "; " << names.size() << " names, were " << names_.size() << '\n';
   std::abort();
 }
 

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Hostile files: a fuzzer's input, done to the files of a system that was legal, while somebody looks at them.
+// Hostile files: a fuzzer's input, done to the files of a system that was legal, while somebody
+// looks at them.
 //
-//   input = | what | file | at | value | what | file | at | value | ...     a deed is 12 bytes: u8, u8, u16, u64
-//   what    0 write `value` over the word number `at`, 1 its lower half over a half, 2 its lowest byte over a byte; 3 cut the file before
-//           byte `at`; 4 the victim's turn                      modulo 5, places modulo what there is
+//   input = | what | file | at | value | what | file | at | value | ...     a deed is 12 bytes: u8,
+//   u8, u16, u64
+//   what    0 write `value` over the word number `at`, 1 its lower half over a half, 2 its lowest
+//           byte over a byte; 3 cut the file before byte `at`; 4 the victim's turn
+//           modulo 5, places modulo what there is
 //
-// So the fuzzer starts behind magic numbers and lengths that fit, and needs few bytes to lie about one of them.
+// So the fuzzer starts behind magic numbers and lengths that fit, and needs few bytes to lie about
+// one of them.
 //
 // Threads  one.
 // Crash    what a fuzzer that crashed has left, the next one removes.
@@ -19,8 +23,8 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/shm/backplane.h>
+#include <mpf/backplane.h>
+#include <mpf/file_descriptor.h>
 
 namespace mpf::test {
 
@@ -28,7 +32,8 @@ struct Deed {
   enum class What : std::uint8_t { word, half, byte, cut, turn };
   static constexpr std::size_t kBytes = 12;
 
-  explicit Deed(std::span<const std::uint8_t, kBytes> bytes) noexcept : what(static_cast<What>(bytes[0] % 5)), file(bytes[1]) {
+  explicit Deed(std::span<const std::uint8_t, kBytes> bytes) noexcept
+      : what(static_cast<What>(bytes[0] % 5)), file(bytes[1]) {
     std::memcpy(&at, &bytes[2], sizeof at);
     std::memcpy(&value, &bytes[4], sizeof value);
   }
@@ -46,8 +51,8 @@ class HostileFiles {
   // Inputs name files by their place in `names`.
   HostileFiles(const Backplane& backplane, const std::vector<std::string>& names);
 
-  // Plays an input with a victim of its own, which makeVictim() returns. It has a turn(value) wherever the input says so, and one more at
-  // the end. Afterwards all files are as they were.
+  // Plays an input with a victim of its own, which makeVictim() returns. It has a turn(value)
+  // wherever the input says so, and one more at the end. Afterwards all files are as they were.
   template <class MakeVictim>
   void play(std::span<const std::uint8_t> input, MakeVictim makeVictim) {
     {
@@ -58,7 +63,9 @@ class HostileFiles {
   }
   // A file that came while the input was played; deeds reach it like the others.
   void add(const std::string& name);
-  [[nodiscard]] const std::string& name(std::size_t file) const { return files_[file % files_.size()].name; }
+  [[nodiscard]] const std::string& name(std::size_t file) const {
+    return files_[file % files_.size()].name;
+  }
   [[nodiscard]] std::size_t count() const noexcept { return files_.size(); }
 
  private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// replay FOLDER MUTATIONS: each file of the folder as an input, and so many inputs that differ a little from it. MPF_TEST_SEED repeats them.
+// replay FOLDER MUTATIONS: each file of the folder as an input, and so many inputs that differ a
+// little from it. MPF_TEST_SEED repeats them.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -9,8 +10,8 @@
 #include <iterator>
 #include <vector>
 
-#include <mpf/tests/support/random.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/random.h"
+#include "tests/support/watchdog.h"
 
 // NOLINTNEXTLINE(readability-identifier-naming): libFuzzer's name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
@@ -24,7 +25,8 @@ constexpr std::size_t kBlock = 12;  // as long as a deed (hostile_files.h)
 
 std::vector<std::filesystem::path> filesOf(const char* folder) {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    files.push_back(entry.path());
   std::ranges::sort(files);
   return files;
 }
@@ -35,7 +37,8 @@ Input contentOf(const std::filesystem::path& path) {
 }
 
 void put(Input& input, std::size_t at, std::uint64_t value, std::size_t bytes) {
-  for (; bytes > 0 && at < input.size(); --bytes, value >>= 8) input[at++] = static_cast<std::uint8_t>(value);
+  for (; bytes > 0 && at < input.size(); --bytes, value >>= 8)
+    input[at++] = static_cast<std::uint8_t>(value);
 }
 
 void mutateOnce(Input& input, Random& random) {
@@ -59,11 +62,14 @@ void mutateOnce(Input& input, Random& random) {
   }
 }
 
-void feed(const Input& input) { static_cast<void>(LLVMFuzzerTestOneInput(input.data(), input.size())); }
+void feed(const Input& input) {
+  static_cast<void>(LLVMFuzzerTestOneInput(input.data(), input.size()));
+}
 
 void replay(const std::filesystem::path& file, int mutations, Random& random) {
   const Watchdog watchdog(file.string());
-  std::cout << file.filename().string() << std::endl;  // the last line names what an input that crashes came from
+  // the last line names what an input that crashes came from
+  std::cout << file.filename().string() << std::endl;
   const auto input = contentOf(file);
   feed(input);
   for (int i = 0; i < mutations; ++i) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/fuzz/router_scene.h>
+#include "tests/fuzz/router_scene.h"
 
 #include <algorithm>
 #include <cstdlib>
 #include <iostream>
 
-#include <mpf/tests/fuzz/hostile_files.h>
+#include "tests/fuzz/hostile_files.h"
 
 namespace mpf::test {
 namespace {
@@ -32,8 +32,12 @@ class PretendedSocket final : public kj::AsyncIoStream {
   kj::Promise<std::size_t> tryRead(void* buffer, std::size_t least, std::size_t most) override {
     return pipe_->tryRead(buffer, least, most);
   }
-  kj::Promise<void> write(const void* buffer, std::size_t size) override { return pipe_->write(buffer, size); }
-  kj::Promise<void> write(kj::ArrayPtr<const kj::ArrayPtr<const kj::byte>> pieces) override { return pipe_->write(pieces); }
+  kj::Promise<void> write(const void* buffer, std::size_t size) override {
+    return pipe_->write(buffer, size);
+  }
+  kj::Promise<void> write(kj::ArrayPtr<const kj::ArrayPtr<const kj::byte>> pieces) override {
+    return pipe_->write(pieces);
+  }
   kj::Promise<void> whenWriteDisconnected() override { return pipe_->whenWriteDisconnected(); }
   void shutdownWrite() override { pipe_->shutdownWrite(); }
   void setsockopt(int, int, const void*, kj::uint) override {}
@@ -100,19 +104,20 @@ kj::Promise<void> FarEnd::readLoop() {
     return paf.promise.then([this] { return readLoop(); });
   }
   auto room = reader_.room();
-  return stream_->tryRead(room.begin(), 1, room.size()).then([this](std::size_t bytes) -> kj::Promise<void> {
-    reader_.filled(bytes);
-    over_ = over_ || bytes == 0;
-    try {
-      while (auto* frame = reader_.tryNext()) {
-        for (const auto item : frame->getRoot<wire::Frame>().getItems()) note(item);
-      }
-    } catch (...) {
-      check(false, "sent a frame that is none");
-    }
-    if (over_) return kj::READY_NOW;
-    return readLoop();
-  });
+  return stream_->tryRead(room.begin(), 1, room.size())
+      .then([this](std::size_t bytes) -> kj::Promise<void> {
+        reader_.filled(bytes);
+        over_ = over_ || bytes == 0;
+        try {
+          while (auto* frame = reader_.tryNext()) {
+            for (const auto item : frame->getRoot<wire::Frame>().getItems()) note(item);
+          }
+        } catch (...) {
+          check(false, "sent a frame that is none");
+        }
+        if (over_) return kj::READY_NOW;
+        return readLoop();
+      });
 }
 
 void FarEnd::note(wire::Item::Reader item) {
@@ -120,7 +125,8 @@ void FarEnd::note(wire::Item::Reader item) {
   const auto ended = [&](std::uint32_t client, std::uint32_t id) {
     if (knowsWhatItSent_) check(asked_[{client, id}]-- > 0, "ended a request that had no end due");
   };
-  if (item.isReply() && item.getReply().getIsFirst()) ended(item.getReply().getClient(), item.getReply().getRequestId());
+  if (item.isReply() && item.getReply().getIsFirst())
+    ended(item.getReply().getClient(), item.getReply().getRequestId());
   if (item.isFate()) ended(item.getFate().getClient(), item.getFate().getRequestId());
 }
 
@@ -134,7 +140,8 @@ void FarEnd::noteSent(const Bytes& bytes) try {
     rest = rest.subspan(part.size());
     while (auto* frame = sent_.tryNext()) {
       for (const auto item : frame->getRoot<wire::Frame>().getItems()) {
-        if (item.isRequest()) ++asked_[{item.getRequest().getClient(), item.getRequest().getRequestId()}];
+        if (item.isRequest())
+          ++asked_[{item.getRequest().getClient(), item.getRequest().getRequestId()}];
       }
     }
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RouterScene: what a router's parts work with, in memory as far as it goes. FarEnd: the peer of one line.
+// RouterScene: what a router's parts work with, in memory as far as it goes. FarEnd: the peer of
+// one line.
 //
 // Threads  one, with its event loop.
 #pragma once
@@ -9,10 +10,10 @@
 #include <map>
 #include <utility>
 
-#include <mpf/router/frame_reader.h>
-#include <mpf/router/surroundings.h>
-#include <mpf/tests/fuzz/choices.h>
-#include <mpf/tests/router/random_items.h>
+#include "router/surroundings.h"
+#include "router/transport/frame_reader.h"
+#include "tests/fuzz/choices.h"
+#include "tests/router/rogue/random_items.h"
 
 namespace mpf::test {
 
@@ -30,14 +31,16 @@ struct RouterScene {
   std::function<void()> onServers = [] {};  // called when they may have come or gone
   router::Presences presences{backplane, io.unixEventPort, [this] { onServers(); }};
   router::Surroundings here;
-  // Somebody always watches: to begin and end that takes the kernel longer than all the rest of an input.
-  Watcher::Token names = backplane.watcher().watchNames(NameKind::wish, [] {});
+  // Somebody always watches: to begin and end that takes the kernel longer than all the rest of an
+  // input.
+  Watcher::Token names = backplane.watcher().watchNames(NameKind::pendingBind, [] {});
 };
 
 // The two ends of a connection: one for the router, whose options can be set, and one for its peer.
 kj::TwoWayPipe makeConnection();
 
-// Sends what it is told, and reads what comes: each frame must be sound, and each request have one end.
+// Sends what it is told, and reads what comes: each frame must be sound, and each request have one
+// end.
 class FarEnd {
  public:
   FarEnd(kj::Own<kj::AsyncIoStream> stream, RandomItems<Choices>& items);
@@ -59,7 +62,8 @@ class FarEnd {
   RandomItems<Choices>& items_;
   router::FrameReader reader_;
   router::FrameReader sent_;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> asked_;  // requests of a client and id that had no end
+  // requests of a client and id that had no end
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> asked_;
   bool knowsWhatItSent_ = true;
   bool over_ = false;
   bool reading_ = true;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/fuzz/scene.h>
+#include "tests/fuzz/scene.h"
 
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/fuzz/hostile_files.h>
-#include <mpf/tests/fuzz/talk.h>
+#include "shm/segment_name.h"
+#include "tests/fuzz/hostile_files.h"
+#include "tests/fuzz/talk.h"
 
 namespace mpf::test {
 namespace {
@@ -26,8 +26,10 @@ std::shared_ptr<MessageLink> channel(std::unique_ptr<Link> link) {
 
 Scene::Scene()
     : backplane(fuzzBackplane()),
-      server(backplaneName(), layout::SegmentKind::serverWindow, serverName(), Rights{}, describeServer),
-      client(backplaneName(), layout::SegmentKind::clientWindow, "", Rights{}, [](layout::SegmentHeader&) {}) {
+      server(backplaneName(), layout::SegmentKind::serverWindow, serverName(), Rights{},
+             describeServer),
+      client(backplaneName(), layout::SegmentKind::clientWindow, "", Rights{},
+             [](layout::SegmentHeader&) {}) {
   server.control().queueSize.store(kQueueSize, std::memory_order_relaxed);
   auto peer = PeerWindow::tryOpen(serverName(), layout::SegmentKind::serverWindow);
   auto link = Link::create(backplaneName(), client, 0, peer);
@@ -40,16 +42,21 @@ Scene::Scene()
   for (const std::uint32_t bytes : {8u, 600u}) sendArray(*serverLink, bytes, bytes);
 }
 
-std::string Scene::serverName() const { return SegmentName::serverWindow(backplaneName(), 0, kServer); }
+std::string Scene::serverName() const {
+  return SegmentName::serverWindow(backplaneName(), 0, kServer);
+}
 
-std::string Scene::clientName() const { return SegmentName::keyed(backplaneName(), NameKind::clientWindow, client.header().incarnation); }
+std::string Scene::clientName() const {
+  return SegmentName::keyed(backplaneName(), NameKind::clientWindow, client.header().incarnation);
+}
 
 std::string Scene::hintsOf(const OwnWindow& window) const {
   return SegmentName::keyed(backplaneName(), NameKind::hints, window.header().incarnation);
 }
 
 std::string Scene::bulkName(LinkSide side) const {
-  return SegmentName::bulk(backplaneName(), clientLink->link().header().incarnation, static_cast<std::uint32_t>(side), 0);
+  return SegmentName::bulk(backplaneName(), clientLink->link().header().incarnation,
+                           static_cast<std::uint32_t>(side), 0);
 }
 
 }  // namespace mpf::test

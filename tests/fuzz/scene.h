@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Scene: a server and a client with a link, as the code makes them, and some requests and replies of every form under way.
+// Scene: a server and a client with a link, as the code makes them, and some requests and replies
+// of every form under way.
 //
 //   requests ring: in one slot, in three, in a chunk        replies ring: in one slot, in a chunk
 //
@@ -10,8 +11,9 @@
 #include <string>
 #include <vector>
 
-#include <mpf/channel/message_link.h>
-#include <mpf/shm/backplane.h>
+#include <mpf/backplane.h>
+
+#include "shm/messages/message_link.h"
 
 namespace mpf::test {
 

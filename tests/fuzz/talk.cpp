@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/fuzz/talk.h>
+#include "tests/fuzz/talk.h"
 
 #include <capnp/message.h>
 #include <mutex>
 #include <sanitizer/asan_interface.h>
 
-#include <mpf/schema/conversion.h>
-#include <mpf/schema/json.h>
-#include <mpf/schema/text.h>
+#include "schema/conversion.h"
+#include "schema/json.h"
+#include "schema/text.h"
 
 namespace mpf::test {
 namespace {
 
 // What the last page of a link has behind its rings: nobody has business there.
 std::span<const std::byte> behind(Link& link) {
-  const auto* begin = reinterpret_cast<const std::byte*>(&link.control()) - layout::kLinkControlOffset;
+  const auto* begin =
+      reinterpret_cast<const std::byte*>(&link.control()) - layout::kLinkControlOffset;
   const auto bytes = layout::linkBytes(link.header().queueSlots, link.header().replySlots);
   const auto pages = (bytes + layout::kPageBytes - 1) / layout::kPageBytes * layout::kPageBytes;
   return {begin + bytes, pages - bytes};
@@ -23,7 +24,8 @@ std::span<const std::byte> behind(Link& link) {
 }  // namespace
 
 LinkSend sendArray(MessageLink& link, std::uint32_t requestId, std::size_t bytes) {
-  Message message = Char8ArrayMessage::inBuffer(link.allocate(Char8ArrayMessage::bytesFor(bytes)), bytes);
+  Message message =
+      Char8ArrayMessage::inBuffer(link.allocate(Char8ArrayMessage::bytesFor(bytes)), bytes);
   Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()), .requestId = requestId};
   const std::lock_guard lock(link.lock());
   return link.trySendLocked(envelope, message, {});
@@ -37,7 +39,8 @@ void lookAt(const Message& message) {
   static_cast<void>(tryToWire(message, builder.initRoot<wire::Envelope>(), {}, error));
 }
 
-Talk::Talk(std::unique_ptr<Link> link) : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<SpinLock>())) {
+Talk::Talk(std::unique_ptr<Link> link)
+    : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<SpinLock>())) {
   [[maybe_unused]] const auto nobodys = behind(channel_->link());
   ASAN_POISON_MEMORY_REGION(nobodys.data(), nobodys.size());
 }
@@ -53,7 +56,8 @@ void Talk::turn(std::uint64_t value) {
   if (isOver_) return;
   for (int i = 0; i < kMost && tryTakeOne(value >> i); ++i) {
   }
-  if (link.peerState() != layout::LinkState::open || link.isLost()) link.setState(layout::LinkState::closed);
+  if (link.peerState() != layout::LinkState::open || link.isLost())
+    link.setState(layout::LinkState::closed);
   sendArray(*channel_, static_cast<std::uint32_t>(value), value % 2048);
   static_cast<void>(link.isTaken(value % 8));
   link.setWatched(value % 2 != 0);
@@ -70,7 +74,8 @@ bool Talk::tryTakeOne(std::uint64_t choice) {
     return true;
   }
   Message message;
-  isOver_ = take == MessageLink::Take::nonsense || channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
+  isOver_ = take == MessageLink::Take::nonsense ||
+            channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
   if (isOver_) return false;
   lookAt(message);
   if (choice % 4 == 0) sendBack(envelope, message);

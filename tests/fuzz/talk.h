@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include <mpf/channel/message_link.h>
+#include "shm/messages/message_link.h"
 
 namespace mpf::test {
 

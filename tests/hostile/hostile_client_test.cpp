@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A client goes mad. Its server loses that link and nothing else: an honest client beside it gets right answers all the while.
+// A client goes mad. Its server loses that link and nothing else: an honest client beside it gets
+// right answers all the while.
 #include <algorithm>
 #include <array>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/tests/hostile/hostile_peer.h>
+#include <mpf/sync_client.h>
+
+#include "tests/hostile/hostile_peer.h"
 
 namespace mpf::test {
 namespace {
@@ -46,11 +48,13 @@ TEST_P(MadClient, CostsItsServerThatLinkAlone) {
       }
     }
     static_cast<void>(backplane_.removeDead());
-    while (!Usage::of(server.pid()).isWithin(before, kSlackKb)) ASSERT_NO_FATAL_FAILURE(ask(honest, ++asked));
+    while (!Usage::of(server.pid()).isWithin(before, kSlackKb))
+      ASSERT_NO_FATAL_FAILURE(ask(honest, ++asked));
   }
 
   EXPECT_TRUE(honest.client().isConnected());
-  std::cout << asked << " right answers; " << before << " before, " << Usage::of(server.pid()) << " after\n";
+  std::cout << asked << " right answers; " << before << " before, " << Usage::of(server.pid())
+            << " after\n";
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }

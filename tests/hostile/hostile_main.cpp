@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A peer that is legal at first: mpf_test_hostile client|server BACKPLANE KIND. Says "hostile" when it has done many deeds,
-// and goes on for ever, with a new window and link now and then. Beside the kinds of Mischief: flood (sends as fast as it can, takes nothing), slow (one
-// message at a time, taken and never freed).
+// A peer that is legal at first: mpf_test_hostile client|server BACKPLANE KIND. Says "hostile" when
+// it has done many deeds, and goes on for ever, with a new window and link now and then. Beside the
+// kinds of Mischief: flood (sends as fast as it can, takes nothing), slow (one message at a time,
+// taken and never freed).
 #include <sys/prctl.h>
 
 #include <csignal>
@@ -10,9 +11,10 @@
 #include <string>
 #include <vector>
 
-#include <mpf/schema/message.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/hostile/mischief.h>
+#include <mpf/message.h>
+
+#include "shm/segment_name.h"
+#include "tests/hostile/mischief.h"
 
 namespace mpf::test {
 namespace {
@@ -27,9 +29,13 @@ class Peer {
  public:
   Peer(const Backplane& backplane, LinkSide side, std::string kind, Random& random)
       : side_(side),
-        endpoint_(backplane, side == LinkSide::client ? layout::SegmentKind::clientWindow : layout::SegmentKind::serverWindow,
-                  side == LinkSide::client ? "" : SegmentName::serverWindow(backplane.name(), 0, "hostile"), Rights{0666, ~0u},
-                  WaitMode::block,
+        endpoint_(backplane,
+                  side == LinkSide::client ? layout::SegmentKind::clientWindow
+                                           : layout::SegmentKind::serverWindow,
+                  side == LinkSide::client
+                      ? ""
+                      : SegmentName::serverWindow(backplane.name(), 0, "hostile"),
+                  Rights{0666, ~0u}, WaitMode::block,
                   [](layout::SegmentHeader& header) {
                     header.queueSize = 32;
                     header.maxMessageBytes = 1 << 20;
@@ -54,7 +60,9 @@ class Peer {
  private:
   std::unique_ptr<Link> connect(std::uint32_t index) {
     std::shared_ptr<PeerWindow> server;
-    while (!server) server = endpoint_.peer(SegmentName::serverWindow(backplane(), 0, kServer), layout::SegmentKind::serverWindow);
+    while (!server)
+      server = endpoint_.peer(SegmentName::serverWindow(backplane(), 0, kServer),
+                              layout::SegmentKind::serverWindow);
     auto link = Link::create(backplane(), endpoint_.window(), index, server);
     endpoint_.attach(index, *link);
     // The server may be busy with what we did to it before.
@@ -70,16 +78,20 @@ class Peer {
     for (;;) {
       endpoint_.wait(Deadline::after(5ms));
       static_cast<void>(endpoint_.next());
-      for (const auto& name : segments::list(SegmentName::linkPrefix(backplane(), endpoint_.window().header().incarnation))) {
+      for (const auto& name : segments::list(
+               SegmentName::linkPrefix(backplane(), endpoint_.window().header().incarnation))) {
         if (auto link = tryAccept(name, index)) return link;
       }
     }
   }
   std::unique_ptr<Link> tryAccept(const std::string& name, std::uint32_t index) try {
     auto link = Link::tryOpen(backplane(), name, endpoint_.window());
-    if (!link || link->control().serverState.load(std::memory_order_relaxed) != layout::LinkState::none) return nullptr;
-    auto client = endpoint_.peer(SegmentName::keyed(backplane(), NameKind::clientWindow, link->header().clientWindow),
-                                 layout::SegmentKind::clientWindow);
+    if (!link ||
+        link->control().serverState.load(std::memory_order_relaxed) != layout::LinkState::none)
+      return nullptr;
+    auto client = endpoint_.peer(
+        SegmentName::keyed(backplane(), NameKind::clientWindow, link->header().clientWindow),
+        layout::SegmentKind::clientWindow);
     if (!client) return nullptr;
     link->attachPeer(std::move(client), link->header().clientIndex);
     endpoint_.attach(index, *link);
@@ -98,7 +110,8 @@ class Peer {
   void send(std::uint32_t id, std::size_t bytes) {
     const auto type = bytes == sizeof(Int32) ? MessageType::int32 : MessageType::float64Array;
     Envelope envelope{.type = static_cast<std::uint16_t>(type), .requestId = id};
-    if (side_ == LinkSide::server) envelope.flags = id % 2 == 0 ? layout::kSlotFirstReply : std::uint8_t{0};
+    if (side_ == LinkSide::server)
+      envelope.flags = id % 2 == 0 ? layout::kSlotFirstReply : std::uint8_t{0};
     static_cast<void>(link_->trySend(envelope, std::vector<std::byte>(bytes), {}));
   }
   void takeOne(bool frees) {
@@ -114,7 +127,8 @@ class Peer {
     link_->end();
   }
   void act(int deed) {
-    if (kind_ == "flood") return send(static_cast<std::uint32_t>(deed + 5), deed % 8 == 0 ? 3000 : sizeof(Int32));
+    if (kind_ == "flood")
+      return send(static_cast<std::uint32_t>(deed + 5), deed % 8 == 0 ? 3000 : sizeof(Int32));
     if (kind_ == "slow") {
       if (deed % 100 == 0) send(static_cast<std::uint32_t>(deed + 5), sizeof(Int32));
       return takeOne(false);

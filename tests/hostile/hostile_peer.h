@@ -9,17 +9,18 @@
 #include <string>
 #include <thread>
 
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/usage.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/test_backplane.h"
+#include "tests/support/usage.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
 class HostilePeer {
  public:
   HostilePeer(const std::string& side, const std::string& backplane, const std::string& kind)
-      : process_(MPF_TEST_HOSTILE, std::vector{side, backplane, kind}), listener_([this] { listen(); }) {}
+      : process_(MPF_TEST_HOSTILE, std::vector{side, backplane, kind}),
+        listener_([this] { listen(); }) {}
   ~HostilePeer() {
     process_.signal(SIGKILL);
     listener_.join();
@@ -56,6 +57,7 @@ class MischiefTest : public testing::TestWithParam<const char*> {
   TestBackplane backplane_;
 };
 
-inline constexpr const char* kMischief[] = {"bytes", "words", "slots", "hints", "headers", "cut", "backwards", "flood", "slow"};
+inline constexpr const char* kMischief[] = {"bytes", "words",     "slots", "hints", "headers",
+                                            "cut",   "backwards", "flood", "slow"};
 
 }  // namespace mpf::test

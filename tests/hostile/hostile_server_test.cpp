@@ -2,8 +2,9 @@
 // A server goes mad. A client of it and of an honest server loses that link and nothing else.
 #include <optional>
 
-#include <mpf/client/message_client.h>
-#include <mpf/tests/hostile/hostile_peer.h>
+#include <mpf/message_client.h>
+
+#include "tests/hostile/hostile_peer.h"
 
 namespace mpf::test {
 namespace {
@@ -37,13 +38,15 @@ class MadServer : public MischiefTest {
   int asked_ = 0;
   int answered_ = 0;
   std::optional<Dispatcher> dispatcher_{std::in_place, backplane_};
-  std::optional<MessageClient> honest_{std::in_place, *dispatcher_, [this](const Message& message) { take(message); }};
+  std::optional<MessageClient> honest_{std::in_place, *dispatcher_,
+                                       [this](const Message& message) { take(message); }};
 };
 
 // A client of the mad one. No request ends more often than once, whatever the server sends.
 class Unlucky {
  public:
-  explicit Unlucky(Dispatcher& dispatcher) : client_(dispatcher, [this](const Message& message) { take(message); }) {
+  explicit Unlucky(Dispatcher& dispatcher)
+      : client_(dispatcher, [this](const Message& message) { take(message); }) {
     client_.bind("hostile");
   }
   void ask(int number) {
@@ -73,7 +76,8 @@ TEST_P(MadServer, CostsItsClientThatLinkAlone) {
       const HostilePeer mad("server", backplane_.name(), GetParam());
       while (!mad.hasActed()) {
         ASSERT_FALSE(mad.hasFailed());
-        Unlucky unlucky(*dispatcher_);  // a new one each time: it would wait a second after nonsense
+        // a new one each time: it would wait a second after nonsense
+        Unlucky unlucky(*dispatcher_);
         for (int i = 0; i < 20; ++i) {
           ASSERT_NO_FATAL_FAILURE(ask());
           unlucky.ask(asked_);
@@ -85,7 +89,8 @@ TEST_P(MadServer, CostsItsClientThatLinkAlone) {
   }
 
   EXPECT_TRUE(honest_->isConnected());
-  std::cout << asked_ << " right answers; " << before << " before, " << Usage::of(::getpid()) << " after\n";
+  std::cout << asked_ << " right answers; " << before << " before, " << Usage::of(::getpid())
+            << " after\n";
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }

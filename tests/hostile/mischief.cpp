@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/hostile/mischief.h>
+#include "tests/hostile/mischief.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include <mpf/shm/segment_name.h>
+#include "shm/segment_name.h"
 
 namespace mpf::test {
 
@@ -17,12 +17,15 @@ void Mischief::open(const std::string& name) {
   const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
   struct stat status{};
   if (!file || ::fstat(file.get(), &status) != 0 || status.st_size == 0) return;
-  files_.push_back({std::move(path), Mapping(file.get(), static_cast<std::size_t>(status.st_size), Mapping::Access::readWrite)});
+  files_.push_back({std::move(path), Mapping(file.get(), static_cast<std::size_t>(status.st_size),
+                                             Mapping::Access::readWrite)});
 }
 
 void Mischief::reach(const Link& link) {
   const std::string backplane(own_.header().backplane.data());
-  const auto hintsOf = [&](std::uint64_t window) { return SegmentName::keyed(backplane, NameKind::hints, window); };
+  const auto hintsOf = [&](std::uint64_t window) {
+    return SegmentName::keyed(backplane, NameKind::hints, window);
+  };
   files_.clear();
   open(link.name());
   open(hintsOf(link.header().serverWindow));
@@ -32,7 +35,8 @@ void Mischief::reach(const Link& link) {
       open(SegmentName::bulk(backplane, link.header().incarnation, side, number));
     }
   }
-  if (link.side() == LinkSide::client) open(SegmentName::keyed(backplane, NameKind::clientWindow, own_.header().incarnation));
+  if (link.side() == LinkSide::client)
+    open(SegmentName::keyed(backplane, NameKind::clientWindow, own_.header().incarnation));
   if (files_.empty()) throw std::runtime_error("nothing to write to");
   position_ = 0;
 }
@@ -65,18 +69,24 @@ void Mischief::writeSlot(Link& link) {
   const bool isClient = link.side() == LinkSide::client;
   const auto slots = isClient ? link.header().queueSlots : link.header().replySlots;
   const auto& consumer = isClient ? link.control().requests : link.control().replies;
-  if (const auto freed = consumer.freed.load(std::memory_order_relaxed); position_ < freed) position_ = freed;
-  const auto offset = layout::kLinkRingsOffset + (isClient ? 0 : std::size_t{link.header().queueSlots} * sizeof(layout::Slot));
+  if (const auto freed = consumer.freed.load(std::memory_order_relaxed); position_ < freed)
+    position_ = freed;
+  const auto offset = layout::kLinkRingsOffset +
+                      (isClient ? 0 : std::size_t{link.header().queueSlots} * sizeof(layout::Slot));
   auto* const memory = reinterpret_cast<std::byte*>(&link.control()) - layout::kLinkControlOffset;
-  auto& slot = *reinterpret_cast<layout::Slot*>(memory + offset + position_ % slots * sizeof(layout::Slot));
+  auto& slot =
+      *reinterpret_cast<layout::Slot*>(memory + offset + position_ % slots * sizeof(layout::Slot));
   slot.type = static_cast<std::uint16_t>(random_.oneIn(8) ? random_.bits() : random_.below(12));
   slot.slots = static_cast<std::uint8_t>(random_.below(6));
   slot.flags = static_cast<std::uint8_t>(random_.below(4));
-  slot.bodyBytes = static_cast<std::uint32_t>(random_.oneIn(2) ? random_.below(300) : random_.nasty());
-  slot.requestId = static_cast<std::uint32_t>(random_.oneIn(4) ? random_.nasty() : random_.below(100));
+  slot.bodyBytes =
+      static_cast<std::uint32_t>(random_.oneIn(2) ? random_.below(300) : random_.nasty());
+  slot.requestId =
+      static_cast<std::uint32_t>(random_.oneIn(4) ? random_.nasty() : random_.below(100));
   slot.deadlineNs = random_.oneIn(4) ? static_cast<std::int64_t>(random_.nasty()) : 0;
   slot.sentTick = static_cast<std::uint32_t>(random_.bits());
-  const layout::ChunkRef ref{static_cast<std::uint32_t>(random_.below(6)), static_cast<std::uint32_t>(random_.below(300)),
+  const layout::ChunkRef ref{static_cast<std::uint32_t>(random_.below(6)),
+                             static_cast<std::uint32_t>(random_.below(300)),
                              static_cast<std::uint32_t>(random_.below(3)), 0};
   std::memcpy(slot.body.data(), &ref, sizeof ref);
   slot.sequence.store(position_ + 1, std::memory_order_relaxed);
@@ -89,8 +99,10 @@ void Mischief::writeHints() {
   for (const auto& file : files_) {
     if (file.path.find(".h.") == std::string::npos) continue;
     auto& hints = *reinterpret_cast<layout::WindowHints*>(file.memory.data());
-    for (auto& word : hints.readyWords) word.store(random_.oneIn(2) ? 0 : UINT64_MAX, std::memory_order_relaxed);
-    for (auto& bits : hints.readyBits) bits.store(random_.oneIn(2) ? 0 : UINT64_MAX, std::memory_order_relaxed);
+    for (auto& word : hints.readyWords)
+      word.store(random_.oneIn(2) ? 0 : UINT64_MAX, std::memory_order_relaxed);
+    for (auto& bits : hints.readyBits)
+      bits.store(random_.oneIn(2) ? 0 : UINT64_MAX, std::memory_order_relaxed);
     for (auto& knock : hints.knocks) knock.store(random_.nasty(), std::memory_order_relaxed);
     hints.knocked.fetch_add(1, std::memory_order_relaxed);
     hints.rescan.store(1, std::memory_order_relaxed);
@@ -101,7 +113,8 @@ void Mischief::writeHints() {
 void Mischief::writeHeader() {
   auto& memory = any();
   const auto word = random_.nasty();
-  std::memcpy(memory.data() + random_.below(sizeof(layout::SegmentHeader) / 8) * 8, &word, sizeof word);
+  std::memcpy(memory.data() + random_.below(sizeof(layout::SegmentHeader) / 8) * 8, &word,
+              sizeof word);
 }
 
 void Mischief::cut() {
@@ -119,8 +132,10 @@ void Mischief::goBack(Link& link) {
   consumer.freed.store(random_.nasty(), std::memory_order_relaxed);
   consumer.taken.store(random_.oneIn(2) ? 0 : random_.nasty(), std::memory_order_relaxed);
   consumer.unwatched.store(static_cast<std::uint32_t>(random_.below(3)), std::memory_order_relaxed);
-  returns.chunks[random_.below(returns.chunks.size())].store(random_.below(4) << 32 | random_.below(40), std::memory_order_relaxed);
-  returns.returned.store(random_.oneIn(4) ? random_.nasty() : random_.below(1000), std::memory_order_relaxed);
+  returns.chunks[random_.below(returns.chunks.size())].store(
+      random_.below(4) << 32 | random_.below(40), std::memory_order_relaxed);
+  returns.returned.store(random_.oneIn(4) ? random_.nasty() : random_.below(1000),
+                         std::memory_order_relaxed);
   if (random_.oneIn(2)) writeSlot(link);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Mischief: what a peer gone mad does to all that it may write: its link, the pools of the link, its own window, the other's hints.
+// Mischief: what a peer gone mad does to all that it may write: its link, the pools of the link,
+// its own window, the other's hints.
 //
 // Threads  one.
 // Crash    it is killed in the end.
@@ -10,15 +11,16 @@
 #include <string>
 #include <vector>
 
-#include <mpf/shm/endpoint.h>
-#include <mpf/tests/support/random.h>
+#include "shm/endpoint.h"
+#include "tests/support/random.h"
 
 namespace mpf::test {
 
 class Mischief {
  public:
   // `kind`: bytes, words, slots, hints, headers, cut, backwards.
-  Mischief(const std::string& kind, OwnWindow& own, Random& random) : random_(random), kind_(kind), own_(own) {}
+  Mischief(const std::string& kind, OwnWindow& own, Random& random)
+      : random_(random), kind_(kind), own_(own) {}
 
   // One deed, at `link`.
   void act(Link& link);

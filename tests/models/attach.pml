@@ -5,7 +5,7 @@
 //   client    window: locked, named ─ link: named ─ bulk segment: named ─ ... ─ bulk, link, window: names removed ─ lock free
 //   attacher  list all names ─ which windows live? ─ remove links of the others ─ remove bulk without a link
 //
-//   MODELS  shm/remains.cpp: judge tryRemove judgeWindow judgeOwned ownerOf
+//   MODELS  shm/stale_segments.cpp: judge tryRemove judgeWindow judgeOwned ownerOf
 //   MODELS  shm/segment.cpp: list removeIfOwnerless
 //   HOLDS   only the client itself removes names of a living client
 //   HOLDS   no name of a dead client is left once a process has attached after its death and after

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The command line of mpf-router: a file, or options in its place, and options that go before a file.
-#include <mpf/router/arguments.h>
+// The command line of mpf-router: a file, or options in its place, and options that go before a
+// file.
+#include "router/arguments.h"
 
-#include <mpf/tests/router/certificates.h>
-#include <mpf/tests/router/config_fixture.h>
+#include "tests/router/certificates.h"
+#include "tests/router/config/config_fixture.h"
 
 namespace mpf::router::test {
 namespace {
@@ -40,11 +41,13 @@ class ArgumentsTest : public ConfigTest {
 };
 
 TEST_F(ArgumentsTest, MakeASimpleServerRouter) {
-  const auto started = start({"--serve", "1=0", "--serve", "3", "--listen", "127.0.0.1:9900", "--listen", "[::1]:9900", "--plain"});
+  const auto started = start({"--serve", "1=0", "--serve", "3", "--listen", "127.0.0.1:9900",
+                              "--listen", "[::1]:9900", "--plain"});
 
   EXPECT_EQ(started.status, std::nullopt) << started.err;
   EXPECT_THAT(config().serve, ElementsAre(Serve{1, 0}, Serve{3, 3}));
-  EXPECT_THAT(config().listen, ElementsAre(Listen{{"127.0.0.1", 9900}, Security::plain}, Listen{{"::1", 9900}, Security::plain}));
+  EXPECT_THAT(config().listen, ElementsAre(Listen{{"127.0.0.1", 9900}, Security::plain},
+                                           Listen{{"::1", 9900}, Security::plain}));
   EXPECT_EQ(config().limits, Limits());
 }
 
@@ -77,7 +80,8 @@ TEST_F(ArgumentsTest, MakeASimpleClientRouter) {
                               "5s"});
 
   EXPECT_EQ(started.status, std::nullopt) << started.err;
-  EXPECT_THAT(config().remotes, ElementsAre(Remote{{1, -2}, {"10.0.0.7", 9900}, Security::tls, "ioc1"}));
+  EXPECT_THAT(config().remotes,
+              ElementsAre(Remote{{1, -2}, {"10.0.0.7", 9900}, Security::tls, "ioc1"}));
   EXPECT_EQ(config().tls, tls);
   EXPECT_EQ(config().name, "me");
   EXPECT_EQ(config().backplane, "b");
@@ -89,9 +93,10 @@ TEST_F(ArgumentsTest, MakeASimpleClientRouter) {
 }
 
 TEST_F(ArgumentsTest, GoBeforeWhatAFileSays) {
-  const auto file = folder_.write("r.toml",
-                                  "name = \"file\"\nbackplane = \"file\"\n[limits]\nqueue-size = 7\nmax-clients = 8\n"
-                                  "[[remote]]\nlocations = 1\naddress = \"a:1\"\nsecurity = \"plain\"\n");
+  const auto file = folder_.write(
+      "r.toml",
+      "name = \"file\"\nbackplane = \"file\"\n[limits]\nqueue-size = 7\nmax-clients = 8\n"
+      "[[remote]]\nlocations = 1\naddress = \"a:1\"\nsecurity = \"plain\"\n");
 
   const auto started = start({"--name", "option", file, "--queue-size", "9"});
 
@@ -120,7 +125,8 @@ TEST_F(ArgumentsTest, StillHoldWhenTheFileIsLoadedAnew) {
 TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
       {{},
-       "nothing to do: write --serve and --listen for servers of this host that clients elsewhere use, or --remote for servers elsewhere "
+       "nothing to do: write --serve and --listen for servers of this host that clients elsewhere "
+       "use, or --remote for servers elsewhere "
        "that clients of this host use"},
       {{"--serve", "1"}, "--serve 1: what is served cannot be reached: write --listen, too"},
       {{"--serve", "one"}, "--serve: \"one\" is not a location: write an integer"},
@@ -128,19 +134,27 @@ TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
       {{"--remote", "ioc1:9900"}, "--remote: \"ioc1:9900\": write LOCATION[,LOCATION]=HOST:PORT"},
       {{"--remote", "1,=ioc1:9900"}, "--remote: \"\" is not a location: write an integer"},
       {{"--remote", "1=ioc1"},
-       "--remote: \"ioc1\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, [fd00::7]:9900 or, to listen, *:9900"},
-      {{"--remote", "1=a:1", "--remote", "1=b:1", "--plain"}, "--remote 1=b:1: location 1 is reached twice; write it once"},
-      {{"--remote", "1=a:1"}, "--remote 1=a:1: TLS needs --tls-certificate, --tls-key and --tls-authorities; or add --plain"},
+       "--remote: \"ioc1\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, "
+       "[fd00::7]:9900 or, to listen, *:9900"},
+      {{"--remote", "1=a:1", "--remote", "1=b:1", "--plain"},
+       "--remote 1=b:1: location 1 is reached twice; write it once"},
+      {{"--remote", "1=a:1"},
+       "--remote 1=a:1: TLS needs --tls-certificate, --tls-key and --tls-authorities; or add "
+       "--plain"},
       {{"--remote", "1=10.0.0.7:1"},
-       "--remote 1=10.0.0.7:1: 10.0.0.7 is no name that a certificate can have; write --tls-name, too: the name in the certificate of the "
+       "--remote 1=10.0.0.7:1: 10.0.0.7 is no name that a certificate can have; write --tls-name, "
+       "too: the name in the certificate of the "
        "router there"},
-      {{"--remote", "1=a:1", "--remote", "2=b:1", "--tls-name", "x"}, "--tls-name: it is that of one --remote; a file can name more"},
+      {{"--remote", "1=a:1", "--remote", "2=b:1", "--tls-name", "x"},
+       "--tls-name: it is that of one --remote; a file can name more"},
       {{"--serve", "1", "--listen", "*:1", "--plain"},
-       "--listen *:1: plain TCP at *:1, which is every network of this host: use TLS, or a loopback, private or link-local address, or "
+       "--listen *:1: plain TCP at *:1, which is every network of this host: use TLS, or a "
+       "loopback, private or link-local address, or "
        "write "
        "--allow-public-plain"},
       {{"--queue-size", "0"}, "--queue-size: 0 is out of range: use 1 to 1000000"},
-      {{"--dead-time", "2"}, "--dead-time: \"2\": write a time with its unit, such as 500ms, 2s or 1min"},
+      {{"--dead-time", "2"},
+       "--dead-time: \"2\": write a time with its unit, such as 500ms, 2s or 1min"},
       {{"--mode", "7"}, "--mode: 7: use an octal number between 0600 and 0666, such as 0660"},
       {{"--group", "no-such-group"}, "--group: no-such-group: there is no group of this name"},
       {{"--group", "root"}, "--group: a group that mode does not let in: write mode 0660, too"},
@@ -148,7 +162,8 @@ TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
        "--log-level: log-level \"loud\": use trace, debug, info, warning, error, critical, off"},
       {{"--remote", "1=a:1", "--plain", "--backplane", "a.b"},
        "--backplane: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -"},
-      {{"--remote", "1=a:1", "--tls-certificate", folder_.file("none"), "--tls-key", "k", "--tls-authorities", "a"},
+      {{"--remote", "1=a:1", "--tls-certificate", folder_.file("none"), "--tls-key", "k",
+        "--tls-authorities", "a"},
        "--tls-certificate: none cannot be read: No such file or directory"},
   };
   for (const auto& [words, why] : wrong) {
@@ -168,17 +183,20 @@ TEST_F(ArgumentsTest, AFileThatIsWrongIsNamedWithItsLine) {
 }
 
 TEST_F(ArgumentsTest, SomeStandInPlaceOfAFile) {
-  for (const auto& words :
-       std::vector<std::vector<std::string>>{{"--serve", "1", "r.toml"}, {"--plain", "r.toml"}, {"r.toml", "--tls-name", "a"}}) {
+  for (const auto& words : std::vector<std::vector<std::string>>{
+           {"--serve", "1", "r.toml"}, {"--plain", "r.toml"}, {"r.toml", "--tls-name", "a"}}) {
     const auto& option = words[0] == "r.toml" ? words[1] : words[0];
-    EXPECT_EQ(start(words).err, "mpf-router: " + option + ": it stands in place of a file; write it into r.toml\n");
+    EXPECT_EQ(start(words).err,
+              "mpf-router: " + option + ": it stands in place of a file; write it into r.toml\n");
   }
 }
 
 TEST_F(ArgumentsTest, CheckSaysWhatAConfigurationMeans) {
   const auto tls = Certificates(folder_, "lab").files("ioc1");
-  const auto file = folder_.write("r.toml", "name = \"ioc1\"\nbackplane = \"b\"\nmode = \"0666\"\n[tls]\ncertificate = \"" +
-                                                tls.certificate + "\"\nkey = \"" + tls.key + "\"\nauthorities = \"" + tls.authorities + R"("
+  const auto file = folder_.write(
+      "r.toml", "name = \"ioc1\"\nbackplane = \"b\"\nmode = \"0666\"\n[tls]\ncertificate = \"" +
+                    tls.certificate + "\"\nkey = \"" + tls.key + "\"\nauthorities = \"" +
+                    tls.authorities + R"("
 [[serve]]
 location = 1
 local = 0
@@ -208,18 +226,22 @@ security = "plain"
 
   EXPECT_EQ(started.status, 0) << started.err;
   EXPECT_THAT(started.err, IsEmpty());
-  EXPECT_THAT(started.out, StartsWith("router      ioc1, on backplane b, clients of this host: mode 0666\n"
-                                      "serves      location 1 (here 0), 3\n"
-                                      "listens     *:9900, TLS\n"
-                                      "listens     10.0.0.1:9901, plain TCP\n"
-                                      "allows      ioc* to bind to serial*, dac at location 1, 3\n"
-                                      "allows      * to bind to Int32 at all locations\n"
-                                      "connects    ioc5:9900, TLS, certificate of ioc5, for locations 5, 6\n"
-                                      "connects    [fd00::7]:9900, plain TCP, for location 7\n"
-                                      "certificate ioc1, valid until 20"));
   EXPECT_THAT(started.out,
-              HasSubstr("\nlimits      queue-size 100 buffer-size 1MiB max-message-size 64MiB window-size 4MiB max-clients 16000 "
-                        "max-connections 1000 dead-time 2s handshake-time 5s first-retry 100ms last-retry 5s\n"));
+              StartsWith("router      ioc1, on backplane b, clients of this host: mode 0666\n"
+                         "serves      location 1 (here 0), 3\n"
+                         "listens     *:9900, TLS\n"
+                         "listens     10.0.0.1:9901, plain TCP\n"
+                         "allows      ioc* to bind to serial*, dac at location 1, 3\n"
+                         "allows      * to bind to Int32 at all locations\n"
+                         "connects    ioc5:9900, TLS, certificate of ioc5, for locations 5, 6\n"
+                         "connects    [fd00::7]:9900, plain TCP, for location 7\n"
+                         "certificate ioc1, valid until 20"));
+  EXPECT_THAT(
+      started.out,
+      HasSubstr(
+          "\nlimits      queue-size 100 buffer-size 1MiB max-message-size 64MiB window-size 4MiB "
+          "max-clients 16000 "
+          "max-connections 1000 dead-time 2s handshake-time 5s first-retry 100ms last-retry 5s\n"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Certificates: an authority of the test's own, and what it signs, made by the command `openssl` in the test's folder.
+// Certificates: an authority of the test's own, and what it signs, made by the command `openssl` in
+// the test's folder.
 //
 //   const Certificates ours(folder, "ours");
 //   Tls tls(ours.files("ioc1"), timer);       // certificate of ioc1, its key, and whom it trusts
@@ -8,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include <mpf/router/config.h>
-#include <mpf/tests/support/temporary_folder.h>
+#include "router/config/router_config.h"
+#include "tests/support/temporary_folder.h"
 
 namespace mpf::router::test {
 

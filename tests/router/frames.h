@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include <mpf/schema/router.capnp.h>
+#include "schema/router.capnp.h"
 
 namespace mpf::test {
 
@@ -26,10 +26,12 @@ inline Bytes bytesOf(capnp::MessageBuilder& message) {
 }
 
 // A frame of these items. `segmentWords`: of its first segment, when it shall have many.
-inline Bytes frameOf(const std::vector<Fill>& items, capnp::uint segmentWords = capnp::SUGGESTED_FIRST_SEGMENT_WORDS) {
-  capnp::MallocMessageBuilder message(segmentWords, segmentWords == capnp::SUGGESTED_FIRST_SEGMENT_WORDS
-                                                        ? capnp::SUGGESTED_ALLOCATION_STRATEGY
-                                                        : capnp::AllocationStrategy::FIXED_SIZE);
+inline Bytes frameOf(const std::vector<Fill>& items,
+                     capnp::uint segmentWords = capnp::SUGGESTED_FIRST_SEGMENT_WORDS) {
+  capnp::MallocMessageBuilder message(segmentWords,
+                                      segmentWords == capnp::SUGGESTED_FIRST_SEGMENT_WORDS
+                                          ? capnp::SUGGESTED_ALLOCATION_STRATEGY
+                                          : capnp::AllocationStrategy::FIXED_SIZE);
   auto list = message.initRoot<wire::Frame>().initItems(static_cast<capnp::uint>(items.size()));
   for (capnp::uint at = 0; at < list.size(); ++at) items[at](list[at]);
   return bytesOf(message);

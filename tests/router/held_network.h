@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// HeldNetwork: a network that looks up no name until the test says what it stands for, in which order it likes.
+// HeldNetwork: a network that looks up no name until the test says what it stands for, in which
+// order it likes.
 //
 //   HeldIo io;
 //   Router router(io.context(), config, log);
@@ -30,12 +31,16 @@ class HeldNetwork final : public kj::Network {
     lookups.push_back(kj::mv(found.fulfiller));
     return kj::mv(found.promise);
   }
-  FoundAddress getSockaddr(const void* address, kj::uint length) override { return real_.getSockaddr(address, length); }
-  kj::Own<kj::Network> restrictPeers(kj::ArrayPtr<const kj::StringPtr> allow, kj::ArrayPtr<const kj::StringPtr> deny) override {
+  FoundAddress getSockaddr(const void* address, kj::uint length) override {
+    return real_.getSockaddr(address, length);
+  }
+  kj::Own<kj::Network> restrictPeers(kj::ArrayPtr<const kj::StringPtr> allow,
+                                     kj::ArrayPtr<const kj::StringPtr> deny) override {
     return real_.restrictPeers(allow, deny);
   }
 
-  // In the order in which they were asked for. One that nobody waits for any more says so: isWaiting().
+  // In the order in which they were asked for. One that nobody waits for any more says so:
+  // isWaiting().
   std::vector<kj::Own<kj::PromiseFulfiller<FoundAddress>>> lookups;
 
  private:
@@ -59,7 +64,9 @@ class HeldIo {
     kj::OneWayPipe newOneWayPipe() override { return real.newOneWayPipe(); }
     kj::TwoWayPipe newTwoWayPipe() override { return real.newTwoWayPipe(); }
     kj::Network& getNetwork() override { return network; }
-    PipeThread newPipeThread(kj::Function<void(kj::AsyncIoProvider&, kj::AsyncIoStream&, kj::WaitScope&)> start) override {
+    PipeThread newPipeThread(
+        kj::Function<void(kj::AsyncIoProvider&, kj::AsyncIoStream&, kj::WaitScope&)> start)
+        override {
       return real.newPipeThread(kj::mv(start));
     }
     kj::Timer& getTimer() override { return real.getTimer(); }
@@ -68,7 +75,8 @@ class HeldIo {
   };
   kj::AsyncIoContext real_ = kj::setupAsyncIo();
   HeldNetwork network_{real_.provider->getNetwork()};
-  kj::AsyncIoContext held_{{}, kj::heap<Provider>(*real_.provider, network_), real_.waitScope, real_.unixEventPort};
+  kj::AsyncIoContext held_{
+      {}, kj::heap<Provider>(*real_.provider, network_), real_.waitScope, real_.unixEventPort};
 };
 
 #pragma GCC diagnostic pop

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A router whose look-ups of names take their time: what it does not want any more ends, whatever comes of them later.
-#include <mpf/router/router.h>
+// A router whose look-ups of names take their time: what it does not want any more ends, whatever
+// comes of them later.
+#include "router/router.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,10 +10,10 @@
 #include <optional>
 #include <stdexcept>
 
-#include <mpf/router/kj_text.h>
-#include <mpf/tests/router/held_network.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include "router/transport/kj_text.h"
+#include "tests/router/held_network.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::router::test {
 namespace {
@@ -30,7 +31,10 @@ class HeldRouterTest : public testing::Test {
   }
   [[nodiscard]] RouterConfig withRemote() const {
     auto with = config();
-    with.remotes.push_back({.locations = {1}, .address = parseAddress("slow.lab:9900"), .security = Security::plain, .tlsName = {}});
+    with.remotes.push_back({.locations = {1},
+                            .address = parseAddress("slow.lab:9900"),
+                            .security = Security::plain,
+                            .tlsName = {}});
     return with;
   }
   [[nodiscard]] RouterConfig withListener() const {
@@ -44,7 +48,8 @@ class HeldRouterTest : public testing::Test {
     io_.run();
   }
 
-  const mpf::test::Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+  const mpf::test::Watchdog watchdog_{
+      testing::UnitTest::GetInstance()->current_test_info()->name()};
   const mpf::test::TestBackplane backplane_;
   std::string said_;
   bool isFull_ = false;  // there is no room for another line
@@ -118,16 +123,21 @@ TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
 
 TEST_F(SlowLookupTest, ThatFailsNamesItsStepAndTheReason) {
   router_->reload(withRemote());
-  lookups()[0]->reject(
-      KJ_EXCEPTION(FAILED, "DNS lookup failed.; params.host = slow.lab; gai_strerror(status) = Name or service not known"));
+  lookups()[0]->reject(KJ_EXCEPTION(FAILED,
+                                    "DNS lookup failed.; params.host = slow.lab; "
+                                    "gai_strerror(status) = Name or service not known"));
   io_.run();
 
-  EXPECT_EQ(said_, "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
+  EXPECT_EQ(
+      said_,
+      "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
 }
 
 TEST(ReasonOf, LeavesOutTheNamesOfCallsAndVariables) {
   EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "connect(): Connection refused")), "Connection refused");
-  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "::bind(sockfd, &addr, length): Address already in use; toString() = 127.0.0.1:1")),
+  EXPECT_EQ(reasonOf(KJ_EXCEPTION(
+                FAILED,
+                "::bind(sockfd, &addr, length): Address already in use; toString() = 127.0.0.1:1")),
             "Address already in use");
   EXPECT_EQ(reasonOf(KJ_EXCEPTION(OVERLOADED, "operation timed out")), kTimeout);
   EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "something else; whatever")), "something else; whatever");

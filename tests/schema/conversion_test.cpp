@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/conversion.h>
+#include "schema/conversion.h"
 
 #include <bit>
 #include <capnp/dynamic.h>
@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
-#include <mpf/schema/text.h>
-#include <mpf/tests/support/sanitized.h>
+#include "schema/text.h"
+#include "tests/support/sanitized.h"
 
 namespace {
 
@@ -25,7 +25,8 @@ kj::Array<capnp::word> toFrame(const Message& message, const ConversionLimits& l
   return capnp::messageToFlatArray(builder);
 }
 
-std::optional<Message> fromFrame(kj::ArrayPtr<const capnp::word> frame, ConversionError& error, const ConversionLimits& limits = {}) {
+std::optional<Message> fromFrame(kj::ArrayPtr<const capnp::word> frame, ConversionError& error,
+                                 const ConversionLimits& limits = {}) {
   capnp::FlatArrayMessageReader reader(frame, limits.readerOptions());
   return tryFromWire(reader.getRoot<wire::Envelope>(), limits, error);
 }
@@ -47,19 +48,27 @@ template <class T>
 void expectSame(const MessageOf<T>& message) {
   const auto back = roundTrip(message);
   EXPECT_EQ(0, std::memcmp(&*message, &*back, sizeof(T))) << print(message) << "\n" << print(back);
-  EXPECT_TRUE(std::ranges::equal(message.body(), back.body())) << print(message) << "\n" << print(back);
+  EXPECT_TRUE(std::ranges::equal(message.body(), back.body())) << print(message) << "\n"
+                                                               << print(back);
   EXPECT_EQ(message.getClientType(), back.getClientType());
   EXPECT_EQ(message.getClientExtra(), back.getClientExtra());
 }
 
 TEST(Conversion, KeepsEveryFieldOfEveryScalar) {
-  expectSame(MessageOf(Connect{.status = ConnectStatus::connectQueueFull, .incarnation = UINT64_MAX}));
-  expectSame(MessageOf(Int32{.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = 6}));
-  expectSame(MessageOf(Int32{.timeout = kMin, .cmd = kMax, .status = kMin, .address = -1, .extra = kMax, .value = kMin}));
-  expectSame(MessageOf(Float64{.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = 6.5}));
-  expectSame(MessageOf(SerialConfig{.baud = 115200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = '\xff'}));
-  expectSame(MessageOf(OutOfBand{.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = 6}));
-  for (const auto fate : {Fate::refused, Fate::neverTaken, Fate::outcomeUnknown, Fate::expired, Fate::cancelled}) {
+  expectSame(
+      MessageOf(Connect{.status = ConnectStatus::connectQueueFull, .incarnation = UINT64_MAX}));
+  expectSame(
+      MessageOf(Int32{.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = 6}));
+  expectSame(MessageOf(Int32{
+      .timeout = kMin, .cmd = kMax, .status = kMin, .address = -1, .extra = kMax, .value = kMin}));
+  expectSame(MessageOf(
+      Float64{.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = 6.5}));
+  expectSame(MessageOf(SerialConfig{
+      .baud = 115200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = '\xff'}));
+  expectSame(MessageOf(
+      OutOfBand{.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = 6}));
+  for (const auto fate :
+       {Fate::refused, Fate::neverTaken, Fate::outcomeUnknown, Fate::expired, Fate::cancelled}) {
     expectSame(MessageOf(RequestFate{.fate = fate, .requestId = UINT32_MAX}));
   }
 }
@@ -100,7 +109,8 @@ template <class T>
 MessageOf<T> filled(std::size_t n) {
   auto message = MessageOf<T>::allocValue(n);
   auto* const bytes = reinterpret_cast<unsigned char*>(message.value().data());
-  for (std::size_t i = 0; i < message.value().size_bytes(); ++i) bytes[i] = static_cast<unsigned char>(i * 37 + i / 251);
+  for (std::size_t i = 0; i < message.value().size_bytes(); ++i)
+    bytes[i] = static_cast<unsigned char>(i * 37 + i / 251);
   return message;
 }
 
@@ -142,10 +152,12 @@ TEST(Conversion, RefusesArraysAboveTheLimitInBothDirections) {
   capnp::MallocMessageBuilder builder;
   ConversionError error;
 
-  EXPECT_FALSE(tryToWire(message, builder.initRoot<wire::Envelope>(), {.maxValueBytes = 799}, error));
+  EXPECT_FALSE(
+      tryToWire(message, builder.initRoot<wire::Envelope>(), {.maxValueBytes = 799}, error));
   EXPECT_EQ(error.fault, ConversionFault::tooLarge);
   EXPECT_EQ(error.text, "float64Array.value: 800 bytes, the limit is 799");
-  EXPECT_TRUE(tryToWire(message, builder.initRoot<wire::Envelope>(), {.maxValueBytes = 800}, error));
+  EXPECT_TRUE(
+      tryToWire(message, builder.initRoot<wire::Envelope>(), {.maxValueBytes = 800}, error));
   EXPECT_EQ(error.fault, ConversionFault::none);
 
   const auto frame = toFrame(filled<Char8Array>(100));
@@ -157,7 +169,8 @@ TEST(Conversion, RefusesArraysAboveTheLimitInBothDirections) {
 
 TEST(Conversion, ReadsUpToTheLimitWithItsReaderOptions) {
   ConversionError error;
-  EXPECT_TRUE(fromFrame(toFrame(filled<Float64Array>(100'000)), error, {.maxValueBytes = 800'000})) << error.text;
+  EXPECT_TRUE(fromFrame(toFrame(filled<Float64Array>(100'000)), error, {.maxValueBytes = 800'000}))
+      << error.text;
 }
 
 TEST(Conversion, NamesATypeFromANewerPeer) {
@@ -166,7 +179,8 @@ TEST(Conversion, NamesATypeFromANewerPeer) {
   // The discriminant is the 16-bit word with the number of `user`, the last member; the next number
   // is unknown.
   auto data = capnp::AnyStruct::Builder(builder.getRoot<capnp::AnyStruct>()).getDataSection();
-  const unsigned offset = capnp::Schema::from<wire::Envelope>().getProto().getStruct().getDiscriminantOffset() * 2;
+  const unsigned offset =
+      capnp::Schema::from<wire::Envelope>().getProto().getStruct().getDiscriminantOffset() * 2;
   ASSERT_EQ(data[offset], 9);
   data[offset] = 10;
   ConversionError error;
@@ -199,11 +213,14 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   EXPECT_EQ(error.text, "requestFate.fate: -3 is no such value");
 }
 
-TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) { expectSame(MessageOf(Connect{.status = ConnectStatus{4000}})); }
+TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) {
+  expectSame(MessageOf(Connect{.status = ConnectStatus{4000}}));
+}
 
 TEST(Conversion, RefusesAnEndOfMessageStringThatDoesNotFit) {
   capnp::MallocMessageBuilder builder;
-  builder.initRoot<wire::Envelope>().initChar8Array().setEomString(kj::StringPtr("too long").asBytes());
+  builder.initRoot<wire::Envelope>().initChar8Array().setEomString(
+      kj::StringPtr("too long").asBytes());
   ConversionError error;
 
   EXPECT_FALSE(fromFrame(capnp::messageToFlatArray(builder), error));
@@ -233,7 +250,8 @@ TEST(Conversion, SurvivesAnyDamage) {
   for (int round = 0; round < 20'000; ++round) {
     auto frame = kj::heapArray<capnp::word>(sound.asPtr());
     auto bytes = frame.asBytes();
-    for (int flips = 0; flips < 3; ++flips) bytes[8 + random() % (bytes.size() - 8)] ^= static_cast<capnp::byte>(1U << (random() % 8));
+    for (int flips = 0; flips < 3; ++flips)
+      bytes[8 + random() % (bytes.size() - 8)] ^= static_cast<capnp::byte>(1U << (random() % 8));
     ConversionError error;
     try {
       const auto message = fromFrame(frame, error, {.maxValueBytes = 4096});

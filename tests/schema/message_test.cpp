@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/message.h>
+#include <mpf/message.h>
 
 #include <algorithm>
 #include <gmock/gmock.h>
@@ -8,17 +8,21 @@
 #include <string>
 #include <vector>
 
-#include <mpf/schema/visit.h>
+#include "schema/visit.h"
 
 namespace {
 
 using namespace mpf;
 
 static_assert(!std::is_copy_constructible_v<Message> && !std::is_copy_assignable_v<Message>);
-static_assert(!std::is_copy_constructible_v<Int32Message> && !std::is_copy_assignable_v<Int32ArrayMessage>);
-static_assert(std::is_nothrow_move_constructible_v<Message> && std::is_nothrow_move_assignable_v<Message>);
-static_assert(std::is_nothrow_move_constructible_v<Float64ArrayMessage> && std::is_nothrow_constructible_v<Int32Message, Int32>);
-static_assert(noexcept(Message::adopt(MessageType::none, {})) && noexcept(Int32Message::tryFrom(Message())));
+static_assert(!std::is_copy_constructible_v<Int32Message> &&
+              !std::is_copy_assignable_v<Int32ArrayMessage>);
+static_assert(std::is_nothrow_move_constructible_v<Message> &&
+              std::is_nothrow_move_assignable_v<Message>);
+static_assert(std::is_nothrow_move_constructible_v<Float64ArrayMessage> &&
+              std::is_nothrow_constructible_v<Int32Message, Int32>);
+static_assert(noexcept(Message::adopt(MessageType::none, {})) &&
+              noexcept(Int32Message::tryFrom(Message())));
 
 // A block of memory in place of a link's pool; counts the bodies that are returned.
 struct Pool final : BodyLender {
@@ -32,7 +36,9 @@ struct Pool final : BodyLender {
     lastData = data;
     lastCapacity = capacity;
   }
-  BodyBytes lend(std::size_t size, std::size_t capacity = 4096) { return {memory.data(), size, capacity, this}; }
+  BodyBytes lend(std::size_t size, std::size_t capacity = 4096) {
+    return {memory.data(), size, capacity, this};
+  }
   template <class T>
   void write(const T& fields) {
     std::memcpy(memory.data(), &fields, sizeof fields);
@@ -79,7 +85,8 @@ TEST(Message, IsOfOneTypeOnly) {
   EXPECT_EQ(message.tryAs<OutOfBand>(), nullptr);  // another type, although the layout is the same
   EXPECT_EQ(message.tryAs<Int32Array>(), nullptr);
   EXPECT_FALSE(Float64Message::tryFrom(std::move(message)));
-  EXPECT_TRUE(message) << "a refused message stays with its owner";  // NOLINT(bugprone-use-after-move)
+  EXPECT_TRUE(message)
+      << "a refused message stays with its owner";  // NOLINT(bugprone-use-after-move)
   const auto typed = Int32Message::tryFrom(std::move(message));
   ASSERT_TRUE(typed);
   EXPECT_EQ((*typed)->value, 5);
@@ -195,8 +202,10 @@ TEST(Message, HandsItsBodyOverWithoutTellingTheLender) {
 TEST(Message, RefusesABufferThatIsTooSmallAndReturnsIt) {
   Pool pool;
 
-  EXPECT_THROW(static_cast<void>(Int32ArrayMessage::inBuffer(pool.lend(0, 60), 10)), std::length_error);
-  EXPECT_THROW(static_cast<void>(Char8ArrayMessage::inBuffer(pool.lend(0, 39), 0)), std::length_error);
+  EXPECT_THROW(static_cast<void>(Int32ArrayMessage::inBuffer(pool.lend(0, 60), 10)),
+               std::length_error);
+  EXPECT_THROW(static_cast<void>(Char8ArrayMessage::inBuffer(pool.lend(0, 39), 0)),
+               std::length_error);
 
   EXPECT_EQ(pool.returned, 2);
 }
@@ -206,7 +215,8 @@ TEST(Message, RefusesABufferThatIsTooSmallAndReturnsIt) {
 TEST(Message, KeepsTheLengthThatItCheckedWhateverThePeerWritesLater) {
   Pool pool;
   pool.write(Int32Array{.address = 3, .length = 5});
-  auto message = *Int32ArrayMessage::tryFrom(Message::adopt(MessageType::int32Array, pool.lend(24 + 20)));
+  auto message =
+      *Int32ArrayMessage::tryFrom(Message::adopt(MessageType::int32Array, pool.lend(24 + 20)));
 
   pool.write(Int32Array{.address = 4, .length = 1'000'000});
 
@@ -243,7 +253,8 @@ TEST(Message, RefusesMisalignedAndMissingBodies) {
   Pool pool;
   pool.write(Int32{});
 
-  EXPECT_FALSE(Message::adopt(MessageType::int32, {pool.memory.data() + 4, 24, 24, &pool}).isSound());
+  EXPECT_FALSE(
+      Message::adopt(MessageType::int32, {pool.memory.data() + 4, 24, 24, &pool}).isSound());
   EXPECT_FALSE(Message::adopt(MessageType::int32, {}).isSound());
   EXPECT_FALSE(Message::adopt(MessageType::int32, pool.lend(23)).isSound());
   EXPECT_TRUE(Message::adopt(MessageType::int32, pool.lend(24)).isSound());

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <string>
 
-#include <mpf/schema/message.capnp.h>
-#include <mpf/schema/visit.h>
+#include "schema/message.capnp.h"
+#include "schema/visit.h"
 
 namespace {
 
@@ -14,7 +14,9 @@ std::string name(kj::StringPtr text) { return text.cStr(); }
 
 template <class Each>
 void forEachType(Each&& each) {
-  [&]<class... T>(std::type_identity<std::tuple<T...>>) { (each.template operator()<T>(), ...); }(std::type_identity<MessageTypes>{});
+  [&]<class... T>(std::type_identity<std::tuple<T...>>) {
+    (each.template operator()<T>(), ...);
+  }(std::type_identity<MessageTypes>{});
 }
 
 template <class T>
@@ -39,9 +41,13 @@ TEST(MessageTypes, StandInTheEnvelopeInTheirOrder) {
 
 TEST(MessageTypes, HaveTheFieldsOfTheirCapnpStructs) {
   forEachType([&]<class T>() {
-    const auto schema = capnp::Schema::from<wire::Envelope>().getFieldByName(std::string(T::kName).c_str()).getType().asStruct();
+    const auto schema = capnp::Schema::from<wire::Envelope>()
+                            .getFieldByName(std::string(T::kName).c_str())
+                            .getType()
+                            .asStruct();
     std::vector<std::string> inSchema;
-    for (const auto field : schema.getFields()) inSchema.push_back(name(field.getProto().getName()));
+    for (const auto field : schema.getFields())
+      inSchema.push_back(name(field.getProto().getName()));
 
     EXPECT_THAT(describedFields<T>(), testing::UnorderedElementsAreArray(inSchema)) << T::kName;
   });
@@ -51,7 +57,8 @@ template <class Names>
 void expectSameEnum(capnp::EnumSchema schema, const Names& names) {
   const auto enumerants = schema.getEnumerants();
   ASSERT_EQ(enumerants.size(), names.size());
-  for (unsigned i = 0; i < names.size(); ++i) EXPECT_EQ(name(enumerants[i].getProto().getName()), names[i]);
+  for (unsigned i = 0; i < names.size(); ++i)
+    EXPECT_EQ(name(enumerants[i].getProto().getName()), names[i]);
 }
 
 TEST(MessageTypes, NameStatusesAndFatesAsTheSchemaDoes) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/serial_sniff.h>
+#include <mpf/serial_sniff.h>
 
 #include <array>
 #include <gmock/gmock.h>
@@ -33,7 +33,8 @@ TEST(SniffRecord, IsTenBytesWithTheTimeFirst) {
 }
 
 TEST(SniffRecord, ReadsWhatItWrote) {
-  for (const auto kind : {SniffKind::sent, SniffKind::received, SniffKind::damaged, SniffKind::breakSignal}) {
+  for (const auto kind :
+       {SniffKind::sent, SniffKind::received, SniffKind::damaged, SniffKind::breakSignal}) {
     const SniffRecord record{-0x0102030405060708, kind, 0x80};
     Bytes bytes{};
 
@@ -50,13 +51,15 @@ TEST(SniffRecord, OfAnUnknownKindIsNone) {
 }
 
 TEST(SniffReply, GivesItsRecordsInOrder) {
-  const std::array records{SniffRecord{1, SniffKind::sent, 'a'}, SniffRecord{2, SniffKind::damaged, 'b'}};
+  const std::array records{SniffRecord{1, SniffKind::sent, 'a'},
+                           SniffRecord{2, SniffKind::damaged, 'b'}};
 
   EXPECT_THAT(tryReadRecords(replyOf(records)), Optional(ElementsAre(records[0], records[1])));
 }
 
 TEST(SniffReply, WithAnotherCountThanRecordsIsNone) {
-  const std::array records{SniffRecord{1, SniffKind::sent, 'a'}, SniffRecord{2, SniffKind::sent, 'b'}};
+  const std::array records{SniffRecord{1, SniffKind::sent, 'a'},
+                           SniffRecord{2, SniffKind::sent, 'b'}};
   for (const auto count : {-1, 1, 3}) {
     auto reply = replyOf(records);
 
@@ -67,7 +70,8 @@ TEST(SniffReply, WithAnotherCountThanRecordsIsNone) {
 }
 
 TEST(SniffReply, WithHalfARecordIsNone) {
-  const std::array records{SniffRecord{1, SniffKind::sent, 'a'}, SniffRecord{2, SniffKind::sent, 'b'}};
+  const std::array records{SniffRecord{1, SniffKind::sent, 'a'},
+                           SniffRecord{2, SniffKind::sent, 'b'}};
   auto reply = replyOf(records);
   reply->extra = 1;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/schema/user.h>
-
 #include <capnp/any.h>
 #include <capnp/message.h>
 #include <gmock/gmock.h>
 #include <kj/exception.h>
 
-#include <mpf/schema/message.capnp.h>
+#include <mpf/user_message.h>
+
+#include "schema/message.capnp.h"
 
 namespace {
 
@@ -28,7 +28,8 @@ TEST(User, IsBuiltAndReadInPlace) {
   EXPECT_EQ(reader.getRoot<Struct>().getValue()[9], 7);
   const auto root = capnp::AnyStruct::Reader(reader.getRoot<capnp::AnyStruct>()).getDataSection();
   EXPECT_GT(reinterpret_cast<const std::byte*>(root.begin()), message.body().data());
-  EXPECT_LE(reinterpret_cast<const std::byte*>(root.end()), message.body().data() + message.body().size());
+  EXPECT_LE(reinterpret_cast<const std::byte*>(root.end()),
+            message.body().data() + message.body().size());
 }
 
 TEST(User, RefusesMoreThanThereIsRoomFor) {
@@ -40,7 +41,8 @@ TEST(User, RefusesMoreThanThereIsRoomFor) {
 }
 
 TEST(User, IsCopiedFromAnyBuilder) {
-  capnp::MallocMessageBuilder builder(8, capnp::AllocationStrategy::FIXED_SIZE);  // several segments
+  capnp::MallocMessageBuilder builder(8,
+                                      capnp::AllocationStrategy::FIXED_SIZE);  // several segments
   builder.initRoot<Struct>().initValue(100).set(99, 5);
 
   const auto message = toUserMessage(builder);

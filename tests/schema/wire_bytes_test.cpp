@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <mpf/schema/conversion.h>
-#include <mpf/schema/text.h>
-#include <mpf/tests/support/every_message.h>
+#include "schema/conversion.h"
+#include "schema/text.h"
+#include "tests/support/every_message.h"
 
 namespace {
 
@@ -34,14 +34,16 @@ class WireBytes : public testing::Test {
     EXPECT_TRUE(tryToWire(message, builder.initRoot<wire::Envelope>(), {}, error)) << error.text;
     const auto frame = capnp::messageToFlatArray(builder);
     std::string text;
-    for (const auto byte : frame.asBytes()) text += fmt::format("{}{:02x}", text.size() % 17 == 16 ? " " : "", byte);
+    for (const auto byte : frame.asBytes())
+      text += fmt::format("{}{:02x}", text.size() % 17 == 16 ? " " : "", byte);
     return text;
   }
   static kj::Array<capnp::word> toFrame(const std::string& text) {
     auto frame = kj::heapArray<capnp::word>((text.size() + 1) / 17);
     auto bytes = frame.asBytes();
     for (std::size_t i = 0; i < bytes.size(); ++i) {
-      bytes[i] = static_cast<kj::byte>(std::stoi(text.substr(i / 8 * 17 + i % 8 * 2, 2), nullptr, 16));
+      bytes[i] =
+          static_cast<kj::byte>(std::stoi(text.substr(i / 8 * 17 + i % 8 * 2, 2), nullptr, 16));
     }
     return frame;
   }
@@ -51,7 +53,8 @@ class WireBytes : public testing::Test {
 
 TEST_F(WireBytes, OfEveryMessageAreTheSameOnEveryHost) {
   ASSERT_EQ(messages_.size(), expected_.size());
-  for (std::size_t i = 0; i < messages_.size(); ++i) EXPECT_EQ(toText(messages_[i]), expected_[i]) << print(messages_[i]);
+  for (std::size_t i = 0; i < messages_.size(); ++i)
+    EXPECT_EQ(toText(messages_[i]), expected_[i]) << print(messages_[i]);
 }
 
 TEST_F(WireBytes, AreReadAsTheSameMessageOnEveryHost) {
@@ -64,7 +67,8 @@ TEST_F(WireBytes, AreReadAsTheSameMessageOnEveryHost) {
     const auto message = tryFromWire(reader.getRoot<wire::Envelope>(), {}, error);
 
     ASSERT_TRUE(message) << error.text;
-    EXPECT_TRUE(test::isSame(*message, messages_[i])) << print(*message) << "\n" << print(messages_[i]);
+    EXPECT_TRUE(test::isSame(*message, messages_[i])) << print(*message) << "\n"
+                                                      << print(messages_[i]);
   }
 }
 
@@ -78,7 +82,8 @@ TEST_F(WireBytes, OfAUsersStructHoldWhatWasWrittenIntoIt) {
   EXPECT_EQ(spectrum.getAddress(), 0x01020304);
   ASSERT_EQ(spectrum.getValue().size(), test::kHardDoubles.size());
   for (unsigned i = 0; i < test::kHardDoubles.size(); ++i) {
-    EXPECT_EQ(std::bit_cast<std::uint64_t>(spectrum.getValue()[i]), std::bit_cast<std::uint64_t>(test::kHardDoubles[i]));
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(spectrum.getValue()[i]),
+              std::bit_cast<std::uint64_t>(test::kHardDoubles[i]));
   }
 }
 

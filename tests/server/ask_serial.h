@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include <mpf/client/sync_client.h>
+#include <mpf/sync_client.h>
 
 namespace mpf::test {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/dac128v_server/dac128v_server.h>
+#include "server/programs/dac128v_server/dac128v_server.h"
 
 #include <thread>
 
-#include <mpf/drivers/dac128v/dac128v_model.h>
-#include <mpf/tests/server/hardware_fixture.h>
+#include "drivers/dac128v/dac128v_model.h"
+#include "tests/server/hardware_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -15,7 +15,9 @@ class Dac128vServerTest : public HardwareTest {
     server_.interrupt();
     thread_.join();
   }
-  std::int32_t set(std::int32_t channel, std::int32_t code) { return asker_.ask({.address = channel, .value = code}).status; }
+  std::int32_t set(std::int32_t channel, std::int32_t code) {
+    return asker_.ask({.address = channel, .value = code}).status;
+  }
 
   Dac128vModel& model_ = carrier_.plug("IP_a", std::make_unique<Dac128vModel>());
   Dac128v dac_{modules_.create("dac", "ipac", "IP_a", Dac128v::kind())};
@@ -26,7 +28,8 @@ class Dac128vServerTest : public HardwareTest {
 };
 
 TEST_F(Dac128vServerTest, SetsAChannelAndSendsTheMessageBack) {
-  const auto reply = asker_.ask({.timeout = 1, .cmd = 2, .status = 3, .address = 7, .extra = 4, .value = 4095});
+  const auto reply =
+      asker_.ask({.timeout = 1, .cmd = 2, .status = 3, .address = 7, .extra = 4, .value = 4095});
 
   EXPECT_EQ(reply.status, 0);
   EXPECT_EQ(reply.timeout, 1);

@@ -5,11 +5,11 @@
 #include <stdexcept>
 #include <thread>
 
-#include <mpf/drivers/digital_io/digital_io_model.h>
-#include <mpf/server/programs/digital_io_server/input_server.h>
-#include <mpf/server/programs/digital_io_server/output_server.h>
-#include <mpf/tests/server/hardware_fixture.h>
-#include <mpf/tests/support/victim.h>
+#include "drivers/digital_io/digital_io_model.h"
+#include "server/programs/digital_io_server/input_server.h"
+#include "server/programs/digital_io_server/output_server.h"
+#include "tests/server/hardware_fixture.h"
+#include "tests/support/victim.h"
 
 namespace mpf::test {
 namespace {
@@ -21,7 +21,10 @@ class DigitalIoServerTest : public HardwareTest {
   static constexpr auto kNever = std::chrono::hours(1);  // polls
   static constexpr std::int32_t kAll = 0xffffff;
 
-  void start(const DigitalIoOptions& options = {.pollEvery = kNever, .vector = 116, .rising = kAll, .falling = kAll},
+  void start(const DigitalIoOptions& options = {.pollEvery = kNever,
+                                                .vector = 116,
+                                                .rising = kAll,
+                                                .falling = kAll},
              const std::string& kind = "IP-Unidig-I") {
     plug(kind);
     io_.emplace(modules_.create("dio", "ipac", "IP_a", digitalIoModules()), options);
@@ -92,8 +95,10 @@ TEST_F(DigitalIoServerTest, RefusesWhatItCannotDo) {
   start();
   EXPECT_EQ(out_.ask({.cmd = cmdSetBits, .address = 0x1000000}).status, -1);
   EXPECT_EQ(out_.ask({.cmd = cmdSetDAC, .value = 1}).status, -1);
-  for (const auto cmd : {0, -1, 3, 4, 9, 77}) EXPECT_EQ(out_.ask({.cmd = cmd, .address = 1}).status, -1) << cmd;
-  for (const auto cmd : {0, -1, 1, 2, 5, 6, 77}) EXPECT_EQ(in_.ask({.cmd = cmd, .address = 1}).status, -1) << cmd;
+  for (const auto cmd : {0, -1, 3, 4, 9, 77})
+    EXPECT_EQ(out_.ask({.cmd = cmd, .address = 1}).status, -1) << cmd;
+  for (const auto cmd : {0, -1, 1, 2, 5, 6, 77})
+    EXPECT_EQ(in_.ask({.cmd = cmd, .address = 1}).status, -1) << cmd;
   EXPECT_EQ(model_->outputs(), 0xffffffu);
   EXPECT_EQ(alarms("dioOut"), 0u);
   EXPECT_EQ(alarms("dioIn"), 0u);
@@ -121,12 +126,14 @@ TEST_F(DigitalIoServerTest, TellsAMonitorTheInputsAtOnceAndEachChange) {
   }
 }
 
-// One that asks without a pause, with many requests on their way, does not keep news back: at most one more of its requests is answered
-// before them. Bit 5 is low in reads that begin after the server has heard the news, and the bus is slow, so that requests wait.
+// One that asks without a pause, with many requests on their way, does not keep news back: at most
+// one more of its requests is answered before them. Bit 5 is low in reads that begin after the
+// server has heard the news, and the bus is slow, so that requests wait.
 TEST_F(DigitalIoServerTest, TellsAMonitorWhileAReaderAsksWithoutAPause) {
   start({.pollEvery = kNever, .vector = 116, .falling = 1});
   std::atomic<bool> isHeard{false}, ends{false};
-  const auto subscription = io_->subscribe([&](const DigitalIoNews&) { isHeard = true; });  // behind the server's
+  // behind the server's
+  const auto subscription = io_->subscribe([&](const DigitalIoNews&) { isHeard = true; });
   model_->connect(5, [&] {
     for (const auto busy = Deadline::after(20us); !busy.hasPassed();) {
     }
@@ -136,7 +143,9 @@ TEST_F(DigitalIoServerTest, TellsAMonitorWhileAReaderAsksWithoutAPause) {
   int news = 0, late = 0;
   std::promise<void> started;
   std::promise<int> told;
-  const auto ask = [&] { EXPECT_EQ(client->send(Int32Message({.cmd = cmdReadBits, .address = 0x20})), SendResult::sent); };
+  const auto ask = [&] {
+    EXPECT_EQ(client->send(Int32Message({.cmd = cmdReadBits, .address = 0x20})), SendResult::sent);
+  };
   client.emplace(backplane_, [&](Message&& message) {
     const auto* const fields = message.tryAs<Int32>();
     if (fields == nullptr) return;
@@ -248,7 +257,8 @@ TEST_F(DigitalIoServerTest, EndsOnlyTheMonitorThatCannotBeServed) {
 
   model_->setInputs(0x2, 0);
   EXPECT_EQ(in_.next().address & 2, 2);
-  EXPECT_EQ(stuck.ask({.cmd = cmdReadBits, .address = 2}).status, 0);  // it may ask, and monitor again
+  EXPECT_EQ(stuck.ask({.cmd = cmdReadBits, .address = 2}).status,
+            0);  // it may ask, and monitor again
   EXPECT_EQ(stuck.ask({.cmd = cmdStartMonitor}).status, 0);
 }
 
@@ -266,7 +276,9 @@ TEST_F(DigitalIoServerTest, MayBeToldOtherEdges) {
 TEST_F(DigitalIoServerTest, SaysWhenItCannotServeTheInputsAnyMore) {
   start();
   std::atomic<bool> throws{false};
-  model_->connect(3, [&] { return throws.exchange(false) ? throw std::runtime_error("a fault of a model") : 5.0; });
+  model_->connect(3, [&] {
+    return throws.exchange(false) ? throw std::runtime_error("a fault of a model") : 5.0;
+  });
   EXPECT_FALSE(hasFailed_);
   throws = true;
   static_cast<void>(in_.client().client().connectWait(60s));
@@ -288,7 +300,11 @@ TEST_F(DigitalIoServerTest, SeesChangesByPollWhenInterruptsAreLost) {
 }
 
 TEST_F(DigitalIoServerTest, SeesChangesDuringAStorm) {
-  start({.pollEvery = 1ms, .vector = 116, .rising = kAll, .falling = kAll, .storm = {.stormLimit = 100, .stormPause = 24h}});
+  start({.pollEvery = 1ms,
+         .vector = 116,
+         .rising = kAll,
+         .falling = kAll,
+         .storm = {.stormLimit = 100, .stormPause = 24h}});
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   while (alarms("dioIn") == 0) std::this_thread::yield();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// FickleLine: a serial line with an instrument at its far end that answers "Q17\n" with "A17\r\n": in time, late, in pieces, twice, half, or
-// not at all, at random. It keeps the times that LineLimits speaks of, exactly: what is due has arrived, whenever a thread comes to read it.
+// FickleLine: a serial line with an instrument at its far end that answers "Q17\n" with "A17\r\n":
+// in time, late, in pieces, twice, half, or not at all, at random. It keeps the times that
+// LineLimits speaks of, exactly: what is due has arrived, whenever a thread comes to read it.
 //
 //   tryWrite("Q17\n") ──► outputs: { due at, bytes }, ... ──► tryRead(): those that are due       a timer makes the line readable then
 //
@@ -14,24 +15,37 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/drivers/serial/serial_line.h>
-#include <mpf/server/programs/serial_server/line_limits.h>
-#include <mpf/tests/support/random.h>
+#include <mpf/clock.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "drivers/serial/serial_line.h"
+#include "server/programs/serial_server/line_limits.h"
+#include "tests/support/random.h"
 
 namespace mpf::test {
 
-enum class Mood : std::uint8_t { inTime, late, lateInPieces, inPieces, twice, lateTwice, half, never };
-inline constexpr std::array kMoods{Mood::inTime, Mood::late,      Mood::lateInPieces, Mood::inPieces,
-                                   Mood::twice,  Mood::lateTwice, Mood::half,         Mood::never};
+enum class Mood : std::uint8_t {
+  inTime,
+  late,
+  lateInPieces,
+  inPieces,
+  twice,
+  lateTwice,
+  half,
+  never
+};
+inline constexpr std::array kMoods{Mood::inTime,   Mood::late,  Mood::lateInPieces,
+                                   Mood::inPieces, Mood::twice, Mood::lateTwice,
+                                   Mood::half,     Mood::never};
 using MoodCounts = std::array<std::uint64_t, kMoods.size()>;
 
 class FickleLine : public SerialLine {
  public:
-  // One question in `oneIn` is not answered at once and whole. A question may have any timeout, 0 included.
-  FickleLine(const LineLimits& limits, std::uint64_t oneIn, MoodCounts& counts) : limits_(limits), oneIn_(oneIn), counts_(counts) {}
+  // One question in `oneIn` is not answered at once and whole. A question may have any timeout, 0
+  // included.
+  FickleLine(const LineLimits& limits, std::uint64_t oneIn, MoodCounts& counts)
+      : limits_(limits), oneIn_(oneIn), counts_(counts) {}
 
   [[nodiscard]] std::string description() const override { return "a fickle line"; }
   [[nodiscard]] std::string problem() const override { return {}; }
@@ -41,7 +55,8 @@ class FickleLine : public SerialLine {
   [[nodiscard]] pollfd waitsFor() const noexcept override { return {timer_.get(), POLLIN, 0}; }
   [[nodiscard]] bool tryRead(std::vector<LineByte>& bytes) override {
     const auto nowNs = Clock::nowNs();
-    const auto later = std::ranges::find_if(outputs_, [&](const Output& output) { return output.atNs > nowNs; });
+    const auto later =
+        std::ranges::find_if(outputs_, [&](const Output& output) { return output.atNs > nowNs; });
     for (auto output = outputs_.begin(); output != later; ++output) {
       for (const char byte : output->bytes) bytes.push_back({static_cast<std::uint8_t>(byte)});
     }
@@ -73,12 +88,14 @@ class FickleLine : public SerialLine {
 
   // Up to `most`, which it does not reach.
   std::int64_t someNs(Ns most) {
-    return static_cast<std::int64_t>(random_.below(static_cast<std::uint64_t>(std::max<std::int64_t>(most.count(), 1))));
+    return static_cast<std::int64_t>(
+        random_.below(static_cast<std::uint64_t>(std::max<std::int64_t>(most.count(), 1))));
   }
 
   void answer(const std::string& text) {
     const auto nowNs = Clock::nowNs();
-    const auto mood = random_.oneIn(oneIn_) ? kMoods[1 + random_.below(kMoods.size() - 1)] : Mood::inTime;
+    const auto mood =
+        random_.oneIn(oneIn_) ? kMoods[1 + random_.below(kMoods.size() - 1)] : Mood::inTime;
     ++counts_[static_cast<std::size_t>(mood)];
     const auto lateNs = nowNs + someNs(limits_.resyncLimit);
     switch (mood) {
@@ -109,7 +126,8 @@ class FickleLine : public SerialLine {
     }
   }
   void add(std::int64_t atNs, const std::string& bytes) {
-    const auto after = std::ranges::find_if(outputs_, [&](const Output& output) { return output.atNs > atNs; });
+    const auto after =
+        std::ranges::find_if(outputs_, [&](const Output& output) { return output.atNs > atNs; });
     outputs_.insert(after, {atNs, bytes});
   }
   void setTimer() {
@@ -127,7 +145,8 @@ class FickleLine : public SerialLine {
   Random random_;
   std::string question_;  // begun
   std::vector<Output> outputs_;  // in the order of their times
-  FileDescriptor timer_{checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), "timerfd_create")};
+  FileDescriptor timer_{
+      checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), "timerfd_create")};
 };
 
 }  // namespace mpf::test

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: MIT
-// HardwareTest: a carrier of models and a backplane, for tests of servers that drive modules; HardwareAsker: a client of one.
+// HardwareTest: a carrier of models and a backplane, for tests of servers that drive modules;
+// HardwareAsker: a client of one.
 #pragma once
 
 #include <gmock/gmock.h>
 #include <memory>
 #include <string>
 
-#include <mpf/client/sync_client.h>
 #include <mpf/drivers/industry_pack/module.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/tests/support/alarms.h>
-#include <mpf/tests/support/model_carrier.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "server/programs/server_log.h"
+#include "tests/support/alarms.h"
+#include "tests/support/model_carrier.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
@@ -21,7 +23,8 @@ using namespace std::chrono_literals;
 
 class HardwareAsker {
  public:
-  HardwareAsker(const Backplane& backplane, const std::string& server) : client_(backplane, server) {}
+  HardwareAsker(const Backplane& backplane, const std::string& server)
+      : client_(backplane, server) {}
 
   // The reply; status -99 when there is none.
   Int32 ask(Int32 fields) {
@@ -67,7 +70,9 @@ class HardwareAsker {
 
 class HardwareTest : public testing::Test {
  protected:
-  [[nodiscard]] std::uint64_t alarms(const std::string& server) const { return alarmsOf(backplane_, server); }
+  [[nodiscard]] std::uint64_t alarms(const std::string& server) const {
+    return alarmsOf(backplane_, server);
+  }
 
   Watchdog watchdog_{"hardware server test"};
   ServerLog log_{"test", "off"};

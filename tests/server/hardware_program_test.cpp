@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Programs that drive modules, as processes: how they start, what they say, how they end, and wires from one to the other.
+// Programs that drive modules, as processes: how they start, what they say, how they end, and wires
+// from one to the other.
 #include <array>
 #include <cstdio>
 
-#include <mpf/schema/digital_io_server.h>
-#include <mpf/tests/server/hardware_fixture.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/test_backplane.h>
+#include <mpf/digital_io_commands.h>
+
+#include "tests/server/hardware_fixture.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
 
 namespace mpf::test {
 namespace {
@@ -20,26 +22,28 @@ std::string helpOf(const std::string& program) {
   std::string help;
   auto* const output = ::popen((program + " --help").c_str(), "r");
   std::array<char, 4096> bytes{};
-  for (std::size_t length = 0; (length = std::fread(bytes.data(), 1, bytes.size(), output)) > 0;) help.append(bytes.data(), length);
+  for (std::size_t length = 0; (length = std::fread(bytes.data(), 1, bytes.size(), output)) > 0;)
+    help.append(bytes.data(), length);
   EXPECT_EQ(::pclose(output), 0);
   return help;
 }
 
 class HardwareProgramTest : public testing::Test {
  protected:
-  using Words = std::vector<std::string>;
-  [[nodiscard]] std::unique_ptr<Program> start(const std::string& program, Words words) const {
+  using OptionFields = std::vector<std::string>;
+  [[nodiscard]] std::unique_ptr<Program> start(const std::string& program,
+                                               OptionFields words) const {
     words.insert(words.begin(), program);
     words.insert(words.end(), {"--backplane", backplane_.name()});
     return std::make_unique<Program>(words);
   }
-  [[nodiscard]] std::unique_ptr<Program> startDac(const Words& more) const {
-    Words words{"dac", "ipac", "IP_a", "20"};
+  [[nodiscard]] std::unique_ptr<Program> startDac(const OptionFields& more) const {
+    OptionFields words{"dac", "ipac", "IP_a", "20"};
     words.insert(words.end(), more.begin(), more.end());
     return start(MPF_TEST_DAC128V_SERVER, words);
   }
-  [[nodiscard]] std::unique_ptr<Program> startDio(const Words& more) const {
-    Words words{"dio", "ipac", "IP_b", "20", "1000", "116", "0xff", "0xf00ff", "0", "5"};
+  [[nodiscard]] std::unique_ptr<Program> startDio(const OptionFields& more) const {
+    OptionFields words{"dio", "ipac", "IP_b", "20", "1000", "116", "0xff", "0xf00ff", "0", "5"};
     words.insert(words.end(), more.begin(), more.end());
     return start(MPF_TEST_DIGITAL_IO_SERVER, words);
   }
@@ -64,16 +68,21 @@ TEST_F(HardwareProgramTest, ServesAndEndsAndLeavesNothing) {
     const auto dio = startDio({"--carrier", "ipac=model"});
     {
       EXPECT_EQ(HardwareAsker(backplane_, "dac").ask({.address = 1, .value = 5}).status, 0);
-      EXPECT_EQ(HardwareAsker(backplane_, "dioOut").ask({.cmd = digital::cmdClearBits, .address = 5}).status, 0);
+      EXPECT_EQ(HardwareAsker(backplane_, "dioOut")
+                    .ask({.cmd = digital::cmdClearBits, .address = 5})
+                    .status,
+                0);
       HardwareAsker in(backplane_, "dioIn");
       EXPECT_EQ(in.ask({.cmd = digital::cmdStartMonitor}).value, 0xfffffa);
       expectEndsWell(*dio, signal);
     }
     expectEndsWell(*dac, signal);
     EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
-    EXPECT_THAT(dac->errors(), HasSubstr("serving the Systran DAC128V at carrier ipac, site IP_a as \"dac\""));
+    EXPECT_THAT(dac->errors(),
+                HasSubstr("serving the Systran DAC128V at carrier ipac, site IP_a as \"dac\""));
     const auto said = dio->errors();
-    EXPECT_THAT(said, HasSubstr("IP-Unidig-I at carrier ipac, site IP_b: polled every 1000 ms, interrupts with vector 116"));
+    EXPECT_THAT(said, HasSubstr("IP-Unidig-I at carrier ipac, site IP_b: polled every 1000 ms, "
+                                "interrupts with vector 116"));
     EXPECT_THAT(said, HasSubstr("maxclients 5 is ignored: any number of clients may monitor"));
     EXPECT_THAT(said, HasSubstr("serving \"dioIn\" and \"dioOut\""));
   }
@@ -81,8 +90,10 @@ TEST_F(HardwareProgramTest, ServesAndEndsAndLeavesNothing) {
 
 TEST_F(HardwareProgramTest, AreWiredToEachOtherByAFile) {
   const auto wires = folder_.file("wires");
-  const auto dac = startDac({"--carrier", "ipac=model", "--wires", wires, "--ranges", "0to10,-10to10"});
-  const auto dio = startDio({"--carrier", "ipac=model", "--wires", wires, "--input", "0=dac.0", "--input", "3=dio.20"});
+  const auto dac =
+      startDac({"--carrier", "ipac=model", "--wires", wires, "--ranges", "0to10,-10to10"});
+  const auto dio = startDio(
+      {"--carrier", "ipac=model", "--wires", wires, "--input", "0=dac.0", "--input", "3=dio.20"});
   HardwareAsker volts(backplane_, "dac");
   HardwareAsker out(backplane_, "dioOut");
   HardwareAsker in(backplane_, "dioIn");
@@ -106,8 +117,9 @@ TEST_F(HardwareProgramTest, AreWiredToEachOtherByAFile) {
 TEST_F(HardwareProgramTest, FollowsWiresWithAnIp440) {
   const auto wires = folder_.file("wires");
   const auto dac = startDac({"--carrier", "ipac=model", "--wires", wires});
-  const auto door = start(MPF_TEST_IP440_SERVER, {"door", "ipac", "IP_c", "--carrier", "ipac=model", "--inputs", "0x80000000", "--wires",
-                                                  wires, "--input", "4=dac.1"});
+  const auto door =
+      start(MPF_TEST_IP440_SERVER, {"door", "ipac", "IP_c", "--carrier", "ipac=model", "--inputs",
+                                    "0x80000000", "--wires", wires, "--input", "4=dac.1"});
   HardwareAsker volts(backplane_, "dac");
   HardwareAsker in(backplane_, "door");
   EXPECT_EQ(volts.ask({.address = 1, .value = 0}).status, 0);
@@ -116,26 +128,30 @@ TEST_F(HardwareProgramTest, FollowsWiresWithAnIp440) {
   EXPECT_EQ(in.ask({.cmd = digital::cmdReadBits, .address = -1}).value, INT32_MIN + 0x10);
   expectEndsWell(*door);
   expectEndsWell(*dac);
-  EXPECT_THAT(door->errors(), HasSubstr("serving the Acromag IP440 at carrier ipac, site IP_c as \"door\""));
+  EXPECT_THAT(door->errors(),
+              HasSubstr("serving the Acromag IP440 at carrier ipac, site IP_c as \"door\""));
 }
 
 TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
   const auto notAFile = folder_.write("letter", "a letter");
-  for (const auto& [words, because] : std::vector<std::pair<Words, std::string>>{
+  for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
            {{"dac", "ipac"}, "site is required"},
            {{"dac", "ipac", "IP_a"}, "nothing says what carrier \"ipac\" is"},
            {{"dac", "ipac", "IP_x", "--carrier", "ipac=model"}, "no site \"IP_x\""},
-           {{"dac", "ipac", "IP_a", "0", "--carrier", "ipac=model"}, "queuesize: 0 is out of range"},
-           {{"--carrier", "ipac=model", "dac", "ipac", "IP_a", "--ranges", "3to4"}, "\"3to4\" is not an output range"},
-           {{"dac", "ipac", "IP_a", "--carrier", "ipac=model", "--wires", notAFile}, "letter is not a file of model wires"}}) {
+           {{"dac", "ipac", "IP_a", "0", "--carrier", "ipac=model"},
+            "queuesize: 0 is out of range"},
+           {{"--carrier", "ipac=model", "dac", "ipac", "IP_a", "--ranges", "3to4"},
+            "\"3to4\" is not an output range"},
+           {{"dac", "ipac", "IP_a", "--carrier", "ipac=model", "--wires", notAFile},
+            "letter is not a file of model wires"}}) {
     expectFails(*start(MPF_TEST_DAC128V_SERVER, words), because);
   }
-  for (const auto& [words, because] :
-       std::vector<std::pair<Words, std::string>>{{{"20", "0", "256"}, "intvec: 256 is out of range"},
-                                                  {{"20", "0", "1", "0x1ffffffff"}, "risingmask"},
-                                                  {{"--kind", "IP-Unidig-T"}, "there is no \"IP-Unidig-T\"; there are IP-Unidig-E"},
-                                                  {{"--input", "32=dac.0"}, "\"32=dac.0\" is no BIT=WIRE"},
-                                                  {{"--input", "3=dac.0"}, "--input requires --wires"}}) {
+  for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
+           {{"20", "0", "256"}, "intvec: 256 is out of range"},
+           {{"20", "0", "1", "0x1ffffffff"}, "risingmask"},
+           {{"--kind", "IP-Unidig-T"}, "there is no \"IP-Unidig-T\"; there are IP-Unidig-E"},
+           {{"--input", "32=dac.0"}, "\"32=dac.0\" is no BIT=WIRE"},
+           {{"--input", "3=dac.0"}, "--input requires --wires"}}) {
     auto all = words;
     all.insert(all.begin(), {"dio", "ipac", "IP_b"});
     all.insert(all.end(), {"--carrier", "ipac=model"});
@@ -146,18 +162,26 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
 
 TEST_F(HardwareProgramTest, SaysWhenAModelCannotInterrupt) {
   const auto dio = startDio({"--carrier", "ipac=model", "--kind", "IP-Unidig"});
-  EXPECT_EQ(HardwareAsker(backplane_, "dioIn").ask({.cmd = digital::cmdStartMonitor}).value, 0xffffff);
+  EXPECT_EQ(HardwareAsker(backplane_, "dioIn").ask({.cmd = digital::cmdStartMonitor}).value,
+            0xffffff);
   expectEndsWell(*dio);
   EXPECT_THAT(dio->errors(), HasSubstr("IP-Unidig cannot interrupt: changes are seen by polling"));
 }
 
 TEST_F(HardwareProgramTest, ShowTheirOldCommandsInTheirHelp) {
-  EXPECT_THAT(helpOf(MPF_TEST_DAC128V_SERVER), HasSubstr(R"(initDAC128V("module", "carrier", "site", queuesize))"));
+  EXPECT_THAT(helpOf(MPF_TEST_DAC128V_SERVER),
+              HasSubstr(R"(initDAC128V("module", "carrier", "site", queuesize))"));
   const auto serial = helpOf(MPF_TEST_SERIAL_SERVER);
-  EXPECT_THAT(serial, HasSubstr(R"(initSerialServer("server", "port", bufsize, queuesize, "eomstr", circular))"));
+  EXPECT_THAT(
+      serial,
+      HasSubstr(R"(initSerialServer("server", "port", bufsize, queuesize, "eomstr", circular))"));
   EXPECT_THAT(serial, HasSubstr(R"(initOctalUART("module", "carrier", "site", nports, intVec))"));
-  EXPECT_THAT(serial, HasSubstr(R"(initOctalUARTPort("port", "module", n, baud, "parity", stopbits, bits, "flow"))"));
-  EXPECT_THAT(helpOf(MPF_TEST_DIGITAL_IO_SERVER), HasSubstr(R"(initIpUnidig("module", "carrier", "site", queuesize, mspoll, intvec,)"));
+  EXPECT_THAT(
+      serial,
+      HasSubstr(
+          R"(initOctalUARTPort("port", "module", n, baud, "parity", stopbits, bits, "flow"))"));
+  EXPECT_THAT(helpOf(MPF_TEST_DIGITAL_IO_SERVER),
+              HasSubstr(R"(initIpUnidig("module", "carrier", "site", queuesize, mspoll, intvec,)"));
 }
 
 }  // namespace

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Carriers, modules and models that programs open, and what --wait waits for.
-#include <mpf/server/programs/hardware/hardware.h>
+#include "server/programs/hardware/hardware.h"
 
 #include <CLI/CLI.hpp>
 #include <gmock/gmock.h>
 #include <stdexcept>
 
-#include <mpf/tests/drivers/industry_pack/plain_model.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/drivers/industry_pack/plain_model.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -24,8 +24,9 @@ class HardwareOpenTest : public testing::Test {
   }
   IndustryPackModule* open(const Hardware::MakeModel& makeModel) {
     const ServerLog log("test", "warning");
-    return hardware_.open({.name = "dac", .carrier = "ipac", .site = "IP_a"}, {.name = "plain", .manufacturer = 0xa3, .models = {0x11}},
-                          makeModel, log);
+    return hardware_.open({.name = "dac", .carrier = "ipac", .site = "IP_a"},
+                          {.name = "plain", .manufacturer = 0xa3, .models = {0x11}}, makeModel,
+                          log);
   }
 
   Watchdog watchdog_{"hardware test"};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Ip330ServersTest: all servers over a model of the board in real time, and a DAC128V's model whose channel 2 is on input 1.
+// Ip330ServersTest: all servers over a model of the board in real time, and a DAC128V's model whose
+// channel 2 is on input 1.
 #pragma once
 
 #include <atomic>
@@ -8,11 +9,12 @@
 #include <memory>
 #include <vector>
 
-#include <mpf/drivers/dac128v/dac128v_model.h>
-#include <mpf/drivers/ip330/ip330_model.h>
-#include <mpf/schema/ip330_server.h>
-#include <mpf/server/programs/ip330_server/ip330_servers.h>
-#include <mpf/tests/server/hardware_fixture.h>
+#include <mpf/ip330_commands.h>
+
+#include "drivers/dac128v/dac128v_model.h"
+#include "drivers/ip330/ip330_model.h"
+#include "server/programs/ip330_server/ip330_servers.h"
+#include "tests/server/hardware_fixture.h"
 
 namespace mpf::test {
 
@@ -27,7 +29,8 @@ class Ip330ServersTest : public HardwareTest {
 
   // The signals are there before the first scan.
   Ip330Model& plugAdc() {
-    auto& adc = carrier_.plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{.gainError = {-0.01}, .offsetError = {50}}));
+    auto& adc = carrier_.plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{
+                                          .gainError = {-0.01}, .offsetError = {50}}));
     adc.setSignal(0, dcSignal(2.5));
     adc.setSignal(1, [this](double) { return volts_.load(); });
     return adc;
@@ -53,7 +56,8 @@ class Ip330ServersTest : public HardwareTest {
     std::vector<typename Array::Element> values;
   };
   template <class Array>
-  Values<Array> askArray(const std::string& server, std::int32_t command, std::int32_t address = 0) {
+  Values<Array> askArray(const std::string& server, std::int32_t command,
+                         std::int32_t address = 0) {
     SyncClient client(backplane_, server);
     auto reply = call(client, Float64Message({.cmd = command, .address = address})).as<Array>();
     if (!reply) return {};
@@ -66,16 +70,21 @@ class Ip330ServersTest : public HardwareTest {
 
   std::atomic<double> volts_{0};
   Ip330Model& adc_ = plugAdc();
-  Dac128vModel& dacModel_ = carrier_.plug("IP_b", std::make_unique<Dac128vModel>(Dac128vRanges{}, [this](int channel, double volts) {
-                                            if (channel == 2) volts_ = volts / 4 + 0.1;
-                                          }));
+  Dac128vModel& dacModel_ = carrier_.plug(
+      "IP_b", std::make_unique<Dac128vModel>(Dac128vRanges{}, [this](int channel, double volts) {
+        if (channel == 2) volts_ = volts / 4 + 0.1;
+      }));
   IndustryPackModule adcModule_{"adc", "a model", carrier_.site(0), kIp330};
   IndustryPackModule dacModule_{"dac", "a model", carrier_.site(1), Dac128v::kind()};
   Dac128v dac_{dacModule_};
   // A test that is held up for a while is no silence of the board.
-  Ip330Servers servers_{backplane_, {},
-                        adcModule_, {.lastChannel = 3},
-                        log_,       {.conversion = 20ms, .silence = 1h, .lookEvery = 1ms, .pollEvery = 1ms, .stormPause = 5ms}};
+  Ip330Servers servers_{
+      backplane_,
+      {},
+      adcModule_,
+      {.lastChannel = 3},
+      log_,
+      {.conversion = 20ms, .silence = 1h, .lookEvery = 1ms, .pollEvery = 1ms, .stormPause = 5ms}};
 };
 
 }  // namespace mpf::test

@@ -6,13 +6,14 @@
 #include <gtest/gtest.h>
 #include <stdio.h>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/schema/ip330_server.h>
-#include <mpf/tests/support/command.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/ip330_commands.h>
+#include <mpf/sync_client.h>
+
+#include "tests/support/command.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -41,8 +42,8 @@ class Ip330ProgramTest : public testing::Test {
 };
 
 TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) {
-  const auto server =
-      start({"adc", "ipac", "IP_a", "D", "-5to5", "0", "15", "10", "120", "--carrier", "ipac=model", "--signal", "3=dc:-2.5,4=sine:5:1"});
+  const auto server = start({"adc", "ipac", "IP_a", "D", "-5to5", "0", "15", "10", "120",
+                             "--carrier", "ipac=model", "--signal", "3=dc:-2.5,4=sine:5:1"});
 
   const auto reply = read("adc", 3);
 
@@ -53,13 +54,16 @@ TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) 
   const auto status = server->end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
   EXPECT_THAT(server->errors(),
-              AllOf(HasSubstr("serving the Acromag IP330 at carrier ipac, site IP_a (channels 0 to 15, -5to5 V, burstContinuous, 1000 us"),
+              AllOf(HasSubstr("serving the Acromag IP330 at carrier ipac, site IP_a (channels 0 to "
+                              "15, -5to5 V, burstContinuous, 1000 us"),
                     HasSubstr(R"(as "adc", "adcConfig")"), HasSubstr("ends")));
 }
 
 TEST_F(Ip330ProgramTest, ServesAllThatItIsToldOverOneBoard) {
-  const auto server = start({"--scan", "s1,0,3,100,30", "--scan", "s2,4,7", "--config", "c", "--sweep", "w,0,1,50", "--pid", "p,0,dac,2,25",
-                             "--dac", "dac,ipac,IP_b", "adc", "ipac", "IP_a", "S", "0to10", "--carrier", "ipac=model"});
+  const auto server =
+      start({"--scan", "s1,0,3,100,30", "--scan", "s2,4,7", "--config", "c", "--sweep", "w,0,1,50",
+             "--pid", "p,0,dac,2,25", "--dac", "dac,ipac,IP_b", "adc", "ipac", "IP_a", "S", "0to10",
+             "--carrier", "ipac=model"});
 
   EXPECT_EQ(read("s1", 3).status, 0);
   EXPECT_EQ(read("s1", 4).status, -1);
@@ -69,7 +73,8 @@ TEST_F(Ip330ProgramTest, ServesAllThatItIsToldOverOneBoard) {
   ASSERT_TRUE(points);
   EXPECT_EQ(points->value().size(), 50u);
   SyncClient pid(backplane_, "p");
-  auto params = pid.call(Float64Message({.cmd = ip330server::cmdGetParams}), 60s).as<Float64Array>();
+  auto params =
+      pid.call(Float64Message({.cmd = ip330server::cmdGetParams}), 60s).as<Float64Array>();
   ASSERT_TRUE(params);
   EXPECT_EQ((*params)->status, 0);
   EXPECT_EQ(server->end(SIGINT), 0);
@@ -77,15 +82,18 @@ TEST_F(Ip330ProgramTest, ServesAllThatItIsToldOverOneBoard) {
 
 TEST_F(Ip330ProgramTest, FeedsBackThroughAWireFromTheDacToTheAdc) {
   const TemporaryFolder folder;
-  const auto server = start({"adc", "ipac", "IP_a", "S", "-10to10", "--carrier", "ipac=model", "--wires", folder.path() / "wires", "--dac",
-                             "dac,ipac,IP_b", "--pid", "p,0,dac,2", "--signal", "0=wire:dac.2"});
+  const auto server = start({"adc", "ipac", "IP_a", "S", "-10to10", "--carrier", "ipac=model",
+                             "--wires", folder.path() / "wires", "--dac", "dac,ipac,IP_b", "--pid",
+                             "p,0,dac,2", "--signal", "0=wire:dac.2"});
   SyncClient pid(backplane_, "p");
   const auto tell = [&](std::int32_t command, double value) {
-    const auto reply = pid.call(Float64Message({.cmd = command, .value = value}), 60s).as<Float64>();
+    const auto reply =
+        pid.call(Float64Message({.cmd = command, .value = value}), 60s).as<Float64>();
     return reply ? (*reply)->status : -99;
   };
   const auto actual = [&] {
-    const auto reply = pid.call(Float64Message({.cmd = ip330server::cmdGetParams}), 60s).as<Float64Array>();
+    const auto reply =
+        pid.call(Float64Message({.cmd = ip330server::cmdGetParams}), 60s).as<Float64Array>();
     return reply ? reply->value()[ip330server::offsetActual] : 0;
   };
 
@@ -101,25 +109,33 @@ TEST_F(Ip330ProgramTest, FeedsBackThroughAWireFromTheDacToTheAdc) {
 
 // A DAC on a PCI board that no host has.
 TEST_F(Ip330ProgramTest, ServesScansWhileItWaitsForADac) {
-  const auto server = start({"adc", "ipac", "IP_a", "--carrier", "ipac=model", "--carrier", "pci=tpci200:ffff:ff:1f.7", "--wait", "--scan",
-                             "s", "--config", "c", "--dac", "dac,pci,IP_b", "--pid", "p,0,dac,2"});
+  const auto server = start({"adc", "ipac", "IP_a", "--carrier", "ipac=model", "--carrier",
+                             "pci=tpci200:ffff:ff:1f.7", "--wait", "--scan", "s", "--config", "c",
+                             "--dac", "dac,pci,IP_b", "--pid", "p,0,dac,2"});
 
   EXPECT_EQ(read("s", 3).status, 0);
 
   EXPECT_EQ(server->end(SIGTERM), 0);
-  EXPECT_THAT(server->errors(), AllOf(HasSubstr(R"(as "s", "c")"), HasSubstr("the board is not there yet"), HasSubstr("ends")));
+  EXPECT_THAT(server->errors(), AllOf(HasSubstr(R"(as "s", "c")"),
+                                      HasSubstr("the board is not there yet"), HasSubstr("ends")));
 }
 
 TEST_F(Ip330ProgramTest, ShowsTheOldCommandsInItsHelp) {
-  EXPECT_THAT(runCommand(std::string(MPF_TEST_IP330_SERVER) + " --help").output,
-              AllOf(HasSubstr(R"(initIp330("module", "carrier", "site", "type", "range", first, last, maxclients, vector))"),
-                    HasSubstr(R"(configIp330(ip330, scanMode, "trigger", usPerScan, secondsBetweenCalibrate))"),
-                    HasSubstr(R"(initIp330Scan(ip330, "server", first, last, msToAverage, queuesize))"),
-                    HasSubstr(R"(initIp330Scan(ip330, "server", first, last, queuesize) of release 1-7: write 0 for MS)"),
-                    HasSubstr(R"(initIp330Scan("module", "carrier", "site", "type", "range", vector, queuesize))"),
-                    HasSubstr(R"(initIp330Config(ip330, "server", queuesize))"),
-                    HasSubstr(R"(initIp330Sweep(ip330, "server", first, last, maxPoints, queuesize))"),
-                    HasSubstr(R"(initIp330PID("server", ip330, channel, dac, dacChannel, queuesize))")));
+  EXPECT_THAT(
+      runCommand(std::string(MPF_TEST_IP330_SERVER) + " --help").output,
+      AllOf(
+          HasSubstr(
+              R"(initIp330("module", "carrier", "site", "type", "range", first, last, maxclients, vector))"),
+          HasSubstr(
+              R"(configIp330(ip330, scanMode, "trigger", usPerScan, secondsBetweenCalibrate))"),
+          HasSubstr(R"(initIp330Scan(ip330, "server", first, last, msToAverage, queuesize))"),
+          HasSubstr(
+              R"(initIp330Scan(ip330, "server", first, last, queuesize) of release 1-7: write 0 for MS)"),
+          HasSubstr(
+              R"(initIp330Scan("module", "carrier", "site", "type", "range", vector, queuesize))"),
+          HasSubstr(R"(initIp330Config(ip330, "server", queuesize))"),
+          HasSubstr(R"(initIp330Sweep(ip330, "server", first, last, maxPoints, queuesize))"),
+          HasSubstr(R"(initIp330PID("server", ip330, channel, dac, dacChannel, queuesize))")));
 }
 
 TEST_F(Ip330ProgramTest, SaysThatThereIsNoSuchCarrier) {
@@ -129,7 +145,8 @@ TEST_F(Ip330ProgramTest, SaysThatThereIsNoSuchCarrier) {
 }
 
 TEST_F(Ip330ProgramTest, SaysWhatIsWrongWithItsArguments) {
-  for (const auto& [options, complaint] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+  for (const auto& [options, complaint] :
+       std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"X"}, "type \"X\": use D"},
            {{"S", "-3to3"}, "range \"-3to3\": use -5to5"},
            {{"D", "0to5", "0", "16"}, "use 0 to 15"},

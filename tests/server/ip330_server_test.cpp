@@ -29,9 +29,11 @@ TEST_F(Ip330ServersTest, SetTheGainOfAChannelForWhoAsksForIt) {
 }
 
 TEST_F(Ip330ServersTest, SayMinusOneToWhatCannotBe) {
-  for (const auto& request : {Int32{.address = -1}, Int32{.address = 4}, Int32{.address = INT32_MAX}, Int32{.value = 4}, Int32{.value = -1},
-                              Int32{.extra = -1}, Int32{.extra = INT32_MAX}}) {
-    EXPECT_EQ(ask("scan", request).status, -1) << request.address << ' ' << request.value << ' ' << request.extra;
+  for (const auto& request :
+       {Int32{.address = -1}, Int32{.address = 4}, Int32{.address = INT32_MAX}, Int32{.value = 4},
+        Int32{.value = -1}, Int32{.extra = -1}, Int32{.extra = INT32_MAX}}) {
+    EXPECT_EQ(ask("scan", request).status, -1)
+        << request.address << ' ' << request.value << ' ' << request.extra;
   }
   EXPECT_EQ(ask("config", {.cmd = 5}).status, -1);
   EXPECT_EQ(ask("config", {.cmd = cmdSetScanMode, .value = 6}).status, -1);
@@ -110,9 +112,13 @@ TEST_F(Ip330ServersTest, TakeArraysOfAllChannels) {
   EXPECT_DOUBLE_EQ(status.values[4], 2 * servers_.board().microsecondsPerScan() / 1e6);
   const auto first = askArray<Int32Array>("sweep", msgRead, 0);
   EXPECT_EQ(first.status, 0);
-  EXPECT_THAT(first.values, testing::AllOf(SizeIs(5), Each(testing::AllOf(testing::Ge(49150), testing::Le(49154)))));
+  EXPECT_THAT(
+      first.values,
+      testing::AllOf(SizeIs(5), Each(testing::AllOf(testing::Ge(49150), testing::Le(49154)))));
   const auto last = askArray<Int32Array>("sweep", msgRead, 3);
-  EXPECT_THAT(last.values, testing::AllOf(SizeIs(5), Each(testing::AllOf(testing::Ge(32766), testing::Le(32770)))));
+  EXPECT_THAT(
+      last.values,
+      testing::AllOf(SizeIs(5), Each(testing::AllOf(testing::Ge(32766), testing::Le(32770)))));
   const auto none = askArray<Int32Array>("sweep", msgRead, 4);
   EXPECT_EQ(none.status, -1);
   EXPECT_THAT(none.values, IsEmpty());
@@ -129,14 +135,16 @@ TEST_F(Ip330ServersTest, FeedBackFromTheAdcToTheDac) {
   EXPECT_EQ(tell("pid", cmdSetSecondsPerScan, 0.001), 0);
   EXPECT_EQ(dac_.tryRead(2), 1000);
   EXPECT_EQ(tell("pid", cmdStartFeedback), 0);
-  while (std::abs(askArray<Float64Array>("pid", cmdGetParams).values.at(offsetActual) - 36000) > 10) {
+  while (std::abs(askArray<Float64Array>("pid", cmdGetParams).values.at(offsetActual) - 36000) >
+         10) {
   }
 
   EXPECT_EQ(tell("pid", cmdStopFeedback), 0);
   const auto params = askArray<Float64Array>("pid", cmdGetParams);
   EXPECT_EQ(params.status, 0);
   ASSERT_THAT(params.values, SizeIs(numFastPIDOffsets));
-  EXPECT_DOUBLE_EQ(params.values[offsetSecondsPerScan], servers_.board().microsecondsPerScan() / 1e6);
+  EXPECT_DOUBLE_EQ(params.values[offsetSecondsPerScan],
+                   servers_.board().microsecondsPerScan() / 1e6);
   const auto code = dac_.tryRead(2);
   waitForScans(5);
   EXPECT_EQ(dac_.tryRead(2), code);
@@ -148,7 +156,8 @@ TEST_F(Ip330ServersTest, SayMinusOneWhileTheBoardIsGoneAndGoOn) {
   carrier_.setFault("IP_a", ModelFault::busError);
   while (ask("scan", {.address = 0}).status == 0) {
   }
-  for (const auto* const name : {"scan", "config", "sweep", "pid"}) EXPECT_GE(alarms(name), 1u) << name;
+  for (const auto* const name : {"scan", "config", "sweep", "pid"})
+    EXPECT_GE(alarms(name), 1u) << name;
   EXPECT_EQ(ask("config", {.cmd = cmdCalibrate}).status, -1);
   EXPECT_EQ(askArray<Float64Array>("sweep", msgGetAcqStatus).status, -1);
   EXPECT_EQ(askArray<Float64Array>("pid", cmdGetParams).status, -1);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/ip440_server/ip440_server.h>
+#include "server/programs/ip440_server/ip440_server.h"
 
 #include <thread>
 
-#include <mpf/drivers/ip440/ip440_model.h>
-#include <mpf/schema/digital_io_server.h>
-#include <mpf/tests/server/hardware_fixture.h>
+#include <mpf/digital_io_commands.h>
+
+#include "drivers/ip440/ip440_model.h"
+#include "tests/server/hardware_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -16,7 +17,9 @@ class Ip440ServerTest : public HardwareTest {
     server_.interrupt();
     thread_.join();
   }
-  Int32 read(std::uint32_t mask) { return asker_.ask({.cmd = digital::cmdReadBits, .address = static_cast<std::int32_t>(mask)}); }
+  Int32 read(std::uint32_t mask) {
+    return asker_.ask({.cmd = digital::cmdReadBits, .address = static_cast<std::int32_t>(mask)});
+  }
 
   Ip440Model& model_ = carrier_.plug("IP_c", std::make_unique<Ip440Model>(0xa5000001));
   Ip440 inputs_{modules_.create("door", "ipac", "IP_c", Ip440::kind())};
@@ -31,7 +34,8 @@ TEST_F(Ip440ServerTest, ReadsTheBitsOfAMask) {
   EXPECT_EQ(all.status, 0);
   EXPECT_EQ(static_cast<std::uint32_t>(all.value), 0xa5000001);
   EXPECT_EQ(read(0xf).value, 1);
-  EXPECT_EQ(asker_.ask({.cmd = digital::cmdReadBits16, .address = 0xffff, .extra = 16}).value, 0xa500);
+  EXPECT_EQ(asker_.ask({.cmd = digital::cmdReadBits16, .address = 0xffff, .extra = 16}).value,
+            0xa500);
   model_.setInputs(0x6);
   EXPECT_EQ(read(0xf).value, 6);
 }
@@ -39,7 +43,8 @@ TEST_F(Ip440ServerTest, ReadsTheBitsOfAMask) {
 TEST_F(Ip440ServerTest, AnswersWhatItCannotDoWithAStatus) {
   for (const std::int32_t cmd : {0, digital::cmdSetBits, digital::cmdStartMonitor, -1, INT32_MAX})
     EXPECT_EQ(asker_.ask({.cmd = cmd}).status, -1);
-  for (const std::int32_t lowest : {-1, 17}) EXPECT_EQ(asker_.ask({.cmd = digital::cmdReadBits16, .extra = lowest}).status, -1);
+  for (const std::int32_t lowest : {-1, 17})
+    EXPECT_EQ(asker_.ask({.cmd = digital::cmdReadBits16, .extra = lowest}).status, -1);
   asker_.expectRefusalOfOtherTypes();
   EXPECT_EQ(alarms("door"), 0u);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What clients, `mpf msr` and the log say of a serial line that loses and damages bytes: on a port of an octal UART.
-#include <mpf/server/programs/serial_server/line_faults.h>
+// What clients, `mpf msr` and the log say of a serial line that loses and damages bytes: on a port
+// of an octal UART.
+#include "server/programs/serial_server/line_faults.h"
 
 #include <array>
 #include <gmock/gmock.h>
@@ -9,15 +10,16 @@
 #include <regex>
 #include <thread>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
-#include <mpf/drivers/octal_uart/octal_uart_port.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/server/programs/serial_server/serial_server.h>
-#include <mpf/tests/support/alarms.h>
-#include <mpf/tests/support/model_carrier.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/serial_commands.h>
+#include <mpf/sync_client.h>
+
+#include "drivers/octal_uart/octal_uart_model.h"
+#include "drivers/octal_uart/octal_uart_port.h"
+#include "server/programs/serial_server/serial_server.h"
+#include "tests/support/alarms.h"
+#include "tests/support/model_carrier.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -34,14 +36,16 @@ struct Answer {
   std::string text;
   friend bool operator==(const Answer&, const Answer&) = default;
   friend std::ostream& operator<<(std::ostream& out, const Answer& answer) {
-    return out << "status " << answer.status << ", extra " << answer.extra << ", \"" << answer.text << '"';
+    return out << "status " << answer.status << ", extra " << answer.extra << ", \"" << answer.text
+               << '"';
   }
 };
 
 class LineFaultsTest : public testing::Test {
  protected:
   void start(OctalUartModelTime time = OctalUartModelTime::instant, const char* logLevel = "off") {
-    model_ = &carrier_.plug("IP_a", std::make_unique<OctalUartModel>(OctalUartModelOptions{.time = time}));
+    model_ = &carrier_.plug("IP_a",
+                            std::make_unique<OctalUartModel>(OctalUartModelOptions{.time = time}));
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
     port_.emplace(*uart_, 0, OctalUartPortOptions{.settings = kFast});
     log_.emplace("test", logLevel);
@@ -83,7 +87,8 @@ class LineFaultsTest : public testing::Test {
     EXPECT_TRUE(answer) << answer.why();
     auto reply = answer.as<Char8Array>();
     if (!reply) return {};
-    return {(*reply)->status, (*reply)->extra, std::string(reply->value().begin(), reply->value().end())};
+    return {(*reply)->status, (*reply)->extra,
+            std::string(reply->value().begin(), reply->value().end())};
   }
   void unplugAndBack() {
     carrier_.setFault("IP_a", ModelFault::busError);
@@ -116,7 +121,8 @@ TEST_F(LineFaultsTest, AnAnswerThatLostBytesWhileNobodyReadIsNotOk) {
   waitForBytes(9);
 
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOverflow, serialFaultOverrun, "abc\r"}));
-  EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "next\r"})) << "the gap is not in this one";
+  EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "next\r"}))
+      << "the gap is not in this one";
 
   EXPECT_EQ(alarmsOf(backplane_, kServer), 1U);
 }
@@ -139,7 +145,9 @@ TEST_F(LineFaultsTest, EachKindOfDamageHasItsBitAndIsAnAlarm) {
   start();
   std::uint64_t bytes = 0;
   for (const auto& [fault, bit] : std::vector<std::pair<LineFault, std::int32_t>>{
-           {LineFault::parity, serialFaultParity}, {LineFault::framing, serialFaultFraming}, {LineFault::breakSignal, serialFaultBreak}}) {
+           {LineFault::parity, serialFaultParity},
+           {LineFault::framing, serialFaultFraming},
+           {LineFault::breakSignal, serialFaultBreak}}) {
     model_->say(0, "12");
     model_->say(0, std::string(1, '\0'), fault);
     model_->say(0, "4\rwhole\r");
@@ -162,7 +170,8 @@ TEST_F(LineFaultsTest, AFaultEndsTheReadThatIsOutstanding) {
   });
 
   EXPECT_EQ(ask(cmdWriteRead, "?\r"), (Answer{serialServerStatusError, serialFaultParity, "12"}));
-  EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusError, serialFaultParity, "4\r"})) << "the rest of a damaged answer";
+  EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusError, serialFaultParity, "4\r"}))
+      << "the rest of a damaged answer";
 }
 
 TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWhenAllIsWell) {
@@ -171,7 +180,8 @@ TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWhenAllIsWell) {
   waitForBytes(5);
 
   EXPECT_EQ(ask(cmdRead, {}, 4), (Answer{serialServerStatusOK, 4, "1234"}));
-  EXPECT_EQ(ask(0, {}, 4), (Answer{serialServerStatusError, 0, ""})) << "no command, and no fault of the line";
+  EXPECT_EQ(ask(0, {}, 4), (Answer{serialServerStatusError, 0, ""}))
+      << "no command, and no fault of the line";
 }
 
 TEST_F(LineFaultsTest, AFlushTakesTheFaultsAwayWithTheBytes) {
@@ -216,20 +226,24 @@ TEST_F(LineFaultsTest, AStormIsTwoLinesOfLogWithPortKindsAndCounts) {
   testing::internal::CaptureStderr();
   start(OctalUartModelTime::instant, "warning");
   const auto begin = std::chrono::steady_clock::now();
-  for (int i = 0; i < kFaults; ++i) model_->say(0, "x", i % 2 == 0 ? LineFault::parity : LineFault::framing);
+  for (int i = 0; i < kFaults; ++i)
+    model_->say(0, "x", i % 2 == 0 ? LineFault::parity : LineFault::framing);
   waitForBytes(kFaults);
   EXPECT_EQ(alarmsOf(backplane_, kServer), kFaults);
   stop();
   const auto periods = (std::chrono::steady_clock::now() - begin) / LineFaults::kQuiet;
   const auto log = testing::internal::GetCapturedStderr();
 
-  const std::regex line(R"(port 0 of UART \(carrier ipac, site IP_a\): the line lost or damaged bytes: )");
-  const auto lines = std::distance(std::sregex_iterator(log.begin(), log.end(), line), std::sregex_iterator());
+  const std::regex line(
+      R"(port 0 of UART \(carrier ipac, site IP_a\): the line lost or damaged bytes: )");
+  const auto lines =
+      std::distance(std::sregex_iterator(log.begin(), log.end(), line), std::sregex_iterator());
   EXPECT_GE(lines, 1);
   EXPECT_LE(lines, 2 + periods) << log;
   int told = 0;
   const std::regex count("([0-9]+) (parity|framing) error");
-  for (std::sregex_iterator at(log.begin(), log.end(), count), end; at != end; ++at) told += std::stoi((*at)[1]);
+  for (std::sregex_iterator at(log.begin(), log.end(), count), end; at != end; ++at)
+    told += std::stoi((*at)[1]);
   EXPECT_EQ(told, kFaults) << log;
 }
 

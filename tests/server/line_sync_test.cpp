@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/line_sync.h>
+#include "server/programs/serial_server/line_sync.h"
 
 #include <gtest/gtest.h>
 #include <string_view>
@@ -9,7 +9,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::int64_t operator""_ms(unsigned long long ms) { return static_cast<std::int64_t>(ms) * 1'000'000; }
+constexpr std::int64_t operator""_ms(unsigned long long ms) {
+  return static_cast<std::int64_t>(ms) * 1'000'000;
+}
 
 constexpr LineLimits kLimits{.settleTime = 5ms, .quietTime = 100ms, .resyncLimit = 1000ms};
 

@@ -5,13 +5,14 @@
 #include <gtest/gtest.h>
 #include <memory>
 
-#include <mpf/client/message_client.h>
-#include <mpf/tests/support/log_lines.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/pty.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_client.h>
+
+#include "tests/support/log_lines.h"
+#include "tests/support/program.h"
+#include "tests/support/pty.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -73,13 +74,15 @@ class LogStormTest : public testing::Test {
 };
 
 TEST_F(LogStormTest, OfTheIp330ServersConfiguration) {
-  start({MPF_TEST_IP330_SERVER, "adc", "ipac", "IP_a", "D", "-5to5", "--carrier", "ipac=model", "--config", "adcConfig"});
+  start({MPF_TEST_IP330_SERVER, "adc", "ipac", "IP_a", "D", "-5to5", "--carrier", "ipac=model",
+         "--config", "adcConfig"});
   storm("adcConfig", Int32Message({.cmd = 4711}));
   expectShortLog("config: cmd 4711, value 0: status -1");
 }
 
 TEST_F(LogStormTest, OfTheIp330ServersScan) {
-  start({MPF_TEST_IP330_SERVER, "adc", "ipac", "IP_a", "D", "-5to5", "--carrier", "ipac=model", "--scan", "adc"});
+  start({MPF_TEST_IP330_SERVER, "adc", "ipac", "IP_a", "D", "-5to5", "--carrier", "ipac=model",
+         "--scan", "adc"});
   storm("adc", Int32Message({.address = 4711}));
   expectShortLog("scan: channel 4711");
 }
@@ -138,8 +141,8 @@ TEST_F(LogStormTest, OfTheEchoServers) {
 TEST_F(LogStormTest, OfAClientProgramWhoseMessagesAreRefused) {
   constexpr std::uint64_t kMessages = 2000;  // one by one
   start({MPF_TEST_CHAR8_ARRAY_SERVER});
-  Program client(
-      {MPF_TEST_INT32_CLIENT, "Char8Array", "--backplane", backplane_.name(), "--count", std::to_string(kMessages), "--timeout", "60000"});
+  Program client({MPF_TEST_INT32_CLIENT, "Char8Array", "--backplane", backplane_.name(), "--count",
+                  std::to_string(kMessages), "--timeout", "60000"});
 
   const auto said = client.errors();
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A program's log: levels, storms, and what is left at the end.
-#include <mpf/server/programs/log.h>
+#include "server/programs/log.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/tests/support/log_lines.h>
+#include "tests/support/log_lines.h"
 
 namespace mpf::test {
 namespace {
@@ -26,7 +26,8 @@ class LogTest : public testing::Test {
 
   std::int64_t nowNs_ = 1'000'000'000'000;
   std::vector<std::string> lines_;
-  const Log log_{[this](Log::Level, std::string text) { lines_.push_back(std::move(text)); }, Log::Level::info, [this] { return nowNs_; }};
+  const Log log_{[this](Log::Level, std::string text) { lines_.push_back(std::move(text)); },
+                 Log::Level::info, [this] { return nowNs_; }};
 };
 
 TEST_F(LogTest, WritesLinesOfItsLevelAndAbove) {

@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: MIT
-// Serial servers on the eight ports of an octal UART: what clients see of it, and of what goes wrong with it.
+// Serial servers on the eight ports of an octal UART: what clients see of it, and of what goes
+// wrong with it.
 #include <array>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <optional>
 #include <thread>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
-#include <mpf/drivers/octal_uart/octal_uart_port.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/server/programs/serial_server/serial_server.h>
-#include <mpf/tests/server/ask_serial.h>
-#include <mpf/tests/support/model_carrier.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/serial_commands.h>
+#include <mpf/sync_client.h>
+
+#include "drivers/octal_uart/octal_uart_model.h"
+#include "drivers/octal_uart/octal_uart_port.h"
+#include "server/programs/serial_server/serial_server.h"
+#include "tests/server/ask_serial.h"
+#include "tests/support/model_carrier.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -44,7 +46,9 @@ class OctalStation {
 
   OctalUartPort& port() { return port_; }
   void setSilent() { isSilent_ = true; }
-  SerialReply ask(std::string_view text) { return askSerial(client_, text, {.timeout = 60, .cmd = serial::cmdWriteRead}); }
+  SerialReply ask(std::string_view text) {
+    return askSerial(client_, text, {.timeout = 60, .cmd = serial::cmdWriteRead});
+  }
   std::int32_t configure(const SerialConfig& settings) {
     auto answer = client_.call(SerialConfigMessage(settings), 60s);
     EXPECT_TRUE(answer) << answer.why();
@@ -82,7 +86,8 @@ class OctalServerTest : public testing::Test {
   OctalServerTest() {
     model_ = &carrier_.plug("IP_a", std::make_unique<OctalUartModel>());
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
-    for (int i = 0; i < 8; ++i) stations_.at(static_cast<std::size_t>(i)).emplace(backplane_, *uart_, *model_, i);
+    for (int i = 0; i < 8; ++i)
+      stations_.at(static_cast<std::size_t>(i)).emplace(backplane_, *uart_, *model_, i);
   }
   OctalStation& station(int number) { return *stations_.at(static_cast<std::size_t>(number)); }
 
@@ -102,7 +107,8 @@ TEST_F(OctalServerTest, EightServersTalkAtOnce) {
     clients.emplace_back([this, i] {
       for (int k = 0; k < 50; ++k) {
         const auto text = std::to_string(1000 * i + k);
-        EXPECT_EQ(station(i).ask(text + "?\r"), (SerialReply{serial::serialServerStatusOK, text + "!\r"}));
+        EXPECT_EQ(station(i).ask(text + "?\r"),
+                  (SerialReply{serial::serialServerStatusOK, text + "!\r"}));
       }
     });
   }
@@ -113,7 +119,8 @@ TEST_F(OctalServerTest, SettingsThatTheChipDoesNotHaveAreAnErrorStatus) {
   EXPECT_EQ(station(2).configure({.baud = 57600}), serial::serialServerStatusError);
   EXPECT_EQ(station(2).configure({.baud = 300, .parity = 'E'}), serial::serialServerStatusOK);
 
-  const auto settings = model_->with(2, [](const OctalUartModelChannel& channel) { return channel.settings(); });
+  const auto settings =
+      model_->with(2, [](const OctalUartModelChannel& channel) { return channel.settings(); });
   EXPECT_EQ(settings, (SerialSettings{300, 1, 8, 'E', 'N'}));
 }
 

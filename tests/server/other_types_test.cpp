@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/hardware/other_types.h>
+#include "server/programs/hardware/other_types.h"
 
 #include <thread>
 #include <vector>
 
-#include <mpf/tests/server/hardware_fixture.h>
+#include "tests/server/hardware_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -17,7 +17,8 @@ TEST_F(HardwareTest, AnswersAllTypesButThoseThatItKnows) {
   std::vector<MessageType> noted;
   server.on<Char8Array>([](Char8Array& request) { request.status = 5; });
   server.on<SerialConfig>([](SerialConfig& request) { request.baud = 19200; });
-  answerOtherTypes<Char8Array, SerialConfig>(server, [&](MessageType type) { noted.push_back(type); });
+  answerOtherTypes<Char8Array, SerialConfig>(server,
+                                             [&](MessageType type) { noted.push_back(type); });
   std::thread thread([&] { server.run(); });
   SyncClient client(backplane_, "server");
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SerialServerTest: a serial server on a real pseudo-terminal with an instrument at its far end, and a client that asks it.
+// SerialServerTest: a serial server on a real pseudo-terminal with an instrument at its far end,
+// and a client that asks it.
 #pragma once
 
 #include <unistd.h>
@@ -9,14 +10,15 @@
 #include <gtest/gtest.h>
 #include <thread>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/drivers/serial/posix_terminal_port.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/server/programs/serial_server/serial_server.h>
-#include <mpf/tests/server/ask_serial.h>
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/serial_commands.h>
+#include <mpf/sync_client.h>
+
+#include "drivers/serial/posix_terminal_port.h"
+#include "server/programs/serial_server/serial_server.h"
+#include "tests/server/ask_serial.h"
+#include "tests/support/instrument.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
@@ -30,7 +32,8 @@ struct OpenPort : PosixTerminalPort {
 
 class SerialServerTest : public testing::Test {
  protected:
-  void start(const SerialServerOptions& options = {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true}) {
+  void start(const SerialServerOptions& options = {
+                 .bufferBytes = 100, .eom = "\r\n", .circularBuffer = true}) {
     serial_ = std::make_unique<SerialServer>(server_, port_, options, log_);
     thread_ = std::thread([this] { server_.run(); });
     ASSERT_TRUE(client_.connectWait(60s));
@@ -41,12 +44,15 @@ class SerialServerTest : public testing::Test {
   }
   static std::string linkPath() {
     static int count = 0;
-    return std::filesystem::temp_directory_path() / ("mpf-serial-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
+    return std::filesystem::temp_directory_path() /
+           ("mpf-serial-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
   }
 
   using Reply = SerialReply;
   // Asks with a timeout in milliseconds, unless `fields` say otherwise.
-  Reply ask(std::string_view text, const Char8Array& fields) { return askSerial(client_, text, fields); }
+  Reply ask(std::string_view text, const Char8Array& fields) {
+    return askSerial(client_, text, fields);
+  }
   static Char8Array fieldsOf(std::int32_t cmd, std::int32_t timeoutMs = 60'000) {
     return {.timeout = timeoutMs, .cmd = cmd | serial::cmdTimeoutMilliseconds};
   }

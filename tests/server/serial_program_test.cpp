@@ -12,13 +12,14 @@
 #include <mutex>
 #include <sstream>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/schema/serial_sniff.h>
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/serial_commands.h>
+#include <mpf/serial_sniff.h>
+#include <mpf/sync_client.h>
+
+#include "tests/support/instrument.h"
+#include "tests/support/program.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -31,12 +32,15 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::MatchesRegex;
 
-bool hasExitedWith(int status, int code) { return WIFEXITED(status) && WEXITSTATUS(status) == code; }
+bool hasExitedWith(int status, int code) {
+  return WIFEXITED(status) && WEXITSTATUS(status) == code;
+}
 
 // A client whose requests end in the background.
 class Asker {
  public:
-  explicit Asker(const Backplane& backplane) : client_(backplane, [this](Message&& message) { keep(std::move(message)); }) {
+  explicit Asker(const Backplane& backplane)
+      : client_(backplane, [this](Message&& message) { keep(std::move(message)); }) {
     client_.bind("dmm");
     EXPECT_TRUE(client_.connectWait(60s)) << client_.notConnectedBecause();
   }
@@ -79,11 +83,16 @@ class Asker {
 class SerialProgramTest : public testing::Test {
  protected:
   std::unique_ptr<Program> start(const std::vector<std::string>& options = {}) const {
-    std::vector<std::string> command{MPF_TEST_SERIAL_SERVER, "dmm", path_, "1000", "20", "\\r\\n", "--backplane", backplane_.name()};
+    std::vector<std::string> command{
+        MPF_TEST_SERIAL_SERVER, "dmm", path_, "1000", "20", "\\r\\n", "--backplane",
+        backplane_.name()};
     command.insert(command.end(), options.begin(), options.end());
     return std::make_unique<Program>(command);
   }
-  static std::string linkPath() { return std::filesystem::temp_directory_path() / ("mpf-serial-program-" + std::to_string(::getpid())); }
+  static std::string linkPath() {
+    return std::filesystem::temp_directory_path() /
+           ("mpf-serial-program-" + std::to_string(::getpid()));
+  }
 
   Watchdog watchdog_{"serial program test"};
   std::string path_ = linkPath();
@@ -91,7 +100,8 @@ class SerialProgramTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-class SerialProgramSignalTest : public SerialProgramTest, public testing::WithParamInterface<int> {};
+class SerialProgramSignalTest : public SerialProgramTest,
+                                public testing::WithParamInterface<int> {};
 
 TEST_P(SerialProgramSignalTest, EndsItDuringALongReadAndLeavesNothing) {
   const auto server = start();
@@ -163,17 +173,27 @@ TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
   std::vector<std::string> lines;
   std::istringstream text(server->errors());
   for (std::string line; std::getline(text, line);) lines.push_back(line);
-  // The line has a thread and the server has one: only the order of what one of them says is certain.
-  const auto ofLine = [](const std::string& line) { return line.find("the line is ") != std::string::npos; };
+  // The line has a thread and the server has one: only the order of what one of them says is
+  // certain.
+  const auto ofLine = [](const std::string& line) {
+    return line.find("the line is ") != std::string::npos;
+  };
   const auto fromServer = std::stable_partition(lines.begin(), lines.end(), ofLine);
   EXPECT_THAT(std::vector(lines.begin(), fromServer),
-              ElementsAre(HasSubstr("warning mpf-serial-server: the line is lost: "), HasSubstr("the line is there")));
+              ElementsAre(HasSubstr("warning mpf-serial-server: the line is lost: "),
+                          HasSubstr("the line is there")));
   lines.erase(lines.begin(), fromServer);
-  ASSERT_THAT(lines, ElementsAre(AllOf(HasSubstr("serving " + path_ + " (19200 baud, 8N1, no flow control) as \"dmm\" at location 0"),
-                                       HasSubstr("\"dmm.sniff\"")),
-                                 HasSubstr("info mpf-serial-server: the first client asks"), HasSubstr("requests fail: "),
-                                 HasSubstr("requests succeed again"), HasSubstr("ends")));
-  EXPECT_THAT(lines[0], MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}[.][0-9]{3} info mpf-serial-server: .*"));
+  ASSERT_THAT(
+      lines,
+      ElementsAre(AllOf(HasSubstr("serving " + path_ +
+                                  " (19200 baud, 8N1, no flow control) as \"dmm\" at location 0"),
+                        HasSubstr("\"dmm.sniff\"")),
+                  HasSubstr("info mpf-serial-server: the first client asks"),
+                  HasSubstr("requests fail: "), HasSubstr("requests succeed again"),
+                  HasSubstr("ends")));
+  EXPECT_THAT(lines[0],
+              MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}[.][0-9]{3} info "
+                           "mpf-serial-server: .*"));
 }
 
 TEST_F(SerialProgramTest, ReportsSurplusInputOnce) {
@@ -199,11 +219,12 @@ TEST_F(SerialProgramTest, ReportsSurplusInputOnce) {
 }
 
 TEST_F(SerialProgramTest, RefusesLimitsThatCannotBe) {
-  for (const auto& [option, value] : std::vector<std::array<std::string, 2>>{{"--settle-time", "-1"},
-                                                                             {"--quiet-time", "9999999999"},
-                                                                             {"--resync-limit", "soon"},
-                                                                             {"--max-timeout", "0"},
-                                                                             {"--max-retries", "-1"}}) {
+  for (const auto& [option, value] :
+       std::vector<std::array<std::string, 2>>{{"--settle-time", "-1"},
+                                               {"--quiet-time", "9999999999"},
+                                               {"--resync-limit", "soon"},
+                                               {"--max-timeout", "0"},
+                                               {"--max-retries", "-1"}}) {
     const auto server = start({option, value});
 
     EXPECT_TRUE(hasExitedWith(server->wait(), 2)) << option;
@@ -241,7 +262,8 @@ TEST_F(SerialProgramTest, RefusesOptionsThatMakeNoSense) {
            {"--mode", "0990", "--mode: 0990: use an octal number"},
            {"--group", "root", "--group requires --mode"},
            {"--wait-mode", "snooze", "--wait-mode: snooze not in {adaptive,block,spin}"},
-           {"--log-level", "loud", "--log-level: loud not in {trace,debug,info,warning,error,critical,off}"}}) {
+           {"--log-level", "loud",
+            "--log-level: loud not in {trace,debug,info,warning,error,critical,off}"}}) {
     const auto server = start({option, value});
 
     const auto status = server->wait();
@@ -258,7 +280,8 @@ TEST_F(SerialProgramTest, NamesThePortThatItCannotOpen) {
 
   EXPECT_TRUE(hasExitedWith(server->wait(), 1));
 
-  EXPECT_THAT(server->errors(), HasSubstr("mpf-serial-server: open " + path_ + ": No such file or directory"));
+  EXPECT_THAT(server->errors(),
+              HasSubstr("mpf-serial-server: open " + path_ + ": No such file or directory"));
 }
 
 }  // namespace

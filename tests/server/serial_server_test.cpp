@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// A serial server on a real pseudo-terminal with an instrument at its far end, asked through shared memory.
-#include <mpf/schema/serial_server.h>
+// A serial server on a real pseudo-terminal with an instrument at its far end, asked through shared
+// memory.
+#include <mpf/serial_commands.h>
 
-#include <mpf/tests/server/serial_fixture.h>
+#include "tests/server/serial_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -76,7 +77,8 @@ TEST_F(SerialServerTest, AnAnswerLongerThanTheBufferOverflows) {
 TEST_F(SerialServerTest, NoByteIsLostBehindAnAnswerThatOverflows) {
   start({.bufferBytes = 5, .eom = "\r\n", .circularBuffer = true});
 
-  EXPECT_EQ(ask("ECHO much too\n", fieldsOf(cmdWriteRead)), (Reply{serialServerStatusOverflow, "much "}));
+  EXPECT_EQ(ask("ECHO much too\n", fieldsOf(cmdWriteRead)),
+            (Reply{serialServerStatusOverflow, "much "}));
   EXPECT_EQ(ask("", fieldsOf(cmdRead)), (Reply{serialServerStatusOK, "too\r\n"}));
 }
 
@@ -101,7 +103,8 @@ TEST_F(SerialServerTest, ATerminatorLengthOutOfRangeIsTolerated) {
 
 TEST_F(SerialServerTest, CircularModeKeepsLinesForLaterReads) {
   start();
-  ASSERT_EQ(ask("", fieldsOf(cmdRead | cmdStartCircularBuffer, 0)).status, serialServerStatusTimeout);
+  ASSERT_EQ(ask("", fieldsOf(cmdRead | cmdStartCircularBuffer, 0)).status,
+            serialServerStatusTimeout);
 
   ASSERT_EQ(ask("ECHO first\nECHO second\n", fieldsOf(cmdWrite)).status, serialServerStatusOK);
 

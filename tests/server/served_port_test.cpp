@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/served_port.h>
+#include "server/programs/serial_server/served_port.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <optional>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
-#include <mpf/drivers/octal_uart/octal_uart_port.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/tests/support/alarms.h>
-#include <mpf/tests/support/model_carrier.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/serial_commands.h>
+#include <mpf/sync_client.h>
+
+#include "drivers/octal_uart/octal_uart_model.h"
+#include "drivers/octal_uart/octal_uart_port.h"
+#include "tests/support/alarms.h"
+#include "tests/support/model_carrier.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/server_arguments.h>
+#include "server/programs/server_arguments.h"
 
 #include <unistd.h>
 
@@ -44,8 +44,10 @@ TEST(ServerArguments, AreTaken) {
   const auto* group = ::getgrgid(::getegid());
   ASSERT_NE(group, nullptr);
 
-  const auto arguments =
-      parse(std::string("--backplane b --location 7 --wait-mode block --mode 0660 --log-level debug --group ") + group->gr_name);
+  const auto arguments = parse(
+      std::string(
+          "--backplane b --location 7 --wait-mode block --mode 0660 --log-level debug --group ") +
+      group->gr_name);
 
   EXPECT_EQ(arguments.backplane, "b");
   EXPECT_EQ(arguments.messages.location, 7);
@@ -63,13 +65,16 @@ TEST(ServerArguments, EachWaitModeHasItsName) {
 
 TEST(ServerArguments, AModeIsOctalLetsTheOwnerInAndExecutesNothing) {
   EXPECT_EQ(parse("--mode 666").messages.rights.mode, 0666U);
-  for (const auto* const mode : {"0888", "0660x", "rw", "0060", "0400", "0770", "2660", "99999999999"}) {
-    EXPECT_THAT(complaintOf(std::string("--mode ") + mode), HasSubstr(std::string(mode) + ": use an octal number between 0600 and 0666"));
+  for (const auto* const mode :
+       {"0888", "0660x", "rw", "0060", "0400", "0770", "2660", "99999999999"}) {
+    EXPECT_THAT(complaintOf(std::string("--mode ") + mode),
+                HasSubstr(std::string(mode) + ": use an octal number between 0600 and 0666"));
   }
 }
 
 TEST(ServerArguments, AGroupMustExistAndNeedsAMode) {
-  EXPECT_THAT(complaintOf("--mode 0660 --group no-such-group"), HasSubstr("no-such-group: there is no group of this name"));
+  EXPECT_THAT(complaintOf("--mode 0660 --group no-such-group"),
+              HasSubstr("no-such-group: there is no group of this name"));
   EXPECT_THAT(complaintOf("--group root"), HasSubstr("requires --mode"));
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serving_thread.h>
+#include "server/programs/serving_thread.h"
 
 #include <gtest/gtest.h>
 #include <semaphore>
 #include <stdexcept>
 
-#include <mpf/base/stop_signals.h>
-#include <mpf/tests/support/watchdog.h>
+#include "base/stop_signals.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -43,7 +43,9 @@ TEST_F(ServingThreadTest, MayEndUnstarted) {
 
 TEST_F(ServingThreadTest, AFailureEndsTheProgramAsASignalDoes) {
   std::binary_semaphore told(0);
-  const StopSignals signals([](void* semaphore) noexcept { static_cast<std::binary_semaphore*>(semaphore)->release(); }, &told);
+  const StopSignals signals(
+      [](void* semaphore) noexcept { static_cast<std::binary_semaphore*>(semaphore)->release(); },
+      &told);
   ProgramFailure failure;
   EXPECT_EQ(failure.exitStatus(), 0);
   ServingThread thread;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/sniff_queue.h>
+#include "server/programs/serial_server/sniff_queue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,8 @@ using namespace std::chrono_literals;
 
 std::vector<PeekedByte> bytesOf(std::string_view text) {
   std::vector<PeekedByte> bytes;
-  for (const char value : text) bytes.push_back({0, static_cast<std::uint8_t>(value), ByteDirection::sent, LineFault::none});
+  for (const char value : text)
+    bytes.push_back({0, static_cast<std::uint8_t>(value), ByteDirection::sent, LineFault::none});
   return bytes;
 }
 

@@ -3,9 +3,9 @@
 #include <numeric>
 #include <vector>
 
-#include <mpf/server/programs/serial_server/sniff_server.h>
-#include <mpf/tests/server/serial_fixture.h>
-#include <mpf/tests/support/victim.h>
+#include "server/programs/serial_server/sniff_server.h"
+#include "tests/server/serial_fixture.h"
+#include "tests/support/victim.h"
 
 namespace mpf::test {
 namespace {
@@ -80,8 +80,10 @@ class SniffTest : public SerialServerTest {
   static constexpr SniffBatching kNever{.maxAge = 24h, .largeBytes = 1'000'000};
 
   void startWithListening(const SniffBatching& batching = {}) {
-    start({.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = {.settleTime = 0ms}});
-    sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_, batching);
+    start(
+        {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = {.settleTime = 0ms}});
+    sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_,
+                                           batching);
     sniff_->start([] { FAIL() << "it cannot serve"; });
   }
   // One question and its answer. Returns what a listener hears of it.
@@ -131,8 +133,10 @@ TEST_F(SniffTest, BytesThatTheLineDamagedAreMarked) {
   port_.taps().show(bytes);
 
   listener.takeUntil(5);
-  EXPECT_THAT(listener.records(), testing::ElementsAre(SniffRecord{1, SniffKind::sent, 'a'}, SniffRecord{2, SniffKind::received, 'b'},
-                                                       SniffRecord{3, SniffKind::damaged, 'c'}, SniffRecord{4, SniffKind::damaged, 'd'},
+  EXPECT_THAT(listener.records(), testing::ElementsAre(SniffRecord{1, SniffKind::sent, 'a'},
+                                                       SniffRecord{2, SniffKind::received, 'b'},
+                                                       SniffRecord{3, SniffKind::damaged, 'c'},
+                                                       SniffRecord{4, SniffKind::damaged, 'd'},
                                                        SniffRecord{5, SniffKind::breakSignal, 0}));
 }
 
@@ -247,7 +251,8 @@ TEST_F(SniffTest, AListenerThatTakesNothingCostsItselfBytes) {
   ASSERT_EQ(busy.start(), sniffStatusOK);
 
   constexpr std::size_t kBytesOfOne = 14;
-  constexpr std::size_t kQuestions = 600;  // a message each at least: more than can wait for one listener
+  // a message each at least: more than can wait for one listener
+  constexpr std::size_t kQuestions = 600;
   std::string spoken;
   for (std::size_t i = 0; i < kQuestions; ++i) {
     spoken += talk(std::to_string(100 + i));
@@ -283,7 +288,8 @@ TEST_F(SniffTest, AStopTellsWhatIsMissingAtTheEnd) {
   const auto reply = idle.stop();
 
   EXPECT_GT(reply.address, 0);
-  EXPECT_EQ(idle.records().size() + static_cast<std::size_t>(reply.address), kQuestions * kBytesOfOne);
+  EXPECT_EQ(idle.records().size() + static_cast<std::size_t>(reply.address),
+            kQuestions * kBytesOfOne);
 }
 
 TEST_F(SniffTest, WhatTheServerCouldNotKeepIsToldToAll) {

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <vector>
 
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/endpoint_pair.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "tests/shm/child.h"
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -23,36 +23,43 @@ using testing::UnorderedElementsAreArray;
 
 class BackplaneTest : public ShmTest {
  protected:
-  // What a program with a server, a client and a link in between has on the backplane. Threads do not cross a fork: no Endpoint.
+  // What a program with a server, a client and a link in between has on the backplane. Threads do
+  // not cross a fork: no Endpoint.
   void occupy(Child::Self& self) const {
-    OwnWindow server(name(), SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader& header) {
-      header.maxMessageBytes = header.maxPoolBytes = 4 << 20;
-      header.linkMode = 0600;
-      header.linkGroup = ~0u;
-    });
+    OwnWindow server(name(), SegmentKind::serverWindow, serverName(), {},
+                     [](layout::SegmentHeader& header) {
+                       header.maxMessageBytes = header.maxPoolBytes = 4 << 20;
+                       header.linkMode = 0600;
+                       header.linkGroup = ~0u;
+                     });
     server.control().queueSize.store(8, std::memory_order_relaxed);
     OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
-    const auto link = Link::create(name(), client, 0, PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
+    const auto link = Link::create(name(), client, 0,
+                                   PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
     const auto accepted = Link::tryOpen(name(), link->name(), server);
     if (!link->tryAlloc(1000) || !link->tryAlloc(100'000) || !accepted->tryAlloc(1000)) ::_exit(4);
-    auto wish = createPage(SegmentKind::wish);
-    wish.sharedHeader().ownerWindow = client.header().incarnation;
-    if (!wish.tryPublish(SegmentName::keyed(name(), NameKind::wish, wish.header().incarnation))) ::_exit(5);
+    auto pendingBind = createPage(SegmentKind::pendingBind);
+    pendingBind.sharedHeader().ownerWindow = client.header().incarnation;
+    if (!pendingBind.tryPublish(
+            SegmentName::keyed(name(), NameKind::pendingBind, pendingBind.header().incarnation)))
+      ::_exit(5);
     self.stay();
   }
   static constexpr std::size_t kOccupied = 3 + 3 + 1 + 3 + 1;
 
   OwnWindow makeServer(std::uint16_t layoutMajor = layout::kMajor) const {
-    return {name(), SegmentKind::serverWindow, serverName("living"), {}, [=](layout::SegmentHeader& header) {
-              header.layoutMajor = layoutMajor;
-            }};
+    return {name(),
+            SegmentKind::serverWindow,
+            serverName("living"),
+            {},
+            [=](layout::SegmentHeader& header) { header.layoutMajor = layoutMajor; }};
   }
 };
 
 // Up to 4096 files it looks at all; beyond that, other users' names must not keep it waiting.
 TEST_F(BackplaneTest, WhoeverAttachesToACrowdOfNamesLooksAtSome) {
   for (std::uint64_t number = 1; number <= 5000; ++number) {
-    std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::wish, number))};
+    std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::pendingBind, number))};
   }
 
   Backplane::attach(name());
@@ -72,7 +79,8 @@ TEST_F(BackplaneTest, IsNamedByItsUserByTheEnvironmentOrDefault) {
 }
 
 TEST_F(BackplaneTest, ANameThatCannotBeOneIsRefusedByName) {
-  EXPECT_THAT(whatOf<std::invalid_argument>([] { Backplane::attach("a.b"); }), HasSubstr("\"a.b\""));
+  EXPECT_THAT(whatOf<std::invalid_argument>([] { Backplane::attach("a.b"); }),
+              HasSubstr("\"a.b\""));
   ::setenv("MPF_BACKPLANE", "a/b", 1);
   EXPECT_THAT(whatOf<std::invalid_argument>([] { Backplane::attach(); }), HasSubstr("\"a/b\""));
   ::unsetenv("MPF_BACKPLANE");
@@ -84,11 +92,15 @@ TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
   ::setenv("MPF_LOCATION", "7", 1);
   EXPECT_EQ(Backplane::defaultLocation(), 7);
   ::setenv("MPF_LOCATION", "7a", 1);
-  EXPECT_THAT(whatOf<std::invalid_argument>([] { static_cast<void>(Backplane::defaultLocation()); }), HasSubstr("MPF_LOCATION \"7a\""));
+  EXPECT_THAT(
+      whatOf<std::invalid_argument>([] { static_cast<void>(Backplane::defaultLocation()); }),
+      HasSubstr("MPF_LOCATION \"7a\""));
   ::unsetenv("MPF_LOCATION");
 }
 
-TEST_F(BackplaneTest, IsolatedOnesDiffer) { EXPECT_NE(Backplane::isolated().name(), Backplane::isolated().name()); }
+TEST_F(BackplaneTest, IsolatedOnesDiffer) {
+  EXPECT_NE(Backplane::isolated().name(), Backplane::isolated().name());
+}
 
 TEST_F(BackplaneTest, CopiesShareTheirWatcher) {
   const Backplane copy = backplane_;
@@ -100,8 +112,8 @@ TEST_F(BackplaneTest, KnowsItsOwnSegmentsAndNoOthers) {
   const auto longer = Backplane::attach(name() + "-x");
   auto ours = createPage();
   auto theirs = createPage();
-  ASSERT_TRUE(ours.tryPublish(SegmentName::keyed(name(), NameKind::wish, 1)));
-  ASSERT_TRUE(theirs.tryPublish(SegmentName::keyed(longer.name(), NameKind::wish, 1)));
+  ASSERT_TRUE(ours.tryPublish(SegmentName::keyed(name(), NameKind::pendingBind, 1)));
+  ASSERT_TRUE(theirs.tryPublish(SegmentName::keyed(longer.name(), NameKind::pendingBind, 1)));
 
   EXPECT_THAT(backplane_.segmentNames(), ElementsAre(ours.name()));
   EXPECT_THAT(longer.segmentNames(), ElementsAre(theirs.name()));
@@ -154,16 +166,19 @@ TEST_F(BackplaneTest, WhatTheLivingOwnStaysWhenOthersDie) {
 // The server of the link dies, then its client: the link is the client's.
 TEST_F(BackplaneTest, ALinkStaysAsLongAsItsClientLives) {
   Child server([&](Child::Self& self) {
-    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader& header) {
-      header.maxPoolBytes = 4 << 20;
-      header.linkMode = 0600;
-      header.linkGroup = ~0u;
-    });
+    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
+                           [](layout::SegmentHeader& header) {
+                             header.maxPoolBytes = 4 << 20;
+                             header.linkMode = 0600;
+                             header.linkGroup = ~0u;
+                           });
     self.stay();
   });
   Child client([&](Child::Self& self) {
-    const OwnWindow window(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
-    const auto link = Link::create(name(), window, 0, PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
+    const OwnWindow window(name(), SegmentKind::clientWindow, "", {},
+                           [](layout::SegmentHeader&) {});
+    const auto link = Link::create(name(), window, 0,
+                                   PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
     if (link->tryAlloc(1000)) self.stay();
   });
 
@@ -185,7 +200,8 @@ TEST_F(BackplaneTest, ALinkThatNobodyCanReadGoesWithItsClient) {
   EXPECT_EQ(backplane_.removeDead().size(), kOccupied);
 }
 
-// A program of the next major version on the same backplane: its names and locks are as ours, the rest is not ours to judge.
+// A program of the next major version on the same backplane: its names and locks are as ours, the
+// rest is not ours to judge.
 TEST_F(BackplaneTest, LivingProgramsOfOtherVersionsKeepWhatIsTheirs) {
   const auto server = makeServer(layout::kMajor + 1);
   auto link = createPage(SegmentKind::link);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Child: a forked process that takes part in a test and may be killed at any point. It ends with the test.
+// Child: a forked process that takes part in a test and may be killed at any point. It ends with
+// the test.
 //
 //   Child child([&](Child::Self& self) {
 //     auto segment = ...;
 //     self.stay();          // tells the parent that it is ready; never returns
 //   });
 //
-// A child has nothing of what the test opened before: see shm/origin.h.
+// A child has nothing of what the test opened before: see shm/fork_guard.h.
 #pragma once
 
 #include <fcntl.h>
@@ -22,8 +23,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
@@ -32,7 +34,8 @@ class Child {
   // The child's end.
   class Self {
    public:
-    Self(FileDescriptor toParent, FileDescriptor fromParent) : toParent_(std::move(toParent)), fromParent_(std::move(fromParent)) {}
+    Self(FileDescriptor toParent, FileDescriptor fromParent)
+        : toParent_(std::move(toParent)), fromParent_(std::move(fromParent)) {}
     // Tells the parent, and goes on when the parent says go().
     void ready() {
       const char one = 1;

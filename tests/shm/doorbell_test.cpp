@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Sleep and wake.
-#include <mpf/shm/doorbell.h>
+#include "shm/doorbell.h"
 
 #include <poll.h>
 #include <pthread.h>
@@ -9,9 +9,9 @@
 
 #include <thread>
 
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "shm/segment_name.h"
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -110,21 +110,24 @@ TEST_F(Signals, EndASleepWithADeadline) {
 
 TEST_F(Signals, EndAnySleepWhenTheirHandlerRings) {
 #ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
+  GTEST_SKIP()
+      << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
 #endif
   rungBySignal = &bell_;
 
-  interrupt([](int) { doorbell::ring(*rungBySignal); }, SA_RESTART, [&] { doorbell::sleep(bell_, 0, Deadline::never()); });
+  interrupt([](int) { doorbell::ring(*rungBySignal); }, SA_RESTART,
+            [&] { doorbell::sleep(bell_, 0, Deadline::never()); });
 }
 
 TEST_F(DoorbellTest, AProcessWakesAnother) {
   auto segment = createPage();
-  ASSERT_TRUE(segment.tryPublish(SegmentName::keyed(name(), NameKind::wish, 1)));
+  ASSERT_TRUE(segment.tryPublish(SegmentName::keyed(name(), NameKind::pendingBind, 1)));
   auto& bell = segment.at<layout::Word32>(1024);
   Child ringer([&](Child::Self& self) {
     // A child's copies of its parent's segments are memory of its own.
     const auto opened =
-        Segment::tryOpen(SegmentName::keyed(name(), NameKind::wish, 1), layout::SegmentKind::wish, Segment::Access::readWrite);
+        Segment::tryOpen(SegmentName::keyed(name(), NameKind::pendingBind, 1),
+                         layout::SegmentKind::pendingBind, Segment::Access::readWrite);
     self.ready();
     doorbell::ring(opened->at<layout::Word32>(1024));
     self.stay();

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Hints that got lost and hints that nobody gave: they cost time, never a message and never the rest.
+// Hints that got lost and hints that nobody gave: they cost time, never a message and never the
+// rest.
 #include <poll.h>
 
 #include <atomic>
 #include <thread>
 
-#include <mpf/tests/shm/endpoint_pair.h>
-#include <mpf/tests/shm/shm_fixture.h>
-#include <mpf/tests/support/random.h>
-#include <mpf/tests/support/wait_modes.h>
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
+#include "tests/support/random.h"
+#include "tests/support/wait_modes.h"
 
 namespace mpf::test {
 namespace {
@@ -50,8 +51,10 @@ class HintsTest : public ShmTest {
   }
 };
 
-class LostHints : public HintsTest, public testing::WithParamInterface<std::tuple<WaitMode, int>> {};
-INSTANTIATE_TEST_SUITE_P(FewAndManyLinks, LostHints, testing::Combine(kWaitModes, testing::Values(1, 100)));
+class LostHints : public HintsTest,
+                  public testing::WithParamInterface<std::tuple<WaitMode, int>> {};
+INSTANTIATE_TEST_SUITE_P(FewAndManyLinks, LostHints,
+                         testing::Combine(kWaitModes, testing::Values(1, 100)));
 
 TEST_P(LostHints, BeforeAWaitLoseNoMessage) {
   const auto [mode, links] = GetParam();
@@ -158,13 +161,16 @@ TEST_F(HintsTest, ABusyScribblerStopsNobody) {
       hints.knocked.store(static_cast<std::uint32_t>(random.bits()), std::memory_order_relaxed);
       hints.rescan.store(static_cast<std::uint32_t>(random.bits()), std::memory_order_relaxed);
       hints.knocks[random.below(layout::kKnocks)].store(random.nasty(), std::memory_order_relaxed);
-      hints.readyWords[random.below(hints.readyWords.size())].store(random.nasty(), std::memory_order_relaxed);
-      hints.readyBits[random.below(hints.readyBits.size())].store(random.nasty(), std::memory_order_relaxed);
+      hints.readyWords[random.below(hints.readyWords.size())].store(random.nasty(),
+                                                                    std::memory_order_relaxed);
+      hints.readyBits[random.below(hints.readyBits.size())].store(random.nasty(),
+                                                                  std::memory_order_relaxed);
       std::this_thread::yield();
     }
   });
   std::thread echo([&] {
-    for (std::uint32_t turn = 0; turn < kTurns; ++turn) EXPECT_EQ(send(link.server, take(server)), LinkSend::sent);
+    for (std::uint32_t turn = 0; turn < kTurns; ++turn)
+      EXPECT_EQ(send(link.server, take(server)), LinkSend::sent);
   });
 
   for (std::uint32_t turn = 0; turn < kTurns; ++turn) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// End: an endpoint with the links that end at it. connect() makes a link from a client's end to a server's, both sides at once.
+// End: an endpoint with the links that end at it. connect() makes a link from a client's end to a
+// server's, both sides at once.
 #pragma once
 
 #include <memory>
@@ -8,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include <mpf/shm/endpoint.h>
-#include <mpf/shm/segment_name.h>
+#include "shm/endpoint.h"
+#include "shm/segment_name.h"
 
 namespace mpf::test {
 
@@ -21,16 +22,19 @@ struct Offer {
 
 struct End {
   // `server` empty: a client.
-  End(const Backplane& backplane, const std::string& server, WaitMode mode = WaitMode::adaptive, Offer offer = {})
-      : endpoint(backplane, server.empty() ? layout::SegmentKind::clientWindow : layout::SegmentKind::serverWindow,
-                 server.empty() ? "" : SegmentName::serverWindow(backplane.name(), 0, server), Rights{}, mode,
-                 [&](layout::SegmentHeader& header) {
-                   server.copy(header.name.data(), header.name.size() - 1);
-                   header.maxMessageBytes = offer.maxMessageBytes;
-                   header.maxPoolBytes = offer.maxPoolBytes;
-                   header.linkMode = 0600;
-                   header.linkGroup = ~0u;
-                 }) {
+  End(const Backplane& backplane, const std::string& server, WaitMode mode = WaitMode::adaptive,
+      Offer offer = {})
+      : endpoint(
+            backplane,
+            server.empty() ? layout::SegmentKind::clientWindow : layout::SegmentKind::serverWindow,
+            server.empty() ? "" : SegmentName::serverWindow(backplane.name(), 0, server), Rights{},
+            mode, [&](layout::SegmentHeader& header) {
+              server.copy(header.name.data(), header.name.size() - 1);
+              header.maxMessageBytes = offer.maxMessageBytes;
+              header.maxPoolBytes = offer.maxPoolBytes;
+              header.linkMode = 0600;
+              header.linkGroup = ~0u;
+            }) {
     endpoint.control().queueSize.store(offer.queueSize, std::memory_order_relaxed);
   }
   ~End() {
@@ -59,7 +63,8 @@ struct End {
     return id;
   }
 
-  std::vector<std::unique_ptr<Link>> links;  // by their bits; before the endpoint, which needs them to the last
+  // by their bits; before the endpoint, which needs them to the last
+  std::vector<std::unique_ptr<Link>> links;
   Endpoint endpoint;
 };
 
@@ -75,11 +80,15 @@ inline Connected connect(End& client, End& server) {
   const auto clientIndex = client.endpoint.tryReserve().value();
   const auto serverIndex = server.endpoint.tryReserve().value();
   const std::string_view serverName(server.endpoint.window().header().name.data());
-  auto peer = client.endpoint.peer(SegmentName::serverWindow(backplane, 0, serverName), layout::SegmentKind::serverWindow);
-  auto& ours = client.keep(clientIndex, Link::create(backplane, client.endpoint.window(), clientIndex, std::move(peer)));
+  auto peer = client.endpoint.peer(SegmentName::serverWindow(backplane, 0, serverName),
+                                   layout::SegmentKind::serverWindow);
+  auto& ours = client.keep(
+      clientIndex, Link::create(backplane, client.endpoint.window(), clientIndex, std::move(peer)));
   auto link = Link::tryOpen(backplane, ours.name(), server.endpoint.window());
-  const auto clientName = SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
-  link->attachPeer(server.endpoint.peer(clientName, layout::SegmentKind::clientWindow), link->header().clientIndex);
+  const auto clientName =
+      SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
+  link->attachPeer(server.endpoint.peer(clientName, layout::SegmentKind::clientWindow),
+                   link->header().clientIndex);
   auto& theirs = server.keep(serverIndex, std::move(link));
   ours.setPeerIndex(serverIndex);
   return {ours, theirs, clientIndex, serverIndex};

@@ -7,17 +7,18 @@
 #include <algorithm>
 #include <thread>
 
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/endpoint_pair.h>
-#include <mpf/tests/shm/shm_fixture.h>
-#include <mpf/tests/support/wait_modes.h>
+#include "tests/shm/child.h"
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
+#include "tests/support/wait_modes.h"
 
 namespace mpf::test {
 namespace {
 
 class EndpointTest : public ShmTest {
  protected:
-  // Messages taken from each of `links` when `messages` are taken from `end`; all links are kept full.
+  // Messages taken from each of `links` when `messages` are taken from `end`; all links are kept
+  // full.
   static std::vector<int> shares(End& end, const std::vector<Connected>& links, int messages) {
     std::vector<int> taken(links.size());
     for (int i = 0; i < messages; ++i) {
@@ -80,7 +81,9 @@ TEST_P(WaitModes, AnInterruptBeforeAWaitEndsIt) {
 
 TEST_P(WaitModes, AnInterruptFromASignalHandlerEndsAWait) {
 #ifdef __SANITIZE_THREAD__
-  if (GetParam() != WaitMode::spin) GTEST_SKIP() << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
+  if (GetParam() != WaitMode::spin)
+    GTEST_SKIP()
+        << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
 #endif
   End server(backplane_, "server", GetParam());
   static Endpoint* interrupted = nullptr;
@@ -119,7 +122,8 @@ TEST_P(WaitModes, ThousandsOfTurnsLoseNoWakeUp) {
   };
 
   std::thread echo([&] {
-    for (std::uint32_t turn = 0; turn < kTurns; ++turn) EXPECT_EQ(send(link.server, takeNext(server)), LinkSend::sent);
+    for (std::uint32_t turn = 0; turn < kTurns; ++turn)
+      EXPECT_EQ(send(link.server, takeNext(server)), LinkSend::sent);
   });
   for (std::uint32_t turn = 0; turn < kTurns; ++turn) {
     EXPECT_EQ(send(link.client, turn), LinkSend::sent);
@@ -155,7 +159,8 @@ TEST_F(EndpointTest, ManyBusyLinksTakeTurnsToo) {
   EXPECT_LE(*most, kEach * 2);
 }
 
-// Whoever asks "is there news?" before each message gets all of them, also of a link that is not polled because others are.
+// Whoever asks "is there news?" before each message gets all of them, also of a link that is not
+// polled because others are.
 TEST_F(EndpointTest, AWaitBeforeEachMessageForgetsNone) {
   constexpr std::uint32_t kLinks = 9;
   End server(backplane_, "server");
@@ -255,12 +260,14 @@ TEST_F(EndpointTest, KnocksAreTakenOnce) {
 
 TEST_F(EndpointTest, APeersDeathIsLocalNews) {
   Child child([&](Child::Self& self) {
-    const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader&) {});
+    const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
+                           [](layout::SegmentHeader&) {});
     self.stay();
   });
   End client(backplane_, "");
   const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
-  EXPECT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), peer) << "mapped once";
+  EXPECT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), peer)
+      << "mapped once";
 
   child.end(SIGKILL);
 
@@ -274,7 +281,8 @@ TEST_F(EndpointTest, APeersDeathIsLocalNews) {
 // A server that is killed while it ends has closed its window, but not yet its links.
 TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
   Child child([&](Child::Self& self) {
-    const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader&) {});
+    const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
+                           [](layout::SegmentHeader&) {});
     self.ready();
     window.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
     self.stay();
@@ -283,7 +291,8 @@ TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
   const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
   child.go();
   ASSERT_TRUE(child.waitUntilReady());
-  ASSERT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr) << "for a second client, which looks for it";
+  ASSERT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr)
+      << "for a second client, which looks for it";
 
   child.end(SIGKILL);
 
@@ -337,7 +346,8 @@ TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUp) {
   };
 
   std::thread echo([&] {
-    for (std::uint32_t turn = 0; turn < kTurns; ++turn) EXPECT_EQ(send(link.server, takeNext(server)), LinkSend::sent);
+    for (std::uint32_t turn = 0; turn < kTurns; ++turn)
+      EXPECT_EQ(send(link.server, takeNext(server)), LinkSend::sent);
   });
   for (std::uint32_t turn = 0; turn < kTurns; ++turn) {
     EXPECT_EQ(send(link.client, turn), LinkSend::sent);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A peer cuts a file that others have mapped: they go on, with zeroes or with a file that is grown again.
-#include <mpf/shm/fault_guard.h>
+// A peer cuts a file that others have mapped: they go on, with zeroes or with a file that is grown
+// again.
+#include "shm/fault_guard.h"
 
 #include <pthread.h>
 #include <signal.h>
@@ -11,12 +12,12 @@
 #include <atomic>
 #include <thread>
 
-#include <mpf/base/signals_blocked.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/endpoint_pair.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "base/signals_blocked.h"
+#include "base/system_call.h"
+#include "shm/window.h"
+#include "tests/shm/child.h"
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -31,9 +32,12 @@ void* const kWholePage = reinterpret_cast<void*>(~std::uintptr_t{layout::kPageBy
 void onFaultOfTheProgram(int, siginfo_t* fault, void*) {
   ++faultsOfTheProgram;
   if (fault->si_code != BUS_ADRERR) return;
-  const auto page = reinterpret_cast<std::uintptr_t>(fault->si_addr) & reinterpret_cast<std::uintptr_t>(kWholePage);
+  const auto page = reinterpret_cast<std::uintptr_t>(fault->si_addr) &
+                    reinterpret_cast<std::uintptr_t>(kWholePage);
   constexpr int kReplacing = MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED;
-  if (::mmap(reinterpret_cast<void*>(page), layout::kPageBytes, PROT_READ | PROT_WRITE, kReplacing, -1, 0) == MAP_FAILED) ::_exit(1);
+  if (::mmap(reinterpret_cast<void*>(page), layout::kPageBytes, PROT_READ | PROT_WRITE, kReplacing,
+             -1, 0) == MAP_FAILED)
+    ::_exit(1);
 }
 
 const bool kIsInstalled = [] {
@@ -54,7 +58,8 @@ class FaultGuard : public ShmTest {
   // A segment of four pages under file_, with something on each.
   Segment publish() const {
     auto segment = Segment::create(4 * layout::kPageBytes, SegmentKind::bulk, name(), {});
-    for (std::size_t page = 0; page < 4; ++page) segment.at<std::uint64_t>(page * layout::kPageBytes + 1000) = 7;
+    for (std::size_t page = 0; page < 4; ++page)
+      segment.at<std::uint64_t>(page * layout::kPageBytes + 1000) = 7;
     EXPECT_TRUE(segment.tryPublish(file_));
     return segment;
   }
@@ -63,14 +68,19 @@ class FaultGuard : public ShmTest {
   }
   static std::size_t fileBytes(const std::string& file) {
     struct stat status{};
-    return ::stat(segments::path(file).c_str(), &status) == 0 ? static_cast<std::size_t>(status.st_size) : 0;
+    return ::stat(segments::path(file).c_str(), &status) == 0
+               ? static_cast<std::size_t>(status.st_size)
+               : 0;
   }
   std::unique_ptr<OwnWindow> makeServer() const {
-    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), Rights{}, [](layout::SegmentHeader&) {});
+    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), Rights{},
+                                       [](layout::SegmentHeader&) {});
   }
-  std::string hintsOf(const OwnWindow& window) const { return SegmentName::keyed(name(), NameKind::hints, window.header().incarnation); }
+  std::string hintsOf(const OwnWindow& window) const {
+    return SegmentName::keyed(name(), NameKind::hints, window.header().incarnation);
+  }
 
-  std::string file_ = SegmentName::keyed(name(), NameKind::wish, 1);
+  std::string file_ = SegmentName::keyed(name(), NameKind::pendingBind, 1);
   int expectedFaultsOfTheProgram_ = 0;
 };
 
@@ -205,7 +215,8 @@ TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
     cut(file_);
     std::vector<std::thread> threads;
     for (int i = 0; i < 4; ++i) {
-      threads.emplace_back([&] { EXPECT_EQ(segment.at<std::uint64_t>(3 * layout::kPageBytes + 1000), 0u); });
+      threads.emplace_back(
+          [&] { EXPECT_EQ(segment.at<std::uint64_t>(3 * layout::kPageBytes + 1000), 0u); });
     }
     for (auto& thread : threads) thread.join();
     segments::remove(file_);
@@ -215,7 +226,8 @@ TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
 TEST_F(FaultGuard, AFaultThatIsNotOursGoesToTheHandlerThatWasThereBefore) {
   const auto segment = publish();
   const FileDescriptor file(checkCall(::memfd_create("not ours", MFD_CLOEXEC), "memfd_create"));
-  auto* const page = static_cast<volatile char*>(::mmap(nullptr, layout::kPageBytes, PROT_READ, MAP_SHARED, file.get(), 0));
+  auto* const page = static_cast<volatile char*>(
+      ::mmap(nullptr, layout::kPageBytes, PROT_READ, MAP_SHARED, file.get(), 0));
   ASSERT_NE(page, MAP_FAILED);
 
   EXPECT_EQ(page[0], 0);
@@ -228,7 +240,8 @@ TEST_F(FaultGuard, AFaultThatIsNotOursGoesToTheHandlerThatWasThereBefore) {
 TEST_F(FaultGuard, HintsThatWereScribbledOverAreRemovedWithTheirDeadOwner) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
-    std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header), sizeof(layout::SegmentHeader), std::byte{0xa5});
+    std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header),
+                sizeof(layout::SegmentHeader), std::byte{0xa5});
     self.stay();
   });
   EXPECT_THAT(backplane_.removeDead(), testing::IsEmpty());

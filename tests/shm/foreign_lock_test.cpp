@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Locks of processes that own nothing: they neither keep the dead alive nor block what the dead left.
+// Locks of processes that own nothing: they neither keep the dead alive nor block what the dead
+// left.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -7,19 +8,19 @@
 #include <atomic>
 #include <semaphore>
 
-#include <mpf/shm/owner_lock.h>
-#include <mpf/shm/remains.h>
-#include <mpf/shm/watcher.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "shm/owner_lock.h"
+#include "shm/stale_segments.h"
+#include "shm/watcher.h"
+#include "shm/window.h"
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
 
 using layout::SegmentKind;
-using remains::Verdict;
 using segments::Owner;
+using stale_segments::Verdict;
 
 // How a stranger locks a whole file.
 struct Grip {
@@ -41,7 +42,8 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
   }
   std::unique_ptr<Child> startOwner(SegmentKind kind) const {
     return std::make_unique<Child>([this, kind](Child::Self& self) {
-      const OwnWindow window(name(), kind, kind == SegmentKind::serverWindow ? serverName() : "", {}, [](layout::SegmentHeader&) {});
+      const OwnWindow window(name(), kind, kind == SegmentKind::serverWindow ? serverName() : "",
+                             {}, [](layout::SegmentHeader&) {});
       self.stay();
     });
   }
@@ -65,11 +67,13 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
   // The only name of that kind.
   [[nodiscard]] std::string nameOf(NameKind kind) const {
     const auto names = backplane_.segmentNames();
-    const auto found = std::ranges::find_if(names, [&](const auto& one) { return SegmentName::tryParse(one)->kind == kind; });
+    const auto found = std::ranges::find_if(
+        names, [&](const auto& one) { return SegmentName::tryParse(one)->kind == kind; });
     return found == names.end() ? std::string() : *found;
   }
   [[nodiscard]] std::unique_ptr<OwnWindow> makeServer() const {
-    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), Rights{}, [](layout::SegmentHeader&) {});
+    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), Rights{},
+                                       [](layout::SegmentHeader&) {});
   }
   std::unique_ptr<Child> stranger_;
 };
@@ -85,21 +89,25 @@ TEST_P(ForeignLock, OnAServersWindowLeavesItsNameToASuccessor) {
   EXPECT_FALSE(old->hasOwner());
   EXPECT_EQ(segments::probeOwner(serverName()), Owner::dead);
   const auto server = makeServer();
-  EXPECT_NE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation, old->header().incarnation);
+  EXPECT_NE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation,
+            old->header().incarnation);
   EXPECT_EQ(nameOf(NameKind::reaper), "") << "a reaper's file goes with its reaper";
 }
 
 TEST_P(ForeignLock, OnAnyFileOfTheDeadLeavesItToWhoeverCleans) {
   for (const auto kind : {SegmentKind::serverWindow, SegmentKind::clientWindow}) {
-    for (const auto locked : {kind == SegmentKind::serverWindow ? NameKind::serverWindow : NameKind::clientWindow, NameKind::hints}) {
+    for (const auto locked :
+         {kind == SegmentKind::serverWindow ? NameKind::serverWindow : NameKind::clientWindow,
+          NameKind::hints}) {
       const auto owner = startOwner(kind);
       startStranger(nameOf(locked));
 
       killOwner(owner);
 
-      const auto judged = remains::judge(name());
+      const auto judged = stale_segments::judge(name());
       EXPECT_EQ(judged.size(), 3U);
-      for (const auto& file : judged) EXPECT_EQ(file.verdict, Verdict::dead) << file.name << ": " << file.reason;
+      for (const auto& file : judged)
+        EXPECT_EQ(file.verdict, Verdict::dead) << file.name << ": " << file.reason;
       EXPECT_EQ(backplane_.removeDead().size(), 3U);
       EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
     }
@@ -147,17 +155,21 @@ TEST_P(ForeignLock, OnALivingWindowTakesNothingFromItsOwner) {
   EXPECT_EQ(segments::probeOwner(serverName()), Owner::alive);
 }
 
-INSTANTIATE_TEST_SUITE_P(Whole, ForeignLock, testing::Values(kReads, kWrites), testing::PrintToStringParamName());
+INSTANTIATE_TEST_SUITE_P(Whole, ForeignLock, testing::Values(kReads, kWrites),
+                         testing::PrintToStringParamName());
 
-// A reaper that was killed beside strangers leaves a file of its own. The next one uses it, and takes it away.
+// A reaper that was killed beside strangers leaves a file of its own. The next one uses it, and
+// takes it away.
 TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
   const auto owner = startOwner(SegmentKind::serverWindow);
-  const auto incarnation = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation;
+  const auto incarnation =
+      PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation;
   startStranger(serverName(), kReads);
   killOwner(owner);
   const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, incarnation);
   Child killed([&](Child::Self& self) {
-    const FileDescriptor window(checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
+    const FileDescriptor window(
+        checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
     const owner_lock::Reaper reaper(window, reaperFile);
     if (!reaper.mayRemove()) ::_exit(4);
     self.stay();
@@ -174,7 +186,8 @@ TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
 
 TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
   const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, 7);
-  const FileDescriptor made(checkCall(::open(segments::path(reaperFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "create"));
+  const FileDescriptor made(checkCall(
+      ::open(segments::path(reaperFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "create"));
 
   EXPECT_THAT(backplane_.removeDead(), testing::ElementsAre(reaperFile));
 }
@@ -183,7 +196,8 @@ TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
 TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
   const OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
-  auto fake = Segment::create(layout::kWindowBytes, SegmentKind::serverWindow, name(), {.mode = 0644, .user = 65534});
+  auto fake = Segment::create(layout::kWindowBytes, SegmentKind::serverWindow, name(),
+                              {.mode = 0644, .user = 65534});
   fake.sharedHeader().incarnation = client.header().incarnation;
   ASSERT_TRUE(fake.tryPublish(serverName("fake")));
   fake = {};
@@ -193,7 +207,8 @@ TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
   EXPECT_EQ(backplane_.segmentNames().size(), 3U);
 }
 
-// A start time tells a later process with the same pid from the owner. This header's owner started as the host booted.
+// A start time tells a later process with the same pid from the owner. This header's owner started
+// as the host booted.
 TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessIsOfTheDead) {
   const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                          [](layout::SegmentHeader& header) { header.ownerStartTicks = 1; });
@@ -205,14 +220,19 @@ class AdmittedPeers : public ShmTest {
  protected:
   [[nodiscard]] std::string rightsOf(NameKind kind) const {
     struct stat status{};
-    checkCall(::stat(segments::path(SegmentName::keyed(name(), kind, client_.header().incarnation)).c_str(), &status), "stat");
+    checkCall(
+        ::stat(
+            segments::path(SegmentName::keyed(name(), kind, client_.header().incarnation)).c_str(),
+            &status),
+        "stat");
     std::array<char, 32> text;
     std::snprintf(text.data(), text.size(), "%04o %u", status.st_mode & 07777u, status.st_gid);
     return text.data();
   }
   void TearDown() override {}
   static constexpr std::uint32_t kOperators = 54321;
-  OwnWindow client_{name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
+  OwnWindow client_{
+      name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
 };
 
 TEST_F(AdmittedPeers, AreNobodyAtFirst) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Where a duration goes in a histogram, and what the buckets say.
-#include <mpf/shm/histogram.h>
+#include "shm/histogram.h"
 
 #include <gtest/gtest.h>
 #include <memory>
 
-#include <mpf/tests/support/random.h>
+#include "tests/support/random.h"
 
 namespace mpf::test {
 namespace {
@@ -53,12 +53,15 @@ TEST(Histogram, RecordsEachDurationOnceAndKeepsTheLongest) {
   record(*histogram, -1);
   record(*histogram, INT64_MAX);
 
-  const auto at = [&](std::uint64_t ns) { return histogram->buckets[HistogramBuckets::indexOf(ns)].load(std::memory_order_relaxed); };
+  const auto at = [&](std::uint64_t ns) {
+    return histogram->buckets[HistogramBuckets::indexOf(ns)].load(std::memory_order_relaxed);
+  };
   EXPECT_EQ(at(100), 2u);
   EXPECT_EQ(at(5'000'000), 1u);
   EXPECT_EQ(at(0), 1u) << "a clock that seems to go back";
   EXPECT_EQ(at(UINT64_MAX), 1u);
-  EXPECT_EQ(histogram->maxNs.load(std::memory_order_relaxed), static_cast<std::uint64_t>(INT64_MAX));
+  EXPECT_EQ(histogram->maxNs.load(std::memory_order_relaxed),
+            static_cast<std::uint64_t>(INT64_MAX));
 }
 
 }  // namespace

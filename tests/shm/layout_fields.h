@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Every field of layout.h with its place, as JSON: what the tables of docs/shm-layout.md are compared with.
+// Every field of layout.h with its place, as JSON: what the tables of docs/shm-layout.md are
+// compared with.
 #pragma once
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
 
-#include <mpf/shm/layout.h>
+#include "shm/layout.h"
 
 namespace mpf::test {
 
@@ -59,55 +60,69 @@ inline nlohmann::json layoutFields() {
   }
   {
     using Struct = WindowControl;
-    all["WindowControl"] = {{"bytes", sizeof(Struct)},
-                            {"fields", {MPF_FIELD(sleeping),    MPF_FIELD(sleepNumber), MPF_FIELD(state),          MPF_FIELD(linkCount),
-                                        MPF_FIELD(queueSize),   MPF_FIELD(shortage),    MPF_FIELD(progress),       MPF_FIELD(progressAtNs),
-                                        MPF_FIELD(received),    MPF_FIELD(sent),        MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),
-                                        MPF_FIELD(expired),     MPF_FIELD(refused),     MPF_FIELD(wakes),          MPF_FIELD(linksOpened),
-                                        MPF_FIELD(linksClosed), MPF_FIELD(peersDied),   MPF_FIELD(protocolErrors), MPF_FIELD(alarms),
-                                        MPF_FIELD(handling),    MPF_FIELD(reserved),    MPF_FIELD(queueWaitNs),    MPF_FIELD(serviceNs)}}};
+    all["WindowControl"] = {
+        {"bytes", sizeof(Struct)},
+        {"fields", {MPF_FIELD(sleeping),       MPF_FIELD(sleepNumber),    MPF_FIELD(state),
+                    MPF_FIELD(linkCount),      MPF_FIELD(queueSize),      MPF_FIELD(shortage),
+                    MPF_FIELD(progress),       MPF_FIELD(progressAtNs),   MPF_FIELD(received),
+                    MPF_FIELD(sent),           MPF_FIELD(replyQueueFull), MPF_FIELD(queueFull),
+                    MPF_FIELD(expired),        MPF_FIELD(refused),        MPF_FIELD(wakes),
+                    MPF_FIELD(linksOpened),    MPF_FIELD(linksClosed),    MPF_FIELD(peersDied),
+                    MPF_FIELD(protocolErrors), MPF_FIELD(alarms),         MPF_FIELD(handling),
+                    MPF_FIELD(reserved),       MPF_FIELD(queueWaitNs),    MPF_FIELD(serviceNs)}}};
   }
   {
     using Struct = Histogram;
-    all["Histogram"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(buckets), MPF_FIELD(maxNs), MPF_FIELD(reserved)}}};
+    all["Histogram"] = {{"bytes", sizeof(Struct)},
+                        {"fields", {MPF_FIELD(buckets), MPF_FIELD(maxNs), MPF_FIELD(reserved)}}};
   }
   {
     using Struct = WindowHints;
-    all["WindowHints"] = {{"bytes", sizeof(Struct)},
-                          {"fields",
-                           {MPF_FIELD(header), MPF_FIELD(bell), MPF_FIELD(knocked), MPF_FIELD(rescan), MPF_FIELD(knocks),
-                            MPF_FIELD(readyWords), MPF_FIELD(readyBits)}}};
+    all["WindowHints"] = {
+        {"bytes", sizeof(Struct)},
+        {"fields",
+         {MPF_FIELD(header), MPF_FIELD(bell), MPF_FIELD(knocked), MPF_FIELD(rescan),
+          MPF_FIELD(knocks), MPF_FIELD(readyWords), MPF_FIELD(readyBits)}}};
   }
   {
     using Struct = LinkControl;
-    all["LinkControl"] = {{"bytes", sizeof(Struct)},
-                          {"fields",
-                           {MPF_FIELD(clientState), MPF_FIELD(clientSent), MPF_FIELD(clientRefused), MPF_FIELD(clientUnanswered),
-                            MPF_FIELD(serverState), MPF_FIELD(serverIndex), MPF_FIELD(reserved0), MPF_FIELD(serverSent),
-                            MPF_FIELD(requests), MPF_FIELD(replies), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
+    all["LinkControl"] = {
+        {"bytes", sizeof(Struct)},
+        {"fields",
+         {MPF_FIELD(clientState), MPF_FIELD(clientSent), MPF_FIELD(clientRefused),
+          MPF_FIELD(clientUnanswered), MPF_FIELD(serverState), MPF_FIELD(serverIndex),
+          MPF_FIELD(reserved0), MPF_FIELD(serverSent), MPF_FIELD(requests), MPF_FIELD(replies),
+          MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
   }
   {
     using Struct = RingControl;
-    all["RingControl"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(unwatched), MPF_FIELD(freed), MPF_FIELD(taken)}}};
+    all["RingControl"] = {{"bytes", sizeof(Struct)},
+                          {"fields", {MPF_FIELD(unwatched), MPF_FIELD(freed), MPF_FIELD(taken)}}};
   }
   {
     using Struct = Slot;
-    all["Slot"] = {{"bytes", sizeof(Struct)},
-                   {"fields",
-                    {MPF_FIELD(sequence), MPF_FIELD(type), MPF_FIELD(slots), MPF_FIELD(flags), MPF_FIELD(bodyBytes), MPF_FIELD(requestId),
-                     MPF_FIELD(clientType), MPF_FIELD(clientExtra), MPF_FIELD(sentTick), MPF_FIELD(deadlineNs), MPF_FIELD(body)}}};
+    all["Slot"] = {
+        {"bytes", sizeof(Struct)},
+        {"fields",
+         {MPF_FIELD(sequence), MPF_FIELD(type), MPF_FIELD(slots), MPF_FIELD(flags),
+          MPF_FIELD(bodyBytes), MPF_FIELD(requestId), MPF_FIELD(clientType), MPF_FIELD(clientExtra),
+          MPF_FIELD(sentTick), MPF_FIELD(deadlineNs), MPF_FIELD(body)}}};
   }
   {
     using Struct = MoreSlot;
-    all["MoreSlot"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(sequence), MPF_FIELD(body)}}};
+    all["MoreSlot"] = {{"bytes", sizeof(Struct)},
+                       {"fields", {MPF_FIELD(sequence), MPF_FIELD(body)}}};
   }
   {
     using Struct = ReturnRing;
-    all["ReturnRing"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(returned), MPF_FIELD(chunks)}}};
+    all["ReturnRing"] = {{"bytes", sizeof(Struct)},
+                         {"fields", {MPF_FIELD(returned), MPF_FIELD(chunks)}}};
   }
   {
     using Struct = ChunkRef;
-    all["ChunkRef"] = {{"bytes", sizeof(Struct)}, {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(reserved)}}};
+    all["ChunkRef"] = {
+        {"bytes", sizeof(Struct)},
+        {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(reserved)}}};
   }
   {
     using Struct = RouterLine;
@@ -169,7 +184,7 @@ inline nlohmann::json layoutKinds() {
           {"hints", SegmentKind::hints},
           {"link", SegmentKind::link},
           {"bulk", SegmentKind::bulk},
-          {"wish", SegmentKind::wish},
+          {"wish", SegmentKind::pendingBind},
           {"router", SegmentKind::router}};
 }
 

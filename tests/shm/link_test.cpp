@@ -3,9 +3,9 @@
 #include <cstring>
 #include <map>
 
-#include <mpf/tests/shm/endpoint_pair.h>
-#include <mpf/tests/shm/shm_fixture.h>
-#include <mpf/tests/support/random.h>
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
+#include "tests/support/random.h"
 
 namespace mpf::test {
 namespace {
@@ -58,8 +58,11 @@ class LinkTest : public ShmTest {
   // Why the server does not take a link of which `change` was made by its client.
   std::string refusal(const std::function<void(layout::SegmentHeader&)>& change) {
     const auto link = makeLink();
-    change(Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)->sharedHeader());
-    return whatOf<SegmentError>([&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); });
+    change(
+        Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)
+            ->sharedHeader());
+    return whatOf<SegmentError>(
+        [&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); });
   }
 
   std::optional<End> server_;
@@ -78,7 +81,8 @@ TEST_P(BodySizes, CrossInBothDirections) {
   EXPECT_EQ(take(link.server), body);
   EXPECT_EQ(take(link.client), body);
 }
-INSTANTIATE_TEST_SUITE_P(InLineAndInChunks, BodySizes, testing::Values(0, 1, 24, 25, 80, 192, 193, 4096, 100'000, 8 << 20));
+INSTANTIATE_TEST_SUITE_P(InLineAndInChunks, BodySizes,
+                         testing::Values(0, 1, 24, 25, 80, 192, 193, 4096, 100'000, 8 << 20));
 
 TEST_F(LinkTest, AChunkIsReadWhereItWasBuiltAndSentBackAsItIs) {
   const auto link = makeLink();
@@ -132,7 +136,8 @@ TEST_F(LinkTest, WithoutMemoryNothingIsSentAndNothingIsLost) {
 
 TEST_F(LinkTest, AQueueTakesWhatItMayAndNoMore) {
   const auto link = makeLink({.queueSize = 4});
-  for (int i = 0; i < 4; ++i) ASSERT_EQ(sendBody(link.client, filled(kLarge), {.waiting = 4}), LinkSend::sent);
+  for (int i = 0; i < 4; ++i)
+    ASSERT_EQ(sendBody(link.client, filled(kLarge), {.waiting = 4}), LinkSend::sent);
 
   EXPECT_EQ(sendBody(link.client, filled(8), {.waiting = 4}), LinkSend::full);
 
@@ -147,7 +152,9 @@ TEST_F(LinkTest, AQueueOfAnyBodiesHasItsFullLength) {
     Random random;
     for (int round = 0; round < 20; ++round) {
       for (std::uint32_t i = 0; i < queue; ++i) {
-        ASSERT_EQ(sendBody(link.client, filled(random.below(300)), {.waiting = queue}), LinkSend::sent) << i << " of " << queue;
+        ASSERT_EQ(sendBody(link.client, filled(random.below(300)), {.waiting = queue}),
+                  LinkSend::sent)
+            << i << " of " << queue;
       }
       ASSERT_EQ(sendBody(link.client, filled(1), {.waiting = queue}), LinkSend::full);
       for (std::uint32_t i = 0; i < queue; ++i) take(link.server);
@@ -190,12 +197,12 @@ TEST_F(LinkTest, TheReadyBitIsSetWhileTheReceiverDoesNotWatch) {
 TEST_F(LinkTest, EveryMessageToASleeperIsTimedAndOneIn64ToWhoPolls) {
   const auto link = makeLink();
   link.server.setWatched(false);
-  EXPECT_TRUE(link.client.shallBeTimed());
+  EXPECT_TRUE(link.client.shouldSampleTime());
   link.server.setWatched(true);
 
   int timed = 0;
   for (int i = 0; i < 256; ++i) {
-    timed += link.client.shallBeTimed() ? 1 : 0;
+    timed += link.client.shouldSampleTime() ? 1 : 0;
     ASSERT_EQ(sendBody(link.client, {}), LinkSend::sent);
     take(link.server);
   }
@@ -219,47 +226,60 @@ TEST_F(LinkTest, GoesWithItsClientsSideAndItsPools) {
 TEST_F(LinkTest, OneThatIsGoneIsNotOpened) {
   makeEnds();
 
-  EXPECT_EQ(Link::tryOpen(name(), SegmentName::link(name(), 1, 2), server_->endpoint.window()), nullptr);
+  EXPECT_EQ(Link::tryOpen(name(), SegmentName::link(name(), 1, 2), server_->endpoint.window()),
+            nullptr);
 }
 
 using Header = layout::SegmentHeader;
 class Geometries : public LinkTest, public testing::WithParamInterface<void (*)(Header&)> {};
 
 TEST_P(Geometries, ThatTheServerDidNotOfferAreRefused) { EXPECT_NE(refusal(GetParam()), ""); }
-INSTANTIATE_TEST_SUITE_P(
-    Nonsense, Geometries,
-    testing::Values([](Header& header) { header.queueSize = 0; }, [](Header& header) { header.queueSize = 16385; },
-                    [](Header& header) { header.queueSize = 1u << 30; }, [](Header& header) { header.queueSize = UINT32_MAX; },
-                    [](Header& header) { header.queueSlots = 0; }, [](Header& header) { header.queueSlots = 3; },
-                    [](Header& header) { header.queueSlots *= 2; }, [](Header& header) { header.replySlots = UINT32_MAX; },
-                    [](Header& header) { header.replySlots /= 2; }, [](Header& header) { header.maxOutstanding = UINT32_MAX; },
-                    [](Header& header) { ++header.serverWindow; }, [](Header& header) { ++header.maxPoolBytes; },
-                    [](Header& header) { header.totalBytes = UINT64_MAX; }));
+INSTANTIATE_TEST_SUITE_P(Nonsense, Geometries,
+                         testing::Values([](Header& header) { header.queueSize = 0; },
+                                         [](Header& header) { header.queueSize = 16385; },
+                                         [](Header& header) { header.queueSize = 1u << 30; },
+                                         [](Header& header) { header.queueSize = UINT32_MAX; },
+                                         [](Header& header) { header.queueSlots = 0; },
+                                         [](Header& header) { header.queueSlots = 3; },
+                                         [](Header& header) { header.queueSlots *= 2; },
+                                         [](Header& header) { header.replySlots = UINT32_MAX; },
+                                         [](Header& header) { header.replySlots /= 2; },
+                                         [](Header& header) { header.maxOutstanding = UINT32_MAX; },
+                                         [](Header& header) { ++header.serverWindow; },
+                                         [](Header& header) { ++header.maxPoolBytes; },
+                                         [](Header& header) { header.totalBytes = UINT64_MAX; }));
 
 TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
   const auto link = makeLink();
-  const auto bytes = layout::linkBytes(link.client.header().queueSlots, link.client.header().replySlots) - 1;
-  Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)->sharedHeader().totalBytes = bytes;
+  const auto bytes =
+      layout::linkBytes(link.client.header().queueSlots, link.client.header().replySlots) - 1;
+  Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)
+      ->sharedHeader()
+      .totalBytes = bytes;
   ASSERT_EQ(::truncate(segments::path(link.client.name()).c_str(), static_cast<off_t>(bytes)), 0);
 
-  EXPECT_THAT(whatOf<SegmentError>([&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); }),
+  EXPECT_THAT(whatOf<SegmentError>(
+                  [&] { Link::tryOpen(name(), link.client.name(), server_->endpoint.window()); }),
               HasSubstr(segments::path(link.client.name())));
 }
 
 // None of a peer that has scribbled an end over its state, either.
-std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try { return link.tryChunk(envelope); } catch (const ChunkUnavailable&) {
+std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try {
+  return link.tryChunk(envelope);
+} catch (const ChunkUnavailable&) {
   return std::nullopt;
 }
 
-// The client may write every byte of the link and of its own pool, at any time. The server goes on: each of its calls ends, stays
-// inside the memory it mapped, and gives memory to one holder only.
+// The client may write every byte of the link and of its own pool, at any time. The server goes on:
+// each of its calls ends, stays inside the memory it mapped, and gives memory to one holder only.
 TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
   Random random;
   const auto link = makeLink({.maxPoolBytes = 4 << 20});
-  auto scribbled = *Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite);
+  auto scribbled =
+      *Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite);
   ASSERT_EQ(sendBody(link.client, filled(1000)), LinkSend::sent);
-  auto bulk = *Segment::tryOpen(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0), layout::SegmentKind::bulk,
-                                Segment::Access::readWrite);
+  auto bulk = *Segment::tryOpen(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0),
+                                layout::SegmentKind::bulk, Segment::Access::readWrite);
   std::vector<std::byte> body(layout::kInlineBodyBytes);
   std::map<std::byte*, std::size_t> held;
   std::uint64_t sum = 0;
@@ -282,9 +302,11 @@ TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
       case 3: {  // the next message, of a chunk that might exist
         auto& slot = nextSlot();
         slot.flags = static_cast<std::uint8_t>(random.below(4));
-        slot.bodyBytes = static_cast<std::uint32_t>(random.oneIn(2) ? random.below(2000) : random.nasty());
+        slot.bodyBytes =
+            static_cast<std::uint32_t>(random.oneIn(2) ? random.below(2000) : random.nasty());
         slot.slots = static_cast<std::uint8_t>(random.below(6));
-        const layout::ChunkRef ref{static_cast<std::uint32_t>(random.below(3)), static_cast<std::uint32_t>(random.below(300)),
+        const layout::ChunkRef ref{static_cast<std::uint32_t>(random.below(3)),
+                                   static_cast<std::uint32_t>(random.below(300)),
                                    static_cast<std::uint32_t>(random.below(3)), 0};
         std::memcpy(slot.body.data(), &ref, sizeof ref);
         slot.sequence.store(position + 1, std::memory_order_relaxed);
@@ -294,7 +316,8 @@ TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
         bulk.data()[random.below(512)] = static_cast<std::byte>(random.bits());
         break;
       case 5:
-        static_cast<void>(sendBody(link.server, filled(random.below(3000)), {.waiting = static_cast<std::uint32_t>(random.below(100))}));
+        static_cast<void>(sendBody(link.server, filled(random.below(3000)),
+                                   {.waiting = static_cast<std::uint32_t>(random.below(100))}));
         break;
       case 6:
         if (!held.empty()) {
@@ -313,12 +336,14 @@ TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
         if ((envelope.flags & layout::kSlotChunk) != 0) {
           if (const auto chunk = chunkOf(link.server, envelope)) {
             ASSERT_LE(envelope.bodyBytes, chunk->capacity);
-            for (std::uint32_t i = 0; i < envelope.bodyBytes; ++i) sum += static_cast<std::uint64_t>(chunk->data[i]);
+            for (std::uint32_t i = 0; i < envelope.bodyBytes; ++i)
+              sum += static_cast<std::uint64_t>(chunk->data[i]);
             link.server.release(chunk->data);
             held.erase(chunk->data);
           }
         } else {
-          link.server.copyBody(std::span(body).first(std::min<std::size_t>(envelope.bodyBytes, link.server.inlineCapacity())));
+          link.server.copyBody(std::span(body).first(
+              std::min<std::size_t>(envelope.bodyBytes, link.server.inlineCapacity())));
         }
         link.server.end();
         position += slots >= 1 && slots <= layout::kMaxMessageSlots ? slots : 1;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Memory for messages that do not fit a ring: lent, given back, sent back, refused.
-#include <mpf/shm/pool.h>
+#include "shm/pool.h"
 
 #include <cstring>
 #include <map>
 #include <optional>
 #include <set>
 
-#include <mpf/tests/shm/shm_fixture.h>
-#include <mpf/tests/support/random.h>
+#include "tests/shm/shm_fixture.h"
+#include "tests/support/random.h"
 
 namespace mpf::test {
 namespace {
@@ -36,13 +36,14 @@ class PoolTest : public ShmTest {
   }
   // The header of the owner's bulk segment `number`, writable.
   Segment openBulk(std::uint32_t number = 0) const {
-    return std::move(
-        *Segment::tryOpen(SegmentName::bulk(name(), kLink, kSide, number), layout::SegmentKind::bulk, Segment::Access::readWrite));
+    return std::move(*Segment::tryOpen(SegmentName::bulk(name(), kLink, kSide, number),
+                                       layout::SegmentKind::bulk, Segment::Access::readWrite));
   }
 
   PoolPlace place_{name(), kLink, kSide, 0xdef};
   layout::ReturnRing returns_{};
-  std::optional<PoolOwner> owner_{std::in_place, place_, Rights{}, std::uint64_t{256} << 20, returns_};
+  std::optional<PoolOwner> owner_{std::in_place, place_, Rights{}, std::uint64_t{256} << 20,
+                                  returns_};
   PoolBorrower borrower_{place_, std::uint64_t{256} << 20, returns_};
 };
 
@@ -65,9 +66,12 @@ TEST_P(ChunkSizes, AreAtLeastWhatWasAskedForAndReachTheBorrowerWhole) {
   EXPECT_EQ(std::memcmp(borrowed->data, chunk->data, chunk->capacity), 0);
 }
 INSTANTIATE_TEST_SUITE_P(SmallAndLarge, ChunkSizes,
-                         testing::Values(0, 1, 193, 512, 640, 641, 1 << 20, (1 << 20) + 128, (1 << 20) + 129, std::size_t{64} << 20));
+                         testing::Values(0, 1, 193, 512, 640, 641, 1 << 20, (1 << 20) + 128,
+                                         (1 << 20) + 129, std::size_t{64} << 20));
 
-TEST_F(PoolTest, APowerOfTwoAndAHeaderCostNoSecondPowerOfTwo) { EXPECT_LT(owner_->tryAlloc((1 << 20) + 128)->capacity, (1u << 20) + 4096); }
+TEST_F(PoolTest, APowerOfTwoAndAHeaderCostNoSecondPowerOfTwo) {
+  EXPECT_LT(owner_->tryAlloc((1 << 20) + 128)->capacity, (1u << 20) + 4096);
+}
 
 TEST_F(PoolTest, CreatesNothingBeforeItIsNeeded) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
@@ -75,7 +79,8 @@ TEST_F(PoolTest, CreatesNothingBeforeItIsNeeded) {
 
   ASSERT_TRUE(owner_->tryAlloc(1));
 
-  EXPECT_THAT(backplane_.segmentNames(), testing::ElementsAre(SegmentName::bulk(name(), kLink, kSide, 0)));
+  EXPECT_THAT(backplane_.segmentNames(),
+              testing::ElementsAre(SegmentName::bulk(name(), kLink, kSide, 0)));
   const auto header = openBulk().header();
   EXPECT_EQ(header.ownerWindow, place_.ownerWindow);
   EXPECT_EQ(header.bulkSide, kSide);
@@ -115,10 +120,13 @@ TEST_F(PoolTest, AForeignReferenceIsRefusedByItsOwner) {
   const auto held = owner_->tryAlloc(1000)->ref;
   ASSERT_FALSE(owner_->tryReceiveBack(held)) << "not lent";
 
-  for (const auto& wrong : {ChunkRef{lent.segment, lent.chunk, 0, 0}, ChunkRef{lent.segment, lent.chunk, 2, 0},
-                            ChunkRef{lent.segment + 1, lent.chunk, kSide, 0}, ChunkRef{lent.segment, 1u << 20, kSide, 0},
-                            ChunkRef{UINT32_MAX, UINT32_MAX, kSide, 0}, ChunkRef{lent.segment, lent.chunk + 2, kSide, 0}}) {
-    EXPECT_FALSE(owner_->tryReceiveBack(wrong)) << wrong.segment << ' ' << wrong.chunk << ' ' << wrong.side;
+  for (const auto& wrong :
+       {ChunkRef{lent.segment, lent.chunk, 0, 0}, ChunkRef{lent.segment, lent.chunk, 2, 0},
+        ChunkRef{lent.segment + 1, lent.chunk, kSide, 0},
+        ChunkRef{lent.segment, 1u << 20, kSide, 0}, ChunkRef{UINT32_MAX, UINT32_MAX, kSide, 0},
+        ChunkRef{lent.segment, lent.chunk + 2, kSide, 0}}) {
+    EXPECT_FALSE(owner_->tryReceiveBack(wrong))
+        << wrong.segment << ' ' << wrong.chunk << ' ' << wrong.side;
   }
   EXPECT_TRUE(owner_->tryReceiveBack(lent));
 }
@@ -128,14 +136,17 @@ TEST_F(PoolTest, AForeignReferenceIsRefusedByTheBorrower) {
   const auto count = openBulk().header().chunkCount;
 
   for (const auto& wrong :
-       {ChunkRef{ref.segment, ref.chunk, 0, 0}, ChunkRef{ref.segment, count, kSide, 0}, ChunkRef{ref.segment, UINT32_MAX, kSide, 0},
-        ChunkRef{ref.segment + 1, 0, kSide, 0}, ChunkRef{256, 0, kSide, 0}, ChunkRef{UINT32_MAX, 0, kSide, 0}}) {
-    EXPECT_FALSE(borrower_.tryBorrow(wrong)) << wrong.segment << ' ' << wrong.chunk << ' ' << wrong.side;
+       {ChunkRef{ref.segment, ref.chunk, 0, 0}, ChunkRef{ref.segment, count, kSide, 0},
+        ChunkRef{ref.segment, UINT32_MAX, kSide, 0}, ChunkRef{ref.segment + 1, 0, kSide, 0},
+        ChunkRef{256, 0, kSide, 0}, ChunkRef{UINT32_MAX, 0, kSide, 0}}) {
+    EXPECT_FALSE(borrower_.tryBorrow(wrong))
+        << wrong.segment << ' ' << wrong.chunk << ' ' << wrong.side;
   }
   EXPECT_TRUE(borrower_.tryBorrow(ref));
 }
 
-class BulkHeaders : public PoolTest, public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
+class BulkHeaders : public PoolTest,
+                    public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
 TEST_P(BulkHeaders, ThatMakeNoSenseAreRefusedByTheBorrower) {
   const auto ref = lendOne();
@@ -144,18 +155,19 @@ TEST_P(BulkHeaders, ThatMakeNoSenseAreRefusedByTheBorrower) {
 
   EXPECT_FALSE(borrower_.tryBorrow(ref));
 }
-INSTANTIATE_TEST_SUITE_P(Nonsense, BulkHeaders,
-                         testing::Values([](layout::SegmentHeader& header) { header.chunkBytes = 0; },
-                                         [](layout::SegmentHeader& header) { header.chunkBytes = UINT64_MAX; },
-                                         [](layout::SegmentHeader& header) { header.chunkBytes += 64; },
-                                         [](layout::SegmentHeader& header) { header.chunkBytes = 1; },
-                                         [](layout::SegmentHeader& header) { header.chunkBytes -= 8; },
-                                         [](layout::SegmentHeader& header) { ++header.chunkCount; },
-                                         [](layout::SegmentHeader& header) { header.chunkCount = UINT32_MAX; },
-                                         [](layout::SegmentHeader& header) { header.chunkCount = 0; },
-                                         [](layout::SegmentHeader& header) { header.kind = layout::SegmentKind::link; },
-                                         [](layout::SegmentHeader& header) { header.magic = 0; },
-                                         [](layout::SegmentHeader& header) { header.totalBytes = UINT64_MAX; }));
+INSTANTIATE_TEST_SUITE_P(
+    Nonsense, BulkHeaders,
+    testing::Values([](layout::SegmentHeader& header) { header.chunkBytes = 0; },
+                    [](layout::SegmentHeader& header) { header.chunkBytes = UINT64_MAX; },
+                    [](layout::SegmentHeader& header) { header.chunkBytes += 64; },
+                    [](layout::SegmentHeader& header) { header.chunkBytes = 1; },
+                    [](layout::SegmentHeader& header) { header.chunkBytes -= 8; },
+                    [](layout::SegmentHeader& header) { ++header.chunkCount; },
+                    [](layout::SegmentHeader& header) { header.chunkCount = UINT32_MAX; },
+                    [](layout::SegmentHeader& header) { header.chunkCount = 0; },
+                    [](layout::SegmentHeader& header) { header.kind = layout::SegmentKind::link; },
+                    [](layout::SegmentHeader& header) { header.magic = 0; },
+                    [](layout::SegmentHeader& header) { header.totalBytes = UINT64_MAX; }));
 
 TEST_F(PoolTest, AChunkThatIsGivenBackTwiceIsFreedOnce) {
   const auto ref = lendOne();
@@ -202,7 +214,8 @@ TEST_F(PoolTest, ALimitIsUsedToItsEnd) {
 }
 
 TEST_F(PoolTest, SizesThatNobodyHasAreRefused) {
-  for (const auto bytes : {(std::size_t{256} << 20) + 1, std::size_t{1} << 40, (std::size_t{1} << 63) + 1, SIZE_MAX - 127, SIZE_MAX}) {
+  for (const auto bytes : {(std::size_t{256} << 20) + 1, std::size_t{1} << 40,
+                           (std::size_t{1} << 63) + 1, SIZE_MAX - 127, SIZE_MAX}) {
     EXPECT_FALSE(owner_->tryAlloc(bytes)) << bytes;
   }
   EXPECT_EQ(owner_->bytes(), 0u);
@@ -215,7 +228,8 @@ TEST_F(PoolTest, NoMoreChunksAreOutThanTheReturnRingHolds) {
   EXPECT_FALSE(owner_->tryAlloc(100));
 
   for (const auto& ref : lent) borrower_.giveBack(ref);
-  for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i) ASSERT_TRUE(owner_->tryAlloc(100)) << "all came back: " << i;
+  for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i)
+    ASSERT_TRUE(owner_->tryAlloc(100)) << "all came back: " << i;
 }
 
 TEST_F(PoolTest, KnowsWhichPointersAreItsOwn) {
@@ -262,7 +276,8 @@ TEST_F(PoolTest, ALinksBulkSegmentsAreRemovedTogether) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-// The borrower writes anything into the return ring at any time; no chunk is ever given to two holders.
+// The borrower writes anything into the return ring at any time; no chunk is ever given to two
+// holders.
 TEST_F(PoolTest, NoChunkHasTwoHoldersWhateverTheBorrowerWrites) {
   makeOwner(4 << 20);
   Random random;
@@ -274,7 +289,9 @@ TEST_F(PoolTest, NoChunkHasTwoHoldersWhateverTheBorrowerWrites) {
       case 0:
       case 1:
         if (const auto chunk = owner_->tryAlloc(random.below(100'000))) {
-          for (const auto& [data, other] : held) ASSERT_TRUE(chunk->data + chunk->capacity <= data || data + other.capacity <= chunk->data);
+          for (const auto& [data, other] : held)
+            ASSERT_TRUE(chunk->data + chunk->capacity <= data ||
+                        data + other.capacity <= chunk->data);
           held.emplace(chunk->data, *chunk);
         }
         break;
@@ -290,12 +307,14 @@ TEST_F(PoolTest, NoChunkHasTwoHoldersWhateverTheBorrowerWrites) {
         break;
       case 3:
         if (lent.empty()) break;
-        if (const auto& one = lent[random.below(lent.size())]; const auto back = owner_->tryReceiveBack(one.ref)) {
+        if (const auto& one = lent[random.below(lent.size())];
+            const auto back = owner_->tryReceiveBack(one.ref)) {
           ASSERT_TRUE(held.emplace(back->data, *back).second);
         }
         break;
       case 4:
-        returns_.chunks[random.below(layout::kReturnSlots)].store(random.below(8) << 32 | random.below(8), std::memory_order_relaxed);
+        returns_.chunks[random.below(layout::kReturnSlots)].store(
+            random.below(8) << 32 | random.below(8), std::memory_order_relaxed);
         break;
       default:
         returns_.returned.store(random.nasty(), std::memory_order_relaxed);

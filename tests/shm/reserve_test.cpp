@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Memory is reserved when a segment is made. This file stands between the program and the kernel's answer.
+// Memory is reserved when a segment is made. This file stands between the program and the kernel's
+// answer.
 #include <fcntl.h>
 
 #include <cerrno>
 #include <functional>
 
-#include <mpf/shm/pool.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "shm/pool.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace {
 
@@ -28,7 +29,9 @@ class Reserve : public ShmTest {
   ~Reserve() override {
     answer = [](off_t) { return 0; };
   }
-  [[nodiscard]] Segment create(std::size_t bytes) const { return Segment::create(bytes, layout::SegmentKind::bulk, name(), {}); }
+  [[nodiscard]] Segment create(std::size_t bytes) const {
+    return Segment::create(bytes, layout::SegmentKind::bulk, name(), {});
+  }
 };
 
 TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
@@ -36,7 +39,8 @@ TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
 
   const auto why = whatOf<std::system_error>([&] { static_cast<void>(create(4096)); });
 
-  EXPECT_THAT(why, testing::AllOf(testing::HasSubstr("reserve 4096 bytes in /dev/shm"), testing::HasSubstr("No space left")));
+  EXPECT_THAT(why, testing::AllOf(testing::HasSubstr("reserve 4096 bytes in /dev/shm"),
+                                  testing::HasSubstr("No space left")));
 }
 
 // As kernels do that undo a long reservation at each tick of a timer.

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include <mpf/shm/ring.h>
+#include "shm/ring.h"
 
 namespace mpf::test {
 
@@ -32,14 +32,16 @@ class RingTest : public testing::Test {
   }
   ~RingTest() override {
     for (const auto* guard : guards()) {
-      EXPECT_TRUE(std::all_of(guard, guard + kGuardBytes, [](auto byte) { return byte == kGuard; })) << "somebody wrote outside the ring";
+      EXPECT_TRUE(std::all_of(guard, guard + kGuardBytes, [](auto byte) { return byte == kGuard; }))
+          << "somebody wrote outside the ring";
     }
   }
   // Raw memory of the ring's slots.
   std::byte* ringBytes() { return bytes(kGuards); }
 
   bool push(std::uint64_t ordinal, std::size_t bodyBytes = 8) {
-    const Envelope envelope{.bodyBytes = static_cast<std::uint32_t>(bodyBytes), .requestId = static_cast<std::uint32_t>(ordinal)};
+    const Envelope envelope{.bodyBytes = static_cast<std::uint32_t>(bodyBytes),
+                            .requestId = static_cast<std::uint32_t>(ordinal)};
     return producer_.tryPush(envelope, pattern(ordinal, bodyBytes));
   }
   // The next message's body.
@@ -56,7 +58,8 @@ class RingTest : public testing::Test {
   static constexpr std::size_t kGuardBytes = kGuards * sizeof(layout::Slot);
   std::array<std::byte*, 2> guards() { return {bytes(0), bytes(kGuards + kCapacity)}; }
   std::byte* bytes(std::uint32_t slot) { return reinterpret_cast<std::byte*>(slots_.get() + slot); }
-  std::unique_ptr<layout::Slot[]> slots_ = std::make_unique<layout::Slot[]>(kCapacity + 2 * kGuards);
+  std::unique_ptr<layout::Slot[]> slots_ =
+      std::make_unique<layout::Slot[]>(kCapacity + 2 * kGuards);
 
  protected:
   layout::Slot* ring_ = slots_.get() + kGuards;

@@ -3,9 +3,9 @@
 #include <deque>
 #include <thread>
 
-#include <mpf/tests/shm/ring_fixture.h>
-#include <mpf/tests/support/random.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/shm/ring_fixture.h"
+#include "tests/support/random.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -13,8 +13,14 @@ namespace {
 TEST_F(RingTest, AnEmptyRingHasNoMessage) { EXPECT_FALSE(consumer_.hasMessage()); }
 
 TEST_F(RingTest, MessagesComeInOrderWithTheirEnvelopes) {
-  const Envelope sent{
-      .type = 1, .flags = 2, .bodyBytes = 3, .requestId = 4, .clientType = -5, .clientExtra = -6, .sentTick = 7, .deadlineNs = 8};
+  const Envelope sent{.type = 1,
+                      .flags = 2,
+                      .bodyBytes = 3,
+                      .requestId = 4,
+                      .clientType = -5,
+                      .clientExtra = -6,
+                      .sentTick = 7,
+                      .deadlineNs = 8};
 
   ASSERT_TRUE(producer_.tryPush(sent, pattern(1, 3)));
   ASSERT_TRUE(push(2));
@@ -83,7 +89,8 @@ TEST_P(InlineSizes, TravelWholeAtEveryPositionOfTheRing) {
   }
   EXPECT_FALSE(consumer_.hasMessage());
 }
-INSTANTIATE_TEST_SUITE_P(AroundEachSlotsEnd, InlineSizes, testing::Values(0, 1, 23, 24, 25, 79, 80, 81, 135, 136, 137, 191, 192));
+INSTANTIATE_TEST_SUITE_P(AroundEachSlotsEnd, InlineSizes,
+                         testing::Values(0, 1, 23, 24, 25, 79, 80, 81, 135, 136, 137, 191, 192));
 
 TEST(RingSlots, AreAsManyAsABodyNeeds) {
   EXPECT_EQ(slotsFor(0), 1u);
@@ -153,13 +160,16 @@ TEST_F(RingTest, ALongMessageWithoutItsFirstSequenceIsNotThere) {
   EXPECT_FALSE(consumer_.hasMessage());
 }
 
-// Slots behind the first hold data where others hold envelopes; their data says what the consumer will wait for one lap later.
+// Slots behind the first hold data where others hold envelopes; their data says what the consumer
+// will wait for one lap later.
 TEST_F(RingTest, BodyBytesOfAnEarlierLapAreNeverTakenForAMessage) {
   constexpr std::uint32_t kSlots = 3;
   Bytes body(layout::kFirstSlotBodyBytes + (kSlots - 1) * sizeof(layout::MoreSlot::body));
   for (std::uint64_t position = 0; position < 16 * kCapacity; position += kSlots) {
     for (std::uint64_t at = 0; at + 8 <= body.size(); at += 8) {
-      const auto slot = at < layout::kFirstSlotBodyBytes ? 0 : 1 + (at - layout::kFirstSlotBodyBytes) / sizeof(layout::MoreSlot::body);
+      const auto slot = at < layout::kFirstSlotBodyBytes ? 0
+                                                         : 1 + (at - layout::kFirstSlotBodyBytes) /
+                                                                   sizeof(layout::MoreSlot::body);
       const std::uint64_t awaited = position + slot + kCapacity + 1;
       std::memcpy(body.data() + at, &awaited, sizeof awaited);
     }
@@ -194,7 +204,9 @@ TEST_F(RingTest, BehavesAsAQueueWhateverTheOrderOfPushesAndTakes) {
 TEST_F(RingTest, ManyMessagesCrossFromThreadToThreadWhole) {
   constexpr std::uint64_t kMessages = 100'000;
   const Watchdog watchdog("a ring between two threads");
-  const auto sizeOf = [](std::uint64_t ordinal) { return ordinal % 11 == 0 ? ordinal % (layout::kInlineBodyBytes + 1) : ordinal % 25; };
+  const auto sizeOf = [](std::uint64_t ordinal) {
+    return ordinal % 11 == 0 ? ordinal % (layout::kInlineBodyBytes + 1) : ordinal % 25;
+  };
 
   std::thread sender([&] {
     for (std::uint64_t i = 0; i < kMessages; ++i) {
@@ -216,8 +228,10 @@ TEST_F(RingTest, ManyMessagesCrossFromThreadToThreadWhole) {
 TEST(Tick, SpansAMinuteAndIsNeverZero) {
   EXPECT_NE(Tick::of(0), 0u);
   const std::int64_t wrapsSoon = (std::int64_t{1} << 36) - 1000;
-  for (const std::int64_t passed : {std::int64_t{0}, std::int64_t{160}, std::int64_t{5'000}, std::int64_t{60'000'000'000}}) {
-    EXPECT_NEAR(static_cast<double>(Tick::nsSince(Tick::of(wrapsSoon), wrapsSoon + passed)), static_cast<double>(passed), 32);
+  for (const std::int64_t passed :
+       {std::int64_t{0}, std::int64_t{160}, std::int64_t{5'000}, std::int64_t{60'000'000'000}}) {
+    EXPECT_NEAR(static_cast<double>(Tick::nsSince(Tick::of(wrapsSoon), wrapsSoon + passed)),
+                static_cast<double>(passed), 32);
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A ring whose other end writes nonsense: it costs messages of this ring and nothing else.
-#include <mpf/tests/shm/ring_fixture.h>
-#include <mpf/tests/support/random.h>
+#include "tests/shm/ring_fixture.h"
+#include "tests/support/random.h"
 
 namespace mpf::test {
 namespace {
@@ -18,7 +18,8 @@ TEST_P(SlotCounts, ThatCannotBeHoldNoBodyAndEndInOneStep) {
   const auto capacity = consumer_.inlineCapacity();
   consumer_.end();
 
-  EXPECT_EQ(envelope.bodyBytes, UINT32_MAX) << "the envelope says what was written; the reader compares";
+  EXPECT_EQ(envelope.bodyBytes, UINT32_MAX)
+      << "the envelope says what was written; the reader compares";
   EXPECT_EQ(capacity, 0u);
   ASSERT_TRUE(consumer_.hasMessage());
   EXPECT_EQ(take(), pattern(2, 8));
@@ -39,7 +40,8 @@ TEST_F(RingTest, TheSlotCountIsReadOnce) {
 }
 
 TEST_F(RingTest, ASequenceFromThePastOrTheFutureIsNoMessage) {
-  for (const std::uint64_t sequence : {std::uint64_t{0}, std::uint64_t{2}, std::uint64_t{kCapacity + 1}, UINT64_MAX}) {
+  for (const std::uint64_t sequence :
+       {std::uint64_t{0}, std::uint64_t{2}, std::uint64_t{kCapacity + 1}, UINT64_MAX}) {
     ring_[0].sequence.store(sequence, std::memory_order_relaxed);
     EXPECT_FALSE(consumer_.hasMessage()) << sequence;
   }
@@ -77,7 +79,8 @@ TEST_F(RingTest, ACountOfTakenMessagesIsHeldToWhatWasSent) {
   EXPECT_TRUE(producer_.isTaken(2));
 }
 
-// Each step is bounded and stays inside the ring (the fixture looks at the guards), whatever the other side writes where.
+// Each step is bounded and stays inside the ring (the fixture looks at the guards), whatever the
+// other side writes where.
 TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
   Random random;
   Bytes body(layout::kInlineBodyBytes);
@@ -90,7 +93,8 @@ TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
         ringBytes()[random.below(kRingBytes)] = static_cast<std::byte>(random.bits());
         break;
       case 1:  // likely to be believed: the sequences of the next positions
-        ring_[random.below(kCapacity)].sequence.store(taken + random.below(2 * kCapacity), std::memory_order_relaxed);
+        ring_[random.below(kCapacity)].sequence.store(taken + random.below(2 * kCapacity),
+                                                      std::memory_order_relaxed);
         break;
       case 2:
         control_.freed.store(random.nasty(), std::memory_order_relaxed);
@@ -100,7 +104,8 @@ TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
         break;
       case 4: {
         const auto before = producer_.messages();
-        const bool pushed = push(static_cast<std::uint64_t>(step), random.below(layout::kInlineBodyBytes + 1));
+        const bool pushed =
+            push(static_cast<std::uint64_t>(step), random.below(layout::kInlineBodyBytes + 1));
         ASSERT_EQ(producer_.messages(), before + (pushed ? 1 : 0));
         ASSERT_LE(producer_.waiting(), producer_.messages());
         break;
@@ -109,7 +114,8 @@ TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
         if (!consumer_.hasMessage()) break;
         const auto envelope = consumer_.begin();
         ASSERT_LE(consumer_.inlineCapacity(), layout::kInlineBodyBytes);
-        consumer_.copyBody(std::span(body).first(std::min<std::size_t>(envelope.bodyBytes, consumer_.inlineCapacity())));
+        consumer_.copyBody(std::span(body).first(
+            std::min<std::size_t>(envelope.bodyBytes, consumer_.inlineCapacity())));
         consumer_.end();
         ++taken;
     }

@@ -2,7 +2,7 @@
 // Names in /dev/shm: built, taken apart, refused.
 #include <set>
 
-#include <mpf/tests/shm/shm_fixture.h>
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -23,7 +23,8 @@ TEST(SegmentName, OfEachKindIsTakenApartAsItWasBuilt) {
   EXPECT_EQ(link->incarnation, kKey);
   EXPECT_EQ(bulk->kind, NameKind::bulk);
   EXPECT_EQ(bulk->incarnation, kKey) << "a bulk segment is filed under its link";
-  for (const auto kind : {NameKind::clientWindow, NameKind::hints, NameKind::wish, NameKind::fifo}) {
+  for (const auto kind :
+       {NameKind::clientWindow, NameKind::hints, NameKind::pendingBind, NameKind::fifo}) {
     const auto keyed = SegmentName::tryParse(SegmentName::keyed("crate-1", kind, kWindow));
     ASSERT_TRUE(keyed);
     EXPECT_EQ(keyed->kind, kind);
@@ -34,7 +35,8 @@ TEST(SegmentName, OfEachKindIsTakenApartAsItWasBuilt) {
 
 TEST(SegmentName, ReadsAsTheGrammarSays) {
   EXPECT_EQ(SegmentName::serverWindow("default", 0, "serial[0]"), "mpf.default.s.0.serial[0]");
-  EXPECT_EQ(SegmentName::serverWindow("default", -1, "AIM1/1.a b%"), "mpf.default.s.-1.AIM1%2F1%2Ea%20b%25");
+  EXPECT_EQ(SegmentName::serverWindow("default", -1, "AIM1/1.a b%"),
+            "mpf.default.s.-1.AIM1%2F1%2Ea%20b%25");
   EXPECT_EQ(SegmentName::keyed("default", NameKind::hints, 0xab), "mpf.default.h.ab");
   EXPECT_EQ(SegmentName::link("default", 0xab, 0xcd), "mpf.default.l.ab.cd");
   EXPECT_EQ(SegmentName::bulk("default", 0xcd, 1, 10), "mpf.default.b.cd.1.10");
@@ -45,7 +47,8 @@ TEST(SegmentName, ReadsAsTheGrammarSays) {
 
 TEST(SegmentName, DifferentServersHaveDifferentFiles) {
   std::set<std::string> files;
-  const std::vector<std::string> servers{"a.b", "a%2Eb", "a%b", "a/b", "a b", "A.b", "a..b", "\xc3\xa9", "[", "%", "%%", "..", "."};
+  const std::vector<std::string> servers{"a.b",      "a%2Eb", "a%b", "a/b", "a b", "A.b", "a..b",
+                                         "\xc3\xa9", "[",     "%",   "%%",  "..",  "."};
 
   for (const auto& server : servers) {
     const auto file = SegmentName::serverWindow("default", 0, server);
@@ -69,7 +72,8 @@ TEST(SegmentName, TheLongestOnesFitAFileName) {
 }
 
 TEST(SegmentName, ABackplaneThatCannotBeAFileNameIsRefusedByName) {
-  for (const std::string wrong : {"a.b", "a/b", "../x", "a b", "\xc3\xa9", "a\n", "[0]", "012345678901234567890123456789012345678-"}) {
+  for (const std::string wrong : {"a.b", "a/b", "../x", "a b", "\xc3\xa9", "a\n", "[0]",
+                                  "012345678901234567890123456789012345678-"}) {
     const auto why = whatOf<std::invalid_argument>([&] { SegmentName::checkBackplane(wrong); });
     EXPECT_THAT(why, testing::HasSubstr("\"" + wrong + "\""));
   }
@@ -79,34 +83,48 @@ TEST(SegmentName, ABackplaneThatCannotBeAFileNameIsRefusedByName) {
 
 TEST(SegmentName, AServerThatNobodyCouldTypeIsRefusedByName) {
   for (const std::string wrong : {"a\nb", "\x7f", "\t", "a\x01"}) {
-    EXPECT_THAT(whatOf<std::invalid_argument>([&] { SegmentName::checkServer(wrong); }), testing::HasSubstr("\"" + wrong + "\""));
+    EXPECT_THAT(whatOf<std::invalid_argument>([&] { SegmentName::checkServer(wrong); }),
+                testing::HasSubstr("\"" + wrong + "\""));
   }
   EXPECT_THROW(SegmentName::checkServer(""), std::invalid_argument);
-  EXPECT_THROW(SegmentName::checkServer(std::string(layout::kNameChars, 'x')), std::invalid_argument);
+  EXPECT_THROW(SegmentName::checkServer(std::string(layout::kNameChars, 'x')),
+               std::invalid_argument);
   EXPECT_NO_THROW(SegmentName::checkServer(std::string(layout::kNameChars - 1, 'x')));
   EXPECT_NO_THROW(SegmentName::checkServer("AIM1/1 \xc3\xa9.[0]"));
 }
 
 class ForeignNames : public testing::TestWithParam<const char*> {};
 
-TEST_P(ForeignNames, AreNotTakenForOurs) { EXPECT_FALSE(SegmentName::tryParse(GetParam())) << GetParam(); }
+TEST_P(ForeignNames, AreNotTakenForOurs) {
+  EXPECT_FALSE(SegmentName::tryParse(GetParam())) << GetParam();
+}
 INSTANTIATE_TEST_SUITE_P(OfOtherPrograms, ForeignNames,
-                         testing::Values("", ".", "mpf", "mpf.", "mpf.default", "mpf.default.c", "mpf.default.c.", "sem.mpf.default.c.1",
-                                         "xmpf.default.c.1", "mpf.default.x.1", "mpf.default.cc.1", "mpf.default..1", "MPF.default.c.1"));
+                         testing::Values("", ".", "mpf", "mpf.", "mpf.default", "mpf.default.c",
+                                         "mpf.default.c.", "sem.mpf.default.c.1",
+                                         "xmpf.default.c.1", "mpf.default.x.1", "mpf.default.cc.1",
+                                         "mpf.default..1", "MPF.default.c.1"));
 INSTANTIATE_TEST_SUITE_P(WithAWrongBackplane, ForeignNames,
-                         testing::Values("mpf..c.1", "mpf.a b.c.1", "mpf.a/b.c.1", "mpf.012345678901234567890123456789012345678-.c.1"));
+                         testing::Values("mpf..c.1", "mpf.a b.c.1", "mpf.a/b.c.1",
+                                         "mpf.012345678901234567890123456789012345678-.c.1"));
 INSTANTIATE_TEST_SUITE_P(WithAWrongKey, ForeignNames,
-                         testing::Values("mpf.default.c.g", "mpf.default.c.-1", "mpf.default.c.+1", "mpf.default.c.0x1", "mpf.default.c. 1",
-                                         "mpf.default.c.1 ", "mpf.default.c.10000000000000000", "mpf.default.c.1.2", "mpf.default.h.",
-                                         "mpf.default.f.1.2", "mpf.default.w.1."));
+                         testing::Values("mpf.default.c.g", "mpf.default.c.-1", "mpf.default.c.+1",
+                                         "mpf.default.c.0x1", "mpf.default.c. 1",
+                                         "mpf.default.c.1 ", "mpf.default.c.10000000000000000",
+                                         "mpf.default.c.1.2", "mpf.default.h.", "mpf.default.f.1.2",
+                                         "mpf.default.w.1."));
 INSTANTIATE_TEST_SUITE_P(WithAWrongShape, ForeignNames,
-                         testing::Values("mpf.default.l.1", "mpf.default.l.1.", "mpf.default.l..1", "mpf.default.l.1.2.3",
-                                         "mpf.default.l.x.1", "mpf.default.b.1", "mpf.default.b.1.0", "mpf.default.b.1.0.0.0",
-                                         "mpf.default.b.1.2.0", "mpf.default.b.1.0.x", "mpf.default.b.1.0.", "mpf.default.b.x.0.0"));
+                         testing::Values("mpf.default.l.1", "mpf.default.l.1.", "mpf.default.l..1",
+                                         "mpf.default.l.1.2.3", "mpf.default.l.x.1",
+                                         "mpf.default.b.1", "mpf.default.b.1.0",
+                                         "mpf.default.b.1.0.0.0", "mpf.default.b.1.2.0",
+                                         "mpf.default.b.1.0.x", "mpf.default.b.1.0.",
+                                         "mpf.default.b.x.0.0"));
 INSTANTIATE_TEST_SUITE_P(WithAWrongServer, ForeignNames,
-                         testing::Values("mpf.default.s.0", "mpf.default.s.0.", "mpf.default.s..a", "mpf.default.s.x.a",
-                                         "mpf.default.s.0.a.b", "mpf.default.s.2147483648.a", "mpf.default.s.0.a b", "mpf.default.s.0.%",
-                                         "mpf.default.s.0.%2", "mpf.default.s.0.%2g", "mpf.default.s.0.%2f"));
+                         testing::Values("mpf.default.s.0", "mpf.default.s.0.", "mpf.default.s..a",
+                                         "mpf.default.s.x.a", "mpf.default.s.0.a.b",
+                                         "mpf.default.s.2147483648.a", "mpf.default.s.0.a b",
+                                         "mpf.default.s.0.%", "mpf.default.s.0.%2",
+                                         "mpf.default.s.0.%2g", "mpf.default.s.0.%2f"));
 
 }  // namespace
 }  // namespace mpf::test

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Files under a segment's name that are not what they should be: each is refused with a text that names it and says why.
+// Files under a segment's name that are not what they should be: each is refused with a text that
+// names it and says why.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/shm_fixture.h>
-#include <mpf/tests/support/random.h>
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
+#include "tests/support/random.h"
 
 namespace mpf::test {
 namespace {
@@ -25,13 +26,14 @@ class SegmentRefusal : public ShmTest {
     ShmTest::TearDown();
   }
   // Why the segment cannot be opened; empty when it can.
-  [[nodiscard]] std::string refusal(SegmentKind kind = SegmentKind::wish) const {
-    return whatOf<SegmentError>([&] { static_cast<void>(Segment::tryOpen(file_, kind, Access::readOnly)); });
+  [[nodiscard]] std::string refusal(SegmentKind kind = SegmentKind::pendingBind) const {
+    return whatOf<SegmentError>(
+        [&] { static_cast<void>(Segment::tryOpen(file_, kind, Access::readOnly)); });
   }
   [[nodiscard]] SegmentHeader& header() const { return segment_.sharedHeader(); }
 
   static constexpr uid_t kNobody = 65534;
-  std::string file_ = SegmentName::keyed(name(), NameKind::wish, 1);
+  std::string file_ = SegmentName::keyed(name(), NameKind::pendingBind, 1);
   std::string path_ = segments::path(file_);
   Segment segment_ = createPage();
 };
@@ -65,7 +67,8 @@ TEST_F(SegmentRefusal, DoesNotMeetANewerMinorVersion) {
 }
 
 TEST_F(SegmentRefusal, NamesBothKinds) {
-  EXPECT_THAT(refusal(SegmentKind::link), AllOf(HasSubstr(path_), HasSubstr("of kind 6, expected kind 4")));
+  EXPECT_THAT(refusal(SegmentKind::link),
+              AllOf(HasSubstr(path_), HasSubstr("of kind 6, expected kind 4")));
 }
 
 TEST_F(SegmentRefusal, NamesBothLengthsOfATruncatedFile) {
@@ -97,8 +100,11 @@ TEST_F(SegmentRefusal, DoesNotFollowASymbolicLink) {
   ASSERT_EQ(::unlink(path_.c_str()), 0);
   ASSERT_EQ(::symlink("/etc/hostname", path_.c_str()), 0);
 
-  EXPECT_THAT(whatOf<std::system_error>([&] { static_cast<void>(Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly)); }),
-              HasSubstr("open " + path_));
+  EXPECT_THAT(
+      whatOf<std::system_error>([&] {
+        static_cast<void>(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
+      }),
+      HasSubstr("open " + path_));
   EXPECT_FALSE(segments::removeIfOwnerless(file_));
 }
 
@@ -125,9 +131,12 @@ TEST_F(SegmentRefusal, NamesTheFileThatMayNotBeOpened) {
   Child stranger([&](Child::Self& self) {
     if (::getuid() == 0) checkCall(::setuid(kNobody), "setuid");
     self.ready();
-    const auto why = whatOf<std::system_error>([&] { static_cast<void>(Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly)); });
+    const auto why = whatOf<std::system_error>([&] {
+      static_cast<void>(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
+    });
     // What we may not look at is not ours to declare dead.
-    const bool isLeftAlone = segments::probeOwner(file_) == segments::Owner::alive && !segments::removeIfOwnerless(file_);
+    const bool isLeftAlone = segments::probeOwner(file_) == segments::Owner::alive &&
+                             !segments::removeIfOwnerless(file_);
     ::_exit(why.starts_with("open " + path_) && isLeftAlone ? 0 : 1);
   });
 
@@ -143,7 +152,8 @@ TEST_F(SegmentRefusal, MeetsAnyOtherHeaderOrItIsUsable) {
   for (int i = 0; i < 20'000; ++i) {
     header() = good;
     auto* bytes = reinterpret_cast<std::byte*>(&header());
-    for (auto changes = 1 + random.below(3); changes != 0; --changes) bytes[random.below(40)] = static_cast<std::byte>(random.bits());
+    for (auto changes = 1 + random.below(3); changes != 0; --changes)
+      bytes[random.below(40)] = static_cast<std::byte>(random.bits());
     const auto why = refusal();
     if (why.empty()) {
       ASSERT_EQ(header().magic, good.magic);

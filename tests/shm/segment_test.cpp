@@ -9,9 +9,10 @@
 #include <set>
 #include <thread>
 
-#include <mpf/base/clock.h>
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include <mpf/clock.h>
+
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -30,7 +31,7 @@ class SegmentTest : public ShmTest {
     EXPECT_EQ(::stat(segments::path(file_).c_str(), &found), 0);
     return found;
   }
-  std::string file_ = SegmentName::keyed(name(), NameKind::wish, 1);
+  std::string file_ = SegmentName::keyed(name(), NameKind::pendingBind, 1);
 };
 
 TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
@@ -39,7 +40,9 @@ TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
   const auto segment = createPage(SegmentKind::bulk);
 
   const auto& header = segment.header();
-  EXPECT_EQ(std::memcmp(&header.magic, std::endian::native == std::endian::little ? "MPF-WIN1" : "1NIW-FPM", 8), 0);
+  EXPECT_EQ(std::memcmp(&header.magic,
+                        std::endian::native == std::endian::little ? "MPF-WIN1" : "1NIW-FPM", 8),
+            0);
   EXPECT_EQ(header.layoutMajor, layout::kMajor);
   EXPECT_EQ(header.layoutMinor, layout::kMinor);
   EXPECT_EQ(header.kind, SegmentKind::bulk);
@@ -54,7 +57,8 @@ TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
   EXPECT_EQ(header.backplane.data(), name());
   EXPECT_STREQ(header.program.data(), "shm_test");
   EXPECT_EQ(segment.bytes(), layout::kPageBytes);
-  EXPECT_TRUE(std::all_of(segment.data() + sizeof(layout::SegmentHeader), segment.data() + segment.bytes(),
+  EXPECT_TRUE(std::all_of(segment.data() + sizeof(layout::SegmentHeader),
+                          segment.data() + segment.bytes(),
                           [](std::byte byte) { return byte == std::byte{0}; }));
 }
 
@@ -66,7 +70,8 @@ TEST_F(SegmentTest, IsSeenUnderItsNameOnlyWhenItIsPublished) {
   ASSERT_TRUE(segment.tryPublish(file_));
 
   EXPECT_THAT(backplane_.segmentNames(), testing::ElementsAre(file_));
-  EXPECT_EQ(Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly)->header().location, 7);
+  EXPECT_EQ(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly)->header().location,
+            7);
 }
 
 TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItIsSeen) {
@@ -82,13 +87,14 @@ TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItIsSeen) {
   });
 
   while (seen < 500) {
-    const auto segment = Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly);
+    const auto segment = Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly);
     if (!segment) continue;
     ++seen;
     EXPECT_EQ(segment->header().location, 7);
     EXPECT_EQ(segment->bytes(), layout::kPageBytes);
     // Its maker takes the name away before it lets go of the lock.
-    EXPECT_TRUE(segment->hasOwner() || segments::probeOwner(file_, segment->header().incarnation) == segments::Owner::absent);
+    EXPECT_TRUE(segment->hasOwner() || segments::probeOwner(file_, segment->header().incarnation) ==
+                                           segments::Owner::absent);
   }
   maker.join();
 }
@@ -112,7 +118,9 @@ TEST_F(SegmentTest, TheSecondOfANameIsNotPublishedAndTheFirstStays) {
 
   EXPECT_FALSE(second.tryPublish(file_));
 
-  EXPECT_EQ(Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly)->header().incarnation, first.header().incarnation);
+  EXPECT_EQ(
+      Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly)->header().incarnation,
+      first.header().incarnation);
 }
 
 TEST_F(SegmentTest, OneOfManyCreatorsWins) {
@@ -135,7 +143,7 @@ TEST_F(SegmentTest, OneOfManyCreatorsWins) {
 TEST_F(SegmentTest, WhatOneWritesAnotherReads) {
   auto segment = createPage();
   ASSERT_TRUE(segment.tryPublish(file_));
-  auto opened = Segment::tryOpen(file_, SegmentKind::wish, Access::readWrite);
+  auto opened = Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readWrite);
   ASSERT_TRUE(opened);
   opened->closeFile();
 
@@ -145,7 +153,7 @@ TEST_F(SegmentTest, WhatOneWritesAnotherReads) {
 }
 
 TEST_F(SegmentTest, ThereIsNoneUnderAnUnusedName) {
-  EXPECT_FALSE(Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly));
+  EXPECT_FALSE(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
   EXPECT_FALSE(segments::remove(file_));
   EXPECT_FALSE(segments::removeIfOwnerless(file_));
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::absent);
@@ -155,7 +163,7 @@ TEST_F(SegmentTest, HasAnOwnerWhileItIsLockedAndNotAfterwards) {
   auto segment = createPage();
   segment.lockForLife();
   ASSERT_TRUE(segment.tryPublish(file_));
-  const auto peers = Segment::tryOpen(file_, SegmentKind::wish, Access::readOnly);
+  const auto peers = Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly);
   EXPECT_TRUE(peers->hasOwner());
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::alive);
 
@@ -165,7 +173,8 @@ TEST_F(SegmentTest, HasAnOwnerWhileItIsLockedAndNotAfterwards) {
   EXPECT_FALSE(peers->hasOwner());
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::dead);
   EXPECT_EQ(segments::probeOwner(file_, incarnation), segments::Owner::dead);
-  EXPECT_EQ(segments::probeOwner(file_, incarnation + 1), segments::Owner::absent) << "another one's name now";
+  EXPECT_EQ(segments::probeOwner(file_, incarnation + 1), segments::Owner::absent)
+      << "another one's name now";
 }
 
 TEST_F(SegmentTest, TheLockGoesWithTheProcessThatIsKilled) {
@@ -186,7 +195,8 @@ TEST_F(SegmentTest, TheLockGoesWithTheProcessThatIsKilled) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-// Reapers and successors at the same name: whoever holds the lock of a published segment finds it under its name until it lets go.
+// Reapers and successors at the same name: whoever holds the lock of a published segment finds it
+// under its name until it lets go.
 TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
   std::atomic<bool> end{false};
   std::vector<std::thread> reapers;
@@ -199,7 +209,8 @@ TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
   for (int round = 0; round < 2000; ++round) {
     auto segment = createPage();
     segment.lockForLife();
-    while (!segment.tryPublish(file_)) std::this_thread::yield();  // until the last round's is reaped
+    // until the last round's is reaped
+    while (!segment.tryPublish(file_)) std::this_thread::yield();
     ASSERT_EQ(segments::probeOwner(file_, segment.header().incarnation), segments::Owner::alive);
     ASSERT_FALSE(segments::removeIfOwnerless(file_));
   }
@@ -216,7 +227,7 @@ TEST_F(SegmentTest, IsItsCreatorsAloneUnlessRightsSayOtherwise) {
   const auto group = ::getuid() == 0 ? 12345 : ::getgid();
   const auto umaskBefore = ::umask(0777);
 
-  auto shared = createPage(SegmentKind::wish, {.mode = 0640, .group = group});
+  auto shared = createPage(SegmentKind::pendingBind, {.mode = 0640, .group = group});
   ::umask(umaskBefore);
 
   ASSERT_TRUE(shared.tryPublish(file_));
@@ -226,7 +237,8 @@ TEST_F(SegmentTest, IsItsCreatorsAloneUnlessRightsSayOtherwise) {
 
 TEST_F(SegmentTest, MoreMemoryThanThereIsIsAnErrorAtCreation) {
   for (const auto bytes : {std::size_t{1} << 50, std::size_t{1} << 62, SIZE_MAX}) {
-    const auto why = whatOf<std::system_error>([&] { static_cast<void>(Segment::create(bytes, SegmentKind::bulk, name(), {})); });
+    const auto why = whatOf<std::system_error>(
+        [&] { static_cast<void>(Segment::create(bytes, SegmentKind::bulk, name(), {})); });
     EXPECT_THAT(why, testing::HasSubstr("reserve " + std::to_string(bytes) + " bytes in /dev/shm"));
   }
 }

@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 #include <string>
 
-#include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
@@ -29,12 +29,17 @@ std::string whatOf(Act act) {
 
 class ShmTest : public testing::Test {
  protected:
-  void TearDown() override { EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()) << "left behind"; }
+  void TearDown() override {
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()) << "left behind";
+  }
 
   [[nodiscard]] const std::string& name() const { return backplane_.name(); }
-  [[nodiscard]] std::string serverName(const std::string& server = "server") const { return SegmentName::serverWindow(name(), 0, server); }
+  [[nodiscard]] std::string serverName(const std::string& server = "server") const {
+    return SegmentName::serverWindow(name(), 0, server);
+  }
   // A segment of one page, not named yet.
-  [[nodiscard]] Segment createPage(layout::SegmentKind kind = layout::SegmentKind::wish, Rights rights = {}) const {
+  [[nodiscard]] Segment createPage(layout::SegmentKind kind = layout::SegmentKind::pendingBind,
+                                   Rights rights = {}) const {
     return Segment::create(layout::kPageBytes, kind, name(), rights);
   }
 

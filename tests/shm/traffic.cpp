@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT
-// What second_reader_test.py looks at: a server and a client with known traffic on a backplane of their own.
+// What second_reader_test.py looks at: a server and a client with known traffic on a backplane of
+// their own.
 //
 //   traffic layout            prints where the code has every field
-//   traffic run               prints what there is to see; one more time for each line "serve" on stdin; ends when stdin does
-//   traffic clean BACKPLANE   removes what the dead left
+//   traffic run               prints what there is to see; one more time for each line "serve" on
+//   stdin; ends when stdin does traffic clean BACKPLANE   removes what the dead left
 #include <iostream>
 #include <string>
 
-#include <mpf/client/message_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/histogram.h>
-#include <mpf/tests/shm/layout_fields.h>
+#include <mpf/message_client.h>
+#include <mpf/message_server.h>
+
+#include "shm/histogram.h"
+#include "tests/shm/layout_fields.h"
 
 namespace mpf::test {
 namespace {
@@ -90,7 +92,9 @@ class Traffic {
   }
 
   Backplane backplane_ = Backplane::isolated();
-  MessageServer server_{backplane_, "AIM1/1 [0].x", {.location = 7, .queueSize = kQueueSize, .waitMode = WaitMode::block}};
+  MessageServer server_{backplane_,
+                        "AIM1/1 [0].x",
+                        {.location = 7, .queueSize = kQueueSize, .waitMode = WaitMode::block}};
   std::string text_ = [] {
     std::string text;
     for (int i = 0; i < 500; ++i) text += "line " + std::to_string(i) + '\n';
@@ -101,7 +105,9 @@ class Traffic {
   int served_ = 0;
   int refused_ = 0;
   json requests_ = json::array();
-  MessageClient client_{dispatcher_, [this](const Message& message) { replies_ += message.getType() == MessageType::int32 ? 1 : 0; }};
+  MessageClient client_{dispatcher_, [this](const Message& message) {
+                          replies_ += message.getType() == MessageType::int32 ? 1 : 0;
+                        }};
   MessageClient waiting_{dispatcher_, [](const Message&) {}};
 };
 
@@ -117,8 +123,13 @@ int run() {
 
 int printLayout() {
   json ends = json::array();
-  for (std::uint32_t i = 0; i < layout::kHistogramBuckets; ++i) ends.push_back(HistogramBuckets::endNs(i));
-  std::cout << json{{"structs", layoutFields()}, {"constants", layoutConstants()}, {"kinds", layoutKinds()}, {"bucketEnds", ends}} << '\n';
+  for (std::uint32_t i = 0; i < layout::kHistogramBuckets; ++i)
+    ends.push_back(HistogramBuckets::endNs(i));
+  std::cout << json{{"structs", layoutFields()},
+                    {"constants", layoutConstants()},
+                    {"kinds", layoutKinds()},
+                    {"bucketEnds", ends}}
+            << '\n';
   return 0;
 }
 
@@ -130,7 +141,8 @@ int main(int argc, char** argv) {
   if (what == "layout") return mpf::test::printLayout();
   if (what == "run") return mpf::test::run();
   if (what == "clean" && argc > 2) {
-    for (const auto& removed : mpf::Backplane::attach(argv[2]).removeDead()) std::cout << removed << '\n';
+    for (const auto& removed : mpf::Backplane::attach(argv[2]).removeDead())
+      std::cout << removed << '\n';
     return 0;
   }
   std::cerr << "usage: traffic layout | run | clean BACKPLANE\n";

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // News of deaths and births of peers.
-#include <mpf/shm/watcher.h>
+#include "shm/watcher.h"
 
 #include <atomic>
 #include <memory>
 #include <semaphore>
 #include <vector>
 
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -36,7 +36,8 @@ class WatcherTest : public ShmTest {
  protected:
   using Describe = std::function<void(layout::SegmentHeader&)>;
 
-  std::unique_ptr<Child> startServer(const std::string& server, const Describe& describe = [](layout::SegmentHeader&) {}) const {
+  std::unique_ptr<Child> startServer(
+      const std::string& server, const Describe& describe = [](layout::SegmentHeader&) {}) const {
     return std::make_unique<Child>([&](Child::Self& self) {
       const OwnWindow window(name(), SegmentKind::serverWindow, serverName(server), {}, describe);
       self.ready();
@@ -118,7 +119,8 @@ TEST_F(WatcherTest, ManyDeathsAtOnceAreReportedOnceEach) {
   std::vector<std::unique_ptr<Child>> servers;
   std::vector<News> news(kServers);
   for (int i = 0; i < kServers; ++i) servers.push_back(startServer(std::to_string(i)));
-  for (int i = 0; i < kServers; ++i) watcher_.watchPeer(open(std::to_string(i)), news[static_cast<std::size_t>(i)].callback());
+  for (int i = 0; i < kServers; ++i)
+    watcher_.watchPeer(open(std::to_string(i)), news[static_cast<std::size_t>(i)].callback());
 
   for (const auto& server : servers) ::kill(server->pid(), SIGKILL);
 
@@ -147,7 +149,8 @@ TEST_F(WatcherTest, NoCallbackRunsAfterItWasForgotten) {
   for (int round = 0; round < 50; ++round) {
     const auto server = startServer("server" + std::to_string(round));
     auto alive = std::make_unique<std::atomic<int>>(0);
-    const auto token = watcher_.watchPeer(open("server" + std::to_string(round)), [&counter = *alive] { counter.fetch_add(1); });
+    const auto token = watcher_.watchPeer(open("server" + std::to_string(round)),
+                                          [&counter = *alive] { counter.fetch_add(1); });
 
     ::kill(server->pid(), SIGKILL);
     watcher_.forget(token);
@@ -197,7 +200,8 @@ TEST_F(WatcherTest, AStoppedProcessIsNotDead) {
   news.wait();
 }
 
-class HiddenOwners : public WatcherTest, public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
+class HiddenOwners : public WatcherTest,
+                     public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
 // Where the header names no process that can be looked for, the lock alone tells.
 TEST_P(HiddenOwners, AreWatchedByTheirLocks) {
@@ -213,16 +217,18 @@ TEST_P(HiddenOwners, AreWatchedByTheirLocks) {
   news.wait();
   EXPECT_TRUE(peer->isDead());
 }
-INSTANTIATE_TEST_SUITE_P(Hidden, HiddenOwners,
-                         testing::Values([](layout::SegmentHeader& header) { ++header.pidNamespace; },
-                                         [](layout::SegmentHeader& header) { header.ownerStartTicks = 0; },
-                                         [](layout::SegmentHeader& header) { header.ownerPid = 0; },
-                                         [](layout::SegmentHeader& header) { header.ownerPid = INT32_MIN; }));
+INSTANTIATE_TEST_SUITE_P(
+    Hidden, HiddenOwners,
+    testing::Values([](layout::SegmentHeader& header) { ++header.pidNamespace; },
+                    [](layout::SegmentHeader& header) { header.ownerStartTicks = 0; },
+                    [](layout::SegmentHeader& header) { header.ownerPid = 0; },
+                    [](layout::SegmentHeader& header) { header.ownerPid = INT32_MIN; }));
 
 // A process that the owner forked has none of its locks.
 TEST_F(WatcherTest, AnOwnersForkDoesNotKeepItAlive) {
   const auto server = std::make_unique<Child>([&](Child::Self& self) {
-    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {}, [](layout::SegmentHeader&) {});
+    const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
+                           [](layout::SegmentHeader&) {});
     if (::fork() == 0) {
       ::prctl(PR_SET_PDEATHSIG, 0);
       self.ready();  // the heir lives until it is told to go on

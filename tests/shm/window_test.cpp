@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a process exposes on the backplane, and what its peers see of it.
-#include <mpf/shm/window.h>
+#include "shm/window.h"
 
 #include <sys/stat.h>
 
@@ -9,8 +9,8 @@
 #include <memory>
 #include <thread>
 
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/shm/shm_fixture.h>
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -23,12 +23,16 @@ using testing::UnorderedElementsAre;
 class WindowTest : public ShmTest {
  protected:
   std::unique_ptr<OwnWindow> makeServer(Rights rights = {}) const {
-    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), rights, [](layout::SegmentHeader&) {});
+    return std::make_unique<OwnWindow>(name(), SegmentKind::serverWindow, serverName(), rights,
+                                       [](layout::SegmentHeader&) {});
   }
   std::unique_ptr<OwnWindow> makeClient() const {
-    return std::make_unique<OwnWindow>(name(), SegmentKind::clientWindow, "", Rights{}, [](layout::SegmentHeader&) {});
+    return std::make_unique<OwnWindow>(name(), SegmentKind::clientWindow, "", Rights{},
+                                       [](layout::SegmentHeader&) {});
   }
-  std::shared_ptr<PeerWindow> openServer() const { return PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow); }
+  std::shared_ptr<PeerWindow> openServer() const {
+    return PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
+  }
   [[nodiscard]] static mode_t modeOf(const std::string& file) {
     struct stat status{};
     EXPECT_EQ(::stat(segments::path(file).c_str(), &status), 0) << file;
@@ -42,11 +46,12 @@ TEST_F(WindowTest, StandsBesideItsHintsAndItsPipeAndGoesWithThem) {
 
   const auto key = server->header().incarnation;
   const auto clientKey = client->header().incarnation;
-  EXPECT_THAT(
-      backplane_.segmentNames(),
-      UnorderedElementsAre(serverName(), SegmentName::keyed(name(), NameKind::hints, key), SegmentName::keyed(name(), NameKind::fifo, key),
-                           SegmentName::keyed(name(), NameKind::clientWindow, clientKey),
-                           SegmentName::keyed(name(), NameKind::hints, clientKey), SegmentName::keyed(name(), NameKind::fifo, clientKey)));
+  EXPECT_THAT(backplane_.segmentNames(),
+              UnorderedElementsAre(serverName(), SegmentName::keyed(name(), NameKind::hints, key),
+                                   SegmentName::keyed(name(), NameKind::fifo, key),
+                                   SegmentName::keyed(name(), NameKind::clientWindow, clientKey),
+                                   SegmentName::keyed(name(), NameKind::hints, clientKey),
+                                   SegmentName::keyed(name(), NameKind::fifo, clientKey)));
   server.reset();
   EXPECT_EQ(backplane_.segmentNames().size(), 3u);
 }
@@ -54,10 +59,11 @@ TEST_F(WindowTest, StandsBesideItsHintsAndItsPipeAndGoesWithThem) {
 TEST_F(WindowTest, IsDescribedBeforeAnybodySeesIt) {
   std::vector<std::string> seen{"not called"};
 
-  OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {}, [&](layout::SegmentHeader& header) {
-    seen = backplane_.segmentNames();
-    header.location = 5;
-  });
+  OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
+                   [&](layout::SegmentHeader& header) {
+                     seen = backplane_.segmentNames();
+                     header.location = 5;
+                   });
 
   EXPECT_THAT(seen, testing::IsEmpty());
   EXPECT_EQ(openServer()->header().location, 5);
@@ -84,7 +90,8 @@ TEST_F(WindowTest, ANameInUseIsRefusedWithItsOwnersNameAndPid) {
 
   const auto why = whatOf<NameInUse>([&] { static_cast<void>(makeServer()); });
 
-  EXPECT_THAT(why, AllOf(HasSubstr(segments::path(serverName())), HasSubstr("shm_test"), HasSubstr(std::to_string(::getpid()))));
+  EXPECT_THAT(why, AllOf(HasSubstr(segments::path(serverName())), HasSubstr("shm_test"),
+                         HasSubstr(std::to_string(::getpid()))));
   EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "nothing is left of the second";
   EXPECT_TRUE(openServer()->hasOwner());
 }
@@ -111,7 +118,8 @@ TEST_F(WindowTest, WhoeverRemovesADeadOneIsNotTakenForItsOwner) {
     self.stay();
   });
   child.end(SIGKILL);
-  FileDescriptor reaper(checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
+  FileDescriptor reaper(
+      checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
   struct flock64 lock{};
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
@@ -122,7 +130,8 @@ TEST_F(WindowTest, WhoeverRemovesADeadOneIsNotTakenForItsOwner) {
   EXPECT_FALSE(openServer()->hasOwner());
   EXPECT_EQ(segments::probeOwner(serverName()), segments::Owner::dead);
   EXPECT_FALSE(segments::removeIfOwnerless(serverName()));
-  EXPECT_THAT(whatOf<SegmentError>([&] { makeServer(); }), testing::HasSubstr("left by a dead process of user"));
+  EXPECT_THAT(whatOf<SegmentError>([&] { makeServer(); }),
+              testing::HasSubstr("left by a dead process of user"));
 
   reaper.reset();
   EXPECT_TRUE(makeServer());
@@ -136,7 +145,8 @@ TEST_F(WindowTest, ASuccessorWaitsForAProcessThatIsSlowToRemoveADeadOne) {
     self.stay();
   });
   child.end(SIGKILL);
-  FileDescriptor reaper(checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
+  FileDescriptor reaper(
+      checkCall(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC), "open"));
   struct flock64 lock{};
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
@@ -193,10 +203,11 @@ TEST_F(WindowTest, OneThatCannotBeCompletedLeavesNothing) {
   std::string pipe;
 
   const auto why = whatOf<std::system_error>([&] {
-    OwnWindow(name(), SegmentKind::serverWindow, serverName(), {}, [&](layout::SegmentHeader& header) {
-      pipe = segments::path(SegmentName::keyed(name(), NameKind::fifo, header.incarnation));
-      std::ofstream{pipe};
-    });
+    OwnWindow(
+        name(), SegmentKind::serverWindow, serverName(), {}, [&](layout::SegmentHeader& header) {
+          pipe = segments::path(SegmentName::keyed(name(), NameKind::fifo, header.incarnation));
+          std::ofstream{pipe};
+        });
   });
 
   EXPECT_THAT(why, HasSubstr(pipe));
@@ -229,10 +240,13 @@ TEST_F(WindowTest, ThereIsNoneWithoutItsNameOrItsHints) {
 TEST_F(WindowTest, OneThatIsTooShortIsRefusedByName) {
   const auto server = makeServer();
   constexpr auto kBytes = layout::kWindowBytes - 1;
-  Segment::tryOpen(serverName(), SegmentKind::serverWindow, Segment::Access::readWrite)->sharedHeader().totalBytes = kBytes;
+  Segment::tryOpen(serverName(), SegmentKind::serverWindow, Segment::Access::readWrite)
+      ->sharedHeader()
+      .totalBytes = kBytes;
   ASSERT_EQ(::truncate(segments::path(serverName()).c_str(), static_cast<off_t>(kBytes)), 0);
 
-  EXPECT_THAT(whatOf<SegmentError>([&] { openServer(); }), AllOf(HasSubstr(segments::path(serverName())), HasSubstr("truncated")));
+  EXPECT_THAT(whatOf<SegmentError>([&] { openServer(); }),
+              AllOf(HasSubstr(segments::path(serverName())), HasSubstr("truncated")));
 }
 
 TEST_F(WindowTest, ANotedLinkHasItsReadyBitWhateverItsNumber) {
@@ -245,7 +259,8 @@ TEST_F(WindowTest, ANotedLinkHasItsReadyBitWhateverItsNumber) {
   EXPECT_EQ(hints.readyBits[65].load(std::memory_order_relaxed), 8u);
   EXPECT_EQ(hints.readyWords[1].load(std::memory_order_relaxed), 2u);
   peer->notify(UINT32_MAX);
-  EXPECT_EQ(hints.readyBits[layout::kMaxLinks / 64 - 1].load(std::memory_order_relaxed), std::uint64_t{1} << 63);
+  EXPECT_EQ(hints.readyBits[layout::kMaxLinks / 64 - 1].load(std::memory_order_relaxed),
+            std::uint64_t{1} << 63);
 }
 
 TEST_F(WindowTest, AKnockThatOverwritesAnotherAsksForALookByName) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// soak DURATION: a server, a crowd of clients, and clients that flood and are killed, for as long as is wanted ("30s", "10m", "2h"). What each
-// process has is printed over time; at the end it must be what it was after the first quarter. Exit status: 0 flat, 1 grown or a wrong answer.
+// soak DURATION: a server, a crowd of clients, and clients that flood and are killed, for as long
+// as is wanted ("30s", "10m", "2h"). What each process has is printed over time; at the end it must
+// be what it was after the first quarter. Exit status: 0 flat, 1 grown or a wrong answer.
 #include <chrono>
 #include <cstdio>
 #include <fmt/format.h>
@@ -10,9 +11,10 @@
 #include <string>
 #include <vector>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/tests/support/usage.h>
-#include <mpf/tests/support/victim.h>
+#include <mpf/sync_client.h>
+
+#include "tests/support/usage.h"
+#include "tests/support/victim.h"
 
 namespace mpf::test {
 namespace {
@@ -37,7 +39,8 @@ class Soak {
  public:
   explicit Soak(std::chrono::seconds duration) : duration_(duration) {
     static_cast<void>(server_.line());
-    while (!crowd_.line().starts_with("answered ")) continue;  // all are connected: what comes later is growth
+    // all are connected: what comes later is growth
+    while (!crowd_.line().starts_with("answered ")) continue;
     pids_ = {{"server", server_.pid()}, {"crowd", crowd_.pid()}, {"this", ::getpid()}};
   }
 
@@ -48,7 +51,9 @@ class Soak {
       print(sample);
       if (sample == kSamples / 4) before_ = usage_;
     }
-    for (int i = 0; i < 1000; ++i) static_cast<void>(client_->call(Float64Message({.value = 0}), 60s));  // the last death is seen
+    // the last death is seen
+    for (int i = 0; i < 1000; ++i)
+      static_cast<void>(client_->call(Float64Message({.value = 0}), 60s));
     print(kSamples);
     bool flat = true;
     for (const auto& [name, usage] : usage_) {
@@ -56,7 +61,8 @@ class Soak {
       fmt::print("{} has grown\n", name);
       flat = false;
     }
-    fmt::print("{} right answers, {} clients killed: {}\n", answers_, killed_, flat ? "flat" : "NOT flat");
+    fmt::print("{} right answers, {} clients killed: {}\n", answers_, killed_,
+               flat ? "flat" : "NOT flat");
     const bool clean = leavesNothing();
     return flat && clean ? 0 : 1;
   }
@@ -75,7 +81,8 @@ class Soak {
     for (int i = 0; i < 200; ++i) {
       auto answer = client_->call(Float64Message({.value = i + 0.0}), 60s);
       if (!answer) throw std::runtime_error(answer.why());
-      if (answer.message().tryAs<Float64>()->value != i + 1.0) throw std::runtime_error("a wrong answer");
+      if (answer.message().tryAs<Float64>()->value != i + 1.0)
+        throw std::runtime_error("a wrong answer");
       ++answers_;
     }
     flood.end(SIGKILL);
@@ -85,8 +92,9 @@ class Soak {
   void print(int sample) {
     for (const auto& [name, pid] : pids_) {
       const auto usage = usage_[name] = Usage::of(pid);
-      fmt::print("{:>6} s  {:<8} {:>8} kB {:>5} files {:>5} segments\n", (duration_ * sample / kSamples).count(), name, usage.residentKb,
-                 usage.files, usage.segments);
+      fmt::print("{:>6} s  {:<8} {:>8} kB {:>5} files {:>5} segments\n",
+                 (duration_ * sample / kSamples).count(), name, usage.residentKb, usage.files,
+                 usage.segments);
     }
     std::fflush(stdout);
   }

@@ -9,10 +9,11 @@
 #include <cstdint>
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/backplane.h>
-#include <mpf/shm/layout.h>
+#include <mpf/backplane.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "shm/layout.h"
 
 namespace mpf::test {
 
@@ -21,7 +22,8 @@ inline std::uint64_t alarmsOf(const Backplane& backplane, const std::string& ser
   const auto path = "/dev/shm/mpf." + backplane.name() + ".s.0." + server;
   const FileDescriptor window(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
   std::uint64_t alarms = 0;
-  constexpr auto kAt = static_cast<off_t>(layout::kWindowControlOffset + offsetof(layout::WindowControl, alarms));
+  constexpr auto kAt =
+      static_cast<off_t>(layout::kWindowControlOffset + offsetof(layout::WindowControl, alarms));
   checkCall(::pread(window.get(), &alarms, sizeof alarms, kAt), "pread", path);
   return alarms;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Caller: a client, and all that it was told, in order. That each request has one end, before the disconnect, is seen to here.
+// Caller: a client, and all that it was told, in order. That each request has one end, before the
+// disconnect, is seen to here.
 //
 // Threads  one, its dispatcher's.
 #pragma once
@@ -12,14 +13,16 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/client/message_client.h>
-#include <mpf/tests/support/router_pair.h>
+#include <mpf/message_client.h>
+
+#include "tests/support/router_pair.h"
 
 namespace mpf::test {
 
 class Caller {
  public:
-  explicit Caller(Dispatcher& dispatcher, const std::string& server = "echo", std::int32_t location = RouterPair::kLocation)
+  explicit Caller(Dispatcher& dispatcher, const std::string& server = "echo",
+                  std::int32_t location = RouterPair::kLocation)
       : client(dispatcher, [this](Message&& message) { note(std::move(message)); }) {
     client.bind(server, location);
   }
@@ -49,10 +52,12 @@ class Caller {
   void note(Message&& message) {
     if (const auto* connect = message.tryAs<Connect>()) {
       news.push_back(connect->status);
-      EXPECT_TRUE(connect->status != ConnectStatus::connectNo || open.empty()) << "a disconnect before the ends of requests";
+      EXPECT_TRUE(connect->status != ConnectStatus::connectNo || open.empty())
+          << "a disconnect before the ends of requests";
       return;
     }
-    const bool isSound = !MessageClient::endsRequest(message) || open.erase(message.route().requestId) == 1;
+    const bool isSound =
+        !MessageClient::endsRequest(message) || open.erase(message.route().requestId) == 1;
     EXPECT_TRUE(isSound) << "an end of a request that is not open";
     messages.push_back(std::move(message));
   }

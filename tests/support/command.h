@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// runCommand(): what a shell command writes to stdout, and how it ends. For tests that look at a program from outside; one that shall live on
-// beside the test, or be signalled, is a Program.
+// runCommand(): what a shell command writes to stdout, and how it ends. For tests that look at a
+// program from outside; one that shall live on beside the test, or be signalled, is a Program.
 //
 //   EXPECT_THAT(runCommand(program + " --help").output, StartsWith("mpf-x - "));
 //
@@ -11,7 +11,7 @@
 #include <cstdio>
 #include <string>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf::test {
 
@@ -22,11 +22,13 @@ struct EndedCommand {
 
 // Waits for its end.
 [[nodiscard]] inline EndedCommand runCommand(const std::string& command) {
-  std::FILE* const pipe = ::popen(command.c_str(), "r");  // NOLINT(cert-env33-c): a test's own programs
+  std::FILE* const pipe =
+      ::popen(command.c_str(), "r");  // NOLINT(cert-env33-c): a test's own programs
   if (pipe == nullptr) throwSystemError(errno, "popen", command);
   EndedCommand ended;
   std::array<char, 4096> bytes{};
-  while (const auto length = std::fread(bytes.data(), 1, bytes.size(), pipe)) ended.output.append(bytes.data(), length);
+  while (const auto length = std::fread(bytes.data(), 1, bytes.size(), pipe))
+    ended.output.append(bytes.data(), length);
   ended.status = ::pclose(pipe);
   return ended;
 }

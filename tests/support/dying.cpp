@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tests that die, one way each: guard_test.cpp runs them. Each writes what it had, a word and a value to a line.
+// Tests that die, one way each: guard_test.cpp runs them. Each writes what it had, a word and a
+// value to a line.
 #include <signal.h>
 #include <unistd.h>
 
@@ -7,18 +8,19 @@
 #include <iostream>
 #include <string>
 
-#include <mpf/base/system_call.h>
-#include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include "base/system_call.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "shm/window.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
 
-// A segment, a window on another backplane of which the guard does not know, a folder, and a child that does not die with its parent.
+// A segment, a window on another backplane of which the guard does not know, a folder, and a child
+// that does not die with its parent.
 class DyingTest : public testing::Test {
  protected:
   DyingTest() {
@@ -28,8 +30,8 @@ class DyingTest : public testing::Test {
     if (child_ == 0) {
       for (;;) ::pause();
     }
-    std::cout << "other " << otherBackplane() << "\nbackplane " << backplane_.name() << "\nfolder " << folder_.path().string() << "\nchild "
-              << child_ << std::endl;
+    std::cout << "other " << otherBackplane() << "\nbackplane " << backplane_.name() << "\nfolder "
+              << folder_.path().string() << "\nchild " << child_ << std::endl;
   }
 
   static std::string otherBackplane() { return "dying-" + std::to_string(::getpid()); }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every message: one of each type at least, with values that another byte order would change. The same on every host.
+// Every message: one of each type at least, with values that another byte order would change. The
+// same on every host.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +14,10 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/schema/message.capnp.h>
-#include <mpf/schema/message.h>
-#include <mpf/schema/user.h>
+#include <mpf/message.h>
+#include <mpf/user_message.h>
+
+#include "schema/message.capnp.h"
 
 namespace mpf::test {
 
@@ -77,13 +79,16 @@ inline Char8ArrayMessage everyByte() {
 inline std::vector<Message> everyRequest() {
   std::vector<Message> messages;
   messages.reserve(32);
-  for (const auto value : kHardIntegers) messages.emplace_back(MessageOf(withStandardFields(Int32{.value = value})));
-  for (const auto value : kHardDoubles) messages.emplace_back(MessageOf(withStandardFields(Float64{.value = value})));
+  for (const auto value : kHardIntegers)
+    messages.emplace_back(MessageOf(withStandardFields(Int32{.value = value})));
+  for (const auto value : kHardDoubles)
+    messages.emplace_back(MessageOf(withStandardFields(Float64{.value = value})));
   messages.emplace_back(arrayOf<Int32Array>(kHardIntegers));
   messages.emplace_back(arrayOf<Float64Array>(kHardDoubles));
   messages.emplace_back(arrayOf<Float64Array>(std::vector<double>{}));
   messages.emplace_back(everyByte());
-  messages.emplace_back(MessageOf(SerialConfig{.baud = 115200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = '\xff'}));
+  messages.emplace_back(MessageOf(SerialConfig{
+      .baud = 115200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = '\xff'}));
   messages.emplace_back(MessageOf(withStandardFields(OutOfBand{.value = 0x01020304})));
   messages.emplace_back(userStruct());
   std::int32_t mark = 0x01020300;
@@ -97,7 +102,8 @@ inline std::vector<Message> everyRequest() {
 // And what MPF itself tells him.
 inline std::vector<Message> everyMessage() {
   auto messages = everyRequest();
-  messages.emplace_back(MessageOf(Connect{.status = ConnectStatus::connectQueueFull, .incarnation = 0x0102'0304'0506'0708}));
+  messages.emplace_back(MessageOf(
+      Connect{.status = ConnectStatus::connectQueueFull, .incarnation = 0x0102'0304'0506'0708}));
   messages.emplace_back(MessageOf(RequestFate{.fate = Fate::expired, .requestId = 0x01020304}));
   return messages;
 }
@@ -105,7 +111,8 @@ inline std::vector<Message> everyMessage() {
 // The same type, marks and bytes.
 inline bool isSame(const Message& one, const Message& other) {
   return one.getType() == other.getType() && one.getClientType() == other.getClientType() &&
-         one.getClientExtra() == other.getClientExtra() && std::ranges::equal(one.body(), other.body());
+         one.getClientExtra() == other.getClientExtra() &&
+         std::ranges::equal(one.body(), other.body());
 }
 
 }  // namespace mpf::test

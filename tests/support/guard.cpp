@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/support/guard.h>
+#include "tests/support/guard.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -24,11 +24,12 @@
 #include <string>
 #include <string_view>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/backplane.h>
-#include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
+#include <mpf/backplane.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
 
 namespace mpf::test {
 namespace {
@@ -44,12 +45,14 @@ Registry* registry = nullptr;         // null in a process without a guard
 std::atomic<pid_t> testProcess = 0;  // for the handler of signals
 
 Registry* makeRegistry() {
-  auto* const memory = ::mmap(nullptr, sizeof(Registry), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  auto* const memory =
+      ::mmap(nullptr, sizeof(Registry), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throwSystemError(errno, "mmap", "the registry of the guard");
   return new (memory) Registry;
 }
 
-// A test that only lists its cases needs no guard, and a debugger wants to see the tests themselves.
+// A test that only lists its cases needs no guard, and a debugger wants to see the tests
+// themselves.
 bool isGuardNeeded(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     if (std::string_view(argv[i]).starts_with("--gtest_list_tests")) return false;
@@ -74,20 +77,24 @@ void forwardSignals() {
 
 using Pids = std::set<pid_t>;
 
-// Returns the status of the tests. Reaps their orphans meanwhile: they are children of the guard. Adds all of them to `dead`.
+// Returns the status of the tests. Reaps their orphans meanwhile: they are children of the guard.
+// Adds all of them to `dead`.
 int waitForTests(pid_t tests, Pids& dead) {
   for (int status = 0;;) {
-    const auto ended = checkCall(retryInterrupted([&] { return ::waitpid(-1, &status, 0); }), "waitpid");
+    const auto ended =
+        checkCall(retryInterrupted([&] { return ::waitpid(-1, &status, 0); }), "waitpid");
     dead.insert(ended);
     if (ended == tests) return status;
   }
 }
 
-// Kills all children of the guard, and adds them to `dead`; their children become the guard's, and are killed next.
+// Kills all children of the guard, and adds them to `dead`; their children become the guard's, and
+// are killed next.
 void killOrphans(Pids& dead) {
   for (;;) {
     std::ifstream children("/proc/self/task/" + std::to_string(::getpid()) + "/children");
-    if (!children) return;  // a kernel without this list: children die with their parents, by PR_SET_PDEATHSIG
+    // a kernel without this list: children die with their parents, by PR_SET_PDEATHSIG
+    if (!children) return;
     for (pid_t child = 0; children >> child;) ::kill(child, SIGKILL);
     const auto ended = ::waitpid(-1, nullptr, 0);
     if (ended > 0) dead.insert(ended);
@@ -98,24 +105,32 @@ void killOrphans(Pids& dead) {
 // Removes all files of the registered backplanes: none of the processes that used them lives.
 void removeSegments() {
   std::error_code ignored;
-  for (std::size_t i = 0; i < std::min(registry->count.load(std::memory_order_relaxed), Registry::kNames); ++i) {
+  for (std::size_t i = 0;
+       i < std::min(registry->count.load(std::memory_order_relaxed), Registry::kNames); ++i) {
     const auto left = segments::list(SegmentName::prefix(registry->names.at(i).data()));
     for (const auto& name : left) std::filesystem::remove(segments::path(name), ignored);
-    if (!left.empty()) std::fprintf(stderr, "guard: removed %zu segments of backplane %s\n", left.size(), registry->names.at(i).data());
+    if (!left.empty())
+      std::fprintf(stderr, "guard: removed %zu segments of backplane %s\n", left.size(),
+                   registry->names.at(i).data());
   }
 }
 
-// Programs such as `mpf torture` and the demo choose backplanes of their own. Removes what the dead left on the backplanes of `dead`.
+// Programs such as `mpf torture` and the demo choose backplanes of their own. Removes what the dead
+// left on the backplanes of `dead`.
 void removeSegmentsOf(const Pids& dead) {
   for (const auto& backplane : Backplane::names()) {
     const auto names = segments::list(SegmentName::prefix(backplane));
     const bool isTheirs = std::ranges::any_of(names, [&](const auto& name) {
       layout::SegmentHeader header{};
-      const FileDescriptor file(::open(segments::path(name).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-      return ::pread(file.get(), &header, sizeof header, 0) == sizeof header && dead.contains(header.ownerPid);
+      const FileDescriptor file(
+          ::open(segments::path(name).c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+      return ::pread(file.get(), &header, sizeof header, 0) == sizeof header &&
+             dead.contains(header.ownerPid);
     });
     const auto removed = isTheirs ? Backplane::named(backplane).removeDead().size() : 0;
-    if (removed != 0) std::fprintf(stderr, "guard: removed %zu segments of backplane %s\n", removed, backplane.c_str());
+    if (removed != 0)
+      std::fprintf(stderr, "guard: removed %zu segments of backplane %s\n", removed,
+                   backplane.c_str());
   }
 }
 

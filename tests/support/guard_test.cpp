@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A test that dies leaves nothing. The tests that die are those of dying.cpp.
-#include <mpf/tests/support/guard.h>
+#include "tests/support/guard.h"
 
 #include <signal.h>
 #include <sys/wait.h>
@@ -12,9 +12,10 @@
 #include <sstream>
 #include <string>
 
-#include <mpf/shm/backplane.h>
-#include <mpf/tests/support/command.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/backplane.h>
+
+#include "tests/support/command.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -49,19 +50,23 @@ class GuardTest : public testing::TestWithParam<Death> {};
 TEST_P(GuardTest, RemovesWhatADyingTestLeaves) {
   const Watchdog watchdog("guard test");
 
-  const auto ended = runCommand("exec " MPF_TEST_DYING " --gtest_filter=DyingTest." + GetParam().name + " 2>&1");
+  const auto ended =
+      runCommand("exec " MPF_TEST_DYING " --gtest_filter=DyingTest." + GetParam().name + " 2>&1");
 
   EXPECT_EQ(ended.status, GetParam().status) << ended.output;
   const auto backplane = Backplane::named(valueOf("backplane", ended.output));
   EXPECT_THAT(backplane.segmentNames(), IsEmpty());
-  EXPECT_THAT(ended.output, HasSubstr("guard: removed 1 segments of backplane " + backplane.name()));
+  EXPECT_THAT(ended.output,
+              HasSubstr("guard: removed 1 segments of backplane " + backplane.name()));
   EXPECT_THAT(Backplane::named(valueOf("other", ended.output)).segmentNames(), IsEmpty());
   EXPECT_FALSE(std::filesystem::exists(valueOf("folder", ended.output)));
   EXPECT_EQ(::kill(std::stoi(valueOf("child", ended.output)), 0), -1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, GuardTest,
-                         testing::Values(Death{"Hangs", kWatchdogSignal}, Death{"IsKilled", SIGKILL}, Death{"Ends", W_EXITCODE(3, 0)}),
+                         testing::Values(Death{"Hangs", kWatchdogSignal},
+                                         Death{"IsKilled", SIGKILL},
+                                         Death{"Ends", W_EXITCODE(3, 0)}),
                          [](const auto& death) { return death.param.name; });
 
 }  // namespace

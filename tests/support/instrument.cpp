@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/support/instrument.h>
+#include "tests/support/instrument.h"
 
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -9,14 +9,15 @@
 #include <array>
 #include <cstdint>
 
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
 Instrument::Instrument() : Instrument(std::string()) {}
 
 Instrument::Instrument(std::string linkPath)
-    : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")), linkPath_(std::move(linkPath)) {
+    : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")),
+      linkPath_(std::move(linkPath)) {
   if (!linkPath_.empty()) plugIn();
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
@@ -58,7 +59,8 @@ void Instrument::setReading(bool isReading) {
 
 bool Instrument::waitForReceived(std::string_view text) const {
   std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, Watchdog::kPatience, [&] { return received_.find(text) != std::string::npos; });
+  return changed_.wait_for(lock, Watchdog::kPatience,
+                           [&] { return received_.find(text) != std::string::npos; });
 }
 
 std::string Instrument::received() const {
@@ -107,7 +109,8 @@ void Instrument::run(const std::stop_token& stop) {
 
 int Instrument::msToNextOutput() const {
   if (outputs_.empty()) return -1;
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(outputs_.front().at - Clock::now());
+  const auto left =
+      std::chrono::ceil<std::chrono::milliseconds>(outputs_.front().at - Clock::now());
   return static_cast<int>(std::max<std::int64_t>(left.count(), 0));
 }
 
@@ -134,7 +137,8 @@ void Instrument::execute(std::string_view command) {
   constexpr std::string_view kEcho = "ECHO ";
   if (command == "*IDN?") return answer("MPF,INSTRUMENT,0,1.0");
   if (command == "MEAS:VOLT?") return answer("1.234");
-  if (command.substr(0, kEcho.size()) == kEcho) return answer(std::string(command.substr(kEcho.size())));
+  if (command.substr(0, kEcho.size()) == kEcho)
+    return answer(std::string(command.substr(kEcho.size())));
 }
 
 void Instrument::answer(const std::string& text) {
@@ -152,7 +156,8 @@ void Instrument::answer(const std::string& text) {
 
 void Instrument::sendDue() {
   const auto now = Clock::now();
-  const auto later = std::find_if(outputs_.begin(), outputs_.end(), [&](const Output& output) { return output.at > now; });
+  const auto later = std::find_if(outputs_.begin(), outputs_.end(),
+                                  [&](const Output& output) { return output.at > now; });
   const std::vector<Output> due(outputs_.begin(), later);
   outputs_.erase(outputs_.begin(), later);
   for (const auto& output : due) send(output.text);
@@ -160,7 +165,8 @@ void Instrument::sendDue() {
 
 void Instrument::send(std::string_view text) {
   while (!text.empty()) {
-    const auto length = retryInterrupted([&] { return ::write(descriptor(), text.data(), text.size()); });
+    const auto length =
+        retryInterrupted([&] { return ::write(descriptor(), text.data(), text.size()); });
     if (length <= 0) return;  // hung up: lost, as on any line
     text.remove_prefix(static_cast<std::size_t>(length));
   }

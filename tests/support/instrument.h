@@ -4,7 +4,8 @@
 //   *IDN?         MPF,INSTRUMENT,0,1.0
 //   MEAS:VOLT?    1.234
 //   ECHO <text>   <text>
-//   anything else: no answer                        commands end with \n or \r\n, answers with answerEnd
+//   anything else: no answer                        commands end with \n or \r\n, answers with
+//   answerEnd
 //
 //   Instrument instrument("/tmp/test/ttyA");        // on a pseudo-terminal, or connect() a socket
 //   instrument.behave({.delay = 20ms, .noise = "\x07"});
@@ -22,17 +23,20 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/tests/support/pty.h>
+#include <mpf/file_descriptor.h>
+
+#include "tests/support/pty.h"
 
 namespace mpf::test {
 
 // From a command to its answer.
 struct Behaviour {
-  std::chrono::milliseconds delay{0};                           // before the answer
-  std::optional<std::chrono::milliseconds> gap = std::nullopt;  // set: the answer goes out byte by byte, with this between bytes
-  std::string noise = {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
-  bool isSilent = false;   // no answer at all
+  std::chrono::milliseconds delay{0};  // before the answer
+  // set: the answer goes out byte by byte, with this between bytes
+  std::optional<std::chrono::milliseconds> gap = std::nullopt;
+  std::string noise =
+      {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
+  bool isSilent = false;  // no answer at all
   std::string answerEnd = "\r\n";
 };
 
@@ -58,7 +62,8 @@ class Instrument {
   // A new pseudo-terminal at the same path.
   void plugIn();
 
-  // Waits until `text` has arrived, in whatever pieces, since the beginning. Returns false when the watchdog barks.
+  // Waits until `text` has arrived, in whatever pieces, since the beginning. Returns false when the
+  // watchdog barks.
   [[nodiscard]] bool waitForReceived(std::string_view text) const;
   [[nodiscard]] std::string received() const;
   // The settings of the pseudo-terminal.

@@ -10,8 +10,8 @@
 
 namespace mpf::test {
 
-// For how many lines a written line stands: the count of "(repeated 12 times in 1.0 s)" or "(the last of
-// 12 such lines in 1.0 s)"; 1 without one.
+// For how many lines a written line stands: the count of "(repeated 12 times in 1.0 s)" or "(the
+// last of 12 such lines in 1.0 s)"; 1 without one.
 inline std::uint64_t timesOf(const std::string& line) {
   for (const std::string_view mark : {" (repeated ", " (the last of "}) {
     const auto at = line.rfind(mark);
@@ -22,8 +22,8 @@ inline std::uint64_t timesOf(const std::string& line) {
 
 struct LogCount {
   std::uint64_t written = 0;  // lines in which `text` stands
-  std::uint64_t meant = 0;    // lines that they stand for
-  std::uint64_t all = 0;      // written lines of any kind
+  std::uint64_t meant = 0;  // lines that they stand for
+  std::uint64_t all = 0;  // written lines of any kind
 };
 
 inline LogCount countLines(const std::string& log, const std::string& text) {

@@ -11,7 +11,8 @@
 namespace mpf::test {
 
 // `carriers` owns it.
-inline ModelCarrier& addModelCarrier(IndustryPackCarriers& carriers, const std::string& name = "ipac") {
+inline ModelCarrier& addModelCarrier(IndustryPackCarriers& carriers,
+                                     const std::string& name = "ipac") {
   auto carrier = std::make_unique<ModelCarrier>();
   auto& added = *carrier;
   carriers.add(name, std::move(carrier));

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Output: everything that a process writes to a pipe. A thread reads it at once, so the process never waits for its reader, and
-// waitForLine() finds a line whether it came before the call or comes after it.
+// Output: everything that a process writes to a pipe. A thread reads it at once, so the process
+// never waits for its reader, and waitForLine() finds a line whether it came before the call or
+// comes after it.
 //
 //   Output output(std::move(readEnd));
-//   output.waitForLine("the line is not there yet");   // the order of lines of different threads does not matter
+//   output.waitForLine("the line is not there yet");   // the order of lines of different threads
+//   does not matter
 //
 // Threads  any.
 #pragma once
@@ -21,22 +23,24 @@
 #include <thread>
 #include <utility>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
 class Output {
  public:
   explicit Output(FileDescriptor readEnd)
-      : readEnd_(std::move(readEnd)), bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {
+      : readEnd_(std::move(readEnd)),
+        bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {
     thread_ = std::jthread([this](const std::stop_token& stop) { collect(stop); });
   }
   Output(const Output&) = delete;
   Output& operator=(const Output&) = delete;
 
-  // Returns the first line that holds `text`, without its end, among all lines since the start of the process; waits until there is
-  // one. Empty when the output ends without one.
+  // Returns the first line that holds `text`, without its end, among all lines since the start of
+  // the process; waits until there is one. Empty when the output ends without one.
   std::string waitForLine(std::string_view text) {
     std::unique_lock lock(mutex_);
     for (std::size_t begin = 0;;) {
@@ -45,8 +49,9 @@ class Output {
       begin += line->size() + 1;
     }
   }
-  // Returns the next line that nextLine() has not returned yet; waits for it. Empty when the output ends. For programs that write a
-  // line for each step of one thread: only there the order of lines is certain.
+  // Returns the next line that nextLine() has not returned yet; waits for it. Empty when the output
+  // ends. For programs that write a line for each step of one thread: only there the order of lines
+  // is certain.
   std::string nextLine() {
     std::unique_lock lock(mutex_);
     const auto line = waitForLineAt(taken_, lock);
@@ -68,13 +73,15 @@ class Output {
     return text_.substr(begin, text_.find('\n', begin) - begin);
   }
   void collect(const std::stop_token& stop) {
-    const std::stop_callback wake(stop, [this] { static_cast<void>(::eventfd_write(bell_.get(), 1)); });
+    const std::stop_callback wake(stop,
+                                  [this] { static_cast<void>(::eventfd_write(bell_.get(), 1)); });
     std::array<char, 4096> bytes{};
     while (!stop.stop_requested()) {
       std::array<pollfd, 2> ready{{{readEnd_.get(), POLLIN, 0}, {bell_.get(), POLLIN, 0}}};
       ::poll(ready.data(), ready.size(), -1);
       if (ready[0].revents == 0) continue;
-      const auto length = retryInterrupted([&] { return ::read(readEnd_.get(), bytes.data(), bytes.size()); });
+      const auto length =
+          retryInterrupted([&] { return ::read(readEnd_.get(), bytes.data(), bytes.size()); });
       if (length <= 0) break;
       const std::lock_guard lock(mutex_);
       text_.append(bytes.data(), static_cast<std::size_t>(length));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/support/output.h>
+#include "tests/support/output.h"
 
 #include <gtest/gtest.h>
 
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/program.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {

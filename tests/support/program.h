@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Program: a program of the project as a process of its own, with what it wrote to stderr. It dies with the test.
+// Program: a program of the project as a process of its own, with what it wrote to stderr. It dies
+// with the test.
 #pragma once
 
 #include <fcntl.h>
@@ -15,9 +16,10 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/tests/support/output.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "tests/support/output.h"
 
 namespace mpf::test {
 
@@ -42,10 +44,14 @@ class Program {
     signal(number);
     return wait();
   }
-  // Waits for a line on stderr that holds `text`, and returns it without its end. A line that came before the call counts: which of
-  // the lines of two threads comes first is not certain. Empty when the program ends without such a line.
-  [[nodiscard]] std::string waitForLine(std::string_view text) const { return errors_->waitForLine(text); }
-  // Waits for the next line on stderr; empty when the program has ended. Only for programs that write all lines with one thread.
+  // Waits for a line on stderr that holds `text`, and returns it without its end. A line that came
+  // before the call counts: which of the lines of two threads comes first is not certain. Empty
+  // when the program ends without such a line.
+  [[nodiscard]] std::string waitForLine(std::string_view text) const {
+    return errors_->waitForLine(text);
+  }
+  // Waits for the next line on stderr; empty when the program has ended. Only for programs that
+  // write all lines with one thread.
   [[nodiscard]] std::string line() const { return errors_->nextLine(); }
   // Waits for the end of stderr. Returns what line() has not returned.
   [[nodiscard]] std::string errors() const { return errors_->rest(); }

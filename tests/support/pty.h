@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Pty: a pair of pseudo-terminals under a name of the test's choice. The far end (an instrument) holds the master; a port opens the name.
+// Pty: a pair of pseudo-terminals under a name of the test's choice. The far end (an instrument)
+// holds the master; a port opens the name.
 //
 //   instrument ── master ══ kernel ══ slave /dev/pts/N ◄── linkPath ── port
 //
-// Destroying it hangs the line up, as unplugging an adapter does. It keeps the slave open itself, so that the master does not see
-// a hang-up whenever the port closes its end, and so that tests can ask which settings the line has.
+// Destroying it hangs the line up, as unplugging an adapter does. It keeps the slave open itself,
+// so that the master does not see a hang-up whenever the port closes its end, and so that tests can
+// ask which settings the line has.
 #pragma once
 
 #include <fcntl.h>
@@ -15,8 +17,9 @@
 #include <filesystem>
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Random: numbers that differ in each run, and can be had again. MPF_TEST_SEED repeats a run from the seed that it printed.
+// Random: numbers that differ in each run, and can be had again. MPF_TEST_SEED repeats a run from
+// the seed that it printed.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RequestLog: how often servers have seen each request of a test, in a file that they share and that outlives them when they are killed.
+// RequestLog: how often servers have seen each request of a test, in a file that they share and
+// that outlives them when they are killed.
 //
 // Threads  any number of processes count; the test reads.
 #pragma once
@@ -12,19 +13,22 @@
 #include <cstdint>
 #include <string>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
 class RequestLog {
  public:
   static constexpr std::uint32_t kRequests = 1u << 20;
-  static constexpr std::int32_t kCounted = 4711;  // in `cmd` of a request whose number, its `value`, shall be counted
+  // in `cmd` of a request whose number, its `value`, shall be counted
+  static constexpr std::int32_t kCounted = 4711;
 
   // The file is made when it is not there.
   explicit RequestLog(const std::string& file) {
-    const FileDescriptor log(checkCall(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", file));
+    const FileDescriptor log(
+        checkCall(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", file));
     checkCall(::ftruncate(log.get(), kBytes), "ftruncate", file);
     auto* const memory = ::mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_SHARED, log.get(), 0);
     if (memory == MAP_FAILED) throwSystemError(errno, "mmap", file);

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// RouterPair: two backplanes, as two hosts have them, and a router on each. Clients on the near one reach servers on the far one.
+// RouterPair: two backplanes, as two hosts have them, and a router on each. Clients on the near one
+// reach servers on the far one.
 //
 //   near: client ─► mpf-router ══ TCP ══ mpf-router ─► server :far
 //
 //   RouterPair routers;
-//   routers.start();                            // or startFar() and startNear(), in any order, again
-//   MessageServer server(routers.far(), "echo", {.location = RouterPair::kLocation});
-//   MessageClient client(routers.near(), ...);
-//   client.bind("echo", RouterPair::kLocation);
-//   ...
+//   routers.start();                            // or startFar() and startNear(), in any order,
+//   again MessageServer server(routers.far(), "echo", {.location = RouterPair::kLocation});
+//   MessageClient client(routers.near(), ...); client.bind("echo", RouterPair::kLocation); ...
 //   routers.expectGoodEnd();                    // once servers and clients are gone
 //
 // Link mpf_test_routers. The routers die with the test.
@@ -28,26 +27,30 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/shm/backplane.h>
-#include <mpf/tests/support/router_process.h>
-#include <mpf/tests/support/test_backplane.h>
+#include <mpf/backplane.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "tests/support/router_process.h"
+#include "tests/support/test_backplane.h"
 
 namespace mpf::test {
 
-// A port of this host that is nobody's, and stays free for routers that listen on it, one after the other.
+// A port of this host that is nobody's, and stays free for routers that listen on it, one after the
+// other.
 class FreePort {
  public:
   FreePort() : socket_(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket")) {
     const int on = 1;  // as listeners have it: bound by two, listening one
-    checkCall(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on), "SO_REUSEADDR");
+    checkCall(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on),
+              "SO_REUSEADDR");
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t length = sizeof address;
     checkCall(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), length), "bind");
-    checkCall(::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &length), "getsockname");
+    checkCall(::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &length),
+              "getsockname");
     address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
   }
   // "127.0.0.1:54321"
@@ -76,7 +79,9 @@ class RouterPair {
   [[nodiscard]] const Backplane& near() const noexcept { return near_; }
   [[nodiscard]] const Backplane& far() const noexcept { return far_; }
   // Where the far one listens, and the near one calls.
-  [[nodiscard]] const std::string& address() const noexcept { return place_.address.empty() ? port_.address() : place_.address; }
+  [[nodiscard]] const std::string& address() const noexcept {
+    return place_.address.empty() ? port_.address() : place_.address;
+  }
 
   void start(const Options& more = {}) {
     startFar(more);
@@ -85,13 +90,15 @@ class RouterPair {
   // One that runs is killed first. `more`: further options.
   void startFar(const Options& more = {}) {
     farRouter_.reset();
-    farRouter_ = started({"--backplane", far_.name(), "--serve", std::to_string(kLocation), "--listen", address(), "--plain"}, more,
-                         place_.enterFar);
+    farRouter_ = started({"--backplane", far_.name(), "--serve", std::to_string(kLocation),
+                          "--listen", address(), "--plain"},
+                         more, place_.enterFar);
   }
   void startNear(const Options& more = {}) {
     nearRouter_.reset();
-    nearRouter_ =
-        started({"--backplane", near_.name(), "--remote", std::to_string(kLocation) + "=" + address(), "--plain"}, more, place_.enterNear);
+    nearRouter_ = started({"--backplane", near_.name(), "--remote",
+                           std::to_string(kLocation) + "=" + address(), "--plain"},
+                          more, place_.enterNear);
   }
   // Once started.
   [[nodiscard]] RouterProcess& nearRouter() { return *nearRouter_; }
@@ -107,11 +114,15 @@ class RouterPair {
   }
 
  private:
-  static std::unique_ptr<RouterProcess> started(Options options, const Options& more, const RouterProcess::Enter& enter) {
+  static std::unique_ptr<RouterProcess> started(Options options, const Options& more,
+                                                const RouterProcess::Enter& enter) {
     options.insert(options.end(), more.begin(), more.end());
-    // Where many want the processors, a router may not run for seconds: that is for those tests to count that mean it.
-    if (std::ranges::find(more, "--dead-time") == more.end()) options.insert(options.end(), {"--dead-time", "60s"});
-    if (std::ranges::find(more, "--handshake-time") == more.end()) options.insert(options.end(), {"--handshake-time", "60s"});
+    // Where many want the processors, a router may not run for seconds: that is for those tests to
+    // count that mean it.
+    if (std::ranges::find(more, "--dead-time") == more.end())
+      options.insert(options.end(), {"--dead-time", "60s"});
+    if (std::ranges::find(more, "--handshake-time") == more.end())
+      options.insert(options.end(), {"--handshake-time", "60s"});
     return std::make_unique<RouterProcess>(options, enter);
   }
   TestBackplane near_;

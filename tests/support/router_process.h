@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RouterProcess: mpf-router as a process of its own, with what it says. It dies with the test, and says it all when that has failed.
+// RouterProcess: mpf-router as a process of its own, with what it says. It dies with the test, and
+// says it all when that has failed.
 //
 // Threads  one.
 #pragma once
@@ -21,8 +22,9 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
@@ -57,7 +59,8 @@ class RouterProcess {
       ::_exit(127);
     }
     told.reset();
-    for (char byte = 0; retryInterrupted([&] { return ::read(ready.get(), &byte, 1); }) == 1;) listening_ += byte;
+    for (char byte = 0; retryInterrupted([&] { return ::read(ready.get(), &byte, 1); }) == 1;)
+      listening_ += byte;
   }
   ~RouterProcess() { end(SIGKILL); }
   RouterProcess(const RouterProcess&) = delete;
@@ -68,12 +71,15 @@ class RouterProcess {
   [[nodiscard]] const std::string& listening() const noexcept { return listening_; }
   // What it has written to stderr until now.
   [[nodiscard]] std::string said() const {
-    std::string text(static_cast<std::size_t>(checkCall(::lseek(said_.get(), 0, SEEK_END), "lseek")), '\0');
-    text.resize(static_cast<std::size_t>(checkCall(::pread(said_.get(), text.data(), text.size(), 0), "pread")));
+    std::string text(
+        static_cast<std::size_t>(checkCall(::lseek(said_.get(), 0, SEEK_END), "lseek")), '\0');
+    text.resize(static_cast<std::size_t>(
+        checkCall(::pread(said_.get(), text.data(), text.size(), 0), "pread")));
     return text;
   }
   void waitUntilSaid(const std::string& text) const {
-    while (said().find(text) == std::string::npos) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    while (said().find(text) == std::string::npos)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
 
   void signal(int number) const { ::kill(pid_, number); }
@@ -83,15 +89,16 @@ class RouterProcess {
     ::waitpid(pid_, nullptr, WUNTRACED);
     stands_ = true;
   }
-  // For nobody else: a SIGCONT takes back the stop by which LeakSanitizer begins to look at a process that ends.
-  void goOn() {
+  // For nobody else: a SIGCONT takes back the stop by which LeakSanitizer begins to look at a
+  // process that ends.
+  void resume() {
     if (std::exchange(stands_, false)) signal(SIGCONT);
   }
   // Sends the signal and waits for the end. Returns the status of waitpid().
   int end(int number) {
     if (pid_ == 0) return 0;
     signal(number);
-    goOn();
+    resume();
     int status = 0;
     ::waitpid(std::exchange(pid_, 0), &status, 0);
     if (testing::Test::HasFailure()) std::cout << "router " << listening_ << said();

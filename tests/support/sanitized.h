@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whether this build has a sanitizer, with which everything takes ten times as long: tests that count do less of the same then.
+// Whether this build has a sanitizer, with which everything takes ten times as long: tests that
+// count do less of the same then.
 #pragma once
 
 namespace mpf::test {

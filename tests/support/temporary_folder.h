@@ -8,14 +8,15 @@
 #include <gtest/gtest.h>
 #include <string>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf::test {
 
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = testing::TempDir() + "mpf-test-" + std::string(6, 'X');  // as mkdtemp() wants it
+    // as mkdtemp() wants it
+    std::string name = testing::TempDir() + "mpf-test-" + std::string(6, 'X');
     if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
     path_ = name;
   }

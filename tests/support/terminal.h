@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Terminal: a program on a pseudo-terminal, and the screen that its user would see (libvterm). It dies with the test.
+// Terminal: a program on a pseudo-terminal, and the screen that its user would see (libvterm). It
+// dies with the test.
 //
 //   Terminal top({MPF_TEST_TOOL, "top"}, 24, 80);
 //   ASSERT_TRUE(top.waitFor("SERVER"));
@@ -28,15 +29,17 @@
 #include <vector>
 #include <vterm.h>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
 class Terminal {
  public:
   // Runs `command`: a path and its arguments.
-  Terminal(std::vector<std::string> command, int rows, int columns) : terminal_(vterm_new(rows, columns)), rows_(rows), columns_(columns) {
+  Terminal(std::vector<std::string> command, int rows, int columns)
+      : terminal_(vterm_new(rows, columns)), rows_(rows), columns_(columns) {
     vterm_set_utf8(terminal_.get(), 1);
     screen_ = vterm_obtain_screen(terminal_.get());
     vterm_screen_enable_altscreen(screen_, 1);
@@ -53,7 +56,9 @@ class Terminal {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
-  void type(std::string_view keys) const { checkCall(::write(master_.get(), keys.data(), keys.size()), "write", "keys"); }
+  void type(std::string_view keys) const {
+    checkCall(::write(master_.get(), keys.data(), keys.size()), "write", "keys");
+  }
   void signal(int number) const { ::kill(pid_, number); }
   void resize(int rows, int columns) {
     std::tie(rows_, columns_) = std::pair(rows, columns);
@@ -89,19 +94,22 @@ class Terminal {
   }
   [[nodiscard]] std::string row(int number) const {
     std::string text(static_cast<std::size_t>(columns_) * 4, '\0');
-    text.resize(vterm_screen_get_text(screen_, text.data(), text.size(), {number, number + 1, 0, columns_}));
+    text.resize(vterm_screen_get_text(screen_, text.data(), text.size(),
+                                      {number, number + 1, 0, columns_}));
     return text;
   }
   // How the first character of a row looks.
-  struct Look {
+  struct SnapshotDelta {
     bool isRed = false;
     bool isReversed = false;
   };
-  [[nodiscard]] Look look(int number) const {
+  [[nodiscard]] SnapshotDelta look(int number) const {
     constexpr std::uint8_t kRed = 1;
     VTermScreenCell cell{};
     vterm_screen_get_cell(screen_, {number, 0}, &cell);
-    return {VTERM_COLOR_IS_INDEXED(&cell.fg) && cell.fg.indexed.idx % 8 == kRed, cell.attrs.reverse != 0};  // bold may make it bright
+    // bold may make it bright
+    return {VTERM_COLOR_IS_INDEXED(&cell.fg) && cell.fg.indexed.idx % 8 == kRed,
+            cell.attrs.reverse != 0};
   }
   [[nodiscard]] std::string screen() const {
     std::string text;
@@ -111,22 +119,27 @@ class Terminal {
 
  private:
   static int onProperty(VTermProp property, VTermValue* value, void* self) {
-    if (property == VTERM_PROP_ALTSCREEN) static_cast<Terminal*>(self)->isAlternate_ = value->boolean != 0;
+    if (property == VTERM_PROP_ALTSCREEN)
+      static_cast<Terminal*>(self)->isAlternate_ = value->boolean != 0;
     return 1;
   }
-  static constexpr VTermScreenCallbacks kCallbacks{nullptr, nullptr, nullptr, onProperty, nullptr, nullptr, nullptr, nullptr};
+  static constexpr VTermScreenCallbacks kCallbacks{nullptr, nullptr, nullptr, onProperty,
+                                                   nullptr, nullptr, nullptr, nullptr};
 
   void openLine() {
     master_.reset(checkCall(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC), "posix_openpt"));
     checkCall(::grantpt(master_.get()), "grantpt");
     checkCall(::unlockpt(master_.get()), "unlockpt");
     std::array<char, 64> name{};
-    if (const int error = ::ptsname_r(master_.get(), name.data(), name.size()); error != 0) throwSystemError(error, "ptsname_r", "pty");
-    slave_.reset(checkCall(::open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC), "open", name.data()));
+    if (const int error = ::ptsname_r(master_.get(), name.data(), name.size()); error != 0)
+      throwSystemError(error, "ptsname_r", "pty");
+    slave_.reset(
+        checkCall(::open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC), "open", name.data()));
     setSize();
   }
   void setSize() const {
-    const winsize size{static_cast<unsigned short>(rows_), static_cast<unsigned short>(columns_), 0, 0};
+    const winsize size{static_cast<unsigned short>(rows_), static_cast<unsigned short>(columns_), 0,
+                       0};
     checkCall(::ioctl(master_.get(), TIOCSWINSZ, &size), "resize", "the terminal");
   }
   void start(std::vector<std::string> command) {

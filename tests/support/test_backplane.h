@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// TestBackplane: an isolated backplane that ends with its test. What users of it that were killed left behind is removed; anything
-// else that is left fails the test. When the test dies, its guard removes all segments. Declare it before whatever uses it.
+// TestBackplane: an isolated backplane that ends with its test. What users of it that were killed
+// left behind is removed; anything else that is left fails the test. When the test dies, its guard
+// removes all segments. Declare it before whatever uses it.
 #pragma once
 
 #include <gmock/gmock.h>
 
-#include <mpf/shm/backplane.h>
-#include <mpf/tests/support/guard.h>
+#include <mpf/backplane.h>
+
+#include "tests/support/guard.h"
 
 namespace mpf::test {
 

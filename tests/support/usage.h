@@ -12,7 +12,7 @@
 #include <ostream>
 #include <string>
 
-#include <mpf/tests/support/sanitized.h>
+#include "tests/support/sanitized.h"
 
 namespace mpf::test {
 
@@ -27,20 +27,24 @@ struct Usage {
     std::size_t pages = 0;
     std::ifstream(process / "statm") >> pages >> pages;  // the second number
     usage.residentKb = pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) / 1024;
-    for ([[maybe_unused]] const auto& file : std::filesystem::directory_iterator(process / "fd")) ++usage.files;
+    for ([[maybe_unused]] const auto& file : std::filesystem::directory_iterator(process / "fd"))
+      ++usage.files;
     std::ifstream maps(process / "maps");
-    for (std::string line; std::getline(maps, line);) usage.segments += line.find("/dev/shm/mpf") != std::string::npos ? 1 : 0;
+    for (std::string line; std::getline(maps, line);)
+      usage.segments += line.find("/dev/shm/mpf") != std::string::npos ? 1 : 0;
     return usage;
   }
   // No more than `before`, give or take what an allocator keeps.
   [[nodiscard]] bool isWithin(const Usage& before, std::size_t slackKb) const {
     if (kIsSanitized) slackKb = std::size_t{1} << 20;  // sanitizers keep what was freed
-    return files <= before.files && segments <= before.segments && residentKb <= before.residentKb + slackKb;
+    return files <= before.files && segments <= before.segments &&
+           residentKb <= before.residentKb + slackKb;
   }
 };
 
 inline std::ostream& operator<<(std::ostream& out, const Usage& usage) {
-  return out << usage.residentKb << " kB, " << usage.files << " files, " << usage.segments << " segments";
+  return out << usage.residentKb << " kB, " << usage.files << " files, " << usage.segments
+             << " segments";
 }
 
 }  // namespace mpf::test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The program behind Victim: an echo server, one that counts what it sees, a client that sends as fast as it can, a crowd of clients, or
-// a client that listens to a serial line or to another server, or one that asks an instrument.
+// The program behind Victim: an echo server, one that counts what it sees, a client that sends as
+// fast as it can, a crowd of clients, or a client that listens to a serial line or to another
+// server, or one that asks an instrument.
 #include <signal.h>
 #include <sys/inotify.h>
 #include <sys/prctl.h>
@@ -16,13 +17,14 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/client/sync_client.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/schema/serial_sniff.h>
-#include <mpf/server/message_server.h>
-#include <mpf/tests/support/request_log.h>
+#include <mpf/file_descriptor.h>
+#include <mpf/message_server.h>
+#include <mpf/serial_commands.h>
+#include <mpf/serial_sniff.h>
+#include <mpf/sync_client.h>
+
+#include "base/system_call.h"
+#include "tests/support/request_log.h"
 
 namespace {
 
@@ -35,7 +37,8 @@ void say(fmt::format_string<Values...> format, Values&&... values) {
   std::fflush(stdout);
 }
 
-// Echoes; keeps each seventh Int32 (and so drops the one kept before), and answers some arrays with new ones.
+// Echoes; keeps each seventh Int32 (and so drops the one kept before), and answers some arrays with
+// new ones.
 int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
   options.queueSize = 32;
   mpf::MessageServer server(backplane, "echo", options);
@@ -66,7 +69,8 @@ int count(const mpf::Backplane& backplane, const std::string& file, mpf::ServerO
     if (request.cmd == mpf::test::RequestLog::kCounted) log.note(request.value);
   });
   server.on<mpf::Int32Array>([&](mpf::Int32ArrayMessage& request) {
-    if (request->cmd == mpf::test::RequestLog::kCounted && !request.value().empty()) log.note(request.value()[0]);
+    if (request->cmd == mpf::test::RequestLog::kCounted && !request.value().empty())
+      log.note(request.value()[0]);
   });
   server.on<mpf::Float64Array>([](mpf::Float64ArrayMessage&) {});
   server.on<mpf::Float64>([](mpf::Float64& request) { request.value += 1; });
@@ -95,7 +99,9 @@ class Visitor {
   static constexpr int kAtATime = 4;
 
   Visitor(mpf::Dispatcher& dispatcher, std::map<std::uint64_t, int>& done, int crowd)
-      : done_(done), crowd_(crowd), client_(dispatcher, [this](const mpf::Message& message) { take(message); }) {
+      : done_(done),
+        crowd_(crowd),
+        client_(dispatcher, [this](const mpf::Message& message) { take(message); }) {
     client_.bind("echo");
   }
   [[nodiscard]] std::string reason() const { return client_.notConnectedBecause(); }
@@ -116,7 +122,8 @@ class Visitor {
     } else {
       --open_;
       const auto fate = message.tryAs<mpf::RequestFate>()->fate;
-      if (fate != mpf::Fate::neverTaken && fate != mpf::Fate::outcomeUnknown) say("a request was {}", mpf::toString(fate));
+      if (fate != mpf::Fate::neverTaken && fate != mpf::Fate::outcomeUnknown)
+        say("a request was {}", mpf::toString(fate));
     }
   }
   void send() {
@@ -125,12 +132,14 @@ class Visitor {
     request.setClientExtra(sent_);
     const auto result = client_.send(std::move(request));
     if (result == mpf::SendResult::notConnected) return;  // the server ends: its fates come now
-    if (result != mpf::SendResult::sent) return say("a send was refused: {}", mpf::toString(result));
+    if (result != mpf::SendResult::sent)
+      return say("a send was refused: {}", mpf::toString(result));
     ++sent_;
     ++open_;
   }
 
-  std::map<std::uint64_t, int>& done_;  // clients by the incarnation of the server that answered them
+  // clients by the incarnation of the server that answered them
+  std::map<std::uint64_t, int>& done_;
   int crowd_;
   std::uint64_t life_ = 0;
   int sent_ = 0;
@@ -139,13 +148,14 @@ class Visitor {
   mpf::MessageClient client_;
 };
 
-// Says "waiting: <reason>", or nothing when the server is there; then "answered <incarnation>" for each life of the server that has
-// answered every client; whatever else it says went wrong.
+// Says "waiting: <reason>", or nothing when the server is there; then "answered <incarnation>" for
+// each life of the server that has answered every client; whatever else it says went wrong.
 int crowd(const mpf::Backplane& backplane, int clients) {
   mpf::Dispatcher dispatcher(backplane);
   std::map<std::uint64_t, int> done;
   std::vector<std::unique_ptr<Visitor>> visitors;
-  for (int i = 0; i < clients; ++i) visitors.push_back(std::make_unique<Visitor>(dispatcher, done, clients));
+  for (int i = 0; i < clients; ++i)
+    visitors.push_back(std::make_unique<Visitor>(dispatcher, done, clients));
   say("waiting: {}", visitors.back()->reason());
   dispatcher.run();
   return 0;
@@ -185,7 +195,9 @@ int ask(const mpf::Backplane& backplane, const std::string& server, const std::s
 
 // role, backplane, what the role wants; then "as USER GROUP", "without-inotify".
 int play(const std::vector<std::string>& arguments) {
-  const auto argument = [&](std::size_t index) { return index < arguments.size() ? arguments[index] : std::string(); };
+  const auto argument = [&](std::size_t index) {
+    return index < arguments.size() ? arguments[index] : std::string();
+  };
   std::vector<mpf::FileDescriptor> taken;
   for (std::size_t at = 3; at < arguments.size(); ++at) {
     if (argument(at) == "as") become(argument(at + 1), argument(at + 2));
@@ -197,11 +209,13 @@ int play(const std::vector<std::string>& arguments) {
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
   if (role == "count") return count(backplane, argument(3), {});
   if (role == "flood") return flood(backplane);
-  if (role == "listen" && argument(3).empty()) return listen(backplane, "serial[0].sniff", mpf::serial::cmdSniffStart);
+  if (role == "listen" && argument(3).empty())
+    return listen(backplane, "serial[0].sniff", mpf::serial::cmdSniffStart);
   if (role == "listen") return listen(backplane, argument(3), std::stoi(argument(4)));
   if (role == "ask") return ask(backplane, argument(3), argument(4));
   if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block, count, flood, listen, ask or crowd\n", role.c_str());
+  std::fprintf(stderr, "role \"%s\": use serve, serve-block, count, flood, listen, ask or crowd\n",
+               role.c_str());
   return 2;
 }
 

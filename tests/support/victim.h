@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Victim: a process with a role, to be killed, stopped and started by a test. It dies with the test.
+// Victim: a process with a role, to be killed, stopped and started by a test. It dies with the
+// test.
 //
 //   Victim server("serve", backplane.name());
-//   server.line();                            // "open": what the role writes to stdout, line by line
+//   server.line();                            // "open": what the role writes to stdout, line by
+//   line
 #pragma once
 
 #include <fcntl.h>
@@ -17,8 +19,9 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
@@ -26,7 +29,8 @@ class Victim {
  public:
   Victim() = default;
   // Runs tests/support/victim.cpp as `role` on `backplane`.
-  Victim(const std::string& role, const std::string& backplane, const std::vector<std::string>& more = {})
+  Victim(const std::string& role, const std::string& backplane,
+         const std::vector<std::string>& more = {})
       : Victim(MPF_TEST_VICTIM, [&] {
           std::vector<std::string> all{role, backplane};
           all.insert(all.end(), more.begin(), more.end());
@@ -44,12 +48,15 @@ class Victim {
     posix_spawn_file_actions_t actions;
     ::posix_spawn_file_actions_init(&actions);
     ::posix_spawn_file_actions_adddup2(&actions, input.get(), STDOUT_FILENO);
-    const int error = ::posix_spawn(&pid_, program.c_str(), &actions, nullptr, arguments.data(), environ);
+    const int error =
+        ::posix_spawn(&pid_, program.c_str(), &actions, nullptr, arguments.data(), environ);
     ::posix_spawn_file_actions_destroy(&actions);
     if (error != 0) throwSystemError(error, "start", program);
   }
   Victim(Victim&& other) noexcept
-      : pid_(std::exchange(other.pid_, 0)), output_(std::move(other.output_)), read_(std::exchange(other.read_, {})) {}
+      : pid_(std::exchange(other.pid_, 0)),
+        output_(std::move(other.output_)),
+        read_(std::exchange(other.read_, {})) {}
   Victim& operator=(Victim&& other) noexcept {
     end(SIGKILL);
     pid_ = std::exchange(other.pid_, 0);
@@ -69,14 +76,16 @@ class Victim {
         return line;
       }
       std::array<char, 512> bytes{};
-      const auto got = retryInterrupted([&] { return ::read(output_.get(), bytes.data(), bytes.size()); });
+      const auto got =
+          retryInterrupted([&] { return ::read(output_.get(), bytes.data(), bytes.size()); });
       if (got <= 0) return {};
       read_.append(bytes.data(), static_cast<std::size_t>(got));
     }
   }
 
   void signal(int number) const { ::kill(pid_, number); }
-  // Returns when it stands still: a signal alone may find it in the middle of something, on another processor.
+  // Returns when it stands still: a signal alone may find it in the middle of something, on another
+  // processor.
   void stop() const {
     signal(SIGSTOP);
     checkCall(::waitpid(pid_, nullptr, WUNTRACED), "waitpid");

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Wait modes as parameters of a test suite: INSTANTIATE_TEST_SUITE_P(InEachWaitMode, SuiteTest, kWaitModes, nameOfWaitMode);
+// Wait modes as parameters of a test suite: INSTANTIATE_TEST_SUITE_P(InEachWaitMode, SuiteTest,
+// kWaitModes, nameOfWaitMode);
 #pragma once
 
 #include <gtest/gtest.h>
 #include <ostream>
 #include <string>
 
-#include <mpf/shm/window.h>
+#include "shm/window.h"
 
 namespace mpf {
 
@@ -28,6 +29,8 @@ namespace mpf::test {
 
 inline const auto kWaitModes = testing::Values(WaitMode::spin, WaitMode::adaptive, WaitMode::block);
 
-inline std::string nameOfWaitMode(const testing::TestParamInfo<WaitMode>& info) { return testing::PrintToString(info.param); }
+inline std::string nameOfWaitMode(const testing::TestParamInfo<WaitMode>& info) {
+  return testing::PrintToString(info.param);
+}
 
 }  // namespace mpf::test

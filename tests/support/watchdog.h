@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Watchdog: a test that hangs ends with a sentence instead of silence, and its guard removes what it leaves. Not an upper time limit:
-// what takes a second alone takes half a minute beside fifty other processes on two processors, so a quarter of an hour is a hang.
-// A timer and not a thread: a test that forks a child should have one thread, since what the others were doing is lost in the child.
+// Watchdog: a test that hangs ends with a sentence instead of silence, and its guard removes what
+// it leaves. Not an upper time limit: what takes a second alone takes half a minute beside fifty
+// other processes on two processors, so a quarter of an hour is a hang. A timer and not a thread: a
+// test that forks a child should have one thread, since what the others were doing is lost in the
+// child.
 #pragma once
 
 #include <signal.h>
@@ -13,7 +15,7 @@
 #include <cstring>
 #include <string>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf::test {
 
@@ -27,7 +29,8 @@ class Watchdog {
 #ifndef __SANITIZE_THREAD__  // it holds handlers back, maybe for ever; the signal ends the process all the same
     struct sigaction action{};
     action.sa_handler = [](int) {
-      [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text().data(), std::strlen(text().data()));
+      [[maybe_unused]] const auto written =
+          ::write(STDERR_FILENO, text().data(), std::strlen(text().data()));
       ::signal(SIGABRT, SIG_DFL);
       ::raise(SIGABRT);
     };

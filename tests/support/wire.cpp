@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tests/support/wire.h>
+#include "tests/support/wire.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -17,7 +17,7 @@
 #include <exception>
 #include <net/if.h>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf::test {
 namespace {
@@ -25,7 +25,8 @@ namespace {
 constexpr std::size_t kPacketBytes = 65'536;
 constexpr std::int64_t kNsPerMs = 1'000'000;
 
-void setAddress(int socket, unsigned long request, const char* what, ifreq& interface, const char* address) {
+void setAddress(int socket, unsigned long request, const char* what, ifreq& interface,
+                const char* address) {
   sockaddr_in in{};
   in.sin_family = AF_INET;
   ::inet_pton(AF_INET, address, &in.sin_addr);
@@ -43,7 +44,10 @@ void bringUp(int socket, const char* name) {
 
 }  // namespace
 
-Wire::Wire() : near_(makeHost(kNear)), far_(makeHost(kFar)), bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {
+Wire::Wire()
+    : near_(makeHost(kNear)),
+      far_(makeHost(kFar)),
+      bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
@@ -59,13 +63,16 @@ Wire::Host Wire::makeHost(const char* address) {
   std::thread([&] {
     try {
       checkCall(::unshare(CLONE_NEWNET), "unshare", "network namespace");
-      host.network.reset(checkCall(::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC), "open", "/proc/thread-self/ns/net"));
-      host.tun.reset(checkCall(::open("/dev/net/tun", O_RDWR | O_CLOEXEC | O_NONBLOCK), "open", "/dev/net/tun"));
+      host.network.reset(checkCall(::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC), "open",
+                                   "/proc/thread-self/ns/net"));
+      host.tun.reset(checkCall(::open("/dev/net/tun", O_RDWR | O_CLOEXEC | O_NONBLOCK), "open",
+                               "/dev/net/tun"));
       ifreq interface{};
       std::strncpy(interface.ifr_name, "mpf0", IFNAMSIZ - 1);
       interface.ifr_flags = IFF_TUN | IFF_NO_PI;
       checkCall(::ioctl(host.tun.get(), TUNSETIFF, &interface), "TUNSETIFF", "/dev/net/tun");
-      const FileDescriptor socket(checkCall(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), "socket"));
+      const FileDescriptor socket(
+          checkCall(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), "socket"));
       setAddress(socket.get(), SIOCSIFADDR, "SIOCSIFADDR", interface, address);
       setAddress(socket.get(), SIOCSIFNETMASK, "SIOCSIFNETMASK", interface, "255.255.255.0");
       bringUp(socket.get(), "mpf0");
@@ -111,8 +118,10 @@ std::uint64_t Wire::passed() const {
 
 void Wire::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    std::array<pollfd, 3> ready{{{near_.tun.get(), POLLIN, 0}, {far_.tun.get(), POLLIN, 0}, {bell_.get(), POLLIN, 0}}};
-    checkCall(retryInterrupted([&] { return ::poll(ready.data(), ready.size(), msToNext()); }), "poll");
+    std::array<pollfd, 3> ready{
+        {{near_.tun.get(), POLLIN, 0}, {far_.tun.get(), POLLIN, 0}, {bell_.get(), POLLIN, 0}}};
+    checkCall(retryInterrupted([&] { return ::poll(ready.data(), ready.size(), msToNext()); }),
+              "poll");
     take(Direction::toFar, near_);
     take(Direction::toNear, far_);
     passDue();
@@ -125,9 +134,13 @@ void Wire::take(Direction direction, const Host& from) {
     const auto got = ::read(from.tun.get(), bytes.data(), bytes.size());
     if (got <= 0) return;
     const std::lock_guard lock(mutex_);
-    if (isCut(direction) || random_.below(1000) < static_cast<std::uint64_t>(weather_.lostPerThousand)) continue;
-    const bool overtakes = random_.below(1000) < static_cast<std::uint64_t>(weather_.overtakingPerThousand);
-    const auto due = Clock::nowNs() + (overtakes ? 0 : std::chrono::nanoseconds(weather_.delay).count());
+    if (isCut(direction) ||
+        random_.below(1000) < static_cast<std::uint64_t>(weather_.lostPerThousand))
+      continue;
+    const bool overtakes =
+        random_.below(1000) < static_cast<std::uint64_t>(weather_.overtakingPerThousand);
+    const auto due =
+        Clock::nowNs() + (overtakes ? 0 : std::chrono::nanoseconds(weather_.delay).count());
     onTheirWay_.emplace(due, Packet{direction, {bytes.begin(), bytes.begin() + got}});
   }
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Wire: two hosts in network namespaces of their own, and the line between them, which delays, loses, reorders and cuts on demand.
+// Wire: two hosts in network namespaces of their own, and the line between them, which delays,
+// loses, reorders and cuts on demand.
 //
 //   10.77.0.1 ── tun ◄═ this process: Weather, cut() ═► tun ── 10.77.0.2
 //
-// Packets pass through here, so no queueing discipline of the kernel is needed. Their fate is random: the seed is printed (random.h).
+// Packets pass through here, so no queueing discipline of the kernel is needed. Their fate is
+// random: the seed is printed (random.h).
 //
 // Threads  one of its own carries packets; the rest by the test's.
 #pragma once
@@ -16,9 +18,10 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/file_descriptor.h>
-#include <mpf/tests/support/random.h>
+#include <mpf/clock.h>
+#include <mpf/file_descriptor.h>
+
+#include "tests/support/random.h"
 
 namespace mpf::test {
 
@@ -36,7 +39,8 @@ class Wire {
   static constexpr const char* kNear = "10.77.0.1";
   static constexpr const char* kFar = "10.77.0.2";
 
-  //   throws  std::system_error: this host does not allow it (namespaces and tun devices are root's)
+  //   throws  std::system_error: this host does not allow it (namespaces and tun devices are
+  //           root's)
   Wire();
   ~Wire();
   Wire(const Wire&) = delete;
@@ -69,7 +73,9 @@ class Wire {
   void take(Direction direction, const Host& from);
   void passDue();
   [[nodiscard]] int msToNext() const;
-  [[nodiscard]] bool& isCut(Direction direction) { return direction == Direction::toFar ? cutToFar_ : cutToNear_; }
+  [[nodiscard]] bool& isCut(Direction direction) {
+    return direction == Direction::toFar ? cutToFar_ : cutToNear_;
+  }
 
   Host near_;
   Host far_;

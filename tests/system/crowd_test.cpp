@@ -5,11 +5,11 @@
 #include <gtest/gtest.h>
 #include <vector>
 
-#include <mpf/shm/segment_name.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include "shm/segment_name.h"
+#include "shm/window.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -20,7 +20,8 @@ class CrowdTest : public testing::Test {
   static constexpr int kClientsOfEach = 10;
 
   void startCrowd() {
-    for (int i = 0; i < kProcesses; ++i) crowd_.emplace_back("crowd", backplane_.name(), std::vector{std::to_string(kClientsOfEach)});
+    for (int i = 0; i < kProcesses; ++i)
+      crowd_.emplace_back("crowd", backplane_.name(), std::vector{std::to_string(kClientsOfEach)});
   }
   void waitUntilBound() {
     for (auto& process : crowd_) EXPECT_THAT(process.line(), testing::StartsWith("waiting: "));
@@ -32,12 +33,15 @@ class CrowdTest : public testing::Test {
   }
   // Waits until every client had all its requests answered by the server that runs now.
   void waitUntilAnswered() {
-    const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"), layout::SegmentKind::serverWindow);
+    const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"),
+                                            layout::SegmentKind::serverWindow);
     ASSERT_TRUE(window);
     const auto all = fmt::format("answered {:x}", window->header().incarnation);
     for (auto& process : crowd_) {
       auto line = process.line();
-      while (line != all && (line.starts_with("answered ") || line.starts_with("waiting: "))) line = process.line();  // of a server before
+      // of a server before
+      while (line != all && (line.starts_with("answered ") || line.starts_with("waiting: ")))
+        line = process.line();
       ASSERT_EQ(line, all);
     }
     EXPECT_EQ(window->control().linksOpened.load(), kProcesses * kClientsOfEach);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the client that draws what they say.
+// The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the
+// client that draws what they say.
 #include <filesystem>
 #include <gmock/gmock.h>
 #include <string>
 
-#include <mpf/tests/support/command.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/terminal.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/command.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/terminal.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -43,8 +44,10 @@ TEST_F(Demo, PrintsWhatComesBackWithoutATerminal) {
   const auto demo = runDemo(MPF_TEST_BUILD);
 
   EXPECT_EQ(demo.status, 0) << demo.output;
-  EXPECT_THAT(demo.output, AllOf(HasSubstr("$ mpf-ip330-server adc ipac IP_b"), HasSubstr("VOLTMETER"), HasSubstr("  voltmeter "),
-                                 HasSubstr("the ADC measured what the DAC gave in"), HasSubstr("dioOut")));
+  EXPECT_THAT(demo.output,
+              AllOf(HasSubstr("$ mpf-ip330-server adc ipac IP_b"), HasSubstr("VOLTMETER"),
+                    HasSubstr("  voltmeter "), HasSubstr("the ADC measured what the DAC gave in"),
+                    HasSubstr("dioOut")));
 }
 
 TEST_F(Demo, ShowsWhatAServerSaidThatDoesNotStart) {
@@ -55,7 +58,8 @@ TEST_F(Demo, ShowsWhatAServerSaidThatDoesNotStart) {
 }
 
 TEST_F(Demo, FailsWhenNothingComesOverAWire) {
-  const auto demo = runDemo(buildWithAdc("exec " MPF_TEST_BUILD "/bin/mpf-ip330-server \"${@/0=wire:dac.0/0=dc:0}\"\n"));
+  const auto demo = runDemo(
+      buildWithAdc("exec " MPF_TEST_BUILD "/bin/mpf-ip330-server \"${@/0=wire:dac.0/0=dc:0}\"\n"));
 
   EXPECT_NE(demo.status, 0) << demo.output;
   EXPECT_THAT(demo.output, HasSubstr("the ADC measured what the DAC gave in"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every program, started with some of its standard descriptors closed or full: it ends as its documents say, opens /dev/null in their
-// place, and never writes its log to an instrument.
+// Every program, started with some of its standard descriptors closed or full: it ends as its
+// documents say, opens /dev/null in their place, and never writes its log to an instrument.
 #include <fcntl.h>
 #include <poll.h>
 #include <sched.h>
@@ -21,25 +21,30 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/client/sync_client.h>
-#include <mpf/schema/serial_server.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/pty.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/file_descriptor.h>
+#include <mpf/serial_commands.h>
+#include <mpf/sync_client.h>
+
+#include "base/system_call.h"
+#include "tests/support/program.h"
+#include "tests/support/pty.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
 
 constexpr unsigned kSubsets = 8;  // of the descriptors 0 to 2: bit n stands for descriptor n
 
-// A program with some of its standard descriptors closed and others on files. It dies with the test.
+// A program with some of its standard descriptors closed and others on files. It dies with the
+// test.
 class Bare {
  public:
-  using Files = std::map<int, const char*>;  // descriptor -> what it is; others are /dev/zero, so that /dev/null means something
+  using Files =
+      std::map<int,
+               // descriptor -> what it is; others are /dev/zero, so that /dev/null means something
+               const char*>;
 
   Bare(std::vector<std::string> command, unsigned closed, const Files& files = {}) {
     std::vector<char*> arguments;
@@ -53,13 +58,15 @@ class Bare {
     if (pid_ != 0) {
       writeEnd.reset();
       char none = 0;
-      [[maybe_unused]] const auto nothing = ::read(started.get(), &none, 1);  // ends when the program has been started
+      // ends when the program has been started
+      [[maybe_unused]] const auto nothing = ::read(started.get(), &none, 1);
       return;
     }
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
       const auto found = files.find(descriptor);
-      ::dup2(::open(found == files.end() ? "/dev/zero" : found->second, O_RDWR | O_CLOEXEC), descriptor);
+      ::dup2(::open(found == files.end() ? "/dev/zero" : found->second, O_RDWR | O_CLOEXEC),
+             descriptor);
     }
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
       if ((closed >> descriptor & 1u) != 0) ::close(descriptor);
@@ -85,7 +92,8 @@ class Bare {
   // Where a descriptor leads to; empty while it is closed.
   [[nodiscard]] std::string placeOf(int descriptor) const {
     std::error_code none;
-    return std::filesystem::read_symlink(fmt::format("/proc/{}/fd/{}", pid_, descriptor), none).string();
+    return std::filesystem::read_symlink(fmt::format("/proc/{}/fd/{}", pid_, descriptor), none)
+        .string();
   }
   // Waits until each of these descriptors leads to /dev/null. False when the program ends first.
   [[nodiscard]] bool waitForNull(unsigned descriptors) const {
@@ -101,7 +109,8 @@ class Bare {
  private:
   [[nodiscard]] bool hasEnded() const {
     siginfo_t info{};
-    return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
+    return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == pid_;
   }
   pid_t pid_ = 0;
 };
@@ -111,7 +120,9 @@ std::vector<std::string> programs() {
   return {std::istream_iterator<std::string>(list), {}};
 }
 
-std::string fileName(const std::string& program) { return std::filesystem::path(program).filename().string(); }
+std::string fileName(const std::string& program) {
+  return std::filesystem::path(program).filename().string();
+}
 
 class EveryProgramStarted : public testing::TestWithParam<std::string> {
  protected:
@@ -120,19 +131,27 @@ class EveryProgramStarted : public testing::TestWithParam<std::string> {
     const std::map<std::string, std::vector<std::string>> arguments{
         {"mpf", {"tap", "nobody", "--backplane", backplane_.name()}},
         {"mpf-bench", {"local", "--quick", "--only", "futex bounce", "--json", fifo_}},
-        {"mpf-router", {"--listen", "127.0.0.1:0", "--serve", "0", "--plain", "--backplane", backplane_.name()}},
+        {"mpf-router",
+         {"--listen", "127.0.0.1:0", "--serve", "0", "--plain", "--backplane", backplane_.name()}},
         {"mpf-serial-server", {"line", linkPath_, "1000", "20", "--backplane", backplane_.name()}},
         {"mpf-int32-client", {"nobody", "--timeout", "1000000", "--backplane", backplane_.name()}},
-        {"mpf-char8-array-client", {"nobody", "--timeout", "1000000", "--backplane", backplane_.name()}},
-        {"mpf-dac128v-server", {"dac", "ipac", "IP_a", "20", "--carrier", "ipac=model", "--backplane", backplane_.name()}},
+        {"mpf-char8-array-client",
+         {"nobody", "--timeout", "1000000", "--backplane", backplane_.name()}},
+        {"mpf-dac128v-server",
+         {"dac", "ipac", "IP_a", "20", "--carrier", "ipac=model", "--backplane",
+          backplane_.name()}},
         {"mpf-ip330-server",
-         {"adc", "ipac", "IP_a", "D", "-5to5", "0", "15", "10", "120", "--carrier", "ipac=model", "--backplane", backplane_.name()}},
+         {"adc", "ipac", "IP_a", "D", "-5to5", "0", "15", "10", "120", "--carrier", "ipac=model",
+          "--backplane", backplane_.name()}},
         {"mpf-digital-io-server",
-         {"dio", "ipac", "IP_a", "20", "100", "116", "0xff", "0xff", "--carrier", "ipac=model", "--backplane", backplane_.name()}},
-        {"mpf-ip440-server", {"in", "ipac", "IP_a", "20", "--carrier", "ipac=model", "--backplane", backplane_.name()}},
+         {"dio", "ipac", "IP_a", "20", "100", "116", "0xff", "0xff", "--carrier", "ipac=model",
+          "--backplane", backplane_.name()}},
+        {"mpf-ip440-server",
+         {"in", "ipac", "IP_a", "20", "--carrier", "ipac=model", "--backplane", backplane_.name()}},
         {"mpf-int32-server", {"--backplane", backplane_.name()}},
         {"mpf-char8-array-server", {"--backplane", backplane_.name()}},
-        {"mpf-demo", {"--seconds", "1000000", "--patience", "1000000", "--backplane", backplane_.name()}}};
+        {"mpf-demo",
+         {"--seconds", "1000000", "--patience", "1000000", "--backplane", backplane_.name()}}};
     auto command = arguments.at(fileName(GetParam()));
     command.insert(command.begin(), GetParam());
     return command;
@@ -168,19 +187,23 @@ TEST_P(EveryProgramStarted, HasNullInPlaceOfWhatIsClosed) {
   for (unsigned closed = 1; closed < kSubsets; ++closed) {
     Bare program(longRun(), closed);
 
-    ASSERT_TRUE(program.waitForNull(closed)) << closed;  // a file of the program's own would stay there
+    // a file of the program's own would stay there
+    ASSERT_TRUE(program.waitForNull(closed)) << closed;
 
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
-      EXPECT_EQ(program.placeOf(descriptor), (closed >> descriptor & 1u) != 0 ? "/dev/null" : "/dev/zero") << closed;
+      EXPECT_EQ(program.placeOf(descriptor),
+                (closed >> descriptor & 1u) != 0 ? "/dev/null" : "/dev/zero")
+          << closed;
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Programs, EveryProgramStarted, testing::ValuesIn(programs()), [](const auto& test) {
-  auto name = fileName(test.param);
-  std::ranges::replace(name, '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Programs, EveryProgramStarted, testing::ValuesIn(programs()),
+                         [](const auto& test) {
+                           auto name = fileName(test.param);
+                           std::ranges::replace(name, '-', '_');
+                           return name;
+                         });
 
 // What an instrument at the far end of a line receives until the server is over.
 class SerialServerWithout : public testing::TestWithParam<unsigned> {
@@ -193,7 +216,8 @@ class SerialServerWithout : public testing::TestWithParam<unsigned> {
 };
 
 TEST_P(SerialServerWithout, TheInstrumentGetsNoLineOfTheLog) {
-  Bare server({MPF_TEST_SERIAL_SERVER, "line", linkPath_, "1000", "20", "--log-level", "trace", "--backplane", backplane_.name()},
+  Bare server({MPF_TEST_SERIAL_SERVER, "line", linkPath_, "1000", "20", "--log-level", "trace",
+               "--backplane", backplane_.name()},
               GetParam());
   {
     SyncClient client(backplane_, "line");
@@ -208,7 +232,8 @@ TEST_P(SerialServerWithout, TheInstrumentGetsNoLineOfTheLog) {
   EXPECT_EQ(server.wait(), 0);  // the log has been written
   std::array<char, 1000> bytes{};
   pollfd poll{line_.master().get(), POLLIN, 0};
-  const auto received = ::poll(&poll, 1, 0) == 1 ? ::read(line_.master().get(), bytes.data(), bytes.size()) : 0;
+  const auto received =
+      ::poll(&poll, 1, 0) == 1 ? ::read(line_.master().get(), bytes.data(), bytes.size()) : 0;
   EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(received)), "*IDN?");
 }
 
@@ -217,7 +242,8 @@ TEST(LogOfAProgram, HasTheTextOfOthersEscaped) {
   const TestBackplane backplane;
   const Program server({MPF_TEST_INT32_SERVER, "a\u202eb", "--backplane", backplane.name()});
 
-  EXPECT_THAT(server.line(), testing::EndsWith(R"(info mpf-int32-server: serving "a\u202eb" at location 0)"));
+  EXPECT_THAT(server.line(),
+              testing::EndsWith(R"(info mpf-int32-server: serving "a\u202eb" at location 0)"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Descriptors, SerialServerWithout, testing::Range(0U, kSubsets));

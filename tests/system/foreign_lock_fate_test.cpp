@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: MIT
-// A stranger's lock on a killed server's files keeps no client from the fate of its request, nor from the next server.
+// A stranger's lock on a killed server's files keeps no client from the fate of its request, nor
+// from the next server.
 #include <fcntl.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <thread>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/client/message_client.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/file_descriptor.h>
+#include <mpf/message_client.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -26,9 +28,11 @@ struct Stranger {
 
 class ForeignLockFate : public testing::TestWithParam<Stranger> {
  protected:
-  // Waits in a thread for a lock on the file, and keeps it. Locks of open files are those of no process: this one is a stranger's.
+  // Waits in a thread for a lock on the file, and keeps it. Locks of open files are those of no
+  // process: this one is a stranger's.
   void waitForLock(const std::string& name) {
-    file_.reset(checkCall(::open(segments::path(name).c_str(), GetParam().access | O_CLOEXEC), "open", name));
+    file_.reset(checkCall(::open(segments::path(name).c_str(), GetParam().access | O_CLOEXEC),
+                          "open", name));
     waiter_ = std::thread([this] {
       struct flock64 lock{};
       lock.l_type = GetParam().type;
@@ -61,7 +65,9 @@ TEST_P(ForeignLockFate, ComesAndTheNextServerTakesTheName) {
   Victim server("serve", backplane_.name());
   ASSERT_EQ(server.line(), "open");
   int fates = 0;
-  MessageClient client(dispatcher_, [&](const Message& message) { fates += message.getType() == MessageType::requestFate ? 1 : 0; });
+  MessageClient client(dispatcher_, [&](const Message& message) {
+    fates += message.getType() == MessageType::requestFate ? 1 : 0;
+  });
   client.bind("echo", 0);
   run([&] { return client.isConnected(); });
   waitForLock(serversFile());
@@ -78,7 +84,8 @@ TEST_P(ForeignLockFate, ComesAndTheNextServerTakesTheName) {
 
 INSTANTIATE_TEST_SUITE_P(OfStrangers, ForeignLockFate,
                          testing::Values(Stranger{NameKind::serverWindow, O_RDONLY, F_RDLCK},
-                                         Stranger{NameKind::serverWindow, O_RDWR, F_WRLCK}, Stranger{NameKind::hints, O_RDONLY, F_RDLCK},
+                                         Stranger{NameKind::serverWindow, O_RDWR, F_WRLCK},
+                                         Stranger{NameKind::hints, O_RDONLY, F_RDLCK},
                                          Stranger{NameKind::hints, O_RDWR, F_WRLCK}));
 
 }  // namespace

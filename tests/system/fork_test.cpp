@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A program forks without exec: its child keeps nobody alive, does nothing to what its parent has, and may have objects of its own.
+// A program forks without exec: its child keeps nobody alive, does nothing to what its parent has,
+// and may have objects of its own.
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -12,13 +13,14 @@
 #include <optional>
 #include <thread>
 
-#include <mpf/base/system_call.h>
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/shm/child.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "tests/shm/child.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -27,7 +29,8 @@ using namespace std::chrono_literals;
 
 class ForkTest : public testing::Test {
  protected:
-  // An echo server with a thread, a client of it with the process's dispatcher thread, and one without a thread.
+  // An echo server with a thread, a client of it with the process's dispatcher thread, and one
+  // without a thread.
   void SetUp() override {
     server_->on<Float64>([](Float64& request) { request.value += 1; });
     thread_ = std::thread([this] { server_->run(); });

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Processes are killed under load at random times. MPF_TEST_KILLS sets how many times per test; the seed is printed.
+// Processes are killed under load at random times. MPF_TEST_KILLS sets how many times per test; the
+// seed is printed.
 #include <array>
 #include <cstdlib>
 #include <gmock/gmock.h>
@@ -10,13 +11,14 @@
 #include <random>
 #include <set>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/sanitized.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "shm/segment_name.h"
+#include "tests/support/sanitized.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -75,7 +77,9 @@ void sendOne(MessageClient& client, Ledger& ledger, std::mt19937& random) {
   if (random() % 4 == 0) {
     result = client.send(client.alloc<Float64Array>(random() % 2000), Deadline::never(), &id);
   } else {
-    const auto deadline = random() % 8 != 0 ? Deadline::never() : Deadline::after(std::chrono::microseconds(random() % 500));
+    const auto deadline = random() % 8 != 0
+                              ? Deadline::never()
+                              : Deadline::after(std::chrono::microseconds(random() % 500));
     result = client.send(Int32Message({.value = 1}), deadline, &id);
   }
   if (result != SendResult::sent) return;
@@ -108,7 +112,8 @@ TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
   EXPECT_TRUE(ledger.open.empty());
   EXPECT_EQ(ledger.connects, kills());
   EXPECT_EQ(ledger.disconnects, kills());
-  EXPECT_EQ(ledger.accepted, ledger.replies + ledger.fates[0] + ledger.fates[1] + ledger.fates[2] + ledger.fates[3]);
+  EXPECT_EQ(ledger.accepted,
+            ledger.replies + ledger.fates[0] + ledger.fates[1] + ledger.fates[2] + ledger.fates[3]);
   EXPECT_GT(ledger.replies, 0u);
 }
 
@@ -123,7 +128,8 @@ TEST_F(KillTest, ADeathIsAThingThatRuns) {
   });
   client.bind("echo");
   ASSERT_TRUE(client.connectWait(60s));
-  while (!dispatcher.nextDeadline().isNever()) dispatcher.runOnce();  // then the death is all that comes
+  // then the death is all that comes
+  while (!dispatcher.nextDeadline().isNever()) dispatcher.runOnce();
 
   server.end(SIGKILL);
   static_cast<void>(backplane_.removeDead());  // there is no window any more, either
@@ -150,7 +156,8 @@ TEST_F(KillTest, AServerGoesOnWhenClientsAreKilled) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-// The server ends before it hears of the death, or before it looks: nobody else is there who could remove what is left.
+// The server ends before it hears of the death, or before it looks: nobody else is there who could
+// remove what is left.
 TEST_F(KillTest, AServerThatEndsTakesItsDeadClientsAlong) {
   auto server = std::make_unique<MessageServer>(backplane_, "echo");
   Victim client("flood", backplaneName());
@@ -173,7 +180,8 @@ TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {
     ASSERT_EQ(successor.line(), "open");
 
     Answer answer = client.call(Float64Message({.value = 2}), 60s);
-    while (!answer) answer = client.call(Float64Message({.value = 2}), 60s);  // the fate of a call that met the death
+    // the fate of a call that met the death
+    while (!answer) answer = client.call(Float64Message({.value = 2}), 60s);
     EXPECT_EQ(answer.message().tryAs<Float64>()->value, 3);
   }
 }
@@ -204,7 +212,7 @@ TEST_F(KillTest, AClientThatPausesAtItsServersEndMayGoOn) {
 
   server.end(SIGKILL);
   while (news != ConnectStatus::connectNo) dispatcher.runOnce(Deadline::after(1ms));
-  client->goOn();
+  client->resume();
 
   EXPECT_EQ(replies, 2);
 }
@@ -222,7 +230,8 @@ TEST_F(KillTest, AStoppedServerIsNotDead) {
 
   auto answer = client.call(Float64Message({.value = 3}), 60s);
   ASSERT_TRUE(answer) << answer.why();
-  EXPECT_EQ(answer.message().tryAs<Float64>()->value, 4) << "a late reply must not be taken for this one's";
+  EXPECT_EQ(answer.message().tryAs<Float64>()->value, 4)
+      << "a late reply must not be taken for this one's";
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What holds for every program that is installed: how it says what it is, and what is wrong with its arguments.
+// What holds for every program that is installed: how it says what it is, and what is wrong with
+// its arguments.
 #include <sys/wait.h>
 
 #include <filesystem>
@@ -9,9 +10,9 @@
 #include <sstream>
 #include <vector>
 
-#include <mpf/tests/support/command.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/command.h"
+#include "tests/support/program.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -43,7 +44,10 @@ class EveryProgram : public testing::TestWithParam<std::string> {
   Watchdog watchdog_{"a program"};
 };
 
-TEST_P(EveryProgram, SaysItsVersion) { EXPECT_EQ(outputOf(GetParam() + " --version"), nameOf(GetParam()) + " " + MPF_TEST_VERSION + "\n"); }
+TEST_P(EveryProgram, SaysItsVersion) {
+  EXPECT_EQ(outputOf(GetParam() + " --version"),
+            nameOf(GetParam()) + " " + MPF_TEST_VERSION + "\n");
+}
 
 // The man pages are made of it.
 TEST_P(EveryProgram, SaysInItsFirstLineWhatItIsFor) {
@@ -64,11 +68,12 @@ TEST_P(EveryProgram, NamesItselfAndWhatIsWrongAndEndsWith2) {
                           EndsWith("`" + nameOf(GetParam()) + " --help` shows what they do\n")));
 }
 
-INSTANTIATE_TEST_SUITE_P(Programs, EveryProgram, testing::ValuesIn(programs()), [](const auto& test) {
-  auto name = std::filesystem::path(test.param).filename().string();
-  std::ranges::replace(name, '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Programs, EveryProgram, testing::ValuesIn(programs()),
+                         [](const auto& test) {
+                           auto name = std::filesystem::path(test.param).filename().string();
+                           std::ranges::replace(name, '-', '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace mpf::test

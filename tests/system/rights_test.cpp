@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Who may be a client: the owner alone, or a group, as the server says. Root plays several users; others see the files' rights only.
+// Who may be a client: the owner alone, or a group, as the server says. Root plays several users;
+// others see the files' rights only.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,13 +10,14 @@
 #include <string>
 #include <thread>
 
-#include <mpf/base/system_call.h>
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -30,7 +32,8 @@ class RightsTest : public testing::Test {
   // An echo server, with a thread of its own.
   class Server {
    public:
-    Server(const Backplane& backplane, Rights rights) : server_(backplane, "echo", {.location = 0, .rights = rights}) {
+    Server(const Backplane& backplane, Rights rights)
+        : server_(backplane, "echo", {.location = 0, .rights = rights}) {
       server_.on<Float64>([](Float64& request) { request.value += 1; });
       server_.on<Float64Array>([](Float64ArrayMessage&) {});
       thread_ = std::thread([this] { server_.run(); });
@@ -46,14 +49,16 @@ class RightsTest : public testing::Test {
     MessageServer server_;
     std::thread thread_;
   };
-  // A client of another user in another process. What it says first is why it is not connected, if it is not.
+  // A client of another user in another process. What it says first is why it is not connected, if
+  // it is not.
   Victim startClientAs(std::uint32_t user, std::uint32_t group) const {
     return {"crowd", backplane_.name(), {"1", "as", std::to_string(user), std::to_string(group)}};
   }
   // What a client is told that may not open the server's window.
   std::string refusal(const std::string& mode, std::uint32_t group) const {
     return fmt::format("open {} (mode {}, user {}, group {}): Permission denied",
-                       segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")), mode, ::geteuid(), group);
+                       segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")),
+                       mode, ::geteuid(), group);
   }
   // Rights and group of each segment that has `mark` in its name, as "0600 0".
   std::vector<std::string> rightsOf(const std::string& mark) const {
@@ -143,7 +148,8 @@ TEST_F(RightsTest, EverybodyIsServedWhenTheServerSaysSo) {
 
 TEST_F(RightsTest, RootIsServedByAnybodysServer) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
-  Victim server("serve", backplane_.name(), {"as", std::to_string(kNobody), std::to_string(kNobody)});
+  Victim server("serve", backplane_.name(),
+                {"as", std::to_string(kNobody), std::to_string(kNobody)});
   EXPECT_EQ(server.line(), "open");
 
   SyncClient client(backplane_, "echo", 0);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Many clients through one pair of routers: each gets its own replies, and all find the next life of their server.
-#include <mpf/tests/support/sanitized.h>
-#include <mpf/tests/system/router_fixture.h>
+// Many clients through one pair of routers: each gets its own replies, and all find the next life
+// of their server.
+#include "tests/support/sanitized.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -18,7 +19,9 @@ class RouterCrowdTest : public RouterTest {
     EXPECT_EQ(echo_.line(), "open");
   }
   void startCrowd() {
-    for (int i = 0; i < kProcesses; ++i) crowd_.emplace_back("crowd", routers_.near().name(), std::vector{std::to_string(kClientsOfEach)});
+    for (int i = 0; i < kProcesses; ++i)
+      crowd_.emplace_back("crowd", routers_.near().name(),
+                          std::vector{std::to_string(kClientsOfEach)});
   }
   void waitUntilAllAreAnswered() {
     for (auto& process : crowd_) waitUntilAnswered(process);
@@ -55,8 +58,8 @@ TEST_F(RouterCrowdTest, AllAreAnsweredByEachLifeOfTheServer) {
   }
 }
 
-// The far router finds, all at once, that one life has ended and the next one is there: who has heard of the end connects again before
-// others have heard.
+// The far router finds, all at once, that one life has ended and the next one is there: who has
+// heard of the end connects again before others have heard.
 TEST_F(RouterCrowdTest, AllFindTheServerThatCameWhileTheRouterStoodStill) {
   routers_.start();
   startServer();
@@ -67,7 +70,7 @@ TEST_F(RouterCrowdTest, AllFindTheServerThatCameWhileTheRouterStoodStill) {
     routers_.farRouter().stop();
     echo_.end(signal);
     startServer();
-    routers_.farRouter().goOn();
+    routers_.farRouter().resume();
     waitUntilAllAreAnswered();
   }
 }

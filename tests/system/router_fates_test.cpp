@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Requests that get no reply through two routers: each has one fate, and news stands where it belongs.
-#include <mpf/tests/system/router_fixture.h>
+// Requests that get no reply through two routers: each has one fate, and news stands where it
+// belongs.
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -83,20 +84,24 @@ TEST_F(RouterFatesTest, ACancelledRequestHasNoOtherEnd) {
   EXPECT_EQ(next().tryAs<Int32>()->value, 2) << "the late reply is nobody's";
 }
 
-// What the server has seen may have been done; the rest was not. Then the disconnect, and a new life.
+// What the server has seen may have been done; the rest was not. Then the disconnect, and a new
+// life.
 TEST_F(RouterFatesTest, WhenAServerEndsWhatItHasSeenIsUnknownAndTheRestWasNeverTaken) {
-  std::vector<std::pair<std::uint32_t, Fate>> expected{{send(), Fate::outcomeUnknown}, {send(), Fate::outcomeUnknown}};
+  std::vector<std::pair<std::uint32_t, Fate>> expected{{send(), Fate::outcomeUnknown},
+                                                       {send(), Fate::outcomeUnknown}};
   const auto first = nextRequest();
   const auto second = nextRequest();
   serverRuns_ = false;
   for (int i = 0; i < 5; ++i) expected.emplace_back(send(), Fate::neverTaken);
-  EXPECT_EQ(nextFate(send(Deadline::after(1ms))), Fate::expired) << "now the others have arrived, too";
+  EXPECT_EQ(nextFate(send(Deadline::after(1ms))), Fate::expired)
+      << "now the others have arrived, too";
 
   server_.reset();
 
   for (const auto& [id, fate] : expected) EXPECT_EQ(nextFate(id), fate);
   runUntil([&] { return !caller_->isConnected(); });
-  EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo));
+  EXPECT_THAT(caller_->news,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo));
   EXPECT_THAT(caller_->messages, testing::IsEmpty());
   serverRuns_ = true;
   openServer();
@@ -121,7 +126,8 @@ TEST_F(RouterFatesTest, AServerThatEndsBeforeItAcceptsAFarClientTakesNothing) {
   EXPECT_EQ(fateOf(late.take()), Fate::neverTaken);
 }
 
-// The queue is the server's, with its size; the client hears of the refusals and, once, that the queue is full.
+// The queue is the server's, with its size; the client hears of the refusals and, once, that the
+// queue is full.
 TEST_F(RouterFatesTest, AQueueThatIsFullRefusesAndIsToldOnceInItsPlace) {
   constexpr int kQueueSize = 10;
   restartServer({.queueSize = kQueueSize});
@@ -140,13 +146,15 @@ TEST_F(RouterFatesTest, AQueueThatIsFullRefusesAndIsToldOnceInItsPlace) {
   EXPECT_EQ(caller_->news.size(), 1u) << "no news since";
 }
 
-// Through any number of lives, each begins with a connect and ends with a disconnect; the fixture sees to the ends of requests.
+// Through any number of lives, each begins with a connect and ends with a disconnect; the fixture
+// sees to the ends of requests.
 TEST_F(RouterFatesTest, EachLifeOfAServerBeginsAndEndsWithNews) {
   constexpr int kLives = 20;
   std::vector<ConnectStatus> expected{ConnectStatus::connectYes};
   for (int life = 0; life < kLives; ++life) {
     for (int i = 0; i < kLives; ++i) send();
-    for (int answered = 0; answered < life; ++answered) static_cast<void>(server_->reply(nextRequest()));
+    for (int answered = 0; answered < life; ++answered)
+      static_cast<void>(server_->reply(nextRequest()));
     serverRuns_ = false;
     server_.reset();
     expected.push_back(ConnectStatus::connectNo);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RouterTest: two routers, a client near and a server far, which take turns in the test's own thread; only the routers are processes.
+// RouterTest: two routers, a client near and a server far, which take turns in the test's own
+// thread; only the routers are processes.
 #pragma once
 
 #include <chrono>
@@ -11,14 +12,15 @@
 #include <optional>
 #include <utility>
 
-#include <mpf/client/message_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/support/caller.h>
-#include <mpf/tests/support/router_pair.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_client.h>
+#include <mpf/message_server.h>
+
+#include "shm/segment_name.h"
+#include "shm/window.h"
+#include "tests/support/caller.h"
+#include "tests/support/router_pair.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
@@ -28,7 +30,8 @@ class RouterTest : public testing::Test {
  protected:
   explicit RouterTest(RouterPlace place = {}) : routers_(std::move(place)) {}
 
-  // The server; `serve` is called for each request that it has received. Default: it sends the request back.
+  // The server; `serve` is called for each request that it has received. Default: it sends the
+  // request back.
   void openServer(ServerOptions options = {}) {
     options.location = RouterPair::kLocation;
     server_ = std::make_unique<MessageServer>(routers_.far(), "echo", options);
@@ -61,10 +64,12 @@ class RouterTest : public testing::Test {
     caller_->send(Int32Message({.value = ++value_}));
     EXPECT_EQ(next().tryAs<Int32>()->value, value_);
   }
-  // The server sends each request back, and remembers its number (numberOf): nothing is to be delivered twice.
+  // The server sends each request back, and remembers its number (numberOf): nothing is to be
+  // delivered twice.
   void serveOnceEach() {
     serve_ = [this](Message&& request) {
-      EXPECT_TRUE(delivered_.insert(numberOf(request)).second) << numberOf(request) << " was delivered twice";
+      EXPECT_TRUE(delivered_.insert(numberOf(request)).second)
+          << numberOf(request) << " was delivered twice";
       static_cast<void>(server_->reply(std::move(request)));
     };
   }
@@ -91,17 +96,22 @@ class RouterTest : public testing::Test {
       dispatcher_->runOnce(Deadline::after(200us));
     }
   }
-  // Until the near router has taken so many requests for the server that is there now: none waits for it then.
+  // Until the near router has taken so many requests for the server that is there now: none waits
+  // for it then.
   void waitUntilTaken(const std::string& server, std::uint64_t requests) {
-    const auto window = SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, server);
+    const auto window =
+        SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, server);
     const auto proxy = PeerWindow::tryOpen(window, layout::SegmentKind::serverWindow);
     runUntil([&] { return proxy->control().received.load(std::memory_order_relaxed) >= requests; });
   }
-  // Until each client of a crowd (victim.cpp) had all its requests answered, with its own answers, in the life of the server that is there now.
+  // Until each client of a crowd (victim.cpp) had all its requests answered, with its own answers,
+  // in the life of the server that is there now.
   void waitUntilAnswered(Victim& crowd) const {
-    const auto window = SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, "echo");
+    const auto window =
+        SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, "echo");
     for (auto line = crowd.line();; line = crowd.line()) {
-      ASSERT_THAT(line, testing::AnyOf(testing::StartsWith("answered "), testing::StartsWith("waiting: ")));
+      ASSERT_THAT(
+          line, testing::AnyOf(testing::StartsWith("answered "), testing::StartsWith("waiting: ")));
       const auto proxy = PeerWindow::tryOpen(window, layout::SegmentKind::serverWindow);
       if (proxy && line == fmt::format("answered {:x}", proxy->header().incarnation)) return;
     }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Routers, servers and clients are killed under load at random times and started again: each request has one end, and it is true.
-// MPF_TEST_KILLS sets how many die per test; the seed is printed.
+// Routers, servers and clients are killed under load at random times and started again: each
+// request has one end, and it is true. MPF_TEST_KILLS sets how many die per test; the seed is
+// printed.
 #include <cstdlib>
 #include <map>
 
-#include <mpf/tests/support/random.h>
-#include <mpf/tests/support/request_log.h>
-#include <mpf/tests/support/sanitized.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/system/router_fixture.h>
+#include "tests/support/random.h"
+#include "tests/support/request_log.h"
+#include "tests/support/sanitized.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -34,7 +35,9 @@ class RouterKillTest : public RouterTest {
   void sendOne() {
     if (!caller_->isConnected() || caller_->open.size() >= 150) return;
     const auto number = ++lastNumber_;
-    const auto deadline = random_.oneIn(8) ? Deadline::after(std::chrono::microseconds(random_.below(2000))) : Deadline::never();
+    const auto deadline = random_.oneIn(8)
+                              ? Deadline::after(std::chrono::microseconds(random_.below(2000)))
+                              : Deadline::never();
     if (random_.oneIn(4)) {
       auto request = caller_->client.alloc<Int32Array>(1 + random_.below(2000));
       request->cmd = RequestLog::kCounted;
@@ -48,18 +51,21 @@ class RouterKillTest : public RouterTest {
     message.setClientExtra(number);
     std::uint32_t id = 0;
     const auto result = caller_->client.send(std::move(message), deadline, &id);
-    EXPECT_THAT(result, testing::AnyOf(SendResult::sent, SendResult::queueFull, SendResult::tooManyOutstanding, SendResult::notConnected));
+    EXPECT_THAT(result, testing::AnyOf(SendResult::sent, SendResult::queueFull,
+                                       SendResult::tooManyOutstanding, SendResult::notConnected));
     if (result == SendResult::sent) caller_->open.insert(id);
   }
   // What has come: the answer to the request whose mark it carries, or its fate.
   void takeAll() {
     for (auto message = caller_->take(); message; message = caller_->take()) {
       const auto number = message.getClientExtra();
-      EXPECT_TRUE(ends_.emplace(number, fateOf(message)).second) << "request " << number << " has had its end";
+      EXPECT_TRUE(ends_.emplace(number, fateOf(message)).second)
+          << "request " << number << " has had its end";
       if (fateOf(message)) continue;
       ++replies_;
       const auto* int32 = message.tryAs<Int32>();
-      EXPECT_EQ(int32 != nullptr ? int32->value : message.valueAs<Int32Array>()[0], number) << "a reply to something else";
+      EXPECT_EQ(int32 != nullptr ? int32->value : message.valueAs<Int32Array>()[0], number)
+          << "a reply to something else";
       EXPECT_GT(number, lastReplied_) << "replies are in the order of requests";
       lastReplied_ = number;
     }
@@ -84,7 +90,8 @@ class RouterKillTest : public RouterTest {
     }
   }
   void waitUntilConnected() {
-    while (!caller_->isConnected() || caller_->news.empty() || caller_->news.back() != ConnectStatus::connectYes) {
+    while (!caller_->isConnected() || caller_->news.empty() ||
+           caller_->news.back() != ConnectStatus::connectYes) {
       dispatcher_->runOnce();
       takeAll();
     }
@@ -104,7 +111,8 @@ class RouterKillTest : public RouterTest {
       const auto seen = log_.timesSeen(number);
       const auto end = fate ? toString(*fate) : "answered";
       EXPECT_GE(seen, fate ? 0 : 1) << "request " << number << ": " << end;
-      EXPECT_LE(seen, fate && *fate != Fate::outcomeUnknown ? 0 : 1) << "request " << number << ": " << end;
+      EXPECT_LE(seen, fate && *fate != Fate::outcomeUnknown ? 0 : 1)
+          << "request " << number << ": " << end;
     }
   }
   void TearDown() override {

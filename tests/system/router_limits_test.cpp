@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// What a router has not enough of: who comes too late is told so, who is there goes on, and when there is room again, others get in.
+// What a router has not enough of: who comes too late is told so, who is there goes on, and when
+// there is room again, others get in.
 #include <arpa/inet.h>
 #include <sys/resource.h>
 
 #include <algorithm>
 
-#include <mpf/tests/support/sanitized.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/system/router_fixture.h>
+#include "tests/support/sanitized.h"
+#include "tests/support/test_backplane.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -19,7 +20,8 @@ FileDescriptor callTo(const std::string& address) {
   to.sin_family = AF_INET;
   to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.find(':') + 1))));
-  checkCall(::connect(socket.get(), reinterpret_cast<sockaddr*>(&to), sizeof to), "connect", address);
+  checkCall(::connect(socket.get(), reinterpret_cast<sockaddr*>(&to), sizeof to), "connect",
+            address);
   return socket;
 }
 
@@ -31,7 +33,8 @@ void limitDescriptors(rlim_t most) {
 // Another near router, with a backplane of its own.
 struct Neighbour {
   explicit Neighbour(const std::string& address)
-      : router(std::vector<std::string>{"--backplane", backplane.name(), "--remote", std::to_string(RouterPair::kLocation) + "=" + address,
+      : router(std::vector<std::string>{"--backplane", backplane.name(), "--remote",
+                                        std::to_string(RouterPair::kLocation) + "=" + address,
                                         "--plain", "--last-retry", "200ms"}) {}
   TestBackplane backplane;
   RouterProcess router;
@@ -103,14 +106,15 @@ TEST_F(RouterLimitsTest, ConnectionsBeyondTheLimitAreTurnedAwayUntilOthersEnd) {
 void callAndReset(const std::string& address) {
   const auto socket = callTo(address);
   const linger atOnce{.l_onoff = 1, .l_linger = 0};
-  checkCall(::setsockopt(socket.get(), SOL_SOCKET, SO_LINGER, &atOnce, sizeof atOnce), "setsockopt");
+  checkCall(::setsockopt(socket.get(), SOL_SOCKET, SO_LINGER, &atOnce, sizeof atOnce),
+            "setsockopt");
 }
 
 TEST_F(RouterLimitsTest, ConnectionsThatAreResetAtOnceTakeNoPlace) {
   routers_.startFar({"--max-connections", "1"});
   routers_.farRouter().stop();
   for (int i = 0; i < 10; ++i) callAndReset(routers_.address());
-  routers_.farRouter().goOn();
+  routers_.farRouter().resume();
 
   const Neighbour neighbour(routers_.address());
   openServer();
@@ -121,15 +125,20 @@ class RouterWithoutDescriptorsTest : public RouterLimitsTest {
  protected:
   using RouterLimitsTest::RouterLimitsTest;
   void SetUp() override {
-    if (kIsSanitized) GTEST_SKIP() << "the sanitizer makes descriptors to look at memory, and takes their lack for a fault of the router";
+    if (kIsSanitized)
+      GTEST_SKIP() << "the sanitizer makes descriptors to look at memory, and takes their lack for "
+                      "a fault of the router";
   }
 };
 
-// With one number of files it is this descriptor that is not to be had first, with another one that.
-class RouterFewDescriptorsTest : public RouterWithoutDescriptorsTest, public testing::WithParamInterface<rlim_t> {
+// With one number of files it is this descriptor that is not to be had first, with another one
+// that.
+class RouterFewDescriptorsTest : public RouterWithoutDescriptorsTest,
+                                 public testing::WithParamInterface<rlim_t> {
  protected:
   RouterFewDescriptorsTest()
-      : RouterWithoutDescriptorsTest({.address = {}, .enterNear = {}, .enterFar = [] { limitDescriptors(GetParam()); }}) {}
+      : RouterWithoutDescriptorsTest(
+            {.address = {}, .enterNear = {}, .enterFar = [] { limitDescriptors(GetParam()); }}) {}
 };
 INSTANTIATE_TEST_SUITE_P(Of, RouterFewDescriptorsTest, testing::Values(48, 49));
 
@@ -139,7 +148,7 @@ TEST_P(RouterFewDescriptorsTest, CallersBeyondTheLimitOfFilesWaitUntilOthersHang
   std::vector<FileDescriptor> callers;
   routers_.farRouter().stop();
   for (int i = 0; i < 60; ++i) callers.push_back(callTo(routers_.address()));
-  routers_.farRouter().goOn();
+  routers_.farRouter().resume();
   routers_.farRouter().waitUntilSaid("Too many open files");
   for (int i = 0; i < 20; ++i) expectAnswer();
 
@@ -161,7 +170,8 @@ class RouterFewFilesTest : public RouterWithoutDescriptorsTest {
     expectAnswer();  // both routers have all that they need for it
     for (int i = 0; i < kServers; ++i) {
       const auto name = "server" + std::to_string(100 + i);
-      servers_.push_back(std::make_unique<MessageServer>(routers_.far(), name, ServerOptions{.location = RouterPair::kLocation}));
+      servers_.push_back(std::make_unique<MessageServer>(
+          routers_.far(), name, ServerOptions{.location = RouterPair::kLocation}));
       callers_.push_back(std::make_unique<Caller>(*dispatcher_, name));
     }
     (routers_.*limited)().waitUntilSaid("Too many open files");
@@ -199,7 +209,9 @@ class RouterFewFilesTest : public RouterWithoutDescriptorsTest {
 
 class RouterFewFilesNearTest : public RouterFewFilesTest {
  protected:
-  RouterFewFilesNearTest() : RouterFewFilesTest({.address = {}, .enterNear = [] { limitDescriptors(40); }, .enterFar = {}}) {}
+  RouterFewFilesNearTest()
+      : RouterFewFilesTest(
+            {.address = {}, .enterNear = [] { limitDescriptors(40); }, .enterFar = {}}) {}
 };
 
 TEST_F(RouterFewFilesNearTest, ServersBeyondTheLimitOfFilesWaitUntilOthersEnd) {
@@ -208,7 +220,9 @@ TEST_F(RouterFewFilesNearTest, ServersBeyondTheLimitOfFilesWaitUntilOthersEnd) {
 
 class RouterFewFilesFarTest : public RouterFewFilesTest {
  protected:
-  RouterFewFilesFarTest() : RouterFewFilesTest({.address = {}, .enterNear = {}, .enterFar = [] { limitDescriptors(40); }}) {}
+  RouterFewFilesFarTest()
+      : RouterFewFilesTest(
+            {.address = {}, .enterNear = {}, .enterFar = [] { limitDescriptors(40); }}) {}
 };
 
 TEST_F(RouterFewFilesFarTest, ServersBeyondTheLimitOfFilesWaitUntilOthersEnd) {

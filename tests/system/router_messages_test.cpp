@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Messages through two routers: each type there and back as it was, replies in any number, fates, news in order.
+// Messages through two routers: each type there and back as it was, replies in any number, fates,
+// news in order.
 #include <bit>
 #include <capnp/message.h>
 #include <capnp/serialize.h>
 #include <cstring>
 #include <limits>
 
-#include <mpf/schema/conversion.h>
-#include <mpf/tests/system/router_fixture.h>
+#include "schema/conversion.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -37,7 +38,8 @@ class RouterMessagesTest : public RouterTest {
   static void expectSame(const Message& one, const Message& other) {
     ASSERT_EQ(one.getType(), other.getType());
     ASSERT_EQ(one.body().size(), other.body().size()) << toString(one.getType());
-    EXPECT_EQ(std::memcmp(one.body().data(), other.body().data(), one.body().size()), 0) << toString(one.getType());
+    EXPECT_EQ(std::memcmp(one.body().data(), other.body().data(), one.body().size()), 0)
+        << toString(one.getType());
   }
   template <class T, class Fill>
   Message array(std::size_t length, Fill fill) {
@@ -51,32 +53,37 @@ constexpr auto kLeast = std::numeric_limits<std::int32_t>::min();
 constexpr auto kMost = std::numeric_limits<std::int32_t>::max();
 
 TEST_F(RouterMessagesTest, IntegersComeBackAsTheyWent) {
-  expectEcho(Int32Message({.timeout = kLeast, .cmd = kMost, .status = -1, .address = 1, .extra = 0, .value = kLeast}));
-  expectEcho(OutOfBandMessage({.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = kMost}));
-  expectEcho(SerialConfigMessage({.baud = 115'200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = 'H'}));
+  expectEcho(Int32Message(
+      {.timeout = kLeast, .cmd = kMost, .status = -1, .address = 1, .extra = 0, .value = kLeast}));
+  expectEcho(OutOfBandMessage(
+      {.timeout = 1, .cmd = 2, .status = 3, .address = 4, .extra = 5, .value = kMost}));
+  expectEcho(SerialConfigMessage(
+      {.baud = 115'200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = 'H'}));
 }
 
 // Not by value: by bits.
 TEST_F(RouterMessagesTest, FloatsComeBackBitForBit) {
   using Limits = std::numeric_limits<double>;
-  const std::vector<double> all{0.0,
-                                -0.0,
-                                1.0 / 3,
-                                Limits::infinity(),
-                                -Limits::infinity(),
-                                Limits::denorm_min(),
-                                Limits::max(),
-                                std::bit_cast<double>(0x7ff8'0000'dead'beefull),   // a quiet NaN with something in it
-                                std::bit_cast<double>(0xfff0'0000'0000'0001ull)};  // a signalling one
-  for (const auto value : all) expectEcho(Float64Message({.timeout = 1, .cmd = 2, .status = -3, .address = 4, .extra = 5, .value = value}));
+  const std::vector<double> all{0.0, -0.0, 1.0 / 3, Limits::infinity(), -Limits::infinity(),
+                                Limits::denorm_min(), Limits::max(),
+                                // a quiet NaN with something in it
+                                std::bit_cast<double>(0x7ff8'0000'dead'beefull),
+                                // a signalling one
+                                std::bit_cast<double>(0xfff0'0000'0000'0001ull)};
+  for (const auto value : all)
+    expectEcho(Float64Message(
+        {.timeout = 1, .cmd = 2, .status = -3, .address = 4, .extra = 5, .value = value}));
   expectEcho(array<Float64Array>(all.size(), [&](std::size_t at) { return all[at]; }));
 }
 
 TEST_F(RouterMessagesTest, ArraysOfAnyLengthComeBack) {
   for (const std::size_t length : {0u, 1u, 2u, 7u, 1000u, 300'000u}) {
-    expectEcho(array<Int32Array>(length, [](std::size_t at) { return static_cast<std::int32_t>(at * 2'654'435'761u); }));
-    expectEcho(array<Float64Array>(length, [](std::size_t at) { return 1.0 / static_cast<double>(at); }));
-    expectEcho(array<Char8Array>(length, [](std::size_t at) { return static_cast<char>(at * 37); }));
+    expectEcho(array<Int32Array>(
+        length, [](std::size_t at) { return static_cast<std::int32_t>(at * 2'654'435'761u); }));
+    expectEcho(
+        array<Float64Array>(length, [](std::size_t at) { return 1.0 / static_cast<double>(at); }));
+    expectEcho(
+        array<Char8Array>(length, [](std::size_t at) { return static_cast<char>(at * 37); }));
   }
 }
 
@@ -95,7 +102,8 @@ TEST_F(RouterMessagesTest, BytesKeepTheirEndOfMessageAndTheirCounts) {
 // Its words are the user's: not even their order in the segment changes.
 TEST_F(RouterMessagesTest, AUsersOwnStructComesBackUnread) {
   for (const std::size_t words : {1u, 2u, 1000u}) {
-    expectEcho(array<User>(8 * words, [&](std::size_t at) { return static_cast<std::byte>(at * 97); }));
+    expectEcho(
+        array<User>(8 * words, [&](std::size_t at) { return static_cast<std::byte>(at * 97); }));
   }
 }
 
@@ -138,7 +146,8 @@ TEST_F(RouterMessagesTest, OneRequestMayHaveManyRepliesOfAnyType) {
   for (const auto* reply : {&first, &second, &third}) EXPECT_EQ(reply->route().requestId, id);
 }
 
-// A subscription: long after its end, a request's client gets more, between the answers to other requests.
+// A subscription: long after its end, a request's client gets more, between the answers to other
+// requests.
 TEST_F(RouterMessagesTest, AServerMaySpeakLongAfterItHasAnswered) {
   caller_->send(Int32Message({.value = 1}));
   auto subscription = nextRequest();
@@ -161,7 +170,8 @@ TEST_F(RouterMessagesTest, AServerMaySpeakLongAfterItHasAnswered) {
 TEST_F(RouterMessagesTest, AMessageLargerThanAllowedIsRefusedWhereItIsSent) {
   restartServer({.maxMessageBytes = 1000});
 
-  EXPECT_EQ(caller_->client.send(array<Char8Array>(1000, [](auto) { return 'x'; })), SendResult::tooLarge);
+  EXPECT_EQ(caller_->client.send(array<Char8Array>(1000, [](auto) { return 'x'; })),
+            SendResult::tooLarge);
 
   expectEcho(array<Char8Array>(1000 - sizeof(Char8Array), [](auto) { return 'x'; }));
 }

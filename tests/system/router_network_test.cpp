@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Two hosts and the line between them: slow, lossy, out of order, cut without a word. Network namespaces and tun devices: skipped where
-// those are not allowed.
+// Two hosts and the line between them: slow, lossy, out of order, cut without a word. Network
+// namespaces and tun devices: skipped where those are not allowed.
 #include <sched.h>
 #include <sys/mount.h>
 
@@ -10,11 +10,12 @@
 #include <set>
 #include <system_error>
 
-#include <mpf/base/clock.h>
-#include <mpf/base/system_call.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/wire.h>
-#include <mpf/tests/system/router_fixture.h>
+#include <mpf/clock.h>
+
+#include "base/system_call.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/wire.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -47,7 +48,8 @@ class RouterNetworkTest : public WiredHosts, public RouterTest {
   }
   // After the dead time; the kernel, which would miss the other one too, waits longer.
   void expectBothMissedTheOther() {
-    for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()}) router->waitUntilSaid("nothing was heard of the peer");
+    for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()})
+      router->waitUntilSaid("nothing was heard of the peer");
   }
 };
 
@@ -55,8 +57,11 @@ class RouterNetworkTest : public WiredHosts, public RouterTest {
 class RouterManyAddressesTest : public WiredHosts, public RouterTest {
  protected:
   RouterManyAddressesTest()
-      : RouterTest({.address = "far.test:9900", .enterNear = [this] { enterNear(); }, .enterFar = [this] { enterFar(); }}) {
-    folder_.write("hosts-near", "10.77.0.3 far.test\n10.77.0.4 far.test\n" + std::string(Wire::kFar) + " far.test\n");
+      : RouterTest({.address = "far.test:9900",
+                    .enterNear = [this] { enterNear(); },
+                    .enterFar = [this] { enterFar(); }}) {
+    folder_.write("hosts-near", "10.77.0.3 far.test\n10.77.0.4 far.test\n" +
+                                    std::string(Wire::kFar) + " far.test\n");
     folder_.write("hosts-far", std::string(Wire::kFar) + " far.test\n");
   }
   void SetUp() override {
@@ -66,7 +71,8 @@ class RouterManyAddressesTest : public WiredHosts, public RouterTest {
   void readHosts(const std::string& file) const {
     checkCall(::unshare(CLONE_NEWNS), "unshare");
     checkCall(::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr), "mount", "/");
-    checkCall(::mount(folder_.file(file).c_str(), "/etc/hosts", nullptr, MS_BIND, nullptr), "mount", file);
+    checkCall(::mount(folder_.file(file).c_str(), "/etc/hosts", nullptr, MS_BIND, nullptr), "mount",
+              file);
   }
   void enterNear() const {
     wire->enterNear();
@@ -87,7 +93,8 @@ TEST_F(RouterManyAddressesTest, EachHasItsTime) {
 
 // ---- weather: nothing is cut, so all is answered
 
-class RouterWeatherTest : public RouterNetworkTest, public testing::WithParamInterface<std::pair<const char*, Weather>> {};
+class RouterWeatherTest : public RouterNetworkTest,
+                          public testing::WithParamInterface<std::pair<const char*, Weather>> {};
 
 TEST_P(RouterWeatherTest, EachRequestGetsItsOneReplyInOrder) {
   constexpr int kClients = 4;
@@ -96,7 +103,9 @@ TEST_P(RouterWeatherTest, EachRequestGetsItsOneReplyInOrder) {
   serveOnceEach();
   std::vector<std::unique_ptr<Caller>> callers;
   for (int i = 0; i < kClients; ++i) callers.push_back(std::make_unique<Caller>(*dispatcher_));
-  runUntil([&] { return std::ranges::all_of(callers, [](const auto& each) { return each->isConnected(); }); });
+  runUntil([&] {
+    return std::ranges::all_of(callers, [](const auto& each) { return each->isConnected(); });
+  });
 
   wire->behave(GetParam().second);
   std::array<int, kClients> sent{};
@@ -110,21 +119,27 @@ TEST_P(RouterWeatherTest, EachRequestGetsItsOneReplyInOrder) {
         request.value()[0] = first + sent.at(at)++;
         caller.send(std::move(request));
       }
-      for (auto message = caller.take(); message; message = caller.take()) EXPECT_EQ(numberOf(message), first + answered.at(at)++);
+      for (auto message = caller.take(); message; message = caller.take())
+        EXPECT_EQ(numberOf(message), first + answered.at(at)++);
     }
     return std::ranges::count(answered, kRequests) == kClients;
   });
   wire->behave({});
 
   EXPECT_EQ(delivered_.size(), kClients * kRequests);
-  for (const auto& caller : callers) EXPECT_THAT(caller->news, testing::ElementsAre(ConnectStatus::connectYes));
+  for (const auto& caller : callers)
+    EXPECT_THAT(caller->news, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-INSTANTIATE_TEST_SUITE_P(In, RouterWeatherTest,
-                         testing::Values(std::pair{"Delay", Weather{.delay = 20ms}}, std::pair{"Loss", Weather{.lostPerThousand = 50}},
-                                         std::pair{"Reordering", Weather{.delay = 10ms, .overtakingPerThousand = 200}},
-                                         std::pair{"AllOfIt", Weather{.delay = 20ms, .lostPerThousand = 50, .overtakingPerThousand = 100}}),
-                         [](const auto& parameter) { return parameter.param.first; });
+INSTANTIATE_TEST_SUITE_P(
+    In, RouterWeatherTest,
+    testing::Values(std::pair{"Delay", Weather{.delay = 20ms}},
+                    std::pair{"Loss", Weather{.lostPerThousand = 50}},
+                    std::pair{"Reordering", Weather{.delay = 10ms, .overtakingPerThousand = 200}},
+                    std::pair{"AllOfIt", Weather{.delay = 20ms,
+                                                 .lostPerThousand = 50,
+                                                 .overtakingPerThousand = 100}}),
+    [](const auto& parameter) { return parameter.param.first; });
 
 // ---- cuts
 
@@ -142,12 +157,15 @@ TEST_F(RouterNetworkTest, ACutIsNoticedAfterTheDeadTimeAndEachRequestHasItsFate)
 
   EXPECT_GE(Clock::nowNs() - beforeNs, kDefaultDeadTimeNs);
   EXPECT_EQ(caller_->messages.size(), 6u);
-  for (auto message = caller_->take(); message; message = caller_->take()) EXPECT_EQ(fateOf(message), Fate::outcomeUnknown);
+  for (auto message = caller_->take(); message; message = caller_->take())
+    EXPECT_EQ(fateOf(message), Fate::outcomeUnknown);
   runUntil([&] { return server_->clientOf(kept) == 0; });
   expectBothMissedTheOther();
   wire->mend();
   expectAnswer();
-  EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo, ConnectStatus::connectYes));
+  EXPECT_THAT(caller_->news,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo,
+                                   ConnectStatus::connectYes));
 }
 
 TEST_F(RouterNetworkTest, AnIdleLineThatIsCutIsMissedByBothSides) {
@@ -204,7 +222,8 @@ TEST_F(RouterNetworkTest, ACutShorterThanTheDeadTimeLosesNothing) {
 
 // Those that the line had no room for were not done, and that is said.
 TEST_F(RouterNetworkTest, WhatNeverReachedTheLineWasNeverTaken) {
-  constexpr std::size_t kElements = 1 << 18;  // more than the kernel takes of a line that stands still
+  // more than the kernel takes of a line that stands still
+  constexpr std::size_t kElements = 1 << 18;
   startAll(kSoonDead);
   serveOnceEach();
   expectAnswer();
@@ -220,7 +239,8 @@ TEST_F(RouterNetworkTest, WhatNeverReachedTheLineWasNeverTaken) {
 
   std::set<Fate> fates;
   EXPECT_EQ(caller_->messages.size(), ids.size());
-  for (auto message = caller_->take(); message; message = caller_->take()) fates.insert(fateOf(message).value());
+  for (auto message = caller_->take(); message; message = caller_->take())
+    fates.insert(fateOf(message).value());
   EXPECT_THAT(fates, testing::UnorderedElementsAre(Fate::outcomeUnknown, Fate::neverTaken));
   wire->mend();
   expectAnswer();
@@ -341,7 +361,8 @@ TEST_F(RouterStormTest, NothingIsDeliveredTwiceAndFatesAreTrue) {
     return caller_->open.empty();
   });
 
-  EXPECT_EQ(answered_.size() + fates_.size(), static_cast<std::size_t>(sent_)) << "each request has one end";
+  EXPECT_EQ(answered_.size() + fates_.size(), static_cast<std::size_t>(sent_))
+      << "each request has one end";
   EXPECT_TRUE(std::ranges::includes(delivered_, answered_));
   for (const auto& [number, fate] : fates_) {
     const bool isTrue = fate == Fate::outcomeUnknown || !delivered_.contains(number);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Routers that stand still for a while (SIGSTOP): the others miss them after the dead time, all meet again, and nothing is delivered twice.
-#include <mpf/tests/system/router_fixture.h>
+// Routers that stand still for a while (SIGSTOP): the others miss them after the dead time, all
+// meet again, and nothing is delivered twice.
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -33,7 +34,7 @@ TEST_F(RouterPauseTest, AFarRouterThatStandsStillIsMissedAndFoundAgain) {
     for (auto message = caller_->take(); message; message = caller_->take()) {
       EXPECT_THAT(fateOf(message), testing::AnyOf(Fate::outcomeUnknown, Fate::neverTaken));
     }
-    routers_.farRouter().goOn();
+    routers_.farRouter().resume();
 
     expectAnswer();
   }
@@ -50,10 +51,12 @@ TEST_F(RouterPauseTest, ANearRouterThatStoodStillConnectsAgain) {
   runUntil([&] { return server_->clientOf(kept) == 0; });
   EXPECT_TRUE(caller_->isConnected());
   send(1);
-  routers_.nearRouter().goOn();
+  routers_.nearRouter().resume();
 
   runUntil([&] { return caller_->news.size() == 3; });
-  EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo, ConnectStatus::connectYes));
+  EXPECT_THAT(caller_->news,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo,
+                                   ConnectStatus::connectYes));
   EXPECT_EQ(caller_->messages.size(), 2u);
   for (auto message = caller_->take(); message; message = caller_->take()) {
     EXPECT_THAT(fateOf(message), testing::AnyOf(Fate::outcomeUnknown, Fate::neverTaken));
@@ -68,7 +71,7 @@ TEST_F(RouterPauseTest, RoutersThatStandStillForLessThanTheDeadTimeLoseNothing) 
   for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()}) {
     router->stop();
     send(10);
-    router->goOn();
+    router->resume();
     for (int i = 0; i < 10; ++i) EXPECT_EQ(next().tryAs<Int32>()->value, --answered);
   }
   EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
@@ -81,7 +84,7 @@ TEST_F(RouterPauseTest, RoutersThatBothStoodStillForLongGoOn) {
   for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()}) router->stop();
 
   runFor(1s);
-  for (auto* const router : {&routers_.farRouter(), &routers_.nearRouter()}) router->goOn();
+  for (auto* const router : {&routers_.farRouter(), &routers_.nearRouter()}) router->resume();
 
   const auto isAnswered = [&] {
     runUntil([&] { return caller_->isConnected(); });

@@ -4,8 +4,9 @@
 
 #include <ctime>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/tests/system/router_fixture.h>
+#include <mpf/sync_client.h>
+
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -14,10 +15,13 @@ class RouterPressureTest : public RouterTest {
  protected:
   // A server that is a process: mpf-int32-server.
   Victim startServer(const std::string& name, const std::string& queueSize) const {
-    return {MPF_TEST_INT32_SERVER, std::vector<std::string>{name, "--queue-size", queueSize, "--backplane", routers_.far().name(),
-                                                            "--location", std::to_string(RouterPair::kLocation), "--log-level", "warning"}};
+    return {MPF_TEST_INT32_SERVER,
+            std::vector<std::string>{
+                name, "--queue-size", queueSize, "--backplane", routers_.far().name(), "--location",
+                std::to_string(RouterPair::kLocation), "--log-level", "warning"}};
   }
-  // Starts both routers, with small windows, and the server, which gets a request (-1) of `slow`; `its` runs no more from then on.
+  // Starts both routers, with small windows, and the server, which gets a request (-1) of `slow`;
+  // `its` runs no more from then on.
   Message subscribe(Dispatcher& its, Caller& slow) {
     routers_.start({"--window-size", "64KiB", "--dead-time", "2s"});
     openServer();
@@ -57,7 +61,8 @@ TEST_F(RouterPressureTest, AStoppedServerFillsItsOwnQueueAndNobodyElseWaits) {
     EXPECT_EQ(fateOf(caller.take()), Fate::refused);
   }
   runUntil([&] { return caller.news.size() == 2; });
-  EXPECT_THAT(caller.news, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
+  EXPECT_THAT(caller.news,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectQueueFull));
   expectAnswers("other", 100);
 
   stopped.signal(SIGCONT);
@@ -67,7 +72,8 @@ TEST_F(RouterPressureTest, AStoppedServerFillsItsOwnQueueAndNobodyElseWaits) {
   }
 }
 
-// Its server is told that it does not take them, the others are answered, and when it goes on it gets all that was sent.
+// Its server is told that it does not take them, the others are answered, and when it goes on it
+// gets all that was sent.
 TEST_F(RouterPressureTest, AClientThatDoesNotTakeItsRepliesDelaysNobodyElse) {
   Dispatcher idle(routers_.near());
   Caller slow(idle, "echo");
@@ -93,7 +99,8 @@ TEST_F(RouterPressureTest, AClientThatDoesNotTakeItsRepliesDelaysNobodyElse) {
   for (int expected = -1; expected < sent; ++expected) {
     while (slow.messages.empty()) idle.runOnce();
     const auto message = slow.take();
-    EXPECT_EQ(expected < 0 ? message.tryAs<Int32>()->value : message.tryAs<OutOfBand>()->value, expected);
+    EXPECT_EQ(expected < 0 ? message.tryAs<Int32>()->value : message.tryAs<OutOfBand>()->value,
+              expected);
   }
 }
 
@@ -120,7 +127,8 @@ TEST_F(RouterPressureTest, AFloodOfOneClientDoesNotStarveAnother) {
 TEST_F(RouterPressureTest, ManyServersThatNobodyAsksLetTheRouterSleep) {
   constexpr int kServers = 300;
   std::vector<std::unique_ptr<Caller>> waiting;
-  for (int i = 0; i < kServers; ++i) waiting.push_back(std::make_unique<Caller>(*dispatcher_, "nobody" + std::to_string(i)));
+  for (int i = 0; i < kServers; ++i)
+    waiting.push_back(std::make_unique<Caller>(*dispatcher_, "nobody" + std::to_string(i)));
   startAll();
   expectAnswer();
   clockid_t clock{};
@@ -162,7 +170,8 @@ TEST_F(RouterPressureTest, AServersEndReachesAllItsClientsThoughOneTakesNothing)
   EXPECT_EQ(server_->reply(subscription.duplicate()), ReplyResult::sent);
   caller_.emplace(*dispatcher_);
   for (int refused = 0; refused < 50;) {
-    if (server_->reply(server_->allocReplyMessage<OutOfBand>(subscription)) == ReplyResult::sent) continue;
+    if (server_->reply(server_->allocReplyMessage<OutOfBand>(subscription)) == ReplyResult::sent)
+      continue;
     ++refused;
     expectAnswer();
   }
@@ -181,7 +190,8 @@ TEST_F(RouterPressureTest, LargeMessagesOfOneClientDoNotKeepSmallOnesWaiting) {
   startAll();
   Caller large(*dispatcher_, "echo");
   runUntil([&] { return large.isConnected(); });
-  large.send(Int32Message());  // from then on the far server has it for a client, and nothing is held for it on the way
+  // from then on the far server has it for a client, and nothing is held for it on the way
+  large.send(Int32Message());
   runUntil([&] { return !large.messages.empty(); });
   static_cast<void>(large.take());
   int larges = 0;

@@ -3,15 +3,16 @@
 #include <fmt/format.h>
 #include <fstream>
 
-#include <mpf/shm/layout.h>
-#include <mpf/shm/segment.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/system/router_fixture.h>
+#include "shm/layout.h"
+#include "shm/segment.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
 
-// Routers with files. "echo" is at location 1 of the far host, in this process; "other" at location 2, a process.
+// Routers with files. "echo" is at location 1 of the far host, in this process; "other" at location
+// 2, a process.
 class RouterReloadTest : public RouterTest {
  protected:
   void SetUp() override {
@@ -25,7 +26,8 @@ class RouterReloadTest : public RouterTest {
   }
   void writeFar(const std::vector<int>& locations, const std::string& more = {}) const {
     auto text = fmt::format("backplane = \"{}\"\n", routers_.far().name());
-    for (const auto location : locations) text += fmt::format("[[serve]]\nlocation = {}\n", location);
+    for (const auto location : locations)
+      text += fmt::format("[[serve]]\nlocation = {}\n", location);
     text += fmt::format("[[listen]]\naddress = \"{}\"\nsecurity = \"plain\"\n", routers_.address());
     folder_.write("far.toml", text + more);
   }
@@ -33,7 +35,8 @@ class RouterReloadTest : public RouterTest {
   void writeNear(const std::vector<int>& locations, const std::string& more = {}) const {
     auto text = fmt::format("backplane = \"{}\"\n", routers_.near().name());
     for (const auto location : locations) {
-      text += fmt::format("[[remote]]\nlocations = {}\naddress = \"{}\"\nsecurity = \"plain\"\n", location, routers_.address());
+      text += fmt::format("[[remote]]\nlocations = {}\naddress = \"{}\"\nsecurity = \"plain\"\n",
+                          location, routers_.address());
     }
     folder_.write("near.toml", text + more);
   }
@@ -56,12 +59,14 @@ class RouterReloadTest : public RouterTest {
   // How often the near router was connected to who has location 1, as it says itself.
   [[nodiscard]] std::uint64_t connectsToFirst() const {
     std::uint64_t connects = 0;
-    for (const auto& name : segments::list(SegmentName::prefix(routers_.near().name()) + static_cast<char>(NameKind::router))) {
+    for (const auto& name : segments::list(SegmentName::prefix(routers_.near().name()) +
+                                           static_cast<char>(NameKind::router))) {
       std::ifstream file(segments::path(name), std::ios::binary);
       file.seekg(layout::kRouterLinesOffset);
       layout::RouterLine line{};
       while (file.read(reinterpret_cast<char*>(&line), sizeof line)) {
-        if (segments::text(line.locations) == "1") connects += line.connects.load(std::memory_order_relaxed);
+        if (segments::text(line.locations) == "1")
+          connects += line.connects.load(std::memory_order_relaxed);
       }
     }
     return connects;
@@ -77,7 +82,8 @@ class RouterReloadTest : public RouterTest {
   std::optional<RouterProcess> nearRouter_;
   std::optional<RouterProcess> farRouter_;
   Victim otherServer_{MPF_TEST_INT32_SERVER,
-                      std::vector<std::string>{"other", "--backplane", routers_.far().name(), "--location", "2", "--log-level", "warning"}};
+                      std::vector<std::string>{"other", "--backplane", routers_.far().name(),
+                                               "--location", "2", "--log-level", "warning"}};
   std::optional<Caller> other_;
 };
 
@@ -140,8 +146,9 @@ TEST_F(RouterReloadTest, OtherLimitsAreForOthers) {
 TEST_F(RouterReloadTest, ALocationThatIsAnotherOneHereIsServedThere) {
   bindToOther();
   expectAnswerOfOther();
-  const Victim elsewhere{MPF_TEST_INT32_SERVER, std::vector<std::string>{"other", "--backplane", routers_.far().name(), "--location", "9",
-                                                                         "--log-level", "warning"}};
+  const Victim elsewhere{MPF_TEST_INT32_SERVER,
+                         std::vector<std::string>{"other", "--backplane", routers_.far().name(),
+                                                  "--location", "9", "--log-level", "warning"}};
 
   writeFar({1}, "[[serve]]\nlocation = 2\nlocal = 9\n");
   reload(*farRouter_);
@@ -149,21 +156,26 @@ TEST_F(RouterReloadTest, ALocationThatIsAnotherOneHereIsServedThere) {
   otherServer_ = {};
 
   expectAnswerOfOther();
-  EXPECT_THAT(other_->news, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo, ConnectStatus::connectYes));
+  EXPECT_THAT(other_->news,
+              testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo,
+                                   ConnectStatus::connectYes));
   expectThatTheFirstNoticedNothing();
 }
 
 // While it waits for somebody to say farewell, who says nothing.
 TEST_F(RouterReloadTest, WhoEndsReloadsNoMore) {
   farRouter_->stop();
-  writeNear({1}, fmt::format("[[serve]]\nlocation = 3\n[[listen]]\naddress = \"{}\"\nsecurity = \"plain\"\n", FreePort().address()));
+  writeNear(
+      {1},
+      fmt::format("[[serve]]\nlocation = 3\n[[listen]]\naddress = \"{}\"\nsecurity = \"plain\"\n",
+                  FreePort().address()));
 
   nearRouter_->signal(SIGTERM);
   nearRouter_->waitUntilSaid(" ends");
   EXPECT_EQ(nearRouter_->end(SIGHUP), 0);
 
   EXPECT_THAT(nearRouter_->said(), testing::Not(testing::HasSubstr("read again")));
-  farRouter_->goOn();
+  farRouter_->resume();
 }
 
 // Under load, again and again: nothing is lost, nothing comes twice.

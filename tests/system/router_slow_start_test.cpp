@@ -3,13 +3,14 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/system/router_fixture.h>
+#include "tests/support/temporary_folder.h"
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
 
-// While the name where it shall listen is looked up: that may take minutes where no name server answers.
+// While the name where it shall listen is looked up: that may take minutes where no name server
+// answers.
 class RouterSlowStartTest : public testing::TestWithParam<int> {
  protected:
   RouterSlowStartTest() {
@@ -30,9 +31,11 @@ class RouterSlowStartTest : public testing::TestWithParam<int> {
 INSTANTIATE_TEST_SUITE_P(At, RouterSlowStartTest, testing::Values(SIGTERM, SIGINT));
 
 TEST_P(RouterSlowStartTest, EndsWhenItIsToldTo) {
-  const std::vector<std::string> words{"--backplane", backplane_.name(), "--listen", "name.held:0", "--serve", "1", "--plain"};
+  const std::vector<std::string> words{
+      "--backplane", backplane_.name(), "--listen", "name.held:0", "--serve", "1", "--plain"};
   Victim router(MPF_TEST_ROUTER, words);
-  const FileDescriptor lookup(checkCall(::open(fifo_.c_str(), O_WRONLY | O_CLOEXEC), "open", fifo_));  // returns once it is asked for
+  const FileDescriptor lookup(checkCall(::open(fifo_.c_str(), O_WRONLY | O_CLOEXEC), "open",
+                                        fifo_));  // returns once it is asked for
 
   EXPECT_EQ(router.end(GetParam()), 0);
 }

@@ -5,7 +5,7 @@
 #include <csignal>
 #include <string>
 
-#include <mpf/tests/system/router_fixture.h>
+#include "tests/system/router_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -66,7 +66,9 @@ TEST_P(RouterAnyOrderTest, AllMeet) {
   } while (std::ranges::next_permutation(order).found);
 }
 
-INSTANTIATE_TEST_SUITE_P(First, RouterAnyOrderTest, testing::Values(Part::client, Part::nearRouter, Part::farRouter, Part::server),
+INSTANTIATE_TEST_SUITE_P(First, RouterAnyOrderTest,
+                         testing::Values(Part::client, Part::nearRouter, Part::farRouter,
+                                         Part::server),
                          [](const auto& parameter) { return nameOf(parameter.param); });
 
 class RouterComesBackTest : public RouterStartOrderTest, public testing::WithParamInterface<Part> {
@@ -84,7 +86,8 @@ TEST_P(RouterComesBackTest, TheClientIsConnectedAgainByItself) {
     startPart(GetParam());
     runUntil([&] { return caller_->isConnected(); });
 
-    EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectNo, ConnectStatus::connectYes));
+    EXPECT_THAT(caller_->news,
+                testing::ElementsAre(ConnectStatus::connectNo, ConnectStatus::connectYes));
   }
   expectAnswer();
 }
@@ -103,7 +106,8 @@ TEST_P(RouterComesBackTest, OneThatComesBackAtOnceMeetsWhoHasNotMissedIt) {
   EXPECT_EQ(caller_->news, expected);
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, RouterComesBackTest, testing::Values(Part::nearRouter, Part::farRouter, Part::server),
+INSTANTIATE_TEST_SUITE_P(Each, RouterComesBackTest,
+                         testing::Values(Part::nearRouter, Part::farRouter, Part::server),
                          [](const auto& parameter) { return nameOf(parameter.param); });
 
 }  // namespace

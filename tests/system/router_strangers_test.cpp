@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Routers and peers that they cannot use: the wrong security, callers that idle, storms of what is refused.
+// Routers and peers that they cannot use: the wrong security, callers that idle, storms of what is
+// refused.
 #include <fcntl.h>
 #include <sys/stat.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <mpf/tests/router/certificates.h>
-#include <mpf/tests/router/rogue_peer.h>
-#include <mpf/tests/support/log_lines.h>
-#include <mpf/tests/support/router_pair.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/router/certificates.h"
+#include "tests/router/rogue/rogue_peer.h"
+#include "tests/support/log_lines.h"
+#include "tests/support/router_pair.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -23,11 +24,13 @@ class RouterStrangersTest : public testing::Test {
  protected:
   RouterPair::Options tls(const std::string& name) {
     const auto files = ours_.files(name);
-    return {"--tls-certificate", files.certificate, "--tls-key", files.key, "--tls-authorities", files.authorities};
+    return {"--tls-certificate", files.certificate,   "--tls-key",
+            files.key,           "--tls-authorities", files.authorities};
   }
   // A router on the far backplane, listening with this security.
   std::unique_ptr<RouterProcess> listen(const RouterPair::Options& security) {
-    RouterPair::Options options{"--backplane", far_.name(), "--serve", "1", "--listen", port_.address()};
+    RouterPair::Options options{"--backplane", far_.name(), "--serve",
+                                "1",           "--listen",  port_.address()};
     options.insert(options.end(), security.begin(), security.end());
     return std::make_unique<RouterProcess>(options);
   }
@@ -61,13 +64,16 @@ TEST_F(RouterStrangersTest, ACallerWithTlsReadsThatThePortIsPlain) {
 
   const auto near = call(security);
 
-  near->waitUntilSaid("the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers");
-  far->waitUntilSaid("the peer uses TLS, this side of the connection plain TCP: set the same security");
+  near->waitUntilSaid(
+      "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers");
+  far->waitUntilSaid(
+      "the peer uses TLS, this side of the connection plain TCP: set the same security");
 }
 
 // As many as there may be connections, from the same host, and more.
 TEST_F(RouterStrangersTest, CallersThatDoNotGreetMakeRoomForAPeer) {
-  const auto far = listen({"--plain", "--max-connections", "10", "--dead-time", "60s", "--handshake-time", "60s"});
+  const auto far = listen(
+      {"--plain", "--max-connections", "10", "--dead-time", "60s", "--handshake-time", "60s"});
   std::vector<std::unique_ptr<RoguePeer>> idlers;
   for (int i = 0; i < 50; ++i) idlers.push_back(std::make_unique<RoguePeer>(port_.address()));
 
@@ -84,7 +90,8 @@ TEST_F(RouterStrangersTest, ACallerThatIsTurnedAwayReadsWhy) {
 
   RoguePeer third(port_.address());
 
-  EXPECT_THAT(third.farewell(), HasSubstr("this router has 1 connections, its limit (max-connections)"));
+  EXPECT_THAT(third.farewell(),
+              HasSubstr("this router has 1 connections, its limit (max-connections)"));
 }
 
 // Ten thousand refused requests for servers: the log stays short, and counts them all.
@@ -134,11 +141,15 @@ class RouterSlowNameTest : public RouterStrangersTest {
 
 // The look-up goes on in its thread, and nobody reads what comes of it.
 TEST_F(RouterSlowNameTest, ALookUpThatTakesTooLongIsGivenUpInSilence) {
-  const RouterProcess router({"--backplane", near_.name(), "--remote", "1=localhost.held:9", "--plain", "--allow-public-plain",
-                              "--dead-time", "100ms", "--log-level", "debug"});
-  router.waitUntilSaid("cannot reach localhost.held:9: the look-up of localhost.held took longer than 100ms (dead-time)");
+  const RouterProcess router({"--backplane", near_.name(), "--remote", "1=localhost.held:9",
+                              "--plain", "--allow-public-plain", "--dead-time", "100ms",
+                              "--log-level", "debug"});
+  router.waitUntilSaid(
+      "cannot reach localhost.held:9: the look-up of localhost.held took longer than 100ms "
+      "(dead-time)");
 
-  const FileDescriptor lookUp(checkCall(::open(fifo_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", fifo_));
+  const FileDescriptor lookUp(
+      checkCall(::open(fifo_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", fifo_));
   checkCall(::write(lookUp.get(), "x", 1), "write", fifo_);
 
   router.waitUntilSaid("a look-up of a name ended after nobody waited for it any more");

@@ -6,13 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <mpf/base/system_call.h>
-#include <mpf/client/message_client.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/shm/window.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_client.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "shm/window.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -27,14 +28,20 @@ class ShortageTest : public testing::Test {
   void SetUp() override {
     ASSERT_EQ(server_.line(), "open");
     checkCall(::prlimit(server_.pid(), RLIMIT_NOFILE, nullptr, &before_), "prlimit");
-    window_ = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"), layout::SegmentKind::serverWindow);
+    window_ = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"),
+                                  layout::SegmentKind::serverWindow);
     ASSERT_TRUE(window_);
   }
   void run(const std::function<bool()>& until) {
-    while (!until()) static_cast<void>(dispatcher_.runOnce(Deadline::after(std::chrono::milliseconds(10))));
+    while (!until())
+      static_cast<void>(dispatcher_.runOnce(Deadline::after(std::chrono::milliseconds(10))));
   }
-  [[nodiscard]] std::uint64_t alarms() const { return window_->control().alarms.load(std::memory_order_relaxed); }
-  [[nodiscard]] layout::Shortage shortage() const { return window_->control().shortage.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t alarms() const {
+    return window_->control().alarms.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] layout::Shortage shortage() const {
+    return window_->control().shortage.load(std::memory_order_relaxed);
+  }
 
   Watchdog watchdog_{"shortage test"};
   TestBackplane backplane_;
@@ -49,9 +56,12 @@ TEST_F(ShortageTest, OfDescriptorsIsToldToTheClientAndCountedOnce) {
   limitFiles(0);
 
   client_.bind("echo", 0);
-  run([&] { return client_.notConnectedBecause().find("no file descriptor left") != std::string::npos; });
+  run([&] {
+    return client_.notConnectedBecause().find("no file descriptor left") != std::string::npos;
+  });
 
-  EXPECT_THAT(client_.notConnectedBecause(), testing::AllOf(testing::HasSubstr("\"echo\""), testing::HasSubstr("ulimit -n")));
+  EXPECT_THAT(client_.notConnectedBecause(),
+              testing::AllOf(testing::HasSubstr("\"echo\""), testing::HasSubstr("ulimit -n")));
   EXPECT_EQ(shortage(), layout::Shortage::descriptors);
   EXPECT_EQ(alarms(), 1U) << "one shortage, however often the client knocks";
 

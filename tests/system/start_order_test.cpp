@@ -9,11 +9,12 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -23,7 +24,9 @@ class StartOrderTest : public testing::Test {
   Victim startServer() const { return {"serve", backplane_.name()}; }
   Victim startClient() const { return {"crowd", backplane_.name(), {"1"}}; }
   // The path of the server's window.
-  std::string windowPath() const { return segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")); }
+  std::string windowPath() const {
+    return segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo"));
+  }
 
   Watchdog watchdog_{"start order test"};
   TestBackplane backplane_;
@@ -81,7 +84,8 @@ TEST_F(StartOrderTest, ASecondServerOfANameIsToldWhoServesIt) {
 
   auto second = startServer();
 
-  EXPECT_EQ(second.line(), fmt::format("error: {}: in use by mpf_test_victim (pid {})", windowPath(), first.pid()));
+  EXPECT_EQ(second.line(), fmt::format("error: {}: in use by mpf_test_victim (pid {})",
+                                       windowPath(), first.pid()));
   const auto status = second.wait();
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1);
   auto client = startClient();
@@ -106,7 +110,8 @@ TEST_F(StartOrderTest, AClientFindsItsServerWhenTheKernelCannotTellItOfNewNames)
   constexpr int kMostToTake = 900;  // a process may have 1024 files
   int limit = 0;
   std::ifstream("/proc/sys/fs/inotify/max_user_instances") >> limit;
-  if (::geteuid() != 0 || limit > kMostToTake) GTEST_SKIP() << "only root can take all instances of a user who has nothing else running";
+  if (::geteuid() != 0 || limit > kMostToTake)
+    GTEST_SKIP() << "only root can take all instances of a user who has nothing else running";
   Victim client("crowd", backplane_.name(), {"1", "as", "65533", "65533", "without-inotify"});
   EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not there");
 

@@ -5,11 +5,12 @@
 #include <set>
 #include <vector>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/sync_client.h>
+
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -27,7 +28,8 @@ class StopTest : public testing::TestWithParam<int> {
     return server;
   }
   bool hasWindow() const {
-    return segments::probeOwner(SegmentName::serverWindow(backplane_.name(), 0, "echo")) != segments::Owner::absent;
+    return segments::probeOwner(SegmentName::serverWindow(backplane_.name(), 0, "echo")) !=
+           segments::Owner::absent;
   }
   // Nobody is dead, so nothing is left.
   void TearDown() override { EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()); }
@@ -114,7 +116,9 @@ TEST_P(StopTest, ASecondSignalDoesNoHarm) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OnEachSignal, StopTest, testing::Values(SIGINT, SIGTERM),
-                         [](const auto& parameter) { return parameter.param == SIGINT ? "Interrupt" : "Terminate"; });
+                         [](const auto& parameter) {
+                           return parameter.param == SIGINT ? "Interrupt" : "Terminate";
+                         });
 
 }  // namespace
 }  // namespace mpf::test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The rest of the world: little shared memory, other namespaces, clocks that differ, limits that are reached, names that somebody takes away.
-// Each test plays in a child of its own; what this host does not allow is skipped by name.
+// The rest of the world: little shared memory, other namespaces, clocks that differ, limits that
+// are reached, names that somebody takes away. Each test plays in a child of its own; what this
+// host does not allow is skipped by name.
 #include <fcntl.h>
 #include <sched.h>
 #include <signal.h>
@@ -19,13 +20,14 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/base/system_call.h>
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/victim.h>
-#include <mpf/tests/support/watchdog.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "base/system_call.h"
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -34,7 +36,8 @@ using namespace std::chrono_literals;
 
 constexpr int kNotAllowed = 77;
 
-// While it lives, programs that are started have a wall clock that can be set back (tests/support/wall_clock.cpp).
+// While it lives, programs that are started have a wall clock that can be set back
+// (tests/support/wall_clock.cpp).
 class WallClock {
  public:
   explicit WallClock(std::string file) : file_(std::move(file)) {
@@ -54,7 +57,9 @@ class WallClock {
     std::ofstream(file_ + ".new") << seconds << '\n';
     checkCall(::rename((file_ + ".new").c_str(), file_.c_str()), "rename", file_);
   }
-  static long asProgramsSeeIt() { return std::stol(Victim("/bin/date", std::vector<std::string>{"+%s"}).line()); }
+  static long asProgramsSeeIt() {
+    return std::stol(Victim("/bin/date", std::vector<std::string>{"+%s"}).line());
+  }
 
  private:
   std::string file_;
@@ -137,7 +142,8 @@ TEST_F(WorldTest, SharedMemoryThatIsFullIsAClearErrorAndServesOn) {
       const MessageServer another(backplane, "another");
       ADD_FAILURE() << "there was room";
     } catch (const std::system_error& error) {
-      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("bytes in /dev/shm"), testing::HasSubstr("No space left")));
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("bytes in /dev/shm"),
+                                               testing::HasSubstr("No space left")));
     }
     expectAnswer(client);
     checkCall(::ftruncate(rest.get(), 0), "ftruncate");
@@ -157,8 +163,10 @@ TEST_F(WorldTest, TwoPidNamespacesShareABackplane) {
   });
 
   // The stranger's death is seen, too: its links are closed.
-  const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"), layout::SegmentKind::serverWindow);
-  while (window->control().linkCount.load(std::memory_order_relaxed) != 0) std::this_thread::sleep_for(1ms);
+  const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"),
+                                          layout::SegmentKind::serverWindow);
+  while (window->control().linkCount.load(std::memory_order_relaxed) != 0)
+    std::this_thread::sleep_for(1ms);
   SyncClient client(backplane_, "echo");
   expectAnswer(client);
 }
@@ -179,7 +187,8 @@ TEST_F(WorldTest, AServersDeathIsSeenFromAnotherPidNamespace) {
   });
 }
 
-// A monotonic clock that is an hour ahead, as in a container that was moved: nothing hangs, and what is alive stays alive.
+// A monotonic clock that is an hour ahead, as in a container that was moved: nothing hangs, and
+// what is alive stays alive.
 TEST_F(WorldTest, AClientWhoseClockIsAheadIsServed) {
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
@@ -226,7 +235,8 @@ TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
   expectAnswer(client);
 }
 
-// As when the host sleeps, but that the clocks went on: all stand still in the middle of what they do, and nobody takes anybody for dead.
+// As when the host sleeps, but that the clocks went on: all stand still in the middle of what they
+// do, and nobody takes anybody for dead.
 TEST_F(WorldTest, ProcessesThatAllStoodStillGoOn) {
   Victim crowd("crowd", backplane_.name(), {"20"});
   EXPECT_THAT(crowd.line(), testing::StartsWith("waiting: "));
@@ -284,7 +294,8 @@ TEST_F(WorldTest, AProcessWithoutMappingsLeftIsToldSoAndRecovers) {
     std::vector<void*> all;
     all.reserve(100'000);
     for (;;) {  // kinds that alternate are not merged
-      auto* const page = ::mmap(nullptr, 4096, all.size() % 2 == 0 ? PROT_READ : PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+      auto* const page = ::mmap(nullptr, 4096, all.size() % 2 == 0 ? PROT_READ : PROT_NONE,
+                                MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
       if (page == MAP_FAILED) break;
       all.push_back(page);
       allow(all.size() < 99'000);  // a host whose limit is beyond a test
@@ -303,8 +314,8 @@ TEST_F(WorldTest, AProcessWithoutMappingsLeftIsToldSoAndRecovers) {
   });
 }
 
-// As RemoveIPC does at a user's logout: names go, processes stay. Links that stand are not touched, a successor can take the name, and a process
-// that nobody finds any more says so.
+// As RemoveIPC does at a user's logout: names go, processes stay. Links that stand are not touched,
+// a successor can take the name, and a process that nobody finds any more says so.
 TEST_F(WorldTest, ASuccessorServesWhoComesAfterTheNamesWereTakenAway) {
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
@@ -319,7 +330,8 @@ TEST_F(WorldTest, ASuccessorServesWhoComesAfterTheNamesWereTakenAway) {
   SyncClient later(backplane_, "echo");
   expectAnswer(later);
   server.end(SIGKILL);
-  while (client.client().notConnectedBecause().find("RemoveIPC") == std::string::npos) static_cast<void>(client.receive(1ms));
+  while (client.client().notConnectedBecause().find("RemoveIPC") == std::string::npos)
+    static_cast<void>(client.receive(1ms));
   expectAnswer(later);
 }
 

@@ -14,13 +14,13 @@ MAY_INCLUDE = {
     "base": [],
     "schema": ["base"],
     "shm": ["base"],
-    "server": ["schema", "shm", "channel"],
+    "shm/messages": ["schema", "shm"],
+    "server": ["schema", "shm", "shm/messages"],
     "server/programs": ["server", "drivers"],
-    "channel": ["schema", "shm"],
-    "client": ["schema", "shm", "channel"],
+    "client": ["schema", "shm", "shm/messages"],
     "client/programs": ["client"],
     "drivers": ["base"],
-    "router": ["schema", "shm", "channel", "client", "server", "server/programs"],  # it looks like a server to local clients, and like a client to local servers
+    "router": ["schema", "shm", "client", "server", "server/programs"],  # it looks like a server to local clients, and like a client to local servers
     "epics": ["client"],
     "crate": ["base"],
     "benchmarks": ["client", "server"],
@@ -28,13 +28,21 @@ MAY_INCLUDE = {
     "tools/torture": ["tools", "server"],
 }
 MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "examples")
+# The folder whose sources define what a public header declares. Headers in include/mpf/drivers/ belong to drivers.
+PUBLIC_HEADERS = {
+    "base": ["clock.h", "file_descriptor.h", "real_time_priority.h", "detail/copy_words.h"],
+    "schema": ["message_types.h", "message.h", "user_message.h", "serial_commands.h", "serial_sniff.h", "digital_io_commands.h", "ip330_commands.h"],
+    "shm": ["wait_mode.h", "rights.h", "errors.h", "backplane.h"],
+    "client": ["dispatcher.h", "message_client.h", "sync_client.h"],
+    "server": ["message_server.h"],
+}
 
 MAX_LINES = 400
 PAIR_REACH = 3  # lines above an ordered access in which its PAIR line stands
 
 ORDERED = re.compile(r"\bmemory_order(_|::)(acquire|release|acq_rel|seq_cst|consume)\b|\.load\(\)")
 PAIR = re.compile(r"\bPAIR\(([\w-]+)\)")
-INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 
 
 def is_cpp(path):
@@ -55,7 +63,12 @@ def line_of(text, offset):
 
 
 def layer(path):
-    """The longest key of MAY_INCLUDE that is a folder of `path`, or None."""
+    """The longest key of MAY_INCLUDE that is a folder of `path`, or None. A public header is in the folder that implements it."""
+    if path.startswith("include/mpf/drivers/"):
+        return "drivers"
+    if path.startswith("include/mpf/"):
+        name = path.removeprefix("include/mpf/")
+        return next((folder for folder, names in PUBLIC_HEADERS.items() if name in names), None)
     fitting = [folder for folder in MAY_INCLUDE if path.startswith(folder + "/")]
     return max(fitting, key=len, default=None)
 
@@ -72,34 +85,52 @@ def include_directions(files):
         if not is_cpp(path):
             continue
         for match in INCLUDE.finditer(text):
-            included = match[1]
             at = line_of(text, match.start())
-            if ".." in included.split("/"):
-                yield path, at, f"includes {included}: write <mpf/folder/file.h>"
-            elif included.startswith("mpf/") and not path.startswith(tuple(f"{folder}/" for folder in MAY_INCLUDE_ANYTHING)):
-                source, target = layer(path), layer(included.removeprefix("mpf/"))
-                if source is None or target is None:
-                    yield path, at, f"includes {included}: a folder that the table of layers does not have"
-                elif target not in reachable(source):
-                    yield path, at, f"{source} may not include {target}"
+            if complaint := judge_include(path, match[1], match[2]):
+                yield path, at, complaint
+
+
+def judge_include(path, bracket, included):
+    is_public = included.startswith("mpf/")
+    if is_public != (bracket == "<" and is_public) or ".." in included.split("/"):
+        return f"includes {included}: write <mpf/message.h> for public headers, \"shm/link.h\" for others"
+    if bracket == "<" and not is_public:
+        return None  # of a library
+    if path.startswith("include/") and not is_public:
+        return f"includes {included}: a public header includes public headers only"
+    if path.startswith(tuple(f"{folder}/" for folder in MAY_INCLUDE_ANYTHING)):
+        return None
+    source, target = layer(path), layer(f"include/{included}" if is_public else included)
+    if source is None or target is None:
+        return f"includes {included}: a header that the table of layers does not have"
+    return None if target in reachable(source) else f"{source} may not include {target}"
 
 
 def pairs(files):
-    """Each tag stands at both ends of its happens-before edge."""
-    places = {}
+    """Each tag stands at both ends of its happens-before edge: at a release and at an acquire."""
+    places, orders = {}, {}
     for path, text in files.items():
-        if is_cpp(path):
-            for number, line in lines(text):
-                for tag in PAIR.findall(line):
-                    places.setdefault(tag, []).append((path, number))
+        if not is_cpp(path):
+            continue
+        source = text.splitlines()
+        for number, line in enumerate(source, start=1):
+            for tag in PAIR.findall(line):
+                places.setdefault(tag, []).append((path, number))
+                below = "\n".join(source[number - 1:number + PAIR_REACH])
+                orders.setdefault(tag, set()).update(match[2] for match in ORDERED.finditer(below))
+                if "fence()" in below:
+                    orders[tag].add("seq_cst")
     for tag, found in places.items():
         if len(found) == 1:
             yield *found[0], f"PAIR({tag}) has no other end"
+        elif not orders[tag] & {"release", "acq_rel", "seq_cst"} or not orders[tag] & {"acquire", "acq_rel", "seq_cst", "consume"}:
+            yield *found[0], f"PAIR({tag}) does not have both a release and an acquire side"
 
 
 def ordered_accesses(files):
     for path, text in files.items():
-        if not (is_cpp(path) and path.startswith("shm/")):
+        # The board of mpf torture and the tests are sequentially consistent on purpose: their speed does not matter.
+        if not is_cpp(path) or path.startswith(("tests/", "tools/torture/")):
             continue
         above = []
         for number, line in lines(text):

@@ -25,20 +25,26 @@ class Rules(unittest.TestCase):
 
     def test_include_directions(self):
         rule = check.include_directions
-        self.refuses(rule, {"shm/ring.h": SPDX + "#include <mpf/schema/int32.h>\n"}, ("shm/ring.h", 2))
-        self.refuses(rule, {"client/c.cpp": '#include "mpf/server/server.h"\n'}, ("client/c.cpp", 1))
-        self.refuses(rule, {"server/s.cpp": "#include <mpf/drivers/serial/port.h>\n"}, ("server/s.cpp", 1))
-        self.refuses(rule, {"server/s.cpp": "#include <mpf/server/programs/options.h>\n"}, ("server/s.cpp", 1))
-        self.refuses(rule, {"drivers/serial/p.cpp": "#  include <mpf/shm/ring.h>\n"}, ("drivers/serial/p.cpp", 1))
+        self.refuses(rule, {"shm/ring.h": SPDX + "#include <mpf/message.h>\n"}, ("shm/ring.h", 2))
+        self.refuses(rule, {"client/c.cpp": '#include "server/server.h"\n'}, ("client/c.cpp", 1))
+        self.refuses(rule, {"client/c.cpp": '#include "mpf/message.h"\n'}, ("client/c.cpp", 1))
+        self.refuses(rule, {"server/s.cpp": '#include "drivers/serial/port.h"\n'}, ("server/s.cpp", 1))
+        self.refuses(rule, {"server/s.cpp": "#include <mpf/drivers/serial/serial_port.h>\n"}, ("server/s.cpp", 1))
+        self.refuses(rule, {"server/s.cpp": '#include "server/programs/options.h"\n'}, ("server/s.cpp", 1))
+        self.refuses(rule, {"drivers/serial/p.cpp": '#  include "shm/ring.h"\n'}, ("drivers/serial/p.cpp", 1))
+        self.refuses(rule, {"include/mpf/message.h": '#include "base/printable.h"\n'}, ("include/mpf/message.h", 1))
+        self.refuses(rule, {"include/mpf/message.h": "#include <mpf/message_client.h>\n"}, ("include/mpf/message.h", 1))
         self.refuses(rule, {"shm/ring.h": '#include "../base/clock.h"\n'}, ("shm/ring.h", 1))
-        self.refuses(rule, {"shm/ring.h": "#include <mpf/attic/clock.h>\n"}, ("shm/ring.h", 1))
-        self.passes(rule, {"client/c.cpp": "#include <mpf/base/clock.h>\n#include <mpf/client/c.h>\n#include <vector>\n"})
-        self.passes(rule, {"server/programs/p.cpp": "#include <mpf/drivers/serial/port.h>\n#include <mpf/server/s.h>\n"})
-        self.passes(rule, {"tests/shm/t.cpp": "#include <mpf/server/s.h>\n"})
+        self.refuses(rule, {"shm/ring.h": "#include <mpf/attic.h>\n"}, ("shm/ring.h", 1))
+        self.passes(rule, {"client/c.cpp": '#include <mpf/clock.h>\n#include "client/c.h"\n#include <vector>\n'})
+        self.passes(rule, {"server/programs/p.cpp": '#include "drivers/serial/port.h"\n#include <mpf/message_server.h>\n'})
+        self.passes(rule, {"tests/shm/t.cpp": '#include "server/s.h"\n'})
 
     def test_pairs(self):
         self.refuses(check.pairs, {"shm/a.h": "\n// PAIR(slot-filled): why\n"}, ("shm/a.h", 2))
-        self.passes(check.pairs, {"shm/a.h": "// PAIR(slot-filled): why\n", "shm/b.h": "// PAIR(slot-filled): because\n"})
+        acquires = "// PAIR(slot-filled): why\n" + ACQUIRE
+        self.refuses(check.pairs, {"shm/a.h": acquires, "shm/b.h": acquires}, ("shm/a.h", 1))
+        self.passes(check.pairs, {"shm/a.h": acquires, "shm/b.h": acquires.replace("acquire", "release")})
 
     def test_ordered_accesses(self):
         rule = check.ordered_accesses

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Usage, errors and exit statuses of `mpf`.
-#include <mpf/tests/tools/tools_fixture.h>
+#include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -10,8 +10,9 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-constexpr std::array<const char*, 13> kSubcommands{"ls",  "mrr",    "msr",   "top",    "inspect", "call", "sniff",
-                                                   "tap", "replay", "clean", "doctor", "torture", "bench"};
+constexpr std::array<const char*, 13> kSubcommands{"ls",     "mrr",     "msr",  "top",    "inspect",
+                                                   "call",   "sniff",   "tap",  "replay", "clean",
+                                                   "doctor", "torture", "bench"};
 
 class CommandLineTest : public ToolsTest {};
 
@@ -21,7 +22,8 @@ TEST_F(CommandLineTest, WithoutAnythingItShowsHowToUseIt) {
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_THAT(ended.err, StartsWith("mpf - looks at backplanes, servers and clients"));
-  for (const auto* name : kSubcommands) EXPECT_THAT(ended.err, HasSubstr(std::string("\n  ") + name + " "));
+  for (const auto* name : kSubcommands)
+    EXPECT_THAT(ended.err, HasSubstr(std::string("\n  ") + name + " "));
 }
 
 TEST_F(CommandLineTest, HelpGoesToStdout) {
@@ -29,8 +31,10 @@ TEST_F(CommandLineTest, HelpGoesToStdout) {
 
   EXPECT_EQ(ended.status, 0);
   EXPECT_THAT(ended.err, IsEmpty());
-  for (const auto* name : kSubcommands) EXPECT_THAT(ended.out, HasSubstr(std::string("\n  ") + name + " "));
-  EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF_BACKPLANE"), HasSubstr("MPF_LOCATION"), HasSubstr("Exit status: 0 done")));
+  for (const auto* name : kSubcommands)
+    EXPECT_THAT(ended.out, HasSubstr(std::string("\n  ") + name + " "));
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF_BACKPLANE"), HasSubstr("MPF_LOCATION"),
+                               HasSubstr("Exit status: 0 done")));
 }
 
 TEST_F(CommandLineTest, EachSubcommandHasItsHelp) {
@@ -41,7 +45,8 @@ TEST_F(CommandLineTest, EachSubcommandHasItsHelp) {
 
     EXPECT_EQ(ended.status, 0) << name;
     EXPECT_THAT(ended.out, HasSubstr("Usage: mpf " + name)) << name;
-    const bool hasBackplane = name != "doctor" && name != "torture";  // these look at the host, or have one of their own
+    // these look at the host, or have one of their own
+    const bool hasBackplane = name != "doctor" && name != "torture";
     EXPECT_EQ(ended.out.find("--backplane") != std::string::npos, hasBackplane) << name;
     EXPECT_THAT(ended.err, IsEmpty()) << name;
   }
@@ -52,11 +57,11 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
-  EXPECT_EQ(
-      ended.err,
-      "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, call, sniff, tap, replay, clean, doctor, torture, "
-      "bench; "
-      "`mpf --help` shows what they do\n");
+  EXPECT_EQ(ended.err,
+            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, "
+            "call, sniff, tap, replay, clean, doctor, torture, "
+            "bench; "
+            "`mpf --help` shows what they do\n");
 }
 
 struct Wrong {
@@ -67,24 +72,33 @@ struct Wrong {
 // Each says what is wrong and where it is said how it is right.
 TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
   const std::vector<Wrong> wrong{
-      {{"ls", "--jason"}, "mpf ls: The following argument was not expected: --jason; `mpf ls --help`"},
-      {{"ls", "--interval", "0"}, "mpf ls: --interval: 0 is out of range: use 1 to 3600000; `mpf ls --help`"},
+      {{"ls", "--jason"},
+       "mpf ls: The following argument was not expected: --jason; `mpf ls --help`"},
+      {{"ls", "--interval", "0"},
+       "mpf ls: --interval: 0 is out of range: use 1 to 3600000; `mpf ls --help`"},
       {{"msr", "a", "b"}, "mpf msr: The following argument was not expected: b; `mpf msr --help`"},
       {{"call"}, "mpf call: server is required; `mpf call --help`"},
       {{"call", "echo"}, "mpf call: type is required; `mpf call --help`"},
-      {{"call", "echo", "int32", "--count", "0"}, "mpf call: --count: 0 is out of range: use 1 to 9007199254740992;"},
-      {{"call", "echo", "int32", "--timeout", "0"}, "mpf call: --timeout: 0 is no time: use a number of seconds above 0 to 1e9"},
+      {{"call", "echo", "int32", "--count", "0"},
+       "mpf call: --count: 0 is out of range: use 1 to 9007199254740992;"},
+      {{"call", "echo", "int32", "--timeout", "0"},
+       "mpf call: --timeout: 0 is no time: use a number of seconds above 0 to 1e9"},
       {{"call", "echo", "int32", "--timeout", "nan"}, "mpf call: --timeout: nan is no time"},
-      {{"call", "echo", "int32", "--interval", "-1"}, "mpf call: --interval: -1 is no time: use a number of seconds from 0 to 1e9"},
+      {{"call", "echo", "int32", "--interval", "-1"},
+       "mpf call: --interval: -1 is no time: use a number of seconds from 0 to 1e9"},
       {{"call", "echo", "int32", "--follow", "1e300"}, "mpf call: --follow: 1e300 is no time"},
-      {{"call", "echo", "int32", "--location", "here"}, "mpf call: Could not convert: --location = here"},
-      {{"replay", "/dev/null", "--speed", "-1"}, "mpf replay: --speed: -1 is out of range: use 0 to 1000000; `mpf replay --help`"},
-      {{"replay", "/dev/null", "--speed", "nan"}, "mpf replay: --speed: nan is out of range: use 0 to 1000000;"},
+      {{"call", "echo", "int32", "--location", "here"},
+       "mpf call: Could not convert: --location = here"},
+      {{"replay", "/dev/null", "--speed", "-1"},
+       "mpf replay: --speed: -1 is out of range: use 0 to 1000000; `mpf replay --help`"},
+      {{"replay", "/dev/null", "--speed", "nan"},
+       "mpf replay: --speed: nan is out of range: use 0 to 1000000;"},
       {{"tap", "echo", "--count", "-1"}, "mpf tap: --count: -1 is out of range: use 0 or more;"},
       {{"inspect", "--last", "-3"}, "mpf inspect: --last: -3 is out of range: use 0 to 65536;"},
       {{"top", "--batch", "0"}, "mpf top: --batch: 0 is out of range: use 1 to 1000000000;"},
       {{"torture", "--hit", "0"}, "mpf torture: --hit: 0 is out of range: use 1 or more;"},
-      {{"torture", "--instructions", "-1"}, "mpf torture: --instructions: -1 is out of range: use 0 or more;"},
+      {{"torture", "--instructions", "-1"},
+       "mpf torture: --instructions: -1 is out of range: use 0 or more;"},
       {{"torture", "--role", "router"}, "mpf torture: --role: router not in {client,server};"},
       {{"torture", "--mode", "0"}, "mpf torture: --mode: 0 not in {kill,stop};"},
       {{"sniff"}, "mpf sniff: server is required; `mpf sniff --help`"},
@@ -104,9 +118,11 @@ TEST_F(CommandLineTest, NamesThatCannotBeAreNamed) {
   for (const std::string name : {"ls", "mrr", "msr", "top", "inspect", "clean"}) {
     const auto ended = run({name, "--backplane", "a.b"});
     EXPECT_EQ(ended.status, 2);
-    EXPECT_EQ(ended.err, "mpf: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
+    EXPECT_EQ(ended.err,
+              "mpf: backplane name \"a.b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
   }
-  EXPECT_EQ(runTool({"call", "echo", "int32"}, "a/b").err, "mpf: backplane name \"a/b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
+  EXPECT_EQ(runTool({"call", "echo", "int32"}, "a/b").err,
+            "mpf: backplane name \"a/b\": use 1 to 39 of the characters A-Z a-z 0-9 _ -\n");
 
   const auto ended = run({"call", std::string(64, 'x'), "int32"});
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Two real routers on two backplanes: servers elsewhere are there for every tool.
-#include <mpf/tests/support/router_pair.h>
-#include <mpf/tests/tools/tools_fixture.h>
+#include "tests/support/router_pair.h"
+#include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {
 namespace {
@@ -14,14 +14,20 @@ using testing::IsEmpty;
 class RemoteTest : public testing::Test {
  protected:
   void TearDown() override { routers_.expectGoodEnd(); }
-  [[nodiscard]] Ended near(std::vector<std::string> arguments) const { return runTool(std::move(arguments), routers_.near().name()); }
-  [[nodiscard]] Ended far(std::vector<std::string> arguments) const { return runTool(std::move(arguments), routers_.far().name()); }
+  [[nodiscard]] Ended near(std::vector<std::string> arguments) const {
+    return runTool(std::move(arguments), routers_.near().name());
+  }
+  [[nodiscard]] Ended far(std::vector<std::string> arguments) const {
+    return runTool(std::move(arguments), routers_.far().name());
+  }
   [[nodiscard]] nlohmann::json ls(const Backplane& backplane) const {
     const auto ended = runTool({"ls", "--json", "--interval", "1"}, backplane.name());
     EXPECT_EQ(ended.status, 0) << ended.err;
     return nlohmann::json::parse(ended.out).at(0);
   }
-  [[nodiscard]] nlohmann::json line(const Backplane& backplane) const { return ls(backplane).at("routers").at(0).at("lines").at(0); }
+  [[nodiscard]] nlohmann::json line(const Backplane& backplane) const {
+    return ls(backplane).at("routers").at(0).at("lines").at(0);
+  }
   void awaitState(const std::string& state) const {
     while (line(routers_.near()).at("state") != state) continue;
   }
@@ -37,11 +43,14 @@ TEST_F(RemoteTest, CallReachesAServerOnAnotherHost) {
   routers_.start();
   const EchoThread echo(routers_.far(), "echo", {.location = RouterPair::kLocation});
 
-  const auto ended = near({"call", "echo", "int32", "value=7", "--location", "1", "--timeout", "100"});
+  const auto ended =
+      near({"call", "echo", "int32", "value=7", "--location", "1", "--timeout", "100"});
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   EXPECT_THAT(ended.out, HasSubstr(" value=7\n"));
-  EXPECT_EQ(near({"call", "echo", "int32", "--location", "1", "--timeout", "100", "--count", "300"}).status, 0);
+  EXPECT_EQ(near({"call", "echo", "int32", "--location", "1", "--timeout", "100", "--count", "300"})
+                .status,
+            0);
 }
 
 // Whichever router has the limit, or the server itself.
@@ -51,17 +60,24 @@ TEST_F(RemoteTest, AMessageThatIsTooLargeIsRefusedWithTheLimit) {
     RouterPair::Options near, far;
     std::uint64_t maxMessageBytes;
   };
-  for (const auto& [nearOptions, farOptions, maxMessageBytes] : {Limited{small, {}, 5000}, {{}, small, 5000}, {{}, {}, 1000}}) {
+  for (const auto& [nearOptions, farOptions, maxMessageBytes] :
+       {Limited{small, {}, 5000}, {{}, small, 5000}, {{}, {}, 1000}}) {
     routers_.startFar(farOptions);
     routers_.startNear(nearOptions);
-    const EchoThread echo(routers_.far(), "echo", {.location = RouterPair::kLocation, .maxMessageBytes = maxMessageBytes});
+    const EchoThread echo(routers_.far(), "echo",
+                          {.location = RouterPair::kLocation, .maxMessageBytes = maxMessageBytes});
     const std::string most(1000 - sizeof(Char8Array), 'x');
 
-    const auto tooLarge = near({"call", "echo", "char8Array", "value=" + most + "x", "--location", "1", "--timeout", "100"});
+    const auto tooLarge = near({"call", "echo", "char8Array", "value=" + most + "x", "--location",
+                                "1", "--timeout", "100"});
 
     EXPECT_EQ(tooLarge.status, 1);
-    EXPECT_EQ(tooLarge.err, "mpf call: not sent: larger than the server allows: 1001 bytes, the limit is 1000\n");
-    EXPECT_EQ(near({"call", "echo", "char8Array", "value=" + most, "--location", "1", "--timeout", "100"}).status, 0);
+    EXPECT_EQ(tooLarge.err,
+              "mpf call: not sent: larger than the server allows: 1001 bytes, the limit is 1000\n");
+    EXPECT_EQ(
+        near({"call", "echo", "char8Array", "value=" + most, "--location", "1", "--timeout", "100"})
+            .status,
+        0);
   }
 }
 
@@ -77,14 +93,20 @@ TEST_F(RemoteTest, ReportsShowWhatIsElsewhere) {
   const auto server = near({"msr", "echo", "--location", "1"}).out;
   const auto there = far({"mrr", "--interval", "1"}).out;
 
-  EXPECT_THAT(list, AllOf(ContainsRegex("  echo@1 +alive +[0-9]+ +→ "), ContainsRegex("  → " + routers_.address() + " +connected +1 ")));
-  EXPECT_THAT(routers, AllOf(ContainsRegex("RMRClient stateConnected queueSize 100 inQueue 0 sendQueueFull 0\n"
-                                           "   Server echo@1 has 1 client. bindState connected\n"
-                                           "   sendPerSec [0-9]+ receivePerSec [0-9]+  tcpSendPerSec [0-9]+ tcpReceivePerSec [0-9]+\n"),
-                             HasSubstr(" address " + routers_.address() + " plain locations 1\n")));
-  EXPECT_THAT(server, AllOf(HasSubstr("queueRequests 1\n"), HasSubstr(routers_.address() + ", connected, round trip ")));
-  EXPECT_THAT(there, ContainsRegex("RMRServer stateConnected queueSize 100 inQueue 0 replyQueueFull 0\n"
-                                   "   Server echo@1 has 1 client. bindState connected\n"));
+  EXPECT_THAT(list, AllOf(ContainsRegex("  echo@1 +alive +[0-9]+ +→ "),
+                          ContainsRegex("  → " + routers_.address() + " +connected +1 ")));
+  EXPECT_THAT(
+      routers,
+      AllOf(ContainsRegex("RMRClient stateConnected queueSize 100 inQueue 0 sendQueueFull 0\n"
+                          "   Server echo@1 has 1 client. bindState connected\n"
+                          "   sendPerSec [0-9]+ receivePerSec [0-9]+  tcpSendPerSec [0-9]+ "
+                          "tcpReceivePerSec [0-9]+\n"),
+            HasSubstr(" address " + routers_.address() + " plain locations 1\n")));
+  EXPECT_THAT(server, AllOf(HasSubstr("queueRequests 1\n"),
+                            HasSubstr(routers_.address() + ", connected, round trip ")));
+  EXPECT_THAT(there,
+              ContainsRegex("RMRServer stateConnected queueSize 100 inQueue 0 replyQueueFull 0\n"
+                            "   Server echo@1 has 1 client. bindState connected\n"));
   const auto seen = line(routers_.near());
   EXPECT_GE(seen.at("messages_sent"), 1);
   EXPECT_GE(seen.at("messages_received"), 1);
@@ -120,10 +142,12 @@ TEST_F(RemoteTest, APeerThatIsGoneIsCutAndComesBack) {
 TEST_F(RemoteTest, AClientWhoseServerIsNotThereWaitsAtTheRouter) {
   routers_.start();
   awaitState("connected");
-  Tool call({"call", "later", "int32", "value=3", "--location", "1", "--timeout", "1000"}, routers_.near().name());
+  Tool call({"call", "later", "int32", "value=3", "--location", "1", "--timeout", "1000"},
+            routers_.near().name());
   while (ls(routers_.near()).at("waiting").empty()) continue;
 
-  EXPECT_THAT(near({"mrr", "--interval", "1"}).out, HasSubstr("   Server later@1 has 1 client. bindState waiting for the server\n"));
+  EXPECT_THAT(near({"mrr", "--interval", "1"}).out,
+              HasSubstr("   Server later@1 has 1 client. bindState waiting for the server\n"));
 
   const EchoThread echo(routers_.far(), "later", {.location = RouterPair::kLocation});
   EXPECT_EQ(call.end().status, 0);
@@ -133,7 +157,8 @@ TEST_F(RemoteTest, TopShowsTheConnection) {
   routers_.start();
   awaitState("connected");
 
-  EXPECT_THAT(near({"top", "--batch", "1", "--interval", "0.01", "--routers"}).out, ContainsRegex("\n→ .* connected "));
+  EXPECT_THAT(near({"top", "--batch", "1", "--interval", "0.01", "--routers"}).out,
+              ContainsRegex("\n→ .* connected "));
 }
 
 }  // namespace

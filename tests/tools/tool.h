@@ -21,8 +21,9 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::test {
 
@@ -35,7 +36,8 @@ struct Ended {
 
 class Tool {
  public:
-  // Runs `mpf` with these arguments and $MPF_BACKPLANE = backplane; empty: without the variable. `user`: as whom, for a test that is root.
+  // Runs `mpf` with these arguments and $MPF_BACKPLANE = backplane; empty: without the variable.
+  // `user`: as whom, for a test that is root.
   Tool(std::vector<std::string> arguments, const std::string& backplane, uid_t user = ::geteuid())
       : err_(::memfd_create("stderr", MFD_CLOEXEC)) {
     checkCall(err_.get(), "memfd_create");
@@ -43,7 +45,8 @@ class Tool {
     checkCall(::pipe2(pipe.data(), O_CLOEXEC), "pipe2");
     out_.reset(pipe[0]);
     const FileDescriptor input(pipe[1]);
-    const FileDescriptor nothing(checkCall(::open("/dev/null", O_RDONLY | O_CLOEXEC), "open", "/dev/null"));
+    const FileDescriptor nothing(
+        checkCall(::open("/dev/null", O_RDONLY | O_CLOEXEC), "open", "/dev/null"));
     std::string program = MPF_TEST_TOOL;
     std::vector<char*> argv{program.data()};
     for (auto& argument : arguments) argv.push_back(argument.data());
@@ -92,8 +95,10 @@ class Tool {
   }
   // What it has written to stderr until now.
   [[nodiscard]] std::string err() const {
-    std::string text(static_cast<std::size_t>(checkCall(::lseek(err_.get(), 0, SEEK_END), "lseek")), '\0');
-    text.resize(static_cast<std::size_t>(checkCall(::pread(err_.get(), text.data(), text.size(), 0), "pread")));
+    std::string text(static_cast<std::size_t>(checkCall(::lseek(err_.get(), 0, SEEK_END), "lseek")),
+                     '\0');
+    text.resize(static_cast<std::size_t>(
+        checkCall(::pread(err_.get(), text.data(), text.size(), 0), "pread")));
     return text;
   }
   // Waits for the end.
@@ -120,7 +125,8 @@ class Tool {
   }
   bool readMore() {
     std::array<char, 4096> bytes{};
-    const auto got = retryInterrupted([&] { return ::read(out_.get(), bytes.data(), bytes.size()); });
+    const auto got =
+        retryInterrupted([&] { return ::read(out_.get(), bytes.data(), bytes.size()); });
     if (got > 0) read_.append(bytes.data(), static_cast<std::size_t>(got));
     else isOver_ = true;
     return got > 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ToolsTest: `mpf` on a backplane of its own, with an echo server that a thread of the test runs. Nothing may be left at the end.
+// ToolsTest: `mpf` on a backplane of its own, with an echo server that a thread of the test runs.
+// Nothing may be left at the end.
 #pragma once
 
 #include <chrono>
@@ -13,12 +14,13 @@
 #include <thread>
 #include <tuple>
 
-#include <mpf/client/sync_client.h>
-#include <mpf/server/message_server.h>
-#include <mpf/shm/segment.h>
-#include <mpf/tests/support/test_backplane.h>
-#include <mpf/tests/support/watchdog.h>
-#include <mpf/tests/tools/tool.h>
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "shm/segment.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
+#include "tests/tools/tool.h"
 
 namespace mpf::test {
 
@@ -27,7 +29,8 @@ using namespace std::chrono_literals;
 // Sends back every message of every type.
 class EchoThread {
  public:
-  EchoThread(const Backplane& backplane, const std::string& name, const ServerOptions& options = {}) : server_(backplane, name, options) {
+  EchoThread(const Backplane& backplane, const std::string& name, const ServerOptions& options = {})
+      : server_(backplane, name, options) {
     echo(std::type_identity<MessageTypes>{});
     thread_ = std::thread([this] { server_.run(); });
   }
@@ -49,9 +52,13 @@ class EchoThread {
 
 class ToolsTest : public testing::Test {
  protected:
-  void TearDown() override { EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()) << "left behind"; }
+  void TearDown() override {
+    EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()) << "left behind";
+  }
 
-  Ended run(std::vector<std::string> arguments) const { return runTool(std::move(arguments), backplane_.name()); }
+  Ended run(std::vector<std::string> arguments) const {
+    return runTool(std::move(arguments), backplane_.name());
+  }
   // The only backplane of a report.
   nlohmann::json report(std::vector<std::string> arguments) const {
     arguments.emplace_back("--json");
@@ -61,16 +68,19 @@ class ToolsTest : public testing::Test {
   }
   [[nodiscard]] nlohmann::json ls() const { return report({"ls"}).at(0); }
 
-  // All that there is to know of the backplane's files: their names, and of each its inode, times, size and bytes.
+  // All that there is to know of the backplane's files: their names, and of each its inode, times,
+  // size and bytes.
   [[nodiscard]] std::map<std::string, std::string> files() const {
     std::map<std::string, std::string> all;
     for (const auto& name : backplane_.segmentNames()) {
       struct stat status{};
       checkCall(::lstat(segments::path(name).c_str(), &status), "lstat", name);
       std::ostringstream text;
-      text << status.st_ino << ' ' << status.st_mode << ' ' << status.st_nlink << ' ' << status.st_size << ' ' << status.st_mtim.tv_sec
-           << '.' << status.st_mtim.tv_nsec << ' ' << status.st_ctim.tv_sec << '.' << status.st_ctim.tv_nsec << '\n';
-      if (S_ISREG(status.st_mode)) text << std::ifstream(segments::path(name), std::ios::binary).rdbuf();
+      text << status.st_ino << ' ' << status.st_mode << ' ' << status.st_nlink << ' '
+           << status.st_size << ' ' << status.st_mtim.tv_sec << '.' << status.st_mtim.tv_nsec << ' '
+           << status.st_ctim.tv_sec << '.' << status.st_ctim.tv_nsec << '\n';
+      if (S_ISREG(status.st_mode))
+        text << std::ifstream(segments::path(name), std::ios::binary).rdbuf();
       all[name] = text.str();
     }
     return all;
@@ -96,7 +106,8 @@ inline std::string inOneLine(const std::string& text) {
 }
 
 // The entry of `list` whose `key` is `value`; null when there is none.
-inline nlohmann::json entryOf(const nlohmann::json& list, const std::string& key, const nlohmann::json& value) {
+inline nlohmann::json entryOf(const nlohmann::json& list, const std::string& key,
+                              const nlohmann::json& value) {
   for (const auto& entry : list) {
     if (entry.contains(key) && entry.at(key) == value) return entry;
   }

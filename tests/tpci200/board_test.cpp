@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The carrier on QEMU's model of the TPCI200, with an Octal 232 at sites IP_a and IP_b. Runs as root in the machine of this folder, first without
-// a kernel driver for the board (tests of PolledBoard), then with uio_pci_generic.
+// The carrier on QEMU's model of the TPCI200, with an Octal 232 at sites IP_a and IP_b. Runs as
+// root in the machine of this folder, first without a kernel driver for the board (tests of
+// PolledBoard), then with uio_pci_generic.
 #include <poll.h>
 #include <signal.h>
 #include <sys/fsuid.h>
@@ -12,8 +13,9 @@
 
 #include <mpf/drivers/industry_pack/id_prom.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
-#include <mpf/drivers/industry_pack/tpci200.h>
-#include <mpf/drivers/octal_uart/scc2698b.h>
+
+#include "drivers/industry_pack/tpci200.h"
+#include "drivers/octal_uart/scc2698b.h"
 
 namespace mpf::test {
 namespace {
@@ -24,7 +26,8 @@ using testing::HasSubstr;
 // A channel whose transmitter is ready interrupts for as long as its mask lets it.
 class Asker {
  public:
-  Asker(IndustryPackSite& site, int channel) : io_(site.io()), line_(site.interrupt(channel / 4)), channel_(channel) {
+  Asker(IndustryPackSite& site, int channel)
+      : io_(site.io()), line_(site.interrupt(channel / 4)), channel_(channel) {
     io_.write8(at(channel, kCr), kCrResetTx);
     io_.write8(at(channel, kCr), kCrEnableTx);
   }
@@ -32,7 +35,9 @@ class Asker {
   Asker(const Asker&) = delete;
   Asker& operator=(const Asker&) = delete;
 
-  void ask(bool on) { io_.write8(atBlock(channel_ / 2, kImr), on ? isrOf(channel_, kIsrTxRdy) : std::uint8_t{0}); }
+  void ask(bool on) {
+    io_.write8(atBlock(channel_ / 2, kImr), on ? isrOf(channel_, kIsrTxRdy) : std::uint8_t{0});
+  }
   // Asks, waits until it was heard, is served.
   void interruptOnce() {
     line_.enable();

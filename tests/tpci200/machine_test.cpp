@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Boots the machine of this folder, which runs board_test.cpp and two serial servers on octal UARTs behind the TPCI200; instruments are here, at
-// the far ends of their lines. `make test-tpci200` sets MPF_TEST_TPCI200 to the build that the machine was made of.
+// Boots the machine of this folder, which runs board_test.cpp and two serial servers on octal UARTs
+// behind the TPCI200; instruments are here, at the far ends of their lines. `make test-tpci200`
+// sets MPF_TEST_TPCI200 to the build that the machine was made of.
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -13,10 +14,10 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/program.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/instrument.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -28,14 +29,17 @@ using testing::HasSubstr;
 class Line {
  public:
   explicit Line(std::string path)
-      : path_(std::move(path)), listener_(checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket")) {
+      : path_(std::move(path)),
+        listener_(checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket")) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path_.copy(static_cast<char*>(address.sun_path), sizeof(address.sun_path) - 1);
-    checkCall(::bind(listener_.get(), reinterpret_cast<sockaddr*>(&address), sizeof(address)), "bind", path_);
+    checkCall(::bind(listener_.get(), reinterpret_cast<sockaddr*>(&address), sizeof(address)),
+              "bind", path_);
     checkCall(::listen(listener_.get(), 1), "listen");
     thread_ = std::jthread([this] {
-      FileDescriptor line(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+      FileDescriptor line(
+          ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       if (line) instrument_.connect(std::move(line));
     });
   }
@@ -65,7 +69,8 @@ std::vector<std::string> linesOf(const Program& program) {
 
 TEST(Tpci200Machine, ServesInstrumentsOnOctalUarts) {
   const char* const build = std::getenv("MPF_TEST_TPCI200");
-  if (build == nullptr) GTEST_SKIP() << "no emulated machine with a TPCI200: make test-tpci200 makes one";
+  if (build == nullptr)
+    GTEST_SKIP() << "no emulated machine with a TPCI200: make test-tpci200 makes one";
   const Watchdog watchdog("the machine");
   const TemporaryFolder folder;
   const Line voltmeter(folder.file("voltmeter"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/actors.h>
+#include "tools/torture/actors.h"
 
 #include <signal.h>
 #include <unistd.h>
@@ -7,18 +7,21 @@
 #include <chrono>
 #include <functional>
 
-#include <mpf/tools/torture/echo.h>
-#include <mpf/tools/torture/sabotage.h>
-#include <mpf/tools/torture/talk.h>
+#include "tools/torture/echo.h"
+#include "tools/torture/sabotage.h"
+#include "tools/torture/talk.h"
 
 namespace mpf::torture {
 namespace {
 
-constexpr auto kPace = std::chrono::microseconds(500);  // between looks at the board, and between handfuls of requests
-constexpr std::uint64_t kVisit = 40;                    // replies after which a visitor has seen enough
-constexpr std::uint64_t kStay = 8;                      // replies after which a guest dies
+// between looks at the board, and between handfuls of requests
+constexpr auto kPace = std::chrono::microseconds(500);
+constexpr std::uint64_t kVisit = 40;  // replies after which a visitor has seen enough
+constexpr std::uint64_t kStay = 8;  // replies after which a guest dies
 
-WaitMode waitModeOf(std::uint32_t seed) { return seed % 2 == 0 ? WaitMode::adaptive : WaitMode::block; }
+WaitMode waitModeOf(std::uint32_t seed) {
+  return seed % 2 == 0 ? WaitMode::adaptive : WaitMode::block;
+}
 bool byDescriptor(std::uint32_t seed) { return seed % 8 == 7; }
 
 void runUntil(Dispatcher& dispatcher, const std::function<bool()>& isDone) {
@@ -83,7 +86,8 @@ int playVisitor(const Cast& cast) {
   auto& board = cast.world.visitor;
   auto& ofSteady = board.talked[0];
   const auto repliesBefore = ofSteady.replies.load();
-  Dispatcher dispatcher(Backplane::attach(cast.backplane), {.waitMode = waitModeOf(cast.seed), .label = "visitor"});
+  Dispatcher dispatcher(Backplane::attach(cast.backplane),
+                        {.waitMode = waitModeOf(cast.seed), .label = "visitor"});
   {
     const Talk absent(dispatcher, cast.world, ofAbsent, "absent", cast.seed);
     Talk steady(dispatcher, cast.world, ofSteady, "steady", cast.seed + 1);
@@ -91,7 +95,8 @@ int playVisitor(const Cast& cast) {
     runUntil(dispatcher, [&] {
       steady.sendSome();
       if (ofFleeting.replies.load() < kStay) fleeting.sendSome();
-      return ofSteady.replies.load() - repliesBefore >= kVisit && ofFleeting.replies.load() >= kStay;
+      return ofSteady.replies.load() - repliesBefore >= kVisit &&
+             ofFleeting.replies.load() >= kStay;
     });
     if (cast.sabotage == Sabotage::halfMessage) publishHalfMessage(cast.backplane);
     fleeting.tellToDie();

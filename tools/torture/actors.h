@@ -6,24 +6,25 @@
 //   visitor ──┬─► steady      a client that is tormented
 //             ├─► fleeting    a server that kills itself when the visitor asks it to
 //             └─► absent      a server that never comes
-//   corpse                    left everything that a dead process can leave, for whoever attaches next
+//   corpse                    left everything that a dead process can leave, for whoever attaches
+//                             next
 #pragma once
 
 #include <cstdint>
 #include <string>
 
-#include <mpf/tools/torture/world.h>
+#include "tools/torture/world.h"
 
 namespace mpf::torture {
 
 // What goes wrong on purpose, so that one sees the referee notice it.
 enum class Sabotage {
   none,
-  loseFate,     // the survivor forgets to count an end
+  loseFate,  // the survivor forgets to count an end
   halfMessage,  // the visitor makes a message visible that it has not written
-  keepName,     // the mortal server's lock outlives it
-  stale,        // the survivor leaves a file
-  leak,         // the survivor opens a descriptor more in each round
+  keepName,  // the mortal server's lock outlives it
+  stale,  // the survivor leaves a file
+  leak,  // the survivor opens a descriptor more in each round
 };
 
 struct Cast {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/campaign.h>
+#include "tools/torture/campaign.h"
 
 #include <algorithm>
 #include <atomic>
@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include <mpf/base/stop_signals.h>
+#include "base/stop_signals.h"
 
 namespace mpf::torture {
 namespace {
@@ -23,15 +23,21 @@ std::atomic<bool>& interrupted() {
 }  // namespace
 
 Campaign::Campaign(const Marks& marks, CampaignOptions options, Progress progress)
-    : marks_(marks), options_(std::move(options)), progress_(std::move(progress)), random_(options_.referee.seed) {
+    : marks_(marks),
+      options_(std::move(options)),
+      progress_(std::move(progress)),
+      random_(options_.referee.seed) {
   tally_.seed = options_.referee.seed;
   for (const auto& [mark, addresses] : marks_.byName()) {
-    if (options_.steps.empty() || std::ranges::find(options_.steps, mark) != options_.steps.end()) tally_.marks[mark] = {};
+    if (options_.steps.empty() || std::ranges::find(options_.steps, mark) != options_.steps.end())
+      tally_.marks[mark] = {};
   }
 }
 
 Tally Campaign::run() {
-  const StopSignals stop([](void* flag) noexcept { static_cast<std::atomic<bool>*>(flag)->store(true); }, &interrupted());
+  const StopSignals stop(
+      [](void* flag) noexcept { static_cast<std::atomic<bool>*>(flag)->store(true); },
+      &interrupted());
   try {
     Referee referee(marks_, options_.referee);
     play(referee);
@@ -49,7 +55,9 @@ void Campaign::play(Referee& referee) {
   }
   for (const auto& [role, marks] : hits_) {
     for (const auto& [mark, hits] : marks) {
-      for (const auto mode : modes()) places_.push_back({role, mode, {mark, options_.hit.value_or(1), options_.instructions.value_or(0)}});
+      for (const auto mode : modes())
+        places_.push_back(
+            {role, mode, {mark, options_.hit.value_or(1), options_.instructions.value_or(0)}});
     }
   }
   if (options_.everyInstruction) return playEveryInstruction(referee);
@@ -60,19 +68,23 @@ void Campaign::play(Referee& referee) {
 void Campaign::reconnoitre(Referee& referee, Role role) {
   std::set<std::string> wanted;
   for (const auto& [mark, tally] : tally_.marks) wanted.insert(mark);
-  for (const auto& [mark, hits] : referee.reconnoitre(role, wanted)) hits_[role][mark] = std::max(hits_[role][mark], hits);
+  for (const auto& [mark, hits] : referee.reconnoitre(role, wanted))
+    hits_[role][mark] = std::max(hits_[role][mark], hits);
 }
 
 // Whether somebody comes to each step that was asked for.
 bool Campaign::isAllFound() const {
   return std::ranges::all_of(tally_.marks, [&](const auto& mark) {
-    return std::ranges::any_of(hits_, [&](const auto& ofRole) { return ofRole.second.contains(mark.first); });
+    return std::ranges::any_of(
+        hits_, [&](const auto& ofRole) { return ofRole.second.contains(mark.first); });
   });
 }
 
 void Campaign::playOnce(Referee& referee) {
   for (const auto& plan : places_) {
-    for (int tries = 0; tries < kTries && !interrupted() && !tryRound(referee, plan, places_.size()); ++tries) continue;
+    for (int tries = 0;
+         tries < kTries && !interrupted() && !tryRound(referee, plan, places_.size()); ++tries)
+      continue;
   }
 }
 
@@ -112,10 +124,16 @@ bool Campaign::tryRound(Referee& referee, const Plan& plan, std::uint64_t planne
   return last_.reached;
 }
 
-std::vector<Role> Campaign::roles() const { return options_.role ? std::vector{*options_.role} : std::vector{Role::client, Role::server}; }
+std::vector<Role> Campaign::roles() const {
+  return options_.role ? std::vector{*options_.role} : std::vector{Role::client, Role::server};
+}
 
-std::vector<Mode> Campaign::modes() const { return options_.mode ? std::vector{*options_.mode} : std::vector{Mode::kill, Mode::stop}; }
+std::vector<Mode> Campaign::modes() const {
+  return options_.mode ? std::vector{*options_.mode} : std::vector{Mode::kill, Mode::stop};
+}
 
-bool Campaign::isOver() const { return interrupted() || std::chrono::steady_clock::now() - begin_ >= options_.duration; }
+bool Campaign::isOver() const {
+  return interrupted() || std::chrono::steady_clock::now() - begin_ >= options_.duration;
+}
 
 }  // namespace mpf::torture

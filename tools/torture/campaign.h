@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Campaign: which rounds are played: each step in each role killed and stopped once, then random places for as long as was asked for.
+// Campaign: which rounds are played: each step in each role killed and stopped once, then random
+// places for as long as was asked for.
 //
 // Threads  one. SIGINT and SIGTERM end it after the round, with the verdict so far.
 #pragma once
@@ -11,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/tools/torture/tally.h>
+#include "tools/torture/tally.h"
 
 namespace mpf::torture {
 
@@ -19,8 +20,8 @@ struct CampaignOptions {
   Referee::Options referee;
   std::chrono::duration<double> duration{60};
   std::vector<std::string> steps;  // empty: all
-  std::optional<Role> role;        // empty: both
-  std::optional<Mode> mode;        // empty: both
+  std::optional<Role> role;  // empty: both
+  std::optional<Mode> mode;  // empty: both
   std::optional<std::uint64_t> hit;
   std::optional<std::uint64_t> instructions;
   bool everyInstruction = false;
@@ -28,8 +29,10 @@ struct CampaignOptions {
 
 class Campaign {
  public:
-  // Called before each round: which, how many so far, and how many are planned (0: until the time is over).
-  using Progress = std::function<void(const Plan& plan, std::uint64_t round, std::uint64_t planned)>;
+  // Called before each round: which, how many so far, and how many are planned (0: until the time
+  // is over).
+  using Progress =
+      std::function<void(const Plan& plan, std::uint64_t round, std::uint64_t planned)>;
 
   Campaign(const Marks& marks, CampaignOptions options, Progress progress);
   // Plays it all, or up to the first failure.
@@ -54,8 +57,8 @@ class Campaign {
   Progress progress_;
   std::mt19937 random_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  std::map<Role, Hits> hits_;     // in a life without torment, of the steps asked for
-  std::vector<Plan> places_;      // each step in each role and mode that comes there
+  std::map<Role, Hits> hits_;  // in a life without torment, of the steps asked for
+  std::vector<Plan> places_;  // each step in each role and mode that comes there
   std::optional<Plan> playing_;
   Outcome last_;
   Tally tally_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/checks.h>
+#include "tools/torture/checks.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <set>
 
-#include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tools/survey.h>
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "tools/report/snapshot.h"
 
 namespace mpf::torture {
 namespace {
@@ -30,11 +30,13 @@ std::uint64_t ownerOf(const std::string& name, layout::SegmentKind kind) try {
 bool isLivingWindow(const std::string& name, NameKind kind, Living& living) {
   const bool isServer = kind == NameKind::serverWindow;
   if (segments::probeOwner(name) != segments::Owner::alive) return false;
-  living.windows.insert(ownerOf(name, isServer ? layout::SegmentKind::serverWindow : layout::SegmentKind::clientWindow));
+  living.windows.insert(ownerOf(
+      name, isServer ? layout::SegmentKind::serverWindow : layout::SegmentKind::clientWindow));
   return true;
 }
 
-// Whether it belongs to the living; windows must have been looked at before links, and links before bulk segments.
+// Whether it belongs to the living; windows must have been looked at before links, and links before
+// bulk segments.
 bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living& living) {
   switch (parsed.kind) {
     case NameKind::serverWindow:
@@ -46,8 +48,8 @@ bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living&
     case NameKind::router:
     case NameKind::reaper:
       return segments::probeOwner(name) == segments::Owner::alive;
-    case NameKind::wish:
-      return living.windows.contains(ownerOf(name, layout::SegmentKind::wish));
+    case NameKind::pendingBind:
+      return living.windows.contains(ownerOf(name, layout::SegmentKind::pendingBind));
     case NameKind::link:
       if (!living.windows.contains(parsed.serverWindow)) return false;
       if (!living.windows.contains(ownerOf(name, layout::SegmentKind::link))) return false;
@@ -78,7 +80,8 @@ std::size_t numberIn(const std::string& path, const std::string& word) {
 std::vector<std::string> staleSegments(const std::string& backplane, std::size_t links) {
   std::vector<std::pair<std::string, SegmentName::Parsed>> names;
   for (auto& name : segments::list(SegmentName::prefix(backplane))) {
-    if (auto parsed = SegmentName::tryParse(name)) names.emplace_back(std::move(name), std::move(*parsed));
+    if (auto parsed = SegmentName::tryParse(name))
+      names.emplace_back(std::move(name), std::move(*parsed));
   }
   std::ranges::stable_sort(names, {}, [](const auto& name) { return rank(name.second.kind); });
   Living living;
@@ -86,29 +89,32 @@ std::vector<std::string> staleSegments(const std::string& backplane, std::size_t
   for (const auto& [name, parsed] : names) {
     if (!belongs(name, parsed, living)) stale.push_back(name);
   }
-  if (living.links.size() > links) stale.push_back(fmt::format("{} links where {} are connected", living.links.size(), links));
+  if (living.links.size() > links)
+    stale.push_back(fmt::format("{} links where {} are connected", living.links.size(), links));
   return stale;
 }
 
 void checkNoNonsense(const std::string& backplane) {
-  const auto survey = tools::Survey::take(backplane);
-  for (const auto* windows : {&survey.servers, &survey.clients}) {
+  const auto snapshot = tools::Snapshot::take(backplane);
+  for (const auto* windows : {&snapshot.servers, &snapshot.clients}) {
     for (const auto& window : *windows) {
-      if (window.protocolErrors != 0) throw Broken(fmt::format("{} read nonsense from a peer", window.name));
+      if (window.protocolErrors != 0)
+        throw Broken(fmt::format("{} read nonsense from a peer", window.name));
     }
   }
 }
 
 std::uint64_t clientsDied(const std::string& backplane, const std::string& server) {
-  const auto survey = tools::Survey::take(backplane);
-  const auto found = std::ranges::find(survey.servers, server, &tools::WindowView::name);
-  return found == survey.servers.end() ? 0 : found->peersDied;
+  const auto snapshot = tools::Snapshot::take(backplane);
+  const auto found = std::ranges::find(snapshot.servers, server, &tools::WindowView::name);
+  return found == snapshot.servers.end() ? 0 : found->peersDied;
 }
 
 Holdings Holdings::of(pid_t pid) {
   const auto directory = fmt::format("/proc/{}", pid);
   Holdings holdings;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(directory + "/fd")) ++holdings.descriptors;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(directory + "/fd"))
+    ++holdings.descriptors;
   std::ifstream maps(directory + "/maps");
   for (std::string line; std::getline(maps, line);) {
     if (line.find(" /dev/shm/") != std::string::npos) ++holdings.mappings;

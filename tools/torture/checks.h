@@ -20,8 +20,10 @@ class Broken : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Segments of a backplane that belong to nobody who lives, and links beyond those that `links` clients have.
-[[nodiscard]] std::vector<std::string> staleSegments(const std::string& backplane, std::size_t links);
+// Segments of a backplane that belong to nobody who lives, and links beyond those that `links`
+// clients have.
+[[nodiscard]] std::vector<std::string> staleSegments(const std::string& backplane,
+                                                     std::size_t links);
 
 // Throws Broken when a living process of the backplane has read nonsense from a peer.
 void checkNoNonsense(const std::string& backplane);
@@ -32,7 +34,7 @@ void checkNoNonsense(const std::string& backplane);
 struct Holdings {
   std::size_t descriptors = 0;
   std::size_t mappings = 0;  // of shared memory
-  std::size_t heapKiB = 0;   // resident memory that is nobody else's
+  std::size_t heapKiB = 0;  // resident memory that is nobody else's
   static Holdings of(pid_t pid);
 };
 

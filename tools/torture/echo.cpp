@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/echo.h>
+#include "tools/torture/echo.h"
 
 #include <poll.h>
 #include <signal.h>
@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <utility>
 
-#include <mpf/tools/torture/talk.h>
+#include "tools/torture/talk.h"
 
 namespace mpf::torture {
 namespace {
@@ -20,13 +20,15 @@ constexpr std::uint32_t kNewEvery = 3;                // arrays that get a new m
 }  // namespace
 
 Echo::Echo(const Backplane& backplane, const std::string& name, World& world, WaitMode waitMode)
-    : world_(world), server_(backplane, name, {.location = 0, .queueSize = 16, .waitMode = waitMode}) {}
+    : world_(world),
+      server_(backplane, name, {.location = 0, .queueSize = 16, .waitMode = waitMode}) {}
 
 void Echo::run(const Board& board, bool byDescriptor) {
   pollfd descriptor{byDescriptor ? server_.descriptor() : -1, POLLIN, 0};
   while (board.leave.load() == 0) {
-    const bool news = byDescriptor ? ::poll(&descriptor, 1, static_cast<int>(kBoardLook.count())) > 0
-                                   : server_.waitForMessage(Deadline::after(kBoardLook));
+    const bool news = byDescriptor
+                          ? ::poll(&descriptor, 1, static_cast<int>(kBoardLook.count())) > 0
+                          : server_.waitForMessage(Deadline::after(kBoardLook));
     if (!news) kept_.reset();  // refused: nobody came after it
     handleAll();
   }
@@ -39,7 +41,8 @@ void Echo::handleAll() {
 void Echo::handle(Message&& request) {
   if (auto number = Int32Message::tryFrom(std::move(request))) return answer(std::move(*number));
   // NOLINTNEXTLINE(bugprone-use-after-move): one of another type is left as it was
-  if (auto array = Float64ArrayMessage::tryFrom(std::move(request))) return answer(std::move(*array));
+  if (auto array = Float64ArrayMessage::tryFrom(std::move(request)))
+    return answer(std::move(*array));
   world_.complain("a server got a message of a type that nobody sends");
 }
 

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Echo: the servers of a torture. It checks each request to the last byte, and answers in place, with a new message, or late.
+// Echo: the servers of a torture. It checks each request to the last byte, and answers in place,
+// with a new message, or late.
 //
 // Threads  one.
 #pragma once
 
 #include <string>
 
-#include <mpf/server/message_server.h>
-#include <mpf/tools/torture/world.h>
+#include <mpf/message_server.h>
+
+#include "tools/torture/world.h"
 
 namespace mpf::torture {
 

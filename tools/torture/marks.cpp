@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/marks.h>
+#include "tools/torture/marks.h"
 
 #include <fcntl.h>
 
@@ -13,8 +13,9 @@
 #include <string_view>
 #include <utility>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 
 namespace mpf::torture {
 namespace {
@@ -34,8 +35,10 @@ Marks::Address loadedAt() {
   return moved;
 }
 
-// Address and name of a probe of ours: three addresses, then provider, name and arguments, each ended by a zero byte.
-std::optional<std::pair<Marks::Address, std::string>> tryProbe(const char* note, std::size_t bytes) {
+// Address and name of a probe of ours: three addresses, then provider, name and arguments, each
+// ended by a zero byte.
+std::optional<std::pair<Marks::Address, std::string>> tryProbe(const char* note,
+                                                               std::size_t bytes) {
   constexpr auto kAddresses = 3 * sizeof(std::uint64_t);
   if (bytes <= kAddresses || note[bytes - 1] != '\0') return std::nullopt;
   std::uint64_t address = 0;
@@ -63,7 +66,8 @@ void forEachProbe(Elf_Data& data, Visit&& visit) {
 Marks Marks::ofThisProgram() {
   const FileDescriptor file(checkCall(::open(kProgram, O_RDONLY | O_CLOEXEC), "open", kProgram));
   ::elf_version(EV_CURRENT);
-  const std::unique_ptr<Elf, int (*)(Elf*)> elf(::elf_begin(file.get(), ELF_C_READ, nullptr), ::elf_end);
+  const std::unique_ptr<Elf, int (*)(Elf*)> elf(::elf_begin(file.get(), ELF_C_READ, nullptr),
+                                                ::elf_end);
   if (!elf) throw std::runtime_error(std::string("read ") + kProgram + ": " + ::elf_errmsg(-1));
   const auto moved = loadedAt();
   Marks marks;
@@ -77,7 +81,8 @@ Marks Marks::ofThisProgram() {
       marks.byAddress_.emplace(moved + probe.first, probe.second);
     });
   }
-  if (marks.byName_.empty()) throw std::runtime_error("this program was built without steps, or they were stripped from it");
+  if (marks.byName_.empty())
+    throw std::runtime_error("this program was built without steps, or they were stripped from it");
   return marks;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Marks: where the steps (base/step.h) of this program are, from the notes of its own file. Forked children have them at the same
-// addresses.
+// Marks: where the steps (base/step.h) of this program are, from the notes of its own file. Forked
+// children have them at the same addresses.
 //
 // Threads  any, once made.
 #pragma once
@@ -20,7 +20,9 @@ class Marks {
   static Marks ofThisProgram();
 
   // All, in alphabetical order. A step in an inline function is at several addresses.
-  [[nodiscard]] const std::map<std::string, std::vector<Address>>& byName() const noexcept { return byName_; }
+  [[nodiscard]] const std::map<std::string, std::vector<Address>>& byName() const noexcept {
+    return byName_;
+  }
   [[nodiscard]] bool contains(const std::string& name) const { return byName_.contains(name); }
   // Name of the step at `address`; nullptr when there is none.
   [[nodiscard]] const std::string* find(Address address) const;

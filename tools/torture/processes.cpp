@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/processes.h>
+#include "tools/torture/processes.h"
 
 #include <sys/eventfd.h>
 #include <sys/prctl.h>
@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <exception>
 
-#include <mpf/base/print_error.h>
-#include <mpf/base/system_call.h>
+#include "base/print_error.h"
+#include "base/system_call.h"
 
 namespace mpf::torture {
 namespace {

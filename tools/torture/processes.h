@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Processes: the actors that are forked and the tracee among them; what the kernel tells about all of them comes in here.
+// Processes: the actors that are forked and the tracee among them; what the kernel tells about all
+// of them comes in here.
 //
 // Threads  one, and the process has no other: it forks without exec.
 // Crash    the actors die with this process.
@@ -12,8 +13,9 @@
 #include <map>
 #include <set>
 
-#include <mpf/base/clock.h>
-#include <mpf/tools/torture/tracee.h>
+#include <mpf/clock.h>
+
+#include "tools/torture/tracee.h"
 
 namespace mpf::torture {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/referee.h>
+#include "tools/torture/referee.h"
 
 #include <sys/wait.h>
 
@@ -7,18 +7,19 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <mpf/base/clock.h>
-#include <mpf/shm/backplane.h>
+#include <mpf/backplane.h>
+#include <mpf/clock.h>
 
 namespace mpf::torture {
 namespace {
 
 constexpr auto kLook = std::chrono::microseconds(500);  // between looks at what the actors report
-constexpr std::uint64_t kEnough = 12;                   // replies that show that somebody goes on
-constexpr std::uint64_t kLife = 40;                     // of a server: replies to the survivor
-constexpr std::size_t kLinksAtRest = 2;                 // the survivor's, to both servers
+constexpr std::uint64_t kEnough = 12;  // replies that show that somebody goes on
+constexpr std::uint64_t kLife = 40;  // of a server: replies to the survivor
+constexpr std::size_t kLinksAtRest = 2;  // the survivor's, to both servers
 
-// What a process may hold more than in its first rounds: a descriptor that is about to be closed, a segment for a busier moment.
+// What a process may hold more than in its first rounds: a descriptor that is about to be closed, a
+// segment for a busier moment.
 constexpr std::size_t kMoreDescriptors = 4;
 constexpr std::size_t kMoreMappings = 16;
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -41,11 +42,15 @@ const char* toString(Role role) noexcept { return role == Role::client ? "client
 const char* toString(Mode mode) noexcept { return mode == Mode::kill ? "kill" : "stop"; }
 
 Referee::Referee(const Marks& marks, const Options& options)
-    : marks_(marks), options_(options), backplane_(Backplane::isolated().name()), random_(options.seed) {
+    : marks_(marks),
+      options_(options),
+      backplane_(Backplane::isolated().name()),
+      random_(options.seed) {
   steady_ = processes_.start([cast = cast()] { return playSteady(cast); });
   survivor_ = processes_.start([cast = cast()] { return playSurvivor(cast); });
   startMortal();
-  waitFor("the survivors talk with each other", [&] { return repliesOf(0) >= kEnough && repliesOf(1) >= kEnough; });
+  waitFor("the survivors talk with each other",
+          [&] { return repliesOf(0) >= kEnough && repliesOf(1) >= kEnough; });
 }
 
 Referee::~Referee() {
@@ -58,7 +63,9 @@ Referee::~Referee() {
   while (!backplane.segmentNames().empty() && !patience.hasPassed());
 }
 
-Cast Referee::cast() { return {*world_, backplane_, static_cast<std::uint32_t>(random_()), options_.sabotage}; }
+Cast Referee::cast() {
+  return {*world_, backplane_, static_cast<std::uint32_t>(random_()), options_.sabotage};
+}
 
 void Referee::waitFor(const std::string& what, const Condition& condition) {
   Nanoseconds waited{0};
@@ -68,7 +75,9 @@ void Referee::waitFor(const std::string& what, const Condition& condition) {
     checkAlive();
     // Where so many wait for a processor that we do, too, the others are not what is slow.
     waited += std::min<Nanoseconds>(Nanoseconds(Clock::nowNs() - sinceNs), kLook);
-    if (waited >= options_.patience) throw Broken(fmt::format("this did not come true in {} s: {}", options_.patience.count(), what));
+    if (waited >= options_.patience)
+      throw Broken(
+          fmt::format("this did not come true in {} s: {}", options_.patience.count(), what));
   }
 }
 
@@ -95,9 +104,11 @@ void Referee::endMortal() {
   const auto& disconnects = (*world_).survivor.talked[1].disconnects;
   const auto before = disconnects.load();
   (*world_).mortal.leave.store(1);
-  waitFor("the server ends in order", [&] { return processes_.hasEnded(mortal_) && disconnects.load() != before; });
+  waitFor("the server ends in order",
+          [&] { return processes_.hasEnded(mortal_) && disconnects.load() != before; });
   const auto status = processes_.takeStatus(std::exchange(mortal_, 0));
-  if (!isOrderly(status)) throw Broken(fmt::format("the server that was to end in order {}", inWords(status)));
+  if (!isOrderly(status))
+    throw Broken(fmt::format("the server that was to end in order {}", inWords(status)));
 }
 
 // Starts the one to be tormented and its companion, and lets them go.
@@ -121,10 +132,12 @@ void Referee::live(Role role, const std::function<void(Tracee&)>& prepare) {
 }
 
 bool Referee::isLifeDone(Role role) const {
-  return role == Role::server && repliesOf(1) - mortalReplies_ >= kLife && processes_.hasEnded(companion_);
+  return role == Role::server && repliesOf(1) - mortalReplies_ >= kLife &&
+         processes_.hasEnded(companion_);
 }
 
-std::map<std::string, std::uint64_t> Referee::reconnoitre(Role role, const std::set<std::string>& marks) {
+std::map<std::string, std::uint64_t> Referee::reconnoitre(Role role,
+                                                          const std::set<std::string>& marks) {
   layOutCorpse();
   live(role, [&](Tracee& tracee) { tracee.watch(marks); });
   torment({role, Mode::stop, {}});
@@ -148,7 +161,8 @@ void Referee::torment(const Plan& plan) {
           [&] { return victim.isThere() || victim.isGone() || isLifeDone(plan.role); });
   if (!victim.isThere()) {
     boardOf(plan.role).leave.store(1);
-    waitFor(fmt::format("the {} ends in order", toString(plan.role)), [&] { return victim.isThere() || victim.isGone(); });
+    waitFor(fmt::format("the {} ends in order", toString(plan.role)),
+            [&] { return victim.isThere() || victim.isGone(); });
   }
   wasThere_ = victim.isThere();
   if (wasThere_ && plan.mode == Mode::kill) {
@@ -156,9 +170,11 @@ void Referee::torment(const Plan& plan) {
     waitFor("a killed process is gone", [&] { return victim.isGone(); });
   } else {
     if (wasThere_) hold(plan.role);
-    waitFor(fmt::format("the {} lives on", toString(plan.role)), [&] { return victim.isGone() || isLifeDone(plan.role); });
+    waitFor(fmt::format("the {} lives on", toString(plan.role)),
+            [&] { return victim.isGone() || isLifeDone(plan.role); });
     boardOf(plan.role).leave.store(1);
-    waitFor(fmt::format("the {} ends in order", toString(plan.role)), [&] { return victim.isGone(); });
+    waitFor(fmt::format("the {} ends in order", toString(plan.role)),
+            [&] { return victim.isGone(); });
     checkOrderlyEnd(plan.role);
   }
   processes_.setTracee(nullptr);
@@ -169,7 +185,8 @@ void Referee::torment(const Plan& plan) {
 
 void Referee::checkOrderlyEnd(Role role) const {
   if (isOrderly(tracee_->status())) return;
-  throw Broken(fmt::format("the {} {}, and nobody had killed it", toString(role), inWords(tracee_->status())));
+  throw Broken(fmt::format("the {} {}, and nobody had killed it", toString(role),
+                           inWords(tracee_->status())));
 }
 
 // The stopped one is slow, not dead.
@@ -181,9 +198,12 @@ void Referee::hold(Role role) {
   const auto disconnects = survivor.talked[1].disconnects.load();
   const auto died = role == Role::client ? clientsDied(backplane_, "steady") : 0;
   const auto replies = repliesOf(0);
-  waitFor("the survivors go on beside a stopped process", [&] { return repliesOf(0) - replies >= kEnough; });
-  if (!leaving && survivor.talked[1].disconnects.load() != disconnects) throw Broken("a server that was only stopped was taken for dead");
-  if (role == Role::client && clientsDied(backplane_, "steady") != died) throw Broken("a client that was only stopped was taken for dead");
+  waitFor("the survivors go on beside a stopped process",
+          [&] { return repliesOf(0) - replies >= kEnough; });
+  if (!leaving && survivor.talked[1].disconnects.load() != disconnects)
+    throw Broken("a server that was only stopped was taken for dead");
+  if (role == Role::client && clientsDied(backplane_, "steady") != died)
+    throw Broken("a client that was only stopped was taken for dead");
   tracee_->release();
 }
 
@@ -193,7 +213,8 @@ void Referee::settle() {
   const auto steadyReplies = repliesOf(0);
   waitFor("the survivors go on", [&] { return repliesOf(0) - steadyReplies >= kEnough; });
   waitFor("the successor has its name, and its client", [&] {
-    if (processes_.hasEnded(mortal_)) throw Broken("the successor could not take the place of the one before");
+    if (processes_.hasEnded(mortal_))
+      throw Broken("the successor could not take the place of the one before");
     return repliesOf(1) - mortalReplies_ >= kEnough;
   });
   survivor.rest.store(1);
@@ -220,7 +241,8 @@ void Referee::checkHoldings() {
     Holdings now;
     const auto isFlat = [&] {
       now = Holdings::of(pid);
-      return now.descriptors <= first.descriptors + kMoreDescriptors && now.mappings <= first.mappings + kMoreMappings &&
+      return now.descriptors <= first.descriptors + kMoreDescriptors &&
+             now.mappings <= first.mappings + kMoreMappings &&
              now.heapKiB <= first.heapKiB + kMoreHeapKiB;
     };
     waitFor("the survivors hold no more than they did", isFlat);
@@ -231,9 +253,11 @@ std::string Referee::holdings() const {
   std::string text;
   for (const auto& [pid, first] : heldAtStart_) {
     const auto now = Holdings::of(pid);
-    text += fmt::format("{}{}: {} descriptors (were {}), {} mappings ({}), {} KiB of heap ({})", text.empty() ? "" : "\n",
-                        pid == steady_ ? "surviving server" : "surviving client", now.descriptors, first.descriptors, now.mappings,
-                        first.mappings, now.heapKiB, first.heapKiB);
+    text +=
+        fmt::format("{}{}: {} descriptors (were {}), {} mappings ({}), {} KiB of heap ({})",
+                    text.empty() ? "" : "\n",
+                    pid == steady_ ? "surviving server" : "surviving client", now.descriptors,
+                    first.descriptors, now.mappings, first.mappings, now.heapKiB, first.heapKiB);
   }
   return text;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Referee: plays rounds. In each, one process is stopped or killed at a chosen place, and afterwards everything must hold.
+// Referee: plays rounds. In each, one process is stopped or killed at a chosen place, and
+// afterwards everything must hold.
 //
 //   before    a corpse is left for the tormented to find, and somebody who will die on it
-//   at the place, stopped   the survivors go on, and nobody takes it for dead; then it goes on, to an orderly end
-//   at the place, killed    a successor has its name at once and gets its client
-//   after     every request has had one end, nothing stale is left, the survivors hold what they held
+//   at the place, stopped   the survivors go on, and nobody takes it for dead; then it goes on, to
+//   an orderly end at the place, killed    a successor has its name at once and gets its client
+//   after     every request has had one end, nothing stale is left, the survivors hold what they
+//             held
 //
 // Threads  one.
 #pragma once
@@ -17,9 +19,9 @@
 #include <set>
 #include <string>
 
-#include <mpf/tools/torture/actors.h>
-#include <mpf/tools/torture/checks.h>
-#include <mpf/tools/torture/processes.h>
+#include "tools/torture/actors.h"
+#include "tools/torture/checks.h"
+#include "tools/torture/processes.h"
 
 namespace mpf::torture {
 
@@ -35,7 +37,7 @@ struct Plan {
 };
 
 struct Outcome {
-  bool reached = false;         // else it ended before it came there
+  bool reached = false;  // else it ended before it came there
   bool cameToNextMark = false;  // and not so far behind the mark as was asked for
 };
 
@@ -77,8 +79,12 @@ class Referee {
   void settle();
   void checkHoldings();
   void checkAlive() const;
-  [[nodiscard]] Board& boardOf(Role role) const { return role == Role::client ? (*world_).visitor : (*world_).mortal; }
-  [[nodiscard]] std::uint64_t repliesOf(std::size_t server) const { return (*world_).survivor.talked[server].replies.load(); }
+  [[nodiscard]] Board& boardOf(Role role) const {
+    return role == Role::client ? (*world_).visitor : (*world_).mortal;
+  }
+  [[nodiscard]] std::uint64_t repliesOf(std::size_t server) const {
+    return (*world_).survivor.talked[server].replies.load();
+  }
 
   const Marks& marks_;
   Options options_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/sabotage.h>
+#include "tools/torture/sabotage.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -10,18 +10,19 @@
 #include <thread>
 #include <utility>
 
-#include <mpf/base/system_call.h>
-#include <mpf/shm/layout.h>
-#include <mpf/shm/segment.h>
-#include <mpf/shm/segment_name.h>
-#include <mpf/tools/torture/talk.h>
+#include "base/system_call.h"
+#include "shm/layout.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "tools/torture/talk.h"
 
 namespace mpf::torture {
 namespace {
 
 // Windows or links of this process.
 template <class Visit>
-void forEachOwn(layout::SegmentKind kind, NameKind nameKind, const std::string& backplane, Visit&& visit) {
+void forEachOwn(layout::SegmentKind kind, NameKind nameKind, const std::string& backplane,
+                Visit&& visit) {
   for (const auto& name : segments::list(SegmentName::prefix(backplane))) {
     const auto parsed = SegmentName::tryParse(name);
     if (!parsed || parsed->kind != nameKind) continue;
@@ -41,7 +42,8 @@ void leaveLink(const std::string& backplane) {
   forEachOwnLink(backplane, [&](const Segment& link) { owner = link.header().ownerWindow; });
   auto link = Segment::create(layout::linkBytes(16, 16), layout::SegmentKind::link, backplane, {});
   link.sharedHeader().ownerWindow = owner;
-  static_cast<void>(link.tryPublish(SegmentName::link(backplane, segments::newIncarnation(), link.header().incarnation)));
+  static_cast<void>(link.tryPublish(
+      SegmentName::link(backplane, segments::newIncarnation(), link.header().incarnation)));
 }
 
 }  // namespace
@@ -50,7 +52,8 @@ void Saboteur::meddle(Talk& mortal, bool rests) {
   const bool begins = rests && !std::exchange(rested_, rests);
   rested_ = rests;
   if (sabotage_ == Sabotage::loseFate && !rests) mortal.loseNextFate();
-  if (sabotage_ == Sabotage::leak && begins) leaked_.emplace_back(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  if (sabotage_ == Sabotage::leak && begins)
+    leaked_.emplace_back(::open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (sabotage_ == Sabotage::stale && begins) leaveLink(backplane_);
 }
 
@@ -58,10 +61,13 @@ void leaveChildBehind(const World& world, const std::string& backplane) {
   // Without a pid in the header, the lock is the only evidence that the owner is alive.
   forEachOwn(layout::SegmentKind::serverWindow, NameKind::serverWindow, backplane,
              [](const Segment& window) { window.sharedHeader().ownerPid = 0; });
-  // Without fork(), so that no handler closes anything: the lock of the parent's window stays when the parent dies.
-  if (checkCall(::syscall(SYS_clone, SIGCHLD, nullptr, nullptr, nullptr, nullptr), "clone") != 0) return;
+  // Without fork(), so that no handler closes anything: the lock of the parent's window stays when
+  // the parent dies.
+  if (checkCall(::syscall(SYS_clone, SIGCHLD, nullptr, nullptr, nullptr, nullptr), "clone") != 0)
+    return;
   const auto referee = world.referee;
-  while (world.isOver.load() == 0 && ::kill(referee, 0) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  while (world.isOver.load() == 0 && ::kill(referee, 0) == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   ::_exit(0);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sabotage: mistakes made on purpose, each of which breaks one invariant. `mpf torture --break` with any of them must fail: a referee
-// that never whistles proves nothing.
+// Sabotage: mistakes made on purpose, each of which breaks one invariant. `mpf torture --break`
+// with any of them must fail: a referee that never whistles proves nothing.
 //
 // Threads  the actor's.
 #pragma once
@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/tools/torture/actors.h>
+#include <mpf/file_descriptor.h>
+
+#include "tools/torture/actors.h"
 
 namespace mpf::torture {
 
@@ -19,7 +20,8 @@ class Talk;
 // The survivor's.
 class Saboteur {
  public:
-  Saboteur(Sabotage sabotage, std::string backplane) : sabotage_(sabotage), backplane_(std::move(backplane)) {}
+  Saboteur(Sabotage sabotage, std::string backplane)
+      : sabotage_(sabotage), backplane_(std::move(backplane)) {}
   // Once a look; `rests`: the referee is looking.
   void meddle(Talk& mortal, bool rests);
 
@@ -30,7 +32,8 @@ class Saboteur {
   std::vector<FileDescriptor> leaked_;
 };
 
-// Forks a child that keeps this process's open files, and with them its locks, until the torture ends.
+// Forks a child that keeps this process's open files, and with them its locks, until the torture
+// ends.
 void leaveChildBehind(const World& world, const std::string& backplane);
 // On each link of this process's clients: the next slot counts as complete, whatever it holds.
 void publishHalfMessage(const std::string& backplane);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/talk.h>
+#include "tools/torture/talk.h"
 
 #include <fmt/format.h>
 #include <utility>
@@ -21,8 +21,12 @@ bool holds(std::span<const double> array, std::int32_t value) noexcept {
   return true;
 }
 
-Talk::Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server, std::uint32_t seed)
-    : world_(world), talked_(talked), random_(seed), client_(dispatcher, [this](const Message& message) { take(message); }) {
+Talk::Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server,
+           std::uint32_t seed)
+    : world_(world),
+      talked_(talked),
+      random_(seed),
+      client_(dispatcher, [this](const Message& message) { take(message); }) {
   client_.bind(server, 0);
 }
 
@@ -32,7 +36,8 @@ void Talk::sendSome() {
 }
 
 Message Talk::makeArray(std::int32_t value, std::size_t length, bool inPool) {
-  auto array = inPool ? client_.alloc<Float64Array>(length) : Float64ArrayMessage::allocValue(length);
+  auto array =
+      inPool ? client_.alloc<Float64Array>(length) : Float64ArrayMessage::allocValue(length);
   array->extra = value;
   for (std::size_t i = 0; i < length; ++i) array.value()[i] = elementOf(value, i);
   return array;
@@ -50,19 +55,26 @@ Message Talk::makeMessage(std::int32_t value) {
     case 5:
       return makeArray(value, kLarge, false);
     case 6:
-      return Int32Message({.cmd = static_cast<std::int32_t>(Request::keep), .address = answerTo(value), .value = value});
+      return Int32Message({.cmd = static_cast<std::int32_t>(Request::keep),
+                           .address = answerTo(value),
+                           .value = value});
     default:
-      return Int32Message({.cmd = static_cast<std::int32_t>(Request::answer), .address = answerTo(value), .value = value});
+      return Int32Message({.cmd = static_cast<std::int32_t>(Request::answer),
+                           .address = answerTo(value),
+                           .value = value});
   }
 }
 
 bool Talk::sendOne() {
   if (!client_.isConnected()) return false;
   const auto value = world_.nextValue();
-  const auto deadline = random_() % 16 == 0 ? Deadline::after(std::chrono::microseconds(random_() % 300)) : Deadline::never();
+  const auto deadline = random_() % 16 == 0
+                            ? Deadline::after(std::chrono::microseconds(random_() % 300))
+                            : Deadline::never();
   std::uint32_t id = 0;
   if (client_.send(makeMessage(value), deadline, &id) != SendResult::sent) return false;
-  if (!open_.emplace(id, value).second) world_.complain("a request got the id of one that is still open");
+  if (!open_.emplace(id, value).second)
+    world_.complain("a request got the id of one that is still open");
   if (random_() % kCancelEvery == 0) client_.cancel(id);
   return true;
 }
@@ -70,14 +82,17 @@ bool Talk::sendOne() {
 void Talk::tellToDie() {
   std::uint32_t id = 0;
   const auto value = world_.nextValue();
-  Int32Message request({.cmd = static_cast<std::int32_t>(Request::die), .address = answerTo(value), .value = value});
-  if (client_.send(std::move(request), Deadline::never(), &id) == SendResult::sent) open_.emplace(id, value);
+  Int32Message request(
+      {.cmd = static_cast<std::int32_t>(Request::die), .address = answerTo(value), .value = value});
+  if (client_.send(std::move(request), Deadline::never(), &id) == SendResult::sent)
+    open_.emplace(id, value);
 }
 
 void Talk::take(const Message& message) {
   if (const auto* news = message.tryAs<Connect>()) return takeConnect(news->status);
   const auto found = open_.find(message.route().requestId);
-  if (found == open_.end()) return world_.complain("a request ended that had ended before, or was never sent");
+  if (found == open_.end())
+    return world_.complain("a request ended that had ended before, or was never sent");
   const auto* fate = message.tryAs<RequestFate>();
   if (fate != nullptr && std::exchange(losing_, false)) return;
   const auto value = found->second;
@@ -89,7 +104,8 @@ void Talk::take(const Message& message) {
 void Talk::takeConnect(ConnectStatus status) {
   if (status == ConnectStatus::connectYes) ++talked_.connects;
   if (status != ConnectStatus::connectNo) return;
-  if (!open_.empty()) world_.complain(fmt::format("a disconnect came before the ends of {} requests", open_.size()));
+  if (!open_.empty())
+    world_.complain(fmt::format("a disconnect came before the ends of {} requests", open_.size()));
   ++talked_.disconnects;
 }
 
@@ -100,8 +116,10 @@ void Talk::takeFate(std::int32_t value, Fate fate) {
 void Talk::takeReply(std::int32_t value, const Message& reply) {
   ++talked_.replies;
   if (const auto* number = reply.tryAs<Int32>()) {
-    if (number->value != answerTo(value)) world_.complain(fmt::format("the reply to {} is {}", value, number->value));
-  } else if (const auto* array = reply.tryAs<Float64Array>(); array == nullptr || array->extra != answerTo(value)) {
+    if (number->value != answerTo(value))
+      world_.complain(fmt::format("the reply to {} is {}", value, number->value));
+  } else if (const auto* array = reply.tryAs<Float64Array>();
+             array == nullptr || array->extra != answerTo(value)) {
     world_.complain(fmt::format("the reply to {} is not what its server sends", value));
   } else if (!holds(reply.valueAs<Float64Array>(), value)) {
     world_.complain(fmt::format("the reply to {} is damaged", value));

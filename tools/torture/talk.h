@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Talk: one client's conversation with one server: requests of all sizes, kept, late and cancelled ones, and an account of their ends.
+// Talk: one client's conversation with one server: requests of all sizes, kept, late and cancelled
+// ones, and an account of their ends.
 //
-//   each request that is sent ends exactly once: with the reply that belongs to it, or with a fate that is true
+//   each request that is sent ends exactly once: with the reply that belongs to it, or with a fate
+//   that is true
 //
 // Threads  the dispatcher's.
 #pragma once
@@ -11,8 +13,9 @@
 #include <random>
 #include <string>
 
-#include <mpf/client/message_client.h>
-#include <mpf/tools/torture/world.h>
+#include <mpf/message_client.h>
+
+#include "tools/torture/world.h"
 
 namespace mpf::torture {
 
@@ -20,13 +23,14 @@ namespace mpf::torture {
 enum class Request : std::int32_t {
   answer = 1,
   keep = 2,  // answer when the next one comes, or drop it
-  die = 3,   // the server kills itself
+  die = 3,  // the server kills itself
 };
 
 class Talk {
  public:
   // Binds to `server`. `talked` takes the counts.
-  Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server, std::uint32_t seed);
+  Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server,
+       std::uint32_t seed);
 
   // Sends until some requests are open, as far as it is possible now.
   void sendSome();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/tally.h>
+#include "tools/torture/tally.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <mpf/tools/table.h>
+#include "tools/text/table.h"
 
 namespace mpf::torture {
 namespace {
@@ -21,7 +21,8 @@ std::string count(std::uint64_t number) { return number == 0 ? "-" : fmt::format
 std::string tableOf(const std::map<std::string, Played>& marks) {
   tools::Table table({"STEP", ">CLIENT KILLED", ">STOPPED", ">SERVER KILLED", ">STOPPED"});
   for (const auto& [mark, played] : marks) {
-    table.add({mark, count(played[0][0]), count(played[0][1]), count(played[1][0]), count(played[1][1])});
+    table.add(
+        {mark, count(played[0][0]), count(played[0][1]), count(played[1][0]), count(played[1][1])});
   }
   return table.text();
 }
@@ -37,8 +38,9 @@ nlohmann::json jsonOf(const Plan& plan) {
 }  // namespace
 
 std::string commandOf(const Plan& plan) {
-  return fmt::format("mpf torture --role {} --mode {} --step {} --hit {} --instructions {}", toString(plan.role), toString(plan.mode),
-                     plan.place.mark, plan.place.hit, plan.place.instructions);
+  return fmt::format("mpf torture --role {} --mode {} --step {} --hit {} --instructions {}",
+                     toString(plan.role), toString(plan.mode), plan.place.mark, plan.place.hit,
+                     plan.place.instructions);
 }
 
 std::vector<std::string> Tally::neverReached() const {
@@ -56,7 +58,8 @@ std::string Tally::verdict() const {
 
 std::string Tally::text() const {
   auto text = tableOf(marks);
-  if (const auto names = neverReached(); !failure && !names.empty()) text += fmt::format("never reached: {}\n", fmt::join(names, ", "));
+  if (const auto names = neverReached(); !failure && !names.empty())
+    text += fmt::format("never reached: {}\n", fmt::join(names, ", "));
   if (!holdings.empty()) text += holdings + "\n";
   text += fmt::format("{}: {} rounds in {:.1f} s, seed {}\n", verdict(), rounds, seconds, seed);
   if (failure) text += fmt::format("{}\n", failure->what);

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/tools/torture/referee.h>
+#include "tools/torture/referee.h"
 
 namespace mpf::torture {
 
@@ -32,11 +32,15 @@ struct Tally {
   std::optional<Failure> failure;
   std::string holdings;
 
-  void note(const Plan& plan) { ++marks.at(plan.place.mark)[static_cast<std::size_t>(plan.role)][static_cast<std::size_t>(plan.mode)]; }
+  void note(const Plan& plan) {
+    ++marks.at(
+        plan.place.mark)[static_cast<std::size_t>(plan.role)][static_cast<std::size_t>(plan.mode)];
+  }
   [[nodiscard]] std::vector<std::string> neverReached() const;
   // "held", "incomplete" (a step was never reached), "failed".
   [[nodiscard]] std::string verdict() const;
-  // For people: a row for each step, what was never reached, the verdict, and how to repeat a failure.
+  // For people: a row for each step, what was never reached, the verdict, and how to repeat a
+  // failure.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] nlohmann::json json() const;
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf torture: stops and kills clients and servers at each step of their lives, and looks whether everything that MPF promises holds.
+// mpf torture: stops and kills clients and servers at each step of their lives, and looks whether
+// everything that MPF promises holds.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -10,13 +11,13 @@
 #include <random>
 #include <stdexcept>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/output_file.h>
-#include <mpf/base/print_error.h>
-#include <mpf/tools/arguments.h>
-#include <mpf/tools/commands.h>
-#include <mpf/tools/json_text.h>
-#include <mpf/tools/torture/campaign.h>
+#include "base/command_line.h"
+#include "base/output_file.h"
+#include "base/print_error.h"
+#include "tools/arguments.h"
+#include "tools/commands.h"
+#include "tools/text/json_text.h"
+#include "tools/torture/campaign.h"
 
 namespace mpf::tools {
 namespace {
@@ -30,18 +31,21 @@ struct Arguments {
   bool list = false;
 };
 
-const std::map<std::string, torture::Role> kRoles{{"client", torture::Role::client}, {"server", torture::Role::server}};
-const std::map<std::string, torture::Mode> kModes{{"kill", torture::Mode::kill}, {"stop", torture::Mode::stop}};
-const std::map<std::string, torture::Sabotage> kSabotages{{"lose-fate", torture::Sabotage::loseFate},
-                                                          {"half-message", torture::Sabotage::halfMessage},
-                                                          {"keep-name", torture::Sabotage::keepName},
-                                                          {"stale", torture::Sabotage::stale},
-                                                          {"leak", torture::Sabotage::leak}};
+const std::map<std::string, torture::Role> kRoles{{"client", torture::Role::client},
+                                                  {"server", torture::Role::server}};
+const std::map<std::string, torture::Mode> kModes{{"kill", torture::Mode::kill},
+                                                  {"stop", torture::Mode::stop}};
+const std::map<std::string, torture::Sabotage> kSabotages{
+    {"lose-fate", torture::Sabotage::loseFate},
+    {"half-message", torture::Sabotage::halfMessage},
+    {"keep-name", torture::Sabotage::keepName},
+    {"stale", torture::Sabotage::stale},
+    {"leak", torture::Sabotage::leak}};
 
 // An option whose value is one of the names.
 template <class Value, class Choice>
-CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& value, const std::map<std::string, Choice>& choices,
-                       const std::string& text) {
+CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& value,
+                       const std::map<std::string, Choice>& choices, const std::string& text) {
   return command
       .add_option_function<std::string>(
           name, [&value, &choices](const std::string& chosen) { value = choices.at(chosen); }, text)
@@ -55,7 +59,9 @@ int list(const torture::Marks& marks) {
 
 void checkSteps(const torture::Marks& marks, const std::vector<std::string>& steps) {
   for (const auto& step : steps) {
-    if (!marks.contains(step)) throw std::invalid_argument(fmt::format("no step \"{}\"; `mpf torture --list` names all", step));
+    if (!marks.contains(step))
+      throw std::invalid_argument(
+          fmt::format("no step \"{}\"; `mpf torture --list` names all", step));
   }
 }
 
@@ -64,8 +70,8 @@ torture::Campaign::Progress progress() {
   if (::isatty(STDERR_FILENO) == 0) return [](const auto&...) {};
   return [](const torture::Plan& plan, std::uint64_t round, std::uint64_t planned) {
     const auto of = planned == 0 ? std::string() : fmt::format(" of {}", planned);
-    writeError(fmt::format("\r\x1b[Kround {}{}: {} {} at {} + {}", round, of, toString(plan.mode), toString(plan.role), plan.place.mark,
-                           plan.place.instructions));
+    writeError(fmt::format("\r\x1b[Kround {}{}: {} {} at {} + {}", round, of, toString(plan.mode),
+                           toString(plan.role), plan.place.mark, plan.place.instructions));
   };
 }
 
@@ -98,22 +104,32 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void addTorture(CLI::App& app, Run& run) {
-  auto& command =
-      *app.add_subcommand("torture", "Kills clients and servers at each step of their lives, and looks whether all others go on");
+  auto& command = *app.add_subcommand(
+      "torture",
+      "Kills clients and servers at each step of their lives, and looks whether all others go on");
   auto arguments = std::make_shared<Arguments>();
   auto& options = arguments->campaign;
   options.referee.seed = std::random_device()();
-  addSeconds(command, "--duration", arguments->seconds, "Time for random places, after each step had its turn", true);
-  command.add_option("--seed", options.referee.seed, "Of what is random; it is printed at the end")->check(wholeNumber(0));
+  addSeconds(command, "--duration", arguments->seconds,
+             "Time for random places, after each step had its turn", true);
+  command.add_option("--seed", options.referee.seed, "Of what is random; it is printed at the end")
+      ->check(wholeNumber(0));
   command.add_flag("--list", arguments->list, "Names the steps, and does nothing");
   command.add_option("--step", options.steps, "Only this step; may be given several times");
   addChoice(command, "--role", options.role, kRoles, "Only clients, or only servers");
   addChoice(command, "--mode", options.mode, kModes, "Only kill, or only stop for a while");
-  command.add_option("--hit", options.hit, "The how-many-th time that the process comes to the step")->check(wholeNumber(1));
-  command.add_option("--instructions", options.instructions, "So many instructions behind the step")->check(wholeNumber(0));
-  command.add_option("--every-instruction", arguments->everyInstruction, "At each instruction from this step to the next one");
-  addSeconds(command, "--patience", arguments->patience, "Longest wait for what must come true", false);
-  command.add_option("--json", arguments->json, "Writes the verdict into this file, too: JSON")->type_name("FILE");
+  command
+      .add_option("--hit", options.hit, "The how-many-th time that the process comes to the step")
+      ->check(wholeNumber(1));
+  command
+      .add_option("--instructions", options.instructions, "So many instructions behind the step")
+      ->check(wholeNumber(0));
+  command.add_option("--every-instruction", arguments->everyInstruction,
+                     "At each instruction from this step to the next one");
+  addSeconds(command, "--patience", arguments->patience, "Longest wait for what must come true",
+             false);
+  command.add_option("--json", arguments->json, "Writes the verdict into this file, too: JSON")
+      ->type_name("FILE");
   addChoice(command, "--break", options.referee.sabotage, kSabotages, "")->group("");
   command.callback([arguments, &run] { run = [arguments] { return tools::run(*arguments); }; });
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/tracee.h>
+#include "tools/torture/tracee.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf::torture {
 namespace {
@@ -37,7 +37,8 @@ constexpr long kOptions = PTRACE_O_EXITKILL | PTRACE_O_TRACECLONE;
 
 int eventOf(int status) { return status >> 16; }
 
-// Whether a thread stopped because it has executed a breakpoint, not because it has executed one instruction.
+// Whether a thread stopped because it has executed a breakpoint, not because it has executed one
+// instruction.
 bool isBreakpoint(pid_t thread) {
   siginfo_t info{};
   return ::ptrace(PTRACE_GETSIGINFO, thread, nullptr, &info) == 0 && info.si_code == SI_KERNEL;
@@ -47,13 +48,15 @@ bool isBreakpoint(pid_t thread) {
 
 Tracee::Tracee(pid_t pid, const Marks& marks) : pid_(pid), marks_(marks) {
   if (!kIsKnownProcessor) throw std::runtime_error("breakpoints are known for x86-64 only");
-  checkCall(::ptrace(PTRACE_SEIZE, pid, nullptr, kOptions), "trace", fmt::format("process {}", pid));
+  checkCall(::ptrace(PTRACE_SEIZE, pid, nullptr, kOptions), "trace",
+            fmt::format("process {}", pid));
   const auto memory = fmt::format("/proc/{}/mem", pid);
   memory_.reset(checkCall(::open(memory.c_str(), O_RDWR | O_CLOEXEC), "open", memory));
 }
 
 void Tracee::patch(Marks::Address address, char instruction) const {
-  checkCall(::pwrite(memory_.get(), &instruction, 1, static_cast<off_t>(address)), "write to", fmt::format("process {}", pid_));
+  checkCall(::pwrite(memory_.get(), &instruction, 1, static_cast<off_t>(address)), "write to",
+            fmt::format("process {}", pid_));
 }
 
 void Tracee::watch(const std::set<std::string>& marks) {
@@ -72,7 +75,9 @@ void Tracee::aim(Place place) {
 
 void Tracee::resume(pid_t thread, int signal) const noexcept {
   const auto request = thread == stepping_ ? PTRACE_SINGLESTEP : PTRACE_CONT;
-  ::ptrace(request, thread, nullptr, static_cast<std::uintptr_t>(signal));  // fails when the thread was killed: its end comes next
+  ::ptrace(request, thread, nullptr,
+           // fails when the thread was killed: its end comes next
+           static_cast<std::uintptr_t>(signal));
 }
 
 void Tracee::handle(pid_t thread, int status) {
@@ -84,7 +89,8 @@ void Tracee::handle(pid_t thread, int status) {
     status_ = status;
     return;
   }
-  if (eventOf(status) != 0) return resume(thread);  // a new thread, as seen by its maker or by itself
+  // a new thread, as seen by its maker or by itself
+  if (eventOf(status) != 0) return resume(thread);
   if (WSTOPSIG(status) != SIGTRAP) return resume(thread, WSTOPSIG(status));
   onTrap(thread);
 }
@@ -99,7 +105,8 @@ void Tracee::onTrap(pid_t thread) {
 void Tracee::onMark(pid_t thread, const std::string& mark) {
   const auto hit = ++hits_[mark];
   if (thread == stepping_) return onInstruction(thread);
-  const bool aimed = !released_ && stepping_ == 0 && stopped_ == 0 && place_.mark == mark && place_.hit == hit;
+  const bool aimed =
+      !released_ && stepping_ == 0 && stopped_ == 0 && place_.mark == mark && place_.hit == hit;
   if (!aimed) return resume(thread);
   left_ = place_.instructions;
   stepping_ = thread;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Tracee: a child under ptrace that is stopped at the k-th time that it comes to a step, or n instructions behind it.
+// Tracee: a child under ptrace that is stopped at the k-th time that it comes to a step, or n
+// instructions behind it.
 //
 //   Tracee victim(pid, marks);       stopped
 //   victim.aim({"slot_written", 3, 17}); or victim.watch({"slot_written", "slot_published"});
 //   ... victim.handle(event) ... until victim.isThere()
 //   victim.kill() or victim.release()
 //
-// The child's nops become breakpoint instructions, in its own copy of the text. A breakpoint is never lifted to step over it: what it
-// replaced did nothing.
+// The child's nops become breakpoint instructions, in its own copy of the text. A breakpoint is
+// never lifted to step over it: what it replaced did nothing.
 //
 // Threads  one: the kernel knows the tracing thread.
 // Crash    when the tracer dies, its tracee does (PTRACE_O_EXITKILL).
@@ -21,23 +22,25 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/tools/torture/marks.h>
+#include <mpf/file_descriptor.h>
+
+#include "tools/torture/marks.h"
 
 namespace mpf::torture {
 
 // A place in a run of a program.
 struct Place {
   std::string mark;
-  std::uint64_t hit = 1;           // the how-many-th time it comes there
+  std::uint64_t hit = 1;  // the how-many-th time it comes there
   std::uint64_t instructions = 0;  // further, in the same thread
-  bool upToNextMark = false;       // and not past another step
+  bool upToNextMark = false;  // and not past another step
 };
 
 class Tracee {
  public:
   // Takes hold of a child of ours, which waits for something.
-  //   throws  std::system_error when this is not allowed, std::runtime_error on a processor that it does not know
+  //   throws  std::system_error when this is not allowed, std::runtime_error on a processor that it
+  //           does not know
   Tracee(pid_t pid, const Marks& marks);
 
   // Counts how often it comes to each of these steps.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/tools/torture/world.h>
+#include "tools/torture/world.h"
 
 #include <sys/mman.h>
 
 #include <cerrno>
 #include <new>
 
-#include <mpf/base/system_call.h>
+#include "base/system_call.h"
 
 namespace mpf::torture {
 
@@ -22,7 +22,9 @@ void World::complain(std::string_view text) noexcept {
   complained_.store(2);
 }
 
-std::string World::complaint() const { return complained_.load() == 2 ? std::string(complaint_.data()) : std::string(); }
+std::string World::complaint() const {
+  return complained_.load() == 2 ? std::string(complaint_.data()) : std::string();
+}
 
 std::atomic<std::int32_t>& World::at(Values& values, std::int32_t value) noexcept {
   return values[static_cast<std::uint32_t>(value) % values.size()];
@@ -30,17 +32,21 @@ std::atomic<std::int32_t>& World::at(Values& values, std::int32_t value) noexcep
 
 // Each notes first and then looks: whoever comes second sees the other.
 void World::noteHandled(std::int32_t value) noexcept {
-  if (at(handled_, value).exchange(value) == value) complain("a server acted on a request for the second time");
-  if (at(neverTaken_, value).load() == value) complain("a server acted on a request whose client had been told that nobody ever would");
+  if (at(handled_, value).exchange(value) == value)
+    complain("a server acted on a request for the second time");
+  if (at(neverTaken_, value).load() == value)
+    complain("a server acted on a request whose client had been told that nobody ever would");
 }
 
 void World::noteNeverTaken(std::int32_t value) noexcept {
   at(neverTaken_, value).store(value);
-  if (at(handled_, value).load() == value) complain("a client was told that nobody took its request, and a server had acted on it");
+  if (at(handled_, value).load() == value)
+    complain("a client was told that nobody took its request, and a server had acted on it");
 }
 
 SharedWorld::SharedWorld() {
-  void* memory = ::mmap(nullptr, sizeof(World), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* memory =
+      ::mmap(nullptr, sizeof(World), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throwSystemError(errno, "mmap", "the world");
   world_ = new (memory) World;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: what the processes of a torture tell each other beside the backplane, in memory that fork() shares. The referee orders, the
-// actors report.
+// World: what the processes of a torture tell each other beside the backplane, in memory that
+// fork() shares. The referee orders, the actors report.
 //
 // Threads  any; each word has one writer, but complaints and values, which are exchanged.
 // Crash    an actor that is killed leaves what it has reported.
@@ -26,13 +26,13 @@ struct Talked {
 // Of one actor.
 struct Board {
   // orders
-  std::atomic<std::uint32_t> rest{0};   // send nothing new
+  std::atomic<std::uint32_t> rest{0};  // send nothing new
   std::atomic<std::uint32_t> leave{0};  // end in order
   // reports
-  std::atomic<std::uint32_t> isAtRest{0};   // nothing is sent, nothing is open
+  std::atomic<std::uint32_t> isAtRest{0};  // nothing is sent, nothing is open
   std::atomic<std::uint32_t> isLeaving{0};  // on its way out
-  std::atomic<std::uint64_t> open{0};       // requests that have no end yet
-  std::array<Talked, 2> talked;             // with the steady server, with the mortal one
+  std::atomic<std::uint64_t> open{0};  // requests that have no end yet
+  std::array<Talked, 2> talked;  // with the steady server, with the mortal one
 
   // For the next actor of this part.
   void clear() noexcept;
@@ -41,9 +41,9 @@ struct Board {
 class World {
  public:
   Board survivor;  // the client that goes on
-  Board steady;    // the server that goes on
-  Board mortal;    // the server that dies and has successors
-  Board visitor;   // the client that dies
+  Board steady;  // the server that goes on
+  Board mortal;  // the server that dies and has successors
+  Board visitor;  // the client that dies
 
   const pid_t referee = ::getpid();
   std::atomic<std::uint32_t> isOver{0};
@@ -55,7 +55,8 @@ class World {
 
   // A value that no other request has.
   [[nodiscard]] std::int32_t nextValue() noexcept { return lastValue_.fetch_add(1) + 1; }
-  // A server acts on a request, a client is told that nobody has: who contradicts another complains, and so does who acts a second time.
+  // A server acts on a request, a client is told that nobody has: who contradicts another
+  // complains, and so does who acts a second time.
   void noteHandled(std::int32_t value) noexcept;
   void noteNeverTaken(std::int32_t value) noexcept;
 

@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: MIT
-// Dac128vServer: requests of clients become codes on the outputs of a DAC128V (manual, "Systran DAC128V Support").
+// Dac128vServer: requests of clients become codes on the outputs of a DAC128V (manual, "Systran
+// DAC128V Support").
 //
 //   client                                 server
 //     Int32 address=channel value=code ──►
 //                                      ◄── the same with status 0, or -1: nothing was written, or it is not on the output
 //
-// A module that has lost what was written to it, by a reset or a power cycle, gets it again with the next request: an alarm in `mpf msr`.
+// A module that has lost what was written to it, by a reset or a power cycle, gets it again with
+// the next request: an alarm in `mpf msr`.
 //
 // Threads  one: the server's.
 #pragma once
 
-#include <mpf/drivers/dac128v/dac128v.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/hardware/fault_note.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/drivers/dac128v.h>
+#include <mpf/message_server.h>
+
+#include "server/programs/hardware/fault_note.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 
@@ -28,7 +31,7 @@ class Dac128vServer {
   Dac128v& dac_;
   const ServerLog& log_;
   FaultNote faults_;
-  bool isAsked_ = false;             // there was a request
+  bool isAsked_ = false;  // there was a request
   std::uint64_t restorations_ = 0;  // of the module's outputs, as told
 };
 

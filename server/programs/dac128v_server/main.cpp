@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-// mpf-dac128v-server: one DAC128V, one server, one process. The old command was initDAC128V("module","carrier","site",queueSize).
+// mpf-dac128v-server: one DAC128V, one server, one process. The old command was
+// initDAC128V("module","carrier","site",queueSize).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fmt/format.h>
 #include <memory>
 #include <optional>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/run_main.h>
-#include <mpf/drivers/dac128v/dac128v_model.h>
-#include <mpf/server/programs/dac128v_server/dac128v_server.h>
-#include <mpf/server/programs/hardware/hardware.h>
-#include <mpf/server/programs/hardware/wire_options.h>
-#include <mpf/server/programs/server_arguments.h>
+#include "base/command_line.h"
+#include "base/run_main.h"
+#include "drivers/dac128v/dac128v_model.h"
+#include "server/programs/dac128v_server/dac128v_server.h"
+#include "server/programs/hardware/hardware.h"
+#include "server/programs/hardware/wire_options.h"
+#include "server/programs/server_arguments.h"
 
 namespace {
 
@@ -24,12 +25,16 @@ struct Options {
   mpf::ServerArguments arguments;
 
   std::optional<int> parse(int argc, char** argv, mpf::Hardware& hardware) {
-    CLI::App app("mpf-dac128v-server - serves the eight outputs of a Systran DAC128V to the clients of a backplane", kProgram);
+    CLI::App app(
+        "mpf-dac128v-server - serves the eight outputs of a Systran DAC128V to the clients of a "
+        "backplane",
+        kProgram);
     place.addTo(app, "Name of the module, under which clients find the server, too");
     arguments.addQueueSizeTo(app);
     app.add_option_function<std::string>(
            "--ranges", [this](const std::string& text) { takeRanges(text); },
-           "What the jumpers say, as LOWtoHIGH: for all, or for channels 0 to 3 and 4 to 7; for models")
+           "What the jumpers say, as LOWtoHIGH: for all, or for channels 0 to 3 and 4 to 7; for "
+           "models")
         ->default_str("-10to10,-10to10");
     hardware.addTo(app);
     arguments.addTo(app);
@@ -41,7 +46,9 @@ struct Options {
   }
 
  private:
-  void takeRanges(const std::string& text) try { ranges = mpf::parseDac128vRanges(text); } catch (const std::invalid_argument& error) {
+  void takeRanges(const std::string& text) try {
+    ranges = mpf::parseDac128vRanges(text);
+  } catch (const std::invalid_argument& error) {
     throw CLI::ValidationError("--ranges", error.what());
   }
 };
@@ -55,13 +62,15 @@ int serve(int argc, char** argv) {
   auto* const module = hardware.open(
       options.place, mpf::Dac128v::kind(),
       [&] {
-        return std::make_unique<mpf::Dac128vModel>(options.ranges,
-                                                   mpf::wireOutputs(hardware.wires(), options.place.name, mpf::Dac128v::kChannels));
+        return std::make_unique<mpf::Dac128vModel>(
+            options.ranges,
+            mpf::wireOutputs(hardware.wires(), options.place.name, mpf::Dac128v::kChannels));
       },
       log);
   if (module == nullptr) return 0;
   mpf::Dac128v dac(*module);
-  mpf::MessageServer server(mpf::Backplane::attach(arguments.backplane), options.place.name, arguments.messages);
+  mpf::MessageServer server(mpf::Backplane::attach(arguments.backplane), options.place.name,
+                            arguments.messages);
   const mpf::Dac128vServer outputs(server, dac, log);
   return mpf::runServer(server, *module, log);
 }

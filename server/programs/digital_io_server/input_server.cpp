@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/digital_io_server/input_server.h>
+#include "server/programs/digital_io_server/input_server.h"
 
 #include <algorithm>
 #include <utility>
 
-#include <mpf/server/programs/hardware/bits_request.h>
-#include <mpf/server/programs/hardware/other_types.h>
+#include "server/programs/hardware/bits_request.h"
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 namespace {
@@ -14,11 +14,14 @@ constexpr std::size_t kMaxNews = 1000;
 
 }  // namespace
 
-DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::string& name, const ServerOptions& options, DigitalIo& io,
+DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::string& name,
+                                       const ServerOptions& options, DigitalIo& io,
                                        const ServerLog& log, std::function<void()> failed)
     : io_(io), log_(log), server_(backplane, name, options), faults_(server_, log) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
-  answerOtherTypes<Int32>(server_, [this](MessageType type) { log_->debug("inputs: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Int32>(server_, [this](MessageType type) {
+    log_->debug("inputs: a request of type {}: status -1", toString(type));
+  });
   logShortages(server_, log_);
   subscription_ = io.subscribe([this](const DigitalIoNews& news) { hear(news); });
   thread_.start(log, [this] { run(); }, std::move(failed));
@@ -35,7 +38,8 @@ void DigitalInputServer::run() {
   while (!ends_.load(std::memory_order_relaxed)) {
     static_cast<void>(server_.waitForMessage());
     deliver();
-    while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) deliver();  // who asks all the time must not keep news back
+    // who asks all the time must not keep news back
+    while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) deliver();
     forgetGone();
   }
 }
@@ -50,7 +54,8 @@ void DigitalInputServer::handle(Int32Message&& request) {
   } else if (isReadRequest(asked.cmd)) {
     read(fields);
   } else if (asked.cmd == digital::cmdSetEdges) {
-    const auto status = io_.trySetEdges(static_cast<std::uint32_t>(asked.address), static_cast<std::uint32_t>(asked.value));
+    const auto status = io_.trySetEdges(static_cast<std::uint32_t>(asked.address),
+                                        static_cast<std::uint32_t>(asked.value));
     if (isFault(status)) faults_.fault(toString(status));
     fields.status = status == DigitalIoStatus::success ? 0 : -1;
   } else {
@@ -82,7 +87,8 @@ void DigitalInputServer::start(Int32Message&& request) {
   if (const auto former = find(client); former != monitors_.end()) monitors_.erase(former);
   const auto mask = static_cast<std::uint32_t>(request->address);
   Monitor monitor{std::move(request), client, mask == 0 ? ~0U : mask};
-  if (send(monitor, state.inputs, monitor.mask & io_.kind().inputs, state.isThere)) monitors_.push_back(std::move(monitor));
+  if (send(monitor, state.inputs, monitor.mask & io_.kind().inputs, state.isThere))
+    monitors_.push_back(std::move(monitor));
   followCount();
 }
 
@@ -100,7 +106,8 @@ void DigitalInputServer::hear(const DigitalIoNews& news) {
   {
     const std::lock_guard lock(mutex_);
     using Kind = DigitalIoNews::Kind;
-    if (news_.size() >= kMaxNews && news.kind == Kind::inputs && news_.back().kind == Kind::inputs) {
+    if (news_.size() >= kMaxNews && news.kind == Kind::inputs &&
+        news_.back().kind == Kind::inputs) {
       news_.back().inputs = news.inputs;
       news_.back().changed |= news.changed;
     } else {
@@ -122,7 +129,8 @@ void DigitalInputServer::deliver() {
     const bool isThere = news.kind != DigitalIoNews::Kind::gone;
     const bool isForAll = !isThere || news.kind == DigitalIoNews::Kind::back;
     std::erase_if(monitors_, [&](Monitor& monitor) {
-      return (isForAll || (news.changed & monitor.mask) != 0) && !send(monitor, news.inputs, news.changed & monitor.mask, isThere);
+      return (isForAll || (news.changed & monitor.mask) != 0) &&
+             !send(monitor, news.inputs, news.changed & monitor.mask, isThere);
     });
   }
   followCount();
@@ -133,7 +141,9 @@ void DigitalInputServer::note(const DigitalIoNews& news) {
     case DigitalIoNews::Kind::inputs:
       return;
     case DigitalIoNews::Kind::back:
-      log_->warn("the module is back, or was reset: it is set up anew, with what was written to its outputs");
+      log_->warn(
+          "the module is back, or was reset: it is set up anew, with what was written to its "
+          "outputs");
       break;
     case DigitalIoNews::Kind::gone:
       log_->warn("the module is gone: nothing answers");
@@ -149,7 +159,8 @@ void DigitalInputServer::note(const DigitalIoNews& news) {
 }
 
 // False: it could not be delivered.
-bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed, bool isThere) {
+bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
+                              bool isThere) {
   auto message = server_.allocReplyMessage<Int32>(monitor.request);
   *message = {.cmd = digital::cmdStartMonitor,
               .status = isThere ? 0 : -1,
@@ -157,16 +168,20 @@ bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint3
               .value = static_cast<std::int32_t>(inputs)};
   const auto result = server_.reply(std::move(message));
   if (result == ReplyResult::sent) return true;
-  if (result != ReplyResult::clientGone) log_->warn("a client does not take its messages and loses its monitor: {}", toString(result));
+  if (result != ReplyResult::clientGone)
+    log_->warn("a client does not take its messages and loses its monitor: {}", toString(result));
   return false;
 }
 
 std::vector<DigitalInputServer::Monitor>::iterator DigitalInputServer::find(std::uint64_t client) {
-  return std::find_if(monitors_.begin(), monitors_.end(), [&](const Monitor& monitor) { return monitor.client == client; });
+  return std::find_if(monitors_.begin(), monitors_.end(),
+                      [&](const Monitor& monitor) { return monitor.client == client; });
 }
 
 void DigitalInputServer::forgetGone() {
-  std::erase_if(monitors_, [&](const Monitor& monitor) { return server_.clientOf(monitor.request) != monitor.client; });
+  std::erase_if(monitors_, [&](const Monitor& monitor) {
+    return server_.clientOf(monitor.request) != monitor.client;
+  });
   followCount();
 }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// DigitalInputServer: tells clients what the inputs of a digital module are, and each change, as schema/digital_io_server.h promises.
+// DigitalInputServer: tells clients what the inputs of a digital module are, and each change, as
+// include/mpf/digital_io_commands.h promises.
 //
 //   driver's thread ── news ──► queue ── own thread ──► monitor 1, monitor 2, ...
 //
-// Threads  its own, which waits for requests and news, and for nobody who listens. News go out before the next request is taken.
+// Threads  its own, which waits for requests and news, and for nobody who listens. News go out
+//          before the next request is taken.
 // Crash    a client that dies is forgotten as soon as its death is known.
-// Trust    a client that does not take its messages loses its monitor. News that wait in the queue are joined when there are too many.
+// Trust    a client that does not take its messages loses its monitor. News that wait in the queue
+//          are joined when there are too many.
 #pragma once
 
 #include <atomic>
@@ -15,12 +18,13 @@
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/digital_io/digital_io.h>
-#include <mpf/schema/digital_io_server.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/hardware/fault_note.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/server/programs/serving_thread.h>
+#include <mpf/digital_io_commands.h>
+#include <mpf/message_server.h>
+
+#include "drivers/digital_io/digital_io.h"
+#include "server/programs/hardware/fault_note.h"
+#include "server/programs/server_log.h"
+#include "server/programs/serving_thread.h"
 
 namespace mpf {
 
@@ -29,7 +33,8 @@ class DigitalInputServer {
   //   io      must outlive this, as `log`
   //   failed  is called when this cannot serve any more, which the log says: the program shall end
   //   throws  as MessageServer
-  DigitalInputServer(const Backplane& backplane, const std::string& name, const ServerOptions& options, DigitalIo& io, const ServerLog& log,
+  DigitalInputServer(const Backplane& backplane, const std::string& name,
+                     const ServerOptions& options, DigitalIo& io, const ServerLog& log,
                      std::function<void()> failed);
   ~DigitalInputServer();
   DigitalInputServer(const DigitalInputServer&) = delete;
@@ -37,7 +42,9 @@ class DigitalInputServer {
 
   [[nodiscard]] const std::string& getName() const noexcept { return server_.getName(); }
   // How many clients have a monitor now.
-  [[nodiscard]] std::size_t monitors() const noexcept { return count_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::size_t monitors() const noexcept {
+    return count_.load(std::memory_order_relaxed);
+  }
 
  private:
   struct Monitor {
@@ -55,7 +62,8 @@ class DigitalInputServer {
   void hear(const DigitalIoNews& news);
   void deliver();
   void note(const DigitalIoNews& news);
-  [[nodiscard]] bool send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed, bool isThere);
+  [[nodiscard]] bool send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
+                          bool isThere);
   [[nodiscard]] std::vector<Monitor>::iterator find(std::uint64_t client);
   void forgetGone();
   void followCount();
@@ -63,9 +71,9 @@ class DigitalInputServer {
   DigitalIo& io_;
   const ServerLog& log_;
   MessageServer server_;
-  FaultNote faults_;               // of reads; this and below, but for what is guarded: the thread's
+  FaultNote faults_;  // of reads; this and below, but for what is guarded: the thread's
   std::vector<Monitor> monitors_;
-  std::mutex mutex_;               // guards
+  std::mutex mutex_;  // guards
   std::deque<DigitalIoNews> news_;  // this
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};

@@ -5,12 +5,12 @@
 #include <fmt/format.h>
 #include <memory>
 
-#include <mpf/base/run_main.h>
-#include <mpf/base/stop_signals.h>
-#include <mpf/drivers/digital_io/digital_io_model.h>
-#include <mpf/server/programs/digital_io_server/input_server.h>
-#include <mpf/server/programs/digital_io_server/output_server.h>
-#include <mpf/server/programs/digital_io_server/start_options.h>
+#include "base/run_main.h"
+#include "base/stop_signals.h"
+#include "drivers/digital_io/digital_io_model.h"
+#include "server/programs/digital_io_server/input_server.h"
+#include "server/programs/digital_io_server/output_server.h"
+#include "server/programs/digital_io_server/start_options.h"
 
 namespace {
 
@@ -18,18 +18,25 @@ constexpr const char* kProgram = "mpf-digital-io-server";
 constexpr int kLines = 32;
 
 // A model, its outputs and inputs at their wires.
-std::unique_ptr<mpf::DigitalIoModel> makeModel(const mpf::DigitalIoStartOptions& options, mpf::ModelWires* wires) {
-  auto model = std::make_unique<mpf::DigitalIoModel>(*options.kind, mpf::wireOutputs(wires, options.place.name, kLines));
+std::unique_ptr<mpf::DigitalIoModel> makeModel(const mpf::DigitalIoStartOptions& options,
+                                               mpf::ModelWires* wires) {
+  auto model = std::make_unique<mpf::DigitalIoModel>(
+      *options.kind, mpf::wireOutputs(wires, options.place.name, kLines));
   options.inputs.connect(*model, wires);
   return model;
 }
 
-void describe(const mpf::DigitalIo& io, const mpf::IndustryPackModule& module, const mpf::DigitalIoStartOptions& options,
-              const mpf::ServerLog& log) {
-  log->info("{} at {}: polled every {} ms, {}", io.kind().name, module.where(), options.io.pollEvery.count(),
-            io.usesInterrupts() ? fmt::format("interrupts with vector {}", options.io.vector) : "no interrupts");
-  if (options.io.vector != 0 && !io.usesInterrupts()) log->warn("{} cannot interrupt: changes are seen by polling", io.kind().name);
-  if (options.maxClients != 0) log->info("maxclients {} is ignored: any number of clients may monitor the inputs", options.maxClients);
+void describe(const mpf::DigitalIo& io, const mpf::IndustryPackModule& module,
+              const mpf::DigitalIoStartOptions& options, const mpf::ServerLog& log) {
+  log->info("{} at {}: polled every {} ms, {}", io.kind().name, module.where(),
+            options.io.pollEvery.count(),
+            io.usesInterrupts() ? fmt::format("interrupts with vector {}", options.io.vector)
+                                : "no interrupts");
+  if (options.io.vector != 0 && !io.usesInterrupts())
+    log->warn("{} cannot interrupt: changes are seen by polling", io.kind().name);
+  if (options.maxClients != 0)
+    log->info("maxclients {} is ignored: any number of clients may monitor the inputs",
+              options.maxClients);
 }
 
 int serve(int argc, char** argv) {
@@ -51,20 +58,25 @@ int serve(int argc, char** argv) {
   if (module == nullptr) return 0;
   std::unique_ptr<mpf::ModelWireWatcher> watcher;
   if (model != nullptr && hardware.wires() != nullptr)
-    watcher = std::make_unique<mpf::ModelWireWatcher>(*hardware.wires(), [model] { model->look(); });
+    watcher =
+        std::make_unique<mpf::ModelWireWatcher>(*hardware.wires(), [model] { model->look(); });
   if (options.io.vector != 0) hardware.modules().takeVector(options.io.vector, *module);
   if (options.io.vector != 0) hardware.logPriority(log);
   mpf::DigitalIo io(*module, options.io);
   const auto backplane = mpf::Backplane::attach(arguments.backplane);
   mpf::MessageServer server(backplane, name + "Out", arguments.messages);
-  const auto stop = [](void* outputs) noexcept { static_cast<mpf::MessageServer*>(outputs)->interrupt(); };
+  const auto stop = [](void* outputs) noexcept {
+    static_cast<mpf::MessageServer*>(outputs)->interrupt();
+  };
   const mpf::StopSignals signals(stop, &server);  // before anybody has an answer, and may stop us
   mpf::logShortages(server, log);
   const mpf::DigitalOutputServer outputs(server, io, log);
   mpf::ProgramFailure failure;
-  const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log, [&] { failure.report(); });
+  const mpf::DigitalInputServer inputs(backplane, name + "In", arguments.messages, io, log,
+                                       [&] { failure.report(); });
   describe(io, *module, options, log);
-  log->info(R"(serving "{}" and "{}" at location {})", inputs.getName(), server.getName(), server.location());
+  log->info(R"(serving "{}" and "{}" at location {})", inputs.getName(), server.getName(),
+            server.location());
   server.run();
   log->info("ends");
   return failure.exitStatus();

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/digital_io_server/output_server.h>
+#include "server/programs/digital_io_server/output_server.h"
 
 #include <utility>
 
-#include <mpf/server/programs/hardware/bits_request.h>
-#include <mpf/server/programs/hardware/other_types.h>
+#include "server/programs/hardware/bits_request.h"
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 
 DigitalOutputServer::DigitalOutputServer(MessageServer& server, DigitalIo& io, const ServerLog& log)
     : io_(io), log_(log), faults_(server, log) {
   server.on<Int32>([this](Int32& request) { handle(request); });
-  answerOtherTypes<Int32>(server, [this](MessageType type) { log_->debug("outputs: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Int32>(server, [this](MessageType type) {
+    log_->debug("outputs: a request of type {}: status -1", toString(type));
+  });
 }
 
 void DigitalOutputServer::handle(Int32& shared) {
@@ -22,8 +24,8 @@ void DigitalOutputServer::handle(Int32& shared) {
     const auto outputs = io_.tryReadOutputs();
     if (!outputs || !tryAnswerBits(request, request.cmd, *outputs)) request.status = -1;
     note(outputs ? DigitalIoStatus::success : DigitalIoStatus::gone, request);
-  } else if (request.cmd == digital::cmdSetBits || request.cmd == digital::cmdClearBits || request.cmd == digital::cmdWriteBits ||
-             request.cmd == digital::cmdSetDAC) {
+  } else if (request.cmd == digital::cmdSetBits || request.cmd == digital::cmdClearBits ||
+             request.cmd == digital::cmdWriteBits || request.cmd == digital::cmdSetDAC) {
     const auto status = perform(request);
     if (status != DigitalIoStatus::success) request.status = -1;
     note(status, request);
@@ -51,7 +53,8 @@ DigitalIoStatus DigitalOutputServer::perform(const Int32& request) noexcept {
 void DigitalOutputServer::note(DigitalIoStatus status, const Int32& request) {
   if (status == DigitalIoStatus::success) return faults_.success();
   if (isFault(status)) return faults_.fault(toString(status));
-  log_->debug("outputs: cmd {}, mask {:#x}: {}", request.cmd, static_cast<std::uint32_t>(request.address), toString(status));
+  log_->debug("outputs: cmd {}, mask {:#x}: {}", request.cmd,
+              static_cast<std::uint32_t>(request.address), toString(status));
 }
 
 }  // namespace mpf

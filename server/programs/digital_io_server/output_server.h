@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// DigitalOutputServer: requests of clients become bits on the outputs of a digital module, as schema/digital_io_server.h has it.
+// DigitalOutputServer: requests of clients become bits on the outputs of a digital module, as
+// include/mpf/digital_io_commands.h has it.
 //
 // Threads  one: the server's.
 #pragma once
 
-#include <mpf/drivers/digital_io/digital_io.h>
-#include <mpf/schema/digital_io_server.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/hardware/fault_note.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/digital_io_commands.h>
+#include <mpf/message_server.h>
+
+#include "drivers/digital_io/digital_io.h"
+#include "server/programs/hardware/fault_note.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 

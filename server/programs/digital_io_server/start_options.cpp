@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/digital_io_server/start_options.h>
+#include "server/programs/digital_io_server/start_options.h"
 
 #include <CLI/CLI.hpp>
 #include <chrono>
 
-#include <mpf/base/command_line.h>
+#include "base/command_line.h"
 
 namespace mpf {
 namespace {
@@ -15,32 +15,40 @@ constexpr int kHighestBit = 31;
 const DigitalIoKind* kindNamed(const std::string& name) {
   if (const auto* const kind = findDigitalIoKind(name)) return kind;
   std::string names;
-  for (const auto& kind : digitalIoKinds()) names += (names.empty() ? "" : ", ") + std::string(kind.name);
+  for (const auto& kind : digitalIoKinds())
+    names += (names.empty() ? "" : ", ") + std::string(kind.name);
   throw CLI::ValidationError("--kind", "there is no \"" + name + "\"; there are " + names);
 }
 
 }  // namespace
 
 std::optional<int> DigitalIoStartOptions::parse(int argc, char** argv, Hardware& hardware) {
-  CLI::App app("mpf-digital-io-server - serves the lines of an IP-Unidig or DIO316I module to the clients of a backplane",
-               "mpf-digital-io-server");
+  CLI::App app(
+      "mpf-digital-io-server - serves the lines of an IP-Unidig or DIO316I module to the clients "
+      "of a backplane",
+      "mpf-digital-io-server");
   std::uint64_t pollMs = 0;
   std::uint32_t both = 0;
   std::string kindName = "IP-Unidig-I";
   place.addTo(app, "Name of the module; clients find its servers as <module>In and <module>Out");
   arguments.addQueueSizeTo(app);
-  app.add_option("mspoll", pollMs, "The inputs are read at least that often [ms]; 0: 100")->check(wholeNumber(0, 3'600'000));
-  app.add_option("intvec", io.vector, "Interrupt vector, 1 to 255; 0: no interrupts")->check(wholeNumber(0, 255));
+  app.add_option("mspoll", pollMs, "The inputs are read at least that often [ms]; 0: 100")
+      ->check(wholeNumber(0, 3'600'000));
+  app.add_option("intvec", io.vector, "Interrupt vector, 1 to 255; 0: no interrupts")
+      ->check(wholeNumber(0, 255));
   app.add_option("risingmask", io.rising, "Inputs that interrupt when they go high, as 0xff");
   app.add_option("fallingmask", io.falling, "Inputs that interrupt when they go low");
   app.add_option("bimask", both, "Inputs that interrupt either way");
-  app.add_option("maxclients", maxClients, "Ignored: as in old command lines; there may be any number of clients");
-  app.add_option("--kind", kindName, "What a model is; a real module says it itself")->capture_default_str();
+  app.add_option("maxclients", maxClients,
+                 "Ignored: as in old command lines; there may be any number of clients");
+  app.add_option("--kind", kindName, "What a model is; a real module says it itself")
+      ->capture_default_str();
   hardware.addTo(app);
   inputs.addTo(app, kHighestBit);
   arguments.addTo(app);
   app.footer(
-      "The old command: initIpUnidig(\"module\", \"carrier\", \"site\", queuesize, mspoll, intvec, risingmask, fallingmask, bimask, "
+      "The old command: initIpUnidig(\"module\", \"carrier\", \"site\", queuesize, mspoll, intvec, "
+      "risingmask, fallingmask, bimask, "
       "maxclients)\n"
       "A model's outputs are the wires MODULE.0, MODULE.1, ..., at 0 or 5 volts.\n"
       "Example: mpf-digital-io-server dio ipac IP_b 20 100 116 0xff 0xff --carrier ipac=model");

@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include <mpf/drivers/digital_io/digital_io.h>
-#include <mpf/server/programs/hardware/hardware.h>
-#include <mpf/server/programs/hardware/wire_options.h>
-#include <mpf/server/programs/server_arguments.h>
+#include "drivers/digital_io/digital_io.h"
+#include "server/programs/hardware/hardware.h"
+#include "server/programs/hardware/wire_options.h"
+#include "server/programs/server_arguments.h"
 
 namespace mpf {
 

@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: MIT
-// tryAnswerBits(): cmdReadBits and cmdReadBits16 of schema/digital_io_server.h, which all servers of digital lines have.
+// tryAnswerBits(): cmdReadBits and cmdReadBits16 of include/mpf/digital_io_commands.h, which all
+// servers of digital lines have.
 #pragma once
 
 #include <cstdint>
 
-#include <mpf/schema/digital_io_server.h>
-#include <mpf/schema/message_types.h>
+#include <mpf/digital_io_commands.h>
+#include <mpf/message_types.h>
 
 namespace mpf {
 
-[[nodiscard]] inline bool isReadRequest(std::int32_t cmd) noexcept { return cmd == digital::cmdReadBits || cmd == digital::cmdReadBits16; }
+[[nodiscard]] inline bool isReadRequest(std::int32_t cmd) noexcept {
+  return cmd == digital::cmdReadBits || cmd == digital::cmdReadBits16;
+}
 
 // Puts what the request asks for of `bits` into its value. False: it cannot be asked.
-[[nodiscard]] inline bool tryAnswerBits(Int32& request, std::int32_t cmd, std::uint32_t bits) noexcept {
+[[nodiscard]] inline bool tryAnswerBits(Int32& request, std::int32_t cmd,
+                                        std::uint32_t bits) noexcept {
   const auto mask = static_cast<std::uint32_t>(request.address);
   const auto lowest = request.extra;
   if (cmd == digital::cmdReadBits) {

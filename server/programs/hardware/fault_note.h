@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// FaultNote: counts the faults of a module for `mpf msr`, and says on stderr when they begin and end; not each, for there may be thousands.
+// FaultNote: counts the faults of a module for `mpf msr`, and says on stderr when they begin and
+// end; not each, for there may be thousands.
 //
 // Threads  one.
 #pragma once
 
 #include <utility>
 
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+
+#include "server/programs/server_log.h"
 
 namespace mpf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/hardware/hardware.h>
+#include "server/programs/hardware/hardware.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -8,10 +8,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/base/stop_bell.h>
 #include <mpf/drivers/industry_pack/create_carrier.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 #include <mpf/drivers/industry_pack/model_carrier.h>
+
+#include "base/stop_bell.h"
 
 namespace mpf {
 namespace {
@@ -19,8 +20,10 @@ namespace {
 constexpr std::chrono::milliseconds kLookAgain{500};
 
 std::string notSaid(const std::string& carrier) {
-  return fmt::format("nothing says what carrier \"{0}\" is; use --carrier {0}=KIND[:PARAMETERS], of which there are:\n{1}", carrier,
-                     carrierKinds());
+  return fmt::format(
+      "nothing says what carrier \"{0}\" is; use --carrier {0}=KIND[:PARAMETERS], of which there "
+      "are:\n{1}",
+      carrier, carrierKinds());
 }
 
 }  // namespace
@@ -38,7 +41,8 @@ void Hardware::addTo(CLI::App& app) {
            for (const auto& option : options) {
              const auto equals = option.find('=');
              if (equals == 0 || equals == std::string::npos)
-               throw CLI::ValidationError("--carrier", "\"" + option + "\" is no NAME=KIND[:PARAMETERS]");
+               throw CLI::ValidationError("--carrier",
+                                          "\"" + option + "\" is no NAME=KIND[:PARAMETERS]");
              kinds_[option.substr(0, equals)] = option.substr(equals + 1);
            }
          },
@@ -46,9 +50,13 @@ void Hardware::addTo(CLI::App& app) {
       ->allow_extra_args(false)
       ->type_name("NAME=KIND");
   app.add_flag("--wait", waits_, "Start even if the board is not there, and wait for it");
-  app.add_option("--wires", wiresPath_, "File by which models of several programs are wired to each other; the first one makes it")
+  app.add_option(
+         "--wires", wiresPath_,
+         "File by which models of several programs are wired to each other; the first one makes it")
       ->type_name("FILE");
-  app.add_option("--real-time", priority_, "Real-time priority of the threads that serve interrupts, where the user may have it; 0: none")
+  app.add_option("--real-time", priority_,
+                 "Real-time priority of the threads that serve interrupts, where the user may have "
+                 "it; 0: none")
       ->type_name("N")
       ->check(CLI::Range(0, 99))
       ->capture_default_str();
@@ -59,12 +67,14 @@ ModelWires* Hardware::wires() {
   return wires_.get();
 }
 
-IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel, const ServerLog& log) {
+IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& kind,
+                                   const MakeModel& makeModel, const ServerLog& log) {
   StopBell stop;
   return open(place, kind, makeModel, log, stop);
 }
 
-IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel, const ServerLog& log,
+IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& kind,
+                                   const MakeModel& makeModel, const ServerLog& log,
                                    StopBell& stop) {
   static_cast<void>(wires());  // a file that is none of wires is not what to wait for
   for (std::string said;;) {
@@ -74,7 +84,8 @@ IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& k
       throw;  // time does not mend it
     } catch (const std::runtime_error& error) {
       if (!waits_ || isForGood(error)) throw;
-      if (std::exchange(said, error.what()) != error.what()) log->warn("the board is not there yet: {}", error.what());
+      if (std::exchange(said, error.what()) != error.what())
+        log->warn("the board is not there yet: {}", error.what());
     }
     if (stop.wait(kLookAgain)) return nullptr;
   }
@@ -88,7 +99,8 @@ bool Hardware::isForGood(const std::runtime_error& error) {
          status == IndustryPackStatus::notImplemented;
 }
 
-IndustryPackModule& Hardware::openNow(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel, const ServerLog& log) {
+IndustryPackModule& Hardware::openNow(const ModulePlace& place, const ModuleKind& kind,
+                                      const MakeModel& makeModel, const ServerLog& log) {
   createCarrierOf(place, log);
   plugModel(place, makeModel);
   auto& module = modules_.create(place.name, place.carrier, place.site, kind);
@@ -102,8 +114,10 @@ void Hardware::logPriority(const ServerLog& log) const {
   } else if (RealTimePriority::isAllowed(priority_)) {
     log->info("interrupts are served at real-time priority {}", priority_);
   } else {
-    log->info("interrupts are served at ordinary priority: this user may not have real-time priority {}; mpf doctor says what helps",
-              priority_);
+    log->info(
+        "interrupts are served at ordinary priority: this user may not have real-time priority {}; "
+        "mpf doctor says what helps",
+        priority_);
   }
 }
 
@@ -114,20 +128,25 @@ void Hardware::createCarrierOf(const ModulePlace& place, const ServerLog& log) {
   if (said == kinds_.end()) throw std::invalid_argument(notSaid(place.carrier));
   const auto& text = said->second;
   const auto colon = text.find(':');
-  carriers_.add(place.carrier, createCarrier(text.substr(0, colon), colon == std::string::npos ? std::string() : text.substr(colon + 1)));
+  carriers_.add(place.carrier,
+                createCarrier(text.substr(0, colon),
+                              colon == std::string::npos ? std::string() : text.substr(colon + 1)));
   const auto& carrier = carriers_.find(place.carrier);
   log->info("carrier {} is {}", place.carrier, carrier.description());
-  if (const auto remark = carrier.remark(); !remark.empty()) log->warn("carrier {}: {}", place.carrier, remark);
+  if (const auto remark = carrier.remark(); !remark.empty())
+    log->warn("carrier {}: {}", place.carrier, remark);
 }
 
 void Hardware::plugModel(const ModulePlace& place, const MakeModel& makeModel) {
   auto* const carrier = dynamic_cast<ModelCarrier*>(&carriers_.find(place.carrier));
-  if (carrier != nullptr && modules_.find(place.carrier, place.site) == nullptr) carrier->plug(place.site, makeModel());
+  if (carrier != nullptr && modules_.find(place.carrier, place.site) == nullptr)
+    carrier->plug(place.site, makeModel());
 }
 
 int runServer(MessageServer& server, const IndustryPackModule& module, const ServerLog& log) {
   logShortages(server, log);
-  log->info(R"(serving the {} at {} as "{}" at location {})", module.kind().name, module.where(), server.getName(), server.location());
+  log->info(R"(serving the {} at {} as "{}" at location {})", module.kind().name, module.where(),
+            server.getName(), server.location());
   const auto status = server.runUntilSignal();
   log->info("ends");
   return status;

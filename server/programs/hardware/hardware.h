@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Hardware: what all programs that drive Industry Pack modules have: carriers on the command line, modules on them, and waiting for both.
+// Hardware: what all programs that drive Industry Pack modules have: carriers on the command line,
+// modules on them, and waiting for both.
 //
 //   mpf-dac128v-server dac ipac IP_a --carrier ipac=tpci200:0000:03:00.0
 //   mpf-dac128v-server dac ipac IP_a --carrier ipac=model
 //
 //   Hardware hardware;
-//   hardware.addTo(app);                              // --carrier NAME=KIND[:PARAMETERS], --wait, --wires FILE, --real-time N
-//   ... parse ...
-//   auto* const module = hardware.open({"dac", "ipac", "IP_a"}, kDac128v, [] { return std::make_unique<Dac128vModel>(); }, log);
-//   if (module == nullptr) return 0;                  // told to stop while it waited
-//   ...
-//   return runServer(server, *module, log);
+//   hardware.addTo(app);                              // --carrier NAME=KIND[:PARAMETERS], --wait,
+//   --wires FILE, --real-time N ... parse ... auto* const module = hardware.open({"dac", "ipac",
+//   "IP_a"}, kDac128v, [] { return std::make_unique<Dac128vModel>(); }, log); if (module ==
+//   nullptr) return 0;                  // told to stop while it waited ... return
+//   runServer(server, *module, log);
 //
-// Threads  one at a time: the program's main thread at start, or later whoever opens what was not there.
+// Threads  one at a time: the program's main thread at start, or later whoever opens what was not
+//          there.
 #pragma once
 
 #include <functional>
@@ -21,13 +22,14 @@
 #include <stdexcept>
 #include <string>
 
-#include <mpf/base/real_time_priority.h>
 #include <mpf/drivers/industry_pack/carrier.h>
 #include <mpf/drivers/industry_pack/device_model.h>
 #include <mpf/drivers/industry_pack/model_wires.h>
 #include <mpf/drivers/industry_pack/module.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+#include <mpf/real_time_priority.h>
+
+#include "server/programs/server_log.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
 class App;
@@ -55,20 +57,22 @@ class Hardware {
 
   // Adds the options; `app` must not outlive this.
   void addTo(CLI::App& app);
-  // The module at `place`, and its carrier first if that is not there yet; on a carrier of models it is plugged in first.
-  // With --wait it waits for both, and says what for whenever that changes; null: SIGINT or SIGTERM came meanwhile.
-  //   throws  what wires(), createCarrier() and IndustryPackModules::create() throw; std::invalid_argument when no option says what the
-  //           carrier is
-  [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel,
-                                         const ServerLog& log);
+  // The module at `place`, and its carrier first if that is not there yet; on a carrier of models
+  // it is plugged in first. With --wait it waits for both, and says what for whenever that changes;
+  // null: SIGINT or SIGTERM came meanwhile.
+  //   throws  what wires(), createCarrier() and IndustryPackModules::create() throw;
+  //           std::invalid_argument when no option says what the carrier is
+  [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind,
+                                         const MakeModel& makeModel, const ServerLog& log);
   // The same for a program that has begun to serve: null as well when `stop` has rung before.
-  [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel, const ServerLog& log,
+  [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind,
+                                         const MakeModel& makeModel, const ServerLog& log,
                                          StopBell& stop);
 
   // As open() without --wait.
   //   throws  in addition what isForGood() is for
-  [[nodiscard]] IndustryPackModule& openNow(const ModulePlace& place, const ModuleKind& kind, const MakeModel& makeModel,
-                                            const ServerLog& log);
+  [[nodiscard]] IndustryPackModule& openNow(const ModulePlace& place, const ModuleKind& kind,
+                                            const MakeModel& makeModel, const ServerLog& log);
   // Wrong parameters and a bus that this host does not have: what is no use to wait for.
   [[nodiscard]] static bool isForGood(const std::runtime_error& error);
 
@@ -96,7 +100,9 @@ class Hardware {
   IndustryPackModules modules_;
 };
 
-// Says that `server` serves `module`, and serves it until SIGINT or SIGTERM. Returns the exit status of the program.
-[[nodiscard]] int runServer(MessageServer& server, const IndustryPackModule& module, const ServerLog& log);
+// Says that `server` serves `module`, and serves it until SIGINT or SIGTERM. Returns the exit
+// status of the program.
+[[nodiscard]] int runServer(MessageServer& server, const IndustryPackModule& module,
+                            const ServerLog& log);
 
 }  // namespace mpf

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// answerOtherTypes(): a reply is owed for every request, one of a type that the server does not speak included.
+// answerOtherTypes(): a reply is owed for every request, one of a type that the server does not
+// speak included.
 #pragma once
 
 #include <concepts>
@@ -7,15 +8,16 @@
 #include <type_traits>
 #include <utility>
 
-#include <mpf/server/message_server.h>
+#include <mpf/message_server.h>
 
 namespace mpf {
 
 template <class T>
 concept HasStatus = std::same_as<decltype(T::status), std::int32_t>;
 
-// Requests of all types but `Known` come back with status -1. A SerialConfig, which has none, is answered with an Int32, as serial servers
-// do; other types without a status are refused, as any server does.
+// Requests of all types but `Known` come back with status -1. A SerialConfig, which has none, is
+// answered with an Int32, as serial servers do; other types without a status are refused, as any
+// server does.
 //   note  runs for each of them, on the server's thread
 template <class... Known, class Note>
 void answerOtherTypes(MessageServer& server, Note note) {
@@ -35,7 +37,9 @@ void answerOtherTypes(MessageServer& server, Note note) {
       });
     }
   };
-  [&]<class... T>(std::type_identity<std::tuple<T...>>) { (answer(std::type_identity<T>{}), ...); }(std::type_identity<MessageTypes>{});
+  [&]<class... T>(std::type_identity<std::tuple<T...>>) {
+    (answer(std::type_identity<T>{}), ...);
+  }(std::type_identity<MessageTypes>{});
 }
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/hardware/wire_options.h>
+#include "server/programs/hardware/wire_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -26,17 +26,23 @@ void InputWires::add(const std::string& text, int highest) {
   const auto equals = text.find('=');
   const auto* const end = text.data() + std::min(equals, text.size());
   const auto [rest, error] = std::from_chars(text.data(), end, bit);
-  if (equals == std::string::npos || error != std::errc() || rest != end || bit < 0 || bit > highest)
-    throw CLI::ValidationError("--input", fmt::format("\"{}\" is no BIT=WIRE with a bit of 0 to {}", text, highest));
+  if (equals == std::string::npos || error != std::errc() || rest != end || bit < 0 ||
+      bit > highest)
+    throw CLI::ValidationError(
+        "--input", fmt::format("\"{}\" is no BIT=WIRE with a bit of 0 to {}", text, highest));
   wires_[bit] = text.substr(equals + 1);
 }
 
-std::function<void(int, double)> wireOutputs(ModelWires* wires, const std::string& module, int count) {
+std::function<void(int, double)> wireOutputs(ModelWires* wires, const std::string& module,
+                                             int count) {
   if (wires == nullptr) return {};
   std::vector<ModelWire> outputs;
   outputs.reserve(static_cast<std::size_t>(count));
-  for (int output = 0; output < count; ++output) outputs.push_back(wires->wire(fmt::format("{}.{}", module, output)));
-  return [outputs](int output, double volts) { outputs.at(static_cast<std::size_t>(output)).set(volts); };
+  for (int output = 0; output < count; ++output)
+    outputs.push_back(wires->wire(fmt::format("{}.{}", module, output)));
+  return [outputs](int output, double volts) {
+    outputs.at(static_cast<std::size_t>(output)).set(volts);
+  };
 }
 
 }  // namespace mpf

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What digital and analog models of all programs have alike on wires: outputs that drive them, inputs that follow them (--input BIT=WIRE).
+// What digital and analog models of all programs have alike on wires: outputs that drive them,
+// inputs that follow them (--input BIT=WIRE).
 //
 //   InputWires inputs;                                  // of the command line
 //   inputs.addTo(app, 31);
@@ -24,13 +25,16 @@ namespace mpf {
 
 class InputWires {
  public:
-  // Adds --input BIT=WIRE for bits 0 to `highest`, which needs --wires; `app` must not outlive this.
+  // Adds --input BIT=WIRE for bits 0 to `highest`, which needs --wires; `app` must not outlive
+  // this.
   void addTo(CLI::App& app, int highest);
 
-  // Model has connect(int bit, callable that returns volts). `wires` is not null if the command line was right, and outlives `model`.
+  // Model has connect(int bit, callable that returns volts). `wires` is not null if the command
+  // line was right, and outlives `model`.
   template <class Model>
   void connect(Model& model, ModelWires* wires) const {
-    for (const auto& [bit, name] : wires_) model.connect(bit, [wire = wires->wire(name)] { return wire.get(); });
+    for (const auto& [bit, name] : wires_)
+      model.connect(bit, [wire = wires->wire(name)] { return wire.get(); });
   }
 
  private:
@@ -38,7 +42,10 @@ class InputWires {
   std::map<int, std::string> wires_;  // by bit
 };
 
-// Told what outputs 0 to `count` - 1 of a model give, in volts, it sets the wires "<module>.0", ...; empty when `wires` is null.
-[[nodiscard]] std::function<void(int output, double volts)> wireOutputs(ModelWires* wires, const std::string& module, int count);
+// Told what outputs 0 to `count` - 1 of a model give, in volts, it sets the wires "<module>.0",
+// ...; empty when `wires` is null.
+[[nodiscard]] std::function<void(int output, double volts)> wireOutputs(ModelWires* wires,
+                                                                        const std::string& module,
+                                                                        int count);
 
 }  // namespace mpf

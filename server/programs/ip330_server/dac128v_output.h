@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <mpf/drivers/dac128v/dac128v.h>
-#include <mpf/drivers/ip330/analog_output.h>
+#include <mpf/drivers/dac128v.h>
+
+#include "drivers/ip330/analog_output.h"
 
 namespace mpf {
 

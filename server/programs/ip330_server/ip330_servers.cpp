@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/ip330_server/ip330_servers.h>
+#include "server/programs/ip330_server/ip330_servers.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/server/programs/ip330_server/dac128v_output.h>
-#include <mpf/server/programs/ip330_server/scan_server.h>
-#include <mpf/server/programs/ip330_server/sweep_server.h>
+#include "server/programs/ip330_server/dac128v_output.h"
+#include "server/programs/ip330_server/scan_server.h"
+#include "server/programs/ip330_server/sweep_server.h"
 
 namespace mpf {
 namespace {
@@ -16,17 +16,22 @@ namespace {
 // The output goes when the feedback that drives it is gone.
 struct DrivenPid {
   DrivenPid(Ip330& board, int channel, Dac128v& dac, int dacChannel, Ip330Faults::Hook hook)
-      : output(dac, dacChannel), pid(board, channel, output, 0, Dac128v::kMaxCode, std::move(hook)) {}
+      : output(dac, dacChannel),
+        pid(board, channel, output, 0, Dac128v::kMaxCode, std::move(hook)) {}
   Dac128vOutput output;
   Ip330Pid pid;
 };
 
 }  // namespace
 
-Ip330Servers::Ip330Servers(const Backplane& backplane, const ServerOptions& options, IndustryPackModule& module,
-                           const Ip330Settings& settings, const ServerLog& log, const Ip330Limits& limits, std::function<void()> failed)
+Ip330Servers::Ip330Servers(const Backplane& backplane, const ServerOptions& options,
+                           IndustryPackModule& module, const Ip330Settings& settings,
+                           const ServerLog& log, const Ip330Limits& limits,
+                           std::function<void()> failed)
     : backplane_(backplane), options_(options), log_(log), failed_(std::move(failed)) {
-  board_ = std::make_unique<Ip330>(module, settings, [this](const std::string& text, bool isThere) { note(text, isThere); }, limits);
+  board_ = std::make_unique<Ip330>(
+      module, settings, [this](const std::string& text, bool isThere) { note(text, isThere); },
+      limits);
 }
 
 Ip330Servers::~Ip330Servers() {
@@ -66,7 +71,8 @@ void Ip330Servers::serve(Unit& unit) {
   unit.thread.start(log_, [&server = *unit.server] { server.run(); }, failed_);
 }
 
-void Ip330Servers::addScan(const std::string& name, int queueSize, int first, int last, std::chrono::milliseconds average) {
+void Ip330Servers::addScan(const std::string& name, int queueSize, int first, int last,
+                           std::chrono::milliseconds average) {
   const auto scan = std::make_shared<Ip330Scan>(*board_, first, last);
   auto& unit = addUnit(name, queueSize);
   unit.device = scan;
@@ -81,7 +87,8 @@ void Ip330Servers::addConfig(const std::string& name, int queueSize) {
   serve(unit);
 }
 
-void Ip330Servers::addSweep(const std::string& name, int queueSize, int first, int last, int maxPoints) {
+void Ip330Servers::addSweep(const std::string& name, int queueSize, int first, int last,
+                            int maxPoints) {
   const auto sweep = std::make_shared<Ip330Sweep>(*board_, first, last, maxPoints);
   auto& unit = addUnit(name, queueSize);
   unit.device = sweep;
@@ -89,12 +96,15 @@ void Ip330Servers::addSweep(const std::string& name, int queueSize, int first, i
   serve(unit);
 }
 
-void Ip330Servers::addPid(const std::string& name, int queueSize, int channel, Dac128v& dac, int dacChannel) {
+void Ip330Servers::addPid(const std::string& name, int queueSize, int channel, Dac128v& dac,
+                          int dacChannel) {
   if (dacChannel < 0 || dacChannel >= Dac128v::kChannels)
-    throw std::invalid_argument(fmt::format("DAC channel {}: use 0 to {}", dacChannel, Dac128v::kChannels - 1));
-  const auto driven = std::make_shared<DrivenPid>(*board_, channel, dac, dacChannel, [this, name](const std::string& text, bool isThere) {
-    note(fmt::format("{}: {}", name, text), isThere);
-  });
+    throw std::invalid_argument(
+        fmt::format("DAC channel {}: use 0 to {}", dacChannel, Dac128v::kChannels - 1));
+  const auto driven = std::make_shared<DrivenPid>(
+      *board_, channel, dac, dacChannel, [this, name](const std::string& text, bool isThere) {
+        note(fmt::format("{}: {}", name, text), isThere);
+      });
   auto& unit = addUnit(name, queueSize);
   unit.device = driven;
   unit.logic = std::make_shared<Ip330PidServer>(*unit.server, driven->pid, log_);

@@ -14,12 +14,13 @@
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/dac128v/dac128v.h>
-#include <mpf/drivers/ip330/ip330.h>
-#include <mpf/drivers/ip330/ip330_scan.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/server/programs/serving_thread.h>
+#include <mpf/drivers/dac128v.h>
+#include <mpf/message_server.h>
+
+#include "drivers/ip330/ip330.h"
+#include "drivers/ip330/ip330_scan.h"
+#include "server/programs/server_log.h"
+#include "server/programs/serving_thread.h"
 
 namespace mpf {
 
@@ -30,8 +31,9 @@ class Ip330Servers {
   //   failed   called by the thread of a server that cannot go on, after the log was told
   //   throws   as Ip330
   Ip330Servers(
-      const Backplane& backplane, const ServerOptions& options, IndustryPackModule& module, const Ip330Settings& settings,
-      const ServerLog& log, const Ip330Limits& limits = {}, std::function<void()> failed = [] {});
+      const Backplane& backplane, const ServerOptions& options, IndustryPackModule& module,
+      const Ip330Settings& settings, const ServerLog& log, const Ip330Limits& limits = {},
+      std::function<void()> failed = [] {});
   // Requests that wait for a sample get status -1; the board does not scan any more.
   ~Ip330Servers();
   Ip330Servers(const Ip330Servers&) = delete;
@@ -39,8 +41,10 @@ class Ip330Servers {
 
   [[nodiscard]] Ip330& board() noexcept { return *board_; }
 
-  // Each throws as MessageServer, and std::invalid_argument when the board does not scan such channels.
-  void addScan(const std::string& name, int queueSize, int first, int last, std::chrono::milliseconds average);
+  // Each throws as MessageServer, and std::invalid_argument when the board does not scan such
+  // channels.
+  void addScan(const std::string& name, int queueSize, int first, int last,
+               std::chrono::milliseconds average);
   void addConfig(const std::string& name, int queueSize);
   void addSweep(const std::string& name, int queueSize, int first, int last, int maxPoints);
   // `dac` must outlive this.
@@ -55,7 +59,7 @@ class Ip330Servers {
     std::shared_ptr<void> device;  // Ip330Scan, ...
     std::unique_ptr<MessageServer> server;
     std::shared_ptr<void> logic;  // Ip330ScanServer, ...
-    std::function<void()> stop;   // ends what its thread waits for
+    std::function<void()> stop;  // ends what its thread waits for
     ServingThread thread;
   };
 
@@ -67,7 +71,7 @@ class Ip330Servers {
   const ServerOptions options_;
   const ServerLog& log_;
   const std::function<void()> failed_;
-  std::mutex mutex_;                     // of the next one: faults come from the boards' threads
+  std::mutex mutex_;  // of the next one: faults come from the boards' threads
   std::vector<MessageServer*> alarmed_;
   std::unique_ptr<Ip330> board_;
   std::vector<std::unique_ptr<Unit>> units_;

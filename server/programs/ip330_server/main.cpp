@@ -5,22 +5,26 @@
 #include <map>
 #include <memory>
 
-#include <mpf/base/run_main.h>
-#include <mpf/base/stop_bell.h>
-#include <mpf/drivers/dac128v/dac128v_model.h>
-#include <mpf/drivers/ip330/ip330_model.h>
-#include <mpf/server/programs/hardware/wire_options.h>
-#include <mpf/server/programs/ip330_server/ip330_servers.h>
-#include <mpf/server/programs/ip330_server/start_options.h>
+#include "base/run_main.h"
+#include "base/stop_bell.h"
+#include "drivers/dac128v/dac128v_model.h"
+#include "drivers/ip330/ip330_model.h"
+#include "server/programs/hardware/wire_options.h"
+#include "server/programs/ip330_server/ip330_servers.h"
+#include "server/programs/ip330_server/start_options.h"
 
 namespace {
 
 constexpr const char* kProgram = "mpf-ip330-server";
 
 // A converter with errors as real ones have them, which calibration takes away.
-std::unique_ptr<mpf::Ip330Model> makeAdc(const mpf::Ip330StartOptions& options, mpf::ModelWires* wires) {
-  auto model = std::make_unique<mpf::Ip330Model>(mpf::Ip330ModelOptions{
-      .range = options.settings.range, .gainError = {0.002, -0.003, 0.0015, -0.001}, .offsetError = {12, -9, 15, 20}, .noise = 0.5});
+std::unique_ptr<mpf::Ip330Model> makeAdc(const mpf::Ip330StartOptions& options,
+                                         mpf::ModelWires* wires) {
+  auto model = std::make_unique<mpf::Ip330Model>(
+      mpf::Ip330ModelOptions{.range = options.settings.range,
+                             .gainError = {0.002, -0.003, 0.0015, -0.001},
+                             .offsetError = {12, -9, 15, 20},
+                             .noise = 0.5});
   if (options.signals.empty()) return model;
   std::map<std::string, mpf::Ip330SignalKind> kinds;
   if (wires != nullptr) {
@@ -28,36 +32,44 @@ std::unique_ptr<mpf::Ip330Model> makeAdc(const mpf::Ip330StartOptions& options, 
       return [wire = wires->wire(name)](double) { return wire.get(); };
     };
   }
-  for (auto& [channel, signal] : mpf::parseIp330Signals(options.signals, kinds)) model->setSignal(channel, signal);
+  for (auto& [channel, signal] : mpf::parseIp330Signals(options.signals, kinds))
+    model->setSignal(channel, signal);
   return model;
 }
 
 std::unique_ptr<mpf::Dac128vModel> makeDac(const std::string& module, mpf::ModelWires* wires) {
-  return std::make_unique<mpf::Dac128vModel>(mpf::Dac128vRanges{}, mpf::wireOutputs(wires, module, mpf::Dac128v::kChannels));
+  return std::make_unique<mpf::Dac128vModel>(
+      mpf::Dac128vRanges{}, mpf::wireOutputs(wires, module, mpf::Dac128v::kChannels));
 }
 
 void addServers(mpf::Ip330Servers& servers, const mpf::Ip330StartOptions& options) {
   for (const auto& scan : options.scans)
-    servers.addScan(scan.name, scan.queueSize, scan.first, scan.last, std::chrono::milliseconds(scan.averageMs));
+    servers.addScan(scan.name, scan.queueSize, scan.first, scan.last,
+                    std::chrono::milliseconds(scan.averageMs));
   for (const auto& config : options.configs) servers.addConfig(config.name, config.queueSize);
-  for (const auto& sweep : options.sweeps) servers.addSweep(sweep.name, sweep.queueSize, sweep.first, sweep.last, sweep.maxPoints);
+  for (const auto& sweep : options.sweeps)
+    servers.addSweep(sweep.name, sweep.queueSize, sweep.first, sweep.last, sweep.maxPoints);
 }
 
 // False: told to stop while it waited for one of them.
-bool openDacs(mpf::Hardware& hardware, const mpf::Ip330StartOptions& options, const mpf::ServerLog& log, mpf::StopBell& stop,
+bool openDacs(mpf::Hardware& hardware, const mpf::Ip330StartOptions& options,
+              const mpf::ServerLog& log, mpf::StopBell& stop,
               std::map<std::string, mpf::Dac128v>& dacs) {
   for (const auto& dac : options.dacs) {
-    auto* const module = hardware.open(dac, mpf::Dac128v::kind(), [&] { return makeDac(dac.name, hardware.wires()); }, log, stop);
+    auto* const module = hardware.open(
+        dac, mpf::Dac128v::kind(), [&] { return makeDac(dac.name, hardware.wires()); }, log, stop);
     if (module == nullptr) return false;
     dacs.try_emplace(dac.name, *module);
   }
   return true;
 }
 
-void describe(const mpf::Ip330Servers& servers, mpf::Ip330& board, const mpf::IndustryPackModule& module, const mpf::ServerLog& log) {
+void describe(const mpf::Ip330Servers& servers, mpf::Ip330& board,
+              const mpf::IndustryPackModule& module, const mpf::ServerLog& log) {
   const auto settings = board.settings();
-  log->info("serving the {} at {} (channels {} to {}, {} V, {}, {} us per scan) as {}", module.kind().name, module.where(),
-            settings.firstChannel, settings.lastChannel, toString(settings.range), toString(settings.scanMode), board.microsecondsPerScan(),
+  log->info("serving the {} at {} (channels {} to {}, {} V, {}, {} us per scan) as {}",
+            module.kind().name, module.where(), settings.firstChannel, settings.lastChannel,
+            toString(settings.range), toString(settings.scanMode), board.microsecondsPerScan(),
             servers.names());
 }
 
@@ -66,7 +78,8 @@ int serve(int argc, char** argv) {
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
   const mpf::ServerLog log(kProgram, options.arguments.logLevel);
-  auto* const module = hardware.open(options.place, mpf::kIp330, [&] { return makeAdc(options, hardware.wires()); }, log);
+  auto* const module = hardware.open(
+      options.place, mpf::kIp330, [&] { return makeAdc(options, hardware.wires()); }, log);
   if (module == nullptr) return 0;
   hardware.logPriority(log);
   if (options.settings.vector != 0) hardware.modules().takeVector(options.settings.vector, *module);
@@ -74,11 +87,13 @@ int serve(int argc, char** argv) {
   mpf::ProgramFailure failure;
   mpf::StopBell stop;
   const auto backplane = mpf::Backplane::attach(options.arguments.backplane);
-  mpf::Ip330Servers servers(backplane, options.arguments.messages, *module, options.settings, log, {}, [&] { failure.report(); });
+  mpf::Ip330Servers servers(backplane, options.arguments.messages, *module, options.settings, log,
+                            {}, [&] { failure.report(); });
   addServers(servers, options);
   if (!servers.names().empty()) describe(servers, servers.board(), *module, log);
   if (openDacs(hardware, options, log, stop, dacs)) {  // those above do not wait for them
-    for (const auto& pid : options.pids) servers.addPid(pid.name, pid.queueSize, pid.channel, dacs.at(pid.dac), pid.dacChannel);
+    for (const auto& pid : options.pids)
+      servers.addPid(pid.name, pid.queueSize, pid.channel, dacs.at(pid.dac), pid.dacChannel);
     if (!options.pids.empty()) describe(servers, servers.board(), *module, log);
     stop.wait();
   }

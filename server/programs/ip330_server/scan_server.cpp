@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/ip330_server/scan_server.h>
+#include "server/programs/ip330_server/scan_server.h"
 
 #include <cmath>
 #include <stdexcept>
 
-#include <mpf/schema/ip330_server.h>
-#include <mpf/server/programs/hardware/other_types.h>
+#include <mpf/ip330_commands.h>
+
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 
-Ip330ScanServer::Ip330ScanServer(MessageServer& server, Ip330Scan& scan, std::chrono::milliseconds average, const ServerLog& log)
+Ip330ScanServer::Ip330ScanServer(MessageServer& server, Ip330Scan& scan,
+                                 std::chrono::milliseconds average, const ServerLog& log)
     : scan_(scan), average_(average), log_(log) {
   server.on<Int32>([this](Int32& request) { handle(request); });
-  answerOtherTypes<Int32>(server, [this](MessageType type) { log_->debug("scan: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Int32>(server, [this](MessageType type) {
+    log_->debug("scan: a request of type {}: status -1", toString(type));
+  });
 }
 
 void Ip330ScanServer::handle(Int32& request) {
@@ -21,16 +25,21 @@ void Ip330ScanServer::handle(Int32& request) {
   const auto value = scan_.tryRead(fields.address, fields.value, average);
   request.status = value ? 0 : -1;
   if (value) request.value = *value;
-  if (!value) log_->debug("scan: channel {}, gain {}, {} ms: status -1", fields.address, fields.value, average.count());
+  if (!value)
+    log_->debug("scan: channel {}, gain {}, {} ms: status -1", fields.address, fields.value,
+                average.count());
 }
 
-Ip330ConfigServer::Ip330ConfigServer(MessageServer& server, Ip330& board, const ServerLog& log) : board_(board), log_(log) {
+Ip330ConfigServer::Ip330ConfigServer(MessageServer& server, Ip330& board, const ServerLog& log)
+    : board_(board), log_(log) {
   server.on<Int32>([this](Int32& request) {
     const auto command = request.cmd;
     request.status = tryDo(command, request) ? 0 : -1;
     log_->info("config: cmd {}, value {}: status {}", command, request.value, request.status);
   });
-  answerOtherTypes<Int32>(server, [this](MessageType type) { log_->debug("config: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Int32>(server, [this](MessageType type) {
+    log_->debug("config: a request of type {}: status -1", toString(type));
+  });
 }
 
 bool Ip330ConfigServer::tryDo(std::int32_t command, Int32& request) {

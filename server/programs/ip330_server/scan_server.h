@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Ip330ScanServer: means of channels for clients (manual, "ip330Scan"); Ip330ConfigServer: how the board scans and calibrates.
+// Ip330ScanServer: means of channels for clients (manual, "ip330Scan"); Ip330ConfigServer: how the
+// board scans and calibrates.
 //
 // Threads  one each: the server's.
 #pragma once
 
 #include <chrono>
 
-#include <mpf/drivers/ip330/ip330_scan.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+
+#include "drivers/ip330/ip330_scan.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 
@@ -16,7 +18,8 @@ class Ip330ScanServer {
  public:
   // Answers every request of `server`. All that is passed must outlive this.
   //   average  for requests that do not say; 0: since the last such reading
-  Ip330ScanServer(MessageServer& server, Ip330Scan& scan, std::chrono::milliseconds average, const ServerLog& log);
+  Ip330ScanServer(MessageServer& server, Ip330Scan& scan, std::chrono::milliseconds average,
+                  const ServerLog& log);
 
  private:
   void handle(Int32& request);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/ip330_server/start_options.h>
+#include "server/programs/ip330_server/start_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -7,86 +7,110 @@
 #include <limits>
 #include <stdexcept>
 
-#include <mpf/base/command_line.h>
-#include <mpf/server/programs/hardware/words.h>
+#include "base/command_line.h"
+#include "server/programs/hardware/option_fields.h"
 
 namespace mpf {
 namespace {
 
 constexpr int kLeftOut = std::numeric_limits<int>::min();
 
-int notNegative(const Words& words, const char* what, int value) {
-  if (value < 0 && value != kLeftOut) words.complain(fmt::format("{} {}: use 0 or more", what, value));
+int notNegative(const OptionFields& words, const char* what, int value) {
+  if (value < 0 && value != kLeftOut)
+    words.complain(fmt::format("{} {}: use 0 or more", what, value));
   return value;
 }
 
 constexpr const char* kOldCommands =
-    "Without --scan, --config, --sweep and --pid it serves scans as MODULE and configuration as MODULEConfig.\n"
+    "Without --scan, --config, --sweep and --pid it serves scans as MODULE and configuration as "
+    "MODULEConfig.\n"
     "The old commands, whose arguments are in the same order here:\n"
-    "  initIp330(\"module\", \"carrier\", \"site\", \"type\", \"range\", first, last, maxclients, vector)\n"
+    "  initIp330(\"module\", \"carrier\", \"site\", \"type\", \"range\", first, last, maxclients, "
+    "vector)\n"
     "  configIp330(ip330, scanMode, \"trigger\", usPerScan, secondsBetweenCalibrate)\n"
     "  initIp330Scan(ip330, \"server\", first, last, msToAverage, queuesize)\n"
-    "  initIp330Scan(ip330, \"server\", first, last, queuesize) of release 1-7: write 0 for MS, between last and queuesize\n"
+    "  initIp330Scan(ip330, \"server\", first, last, queuesize) of release 1-7: write 0 for MS, "
+    "between last and queuesize\n"
     "  initIp330Config(ip330, \"server\", queuesize)\n"
     "  initIp330Sweep(ip330, \"server\", first, last, maxPoints, queuesize)\n"
     "  initIp330PID(\"server\", ip330, channel, dac, dacChannel, queuesize)\n"
-    "and of release 1-4 initIp330Scan(\"module\", \"carrier\", \"site\", \"type\", \"range\", vector, queuesize).\n"
-    "DIP switches 1 to 10: -5to5 1011000010, -10to10 0100110010, 0to5 1010100100, 0to10 1011001000\n"
-    "Gain 3 of 0to5 is calibrated with 0 V: where a converter gives code 0 for it (offset below 0), that gain has status -1.\n"
-    "Example: mpf-ip330-server adc ipac IP_a D -5to5 0 15 10 120 --carrier ipac=model --signal 0=sine:5:2";
+    "and of release 1-4 initIp330Scan(\"module\", \"carrier\", \"site\", \"type\", \"range\", "
+    "vector, queuesize).\n"
+    "DIP switches 1 to 10: -5to5 1011000010, -10to10 0100110010, 0to5 1010100100, 0to10 "
+    "1011001000\n"
+    "Gain 3 of 0to5 is calibrated with 0 V: where a converter gives code 0 for it (offset below "
+    "0), that gain has status -1.\n"
+    "Example: mpf-ip330-server adc ipac IP_a D -5to5 0 15 10 120 --carrier ipac=model --signal "
+    "0=sine:5:2";
 
 }  // namespace
 
 void Ip330StartOptions::addBoard(CLI::App& app) {
   place.addTo(app, "Name of the module");
-  app.add_option("type", type_, "Inputs: D (differential) or S (single ended)")->capture_default_str();
-  app.add_option("range", range_, "What the DIP switches say: -5to5, -10to10, 0to5 or 0to10")->capture_default_str();
+  app.add_option("type", type_, "Inputs: D (differential) or S (single ended)")
+      ->capture_default_str();
+  app.add_option("range", range_, "What the DIP switches say: -5to5, -10to10, 0to5 or 0to10")
+      ->capture_default_str();
   app.add_option("first", settings.firstChannel, "First channel")->capture_default_str();
   app.add_option("last", settings.lastChannel, "Last channel")->capture_default_str();
-  app.add_option("maxclients", settings.maxClients, "Scan, sweep and PID servers that there may be")->capture_default_str();
+  app.add_option("maxclients", settings.maxClients, "Scan, sweep and PID servers that there may be")
+      ->capture_default_str();
   app.add_option("vector", settings.vector, "Interrupt vector")->capture_default_str();
   app.add_option("--scan-mode", scanMode_,
-                 "0 disable, 1 uniformContinuous, 2 uniformSingle, 3 burstContinuous, 4 burstSingle, 5 convertOnExternalTriggerOnly")
+                 "0 disable, 1 uniformContinuous, 2 uniformSingle, 3 burstContinuous, 4 "
+                 "burstSingle, 5 convertOnExternalTriggerOnly")
       ->capture_default_str();
-  app.add_option("--trigger", trigger_, "Direction of the external trigger: Input or Output")->capture_default_str();
-  app.add_option("--us-per-scan", settings.microsecondsPerScan, "Time from scan to scan of all channels [us]")->capture_default_str();
-  app.add_option("--seconds-between-calibrate", settings.secondsBetweenCalibrate, "0: once; -1: never, values are raw")
+  app.add_option("--trigger", trigger_, "Direction of the external trigger: Input or Output")
+      ->capture_default_str();
+  app.add_option("--us-per-scan", settings.microsecondsPerScan,
+                 "Time from scan to scan of all channels [us]")
+      ->capture_default_str();
+  app.add_option("--seconds-between-calibrate", settings.secondsBetweenCalibrate,
+                 "0: once; -1: never, values are raw")
       ->capture_default_str();
   app.add_option("--signal", signals,
-                 "What is on a model's inputs: CHANNEL=dc:VOLTS, CHANNEL=sine:HERTZ:VOLTS[:OFFSET], CHANNEL=wire:NAME, ...")
+                 "What is on a model's inputs: CHANNEL=dc:VOLTS, "
+                 "CHANNEL=sine:HERTZ:VOLTS[:OFFSET], CHANNEL=wire:NAME, ...")
       ->type_name("TEXT");
 }
 
 void Ip330StartOptions::addServers(CLI::App& app) {
-  addWords(app, "--scan", "NAME[,FIRST,LAST[,MS[,QUEUE]]]",
-           "A server of means; MS: averaging time of requests that do not say, 0: since the last", [this](Words& words) {
+  addWords(
+      app, "--scan", "NAME[,FIRST,LAST[,MS[,QUEUE]]]",
+      "A server of means; MS: averaging time of requests that do not say, 0: since the last",
+      [this](OptionFields& words) {
+        auto name = words.word("name");
+        const int first =
+            notNegative(words, "first channel", words.number("first channel", kLeftOut));
+        const int last = first == kLeftOut
+                             ? words.number("last channel", kLeftOut)
+                             : notNegative(words, "last channel", words.number("last channel"));
+        const int average = notNegative(words, "averaging time", words.number("averaging time", 0));
+        scans.push_back({std::move(name), first, last, average, words.queueSize()});
+      });
+  addWords(app, "--config", "NAME[,QUEUE]", "A server for calibration and scan mode",
+           [this](OptionFields& words) {
              auto name = words.word("name");
-             const int first = notNegative(words, "first channel", words.number("first channel", kLeftOut));
-             const int last = first == kLeftOut ? words.number("last channel", kLeftOut)
-                                                : notNegative(words, "last channel", words.number("last channel"));
-             const int average = notNegative(words, "averaging time", words.number("averaging time", 0));
-             scans.push_back({std::move(name), first, last, average, words.queueSize()});
+             configs.push_back({std::move(name), words.queueSize()});
            });
-  addWords(app, "--config", "NAME[,QUEUE]", "A server for calibration and scan mode", [this](Words& words) {
-    auto name = words.word("name");
-    configs.push_back({std::move(name), words.queueSize()});
-  });
-  addWords(app, "--sweep", "NAME,FIRST,LAST,POINTS[,QUEUE]", "A server of arrays over time", [this](Words& words) {
-    auto name = words.word("name");
-    const int first = words.number("first channel");
-    const int last = words.number("last channel");
-    const int points = words.number("points");
-    sweeps.push_back({std::move(name), first, last, points, words.queueSize()});
-  });
-  addWords(app, "--pid", "NAME,CHANNEL,DAC,DACCHANNEL[,QUEUE]", "A server of fast feedback from a channel to that of a --dac",
-           [this](Words& words) {
+  addWords(app, "--sweep", "NAME,FIRST,LAST,POINTS[,QUEUE]", "A server of arrays over time",
+           [this](OptionFields& words) {
              auto name = words.word("name");
-             const int channel = words.number("channel");
-             auto dac = words.word("name of the DAC");
-             const int dacChannel = words.number("DAC channel");
-             pids.push_back({std::move(name), channel, std::move(dac), dacChannel, words.queueSize()});
+             const int first = words.number("first channel");
+             const int last = words.number("last channel");
+             const int points = words.number("points");
+             sweeps.push_back({std::move(name), first, last, points, words.queueSize()});
            });
-  addWords(app, "--dac", "MODULE,CARRIER,SITE", "A DAC128V for --pid", [this](Words& words) {
+  addWords(
+      app, "--pid", "NAME,CHANNEL,DAC,DACCHANNEL[,QUEUE]",
+      "A server of fast feedback from a channel to that of a --dac", [this](OptionFields& words) {
+        auto name = words.word("name");
+        const int channel = words.number("channel");
+        auto dac = words.word("name of the DAC");
+        const int dacChannel = words.number("DAC channel");
+        pids.push_back({std::move(name), channel, std::move(dac), dacChannel, words.queueSize()});
+      });
+  addWords(app, "--dac", "MODULE,CARRIER,SITE", "A DAC128V for --pid", [this](OptionFields& words) {
     auto name = words.word("module");
     auto carrier = words.word("carrier");
     dacs.push_back({std::move(name), std::move(carrier), words.word("site")});
@@ -98,18 +122,23 @@ void Ip330StartOptions::takeAll() {
   settings.range = parseIp330Range(range_);
   settings.scanMode = parseIp330ScanMode(scanMode_);
   settings.trigger = parseIp330Trigger(trigger_);
-  if (const auto problem = settings.problem(); !problem.empty()) throw std::invalid_argument(problem);
+  if (const auto problem = settings.problem(); !problem.empty())
+    throw std::invalid_argument(problem);
   for (const auto& pid : pids) {
     if (std::ranges::none_of(dacs, [&](const ModulePlace& dac) { return dac.name == pid.dac; }))
       throw std::invalid_argument(fmt::format("--pid {}: no --dac is named {}", pid.name, pid.dac));
     if (!settings.has(pid.channel))
-      throw std::invalid_argument(fmt::format("--pid {}: channel {}: the board scans {} to {}", pid.name, pid.channel,
-                                              settings.firstChannel, settings.lastChannel));
+      throw std::invalid_argument(fmt::format("--pid {}: channel {}: the board scans {} to {}",
+                                              pid.name, pid.channel, settings.firstChannel,
+                                              settings.lastChannel));
   }
 }
 
 std::optional<int> Ip330StartOptions::parse(int argc, char** argv, Hardware& hardware) {
-  CLI::App app("mpf-ip330-server - serves the analog inputs of an Acromag IP330 to the clients of a backplane", "mpf-ip330-server");
+  CLI::App app(
+      "mpf-ip330-server - serves the analog inputs of an Acromag IP330 to the clients of a "
+      "backplane",
+      "mpf-ip330-server");
   addBoard(app);
   addServers(app);
   hardware.addTo(app);
@@ -126,8 +155,9 @@ std::optional<int> Ip330StartOptions::parse(int argc, char** argv, Hardware& har
     if (scan.last == kLeftOut) scan.last = settings.lastChannel;
   }
   if (scans.empty() && configs.empty() && sweeps.empty() && pids.empty()) {
-    scans.push_back({place.name, settings.firstChannel, settings.lastChannel, 0, Words::kQueueSizeAsBefore});
-    configs.push_back({place.name + "Config", Words::kQueueSizeAsBefore});
+    scans.push_back({place.name, settings.firstChannel, settings.lastChannel, 0,
+                     OptionFields::kQueueSizeAsBefore});
+    configs.push_back({place.name + "Config", OptionFields::kQueueSizeAsBefore});
   }
   return std::nullopt;
 }

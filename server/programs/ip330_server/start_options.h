@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/ip330/ip330_settings.h>
-#include <mpf/server/programs/hardware/hardware.h>
-#include <mpf/server/programs/server_arguments.h>
+#include "drivers/ip330/ip330_settings.h"
+#include "server/programs/hardware/hardware.h"
+#include "server/programs/server_arguments.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): CLI11's
 class App;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/ip330_server/sweep_server.h>
+#include "server/programs/ip330_server/sweep_server.h"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/schema/ip330_server.h>
-#include <mpf/server/programs/hardware/other_types.h>
+#include <mpf/ip330_commands.h>
+
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 namespace {
@@ -23,7 +24,8 @@ void answer(MessageServer& server, Float64Message&& request, bool isGood) {
 // A reply with an array. False: it is larger than a message of this server may be.
 //   throws  std::bad_alloc
 template <class Array, class Value>
-[[nodiscard]] bool sendArray(MessageServer& server, const Float64Message& request, std::span<const Value> values, bool isGood) {
+[[nodiscard]] bool sendArray(MessageServer& server, const Float64Message& request,
+                             std::span<const Value> values, bool isGood) {
   auto reply = server.allocReplyMessage<Array>(request, values.size());
   reply->cmd = request->cmd;
   reply->address = request->address;
@@ -48,16 +50,20 @@ void answerBy(MessageServer& server, Float64Message&& request, Send send) {
 
 }  // namespace
 
-Ip330SweepServer::Ip330SweepServer(MessageServer& server, Ip330& board, Ip330Sweep& sweep, const ServerLog& log)
+Ip330SweepServer::Ip330SweepServer(MessageServer& server, Ip330& board, Ip330Sweep& sweep,
+                                   const ServerLog& log)
     : server_(server), board_(board), sweep_(sweep) {
   server.on<Float64>([this](Float64Message&& request) { handle(std::move(request)); });
-  answerOtherTypes<Float64>(server, [&log](MessageType type) { log->debug("sweep: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Float64>(server, [&log](MessageType type) {
+    log->debug("sweep: a request of type {}: status -1", toString(type));
+  });
 }
 
 void Ip330SweepServer::handle(Float64Message&& request) {
   const auto command = request->cmd;
   const auto value = request->value;
-  if (command == ip330server::msgRead) return answerBy(server_, std::move(request), [this](auto& asked) { return sendPoints(asked); });
+  if (command == ip330server::msgRead)
+    return answerBy(server_, std::move(request), [this](auto& asked) { return sendPoints(asked); });
   if (command == ip330server::msgGetAcqStatus)
     return answerBy(server_, std::move(request), [this](auto& asked) { return sendStatus(asked); });
   answer(server_, std::move(request), tryDo(command, value));
@@ -65,15 +71,18 @@ void Ip330SweepServer::handle(Float64Message&& request) {
 
 bool Ip330SweepServer::sendPoints(const Float64Message& request) {
   const auto points = sweep_.tryRead(request->address);
-  const auto values = points ? std::span<const std::int32_t>(*points) : std::span<const std::int32_t>();
+  const auto values =
+      points ? std::span<const std::int32_t>(*points) : std::span<const std::int32_t>();
   return sendArray<Int32Array>(server_, request, values, points.has_value());
 }
 
 bool Ip330SweepServer::sendStatus(const Float64Message& request) {
   const auto status = sweep_.status();
   const double seconds = status.elapsedSeconds;
-  const std::array<double, 5> values{status.isAcquiring ? 1.0 : 0.0, seconds, seconds, 0, status.secondsPerPoint};
-  return sendArray<Float64Array>(server_, request, std::span<const double>(values), board_.isDelivering());
+  const std::array<double, 5> values{status.isAcquiring ? 1.0 : 0.0, seconds, seconds, 0,
+                                     status.secondsPerPoint};
+  return sendArray<Float64Array>(server_, request, std::span<const double>(values),
+                                 board_.isDelivering());
 }
 
 bool Ip330SweepServer::tryDo(std::int32_t command, double value) {
@@ -99,15 +108,19 @@ bool Ip330SweepServer::tryDo(std::int32_t command, double value) {
   }
 }
 
-Ip330PidServer::Ip330PidServer(MessageServer& server, Ip330Pid& pid, const ServerLog& log) : server_(server), pid_(pid) {
+Ip330PidServer::Ip330PidServer(MessageServer& server, Ip330Pid& pid, const ServerLog& log)
+    : server_(server), pid_(pid) {
   server.on<Float64>([this](Float64Message&& request) { handle(std::move(request)); });
-  answerOtherTypes<Float64>(server, [&log](MessageType type) { log->debug("PID: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Float64>(server, [&log](MessageType type) {
+    log->debug("PID: a request of type {}: status -1", toString(type));
+  });
 }
 
 void Ip330PidServer::handle(Float64Message&& request) {
   const auto command = request->cmd;
   const auto value = request->value;
-  if (command == ip330server::cmdGetParams) return answerBy(server_, std::move(request), [this](auto& asked) { return sendParams(asked); });
+  if (command == ip330server::cmdGetParams)
+    return answerBy(server_, std::move(request), [this](auto& asked) { return sendParams(asked); });
   answer(server_, std::move(request), tryDo(command, value));
 }
 
@@ -128,7 +141,9 @@ bool Ip330PidServer::tryDo(std::int32_t command, double value) {
   if (command == ip330server::cmdStartFeedback) return pid_.start(), true;
   if (command == ip330server::cmdStopFeedback) return pid_.stop(), true;
   if (command == ip330server::cmdSetSecondsPerScan) return pid_.trySetSecondsPerScan(value);
-  if (command < ip330server::cmdSetHighLimit || command > ip330server::cmdSetSetPoint || !std::isfinite(value)) return false;
+  if (command < ip330server::cmdSetHighLimit || command > ip330server::cmdSetSetPoint ||
+      !std::isfinite(value))
+    return false;
   pid_.set([command, value](PidLoop& loop) {
     switch (command) {
       case ip330server::cmdSetHighLimit:

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Ip330SweepServer: a digitiser for clients that speak to an MCA; Ip330PidServer: fast feedback for those of an EPID record.
-// Their commands: schema/ip330_server.h.
+// Ip330SweepServer: a digitiser for clients that speak to an MCA; Ip330PidServer: fast feedback for
+// those of an EPID record. Their commands: include/mpf/ip330_commands.h.
 //
 // Threads  one each: the server's.
 #pragma once
 
-#include <mpf/drivers/ip330/ip330_pid.h>
-#include <mpf/drivers/ip330/ip330_sweep.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+
+#include "drivers/ip330/ip330_pid.h"
+#include "drivers/ip330/ip330_sweep.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/ip440_server/ip440_server.h>
+#include "server/programs/ip440_server/ip440_server.h"
 
-#include <mpf/server/programs/hardware/bits_request.h>
-#include <mpf/server/programs/hardware/other_types.h>
+#include "server/programs/hardware/bits_request.h"
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 
-Ip440Server::Ip440Server(MessageServer& server, Ip440& inputs, const ServerLog& log) : inputs_(inputs), log_(log), faults_(server, log) {
+Ip440Server::Ip440Server(MessageServer& server, Ip440& inputs, const ServerLog& log)
+    : inputs_(inputs), log_(log), faults_(server, log) {
   server.on<Int32>([this](Int32& request) { handle(request); });
-  answerOtherTypes<Int32>(server, [this](MessageType type) { log_->debug("a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Int32>(server, [this](MessageType type) {
+    log_->debug("a request of type {}: status -1", toString(type));
+  });
 }
 
 void Ip440Server::handle(Int32& shared) {

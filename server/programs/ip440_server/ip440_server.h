@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ip440Server: clients read the inputs of an IP440, as schema/digital_io_server.h has it.
+// Ip440Server: clients read the inputs of an IP440, as include/mpf/digital_io_commands.h has it.
 //
 //   client                                   server
 //     Int32 cmdReadBits   address=mask ──►
@@ -9,10 +9,11 @@
 // Threads  one: the server's.
 #pragma once
 
-#include <mpf/drivers/ip440/ip440.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/hardware/fault_note.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+
+#include "drivers/ip440/ip440.h"
+#include "server/programs/hardware/fault_note.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 

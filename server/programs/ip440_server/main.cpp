@@ -6,13 +6,13 @@
 #include <memory>
 #include <optional>
 
-#include <mpf/base/command_line.h>
-#include <mpf/base/run_main.h>
-#include <mpf/drivers/ip440/ip440_model.h>
-#include <mpf/server/programs/hardware/hardware.h>
-#include <mpf/server/programs/hardware/wire_options.h>
-#include <mpf/server/programs/ip440_server/ip440_server.h>
-#include <mpf/server/programs/server_arguments.h>
+#include "base/command_line.h"
+#include "base/run_main.h"
+#include "drivers/ip440/ip440_model.h"
+#include "server/programs/hardware/hardware.h"
+#include "server/programs/hardware/wire_options.h"
+#include "server/programs/ip440_server/ip440_server.h"
+#include "server/programs/server_arguments.h"
 
 namespace {
 
@@ -25,10 +25,13 @@ struct Options {
   mpf::ServerArguments arguments;
 
   std::optional<int> parse(int argc, char** argv, mpf::Hardware& hardware) {
-    CLI::App app("mpf-ip440-server - serves the 32 inputs of an Acromag IP440 to the clients of a backplane", kProgram);
+    CLI::App app(
+        "mpf-ip440-server - serves the 32 inputs of an Acromag IP440 to the clients of a backplane",
+        kProgram);
     place.addTo(app, "Name of the module, under which clients find the server, too");
     arguments.addQueueSizeTo(app);
-    app.add_option("--inputs", inputs, "A model's inputs that are on, as 0x80000001: bit 0 is IN00");
+    app.add_option("--inputs", inputs,
+                   "A model's inputs that are on, as 0x80000001: bit 0 is IN00");
     hardware.addTo(app);
     wired.addTo(app, mpf::Ip440::kInputs - 1);
     arguments.addTo(app);
@@ -50,10 +53,12 @@ int serve(int argc, char** argv) {
   mpf::Hardware hardware;
   if (const auto exit = options.parse(argc, argv, hardware)) return *exit;
   const mpf::ServerLog log(kProgram, options.arguments.logLevel);
-  auto* const module = hardware.open(options.place, mpf::Ip440::kind(), [&] { return makeModel(options, hardware.wires()); }, log);
+  auto* const module = hardware.open(
+      options.place, mpf::Ip440::kind(), [&] { return makeModel(options, hardware.wires()); }, log);
   if (module == nullptr) return 0;
   mpf::Ip440 inputs(*module);
-  mpf::MessageServer server(mpf::Backplane::attach(options.arguments.backplane), options.place.name, options.arguments.messages);
+  mpf::MessageServer server(mpf::Backplane::attach(options.arguments.backplane), options.place.name,
+                            options.arguments.messages);
   const mpf::Ip440Server served(server, inputs, log);
   return mpf::runServer(server, *module, log);
 }

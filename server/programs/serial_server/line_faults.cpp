@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/line_faults.h>
+#include "server/programs/serial_server/line_faults.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -7,8 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include <mpf/base/duration_text.h>
-#include <mpf/schema/serial_server.h>
+#include <mpf/serial_commands.h>
+
+#include "base/duration_text.h"
 
 namespace mpf {
 namespace {
@@ -42,7 +43,8 @@ std::uint8_t faultBit(LineFault fault) noexcept {
   return 0;
 }
 
-LineFaults::LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log, std::chrono::milliseconds quiet)
+LineFaults::LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log,
+                       std::chrono::milliseconds quiet)
     : server_(server), port_(port), log_(log), quiet_(quiet), seen_(counted()) {}
 
 LineFaults::~LineFaults() {
@@ -83,11 +85,13 @@ std::string LineFaults::textOf(const Counts& counts, const std::string& when) {
   std::vector<std::string> kinds;
   if (counts.overruns > 0) kinds.push_back(withCount(counts.overruns, "overrun", "overruns"));
   if (counts.parity > 0) kinds.push_back(withCount(counts.parity, "parity error", "parity errors"));
-  if (counts.framing > 0) kinds.push_back(withCount(counts.framing, "framing error", "framing errors"));
+  if (counts.framing > 0)
+    kinds.push_back(withCount(counts.framing, "framing error", "framing errors"));
   if (counts.breaks > 0) kinds.push_back(withCount(counts.breaks, "break", "breaks"));
   auto text = fmt::format("{}{}", fmt::join(kinds, ", "), when);
   if (counts.overruns > 0) text += "; this program got no processor in time, see mpf doctor";
-  if (counts.parity + counts.framing > 0) text += "; do both ends have the same settings, and is the cable good?";
+  if (counts.parity + counts.framing > 0)
+    text += "; do both ends have the same settings, and is the cable good?";
   return text;
 }
 
@@ -97,7 +101,8 @@ std::int32_t LineFaults::statusOf(std::int32_t status) const noexcept {
 }
 
 void LineFaults::describe(Char8Array& reply) const noexcept {
-  if (reply.status == serialServerStatusOverflow || reply.status == serialServerStatusError) reply.extra = answer_;
+  if (reply.status == serialServerStatusOverflow || reply.status == serialServerStatusError)
+    reply.extra = answer_;
 }
 
 }  // namespace mpf

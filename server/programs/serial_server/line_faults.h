@@ -2,10 +2,10 @@
 // LineFaults: tells people and clients what a serial line has lost and damaged.
 //
 //   port's counters ── look() ──► alarms, one for each fault     log, at most one line in `quiet`, with the counts since the line before
-//   an answer's faults ──► status and `extra` of its reply (schema/serial_server.h)
+//   an answer's faults ──► status and `extra` of its reply (include/mpf/serial_commands.h)
 //
-// Threads  look() from any: the port's thread after each fault, the server's thread after each request. setAnswer() and what tells a
-//          reply: the server's thread.
+// Threads  look() from any: the port's thread after each fault, the server's thread after each
+//          request. setAnswer() and what tells a reply: the server's thread.
 // Trust    a line that does nothing but fail costs one line of log each `quiet`.
 #pragma once
 
@@ -14,11 +14,12 @@
 #include <mutex>
 #include <string>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
-#include <mpf/schema/message_types.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+#include <mpf/message_types.h>
+
+#include "server/programs/server_log.h"
 
 namespace mpf {
 
@@ -30,7 +31,8 @@ class LineFaults {
   static constexpr std::chrono::seconds kQuiet{10};
 
   // What has happened until now is not told. All that is passed must outlive this.
-  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log, std::chrono::milliseconds quiet = kQuiet);
+  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log,
+             std::chrono::milliseconds quiet = kQuiet);
   // Tells the rest.
   ~LineFaults();
   LineFaults(const LineFaults&) = delete;
@@ -50,7 +52,9 @@ class LineFaults {
  private:
   struct Counts {
     std::uint64_t overruns = 0, parity = 0, framing = 0, breaks = 0;
-    [[nodiscard]] std::uint64_t sum() const noexcept { return overruns + parity + framing + breaks; }
+    [[nodiscard]] std::uint64_t sum() const noexcept {
+      return overruns + parity + framing + breaks;
+    }
   };
   [[nodiscard]] Counts counted() const;
   void tell(std::int64_t nowNs);

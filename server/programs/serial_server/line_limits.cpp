@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/line_limits.h>
+#include "server/programs/serial_server/line_limits.h"
 
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include <mpf/base/command_line.h>
+#include "base/command_line.h"
 
 namespace mpf {
 namespace {
@@ -14,7 +14,8 @@ constexpr int kLongestSeconds = 86'400;
 constexpr int kMostRetries = 1'000'000;
 
 template <class Duration>
-void addTime(CLI::App& app, const std::string& option, Duration& time, int least, int most, const std::string& help) {
+void addTime(CLI::App& app, const std::string& option, Duration& time, int least, int most,
+             const std::string& help) {
   app.add_option_function<int>(
          option, [&time](int value) { time = Duration(value); }, help)
       ->check(wholeNumber(static_cast<std::uint64_t>(least), static_cast<std::uint64_t>(most)))
@@ -25,12 +26,16 @@ void addTime(CLI::App& app, const std::string& option, Duration& time, int least
 
 void LineLimits::addTo(CLI::App& app) {
   addTime(app, "--settle-time", settleTime, 0, kLongestMs,
-          "Silence on a line before a write-read is sent [ms]. Longer than the pause before an answer that the instrument repeats");
+          "Silence on a line before a write-read is sent [ms]. Longer than the pause before an "
+          "answer that the instrument repeats");
   addTime(app, "--quiet-time", quietTime, 0, kLongestMs,
-          "The same after an answer that was late, damaged or too long [ms]. Longer than pauses within an answer");
+          "The same after an answer that was late, damaged or too long [ms]. Longer than pauses "
+          "within an answer");
   addTime(app, "--resync-limit", resyncLimit, 0, kLongestMs,
-          "How long after its timeout an answer may still come [ms]: nothing is sent until it has, or this is over");
-  addTime(app, "--max-timeout", maxTimeout, 1, kLongestSeconds, "Longest that one request may have the line, retries included [s]");
+          "How long after its timeout an answer may still come [ms]: nothing is sent until it has, "
+          "or this is over");
+  addTime(app, "--max-timeout", maxTimeout, 1, kLongestSeconds,
+          "Longest that one request may have the line, retries included [s]");
   app.add_option("--max-retries", maxRetries, "Most retries of one request; more are not made")
       ->check(wholeNumber(0, kMostRetries))
       ->capture_default_str();

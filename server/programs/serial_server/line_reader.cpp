@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/line_reader.h>
+#include "server/programs/serial_server/line_reader.h"
 
 #include <algorithm>
 #include <utility>
 
-#include <mpf/server/programs/serial_server/line_faults.h>
+#include "server/programs/serial_server/line_faults.h"
 
 namespace mpf {
 namespace {
@@ -13,7 +13,8 @@ constexpr std::chrono::milliseconds kAskEvery{20};
 
 }  // namespace
 
-LineReader::LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits, SurplusHandler onSurplus,
+LineReader::LineReader(std::size_t bufferBytes, std::string eom, bool circular,
+                       const LineLimits& limits, SurplusHandler onSurplus,
                        std::function<void()> onFault)
     : onFault_(std::move(onFault)),
       bufferBytes_(bufferBytes),
@@ -60,7 +61,8 @@ bool LineReader::tryContinue() {
   return continues_;
 }
 
-LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isHopeless) {
+LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until,
+                                       const std::function<bool()>& isHopeless) {
   std::unique_lock lock(mutex_);
   stopLingering();
   phase_ = isQuestion ? Phase::syncing : Phase::idle;
@@ -139,7 +141,8 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
   if (input_.size() >= bufferBytes_) {
     if (isRead) {
       answer_.overflow = true;
-      input_.push_back(static_cast<char>(byte));  // behind what the answer has: the next one begins with it
+      // behind what the answer has: the next one begins with it
+      input_.push_back(static_cast<char>(byte));
       return ByteHandlerResult::endRead;
     }
     if (phase_ == Phase::lingering) {
@@ -162,7 +165,8 @@ ByteHandlerResult LineReader::readBegins() {
   const std::lock_guard lock(mutex_);
   if (isQuestion_ && !continues_) {
     if (!std::exchange(input_, {}).empty()) noteSurplus();
-    // The port has passed all that had arrived; some of it may have come after the silence was seen.
+    // The port has passed all that had arrived; some of it may have come after the silence was
+    // seen.
     answer_.wasDisturbed = !Deadline::atNs(sync_.readyAtNs(true)).hasPassed();
     phase_ = answer_.wasDisturbed ? Phase::idle : Phase::armed;
     return answer_.wasDisturbed ? ByteHandlerResult::error : ByteHandlerResult::ok;
@@ -213,9 +217,11 @@ void LineReader::lineFailed(LineFault fault, std::uint64_t /*count*/) {
     // A line that was away has cut off only what had not come in full.
     const bool isBetweenAnswers = input_.empty() || (!eom_.empty() && input_.endsWith(eom_));
     const bool cuts = fault != LineFault::unplugged || !isBetweenAnswers;
-    const bool isKept = phase_ == Phase::reading || phase_ == Phase::lingering || (phase_ == Phase::idle && circular_);
+    const bool isKept = phase_ == Phase::reading || phase_ == Phase::lingering ||
+                        (phase_ == Phase::idle && circular_);
     if (cuts && isKept) input_.mark(faultBit(fault));
-    if (phase_ == Phase::reading) answer_.faults = static_cast<std::uint8_t>(answer_.faults | faultBit(fault));
+    if (phase_ == Phase::reading)
+      answer_.faults = static_cast<std::uint8_t>(answer_.faults | faultBit(fault));
     if (fault != LineFault::unplugged) sync_.disturbed(Clock::nowNs());
   }
   if (onFault_) onFault_();

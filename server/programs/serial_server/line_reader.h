@@ -19,40 +19,41 @@
 #include <mutex>
 #include <string>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
-#include <mpf/server/programs/serial_server/line_sync.h>
-#include <mpf/server/programs/serial_server/marked_input.h>
+
+#include "server/programs/serial_server/line_sync.h"
+#include "server/programs/serial_server/marked_input.h"
 
 namespace mpf {
 
 class LineReader final : public ByteHandler {
  public:
-  // Called when input is thrown away that no request had read, once until the next write-read is sent.
-  // Runs under the reader's mutex, on either thread: it must not call the reader.
+  // Called when input is thrown away that no request had read, once until the next write-read is
+  // sent. Runs under the reader's mutex, on either thread: it must not call the reader.
   using SurplusHandler = std::function<void()>;
 
   // `eom`: 0 to 2 bytes that end an answer. `circular`: keep what is received while nobody reads.
   // `onFault`: called after each fault of the line, on the port's thread.
-  LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits = {}, SurplusHandler onSurplus = {},
-             std::function<void()> onFault = {});
+  LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits = {},
+             SurplusHandler onSurplus = {}, std::function<void()> onFault = {});
 
   void setEom(std::string eom);
   void setCircular(bool circular);
 
   // For the next read: drop what is there first; end after so many bytes, 0 for no such limit.
   void prepareRead(bool flush, std::size_t maxBytes);
-  // For the next write-read: its answer ends after so many bytes, 0 for no such limit. With `mayBeLate`
-  // an answer that does not come in time stays here, for a read after tryContinue().
+  // For the next write-read: its answer ends after so many bytes, 0 for no such limit. With
+  // `mayBeLate` an answer that does not come in time stays here, for a read after tryContinue().
   void prepareQuestion(std::size_t maxBytes, bool mayBeLate);
-  // The next read goes on with the answer that the last write-read did not get in time. False: its end
-  // could not be told, or it was not kept.
+  // The next read goes on with the answer that the last write-read did not get in time. False: its
+  // end could not be told, or it was not kept.
   [[nodiscard]] bool tryContinue();
 
   enum class Sync {
-    inStep,     // the request may be sent now
+    inStep,  // the request may be sent now
     noSilence,  // `until` has passed
-    hopeless,   // isHopeless() said so
+    hopeless,  // isHopeless() said so
   };
   // Waits until a request may be sent. Before a question the input is thrown away, and what arrives
   // during the wait.
@@ -64,7 +65,8 @@ class LineReader final : public ByteHandler {
     std::string bytes;
     bool overflow = false;
     bool wasDisturbed = false;  // input arrived before the question was sent: it was not sent
-    std::uint8_t faults = 0;  // bits of serial_server.h: bytes are missing or were damaged within it or right before it
+    // bits of serial_server.h: bytes are missing or were damaged within it or right before it
+    std::uint8_t faults = 0;
   };
   // Of the read that has ended.
   Answer takeAnswer();
@@ -78,8 +80,8 @@ class LineReader final : public ByteHandler {
  private:
   enum class Phase : std::uint8_t {
     idle,
-    syncing,    // a question waits for silence: input is thrown away
-    armed,      // it is about to be sent: input would disturb it
+    syncing,  // a question waits for silence: input is thrown away
+    armed,  // it is about to be sent: input would disturb it
     reading,
     lingering,  // its answer is late, and is collected all the same
   };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/line_sync.h>
+#include "server/programs/serial_server/line_sync.h"
 
 #include <algorithm>
 #include <utility>

@@ -13,7 +13,7 @@
 #include <optional>
 #include <string>
 
-#include <mpf/server/programs/serial_server/line_limits.h>
+#include "server/programs/serial_server/line_limits.h"
 
 namespace mpf {
 
@@ -36,7 +36,8 @@ class LineSync {
   // Input was thrown away that no request had read.
   void noteSurplus() noexcept { hasSurplus_ = true; }
 
-  // Whether input that comes now, unread, means that answers and questions may have got out of step.
+  // Whether input that comes now, unread, means that answers and questions may have got out of
+  // step.
   [[nodiscard]] bool isSurplusExpected() const noexcept { return !wasAsked_ && !late_; }
   // Whether the answer that is owed has been seen, or none is.
   [[nodiscard]] bool isWhole() const noexcept { return !late_ || late_->isWhole; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // mpf-serial-server: serial lines, a server for each. The old commands were
-// initSerialServer("serverName","portName",bufSize,queueSize,"eomstr",circularBufferMode), and for ports of an octal UART before it
+// initSerialServer("serverName","portName",bufSize,queueSize,"eomstr",circularBufferMode), and for
+// ports of an octal UART before it
 // initOctalUART("moduleName","carrierName","carrierSite",nports,intVec) and
 // initOctalUARTPort("portName","moduleName",port,baud,"parity",stop_bits,bits_char,"flowType").
 #include <cstdio>
@@ -8,11 +9,11 @@
 #include <memory>
 #include <vector>
 
-#include <mpf/base/run_main.h>
-#include <mpf/base/stop_bell.h>
-#include <mpf/server/programs/serial_server/serial_ports.h>
-#include <mpf/server/programs/serial_server/served_port.h>
-#include <mpf/server/programs/serial_server/start_options.h>
+#include "base/run_main.h"
+#include "base/stop_bell.h"
+#include "server/programs/serial_server/serial_ports.h"
+#include "server/programs/serial_server/served_port.h"
+#include "server/programs/serial_server/start_options.h"
 
 namespace {
 
@@ -26,7 +27,8 @@ int serve(int argc, char** argv) {
   std::vector<std::unique_ptr<mpf::ServedPort>> served;
   served.reserve(options.servers.size());
   for (const auto& start : options.servers)
-    served.push_back(std::make_unique<mpf::ServedPort>(backplane, options, start, ports.find(start.port)));
+    served.push_back(
+        std::make_unique<mpf::ServedPort>(backplane, options, start, ports.find(start.port)));
   ports.onAlarm([&](const std::string& module) {
     for (const auto& server : served) {
       const auto* const port = options.octal.find(server->portName());

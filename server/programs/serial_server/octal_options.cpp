@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/octal_options.h>
+#include "server/programs/serial_server/octal_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include <mpf/server/programs/hardware/words.h>
+#include "server/programs/hardware/option_fields.h"
 
 namespace mpf {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 constexpr const char* kUartForm = "MODULE,CARRIER,SITE,NPORTS[,VECTOR]";
 constexpr const char* kPortForm = "PORT,MODULE,N[,BAUD[,PARITY[,STOPBITS[,BITS[,FLOW]]]]]";
 
-OctalUartStart readUart(Words& words) {
+OctalUartStart readUart(OptionFields& words) {
   OctalUartStart uart;
   uart.place.name = words.word("module");
   uart.place.carrier = words.word("carrier");
@@ -23,7 +23,7 @@ OctalUartStart readUart(Words& words) {
   return uart;
 }
 
-OctalPortStart readPort(Words& words) {
+OctalPortStart readPort(OptionFields& words) {
   OctalPortStart port;
   port.name = words.word("port");
   port.module = words.word("module");
@@ -40,14 +40,17 @@ OctalPortStart readPort(Words& words) {
 }  // namespace
 
 void OctalOptions::addTo(CLI::App& app) {
-  addWords(app, "--octal-uart", kUartForm, "A module of serial ports. All its ports are one process's",
-           [this](Words& words) { uarts.push_back(readUart(words)); });
-  addWords(app, "--octal-port", kPortForm, "A port of such a module: a PORT to serve. Unless said: 9600,N,1,8,N",
-           [this](Words& words) { ports.push_back(readPort(words)); });
+  addWords(app, "--octal-uart", kUartForm,
+           "A module of serial ports. All its ports are one process's",
+           [this](OptionFields& words) { uarts.push_back(readUart(words)); });
+  addWords(app, "--octal-port", kPortForm,
+           "A port of such a module: a PORT to serve. Unless said: 9600,N,1,8,N",
+           [this](OptionFields& words) { ports.push_back(readPort(words)); });
   app.add_option_function<std::string>(
-         "--octal-model", [this](const std::string& kind) { model.model = kind == "232"   ? 0x22
-                                                                          : kind == "422" ? 0x2a
-                                                                                          : 0x48; },
+         "--octal-model",
+         [this](const std::string& kind) {
+           model.model = kind == "232" ? 0x22 : kind == "422" ? 0x2a : 0x48;
+         },
          "On a carrier of models: which module it is")
       ->check(CLI::IsMember({"232", "422", "485"}))
       ->default_str("232");
@@ -62,7 +65,8 @@ const OctalPortStart* OctalOptions::find(const std::string& port) const {
 }
 
 const OctalUartStart* OctalOptions::findUart(const std::string& module) const {
-  const auto found = std::ranges::find(uarts, module, [](const OctalUartStart& uart) { return uart.place.name; });
+  const auto found =
+      std::ranges::find(uarts, module, [](const OctalUartStart& uart) { return uart.place.name; });
   return found == uarts.end() ? nullptr : &*found;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// OctalOptions: the options that say which octal UARTs there are and which ports of theirs, as the old commands said it.
+// OctalOptions: the options that say which octal UARTs there are and which ports of theirs, as the
+// old commands said it.
 //
 //   --octal-uart MODULE,CARRIER,SITE,NPORTS[,VECTOR]                        initOctalUART
 //   --octal-port PORT,MODULE,N[,BAUD[,PARITY[,STOPBITS[,BITS[,FLOW]]]]]     initOctalUARTPort
@@ -11,9 +12,10 @@
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
 #include <mpf/drivers/serial/serial_settings.h>
-#include <mpf/server/programs/hardware/hardware.h>
+
+#include "drivers/octal_uart/octal_uart_model.h"
+#include "server/programs/hardware/hardware.h"
 
 namespace mpf {
 

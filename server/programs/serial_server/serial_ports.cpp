@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/serial_ports.h>
+#include "server/programs/serial_server/serial_ports.h"
 
 #include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
 
-#include <mpf/drivers/octal_uart/octal_uart_port.h>
-#include <mpf/drivers/serial/late_line.h>
-#include <mpf/drivers/serial/posix_terminal_port.h>
-#include <mpf/drivers/serial/tcp_serial_port.h>
+#include "drivers/octal_uart/octal_uart_port.h"
+#include "drivers/serial/late_line.h"
+#include "drivers/serial/posix_terminal_port.h"
+#include "drivers/serial/tcp_serial_port.h"
 
 namespace mpf {
 
-SerialPorts::SerialPorts(SerialStartOptions& options, const ServerLog& log) : options_(options), log_(log) {
+SerialPorts::SerialPorts(SerialStartOptions& options, const ServerLog& log)
+    : options_(options), log_(log) {
   for (const auto& uart : options.octal.uarts) {
     if (tryOpenModule(uart)) openUart(uart);
   }
-  for (const auto& start : options.servers) registry_.registerName(start.port, openPort(start.port));
+  for (const auto& start : options.servers)
+    registry_.registerName(start.port, openPort(start.port));
 }
 
 // ---- modules
@@ -47,8 +49,10 @@ IndustryPackModule& SerialPorts::openModule(const OctalUartStart& start) {
   };
   auto& module = options_.hardware.openNow(start.place, kOctalUart, makeModel, log_);
   for (const auto& port : options_.octal.ports) {
-    if (model != nullptr && port.module == start.place.name && port.number >= 0 && port.number < start.ports)
-      log_->info("{} is a model: its instrument may open {}", port.name, model->terminal(port.number));
+    if (model != nullptr && port.module == start.place.name && port.number >= 0 &&
+        port.number < start.ports)
+      log_->info("{} is a model: its instrument may open {}", port.name,
+                 model->terminal(port.number));
   }
   return module;
 }
@@ -62,7 +66,8 @@ OctalUart& SerialPorts::openUart(const OctalUartStart& start) {
   auto& module = known != nullptr ? *known : openModule(start);
   if (start.vector) modules.takeVector(*start.vector, module);
   options_.hardware.logPriority(log_);
-  auto uart = std::make_unique<OctalUart>(module, OctalUartOptions{.ports = start.ports, .vector = start.vector.value_or(0)});
+  auto uart = std::make_unique<OctalUart>(
+      module, OctalUartOptions{.ports = start.ports, .vector = start.vector.value_or(0)});
   if (alarmHandler_) follow(*uart, name);
   return *uarts_.emplace(name, std::move(uart)).first->second;
 }
@@ -74,7 +79,8 @@ void SerialPorts::onAlarm(AlarmHandler handler) {
 }
 
 void SerialPorts::follow(OctalUart& uart, const std::string& module) const {
-  uart.onAlarm([&log = log_, handler = alarmHandler_, module](OctalUartAlarm alarm, const std::string& what) {
+  uart.onAlarm([&log = log_, handler = alarmHandler_, module](OctalUartAlarm alarm,
+                                                              const std::string& what) {
     log->warn("{}", what);
     if (handler && alarm != OctalUartAlarm::lost) handler(module);
   });
@@ -108,14 +114,18 @@ std::shared_ptr<SerialPort> SerialPorts::openOctalPort(const OctalPortStart& sta
 }
 
 // What is wrong with the command line is told now: no module that comes would mend it.
-std::shared_ptr<SerialPort> SerialPorts::openLater(const OctalPortStart& port, const OctalUartStart& uart) {
-  auto description = fmt::format("port {} of {} (carrier {}, site {})", port.number, port.module, uart.place.carrier, uart.place.site);
+std::shared_ptr<SerialPort> SerialPorts::openLater(const OctalPortStart& port,
+                                                   const OctalUartStart& uart) {
+  auto description = fmt::format("port {} of {} (carrier {}, site {})", port.number, port.module,
+                                 uart.place.carrier, uart.place.site);
   if (port.number < 0 || port.number >= uart.ports)
-    throw std::invalid_argument(fmt::format("{}: its ports are 0 to {}", description, uart.ports - 1));
+    throw std::invalid_argument(
+        fmt::format("{}: its ports are 0 to {}", description, uart.ports - 1));
   if (const auto refused = octalUartProblemOf(port.settings, false); !refused.empty())
     throw std::invalid_argument(fmt::format("{}: {}", description, refused));
-  auto line = std::make_unique<LateLine>(
-      std::move(description), [this, &port, &uart] { return std::make_unique<OctalUartLine>(openUart(uart), port.number, port.settings); });
+  auto line = std::make_unique<LateLine>(std::move(description), [this, &port, &uart] {
+    return std::make_unique<OctalUartLine>(openUart(uart), port.number, port.settings);
+  });
   return std::make_shared<PolledSerialPort>(std::move(line), true);
 }
 

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
-// SerialPorts: opens the ports that a command line speaks of, and owns them and the modules that some of them are on.
+// SerialPorts: opens the ports that a command line speaks of, and owns them and the modules that
+// some of them are on.
 //
-// With --wait every port is there from the start, and unplugged until its line is there: a module that is absent keeps no other line waiting.
+// With --wait every port is there from the start, and unplugged until its line is there: a module
+// that is absent keeps no other line waiting.
 //
-// Threads  the program's main thread; a module that comes later is opened on the thread of one of its ports.
+// Threads  the program's main thread; a module that comes later is opened on the thread of one of
+//          its ports.
 #pragma once
 
 #include <functional>
@@ -12,16 +15,18 @@
 #include <mutex>
 #include <string>
 
-#include <mpf/drivers/octal_uart/octal_uart.h>
 #include <mpf/drivers/serial/serial_port_registry.h>
-#include <mpf/server/programs/serial_server/start_options.h>
-#include <mpf/server/programs/server_log.h>
+
+#include "drivers/octal_uart/octal_uart.h"
+#include "server/programs/serial_server/start_options.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 
 class SerialPorts {
  public:
-  // Told of a module's interrupts that come without end, or not at all, and which one it is. Of a line that is lost its port tells.
+  // Told of a module's interrupts that come without end, or not at all, and which one it is. Of a
+  // line that is lost its port tells.
   using AlarmHandler = std::function<void(const std::string& module)>;
 
   // Opens all of them.
@@ -30,7 +35,8 @@ class SerialPorts {
   SerialPorts(SerialStartOptions& options, const ServerLog& log);
 
   [[nodiscard]] SerialPort& find(const std::string& port) const { return *registry_.find(port); }
-  // What is wrong with modules is logged and told to `handler`, instead of the one before, which after return does not run any more.
+  // What is wrong with modules is logged and told to `handler`, instead of the one before, which
+  // after return does not run any more.
   void onAlarm(AlarmHandler handler);
 
  private:
@@ -41,7 +47,8 @@ class SerialPorts {
   void follow(OctalUart& uart, const std::string& module) const;
   [[nodiscard]] std::shared_ptr<SerialPort> openPort(const std::string& port);
   [[nodiscard]] std::shared_ptr<SerialPort> openOctalPort(const OctalPortStart& start);
-  [[nodiscard]] std::shared_ptr<SerialPort> openLater(const OctalPortStart& port, const OctalUartStart& uart);
+  [[nodiscard]] std::shared_ptr<SerialPort> openLater(const OctalPortStart& port,
+                                                      const OctalUartStart& uart);
 
   SerialStartOptions& options_;
   const ServerLog& log_;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/serial_server.h>
+#include "server/programs/serial_server/serial_server.h"
 
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
 #include <utility>
 
-#include <mpf/schema/serial_server.h>
-#include <mpf/server/programs/hardware/other_types.h>
+#include <mpf/serial_commands.h>
+
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 namespace {
@@ -20,7 +21,9 @@ constexpr std::chrono::seconds kGraceOfWrites{2};
 
 std::int32_t commandOf(const Char8Array& request) { return request.cmd & cmdCommandMask; }
 
-std::size_t maxBytesOf(const Char8Array& request) { return static_cast<std::size_t>(std::max(request.extra, 0)); }
+std::size_t maxBytesOf(const Char8Array& request) {
+  return static_cast<std::size_t>(std::max(request.extra, 0));
+}
 
 // A timeout of 0 gives at once what is there.
 std::chrono::milliseconds timeoutOf(const Char8Array& request) {
@@ -43,23 +46,27 @@ std::int32_t statusOf(SerialPortStatus status) {
 
 }  // namespace
 
-SerialServer::SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log)
+SerialServer::SerialServer(MessageServer& server, SerialPort& port,
+                           const SerialServerOptions& options, const ServerLog& log)
     : server_(server),
       log_(log),
       limits_(options.limits),
       faults_(server, port, log),
       reader_(
-          options.bufferBytes, options.eom, options.circularBuffer, options.limits, [this] { noteSurplus(); }, [this] { faults_.look(); }),
+          options.bufferBytes, options.eom, options.circularBuffer, options.limits,
+          [this] { noteSurplus(); }, [this] { faults_.look(); }),
       port_(port, reader_) {
   server.on<Char8Array>([this](Char8ArrayMessage&& request) { handle(std::move(request)); });
   server.on<SerialConfig>([this](SerialConfigMessage&& request) { configure(std::move(request)); });
-  answerOtherTypes<Char8Array, SerialConfig>(server,
-                                             [this](MessageType type) { log_->debug("a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Char8Array, SerialConfig>(server, [this](MessageType type) {
+    log_->debug("a request of type {}: status -1", toString(type));
+  });
 }
 
 void SerialServer::stop() {
   isStopped_.store(true, std::memory_order_relaxed);
-  server_.interrupt();  // before the request that is on the line ends: the server shall take no other
+  // before the request that is on the line ends: the server shall take no other
+  server_.interrupt();
   port_->release();
 }
 
@@ -70,9 +77,11 @@ void SerialServer::noteRequest() {
 }
 
 void SerialServer::noteStatus(const Work& work) {
-  log_->debug("cmd {:#x}, timeout {}: status {}", work.fields.cmd, work.fields.timeout, work.status);
+  log_->debug("cmd {:#x}, timeout {}: status {}", work.fields.cmd, work.fields.timeout,
+              work.status);
   faults_.look();
-  const bool fails = work.status == serialServerStatusError && !faults_.hasAnswerFaults();  // `faults_` reports those of the line
+  // `faults_` reports those of the line
+  const bool fails = work.status == serialServerStatusError && !faults_.hasAnswerFaults();
   if (fails == std::exchange(isFailing_, fails)) return;
   if (!fails) return log_->info("requests succeed again");
   log_->warn("requests fail: {}", whyFailed(work));
@@ -88,16 +97,21 @@ void SerialServer::noteSurplus() {
   server_.countAlarm();
   const auto times = surplusLog_.note();
   if (!times) return;
-  log_->warn("surplus input, {} {} since the last report: bytes arrived that no request was waiting for; requests wait for a silent line",
-             *times, *times == 1 ? "time" : "times");
+  log_->warn(
+      "surplus input, {} {} since the last report: bytes arrived that no request was waiting for; "
+      "requests wait for a silent line",
+      *times, *times == 1 ? "time" : "times");
 }
 
 void SerialServer::noteLimits(const Char8Array& request) {
-  if (timeoutOf(request) <= limits_.maxTimeout && request.numberRetrys <= limits_.maxRetries) return;
+  if (timeoutOf(request) <= limits_.maxTimeout && request.numberRetrys <= limits_.maxRetries)
+    return;
   if (const auto times = limitLog_.note()) {
-    log_->warn("{} of clients limited to {} s (--max-timeout) and {} retries (--max-retries): cmd {:#x}, timeout {}, numberRetrys {}",
-               *times == 1 ? "a request" : fmt::format("{} requests", *times), limits_.maxTimeout.count(), limits_.maxRetries, request.cmd,
-               request.timeout, request.numberRetrys);
+    log_->warn(
+        "{} of clients limited to {} s (--max-timeout) and {} retries (--max-retries): cmd {:#x}, "
+        "timeout {}, numberRetrys {}",
+        *times == 1 ? "a request" : fmt::format("{} requests", *times), limits_.maxTimeout.count(),
+        limits_.maxRetries, request.cmd, request.timeout, request.numberRetrys);
   }
 }
 
@@ -149,7 +163,8 @@ void SerialServer::reply(const Char8ArrayMessage& request, const Work& work) {
 
 // Whether to end the wait of a request: nobody is there for its answer.
 bool SerialServer::isHopeless(const Char8ArrayMessage& request, bool isWrite) {
-  if (isStopped_.load(std::memory_order_relaxed) || port_->state() == SerialPortState::unplugged) return true;
+  if (isStopped_.load(std::memory_order_relaxed) || port_->state() == SerialPortState::unplugged)
+    return true;
   if (server_.isAwaited(request)) return false;
   if (!isWrite) return true;
   if (writeEnds_.isNever()) writeEnds_ = Deadline::after(kGraceOfWrites);
@@ -160,7 +175,8 @@ void SerialServer::serve(Work& work) {
   for (;;) {
     attempt(work);
     if (work.status == serialServerStatusOK || work.retries == 0 || work.isHopeless()) return;
-    if (work.status == serialServerStatusTimeout && commandOf(work.fields) == cmdWriteRead) takeLateAnswer(work);
+    if (work.status == serialServerStatusTimeout && commandOf(work.fields) == cmdWriteRead)
+      takeLateAnswer(work);
     if (work.status == serialServerStatusOK || work.until.hasPassed()) return;
     --work.retries;
   }
@@ -177,13 +193,16 @@ void SerialServer::attempt(Work& work) {
       return ask(work);
     default:  // options alone do no I/O, and are no command
       work.status = serialServerStatusError;
-      work.problem = fmt::format("cmd {:#x} is no command: use 1 (read), 2 (write) or 3 (write-read), plus options", work.fields.cmd);
+      work.problem = fmt::format(
+          "cmd {:#x} is no command: use 1 (read), 2 (write) or 3 (write-read), plus options",
+          work.fields.cmd);
       work.retries = 0;
   }
 }
 
 Deadline SerialServer::deadlineOf(const Work& work) const {
-  return std::min(work.until, Deadline::after(std::min<std::chrono::milliseconds>(timeoutOf(work.fields), limits_.maxTimeout)));
+  return std::min(work.until, Deadline::after(std::min<std::chrono::milliseconds>(
+                                  timeoutOf(work.fields), limits_.maxTimeout)));
 }
 
 void SerialServer::read(Work& work) {
@@ -231,14 +250,17 @@ bool SerialServer::isInStep(Work& work, bool isQuestion, Deadline until) {
   work.status = serialServerStatusError;
   work.answer.clear();
   if (sync == LineReader::Sync::noSilence)
-    work.problem = fmt::format("input does not stop, so a question cannot be told from its answers: not silent for {} ms (--quiet-time)",
-                               limits_.quietTime.count());
+    work.problem = fmt::format(
+        "input does not stop, so a question cannot be told from its answers: not silent for {} ms "
+        "(--quiet-time)",
+        limits_.quietTime.count());
   return false;
 }
 
 void SerialServer::configure(SerialConfigMessage&& request) {
   noteRequest();
-  const auto refusal = port_->config({request->baud, request->stopBits, request->bitsPerChar, request->parity, request->flowControl});
+  const auto refusal = port_->config({request->baud, request->stopBits, request->bitsPerChar,
+                                      request->parity, request->flowControl});
   if (!refusal.empty()) log_->warn("settings refused: {}", refusal);
   auto reply = server_.allocReplyMessage<Int32>(request);
   reply->status = refusal.empty() ? serialServerStatusOK : serialServerStatusError;

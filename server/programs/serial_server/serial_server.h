@@ -8,8 +8,8 @@
 // LineLimits, or until its client is gone.
 //
 // Threads  one: the server's; stop() from another.
-// Trust    a client asks for any timeout and any number of retries, or dies: it costs the others no more
-//          than LineLimits::maxTimeout.
+// Trust    a client asks for any timeout and any number of retries, or dies: it costs the others no
+//          more than LineLimits::maxTimeout.
 #pragma once
 
 #include <atomic>
@@ -18,13 +18,14 @@
 #include <string>
 #include <vector>
 
-#include <mpf/base/clock.h>
+#include <mpf/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/rare_log.h>
-#include <mpf/server/programs/serial_server/line_faults.h>
-#include <mpf/server/programs/serial_server/line_reader.h>
-#include <mpf/server/programs/server_log.h>
+#include <mpf/message_server.h>
+
+#include "server/programs/rare_log.h"
+#include "server/programs/serial_server/line_faults.h"
+#include "server/programs/serial_server/line_reader.h"
+#include "server/programs/server_log.h"
 
 namespace mpf {
 
@@ -37,12 +38,15 @@ struct SerialServerOptions {
 
 class SerialServer {
  public:
-  // Surplus input is an alarm of `server`. Answers Char8Array and SerialConfig requests of `server`, and those of other types with status -1.
-  // All that is passed must outlive this, but for the options.
-  SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options, const ServerLog& log);
+  // Surplus input is an alarm of `server`. Answers Char8Array and SerialConfig requests of
+  // `server`, and those of other types with status -1. All that is passed must outlive this, but
+  // for the options.
+  SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options,
+               const ServerLog& log);
 
-  // Ends the server's run(). A request that is on the line is answered at once with serialServerStatusError and what was read; those that
-  // the server has not taken end with it, as `neverTaken`.
+  // Ends the server's run(). A request that is on the line is answered at once with
+  // serialServerStatusError and what was read; those that the server has not taken end with it, as
+  // `neverTaken`.
   void stop();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/served_port.h>
+#include "server/programs/serial_server/served_port.h"
 
 #include <fmt/format.h>
 #include <utility>
@@ -15,12 +15,14 @@ ServerOptions messagesOf(const SerialStartOptions& options, const SerialServerSt
 
 // Of several in one program each says who it is.
 std::string nameInLog(const SerialStartOptions& options, const SerialServerStart& start) {
-  return options.servers.size() == 1 ? "mpf-serial-server" : fmt::format("mpf-serial-server {}", start.server);
+  return options.servers.size() == 1 ? "mpf-serial-server"
+                                     : fmt::format("mpf-serial-server {}", start.server);
 }
 
 }  // namespace
 
-ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& options, const SerialServerStart& start, SerialPort& port)
+ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& options,
+                       const SerialServerStart& start, SerialPort& port)
     : portName_(start.port),
       port_(port),
       log_(nameInLog(options, start), options.arguments.logLevel),
@@ -33,9 +35,11 @@ ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& opt
     log_->warn("the line is lost: {}", because);
     server_.countAlarm();
   });
-  log_->info(R"(serving {} ({}) as "{}" at location {}; listeners: "{}")", port.description(), options.describeLine(start.port),
-             server_.getName(), server_.location(), sniff_.getName());
-  if (port.state() == SerialPortState::unplugged) log_->warn("the line is not there yet: {}", port.unpluggedBecause());
+  log_->info(R"(serving {} ({}) as "{}" at location {}; listeners: "{}")", port.description(),
+             options.describeLine(start.port), server_.getName(), server_.location(),
+             sniff_.getName());
+  if (port.state() == SerialPortState::unplugged)
+    log_->warn("the line is not there yet: {}", port.unpluggedBecause());
 }
 
 ServedPort::~ServedPort() {

@@ -8,11 +8,12 @@
 #include <string>
 
 #include <mpf/drivers/serial/serial_port.h>
-#include <mpf/server/programs/serial_server/serial_server.h>
-#include <mpf/server/programs/serial_server/sniff_server.h>
-#include <mpf/server/programs/serial_server/start_options.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/server/programs/serving_thread.h>
+
+#include "server/programs/serial_server/serial_server.h"
+#include "server/programs/serial_server/sniff_server.h"
+#include "server/programs/serial_server/start_options.h"
+#include "server/programs/server_log.h"
+#include "server/programs/serving_thread.h"
 
 namespace mpf {
 
@@ -21,12 +22,14 @@ class ServedPort {
   // Opens both servers and says so.
   //   port    outlives this
   //   throws  as MessageServer
-  ServedPort(const Backplane& backplane, const SerialStartOptions& options, const SerialServerStart& start, SerialPort& port);
+  ServedPort(const Backplane& backplane, const SerialStartOptions& options,
+             const SerialServerStart& start, SerialPort& port);
   ~ServedPort();
   ServedPort(const ServedPort&) = delete;
   ServedPort& operator=(const ServedPort&) = delete;
 
-  // Serves, until stop(). `failed` is called, on any thread, when one of both servers ended for another reason, which the log says.
+  // Serves, until stop(). `failed` is called, on any thread, when one of both servers ended for
+  // another reason, which the log says.
   void start(std::function<void()> failed);
   void stop() { serial_.stop(); }
   // Waits for its end.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/sniff_queue.h>
+#include "server/programs/serial_server/sniff_queue.h"
 
 #include <algorithm>
 #include <utility>
 
 namespace mpf {
 
-SniffQueue::SniffQueue(const SniffBatching& batching) : batching_(batching) { bytes_.reserve(batching_.maxBytes); }
+SniffQueue::SniffQueue(const SniffBatching& batching) : batching_(batching) {
+  bytes_.reserve(batching_.maxBytes);
+}
 
 bool SniffQueue::push(std::span<const PeekedByte> bytes) {
   const std::lock_guard lock(mutex_);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/sniff_server.h>
+#include "server/programs/serial_server/sniff_server.h"
 
 #include <algorithm>
 #include <cstdint>
 #include <span>
 #include <utility>
 
-#include <mpf/server/programs/hardware/other_types.h>
+#include "server/programs/hardware/other_types.h"
 
 namespace mpf {
 namespace {
@@ -14,8 +14,8 @@ namespace {
 using serial::SniffKind;
 using serial::SniffRecord;
 
-// Listeners are in no hurry, and a thread that spun would take a processor from the line. For each of them some 250 messages may wait, with
-// bodies of at most 16 MB.
+// Listeners are in no hurry, and a thread that spun would take a processor from the line. For each
+// of them some 250 messages may wait, with bodies of at most 16 MB.
 ServerOptions optionsLike(ServerOptions options) {
   options.queueSize = 128;
   options.maxPoolBytes = 16ULL << 20;
@@ -39,15 +39,23 @@ void writeRecords(std::span<const PeekedByte> bytes, std::vector<char>& records)
 }
 
 // As much of a count as a field can tell.
-std::int32_t tellable(std::uint64_t count) noexcept { return static_cast<std::int32_t>(std::min<std::uint64_t>(count, INT32_MAX)); }
+std::int32_t tellable(std::uint64_t count) noexcept {
+  return static_cast<std::int32_t>(std::min<std::uint64_t>(count, INT32_MAX));
+}
 
 }  // namespace
 
-SniffServer::SniffServer(const Backplane& backplane, const std::string& server, const ServerOptions& like, SerialPort& port,
-                         const ServerLog& log, const SniffBatching& batching)
-    : log_(log), port_(port), queue_(batching), server_(backplane, server + std::string(serial::sniffSuffix), optionsLike(like)) {
+SniffServer::SniffServer(const Backplane& backplane, const std::string& server,
+                         const ServerOptions& like, SerialPort& port, const ServerLog& log,
+                         const SniffBatching& batching)
+    : log_(log),
+      port_(port),
+      queue_(batching),
+      server_(backplane, server + std::string(serial::sniffSuffix), optionsLike(like)) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
-  answerOtherTypes<Int32>(server_, [this](MessageType type) { log_->debug("listeners: a request of type {}: status -1", toString(type)); });
+  answerOtherTypes<Int32>(server_, [this](MessageType type) {
+    log_->debug("listeners: a request of type {}: status -1", toString(type));
+  });
 }
 
 void SniffServer::start(std::function<void()> failed) {
@@ -113,11 +121,14 @@ void SniffServer::answer(const Int32Message& request, std::int32_t status, std::
 }
 
 std::vector<SniffServer::Listener>::iterator SniffServer::find(std::uint64_t client) {
-  return std::find_if(listeners_.begin(), listeners_.end(), [&](const Listener& listener) { return listener.client == client; });
+  return std::find_if(listeners_.begin(), listeners_.end(),
+                      [&](const Listener& listener) { return listener.client == client; });
 }
 
 void SniffServer::forgetGone() {
-  std::erase_if(listeners_, [&](const Listener& listener) { return server_.clientOf(listener.request) != listener.client; });
+  std::erase_if(listeners_, [&](const Listener& listener) {
+    return server_.clientOf(listener.request) != listener.client;
+  });
   followCount();
 }
 

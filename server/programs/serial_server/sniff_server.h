@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// SniffServer: lets clients see every byte of a serial line, as schema/serial_sniff.h promises them.
+// SniffServer: lets clients see every byte of a serial line, as include/mpf/serial_sniff.h promises
+// them.
 //
 //   port's thread ── tap ──► SniffQueue ── own thread ──► a batch ──► listener 1, listener 2, ...
 //
 // The tap is attached while somebody listens, and the thread sleeps while there is nothing to tell.
 //
-// Threads  its own, which waits for the line and for nobody else. The port's thread copies bytes into a queue and rings.
+// Threads  its own, which waits for the line and for nobody else. The port's thread copies bytes
+//          into a queue and rings.
 // Crash    a listener that dies is forgotten as soon as its death is known.
 // Trust    a listener that does not take its messages loses bytes, and is told how many.
 #pragma once
@@ -17,11 +19,12 @@
 #include <vector>
 
 #include <mpf/drivers/serial/serial_port.h>
-#include <mpf/schema/serial_sniff.h>
-#include <mpf/server/message_server.h>
-#include <mpf/server/programs/serial_server/sniff_queue.h>
-#include <mpf/server/programs/server_log.h>
-#include <mpf/server/programs/serving_thread.h>
+#include <mpf/message_server.h>
+#include <mpf/serial_sniff.h>
+
+#include "server/programs/serial_server/sniff_queue.h"
+#include "server/programs/server_log.h"
+#include "server/programs/serving_thread.h"
 
 namespace mpf {
 
@@ -30,8 +33,8 @@ class SniffServer {
   // Serves "<server>.sniff" at the location and with the rights of `like`.
   //   port    must outlive this
   //   throws  as MessageServer
-  SniffServer(const Backplane& backplane, const std::string& server, const ServerOptions& like, SerialPort& port, const ServerLog& log,
-              const SniffBatching& batching = {});
+  SniffServer(const Backplane& backplane, const std::string& server, const ServerOptions& like,
+              SerialPort& port, const ServerLog& log, const SniffBatching& batching = {});
   ~SniffServer();
   SniffServer(const SniffServer&) = delete;
   SniffServer& operator=(const SniffServer&) = delete;
@@ -40,7 +43,9 @@ class SniffServer {
   void start(std::function<void()> failed);
   [[nodiscard]] const std::string& getName() const noexcept { return server_.getName(); }
   // How many clients listen now.
-  [[nodiscard]] std::size_t listeners() const noexcept { return count_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::size_t listeners() const noexcept {
+    return count_.load(std::memory_order_relaxed);
+  }
 
  private:
   struct Listener {
@@ -65,9 +70,9 @@ class SniffServer {
   SniffQueue queue_;
   MessageServer server_;
   std::vector<Listener> listeners_;  // this and below: the thread's
-  std::optional<PeekTap> tap_;       // there while somebody listens; ends before what it pushes to
-  std::vector<PeekedByte> bytes_;    // of the batch that is being delivered
-  std::vector<char> records_;        // the same, as listeners get it
+  std::optional<PeekTap> tap_;  // there while somebody listens; ends before what it pushes to
+  std::vector<PeekedByte> bytes_;  // of the batch that is being delivered
+  std::vector<char> records_;  // the same, as listeners get it
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
   ServingThread thread_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/server/programs/serial_server/start_options.h>
+#include "server/programs/serial_server/start_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <string_view>
 
-#include <mpf/base/command_line.h>
-#include <mpf/schema/text.h>
-#include <mpf/server/programs/hardware/words.h>
-#include <mpf/shm/link.h>
+#include "base/command_line.h"
+#include "schema/text.h"
+#include "server/programs/hardware/option_fields.h"
+#include "shm/link.h"
 
 namespace mpf {
 namespace {
@@ -27,18 +27,21 @@ std::optional<std::string> tryReadEom(const std::string& text) {
 }
 
 // As far as the positional arguments' checks go.
-SerialServerStart readServer(Words& words) {
+SerialServerStart readServer(OptionFields& words) {
   SerialServerStart start;
   start.server = words.word("server");
   start.port = words.word("port");
-  const int bufferBytes = words.number("longest answer", static_cast<int>(start.serial.bufferBytes));
+  const int bufferBytes =
+      words.number("longest answer", static_cast<int>(start.serial.bufferBytes));
   if (bufferBytes < 1 || bufferBytes > kLongestAnswer)
-    words.complain(fmt::format("longest answer {}: use 1 to {} bytes", bufferBytes, kLongestAnswer));
+    words.complain(
+        fmt::format("longest answer {}: use 1 to {} bytes", bufferBytes, kLongestAnswer));
   start.serial.bufferBytes = static_cast<std::size_t>(bufferBytes);
   start.queueSize = words.queueSize();
   const auto eom = words.word("end of message", "\\r");
   const auto bytes = tryReadEom(eom);
-  if (!bytes) words.complain(fmt::format("end of message {}: use 0 to 2 bytes, with escapes as in C", eom));
+  if (!bytes)
+    words.complain(fmt::format("end of message {}: use 0 to 2 bytes, with escapes as in C", eom));
   start.serial.eom = *bytes;
   start.serial.circularBuffer = words.number("circular", 1) != 0;
   return start;
@@ -55,8 +58,8 @@ std::string SerialStartOptions::describeLine(const std::string& port) const {
   if (tcpAddressOf(port)) return "a terminal server";
   const auto* const octalPort = octal.find(port);
   const auto& line = octalPort != nullptr ? octalPort->settings : settings;
-  return fmt::format("{} baud, {}{}{}, {} flow control", line.baud, line.bitsPerChar, line.parity, line.stopBits,
-                     line.flowControl == 'H' ? "hardware" : "no");
+  return fmt::format("{} baud, {}{}{}, {} flow control", line.baud, line.bitsPerChar, line.parity,
+                     line.stopBits, line.flowControl == 'H' ? "hardware" : "no");
 }
 
 // What options say of each other.
@@ -66,49 +69,68 @@ std::string SerialStartOptions::problem() const {
     const auto& start = servers[i];
     if (start.port.empty()) return "port is required";
     const auto sames =
-        std::count_if(servers.begin(), servers.end(), [&](const SerialServerStart& other) { return other.port == start.port; });
-    if (sames > 1) return fmt::format("port {}: has two servers, and a line is one's own", start.port);
+        std::count_if(servers.begin(), servers.end(),
+                      [&](const SerialServerStart& other) { return other.port == start.port; });
+    if (sames > 1)
+      return fmt::format("port {}: has two servers, and a line is one's own", start.port);
   }
   for (const auto& port : octal.ports) {
     if (octal.findUart(port.module) == nullptr)
       return fmt::format("--octal-port: {}: no --octal-uart is called {}", port.name, port.module);
-    if (octal.find(port.name) != &port) return fmt::format("--octal-port: {}: two ports have that name", port.name);
+    if (octal.find(port.name) != &port)
+      return fmt::format("--octal-port: {}: two ports have that name", port.name);
   }
   return {};
 }
 
 bool SerialStartOptions::hasTerminal() const {
-  return std::ranges::any_of(
-      servers, [&](const SerialServerStart& start) { return !tcpAddressOf(start.port) && octal.find(start.port) == nullptr; });
+  return std::ranges::any_of(servers, [&](const SerialServerStart& start) {
+    return !tcpAddressOf(start.port) && octal.find(start.port) == nullptr;
+  });
 }
 
 std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
-  CLI::App app("mpf-serial-server - serves serial lines to the clients of a backplane", "mpf-serial-server");
+  CLI::App app("mpf-serial-server - serves serial lines to the clients of a backplane",
+               "mpf-serial-server");
   SerialServerStart first;
   std::vector<SerialServerStart> others;
   std::string eom = "\\r";
   app.add_option("server", first.server, "Name under which clients find it");
-  app.add_option("port", first.port, "Terminal device, tcp:HOST:PORT of a terminal server, or PORT of --octal-port");
+  app.add_option("port", first.port,
+                 "Terminal device, tcp:HOST:PORT of a terminal server, or PORT of --octal-port");
   app.add_option("bufsize", first.serial.bufferBytes, "Longest answer [bytes]")
       ->capture_default_str()
       ->check(wholeNumber(1, kLongestAnswer));
   app.add_option("queuesize", first.queueSize, "Requests of one client that may wait")
       ->capture_default_str()
       ->check(wholeNumber(1, kLongestQueue));
-  app.add_option("eomstr", eom, "End of message of the instrument: 0 to 2 bytes, with escapes as in C")->capture_default_str();
-  app.add_option("circular", first.serial.circularBuffer, "1: keep what is received while nobody reads; 0: drop it")->capture_default_str();
-  addWords(app, "--server", kServerForm, "One more server, as the arguments above say one. Any number",
-           [&others](Words& words) { others.push_back(readServer(words)); });
+  app.add_option("eomstr", eom,
+                 "End of message of the instrument: 0 to 2 bytes, with escapes as in C")
+      ->capture_default_str();
+  app.add_option("circular", first.serial.circularBuffer,
+                 "1: keep what is received while nobody reads; 0: drop it")
+      ->capture_default_str();
+  addWords(app, "--server", kServerForm,
+           "One more server, as the arguments above say one. Any number",
+           [&others](OptionFields& words) { others.push_back(readServer(words)); });
   const std::array ofTerminals{
-      app.add_option("--baud", settings.baud, "Speed of terminal devices [bit/s]")->capture_default_str(),
-      app.add_option("--parity", settings.parity, "Parity of terminal devices: E, O or N")->capture_default_str(),
-      app.add_option("--stop-bits", settings.stopBits, "Stop bits of terminal devices: 1 or 2")->capture_default_str(),
-      app.add_option("--bits", settings.bitsPerChar, "Bits per character of terminal devices, 5 to 8")->capture_default_str(),
-      app.add_option("--flow", settings.flowControl, "Flow control of terminal devices: H (hardware) or N")->capture_default_str()};
+      app.add_option("--baud", settings.baud, "Speed of terminal devices [bit/s]")
+          ->capture_default_str(),
+      app.add_option("--parity", settings.parity, "Parity of terminal devices: E, O or N")
+          ->capture_default_str(),
+      app.add_option("--stop-bits", settings.stopBits, "Stop bits of terminal devices: 1 or 2")
+          ->capture_default_str(),
+      app.add_option("--bits", settings.bitsPerChar,
+                     "Bits per character of terminal devices, 5 to 8")
+          ->capture_default_str(),
+      app.add_option("--flow", settings.flowControl,
+                     "Flow control of terminal devices: H (hardware) or N")
+          ->capture_default_str()};
   octal.addTo(app);
   limits.addTo(app);
   hardware.addTo(app);
-  app.get_option("--wait")->description("Start even if the line or its board is not there, and wait for it");
+  app.get_option("--wait")->description(
+      "Start even if the line or its board is not there, and wait for it");
   arguments.addTo(app);
   app.footer(
       "The old commands:\n"
@@ -118,21 +140,29 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
       "Examples:\n"
       "  mpf-serial-server dmm /dev/ttyS0 1000 20 '\\r\\n' 1 --baud 19200\n"
       "  mpf-serial-server --carrier ipac=model --octal-uart UART0,ipac,IP_a,8,100\n"
-      "    --octal-port 'UART0[0],UART0,0,9600,N,1,8,N' --server 'a-Serial[0],UART0[0],1000,20,\\r,1'\n"
-      "    --octal-port 'UART0[1],UART0,1,38400,E,1,7,N' --server 'a-Serial[1],UART0[1],1000,20,\\r\\n,1'");
+      "    --octal-port 'UART0[0],UART0,0,9600,N,1,8,N' --server "
+      "'a-Serial[0],UART0[0],1000,20,\\r,1'\n"
+      "    --octal-port 'UART0[1],UART0,1,38400,E,1,7,N' --server "
+      "'a-Serial[1],UART0[1],1000,20,\\r\\n,1'");
   if (const auto status = parseCommandLine(app, argc, argv)) return status;
   const auto bytes = tryReadEom(eom);
-  if (!bytes) return refuseArguments(app.get_name(), "eomstr: " + eom + ": use 0 to 2 bytes, with escapes as in C");
+  if (!bytes)
+    return refuseArguments(app.get_name(),
+                           "eomstr: " + eom + ": use 0 to 2 bytes, with escapes as in C");
   first.serial.eom = *bytes;
   if (!first.server.empty()) servers.push_back(first);
   servers.insert(servers.end(), others.begin(), others.end());
   for (auto& start : servers) start.serial.limits = limits;
   if (const auto why = problem(); !why.empty()) return refuseArguments(app.get_name(), why);
-  const auto useless = std::ranges::find_if(ofTerminals, [](const CLI::Option* option) { return option->count() > 0; });
+  const auto useless = std::ranges::find_if(
+      ofTerminals, [](const CLI::Option* option) { return option->count() > 0; });
   if (useless != ofTerminals.end() && !hasTerminal()) {
-    return refuseArguments(app.get_name(), fmt::format("{} is for terminal devices, and no port is one: --octal-port says it of its port, "
-                                                       "and a terminal server keeps its settings itself",
-                                                       (*useless)->get_name()));
+    return refuseArguments(
+        app.get_name(),
+        fmt::format(
+            "{} is for terminal devices, and no port is one: --octal-port says it of its port, "
+            "and a terminal server keeps its settings itself",
+            (*useless)->get_name()));
   }
   return std::nullopt;
 }

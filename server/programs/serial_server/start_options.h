@@ -7,10 +7,11 @@
 #include <vector>
 
 #include <mpf/drivers/serial/serial_settings.h>
-#include <mpf/server/programs/hardware/hardware.h>
-#include <mpf/server/programs/serial_server/octal_options.h>
-#include <mpf/server/programs/serial_server/serial_server.h>
-#include <mpf/server/programs/server_arguments.h>
+
+#include "server/programs/hardware/hardware.h"
+#include "server/programs/serial_server/octal_options.h"
+#include "server/programs/serial_server/serial_server.h"
+#include "server/programs/server_arguments.h"
 
 namespace mpf {
 
@@ -30,7 +31,8 @@ struct SerialStartOptions {
   Hardware hardware;  // --carrier, --wait
   ServerArguments arguments;
 
-  // "9600 baud, 8N1, no flow control"; of a terminal server's port, whose settings it keeps itself, "a terminal server".
+  // "9600 baud, 8N1, no flow control"; of a terminal server's port, whose settings it keeps itself,
+  // "a terminal server".
   [[nodiscard]] std::string describeLine(const std::string& port) const;
   // The exit status when the program shall end: --help, or a line that is wrong.
   std::optional<int> parse(int argc, char** argv);

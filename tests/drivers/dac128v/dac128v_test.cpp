@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/dac128v/dac128v.h>
+#include <mpf/drivers/dac128v.h>
 
 #include <atomic>
 #include <barrier>
@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <thread>
 
-#include <mpf/drivers/dac128v/dac128v_model.h>
-#include <mpf/tests/drivers/industry_pack/plain_model.h>
-#include <mpf/tests/support/model_carrier.h>
+#include "drivers/dac128v/dac128v_model.h"
+#include "tests/drivers/industry_pack/plain_model.h"
+#include "tests/support/model_carrier.h"
 
 namespace mpf::test {
 namespace {
@@ -30,7 +30,9 @@ class Dac128vTest : public testing::Test {
 
   Dac128vModel& plug() { return carrier_.plug("IP_a", std::make_unique<Dac128vModel>(kRanges)); }
   // The contents of the register, read without the driver.
-  int code(int channel) { return carrier_.site(0).io().read16(2 * static_cast<std::size_t>(channel)) & 0xfff; }
+  int code(int channel) {
+    return carrier_.site(0).io().read16(2 * static_cast<std::size_t>(channel)) & 0xfff;
+  }
 };
 
 TEST_F(Dac128vTest, IsInTheMiddleAfterPowerUpAndStaysThere) {
@@ -41,9 +43,11 @@ TEST_F(Dac128vTest, IsInTheMiddleAfterPowerUpAndStaysThere) {
 }
 
 TEST_F(Dac128vTest, GivesEachChannelItsOwnCode) {
-  for (int channel = 0; channel < Dac128v::kChannels; ++channel) EXPECT_EQ(dac_.tryWrite(channel, 100 * channel), Dac128vStatus::success);
+  for (int channel = 0; channel < Dac128v::kChannels; ++channel)
+    EXPECT_EQ(dac_.tryWrite(channel, 100 * channel), Dac128vStatus::success);
 
-  for (int channel = 0; channel < Dac128v::kChannels; ++channel) EXPECT_EQ(dac_.tryRead(channel), 100 * channel);
+  for (int channel = 0; channel < Dac128v::kChannels; ++channel)
+    EXPECT_EQ(dac_.tryRead(channel), 100 * channel);
 }
 
 TEST_F(Dac128vTest, TakesBothEndsOfItsRange) {
@@ -56,7 +60,8 @@ TEST_F(Dac128vTest, TakesBothEndsOfItsRange) {
 TEST_F(Dac128vTest, LeavesTheRegisterWhereTheCodeOrTheChannelIsNone) {
   ASSERT_EQ(dac_.tryWrite(7, 1234), Dac128vStatus::success);
 
-  for (const int code : {-1, 4096, 0x10000, INT32_MIN, INT32_MAX}) EXPECT_EQ(dac_.tryWrite(7, code), Dac128vStatus::outOfRange) << code;
+  for (const int code : {-1, 4096, 0x10000, INT32_MIN, INT32_MAX})
+    EXPECT_EQ(dac_.tryWrite(7, code), Dac128vStatus::outOfRange) << code;
   for (const int channel : {-1, 8, INT32_MIN, INT32_MAX}) {
     EXPECT_EQ(dac_.tryWrite(channel, 0), Dac128vStatus::noChannel) << channel;
     EXPECT_EQ(dac_.tryRead(channel), std::nullopt) << channel;
@@ -67,7 +72,8 @@ TEST_F(Dac128vTest, LeavesTheRegisterWhereTheCodeOrTheChannelIsNone) {
 }
 
 TEST_F(Dac128vTest, GivesAllChannelsWhatTheyHadWhenTheModuleLostIt) {
-  for (const int channel : {1, 5, 6}) ASSERT_EQ(dac_.tryWrite(channel, 100 * channel), Dac128vStatus::success);
+  for (const int channel : {1, 5, 6})
+    ASSERT_EQ(dac_.tryWrite(channel, 100 * channel), Dac128vStatus::success);
   carrier_.unplug("IP_a");
   plug();
 
@@ -98,7 +104,8 @@ TEST_F(Dac128vTest, WritesNothingToAModuleThatIsNoDac) {
 
   EXPECT_EQ(dac_.tryWrite(2, 7), Dac128vStatus::gone);
 
-  for (std::size_t offset = 0; offset < 16; offset += 2) EXPECT_EQ(other.read(DeviceModel::Space::io, offset, DeviceModel::kBoth), 0);
+  for (std::size_t offset = 0; offset < 16; offset += 2)
+    EXPECT_EQ(other.read(DeviceModel::Space::io, offset, DeviceModel::kBoth), 0);
 }
 
 // This also holds for the first write, when the contents of the registers are unknown.
@@ -133,7 +140,8 @@ TEST_F(Dac128vTest, ReadsBackItsOwnWriteWhenTwoThreadsWriteAtOnce) {
   std::barrier start(2);
   const auto write = [&](int code) {
     start.arrive_and_wait();
-    for (int i = 0; i < 100'000; ++i) failures += dac_.tryWrite(0, code) != Dac128vStatus::success ? 1 : 0;
+    for (int i = 0; i < 100'000; ++i)
+      failures += dac_.tryWrite(0, code) != Dac128vStatus::success ? 1 : 0;
   };
   {
     const std::jthread other([&] { write(1); });
@@ -144,7 +152,8 @@ TEST_F(Dac128vTest, ReadsBackItsOwnWriteWhenTwoThreadsWriteAtOnce) {
 
 TEST(Dac128vModel, TellsWhatItsOutputsGive) {
   std::vector<std::pair<int, double>> told;
-  Dac128vModel model(kRanges, [&](int channel, double volts) { told.emplace_back(channel, volts); });
+  Dac128vModel model(kRanges,
+                     [&](int channel, double volts) { told.emplace_back(channel, volts); });
   EXPECT_EQ(told.size(), 8u);
   EXPECT_EQ(told[7], std::pair(7, 2.5));
   told.clear();
@@ -167,7 +176,8 @@ TEST(Dac128vRanges, AreWhatJumpersCanSay) {
   EXPECT_EQ(parseDac128vRanges("-10to10")[1], (Dac128vRange{-10, 10}));
   EXPECT_EQ(parseDac128vRanges("-5to+5,0to10")[1], (Dac128vRange{0, 10}));
   EXPECT_EQ(parseDac128vRanges("-5to+5,0to10")[0], (Dac128vRange{-5, 5}));
-  for (const auto* const text : {"", "10", "10to-10", "0to0", "-3to3", "0to10,", "0to10,0to5,0to5", "0to10V"})
+  for (const auto* const text :
+       {"", "10", "10to-10", "0to0", "-3to3", "0to10,", "0to10,0to5,0to5", "0to10V"})
     EXPECT_THROW(static_cast<void>(parseDac128vRanges(text)), std::invalid_argument) << text;
 }
 

@@ -10,18 +10,19 @@
 #include <mutex>
 #include <string>
 
-#include <mpf/drivers/digital_io/digital_io.h>
-#include <mpf/drivers/digital_io/digital_io_model.h>
-#include <mpf/tests/drivers/industry_pack/plain_model.h>
-#include <mpf/tests/support/model_carrier.h>
-#include <mpf/tests/support/watchdog.h>
+#include "drivers/digital_io/digital_io.h"
+#include "drivers/digital_io/digital_io_model.h"
+#include "tests/drivers/industry_pack/plain_model.h"
+#include "tests/support/model_carrier.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
 // Records all reports of the driver.
 class DigitalIoListener {
  public:
-  explicit DigitalIoListener(DigitalIo& io) : subscription_(io.subscribe([this](const DigitalIoNews& news) { hear(news); })) {}
+  explicit DigitalIoListener(DigitalIo& io)
+      : subscription_(io.subscribe([this](const DigitalIoNews& news) { hear(news); })) {}
 
   // Waits for the next report.
   DigitalIoNews next() {
@@ -69,7 +70,8 @@ class DigitalIoTest : public testing::Test {
 
   // Starts a module with this name and its driver, in place of the previous one, whose listeners
   // must have ended.
-  DigitalIo& start(const std::string& name, const DigitalIoOptions& options = {.pollEvery = kNever}) {
+  DigitalIo& start(const std::string& name,
+                   const DigitalIoOptions& options = {.pollEvery = kNever}) {
     io_.reset();
     carrier_.unplug("IP_a");
     plug(name);

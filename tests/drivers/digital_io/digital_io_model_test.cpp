@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The device model, register by register; digital_io_kind.h describes the registers.
 #include <mpf/drivers/industry_pack/model_wires.h>
-#include <mpf/tests/support/temporary_folder.h>
 
 #include "digital_io_fixture.h"
+#include "tests/support/temporary_folder.h"
 
 namespace mpf::test {
 namespace {
@@ -14,8 +14,12 @@ using testing::Pair;
 
 class DigitalIoModelTest : public testing::Test {
  protected:
-  std::uint16_t read(std::size_t word) { return model_.read(DeviceModel::Space::io, 2 * word, DeviceModel::kBoth); }
-  void write(std::size_t word, std::uint16_t value) { model_.write(DeviceModel::Space::io, 2 * word, value, DeviceModel::kBoth); }
+  std::uint16_t read(std::size_t word) {
+    return model_.read(DeviceModel::Space::io, 2 * word, DeviceModel::kBoth);
+  }
+  void write(std::size_t word, std::uint16_t value) {
+    model_.write(DeviceModel::Space::io, 2 * word, value, DeviceModel::kBoth);
+  }
   void watchInterrupt() {
     model_.connectInterrupts([this](int number, bool active) {
       EXPECT_EQ(number, 0);
@@ -87,22 +91,27 @@ TEST_F(DigitalIoModelTest, HasNoInterruptRegistersWhereItCannotInterrupt) {
 
 TEST(DigitalIoModel, TellsWhatItsOutputsGive) {
   std::vector<std::pair<int, double>> told;
-  DigitalIoModel model(*findDigitalIoKind("IP-Unidig-HV-16I8O"), [&](int bit, double volts) { told.emplace_back(bit, volts); });
+  DigitalIoModel model(*findDigitalIoKind("IP-Unidig-HV-16I8O"),
+                       [&](int bit, double volts) { told.emplace_back(bit, volts); });
   EXPECT_EQ(told.size(), 8u);
   told.clear();
 
   model.write(DeviceModel::Space::io, 2, 0xee, DeviceModel::kLow);
   model.write(DeviceModel::Space::io, 2, 0x0f, DeviceModel::kBoth);
 
-  EXPECT_THAT(told, ElementsAre(Pair(16, 0.0), Pair(20, 0.0), Pair(16, 5.0), Pair(21, 0.0), Pair(22, 0.0), Pair(23, 0.0)));
+  EXPECT_THAT(told, ElementsAre(Pair(16, 0.0), Pair(20, 0.0), Pair(16, 5.0), Pair(21, 0.0),
+                                Pair(22, 0.0), Pair(23, 0.0)));
 }
 
 // Two modules, as in two programs: inputs of one follow outputs of the other.
 TEST_F(DigitalIoTest, FollowsAnotherModuleOverWires) {
   const TemporaryFolder folder;
   ModelWires wires(folder.file("wires"));
-  DigitalIoModel other(*findDigitalIoKind("DIO316I"), [&](int bit, double volts) { wires.wire("dio." + std::to_string(bit)).set(volts); });
-  auto& io = start("IP-Unidig-I", {.pollEvery = kNever, .vector = 1, .rising = 0xf, .falling = 0xf});
+  DigitalIoModel other(*findDigitalIoKind("DIO316I"), [&](int bit, double volts) {
+    wires.wire("dio." + std::to_string(bit)).set(volts);
+  });
+  auto& io =
+      start("IP-Unidig-I", {.pollEvery = kNever, .vector = 1, .rising = 0xf, .falling = 0xf});
   model_->connect(2, [wire = wires.wire("dio.17")] { return wire.get(); });
   const ModelWireWatcher watcher(wires, [&] { model_->look(); });
   other.write(DeviceModel::Space::io, 2 * at::kSystranEnable, 0xf, DeviceModel::kBoth);

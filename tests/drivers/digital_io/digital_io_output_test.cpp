@@ -81,7 +81,8 @@ TEST_F(DigitalIoTest, EnablesSwitchedDriversInTheirOwnRegister) {
 }
 
 TEST_F(DigitalIoTest, SwitchesTheDriversOfOpticalModelsOn) {
-  for (const auto* const name : {"IP-Unidig-O-24IO", "IP-Unidig-I-O-24IO", "IP-Unidig-O-12I12O", "IP-Unidig-I-O-12I12O"}) {
+  for (const auto* const name :
+       {"IP-Unidig-O-24IO", "IP-Unidig-I-O-24IO", "IP-Unidig-O-12I12O", "IP-Unidig-I-O-12I12O"}) {
     ASSERT_EQ(start(name).tryClearBits(0x800000), kSuccess) << name;
     EXPECT_EQ(model_->driven() & 0x800000, 0x800000u) << name;
   }
@@ -99,11 +100,12 @@ TEST_F(DigitalIoTest, SetsUpTheSystran) {
 }
 
 TEST_F(DigitalIoTest, RefusesBitsThatAModelCannotWriteAndChangesNothing) {
-  for (const auto& [name, outputs] : std::vector<std::pair<const char*, std::uint32_t>>{{"IP-Unidig", 0xffffff},
-                                                                                        {"IP-Unidig-HV-16I8O", 0xff0000},
-                                                                                        {"IP-Unidig-HV-8I16O", 0xffff00},
-                                                                                        {"IP-Unidig-O-12I12O", 0xfff000},
-                                                                                        {"IP-Unidig-O-24I", 0}}) {
+  for (const auto& [name, outputs] :
+       std::vector<std::pair<const char*, std::uint32_t>>{{"IP-Unidig", 0xffffff},
+                                                          {"IP-Unidig-HV-16I8O", 0xff0000},
+                                                          {"IP-Unidig-HV-8I16O", 0xffff00},
+                                                          {"IP-Unidig-O-12I12O", 0xfff000},
+                                                          {"IP-Unidig-O-24I", 0}}) {
     auto& io = start(name);
     EXPECT_EQ(io.tryClearBits(0xffffffff), DigitalIoStatus::noSuchBits) << name;
     for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
@@ -120,7 +122,8 @@ TEST_F(DigitalIoTest, RefusesBitsThatAModelCannotWriteAndChangesNothing) {
 // The first EPICS driver omitted one of the four models, had another one twice, and accepted any
 // value.
 TEST_F(DigitalIoTest, SetsTheThresholdOfModelsThatHaveOne) {
-  for (const auto* const name : {"IP-Unidig-HV-16I8O", "IP-Unidig-HV-8I16O", "IP-Unidig-I-HV-16I8O", "IP-Unidig-I-HV-8I16O"}) {
+  for (const auto* const name : {"IP-Unidig-HV-16I8O", "IP-Unidig-HV-8I16O", "IP-Unidig-I-HV-16I8O",
+                                 "IP-Unidig-I-HV-8I16O"}) {
     auto& io = start(name);
     EXPECT_EQ(threshold(), 166) << name;
     model_->connect(3, [] { return 24.0; });
@@ -136,7 +139,8 @@ TEST_F(DigitalIoTest, SetsTheThresholdOfModelsThatHaveOne) {
 
 // Word e of these models is the threshold: clearing interrupts must not change it.
 TEST_F(DigitalIoTest, KeepsTheThresholdWhileItServesInterrupts) {
-  auto& io = start("IP-Unidig-I-HV-16I8O", {.pollEvery = kNever, .vector = 5, .rising = 0xffffff, .falling = 0xffffff});
+  auto& io = start("IP-Unidig-I-HV-16I8O",
+                   {.pollEvery = kNever, .vector = 5, .rising = 0xffffff, .falling = 0xffffff});
   DigitalIoListener listener(io);
   ASSERT_EQ(io.trySetThreshold(100), kSuccess);
   model_->setInputs(0xffff, 0);
@@ -163,7 +167,8 @@ TEST_F(DigitalIoTest, SaysWhenNothingAnswers) {
     EXPECT_EQ(io.tryClearBits(0xff0000), DigitalIoStatus::gone);
     EXPECT_EQ(io.tryReadInputs(), std::nullopt);
     EXPECT_EQ(io.tryReadOutputs(), std::nullopt);
-    EXPECT_EQ(io.trySetThreshold(1), name == std::string("DIO316I") ? DigitalIoStatus::noThreshold : DigitalIoStatus::gone);
+    EXPECT_EQ(io.trySetThreshold(1), name == std::string("DIO316I") ? DigitalIoStatus::noThreshold
+                                                                    : DigitalIoStatus::gone);
     carrier_.setFault("IP_a", ModelFault::none);
     EXPECT_EQ(io.trySetBits(0xff0000), kSuccess);
   }
@@ -259,7 +264,8 @@ TEST_F(DigitalIoTest, TellsABrokenRegisterOnce) {
 }
 
 TEST_F(DigitalIoTest, WritesNothingToAModuleThatIsNoneOfDigitalLines) {
-  auto& io = start("IP-Unidig-I-D", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff, .falling = 0xff});
+  auto& io = start("IP-Unidig-I-D",
+                   {.pollEvery = kNever, .vector = 0x74, .rising = 0xff, .falling = 0xff});
   ASSERT_EQ(io.tryClearBits(0x3), kSuccess);
   carrier_.unplug("IP_a");
   auto& other = carrier_.plug("IP_a", std::make_unique<PlainModel>());
@@ -290,7 +296,9 @@ TEST(DigitalIoKind, KnowsAllModels) {
   for (const auto& kind : digitalIoKinds()) {
     EXPECT_EQ(findDigitalIoKind(kind.manufacturer, kind.model), &kind);
     EXPECT_EQ(findDigitalIoKind(kind.name), &kind);
-    EXPECT_EQ(kind.hasInterrupts, kind.name.find("-I-") != std::string_view::npos || kind.name.ends_with("-I")) << kind.name;
+    EXPECT_EQ(kind.hasInterrupts,
+              kind.name.find("-I-") != std::string_view::npos || kind.name.ends_with("-I"))
+        << kind.name;
     EXPECT_EQ(kind.hasThreshold, kind.name.find("HV") != std::string_view::npos) << kind.name;
   }
   EXPECT_EQ(findDigitalIoKind(kGreenSpring, 0x6d), nullptr);  // a timer

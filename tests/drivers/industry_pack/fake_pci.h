@@ -14,8 +14,8 @@
 #include <fstream>
 #include <string>
 
-#include <mpf/drivers/industry_pack/pci_device.h>
-#include <mpf/tests/support/temporary_folder.h>
+#include "drivers/industry_pack/pci_device.h"
+#include "tests/support/temporary_folder.h"
 
 namespace mpf::test {
 
@@ -31,7 +31,8 @@ class FakePci {
   }
 
   [[nodiscard]] PciPlaces places() const {
-    return {.devices = (folder_.path() / "devices").string(), .dev = (folder_.path() / "dev").string()};
+    return {.devices = (folder_.path() / "devices").string(),
+            .dev = (folder_.path() / "dev").string()};
   }
   [[nodiscard]] std::string file(const std::string& address, const std::string& name) const {
     return places().devices + "/" + address + "/" + name;
@@ -42,7 +43,8 @@ class FakePci {
   }
 
   // Adds an enabled board that is not bound to a driver.
-  void add(const std::string& address, const std::string& vendor = "0x1498", const std::string& device = "0x30c8") const {
+  void add(const std::string& address, const std::string& vendor = "0x1498",
+           const std::string& device = "0x30c8") const {
     std::filesystem::create_directories(places().devices + "/" + address);
     write(address, "vendor", vendor + "\n");
     write(address, "device", device + "\n");
@@ -56,7 +58,8 @@ class FakePci {
     write(address, "resource", windows);
     for (const int number : {0, 2, 3, 4}) {
       write(address, fmt::format("resource{}", number), "");
-      std::filesystem::resize_file(file(address, fmt::format("resource{}", number)), number == 4 ? 0x2000000 : 4096);
+      std::filesystem::resize_file(file(address, fmt::format("resource{}", number)),
+                                   number == 4 ? 0x2000000 : 4096);
     }
   }
   // Binds the board to uio_pci_generic, as /dev/uio7. A write to that file is an interrupt.
@@ -68,7 +71,8 @@ class FakePci {
   }
   void setDriver(const std::string& address, const std::string& driver) const {
     std::filesystem::create_directories(folder_.path() / "drivers" / driver);
-    std::filesystem::create_directory_symlink(folder_.path() / "drivers" / driver, file(address, "driver"));
+    std::filesystem::create_directory_symlink(folder_.path() / "drivers" / driver,
+                                              file(address, "driver"));
   }
   void interrupt() const {
     const std::uint32_t count = 1;
@@ -80,16 +84,20 @@ class FakePci {
   // Access to the registers from the side of the board. It uses the file, since another thread uses
   // the mapping.
   template <class Value>
-  [[nodiscard]] Value get(const std::string& address, const std::string& name, std::size_t offset) const {
+  [[nodiscard]] Value get(const std::string& address, const std::string& name,
+                          std::size_t offset) const {
     const FileDescriptor opened(::open(file(address, name).c_str(), O_RDONLY | O_CLOEXEC));
     Value value{};
-    EXPECT_EQ(::pread(opened.get(), &value, sizeof(value), static_cast<off_t>(offset)), ssize_t{sizeof(value)});
+    EXPECT_EQ(::pread(opened.get(), &value, sizeof(value), static_cast<off_t>(offset)),
+              ssize_t{sizeof(value)});
     return value;
   }
   template <class Value>
-  void set(const std::string& address, const std::string& name, std::size_t offset, Value value) const {
+  void set(const std::string& address, const std::string& name, std::size_t offset,
+           Value value) const {
     const FileDescriptor opened(::open(file(address, name).c_str(), O_WRONLY | O_CLOEXEC));
-    EXPECT_EQ(::pwrite(opened.get(), &value, sizeof(value), static_cast<off_t>(offset)), ssize_t{sizeof(value)});
+    EXPECT_EQ(::pwrite(opened.get(), &value, sizeof(value), static_cast<off_t>(offset)),
+              ssize_t{sizeof(value)});
   }
 
  private:

@@ -26,13 +26,14 @@ TEST_P(IdPromCrc, IsThatOfTheModule) {
 }
 
 // The CRCs that the standard defines for 12 bytes with revision, reserved and driver 0.
-INSTANTIATE_TEST_SUITE_P(Known, IdPromCrc,
-                         testing::Values(CrcVector{"Ip330", 0xa3, 0x11, 0x5a}, CrcVector{"Octal232", 0xf0, 0x22, 0x44},
-                                         CrcVector{"Octal422", 0xf0, 0x2a, 0xe9}, CrcVector{"Octal485", 0xf0, 0x48, 0x10},
-                                         CrcVector{"Ip488", 0xf0, 0x14, 0xec}, CrcVector{"Dac128v", 0x45, 0x69, 0x64},
-                                         CrcVector{"Unidig", 0xf0, 0x61, 0x2a}, CrcVector{"UnidigI", 0xf0, 0x68, 0xe6},
-                                         CrcVector{"Dio316i", 0x45, 0x63, 0x2a}),
-                         [](const auto& known) { return std::string(known.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Known, IdPromCrc,
+    testing::Values(CrcVector{"Ip330", 0xa3, 0x11, 0x5a}, CrcVector{"Octal232", 0xf0, 0x22, 0x44},
+                    CrcVector{"Octal422", 0xf0, 0x2a, 0xe9},
+                    CrcVector{"Octal485", 0xf0, 0x48, 0x10}, CrcVector{"Ip488", 0xf0, 0x14, 0xec},
+                    CrcVector{"Dac128v", 0x45, 0x69, 0x64}, CrcVector{"Unidig", 0xf0, 0x61, 0x2a},
+                    CrcVector{"UnidigI", 0xf0, 0x68, 0xe6}, CrcVector{"Dio316i", 0x45, 0x63, 0x2a}),
+    [](const auto& known) { return std::string(known.param.name); });
 
 class IdPromTest : public testing::Test {
  protected:
@@ -65,12 +66,17 @@ TEST_F(IdPromTest, OfFormatTwoIsReadBack) {
 }
 
 TEST_F(IdPromTest, TellsAWrongCrc) {
-  EXPECT_FALSE(readIdProm(space({.manufacturer = 0xf0, .model = 0x22, .isCrcRight = false}), "IP_a").isCrcRight);
+  EXPECT_FALSE(readIdProm(space({.manufacturer = 0xf0, .model = 0x22, .isCrcRight = false}), "IP_a")
+                   .isCrcRight);
 }
 
 TEST_F(IdPromTest, TellsAWrongCrcOfFormatTwo) {
-  EXPECT_FALSE(
-      readIdProm(space({.format = IdProm::Format::two, .manufacturer = 1, .bytesUsed = 26, .isCrcRight = false}), "IP_a").isCrcRight);
+  EXPECT_FALSE(readIdProm(space({.format = IdProm::Format::two,
+                                 .manufacturer = 1,
+                                 .bytesUsed = 26,
+                                 .isCrcRight = false}),
+                          "IP_a")
+                   .isCrcRight);
 }
 
 TEST_F(IdPromTest, ThatUsesMoreBytesThanThereAreIsWrong) {

@@ -8,9 +8,8 @@
 #include <semaphore>
 #include <thread>
 
-#include <mpf/tests/support/watchdog.h>
-
 #include "plain_model.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -67,7 +66,8 @@ TEST_F(InterruptThreadTest, HasThePriorityOfItsInterruptWhereItMay) {
   }
 }
 
-// The handler always has something to do: no storm ends it, and what it waits for may need the same processor.
+// The handler always has something to do: no storm ends it, and what it waits for may need the same
+// processor.
 TEST_F(InterruptThreadTest, OneThatNeverSleepsLosesItsPriority) {
   std::atomic<bool> isOrdinary{false};
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
@@ -90,7 +90,8 @@ TEST_F(InterruptThreadTest, PollsForOneThatNeverComes) {
 
 TEST_F(InterruptThreadTest, MasksAStormAndStillPolls) {
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
-  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h}, serve());
+  InterruptThread thread(carrier_.site(0).interrupt(0),
+                         {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h}, serve());
   while (thread.counters().storms == 0) std::this_thread::yield();
   const auto interrupts = thread.counters().interrupts;
   io().write16(0, 1);
@@ -126,7 +127,8 @@ TEST_F(InterruptThreadTest, ToleratesInterruptsInVainAmongUsefulOnes) {
 
 TEST_F(InterruptThreadTest, TellsOfAStormWhenItBeginsAndNotAfterEachPause) {
   std::atomic<int> told = 0;
-  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 10ms}, serve(), [&](InterruptTrouble) { ++told; });
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 10ms},
+                         serve(), [&](InterruptTrouble) { ++told; });
 
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   while (thread.counters().storms < 10) std::this_thread::yield();
@@ -137,10 +139,11 @@ TEST_F(InterruptThreadTest, TellsOfAStormWhenItBeginsAndNotAfterEachPause) {
 
 TEST_F(InterruptThreadTest, TellsOnceOfALineThatIsDead) {
   std::atomic<int> told = 0;
-  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .lateLimit = 3}, serve(), [&](InterruptTrouble trouble) {
-    EXPECT_EQ(trouble, InterruptTrouble::never);
-    ++told;
-  });
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .lateLimit = 3}, serve(),
+                         [&](InterruptTrouble trouble) {
+                           EXPECT_EQ(trouble, InterruptTrouble::never);
+                           ++told;
+                         });
   carrier_.setFault("IP_a", ModelFault::interruptsLost);
   for (int i = 0; i < 10; ++i) {
     io().write16(0, 1);
@@ -153,8 +156,10 @@ TEST_F(InterruptThreadTest, TellsOnceOfALineThatIsDead) {
 TEST_F(InterruptThreadTest, CallsNoLineDeadThatItMasksItself) {
   std::atomic<int> dead = 0;
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
-  InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h, .lateLimit = 3}, serve(),
-                         [&](InterruptTrouble trouble) { dead += trouble == InterruptTrouble::never ? 1 : 0; });
+  InterruptThread thread(
+      carrier_.site(0).interrupt(0),
+      {.pollEvery = 1ms, .stormLimit = 10, .stormPause = 1h, .lateLimit = 3}, serve(),
+      [&](InterruptTrouble trouble) { dead += trouble == InterruptTrouble::never ? 1 : 0; });
   while (thread.counters().storms == 0) std::this_thread::yield();
   for (int i = 0; i < 10; ++i) {
     io().write16(0, 1);
@@ -165,7 +170,8 @@ TEST_F(InterruptThreadTest, CallsNoLineDeadThatItMasksItself) {
 
 TEST_F(InterruptThreadTest, GoesOnAfterAStorm) {
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
-  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 1ms}, serve());
+  InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 1ms},
+                         serve());
   while (thread.counters().storms < 3) std::this_thread::yield();
   carrier_.setFault("IP_a", ModelFault::none);
   io().write16(0, 1);

@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/watchdog.h>
+#include "tests/support/temporary_folder.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -26,7 +26,8 @@ using testing::ThrowsMessage;
 class ModelWiresTest : public testing::Test {
  protected:
   void expectRefused(const std::string& words) const {
-    EXPECT_THAT([&] { const ModelWires wires(path_); }, ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path_), HasSubstr(words))));
+    EXPECT_THAT([&] { const ModelWires wires(path_); },
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path_), HasSubstr(words))));
   }
   // Overwrites bytes of the file.
   void damage(std::streamoff at, const std::string& bytes) const {
@@ -115,9 +116,12 @@ TEST_F(ModelWiresTest, AreMadeOnceByManyAtOnce) {
     }
     ModelWires wires(path_);
     for (int i = 0; i < 16; ++i) EXPECT_NE(wires.wire("w." + std::to_string(i)).get(), 0);
-    for (int i = 16; i < 1024; ++i) EXPECT_NO_THROW(static_cast<void>(wires.wire("w." + std::to_string(i))));
-    EXPECT_THAT([&] { static_cast<void>(wires.wire("one more")); }, testing::Throws<std::invalid_argument>());
-    EXPECT_THAT([&] { static_cast<void>(wires.wire("one.more")); }, ThrowsMessage<std::runtime_error>(HasSubstr("1024 wires")));
+    for (int i = 16; i < 1024; ++i)
+      EXPECT_NO_THROW(static_cast<void>(wires.wire("w." + std::to_string(i))));
+    EXPECT_THAT([&] { static_cast<void>(wires.wire("one more")); },
+                testing::Throws<std::invalid_argument>());
+    EXPECT_THAT([&] { static_cast<void>(wires.wire("one.more")); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("1024 wires")));
   }
 }
 
@@ -172,7 +176,8 @@ TEST_F(ModelWiresTest, RefuseAFolderAndAPathThatCannotBe) {
 
 TEST_F(ModelWiresTest, RefuseNamesThatAreNone) {
   ModelWires wires(path_);
-  for (const auto& name : {std::string(), std::string(44, 'n'), std::string("a b"), std::string("a\n")})
+  for (const auto& name :
+       {std::string(), std::string(44, 'n'), std::string("a b"), std::string("a\n")})
     EXPECT_THROW(static_cast<void>(wires.wire(name)), std::invalid_argument);
   EXPECT_NO_THROW(static_cast<void>(wires.wire(std::string(43, 'n'))));
 }

@@ -44,11 +44,14 @@ TEST_F(ModuleTest, IsFoundByNameAndByPlace) {
   EXPECT_EQ(module.problem(), "");
 }
 
-TEST_F(ModuleTest, ThatIsAbsentIsAClearError) { expectError(IndustryPackStatus::noModule, "no module at carrier ipac, site IP_a"); }
+TEST_F(ModuleTest, ThatIsAbsentIsAClearError) {
+  expectError(IndustryPackStatus::noModule, "no module at carrier ipac, site IP_a");
+}
 
 TEST_F(ModuleTest, OfAnotherManufacturerIsAClearError) {
   model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0x45, .model = 0x11}));
-  expectError(IndustryPackStatus::badModule, "is not the expected Acromag IP330: its manufacturer is 0x45, not 0xa3");
+  expectError(IndustryPackStatus::badModule,
+              "is not the expected Acromag IP330: its manufacturer is 0x45, not 0xa3");
 }
 
 TEST_F(ModuleTest, OfAnotherModelIsAClearError) {
@@ -58,18 +61,21 @@ TEST_F(ModuleTest, OfAnotherModelIsAClearError) {
 
 TEST_F(ModuleTest, MayBeOfAnyMakerThatItsKindHas) {
   kind_.others.push_back({.manufacturer = kSystran, .models = {0x63}});
-  model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = kSystran, .model = 0x63}));
+  model_->plug("IP_a",
+               std::make_unique<PlainModel>(IdProm{.manufacturer = kSystran, .model = 0x63}));
   EXPECT_EQ(modules_.create("dio", "ipac", "IP_a", kind_).idProm().manufacturer, kSystran);
 }
 
 TEST_F(ModuleTest, OfAMakersOtherModelIsAClearError) {
   kind_.others.push_back({.manufacturer = kSystran, .models = {0x63}});
-  model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = kSystran, .model = 0x11}));
+  model_->plug("IP_a",
+               std::make_unique<PlainModel>(IdProm{.manufacturer = kSystran, .model = 0x11}));
   expectError(IndustryPackStatus::badModule, "its model is 0x11, not 0x63");
 }
 
 TEST_F(ModuleTest, WithAWrongCrcIsAClearError) {
-  model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0xa3, .model = 0x11, .isCrcRight = false}));
+  model_->plug("IP_a", std::make_unique<PlainModel>(
+                           IdProm{.manufacturer = 0xa3, .model = 0x11, .isCrcRight = false}));
   expectError(IndustryPackStatus::badCrc, "CRC");
 }
 
@@ -100,9 +106,13 @@ TEST_F(ModuleTest, ThatIsExchangedForAnotherOfItsKindHasAProblem) {
   auto& module = modules_.create("adc", "ipac", "IP_a", kind_);
   model_->unplug("IP_a");
   model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0xa3, .model = 0x12}));
-  EXPECT_THAT(module.problem(), HasSubstr("carrier ipac, site IP_a has another Acromag IP330: 0xa3/0x12 in place of 0xa3/0x11"));
+  EXPECT_THAT(
+      module.problem(),
+      HasSubstr(
+          "carrier ipac, site IP_a has another Acromag IP330: 0xa3/0x12 in place of 0xa3/0x11"));
   model_->unplug("IP_a");
-  model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0xa3, .model = 0x11, .revision = 7}));
+  model_->plug("IP_a", std::make_unique<PlainModel>(
+                           IdProm{.manufacturer = 0xa3, .model = 0x11, .revision = 7}));
   EXPECT_EQ(module.problem(), "");
 }
 
@@ -119,7 +129,8 @@ TEST_F(ModuleTest, SharesItsVectorWithNobody) {
 
 TEST(CarriersTest, AreNoMoreThanTwentyOne) {
   IndustryPackCarriers carriers;
-  for (int i = 0; i < 21; ++i) carriers.add("ipac" + std::to_string(i), std::make_unique<ModelCarrier>());
+  for (int i = 0; i < 21; ++i)
+    carriers.add("ipac" + std::to_string(i), std::make_unique<ModelCarrier>());
   EXPECT_THROW(carriers.add("ipac0", std::make_unique<ModelCarrier>()), std::invalid_argument);
   EXPECT_THROW(carriers.add("ipac21", std::make_unique<ModelCarrier>()), IndustryPackError);
 }

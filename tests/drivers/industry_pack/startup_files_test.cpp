@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/industry_pack/carrier_parameters.h>
+#include "drivers/industry_pack/carrier_parameters.h"
 
 namespace mpf::test {
 namespace {
@@ -42,14 +42,16 @@ void addLinesOf(const std::filesystem::path& file, std::vector<CarrierLine>& fou
 
 TEST(StartupFilesTest, HaveCarriersWhoseParametersAreUnderstood) {
   const auto folder = startupFolder();
-  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no startup files of users in " << folder;
+  if (!std::filesystem::is_directory(folder))
+    GTEST_SKIP() << "no startup files of users in " << folder;
   std::vector<CarrierLine> found;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (entry.is_regular_file()) addLinesOf(entry.path(), found);
   }
   EXPECT_FALSE(found.empty());
   for (const auto& line : found) {
-    EXPECT_NO_THROW(EXPECT_EQ(parseCarrierParameters(line.kind, line.parameters).sites.size(), 4U) << line.where)
+    EXPECT_NO_THROW(EXPECT_EQ(parseCarrierParameters(line.kind, line.parameters).sites.size(), 4U)
+                    << line.where)
         << line.where << ": " << line.kind << " \"" << line.parameters << '"';
   }
 }

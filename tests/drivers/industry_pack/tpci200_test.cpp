@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The carrier with files in place of a board: selection of a board, error messages, windows,
 // interrupts. tests/tpci200 runs it on QEMU's model of the board.
-#include <mpf/drivers/industry_pack/tpci200.h>
+#include "drivers/industry_pack/tpci200.h"
 
 #include <poll.h>
 #include <sys/fsuid.h>
@@ -12,9 +12,9 @@
 #include <mpf/drivers/industry_pack/create_carrier.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
-#include <mpf/tests/support/watchdog.h>
 
 #include "fake_pci.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -50,13 +50,18 @@ class Tpci200Test : public testing::Test {
     return "none";
   }
   [[nodiscard]] std::uint16_t control(int site) const {
-    return le16toh(pci_.get<std::uint16_t>(kBoard, "resource2", kInPage + 2 + 2 * static_cast<std::size_t>(site)));
+    return le16toh(pci_.get<std::uint16_t>(kBoard, "resource2",
+                                           kInPage + 2 + 2 * static_cast<std::size_t>(site)));
   }
   void setControl(int site, std::uint16_t value) const {
     pci_.set(kBoard, "resource2", kInPage + 2 + 2 * static_cast<std::size_t>(site), htole16(value));
   }
-  void setStatus(unsigned bits) const { pci_.set(kBoard, "resource2", kInPage + 0xc, htole16(static_cast<std::uint16_t>(bits))); }
-  [[nodiscard]] bool isInterruptMasked() const { return (pci_.get<std::uint8_t>(kBoard, "config", 5) & 4) != 0; }
+  void setStatus(unsigned bits) const {
+    pci_.set(kBoard, "resource2", kInPage + 0xc, htole16(static_cast<std::uint16_t>(bits)));
+  }
+  [[nodiscard]] bool isInterruptMasked() const {
+    return (pci_.get<std::uint8_t>(kBoard, "config", 5) & 4) != 0;
+  }
   static void waitFor(const Interrupt& interrupt) {
     pollfd readable{.fd = interrupt.descriptor(), .events = POLLIN, .revents = 0};
     ASSERT_EQ(::poll(&readable, 1, -1), 1);
@@ -80,9 +85,14 @@ TEST_F(Tpci200Test, ThatIsNotThereIsAClearError) {
   EXPECT_THAT(problem(), HasSubstr("this host has no TPCI200 (PCI id 0x1498:0x30c8)"));
   pci_.add(kBoard);
   pci_.add("0000:02:00.0", "0x8086", "0x100e");
-  EXPECT_THAT(problem("1"), HasSubstr("this host has no TPCI200 number 1, counted from 0; its boards: 0000:03:00.0"));
-  EXPECT_THAT(problem("04:00.0"), HasSubstr("no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
-  EXPECT_THAT(problem("02:00.0"), HasSubstr("the PCI device at 0000:02:00.0 is not a TPCI200: its id is 0x8086:0x100e"));
+  EXPECT_THAT(
+      problem("1"),
+      HasSubstr("this host has no TPCI200 number 1, counted from 0; its boards: 0000:03:00.0"));
+  EXPECT_THAT(problem("04:00.0"),
+              HasSubstr("no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
+  EXPECT_THAT(
+      problem("02:00.0"),
+      HasSubstr("the PCI device at 0000:02:00.0 is not a TPCI200: its id is 0x8086:0x100e"));
 }
 
 TEST_F(Tpci200Test, ThatAnotherDriverHasIsAnErrorThatSaysHowToGetIt) {
@@ -91,7 +101,8 @@ TEST_F(Tpci200Test, ThatAnotherDriverHasIsAnErrorThatSaysHowToGetIt) {
   const auto said = problem();
   EXPECT_THAT(said, HasSubstr("the board is bound to the kernel's driver tpci200"));
   EXPECT_THAT(said, HasSubstr("echo 0000:03:00.0 > " + pci_.file(kBoard, "driver/unbind")));
-  EXPECT_THAT(said, HasSubstr("modprobe uio_pci_generic; echo uio_pci_generic > " + pci_.file(kBoard, "driver_override")));
+  EXPECT_THAT(said, HasSubstr("modprobe uio_pci_generic; echo uio_pci_generic > " +
+                              pci_.file(kBoard, "driver_override")));
 }
 
 TEST_F(Tpci200Test, WithoutTheRightToItIsAnErrorThatNamesTheFile) {
@@ -142,7 +153,8 @@ TEST_F(Tpci200Test, HasItsBridgeTurnTheBytesOfModulesOnly) {
   pci_.set(kBoard, "resource0", kInPage + 0x28, htole32(0xd54160a0));
   const Tpci200 carrier(options());
   const auto isBig = [&](std::size_t space) {
-    return (le32toh(pci_.get<std::uint32_t>(kBoard, "resource0", kInPage + space)) & 0x1000000) != 0;
+    return (le32toh(pci_.get<std::uint32_t>(kBoard, "resource0", kInPage + space)) & 0x1000000) !=
+           0;
   };
   EXPECT_FALSE(isBig(0x28));
   EXPECT_TRUE(isBig(0x2c));
@@ -162,9 +174,11 @@ TEST_F(Tpci200Test, HasTheSpacesOfEachSiteWhereTheyBelong) {
     site.io().write16(0x10, 0x1234);
     site.io().write8(0x21, 0x56);
     site.memory().write16(0x7ffffe, static_cast<std::uint16_t>(0xaa00 + i));
-    EXPECT_EQ(pci_.get<std::uint16_t>(kBoard, "resource3", kInPage + 0x100 * i + 0x10), htobe16(0x1234));
+    EXPECT_EQ(pci_.get<std::uint16_t>(kBoard, "resource3", kInPage + 0x100 * i + 0x10),
+              htobe16(0x1234));
     EXPECT_EQ(pci_.get<std::uint8_t>(kBoard, "resource3", kInPage + 0x100 * i + 0x21), 0x56);
-    EXPECT_EQ(pci_.get<std::uint16_t>(kBoard, "resource4", 0x800000 * (i + 1) - 2), htobe16(static_cast<std::uint16_t>(0xaa00 + i)));
+    EXPECT_EQ(pci_.get<std::uint16_t>(kBoard, "resource4", 0x800000 * (i + 1) - 2),
+              htobe16(static_cast<std::uint16_t>(0xaa00 + i)));
     pci_.set(kBoard, "resource3", kInPage + 0x100 * i + 0x80, htobe32(0x00490050));
     EXPECT_EQ(site.id().read32(0), 0x00490050U);
     EXPECT_EQ(site.id().read8(3), 0x50);
@@ -307,7 +321,8 @@ TEST_F(Tpci200Test, ALineThatIsPolledLaterIsToldOf) {
   Tpci200 carrier(options());
   std::binary_semaphore isPolled(0);
   InterruptThread thread(
-      carrier.site(0).interrupt(0), {.pollEvery = std::chrono::milliseconds(1)}, [](InterruptThread::Cause) { return false; },
+      carrier.site(0).interrupt(0), {.pollEvery = std::chrono::milliseconds(1)},
+      [](InterruptThread::Cause) { return false; },
       [&](InterruptTrouble trouble) {
         EXPECT_EQ(trouble, InterruptTrouble::polled);
         isPolled.release();
@@ -324,7 +339,8 @@ TEST(Tpci200ParametersTest, AreAnAddressAndAPollingPeriod) {
   const auto both = Tpci200Options::parse("1,poll=250");
   EXPECT_EQ(both.board, "1");
   EXPECT_EQ(both.pollEvery, std::chrono::microseconds(250));
-  for (const auto* const wrong : {"eth0", "../0000:03:00.0", "0,fast", "0,poll=", "0,poll=0", "0,poll=5ms", "0,poll=2000000"})
+  for (const auto* const wrong :
+       {"eth0", "../0000:03:00.0", "0,fast", "0,poll=", "0,poll=0", "0,poll=5ms", "0,poll=2000000"})
     EXPECT_THROW(static_cast<void>(Tpci200Options::parse(wrong)), IndustryPackError) << wrong;
   EXPECT_THROW(static_cast<void>(createCarrier("tpci200", "0,poll=0")), IndustryPackError);
 }

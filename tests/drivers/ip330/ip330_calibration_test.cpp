@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_calibration.h>
+#include "drivers/ip330/ip330_calibration.h"
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,8 @@ struct CalibrationCase {
 std::vector<CalibrationCase> allCases() {
   std::vector<CalibrationCase> cases;
   for (const auto type : {Ip330Type::singleEnded, Ip330Type::differential}) {
-    for (const auto range : {Ip330Range::minus5to5, Ip330Range::minus10to10, Ip330Range::from0to5, Ip330Range::from0to10}) {
+    for (const auto range : {Ip330Range::minus5to5, Ip330Range::minus10to10, Ip330Range::from0to5,
+                             Ip330Range::from0to10}) {
       for (int gain = 0; gain < kIp330Gains; ++gain) {
         for (const double sign : {1, -1}) cases.push_back({type, range, gain, sign});
       }
@@ -45,13 +46,16 @@ std::array<double, kIp330Gains> times(double factor, std::array<double, kIp330Ga
 
 // The error of such a converter cannot be measured: the only other voltage in the range is 0 V, the
 // end of the range.
-bool cannotBeCalibrated(Ip330Range range, int gain, double offset) { return range == Ip330Range::from0to5 && gain == 3 && offset < 1; }
+bool cannotBeCalibrated(Ip330Range range, int gain, double offset) {
+  return range == Ip330Range::from0to5 && gain == 3 && offset < 1;
+}
 
 // Voltages in the inner 96 % of the input range: at the ends, a converter with errors runs out of
 // codes.
 double voltageOf(Ip330Range range, int gain, int number) {
   const auto [zero, span] = spanOf(range);
-  return (zero + span * (0.02 + 0.96 * number / (kTestVoltages - 1))) / kIp330Gain[static_cast<std::size_t>(gain)];
+  return (zero + span * (0.02 + 0.96 * number / (kTestVoltages - 1))) /
+         kIp330Gain[static_cast<std::size_t>(gain)];
 }
 
 class Ip330CalibrationTest : public testing::TestWithParam<CalibrationCase> {};
@@ -72,15 +76,18 @@ std::array<double, kTestVoltages> meansOf(Ip330Board& with, int scans) {
 TEST_P(Ip330CalibrationTest, TakesTheErrorsAwayToOneAndAHalfCodes) {
   const auto& [type, range, gain, sign] = GetParam();
   const auto offsets = times(sign, {-70, 55, -40, 90});
-  Ip330Board with({.type = type, .range = range, .secondsBetweenCalibrate = 0}, {.range = range,
-                                                                                 .gainError = times(sign, {0.009, -0.009, 0.008, -0.006}),
-                                                                                 .offsetError = offsets,
-                                                                                 .noise = 0.4,
-                                                                                 .seed = 7,
-                                                                                 .isRealTime = false});
+  Ip330Board with({.type = type, .range = range, .secondsBetweenCalibrate = 0},
+                  {.range = range,
+                   .gainError = times(sign, {0.009, -0.009, 0.008, -0.006}),
+                   .offsetError = offsets,
+                   .noise = 0.4,
+                   .seed = 7,
+                   .isRealTime = false});
   if (cannotBeCalibrated(range, gain, offsets[static_cast<std::size_t>(gain)])) {
     EXPECT_FALSE(with.board.trySetGain(0, gain));
-    EXPECT_TRUE(with.notes.has("+calibration fails: the converter gives no codes, implausible codes, or the end of its range"));
+    EXPECT_TRUE(
+        with.notes.has("+calibration fails: the converter gives no codes, implausible codes, or "
+                       "the end of its range"));
     return;
   }
   for (int i = 0; i < kTestVoltages; ++i) {
@@ -92,7 +99,8 @@ TEST_P(Ip330CalibrationTest, TakesTheErrorsAwayToOneAndAHalfCodes) {
 
   for (int i = 0; i < kTestVoltages; ++i) {
     const double ideal = Ip330Model::idealCode(range, gain, voltageOf(range, gain, i));
-    EXPECT_NEAR(clampedCode(means[static_cast<std::size_t>(i)]), ideal, 1.5) << voltageOf(range, gain, i) << " V";
+    EXPECT_NEAR(clampedCode(means[static_cast<std::size_t>(i)]), ideal, 1.5)
+        << voltageOf(range, gain, i) << " V";
   }
 }
 
@@ -102,8 +110,8 @@ TEST(Ip330Correction, IsNoneForAPerfectConverter) {
   for (const auto& [type, range, gain, sign] : allCases()) {
     if (cannotBeCalibrated(range, gain, 0)) continue;
     const auto [low, high] = calibrationPointsOf(range, gain);
-    const auto correction =
-        correctionOf(range, gain, Ip330Model::idealCode(range, gain, low.volts), Ip330Model::idealCode(range, gain, high.volts));
+    const auto correction = correctionOf(range, gain, Ip330Model::idealCode(range, gain, low.volts),
+                                         Ip330Model::idealCode(range, gain, high.volts));
     ASSERT_TRUE(correction);
     EXPECT_NEAR(correction->slope, 1, 1e-12);
     EXPECT_NEAR(correction->offset, 0, 1e-9);
@@ -166,7 +174,8 @@ TEST(Ip330Calibration, OfAGainThatWasCalibratedCostsNone) {
 }
 
 TEST(Ip330Calibration, ThatNeverEndsIsSaidAndTheBoardGoesOn) {
-  Ip330Board with({.secondsBetweenCalibrate = 0}, {.isRealTime = false}, {.conversion = 1ms, .silence = 1h, .lookEvery = 1h});
+  Ip330Board with({.secondsBetweenCalibrate = 0}, {.isRealTime = false},
+                  {.conversion = 1ms, .silence = 1h, .lookEvery = 1h});
   with.model.setStuck(true);
 
   EXPECT_FALSE(with.board.tryCalibrate());
@@ -181,8 +190,9 @@ TEST(Ip330Calibration, ThatNeverEndsIsSaidAndTheBoardGoesOn) {
 
 // A gain that is not in use fails; the other gains must not be calibrated repeatedly because of it.
 TEST(Ip330Calibration, OfAGainThatCannotBeLeavesTheChannelAsItWas) {
-  Ip330Board with({.range = Ip330Range::from0to5, .secondsBetweenCalibrate = 0},
-                  {.range = Ip330Range::from0to5, .offsetError = {5, 5, 5, -20}, .isRealTime = false});
+  Ip330Board with(
+      {.range = Ip330Range::from0to5, .secondsBetweenCalibrate = 0},
+      {.range = Ip330Range::from0to5, .offsetError = {5, 5, 5, -20}, .isRealTime = false});
   with.model.setSignal(0, dcSignal(2.5));
 
   EXPECT_FALSE(with.board.trySetGain(0, 3));
@@ -197,14 +207,16 @@ TEST(Ip330Calibration, OfAGainThatCannotBeLeavesTheChannelAsItWas) {
 }
 
 TEST(Ip330Calibration, OfOneGainThatIsNonsenseDoesNotKeepTheOthersFromIt) {
-  Ip330Board with({.secondsBetweenCalibrate = -1}, {.gainError = {-0.5}, .offsetError = {0, 40}, .isRealTime = false});
+  Ip330Board with({.secondsBetweenCalibrate = -1},
+                  {.gainError = {-0.5}, .offsetError = {0, 40}, .isRealTime = false});
   ASSERT_TRUE(with.board.trySetGain(1, 1));
 
   EXPECT_FALSE(with.board.trySetSecondsBetweenCalibrate(0));
 
   Ip330Sample last;
   {
-    const auto subscription = with.board.subscribe([&](const Ip330Sample& sample) { last = sample; });
+    const auto subscription =
+        with.board.subscribe([&](const Ip330Sample& sample) { last = sample; });
     with.scan(1);
   }
   EXPECT_FALSE(last.isValid(0));
@@ -226,20 +238,26 @@ TEST(Ip330Calibration, IsTriedAgainUntilItSucceeds) {
 // Calibration, changes of gain and scans at the same time: no sample has codes of a calibration
 // voltage, or of a gain other than the one that it reports.
 TEST(Ip330Calibration, DoesNotMixWithScans) {
-  Ip330Board with({.type = Ip330Type::differential, .lastChannel = 3, .microsecondsPerScan = 300, .secondsBetweenCalibrate = 0},
+  Ip330Board with({.type = Ip330Type::differential,
+                   .lastChannel = 3,
+                   .microsecondsPerScan = 300,
+                   .secondsBetweenCalibrate = 0},
                   {.isRealTime = true}, {.conversion = 1h, .silence = 1h, .lookEvery = 1h});
   for (int i = 0; i < 4; ++i) with.model.setSignal(i, dcSignal(0.3));
   ASSERT_EQ(with.board.tryConfigure(Ip330ScanMode::burstContinuous, Ip330Trigger::input, 300), "");
   std::atomic<int> samples{0};
   std::atomic<int> wrong{0};
-  const auto subscription = with.board.subscribe([&, epoch = with.board.epoch()](const Ip330Sample& sample) {
-    if (sample.epoch != epoch) return;  // from before the signals were set
-    for (int i = 0; i < 4; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      if (std::abs(sample.corrected[at] - Ip330Model::idealCode(Ip330Range::minus5to5, sample.gain[at], 0.3)) > 1.5) wrong.fetch_add(1);
-    }
-    samples.fetch_add(1);
-  });
+  const auto subscription =
+      with.board.subscribe([&, epoch = with.board.epoch()](const Ip330Sample& sample) {
+        if (sample.epoch != epoch) return;  // from before the signals were set
+        for (int i = 0; i < 4; ++i) {
+          const auto at = static_cast<std::size_t>(i);
+          if (std::abs(sample.corrected[at] -
+                       Ip330Model::idealCode(Ip330Range::minus5to5, sample.gain[at], 0.3)) > 1.5)
+            wrong.fetch_add(1);
+        }
+        samples.fetch_add(1);
+      });
 
   for (int i = 0; samples.load() < 300; ++i) {
     const bool isCalibrated = i % 3 != 0 || with.board.tryCalibrate();

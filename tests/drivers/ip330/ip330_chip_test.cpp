@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The registers of the chip with the device model, without threads: mailboxes, flags, halves.
-#include <mpf/drivers/ip330/ip330_chip.h>
+#include "drivers/ip330/ip330_chip.h"
 
 #include <gtest/gtest.h>
 
 #include <mpf/drivers/industry_pack/model_carrier.h>
-#include <mpf/drivers/ip330/ip330_model.h>
-#include <mpf/drivers/ip330/ip330_registers.h>
-#include <mpf/tests/support/watchdog.h>
+
+#include "drivers/ip330/ip330_model.h"
+#include "drivers/ip330/ip330_registers.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -17,7 +18,8 @@ using namespace std::chrono_literals;
 class Ip330ChipTest : public testing::Test {
  protected:
   void start(Ip330Type type, Ip330ScanMode mode = Ip330ScanMode::burstContinuous) {
-    settings_ = {.type = type, .firstChannel = 2, .lastChannel = 7, .vector = 0x5a, .scanMode = mode};
+    settings_ = {
+        .type = type, .firstChannel = 2, .lastChannel = 7, .vector = 0x5a, .scanMode = mode};
     chip_.start(settings_, gains_, 1h);
     // The codes of each scan are 100 higher than those of the previous scan.
     model_.setSignal(7, [this](double) { return -5 + ++conversions_ * 100 * 10 / 65536.0; });
@@ -31,7 +33,8 @@ class Ip330ChipTest : public testing::Test {
 
   Watchdog watchdog_{"ip330 chip test"};
   ModelCarrier carrier_;
-  Ip330Model& model_ = carrier_.plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{.isRealTime = false}));
+  Ip330Model& model_ =
+      carrier_.plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{.isRealTime = false}));
   Registers& io_ = carrier_.site(0).io();
   Ip330Chip chip_{io_};
   Ip330Settings settings_;

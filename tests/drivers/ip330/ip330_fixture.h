@@ -10,9 +10,10 @@
 #include <vector>
 
 #include <mpf/drivers/industry_pack/model_carrier.h>
-#include <mpf/drivers/ip330/ip330.h>
-#include <mpf/drivers/ip330/ip330_model.h>
-#include <mpf/tests/support/watchdog.h>
+
+#include "drivers/ip330/ip330.h"
+#include "drivers/ip330/ip330_model.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
@@ -44,14 +45,23 @@ class Notes {
 };
 
 // Limits for tests without timing: no polling, and no wait that ends while the test is delayed.
-inline constexpr Ip330Limits kPatient{
-    .conversion = 1h, .silence = 1h, .lookEvery = 1h, .pollEvery = 0ms, .stormLimit = 16, .stormPause = 1h};
+inline constexpr Ip330Limits kPatient{.conversion = 1h,
+                                      .silence = 1h,
+                                      .lookEvery = 1h,
+                                      .pollEvery = 0ms,
+                                      .stormLimit = 16,
+                                      .stormPause = 1h};
 // Limits with which faults are noticed soon.
-inline constexpr Ip330Limits kWatchful{
-    .conversion = 10ms, .silence = 50ms, .lookEvery = 1ms, .pollEvery = 1ms, .stormLimit = 16, .stormPause = 5ms};
+inline constexpr Ip330Limits kWatchful{.conversion = 10ms,
+                                       .silence = 50ms,
+                                       .lookEvery = 1ms,
+                                       .pollEvery = 1ms,
+                                       .stormLimit = 16,
+                                       .stormPause = 5ms};
 
 struct Ip330Board {
-  explicit Ip330Board(const Ip330Settings& settings, const Ip330ModelOptions& options = {.isRealTime = false},
+  explicit Ip330Board(const Ip330Settings& settings,
+                      const Ip330ModelOptions& options = {.isRealTime = false},
                       const Ip330Limits& limits = kPatient)
       : model(carrier.plug("IP_a", std::make_unique<Ip330Model>(options))),
         module("adc", "a model", carrier.site(0), kIp330),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_pid.h>
+#include "drivers/ip330/ip330_pid.h"
 
 #include <atomic>
 #include <cmath>
@@ -68,7 +68,9 @@ TEST(PidLoop, HasItsIntegralAtALimitWhenItHasNone) {
 // An output of 12 bits and -10 to 10 V. Threads: any.
 class FakeOutput final : public AnalogOutput {
  public:
-  std::optional<double> tryRead() override { return answers ? std::optional(code.load()) : std::nullopt; }
+  std::optional<double> tryRead() override {
+    return answers ? std::optional(code.load()) : std::nullopt;
+  }
   bool tryWrite(double wanted) override {
     if (answers) code = std::round(wanted);
     if (answers) ++writes;
@@ -83,7 +85,8 @@ class Ip330PidTest : public testing::Test {
  protected:
   // The voltage at channel 1 is a quarter of the output plus 0.2 V.
   Ip330PidTest() {
-    with_.model.setSignal(1, [this](double) { return 0.2 + (output_.code - 2048) * 20 / 4096 / 4; });
+    with_.model.setSignal(1,
+                          [this](double) { return 0.2 + (output_.code - 2048) * 20 / 4096 / 4; });
     pid_.set([](PidLoop& loop) {
       loop.kp = 0.05;
       loop.ki = 100;
@@ -126,7 +129,8 @@ TEST_F(Ip330PidTest, StepsAsSlowlyAsItIsTold) {
 // Gain code 1 of the converter has such a large error that it cannot be calibrated.
 TEST(Ip330Pid, SaysThatItsChannelIsNotCalibrated) {
   FakeOutput output;
-  Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.gainError = {-0.5}, .isRealTime = false});
+  Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0},
+                  {.gainError = {-0.5}, .isRealTime = false});
   Ip330Pid pid(with.board, 1, output, 0, 4095);
   with.scan(1);
   EXPECT_FALSE(pid.status().isGood);

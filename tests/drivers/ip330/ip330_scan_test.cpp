@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_scan.h>
+#include "drivers/ip330/ip330_scan.h"
 
 #include <stdexcept>
 
@@ -147,7 +147,8 @@ TEST_F(Ip330ScanTest, ReadsNothingOfBeforeAnotherMode) {
   while (with_.board.counters().scans == before) std::this_thread::yield();
   EXPECT_EQ(scan_.tryRead(5, 0, 0ms), 32768 + 400);
   EXPECT_EQ(scan_.tryRead(5, 0, 0ms), 32768 + 400);
-  ASSERT_EQ(with_.board.tryConfigure(Ip330ScanMode::burstContinuous, Ip330Trigger::input, 2000), "");
+  ASSERT_EQ(with_.board.tryConfigure(Ip330ScanMode::burstContinuous, Ip330Trigger::input, 2000),
+            "");
   with_.scan(2);
   EXPECT_EQ(scan_.tryRead(5, 0, 100ms), 32768 + 550);
 }
@@ -155,7 +156,8 @@ TEST_F(Ip330ScanTest, ReadsNothingOfBeforeAnotherMode) {
 // With an offset of 200 codes, voltages just outside the range would have corrected codes outside 0
 // to 0xffff.
 TEST(Ip330Scan, GivesCodesWithinTheRange) {
-  Ip330Board with({.secondsBetweenCalibrate = 0}, {.gainError = {-0.02}, .offsetError = {700}, .isRealTime = false});
+  Ip330Board with({.secondsBetweenCalibrate = 0},
+                  {.gainError = {-0.02}, .offsetError = {700}, .isRealTime = false});
   Ip330Scan scan(with.board, 0, 1);
   with.model.setSignal(0, dcSignal(-5.05));
   with.model.setSignal(1, dcSignal(5.05));

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_settings.h>
+#include "drivers/ip330/ip330_settings.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <limits>
 #include <stdexcept>
 
-#include <mpf/drivers/ip330/ip330_timing.h>
+#include "drivers/ip330/ip330_timing.h"
 
 namespace mpf::test {
 namespace {
@@ -38,16 +38,19 @@ TEST_P(Ip330TimerTest, MakesTheTimeAskedFor) {
 
 // The first two are the board of the manual: EPICS ip330 R1-4 needed 1240 and 1480 us instead of 1
 // ms.
-INSTANTIATE_TEST_SUITE_P(Table, Ip330TimerTest,
-                         testing::Values(TimerRow{Mode::burstContinuous, 16, 1000, 64, 95, 1000},
-                                         TimerRow{Mode::burstContinuous, 32, 1000, 64, 65, 1000},
-                                         TimerRow{Mode::burstContinuous, 1, 23, 64, 1, 23},
-                                         TimerRow{Mode::burstContinuous, 1, 15 + 64 * 65535 / 8.0, 64, 65535, 15 + 64 * 65535 / 8.0},
-                                         TimerRow{Mode::burstContinuous, 1, 1e6 + 15, 123, 65041, 15 + 123 * 65041 / 8.0},
-                                         TimerRow{Mode::burstContinuous, 1, 15 + 255 * 65535 / 8.0, 255, 65535, 15 + 255 * 65535 / 8.0},
-                                         TimerRow{Mode::uniformContinuous, 16, 16 * 64, 64, 8, 1024},
-                                         TimerRow{Mode::uniformContinuous, 10, 10000, 64, 125, 10000},
-                                         TimerRow{Mode::uniformSingle, 1, 16, 64, 2, 16}));
+INSTANTIATE_TEST_SUITE_P(
+    Table, Ip330TimerTest,
+    testing::Values(
+        TimerRow{Mode::burstContinuous, 16, 1000, 64, 95, 1000},
+        TimerRow{Mode::burstContinuous, 32, 1000, 64, 65, 1000},
+        TimerRow{Mode::burstContinuous, 1, 23, 64, 1, 23},
+        TimerRow{Mode::burstContinuous, 1, 15 + 64 * 65535 / 8.0, 64, 65535, 15 + 64 * 65535 / 8.0},
+        TimerRow{Mode::burstContinuous, 1, 1e6 + 15, 123, 65041, 15 + 123 * 65041 / 8.0},
+        TimerRow{Mode::burstContinuous, 1, 15 + 255 * 65535 / 8.0, 255, 65535,
+                 15 + 255 * 65535 / 8.0},
+        TimerRow{Mode::uniformContinuous, 16, 16 * 64, 64, 8, 1024},
+        TimerRow{Mode::uniformContinuous, 10, 10000, 64, 125, 10000},
+        TimerRow{Mode::uniformSingle, 1, 16, 64, 2, 16}));
 
 TEST(Ip330Timer, IsNotUsedWhereTriggersSayWhen) {
   for (const auto mode : {Mode::disable, Mode::burstSingle, Mode::convertOnExternalTriggerOnly}) {
@@ -62,7 +65,9 @@ TEST(Ip330Timer, RefusesWhatCannotBeInsteadOfTakingAnotherTime) {
   EXPECT_EQ(ip330TimerOf(Mode::burstContinuous, 16, 248).problem, "");
   EXPECT_THAT(ip330TimerOf(Mode::uniformContinuous, 16, 239).problem, HasSubstr("use 240 to "));
   EXPECT_THAT(ip330TimerOf(Mode::burstContinuous, 1, 2.1e6).problem, HasSubstr("to 2088943 us"));
-  EXPECT_THAT(ip330TimerOf(Mode::uniformContinuous, 1, std::numeric_limits<double>::quiet_NaN()).problem, HasSubstr("use 15"));
+  EXPECT_THAT(
+      ip330TimerOf(Mode::uniformContinuous, 1, std::numeric_limits<double>::quiet_NaN()).problem,
+      HasSubstr("use 15"));
 }
 
 TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
@@ -82,8 +87,10 @@ TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
 
 TEST(Ip330Settings, SayWhatCannotBe) {
   EXPECT_EQ(Ip330Settings().problem(), "");
-  EXPECT_THAT((Ip330Settings{.type = Ip330Type::differential, .lastChannel = 16}.problem()), HasSubstr("use 0 to 15"));
-  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()), HasSubstr("in ascending order"));
+  EXPECT_THAT((Ip330Settings{.type = Ip330Type::differential, .lastChannel = 16}.problem()),
+              HasSubstr("use 0 to 15"));
+  EXPECT_THAT((Ip330Settings{.firstChannel = 5, .lastChannel = 4}.problem()),
+              HasSubstr("in ascending order"));
   EXPECT_THAT((Ip330Settings{.vector = 256}.problem()), HasSubstr("use 0 to 255"));
   EXPECT_THAT((Ip330Settings{.maxClients = 0}.problem()), HasSubstr("use 1 or more"));
   EXPECT_THAT((Ip330Settings{.microsecondsPerScan = 1}.problem()), HasSubstr("us per scan"));

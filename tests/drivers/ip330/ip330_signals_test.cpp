@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_signals.h>
+#include "drivers/ip330/ip330_signals.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,13 +19,15 @@ TEST(Ip330Signals, AreReadFromText) {
 }
 
 TEST(Ip330Signals, CanBeOfOtherKinds) {
-  const auto signals = parseIp330Signals("3=wire:a", {{"wire", [](const std::string& name) { return dcSignal(name == "a" ? 7 : 0); }}});
+  const auto signals = parseIp330Signals(
+      "3=wire:a",
+      {{"wire", [](const std::string& name) { return dcSignal(name == "a" ? 7 : 0); }}});
   EXPECT_DOUBLE_EQ(signals.at(3)(0), 7);
 }
 
 TEST(Ip330Signals, SayWhatCannotBeRead) {
-  for (const auto* const text : {"", "0", "0=", "0=dc", "0=dc:x", "0=dc:1x", "32=dc:1", "-1=dc:1", "x=dc:1", "0=sine:5", "0=sine:1:2:3:4",
-                                 "0=square:1", "0=dc:1,"}) {
+  for (const auto* const text : {"", "0", "0=", "0=dc", "0=dc:x", "0=dc:1x", "32=dc:1", "-1=dc:1",
+                                 "x=dc:1", "0=sine:5", "0=sine:1:2:3:4", "0=square:1", "0=dc:1,"}) {
     EXPECT_THROW(static_cast<void>(parseIp330Signals(text)), std::invalid_argument) << text;
   }
 }

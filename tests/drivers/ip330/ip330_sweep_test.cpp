@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip330/ip330_sweep.h>
+#include "drivers/ip330/ip330_sweep.h"
 
 #include <cmath>
 #include <stdexcept>
@@ -17,7 +17,8 @@ class Ip330SweepTest : public testing::Test {
     for (int channel = 0; channel < 8; ++channel) {
       // The code in sample n is 32768 + 10 * channel + 100 n.
       with_.model.setSignal(channel, [this, channel](double) {
-        return (100 * ++conversions_[static_cast<std::size_t>(channel)] + 10 * channel) * 10 / 65536.0;
+        return (100 * ++conversions_[static_cast<std::size_t>(channel)] + 10 * channel) * 10 /
+               65536.0;
       });
     }
   }
@@ -51,7 +52,8 @@ TEST_F(Ip330SweepTest, PointsAreMeansInEveryChannelTheLastIncluded) {
   EXPECT_DOUBLE_EQ(sweep_.status().secondsPerPoint, 0.003);
   sweep_.start();
   with_.scan(6);
-  for (int channel = 2; channel <= 5; ++channel) EXPECT_EQ(read(channel), (Points{200, 500, 0, 0})) << channel;
+  for (int channel = 2; channel <= 5; ++channel)
+    EXPECT_EQ(read(channel), (Points{200, 500, 0, 0})) << channel;
 }
 
 TEST_F(Ip330SweepTest, GoesOnWhereItStopped) {

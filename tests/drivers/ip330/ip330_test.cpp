@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The board as a whole: subscribers, gains, faults.
-#include <mpf/drivers/ip330/ip330.h>
+#include "drivers/ip330/ip330.h"
 
 #include <set>
 #include <stdexcept>
@@ -16,9 +16,12 @@ TEST(Ip330, EverySubscriberGetsEveryScan) {
   int first = 0;
   int second = 0;
   {
-    const auto one = with.board.subscribe([&](const Ip330Sample& sample) { first += sample.isValid(2) && !sample.isValid(0) ? 1 : 100; });
-    const auto two =
-        with.board.subscribe([&](const Ip330Sample& sample) { second += std::abs(sample.corrected[2] - 49152) < 1.5 ? 1 : 100; });
+    const auto one = with.board.subscribe([&](const Ip330Sample& sample) {
+      first += sample.isValid(2) && !sample.isValid(0) ? 1 : 100;
+    });
+    const auto two = with.board.subscribe([&](const Ip330Sample& sample) {
+      second += std::abs(sample.corrected[2] - 49152) < 1.5 ? 1 : 100;
+    });
     with.scan(5);
   }
   with.scan(1);
@@ -30,13 +33,15 @@ TEST(Ip330, EverySubscriberGetsEveryScan) {
 TEST(Ip330, TakesAsManySubscribersAsItWasTold) {
   Ip330Board with({.maxClients = 1});
   const auto one = with.board.subscribe([](const Ip330Sample&) {});
-  EXPECT_THROW(static_cast<void>(with.board.subscribe([](const Ip330Sample&) {})), std::length_error);
+  EXPECT_THROW(static_cast<void>(with.board.subscribe([](const Ip330Sample&) {})),
+               std::length_error);
 }
 
 // EPICS ip330 R1-4 read only one half of the mailboxes: a mean of 200 samples had only 100
 // different ones.
 TEST(Ip330, DifferentialSamplesOfARampAreAllDistinct) {
-  Ip330Board with({.type = Ip330Type::differential, .lastChannel = 15, .secondsBetweenCalibrate = 0});
+  Ip330Board with(
+      {.type = Ip330Type::differential, .lastChannel = 15, .secondsBetweenCalibrate = 0});
   for (int i = 0; i < 16; ++i) with.model.setSignal(i, [](double seconds) { return seconds * 5; });
   std::array<std::set<int>, 16> seen;
   auto subscription = with.board.subscribe([&](const Ip330Sample& sample) {
@@ -63,7 +68,8 @@ TEST(Ip330, RefusesGainsAndChannelsThatItHasNot) {
 
 TEST(Ip330, CanBeSetToAnotherModeAndTime) {
   Ip330Board with({.lastChannel = 1, .secondsBetweenCalibrate = 0});
-  EXPECT_EQ(with.board.tryConfigure(Ip330ScanMode::uniformContinuous, Ip330Trigger::input, 2048), "");
+  EXPECT_EQ(with.board.tryConfigure(Ip330ScanMode::uniformContinuous, Ip330Trigger::input, 2048),
+            "");
   EXPECT_DOUBLE_EQ(with.board.microsecondsPerScan(), 2048);
   with.scan(2);
   EXPECT_NE(with.board.tryConfigure(Ip330ScanMode::burstContinuous, Ip330Trigger::input, 1), "");
@@ -77,7 +83,8 @@ TEST(Ip330, CanBeSetToAnotherModeAndTime) {
 TEST(Ip330, ConvertsWhenToldToInTheSingleModesAlone) {
   Ip330Board with({.lastChannel = 1});
   EXPECT_FALSE(with.board.tryStartConvert());
-  for (const auto mode : {Ip330ScanMode::disable, Ip330ScanMode::uniformContinuous, Ip330ScanMode::convertOnExternalTriggerOnly}) {
+  for (const auto mode : {Ip330ScanMode::disable, Ip330ScanMode::uniformContinuous,
+                          Ip330ScanMode::convertOnExternalTriggerOnly}) {
     ASSERT_EQ(with.board.tryConfigure(mode, Ip330Trigger::input, 1000), "");
     EXPECT_FALSE(with.board.tryStartConvert()) << toString(mode);
   }
@@ -112,7 +119,8 @@ class Ip330FaultTest : public testing::Test {
     const auto before = with_.board.counters().scans;
     while (with_.board.counters().scans < before + scans) std::this_thread::yield();
   }
-  Ip330Board with_{{.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.isRealTime = true}, kWatchful};
+  Ip330Board with_{
+      {.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.isRealTime = true}, kWatchful};
 };
 
 TEST_F(Ip330FaultTest, InterruptsThatNeverComeAreMadeUpForByLooking) {
@@ -146,9 +154,15 @@ TEST_F(Ip330FaultTest, ABoardThatReadsAllOnesIsGoneUntilItAnswers) {
 // The words of a foreign module drive its outputs, so nothing may be written to it.
 class OtherModel final : public DeviceModel {
  public:
-  explicit OtherModel(std::atomic<int>& writes) : DeviceModel({.manufacturer = kSystran, .model = 0x69}), writes_(writes) {}
-  std::uint16_t read(Space /*space*/, std::size_t /*offset*/, Lanes /*lanes*/) override { return 2048; }
-  void write(Space /*space*/, std::size_t /*offset*/, std::uint16_t /*value*/, Lanes /*lanes*/) override { writes_.fetch_add(1); }
+  explicit OtherModel(std::atomic<int>& writes)
+      : DeviceModel({.manufacturer = kSystran, .model = 0x69}), writes_(writes) {}
+  std::uint16_t read(Space /*space*/, std::size_t /*offset*/, Lanes /*lanes*/) override {
+    return 2048;
+  }
+  void write(Space /*space*/, std::size_t /*offset*/, std::uint16_t /*value*/,
+             Lanes /*lanes*/) override {
+    writes_.fetch_add(1);
+  }
 
  private:
   std::atomic<int>& writes_;
@@ -157,7 +171,8 @@ class OtherModel final : public DeviceModel {
 TEST(Ip330OfWhichTheModuleIsAnother, WritesNothing) {
   std::atomic<int> writes{0};
   {
-    Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.isRealTime = true}, kWatchful);
+    Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.isRealTime = true},
+                    kWatchful);
     with.carrier.unplug("IP_a");
     with.carrier.plug("IP_a", std::make_unique<OtherModel>(writes));
     EXPECT_FALSE(with.board.trySetGain(0, 1));
@@ -171,7 +186,8 @@ TEST(Ip330OfWhichTheModuleIsAnother, WritesNothing) {
 
 TEST(Ip330OfWhichTheModuleIsAnother, GoesOnWithTheNextBoardByItsOwnCalibration) {
   std::atomic<int> writes{0};
-  Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.offsetError = {90}, .isRealTime = true}, kWatchful);
+  Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0},
+                  {.offsetError = {90}, .isRealTime = true}, kWatchful);
   with.carrier.unplug("IP_a");
   with.carrier.plug("IP_a", std::make_unique<OtherModel>(writes));
   with.notes.waitFor("+the board is gone");

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/ip440/ip440.h>
+#include "drivers/ip440/ip440.h"
 
 #include <array>
 #include <gmock/gmock.h>
 #include <stdexcept>
 
-#include <mpf/drivers/ip440/ip440_model.h>
-#include <mpf/tests/drivers/industry_pack/plain_model.h>
-#include <mpf/tests/support/model_carrier.h>
+#include "drivers/ip440/ip440_model.h"
+#include "tests/drivers/industry_pack/plain_model.h"
+#include "tests/support/model_carrier.h"
 
 namespace mpf::test {
 namespace {
@@ -61,14 +61,16 @@ TEST_F(Ip440Test, ReadsWhatItsInputsAreConnectedTo) {
 }
 
 TEST_F(Ip440Test, KeepsItsInputsWhenItsPortsAreWrittenTo) {
-  for (std::size_t offset = 0; offset < 16; offset += 2) carrier_.site(2).io().write16(offset, 0xffff);
+  for (std::size_t offset = 0; offset < 16; offset += 2)
+    carrier_.site(2).io().write16(offset, 0xffff);
   EXPECT_EQ(inputs_.tryRead(), 0x1u);
 }
 
 TEST_F(Ip440Test, HasTheIdPromOfTheManual) {  // table 3.2, with its CRC
   auto& id = carrier_.site(2).id();
   const std::array<std::uint8_t, 12> manual{'I', 'P', 'A', 'C', 0xa3, 0x10, 0, 0, 0, 0, 12, 0x3b};
-  for (std::size_t at = 0; at < manual.size(); ++at) EXPECT_EQ(id.read8(2 * at + 1), manual.at(at)) << at;
+  for (std::size_t at = 0; at < manual.size(); ++at)
+    EXPECT_EQ(id.read8(2 * at + 1), manual.at(at)) << at;
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 #include <thread>
 
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
-#include <mpf/drivers/serial/late_line.h>
 
+#include "drivers/serial/late_line.h"
 #include "octal_uart_fixture.h"
 
 namespace mpf::test {
@@ -15,7 +15,9 @@ using testing::HasSubstr;
 class OctalUartFaultTest : public OctalUartTest {
  protected:
   // The next attempts to open get rarer with each that fails.
-  static void waitUntil(const OctalUartPort& port, SerialPortState state) { EXPECT_TRUE(port.waitForState(state, Deadline::never())); }
+  static void waitUntil(const OctalUartPort& port, SerialPortState state) {
+    EXPECT_TRUE(port.waitForState(state, Deadline::never()));
+  }
 };
 
 TEST_F(OctalUartFaultTest, WritesItsVectorIntoMemorySpace) {
@@ -36,7 +38,9 @@ TEST_F(OctalUartFaultTest, ASiteWithoutMemoryIsAnErrorThatSaysSo) {
   }
 }
 
-TEST_F(OctalUartFaultTest, ThereAreModulesOfFourAndEight) { EXPECT_THROW(start({}, {.ports = 6}), std::invalid_argument); }
+TEST_F(OctalUartFaultTest, ThereAreModulesOfFourAndEight) {
+  EXPECT_THROW(start({}, {.ports = 6}), std::invalid_argument);
+}
 
 TEST_F(OctalUartFaultTest, KnowsItsThreeKinds) {
   for (const auto kind : kOctalUart.models) {
@@ -61,7 +65,8 @@ TEST_F(OctalUartFaultTest, AStormIsAnAlarmAndEveryPortGoesOn) {
 
 // A stuck line uses up a processor, whatever is said on the ports meanwhile.
 TEST_F(OctalUartFaultTest, AStormIsSeenThroughTraffic) {
-  BoundOctalPort low(start({}, {.stormLimit = 20'000}), 1, kFast);  // more than there are in vain in a row
+  BoundOctalPort low(start({}, {.stormLimit = 20'000}), 1,
+                     kFast);  // more than there are in vain in a row
   BoundOctalPort high(*uart_, 6, kFast);
 
   carrier_.setFault("IP_a", ModelFault::interruptStorm, 0);
@@ -80,7 +85,8 @@ TEST_F(OctalUartFaultTest, AStormIsToldWhenItBeginsAndNotAfterEachPause) {
   while (uart.counters().spurious < 10ULL * kLimit) std::this_thread::yield();
 
   alarms_.waitFor(OctalUartAlarm::storm);
-  EXPECT_LT(alarms_.count(OctalUartAlarm::storm), 9);  // 1, unless the host forgot this process for a while
+  EXPECT_LT(alarms_.count(OctalUartAlarm::storm),
+            9);  // 1, unless the host forgot this process for a while
 }
 
 TEST_F(OctalUartFaultTest, ALineThatIsDeadIsNoticedWhileTheOtherIsBusy) {
@@ -114,7 +120,8 @@ TEST_F(OctalUartFaultTest, WhatIsWrongBeforeSomebodyListensIsToldLater) {
   waitUntil(port, SerialPortState::unplugged);
   while (uart.counters().alarms == 0) std::this_thread::yield();
   carrier_.setFault("IP_a", ModelFault::interruptStorm, 0);  // its thread goes on to other things
-  for (const auto before = uart.counters().interrupts; uart.counters().interrupts == before;) std::this_thread::yield();
+  for (const auto before = uart.counters().interrupts; uart.counters().interrupts == before;)
+    std::this_thread::yield();
 
   uart.onAlarm([this](OctalUartAlarm alarm, const std::string& /*what*/) { alarms_.add(alarm); });
 
@@ -192,7 +199,9 @@ TEST_F(OctalUartFaultTest, SomethingElseInItsPlaceIsNotTouched) {
 
   plug({.model = 0x11});
 
-  while (bound.port.unpluggedBecause().find("is not the expected GreenSpring Octal") == std::string::npos) std::this_thread::yield();
+  while (bound.port.unpluggedBecause().find("is not the expected GreenSpring Octal") ==
+         std::string::npos)
+    std::this_thread::yield();
   EXPECT_EQ(model_->vector(), 0x0f);
 }
 
@@ -205,7 +214,9 @@ TEST_F(OctalUartFaultTest, AnotherModelInItsPlaceIsNotTouched) {
 
     plug({.model = 0x48});
 
-    while (bound.port.unpluggedBecause().find("0xf0/0x48 in place of 0xf0/0x22") == std::string::npos) std::this_thread::yield();
+    while (bound.port.unpluggedBecause().find("0xf0/0x48 in place of 0xf0/0x22") ==
+           std::string::npos)
+      std::this_thread::yield();
     EXPECT_EQ(bound.line->write(bytesOf("x"), kWatchdog), SerialPortStatus::failure);
     EXPECT_EQ(alarms_.count(OctalUartAlarm::lost), 1);
   }
@@ -264,14 +275,16 @@ TEST_F(OctalUartFaultTest, APortMayWaitForItsModule) {
 // Of a module, or a carrier, that was never there.
 TEST_F(OctalUartFaultTest, ALateLineComesWithItsModule) {
   auto line = std::make_unique<LateLine>("port 3 of UART", [this] {
-    if (!uart_) uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
+    if (!uart_)
+      uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
     return std::make_unique<OctalUartLine>(*uart_, 3, kFast);
   });
   LineCollector collector("\r");
   PolledSerialPort port(std::move(line), true);
   BoundSerialPort bound(port, collector);
   EXPECT_EQ(bound->write(bytesOf("x"), kWatchdog), SerialPortStatus::failure);
-  while (port.unpluggedBecause() != "no module at carrier ipac, site IP_a") std::this_thread::yield();
+  while (port.unpluggedBecause() != "no module at carrier ipac, site IP_a")
+    std::this_thread::yield();
 
   auto& model = plug({});
 

@@ -10,10 +10,11 @@
 #include <mutex>
 
 #include <mpf/drivers/industry_pack/model_carrier.h>
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
-#include <mpf/drivers/octal_uart/octal_uart_port.h>
-#include <mpf/tests/drivers/serial/line_collector.h>
-#include <mpf/tests/support/watchdog.h>
+
+#include "drivers/octal_uart/octal_uart_model.h"
+#include "drivers/octal_uart/octal_uart_port.h"
+#include "tests/drivers/serial/line_collector.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
@@ -42,7 +43,8 @@ class AlarmLog {
 
 // A port with who is bound to it.
 struct BoundOctalPort {
-  BoundOctalPort(OctalUart& uart, int number, const SerialSettings& settings) : port(uart, number, {.settings = settings}) {}
+  BoundOctalPort(OctalUart& uart, int number, const SerialSettings& settings)
+      : port(uart, number, {.settings = settings}) {}
   LineCollector collector{"\r"};
   OctalUartPort port;
   BoundSerialPort line{port, collector};
@@ -60,21 +62,25 @@ class OctalUartTest : public testing::Test {
   OctalUart& start(const OctalUartModelOptions& model = {}, const OctalUartOptions& options = {}) {
     plug(model);
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), options);
-    uart_->onAlarm([this](OctalUartAlarm alarm, const std::string& /*what*/) { alarms_.add(alarm); });
+    uart_->onAlarm(
+        [this](OctalUartAlarm alarm, const std::string& /*what*/) { alarms_.add(alarm); });
     return *uart_;
   }
   [[nodiscard]] SerialSettings settingsInChip(int number) const {
-    return model_->with(number, [](const OctalUartModelChannel& channel) { return channel.settings(); });
+    return model_->with(number,
+                        [](const OctalUartModelChannel& channel) { return channel.settings(); });
   }
   [[nodiscard]] bool requestsToSend(int number) const {
-    return model_->with(number, [](const OctalUartModelChannel& channel) { return channel.requestsToSend(); });
+    return model_->with(
+        number, [](const OctalUartModelChannel& channel) { return channel.requestsToSend(); });
   }
   // Whether a command gets through and its answer back.
   bool echoes(BoundOctalPort& bound, int number) {
     const auto tap = bound.port.attachTap([this, number](std::span<const PeekedByte> bytes) {
       if (bytes.front().direction == ByteDirection::sent) model_->say(number, "yes\r");
     });
-    return bound.line->writeRead(bytesOf("ok?\r"), kWatchdog) == SerialPortStatus::success && bound.collector.answer() == "yes\r";
+    return bound.line->writeRead(bytesOf("ok?\r"), kWatchdog) == SerialPortStatus::success &&
+           bound.collector.answer() == "yes\r";
   }
 
   Watchdog watchdog_{"octal UART test"};
@@ -85,7 +91,8 @@ class OctalUartTest : public testing::Test {
   OctalUartModel* model_ = nullptr;  // the carrier's
   std::optional<OctalUart> uart_;
 
-  ModelCarrier& addCarrier(std::unique_ptr<ModelCarrier> carrier, const std::string& name = "ipac") {
+  ModelCarrier& addCarrier(std::unique_ptr<ModelCarrier> carrier,
+                           const std::string& name = "ipac") {
     auto& added = *carrier;
     carriers_.add(name, std::move(carrier));
     return added;

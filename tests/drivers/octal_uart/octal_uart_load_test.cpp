@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Eight ports at 38400 baud at once: the chip keeps four bytes of each, so they must be served every 1.04 ms.
+// Eight ports at 38400 baud at once: the chip keeps four bytes of each, so they must be served
+// every 1.04 ms.
 #include <array>
 #include <thread>
 
-#include <mpf/tests/support/sanitized.h>
-
 #include "octal_uart_fixture.h"
+#include "tests/support/sanitized.h"
 
 namespace mpf::test {
 namespace {
@@ -18,25 +18,33 @@ class OctalUartLoadTest : public OctalUartTest {
   BoundOctalPort& port(int number) { return *ports_.at(static_cast<std::size_t>(number)); }
   static std::string textOf(int number, std::size_t bytes) {
     std::string text;
-    for (std::size_t i = 0; i < bytes; ++i) text += static_cast<char>('a' + (i * static_cast<std::size_t>(number + 1)) % 26);
+    for (std::size_t i = 0; i < bytes; ++i)
+      text += static_cast<char>('a' + (i * static_cast<std::size_t>(number + 1)) % 26);
     return text;
   }
   [[nodiscard]] std::uint64_t lost(int number) const {
-    return model_->with(number, [](const OctalUartModelChannel& channel) { return channel.overrun(); });
+    return model_->with(number,
+                        [](const OctalUartModelChannel& channel) { return channel.overrun(); });
   }
   // What the instruments have still to say.
   [[nodiscard]] bool isQuiet() const {
     for (int i = 0; i < 8; ++i) {
-      if (!model_->with(i, [](const OctalUartModelChannel& channel) { return channel.incoming.empty(); })) return false;
+      if (!model_->with(
+              i, [](const OctalUartModelChannel& channel) { return channel.incoming.empty(); }))
+        return false;
     }
     return true;
   }
-  // Every port sends and every instrument says so many bytes at once; returns when all are off the line.
+  // Every port sends and every instrument says so many bytes at once; returns when all are off the
+  // line.
   void talkBothWays(std::size_t bytes) {
     for (int i = 0; i < 8; ++i) model_->say(i, textOf(i, bytes));
     std::vector<std::thread> writers;
     for (int i = 0; i < 8; ++i) {
-      writers.emplace_back([&, i] { EXPECT_EQ(port(i).line->write(bytesOf(textOf(i, bytes)), kWatchdog), SerialPortStatus::success); });
+      writers.emplace_back([&, i] {
+        EXPECT_EQ(port(i).line->write(bytesOf(textOf(i, bytes)), kWatchdog),
+                  SerialPortStatus::success);
+      });
     }
     for (auto& writer : writers) writer.join();
     while (!isQuiet()) std::this_thread::sleep_for(1ms);
@@ -77,8 +85,9 @@ TEST_F(OctalUartLoadTest, NoByteIsLostByWhoComesThreeBytesLate) {
   }
 }
 
-// By the clock, both ways at once. A host that is busy with other things may let the driver come late, and then a round may lose bytes, and is
-// repeated; one in which the driver was there in time may not.
+// By the clock, both ways at once. A host that is busy with other things may let the driver come
+// late, and then a round may lose bytes, and is repeated; one in which the driver was there in time
+// may not.
 TEST_F(OctalUartLoadTest, NoByteIsLostByTheClock) {
   const SerialSettings settings{kIsSanitized ? 1200 : 38400, 1, 8, 'N', 'N'};
   start({.time = OctalUartModelTime::clock});
@@ -97,7 +106,8 @@ TEST_F(OctalUartLoadTest, NoByteIsLostByTheClock) {
       while (port(i).collector.all().size() < kBytes - lostOfPort) std::this_thread::yield();
     }
     if (lostNow == 0) break;
-    ASSERT_GT(model_->takeLongestWait(), 2 * byteTime(settings)) << lostNow << " bytes lost, and nobody was late";
+    ASSERT_GT(model_->takeLongestWait(), 2 * byteTime(settings))
+        << lostNow << " bytes lost, and nobody was late";
     for (int i = 0; i < 8; ++i) port(i).collector.clear();
   }
   for (int i = 0; i < 8; ++i) {

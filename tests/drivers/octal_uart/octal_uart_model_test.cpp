@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The model behaves as the data sheet says. What it does wrong, the driver's tests would not see.
-#include <mpf/drivers/octal_uart/octal_uart_model.h>
+#include "drivers/octal_uart/octal_uart_model.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -18,7 +18,9 @@ class OctalUartModelTest : public OctalUartTest {
  protected:
   Registers& io() { return carrier_.site(0).io(); }
   std::uint8_t get(ChannelRegister which) { return io().read8(at(kChannel, which)); }
-  void set(ChannelRegister which, unsigned value) { io().write8(at(kChannel, which), static_cast<std::uint8_t>(value)); }
+  void set(ChannelRegister which, unsigned value) {
+    io().write8(at(kChannel, which), static_cast<std::uint8_t>(value));
+  }
   void setUp(unsigned mr2 = kMr2OneStop) {
     set(kCr, kCrResetMr);
     set(kMr, 0x13);
@@ -92,7 +94,8 @@ TEST_F(OctalUartModelTest, SendsOneByteWhileTheNextOneWaits) {
   EXPECT_EQ(model.heard(kChannel), "ab");
 }
 
-// Philips' sheets of this family: "enable transmitter and reset transmitter" cannot be in one command word.
+// Philips' sheets of this family: "enable transmitter and reset transmitter" cannot be in one
+// command word.
 TEST_F(OctalUartModelTest, IsNotEnabledByTheWriteThatResetsIt) {
   auto& model = plug({});
   setUp();
@@ -153,7 +156,8 @@ TEST_F(OctalUartModelTest, TheOtherHalfHasTheOtherLine) {
 TEST_F(OctalUartModelTest, HasATerminalBehindEachPort) {
   auto& model = plug({.terminals = true});
   setUp();
-  const FileDescriptor instrument(checkCall(::open(model.terminal(kChannel).c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC), "open"));
+  const FileDescriptor instrument(
+      checkCall(::open(model.terminal(kChannel).c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC), "open"));
 
   set(kThr, 'q');
   char question = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_port.h>
+#include "drivers/octal_uart/octal_uart_port.h"
 
 #include <poll.h>
 
@@ -25,7 +25,8 @@ class OctalUartPortTest : public OctalUartTest {
     }
   }
   [[nodiscard]] bool isBreaking(int number) const {
-    return model_->with(number, [](const OctalUartModelChannel& channel) { return channel.isBreaking(); });
+    return model_->with(number,
+                        [](const OctalUartModelChannel& channel) { return channel.isBreaking(); });
   }
 };
 
@@ -105,8 +106,8 @@ TEST_F(OctalUartPortTest, DamagedBytesFailTheReadAndAreTold) {
     EXPECT_TRUE(bound.collector.waitForAll("ad\r"));
   }
 
-  EXPECT_THAT(faults, ElementsAre(LineFault::none, LineFault::parity, LineFault::framing, LineFault::breakSignal, LineFault::none,
-                                  LineFault::none));
+  EXPECT_THAT(faults, ElementsAre(LineFault::none, LineFault::parity, LineFault::framing,
+                                  LineFault::breakSignal, LineFault::none, LineFault::none));
   const auto counters = bound.port.counters();
   EXPECT_EQ(counters.parityErrors, 1U);
   EXPECT_EQ(counters.framingErrors, 1U);
@@ -124,7 +125,8 @@ TEST_F(OctalUartPortTest, AnOverrunIsCountedAndCostsNoOtherByte) {
   EXPECT_EQ(bound.port.counters().overruns, 1U);
 }
 
-// The chip says that it has lost bytes, and the driver that they are missing before the third or the fourth byte from there on.
+// The chip says that it has lost bytes, and the driver that they are missing before the third or
+// the fourth byte from there on.
 TEST_F(OctalUartPortTest, AnOverrunIsToldWhereBytesAreMissing) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
   const auto pass = [&](int bytes) {
@@ -137,7 +139,8 @@ TEST_F(OctalUartPortTest, AnOverrunIsToldWhereBytesAreMissing) {
   for (int i = 0; i < 4; ++i) pass(1);
 
   EXPECT_TRUE(bound.collector.waitForAll("12345678abc\rnext"));
-  EXPECT_THAT(bound.collector.faults(), ElementsAre(ToldFault{10, LineFault::overrun, 1}, ToldFault{11, LineFault::overrun, 0}));
+  EXPECT_THAT(bound.collector.faults(), ElementsAre(ToldFault{10, LineFault::overrun, 1},
+                                                    ToldFault{11, LineFault::overrun, 0}));
 }
 
 TEST_F(OctalUartPortTest, NobodyLosesWhatFitsIntoTheChip) {
@@ -155,7 +158,8 @@ TEST_F(OctalUartPortTest, SendsABreak) {
 
   EXPECT_EQ(bound.line->sendBreak(20ms), SerialPortStatus::success);
 
-  EXPECT_EQ(model_->with(4, [](const OctalUartModelChannel& channel) { return channel.breaks(); }), 1);
+  EXPECT_EQ(model_->with(4, [](const OctalUartModelChannel& channel) { return channel.breaks(); }),
+            1);
   EXPECT_FALSE(isBreaking(4));
   EXPECT_TRUE(echoes(bound, 4));
 }
@@ -208,7 +212,8 @@ TEST_F(OctalUartPortTest, Rs485TalksOrListens) {
   writer.join();
 
   EXPECT_FALSE(requestsToSend(5));
-  EXPECT_GE(model_->with(5, [](const OctalUartModelChannel& channel) { return channel.unheard(); }), 3U);
+  EXPECT_GE(model_->with(5, [](const OctalUartModelChannel& channel) { return channel.unheard(); }),
+            3U);
 }
 
 TEST_F(OctalUartPortTest, Rs485HearsAnAnswerAtOnce) {
@@ -222,7 +227,8 @@ TEST_F(OctalUartPortTest, Rs485HearsAnAnswerAtOnce) {
   });
 
   for (int i = 0; i < 100; ++i)
-    EXPECT_EQ(bound.line->writeRead(bytesOf("?" + std::to_string(i) + "\r"), kWatchdog), SerialPortStatus::success);
+    EXPECT_EQ(bound.line->writeRead(bytesOf("?" + std::to_string(i) + "\r"), kWatchdog),
+              SerialPortStatus::success);
 
   instrument.join();
 }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/octal_uart/octal_uart_settings.h>
+#include "drivers/octal_uart/octal_uart_settings.h"
 
 #include <stdexcept>
 
-#include <mpf/drivers/octal_uart/scc2698b.h>
-
+#include "drivers/octal_uart/scc2698b.h"
 #include "octal_uart_fixture.h"
 
 namespace mpf::test {
@@ -16,8 +15,10 @@ class OctalUartSettingsTest : public OctalUartTest {};
 
 // Facts from the old driver: what it wrote for each of the manual's speeds.
 TEST_F(OctalUartSettingsTest, TheManualsSpeedsAreWhatTheOldDriverWrote) {
-  const std::map<int, std::uint8_t> codes{{1200, 0x66}, {2400, 0x88}, {4800, 0x99}, {9600, 0xbb}, {19200, 0xcc}, {38400, 0x22}};
-  for (const auto& [baud, csr] : codes) EXPECT_EQ(octalUartModeOf({baud, 1, 8, 'N', 'N'}).csr, csr) << baud;
+  const std::map<int, std::uint8_t> codes{{1200, 0x66}, {2400, 0x88},  {4800, 0x99},
+                                          {9600, 0xbb}, {19200, 0xcc}, {38400, 0x22}};
+  for (const auto& [baud, csr] : codes)
+    EXPECT_EQ(octalUartModeOf({baud, 1, 8, 'N', 'N'}).csr, csr) << baud;
 }
 
 TEST_F(OctalUartSettingsTest, ModesAreWhatTheOldDriverWrote) {
@@ -55,7 +56,8 @@ TEST_F(OctalUartSettingsTest, ASpeedThatTheChipDoesNotMakeIsNamedAndChangesNothi
   OctalUartPort port(start(), 0, {.settings = kFast});
 
   EXPECT_EQ(port.config({.baud = 57600, .parity = 'E'}),
-            "baud 57600: this chip makes 75, 110, 150, 300, 600, 1200, 1800, 2000, 2400, 4800, 9600, 19200, 38400");
+            "baud 57600: this chip makes 75, 110, 150, 300, 600, 1200, 1800, 2000, 2400, 4800, "
+            "9600, 19200, 38400");
 
   EXPECT_EQ(settingsInChip(0), kFast);
 }

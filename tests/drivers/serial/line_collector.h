@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// LineCollector: a byte handler as a server would have it: reads end at an end-of-message string. And waits of tests.
+// LineCollector: a byte handler as a server would have it: reads end at an end-of-message string.
+// And waits of tests.
 #pragma once
 
 #include <condition_variable>
@@ -11,14 +12,16 @@
 #include <vector>
 
 #include <mpf/drivers/serial/serial_port.h>
-#include <mpf/tests/support/watchdog.h>
+
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 
 using std::chrono_literals::operator""ms;
 using std::chrono_literals::operator""s;
 
-constexpr auto kWatchdog = Watchdog::kPatience;  // no upper time limit: what it guards against is a hang
+// no upper time limit: what it guards against is a hang
+constexpr auto kWatchdog = Watchdog::kPatience;
 
 inline Deadline watchdog() { return Deadline::after(kWatchdog); }
 
@@ -36,7 +39,8 @@ struct ToldFault {
 
 class LineCollector : public ByteHandler {
  public:
-  explicit LineCollector(std::string end = "\r\n", std::string error = {}) : end_(std::move(end)), error_(std::move(error)) {}
+  explicit LineCollector(std::string end = "\r\n", std::string error = {})
+      : end_(std::move(end)), error_(std::move(error)) {}
 
   ByteHandlerResult byteReceived(std::uint8_t byte) override {
     const std::lock_guard lock(mutex_);
@@ -50,7 +54,8 @@ class LineCollector : public ByteHandler {
     start_ = all_.size();
     ++readsBegun_;
     changed_.notify_all();
-    return acceptsEarlier_ && all_.ends_with(end_) ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
+    return acceptsEarlier_ && all_.ends_with(end_) ? ByteHandlerResult::endRead
+                                                   : ByteHandlerResult::ok;
   }
   void readEnds(SerialPortStatus status) override {
     const std::lock_guard lock(mutex_);

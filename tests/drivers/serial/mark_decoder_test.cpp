@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/mark_decoder.h>
+#include "drivers/serial/mark_decoder.h"
 
 #include <gtest/gtest.h>
 
@@ -16,19 +16,30 @@ Bytes decoded(std::initializer_list<std::vector<std::uint8_t>> pieces) {
   return bytes;
 }
 
-TEST(MarkDecoder, PassesPlainBytes) { EXPECT_EQ(decoded({{'a', 0, 0xfe}}), (Bytes{{'a'}, {0}, {0xfe}})); }
+TEST(MarkDecoder, PassesPlainBytes) {
+  EXPECT_EQ(decoded({{'a', 0, 0xfe}}), (Bytes{{'a'}, {0}, {0xfe}}));
+}
 
-TEST(MarkDecoder, HalvesDoubledMarks) { EXPECT_EQ(decoded({{0xff, 0xff, 'a'}}), (Bytes{{0xff}, {'a'}})); }
+TEST(MarkDecoder, HalvesDoubledMarks) {
+  EXPECT_EQ(decoded({{0xff, 0xff, 'a'}}), (Bytes{{0xff}, {'a'}}));
+}
 
-TEST(MarkDecoder, TellsDamagedBytes) { EXPECT_EQ(decoded({{'a', 0xff, 0, 'b', 'c'}}), (Bytes{{'a'}, {'b', kDamage}, {'c'}})); }
+TEST(MarkDecoder, TellsDamagedBytes) {
+  EXPECT_EQ(decoded({{'a', 0xff, 0, 'b', 'c'}}), (Bytes{{'a'}, {'b', kDamage}, {'c'}}));
+}
 
-TEST(MarkDecoder, TellsADamagedMarkByte) { EXPECT_EQ(decoded({{0xff, 0, 0xff, 'a'}}), (Bytes{{0xff, kDamage}, {'a'}})); }
+TEST(MarkDecoder, TellsADamagedMarkByte) {
+  EXPECT_EQ(decoded({{0xff, 0, 0xff, 'a'}}), (Bytes{{0xff, kDamage}, {'a'}}));
+}
 
-TEST(MarkDecoder, TellsBreaks) { EXPECT_EQ(decoded({{0xff, 0, 0, 'a'}}), (Bytes{{0, LineFault::breakSignal}, {'a'}})); }
+TEST(MarkDecoder, TellsBreaks) {
+  EXPECT_EQ(decoded({{0xff, 0, 0, 'a'}}), (Bytes{{0, LineFault::breakSignal}, {'a'}}));
+}
 
 // A read may end anywhere.
 TEST(MarkDecoder, PutsSplitMarksTogether) {
-  EXPECT_EQ(decoded({{'a', 0xff}, {0}, {'b', 0xff}, {0xff, 'c'}}), (Bytes{{'a'}, {'b', kDamage}, {0xff}, {'c'}}));
+  EXPECT_EQ(decoded({{'a', 0xff}, {0}, {'b', 0xff}, {0xff, 'c'}}),
+            (Bytes{{'a'}, {'b', kDamage}, {0xff}, {'c'}}));
 }
 
 }  // namespace

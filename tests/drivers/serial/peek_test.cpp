@@ -4,10 +4,11 @@
 #include <optional>
 
 #include <mpf/drivers/serial/peek_taps.h>
-#include <mpf/drivers/serial/posix_terminal_port.h>
-#include <mpf/tests/drivers/serial/line_collector.h>
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/temporary_folder.h>
+
+#include "drivers/serial/posix_terminal_port.h"
+#include "tests/drivers/serial/line_collector.h"
+#include "tests/support/instrument.h"
+#include "tests/support/temporary_folder.h"
 
 namespace mpf::test {
 namespace {
@@ -53,7 +54,9 @@ class PeekTest : public testing::Test {
   PosixTerminalPort port_{{.device = folder_.file("tty")}};
   BoundSerialPort line_{port_, collector_};
 
-  void ask(std::string_view command) { EXPECT_EQ(line_->writeRead(bytesOf(command), kWatchdog), SerialPortStatus::success); }
+  void ask(std::string_view command) {
+    EXPECT_EQ(line_->writeRead(bytesOf(command), kWatchdog), SerialPortStatus::success);
+  }
 };
 
 TEST_F(PeekTest, TapSeesBothDirectionsInTheOrderOfTheLine) {

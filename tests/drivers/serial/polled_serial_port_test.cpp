@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/polled_serial_port.h>
+#include "drivers/serial/polled_serial_port.h"
 
 #include <sys/eventfd.h>
 
@@ -7,9 +7,10 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-#include <mpf/base/file_descriptor.h>
-#include <mpf/base/system_call.h>
-#include <mpf/tests/drivers/serial/line_collector.h>
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "tests/drivers/serial/line_collector.h"
 
 namespace mpf::test {
 namespace {
@@ -63,7 +64,9 @@ class PlayedLine : public SerialLine {
     script_.take(bytes);
     return true;
   }
-  std::optional<std::size_t> tryWrite(std::span<const std::uint8_t> bytes) override { return bytes.size(); }
+  std::optional<std::size_t> tryWrite(std::span<const std::uint8_t> bytes) override {
+    return bytes.size();
+  }
   std::chrono::milliseconds timeToSend() const override { return script_.isHeldUp ? 1ms : 0ms; }
   void discardUnsent() noexcept override { ++script_.discards; }
   std::uint64_t takeOverruns() noexcept override { return script_.takeOverruns(); }
@@ -121,7 +124,8 @@ TEST_F(PolledSerialPortTest, TapsSeeDamagedBytesWithTheirFault) {
 
 TEST_F(PolledSerialPortTest, ReadingIsEnabledBeforeTheFirstByteIsSent) {
   int readsBegun = 0;
-  const auto tap = port_.attachTap([&](std::span<const PeekedByte>) { readsBegun = collector_.readsBegun(); });
+  const auto tap =
+      port_.attachTap([&](std::span<const PeekedByte>) { readsBegun = collector_.readsBegun(); });
 
   EXPECT_EQ(line_->writeRead(bytesOf("?"), 0ms), SerialPortStatus::timeout);
 
@@ -156,7 +160,8 @@ TEST_F(PolledSerialPortTest, AGapIsToldBetweenTheBytesWhereItIs) {
   script_.arrive({{'a'}, {'b', LineFault::none, true}, {'c'}, {'d', LineFault::none, true}}, 3);
 
   EXPECT_TRUE(collector_.waitForAll("abcd"));
-  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{1, LineFault::overrun, 3}, ToldFault{3, LineFault::overrun, 0}));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{1, LineFault::overrun, 3},
+                                               ToldFault{3, LineFault::overrun, 0}));
 }
 
 TEST_F(PolledSerialPortTest, AGapThatMayBeAnywhereIsToldBeforeTheBytes) {
@@ -218,7 +223,9 @@ TEST_F(PolledSerialPortTest, ARequestThatItsBinderGivesUpFails) {
 // A handler that refuses the read, and counts what begins to be sent.
 struct Refuser : ByteHandler {
   ByteHandlerResult byteReceived(std::uint8_t /*byte*/) override { return ByteHandlerResult::ok; }
-  ByteHandlerResult readBegins() override { return refuses ? ByteHandlerResult::error : ByteHandlerResult::ok; }
+  ByteHandlerResult readBegins() override {
+    return refuses ? ByteHandlerResult::error : ByteHandlerResult::ok;
+  }
   void sendBegins() override { ++sends; }
   std::atomic<bool> refuses = true;
   std::atomic<int> sends = 0;
@@ -239,8 +246,10 @@ TEST_F(PolledSerialPortTest, AHandlerThatRefusesAReadKeepsItsRequestFromTheLine)
 }
 
 TEST_F(PolledSerialPortTest, ReleaseEndsABreak) {
-  std::jthread other([&] { EXPECT_EQ(port_.sendBreak(std::chrono::hours(1)), SerialPortStatus::failure); });
-  for (const auto deadline = watchdog(); !script_.isInBreak && !deadline.hasPassed();) std::this_thread::yield();
+  std::jthread other(
+      [&] { EXPECT_EQ(port_.sendBreak(std::chrono::hours(1)), SerialPortStatus::failure); });
+  for (const auto deadline = watchdog(); !script_.isInBreak && !deadline.hasPassed();)
+    std::this_thread::yield();
   ASSERT_TRUE(script_.isInBreak);
 
   line_->release();

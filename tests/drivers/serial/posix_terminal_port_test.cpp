@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/posix_terminal_port.h>
+#include "drivers/serial/posix_terminal_port.h"
 
 #include <future>
 #include <gmock/gmock.h>
@@ -7,11 +7,11 @@
 #include <stdexcept>
 #include <thread>
 
-#include <mpf/drivers/serial/terminal_settings.h>
-#include <mpf/tests/drivers/serial/line_collector.h>
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/temporary_folder.h>
-#include <mpf/tests/support/watchdog.h>
+#include "drivers/serial/terminal_settings.h"
+#include "tests/drivers/serial/line_collector.h"
+#include "tests/support/instrument.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -23,7 +23,9 @@ using testing::HasSubstr;
 class PosixTerminalPortTest : public testing::Test {
  protected:
   PosixTerminalOptions options() const { return {.device = folder_.file("tty")}; }
-  PosixTerminalOptions optionsWith(const SerialSettings& settings) const { return {.device = folder_.file("tty"), .settings = settings}; }
+  PosixTerminalOptions optionsWith(const SerialSettings& settings) const {
+    return {.device = folder_.file("tty"), .settings = settings};
+  }
 
   TemporaryFolder folder_;
   Instrument instrument_{folder_.file("tty")};
@@ -40,7 +42,8 @@ std::string whyNot(const PosixTerminalOptions& options) {
 }
 
 TEST_F(PosixTerminalPortTest, StartsWithItsSettings) {
-  const PosixTerminalPort port(optionsWith({.baud = 19200, .stopBits = 2, .bitsPerChar = 8, .parity = 'N', .flowControl = 'H'}));
+  const PosixTerminalPort port(optionsWith(
+      {.baud = 19200, .stopBits = 2, .bitsPerChar = 8, .parity = 'N', .flowControl = 'H'}));
 
   const auto line = instrument_.settings();
 
@@ -51,9 +54,10 @@ TEST_F(PosixTerminalPortTest, StartsWithItsSettings) {
 
 TEST_F(PosixTerminalPortTest, NamedSpeedsGoByTheirNames) {
   PosixTerminalPort port(options());
-  const std::vector<std::pair<int, speed_t>> speeds = {{50, B50},         {110, B110},         {300, B300},         {1200, B1200},
-                                                       {9600, B9600},     {38400, B38400},     {115200, B115200},   {460800, B460800},
-                                                       {921600, B921600}, {1000000, B1000000}, {3000000, B3000000}, {4000000, B4000000}};
+  const std::vector<std::pair<int, speed_t>> speeds = {
+      {50, B50},         {110, B110},         {300, B300},         {1200, B1200},
+      {9600, B9600},     {38400, B38400},     {115200, B115200},   {460800, B460800},
+      {921600, B921600}, {1000000, B1000000}, {3000000, B3000000}, {4000000, B4000000}};
   for (const auto& [baud, constant] : speeds) {
     EXPECT_EQ(port.config({.baud = baud}), "");
 
@@ -89,7 +93,8 @@ TEST_F(PosixTerminalPortTest, ZeroLeavesASettingAsItIs) {
 TEST_F(PosixTerminalPortTest, NamesTheSettingThatTheLineDoesNotAccept) {
   PosixTerminalPort port(optionsWith({.baud = 9600}));
 
-  EXPECT_THAT(port.config({.baud = 19200, .bitsPerChar = 7}), HasSubstr("does not accept bits per character 7"));
+  EXPECT_THAT(port.config({.baud = 19200, .bitsPerChar = 7}),
+              HasSubstr("does not accept bits per character 7"));
   EXPECT_THAT(port.config({.baud = 19200, .parity = 'E'}), HasSubstr("does not accept parity E"));
   EXPECT_THAT(port.config({.parity = 'Q'}), HasSubstr("parity 'Q'"));
 
@@ -98,16 +103,19 @@ TEST_F(PosixTerminalPortTest, NamesTheSettingThatTheLineDoesNotAccept) {
 }
 
 TEST_F(PosixTerminalPortTest, SaysWhyItCannotStart) {
-  EXPECT_THAT(whyNot({.device = folder_.file("absent")}), AllOf(HasSubstr("open"), HasSubstr("absent"), HasSubstr("No such file")));
+  EXPECT_THAT(whyNot({.device = folder_.file("absent")}),
+              AllOf(HasSubstr("open"), HasSubstr("absent"), HasSubstr("No such file")));
   EXPECT_THAT(whyNot({.device = "/dev/null"}), HasSubstr("open /dev/null: not a terminal"));
-  EXPECT_THAT(whyNot(optionsWith({.bitsPerChar = 7})), HasSubstr("does not accept bits per character 7"));
+  EXPECT_THAT(whyNot(optionsWith({.bitsPerChar = 7})),
+              HasSubstr("does not accept bits per character 7"));
   EXPECT_THAT(whyNot(optionsWith({.stopBits = 5})), HasSubstr("stop bits 5"));
 }
 
 TEST_F(PosixTerminalPortTest, OpensTheDeviceForItselfAlone) {
   {
     const PosixTerminalPort port(options());
-    EXPECT_THAT(whyNot(options()), AllOf(HasSubstr(folder_.file("tty")), HasSubstr("in use by another program")));
+    EXPECT_THAT(whyNot(options()),
+                AllOf(HasSubstr(folder_.file("tty")), HasSubstr("in use by another program")));
   }
 
   EXPECT_EQ(whyNot(options()), "");
@@ -131,7 +139,8 @@ TEST_F(PosixTerminalPortTest, UnplugFailsTheRequestThatIsOutstanding) {
   PosixTerminalPort port(options());
   const BoundSerialPort line(port, collector_);
   instrument_.behave({.isSilent = true});
-  auto status = std::async(std::launch::async, [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
+  auto status = std::async(std::launch::async,
+                           [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
   ASSERT_TRUE(instrument_.waitForReceived("*IDN?\n"));
 
   instrument_.unplug();
@@ -188,7 +197,8 @@ TEST_F(PosixTerminalPortTest, TapsSurviveAnUnplug) {
   PosixTerminalPort port(options());
   const BoundSerialPort line(port, collector_);
   std::atomic<int> seen = 0;
-  const auto tap = port.attachTap([&](std::span<const PeekedByte> bytes) { seen += static_cast<int>(bytes.size()); });
+  const auto tap = port.attachTap(
+      [&](std::span<const PeekedByte> bytes) { seen += static_cast<int>(bytes.size()); });
   instrument_.unplug();
   ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
   instrument_.plugIn();
@@ -209,7 +219,8 @@ TEST_F(PosixTerminalPortTest, TellsEachChangeOfStateOnce) {
   instrument_.unplug();
   ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
   const auto lost = port.unpluggedBecause();
-  while (port.unpluggedBecause() == lost) std::this_thread::yield();  // until an attempt to open has failed, which is no change
+  // until an attempt to open has failed, which is no change
+  while (port.unpluggedBecause() == lost) std::this_thread::yield();
   instrument_.plugIn();
   ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
 

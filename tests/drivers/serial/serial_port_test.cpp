@@ -6,11 +6,12 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-#include <mpf/drivers/serial/posix_terminal_port.h>
 #include <mpf/drivers/serial/serial_port_registry.h>
-#include <mpf/tests/drivers/serial/line_collector.h>
-#include <mpf/tests/support/instrument.h>
-#include <mpf/tests/support/temporary_folder.h>
+
+#include "drivers/serial/posix_terminal_port.h"
+#include "tests/drivers/serial/line_collector.h"
+#include "tests/support/instrument.h"
+#include "tests/support/temporary_folder.h"
 
 namespace mpf::test {
 namespace {
@@ -190,7 +191,9 @@ TEST_F(SerialPortTest, ASecondBinderIsRefusedUntilRelease) {
   EXPECT_EQ(collector_.all(), "");
 }
 
-TEST_F(SerialPortTest, WithoutBindingRequestsFail) { EXPECT_EQ(port_.writeRead(bytesOf("*IDN?\n"), kWatchdog), kFailure); }
+TEST_F(SerialPortTest, WithoutBindingRequestsFail) {
+  EXPECT_EQ(port_.writeRead(bytesOf("*IDN?\n"), kWatchdog), kFailure);
+}
 
 TEST_F(SerialPortTest, ReleaseEndsARequestThatIsOutstanding) {
   port_.bind(collector_);
@@ -239,7 +242,8 @@ TEST(SerialPortRegistry, FindsByName) {
   const TemporaryFolder folder;
   const Instrument instrument(folder.file("tty"));
   SerialPortRegistry registry;
-  const auto port = std::make_shared<PosixTerminalPort>(PosixTerminalOptions{.device = folder.file("tty")});
+  const auto port =
+      std::make_shared<PosixTerminalPort>(PosixTerminalOptions{.device = folder.file("tty")});
 
   registry.registerName("UART[0]", port);
 
@@ -255,7 +259,8 @@ TEST(SerialPortRegistry, BindsByName) {
   Instrument instrument(folder.file("tty"));
   LineCollector collector;
   SerialPortRegistry registry;
-  registry.registerName("UART[0]", std::make_shared<PosixTerminalPort>(PosixTerminalOptions{.device = folder.file("tty")}));
+  registry.registerName("UART[0]", std::make_shared<PosixTerminalPort>(
+                                       PosixTerminalOptions{.device = folder.file("tty")}));
 
   const auto line = registry.bind("UART[0]", collector);
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-#include <mpf/drivers/serial/tcp_address.h>
+#include "drivers/serial/tcp_address.h"
 
 namespace mpf {
 namespace {
@@ -17,7 +17,12 @@ TEST(SerialSettings, AllZeroIsPossible) { EXPECT_EQ(problemOf({}), ""); }
 TEST(SerialSettings, AcceptsWhatTheManualHas) {
   for (const char parity : {'E', 'O', 'N'}) {
     for (const int bits : {5, 6, 7, 8}) {
-      EXPECT_EQ(problemOf({.baud = 19200, .stopBits = 2, .bitsPerChar = bits, .parity = parity, .flowControl = 'H'}), "");
+      EXPECT_EQ(problemOf({.baud = 19200,
+                           .stopBits = 2,
+                           .bitsPerChar = bits,
+                           .parity = parity,
+                           .flowControl = 'H'}),
+                "");
     }
   }
 }
@@ -32,11 +37,15 @@ TEST(SerialSettings, ProblemNamesTheValue) {
 }
 
 TEST(SerialSettings, ZeroKeepsWhatWas) {
-  const SerialSettings before{.baud = 9600, .stopBits = 1, .bitsPerChar = 8, .parity = 'N', .flowControl = 'N'};
+  const SerialSettings before{
+      .baud = 9600, .stopBits = 1, .bitsPerChar = 8, .parity = 'N', .flowControl = 'N'};
 
   const auto after = merged(before, {.baud = 19200, .parity = 'E'});
 
-  EXPECT_EQ(after, (SerialSettings{.baud = 19200, .stopBits = 1, .bitsPerChar = 8, .parity = 'E', .flowControl = 'N'}));
+  EXPECT_EQ(
+      after,
+      (SerialSettings{
+          .baud = 19200, .stopBits = 1, .bitsPerChar = 8, .parity = 'E', .flowControl = 'N'}));
 }
 
 TEST(TcpAddress, HasHostAndPort) {

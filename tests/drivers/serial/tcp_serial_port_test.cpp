@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/tcp_serial_port.h>
+#include "drivers/serial/tcp_serial_port.h"
 
 #include <netinet/in.h>
 #include <poll.h>
@@ -12,8 +12,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include <mpf/tests/drivers/serial/line_collector.h>
-#include <mpf/tests/support/instrument.h>
+#include "tests/drivers/serial/line_collector.h"
+#include "tests/support/instrument.h"
 
 namespace mpf::test {
 namespace {
@@ -25,12 +25,16 @@ class TerminalServer {
  public:
   explicit TerminalServer(int family = AF_INET) : family_(family) { listen(0); }
 
-  [[nodiscard]] TcpAddress address() const { return {family_ == AF_INET ? "127.0.0.1" : "::1", std::to_string(port_)}; }
+  [[nodiscard]] TcpAddress address() const {
+    return {family_ == AF_INET ? "127.0.0.1" : "::1", std::to_string(port_)};
+  }
   [[nodiscard]] FileDescriptor accept() const {
     pollfd ready{listener_.get(), POLLIN, 0};
     const auto watchdogMs = static_cast<int>(std::chrono::milliseconds(kWatchdog).count());
-    if (retryInterrupted([&] { return ::poll(&ready, 1, watchdogMs); }) != 1) throw std::runtime_error("nobody connects");
-    return FileDescriptor(checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
+    if (retryInterrupted([&] { return ::poll(&ready, 1, watchdogMs); }) != 1)
+      throw std::runtime_error("nobody connects");
+    return FileDescriptor(
+        checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
   }
   void switchOff() { listener_.reset(); }
   void switchOn() { listen(port_); }
@@ -39,7 +43,8 @@ class TerminalServer {
   void listen(std::uint16_t port) {
     listener_.reset(checkCall(::socket(family_, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
     const int yes = 1;
-    checkCall(::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes), "setsockopt");
+    checkCall(::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes),
+              "setsockopt");
     sockaddr_in6 address{};  // the port is at the same place in sockaddr_in
     address.sin6_family = static_cast<sa_family_t>(family_);
     address.sin6_port = htons(port);
@@ -122,7 +127,8 @@ TEST_F(TcpSerialPortTest, SettingsBelongToTheTerminalServer) {
   TcpSerialPort port({.address = server_.address()});
 
   EXPECT_EQ(port.config({}), "");
-  EXPECT_THAT(port.config({.baud = 9600}), HasSubstr("not supported over TCP: set it on the terminal server"));
+  EXPECT_THAT(port.config({.baud = 9600}),
+              HasSubstr("not supported over TCP: set it on the terminal server"));
 }
 
 TEST_F(TcpSerialPortTest, CannotSendABreak) {
@@ -135,19 +141,23 @@ TEST_F(TcpSerialPortTest, CannotSendABreak) {
 TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
   server_.switchOff();
 
-  EXPECT_THAT(whyNot({.address = server_.address()}), HasSubstr("connect to " + server_.address().toString() + ": Connection refused"));
-  EXPECT_THAT(whyNot({.address = {"no-such-host.invalid", "1"}}), HasSubstr("resolve no-such-host.invalid:1"));
+  EXPECT_THAT(whyNot({.address = server_.address()}),
+              HasSubstr("connect to " + server_.address().toString() + ": Connection refused"));
+  EXPECT_THAT(whyNot({.address = {"no-such-host.invalid", "1"}}),
+              HasSubstr("resolve no-such-host.invalid:1"));
 }
 
 // The accept queue is full, so that the kernel does not answer.
 TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
-  const TcpSerialOptions options{.address = server_.address(), .connectTimeout = 50ms, .waitForServer = true};
+  const TcpSerialOptions options{
+      .address = server_.address(), .connectTimeout = 50ms, .waitForServer = true};
   std::array<std::unique_ptr<TcpSerialPort>, 4> fillers;
   for (auto& filler : fillers) filler = std::make_unique<TcpSerialPort>(options);
 
   const auto reason = [&] {
     for (;;) {
-      if (auto why = whyNot({.address = server_.address(), .connectTimeout = 50ms}); !why.empty()) return why;
+      if (auto why = whyNot({.address = server_.address(), .connectTimeout = 50ms}); !why.empty())
+        return why;
     }
   }();
 
@@ -159,7 +169,8 @@ TEST_F(TcpSerialPortTest, ALostConnectionFailsTheRequestThatIsOutstanding) {
   instrument_.connect(server_.accept());
   const BoundSerialPort line(port, collector_);
   instrument_.behave({.isSilent = true});
-  auto status = std::async(std::launch::async, [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
+  auto status = std::async(std::launch::async,
+                           [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
   ASSERT_TRUE(instrument_.waitForReceived("*IDN?\n"));
 
   server_.switchOff();
@@ -203,7 +214,8 @@ TEST_F(TcpSerialPortTest, AFloodDoesNotKeepARequestFromItsDeadline) {
   const BoundSerialPort line(port, collector);
   std::jthread flood([&](const std::stop_token& stop) {
     const std::string noise(1000, '#');
-    while (!stop.stop_requested() && ::send(far.get(), noise.data(), noise.size(), MSG_NOSIGNAL) > 0) {
+    while (!stop.stop_requested() &&
+           ::send(far.get(), noise.data(), noise.size(), MSG_NOSIGNAL) > 0) {
     }
   });
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/drivers/serial/terminal_errors.h>
+#include "drivers/serial/terminal_errors.h"
 
 #include <gtest/gtest.h>
 
@@ -32,7 +32,8 @@ TEST(TerminalErrors, DamageIsParityUnlessFramingErrorsWereCounted) {
   EXPECT_EQ(errors.take(Counts{}, true), LineFault::parity);
   EXPECT_EQ(errors.take(Counts{.framing = 1, .overruns = 0}, true), LineFault::framing);
   EXPECT_EQ(errors.take(Counts{.framing = 1, .overruns = 0}, true), LineFault::parity);
-  EXPECT_EQ(errors.take(Counts{}, false), LineFault::framing) << "without parity it can be nothing else";
+  EXPECT_EQ(errors.take(Counts{}, false), LineFault::framing)
+      << "without parity it can be nothing else";
 }
 
 TEST(TerminalErrors, WithoutCountersNothingIsSuspect) {

@@ -314,7 +314,7 @@ class ServerRouter:
       for session in self.sessions:
         session.serverCame(server)
 
-  def goOn(self, server):
+  def resume(self, server):
     """It takes requests again."""
     with self.changed:
       server.takes = True

@@ -109,7 +109,7 @@ class AsServerRouter(PeerCase):
     second = self.programs.call(self.near, "far", "int32", "--location", 2)
 
     self.assertIn("no reply: refused", second.communicate()[1])
-    self.far.goOn(self.server)
+    self.far.resume(self.server)
     self.assertEqual(first.wait(), 0)
     self.assertIsNone(self.session().connection.ending)
 
@@ -144,7 +144,7 @@ class AsServerRouter(PeerCase):
     self.assertIn("neverTaken", call.communicate()[1])
     call = self.programs.call(self.near, "far", "int32", "value=2", "--location", 2)
     self.far.comeBack(self.server)
-    self.far.goOn(self.server)
+    self.far.resume(self.server)
     self.assertIn("value=2", call.communicate()[0])
 
   # A client that stands still stops the server's replies at the window; when it goes on, so do they.
@@ -161,7 +161,7 @@ class AsServerRouter(PeerCase):
     self.far.await_(lambda: any(session.untaken() for session in self.far.sessions))
     client.send_signal(signal.SIGSTOP)
 
-    self.far.goOn(self.server)
+    self.far.resume(self.server)
 
     (one,) = self.session().clients.values()
     self.far.await_(lambda: one.held and one.window <= 0)

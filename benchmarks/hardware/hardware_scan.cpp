@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// The rows of `mpf bench hardware` about what scanning costs: all that mpf-ip330-server has in its
+// process, in one of the bench's own, which can look into it.
+#include <pthread.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <optional>
+#include <stdexcept>
+
+#include <mpf/drivers/industry_pack/model_carrier.h>
+
+#include "benchmarks/hardware/hardware.h"
+#include "benchmarks/peers/mpf_peer.h"
+#include "benchmarks/stage/meter.h"
+#include "drivers/ip330/ip330_model.h"
+#include "server/programs/ip330_server/ip330_servers.h"
+
+namespace mpf::bench {
+namespace {
+
+constexpr auto kFirstScan = std::chrono::seconds(10);
+constexpr auto kScanAtLeast = std::chrono::seconds(1);
+
+// What one look finds out, in Figures::more.
+// the last two: percent of one CPU
+enum ScanFound : std::size_t { scansPerSecond, scansMissed, driversThread, wholeProcess };
+
+double nsOf(clockid_t clock) {
+  timespec used{};
+  ::clock_gettime(clock, &used);
+  return static_cast<double>(used.tv_sec) * 1e9 + static_cast<double>(used.tv_nsec);
+}
+
+// The CPU clock of the thread that reads the mailboxes and tells subscribers.
+clockid_t clockOfDriver(Ip330& board) {
+  std::atomic<clockid_t> clock{0};
+  std::atomic<bool> isKnown{false};
+  const auto subscription = board.subscribe([&](const Ip330Sample&) {
+    clockid_t mine{};
+    if (::pthread_getcpuclockid(::pthread_self(), &mine) != 0) return;
+    clock.store(mine, std::memory_order_relaxed);
+    // PAIR(bench-clock): who sees that it is known sees which.
+    isKnown.store(true, std::memory_order_release);
+  });
+  // PAIR(bench-clock): the clock is there.
+  if (!waitUntil([&] { return isKnown.load(std::memory_order_acquire); }, kFirstScan))
+    throw std::runtime_error("no scan comes");
+  return clock.load(std::memory_order_relaxed);
+}
+
+void measureScanning(const Scene& scene, const Bench& bench) {
+  IndustryPackCarriers carriers;
+  auto carrier = std::make_unique<ModelCarrier>();
+  carrier->plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{.noise = 0.5}));
+  carriers.add("ipac", std::move(carrier));
+  IndustryPackModules modules(carriers);
+  auto& module = modules.create("adc", "ipac", "IP_a", kIp330);
+  const ServerLog log("mpf-bench", "off");
+  const auto backplane = Backplane::attach(bench.backplane);
+  ServerOptions options;
+  options.waitMode = waitMode(bench.wait);
+  Ip330Servers servers(backplane, options, module,
+                       {.lastChannel = kIp330Channels - 1, .microsecondsPerScan = 1000}, log);
+  servers.addScan("adc", 20, 0, kIp330Channels - 1, std::chrono::milliseconds(0));
+
+  auto& board = servers.board();
+  const auto driver = clockOfDriver(board);
+  sleepFor(scene.budget().warmUp);
+  const auto before = board.counters();
+  const auto driverBefore = nsOf(driver);
+  const auto processBefore = cpuNsOf(::getpid());
+  const auto fromNs = Clock::nowNs();
+  sleepFor(std::max<Nanoseconds>(scene.budget().measure, kScanAtLeast));
+  const auto elapsedNs = static_cast<double>(Clock::nowNs() - fromNs);
+  const auto after = board.counters();
+  auto& more = scene.figures().more;
+  more[driversThread] = 100 * (nsOf(driver) - driverBefore) / elapsedNs;
+  more[wholeProcess] = 100 * (cpuNsOf(::getpid()) - processBefore) / elapsedNs;
+  more[scansPerSecond] = static_cast<double>(after.scans - before.scans) * 1e9 / elapsedNs;
+  more[scansMissed] = static_cast<double>(after.missed - before.missed);
+}
+
+Outcome runScanning(const Stage& stage, const Bench& bench) {
+  Act act;
+  act.requester = [&](const Scene& scene) {
+    pinTo(stage.placement().server);
+    measureScanning(scene, bench);
+  };
+  auto outcome = stage.run(act);
+  removeBackplanes(bench.backplane);
+  return outcome;
+}
+
+}  // namespace
+
+std::vector<Measurement> scanRows(const Bench& bench) {
+  // One look is enough: its rows tell of the same one.
+  const auto seen = std::make_shared<std::optional<Outcome>>();
+  const auto row = [&](const std::string& name, const std::string& unit, std::size_t what) {
+    Measurement made;
+    made.question = kScanning;
+    made.name = name;
+    made.mode = bench.wait;
+    made.unit = unit;
+    made.share = what == scansPerSecond ? 4 : 0;
+    made.isSlow = true;
+    made.run = [=](const Stage& stage) {
+      if (!*seen) *seen = runScanning(stage, bench);
+      auto outcome = **seen;
+      outcome.figures.value = outcome.figures.more[what];
+      return outcome;
+    };
+    return made;
+  };
+  return {row("scans read", "scans a second", scansPerSecond),
+          row("scans missed", "times that scans were overwritten", scansMissed),
+          row("the driver's thread", "% of one CPU", driversThread),
+          row("the whole process, model included", "% of one CPU", wholeProcess)};
+}
+
+}  // namespace mpf::bench

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+// How long after a process was killed its peer has the news: a client the fate of its request, a
+// server that the client is gone. Beside it: the time until waitpid() returns in the parent, before
+// which the kernel itself has not finished with the process.
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <time.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <fmt/format.h>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <utility>
+
+#include <mpf/message_client.h>
+
+#include "base/print_error.h"
+#include "base/system_call.h"
+#include "benchmarks/peers/mpf_peer.h"
+#include "benchmarks/stage/measurement.h"
+#include "benchmarks/stage/meter.h"
+
+namespace mpf::bench {
+namespace {
+
+constexpr Nanoseconds kNewsLimit = std::chrono::seconds(10);
+constexpr const char* kQuestion = "Death to fate: from kill -9 until the peer has the news";
+
+enum class Victim { server, client };
+
+// How long a pair has been connected when one of it is killed.
+struct Age {
+  const char* name;
+  Nanoseconds least, most;
+};
+constexpr std::array kAges{
+    Age{"0-5 ms", Nanoseconds(0), std::chrono::milliseconds(5)},
+    Age{"20 ms", std::chrono::milliseconds(20), std::chrono::milliseconds(20)}};
+
+// Words that the killer and its victims share. Times in ns of CLOCK_MONOTONIC; 0: not yet.
+struct Board {
+  std::atomic<std::int64_t> connectedNs{0};
+  std::atomic<std::int64_t> newsNs{0};
+};
+
+class SharedBoard {
+ public:
+  SharedBoard()
+      : memory_(::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
+                       -1, 0)) {
+    if (memory_ == MAP_FAILED) throwSystemError(errno, "mmap", "the board of a measurement");
+    new (memory_) Board;
+  }
+  ~SharedBoard() { ::munmap(memory_, sizeof(Board)); }
+  SharedBoard(const SharedBoard&) = delete;
+  SharedBoard& operator=(const SharedBoard&) = delete;
+  [[nodiscard]] Board& operator*() const noexcept { return *static_cast<Board*>(memory_); }
+
+ private:
+  void* memory_;
+};
+
+// Takes requests and keeps them, so that a client's request is open when its server dies.
+void serve(const std::string& backplane, Board& board) {
+  MessageServer server(Backplane::attach(backplane), kServer);
+  server.onClient([&](std::uint64_t, bool isThere) {
+    if (!isThere) board.newsNs.store(Clock::nowNs(), std::memory_order_relaxed);
+  });
+  std::vector<Message> kept;
+  while (server.waitForMessage()) {
+    while (auto request = server.receive()) kept.push_back(std::move(request));
+  }
+}
+
+void ask(const std::string& backplane, Board& board) {
+  MessageClient client(Backplane::attach(backplane), [&](Message&& message) {
+    if (message.getType() == MessageType::requestFate)
+      board.newsNs.store(Clock::nowNs(), std::memory_order_relaxed);
+  });
+  client.bind(kServer);
+  if (!client.connectWait(kConnectLimit))
+    throw std::runtime_error("not connected: " + client.notConnectedBecause());
+  if (client.send(Int32Message({.value = 1})) != SendResult::sent)
+    throw std::runtime_error("send failed");
+  board.connectedNs.store(Clock::nowNs(), std::memory_order_relaxed);
+  for (;;) ::pause();
+}
+
+// A process of a measurement, which says on stderr why it fails.
+class Process {
+ public:
+  template <class Body>
+  explicit Process(const Body& body)
+      : pid_(forkProcess([&] {
+          try {
+            body();
+          } catch (const std::exception& error) {
+            printError("death to fate: {}\n", error.what());
+          }
+        })) {}
+  ~Process() { killProcess(pid_); }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  // Kills it. Returns how long waitpid() takes from then on.
+  std::int64_t reapNs(std::int64_t& killedNs) {
+    killedNs = Clock::nowNs();
+    ::kill(pid_, SIGKILL);
+    retryInterrupted([&] { return ::waitpid(std::exchange(pid_, 0), nullptr, 0); });
+    return Clock::nowNs() - killedNs;
+  }
+
+ private:
+  int pid_;
+};
+
+struct Durations {
+  std::int64_t newsNs, reapNs;
+};
+
+void sleepUntil(std::int64_t ns) {
+  const timespec until{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+  }
+}
+
+// The client waits for its server before that is there, as after a restart of it.
+Durations killOnce(const std::string& backplane, Victim victim, Nanoseconds age) {
+  const SharedBoard shared;
+  auto& board = *shared;
+  std::optional<Process> client;
+  std::optional<Process> server;
+  if (victim == Victim::server) client.emplace([&] { ask(backplane, board); });
+  if (victim == Victim::server) sleepFor(std::chrono::milliseconds(5));
+  server.emplace([&] { serve(backplane, board); });
+  if (victim == Victim::client) sleepFor(std::chrono::milliseconds(5));
+  if (victim == Victim::client) client.emplace([&] { ask(backplane, board); });
+  const auto isIn = [](const std::atomic<std::int64_t>& word) {
+    return word.load(std::memory_order_relaxed) != 0;
+  };
+  if (!waitUntil([&] { return isIn(board.connectedNs); }, kConnectLimit))
+    throw std::runtime_error("the client does not connect");
+  sleepUntil(board.connectedNs.load(std::memory_order_relaxed) + age.count());
+  std::int64_t killedNs = 0;
+  const auto reapNs = (victim == Victim::server ? *server : *client).reapNs(killedNs);
+  if (!waitUntil([&] { return isIn(board.newsNs); }, kNewsLimit))
+    throw std::runtime_error("the peer has no news");
+  return {board.newsNs.load(std::memory_order_relaxed) - killedNs, reapNs};
+}
+
+Outcome deaths(const Stage& stage, const std::string& backplane, Victim victim, const Age& age,
+               bool isFloor) {
+  auto cpus = stage.placement().server;
+  cpus.insert(cpus.end(), stage.placement().requester.begin(), stage.placement().requester.end());
+  Act act;
+  act.requester = [=](const Scene& scene) {
+    pinTo(cpus);
+    std::minstd_rand random(std::random_device{}());
+    std::uniform_int_distribution<std::int64_t> ageNs(age.least.count(), age.most.count());
+    LatencyRecorder recorder;
+    const auto end = Deadline::after(scene.budget().measure);
+    do {
+      const auto took = killOnce(backplane, victim, Nanoseconds(ageNs(random)));
+      recorder.add(static_cast<std::uint64_t>(isFloor ? took.reapNs : took.newsNs));
+    } while (!end.hasPassed());
+    scene.figures().latency = recorder;
+  };
+  act.grace = std::chrono::seconds(30);
+  auto outcome = stage.run(act);
+  removeBackplanes(backplane);
+  return outcome;
+}
+
+}  // namespace
+
+std::vector<Measurement> deathMeasurements(const std::string& runName) {
+  std::vector<Measurement> rows;
+  for (const auto victim : {Victim::server, Victim::client}) {
+    for (const auto& age : kAges) {
+      const auto* const who = victim == Victim::server ? "server" : "client";
+      const auto* const told = victim == Victim::server ? "client" : "server";
+      Measurement floor;
+      floor.question = kQuestion;
+      floor.name = fmt::format("waitpid, {} of {}", who, age.name);
+      floor.mode = Mode::adaptive;
+      floor.share = 8;
+      floor.isSlow = true;
+      floor.detail = fmt::format("{} killed {} after the client connected", who, age.name);
+      auto ours = floor;
+      ours.name = fmt::format("{}, {}'s news, {}", kMpf, told, age.name);
+      ours.floorName = floor.name;
+      const auto backplane = fmt::format("{}-death-{}{}", runName, who[0], age.least.count());
+      floor.run = [=](const Stage& stage) { return deaths(stage, backplane, victim, age, true); };
+      ours.run = [=](const Stage& stage) { return deaths(stage, backplane, victim, age, false); };
+      rows.push_back(std::move(floor));
+      rows.push_back(std::move(ours));
+    }
+  }
+  return rows;
+}
+
+}  // namespace mpf::bench

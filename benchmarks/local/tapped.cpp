@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// What it costs two processes that `mpf tap` reads along. The tap runs wherever the kernel puts it:
+// with two CPUs, beside one of the two.
+#include <fcntl.h>
+#include <sched.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "benchmarks/local/company.h"
+#include "benchmarks/peers/mpf_peer.h"
+
+namespace mpf::bench {
+namespace {
+
+std::string tool() {
+  return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mpf").string();
+}
+
+// `mpf tap`, the program beside this one, once it follows the server; what it reads goes to a file
+// that nobody keeps.
+class Tap {
+ public:
+  explicit Tap(const std::string& backplane) {
+    int ends[2];
+    checkCall(::pipe2(ends, O_CLOEXEC), "pipe2");
+    const FileDescriptor said(ends[0]);
+    FileDescriptor says(ends[1]);
+    pid_ = startProgram({tool(), "tap", kServer, "--backplane", backplane, "--write", "/dev/null"},
+                        [&] {
+                          cpu_set_t all;
+                          std::memset(&all, 0xff, sizeof all);
+                          ::sched_setaffinity(0, sizeof all, &all);
+                          ::dup2(says.get(), STDERR_FILENO);
+                        });
+    says.reset();
+    char first{};
+    if (retryInterrupted([&] { return ::read(said.get(), &first, 1); }) != 1)
+      throw std::runtime_error("mpf tap does not start");
+  }
+  ~Tap() { killProcess(pid_); }
+  Tap(const Tap&) = delete;
+  Tap& operator=(const Tap&) = delete;
+
+ private:
+  int pid_ = 0;
+};
+
+}  // namespace
+
+std::vector<Measurement> tappedMeasurements(const std::string& runName) {
+  std::vector<Measurement> rows;
+  for (const auto mode : {Mode::spin, Mode::block}) {
+    for (const bool tapped : {false, true}) {
+      Measurement row;
+      row.question = "Round trip of 4 B beside a tap";
+      row.name = std::string(kMpf) + (tapped ? ", tapped" : ", alone");
+      row.mode = mode;
+      row.bytes = 4;
+      row.floorName = mode == Mode::block ? kFutexBounce : kBounce;
+      row.floorBytes = 4;
+      if (tapped && !std::filesystem::exists(tool())) row.skipped = tool() + " is not there";
+      const auto backplane = runName + "-tap" + (tapped ? "1" : "0") + toString(mode)[0];
+      row.run = [=](const Stage& stage) {
+        return roundTripBeside(
+            stage, backplane, mode,
+            tapped ? Company([=] { return std::make_shared<Tap>(backplane); }) : nullptr);
+      };
+      rows.push_back(std::move(row));
+    }
+  }
+  return rows;
+}
+
+}  // namespace mpf::bench

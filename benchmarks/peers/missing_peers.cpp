@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+// Peers that were not installed when this was built: named, and left out.
+#include "benchmarks/peers/peer.h"
+
+namespace mpf::bench {
+namespace {
+
+[[maybe_unused]] PeerFamily missing(const char* name, const char* package) {
+  PeerFamily family;
+  family.name = name;
+  family.skipped = std::string("not installed when this was built (") + package + ")";
+  family.modes = {Mode::block};
+  return family;
+}
+
+}  // namespace
+
+#ifndef MPF_BENCH_ZEROMQ
+PeerFamily zeromqPeer() { return missing("ZeroMQ", "libzmq3-dev"); }
+#endif
+#ifndef MPF_BENCH_ICEORYX
+PeerFamily iceoryxPeer() { return missing("iceoryx 2.0", "libiceoryx-posh-dev"); }
+#endif
+
+}  // namespace mpf::bench

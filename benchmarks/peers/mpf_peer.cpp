@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+// Ours, through the public API: MessageServer, and MessageClient with its callback, on a dispatcher
+// that the requester runs itself.
+#include "benchmarks/peers/mpf_peer.h"
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <optional>
+#include <stdexcept>
+
+#include <mpf/message_client.h>
+#include <mpf/message_server.h>
+
+#include "benchmarks/peers/peer.h"
+#include "benchmarks/stage/touch.h"
+#include "shm/cpu_relax.h"
+
+namespace mpf::bench {
+namespace {
+
+template <ArrayBody Array>
+class MpfPeer final : public Peer {
+ public:
+  MpfPeer(PeerOptions options, MpfPlaces places)
+      : options_(std::move(options)), places_(std::move(places)) {}
+
+  void serve(const Scene& scene) override {
+    MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
+    scene.ready();
+    for (bool last = false; !last && server.waitForMessage();) {
+      while (auto request = server.receive()) {
+        last = scene.stopping();
+        if (options_.touch) {
+          const auto value = request.template valueAs<Array>();
+          readAll(value.data(), value.size_bytes());
+          writeAll(value.data(), value.size_bytes());
+        }
+        if (server.reply(std::move(request)) != ReplyResult::sent)
+          throw std::runtime_error("a reply was not sent");
+      }
+    }
+  }
+
+  void connect(const Scene&) override {
+    dispatcher_.emplace(Backplane::attach(places_.clientBackplane),
+                        DispatcherOptions{waitMode(options_.mode), {}});
+    client_.emplace(*dispatcher_, [this](Message&& message) { take(message); });
+    client_->bind(kServer, places_.location);
+    if (!client_->connectWait(kConnectLimit))
+      throw std::runtime_error("not connected: " + client_->notConnectedBecause());
+  }
+  void send() override {
+    SendResult result{};
+    if (options_.bytes == 4) {
+      result = client_->send(Int32Message({.address = 3, .value = 100}));
+    } else {
+      auto request =
+          client_->template alloc<Array>(options_.bytes / sizeof(typename Array::Element));
+      if (options_.touch) writeAll(request.value().data(), options_.bytes);
+      result = client_->send(std::move(request));
+    }
+    if (result != SendResult::sent)
+      throw std::runtime_error(std::string("send: ") + toString(result));
+  }
+  void receive() override {
+    ++awaited_;
+    while (received_ < awaited_) dispatcher_->runOnce();
+  }
+  void roundTrip() override {
+    send();
+    MpfPeer::receive();
+  }
+
+  // One way, the server sends: to one request any number of replies may be sent, and the client
+  // takes them in its callback.
+  void sink(const Scene& scene) override {
+    scene.ready();
+    connect(scene);
+    send();
+    for (;;) {
+      dispatcher_->runOnce();
+      if (received_ % 64 == 0) scene.consumed(received_);
+    }
+  }
+  void flood(const Scene&, const std::function<bool()>& resume) override {
+    MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
+    Message request;
+    while (!request) {
+      if (!server.waitForMessage(Deadline::after(kConnectLimit)))
+        throw std::runtime_error("no request from the client");
+      request = server.receive();
+    }
+    for (std::int32_t value = 0; resume();) {
+      for (int i = 0; i < 64; ++i) {
+        auto reply = server.allocReplyMessage<Int32>(request);
+        reply->value = ++value;
+        for (auto result = ReplyResult::queueFull; result != ReplyResult::sent;) {
+          result = server.reply(std::move(reply));
+          if (result == ReplyResult::queueFull) cpuRelax();
+          if (result == ReplyResult::clientGone) throw std::runtime_error("the client is gone");
+        }
+      }
+    }
+  }
+
+  void removeTraces() noexcept override {
+    removeBackplanes(places_.serverBackplane);
+    if (places_.clientBackplane != places_.serverBackplane)
+      removeBackplanes(places_.clientBackplane);
+  }
+
+ private:
+  [[nodiscard]] ServerOptions optionsOfServer() const {
+    auto options = serverOptions(options_.mode);
+    options.location = places_.location;
+    options.queueSize = places_.queueSize;
+    return options;
+  }
+  void take(Message& message) {
+    if (message.getType() == MessageType::connect) return;
+    if (options_.bytes == 4) {
+      if (message.tryAs<Int32>() == nullptr) throw std::runtime_error("a reply that is none");
+    } else {
+      const auto value = message.template valueAs<Array>();
+      if (value.size_bytes() != options_.bytes) throw std::runtime_error("a reply of another size");
+      if (options_.touch) readAll(value.data(), value.size_bytes());
+    }
+    ++received_;
+  }
+
+  PeerOptions options_;
+  MpfPlaces places_;
+  std::optional<Dispatcher> dispatcher_;
+  std::optional<MessageClient> client_;
+  std::uint64_t received_ = 0;
+  std::uint64_t awaited_ = 0;
+};
+
+}  // namespace
+
+template <ArrayBody Array>
+std::unique_ptr<Peer> makeMpfPeer(const PeerOptions& options, const MpfPlaces& places) {
+  return std::make_unique<MpfPeer<Array>>(options, places);
+}
+template std::unique_ptr<Peer> makeMpfPeer<Char8Array>(const PeerOptions&, const MpfPlaces&);
+template std::unique_ptr<Peer> makeMpfPeer<Int32Array>(const PeerOptions&, const MpfPlaces&);
+template std::unique_ptr<Peer> makeMpfPeer<Float64Array>(const PeerOptions&, const MpfPlaces&);
+
+WaitMode waitMode(Mode mode) noexcept {
+  return mode == Mode::spin    ? WaitMode::spin
+         : mode == Mode::block ? WaitMode::block
+                               : WaitMode::adaptive;
+}
+
+ServerOptions serverOptions(Mode mode) {
+  ServerOptions options;
+  options.queueSize = 256;
+  options.waitMode = waitMode(mode);
+  return options;
+}
+
+void raiseDescriptorLimit() noexcept {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_NOFILE, &limit);
+  limit.rlim_cur = limit.rlim_max;
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+double occupiedBytes(const Backplane& backplane) {
+  double bytes = 0;
+  for (const auto& name : backplane.segmentNames()) {
+    struct stat file{};
+    if (::stat(("/dev/shm/" + name).c_str(), &file) == 0)
+      bytes += static_cast<double>(file.st_blocks) * 512;
+  }
+  return bytes;
+}
+
+// In a process of its own: attaching starts a thread, and the runner has to stay without.
+void removeBackplanes(const std::string& prefix) noexcept try {
+  const auto pid = forkProcess([&] {
+    for (const auto& name : Backplane::names()) {
+      if (name.starts_with(prefix)) Backplane::attach(name).removeDead();
+    }
+  });
+  if (!waitUntil([pid] { return hasEnded(pid); }, std::chrono::seconds(10))) killProcess(pid);
+} catch (const std::exception&) {
+  return;  // the next run tries again
+}
+
+PeerFamily mpfPeer() {
+  PeerFamily family;
+  family.name = kMpf;
+  family.modes = {Mode::spin, Mode::adaptive, Mode::block};
+  family.make = [](const PeerOptions& options) {
+    return makeMpfPeer<Char8Array>(
+        options, {.serverBackplane = options.name, .clientBackplane = options.name});
+  };
+  family.oneWay = true;
+  return family;
+}
+
+}  // namespace mpf::bench

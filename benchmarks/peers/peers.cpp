@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT
+// The questions that are put to every peer, ours first.
+#include <algorithm>
+
+#include "benchmarks/stage/measurement.h"
+#include "benchmarks/stage/timing.h"
+
+namespace mpf::bench {
+namespace {
+
+using PeerMaker = std::function<std::unique_ptr<Peer>()>;
+
+Outcome runAndClean(const Stage& stage, const std::shared_ptr<Peer>& peer, const Act& act) {
+  auto outcome = stage.run(act);
+  peer->removeTraces();
+  return outcome;
+}
+
+Outcome roundTrips(const Stage& stage, const std::shared_ptr<Peer>& peer) {
+  Act act;
+  act.stopsByItself = true;
+  act.server = [peer](const Scene& scene) { peer->serve(scene); };
+  act.requester = [peer](const Scene& scene) {
+    peer->connect(scene);
+    timeEach(scene, [&] { peer->roundTrip(); });
+    scene.stop();
+    peer->roundTrip();
+  };
+  return runAndClean(stage, peer, act);
+}
+
+Outcome outstanding(const Stage& stage, const std::shared_ptr<Peer>& peer, int window) {
+  Act act;
+  act.stopsByItself = true;
+  act.server = [peer](const Scene& scene) { peer->serve(scene); };
+  act.requester = [peer, window](const Scene& scene) {
+    peer->connect(scene);
+    for (int i = 0; i < window; ++i) peer->send();
+    timeRate(scene, 1, [&] {
+      peer->receive();
+      peer->send();
+    });
+    for (int i = 0; i < window; ++i) peer->receive();
+    scene.stop();
+    peer->roundTrip();
+  };
+  return runAndClean(stage, peer, act);
+}
+
+Outcome oneWay(const Stage& stage, const std::shared_ptr<Peer>& peer) {
+  Act act;
+  act.server = [peer](const Scene& scene) { peer->sink(scene); };
+  act.requester = [peer](const Scene& scene) {
+    timeOneWay(scene, [&](const std::function<bool()>& resume) { peer->flood(scene, resume); });
+  };
+  return runAndClean(stage, peer, act);
+}
+
+std::string sizeText(std::size_t bytes) {
+  if (bytes >= 1u << 20) return std::to_string(bytes >> 20) + " MiB";
+  if (bytes >= 1u << 10) return std::to_string(bytes >> 10) + " KiB";
+  return std::to_string(bytes) + " B";
+}
+
+// One row for a family; the rest is filled in by who asks.
+class Asker {
+ public:
+  explicit Asker(std::string runName) : runName_(std::move(runName)) {}
+
+  Measurement row(const PeerFamily& family, const std::string& question, Mode mode,
+                  std::size_t bytes, bool touched) {
+    Measurement row;
+    row.question = question;
+    row.name = family.name;
+    row.mode = mode;
+    row.bytes = bytes;
+    row.touched = touched;
+    row.skipped = family.skipped;
+    row.environment = family.start;
+    row.environmentName = family.start ? family.name : "";
+    const bool copies = touched;
+    row.floorName = copies ? (mode == Mode::block ? kFutexMemcpyBounce : kMemcpyBounce)
+                           : (mode == Mode::block ? kFutexBounce : kBounce);
+    row.floorBytes = copies ? bytes : 4;
+    return row;
+  }
+  // Makes the peer of a row, in the runner.
+  std::function<std::shared_ptr<Peer>()> maker(const PeerFamily& family, const Measurement& row) {
+    if (!family.make) return {};
+    PeerOptions options{row.mode, row.bytes, row.touched, runName_ + "-" + std::to_string(++made_)};
+    return [make = family.make, options] { return std::shared_ptr<Peer>(make(options)); };
+  }
+
+ private:
+  std::string runName_;
+  int made_ = 0;
+};
+
+std::vector<PeerFamily> families() {
+  return {mpfPeer(), boostPeer(), socketPeer(), zeromqPeer(), iceoryxPeer()};
+}
+
+// A family that is not there is named once per question.
+std::vector<Mode> modesOf(const PeerFamily& family) {
+  return family.skipped.empty() ? family.modes : std::vector{family.modes.front()};
+}
+
+}  // namespace
+
+std::vector<Measurement> peerMeasurements(const std::string& runName) {
+  Asker asker(runName);
+  std::vector<Measurement> rows;
+  const auto all = families();
+  const auto add = [&](const PeerFamily& family, Measurement row, auto ask) {
+    if (const auto make = asker.maker(family, row))
+      row.run = [make, ask](const Stage& stage) { return ask(stage, make()); };
+    rows.push_back(std::move(row));
+  };
+
+  for (const std::size_t bytes :
+       {std::size_t{4}, std::size_t{1} << 10, std::size_t{1} << 16, std::size_t{1} << 20}) {
+    for (const bool touched : {false, true}) {
+      if (touched && bytes == 4) continue;  // an Int32 is always written and read
+      const auto question = "Round trip of " + sizeText(bytes) +
+                            (bytes == 4 ? ""
+                             : touched  ? ", every byte written and read both ways"
+                                        : ", untouched");
+      for (const auto& family : all) {
+        for (const auto mode : modesOf(family)) {
+          add(family, asker.row(family, question, mode, bytes, touched),
+              [](const Stage& stage, const auto& peer) { return roundTrips(stage, peer); });
+        }
+      }
+    }
+  }
+  for (const auto& family : all) {
+    if (!family.oneWay && family.skipped.empty()) continue;
+    for (const auto mode : modesOf(family)) {
+      auto row = asker.row(family, "One way, 4 B", mode, 4, false);
+      row.floorName = kRing;
+      add(family, std::move(row),
+          [](const Stage& stage, const auto& peer) { return oneWay(stage, peer); });
+    }
+  }
+  for (const int window : {1, 10, 100}) {
+    for (const auto& family : all) {
+      for (const auto mode : modesOf(family)) {
+        auto row = asker.row(
+            family, "Requests and replies of 4 B with " + std::to_string(window) + " outstanding",
+            mode, 4, false);
+        row.detail = std::to_string(window) + " outstanding";
+        if (row.skipped.empty() && window > family.maxOutstanding)
+          row.skipped = "holds at most " + std::to_string(family.maxOutstanding);
+        add(family, std::move(row), [window](const Stage& stage, const auto& peer) {
+          return outstanding(stage, peer, window);
+        });
+      }
+    }
+  }
+  return rows;
+}
+
+}  // namespace mpf::bench

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// The rows of `mpf bench remote` in which messages go there and back: the manual's table, and
+// arrays of 1 MiB.
+#include "benchmarks/peers/mpf_peer.h"
+#include "benchmarks/remote/remote.h"
+#include "benchmarks/remote/routers.h"
+#include "benchmarks/remote/tcp_peer.h"
+#include "benchmarks/stage/timing.h"
+
+namespace mpf::bench {
+namespace {
+
+constexpr std::size_t kInt32 = 4;
+constexpr std::size_t kArray = 1u << 20;
+
+using PeerMaker = std::function<std::shared_ptr<Peer>()>;
+
+// What goes from client to server and back, over and over.
+struct Traffic {
+  int sends = 1;  // one after another, then the replies to all of them
+  int messages = 1;  // in all of them together
+  std::size_t window = 0;  // not 0: instead so many are always on their way
+};
+
+// `writer`, asked once the row begins, has the client's socket.
+Outcome goThereAndBack(const Stage& stage, const std::shared_ptr<Peer>& peer,
+                       const Traffic& traffic, int writer) {
+  Act act;
+  act.stopsByItself = true;
+  act.server = [=](const Scene& scene) { peer->serve(scene); };
+  act.requester = [=, &stage](const Scene& scene) {
+    peer->connect(scene);
+    Meter meter(stage.placement(), writer);
+    if (traffic.window != 0) {
+      timeWindow(scene, meter, traffic.window, [&] { peer->send(); }, [&] { peer->receive(); });
+    } else {
+      timeExchanges(scene, meter, static_cast<std::uint64_t>(traffic.messages), [&] {
+        for (int i = 0; i < traffic.sends; ++i) peer->send();
+        for (int i = 0; i < traffic.sends; ++i) peer->receive();
+      });
+    }
+    scene.stop();
+    peer->roundTrip();
+  };
+  return stage.run(act);
+}
+
+Measurement tcpRow(const Place& place, const std::string& question, const std::string& name,
+                   const Traffic& traffic, std::size_t unitBytes) {
+  auto row = rowAt(place, question, "raw TCP, " + name, false);
+  row.mode = Mode::block;
+  row.bytes = unitBytes * static_cast<std::size_t>(traffic.sends) /
+              static_cast<std::size_t>(traffic.messages);
+  row.run = [=, between = place.between](const Stage& stage) {
+    const std::shared_ptr<Peer> peer = makeTcpPeer({between, unitBytes, traffic.window > 1});
+    return goThereAndBack(stage, peer, traffic, Meter::kThisProcess);
+  };
+  return row;
+}
+
+Measurement localRow(const Place& place, const std::string& question, const std::string& name,
+                     const Traffic& traffic) {
+  auto row = rowAt(place, question, "MPF local, " + name, false);
+  row.bytes = kInt32;
+  const auto backplane = place.runName + "-local";
+  row.run = [=, mode = place.wait](const Stage& stage) {
+    const MpfPlaces places{backplane, backplane, 0, 1024};
+    const std::shared_ptr<Peer> peer =
+        makeMpfPeer<Float64Array>({mode, kInt32, false, backplane}, places);
+    auto outcome = goThereAndBack(stage, peer, traffic, Meter::kNobody);
+    peer->removeTraces();
+    return outcome;
+  };
+  return row;
+}
+
+template <class Array = Float64Array>
+Measurement remoteRow(const Place& place, const std::string& question, const std::string& name,
+                      const Traffic& traffic, std::size_t bytes) {
+  auto row = rowAt(place, question, "MPF remote, " + name, true);
+  row.bytes = bytes;
+  row.run = [=, mode = place.wait, routers = place.routers](const Stage& stage) {
+    const MpfPlaces places{routers->serverBackplane(), routers->clientBackplane(), kRemoteLocation,
+                           1024};
+    const std::shared_ptr<Peer> peer = makeMpfPeer<Array>({mode, bytes, false, {}}, places);
+    return routers->run([&] { return goThereAndBack(stage, peer, traffic, routers->clientPid()); });
+  };
+  return row;
+}
+
+Measurement besides(Measurement row, const std::string& rawTcp) {
+  row.floorName = "raw TCP, " + rawTcp;
+  row.floorBytes = row.bytes;
+  return row;
+}
+
+}  // namespace
+
+std::vector<Measurement> messageRows(const Place& place, bool withLocal) {
+  const std::string none = "no buffer";
+  const std::string gathered = "100 in one write";
+  const std::string gathered1000 = "1000 in one write";
+  const Traffic one{1, 1}, hundred{100, 100}, thousand{1000, 1000};
+  std::vector<Measurement> rows;
+  rows.push_back(tcpRow(place, kMessages, none, one, kInt32));
+  rows.push_back(tcpRow(place, kMessages, gathered, {1, 100}, 100 * kInt32));
+  rows.push_back(besides(tcpRow(place, kMessages, "100, a write each", hundred, kInt32), gathered));
+  rows.push_back(tcpRow(place, kMessages, gathered1000, {1, 1000}, 1000 * kInt32));
+  if (withLocal) {
+    rows.push_back(besides(localRow(place, kMessages, none, one), none));
+    rows.push_back(besides(localRow(place, kMessages, "100 buffered", hundred), gathered));
+    rows.push_back(besides(localRow(place, kMessages, "1000 buffered", thousand), gathered1000));
+  }
+  rows.push_back(besides(remoteRow(place, kMessages, none, one, kInt32), none));
+  rows.push_back(besides(remoteRow(place, kMessages, "100 buffered", hundred, kInt32), gathered));
+  rows.push_back(
+      besides(remoteRow(place, kMessages, "1000 buffered", thousand, kInt32), gathered1000));
+  return rows;
+}
+
+std::vector<Measurement> arrayRows(const Place& place) {
+  std::vector<Measurement> rows;
+  for (const std::size_t window : {std::size_t{1}, std::size_t{4}}) {
+    const auto name =
+        window == 1 ? std::string("one at a time") : std::to_string(window) + " in flight";
+    const Traffic traffic{1, 1, window};
+    rows.push_back(tcpRow(place, kArrays, name, traffic, kArray));
+    rows.push_back(besides(
+        remoteRow<Float64Array>(place, kArrays, "Float64Array, " + name, traffic, kArray), name));
+    rows.push_back(besides(
+        remoteRow<Int32Array>(place, kArrays, "Int32Array, " + name, traffic, kArray), name));
+  }
+  return rows;
+}
+
+}  // namespace mpf::bench

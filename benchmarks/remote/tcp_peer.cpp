@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+#include "benchmarks/remote/tcp_peer.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <stdexcept>
+#include <vector>
+
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+
+namespace mpf::bench {
+namespace {
+
+class TcpPeer final : public Peer {
+ public:
+  explicit TcpPeer(TcpOptions options) : options_(std::move(options)) {}
+
+  void serve(const Scene& scene) override {
+    options_.between.enterServer();
+    accept(scene);
+    for (bool last = false; !last;) {
+      takeUnit();
+      last = scene.stopping();
+      put(in_);
+    }
+  }
+
+  void connect(const Scene& scene) override {
+    options_.between.enterRequester();
+    fd_ = FileDescriptor(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
+    const auto address = addressOf(scene.port());
+    checkCall(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
+              "connect", options_.between.serverAddress());
+    if (options_.reads) checkCall(::fcntl(fd_.get(), F_SETFL, O_NONBLOCK), "fcntl");
+    prepare();
+  }
+  void send() override {
+    out_.back() = static_cast<std::byte>(++sent_);
+    put(out_);
+  }
+  void receive() override { takeUnit(); }
+
+ private:
+  [[nodiscard]] sockaddr_in addressOf(std::uint16_t port) const {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    ::inet_pton(AF_INET, options_.between.serverAddress().c_str(), &address.sin_addr);
+    return address;
+  }
+  void accept(const Scene& scene) {
+    // the client does: that is enough for neither to wait for the other for ever
+    options_.reads = false;
+    const FileDescriptor listener(
+        checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
+    auto address = addressOf(0);
+    socklen_t length = sizeof address;
+    checkCall(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), length), "bind",
+              options_.between.serverAddress());
+    checkCall(::listen(listener.get(), 1), "listen");
+    checkCall(::getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &length),
+              "getsockname");
+    scene.ready(ntohs(address.sin_port));
+    fd_ = FileDescriptor(checkCall(::accept(listener.get(), nullptr, nullptr), "accept"));
+    prepare();
+  }
+  void prepare() {
+    ::signal(SIGPIPE, SIG_IGN);  // NOLINT(cert-err33-c): cannot fail
+    const int on = 1;
+    checkCall(::setsockopt(fd_.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on), "setsockopt",
+              "TCP_NODELAY");
+    out_.assign(options_.unitBytes, std::byte{1});
+    in_.assign(options_.unitBytes, std::byte{0});
+  }
+
+  // write() and read(), not send() and recv(): these are what the kernel counts.
+  void put(const std::vector<std::byte>& unit) {
+    for (std::size_t done = 0; done < unit.size();) {
+      const auto wrote = ::write(fd_.get(), unit.data() + done, unit.size() - done);
+      if (wrote > 0) done += static_cast<std::size_t>(wrote);
+      if (wrote < 0) awaitAfter("write", POLLIN | POLLOUT);
+    }
+  }
+  void takeUnit() {
+    while (units_ == 0) {
+      if (!take()) awaitAfter("read", POLLIN);
+    }
+    --units_;
+  }
+  // Reads to where the bytes belong in their unit, into one buffer for all. False: nothing is
+  // there.
+  bool take() {
+    const auto got = ::read(fd_.get(), in_.data() + at_, in_.size() - at_);
+    if (got == 0) throwSystemError(ECONNRESET, "read", "a TCP connection");
+    if (got < 0) return false;
+    at_ = (at_ + static_cast<std::size_t>(got)) % in_.size();
+    if (at_ != 0) return true;
+    ++units_;
+    if (sent_ != 0 && in_.back() != static_cast<std::byte>(++echoed_))
+      throw std::runtime_error("an echo of something else");
+    return true;
+  }
+  // A blocking socket never comes here but with an error.
+  void awaitAfter(const char* call, short events) {
+    if (errno == EINTR) return;
+    if (errno != EAGAIN) throwSystemError(errno, call, "a TCP connection");
+    pollfd found{fd_.get(), events, 0};
+    ::poll(&found, 1, -1);
+    if ((found.revents & POLLIN) != 0 && (events & POLLOUT) != 0) static_cast<void>(take());
+  }
+
+  TcpOptions options_;
+  FileDescriptor fd_;
+  std::vector<std::byte> out_, in_;
+  std::size_t at_ = 0;  // in in_: where the next byte goes
+  std::size_t units_ = 0;  // that are there and that nobody took
+  unsigned sent_ = 0;  // by the client: the last byte of each unit counts them
+  unsigned echoed_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Peer> makeTcpPeer(const TcpOptions& options) {
+  return std::make_unique<TcpPeer>(options);
+}
+
+}  // namespace mpf::bench

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// Measurement: one row of the table, before and after it was taken.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "benchmarks/peers/peer.h"
+#include "benchmarks/stage/mode.h"
+#include "benchmarks/stage/stage.h"
+
+namespace mpf::bench {
+
+struct Measurement {
+  std::string setting;   // the surroundings that it is taken in; its floor is of the same
+  std::string question;  // the heading in the table
+  std::string name;
+  Mode mode = Mode::spin;
+  std::size_t bytes = 0;
+  bool touched = false;
+  std::string detail;      // "100 outstanding"
+  std::string floorName;   // the row that this one is divided by; empty: none
+  std::size_t floorBytes = 0;
+  std::string unit;        // of Figures::value; empty when the row is a latency or a rate
+  std::string skipped;     // why it is not taken
+  double share = 1.0;      // of the time that a row gets
+  bool isSlow = false;     // takes seconds to set up: once is enough
+  // rows one after another that name the same one share it
+  std::function<std::unique_ptr<Environment>()> environment;
+  std::string environmentName;
+  std::function<Outcome(const Stage&)> run;
+};
+
+// Nanoseconds per message: from a rate, or typical, or p50 where groups make no sense; 0 for
+// neither.
+[[nodiscard]] double costNs(const Figures& figures) noexcept;
+
+struct Result {
+  Measurement measurement;
+  Figures figures;
+  std::string error;
+  double floorNs = 0;  // a message of the floor, in the same minute
+  double ratioToFloor = 0;  // above 1: slower than the floor. 0: there is none
+
+  [[nodiscard]] bool isGood() const noexcept {
+    return measurement.skipped.empty() && error.empty();
+  }
+  [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
+};
+
+// Everything that `mpf bench local` takes, in order, floors first.
+//   runName  unique on this host: part of the names of sockets and segments
+[[nodiscard]] std::vector<Measurement> catalogue(const std::string& runName);
+
+// The rows of one source file each.
+[[nodiscard]] std::vector<Measurement> floorMeasurements();
+[[nodiscard]] std::vector<Measurement> peerMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> scaleMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> deathMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> tappedMeasurements(const std::string& runName);
+
+inline constexpr const char* kBounce = "cache-line bounce";
+inline constexpr const char* kFutexBounce = "futex bounce";
+inline constexpr const char* kMemcpyBounce = "memcpy bounce";
+inline constexpr const char* kFutexMemcpyBounce = "memcpy bounce, asleep";
+inline constexpr const char* kRing = "bare slot ring";
+
+}  // namespace mpf::bench

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#include "benchmarks/stage/stage.h"
+
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <new>
+#include <stdexcept>
+
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+
+namespace mpf::bench {
+namespace {
+
+constexpr auto kStopGrace = std::chrono::milliseconds(500);  // for a server that leaves by itself
+enum Role : std::size_t { server = 0, requester = 1 };
+
+// Shared anonymous memory, populated.
+class Shared {
+ public:
+  explicit Shared(std::size_t bytes)
+      : bytes_(bytes),
+        at_(::mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
+                   MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0)) {
+    if (at_ == MAP_FAILED) throwSystemError(errno, "mmap", "benchmark memory");
+  }
+  Shared(const Shared&) = delete;
+  Shared& operator=(const Shared&) = delete;
+  ~Shared() { ::munmap(at_, bytes_); }
+  [[nodiscard]] std::span<std::byte> bytes() const noexcept {
+    return {static_cast<std::byte*>(at_), bytes_};
+  }
+
+ private:
+  std::size_t bytes_;
+  void* at_;
+};
+
+int pidFd(int pid) { return static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)); }
+
+// One of the two processes.
+class Child {
+ public:
+  Child(Role role, const Cpus& cpus, Control& control, const std::function<void()>& body)
+      : pid_(forkProcess([&] {
+          auto& error = control.errors[role];
+          try {
+            pinTo(cpus);
+            body();
+          } catch (const std::exception& exception) {
+            std::snprintf(error.data(), error.size(), "%s", exception.what());
+            std::_Exit(1);
+          }
+        })),
+        fd_(pidFd(pid_)) {}
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  ~Child() { killProcess(pid_); }
+  [[nodiscard]] const FileDescriptor& fd() const noexcept { return fd_; }
+
+  // Waits for its end; empty when it ended well.
+  [[nodiscard]] std::string ending(const char* who, const std::array<char, 240>& error) {
+    int status = 0;
+    if (retryInterrupted([&] { return ::waitpid(pid_, &status, 0); }) == pid_) pid_ = 0;
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+    if (error[0] != '\0') return std::string(who) + ": " + error.data();
+    return std::string(who) + (WIFSIGNALED(status)
+                                   ? " died of signal " + std::to_string(WTERMSIG(status))
+                                   : " failed");
+  }
+
+ private:
+  int pid_;
+  FileDescriptor fd_;
+};
+
+// Waits until one of both ends. Which one; nullopt: neither in time.
+std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterChild,
+                               Deadline deadline) {
+  for (;;) {
+    std::array<pollfd, 2> fds{
+        pollfd{serverChild != nullptr ? serverChild->fd().get() : -1, POLLIN, 0},
+        pollfd{requesterChild.fd().get(), POLLIN, 0}};
+    const auto leftMs =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline.left()).count();
+    const int found = ::poll(fds.data(), fds.size(), static_cast<int>(leftMs) + 1);
+    if (fds[requester].revents != 0) return requester;
+    if (fds[server].revents != 0) return server;
+    if (found == 0 && deadline.hasPassed()) return std::nullopt;
+  }
+}
+
+}  // namespace
+
+void Scene::ready(std::uint16_t port) const noexcept {
+  control_.port.store(port, std::memory_order_relaxed);
+  // PAIR(bench-ready): the requester starts after everything that the server did before.
+  control_.ready.store(1, std::memory_order_release);
+}
+
+Outcome Stage::run(const Act& act) const {
+  const Shared memory(sizeof(Control) + act.scratchBytes + 4096);
+  auto& control = *new (memory.bytes().data()) Control;
+  constexpr std::size_t kScratchOffset = (sizeof(Control) + 4095) / 4096 * 4096;
+  const Scene scene(
+      control, budget_,
+      memory.bytes().subspan(std::min(kScratchOffset, memory.bytes().size()), act.scratchBytes));
+  const auto limit = budget_.warmUp + budget_.measure + act.grace;
+
+  std::unique_ptr<Child> serverChild;
+  if (act.server)
+    serverChild =
+        std::make_unique<Child>(server, placement_.server, control, [&] { act.server(scene); });
+  Child requesterChild(requester, placement_.requester, control, [&] {
+    // PAIR(bench-ready): what the server did before is done.
+    const auto isReady = [&] { return control.ready.load(std::memory_order_acquire) != 0; };
+    if (act.server && !waitUntil(isReady, act.grace))
+      throw std::runtime_error("the server is not ready in time");
+    act.requester(scene);
+  });
+
+  Outcome outcome;
+  const auto first = waitForEnd(serverChild.get(), requesterChild, Deadline::after(limit));
+  if (!first) {
+    outcome.error = "no end within the time limit";
+  } else if (*first == requester) {
+    outcome.error = requesterChild.ending("requester", control.errors[requester]);
+    if (serverChild && act.stopsByItself && outcome.error.empty()) {
+      pollfd end{serverChild->fd().get(), POLLIN, 0};
+      ::poll(&end, 1, static_cast<int>(std::chrono::milliseconds(kStopGrace).count()));
+    }
+  } else if (outcome.error = serverChild->ending("server", control.errors[server]);
+             outcome.error.empty()) {
+    // It answered the last request and left first.
+    const auto second = waitForEnd(nullptr, requesterChild, Deadline::after(act.grace));
+    outcome.error = second ? requesterChild.ending("requester", control.errors[requester])
+                           : "the requester does not end";
+  }
+  outcome.figures = control.figures;
+  return outcome;
+}
+
+}  // namespace mpf::bench

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+// Timing: the loops that the requester runs, the same for floors, peers and ours.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "benchmarks/stage/meter.h"
+#include "benchmarks/stage/stage.h"
+#include "benchmarks/stage/stopwatch.h"
+
+namespace mpf::bench {
+
+// The median duration of groups of calls, divided by the calls in a group. The counter of some
+// processors moves in steps of 10 ns, and reading it takes as long: single durations show the
+// spread, groups tell what a call costs.
+template <class RoundTrip>
+double typicalNs(const Stopwatch& watch, Nanoseconds budget, double aboutNs,
+                 RoundTrip&& roundTrip) {
+  const auto perGroup =
+      static_cast<std::size_t>(std::clamp(20'000.0 / std::max(aboutNs, 1.0), 1.0, 100.0));
+  std::vector<double> groups;
+  groups.reserve(1u << 16);
+  const auto end = Stopwatch::start() + watch.ticksOf(budget);
+  for (std::uint64_t now = 0; (now < end && groups.size() < groups.capacity()) || groups.empty();) {
+    const auto from = Stopwatch::start();
+    for (std::size_t i = 0; i < perGroup; ++i) roundTrip();
+    now = Stopwatch::stop();
+    groups.push_back(watch.elapsed(from, now) / static_cast<double>(perGroup));
+  }
+  const auto middle = groups.begin() + static_cast<std::ptrdiff_t>(groups.size() / 2);
+  std::nth_element(groups.begin(), middle, groups.end());
+  return *middle;
+}
+
+// Calls `roundTrip` over and over: for half of the time one by one, for the other half in groups.
+template <class RoundTrip>
+void timeEach(const Scene& scene, RoundTrip&& roundTrip) {
+  const Stopwatch watch;
+  const auto warm = Stopwatch::start() + watch.ticksOf(scene.budget().warmUp);
+  do roundTrip();
+  while (Stopwatch::start() < warm);
+
+  LatencyRecorder recorder;  // private: a shared one would be a line that bounces
+  const auto half = scene.budget().measure / 2;
+  const auto end = Stopwatch::start() + watch.ticksOf(half);
+  for (std::uint64_t now = 0; now < end;) {
+    const auto from = Stopwatch::start();
+    roundTrip();
+    now = Stopwatch::stop();
+    recorder.add(watch.elapsedNs(from, now));
+  }
+  scene.figures().typicalNs =
+      typicalNs(watch, half, static_cast<double>(recorder.percentileNs(50)), roundTrip);
+  scene.figures().latency = recorder;
+}
+
+// Calls `step`, which finishes `perStep` messages, over and over; the result is messages a second.
+template <class Step>
+void timeRate(const Scene& scene, std::uint64_t perStep, Step&& step) {
+  const auto warm = Deadline::after(scene.budget().warmUp);
+  do step();
+  while (!warm.hasPassed());
+
+  const auto fromNs = Clock::nowNs();
+  const auto end = Deadline::after(scene.budget().measure);
+  std::uint64_t steps = 0;
+  do {
+    for (int i = 0; i < 16; ++i) step();  // the clock costs 20 ns
+    steps += 16;
+  } while (!end.hasPassed());
+  const auto elapsedNs = Clock::nowNs() - fromNs;
+  scene.figures().count = steps * perStep;
+  scene.figures().perSecond =
+      static_cast<double>(steps * perStep) * 1e9 / static_cast<double>(elapsedNs);
+}
+
+// Calls `exchange`, which sends `perExchange` messages and takes their replies, over and over. Each
+// exchange is timed by itself; the rate is that of the messages.
+template <class Exchange>
+void timeExchanges(const Scene& scene, Meter& meter, std::uint64_t perExchange,
+                   Exchange&& exchange) {
+  const Stopwatch watch;
+  const auto warm = Stopwatch::start() + watch.ticksOf(scene.budget().warmUp);
+  do exchange();
+  while (Stopwatch::start() < warm);
+
+  LatencyRecorder recorder;  // private: a shared one would be a line that bounces
+  meter.start();
+  const auto begin = Stopwatch::start();
+  const auto end = begin + watch.ticksOf(scene.budget().measure);
+  std::uint64_t now = begin;
+  while (now < end) {
+    const auto from = Stopwatch::start();
+    exchange();
+    now = Stopwatch::stop();
+    recorder.add(watch.elapsedNs(from, now));
+  }
+  meter.stop(scene.figures());
+  scene.figures().latency = recorder;
+  scene.figures().count = recorder.count() * perExchange;
+  scene.figures().perSecond =
+      static_cast<double>(scene.figures().count) * 1e9 / watch.elapsed(begin, now);
+}
+
+// Keeps `window` messages on their way: `receive` takes the oldest reply, then `send` sends one
+// more. Each is timed from its send to its reply.
+template <class Send, class Receive>
+void timeWindow(const Scene& scene, Meter& meter, std::size_t window, Send&& send,
+                Receive&& receive) {
+  const Stopwatch watch;
+  std::vector<std::uint64_t> sentAt(window);
+  const auto sendAt = [&](std::size_t place) {
+    sentAt[place] = Stopwatch::start();
+    send();
+  };
+  LatencyRecorder recorder;
+  std::size_t oldest = 0;
+  const auto resume = [&](Nanoseconds duration) {
+    const auto end = Stopwatch::start() + watch.ticksOf(duration);
+    for (std::uint64_t now = 0; now < end; oldest = (oldest + 1) % window) {
+      receive();
+      now = Stopwatch::stop();
+      recorder.add(watch.elapsedNs(sentAt[oldest], now));
+      sendAt(oldest);
+    }
+  };
+  for (std::size_t place = 0; place < window; ++place) sendAt(place);
+  resume(scene.budget().warmUp);
+
+  recorder = {};
+  meter.start();
+  const auto begin = Stopwatch::start();
+  resume(scene.budget().measure);
+  const auto elapsed = watch.elapsed(begin, Stopwatch::stop());
+  meter.stop(scene.figures());
+  for (std::size_t i = 0; i < window; ++i) receive();
+  scene.figures().latency = recorder;
+  scene.figures().count = recorder.count();
+  scene.figures().perSecond = static_cast<double>(recorder.count()) * 1e9 / elapsed;
+}
+
+// For one-way traffic: `flood(resume)` sends while resume(); what counts is what the other process
+// has taken.
+template <class Flood>
+void timeOneWay(const Scene& scene, Flood&& flood) {
+  std::int64_t fromNs = 0;
+  std::uint64_t fromCount = 0;
+  const auto startNs = Clock::nowNs();
+  const auto warmNs = startNs + scene.budget().warmUp.count();
+  flood([&] {
+    const auto nowNs = Clock::nowNs();
+    if (fromNs == 0 && nowNs >= warmNs) {
+      fromNs = nowNs;
+      fromCount = scene.consumedCount();
+    }
+    if (fromNs == 0 || nowNs <= fromNs + scene.budget().measure.count()) return true;
+    if (scene.figures().perSecond == 0) {
+      scene.figures().count = scene.consumedCount() - fromCount;
+      scene.figures().perSecond =
+          static_cast<double>(scene.figures().count) * 1e9 / static_cast<double>(nowNs - fromNs);
+    }
+    return false;
+  });
+}
+
+}  // namespace mpf::bench

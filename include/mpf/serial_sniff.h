@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// The messages between a serial server and the listeners of its line (manual, "serialPortSniff";
+// here any number of listeners in any process).
+//
+//   listener                      server "<serial server>.sniff"
+//     Int32 cmd=cmdSniffStart ──►
+//                             ◄── Int32 status=sniffStatusOK
+//                             ◄── Char8Array extra=3 address=0 value=| T 31 | T 0d | R 31 |      further replies to the same request,
+//                             ◄── Char8Array extra=2 address=7 value=| R 32 | R 0d |             with its clientType and clientExtra
+//     Int32 cmd=cmdSniffStop  ──►
+//                             ◄── Int32 status=sniffStatusOK address=0                           the last message
+//
+// Each Char8Array has
+//   value    `extra` records in the order of the line, see SniffRecord
+//   extra    number of records, 1 or more
+//   address  number of bytes that are missing before this message, because the listener did not
+//            take its messages or the server was too slow; at most 2^31 - 1, the rest follows in
+//            the next message
+// The server collects records for at most about 20 ms, so a slow line gives small messages and a
+// fast line large ones.
+//
+// The replies to start and stop are Int32 with
+//   status   sniffStatusOK; sniffStatusNotListening: stop without start; sniffStatusError: unknown
+//            cmd
+//   address  for stop: number of bytes before the stop that are missing at the end
+//
+// If a client starts again while it listens, later records go to the new request; no record is sent
+// twice. A client that goes away need not stop first. A client that does not take its messages
+// loses bytes; neither the line nor other listeners wait for it. When the server ends, the listener
+// gets a ConnectMessage.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <mpf/message.h>
+
+namespace mpf::serial {
+
+// NOLINTBEGIN(readability-identifier-naming): same style as the names of serial_server.h
+
+// The name of the server for listeners is that of the serial server with this suffix.
+inline constexpr std::string_view sniffSuffix = ".sniff";
+
+// `cmd` of an Int32 message.
+inline constexpr std::int32_t cmdSniffStart = 1;
+inline constexpr std::int32_t cmdSniffStop = 2;
+
+// `status` of the reply.
+inline constexpr std::int32_t sniffStatusOK = 0;
+inline constexpr std::int32_t sniffStatusNotListening = 1;
+inline constexpr std::int32_t sniffStatusError = 3;
+
+// NOLINTEND(readability-identifier-naming)
+
+// What happened on the line; the value is the byte in the record.
+enum class SniffKind : char {
+  sent = 'T',
+  received = 'R',
+  damaged = 'r',  // received with a parity or framing error; the value is the byte that arrived
+  breakSignal = 'B',  // a break was received; the value is 0
+};
+
+// One byte of the line.
+//
+//   | at: 8 bytes, little-endian | kind | value |     10 bytes, no padding
+struct SniffRecord {
+  static constexpr std::size_t kBytes = 10;
+
+  // CLOCK_MONOTONIC of the server's host when the kernel took or delivered the byte
+  std::int64_t atNs = 0;
+  SniffKind kind = SniffKind::sent;
+  std::uint8_t value = 0;
+
+  void write(std::span<char, kBytes> bytes) const noexcept;
+  // Returns nullopt when the kind is unknown.
+  [[nodiscard]] static std::optional<SniffRecord> tryRead(
+      std::span<const char, kBytes> bytes) noexcept;
+
+  friend bool operator==(const SniffRecord&, const SniffRecord&) = default;
+};
+
+// Returns the records of a reply; nullopt when the reply is invalid: its size does not match
+// `extra`, or a kind is unknown.
+[[nodiscard]] std::optional<std::vector<SniffRecord>> tryReadRecords(
+    const Char8ArrayMessage& reply);
+
+}  // namespace mpf::serial

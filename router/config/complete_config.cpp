@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: MIT
+// What no value can tell by itself: whether all of them together make sense.
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <set>
+
+#include "router/config/tls_files.h"
+#include "router/config/written_config.h"
+#include "shm/segment_name.h"
+
+namespace mpf::router {
+namespace {
+
+constexpr std::size_t kLongestRouterName = 63;
+constexpr std::array<const char*, 7> kLogLevels{"trace", "debug",    "info", "warning",
+                                                "error", "critical", "off"};
+
+// What is missing on a command line has no place.
+[[noreturn]] void refuse(const std::string& place, const std::string& why) {
+  throw ConfigError((place.empty() ? "" : place + ": ") + why);
+}
+
+std::string hostName() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return std::string(name.data()).substr(0, kLongestRouterName);
+}
+
+class Completion {
+ public:
+  explicit Completion(WrittenConfig& written) : config_(written.config), places_(written.places) {}
+
+  void run() {
+    checkRoot();
+    checkThatItDoesSomething();
+    checkServe();
+    checkListen();
+    checkRemotes();
+    checkAllow();
+    checkRetry();
+    checkTls();
+  }
+
+ private:
+  void checkRoot() {
+    const auto& root = places_.root;
+    if (config_.name.empty()) config_.name = hostName();
+    const auto isPrintable =
+        std::ranges::all_of(config_.name, [](char c) { return c >= ' ' && c <= '~'; });
+    if (config_.name.size() > kLongestRouterName || !isPrintable) {
+      refuse(root.of("name"), fmt::format("name \"{}\": use 1 to {} printable characters",
+                                          config_.name, kLongestRouterName));
+    }
+    if (std::ranges::find(kLogLevels, config_.logLevel) == kLogLevels.end()) {
+      refuse(root.of("log-level"), fmt::format("log-level \"{}\": use {}", config_.logLevel,
+                                               fmt::join(kLogLevels, ", ")));
+    }
+    constexpr mode_t kGroupReadsAndWrites = 0060;
+    if (config_.rights.group != Rights().group &&
+        (config_.rights.mode & kGroupReadsAndWrites) == 0) {
+      refuse(root.of("group"), "a group that mode does not let in: write mode 0660, too");
+    }
+    try {
+      if (!config_.backplane.empty()) SegmentName::checkBackplane(config_.backplane);
+    } catch (const std::invalid_argument& error) {
+      refuse(root.of("backplane"), error.what());
+    }
+  }
+
+  void checkThatItDoesSomething() const {
+    const auto serve = places_.entry("serve");
+    const auto listen = places_.entry("listen");
+    if (config_.serve.empty() && config_.listen.empty() && config_.remotes.empty()) {
+      refuse(
+          places_.root.at(""),
+          fmt::format(
+              "nothing to do: write {} and {} for servers of this host that clients elsewhere use, "
+              "or {} for servers elsewhere that clients of this host use",
+              serve, listen, places_.entry("remote")));
+    }
+    if (!config_.serve.empty() && config_.listen.empty()) {
+      refuse(places_.serve.front().at(""),
+             fmt::format("what is served cannot be reached: write {}, too", listen));
+    }
+    if (config_.serve.empty() && !config_.listen.empty()) {
+      refuse(places_.listen.front().at(""),
+             fmt::format("whoever connects finds nothing that is served: write {}, too", serve));
+    }
+  }
+
+  void checkServe() const {
+    std::set<std::int32_t> seen;
+    for (std::size_t i = 0; i < config_.serve.size(); ++i) {
+      const auto location = config_.serve[i].location;
+      if (!seen.insert(location).second) {
+        refuse(places_.serve[i].of("location"),
+               fmt::format("location {} is served twice; write it once", location));
+      }
+    }
+  }
+
+  void checkListen() const {
+    for (std::size_t i = 0; i < config_.listen.size(); ++i) {
+      const auto& listen = config_.listen[i];
+      const auto& places = places_.listen[i];
+      checkPlain(listen.security, listen.address, places);
+      for (std::size_t earlier = 0; earlier < i; ++earlier) {
+        if (listen.address.port == 0 || config_.listen[earlier].address != listen.address) continue;
+        refuse(places.of("address"),
+               fmt::format("{} is listened at twice; write it once", listen.address.text()));
+      }
+    }
+  }
+
+  // A name is only known when it is resolved; who does that asks isPublic() again.
+  void checkPlain(Security security, const Address& address, const Places& places) const {
+    const auto isKnown = address.host == "*" || isIpAddress(address.host);
+    if (security == Security::tls || config_.allowPublicPlain || !isKnown ||
+        !isPublic(address.host))
+      return;
+    refuse(places.of("security"),
+           fmt::format("plain TCP at {}, which is {}: use TLS, or a loopback, private or "
+                       "link-local address, or write {}",
+                       address.text(),
+                       isAny(address.host) ? "every network of this host" : "a public address",
+                       places_.isFile ? "allow-public-plain = true" : "--allow-public-plain"));
+  }
+
+  void checkRemotes() {
+    std::set<std::int32_t> seen;
+    for (std::size_t i = 0; i < config_.remotes.size(); ++i) {
+      auto& remote = config_.remotes[i];
+      const auto& places = places_.remotes[i];
+      for (const auto location : remote.locations) {
+        if (!seen.insert(location).second)
+          refuse(places.of("locations"),
+                 fmt::format("location {} is reached twice; write it once", location));
+        checkThatItIsElsewhere(location, places);
+      }
+      if (isAny(remote.address.host)) {
+        refuse(places.of("address"),
+               fmt::format("{} is an address to listen at; write that of one host",
+                           remote.address.text()));
+      }
+      if (remote.address.port == 0)
+        refuse(places.of("address"),
+               fmt::format("{}: the port to connect to is 1 to 65535", remote.address.text()));
+      checkPlain(remote.security, remote.address, places);
+      completeTlsName(remote, places);
+    }
+  }
+
+  void checkThatItIsElsewhere(std::int32_t location, const Places& places) const {
+    for (std::size_t i = 0; i < config_.serve.size(); ++i) {
+      const auto& serve = config_.serve[i];
+      if (serve.location != location && serve.local != location) continue;
+      refuse(places.of("locations"),
+             fmt::format("location {} is elsewhere and here, by {}; each location has one place",
+                         location,
+                         places_.serve[i].of(serve.location == location ? "location" : "local")));
+    }
+  }
+
+  void completeTlsName(Remote& remote, const Places& places) const {
+    const auto key = places_.isFile ? "tls-name" : "--tls-name";
+    const auto isNumber = isIpAddress(remote.address.host);
+    if (remote.security == Security::plain && !remote.tlsName.empty())
+      refuse(places.of("tls-name"), fmt::format("{} without TLS; leave it out", key));
+    if (remote.security == Security::plain) return;
+    if (remote.tlsName.empty() && isNumber) {
+      refuse(places.of("address"), fmt::format("{} is no name that a certificate can have; write "
+                                               "{}, too: the name in the certificate of "
+                                               "the router there",
+                                               remote.address.host, key));
+    }
+    if (isIpAddress(remote.tlsName))
+      refuse(places.of("tls-name"),
+             fmt::format("{} {} is an address; write a name", key, remote.tlsName));
+    if (remote.tlsName.empty()) remote.tlsName = remote.address.host;
+  }
+
+  void checkAllow() const {
+    const auto isTls = [](const Listen& listen) { return listen.security == Security::tls; };
+    for (std::size_t i = 0; i < config_.allow.size(); ++i) {
+      const auto& allow = config_.allow[i];
+      const auto& places = places_.allow[i];
+      if (config_.serve.empty())
+        refuse(places.at(""), fmt::format("[[allow]] without {}: there is nothing to allow",
+                                          places_.entry("serve")));
+      for (const auto location : allow.locations) {
+        if (std::ranges::find(config_.serve, location, &Serve::location) != config_.serve.end())
+          continue;
+        refuse(places.of("locations"), fmt::format("location {} is not served here", location));
+      }
+      if (std::ranges::find(allow.servers, "") != allow.servers.end() || allow.peer.empty()) {
+        refuse(places.of(allow.peer.empty() ? "peer" : "servers"),
+               "an empty pattern fits nothing; \"*\" fits everything");
+      }
+      if (allow.peer.find_first_not_of('*') != std::string::npos &&
+          std::ranges::none_of(config_.listen, isTls)) {
+        refuse(places.of("peer"),
+               fmt::format("peer \"{}\" cannot come: only TLS tells names, and no {} uses it",
+                           allow.peer, places_.entry("listen")));
+      }
+    }
+  }
+
+  void checkRetry() const {
+    const auto& limits = config_.limits;
+    if (limits.firstRetry <= limits.lastRetry) return;
+    refuse(places_.limits.of("first-retry"),
+           fmt::format("first-retry, {} ms, is longer than last-retry, {} ms",
+                       limits.firstRetry.count(), limits.lastRetry.count()));
+  }
+
+  void checkTls() const {
+    const auto* const user = whoUsesTls();
+    if (user == nullptr) return;
+    const auto& tls = config_.tls;
+    for (const auto& [key, file] : {std::pair{"certificate", &tls.certificate},
+                                    {"key", &tls.key},
+                                    {"authorities", &tls.authorities}}) {
+      if (!file->empty()) continue;
+      refuse(
+          *user,
+          places_.isFile
+              ? R"(TLS needs [tls] with certificate, key and authorities; or write security = "plain")"
+              : fmt::format("TLS needs --tls-certificate, --tls-key and --tls-authorities; or add "
+                            "--plain"));
+    }
+    checkTlsFiles(tls, places_.tls);
+  }
+
+  // The place of the first that does; nullptr: nobody.
+  [[nodiscard]] const std::string* whoUsesTls() const {
+    for (std::size_t i = 0; i < config_.listen.size(); ++i) {
+      if (config_.listen[i].security == Security::tls) return &places_.listen[i].of("security");
+    }
+    for (std::size_t i = 0; i < config_.remotes.size(); ++i) {
+      if (config_.remotes[i].security == Security::tls) return &places_.remotes[i].of("security");
+    }
+    return nullptr;
+  }
+
+  RouterConfig& config_;
+  const ConfigPlaces& places_;
+};
+
+}  // namespace
+
+void completeConfig(WrittenConfig& written) { Completion(written).run(); }
+
+}  // namespace mpf::router

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+#include "router/incoming/presence.h"
+
+#include <algorithm>
+
+#include "shm/link.h"
+#include "shm/segment_name.h"
+
+namespace mpf::router {
+
+Presence::Presence(Backplane backplane, ServerName name, std::function<void()> news)
+    : backplane_(std::move(backplane)), name_(std::move(name)), news_(std::move(news)) {}
+
+Presence::~Presence() { forget(); }
+
+void Presence::forget() noexcept {
+  if (window_) backplane_.watcher().forget(token_);
+  window_.reset();
+}
+
+bool Presence::look() {
+  const auto before = incarnation();
+  const bool hadFailed = failed_;
+  const bool isThere = find();
+  if ((before != 0 || hadFailed) && incarnation() != before) news_();
+  return isThere;
+}
+
+bool Presence::find() try {
+  if (window_ && !window_->isDead() && !window_->isClosed() && !window_->isLost() &&
+      window_->hasOwner())
+    return true;
+  forget();
+  failed_ = false;
+  problem_ = "it is not there";
+  auto window = PeerWindow::tryOpen(
+      SegmentName::serverWindow(backplane_.name(), name_.location, name_.server),
+      layout::SegmentKind::serverWindow);
+  if (!window || window->isClosed() || !window->hasOwner()) return false;
+  token_ = backplane_.watcher().watchPeer(window, news_);
+  window_ = std::move(window);
+  problem_.clear();
+  return true;
+} catch (const std::exception& error) {
+  failed_ = true;
+  problem_ = error.what();
+  return false;
+}
+
+std::uint32_t Presence::queueSize() const noexcept {
+  return std::clamp(window_->control().queueSize.load(std::memory_order_relaxed), 1u,
+                    LinkGeometry::kMaxQueueSize);
+}
+
+}  // namespace mpf::router

@@ -1,0 +1,427 @@
+// SPDX-License-Identifier: MIT
+#include "router/outgoing/client_router.h"
+
+#include <fmt/format.h>
+#include <sstream>
+
+#include "router/config/limit_text.h"
+#include "router/transport/kj_text.h"
+#include "shm/link.h"
+
+namespace mpf::router {
+namespace {
+
+constexpr std::int64_t kLingerNs = 60'000'000'000;    // of a proxy that nobody uses
+constexpr std::int64_t kBindAgainNs = 2'000'000'000;  // after a refusal
+constexpr int kTurn = 16;  // requests of one server before those of the next
+constexpr int kMaxTurns = 256;  // before everything else that the loop has to do
+constexpr std::chrono::seconds kSweepEvery{1};  // while there is something to wait for
+
+// One that a newer peer knows promises nothing.
+Fate fateOf(wire::Fate fate) noexcept {
+  return fate <= wire::Fate::CANCELLED ? static_cast<Fate>(fate) : Fate::outcomeUnknown;
+}
+
+// As much of it as keeps our clients' ids apart at the far side, too.
+std::uint32_t queueSizeOf(wire::Server::Reader server) {
+  auto queueSize = std::min<std::uint32_t>(server.getQueueSize(), LinkGeometry::kMaxQueueSize);
+  while (queueSize > 1 &&
+         LinkGeometry::forQueue(queueSize).maxOutstanding > server.getMaxOutstanding())
+    --queueSize;
+  return queueSize;
+}
+
+}  // namespace
+
+ClientRouter::ClientRouter(Surroundings& here, const Remote& remote)
+    : here_(here),
+      remote_(remote),
+      record_(here.statistics.add(layout::RouterRole::client)),
+      log_(here.log.forObject()),
+      retry_(here.config.limits.firstRetry),
+      pumpAgain_(here.timer,
+                 [this] {
+                   if (line_) onRoom();
+                 }),
+      sweeps_(here.timer, [this] { sweep(); }) {
+  record_->setAddress(remote.address.text());
+  record_->setLocations(remote.locations);
+  (*record_)->isTls.store(remote.security == Security::tls ? 1 : 0, std::memory_order_relaxed);
+  (*record_)->queueSize.store(here.config.limits.queueSize, std::memory_order_relaxed);
+  loop_ = connectLoop().fork();
+  tasks_.add(loop_.addBranch());
+}
+
+ClientRouter::~ClientRouter() {
+  if (line_) onLineEnd("the router ends");
+}
+
+kj::Promise<void> ClientRouter::stop() {
+  stopping_ = true;
+  if (!line_) return kj::READY_NOW;
+  line_->end(FarewellCode::STOPPING, "the router ends");
+  return loop_.addBranch();
+}
+
+// ---- the line
+
+// What goes wrong on the way there is a line's end, and it is tried again.
+kj::Promise<void> ClientRouter::connectLoop() {
+  return kj::evalNow([this] { return runOnce(); })
+      .then([this](const LineEnd& end) { onLineEnd(end.text); },
+            [this](kj::Exception&& error) { onLineEnd(toStd(error.getDescription())); })
+      .then([this]() -> kj::Promise<void> {
+        if (stopping_) return kj::READY_NOW;
+        return here_.timer.afterDelay(nextDelay()).then([this] { return connectLoop(); });
+      });
+}
+
+// Between half of the time and all of it: routers that lost the same peer at once do not come back
+// at once.
+kj::Duration ClientRouter::nextDelay() {
+  const auto now = retry_.count();
+  retry_ = std::min(2 * retry_, here_.config.limits.lastRetry);
+  return (now / 2 +
+          static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(now / 2 + 1))) *
+         kj::MILLISECONDS;
+}
+
+kj::Promise<LineEnd> ClientRouter::runOnce() {
+  record_->setState(layout::RouterLineState::connecting);
+  return connect().then([this](kj::Own<kj::AsyncIoStream> stream) {
+    line_ =
+        std::make_unique<Line>(kj::mv(stream), here_.timer, here_.config.limits, *record_, *this);
+    return line_->run([this](wire::Item::Builder item) { introduce(item.initGreeting(), here_); });
+  });
+}
+
+// A name may stand for several addresses, the first of which may answer nothing.
+kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
+  const auto& address = remote_.address;
+  auto lookUp =
+      kj::evalNow([&] { return here_.network.parseAddress(hostForKj(address), address.port); });
+  return within(fmt::format("the look-up of {}", address.host), kj::mv(lookUp))
+      .then([this](kj::Own<kj::NetworkAddress> parsed) {
+        if (remote_.security == Security::plain) checkPlain(*parsed, here_.config);
+        std::vector<std::string> addresses;
+        std::istringstream all(toStd(parsed->toString()));
+        for (std::string one; std::getline(all, one, ',');) addresses.push_back(one);
+        return connectToOne(std::move(addresses));
+      });
+}
+
+kj::Exception ClientRouter::failed(const std::string& step, const kj::Exception& error) const {
+  const auto deadTime = limitText(here_.config.limits, "dead-time");
+  const auto why = reasonOf(error);
+  const auto text = why == kTimeout
+                        ? fmt::format("{} took longer than {} (dead-time)", step, deadTime)
+                        : fmt::format("{} failed: {}", step, why);
+  return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
+}
+
+kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connectToOne(
+    std::vector<std::string> addresses) {
+  const auto next = addresses.front();
+  addresses.erase(addresses.begin());
+  return within(fmt::format("the connection to {}", next), connectTo(next))
+      .catch_([this, addresses = std::move(addresses)](
+                  kj::Exception&& error) mutable -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+        if (addresses.empty()) return kj::mv(error);
+        return connectToOne(std::move(addresses));
+      });
+}
+
+kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connectTo(const std::string& address) {
+  return here_.network.parseAddress(address).then([this](kj::Own<kj::NetworkAddress> parsed) {
+    auto connected = parsed->connectAuthenticated();
+    return connected.attach(kj::mv(parsed))
+        .then([this](kj::AuthenticatedStream caller) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+          prepare(*caller.stream, here_.config.limits);
+          if (remote_.security == Security::plain) return kj::mv(caller.stream);
+          return here_.tls
+              ->connect(kj::mv(caller),
+                        remote_.tlsName.empty() ? remote_.address.host : remote_.tlsName)
+              .then(
+                  [](kj::AuthenticatedStream secured) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+                    return kj::mv(secured.stream);
+                  },
+                  [](kj::Exception&& error) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+                    return kj::Exception(kj::Exception::Type::FAILED, __FILE__, __LINE__,
+                                         kj::heapString(tlsTrouble(error)));
+                  });
+        });
+  });
+}
+
+void ClientRouter::onGreeting(const PeerGreeting& greeting) {
+  connected_ = true;
+  connectedNs_ = Clock::nowNs();
+  problem_.clear();
+  count((*record_)->connects);
+  record_->setState(layout::RouterLineState::connected);
+  record_->setProblem({});
+  log_.info("connected to {} at {} ({})", greeting.router, remote_.address.text(),
+            greeting.program);
+  bindWanted();
+}
+
+// Requests that did not reach the line were not done, and that is said; of the others the local
+// clients know as much as we do.
+void ClientRouter::onLineEnd(const std::string& why) {
+  if (!stopping_ && (connected_ || problem_ != why)) {
+    log_.warn("{} {}: {}", connected_ ? "lost" : "cannot reach", remote_.address.text(), why);
+  }
+  problem_ = why;
+  // One that greets and goes is called less and less often, too.
+  const bool lasted =
+      connected_ && Clock::nowNs() - connectedNs_ >=
+                        std::chrono::nanoseconds(here_.config.limits.deadTime).count();
+  if (lasted) retry_ = here_.config.limits.firstRetry;
+  connected_ = false;
+  record_->setState(layout::RouterLineState::waiting);
+  record_->setProblem(why);
+  (*record_)->inQueue.store(0, std::memory_order_relaxed);
+  (*record_)->roundTripNs.store(0, std::memory_order_relaxed);
+  if (line_) {
+    for (const auto& carried : line_->takeUnsentRequests()) {
+      if (auto* proxy = proxyOf(carried.client))
+        proxy->endRequest(carried.client, carried.requestId, Fate::neverTaken, why);
+    }
+  }
+  for (auto& [name, wanted] : wanted_) {
+    wanted.proxy.reset();
+    wanted.offer.reset();
+    wanted.binding = 0;
+    wanted.bindAgainNs = 0;
+  }
+  bindings_.clear();
+  clients_.clear();
+  lastBinding_ = lastClient_ = 0;
+  saidFull_ = false;
+  line_.reset();
+}
+
+// ---- servers that somebody wants
+
+void ClientRouter::setPendingBinds(const std::set<ServerName>& pendingBinds) {
+  for (auto& [name, wanted] : wanted_) {
+    if (!pendingBinds.contains(name) && wanted.idleSinceNs == 0)
+      wanted.idleSinceNs = Clock::nowNs();
+  }
+  for (const auto& name : pendingBinds) {
+    if (std::ranges::find(remote_.locations, name.location) != remote_.locations.end())
+      wanted_[name].idleSinceNs = 0;
+  }
+  bindWanted();
+  sweepSoon();
+}
+
+void ClientRouter::bindWanted() {
+  (*record_)->bindings.store(wanted_.size(), std::memory_order_relaxed);
+  if (!connected_) return;
+  for (auto& [name, wanted] : wanted_) {
+    if (wanted.binding == 0 && Clock::nowNs() >= wanted.bindAgainNs) bind(name, wanted);
+  }
+}
+
+void ClientRouter::bind(const ServerName& name, Wanted& wanted) {
+  wanted.binding = ++lastBinding_;
+  bindings_[wanted.binding] = name;
+  line_->send([binding = wanted.binding, name](wire::Item::Builder item) {
+    auto bind = item.initBind();
+    bind.setBinding(binding);
+    bind.setLocation(name.location);
+    bind.setServer(name.server);
+  });
+}
+
+void ClientRouter::onServer(wire::Server::Reader server) {
+  const auto binding = bindings_.find(server.getBinding());
+  if (binding == bindings_.end()) return;  // unbound meanwhile
+  auto& wanted = wanted_.at(binding->second);
+  switch (server.getState()) {
+    case wire::Server::State::THERE:
+      wanted.offer = Proxy::Offer{server.getBinding(), server.getIncarnation(), queueSizeOf(server),
+                                  server.getMaxMessageBytes()};
+      if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);  // of an earlier life
+      break;
+    case wire::Server::State::REFUSED:
+      onRefusal(binding->second, wanted, forPeople(server.getReason()));
+      bindings_.erase(binding);
+      wanted.offer.reset();
+      if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
+      break;
+    case wire::Server::State::ABSENT:  // what has no end by now was on its way
+      wanted.offer.reset();
+      if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);
+      break;
+    default:  // what a newer peer may say promises nothing
+      wanted.offer.reset();
+      if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
+      break;
+  }
+  sweep();
+}
+
+// Its configuration may change.
+void ClientRouter::onRefusal(const ServerName& name, Wanted& wanted, const std::string& why) {
+  if (wanted.problem != why)
+    log_.warn("{} at location {}: {} refuses: {}", name.server, name.location,
+              remote_.address.text(), why);
+  wanted.problem = why;
+  wanted.binding = 0;
+  wanted.bindAgainNs = Clock::nowNs() + kBindAgainNs;
+}
+
+void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
+  if (!wanted.offer) return;
+  wanted.proxy = std::make_unique<Proxy>(here_, *this, name, *wanted.offer);
+  wanted.offer.reset();
+  wanted.problem.clear();
+  log_.info("{} at location {} is there", name.server, name.location);
+} catch (const std::exception& error) {
+  if (wanted.problem != error.what())
+    log_.warn("{} at location {} cannot be offered here: {}", name.server, name.location,
+              error.what());
+  wanted.problem = error.what();
+}
+
+// Proxies whose requests have all had their end go, new ones come, and what nobody has wanted for
+// long is forgotten.
+void ClientRouter::sweep() {
+  const auto nowNs = Clock::nowNs();
+  for (auto each = wanted_.begin(); each != wanted_.end();) {
+    auto& [name, wanted] = *each;
+    if (wanted.proxy && wanted.proxy->isDone()) {
+      log_.info("{} at location {} is gone", name.server, name.location);
+      wanted.proxy.reset();
+    }
+    if (!wanted.proxy && wanted.offer && connected_) makeProxy(name, wanted);
+    if (wanted.proxy && wanted.proxy->hasClients()) wanted.idleSinceNs = 0;
+    else if (wanted.proxy && wanted.idleSinceNs == 0) wanted.idleSinceNs = nowNs;
+    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kLingerNs) {
+      ++each;
+      continue;
+    }
+    if (connected_ && wanted.binding != 0)
+      line_->send(
+          [binding = wanted.binding](wire::Item::Builder item) { item.setUnbind(binding); });
+    bindings_.erase(wanted.binding);
+    each = wanted_.erase(each);
+  }
+  bindWanted();
+  if (std::ranges::any_of(wanted_, [this](const auto& each) { return isPending(each.second); }))
+    sweepSoon();
+}
+
+// Whether time alone will change something.
+bool ClientRouter::isPending(const Wanted& wanted) const {
+  return wanted.idleSinceNs != 0 || (wanted.binding == 0 && connected_) ||
+         (wanted.offer && !wanted.proxy) || (wanted.proxy && wanted.proxy->isDraining());
+}
+
+void ClientRouter::sweepSoon() { sweeps_.setAt(Deadline::after(kSweepEvery)); }
+
+// ---- from the line
+
+Proxy* ClientRouter::proxyOf(std::uint32_t client) {
+  const auto found = clients_.find(client);
+  return found == clients_.end() ? nullptr : found->second;
+}
+
+// Naming a client that was never opened is a protocol error.
+Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
+  if (client == 0 || client > lastClient_)
+    throw ProtocolError(FarewellCode::PROTOCOL, fmt::format("client {} was never opened", client));
+  return proxyOf(client);
+}
+
+std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
+  const auto most = line_->peer().maxClients;
+  if (most != 0 && clients_.size() >= most) {
+    if (!std::exchange(saidFull_, true))
+      log_.warn(
+          "{} accepts at most {} clients of this connection (its max-clients): others are refused",
+          remote_.address.text(), most);
+    return std::nullopt;
+  }
+  if (lastClient_ == UINT32_MAX) {
+    line_->end(FarewellCode::STOPPING, "out of numbers for clients");
+    return std::nullopt;
+  }
+  clients_[++lastClient_] = &proxy;
+  (*record_)->clients.store(clients_.size(), std::memory_order_relaxed);
+  return lastClient_;
+}
+
+void ClientRouter::dropClient(std::uint32_t number) {
+  clients_.erase(number);
+  sweepSoon();  // it may have been the last one of its proxy
+  (*record_)->clients.store(clients_.size(), std::memory_order_relaxed);
+}
+
+// What is said of a client that has gone meanwhile is of no interest any more.
+void ClientRouter::onItem(wire::Item::Reader item) {
+  switch (item.which()) {
+    case wire::Item::SERVER:
+      return onServer(item.getServer());
+    case wire::Item::REPLY:
+      if (auto* proxy = openedProxyOf(item.getReply().getClient())) {
+        proxy->reply(item.getReply().getClient(), item.getReply());
+        if (proxy->isDone()) sweep();
+      }
+      return;
+    case wire::Item::FATE: {
+      const auto end = item.getFate();
+      auto* proxy = openedProxyOf(end.getClient());
+      if (proxy == nullptr) return;
+      proxy->endRequest(end.getClient(), end.getRequestId(), fateOf(end.getFate()),
+                        forPeople(end.getReason()));
+      if (proxy->isDone()) sweep();
+      return;
+    }
+    case wire::Item::QUEUE_FULL:
+      if (auto* proxy = openedProxyOf(item.getQueueFull())) proxy->queueFull(item.getQueueFull());
+      return;
+    case wire::Item::REFUSE:
+      if (auto* proxy = openedProxyOf(item.getRefuse().getClient()))
+        proxy->refuse(item.getRefuse().getClient(), forPeople(item.getRefuse().getReason()));
+      return;
+    case wire::Item::BIND:
+    case wire::Item::UNBIND:
+    case wire::Item::OPEN:
+    case wire::Item::CLOSE:
+    case wire::Item::REQUEST:
+    case wire::Item::CREDIT:
+      throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a client router sends");
+    default:  // of a newer peer
+      return;
+  }
+}
+
+// In turn, some of each, from behind the last one on: nobody waits for a flood to end.
+void ClientRouter::onRoom() {
+  auto next = wanted_.upper_bound(pumped_);
+  const ServerName* pumped = nullptr;
+  std::size_t idle = 0;
+  for (int turns = 0; turns < kMaxTurns && idle < wanted_.size() && line_->hasRoom(); ++next) {
+    if (next == wanted_.end()) next = wanted_.begin();
+    ++idle;
+    auto& proxy = next->second.proxy;
+    if (!proxy || !proxy->hasMore()) continue;
+    ++turns;
+    pumped = &next->first;
+    if (proxy->pump(kTurn)) idle = 0;
+  }
+  if (pumped != nullptr) pumped_ = *pumped;
+  if (idle < wanted_.size() && line_->hasRoom()) pumpAgain_.setAt(Deadline::after(Nanoseconds(0)));
+}
+
+void ClientRouter::onUnsendable(const Carried& carried, const std::string& why,
+                                wire::Item::Builder /*instead*/) {
+  log_.warn("a request is refused: {}", why);
+  if (auto* proxy = proxyOf(carried.client))
+    proxy->endRequest(carried.client, carried.requestId, Fate::refused, why);
+}
+
+}  // namespace mpf::router

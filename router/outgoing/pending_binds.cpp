@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#include "router/outgoing/pending_binds.h"
+
+#include <cerrno>
+#include <exception>
+#include <system_error>
+
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+
+namespace mpf::router {
+namespace {
+
+// Of something of which there may be more in a while.
+bool isShortage(const std::exception& error) noexcept {
+  const auto* const failure = dynamic_cast<const std::system_error*>(&error);
+  const auto code = failure != nullptr ? failure->code().value() : 0;
+  return code == EMFILE || code == ENFILE || code == ENOMEM;
+}
+
+}  // namespace
+
+std::set<ServerName> PendingBinds::look() {
+  const auto& backplane = backplane_.name();
+  std::map<std::string, Known> known;
+  problem_.clear();
+  for (const auto& name : segments::list(SegmentName::prefix(backplane) +
+                                         static_cast<char>(NameKind::pendingBind) + '.')) {
+    if (const auto found = known_.find(name); found != known_.end()) {
+      known.insert(known_.extract(found));
+      continue;
+    }
+    try {
+      if (const auto header = segments::tryReadHeader(name, layout::SegmentKind::pendingBind)) {
+        known[name] = {{header->location, segments::rawText(header->name)}, header->ownerWindow};
+      }
+    } catch (const std::exception& error) {
+      if (isShortage(error)) problem_ = error.what();
+      else known[name] = {};  // nobody's, or not for us to read: it has no name that anybody serves
+    }
+  }
+  known_ = std::move(known);
+  std::set<ServerName> names;
+  std::map<std::uint64_t, bool> lives;
+  for (const auto& [segment, pendingBind] : known_) {
+    const auto [found, isNew] = lives.try_emplace(pendingBind.client, false);
+    if (isNew) {
+      const auto window = SegmentName::keyed(backplane, NameKind::clientWindow, pendingBind.client);
+      found->second =
+          pendingBind.client != 0 && segments::probeOwner(window) == segments::Owner::alive;
+    }
+    if (found->second) names.insert(pendingBind.name);
+  }
+  return names;
+}
+
+}  // namespace mpf::router

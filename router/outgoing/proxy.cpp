@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+#include "router/outgoing/proxy.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+#include "router/transport/kj_text.h"
+
+namespace mpf::router {
+namespace {
+
+constexpr std::chrono::milliseconds kFirstRetry{1};  // of a reply that a client had no room for
+constexpr std::chrono::milliseconds kLastRetry{50};
+constexpr int kAtOnce = 1024;  // requests, before everything else that the loop has to do
+constexpr std::chrono::seconds kOpenAgain{1};  // after a refusal
+constexpr std::uint32_t kCreditShare = 4;  // of the window: given back in such portions
+
+ServerOptions optionsFor(const Surroundings& here, const ServerName& name,
+                         const Proxy::Offer& offer, std::uint64_t maxMessageBytes) {
+  ServerOptions options;
+  options.location = name.location;
+  options.queueSize = std::max(static_cast<int>(offer.queueSize), 1);
+  const auto maxOffered = std::min(offer.maxMessageBytes, maxMessageBytes);
+  options.maxMessageBytes =
+      std::min(maxOffered + kMostBesideElements, std::max(maxMessageBytes, kMostBesideElements));
+  options.waitMode = WaitMode::block;
+  options.rights = here.config.rights;
+  return options;
+}
+
+}  // namespace
+
+Proxy::Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Offer& offer)
+    : here_(here),
+      owner_(owner),
+      name_(name),
+      offer_(offer),
+      log_(owner.log()),
+      retry_(here.timer, [this] { retryHeld(); }),
+      server_(here.backplane, name.server,
+              optionsFor(here, name, offer, owner.line().maxMessageBytes())),
+      again_(here.timer, [this] { onReadable(); }) {
+  server_.onClient([this](std::uint64_t client, bool isThere) { onClient(client, isThere); });
+  readable_ = std::make_unique<Readable>(here.port, server_.descriptor(), [this] { onReadable(); });
+}
+
+Proxy::~Proxy() {
+  for (const auto& [number, client] : clients_) owner_.dropClient(number);
+}
+
+// ---- to the far server
+
+// Those that are refused at once take no room of the line: there may be any number of them.
+void Proxy::onReadable() {
+  if (pump(kAtOnce) && owner_.line().hasRoom()) again_.setAt(Deadline::after(Nanoseconds(0)));
+}
+
+// False: the far side has no place for it now.
+bool Proxy::tryOpen(std::uint64_t local) {
+  const auto number = owner_.tryNewClient(*this);
+  numbers_[local] = number.value_or(0);
+  if (!number) return false;
+  auto& client = clients_[*number];
+  client.local = local;
+  client.window = here_.config.limits.windowBytes;
+  owner_.line().send([number = *number, binding = offer_.binding, incarnation = offer_.incarnation,
+                      window = client.window](wire::Item::Builder item) {
+    auto open = item.initOpen();
+    open.setClient(number);
+    open.setBinding(binding);
+    open.setIncarnation(incarnation);
+    open.setWindow(window);
+  });
+  return true;
+}
+
+void Proxy::close(std::uint32_t number) {
+  owed_ -= clients_[number].owed;
+  clients_.erase(number);
+  owner_.dropClient(number);
+  owner_.line().send([number](wire::Item::Builder item) { item.setClose(number); });
+}
+
+void Proxy::onClient(std::uint64_t local, bool isThere) {
+  if (isThere) {
+    tryOpen(local);
+  } else if (const auto found = numbers_.find(local); found != numbers_.end()) {
+    if (found->second != 0) close(found->second);
+    numbers_.erase(found);
+  }
+}
+
+bool Proxy::pump(int most) {
+  if (isDraining()) return hasMore_ = false;
+  for (; most != 0 && owner_.line().hasRoom(); --most) {
+    auto request = server_.receive();
+    if (!request) return hasMore_ = false;
+    forward(std::move(request));
+  }
+  return hasMore_ = true;
+}
+
+void Proxy::forward(Message request) {
+  const auto found = numbers_.find(server_.clientOf(request));
+  if (found == numbers_.end()) return;  // it has gone meanwhile
+  if (const auto known = clients_.find(found->second);
+      known != clients_.end() && known->second.owed == 0 && known->second.openAgain.hasPassed()) {
+    close(found->second);
+    found->second = 0;
+  }
+  if (found->second == 0 && !tryOpen(found->first)) return;  // its handle's death refuses it
+  // From here on its end is ours to tell: the handle's death must not.
+  auto route = request.route();
+  route.keeper = nullptr;
+  request.setRoute(route);
+  auto& client = clients_[found->second];
+  ++client.owed;
+  ++owed_;
+  if (client.refusal)
+    return endRequest(found->second, route.requestId, Fate::refused, *client.refusal);
+  owner_.line().send(Carried{.isRequest = true,
+                             .client = found->second,
+                             .requestId = route.requestId,
+                             .takeBefore = server_.takeBefore(),
+                             .message = std::move(request)});
+}
+
+void Proxy::drain(Fate fate) {
+  if (isDraining()) return;
+  drainUntil_ = Deadline::after(here_.config.limits.deadTime);
+  for (const auto& [number, client] : clients_) {
+    for (const auto requestId : server_.owed(client.local)) end(number, requestId, fate);
+  }
+}
+
+bool Proxy::isDone() const noexcept {
+  if (!isDraining()) return false;
+  const bool isEmpty = owed_ == 0 && std::ranges::all_of(clients_, [](const auto& each) {
+                         return each.second.held.empty();
+                       });
+  return isEmpty || drainUntil_.hasPassed();
+}
+
+// ---- from it
+
+// Whether a request has had no end, be it one that is held.
+bool Proxy::awaits(const Client& client, std::uint32_t requestId) const noexcept {
+  return server_.owes(client.local, requestId) &&
+         std::ranges::none_of(client.held,
+                              [&](const Held& held) { return held.requestId == requestId; });
+}
+
+void Proxy::ended(Client& client) noexcept {
+  --client.owed;
+  --owed_;
+}
+
+void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
+  const auto found = clients_.find(number);
+  if (found == clients_.end() || isDraining()) return;  // it has gone
+  auto& client = found->second;
+  const bool isOwed = awaits(client, reply.getRequestId());
+  if (reply.getIsFirst() != isOwed) {
+    throw ProtocolError(
+        FarewellCode::PROTOCOL,
+        fmt::format("a reply to request {} of client {}, which {}", reply.getRequestId(), number,
+                    isOwed ? "is to get its first one" : "has had its end"));
+  }
+  if (client.unpaid >= client.window)
+    throw ProtocolError(
+        FarewellCode::LIMIT,
+        fmt::format("a reply to client {} beyond its window of {} bytes", number, client.window));
+  ConversionError error;
+  auto message = tryFromWire(
+      reply.getMessage(), {static_cast<std::size_t>(owner_.line().limits().maxMessageBytes)}, error,
+      [&](std::size_t bytes) { return server_.allocateBody(client.local, bytes); });
+  if (!message || message->getType() == MessageType::connect ||
+      message->getType() == MessageType::requestFate) {
+    if (error.fault != ConversionFault::unknownType && error.fault != ConversionFault::tooLarge) {
+      throw ProtocolError(FarewellCode::PROTOCOL,
+                          message ? "a reply that only MPF itself may send" : error.text);
+    }
+    return loseReply(number, reply, error.text);
+  }
+  client.unpaid += windowBytesOf(*message);
+  deliver(number, client, reply.getRequestId(), std::move(*message));
+}
+
+// It was done, and what came of it cannot be said.
+void Proxy::loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why) {
+  log_.warn("{} at location {}: a reply is lost: {}", name_.server, name_.location, why);
+  if (reply.getIsFirst()) endRequest(number, reply.getRequestId(), Fate::outcomeUnknown, why);
+  // At least what it took.
+  giveCredit(number, clients_.at(number),
+             kWindowBytesBeside + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
+}
+
+void Proxy::endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate,
+                       const std::string& why) {
+  if (!why.empty())
+    log_.debug("{} at location {}: request {}: {}", name_.server, name_.location, requestId, why);
+  end(number, requestId, fate);
+}
+
+void Proxy::end(std::uint32_t number, std::uint32_t requestId, Fate fate) {
+  const auto found = clients_.find(number);
+  if (found == clients_.end() || !awaits(found->second, requestId)) return;
+  deliver(number, found->second, requestId,
+          RequestFateMessage({.fate = fate, .requestId = requestId}));
+}
+
+void Proxy::queueFull(std::uint32_t number) {
+  count(owner_.record()->queueFull);
+  const auto found = clients_.find(number);
+  if (found == clients_.end() || found->second.heldQueueFull) return;
+  found->second.heldQueueFull = true;
+  deliver(number, found->second, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull}));
+}
+
+void Proxy::refuse(std::uint32_t number, const std::string& why) {
+  const auto found = clients_.find(number);
+  if (found == clients_.end()) return;
+  if (!found->second.refusal)
+    log_.warn("{} at location {} refuses a client: {}", name_.server, name_.location, why);
+  found->second.refusal = why;
+  found->second.openAgain = Deadline::after(kOpenAgain);
+}
+
+// In order: behind what is held.
+void Proxy::deliver(std::uint32_t number, Client& client, std::uint32_t requestId,
+                    Message&& message) {
+  if (client.held.empty() && tryDeliver(number, client, requestId, message)) return;
+  client.held.push_back({requestId, std::move(message)});
+  retryAfter_ = kFirstRetry;
+  retry_.setAt(Deadline::after(retryAfter_));
+}
+
+// False: the client has no room for it now.
+bool Proxy::tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId,
+                       Message& message) {
+  const bool isOwed = server_.owes(client.local, requestId);
+  const bool isNews = message.getType() == MessageType::connect;
+  const bool isOurs = isNews || message.getType() == MessageType::requestFate;
+  const auto bytes = windowBytesOf(message);
+  switch (server_.replyTo(client.local, requestId, std::move(message))) {
+    case ReplyResult::queueFull:
+    case ReplyResult::noMemory:
+      return false;
+    case ReplyResult::tooLarge:
+      log_.warn("{} at location {}: a reply is larger than its client can get", name_.server,
+                name_.location);
+      if (isOwed)
+        static_cast<void>(server_.replyTo(
+            client.local, requestId,
+            RequestFateMessage({.fate = Fate::outcomeUnknown, .requestId = requestId})));
+      break;
+    case ReplyResult::sent:
+    case ReplyResult::clientGone:
+      break;
+  }
+  if (isOwed) ended(client);
+  if (isNews) client.heldQueueFull = false;
+  if (!isOurs) giveCredit(number, client, bytes);
+  return true;
+}
+
+void Proxy::giveCredit(std::uint32_t number, Client& client, std::size_t bytes) {
+  client.taken += static_cast<std::uint32_t>(bytes);
+  if (client.taken < client.window / kCreditShare) return;
+  client.unpaid -= std::min<std::uint64_t>(client.taken, client.unpaid);
+  owner_.line().send([number, taken = client.taken](wire::Item::Builder item) {
+    auto credit = item.initCredit();
+    credit.setClient(number);
+    credit.setBytes(taken);
+  });
+  client.taken = 0;
+}
+
+void Proxy::retryHeld() {
+  for (auto& [number, client] : clients_) {
+    while (!client.held.empty() &&
+           tryDeliver(number, client, client.held.front().requestId, client.held.front().message)) {
+      client.held.pop_front();
+    }
+  }
+  const bool some =
+      std::ranges::any_of(clients_, [](const auto& each) { return !each.second.held.empty(); });
+  if (!some) return;
+  retryAfter_ = std::min(2 * retryAfter_, kLastRetry);
+  retry_.setAt(Deadline::after(retryAfter_));
+}
+
+}  // namespace mpf::router

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#include "router/transport/frame_reader.h"
+
+#include <algorithm>
+#include <cstring>
+#include <fmt/format.h>
+
+namespace mpf::router {
+namespace {
+
+constexpr std::size_t kWord = sizeof(capnp::word);
+constexpr std::size_t kFirstRoom = std::size_t{64} << 10;
+constexpr std::size_t kLeastRoom = std::size_t{4} << 10;
+constexpr std::size_t kGoodRoom = std::size_t{16} << 10;  // for the next part of a long frame
+// what a long frame needed beyond is given back
+constexpr std::size_t kKeptRoom = std::size_t{4} << 20;
+
+std::uint32_t littleEndian32(const kj::byte* bytes) noexcept {
+  return std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
+         std::uint32_t{bytes[3]} << 24;
+}
+
+// Pointers may lead to the same words again, which a reader must not follow for ever: four times
+// through is plenty for honest frames.
+capnp::ReaderOptions readerOptions(std::size_t bytes) {
+  return {.traversalLimitInWords = 4 * (bytes / kWord) + 1024, .nestingLimit = 16};
+}
+
+}  // namespace
+
+FrameReader::FrameReader(std::uint64_t maxFrameBytes)
+    : maxFrameBytes_(maxFrameBytes), buffer_(kj::heapArray<capnp::word>(kFirstRoom / kWord)) {}
+
+kj::ArrayPtr<kj::byte> FrameReader::room() {
+  frame_.reset();
+  if (begin_ == end_) begin_ = end_ = 0;
+  const auto needed = frameBytes();
+  const auto capacity = buffer_.size() * kWord;
+  if (needed && *needed > capacity - begin_) {
+    if (capacity - end_ < kGoodRoom)
+      makeRoom(static_cast<std::size_t>(
+          std::min<std::uint64_t>(*needed, std::max(2 * pending(), kFirstRoom))));
+  } else if (!needed &&
+             (capacity - end_ < kLeastRoom || (pending() == 0 && capacity > kKeptRoom))) {
+    makeRoom(kFirstRoom);
+  }
+  return buffer_.asBytes().slice(end_, buffer_.size() * kWord);
+}
+
+// Moves what is pending to the beginning of a buffer that holds at least `bytes`, and some more
+// than what is pending.
+void FrameReader::makeRoom(std::size_t bytes) {
+  const auto words = (std::max(bytes, pending() + kLeastRoom) + kWord - 1) / kWord;
+  const auto used = pending();
+  if (words > buffer_.size() || buffer_.size() * kWord > kKeptRoom) {
+    auto larger = kj::heapArray<capnp::word>(words);
+    std::memcpy(larger.asBytes().begin(), at(begin_), used);
+    buffer_ = kj::mv(larger);
+  } else {
+    std::memmove(buffer_.asBytes().begin(), at(begin_), used);
+  }
+  begin_ = 0;
+  end_ = used;
+}
+
+// Length of the frame that begins at begin_; nullopt while its segment table has not come.
+std::optional<std::uint64_t> FrameReader::frameBytes() const {
+  if (pending() < sizeof(std::uint32_t)) return std::nullopt;
+  const std::uint64_t segments = std::uint64_t{littleEndian32(at(begin_))} + 1;
+  if (segments > kMaxSegments) {
+    throw ProtocolError(
+        FarewellCode::PROTOCOL,
+        fmt::format("a frame of {} segments; the limit is {}", segments, kMaxSegments));
+  }
+  const std::size_t table = (segments / 2 + 1) * kWord;
+  if (pending() < table) return std::nullopt;
+  std::uint64_t bytes = table;
+  for (std::size_t segment = 0; segment < segments; ++segment) {
+    bytes += std::uint64_t{littleEndian32(at(begin_ + 4 * (segment + 1)))} * kWord;
+  }
+  if (bytes > maxFrameBytes_) {
+    throw ProtocolError(FarewellCode::LIMIT,
+                        fmt::format("a frame of {} bytes; the limit is {}", bytes, maxFrameBytes_));
+  }
+  return bytes;
+}
+
+// As a segment table, these bytes would announce more than kMaxSegments segments.
+bool FrameReader::beginsAsTls() const noexcept {
+  constexpr kj::byte kAlert = 0x15;
+  constexpr kj::byte kHandshake = 0x16;
+  constexpr kj::byte kMajorVersion = 3;
+  if (pending() < 2) return false;
+  return (*at(begin_) == kAlert || *at(begin_) == kHandshake) && *at(begin_ + 1) == kMajorVersion;
+}
+
+capnp::MessageReader* FrameReader::tryNext() {
+  frame_.reset();
+  const auto bytes = frameBytes();
+  if (!bytes || *bytes > pending()) return nullptr;
+  const auto words = static_cast<std::size_t>(*bytes) / kWord;
+  const auto first = begin_ / kWord;
+  frame_.emplace(buffer_.slice(first, first + words).asConst(), readerOptions(words * kWord));
+  begin_ += words * kWord;
+  return &*frame_;
+}
+
+}  // namespace mpf::router

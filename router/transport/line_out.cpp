@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+// Line, continued: the way out.
+#include <algorithm>
+#include <capnp/serialize-async.h>
+#include <iterator>
+
+#include "router/transport/line.h"
+#include "router/transport/tls.h"
+
+namespace mpf::router {
+namespace {
+
+constexpr std::size_t kItemBytes = 256;  // an item without its body, generously
+constexpr std::size_t kKeptScratch = std::size_t{4} << 20;  // memory that stays for the next frame
+
+}  // namespace
+
+void Line::send(Note note) {
+  if (isEnding()) return;
+  if (handling_) {
+    queue_.emplace_back(Answer{std::move(note)});
+    ++answers_;
+  } else {
+    queue_.emplace_back(std::move(note));
+  }
+  scheduleWrite();
+}
+
+void Line::send(Carried carried) {
+  if (isEnding()) {
+    if (carried.isRequest) late_.push_back(std::move(carried));
+    return;
+  }
+  queue_.emplace_back(std::move(carried));
+  ++waiting_;
+  noteQueue();
+  scheduleWrite();
+}
+
+void Line::noteQueue() noexcept { record_->inQueue.store(waiting_, std::memory_order_relaxed); }
+
+// After all that is to be done now: what it sends shares the frame.
+void Line::scheduleWrite() {
+  if (std::exchange(writing_, true)) return;
+  writes_ =
+      kj::evalLast([this] { return writeAll(); }).eagerlyEvaluate([this](kj::Exception&& error) {
+        onWriteFailure(tlsTrouble(error));
+      });
+}
+
+// The peer may have said why it takes nothing any more.
+void Line::onWriteFailure(const std::string& why) {
+  if (isEnding()) return finish({farewell_.empty() ? why : farewell_});
+  phase_ = Phase::broken;
+  lastMoment_ =
+      timer_.afterDelay(kLastMoment).then([this, why] { finish({why}); }).eagerlyEvaluate(nullptr);
+}
+
+kj::Promise<void> Line::writeAll() {
+  if (queue_.empty()) {
+    writing_ = false;
+    if (isEnding() && lingers_) stream_->shutdownWrite();
+    else if (isEnding()) finish({farewell_});
+    return kj::READY_NOW;
+  }
+  buildFrame();
+  count(record_->framesSent);
+  return capnp::writeMessage(*stream_, *frame_).then([this] {
+    frame_ = nullptr;
+    if (readOn_) {
+      heardNs_ = Clock::nowNs();  // it reads, and is not read: what it said meanwhile is not heard
+      if (answers_ < kManyNotes) std::exchange(readOn_, nullptr)->fulfill();
+    }
+    if (!isEnding()) owner_.onRoom();
+    return writeAll();
+  });
+}
+
+// Items for the next frame: at least one, and no more bytes than may share one.
+Line::FrameSize Line::sizeOfNextFrame() const {
+  FrameSize size{0, 0};
+  for (const auto& outgoing : queue_) {
+    const auto* carried = std::get_if<Carried>(&outgoing);
+    const auto bytes = kItemBytes + (carried != nullptr ? carried->message.body().size() : 0);
+    if (size.items != 0 && size.bytes + bytes > limits_.bufferBytes) break;
+    ++size.items;
+    size.bytes += bytes;
+    if (!greeted_) break;  // the greeting stands alone
+  }
+  return size;
+}
+
+// Zeroed memory for the next frame, kept from frame to frame.
+void Line::makeScratch(std::size_t bytes) {
+  constexpr std::size_t kLeast = std::size_t{16} << 10;
+  bytes = std::min(kLeast + bytes, kKeptScratch);
+  if (scratch_.size() * sizeof(capnp::word) >= bytes) return;
+  scratch_ = kj::heapArray<capnp::word>(bytes / sizeof(capnp::word) + 1);
+  std::memset(scratch_.asBytes().begin(), 0, scratch_.asBytes().size());
+}
+
+void Line::buildFrame() {
+  const auto [items, bytes] = sizeOfNextFrame();
+  makeScratch(bytes);
+  frame_ = kj::heap<capnp::MallocMessageBuilder>(scratch_.asPtr());
+  auto list = frame_->initRoot<wire::Frame>().initItems(static_cast<capnp::uint>(items));
+  for (capnp::uint at = 0; at < items; ++at) {
+    auto outgoing = std::move(queue_.front());
+    queue_.pop_front();
+    if (auto* note = std::get_if<Note>(&outgoing)) {
+      (*note)(list[at]);
+    } else if (auto* answer = std::get_if<Answer>(&outgoing)) {
+      --answers_;
+      answer->note(list[at]);
+    } else {
+      build(list[at], std::get<Carried>(outgoing));
+      --waiting_;
+      count(record_->messagesSent);
+    }
+  }
+  noteQueue();
+  count(record_->bytesSent, frame_->sizeInWords() * sizeof(capnp::word));
+}
+
+void Line::build(wire::Item::Builder item, Carried& carried) {
+  const ConversionLimits limits{static_cast<std::size_t>(maxMessageBytes())};
+  ConversionError error;
+  bool isSound = false;
+  if (carried.isRequest) {
+    auto request = item.initRequest();
+    request.setClient(carried.client);
+    request.setRequestId(carried.requestId);
+    // One that has passed already is the far side's to say, as any other.
+    if (!carried.takeBefore.isNever())
+      request.setTakeWithinNs(
+          static_cast<std::uint64_t>(std::max<std::int64_t>(carried.takeBefore.left().count(), 1)));
+    isSound = tryToWire(carried.message, request.initMessage(), limits, error);
+  } else {
+    auto reply = item.initReply();
+    reply.setClient(carried.client);
+    reply.setRequestId(carried.requestId);
+    reply.setIsFirst(carried.isFirst);
+    isSound = tryToWire(carried.message, reply.initMessage(), limits, error);
+  }
+  if (isSound) return;
+  item.setNone();
+  owner_.onUnsendable(carried, error.text, item);
+}
+
+std::vector<Carried> Line::takeUnsentRequests() {
+  std::vector<Carried> requests;
+  for (auto& outgoing : queue_) {
+    auto* carried = std::get_if<Carried>(&outgoing);
+    if (carried != nullptr && carried->isRequest) requests.push_back(std::move(*carried));
+  }
+  queue_.clear();
+  std::ranges::move(std::exchange(late_, {}), std::back_inserter(requests));
+  return requests;
+}
+
+}  // namespace mpf::router

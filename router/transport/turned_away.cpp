@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#include "router/transport/turned_away.h"
+
+#include <array>
+#include <capnp/message.h>
+#include <capnp/serialize-async.h>
+
+#include "router/transport/kj_text.h"
+
+namespace mpf::router {
+namespace {
+
+constexpr auto kMoment = 500 * kj::MILLISECONDS;
+
+// What it sends does not matter any more. Unread, it would make the kernel take the farewell back.
+kj::Promise<void> readToEnd(kj::AsyncIoStream& caller) {
+  constexpr std::size_t kReadBytes = 4096;
+  auto room = kj::heapArray<kj::byte>(kReadBytes);
+  auto read = caller.tryRead(room.begin(), 1, room.size());
+  return read.attach(kj::mv(room)).then([&caller](std::size_t bytes) -> kj::Promise<void> {
+    if (bytes == 0) return kj::READY_NOW;
+    return readToEnd(caller);
+  });
+}
+
+}  // namespace
+
+void TurnedAway::add(kj::Own<kj::AsyncIoStream> caller, FarewellCode code, const std::string& why) {
+  if (callers_ >= kMost) return;
+  ++callers_;
+  auto message = kj::heap<capnp::MallocMessageBuilder>();
+  auto farewell = message->initRoot<wire::Frame>().initItems(1)[0].initFarewell();
+  farewell.setCode(code);
+  farewell.setReason(forPeople(why));
+  auto& stream = *caller;
+  auto& frame = *message;
+  auto told = kj::evalNow([&] { return capnp::writeMessage(stream, frame); }).then([&stream] {
+    stream.shutdownWrite();
+    return readToEnd(stream);
+  });
+  tasks_.add(timer_.timeoutAfter(kMoment, kj::mv(told))
+                 .attach(kj::defer([this] { --callers_; }), kj::mv(message), kj::mv(caller)));
+}
+
+}  // namespace mpf::router

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "shm/messages/message_link.h"
+
+#include <mutex>
+
+namespace mpf {
+
+MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& message) noexcept try {
+  const auto type = static_cast<MessageType>(envelope.type);
+  message.reset();
+  if ((envelope.flags & layout::kSlotChunk) != 0) {
+    const std::lock_guard guard(*lock_);
+    if (const auto chunk = link_->tryChunk(envelope)) {
+      lendOne();
+      message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
+    }
+  } else if (envelope.bodyBytes <= Message::kInlineBytes) {
+    message.assignInline(type, envelope.bodyBytes,
+                         [&](auto body) { link_->copyBody(body.first(envelope.bodyBytes)); });
+  } else {
+    auto body = allocateHeapBody(layout::kInlineBodyBytes);
+    body.size = envelope.bodyBytes;
+    link_->copyBody({body.data, body.size});
+    message = Message::adopt(type, body);
+  }
+  return Finish::message;
+} catch (const ChunkUnavailable&) {
+  return Finish::unavailable;
+} catch (const std::bad_alloc&) {
+  return Finish::unavailable;
+}
+
+void MessageLink::discard(const Envelope& envelope) noexcept {
+  try {
+    if ((envelope.flags & layout::kSlotChunk) != 0) {
+      const std::lock_guard guard(*lock_);
+      if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+    }
+  } catch (
+      const ChunkUnavailable&) {  // NOLINT(bugprone-empty-catch): and so it has been given back
+  }
+  link_->end();
+}
+
+LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message,
+                                    const Link::Limits& limits) noexcept {
+  const bool ours = message.lender() == this;
+  const auto result = link_->trySend(envelope, message.body(), limits);
+  if (result == LinkSend::sentInPlace) {
+    static_cast<void>(message.releaseBody());
+    if (ours) endLending();
+  } else if (result == LinkSend::sent && ours) {
+    // Copied into the ring: the chunk is free again. Here, because takeBack() would want the lock
+    // that the caller holds.
+    const auto body = message.releaseBody();
+    link_->release(body.data);
+    endLending();
+  }
+  return result;
+}
+
+BodyBytes MessageLink::allocate(std::size_t bytes) {
+  {
+    const std::lock_guard guard(*lock_);
+    if (bytes > layout::kInlineBodyBytes) {
+      if (const auto chunk = link_->tryAlloc(bytes)) {
+        lendOne();
+        return {chunk->data, bytes, chunk->capacity, this};
+      }
+    }
+  }
+  return allocateHeapBody(bytes);
+}
+
+void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {
+  std::shared_ptr<MessageLink> last;  // dies after the guard, and may take this object along
+  const auto lock = lock_;
+  const std::lock_guard guard(*lock);
+  link_->release(data);
+  if (lent_ == 1) last = self_;
+  endLending();
+}
+
+void MessageLink::lendOne() noexcept {
+  if (lent_++ == 0) self_ = shared_from_this();
+}
+
+void MessageLink::endLending() noexcept {
+  if (--lent_ == 0) self_.reset();
+}
+
+}  // namespace mpf

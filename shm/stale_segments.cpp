@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+#include "shm/stale_segments.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <iterator>
+#include <map>
+#include <random>
+
+#include "base/step.h"
+#include "shm/owner_lock.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+
+namespace mpf::stale_segments {
+namespace {
+
+// What is known of one file; of a window it is what is known of all that hang on it.
+struct Finding {
+  Verdict verdict{};
+  std::string reason;
+};
+
+std::string ownerText(const layout::SegmentHeader& header) {
+  return fmt::format("pid {} ({})", header.ownerPid, segments::text(header.program));
+}
+
+// A file with a lock of its own and a name that nobody else will ever have: the lock alone tells.
+Finding judgeKeyed(const std::string& name) {
+  switch (segments::probeOwner(name)) {
+    case segments::Owner::alive:
+      return {Verdict::alive, fmt::format("the lock of {} is held", name)};
+    case segments::Owner::dead:
+      if (segments::isLocked(name))
+        return {Verdict::dead,
+                fmt::format("its owner has ended; another process holds a lock on {}", name)};
+      return {Verdict::dead, fmt::format("nobody holds the lock of {}", name)};
+    case segments::Owner::absent:
+      break;
+  }
+  return {Verdict::dead, "its name is gone"};
+}
+
+// A window. Of anything but a segment that we know, a free lock proves nothing, unless its name
+// does.
+Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
+  const auto header = segments::tryReadHeader(name, kind);
+  if (!header) return {Verdict::dead, "its name is gone"};
+  switch (segments::probeOwner(name, header->incarnation)) {
+    case segments::Owner::alive:
+      return {Verdict::alive, fmt::format("{} holds the lock of {}", ownerText(*header), name)};
+    case segments::Owner::dead:
+      if (segments::isLocked(name))
+        return {Verdict::dead, fmt::format("{} has ended; another process holds a lock on {}",
+                                           ownerText(*header), name)};
+      return {Verdict::dead,
+              fmt::format("nobody holds the lock of {}; {} did", name, ownerText(*header))};
+    case segments::Owner::absent:
+      break;
+  }
+  return {Verdict::unknown, "it was replaced just now"};
+} catch (const VersionError& error) {
+  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+} catch (const SegmentError& error) {
+  if (kind == layout::SegmentKind::clientWindow) return judgeKeyed(name);
+  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+} catch (const std::exception& error) {
+  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+}
+
+class Judge {
+ public:
+  // With a `choice`, the names are not all that there are.
+  Judge(std::string backplane, std::vector<std::string> names, bool isChoice)
+      : backplane_(std::move(backplane)), names_(std::move(names)), isChoice_(isChoice) {}
+
+  std::vector<Judged> run() {
+    for (const auto step : {&Judge::withLock, &Judge::hints, &Judge::ofWindow, &Judge::last}) {
+      for (const auto& name : names_) {
+        if (const auto parsed = SegmentName::tryParse(name)) (this->*step)(name, *parsed);
+        else if (step == &Judge::last && !isChoice_)
+          add(name, {Verdict::unknown, "not a name that MPF gives"});
+      }
+    }
+    return std::move(judged_);
+  }
+
+ private:
+  using Parsed = SegmentName::Parsed;
+
+  void add(const std::string& name, Finding finding) {
+    judged_.push_back({name, finding.verdict, std::move(finding.reason)});
+  }
+
+  void withLock(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::serverWindow) {
+      auto finding = judgeWindow(name, layout::SegmentKind::serverWindow);
+      if (finding.verdict == Verdict::dead) noteDead(name, layout::SegmentKind::serverWindow);
+      add(name, std::move(finding));
+    } else if (parsed.kind == NameKind::clientWindow) {
+      const auto& finding = clients_[parsed.incarnation] =
+          judgeWindow(name, layout::SegmentKind::clientWindow);
+      if (finding.verdict == Verdict::dead) deadWindows_.emplace(parsed.incarnation, name);
+      add(name, finding);
+    } else if (parsed.kind == NameKind::router || parsed.kind == NameKind::reaper) {
+      add(name, judgeKeyed(name));
+    }
+  }
+
+  // Remembers a dead server window by its incarnation.
+  void noteDead(const std::string& name, layout::SegmentKind kind) try {
+    if (const auto header = segments::tryReadHeader(name, kind))
+      deadWindows_.emplace(header->incarnation, name);
+  } catch (
+      const std::
+          exception&) {  // NOLINT(bugprone-empty-catch): it went away or was replaced: then it says nothing of hints
+  }
+
+  void hints(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::hints)
+      add(name, hints_[parsed.incarnation] = judgeHints(name, parsed.incarnation));
+  }
+
+  // Hints are as dead as their window: every peer may write over their header and lock them. A
+  // window says nothing of another user's hints: anybody may make a file that claims their
+  // incarnation.
+  Finding judgeHints(const std::string& name, std::uint64_t incarnation) const {
+    const auto [first, last] = deadWindows_.equal_range(incarnation);
+    const auto isTheirs = [&](const auto& window) {
+      return segments::haveSameUser(window.second, name);
+    };
+    if (const auto window = std::find_if(first, last, isTheirs); window != last)
+      return {Verdict::dead, fmt::format("the owner of {} is dead", window->second)};
+    return judgeKeyed(name);
+  }
+
+  void ofWindow(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::pendingBind)
+      add(name, judgeOwned(name, layout::SegmentKind::pendingBind));
+    if (parsed.kind == NameKind::link)
+      add(name, links_[parsed.incarnation] = judgeOwned(name, layout::SegmentKind::link));
+  }
+
+  // A link, a pending bind: it lives as long as its client's window.
+  Finding judgeOwned(const std::string& name, layout::SegmentKind kind) try {
+    const auto header = segments::tryReadHeader(name, kind);
+    if (!header) return {Verdict::dead, "its name is gone"};
+    return ownerOf(clients_, NameKind::clientWindow, header->ownerWindow);
+  } catch (const VersionError& error) {
+    return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  } catch (const SegmentError& error) {
+    return {Verdict::dead, fmt::format("nobody can use it: {}", error.what())};
+  } catch (const std::exception& error) {
+    return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  }
+
+  // Pools hang on links, pipes on hints.
+  void last(const std::string& name, const Parsed& parsed) {
+    if (parsed.kind == NameKind::bulk) {
+      const auto link = links_.find(parsed.incarnation);
+      if (link == links_.end() && isChoice_) return;
+      add(name, link == links_.end() ? Finding{Verdict::dead, fmt::format("its link {:x} is gone",
+                                                                          parsed.incarnation)}
+                                     : link->second);
+    } else if (parsed.kind == NameKind::fifo) {
+      add(name, ownerOf(hints_, NameKind::hints, parsed.incarnation));
+    }
+  }
+
+  // What is known of an owner. One that was not listed may have come since: its lock tells, under
+  // either of its names.
+  const Finding& ownerOf(std::map<std::uint64_t, Finding>& known, NameKind kind,
+                         std::uint64_t incarnation) const {
+    const auto [found, isNew] = known.try_emplace(incarnation);
+    if (!isNew) return found->second;
+    const auto name = SegmentName::keyed(backplane_, kind, incarnation);
+    found->second = {Verdict::dead, fmt::format("its owner's {} is gone", name)};
+    for (const auto& lock : {name, SegmentName::keyed(backplane_, NameKind::hints, incarnation)}) {
+      if (segments::probeOwner(lock) == segments::Owner::alive)
+        found->second = {Verdict::alive, fmt::format("the lock of {} is held", lock)};
+    }
+    return found->second;
+  }
+
+  std::string backplane_;
+  std::vector<std::string> names_;
+  bool isChoice_;
+  std::map<std::uint64_t, Finding> clients_;  // by incarnation of the window, as the next
+  std::multimap<std::uint64_t, std::string> deadWindows_;  // their names
+  std::map<std::uint64_t, Finding> hints_;
+  std::map<std::uint64_t, Finding> links_;
+  std::vector<Judged> judged_;
+};
+
+}  // namespace
+
+std::vector<Judged> judge(const std::string& backplane) {
+  return Judge(backplane, segments::list(SegmentName::prefix(backplane)), false).run();
+}
+
+std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most) {
+  auto names = segments::list(SegmentName::prefix(backplane));
+  if (names.size() <= most) return Judge(backplane, std::move(names), false).run();
+  std::vector<std::string> chosen;
+  std::ranges::sample(names, std::back_inserter(chosen), static_cast<std::ptrdiff_t>(most),
+                      std::minstd_rand(std::random_device()()));
+  return Judge(backplane, std::move(chosen), true).run();
+}
+
+bool tryRemove(const Judged& file) {
+  const auto parsed = SegmentName::tryParse(file.name);
+  if (file.verdict != Verdict::dead || !parsed) return false;
+  switch (parsed->kind) {
+    case NameKind::serverWindow:
+      // Its name may be a successor's by now: the lock is asked again, and held until the name is
+      // gone.
+      return segments::removeIfOwnerless(file.name);
+    case NameKind::clientWindow:
+    case NameKind::router:
+      return segments::removeKeyedIfOwnerless(file.name);
+    case NameKind::reaper:
+      return owner_lock::removeReaperFile(file.name);
+    default:
+      return segments::remove(file.name);
+  }
+}
+
+void removeDeadWindow(const std::string& backplane, const std::string& name,
+                      std::uint64_t incarnation) {
+  const bool isDead = segments::probeOwner(name, incarnation) == segments::Owner::dead;
+  const auto hints = SegmentName::keyed(backplane, NameKind::hints, incarnation);
+  const bool ownsHints = isDead && segments::haveSameUser(name, hints);
+  if (name == SegmentName::keyed(backplane, NameKind::clientWindow, incarnation)) {
+    segments::removeKeyedIfOwnerless(name);
+  } else if (isDead) {
+    segments::removeIfOwnerless(name);
+  }
+  MPF_STEP(dead_window_removed);
+  // Every peer may lock the hints: their lock tells only when there is no window to ask.
+  if (ownsHints ? segments::remove(hints) : segments::removeKeyedIfOwnerless(hints)) {
+    segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
+  }
+}
+
+}  // namespace mpf::stale_segments

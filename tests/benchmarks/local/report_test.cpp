@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+#include "benchmarks/local/report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "benchmarks/local/runner.h"
+
+namespace mpf::bench {
+namespace {
+
+using testing::HasSubstr;
+
+nlohmann::json parsed(const Result& result) {
+  return nlohmann::json::parse(toJson({result}, Machine{}, {})).at(0);
+}
+
+// One row in earnest, however short: processes, loop, figures, JSON.
+TEST(Json, HasWhatReadersCountOnForALatency) {
+  const auto cpus = allowedCpus();
+  const Placement placement{{cpus.front()}, {cpus.back()}};
+  const auto rows = floorMeasurements();
+  const Budget moment{std::chrono::milliseconds(1), std::chrono::milliseconds(4)};
+  const auto asleep = std::find_if(rows.begin(), rows.end(),
+                                   [](const auto& row) { return row.name == kFutexBounce; });
+
+  const auto row = parsed(Runner(placement, rows).run(*asleep, moment, 1));
+
+  EXPECT_EQ(row.at("name"), kFutexBounce);
+  EXPECT_EQ(row.at("mode"), "block");
+  EXPECT_EQ(row.at("bytes"), 4);
+  EXPECT_EQ(row.at("touched"), false);
+  EXPECT_GT(row.at("p50_ns").get<double>(), 0);
+  EXPECT_LE(row.at("p50_ns").get<double>(), row.at("p99_ns").get<double>());
+  EXPECT_LE(row.at("p99_ns").get<double>(), row.at("p999_ns").get<double>());
+  EXPECT_LE(row.at("p999_ns").get<double>(), row.at("max_ns").get<double>());
+  EXPECT_GT(row.at("samples").get<int>(), 0);
+  EXPECT_TRUE(row.at("floor_name").is_null());
+  EXPECT_TRUE(row.at("ratio_to_floor").is_null());
+  EXPECT_EQ(row.at("cpus").size(), 2u);
+}
+
+TEST(Json, HasWhatReadersCountOnForARate) {
+  Result result;
+  result.measurement.name = "MPF";
+  result.measurement.mode = Mode::adaptive;
+  result.measurement.floorName = "floor";
+  result.figures.perSecond = 2e6;
+  result.ratioToFloor = 3;
+
+  const auto row = parsed(result);
+
+  EXPECT_EQ(row.at("mode"), "adaptive");
+  EXPECT_EQ(row.at("per_s"), 2e6);
+  EXPECT_EQ(row.at("floor_name"), "floor");
+  EXPECT_EQ(row.at("ratio_to_floor"), 3);
+  EXPECT_FALSE(row.contains("p50_ns"));
+}
+
+TEST(Json, NamesWhatWasLeftOutAndWhatFailed) {
+  Result leftOut;
+  leftOut.measurement.skipped = "not installed";
+  Result failed;
+  failed.error = "server died";
+
+  EXPECT_EQ(parsed(leftOut).at("skipped"), "not installed");
+  EXPECT_EQ(parsed(failed).at("error"), "server died");
+}
+
+TEST(Table, NamesWhatWasLeftOutAndWhatFailed) {
+  Result leftOut;
+  leftOut.measurement.name = "ZeroMQ";
+  leftOut.measurement.skipped = "not installed";
+  Result failed;
+  failed.measurement.name = "iceoryx";
+  failed.error = "server died";
+
+  const auto text = table({leftOut, failed});
+
+  EXPECT_THAT(text, HasSubstr("ZeroMQ"));
+  EXPECT_THAT(text, HasSubstr("left out: not installed"));
+  EXPECT_THAT(text, HasSubstr("failed: server died"));
+}
+
+TEST(Goals, AreShownOnlyForRowsThatWereTaken) { EXPECT_EQ(goals({}), ""); }
+
+}  // namespace
+}  // namespace mpf::bench

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <stdexcept>
+
+#include "benchmarks/peers/peer.h"
+#include "benchmarks/stage/stage.h"
+
+namespace mpf::bench {
+namespace {
+
+// Round trips, then several requests at a time.
+void expectToAnswer(const PeerFamily& family, Mode mode, std::size_t bytes) {
+  const std::shared_ptr<Peer> peer =
+      family.make({mode, bytes, true, "mpf-bench-test-" + std::to_string(::getpid())});
+  const auto cpus = allowedCpus();
+  Act act;
+  act.stopsByItself = true;
+  act.server = [peer](const Scene& scene) { peer->serve(scene); };
+  act.requester = [peer](const Scene& scene) {
+    peer->connect(scene);
+    for (int i = 0; i < 3; ++i) peer->roundTrip();
+    for (int i = 0; i < 2; ++i) peer->send();
+    for (int i = 0; i < 2; ++i) peer->receive();
+    scene.stop();
+    peer->roundTrip();
+  };
+
+  const auto outcome = Stage({{cpus.front()}, {cpus.back()}}, {}).run(act);
+  peer->removeTraces();
+
+  EXPECT_EQ(outcome.error, "") << family.name << ", " << toString(mode) << ", " << bytes
+                               << " bytes";
+}
+
+void expectToAnswer(const PeerFamily& family) {
+  if (!family.skipped.empty()) GTEST_SKIP() << family.skipped;
+  for (const auto mode : family.modes) {
+    for (const std::size_t bytes : {std::size_t{4}, std::size_t{65536}})
+      expectToAnswer(family, mode, bytes);
+  }
+}
+
+TEST(Peers, OursAnswers) { expectToAnswer(mpfPeer()); }
+TEST(Peers, BoostAnswers) { expectToAnswer(boostPeer()); }
+TEST(Peers, SocketAnswers) { expectToAnswer(socketPeer()); }
+TEST(Peers, ZeromqAnswers) { expectToAnswer(zeromqPeer()); }
+// iceoryx takes a daemon that only one on a host can be: not in tests that run beside each other.
+
+}  // namespace
+}  // namespace mpf::bench

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: MIT
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/system_call.h"
+#include "benchmarks/remote/routers.h"
+#include "benchmarks/remote/surroundings.h"
+#include "benchmarks/remote/tcp_peer.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/watchdog.h"
+
+namespace mpf::bench {
+namespace {
+
+using testing::HasSubstr;
+
+Stage stageOnTwo() {
+  const auto cpus = allowedCpus();
+  return Stage({{cpus.front()}, {cpus.back()}}, {});
+}
+
+ino_t netOf(const std::string& process) {
+  struct stat file{};
+  return ::stat(("/proc/" + process + "/ns/net").c_str(), &file) == 0 ? file.st_ino : 0;
+}
+
+// Units there and back, `window` of them at a time.
+void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window) {
+  const std::shared_ptr<Peer> peer = makeTcpPeer({between, unitBytes, window > 1});
+  Act act;
+  act.stopsByItself = true;
+  act.server = [peer](const Scene& scene) { peer->serve(scene); };
+  act.requester = [&](const Scene& scene) {
+    peer->connect(scene);
+    for (int round = 0; round < 3; ++round) {
+      for (int i = 0; i < window; ++i) peer->send();
+      for (int i = 0; i < window; ++i) peer->receive();
+    }
+    scene.stop();
+    peer->roundTrip();
+  };
+
+  EXPECT_EQ(stageOnTwo().run(act).error, "") << unitBytes << " bytes, " << window << " at a time";
+}
+
+TEST(TcpPeer, EchoesOnLoopback) {
+  expectToEcho(Surroundings::loopback(), 4, 1);
+  expectToEcho(Surroundings::loopback(), 4000, 1);
+}
+
+// More than all buffers between both hold: neither waits for the other for ever.
+TEST(TcpPeer, EchoesWhatTheBuffersDoNotHold) {
+  expectToEcho(Surroundings::loopback(), 1u << 20, 40);
+}
+
+// Where one may make them.
+class NamespacesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    try {
+      between_ = Surroundings::namespaces();
+    } catch (const std::exception& reason) {
+      GTEST_SKIP() << reason.what();
+    }
+  }
+  const ino_t before_ = netOf("self");
+  Surroundings between_ = Surroundings::loopback();
+};
+
+TEST_F(NamespacesTest, JoinBothSides) {
+  expectToEcho(between_, 4, 1);
+  expectToEcho(between_, 1u << 20, 4);
+}
+
+TEST_F(NamespacesTest, LeaveTheirMakerWhereItWas) {
+  EXPECT_EQ(netOf("self"), before_);
+  EXPECT_NE(between_.serverAddress(), Surroundings::loopback().serverAddress());
+}
+
+bool isSomebodyIn(ino_t net) {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    if (netOf(entry.path().filename().string()) == net) return true;
+  }
+  return false;
+}
+
+// Killed, a runner takes both namespaces along: they live by its processes and descriptors alone.
+TEST_F(NamespacesTest, NobodyIsLeftInThemWhenTheirMakerIsKilled) {
+  const test::Watchdog watchdog("namespaces of a killed runner");
+  std::array<int, 2> ends{};
+  checkCall(::pipe2(ends.data(), O_CLOEXEC), "pipe2");
+  const FileDescriptor tells(ends[1]);
+  const auto tellAndWait = [&] {
+    const auto net = netOf("self");
+    if (::write(tells.get(), &net, sizeof net) != sizeof net) std::_Exit(1);
+    for (;;) ::pause();
+  };
+  const int runner = forkProcess([&] {
+    const auto between = Surroundings::namespaces();
+    Act act;
+    act.server = [&](const Scene& scene) {
+      between.enterServer();
+      scene.ready();
+      tellAndWait();
+    };
+    act.requester = [&](const Scene&) {
+      between.enterRequester();
+      tellAndWait();
+    };
+    static_cast<void>(stageOnTwo().run(act));
+  });
+  const FileDescriptor told(ends[0]);
+  std::array<ino_t, 2> nets{};
+  for (auto& net : nets)
+    ASSERT_EQ(::read(told.get(), &net, sizeof net), static_cast<ssize_t>(sizeof net));
+  ASSERT_NE(nets[0], nets[1]);
+  for (const auto net : nets) ASSERT_TRUE(net != netOf("self") && isSomebodyIn(net));
+
+  killProcess(runner);
+
+  for (const auto net : nets) {
+    while (isSomebodyIn(net)) ::sched_yield();
+  }
+}
+
+// A program in place of mpf-router: a shell script.
+class RouterPairTest : public testing::Test {
+ protected:
+  std::unique_ptr<RouterPair> routers(const std::string& script) {
+    const auto program = folder_.write("router", "#!/bin/bash\n" + script);
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+    const auto cpus = allowedCpus();
+    return std::make_unique<RouterPair>(program, "mpf-bench-test-" + std::to_string(::getpid()),
+                                        Placement{{cpus.front()}, {cpus.back()}},
+                                        Surroundings::loopback());
+  }
+  // Says where it listens as the server's router, then goes on as both.
+  static std::string listening(const std::string& goesOn) {
+    return "fd=; while [ $# -gt 0 ]; do [ $1 = --ready-fd ] && fd=$2; shift; done\n"
+           "if [ -n \"$fd\" ]; then echo 127.0.0.1:7 >&$fd; exec {fd}>&-; fi\n" +
+           goesOn + "\n";
+  }
+  static Outcome well() { return {}; }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(RouterPairTest, SaysWhyARouterDoesNotListen) {
+  const auto pair = routers("echo 'no such place' >&2; exit 1\n");
+
+  try {
+    pair->start();
+    FAIL() << "it listens";
+  } catch (const std::exception& error) {
+    EXPECT_STREQ(error.what(), "the server's router does not listen: no such place");
+  }
+}
+
+TEST_F(RouterPairTest, RunsRowsWhileBothRun) {
+  const auto pair = routers(listening("exec sleep 3600"));
+
+  pair->start();
+
+  EXPECT_EQ(pair->run(well).error, "");
+  EXPECT_GT(pair->serverPid(), 0);
+  EXPECT_NE(pair->serverPid(), pair->clientPid());
+}
+
+TEST_F(RouterPairTest, SaysOfARowThatFailsWhatTheClientsRouterSaid) {
+  const auto pair = routers(
+      listening("[ -n \"$fd\" ] && exec sleep 3600; echo 'the line is bad' >&2; exec sleep 3600"));
+  pair->start();
+  const auto failing = [] {
+    Outcome outcome;
+    outcome.error = "no end";
+    return outcome;
+  };
+  const test::Watchdog watchdog("a router that says something");
+
+  // It says so at some time or other.
+  std::string error;
+  while (error.empty() || error == "no end") error = pair->run(failing).error;
+
+  EXPECT_EQ(error, "no end; the client's router said last: the line is bad");
+}
+
+TEST_F(RouterPairTest, IsGoneAfterItsStop) {
+  const auto pair = routers(listening("exec sleep 3600"));
+  pair->start();
+  const int server = pair->serverPid();
+  const int client = pair->clientPid();
+
+  pair->stop();
+
+  EXPECT_NE(::kill(server, 0), 0);
+  EXPECT_NE(::kill(client, 0), 0);
+}
+
+TEST_F(RouterPairTest, SaysWhatARouterSaidThatHasEnded) {
+  const test::Watchdog watchdog("a router that ends");
+  const auto pair =
+      routers(listening("[ -n \"$fd\" ] && exec sleep 3600; echo 'an accident' >&2; exit 3"));
+  pair->start();
+
+  // It ends at some time or other.
+  std::string error;
+  while (error.empty()) error = pair->run(well).error;
+
+  EXPECT_EQ(error, "the client's router has ended: an accident");
+}
+
+TEST_F(RouterPairTest, StartsAnew) {
+  const auto pair = routers(listening("exec sleep 3600"));
+  pair->start();
+  pair->stop();
+
+  pair->start();
+
+  EXPECT_EQ(pair->run(well).error, "");
+}
+
+}  // namespace
+}  // namespace mpf::bench

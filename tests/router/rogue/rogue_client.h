@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// RogueClientTest: a rogue calls a server router.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "tests/router/rogue/rogue_fixture.h"
+
+namespace mpf::test {
+
+inline Fill bind(std::uint32_t binding, const std::string& server = "echo",
+                 std::int32_t location = RouterPair::kLocation) {
+  return [=](wire::Item::Builder item) {
+    auto bind = item.initBind();
+    bind.setBinding(binding);
+    bind.setLocation(location);
+    bind.setServer(server);
+  };
+}
+
+inline Fill open(std::uint32_t client, std::uint32_t binding, std::uint64_t incarnation) {
+  return [=](wire::Item::Builder item) {
+    auto open = item.initOpen();
+    open.setClient(client);
+    open.setBinding(binding);
+    open.setIncarnation(incarnation);
+    open.setWindow(1u << 20);
+  };
+}
+
+inline Fill close(std::uint32_t client) {
+  return [=](wire::Item::Builder item) { item.setClose(client); };
+}
+
+inline Fill requestOf(std::uint32_t client, std::uint32_t id, const FillMessage& fill) {
+  return [=](wire::Item::Builder item) {
+    auto request = item.initRequest();
+    request.setClient(client);
+    request.setRequestId(id);
+    fill(request.initMessage());
+  };
+}
+
+inline Fill request(std::uint32_t client, std::uint32_t id, std::int32_t value = 0) {
+  return requestOf(client, id, [value](auto message) { message.initInt32().setValue(value); });
+}
+
+inline Fill credit(std::uint32_t client, std::uint32_t bytes) {
+  return [=](wire::Item::Builder item) {
+    item.initCredit().setClient(client);
+    item.getCredit().setBytes(bytes);
+  };
+}
+
+class RogueClientTest : public RogueTest {
+ protected:
+  explicit RogueClientTest(std::string deadTime = "5s") : deadTime_(std::move(deadTime)) {}
+
+  void SetUp() override {
+    startAll({"--dead-time", deadTime_, "--max-clients", "20", "--max-message-size", "1MiB",
+              "--max-connections", "30"},
+             {});
+  }
+
+  // A peer of the router that has yet to say something.
+  [[nodiscard]] RoguePeer stranger() { return RoguePeer(routers_.address()); }
+  // A rogue that has been legal so far: greeted, bound to the server (1), with a client (1).
+  [[nodiscard]] RoguePeer rogue() {
+    auto peer = stranger();
+    peer.sendItems({greeting()});
+    peer.sendItems({bind(1)});
+    incarnation_ = peer.next(wire::Item::SERVER).getServer().getIncarnation();
+    peer.sendItems({open(1, 1, incarnation_)});
+    return peer;
+  }
+  // One more message of a legal rogue.
+  Fill message(RoguePeer&, const FillMessage& fill) { return requestOf(1, ++lastId_, fill); }
+  // It sends this and gets that farewell.
+  void expectFarewell(const Bytes& bytes, const testing::Matcher<const std::string&>& farewell) {
+    auto peer = rogue();
+    EXPECT_TRUE(peer.send(bytes));
+    EXPECT_THAT(peer.farewell(), farewell);
+    expectHonestWork();
+  }
+  void expectAnswer(RoguePeer& peer, std::uint32_t client, std::uint32_t id, std::int32_t value) {
+    ASSERT_TRUE(peer.sendItems({request(client, id, value)}));
+    auto reply = peer.next(wire::Item::REPLY).getReply();
+    while (reply.getClient() != client) reply = peer.next(wire::Item::REPLY).getReply();
+    EXPECT_EQ(reply.getRequestId(), id);
+    EXPECT_TRUE(reply.getIsFirst());
+    EXPECT_EQ(reply.getMessage().getInt32().getValue(), value);
+  }
+  [[nodiscard]] Usage usage() { return Usage::of(routers_.farRouter().pid()); }
+  void expectUsage(const Usage& before, std::size_t slackKb) {
+    expectUsageOf(routers_.farRouter().pid(), before, slackKb);
+  }
+
+  std::uint64_t incarnation_ = 0;
+
+ private:
+  std::string deadTime_;
+  std::uint32_t lastId_ = 0;
+};
+
+}  // namespace mpf::test

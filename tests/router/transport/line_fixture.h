@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+// A Line, and the peer at its other end made by hand: what it sends are bytes, what it gets are
+// items as text.
+//
+// Threads  one, with its event loop.
+#pragma once
+
+#include <capnp/pretty-print.h>
+#include <capnp/serialize-async.h>
+#include <gmock/gmock.h>
+#include <kj/async-io.h>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "router/transport/kj_text.h"
+#include "router/transport/line.h"
+#include "tests/router/frames.h"
+#include "tests/support/watchdog.h"
+
+namespace mpf::test {
+
+using router::Carried;
+using router::FarewellCode;
+using router::Line;
+using router::LineEnd;
+using router::PeerGreeting;
+using router::ProtocolError;
+
+class LineTest : public testing::Test, public Line::Owner {
+ protected:
+  // no pings but those that a test asks for
+  LineTest() { limits_.deadTime = limits_.handshakeTime = std::chrono::minutes(10); }
+  ~LineTest() noexcept override = default;
+
+  void TearDown() override { hangUp(); }
+  void hangUp() {
+    sending_ = nullptr;
+    running_ = nullptr;
+    line_ = nullptr;
+  }
+  // As before start().
+  void restart() {
+    hangUp();
+    pipe_ = kj::newTwoWayPipe();
+    peer_ = kj::mv(pipe_.ends[1]);
+    said_.clear();
+  }
+
+  void start() {
+    line_ = std::make_unique<Line>(kj::mv(pipe_.ends[0]), io_.provider->getTimer(), limits_,
+                                   record_, *this);
+    running_ = line_
+                   ->run([this](wire::Item::Builder item) {
+                     Line::describe(item.initGreeting(), limits_);
+                   })
+                   .then([this](LineEnd end) { end_ = std::move(end.text); })
+                   .eagerlyEvaluate(nullptr);
+  }
+  // The same, and both have greeted.
+  void startGreeted(const Fill& ours = greeting()) {
+    start();
+    EXPECT_THAT(receive(), testing::ElementsAre(testing::HasSubstr("greeting = ")));
+    send(frameOf({ours}));
+    EXPECT_THAT(receive(), testing::ElementsAre(testing::StartsWith("(ping = ")))
+        << "to know the round trip";
+    EXPECT_THAT(said_, testing::ElementsAre("greeted"));
+    said_.clear();
+  }
+  // Lets everything happen that can.
+  void settle() { io_.waitScope.poll(); }
+  void waitForEnd() {
+    while (end_.empty()) io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
+  }
+
+  // ---- the peer
+
+  // Until the line has read it all.
+  void send(const Bytes& bytes) {
+    peer_->write(bytes.data(), bytes.size()).wait(io_.waitScope);
+    settle();
+  }
+  // Without waiting for that.
+  void beginToSend(Bytes bytes) {
+    auto kept = kj::heap(std::move(bytes));
+    sending_ = peer_->write(kept->data(), kept->size())
+                   .attach(kj::mv(kept))
+                   .then([this] { sent_ = true; })
+                   .eagerlyEvaluate(nullptr);
+  }
+  // Items of the next frame; "end" when there is none any more.
+  std::vector<std::string> receive() {
+    settle();
+    auto frame =
+        capnp::tryReadMessage(*peer_, {.traversalLimitInWords = UINT64_MAX}).wait(io_.waitScope);
+    std::vector<std::string> items;
+    KJ_IF_MAYBE (message, frame) {
+      for (const auto item : (*message)->getRoot<wire::Frame>().getItems())
+        items.push_back(router::toStd(kj::str(item)));
+    } else {
+      items.emplace_back("end");
+    }
+    settle();
+    return items;
+  }
+  void close() {
+    peer_->shutdownWrite();
+    settle();
+  }
+  // The farewell's code and reason, when it is the next frame; the peer closes then, as it should.
+  std::string farewell() {
+    const auto items = receive();
+    close();
+    return items.size() == 1 && items[0].find("farewell") != std::string::npos
+               ? items[0]
+               : "none, but: " + items[0];
+  }
+
+  // ---- the owner
+
+  void onGreeting(const PeerGreeting&) override { said_.emplace_back("greeted"); }
+  void onItem(wire::Item::Reader item) override {
+    if (onItem_) onItem_(item);
+    said_.push_back(router::toStd(kj::str(item)));
+  }
+  void onRoom() override {
+    if (onRoom_) onRoom_();
+  }
+  void onUnsendable(const Carried& carried, const std::string& why,
+                    wire::Item::Builder /*instead*/) override {
+    said_.push_back("cannot send " + std::to_string(carried.requestId) + ": " + why);
+  }
+
+  static Carried request(std::uint32_t id, std::int32_t value = 0) {
+    return {
+        .isRequest = true, .client = 1, .requestId = id, .message = Int32Message({.value = value})};
+  }
+
+  const Watchdog watchdog_{"a line"};
+  kj::AsyncIoContext io_ = kj::setupAsyncIo();
+  router::Limits limits_;
+  // holds nothing: what is written waits for its reader
+  kj::TwoWayPipe pipe_ = kj::newTwoWayPipe();
+  kj::Own<kj::AsyncIoStream> peer_ = kj::mv(pipe_.ends[1]);
+  layout::RouterLine row_{};
+  router::PeerRecord record_{row_};
+  std::unique_ptr<Line> line_;
+  std::vector<std::string> said_;  // to the owner
+  std::string end_;  // of the line
+  bool sent_ = false;  // what beginToSend() began
+  std::function<void(wire::Item::Reader)> onItem_;
+  std::function<void()> onRoom_;
+
+ private:
+  kj::Promise<void> running_ = nullptr;
+  kj::Promise<void> sending_ = nullptr;
+};
+
+}  // namespace mpf::test

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// Line: signs of life, which are asked for, given and missed.
+#include "tests/router/transport/line_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+using testing::StartsWith;
+
+TEST_F(LineTest, EndsWhenNoGreetingComes) {
+  limits_.deadTime = 100ms;
+  start();
+  receive();
+
+  EXPECT_THAT(farewell(), HasSubstr("code = silence"));
+  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for 1"));
+}
+
+// They are signs of life, and no greeting.
+TEST_F(LineTest, EndsWhenOnlyEmptyFramesCome) {
+  pipe_ = io_.provider->newTwoWayPipe();  // the kernel's, which keeps what is written
+  peer_ = kj::mv(pipe_.ends[1]);
+  limits_.handshakeTime = 100ms;
+  start();
+
+  while (end_.empty()) {
+    send(frameOf({}));
+    io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
+  }
+
+  EXPECT_EQ(end_, "the peer sent no greeting within 100 ms (handshake-time)");
+}
+
+TEST_F(LineTest, EndsWhenThePeerFallsSilentAndDoesNotReadEither) {
+  limits_.deadTime = 100ms;
+  startGreeted();
+
+  waitForEnd();
+
+  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for"));
+}
+
+TEST_F(LineTest, PingsAndLivesWhileItIsAnswered) {
+  limits_.deadTime = 400ms;
+  startGreeted();
+
+  for (int i = 0; i < 12; ++i) {
+    EXPECT_THAT(receive(), ElementsAre(HasSubstr("ping = ")));
+    send(frameOf({[](wire::Item::Builder) {}}));
+  }
+
+  EXPECT_EQ(end_, "");
+}
+
+TEST_F(LineTest, HearsWhatWasSaidWhileItDidNotRun) {
+  pipe_ = io_.provider->newTwoWayPipe();  // the kernel's, which keeps what is written
+  peer_ = kj::mv(pipe_.ends[1]);
+  limits_.deadTime = 100ms;
+  startGreeted();
+
+  beginToSend(frameOf({ping(1)}));
+  for (const auto until = Clock::nowNs() + 300'000'000; Clock::nowNs() < until;) {
+  }
+
+  for (auto items = receive(); items.back() != "(pong = (stamp = 1))"; items = receive())
+    ASSERT_THAT(items.back(), HasSubstr("ping"));
+}
+
+// A host that was stopped, with routers at both ends of a line: neither has anything to read at
+// first.
+TEST_F(LineTest, DoesNotCountTheTimeWhenItDidNotRun) {
+  limits_.deadTime = 400ms;
+  startGreeted();
+
+  for (const auto until = Clock::nowNs() + 1'000'000'000; Clock::nowNs() < until;) {
+  }
+
+  for (int i = 0; i < 2; ++i) EXPECT_THAT(receive(), ElementsAre(HasSubstr("ping = ")));
+  EXPECT_EQ(end_, "");
+}
+
+// A peer behind a thin line takes its time over a long message.
+TEST_F(LineTest, LivesWhileALongFrameComes) {
+  limits_.deadTime = 400ms;
+  startGreeted();
+  const auto bytes = frameOf({[](wire::Item::Builder item) {
+    item.initReply().initMessage().initUser().initValue(2u << 20);
+  }});
+  constexpr std::size_t kPart = std::size_t{64} << 10;
+
+  for (std::size_t at = 0; at < bytes.size(); at += kPart) {
+    EXPECT_THAT(receive(), ElementsAre(HasSubstr("ping = ")));
+    send({bytes.begin() + static_cast<std::ptrdiff_t>(at),
+          bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at + kPart, bytes.size()))});
+  }
+
+  EXPECT_THAT(said_, SizeIs(1));
+  EXPECT_EQ(end_, "");
+}
+
+TEST_F(LineTest, EndsWhenAFrameComesDripByDrip) {
+  limits_.deadTime = 200ms;
+  startGreeted();
+  const auto bytes = frameOf({ping(1)});
+
+  for (std::size_t at = 0; at + 1 < bytes.size() && end_.empty(); ++at) {
+    receive();  // a ping, or the farewell
+    if (end_.empty()) send({bytes[at]});
+  }
+
+  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for"));
+}
+
+TEST_F(LineTest, SendsEachPingBack) {
+  startGreeted();
+
+  beginToSend(frameOf({ping(7), ping(8)}));
+
+  EXPECT_THAT(receive(), ElementsAre("(pong = (stamp = 7))", "(pong = (stamp = 8))"));
+}
+
+// Counts its own pings in a second in which the peer asks again and again, as long as the peer did
+// so in time: it may be held up, too.
+TEST_F(LineTest, LeavesAskingForSignsOfLifeToAPeerThatDoesSo) {
+  constexpr auto kHalf = 200ms;
+  limits_.deadTime = 2 * kHalf;
+  int pings = 0;
+  for (bool inTime = false; !inTime;) {
+    restart();
+    startGreeted();
+    pings = 0;
+    inTime = true;
+    auto last = Clock::nowNs();
+    for (const auto end = Deadline::after(5 * kHalf); !end.hasPassed();) {
+      beginToSend(frameOf({ping(1)}));
+      for (const auto& item : receive()) pings += item.starts_with("(ping = ") ? 1 : 0;
+      inTime = inTime && Clock::nowNs() - last < Nanoseconds(kHalf).count();
+      last = Clock::nowNs();
+      io_.provider->getTimer().afterDelay(20 * kj::MILLISECONDS).wait(io_.waitScope);
+    }
+  }
+  EXPECT_EQ(pings, 0);
+}
+
+}  // namespace
+}  // namespace mpf::test

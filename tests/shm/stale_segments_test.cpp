@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// What is dead, what is not, and what nobody can tell; and the reason for each.
+#include "shm/stale_segments.h"
+
+#include <sys/stat.h>
+
+#include <fstream>
+#include <map>
+
+#include "shm/link.h"
+#include "tests/shm/child.h"
+#include "tests/shm/shm_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using layout::SegmentKind;
+using stale_segments::Verdict;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class StaleSegmentsTest : public ShmTest {
+ protected:
+  [[nodiscard]] std::map<std::string, stale_segments::Judged> judge() const {
+    std::map<std::string, stale_segments::Judged> all;
+    for (const auto& file : stale_segments::judge(name())) all.emplace(file.name, file);
+    return all;
+  }
+  [[nodiscard]] stale_segments::Judged judgementOf(const std::string& file) const {
+    return judge()[file];
+  }
+  [[nodiscard]] std::string keyed(NameKind kind, std::uint64_t incarnation) const {
+    return SegmentName::keyed(name(), kind, incarnation);
+  }
+  OwnWindow makeClient() const {
+    return {name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {}};
+  }
+  // A segment of one page under that name, of a window that has this incarnation.
+  void leave(const std::string& file, SegmentKind kind, std::uint64_t ownerWindow,
+             std::uint16_t layoutMajor = layout::kMajor) const {
+    auto page = createPage(kind);
+    page.sharedHeader().ownerWindow = ownerWindow;
+    page.sharedHeader().layoutMajor = layoutMajor;
+    EXPECT_TRUE(page.tryPublish(file));
+  }
+};
+
+TEST_F(StaleSegmentsTest, OfTheLivingTheLockIsTheReason) {
+  const auto client = makeClient();
+  const auto incarnation = client.header().incarnation;
+  const auto pendingBind = keyed(NameKind::pendingBind, 7);
+  leave(pendingBind, SegmentKind::pendingBind, incarnation);
+
+  const auto all = judge();
+
+  const auto lock = "pid " + std::to_string(::getpid()) + " (shm_test) holds the lock of ";
+  ASSERT_EQ(all.size(), 4U);
+  for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::alive) << file;
+  EXPECT_EQ(all.at(keyed(NameKind::clientWindow, incarnation)).reason,
+            lock + keyed(NameKind::clientWindow, incarnation));
+  // Every peer may write over the header of hints: it names nobody.
+  const auto held = "the lock of " + keyed(NameKind::hints, incarnation) + " is held";
+  EXPECT_EQ(all.at(keyed(NameKind::hints, incarnation)).reason, held);
+  EXPECT_EQ(all.at(keyed(NameKind::fifo, incarnation)).reason, held);
+  EXPECT_EQ(all.at(pendingBind).reason, lock + keyed(NameKind::clientWindow, incarnation));
+  EXPECT_FALSE(stale_segments::tryRemove(all.at(pendingBind))) << "it lives";
+  segments::remove(pendingBind);
+}
+
+TEST_F(StaleSegmentsTest, OfTheDeadTheFreeLockIsTheReason) {
+  std::uint64_t incarnation = 0;
+  Child child([&](Child::Self& self) {
+    const auto client = makeClient();
+    self.stay();
+  });
+  for (const auto& [file, judged] : judge()) incarnation = SegmentName::tryParse(file)->incarnation;
+  const auto pendingBind = keyed(NameKind::pendingBind, 7);
+  leave(pendingBind, SegmentKind::pendingBind, incarnation);
+
+  child.end(SIGKILL);
+
+  const auto all = judge();
+  ASSERT_EQ(all.size(), 4U);
+  for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::dead) << file;
+  EXPECT_THAT(
+      all.at(pendingBind).reason,
+      AllOf(HasSubstr("nobody holds the lock of " + keyed(NameKind::clientWindow, incarnation)),
+            HasSubstr("pid ")));
+  for (const auto& [file, judged] : all) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
+}
+
+TEST_F(StaleSegmentsTest, WhatNobodyOwnsIsDead) {
+  const auto pendingBind = keyed(NameKind::pendingBind, 7);
+  leave(pendingBind, SegmentKind::pendingBind, 0x99);
+  const auto bulk = SegmentName::bulk(name(), 0x55, 1, 0);
+  leave(bulk, SegmentKind::bulk, 0x99);
+  const auto link = SegmentName::link(name(), 1, 2);
+  std::ofstream(segments::path(link)) << "junk";
+
+  EXPECT_EQ(judgementOf(pendingBind).reason,
+            "its owner's " + keyed(NameKind::clientWindow, 0x99) + " is gone");
+  EXPECT_EQ(judgementOf(bulk).reason, "its link 55 is gone");
+  EXPECT_THAT(judgementOf(link).reason, HasSubstr("nobody can use it: "));
+  for (const auto& [file, judged] : judge()) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
+}
+
+// Somebody removed the name of a window whose owner lives on.
+TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsWhatIsItsOwn) {
+  const auto client = makeClient();
+  const auto pendingBind = keyed(NameKind::pendingBind, 7);
+  leave(pendingBind, SegmentKind::pendingBind, client.header().incarnation);
+
+  segments::remove(keyed(NameKind::clientWindow, client.header().incarnation));
+
+  EXPECT_EQ(judgementOf(pendingBind).verdict, Verdict::alive);
+  EXPECT_EQ(judgementOf(pendingBind).reason,
+            "the lock of " + keyed(NameKind::hints, client.header().incarnation) + " is held");
+  segments::remove(pendingBind);
+}
+
+TEST_F(StaleSegmentsTest, WhatCannotBeUnderstoodIsNotJudged) {
+  const auto notes = SegmentName::prefix(name()) + "notes";
+  std::ofstream(segments::path(notes)) << "mine";
+  leave(serverName("newer"), SegmentKind::serverWindow, 0, layout::kMajor + 1);
+  leave(serverName("wish"), SegmentKind::pendingBind, 0);
+  leave(keyed(NameKind::pendingBind, 7), SegmentKind::pendingBind, 0, layout::kMajor + 1);
+  ASSERT_EQ(::mkfifo(segments::path(serverName("pipe")).c_str(), 0600), 0);
+
+  const auto all = judge();
+
+  ASSERT_EQ(all.size(), 5U);
+  for (const auto& [file, judged] : all) {
+    EXPECT_EQ(judged.verdict, Verdict::unknown) << file;
+    EXPECT_FALSE(stale_segments::tryRemove(judged)) << file;
+    segments::remove(file);
+  }
+  EXPECT_EQ(all.at(notes).reason, "not a name that MPF gives");
+  EXPECT_THAT(all.at(serverName("newer")).reason, HasSubstr("layout 2, this program speaks 1-1"));
+}
+
+// Judged dead, and then the name is a successor's: the removal asks the lock once more.
+TEST_F(StaleSegmentsTest, ASuccessorThatTookTheNameStays) {
+  leave(serverName(), SegmentKind::serverWindow, 0);
+  const auto judged = judgementOf(serverName());
+  ASSERT_EQ(judged.verdict, Verdict::dead);
+  const OwnWindow successor(name(), SegmentKind::serverWindow, serverName(), {},
+                            [](layout::SegmentHeader&) {});
+
+  EXPECT_FALSE(stale_segments::tryRemove(judged));
+
+  EXPECT_EQ(segments::probeOwner(serverName(), successor.header().incarnation),
+            segments::Owner::alive);
+}
+
+// Any user may fill /dev/shm with names.
+TEST_F(StaleSegmentsTest, OfManyNamesAsManyAreJudgedAsWasAskedFor) {
+  for (std::uint64_t number = 1; number <= 200; ++number)
+    std::ofstream(segments::path(keyed(NameKind::pendingBind, number)));
+
+  EXPECT_EQ(stale_segments::judgeSome(name(), 50).size(), 50U);
+  EXPECT_EQ(stale_segments::judgeSome(name(), 200).size(), 200U);
+  EXPECT_EQ(backplane_.removeDead().size(), 200U);
+}
+
+// A pool hangs on its link: when that was not looked at, nothing is known of the pool.
+TEST_F(StaleSegmentsTest, APoolWhoseLinkWasNotLookedAtIsNotJudged) {
+  const auto client = makeClient();
+  const auto link = SegmentName::link(name(), 1, 2);
+  leave(link, SegmentKind::link, client.header().incarnation);
+  const auto bulk = SegmentName::bulk(name(), 2, 0, 0);
+  leave(bulk, SegmentKind::bulk, client.header().incarnation);
+
+  for (int round = 0; round < 100; ++round) {
+    for (const auto& file : stale_segments::judgeSome(name(), 2))
+      EXPECT_EQ(file.verdict, Verdict::alive) << file.name;
+  }
+
+  segments::remove(link);
+  segments::remove(bulk);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,424 @@
+// SPDX-License-Identifier: MIT
+// ls and mrr: what they say of servers and clients in every state.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <fstream>
+#include <regex>
+#include <set>
+
+#include "tests/support/test_backplane.h"
+#include "tests/support/victim.h"
+#include "tests/tools/report/report_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::MatchesRegex;
+using testing::SizeIs;
+using testing::StartsWith;
+
+TEST_F(ReportTest, AnEmptyBackplaneIsSaidToBeEmpty) {
+  EXPECT_EQ(run({"ls"}).out, "backplane " + backplane_.name() + "\n  no server\n  no client\n");
+  EXPECT_EQ(run({"mrr", "--interval", "1"}).out,
+            "backplane " + backplane_.name() + "\nclientRouterList\nserverRouterList\n");
+  EXPECT_EQ(run({"msr"}).out, "no server\n");
+  EXPECT_EQ(report({"msr"}), nlohmann::json::array());
+}
+
+TEST_F(ReportTest, ServersAndClientsAreListed) {
+  openServer("dac/1");
+  connect();
+  const auto pid = std::to_string(::getpid());
+
+  const auto ended = run({"ls"});
+
+  EXPECT_EQ(ended.status, 0);
+  EXPECT_THAT(ended.err, IsEmpty());
+  EXPECT_THAT(
+      linesOf(ended.out),
+      ElementsAre("backplane " + backplane_.name(),
+                  MatchesRegex("  SERVER +STATE +PID +PROGRAM +CONN +QUEUED +TAKEN +AGE"),
+                  MatchesRegex("  dac/1 +alive +" + pid + " +tools_test +1 +0 +0 +[0-9.]+ [mun]?s"),
+                  MatchesRegex("  CLIENT +STATE +PID +UNANSWERED +AGE +SERVERS"),
+                  MatchesRegex("  tools_test +alive +" + pid + " +0 +[0-9.]+ [mun]?s +dac/1")));
+}
+
+TEST_F(ReportTest, ProgramsLearnTheSame) {
+  openServer("dac/1", 7);
+  connect();
+  ASSERT_EQ(send(), SendResult::sent);
+  ASSERT_EQ(send(), SendResult::sent);
+  handle(1);
+
+  const auto all = ls();
+
+  EXPECT_EQ(all.at("backplane"), backplane_.name());
+  EXPECT_THAT(all.at("problems"), SizeIs(0));
+  EXPECT_THAT(all.at("waiting"), SizeIs(0));
+  ASSERT_THAT(all.at("servers"), SizeIs(1));
+  const auto& server = all.at("servers").at(0);
+  EXPECT_EQ(server.at("name"), "dac/1");
+  EXPECT_EQ(server.at("pid"), ::getpid());
+  EXPECT_EQ(server.at("program"), "tools_test");
+  EXPECT_EQ(server.at("location"), 0);
+  EXPECT_EQ(server.at("queue_size"), 7);
+  EXPECT_EQ(server.at("received"), 1);
+  EXPECT_EQ(server.at("replies"), 1);
+  ASSERT_THAT(server.at("links"), SizeIs(1));
+  EXPECT_EQ(server.at("links").at(0).at("peer_pid"), ::getpid());
+  ASSERT_THAT(all.at("clients"), SizeIs(1));
+  ASSERT_THAT(all.at("clients").at(0).at("links"), SizeIs(1));
+  const auto& link = all.at("clients").at(0).at("links").at(0);
+  EXPECT_EQ(link.at("server"), "dac/1");
+  EXPECT_EQ(link.at("client_state"), "open");
+  EXPECT_EQ(link.at("server_state"), "open");
+  EXPECT_EQ(link.at("requests"), (nlohmann::json{{"sent", 2}, {"taken", 1}, {"waiting", 1}}));
+  EXPECT_EQ(link.at("replies"), (nlohmann::json{{"sent", 1}, {"taken", 0}, {"waiting", 1}}));
+  EXPECT_EQ(link.at("unanswered"), 2);
+}
+
+TEST_F(ReportTest, AClientThatWaitsForItsServerIsListed) {
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+  MessageClient client(*dispatcher_, [](const Message&) {});
+  client.bind("later", 3);
+  while (client.notConnectedBecause().find("not there") == std::string::npos)
+    dispatcher_->runOnce(Deadline::after(100us));
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
+
+  const auto all = ls();
+  const auto text = run({"ls"}).out;
+  const auto routers = run({"mrr", "--interval", "1"}).out;
+
+  EXPECT_EQ(all.at("waiting"),
+            (nlohmann::json{{{"server", "later"}, {"location", 3}, {"pid", ::getpid()}}}));
+  EXPECT_THAT(text, AllOf(HasSubstr("no server\n"), HasSubstr("  later@3 (waiting)\n")));
+  EXPECT_THAT(routers,
+              HasSubstr("   Server later@3 has 1 client. bindState waiting for the server\n"));
+}
+
+TEST_F(ReportTest, ADeadServerIsDead) {
+  Victim victim("serve", backplane_.name());
+  ASSERT_EQ(victim.line(), "open");
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "alive");
+
+  victim.end(SIGKILL);
+
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "dead");
+  EXPECT_THAT(inOneLine(run({"mrr", "--interval", "1"}).out),
+              HasSubstr("] dead (removed by the next program that attaches) queueSize 32 "));
+  EXPECT_THAT(run({"msr", "echo"}).out, HasSubstr("              state dead, pid "));
+  static_cast<void>(backplane_.removeDead());
+}
+
+TEST_F(ReportTest, AStoppedProcessIsStopped) {
+  Victim victim("serve", backplane_.name());
+  ASSERT_EQ(victim.line(), "open");
+
+  victim.signal(SIGSTOP);
+  int status = 0;
+  ASSERT_EQ(::waitpid(victim.pid(), &status, WUNTRACED), victim.pid());
+
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "stopped");
+  victim.signal(SIGCONT);
+  ASSERT_EQ(::waitpid(victim.pid(), &status, WCONTINUED), victim.pid());
+  EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "alive");
+  EXPECT_EQ(victim.end(SIGTERM), 0);
+}
+
+TEST_F(ReportTest, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
+  openServer("echo");
+  connect();
+  EXPECT_EQ(ls().at("servers").at(0).at("state"), "alive");
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(send(), SendResult::sent);
+
+  EXPECT_EQ(ls().at("servers").at(0).at("state"), "stalled");
+  EXPECT_THAT(run({"ls"}).out,
+              testing::ContainsRegex("  echo +stalled +[0-9]+ +tools_test +1 +3 +0 "));
+  handle(3);
+  const auto now = ls();
+  EXPECT_EQ(now.at("servers").at(0).at("state"), "alive");
+  EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it takes no replies";
+}
+
+// A server whose one thread works on a request accepts nobody and takes nothing: all say why.
+TEST_F(ReportTest, ABusyServerIsShownWithItsRequestAndTheTime) {
+  openServer("dmm");
+  connect();
+  auto question = client_->alloc<Char8Array>(1);
+  *question = {.cmd = 3, .length = 1};
+  ASSERT_EQ(client_->send(std::move(question)), SendResult::sent);
+  Message inWork;
+  while (!inWork) inWork = server_->receive();
+
+  const auto now = ls().at("servers").at(0);
+  EXPECT_EQ(now.at("state"), "busy");
+  EXPECT_EQ(now.at("handling").at("type"), "char8Array");
+  EXPECT_EQ(now.at("handling").at("cmd"), 3);
+  EXPECT_GT(now.at("handling").at("since_s"), 0);
+  EXPECT_THAT(run({"ls"}).out,
+              testing::ContainsRegex(
+                  "  dmm +busy +(.*\n)+  busy: dmm, with char8Array cmd=3 for [0-9.]+ [mun]?s\n"));
+  EXPECT_THAT(
+      run({"msr"}).out,
+      testing::ContainsRegex("  state busy with char8Array cmd=3 for [0-9.]+ [mun]?s, pid "));
+
+  Dispatcher another(backplane_);
+  MessageClient newcomer(another, [](const Message&) {});
+  newcomer.bind("dmm", 0);
+  while (newcomer.notConnectedBecause().find("busy") == std::string::npos)
+    another.runOnce(Deadline::after(100us));
+  EXPECT_THAT(newcomer.notConnectedBecause(),
+              MatchesRegex("server \"dmm\" is busy with a request, char8Array cmd=3, since "
+                           "[0-9]{4}-[0-9]{2}-[0-9]{2} "
+                           "[0-9]{2}:[0-9]{2}:[0-9]{2}, and has not accepted the client yet"));
+
+  EXPECT_EQ(server_->reply(std::move(inWork)), ReplyResult::sent);
+  while (!newcomer.isConnected()) {
+    EXPECT_FALSE(server_->handleOne());
+    another.runOnce(Deadline::after(100us));
+  }
+  EXPECT_EQ(ls().at("servers").at(0).at("state"), "alive");
+}
+
+TEST_F(ReportTest, MrrHasTheManualsLines) {
+  openServer("Int32");
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("Int32", 0);
+  while (!second.isConnected()) {
+    server_->handleOne();
+    dispatcher_->runOnce(Deadline::after(100us));
+  }
+  ASSERT_EQ(send(), SendResult::sent);
+  const auto us = "tools_test\\[" + std::to_string(::getpid()) + "\\]";
+
+  const auto ended = run({"mrr", "--interval", "100"});
+
+  EXPECT_EQ(ended.status, 0);
+  const auto whole = std::regex_replace(ended.out, std::regex("\n     "),
+                                        " ");  // a line of more than 80 columns, for a long pid
+  EXPECT_THAT(
+      linesOf(whole),
+      ElementsAre(
+          "backplane " + backplane_.name(), "clientRouterList",
+          MatchesRegex(" 1 " + us +
+                       " stateConnected queueSize 100 inQueue 1 sendQueueFull 0 unanswered 1"),
+          "   Server Int32 has 2 clients. bindState connected", "   sendPerSec 0 receivePerSec 0",
+          "serverRouterList",
+          MatchesRegex(
+              " 1 Int32\\[[0-9]+\\] stalled queueSize 100 inQueue 1 replyQueueFull 0 clients 2"),
+          "   sendPerSec 0 receivePerSec 0"));
+}
+
+TEST_F(ReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
+  const EchoThread echo(backplane_, "echo");
+  Tool load({"call", "echo", "int32", "--count", "1000000000", "--timeout", "100"},
+            backplane_.name());
+  const auto isMoving = [](const nlohmann::json& entry) {
+    return entry.at("received_per_s") > 0 && entry.at("sent_per_s") > 0;
+  };
+
+  for (auto all = ls(); all.at("clients").empty() || !isMoving(all.at("clients").at(0)) ||
+                        !isMoving(all.at("servers").at(0));)
+    all = ls();
+
+  load.signal(SIGINT);
+  EXPECT_EQ(load.end().status, 0);
+}
+
+void addKeys(const nlohmann::json& json, std::set<std::string>& keys) {
+  if (!json.is_structured()) return;
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_object()) keys.insert(key);
+    addKeys(value, keys);
+  }
+}
+
+// Whoever reads the JSON can look each field up.
+TEST_F(ReportTest, EachFieldIsInTheDocument) {
+  openServer("echo");
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("later", 0);
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
+  std::set<std::string> keys;
+  addKeys(ls(), keys);
+  addKeys(report({"msr", "echo"}), keys);
+  auto call =
+      nlohmann::json::parse(run({"call", "nobody", "int32", "--timeout", "0.01", "--json"}).out);
+  call.at("why").clear();  // its keys are reasons
+  addKeys(call, keys);
+  std::ostringstream document;
+  document << std::ifstream(MPF_TEST_TOOLS_MD).rdbuf();
+
+  for (const auto& key : keys)
+    EXPECT_NE(document.str().find("`" + key + "`"), std::string::npos) << key;
+  EXPECT_GT(keys.size(), 40U);
+}
+
+TEST_F(ReportTest, NamesInAnyLanguageAreAligned) {
+  const MessageServer oven(backplane_, "Ofen-Süd [°C]", {.location = 0});
+  const MessageServer plain(backplane_, "oven", {.location = 0});
+
+  const auto lines = linesOf(run({"ls"}).out);
+
+  ASSERT_THAT(lines, SizeIs(5));
+  EXPECT_THAT(lines[1], StartsWith("  SERVER         STATE"));
+  EXPECT_THAT(lines[2], StartsWith("  Ofen-Süd [°C]  alive"));
+  EXPECT_THAT(lines[3], StartsWith("  oven           alive"));
+}
+
+TEST_F(ReportTest, ANameThatIsNoTextIsReportedAllTheSame) {
+  const MessageServer server(backplane_, "a\xff", {.location = 0});
+
+  EXPECT_EQ(ls().at("servers").at(0).at("name"), R"(a\xff)");
+  EXPECT_THAT(run({"ls"}).out, HasSubstr(R"(  a\xff )"));
+}
+
+// Control characters are refused when a server starts; those that turn the direction of a text are
+// not.
+TEST_F(ReportTest, NoNameReachesTheTerminalAsItIsAndEachIsFoundAsItIsShown) {
+  const std::string name = "a\u202eb\u200b";
+  const std::string shown = R"(a\u202eb\u200b)";
+  openServer(name);
+  connect();
+
+  for (const std::vector<std::string>& report :
+       std::vector<std::vector<std::string>>{{"ls"},
+                                             {"mrr", "--interval", "1"},
+                                             {"msr"},
+                                             {"inspect"},
+                                             {"top", "--batch", "1"},
+                                             {"ls", "--json"},
+                                             {"inspect", "--json"}}) {
+    const auto ended = run(report);
+
+    EXPECT_THAT(ended.out,
+                AllOf(HasSubstr("a\\"), Not(HasSubstr("\u202e")), Not(HasSubstr("\u200b"))))
+        << report.front();
+    EXPECT_TRUE(report.back() != "--json" || nlohmann::json::accept(ended.out)) << ended.out;
+  }
+  for (const auto& given : {name, shown}) {
+    EXPECT_THAT(run({"msr", given}).out, StartsWith(shown + "\n"));
+    EXPECT_EQ(run({"inspect", given}).status, 0);
+  }
+  EXPECT_EQ(run({"msr", "x\u202ey"}).err,
+            "mpf msr: no server \"x\\u202ey\"; `mpf ls` shows those that there are\n");
+}
+
+TEST_F(ReportTest, ServersOfOneNameAtTwoLocationsAreToldApart) {
+  openServer("dac");
+  const EchoThread other(backplane_, "dac", {.location = 2});
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("dac", 2);
+  while (!second.isConnected()) dispatcher_->runOnce(Deadline::after(100us));
+
+  const auto text = run({"ls"}).out;
+  const auto routers = run({"mrr", "--interval", "1"}).out;
+
+  EXPECT_THAT(text, HasSubstr("dac, dac@2\n"));
+  EXPECT_THAT(routers, AllOf(HasSubstr("   Server dac has 1 client. bindState connected\n   Server "
+                                       "dac@2 has 1 client. bindState connected\n"),
+                             HasSubstr(" 2 dac@2[")));
+}
+
+TEST_F(ReportTest, AProcessWithThousandsOfClientsIsOneLine) {
+  const EchoThread echo(backplane_, "echo");
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+  std::vector<std::unique_ptr<MessageClient>> clients;
+  for (int i = 0; i < 3000; ++i) {
+    clients.push_back(std::make_unique<MessageClient>(*dispatcher_, [](const Message&) {}));
+    clients.back()->bind("echo", 0);
+  }
+  for (const auto& client : clients) ASSERT_TRUE(client->connectWait(60s));
+
+  const auto text = run({"ls"}).out;
+
+  EXPECT_THAT(text, HasSubstr("  echo x 3000\n"));
+  EXPECT_THAT(run({"mrr", "--interval", "1"}).out,
+              HasSubstr("   Server echo has 3000 clients. bindState connected\n"));
+}
+
+TEST_F(ReportTest, AClientOfManyServersShowsSome) {
+  std::vector<std::unique_ptr<EchoThread>> servers;
+  std::vector<std::unique_ptr<MessageClient>> clients;
+  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
+  for (char letter = 'a'; letter < 'j'; ++letter) {
+    servers.push_back(std::make_unique<EchoThread>(backplane_, std::string(1, letter)));
+    clients.push_back(std::make_unique<MessageClient>(*dispatcher_, [](const Message&) {}));
+    clients.back()->bind(std::string(1, letter));
+    ASSERT_TRUE(clients.back()->connectWait(60s));
+  }
+
+  const auto text = run({"ls"}).out;
+
+  EXPECT_THAT(inOneLine(text), HasSubstr(" a, b, c, d, e, f, 3 more"));
+  clients.clear();
+}
+
+std::size_t widestOf(const std::string& text) {
+  std::size_t widest = 0;
+  for (const auto& line : linesOf(text)) widest = std::max(widest, line.size());
+  return widest;
+}
+
+// Of names as long as they may be, nothing is lost.
+TEST_F(ReportTest, LongNamesFitIntoEightyColumns) {
+  const std::string name = "a-server-" + std::string(54, 'x');
+  openServer(name);
+  dispatcher_ = std::make_unique<Dispatcher>(
+      backplane_, DispatcherOptions{WaitMode::adaptive, "a-client-" + std::string(54, 'y')});
+  connect();
+  MessageClient second(*dispatcher_, [](const Message&) {});
+  second.bind("another-" + std::string(54, 'z'), -2'000'000'000);
+  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
+
+  const auto list = run({"ls"}).out;
+  const auto server = run({"msr", name}).out;
+  const auto routers = run({"mrr", "--interval", "1"}).out;
+  const auto summary = run({"inspect"}).out;
+
+  EXPECT_LE(widestOf(routers), 80U) << routers;
+  EXPECT_LE(widestOf(summary), 80U) << summary;
+  EXPECT_THAT(routers, AllOf(HasSubstr(name + "["), HasSubstr("Server " + name),
+                             HasSubstr("a-client-" + std::string(54, 'y') + "["),
+                             HasSubstr("another-" + std::string(54, 'z'))));
+  EXPECT_THAT(summary, AllOf(HasSubstr("server " + name + "\n"),
+                             HasSubstr("client a-client-" + std::string(54, 'y') + "\n")));
+  EXPECT_LE(widestOf(list), 80U) << list;
+  EXPECT_LE(widestOf(server), 80U) << server;
+  EXPECT_THAT(
+      list, AllOf(HasSubstr("  " + name + "\n"), HasSubstr("  a-client-" + std::string(54, 'y'))));
+  EXPECT_THAT(server, HasSubstr("\n  a-client-" + std::string(54, 'y') + "["));
+  dispatcher_->runOnce(Deadline::after(1us));
+}
+
+TEST_F(ReportTest, WithoutABackplaneAllAreReported) {
+  const MessageServer here(backplane_, "here");
+  const TestBackplane elsewhere;
+  const MessageServer there(elsewhere, "there");
+
+  const auto ended = runTool({"msr", "--json", "--interval", "1"}, "");
+
+  EXPECT_EQ(ended.status, 0);
+  const auto all = nlohmann::json::parse(ended.out);
+  EXPECT_EQ(entryOf(all, "backplane", backplane_.name()).at("name"), "here");
+  EXPECT_EQ(entryOf(all, "backplane", elsewhere.name()).at("name"), "there");
+}
+
+TEST_F(ReportTest, AnArgumentIsStrongerThanTheEnvironment) {
+  const MessageServer server(backplane_, "here");
+
+  const auto ended = runTool({"msr", "--backplane", backplane_.name()}, "another");
+
+  EXPECT_THAT(ended.out, StartsWith("here\n"));
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: MIT
+// Two snapshots: rates, and who has stopped moving. The snapshots are made by hand.
+#include "tools/report/snapshot_delta.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace mpf::tools {
+namespace {
+
+constexpr std::uint64_t kServer = 1;
+constexpr std::uint64_t kClient = 2;
+
+LinkView link(std::uint64_t incarnation, Traffic requests, Traffic replies = {}) {
+  LinkView view;
+  view.incarnation = incarnation;
+  view.serverWindow = kServer;
+  view.clientWindow = kClient;
+  view.requests = requests;
+  view.replies = replies;
+  return view;
+}
+
+WindowView server(std::uint64_t received, std::uint64_t sent, std::vector<LinkView> links = {}) {
+  WindowView view;
+  view.isServer = true;
+  view.incarnation = kServer;
+  view.received = received;
+  view.sent = sent;
+  view.processState = 'S';
+  view.links = std::move(links);
+  return view;
+}
+
+WindowView client(std::uint64_t received, std::vector<LinkView> links = {}) {
+  auto view = server(received, 0, std::move(links));
+  view.isServer = false;
+  view.incarnation = kClient;
+  return view;
+}
+
+Snapshot snapshot(std::int64_t atNs, std::vector<WindowView> servers,
+                  std::vector<WindowView> clients = {}) {
+  Snapshot made;
+  made.atNs = atNs;
+  made.servers = std::move(servers);
+  made.clients = std::move(clients);
+  return made;
+}
+
+constexpr std::int64_t kHalfASecond = 500'000'000;
+
+TEST(SnapshotDelta, AServersRatesAreWhatItTookAndSent) {
+  const SnapshotDelta look(snapshot(0, {server(100, 50)}),
+                           snapshot(kHalfASecond, {server(200, 80)}));
+
+  const auto rates = delta.ratesOf(delta.now().servers.front());
+
+  EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 200);
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 60);
+}
+
+// Clients that come, ask and go between two looks leave no link behind; their requests were handled
+// all the same.
+TEST(SnapshotDelta, AServersRatesDoNotDependOnItsClientsStaying) {
+  const SnapshotDelta look(snapshot(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}),
+                           snapshot(kHalfASecond, {server(130, 130)}));
+
+  const auto rates = delta.ratesOf(delta.now().servers.front());
+
+  EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 60);
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 60);
+}
+
+TEST(SnapshotDelta, AClientsRatesAreWhatItsLinksSentAndWhatItTook) {
+  const SnapshotDelta look(
+      snapshot(0, {}, {client(10, {link(7, {10, 10}), link(8, {1000, 1000})})}),
+      snapshot(kHalfASecond, {}, {client(15, {link(7, {20, 20}), link(9, {5, 5})})}));
+
+  const auto rates = delta.ratesOf(delta.now().clients.front());
+
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 30);  // 10 on an old link, 5 on a new one; one is gone
+  EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 10);
+}
+
+TEST(SnapshotDelta, WhatWasNotThereBeforeHasNoRatesYet) {
+  const SnapshotDelta look(snapshot(0, {}), snapshot(kHalfASecond, {server(100, 100)}));
+
+  EXPECT_DOUBLE_EQ(delta.ratesOf(delta.now().servers.front()).receivedPerSecond, 0);
+}
+
+TEST(SnapshotDelta, CountersThatGoBackAndClocksThatStandGiveNoRates) {
+  const SnapshotDelta back(snapshot(0, {server(100, 100)}),
+                           snapshot(kHalfASecond, {server(10, 10)}));
+  const SnapshotDelta standing(snapshot(5, {server(1, 1)}), snapshot(5, {server(2, 2)}));
+
+  EXPECT_DOUBLE_EQ(back.ratesOf(back.now().servers.front()).sentPerSecond, 0);
+  EXPECT_DOUBLE_EQ(standing.ratesOf(standing.now().servers.front()).sentPerSecond, 0);
+}
+
+TEST(SnapshotDelta, WindowsAreFoundByTheirIncarnation) {
+  const SnapshotDelta look(snapshot(0, {}), snapshot(1, {server(0, 0)}, {client(0)}));
+
+  EXPECT_EQ(delta.find(kServer), &delta.now().servers.front());
+  EXPECT_EQ(delta.find(kClient), &delta.now().clients.front());
+  EXPECT_EQ(delta.find(3), nullptr);
+}
+
+std::string serverState(const WindowView& before, const WindowView& now) {
+  const SnapshotDelta look(snapshot(0, {before}), snapshot(kHalfASecond, {now}));
+  return delta.stateOf(delta.now().servers.front());
+}
+
+TEST(SnapshotDelta, AServerWithNothingToDoIsAlive) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {5, 5})})), "alive");
+}
+
+TEST(SnapshotDelta, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {9, 5})})),
+            "stalled");
+}
+
+TEST(SnapshotDelta, AServerThatTakesSomethingIsAliveHoweverMuchWaits) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {60, 5})}), server(6, 6, {link(7, {60, 6})})),
+            "alive");
+}
+
+TEST(SnapshotDelta, ARequestThatCameJustNowStallsNobody) {
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {6, 5})})), "alive");
+  EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {6, 6})})), "alive");
+}
+
+// Nor does it help that another client went away with what it had counted.
+TEST(SnapshotDelta, AStalledServerStaysStalledWhenAClientLeaves) {
+  EXPECT_EQ(serverState(server(9, 9, {link(7, {6, 5}), link(8, {4, 4})}),
+                        server(9, 9, {link(7, {6, 5})})),
+            "stalled");
+}
+
+TEST(SnapshotDelta, AClientThatDoesNotTakeItsRepliesIsStalled) {
+  const auto stuck = client(2, {link(7, {5, 5}, {5, 2})});
+  const SnapshotDelta look(snapshot(0, {}, {stuck}), snapshot(kHalfASecond, {}, {stuck}));
+
+  EXPECT_EQ(delta.stateOf(delta.now().clients.front()), "stalled");
+}
+
+TEST(SnapshotDelta, WhatIsWorseIsSaidFirst) {
+  const auto stuck = server(5, 5, {link(7, {6, 5})});
+  auto stopped = stuck;
+  stopped.processState = 'T';
+  auto traced = stuck;
+  traced.processState = 't';
+  auto dead = stopped;
+  dead.life = Life::dead;
+  auto closed = stuck;
+  closed.life = Life::closed;
+
+  EXPECT_EQ(serverState(stuck, stopped), "stopped");
+  EXPECT_EQ(serverState(stuck, traced), "stopped");
+  EXPECT_EQ(serverState(stuck, dead), "dead");
+  EXPECT_EQ(serverState(stuck, closed), "closed");
+}
+
+TEST(Totals, AServersIncomingAreRequestsAClientsAreReplies) {
+  auto one = link(7, {10, 8}, {7, 6});
+  one.refused = 1;
+  one.unanswered = 2;
+  one.bytes = 4096;
+  const std::vector<LinkView> links{one, one};
+
+  const auto ofServer = Totals::of(server(0, 0, links));
+  const auto ofClient = Totals::of(client(0, links));
+
+  EXPECT_EQ(ofServer.incoming.waiting(), 4U);
+  EXPECT_EQ(ofServer.outgoing.waiting(), 2U);
+  EXPECT_EQ(ofClient.incoming.waiting(), 2U);
+  EXPECT_EQ(ofClient.outgoing.waiting(), 4U);
+  EXPECT_EQ(ofServer.refused, 2U);
+  EXPECT_EQ(ofServer.unanswered, 4U);
+  EXPECT_EQ(ofServer.bytes, 8192U);
+}
+
+RouterView router(std::vector<RouterLineView> lines) {
+  RouterView view;
+  view.incarnation = 5;
+  view.processState = 'S';
+  view.lines = std::move(lines);
+  return view;
+}
+
+RouterLineView line(const std::string& address, std::uint64_t count) {
+  RouterLineView view;
+  view.row = 3;
+  view.role = layout::RouterRole::client;
+  view.state = layout::RouterLineState::connected;
+  view.address = address;
+  view.messagesSent = count;
+  view.messagesReceived = 2 * count;
+  view.framesSent = 3 * count;
+  view.framesReceived = 4 * count;
+  view.bytesSent = 5 * count;
+  view.bytesReceived = 6 * count;
+  return view;
+}
+
+SnapshotDelta routersAt(const RouterView& before, const RouterView& now) {
+  auto was = snapshot(0, {});
+  auto is = snapshot(kHalfASecond, {});
+  was.routers = {before};
+  is.routers = {now};
+  return {std::move(was), std::move(is)};
+}
+
+TEST(SnapshotDelta, AConnectionsRatesAreOfMessagesFramesAndBytes) {
+  const auto delta = routersAt(router({line("a", 100)}), router({line("a", 110)}));
+  const auto& now = delta.now().routers.front();
+
+  const auto rates = delta.ratesOf(now, now.lines.front());
+
+  EXPECT_DOUBLE_EQ(rates.messages.sentPerSecond, 20);
+  EXPECT_DOUBLE_EQ(rates.messages.receivedPerSecond, 40);
+  EXPECT_DOUBLE_EQ(rates.frames.sentPerSecond, 60);
+  EXPECT_DOUBLE_EQ(rates.frames.receivedPerSecond, 80);
+  EXPECT_DOUBLE_EQ(rates.bytes.sentPerSecond, 100);
+  EXPECT_DOUBLE_EQ(rates.bytes.receivedPerSecond, 120);
+}
+
+// A row is given on when its connection has ended.
+TEST(SnapshotDelta, AnotherConnectionInTheSameRowHasNoRatesYet) {
+  const auto delta = routersAt(router({line("a", 100)}), router({line("b", 110)}));
+  const auto& now = delta.now().routers.front();
+
+  EXPECT_DOUBLE_EQ(delta.ratesOf(now, now.lines.front()).messages.sentPerSecond, 0);
+}
+
+TEST(SnapshotDelta, AConnectionIsAsItsRouterIs) {
+  auto view = router({line("a", 0)});
+  const auto stateOf = [](const RouterView& now) {
+    const auto delta = routersAt(now, now);
+    return delta.stateOf(delta.now().routers.front(), delta.now().routers.front().lines.front());
+  };
+
+  EXPECT_EQ(stateOf(view), "connected");
+  view.lines.front().state = layout::RouterLineState::connecting;
+  EXPECT_EQ(stateOf(view), "connecting");
+  view.processState = 'T';
+  EXPECT_EQ(stateOf(view), "stopped");
+  view.life = Life::dead;
+  EXPECT_EQ(stateOf(view), "dead");
+}
+
+TEST(SnapshotDelta, AWindowOfARouterLeadsToItsConnection) {
+  auto proxy = server(0, 0);
+  proxy.router = 5;
+  proxy.routerRow = 3;
+  auto is = snapshot(1, {proxy, server(0, 0)});
+  is.routers = {router({line("a", 0)})};
+  const SnapshotDelta look(snapshot(0, {}), std::move(is));
+
+  EXPECT_EQ(delta.routerOf(delta.now().servers.front()).line,
+            &delta.now().routers.front().lines.front());
+  EXPECT_FALSE(delta.routerOf(delta.now().servers.back()));
+}
+
+}  // namespace
+}  // namespace mpf::tools

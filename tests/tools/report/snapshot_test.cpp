@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// What the segments of a backplane say at one moment.
+#include "tools/report/snapshot.h"
+
+#include <unistd.h>
+
+#include <fstream>
+
+#include <mpf/message_server.h>
+#include <mpf/sync_client.h>
+
+#include "tests/shm/shm_fixture.h"
+
+namespace mpf::tools {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class SurveyTest : public test::ShmTest {
+ protected:
+  [[nodiscard]] Snapshot take() const { return Snapshot::take(name()); }
+};
+
+// Clients of one process.
+class Clients {
+ public:
+  explicit Clients(const Backplane& backplane) : dispatcher_(backplane) {}
+  MessageClient& bind(const std::string& server, std::int32_t location = 0) {
+    clients_.push_back(std::make_unique<MessageClient>(dispatcher_, [](const Message&) {}));
+    clients_.back()->bind(server, location);
+    return *clients_.back();
+  }
+  MessageClient& connect(MessageServer& server) {
+    auto& client = bind(server.getName(), server.location());
+    while (!client.isConnected()) {
+      server.handleOne();
+      runOnce();
+    }
+    return client;
+  }
+  void runOnce() { dispatcher_.runOnce(Deadline::after(100us)); }
+
+ private:
+  Dispatcher dispatcher_;
+  std::vector<std::unique_ptr<MessageClient>> clients_;
+};
+
+TEST_F(SurveyTest, ANameThatNoBackplaneCanHaveIsNamed) {
+  EXPECT_THAT(test::whatOf<std::invalid_argument>([] { static_cast<void>(Snapshot::take("a.b")); }),
+              testing::HasSubstr("\"a.b\""));
+}
+
+TEST_F(SurveyTest, AServerSaysWhoItIs) {
+  const MessageServer server(
+      backplane_, "dac",
+      {.location = 3, .queueSize = 17, .maxMessageBytes = 12345, .waitMode = WaitMode::block});
+
+  const auto snapshot = take();
+
+  ASSERT_THAT(snapshot.servers, SizeIs(1));
+  const auto& seen = snapshot.servers.front();
+  EXPECT_TRUE(seen.isServer);
+  EXPECT_EQ(seen.name, "dac");
+  EXPECT_EQ(seen.location, 3);
+  EXPECT_EQ(seen.pid, ::getpid());
+  EXPECT_THAT(seen.program, testing::StartsWith("tools_unit_test"));
+  EXPECT_EQ(seen.queueSize, 17U);
+  EXPECT_EQ(seen.maxMessageBytes, 12345U);
+  EXPECT_EQ(seen.waitMode, static_cast<std::uint32_t>(WaitMode::block));
+  EXPECT_EQ(seen.life, Life::alive);
+  EXPECT_GE(seen.ageNs, 0);
+  EXPECT_EQ(seen.received, 0U);
+  EXPECT_THAT(seen.links, IsEmpty());
+  EXPECT_THAT(snapshot.problems, IsEmpty());
+}
+
+TEST_F(SurveyTest, ALinkIsSeenFromBothOfItsWindows) {
+  MessageServer server(backplane_, "dac", {.location = 0, .queueSize = 17});
+  server.on<Int32>([](Int32&) {});
+  Clients clients(backplane_);
+  auto& client = clients.connect(server);
+  for (int i = 0; i < 5; ++i) ASSERT_EQ(client.send(Int32Message()), SendResult::sent);
+  while (!server.handleOne()) continue;
+  while (!server.handleOne()) continue;
+
+  const auto snapshot = take();
+
+  ASSERT_THAT(snapshot.servers, SizeIs(1));
+  ASSERT_THAT(snapshot.servers.front().links, SizeIs(1));
+  ASSERT_THAT(snapshot.clients, SizeIs(1));
+  ASSERT_THAT(snapshot.clients.front().links, SizeIs(1));
+  const auto& link = snapshot.clients.front().links.front();
+  EXPECT_EQ(link.incarnation, snapshot.servers.front().links.front().incarnation);
+  EXPECT_TRUE(link.isOpen());
+  EXPECT_EQ(link.server, "dac");
+  EXPECT_EQ(link.queueSize, 17U);
+  EXPECT_EQ(link.requests.sent, 5U);
+  EXPECT_EQ(link.requests.taken, 2U);
+  EXPECT_EQ(link.requests.waiting(), 3U);
+  EXPECT_EQ(link.replies.sent, 2U);
+  EXPECT_EQ(link.replies.waiting(), 2U);
+  EXPECT_EQ(link.unanswered, 5U);
+  EXPECT_GT(link.bytes, 4096U);
+  EXPECT_EQ(snapshot.servers.front().received, 2U);
+  EXPECT_EQ(snapshot.servers.front().sent, 2U);
+}
+
+TEST_F(SurveyTest, ALinkHasTheMemoryOfItsLargeMessages) {
+  MessageServer server(backplane_, "dac");
+  Clients clients(backplane_);
+  auto& client = clients.connect(server);
+  const auto before = take().servers.front().links.front().bytes;
+
+  ASSERT_EQ(client.send(client.alloc<Float64Array>(100'000)), SendResult::sent);
+
+  EXPECT_GE(take().servers.front().links.front().bytes, before + 800'000);
+}
+
+TEST_F(SurveyTest, SeveralClientsOfAProcessAreLinksOfOneWindow) {
+  MessageServer dac(backplane_, "dac");
+  MessageServer adc(backplane_, "adc");
+  Clients clients(backplane_);
+  clients.connect(dac);
+  clients.connect(dac);
+  clients.connect(adc);
+
+  const auto snapshot = take();
+
+  std::vector<std::string> servers;
+  ASSERT_THAT(snapshot.clients, SizeIs(1));
+  for (const auto& link : snapshot.clients.front().links) servers.push_back(link.server);
+  EXPECT_THAT(servers, ElementsAre("adc", "dac", "dac"));
+  ASSERT_THAT(snapshot.servers, SizeIs(2));
+  EXPECT_EQ(snapshot.servers[0].name, "adc");
+  EXPECT_THAT(snapshot.servers[0].links, SizeIs(1));
+  EXPECT_THAT(snapshot.servers[1].links, SizeIs(2));
+}
+
+TEST_F(SurveyTest, AClientThatWaitsForItsServerIsSeen) {
+  Clients clients(backplane_);
+  clients.bind("later", 5);
+  while (take().pendingBinds.empty()) clients.runOnce();
+
+  const auto snapshot = take();
+
+  ASSERT_THAT(snapshot.pendingBinds, SizeIs(1));
+  EXPECT_EQ(snapshot.pendingBinds.front().server, "later");
+  EXPECT_EQ(snapshot.pendingBinds.front().location, 5);
+  ASSERT_THAT(snapshot.clients, SizeIs(1));
+  EXPECT_EQ(snapshot.clients.front().incarnation, snapshot.pendingBinds.front().clientWindow);
+  ASSERT_THAT(snapshot.clients.front().pendingBinds, SizeIs(1));
+  EXPECT_EQ(snapshot.clients.front().pendingBinds.front().server, "later");
+}
+
+TEST_F(SurveyTest, OfAnotherBackplaneNothingIsSeen) {
+  const auto other = Backplane::named(name() + "x");
+  const MessageServer server(other, "dac");
+
+  const auto snapshot = take();
+
+  EXPECT_THAT(snapshot.servers, IsEmpty());
+  EXPECT_THAT(snapshot.problems, IsEmpty());
+}
+
+// Whoever may write to /dev/shm chooses the names in headers.
+TEST_F(SurveyTest, ANameCannotCommandTheTerminal) {
+  auto window =
+      Segment::create(layout::kWindowBytes, layout::SegmentKind::serverWindow, name(), {});
+  const std::string evil = "a\x1b[2Jb\n\x7f";
+  evil.copy(window.sharedHeader().name.data(), evil.size());
+  window.sharedHeader().program = {'\t', 'H', '\r'};
+  ASSERT_TRUE(window.tryPublish(serverName()));
+
+  const auto snapshot = take();
+
+  ASSERT_THAT(snapshot.servers, SizeIs(1));
+  EXPECT_EQ(snapshot.servers.front().name, R"(a\x1b[2Jb\n\x7f)");
+  EXPECT_EQ(snapshot.servers.front().program, R"(\tH\r)");
+  segments::remove(serverName());
+}
+
+TEST_F(SurveyTest, AProblemHidesNothingElse) {
+  const MessageServer server(backplane_, "dac");
+  const auto junk = segments::path(serverName("junk"));
+  std::ofstream(junk) << "junk";
+
+  const auto snapshot = take();
+
+  EXPECT_THAT(snapshot.servers, SizeIs(1));
+  EXPECT_THAT(snapshot.problems,
+              ElementsAre(junk + ": truncated, 4 bytes are too few for a header"));
+  segments::remove(serverName("junk"));
+}
+
+TEST_F(SurveyTest, JunkUnderEveryKindOfNameIsAProblem) {
+  std::vector<std::string> junk{serverName()};
+  for (const char* rest :
+       {"c.1", "h.1", "l.1.2", "b.1.0.0", "w.1", "f.1", "x.1", "s.0", "nothing"}) {
+    junk.push_back(SegmentName::prefix(name()) + rest);
+  }
+  for (const auto& each : junk) std::ofstream(segments::path(each)) << "junk";
+
+  const auto problems = take().problems;
+
+  for (const auto& each : junk) {
+    EXPECT_THAT(problems, testing::Contains(testing::StartsWith(segments::path(each) + ": ")));
+    segments::remove(each);
+  }
+  EXPECT_THAT(problems, SizeIs(junk.size()));
+}
+
+}  // namespace
+}  // namespace mpf::tools

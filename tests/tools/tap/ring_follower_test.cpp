@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+// RingFollower: sees what crosses a ring, or says that it did not; and never a message that was not
+// sent.
+#include "tools/tap/ring_follower.h"
+
+#include "tests/shm/ring_fixture.h"
+#include "tests/support/random.h"
+
+namespace mpf::test {
+namespace {
+
+using tools::FollowFrom;
+using tools::RingCopy;
+using tools::RingFollower;
+using Next = tools::RingFollower::Next;
+
+class RingFollowerTest : public RingTest {
+ protected:
+  RingFollower follow(FollowFrom from = FollowFrom::newest) { return {ring_, kCapacity, from}; }
+  void cross(std::uint64_t ordinal, std::size_t bodyBytes = 8) {
+    ASSERT_TRUE(push(ordinal, bodyBytes));
+    EXPECT_EQ(take(), pattern(ordinal, bodyBytes));
+  }
+  // That the follower's next message is `ordinal`.
+  static void expectNext(RingFollower& follower, std::uint64_t ordinal, std::size_t bodyBytes = 8) {
+    RingCopy copy;
+    ASSERT_EQ(follower.tryNext(copy), Next::message);
+    EXPECT_EQ(copy.envelope.requestId, ordinal);
+    EXPECT_EQ(Bytes(copy.body().begin(), copy.body().end()), pattern(ordinal, bodyBytes));
+  }
+  static void expectNothing(RingFollower& follower) {
+    RingCopy copy;
+    EXPECT_EQ(follower.tryNext(copy), Next::nothing);
+  }
+};
+
+TEST_F(RingFollowerTest, SeesMessagesOfEverySizeInTheirOrder) {
+  auto follower = follow();
+  std::uint64_t ordinal = 0;
+  for (std::size_t bytes = 0; bytes <= layout::kInlineBodyBytes; ++bytes) {
+    cross(++ordinal, bytes);
+    expectNext(follower, ordinal, bytes);
+    expectNothing(follower);
+  }
+}
+
+TEST_F(RingFollowerTest, SeesWhatNobodyHasTakenAndWhatWasTaken) {
+  auto follower = follow();
+  ASSERT_TRUE(push(1));
+
+  expectNext(follower, 1);
+  EXPECT_EQ(take(), pattern(1, 8));
+  cross(2);
+  expectNext(follower, 2);
+}
+
+TEST_F(RingFollowerTest, BeginsBehindTheNewestMessageWhereverThatIs) {
+  for (std::uint64_t ordinal = 1; ordinal < 100; ++ordinal) {
+    cross(ordinal, ordinal % layout::kInlineBodyBytes);
+    auto follower = follow();
+    expectNothing(follower);
+    cross(1000 + ordinal);
+    expectNext(follower, 1000 + ordinal);
+  }
+}
+
+TEST_F(RingFollowerTest, BeginsWithTheFirstMessageWhenAsked) {
+  cross(1);
+  cross(2, layout::kInlineBodyBytes);
+
+  auto follower = follow(FollowFrom::first);
+
+  expectNext(follower, 1);
+  expectNext(follower, 2, layout::kInlineBodyBytes);
+  expectNothing(follower);
+}
+
+TEST_F(RingFollowerTest, GoesOnBehindTheNewestWhenItWasTooSlow) {
+  auto follower = follow();
+  for (std::uint64_t ordinal = 1; ordinal <= 3 * kCapacity; ++ordinal) cross(ordinal);
+
+  RingCopy copy;
+  EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+  expectNothing(follower);
+  cross(1000);
+  expectNext(follower, 1000);
+}
+
+// A message of several slots leaves the sequences of its later slots as they were: old ones, that
+// look like none.
+TEST_F(RingFollowerTest, NoticesThatItWasTooSlowWhenLongMessagesCame) {
+  for (std::uint64_t warmUp = 0; warmUp < 7; ++warmUp) {
+    cross(warmUp);
+    auto follower = follow();
+    for (std::uint64_t ordinal = 0; ordinal < kCapacity; ++ordinal)
+      cross(ordinal, layout::kInlineBodyBytes);
+
+    RingCopy copy;
+    EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+  }
+}
+
+TEST_F(RingFollowerTest, NonsenseIsPassedOver) {
+  auto follower = follow();
+  ASSERT_TRUE(push(1));
+  ring_[0].slots = 99;
+
+  RingCopy copy;
+  EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+  EXPECT_NE(follower.tryNext(copy), Next::message);
+}
+
+// The producer may write any sequence into any slot. One that its slot cannot have must not look
+// like an overrun for ever.
+TEST_F(RingFollowerTest, ASequenceThatItsSlotCannotHaveIsNoNewerMessage) {
+  auto follower = follow();
+  for (const std::uint64_t sequence : {std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
+    for (std::uint64_t slot = 0; slot < kCapacity; ++slot)
+      ring_[slot].sequence.store(sequence + slot * 2, std::memory_order_relaxed);
+
+    RingCopy copy;
+    if (follower.tryNext(copy) == Next::overrun) expectNothing(follower);
+  }
+}
+
+TEST_F(RingFollowerTest, SurvivesARingOfNoise) {
+  Random random;
+  RingCopy copy;
+  for (int round = 0; round < 2000; ++round) {
+    auto follower = follow(round % 2 == 0 ? FollowFrom::first : FollowFrom::newest);
+    for (std::size_t i = 0; i < kCapacity * sizeof(layout::Slot); ++i)
+      ringBytes()[i] = static_cast<std::byte>(random.bits());
+    // Sequences that may be meant, too: noise alone is hardly ever one.
+    for (std::uint32_t slot = 0; slot < kCapacity; ++slot)
+      ring_[slot].sequence = slot + 1 + kCapacity * random.below(3);
+    for (std::uint32_t i = 0; i < 2 * kCapacity; ++i) {
+      if (follower.tryNext(copy) == Next::message) {
+        EXPECT_LE(copy.size, layout::kInlineBodyBytes);
+      }
+    }
+  }
+}
+
+// What the follower does not say it missed, it has seen, whole and in order.
+TEST_F(RingFollowerTest, MissesNothingUnsaidWhateverTheOrderOfPushesTakesAndLooks) {
+  Random random;
+  auto follower = follow();
+  std::uint64_t pushed = 0;
+  std::uint64_t taken = 0;
+  std::uint64_t next = 1;
+  std::vector<std::size_t> sizes{0};
+  std::uint64_t overruns = 0;
+  for (int step = 0; step < 200'000; ++step) {
+    switch (random.below(3)) {
+      case 0: {
+        const auto size = random.below(layout::kInlineBodyBytes + 1);
+        if (push(pushed + 1, size)) {
+          ++pushed;
+          sizes.push_back(size);
+        }
+        break;
+      }
+      case 1:
+        if (consumer_.hasMessage()) {
+          ++taken;
+          EXPECT_EQ(take(), pattern(taken, sizes[taken]));
+        }
+        break;
+      default: {
+        if (!random.oneIn(4)) break;
+        RingCopy copy;
+        const auto what = follower.tryNext(copy);
+        if (what == Next::nothing) {
+          EXPECT_EQ(next, pushed + 1);
+        }
+        if (what == Next::overrun) {
+          ++overruns;
+          next = pushed + 1;
+        }
+        if (what != Next::message) break;
+        ASSERT_EQ(copy.envelope.requestId, next);
+        ASSERT_EQ(Bytes(copy.body().begin(), copy.body().end()), pattern(next, sizes[next]));
+        ++next;
+      }
+    }
+  }
+  EXPECT_GT(overruns, 0u);
+  EXPECT_LT(overruns, pushed);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// `mpf torture`: that everything holds when processes are stopped and killed at each step, and that
+// it would say so if something did not.
+#include <sys/ptrace.h>
+
+#include <fstream>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "tests/support/watchdog.h"
+#include "tests/tools/tool.h"
+
+namespace mpf::test {
+namespace {
+
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::MatchesRegex;
+using testing::Not;
+
+class TortureTest : public testing::Test {
+ protected:
+  void SetUp() override {
+#ifdef __SANITIZE_THREAD__
+    GTEST_SKIP() << "ThreadSanitizer does not follow processes that fork and start threads";
+#endif
+    if (!mayTrace()) GTEST_SKIP() << "this host does not let a process trace its children";
+  }
+  static bool mayTrace() {
+    const auto child = checkCall(::fork(), "fork");
+    if (child == 0) {
+      for (;;) ::pause();
+    }
+    const bool may = ::ptrace(PTRACE_SEIZE, child, nullptr, nullptr) == 0;
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    return may;
+  }
+  static Ended torture(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "torture");
+    return runTool(std::move(arguments), "");
+  }
+  const Watchdog watchdog_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(TortureTest, EverythingHoldsWhenProcessesAreKilledAtEachStep) {
+  const auto ended = torture({"--duration", "0", "--mode", "kill"});
+
+  EXPECT_EQ(ended.status, 0) << ended.out << ended.err;
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("\nheld: "), Not(HasSubstr("never reached"))));
+}
+
+TEST_F(TortureTest, EverythingHoldsWhenProcessesAreStoppedAtEachStep) {
+  const auto ended = torture({"--duration", "0", "--mode", "stop"});
+
+  EXPECT_EQ(ended.status, 0) << ended.out << ended.err;
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("\nheld: "), Not(HasSubstr("never reached"))));
+}
+
+TEST_F(TortureTest, EveryInstructionUpToTheNextStepIsTried) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "AddressSanitizer makes many instructions of one";
+#endif
+  const auto ended =
+      torture({"--every-instruction", "chunk_noted", "--role", "client", "--mode", "kill"});
+
+  EXPECT_EQ(ended.status, 0) << ended.out << ended.err;
+  EXPECT_THAT(ended.out, HasSubstr("\nheld: ")) << "each behind the one before";
+  std::istringstream row(ended.out.substr(ended.out.find("\nchunk_noted")));
+  std::string name;
+  int killed = 0;
+  row >> name >> killed;
+  EXPECT_GT(killed, 3);
+}
+
+TEST_F(TortureTest, TheVerdictIsThereForProgramsToo) {
+  const auto path = testing::TempDir() + "mpf-torture-" + std::to_string(::getpid()) + ".json";
+
+  const auto ended =
+      torture({"--duration", "0", "--step", "link_created", "--seed", "7", "--json", path});
+
+  const auto json = nlohmann::json::parse(std::ifstream(path));
+  EXPECT_EQ(std::remove(path.c_str()), 0);
+  EXPECT_EQ(ended.status, 0) << ended.out << ended.err;
+  EXPECT_EQ(json.at("verdict"), "held");
+  EXPECT_EQ(json.at("seed"), 7);
+  EXPECT_EQ(json.at("never_reached"), nlohmann::json::array());
+  EXPECT_EQ(json.at("steps").at(0).at("step"), "link_created");
+  EXPECT_EQ(json.at("steps").at(0).at("client").at("killed"), 1);
+  EXPECT_EQ(json.at("steps").at(0).at("server").at("killed"), 0) << "no server comes there";
+}
+
+TEST_F(TortureTest, AStepThatIsNeverReachedMakesTheVerdictIncomplete) {
+  const auto ended = torture({"--duration", "0", "--step", "link_created", "--role", "server"});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.out,
+              AllOf(HasSubstr("never reached: link_created\n"), HasSubstr("\nincomplete: ")));
+}
+
+// Each mistake breaks what it should break.
+struct Mistake {
+  std::string name, patience, complaint;
+};
+std::ostream& operator<<(std::ostream& out, const Mistake& mistake) { return out << mistake.name; }
+
+class MistakeTest : public TortureTest, public testing::WithParamInterface<Mistake> {};
+
+TEST_P(MistakeTest, IsFound) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "how patient a referee must be is tried without AddressSanitizer, with which "
+                  "every step takes longer";
+#endif
+  const auto ended = torture({"--break", GetParam().name, "--patience", GetParam().patience,
+                              "--step", "window_closed", "--duration", "200"});
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("\nfailed: "), HasSubstr(GetParam().complaint)));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Each, MistakeTest,
+    testing::Values(Mistake{"lose-fate", "8", "each request has an end"},
+                    // nonsense, or an old request once more
+                    Mistake{"half-message", "30", ""},
+                    Mistake{"keep-name", "30", "the successor could not take the place"},
+                    Mistake{"stale", "8", "nothing stale is left; there are mpf."},
+                    Mistake{"leak", "8", "the survivors hold no more than they did"}),
+    [](const auto& mistake) {
+      auto name = mistake.param.name;
+      name.erase(name.find('-') == std::string::npos ? name.size() : name.find('-'), 1);
+      return name;
+    });
+
+TEST(TortureStepsTest, AreExplainedInTheManual) {
+  std::set<std::string> explained;
+  std::ifstream manual(MPF_TEST_TORTURE_MD);
+  std::string line;
+  while (std::getline(manual, line) && line != "## Steps") continue;
+  while (std::getline(manual, line)) {
+    if (line.starts_with("| `")) explained.insert(line.substr(3, line.find('`', 3) - 3));
+  }
+  std::istringstream listed(runTool({"torture", "--list"}, "").out);
+  const std::set<std::string> steps{std::istream_iterator<std::string>(listed), {}};
+
+  EXPECT_EQ(explained, steps);
+}
+
+TEST(TortureStepsTest, AnUnknownOneIsNamed) {
+  const auto ended = runTool({"torture", "--step", "nonsense"}, "");
+
+  EXPECT_EQ(ended.status, 2);
+  EXPECT_THAT(ended.err, HasSubstr("no step \"nonsense\"; `mpf torture --list` names all"));
+}
+
+// Before hours of work, not after them.
+TEST_F(TortureTest, AVerdictThatCannotBeWrittenEndsItAtOnce) {
+  const auto ended =
+      runTool({"torture", "--json", "/nowhere/verdict.json", "--duration", "1000000"}, "");
+
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.err, HasSubstr("open /nowhere/verdict.json: No such file or directory"));
+  EXPECT_EQ(ended.out, "");
+}
+
+}  // namespace
+}  // namespace mpf::test

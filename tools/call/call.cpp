@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: MIT
+// mpf call: sends a message of any type and prints the reply; or many, and prints how long they
+// took.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <fmt/format.h>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include <mpf/sync_client.h>
+
+#include "base/command_line.h"
+#include "base/duration_text.h"
+#include "base/latency_recorder.h"
+#include "base/print_error.h"
+#include "base/stop_signals.h"
+#include "schema/json.h"
+#include "tools/arguments.h"
+#include "tools/commands.h"
+#include "tools/text/json_text.h"
+#include "tools/text/show.h"
+
+namespace mpf::tools {
+namespace {
+
+struct CallArguments : ServerArguments {
+  std::string type;
+  std::vector<std::string> fields;
+  std::uint64_t count = 1;
+  double timeout = 1;  // [s]
+  double interval = 0;  // [s]
+  double follow = 0;  // [s]
+  bool json = false;
+  bool printAll = false;
+};
+
+// What only MPF itself says is nothing to call with: no server waits for it, and its reply would
+// pass for a fate.
+bool isForCalls(MessageType type) {
+  return type != MessageType::connect && type != MessageType::requestFate;
+}
+
+std::string typesForCalls() {
+  std::string names;
+  for (std::uint16_t number = 1; toString(static_cast<MessageType>(number)) != "unknown";
+       ++number) {
+    const auto type = static_cast<MessageType>(number);
+    if (isForCalls(type)) names.append(names.empty() ? "" : ", ").append(toString(type));
+  }
+  return names;
+}
+
+// What the end of a request means for who sent it.
+std::string meaning(Fate fate, MessageType type) {
+  switch (fate) {
+    case Fate::refused:
+      return fmt::format("the server does not take {} messages, or let this one go without a reply",
+                         toString(type));
+    case Fate::neverTaken:
+      return "the server went away before it took the request: nothing was done";
+    case Fate::outcomeUnknown:
+      return "the server took the request and did not reply in time, went away, or its reply was "
+             "larger than a router lets through: it may "
+             "have been done";
+    case Fate::expired:
+      return "the server did not take the request in time: nothing was done";
+    case Fate::cancelled:
+      return "the request was taken back";
+  }
+  return "this program does not know that fate";
+}
+
+class Caller {
+ public:
+  Caller(const CallArguments& arguments, MessageType type)
+      : arguments_(arguments),
+        type_(type),
+        client_(Backplane::attach(arguments.backplane), arguments.server, arguments.location) {
+    // What comes at the end is worth something: then a signal ends the loop, after the call that is
+    // under way. Else it ends the program.
+    if (isLoop() || arguments_.follow > 0) {
+      stop_.emplace(
+          [](void* stopped) noexcept { static_cast<std::atomic<bool>*>(stopped)->store(true); },
+          &stopped_);
+    }
+  }
+
+  int run() {
+    for (std::uint64_t i = 0; i < arguments_.count && !stopped_; ++i) {
+      if (i != 0) pause();
+      if (stopped_) break;
+      callOnce();
+      showProgress(i + 1);
+    }
+    follow();
+    report();
+    return failed_ == 0 && recorder_->count() != 0 ? 0 : 1;
+  }
+
+ private:
+  // how often waits look whether they shall end
+  static constexpr Nanoseconds kGlance = std::chrono::milliseconds(100);
+
+  [[nodiscard]] bool isLoop() const noexcept { return arguments_.count > 1; }
+  [[nodiscard]] bool showsEach() const noexcept { return !isLoop() || arguments_.printAll; }
+
+  void pause() const {
+    const auto until = Deadline::after(ofSeconds(arguments_.interval));
+    while (!stopped_ && !until.hasPassed())
+      std::this_thread::sleep_for(std::min(kGlance, until.left()));
+  }
+
+  void callOnce() {
+    std::string error;
+    auto message = tryParse(type_, arguments_.fields, error);
+    if (!message) throw std::logic_error(error);  // parsed before: nothing is wrong with it
+    const auto sentNs = Clock::nowNs();
+    auto answer = client_.call(std::move(*message), ofSeconds(arguments_.timeout));
+    if (answer) {
+      recorder_->add(static_cast<std::uint64_t>(Clock::nowNs() - sentNs));
+      if (showsEach()) show(answer.message());
+    } else {
+      ++failed_;
+      const auto why = whyNot(answer);
+      ++reasons_[why];
+      if (showsEach() && !arguments_.json) printError("mpf call: {}\n", why);
+    }
+  }
+
+  std::string whyNot(const Answer& answer) {
+    if (const auto fate = answer.fate())
+      return fmt::format("{} ({})", answer.why(), meaning(*fate, type_));
+    const auto because = client_.client().notConnectedBecause();
+    return answer.why() +
+           (because.empty() ? "" : fmt::format(": {}; `mpf ls` shows what there is", because));
+  }
+
+  void show(const Message& message) {
+    if (arguments_.json) replies_.push_back(toJson(message));
+    else
+      tools::show(
+          print(message, arguments_.printAll ? std::numeric_limits<std::size_t>::max() : 64) +
+          "\n");
+  }
+
+  // Messages of the server that come after the reply.
+  void follow() {
+    const auto until = Deadline::after(ofSeconds(arguments_.follow));
+    while (arguments_.follow > 0 && !stopped_ && !until.hasPassed()) {
+      if (const auto message = client_.receive(std::min(kGlance, until.left()))) show(message);
+    }
+  }
+
+  void showProgress(std::uint64_t done) {
+    const auto nowNs = Clock::nowNs();
+    if (!isLoop() || nowNs - shownNs_ < 1'000'000'000 || ::isatty(STDERR_FILENO) == 0) return;
+    shownNs_ = nowNs;
+    writeError(fmt::format("\r{} of {}, {} failed ", done, arguments_.count, failed_));
+  }
+
+  void report() {
+    if (shownNs_ != 0) writeError("\r\x1b[K");
+    if (arguments_.json) return reportJson();
+    if (!isLoop()) return;
+    for (const auto& [reason, times] : reasons_) {
+      if (!showsEach())
+        printError("mpf call: {}{}\n", reason, times == 1 ? "" : fmt::format(" ({} times)", times));
+    }
+    const auto at = [&](double percent) {
+      return durationText(static_cast<double>(recorder_->percentileNs(percent)));
+    };
+    fmt::print("{} replied, {} did not; p50 {}, p99 {}, p99.9 {}, max {}\n", recorder_->count(),
+               failed_, at(50), at(99), at(99.9),
+               durationText(static_cast<double>(recorder_->maxNs())));
+  }
+
+  void reportJson() {
+    nlohmann::json report{{"server", arguments_.server},
+                          {"location", arguments_.location},
+                          {"replied", recorder_->count()},
+                          {"failed", failed_},
+                          {"why", reasons_},
+                          {"replies", replies_},
+                          {"p50_ns", recorder_->percentileNs(50)},
+                          {"p99_ns", recorder_->percentileNs(99)},
+                          {"p999_ns", recorder_->percentileNs(99.9)},
+                          {"max_ns", recorder_->maxNs()}};
+    fmt::print("{}\n", jsonText(report));
+  }
+
+  const CallArguments& arguments_;
+  MessageType type_;
+  SyncClient client_;
+  std::atomic<bool> stopped_{false};
+  std::optional<StopSignals> stop_;
+  std::unique_ptr<LatencyRecorder> recorder_ = std::make_unique<LatencyRecorder>();
+  std::uint64_t failed_ = 0;
+  std::map<std::string, std::uint64_t> reasons_;
+  nlohmann::json replies_ = nlohmann::json::array();
+  std::int64_t shownNs_ = 0;
+};
+
+int call(const CallArguments& arguments) {
+  const auto type = tryParseType(arguments.type);
+  if (!type || !isForCalls(*type)) {
+    const auto what = type ? "is what MPF itself says to clients" : "is no message type";
+    printError("mpf call: {} {}; use one of {}\n", arguments.type, what, typesForCalls());
+    return 2;
+  }
+  std::string error;
+  if (!tryParse(*type, arguments.fields, error)) {
+    printError("mpf call: {}\n", error);
+    return 2;
+  }
+  return Caller(arguments, *type).run();
+}
+
+}  // namespace
+
+void addCall(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand(
+      "call", "Sends a message to a server and prints the reply; or many, and how long they took");
+  auto arguments = std::make_shared<CallArguments>();
+  addServer(command, *arguments);
+  command.add_option("type", arguments->type, "Type of the message: " + typesForCalls())
+      ->required();
+  command.add_option(
+      "fields", arguments->fields,
+      R"(Its fields, as field=value: value=3, value=1,2,3, value='*IDN?\n', eomString='\r\n')");
+  addSeconds(command, "--timeout", arguments->timeout, "Longest wait for a reply", false);
+  command.add_option("--count", arguments->count, "Messages to send, one after the other's reply")
+      ->capture_default_str()
+      ->check(wholeNumber(1, std::uint64_t{1} << 53));
+  addSeconds(command, "--interval", arguments->interval, "Pause between them", true);
+  addSeconds(command, "--follow", arguments->follow,
+             "Go on for so long to print what the server sends after the reply", true);
+  command.add_flag("--print", arguments->printAll,
+                   "Print each reply of a loop, and arrays in full");
+  addJson(command, arguments->json);
+  command.footer(
+      "Fields that are not named are 0; a wrong one gets you the list of all.\n"
+      "Example: mpf call Int32 int32 value=3\n"
+      "Example: mpf call voltmeter char8Array cmd=3 timeout=1 value='*IDN?\\n'    (a serial "
+      "server: write, then read; 1 s at most)\n"
+      "Exit status: 0 every message got a reply, whatever the reply says; 1 not so; 2 there is no "
+      "such type or field.");
+  command.callback([arguments, &run] { run = [arguments] { return call(*arguments); }; });
+}
+
+}  // namespace mpf::tools

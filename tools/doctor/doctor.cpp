@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// mpf doctor: what on this host would hurt, and what helps.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fmt/format.h>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "tools/arguments.h"
+#include "tools/commands.h"
+#include "tools/doctor/checks.h"
+#include "tools/text/json_text.h"
+#include "tools/text/wrap.h"
+
+namespace mpf::tools {
+namespace {
+
+void print(const Finding& finding) {
+  constexpr std::size_t kIndent = 9;
+  fmt::print("{}", wrap(fmt::format("{:<8} ", toString(finding.health)),
+                        finding.check + ": " + finding.seen, kIndent));
+  if (!finding.remedy.empty())
+    fmt::print("{}", wrap(std::string(kIndent, ' '), "remedy: " + finding.remedy, kIndent + 2));
+}
+
+nlohmann::json toJson(const std::vector<Finding>& findings) {
+  auto list = nlohmann::json::array();
+  for (const auto& finding : findings) {
+    list.push_back({{"check", finding.check},
+                    {"verdict", toString(finding.health)},
+                    {"seen", finding.seen},
+                    {"remedy", finding.remedy}});
+  }
+  return list;
+}
+
+int examine(bool json) {
+  const auto findings = runDoctorChecks(Host());
+  if (json) fmt::print("{}\n", jsonText(toJson(findings)));
+  else
+    for (const auto& finding : findings) print(finding);
+  return std::ranges::any_of(
+             findings, [](const Finding& finding) { return finding.health == Health::problem; })
+             ? 1
+             : 0;
+}
+
+}  // namespace
+
+void addDoctor(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand("doctor", "What on this host would hurt, and what helps");
+  auto json = std::make_shared<bool>(false);
+  addJson(command, *json);
+  command.footer("Exit status: 0 no problem, though maybe warnings; 1 a problem.");
+  command.callback([json, &run] { run = [json] { return examine(*json); }; });
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// Check-up of servers that run: whether they can accept more clients.
+#include <fcntl.h>
+
+#include <charconv>
+#include <fmt/format.h>
+
+#include <mpf/file_descriptor.h>
+
+#include "shm/owner_lock.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "tools/doctor/checks.h"
+#include "tools/inspect/segment_image.h"
+#include "tools/text/wrap.h"
+
+namespace mpf::tools {
+namespace {
+
+struct OpenFiles {
+  std::uint64_t used = 0, limit = 0;
+  // Another two or three clients are the last.
+  [[nodiscard]] bool isNearlyFull() const noexcept {
+    return limit != 0 && used + limit / 20 >= limit;
+  }
+};
+
+// Of a process; nothing where /proc does not show it to this user.
+OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
+  OpenFiles files;
+  files.used = host.list(fmt::format("proc/{}/fd", pid)).size();
+  if (files.used == 0) return {};
+  constexpr std::string_view kLine = "Max open files";
+  for (const auto& line : host.tryReadLines(fmt::format("proc/{}/limits", pid))) {
+    const auto from = line.find_first_not_of(' ', kLine.size());
+    if (!line.starts_with(kLine) || from == std::string::npos) continue;
+    std::from_chars(line.data() + from, line.data() + line.size(), files.limit);
+  }
+  return files;
+}
+
+// What hinders a server; empty when nothing does.
+std::string troubleOf(const Host& host, const layout::SegmentHeader& header,
+                      const layout::WindowControl& control) {
+  const auto server = fmt::format("\"{}\" (pid {})", segments::text(header.name), header.ownerPid);
+  switch (control.shortage.load(std::memory_order_relaxed)) {
+    case layout::Shortage::descriptors:
+      return server + " refuses clients: no file descriptor is left";
+    case layout::Shortage::openFiles:
+      return server + " refuses clients: the host has no open file left";
+    case layout::Shortage::memory:
+      return server + " refuses clients: no memory is left";
+    default:
+      break;
+  }
+  const auto files = openFilesOf(host, header.ownerPid);
+  if (!files.isNearlyFull()) return {};
+  return fmt::format("{} has {} of {} files open", server, files.used, files.limit);
+}
+
+// A server window whose owner lives; nullopt: something else, or not for this user to read.
+std::optional<SegmentImage> livingServer(const std::filesystem::path& path) try {
+  auto image = SegmentImage::tryReadFile(path.string());
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  if (!image || !file || image->header().kind != layout::SegmentKind::serverWindow)
+    return std::nullopt;
+  if (!owner_lock::isHeldByOwner(file.get(), image->header())) return std::nullopt;
+  return image;
+} catch (const std::exception&) {
+  return std::nullopt;
+}
+
+}  // namespace
+
+Finding checkServers(const Host& host) {
+  constexpr const char* kName = "open files of servers";
+  std::size_t servers = 0;
+  std::vector<std::string> troubles;
+  for (const auto& name : host.list("dev/shm")) {
+    const auto parsed = SegmentName::tryParse(name);
+    if (!parsed || parsed->kind != NameKind::serverWindow) continue;
+    const auto image = livingServer(host.root / "dev/shm" / name);
+    if (!image) continue;
+    ++servers;
+    if (auto trouble = troubleOf(host, image->header(), image->window()); !trouble.empty())
+      troubles.push_back(std::move(trouble));
+  }
+  if (servers == 0) return {kName, Health::ok, "no server runs", {}};
+  if (troubles.empty()) return {kName, Health::ok, counted(servers, "server"), {}};
+  auto seen = troubles.front();
+  if (troubles.size() > 1) seen += fmt::format("; and {} more", troubles.size() - 1);
+  return {kName, Health::problem, seen,
+          "start it with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd unit"};
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+#include "tools/inspect/dissect_link.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+
+#include <mpf/file_descriptor.h>
+
+#include "schema/json.h"
+#include "schema/text.h"
+#include "shm/segment.h"
+#include "shm/segment_name.h"
+#include "tools/inspect/ring_view.h"
+#include "tools/report/snapshot.h"
+
+namespace mpf::tools {
+namespace {
+
+using layout::SegmentHeader;
+
+constexpr std::uint32_t kMostBulks = 256;  // of one side; a pool never has more
+constexpr std::size_t kMostBody = std::size_t{16} << 20;  // larger ones are not read to be shown
+
+template <class Word>
+auto said(const Word& word) noexcept {
+  return word.load(std::memory_order_relaxed);
+}
+
+// The folder in which a link's bulk segments lie, and how they are called.
+struct Beside {
+  std::filesystem::path link;
+  std::string backplane;
+  std::uint64_t incarnation = 0;
+  [[nodiscard]] std::string bulk(std::uint32_t side, std::uint32_t segment) const {
+    return std::filesystem::path(link)
+        .replace_filename(SegmentName::bulk(backplane, incarnation, side, segment))
+        .string();
+  }
+};
+
+// Reads the body of a message from its chunk. Throws with the reason why it cannot.
+std::vector<std::byte> readChunk(const Beside& beside, const layout::ChunkRef& ref,
+                                 std::size_t bodyBytes) {
+  if (ref.side > 1)
+    throw SegmentError(fmt::format("a chunk of side {}, which no link has", ref.side));
+  const auto path = beside.bulk(ref.side, ref.segment);
+  const auto image = SegmentImage::tryReadFile(path);
+  if (!image) throw SegmentError(path + ": not there any more");
+  const auto& header = image->header();
+  if (header.kind != layout::SegmentKind::bulk || ref.chunk >= header.chunkCount ||
+      bodyBytes > header.chunkBytes) {
+    throw SegmentError(fmt::format("{}: has no chunk {} of {} bytes", path, ref.chunk, bodyBytes));
+  }
+  if (bodyBytes > kMostBody)
+    throw SegmentError(fmt::format("{} bytes are too many to show", bodyBytes));
+  std::vector<std::byte> body(bodyBytes);
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  const auto offset = layout::kBulkChunksOffset + ref.chunk * header.chunkBytes;
+  if (!file || ::pread(file.get(), body.data(), body.size(), static_cast<off_t>(offset)) !=
+                   static_cast<ssize_t>(body.size())) {
+    throw SegmentError(fmt::format("{}: chunk {} is cut off", path, ref.chunk));
+  }
+  return body;
+}
+
+Tree dissectMessage(const RingMessage& message, const Beside& beside, bool raw) {
+  const auto& slot = message.first.front();
+  Tree tree{{"position", message.position},
+            {"state", toString(message.state)},
+            {"request_id", slot.requestId}};
+  if (slot.deadlineNs != 0) tree["deadline_ns"] = slot.deadlineNs;
+  tree["first_reply"] = (slot.flags & layout::kSlotFirstReply) != 0;
+  auto body = message.inlineBody();
+  try {
+    if ((slot.flags & layout::kSlotChunk) != 0) {
+      layout::ChunkRef ref{};
+      std::memcpy(&ref, body.data(), sizeof ref);
+      tree["chunk"] = {{"side", ref.side}, {"segment", ref.segment}, {"chunk", ref.chunk}};
+      body = readChunk(beside, ref, slot.bodyBytes);
+    } else if (slot.bodyBytes > body.size()) {
+      throw SegmentError(fmt::format("{} bytes of body in {} slots", slot.bodyBytes,
+                                     message.bytes.size() / sizeof(layout::Slot)));
+    }
+    body.resize(slot.bodyBytes);
+    auto decoded = Message::copyOf(static_cast<MessageType>(slot.type), body);
+    decoded.setClientType(slot.clientType);
+    decoded.setClientExtra(slot.clientExtra);
+    tree["text"] = print(decoded);
+    tree["message"] = toJson(decoded);
+  } catch (const std::exception& error) {
+    tree["problem"] = error.what();
+  }
+  if (raw) tree["raw"] = hexDigits(message.bytes);
+  return tree;
+}
+
+struct RingPlace {
+  std::size_t offset;
+  std::uint32_t slots;
+  const layout::RingControl& control;
+  const layout::RingControl& laterControl;
+  std::uint64_t sent;
+};
+
+Tree dissectRing(const RingPlace& place, const SegmentImage& image, const SegmentImage& later,
+                 const Beside& beside, const DissectOptions& options) {
+  const RingWords words{said(place.control.freed), said(place.control.taken), place.sent};
+  const auto view =
+      RingView::of(image.slots(place.offset, place.slots), words,
+                   later.slots(place.offset, place.slots), said(place.laterControl.freed));
+  Tree tree{{"slots", place.slots},
+            {"sent", words.sent},
+            {"taken", words.taken},
+            {"waiting", words.waiting()},
+            {"freed", words.freed},
+            {"end", view.end},
+            {"polled", said(place.control.unwatched) == 0}};
+  if (view.overwritten != 0) tree["overwritten"] = view.overwritten;
+  tree["messages"] = Tree::array();
+  const auto skipped = view.messages.size() - std::min(view.messages.size(), options.last);
+  for (std::size_t i = skipped; i < view.messages.size(); ++i) {
+    tree["messages"].push_back(dissectMessage(view.messages[i], beside, options.raw));
+  }
+  return tree;
+}
+
+Tree dissectPool(std::uint32_t side, const layout::ReturnRing& returns, const Beside& beside) {
+  Tree tree{{"returned", said(returns.returned)}};
+  auto segments = Tree::array();
+  for (std::uint32_t number = 0; number < kMostBulks; ++number) {
+    const auto path = beside.bulk(side, number);
+    try {
+      const auto image = SegmentImage::tryReadFile(path);
+      if (!image) break;
+      segments.push_back({{"file", path},
+                          {"chunk_count", image->header().chunkCount},
+                          {"chunk_bytes", image->header().chunkBytes}});
+    } catch (const std::exception& error) {
+      segments.push_back({{"file", path}, {"problem", error.what()}});
+    }
+  }
+  tree["segments"] = std::move(segments);
+  return tree;
+}
+
+bool isRing(std::uint32_t slots) noexcept {
+  return std::has_single_bit(slots) && slots <= layout::kMaxRingSlots;
+}
+
+}  // namespace
+
+std::string hexDigits(std::span<const std::byte> bytes) {
+  std::string text;
+  text.reserve(2 * bytes.size());
+  for (const auto byte : bytes)
+    fmt::format_to(std::back_inserter(text), "{:02x}", std::to_integer<unsigned>(byte));
+  return text;
+}
+
+void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
+                 const DissectOptions& options) {
+  const auto& header = image.header();
+  const auto& control = image.link();
+  tree["server"] = segments::text(header.name);
+  tree["location"] = header.location;
+  tree["server_side"] = {{"window", hex(header.serverWindow)},
+                         {"state", toString(said(control.serverState))},
+                         {"index", said(control.serverIndex)},
+                         {"sent", said(control.serverSent)}};
+  tree["client_side"] = {{"window", hex(header.clientWindow)},
+                         {"state", toString(said(control.clientState))},
+                         {"index", header.clientIndex},
+                         {"sent", said(control.clientSent)},
+                         {"refused", said(control.clientRefused)},
+                         {"unanswered", said(control.clientUnanswered)}};
+  tree["limits"] = {{"queue_size", header.queueSize},
+                    {"max_outstanding", header.maxOutstanding},
+                    {"max_message_bytes", header.maxMessageBytes},
+                    {"max_pool_bytes", header.maxPoolBytes}};
+  const Beside beside{path, segments::text(header.backplane), header.incarnation};
+  if (!isRing(header.queueSlots) || !isRing(header.replySlots)) {
+    tree["problem"] =
+        fmt::format("rings of {} and {} slots make no sense", header.queueSlots, header.replySlots);
+    return;
+  }
+  if (image.bytes().size() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+    tree["problem"] = fmt::format("{} bytes are too few for rings of {} and {} slots",
+                                  image.bytes().size(), header.queueSlots, header.replySlots);
+    return;
+  }
+  try {
+    SegmentName::checkBackplane(beside.backplane);
+  } catch (const std::exception& error) {
+    tree["problem"] = error.what();
+    return;
+  }
+  // What the first copy caught half-way the second one tells.
+  auto again = SegmentImage::tryReadFile(path);
+  const auto& later = again && again->bytes().size() == image.bytes().size() ? *again : image;
+  const auto replies = layout::kLinkRingsOffset + header.queueSlots * sizeof(layout::Slot);
+  tree["requests"] = dissectRing({layout::kLinkRingsOffset, header.queueSlots, control.requests,
+                                  later.link().requests, said(control.clientSent)},
+                                 image, later, beside, options);
+  tree["replies"] = dissectRing(
+      {replies, header.replySlots, control.replies, later.link().replies, said(control.serverSent)},
+      image, later, beside, options);
+  tree["client_pool"] = dissectPool(0, control.requestChunks, beside);
+  tree["server_pool"] = dissectPool(1, control.replyChunks, beside);
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include "tools/inspect/segment_image.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fmt/format.h>
+
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
+#include "shm/segment.h"
+
+namespace mpf::tools {
+
+namespace {
+
+// As long as a segment of any kind can be without its chunks: a link with the longest rings.
+constexpr std::size_t kMostBytes = layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots);
+
+// What a header says, unchecked; no kind at all when there is none.
+layout::SegmentKind kindOf(int file) noexcept {
+  layout::SegmentKind kind{};
+  static_cast<void>(::pread(file, &kind, sizeof kind, offsetof(layout::SegmentHeader, kind)));
+  return kind;
+}
+
+}  // namespace
+
+std::optional<SegmentImage> SegmentImage::tryRead(const std::string& name, layout::SegmentKind kind,
+                                                  std::size_t bytes) {
+  return tryLoad(segments::path(name), kind, bytes);
+}
+
+std::optional<SegmentImage> SegmentImage::tryReadFile(const std::string& path) {
+  return tryLoad(path, std::nullopt, kMostBytes);
+}
+
+std::optional<SegmentImage> SegmentImage::tryLoad(const std::string& path,
+                                                  std::optional<layout::SegmentKind> kind,
+                                                  std::size_t bytes) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  if (!file) {
+    if (errno == ENOENT) return std::nullopt;
+    throwSystemError(errno, "open", path);
+  }
+  struct stat status{};
+  checkCall(::fstat(file.get(), &status), "look at", path);
+  if (!S_ISREG(status.st_mode))
+    throw SegmentError(fmt::format("{}: not a segment of MPF (no plain file)", path));
+
+  SegmentImage image;
+  image.fileBytes_ = static_cast<std::uint64_t>(status.st_size);
+  // What the accessors reach is there, whatever the file has.
+  constexpr auto kLeast =
+      std::max({layout::kWindowBytes, layout::kLinkRingsOffset, sizeof(layout::WindowHints)});
+  const auto most = kind || kindOf(file.get()) != layout::SegmentKind::bulk
+                        ? bytes
+                        : sizeof(layout::SegmentHeader);
+  const auto wanted = std::min<std::uint64_t>(most, image.fileBytes_);
+  image.blocks_ = std::make_unique<Block[]>(
+      (std::max<std::size_t>(wanted, kLeast) + sizeof(Block) - 1) / sizeof(Block));
+  image.bytesRead_ = static_cast<std::size_t>(
+      checkCall(::pread(file.get(), image.blocks_.get(), wanted, 0), "read", path));
+  if (image.bytesRead_ < sizeof(layout::SegmentHeader)) {
+    throw SegmentError(
+        fmt::format("{}: truncated, {} bytes are too few for a header", path, image.bytesRead_));
+  }
+  segments::check(image.header(), image.fileBytes_, kind.value_or(image.header().kind), path);
+  return image;
+}
+
+std::span<const layout::RouterLine> SegmentImage::routerLines() const noexcept {
+  if (bytesRead_ < layout::kRouterLinesOffset) return {};
+  const auto rows = (bytesRead_ - layout::kRouterLinesOffset) / sizeof(layout::RouterLine);
+  return {&at<layout::RouterLine>(layout::kRouterLinesOffset),
+          std::min<std::size_t>(rows, layout::kRouterLines)};
+}
+
+std::span<const layout::Slot> SegmentImage::slots(std::size_t offset,
+                                                  std::size_t count) const noexcept {
+  if (offset % sizeof(layout::Slot) != 0 || offset >= bytesRead_) return {};
+  return {&at<layout::Slot>(offset), std::min(count, (bytesRead_ - offset) / sizeof(layout::Slot))};
+}
+
+}  // namespace mpf::tools

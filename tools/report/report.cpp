@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#include "tools/report/report.h"
+
+#include <fmt/format.h>
+
+#include <mpf/backplane.h>
+
+#include "base/command_line.h"
+#include "tools/arguments.h"
+#include "tools/text/json_text.h"
+
+namespace mpf::tools {
+
+void addReport(CLI::App& app, ReportArguments& arguments) {
+  addBackplane(app, arguments.backplane, "all that there are");
+  app.add_option("--interval", arguments.intervalMs,
+                 "Time between the two looks that give rates and show who is stalled [ms]")
+      ->capture_default_str()
+      ->check(wholeNumber(1, 3'600'000));
+  addJson(app, arguments.json);
+}
+
+std::string serverText(const std::string& server, std::int32_t location) {
+  return location == 0 ? server : fmt::format("{}@{}", server, location);
+}
+
+int reportEach(const ReportArguments& arguments,
+               const std::function<void(const SnapshotDelta&)>& print,
+               const std::function<void(const SnapshotDelta&, nlohmann::json& list)>& collect) {
+  auto list = nlohmann::json::array();
+  const auto backplanes =
+      arguments.backplane.empty() ? Backplane::names() : std::vector{arguments.backplane};
+  for (const auto& backplane : backplanes) {
+    const SnapshotDelta look(backplane, std::chrono::milliseconds(arguments.intervalMs));
+    if (arguments.json) collect(delta, list);
+    else print(delta);
+  }
+  if (arguments.json) fmt::print("{}\n", jsonText(list));
+  return static_cast<int>(backplanes.size());
+}
+
+}  // namespace mpf::tools

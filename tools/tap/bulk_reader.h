@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// BulkReader: copies bodies out of the pool of one side of a link, beside the two that own and
+// borrow it.
+//
+// Threads  one.
+// Crash    a pool whose link is gone stays readable for as long as its segments are mapped here.
+// Trust    a ChunkRef that does not fit its segment is refused in words.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shm/segment.h"
+
+namespace mpf::tools {
+
+class BulkReader {
+ public:
+  BulkReader(std::string backplane, std::uint64_t link)
+      : backplane_(std::move(backplane)), link_(link) {}
+
+  // The beginning of the chunk, `bytes` long.
+  //   throws  SegmentError, std::system_error, std::bad_alloc
+  [[nodiscard]] std::vector<std::byte> read(const layout::ChunkRef& ref, std::size_t bytes);
+
+ private:
+  const Segment& open(const layout::ChunkRef& ref);
+  std::string backplane_;
+  std::uint64_t link_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Segment> segments_;  // by side and number
+};
+
+}  // namespace mpf::tools

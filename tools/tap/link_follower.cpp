@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include "tools/tap/link_follower.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <iterator>
+
+namespace mpf::tools {
+namespace {
+
+// Most that is read of one direction before the other one has its turn.
+constexpr std::size_t kBatch = 256;
+
+const layout::LinkControl& controlOf(const Segment& segment) {
+  return segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+}
+
+// Moves a reply's request, and those before it, in front of it.
+void interleave(std::vector<TappedMessage>& requests, std::vector<TappedMessage>& replies,
+                std::vector<TappedMessage>& merged) {
+  auto next = requests.begin();
+  for (auto& reply : replies) {
+    const auto own = std::find_if(next, requests.end(), [&](const TappedMessage& request) {
+      return request.requestId == reply.requestId;
+    });
+    if (own != requests.end()) {
+      std::move(next, own + 1, std::back_inserter(merged));
+      next = own + 1;
+    }
+    merged.push_back(std::move(reply));
+  }
+  std::move(next, requests.end(), std::back_inserter(merged));
+}
+
+}  // namespace
+
+std::unique_ptr<LinkFollower> LinkFollower::tryOpen(const std::string& backplane,
+                                                    const std::string& name, FollowFrom from) {
+  auto segment = Segment::tryOpen(name, layout::SegmentKind::link, Segment::Access::readOnly);
+  if (!segment) return nullptr;
+  const auto& header = segment->header();
+  const auto isRing = [](std::uint32_t slots) {
+    return std::has_single_bit(slots) && slots >= 16 && slots <= layout::kMaxRingSlots;
+  };
+  if (!isRing(header.queueSlots) || !isRing(header.replySlots) ||
+      segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+    throw SegmentError(segments::path(name) + ": no link, its rings do not fit its file");
+  }
+  return std::unique_ptr<LinkFollower>(new LinkFollower(backplane, std::move(*segment), from));
+}
+
+LinkFollower::LinkFollower(const std::string& backplane, Segment segment, FollowFrom from)
+    : segment_(std::move(segment)),
+      bulk_(backplane, segment_.header().incarnation),
+      requests_(begin(Direction::request, from)),
+      replies_(begin(Direction::reply, from)) {}
+
+LinkFollower::Side LinkFollower::begin(Direction direction, FollowFrom from) const {
+  constexpr int kTries = 100;
+  const auto& control = controlOf(segment_);
+  const bool isRequest = direction == Direction::request;
+  const auto* slots = &segment_.at<layout::Slot>(layout::kLinkRingsOffset);
+  const auto& sent = isRequest ? control.clientSent : control.serverSent;
+  for (int tries = 1;; ++tries) {
+    const auto before = from == FollowFrom::first ? 0 : sent.load(std::memory_order_relaxed);
+    const Side side{isRequest
+                        ? RingFollower(slots, header().queueSlots, from)
+                        : RingFollower(slots + header().queueSlots, header().replySlots, from),
+                    sent, isRequest ? control.requests : control.replies, before};
+    // The number of messages sent belongs to the follower's place; under a flood, nearly.
+    if (from == FollowFrom::first || sent.load(std::memory_order_relaxed) == before ||
+        tries == kTries)
+      return side;
+  }
+}
+
+bool LinkFollower::take(std::vector<TappedMessage>& messages) {
+  newRequests_.clear();
+  newReplies_.clear();
+  // Replies first: whoever has a reply finds its request then.
+  const bool some = drain(replies_, Direction::reply, newReplies_);
+  const bool more = drain(requests_, Direction::request, newRequests_);
+  interleave(newRequests_, newReplies_, messages);
+  return some || more;
+}
+
+bool LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMessage>& messages) {
+  RingCopy copy;
+  bool some = false;
+  while (messages.size() < kBatch) {
+    const auto next = side.follower.tryNext(copy);
+    some = some || next != RingFollower::Next::nothing;
+    if (next != RingFollower::Next::message) {
+      // We stand behind the newest message: what was sent is what we saw and what we missed.
+      const auto sent = side.sent.load(std::memory_order_relaxed) - side.sentBefore;
+      side.missed = sent > side.seen ? sent - side.seen : 0;
+      break;
+    }
+    ++side.seen;
+    messages.push_back(read(copy, side, direction));
+  }
+  return some;
+}
+
+TappedMessage LinkFollower::read(const RingCopy& copy, const Side& side, Direction direction) {
+  TappedMessage tapped;
+  tapped.direction = direction;
+  tapped.requestId = copy.envelope.requestId;
+  tapped.isFirstReply = (copy.envelope.flags & layout::kSlotFirstReply) != 0;
+  try {
+    readBody(copy, side, tapped);
+  } catch (const std::exception& error) {
+    tapped.problem = error.what();
+  }
+  return tapped;
+}
+
+void LinkFollower::readBody(const RingCopy& copy, const Side& side, TappedMessage& tapped) {
+  const auto type = static_cast<MessageType>(copy.envelope.type);
+  if ((copy.envelope.flags & layout::kSlotChunk) == 0) {
+    tapped.message = Message::copyOf(type, copy.body());
+  } else {
+    layout::ChunkRef ref{};
+    std::memcpy(&ref, copy.bytes.data(), sizeof ref);
+    tapped.message = Message::copyOf(type, bulk_.read(ref, copy.envelope.bodyBytes));
+    // PAIR(message-taken): the body before, whether its receiver had it after.
+    tapped.mayHaveChanged = side.consumer.taken.load(std::memory_order_acquire) >=
+                            side.sentBefore + side.seen + side.missed;
+  }
+  tapped.message.setClientType(copy.envelope.clientType);
+  tapped.message.setClientExtra(copy.envelope.clientExtra);
+}
+
+bool LinkFollower::isOver() const {
+  const auto& control = controlOf(segment_);
+  const auto ended = [](const std::atomic<layout::LinkState>& state) {
+    const auto is = state.load(std::memory_order_relaxed);
+    return is == layout::LinkState::closed || is == layout::LinkState::refused;
+  };
+  return ended(control.clientState) || ended(control.serverState);
+}
+
+}  // namespace mpf::tools

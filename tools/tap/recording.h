@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Recording: a file of what a tap saw. Its format is schema/recording.capnp.
+//
+// Threads  one.
+// Crash    a record is written with one call: a file that ends within a record was cut there, and
+//          is readable up to it.
+// Trust    a file may hold anything: what is no record is an error that names file and place.
+#pragma once
+
+#include <capnp/serialize.h>
+#include <cstdint>
+#include <functional>
+#include <kj/io.h>
+#include <string>
+
+#include <mpf/file_descriptor.h>
+
+#include "base/output_file.h"
+#include "schema/recording.capnp.h"
+
+namespace mpf::tools {
+
+class RecordingWriter {
+ public:
+  // Creates the file, or opens it, and checks that it can be written. Throws std::system_error.
+  explicit RecordingWriter(std::string path);
+
+  // Throws std::system_error when the disk is full, say.
+  void write(capnp::MessageBuilder& record);
+  // Throws std::system_error when what was written is not kept.
+  void close() { file_.close(); }
+
+ private:
+  OutputFile file_;
+};
+
+class RecordingReader {
+ public:
+  // Throws std::system_error.
+  explicit RecordingReader(std::string path);
+
+  // Hands over the next record. False at the end.
+  //   throws  std::runtime_error for what is no record: "x.mpf: record 12, at byte 3456 of 5000:
+  //           ..."
+  bool tryNext(const std::function<void(wire::Record::Reader)>& take);
+
+  // The record that was handed over last: "x.mpf: record 12, at byte 3456 of 5000".
+  [[nodiscard]] std::string place() const;
+
+ private:
+  std::string path_;
+  FileDescriptor file_;
+  kj::FdInputStream stream_;
+  kj::BufferedInputStreamWrapper buffered_;
+  capnp::ReaderOptions limits_;  // no message is longer than the file
+  std::uint64_t number_ = 0;
+  std::uint64_t bytes_ = 0;  // of the file
+  std::uint64_t begin_ = 0;  // of the record, in the file
+};
+
+}  // namespace mpf::tools

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include "tools/tap/ring_follower.h"
+
+#include <algorithm>
+
+namespace mpf::tools {
+namespace {
+
+constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring has come that far
+
+}  // namespace
+
+RingFollower::RingFollower(const layout::Slot* slots, std::uint32_t capacity,
+                           FollowFrom from) noexcept
+    : slots_(slots), capacity_(capacity) {
+  if (from == FollowFrom::newest) goBehindNewest();
+}
+
+// A sequence that is none of its slot's is nonsense, and no reason to look for anything newer.
+bool RingFollower::isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept {
+  return sequence <= kMost && ((sequence - 1 - position) & (capacity_ - 1)) == 0;
+}
+
+// What lies in a slot is the newest message if no slot has a higher sequence.
+void RingFollower::goBehindNewest() noexcept {
+  std::uint64_t newest = 0;
+  std::uint8_t slots = 1;
+  for (std::uint64_t index = 0; index < capacity_; ++index) {
+    // PAIR(slot-filled): the message is complete.
+    const auto sequence = slots_[index].sequence.load(std::memory_order_acquire);
+    if (sequence <= newest || !isPossible(sequence, index)) continue;
+    newest = sequence;
+    slots = slots_[index].slots;
+  }
+  position_ =
+      newest == 0 ? 0 : newest - 1 + std::clamp<std::uint32_t>(slots, 1, layout::kMaxMessageSlots);
+}
+
+// Of any kMaxMessageSlots slots in a row that the producer has passed, one is the first of a
+// message and says so.
+bool RingFollower::isOverrun() const noexcept {
+  for (std::uint32_t i = 0; i < layout::kMaxMessageSlots; ++i) {
+    const auto ahead = position_ + capacity_ / 2 + i;
+    const auto sequence = slot(ahead).sequence.load(std::memory_order_relaxed);
+    if (sequence > ahead && isPossible(sequence, ahead)) return true;
+  }
+  return false;
+}
+
+RingFollower::Next RingFollower::tryNext(RingCopy& copy) noexcept {
+  // PAIR(slot-filled): the message is complete.
+  const bool filled = slot(position_).sequence.load(std::memory_order_acquire) == position_ + 1;
+  const auto slots = slot(position_).slots;
+  const bool whole = filled && tryCopy(slots, copy);
+  // PAIR(slot-filled): the copy before, the place of the producer after.
+  std::atomic_thread_fence(std::memory_order_acquire);
+  if (isOverrun() || (filled && !whole)) {
+    goBehindNewest();
+    return Next::overrun;
+  }
+  if (!filled) return Next::nothing;
+  position_ += slots;
+  return Next::message;
+}
+
+// False when the slots say what cannot be.
+bool RingFollower::tryCopy(std::uint32_t slots, RingCopy& copy) const noexcept {
+  const auto& first = slot(position_);
+  if (slots < 1 || slots > layout::kMaxMessageSlots) return false;
+  copy.envelope = {first.type,       first.flags,       first.bodyBytes, first.requestId,
+                   first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
+  const bool isChunk = (copy.envelope.flags & layout::kSlotChunk) != 0;
+  copy.size = isChunk ? sizeof(layout::ChunkRef) : copy.envelope.bodyBytes;
+  if (copy.size > layout::kFirstSlotBodyBytes + (slots - 1) * sizeof(layout::MoreSlot::body))
+    return false;
+  auto left = std::span(copy.bytes).first(copy.size);
+  const auto take = [&](const auto& from) {
+    const auto part = std::min(left.size(), from.size());
+    std::copy_n(from.begin(), part, left.begin());
+    left = left.subspan(part);
+  };
+  take(first.body);
+  for (std::uint32_t i = 1; i < slots; ++i)
+    take(reinterpret_cast<const layout::MoreSlot&>(slot(position_ + i)).body);
+  return true;
+}
+
+}  // namespace mpf::tools

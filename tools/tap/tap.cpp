@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// mpf tap: what the clients of a server and the server say to each other, live, without taking
+// part.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <fmt/format.h>
+#include <memory>
+
+#include <mpf/backplane.h>
+
+#include "base/command_line.h"
+#include "base/print_error.h"
+#include "base/stop_signals.h"
+#include "tools/arguments.h"
+#include "tools/commands.h"
+#include "tools/tap/tap_session.h"
+#include "tools/text/wrap.h"
+
+namespace mpf::tools {
+namespace {
+
+struct TapArguments : ServerArguments {
+  double seconds = 0;
+  double poll = 0.001;  // [s]
+  std::uint64_t count = 0;
+  std::string link;
+  std::string file;
+  bool json = false;
+  bool printAll = false;
+};
+
+constexpr int kShortPauses = 32;  // the shortest pause is that part of the longest
+
+std::uint64_t linkNumber(const std::string& digits) {
+  std::uint64_t number = 0;
+  const auto* const end = digits.data() + digits.size();
+  if (digits.empty()) return 0;
+  if (const auto [at, failure] = std::from_chars(digits.data(), end, number, 16);
+      failure == std::errc{} && at == end && digits.size() == 16)
+    return number;
+  throw std::invalid_argument(fmt::format(
+      "tap: \"{}\" is no link: use its 16 hexadecimal digits, as tap and inspect show them",
+      digits));
+}
+
+std::unique_ptr<TapSink> sinkFor(const TapArguments& arguments) {
+  if (!arguments.file.empty()) return TapSink::file(arguments.file);
+  if (arguments.json) return TapSink::json();
+  return TapSink::lines(arguments.printAll ? SIZE_MAX : 16);
+}
+
+int tap(const TapArguments& arguments) {
+  std::atomic<bool> stopped{false};
+  const StopSignals stop(
+      [](void* flag) noexcept { static_cast<std::atomic<bool>*>(flag)->store(true); }, &stopped);
+  const auto sink = sinkFor(arguments);
+  TapSession session({Backplane::named(arguments.backplane).name(), arguments.server,
+                      arguments.location, linkNumber(arguments.link)},
+                     *sink);
+  if (session.isServerThere()) {
+    printError("mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(),
+               session.links() == 1 ? "" : "s");
+  } else {
+    printError("mpf tap: server \"{}\" at location {} is not there; waiting for it\n",
+               arguments.server, arguments.location);
+  }
+
+  const auto end =
+      arguments.seconds > 0 ? Deadline::after(ofSeconds(arguments.seconds)) : Deadline::never();
+  const auto isOver = [&] {
+    return stopped || end.hasPassed() ||
+           (arguments.count != 0 && session.seen() >= arguments.count);
+  };
+  auto pause = ofSeconds(arguments.poll);
+  while (!isOver()) {
+    // Where messages come there are more to come: short pauses first, then longer ones.
+    if (session.runOnce()) pause = ofSeconds(arguments.poll) / kShortPauses;
+    else session.pause(pause = std::min(2 * pause, ofSeconds(arguments.poll)));
+  }
+  session.finish();
+  sink->finish();
+  for (const auto& problem : session.problems()) printError("mpf tap: {}\n", problem);
+  printError("mpf tap: {} seen, {} missed\n", counted(session.seen(), "message"), session.missed());
+  if (session.goneLinks() != 0)
+    printError("mpf tap: {} links came and went unread\n", session.goneLinks());
+  return session.problems().empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void addTap(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand(
+      "tap", "Every message between a server and its clients, live, without taking part");
+  auto arguments = std::make_shared<TapArguments>();
+  addServer(command, *arguments);
+  addSeconds(command, "seconds", arguments->seconds, "For how long; 0: until Ctrl-C", true);
+  command.add_option("--count", arguments->count, "End after so many messages; 0: do not")
+      ->capture_default_str()
+      ->check(wholeNumber(0));
+  command.add_option("--link", arguments->link, "Only this link: its 16 hexadecimal digits");
+  command
+      .add_option("--write", arguments->file,
+                  "Write to this file, for `mpf replay`, instead of to the screen")
+      ->type_name("FILE");
+  addSeconds(command, "--poll", arguments->poll,
+             "Pause between two looks at links that are at rest", false);
+  command.add_flag("--print", arguments->printAll, "Print arrays in full");
+  addJson(command, arguments->json);
+  command.footer(
+      "->: a request; <-: the reply that ends it; < : another message of the server. The number is "
+      "the request's.\n"
+      "Messages that came faster than tap could read are counted as missed. Who may read a link: "
+      "its user and group, and root.");
+  command.callback([arguments, &run] { run = [arguments] { return tap(*arguments); }; });
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+#include "tools/tap/tap_session.h"
+
+#include <algorithm>
+#include <ctime>
+#include <exception>
+#include <utility>
+
+#include "shm/segment_name.h"
+#include "tools/inspect/segment_image.h"
+
+namespace mpf::tools {
+namespace {
+
+constexpr auto kLookEvery = std::chrono::milliseconds(200);
+
+std::int64_t realtimeNs() {
+  timespec wall{};
+  ::clock_gettime(CLOCK_REALTIME, &wall);
+  return std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec;
+}
+
+TappedLink describe(const std::string& backplane, const layout::SegmentHeader& header) {
+  TappedLink link;
+  link.incarnation = header.incarnation;
+  link.server = segments::rawText(header.name);
+  link.location = header.location;
+  const auto name = SegmentName::keyed(backplane, NameKind::clientWindow, header.clientWindow);
+  const auto client =
+      SegmentImage::tryRead(name, layout::SegmentKind::clientWindow, sizeof(layout::SegmentHeader));
+  if (!client) return link;
+  link.client = segments::rawText(client->header().name);
+  if (link.client.empty()) link.client = segments::rawText(client->header().program);
+  link.clientPid = client->header().ownerPid;
+  return link;
+}
+
+}  // namespace
+
+TapSession::TapSession(TapSelection selection, TapSink& sink)
+    : selection_(std::move(selection)),
+      sink_(sink),
+      window_(
+          SegmentName::serverWindow(selection_.backplane, selection_.location, selection_.server)) {
+  SegmentName::checkBackplane(selection_.backplane);
+  SegmentName::checkServer(selection_.server);
+  lookAtNames(FollowFrom::newest);
+}
+
+bool TapSession::isWanted(const std::string& name) const {
+  const auto parsed = SegmentName::tryParse(name);
+  return parsed && parsed->kind == NameKind::link && parsed->backplane == selection_.backplane &&
+         parsed->serverWindow == incarnation_ &&
+         (selection_.link == 0 || parsed->incarnation == selection_.link);
+}
+
+// All names: at the start, when the server came, now and then to see what is gone.
+void TapSession::lookAtNames(FollowFrom from) {
+  lookAgain_ = Deadline::after(kLookEvery);
+  const auto image = SegmentImage::tryRead(window_, layout::SegmentKind::serverWindow,
+                                           sizeof(layout::SegmentHeader));
+  incarnation_ = image ? image->header().incarnation : 0;
+  const auto names = segments::list(SegmentName::prefix(selection_.backplane));
+  dropEnded({names.begin(), names.end()});
+  for (const auto& name : names) {
+    if (isWanted(name)) follow(name, from);
+  }
+}
+
+void TapSession::lookAtNew(const std::vector<std::string>& names) {
+  if (std::ranges::find(names, window_) != names.end()) return lookAtNames(FollowFrom::first);
+  for (const auto& name : names) {
+    if (isWanted(name)) follow(name, FollowFrom::first);
+  }
+}
+
+void TapSession::dropEnded(const std::set<std::string>& there) {
+  for (auto entry = followed_.begin(); entry != followed_.end();) {
+    auto& [name, followed] = *entry;
+    if (there.contains(name) && !followed.follower->isOver()) {
+      ++entry;
+      continue;
+    }
+    close(followed);
+    if (there.contains(name)) notFollowed_.insert(name);
+    entry = followed_.erase(entry);
+  }
+  std::erase_if(notFollowed_, [&](const std::string& name) { return !there.contains(name); });
+}
+
+void TapSession::follow(const std::string& name, FollowFrom from) {
+  if (followed_.contains(name) || notFollowed_.contains(name)) return;
+  auto followed = tryOpen(name, from);
+  if (!followed) return;
+  sink_.opened(realtimeNs(), followed->link);  // a sink that cannot write ends the session
+  followed_.emplace(name, std::move(*followed));
+}
+
+std::optional<TapSession::Followed> TapSession::tryOpen(const std::string& name,
+                                                        FollowFrom from) try {
+  auto follower = LinkFollower::tryOpen(selection_.backplane, name, from);
+  if (!follower) {
+    ++goneLinks_;
+    return std::nullopt;
+  }
+  auto link = describe(selection_.backplane, follower->header());
+  return Followed{std::move(link), std::move(follower)};
+} catch (const std::exception& error) {
+  notFollowed_.insert(name);
+  problems_.emplace_back(error.what());
+  return std::nullopt;
+}
+
+bool TapSession::runOnce() {
+  const auto names = names_.take();
+  if (!names || lookAgain_.hasPassed()) lookAtNames(FollowFrom::first);
+  else lookAtNew(*names);
+  bool some = false;
+  for (auto& [name, followed] : followed_) {
+    if (take(followed)) some = true;
+    else tellMissed(followed);
+  }
+  return some;
+}
+
+bool TapSession::take(Followed& followed) {
+  batch_.clear();
+  const bool some = followed.follower->take(batch_);
+  const auto atNs = realtimeNs();
+  for (const auto& message : batch_) sink_.message(atNs, followed.link, message);
+  seen_ += batch_.size();
+  return some;
+}
+
+// A message on its way counts as missed for a moment: what is told has been so at two looks.
+void TapSession::tellMissed(Followed& followed) {
+  const auto missed = followed.follower->missed();
+  if (missed != std::exchange(followed.missedSeen, missed) || missed == followed.missedTold) return;
+  followed.missedTold = missed;
+  sink_.missed(realtimeNs(), followed.link, missed);
+}
+
+void TapSession::takeTheRest(Followed& followed) {
+  // Whoever goes on sending is not waited for: what fits the rings is all that had been sent.
+  std::size_t left =
+      followed.follower->header().queueSlots + std::size_t{followed.follower->header().replySlots};
+  while (left != 0 && take(followed))
+    left -= std::min(left, std::max<std::size_t>(batch_.size(), 1));
+  tellMissed(followed);
+  tellMissed(followed);
+  missedBefore_ += followed.follower->missed();
+}
+
+void TapSession::close(Followed& followed) {
+  takeTheRest(followed);
+  sink_.closed(realtimeNs(), followed.link);
+}
+
+void TapSession::finish() {
+  for (auto& [name, followed] : followed_) takeTheRest(followed);
+  followed_.clear();
+}
+
+std::uint64_t TapSession::missed() const noexcept {
+  std::uint64_t missed = missedBefore_;
+  for (const auto& [name, followed] : followed_) missed += followed.follower->missed();
+  return missed;
+}
+
+}  // namespace mpf::tools

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// TapSession: follows all links of one server, or one of them, as they come and go, through the
+// server's lives.
+//
+//   names in /dev/shm ─► LinkFollower per link ─► TapSink
+//
+// Threads  one.
+// Crash    what a dead process has said is read to the end.
+// Trust    a link that cannot be read is told once and left alone.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <mpf/clock.h>
+
+#include "tools/tap/link_follower.h"
+#include "tools/tap/name_watch.h"
+#include "tools/tap/tap_sink.h"
+
+namespace mpf::tools {
+
+struct TapSelection {
+  std::string backplane;
+  std::string server;
+  std::int32_t location = 0;
+  std::uint64_t link = 0;  // 0: all of the server's
+};
+
+class TapSession {
+ public:
+  // Links that are there already are followed from now on, later ones from their first message.
+  //   throws  std::invalid_argument for names that cannot be
+  TapSession(TapSelection selection, TapSink& sink);
+
+  // Hands over what has come, from new links too. False: nothing has come, or gone by.
+  bool runOnce();
+  // Returns when there may be a new link, or after `limit`; a signal ends it, too.
+  void pause(Nanoseconds limit) const noexcept { names_.wait(limit); }
+  // Looks a last time, and tells what is missing.
+  void finish();
+
+  [[nodiscard]] bool isServerThere() const noexcept { return incarnation_ != 0; }
+  [[nodiscard]] std::size_t links() const noexcept { return followed_.size(); }
+  [[nodiscard]] std::uint64_t seen() const noexcept { return seen_; }
+  [[nodiscard]] std::uint64_t missed() const noexcept;
+  // Links that came and went before they could be read.
+  [[nodiscard]] std::uint64_t goneLinks() const noexcept { return goneLinks_; }
+  [[nodiscard]] const std::vector<std::string>& problems() const noexcept { return problems_; }
+
+ private:
+  struct Followed {
+    TappedLink link;
+    std::unique_ptr<LinkFollower> follower;
+    std::uint64_t missedSeen = 0;  // when it was last at rest
+    std::uint64_t missedTold = 0;
+  };
+  void lookAtNames(FollowFrom from);
+  void lookAtNew(const std::vector<std::string>& names);
+  void dropEnded(const std::set<std::string>& there);
+  void follow(const std::string& name, FollowFrom from);
+  std::optional<Followed> tryOpen(const std::string& name, FollowFrom from);
+  bool take(Followed& followed);
+  void tellMissed(Followed& followed);
+  void takeTheRest(Followed& followed);
+  void close(Followed& followed);
+  [[nodiscard]] bool isWanted(const std::string& name) const;
+
+  TapSelection selection_;
+  TapSink& sink_;
+  std::string window_;  // name of the server's window
+  std::uint64_t incarnation_ = 0;  // of the server; 0: it is not there
+  NameWatch names_;
+  Deadline lookAgain_ = Deadline::never();
+  std::map<std::string, Followed> followed_;  // by name
+  std::set<std::string> notFollowed_;  // could not be read, or are over
+  std::vector<TappedMessage> batch_;
+  std::vector<std::string> problems_;
+  std::uint64_t seen_ = 0;
+  std::uint64_t goneLinks_ = 0;
+  std::uint64_t missedBefore_ = 0;  // of links that are over
+};
+
+}  // namespace mpf::tools
