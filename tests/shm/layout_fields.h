@@ -169,7 +169,7 @@ inline nlohmann::json layoutKinds() {
           {"hints", SegmentKind::hints},
           {"link", SegmentKind::link},
           {"bulk", SegmentKind::bulk},
-          {"wish", SegmentKind::wish},
+          {"pendingBind", SegmentKind::wish},
           {"router", SegmentKind::router}};
 }
 
