@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Entry point: each target does everything it needs, including the set-up. The build itself is described
-# in CMakeLists.txt and CMakePresets.json.
+# Entry point: each target does everything it needs, including the set-up. The build itself is
+# described in CMakeLists.txt and CMakePresets.json.
 #
 #   JOBS=n      parallel jobs (default: all processors)
 #   PREFIX=dir  where `make install` puts the tree (default /usr/local)
@@ -28,16 +28,16 @@ help: ## print this list
 setup: ## install the Debian packages that are missing (every other target calls it)
 	@scripts/setup
 
-demo: release ## run a voltmeter, its server and clients through crashes; then modules that are wired to each other
+demo: release ## run a voltmeter through crashes, then modules that are wired together
 	./examples/demo/run build/release
 	./examples/demo/hardware build/release
 
 test: test-debug ## build with debug information and run every test
 
-test-repeated: debug ## run COPIES copies of all tests in parallel, ROUNDS times; no test may fail or leave files (COPIES=6 ROUNDS=20)
+test-repeated: debug ## run all tests in parallel copies, repeatedly (COPIES=6 ROUNDS=20)
 	scripts/repeat-tests build/debug --copies $(or $(COPIES),6) --rounds $(or $(ROUNDS),20) $(if $(TESTS),--tests '$(TESTS)')
 
-test-big-endian: debug ## exchange messages between this host and an emulated one with the other byte order
+test-big-endian: debug ## exchange messages with an emulated big-endian host
 	@scripts/setup big-endian
 	@scripts/big-endian-sysroot
 	@cmake --preset big-endian --log-level=NOTICE
@@ -45,21 +45,22 @@ test-big-endian: debug ## exchange messages between this host and an emulated on
 	ctest --preset big-endian $(CTEST_FLAGS)
 	MPF_TEST_BIG_ENDIAN="$(CURDIR)/build/big-endian" ctest --preset debug $(CTEST_FLAGS) --label-regex '^byte_order_test$$'
 
-test-tpci200: debug ## test the PCI carrier and serial servers on its octal UARTs, in an emulated machine
+test-tpci200: debug ## test the PCI carrier and its octal UARTs in an emulated machine
 	@scripts/setup tpci200
 	@scripts/tpci200-machine make build/debug
 	MPF_TEST_TPCI200="$(CURDIR)/build/debug" ctest --preset debug $(CTEST_FLAGS) --label-regex '^tpci200_test$$'
 
-soak: debug ## run hours of traffic with clients that are killed; memory and descriptors must not grow (DURATION=2h)
+soak: debug ## check memory and descriptors in hours of traffic with killed clients (DURATION=2h)
 	build/debug/bin/mpf_test_soak $(or $(DURATION),2h)
 
-fuzz: ## search for contents of shared memory or messages that harm their reader, guided by coverage (DURATION=60 FUZZERS=tools)
+fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FUZZERS=tools)
 	@scripts/setup fuzz
 	@cmake --preset fuzz --log-level=NOTICE
 	cmake --build --preset fuzz --parallel $(JOBS)
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
-bench: release ## measure this host (BENCH=local, remote or hardware); also writes the table to build/release/bench/
+# Also writes the table to build/release/bench/.
+bench: release ## measure this host (BENCH=local, remote or hardware)
 	@mkdir -p build/release/bench
 	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | tee build/release/bench/$(or $(BENCH),local).txt'
 
@@ -72,7 +73,7 @@ format: setup ## format all sources
 format-check: setup ## print the sources that `make format` would change
 	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 --dry-run -Werror
 
-tidy: ## run clang-tidy on sources that changed since they were last clean (FOLDERS="shm router": only these)
+tidy: ## run clang-tidy on changed sources (FOLDERS="shm router": only these)
 	@scripts/setup fuzz
 	@cmake --preset tidy --log-level=NOTICE
 	@cmake --build --preset tidy --parallel $(JOBS)
@@ -81,7 +82,8 @@ tidy: ## run clang-tidy on sources that changed since they were last clean (FOLD
 clean: ## remove build/
 	$(RM) -r build
 
-# make release, debug, edit, asan, tsan: builds with that preset. make test-asan: also runs its tests.
+# make release, debug, edit, asan, tsan: builds with that preset. make test-asan: also runs its
+# tests.
 $(PRESETS): setup
 	@cmake --preset $@ --log-level=NOTICE
 	cmake --build --preset $@ --parallel $(JOBS)

@@ -8,7 +8,8 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 # All programs are in one folder, where the demo, the tests and `make bench` find them.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
-# Sources write #include <mpf/shm/window.h>, in this tree and in programs that use the installed one.
+# Sources write #include <mpf/shm/window.h>, in this tree and in programs that use the installed
+# one.
 set(MPF_INCLUDE_ROOT "${CMAKE_BINARY_DIR}/include")
 file(MAKE_DIRECTORY "${MPF_INCLUDE_ROOT}/mpf")
 foreach(folder base schema shm channel client server drivers router tools tests benchmarks)
@@ -28,24 +29,24 @@ endif()
 
 set(MPF_SANITIZE "" CACHE STRING "Sanitizers, in the notation of -fsanitize=: address,undefined or thread")
 if(MPF_SANITIZE)
-  # -Og -g1 compiles in half the time of -O1 -g, and reports still contain line numbers. In the code that
-  # a sanitizer adds, g++ 12 warns of variables that may be uninitialised.
+  # -Og -g1 compiles in half the time of -O1 -g, and reports still contain line numbers. In the code
+  # that a sanitizer adds, g++ 12 warns of variables that may be uninitialised.
   add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -Og -g1 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-  # These checks cost a fifth of the compile time. AddressSanitizer detects the same errors, or the error is
-  # harmless on this processor.
+  # These checks cost a fifth of the compile time. AddressSanitizer detects the same errors, or the
+  # error is harmless on this processor.
   if(MPF_SANITIZE MATCHES undefined)
     add_compile_options(-fno-sanitize=null,alignment,vptr,object-size)
   endif()
   add_link_options(-fsanitize=${MPF_SANITIZE})
 endif()
-# g++ warns that ThreadSanitizer does not model std::atomic_thread_fence; the tests show whether this
-# causes false reports.
+# g++ warns that ThreadSanitizer does not model std::atomic_thread_fence; the tests show whether
+# this causes false reports.
 if(MPF_SANITIZE STREQUAL thread)
   target_compile_options(mpf_warnings INTERFACE -Wno-tsan)
 endif()
 
-# Each build links some fifty programs. GNU ld needs a second for each, mold a fraction of that. Release
-# builds use the default linker.
+# Each build links some fifty programs. GNU ld needs a second for each, mold a fraction of that.
+# Release builds use the default linker.
 find_program(MPF_MOLD mold)
 if(MPF_MOLD AND CMAKE_BUILD_TYPE STREQUAL Debug AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CROSSCOMPILING)
   add_link_options(-fuse-ld=mold)

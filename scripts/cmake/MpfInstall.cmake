@@ -17,8 +17,8 @@ function(mpf_find_targets out folder type)
   set(${out} "${${out}}" PARENT_SCOPE)
 endfunction()
 
-# The public libraries, which other repositories link as one archive libmpf.a: one name, and no link order
-# to get right. All libraries of drivers/ are public.
+# The public libraries, which other repositories link as one archive libmpf.a: one name, and no link
+# order to get right. All libraries of drivers/ are public.
 set(publicLibraries mpf_base mpf_schema mpf_shm mpf_channel mpf_client mpf_server)
 if(drivers IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/drivers/CMakeLists.txt")
   mpf_find_targets(publicLibraries "${CMAKE_SOURCE_DIR}/drivers" STATIC_LIBRARY)
@@ -58,7 +58,7 @@ set(findDependencies "")
 foreach(link IN LISTS links)
   list(FIND outsideTargets "${link}" at)
   if(at LESS 0)
-    message(FATAL_ERROR "A public library links ${link}, which is not in the table of external libraries: add it in scripts/cmake/MpfInstall.cmake")
+    message(FATAL_ERROR "A public library links ${link}, which is not in the table in scripts/cmake/MpfInstall.cmake: add it there")
   endif()
   list(GET outsidePackages ${at} package)
   list(GET outsideModules ${at} module)

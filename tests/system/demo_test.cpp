@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the client that draws their values.
+// The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the
+// client that draws their values.
 #include <filesystem>
 #include <gmock/gmock.h>
 #include <string>

@@ -2,16 +2,17 @@
 # SPDX-License-Identifier: MIT
 """check_sources TOP: rules of this project that compilers do not check.
 
-Prints file:line: complaint for each violation, and exits with 1 if there is one. A rule is a function of
-all files ({path: text}) that yields (path, line, complaint); self_test.py shows that each rule can fail.
+Prints file:line: complaint for each violation, and exits with 1 if there is one. A rule is a
+function of all files ({path: text}) that yields (path, line, complaint); self_test.py shows that
+each rule can fail.
 """
 import os
 import re
 import subprocess
 import sys
 
-# The folders that a folder may include directly; it may also include what they may include. Call order
-# is dependency order.
+# The folders that a folder may include directly; it may also include what they may include. Call
+# order is dependency order.
 MAY_INCLUDE = {
     "base": [],
     "schema": ["base"],
@@ -22,7 +23,8 @@ MAY_INCLUDE = {
     "client": ["schema", "shm", "channel"],
     "client/programs": ["client"],
     "drivers": ["base"],
-    "router": ["schema", "shm", "channel", "client", "server", "server/programs"],  # a server to local clients, and a client to local servers
+    # A router is a server to local clients, and a client to local servers.
+    "router": ["schema", "shm", "channel", "client", "server", "server/programs"],
     "epics": ["client"],
     "crate": ["base"],
     "benchmarks": ["client", "server"],
@@ -96,7 +98,7 @@ def pairs(files):
                     places.setdefault(tag, []).append((path, number))
     for tag, found in places.items():
         if len(found) == 1:
-            yield *found[0], f"PAIR({tag}) is used only here: the other end of the edge needs the same tag"
+            yield *found[0], f"PAIR({tag}) is missing at the other end of its edge"
 
 
 def ordered_accesses(files):
@@ -133,7 +135,7 @@ def unfinished(files):
 
 
 def shown_code(files):
-    """A document that shows code after the name of its file (`drivers/x.h`: and a block) shows lines of that file."""
+    """A block after the name of a file (`drivers/x.h`:) in a document shows lines of that file."""
     block = re.compile(r"^`([\w./-]+)`:\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
     for path, text in files.items():
         for match in block.finditer(text) if path.endswith(".md") else ():

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Each rule of check_sources reports an invalid sample, at the right line, and accepts a valid one."""
+"""Each rule of check_sources reports an invalid sample, at its line, and accepts a valid one."""
 import unittest
 
 import check_sources as check
