@@ -101,9 +101,9 @@ class SerialPort {
   SerialPortStatus write(Bytes data, Deadline deadline) { return transfer(data, false, deadline); }
   SerialPortStatus read(Deadline deadline) { return transfer({}, true, deadline); }
   SerialPortStatus writeRead(Bytes data, Deadline deadline) { return transfer(data, true, deadline); }
-  // The thread that waits for a request asks `isHopeless` every 20 ms; true ends the request with failure. Empty: wait on.
+  // The thread that waits for a request asks `isAbandoned` every 20 ms; true ends the request with failure. Empty: wait on.
   // For the binder, between requests.
-  virtual void giveUpWhen(std::function<bool()> isHopeless) = 0;
+  virtual void abandonWhen(std::function<bool()> isAbandoned) = 0;
   // Holds the line in the break state. Fails where the line cannot.
   virtual SerialPortStatus sendBreak(Milliseconds duration) = 0;
   // How the last request ended.
