@@ -22,17 +22,17 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] Link& link() noexcept { return *link_; }
   [[nodiscard]] SpinLock& lock() noexcept { return *lock_; }
 
-  enum class Take { nothing, message, nonsense };
+  enum class Take { nothing, message, invalid };
   // Begins the next message: its envelope is copied and it counts as taken. `nothing` changes nothing.
   Take tryBegin(Envelope& envelope) noexcept {
     if (!link_->hasMessage()) return Take::nothing;
     envelope = link_->begin();
     const auto room = link_->inlineCapacity();
     const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
-    return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room) ? Take::message : Take::nonsense;
+    return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room) ? Take::message : Take::invalid;
   }
   // `unavailable`: the memory of the body went with its owner, or cannot be had now. The message is lost, and the link is sound.
-  enum class Finish { message, nonsense, unavailable };
+  enum class Finish { message, invalid, unavailable };
   // The body of the message begun into `message`, then done with its slots. `message` is empty when there is none.
   [[nodiscard]] Finish tryFinish(const Envelope& envelope, Message& message) noexcept {
     auto finish = Finish::message;
@@ -43,7 +43,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
       finish = readBody(envelope, message);
     }
     link_->end();
-    if (!message) return finish == Finish::message ? Finish::nonsense : finish;
+    if (!message) return finish == Finish::message ? Finish::invalid : finish;
     message.setClientType(envelope.clientType);
     message.setClientExtra(envelope.clientExtra);
     return finish;

@@ -70,7 +70,7 @@ bool Talk::tryTakeOne(std::uint64_t choice) {
     return true;
   }
   Message message;
-  isOver_ = take == MessageLink::Take::nonsense || channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
+  isOver_ = take == MessageLink::Take::invalid || channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
   if (isOver_) return false;
   lookAt(message);
   if (choice % 4 == 0) sendBack(envelope, message);
