@@ -39,7 +39,8 @@ TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
   folder.write("mpf-bench-1-server.lock", "");
   leaveSocket(folder.file("mpf-bench-1-server"));
   folder.write("another.lock", "");
-  folder.write("mpf-bench-roudi-XXXXXX", "[general]");
+  const auto settings = "mpf-bench-roudi-" + std::string(6, 'X');  // a name that mkstemp() has not filled in
+  folder.write(settings, "[general]");
   const FileDescriptor held(::open(folder.write("mpf-bench-2-client.lock", "").c_str(), O_RDWR | O_CLOEXEC));
   leaveSocket(folder.file("mpf-bench-2-client"));
   checkCall(::flock(held.get(), LOCK_EX), "flock");
@@ -47,7 +48,7 @@ TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
   removeIceoryxFiles(folder.path());
 
   EXPECT_THAT(namesIn(folder.path()),
-              testing::UnorderedElementsAre("another.lock", "mpf-bench-roudi-XXXXXX", "mpf-bench-2-client.lock", "mpf-bench-2-client"));
+              testing::UnorderedElementsAre("another.lock", settings, "mpf-bench-2-client.lock", "mpf-bench-2-client"));
 }
 
 TEST(IceoryxFiles, ThoseOfADaemonThatIsGoneAreRemoved) {
