@@ -40,8 +40,7 @@ bool RunnerLock::hasOtherRunner() {
 void RunnerLock::throwOtherRunner() {
   throw std::logic_error(
       "Dispatcher: another thread runs this dispatcher. Let one thread run it (a shared dispatcher "
-      "has a "
-      "thread of its own); bind(), send() and cancel() work from every thread.");
+      "has a thread of its own); bind(), send() and cancel() work from every thread.");
 }
 
 void RunnerLock::waitForTemporaryOwner() {

@@ -49,7 +49,10 @@ class RunnerLock {
   void release() noexcept;
 
   // True when a temporary owner must release the lock.
-  [[nodiscard]] bool isRunnerWaiting() const noexcept { return waitingRunners_.load() != 0; }
+  [[nodiscard]] bool isRunnerWaiting() const noexcept {
+    // PAIR(runner-waiting): seen false, the waiting thread wakes this one after it.
+    return waitingRunners_.load(std::memory_order_seq_cst) != 0;
+  }
 
   // True when the last runner is another thread that has not ended: callbacks belong on that
   // thread.
@@ -59,8 +62,11 @@ class RunnerLock {
   static constexpr std::uint64_t kTemporary = 1;
 
   struct WaitingRunner {
-    explicit WaitingRunner(std::atomic<int>& number) noexcept : number_(number) { ++number_; }
-    ~WaitingRunner() { --number_; }
+    explicit WaitingRunner(std::atomic<int>& number) noexcept : number_(number) {
+      // PAIR(runner-waiting): before wakeOwner().
+      number_.fetch_add(1, std::memory_order_seq_cst);
+    }
+    ~WaitingRunner() { number_.fetch_sub(1, std::memory_order_relaxed); }
     WaitingRunner(const WaitingRunner&) = delete;
     WaitingRunner& operator=(const WaitingRunner&) = delete;
     std::atomic<int>& number_;
