@@ -26,24 +26,24 @@ void look(wire::Envelope::Reader envelope) {
 }
 
 void look(wire::Item::Reader item) {
-  using router::forPeople;
+  using router::displayText;
   switch (item.which()) {
     case wire::Item::GREETING:
-      static_cast<void>(forPeople(item.getGreeting().getRouter()));
-      static_cast<void>(forPeople(item.getGreeting().getProgram()));
+      static_cast<void>(displayText(item.getGreeting().getRouter()));
+      static_cast<void>(displayText(item.getGreeting().getProgram()));
       for ([[maybe_unused]] const auto location : item.getGreeting().getLocations()) {
       }
       return;
     case wire::Item::FAREWELL:
-      return static_cast<void>(forPeople(item.getFarewell().getReason()));
+      return static_cast<void>(displayText(item.getFarewell().getReason()));
     case wire::Item::BIND:
       return static_cast<void>(router::toStd(item.getBind().getServer()));
     case wire::Item::SERVER:
-      return static_cast<void>(forPeople(item.getServer().getReason()));
+      return static_cast<void>(displayText(item.getServer().getReason()));
     case wire::Item::REFUSE:
-      return static_cast<void>(forPeople(item.getRefuse().getReason()));
+      return static_cast<void>(displayText(item.getRefuse().getReason()));
     case wire::Item::FATE:
-      return static_cast<void>(forPeople(item.getFate().getReason()));
+      return static_cast<void>(displayText(item.getFate().getReason()));
     case wire::Item::REQUEST:
       return look(item.getRequest().getMessage());
     case wire::Item::REPLY:

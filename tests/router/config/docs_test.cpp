@@ -96,7 +96,7 @@ TEST_F(RouterDocs, HaveTheKeysThatTheProgramKnows) {
   for (const std::string table : {"", "[tls]\n", "[limits]\n", "[[serve]]\n", "[[listen]]\n",
                                   "[[remote]]\n", "[[allow]]\n"}) {
     const auto complaint = complaintOf(table + "qqqqqqqqqqqqqqqqqq = 1\n");
-    constexpr std::string_view kBegin = "there are ";
+    constexpr std::string_view kBegin = "the keys are ";
     ASSERT_THAT(complaint, HasSubstr(kBegin));
     std::istringstream known(complaint.substr(complaint.find(kBegin) + kBegin.size()));
     for (std::string key; known >> key;) {

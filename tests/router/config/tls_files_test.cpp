@@ -93,7 +93,7 @@ TEST_F(TlsFilesTest, WhatIsWrongWithThemIsSaid) {
       {ours_.files("old", Valid::notAnyMore),
        "ours-old1.pem expired on 2021-02-03 04:05 UTC; renew it"},
       {ours_.files("new", Valid::notYet),
-       "ours-new2.pem is not valid before 2098-01-02 03:04 UTC; is this host's clock right?"},
+       "ours-new2.pem is not valid before 2098-01-02 03:04 UTC; check the clock of this host"},
   };
   for (const auto& [files, complaint] : wrong) EXPECT_EQ(complaintOf(files), complaint);
 }

@@ -117,8 +117,8 @@ TEST_F(RogueFloodTest, OfCallersThatComeAndGoLeavesTheLogShort) {
   const auto seconds =
       std::chrono::ceil<std::chrono::seconds>(std::chrono::steady_clock::now() - begun).count();
   EXPECT_LE(linesWith(" is connected (", said), kAtOnce + 1 + seconds);
-  EXPECT_LE(linesWith(" is gone: ", said), kAtOnce + 1 + seconds);
-  EXPECT_LE(linesWith(" is not for this peer", said), kAtOnce + seconds);
+  EXPECT_LE(linesWith(" disconnected: ", said), kAtOnce + 1 + seconds);
+  EXPECT_LE(linesWith(" is not allowed for this peer", said), kAtOnce + seconds);
 }
 
 }  // namespace

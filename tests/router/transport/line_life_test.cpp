@@ -17,7 +17,7 @@ TEST_F(LineTest, EndsWhenNoGreetingComes) {
   receive();
 
   EXPECT_THAT(farewell(), HasSubstr("code = silence"));
-  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for 1"));
+  EXPECT_THAT(end_, StartsWith("received nothing from the peer for 1"));
 }
 
 // They are signs of life, and no greeting.
@@ -41,7 +41,7 @@ TEST_F(LineTest, EndsWhenThePeerFallsSilentAndDoesNotReadEither) {
 
   waitForEnd();
 
-  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for"));
+  EXPECT_THAT(end_, StartsWith("received nothing from the peer for"));
 }
 
 TEST_F(LineTest, PingsAndLivesWhileItIsAnswered) {
@@ -112,7 +112,7 @@ TEST_F(LineTest, EndsWhenAFrameComesDripByDrip) {
     if (end_.empty()) send({bytes[at]});
   }
 
-  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for"));
+  EXPECT_THAT(end_, StartsWith("received nothing from the peer for"));
 }
 
 TEST_F(LineTest, SendsEachPingBack) {

@@ -131,7 +131,7 @@ TEST_F(LineTest, EndsWhenThePeerSaysFarewell) {
   send(frameOf(
       {[](wire::Item::Builder item) { item.initFarewell().setReason("good night"); }, ping(1)}));
 
-  EXPECT_EQ(end_, "the peer says: good night");
+  EXPECT_EQ(end_, "the peer ended the connection: good night");
 }
 
 TEST_F(LineTest, SaysFarewellBehindWhatWaits) {

@@ -59,7 +59,7 @@ class TlsTest : public testing::Test {
   kj::Promise<void> watch(Handshake handshake, Side& side) {
     return handshake
         .then([&](kj::AuthenticatedStream stream) { side.connected = kj::mv(stream); },
-              [&](kj::Exception&& error) { side.trouble = tlsTrouble(error); })
+              [&](kj::Exception&& error) { side.trouble = tlsProblem(error); })
         .eagerlyEvaluate(nullptr);
   }
   static kj::AuthenticatedStream& streamOf(Side& side) {
@@ -74,7 +74,7 @@ class TlsTest : public testing::Test {
     streamOf(side)
         .stream->tryRead(&byte, 1, 1)
         .then([&](std::size_t length) { trouble = length == 0 ? "end" : "a byte"; },
-              [&](kj::Exception&& error) { trouble = tlsTrouble(error); })
+              [&](kj::Exception&& error) { trouble = tlsProblem(error); })
         .wait(io_.waitScope);
     return trouble;
   }
