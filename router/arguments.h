@@ -4,8 +4,8 @@
 //
 //   mpf-router /etc/mpf/router.toml
 //   mpf-router --serve 1 --listen 10.0.0.7:9900 --plain
-//   mpf-router --remote 1,2=ioc1.lab:9900 --tls-certificate our.pem --tls-key our.key \
-//     --tls-authorities lab.pem
+//   mpf-router --remote 1,2=ioc1.lab:9900
+//     --tls-certificate our.pem --tls-key our.key --tls-authorities lab.pem
 //
 // Threads  one.
 #pragma once

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The command line of mpf-router: a file, or options in its place, and options that go before a
+// The command line of mpf-router: a file, options that replace a file, and options that override a
 // file.
 #include "router/arguments.h"
 
@@ -40,7 +40,7 @@ class ArgumentsTest : public ConfigTest {
   std::unique_ptr<RouterArguments> arguments_;
 };
 
-TEST_F(ArgumentsTest, MakeASimpleServerRouter) {
+TEST_F(ArgumentsTest, ConfigureASimpleServerRouter) {
   const auto started = start({"--serve", "1=0", "--serve", "3", "--listen", "127.0.0.1:9900",
                               "--listen", "[::1]:9900", "--plain"});
 
@@ -51,7 +51,7 @@ TEST_F(ArgumentsTest, MakeASimpleServerRouter) {
   EXPECT_EQ(config().limits, Limits());
 }
 
-TEST_F(ArgumentsTest, MakeASimpleClientRouter) {
+TEST_F(ArgumentsTest, ConfigureASimpleClientRouter) {
   const auto tls = Certificates(folder_, "lab").files("ioc1");
 
   const auto started = start({"--remote",
@@ -92,7 +92,7 @@ TEST_F(ArgumentsTest, MakeASimpleClientRouter) {
   EXPECT_EQ(config().limits.deadTime, 5s);
 }
 
-TEST_F(ArgumentsTest, GoBeforeWhatAFileSays) {
+TEST_F(ArgumentsTest, OverrideTheFile) {
   const auto file = folder_.write(
       "r.toml",
       "name = \"file\"\nbackplane = \"file\"\n[limits]\nqueue-size = 7\nmax-clients = 8\n"
@@ -107,22 +107,22 @@ TEST_F(ArgumentsTest, GoBeforeWhatAFileSays) {
   EXPECT_EQ(config().limits.maxClients, 8U);
 }
 
-TEST_F(ArgumentsTest, StillHoldWhenTheFileIsLoadedAnew) {
+TEST_F(ArgumentsTest, OverrideTheFileAgainAfterAReload) {
   const std::string remote = "[[remote]]\nlocations = 1\naddress = \"a:1\"\nsecurity = \"plain\"\n";
   const auto file = folder_.write("r.toml", remote);
   ASSERT_EQ(start({file, "--name", "option"}).status, std::nullopt);
   folder_.write("r.toml", "name = \"file\"\nbackplane = \"changed\"\n" + remote);
 
-  const auto changed = arguments_->load();
+  const auto changed = arguments_->loadConfig();
 
   EXPECT_EQ(changed.name, "option");
   EXPECT_EQ(changed.backplane, "changed");
-  EXPECT_EQ(config().backplane, "") << "what was loaded stays";
+  EXPECT_EQ(config().backplane, "") << "the loaded configuration does not change";
   folder_.write("r.toml", "nam = 1\n" + remote);
-  EXPECT_THROW(static_cast<void>(arguments_->load()), ConfigError);
+  EXPECT_THROW(static_cast<void>(arguments_->loadConfig()), ConfigError);
 }
 
-TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
+TEST_F(ArgumentsTest, AreNamedInErrors) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
       {{},
        "nothing to do: write --serve and --listen to offer servers of this host to other hosts, or "
@@ -172,14 +172,14 @@ TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
   }
 }
 
-TEST_F(ArgumentsTest, AFileThatIsWrongIsNamedWithItsLine) {
+TEST_F(ArgumentsTest, ErrorsOfAFileNameItsLine) {
   const auto started = start({folder_.write("r.toml", "\nnam = \"a\"\n")});
 
   EXPECT_EQ(started.status, 2);
   EXPECT_EQ(started.err, "mpf-router: r.toml:2: unknown key \"nam\"; did you mean \"name\"?\n");
 }
 
-TEST_F(ArgumentsTest, SomeStandInPlaceOfAFile) {
+TEST_F(ArgumentsTest, SomeCannotBeCombinedWithAFile) {
   for (const auto& words : std::vector<std::vector<std::string>>{
            {"--serve", "1", "r.toml"}, {"--plain", "r.toml"}, {"r.toml", "--tls-name", "a"}}) {
     const auto& option = words[0] == "r.toml" ? words[1] : words[0];
@@ -189,7 +189,7 @@ TEST_F(ArgumentsTest, SomeStandInPlaceOfAFile) {
   }
 }
 
-TEST_F(ArgumentsTest, CheckSaysWhatAConfigurationMeans) {
+TEST_F(ArgumentsTest, CheckDescribesTheConfiguration) {
   const auto tls = Certificates(folder_, "lab").files("ioc1");
   const auto file = folder_.write(
       "r.toml", "name = \"ioc1\"\nbackplane = \"b\"\nmode = \"0666\"\n[tls]\ncertificate = \"" +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// HOST:PORT, which of them are public, and patterns.
+// HOST:PORT, public addresses, and patterns.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ TEST(RouterAddress, IsWrittenAsItIsRead) {
     EXPECT_EQ(parseAddress(text).text(), text);
 }
 
-TEST(RouterAddress, WhatIsWrongWithItIsSaid) {
+TEST(RouterAddress, ErrorsQuoteTheTextAndShowTheForm) {
   const std::vector<std::pair<std::string, std::string>> wrong{
       {"",
        "\"\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, [fd00::7]:9900 "
@@ -74,7 +74,6 @@ TEST(RouterAddress, LoopbackPrivateAndLinkLocalAreNotPublic) {
   }
 }
 
-// The socket address of `ip`.
 TEST(RouterPattern, StarsStandForAnythingAndQuestionMarksForOne) {
   for (const auto& [pattern, name] :
        std::vector<std::pair<std::string, std::string>>{{"", ""},
@@ -107,9 +106,8 @@ TEST(RouterPattern, StarsStandForAnythingAndQuestionMarksForOne) {
   }
 }
 
-// A peer chooses its name, and somebody the pattern: together they must not cost more than their
-// product.
-TEST(RouterPattern, ManyStarsCostNothing) {
+// A peer chooses its own name: matching takes at most the product of both lengths.
+TEST(RouterPattern, ManyStarsAreMatchedQuickly) {
   std::string pattern;
   for (int i = 0; i < 1000; ++i) pattern += "*a";
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Files that are wrong: each with its line and its text.
+// Invalid configuration files: the line and the text of each error.
 #include <vector>
 
 #include "tests/router/certificates.h"
 #include "tests/router/config/config_fixture.h"
 
-// NOLINTBEGIN(modernize-raw-string-literal): a line of TOML ends with \n here, so that one test case is one line
+// Lines of TOML end with \n here, so that one test case is one line.
+// NOLINTBEGIN(modernize-raw-string-literal)
 namespace mpf::router::test {
 namespace {
 
@@ -36,7 +37,7 @@ class ConfigErrorTest : public ConfigTest {
   }
 };
 
-TEST_F(ConfigErrorTest, WhatIsNoToml) {
+TEST_F(ConfigErrorTest, InvalidToml) {
   EXPECT_THAT(complaintOf("name = \"a\"\n\nname = \"b\"\n"),
               HasSubstr("router.toml:3: Error while parsing key-value pair: cannot redefine "
                         "existing string 'name'"));
@@ -46,7 +47,7 @@ TEST_F(ConfigErrorTest, WhatIsNoToml) {
   EXPECT_THAT(complaintOf("# \xff\n"), HasSubstr("router.toml:1: "));
 }
 
-TEST_F(ConfigErrorTest, KeysThatThereAreNot) {
+TEST_F(ConfigErrorTest, UnknownKeys) {
   expectComplaints({
       {"nam = \"a\"\n", "1: unknown key \"nam\"; did you mean \"name\"?"},
       {kRemote + "adress = \"a:1\"\n",
@@ -63,7 +64,7 @@ TEST_F(ConfigErrorTest, KeysThatThereAreNot) {
   });
 }
 
-TEST_F(ConfigErrorTest, KeysThatMustBeThere) {
+TEST_F(ConfigErrorTest, MissingKeys) {
   expectComplaints({
       {"\n[[serve]]\nlocal = 0\n", "2: [[serve]] has no location; write location = 1"},
       {kServe + "[[listen]]\n", "3: [[listen]] has no address; write address = \"*:9900\""},
@@ -75,7 +76,7 @@ TEST_F(ConfigErrorTest, KeysThatMustBeThere) {
   });
 }
 
-TEST_F(ConfigErrorTest, ValuesOfAnotherKind) {
+TEST_F(ConfigErrorTest, ValuesOfTheWrongType) {
   expectComplaints({
       {"name = 7\n", "1: name is an integer; write a string in quotes"},
       {"name = [\n \"a\"]\n", "1: name is a list; write a string in quotes"},
@@ -97,7 +98,7 @@ TEST_F(ConfigErrorTest, ValuesOfAnotherKind) {
   });
 }
 
-TEST_F(ConfigErrorTest, ValuesThatCannotBe) {
+TEST_F(ConfigErrorTest, InvalidValues) {
   expectComplaints({
       {"mode = \"0888\"\n",
        "1: mode: 0888: use an octal number between 0600 and 0666, such as 0660"},
@@ -121,7 +122,7 @@ TEST_F(ConfigErrorTest, ValuesThatCannotBe) {
   });
 }
 
-TEST_F(ConfigErrorTest, ARouterThatWouldDoNothing) {
+TEST_F(ConfigErrorTest, ARouterWithNothingToDo) {
   expectComplaints({
       {"",
        "1: nothing to do: write [[serve]] and [[listen]] to offer servers of this host to other "
@@ -132,7 +133,7 @@ TEST_F(ConfigErrorTest, ARouterThatWouldDoNothing) {
   });
 }
 
-TEST_F(ConfigErrorTest, LocationsInTwoPlaces) {
+TEST_F(ConfigErrorTest, DuplicateLocationsAndAddresses) {
   expectComplaints({
       {kServe + kServe + kListen, "4: location 1 is served twice; write it once"},
       {kRemote + kRemote, "6: location 2 appears twice in remotes; write it once"},
@@ -152,7 +153,7 @@ TEST_F(ConfigErrorTest, LocationsInTwoPlaces) {
   });
 }
 
-TEST_F(ConfigErrorTest, AddressesThatCannotBeCalled) {
+TEST_F(ConfigErrorTest, AddressesThatCannotBeConnectedTo) {
   expectComplaints({
       {remoteAt("*:9900"),
        "3: *:9900 is a wildcard address to listen on; write the address of one host"},
@@ -162,7 +163,7 @@ TEST_F(ConfigErrorTest, AddressesThatCannotBeCalled) {
   });
 }
 
-TEST_F(ConfigErrorTest, PlainTcpWhereEverybodyListens) {
+TEST_F(ConfigErrorTest, PlainTcpWithPublicAddresses) {
   const auto how =
       ": use TLS, or a loopback, private or link-local address, or write allow-public-plain = true";
   expectComplaints({
@@ -191,7 +192,7 @@ TEST_F(ConfigErrorTest, Patterns) {
   });
 }
 
-TEST_F(ConfigErrorTest, TlsThatIsNotComplete) {
+TEST_F(ConfigErrorTest, IncompleteTls) {
   const auto needs =
       ": TLS needs [tls] with certificate, key and authorities; or write security = \"plain\"";
   expectComplaints({
@@ -208,7 +209,7 @@ TEST_F(ConfigErrorTest, TlsThatIsNotComplete) {
   });
 }
 
-TEST_F(ConfigErrorTest, FilesOfTls) {
+TEST_F(ConfigErrorTest, InvalidTlsFiles) {
   const auto tls = [](const std::string& certificate, const std::string& key,
                       const std::string& authorities) {
     return "[tls]\ncertificate = \"" + certificate + "\"\nkey = \"" + key + "\"\nauthorities = \"" +
@@ -236,7 +237,7 @@ TEST_F(ConfigErrorTest, FilesOfTls) {
   });
 }
 
-TEST_F(ConfigErrorTest, FilesThatCannotBeRead) {
+TEST_F(ConfigErrorTest, UnreadableFiles) {
   const auto complaintOfFile = [&](const std::string& file) -> std::string {
     try {
       static_cast<void>(loadConfig(file));
