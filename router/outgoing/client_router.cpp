@@ -9,10 +9,10 @@
 namespace mpf::router {
 namespace {
 
-constexpr std::int64_t kLingerNs = 60'000'000'000;    // how long an unused proxy is kept
+constexpr std::int64_t kIdleProxyNs = 60'000'000'000;  // how long a proxy without clients is kept
 constexpr std::int64_t kBindAgainNs = 2'000'000'000;  // pause after a refused bind
-constexpr int kTurn = 16;        // requests of one server before those of the next server
-constexpr int kMaxTurns = 256;   // turns before the event loop runs its other tasks
+constexpr int kTurn = 16;  // requests of one server before those of the next server
+constexpr int kMaxTurns = 256;  // turns before the event loop runs its other tasks
 constexpr std::chrono::seconds kSweepEvery{1};  // while isPending() is true for a server
 
 // A fate that only a newer peer defines becomes outcomeUnknown, which promises nothing.
@@ -230,7 +230,7 @@ void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
 }
 
 // Destroys proxies that are done, makes proxies for new offers, and unbinds servers that no client
-// has used or waited for during kLingerNs.
+// has used or waited for during kIdleProxyNs.
 void ClientRouter::sweep() {
   const auto nowNs = Clock::nowNs();
   for (auto each = wanted_.begin(); each != wanted_.end();) {
@@ -242,7 +242,7 @@ void ClientRouter::sweep() {
     if (!wanted.proxy && wanted.offer && connected_) makeProxy(name, wanted);
     if (wanted.proxy && wanted.proxy->hasClients()) wanted.idleSinceNs = 0;
     else if (wanted.proxy && wanted.idleSinceNs == 0) wanted.idleSinceNs = nowNs;
-    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kLingerNs) {
+    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kIdleProxyNs) {
       ++each;
       continue;
     }

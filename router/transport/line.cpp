@@ -93,7 +93,7 @@ void Line::end(FarewellCode code, const std::string& why) {
   });
   phase_ = Phase::leaving;
   farewell_ = text;
-  lingers_ = code != FarewellCode::SILENCE;
+  drains_ = code != FarewellCode::SILENCE;
   farewellTimer_ = timer_.afterDelay(kFarewellTime)
                        .then([this, text] { finish({text}); })
                        .eagerlyEvaluate(nullptr);

@@ -201,7 +201,7 @@ class Line {
   std::string farewell_;  // the text of our farewell
   // After our farewell, read until the peer closes: with unread data the kernel would reset the
   // connection, and the peer might not receive the farewell.
-  bool lingers_ = false;
+  bool drains_ = false;
   std::int64_t lastReceiveNs_ = 0;  // time of the last sign of life
   std::size_t partialBytes_ = 0;  // received since then, of a frame that is still arriving
   bool overdue_ = false;  // the last check has found the peer overdue

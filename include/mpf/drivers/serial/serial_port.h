@@ -121,9 +121,9 @@ class SerialPort {
   SerialPortStatus writeRead(Bytes data, Deadline deadline) {
     return transfer(data, true, deadline);
   }
-  // The thread that waits for a request asks `isHopeless` every 20 ms; true ends the request with
+  // The thread that waits for a request asks `isAbandoned` every 20 ms; true ends the request with
   // failure. Empty: wait on. For the binder, between requests.
-  virtual void giveUpWhen(std::function<bool()> isHopeless) = 0;
+  virtual void abandonWhen(std::function<bool()> isAbandoned) = 0;
   // Holds the line in the break state. Fails where the line cannot.
   virtual SerialPortStatus sendBreak(Milliseconds duration) = 0;
   // How the last request ended.
