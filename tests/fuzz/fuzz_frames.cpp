@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whatever comes over a line, cut into frames, and all that is in them read. The input is what
-// comes, behind a byte that says in which parts.
+// Reads all fields of the frames in an input. The first byte of the input sets the size of the
+// parts in which the rest arrives.
 #include <algorithm>
 #include <capnp/message.h>
 #include <cstring>
@@ -69,9 +69,8 @@ void play(std::span<const std::uint8_t> input) try {
       for (const auto item : frame->getRoot<wire::Frame>().getItems()) look(item);
     }
   }
-} catch (
-    const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): it costs the peer its connection
-} catch (const kj::Exception&) {  // NOLINT(bugprone-empty-catch): likewise
+} catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): ends the connection
+} catch (const kj::Exception&) {       // NOLINT(bugprone-empty-catch): ends the connection
 }
 
 }  // namespace mpf::test

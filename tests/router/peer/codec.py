@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-# Cap'n Proto, as much of it as frames need: a frame is one message in standard stream framing, with a Frame as its root.
+# The part of Cap'n Proto that frames need: a frame is one message in standard stream framing, with a
+# Frame as its root.
 #
-#   struct   {field: value}; a union besides: kind, the member's name or the number of an unknown one, and body, what it holds
-#   enum     its name, or the number of an unknown one
+#   struct   {field: value}; with a union also kind, the name of the member or the number of an unknown
+#            one, and body, its value
+#   enum     its name, or the number of an unknown value
 #   Data     bytes; Text is str; List(...) is a list
 import struct
 
@@ -16,11 +18,11 @@ _elementBits = (0, 1, 8, 16, 32, 64, 64)
 
 
 class NoFrame(Exception):
-  """What no Cap'n Proto message with a Frame can be."""
+  """The bytes are not a Cap'n Proto message with a Frame."""
 
 
 class TooLong(Exception):
-  """More than the receiver takes."""
+  """The frame is longer than the receiver accepts."""
 
 
 def item(kind, body=None, **fields):
@@ -34,7 +36,7 @@ def padded(size):
 # ---- writing
 
 class _Writer:
-  """Puts one object behind the other into segment 0; or, spread, each into a segment of its own, behind far and double-far pointers."""
+  """Writes all objects to segment 0 or, if `spread`, each to a segment of its own, with far pointers."""
 
   def __init__(self, layouts, spread):
     self.layouts_ = layouts
@@ -46,14 +48,14 @@ class _Writer:
     return len(self.segments) - 1
 
   def place(self, segment, at, low, high, size):
-    """Makes room for an object, sets the pointer at `at` to it, and returns where it is."""
+    """Allocates an object, sets the pointer at `at` to it, and returns its place."""
     word = low | high << 32
-    if not self.spread_ or size == 0:  # an empty segment is not to every reader's taste
+    if not self.spread_ or size == 0:  # some readers refuse empty segments
       target = len(self.segments[segment])
       self.segments[segment] += bytes(padded(size))
       self.put("u64", segment, at, word | (target - at - 8) // 8 << 2)
       return segment, target
-    if len(self.segments) % 2:  # far: the landing pad stands before the object
+    if len(self.segments) % 2:  # far: the landing pad precedes the object
       target = self.newSegment(8 + padded(size))
       self.put("u64", target, 0, word)
       self.put("u64", segment, at, 2 | target << 32)
@@ -179,19 +181,19 @@ class _Reader:
 
   def word(self, segment, at):
     if segment >= len(self.segments_) or not 0 <= at <= len(self.segments_[segment]) - 8:
-      raise NoFrame("a pointer out of the message")
+      raise NoFrame("a pointer outside of the message")
     return struct.unpack_from("<Q", self.segments_[segment], at)[0]
 
   def claim(self, segment, at, words, atLeast=0):
-    """Says that an object lies within its segment, and counts it."""
+    """Checks that an object is within its segment, and limits the total of all objects."""
     if segment >= len(self.segments_) or at < 0 or at + 8 * words > len(self.segments_[segment]):
-      raise NoFrame("an object out of the message")
+      raise NoFrame("an object outside of the message")
     self.words_ -= max(words, atLeast)
     if self.words_ < 0:
-      raise NoFrame("pointers to the same bytes over and over")
+      raise NoFrame("too many pointers to the same bytes")
 
   def follow(self, segment, at, level, kind):
-    """Where the pointer at `at` leads: segment, byte, upper half of the pointer; None for a null one."""
+    """The target of the pointer at `at`: segment, byte, upper half of the pointer; None if null."""
     if level > kMaxLevels:
       raise NoFrame("too many levels")
     word = self.word(segment, at)
@@ -220,7 +222,7 @@ class _Reader:
     return self.content(kLayouts[name], segment, start, sizes & 0xFFFF, sizes >> 16, level)
 
   def content(self, layout, segment, start, dataWords, pointers, level):
-    """A struct; fields that lie behind its end have their defaults."""
+    """Reads a struct; fields beyond its end have their default values."""
     def field(kind, place):
       if kind == "void":
         return None
@@ -278,7 +280,7 @@ class _Reader:
       raise NoFrame("a list of structs without a tag")
     tag = self.word(segment, start)
     elements, dataWords, pointers = tag >> 2 & 0x3FFFFFFF, tag >> 32 & 0xFFFF, tag >> 48
-    self.claim(segment, start, 1 + count, atLeast=elements)  # an element without a size costs a word, too
+    self.claim(segment, start, 1 + count, atLeast=elements)  # an element of size 0 counts as a word
     if tag & 3 or elements * (dataWords + pointers) > count:
       raise NoFrame("a list that is shorter than its elements")
     size = 8 * (dataWords + pointers)

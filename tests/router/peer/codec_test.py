@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The codec and its frozen layouts: against the schemas of today, the `capnp` tool, the examples of the page, and noise.
+# Compares the codec and its frozen layouts with today's schemas, the `capnp` tool and the examples of
+# docs/wire-format.md, and reads damaged frames.
 import math
 import os
 import random
@@ -46,20 +47,21 @@ def decoded(frame):
 
 
 def covers(value, sent):
-  """Whether all that was sent has been read; fields that were not sent have their defaults."""
+  """Whether all sent fields have been read; fields that were not sent have their default values."""
   if isinstance(sent, dict):
     return all(covers(value.get(key) if value else None, sent[key]) for key in sent)
   return value == sent
 
 
-@unittest.skipUnless(shutil.which("capnp"), "no `capnp` on this host")
+@unittest.skipUnless(shutil.which("capnp"), "the tool `capnp` is not installed")
 class Tool(unittest.TestCase):
   def capnp(self, *arguments, given=b""):
     done = subprocess.run(["capnp", *arguments], input=given, capture_output=True, cwd=kSources, check=False)
     self.assertEqual(done.returncode, 0, done.stderr.decode())
     return done.stdout
 
-  # Each field that the table knows is where today's schemas have it; enums and unions begin as the table has them.
+  # Each field of the table has the same place in today's schemas. Enums and unions begin with the values
+  # and members of the table.
   def testSchemasHaveTheFrozenLayouts(self):
     compiled = self.capnp("compile", kImports, "-ocapnp", "schema/router.capnp", "schema/message.capnp").decode()
     found, structName, enumName = {}, None, None
@@ -89,7 +91,7 @@ class Tool(unittest.TestCase):
     for name, values in kEnums.items():
       self.assertEqual([found[name, number] for number in range(len(values))], list(values))
 
-  # What the codec writes the tool reads; what the tool then writes the codec reads, and it is the same.
+  # The tool reads the frames of the codec, and the codec reads the frames that the tool makes of them.
   def testToolAgreesOnEachKindOfItem(self):
     for sent in kindsOfItems():
       for spread in (False, True):
@@ -121,7 +123,7 @@ class Codec(unittest.TestCase):
 
     self.assertEqual((back[0]["kind"], back[1]["body"]["message"]["kind"], back[2]["body"]["state"]), (99, 98, 97))
 
-  def testReadsTheGreetingOfThePage(self):
+  def testReadsTheGreetingOfTheDocument(self):
     greeting = bytes.fromhex("""00000000 11000000 00000000 00000100 01000000 17000000 04000000 01000100 01000000 00000000 00000000 05000300
         01000000 d0070000 86321a0c b2e74cca 00001004 00000000 00000004 00000000 00000000 00000000 09000000 3a000000 09000000 8a000000
         00000000 00000000 726f7574 65720000 6d70662d 726f7574 657220302e312e30 0000000000000000""")
@@ -132,8 +134,8 @@ class Codec(unittest.TestCase):
                                 incarnation=0xCA4CE7B20C1A3286, locations=[], maxFrameBytes=68157440, maxMessageBytes=67108864,
                                 deadTimeMs=2000, maxClients=0))
 
-  # The second frame of the page's example, and the differences that it names for the reply.
-  def testReadsAndWritesTheExamplesOfThePage(self):
+  # The second frame of the document's example, and the differences that it lists for the reply.
+  def testReadsAndWritesTheExamplesOfTheDocument(self):
     request = bytes.fromhex("""00000000 0e000000 00000000 00000100 01000000 17000000 04000000 01000100 0b000000 00000000 00000000 02000100
         01000000 01000000 8c203fa5 04000000 00000000 02000100 00000000 00000000 01000000 00000000 00000000 03000000 00000000 00000000
         00000000 02000000 00000000 07000000""")
@@ -147,18 +149,18 @@ class Codec(unittest.TestCase):
     different = [at for at in range(0, len(request), 8) if request[at:at + 8] != answer[at:at + 8]]
     self.assertEqual([answer[at:at + 8].hex() for at in different], ["0c00000000000000", "0100000000000000"])
 
-  # Whatever comes, the reader says that it is no frame, or reads it, soon.
-  def testNoiseIsNoFrame(self):
+  # The reader either reads a damaged frame or raises an exception, in a short time.
+  def testReadsOrRefusesDamagedFrames(self):
     seed = random.randrange(1 << 32)
     print(f"seed {seed}")
     random.seed(seed)
     whole = encodeFrame(kindsOfItems(), spread=True)
     for _ in range(400):
-      noise = bytearray(whole)
+      damaged = bytearray(whole)
       for _ in range(random.randrange(1, 6)):
-        noise[random.randrange(8, len(noise))] ^= 1 << random.randrange(8)
+        damaged[random.randrange(8, len(damaged))] ^= 1 << random.randrange(8)
       reader = FrameReader(1 << 20)
-      reader.feed(noise)
+      reader.feed(damaged)
       try:
         segments = reader.tryNext()
         if segments is not None:
@@ -166,9 +168,9 @@ class Codec(unittest.TestCase):
       except (NoFrame, TooLong):
         pass
 
-  def testRefusesPointersToTheSameBytesOverAndOver(self):
+  def testRefusesManyPointersToTheSameBytes(self):
     elements = 8000
-    array = struct.pack("<QQ", 1 << 32 | 1 << 48, 0)  # what each item points to: a request, and its message
+    array = struct.pack("<QQ", 1 << 32 | 1 << 48, 0)  # the target of each item: a request and its message
     words = [1 << 48, 1 | 7 << 32 | 2 * elements << 35, elements << 2 | 1 << 32 | 1 << 48]
     for index in range(elements):
       words += [5, (2 * (elements - index) - 2) << 2 | 500 << 32]

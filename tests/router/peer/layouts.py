@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-# The layouts of the structs on the wire, frozen: what `capnp compile -ocapnp` says of schema/router.capnp and schema/message.capnp
-# at protocol 1.0. codec_test.py compares them with today's schemas, which may have added to them and changed nothing.
+# The frozen layouts of the structs on the wire: the output of `capnp compile -ocapnp` for
+# schema/router.capnp and schema/message.capnp at protocol 1.0. codec_test.py compares them with today's
+# schemas, which may have additional fields but no other changes.
 #
-#   Layout(words of data, pointers, {field: (type, place)})    place: byte of the data section, or index of the pointer
-#   a union: where its discriminant is, and its members in order
+#   Layout(words of data, pointers, {field: (type, place)})
+#   place    byte of the data section, or index of the pointer
+#   a union  the place of its discriminant, and its members in order
 from typing import NamedTuple
 
 
@@ -13,7 +15,7 @@ class Layout(NamedTuple):
   fields: dict = {}
   tagAt: int = -1     # byte of the discriminant; -1: no union
   members: tuple = ()  # (name, type, place)
-  presets: dict = {}  # what a writer puts into fields that are not given
+  presets: dict = {}  # values of fields that a writer does not set
 
 
 kEnums = {
@@ -77,10 +79,12 @@ def _newer(layout):
                 {"newNumber": 0xFEDCBA9876543210, "newText": "of a later minor version"})
 
 
-# What some minor version after 1.0 may look like: each struct has a number and a text more, each union a member more, "novelty".
+# An invented minor version after 1.0: each struct has an additional number and text, and each union has
+# an additional member, "novelty".
 kNewerLayouts = {name: _newer(layout) for name, layout in kLayouts.items()}
 
-# What a minor version before 1.0 would have been: without what is for people, and without a limit that may be 0.
+# An invented minor version before 1.0: without the texts that only inform, and without a limit that may
+# be 0.
 kOlderLayouts = {
     **kLayouts,
     "Greeting": Layout(4, 3, {name: place for name, place in kLayouts["Greeting"].fields.items() if name != "maxClients"}),

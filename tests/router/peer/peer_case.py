@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# What the tests of both roles share: the real programs, a watchdog, messages of every type, and the ways in which the peer speaks.
+# The common part of the tests of both roles: the real programs, a watchdog, messages of every type, and
+# the protocol versions of the peer.
 import os
 import struct
 import sys
@@ -10,7 +11,7 @@ from programs import Programs
 
 kWatchdogSeconds = 900
 kNaN = struct.unpack("<d", bytes.fromhex("efbeadde0000f87f"))[0]
-# As 1.0, as the minor versions after and before it, in many segments.
+# Protocol 1.0, a later and an earlier minor version, and 1.0 with many segments.
 kSpeech = ({}, {"version": "newer", "protocolMinor": 1}, {"version": "older"}, {"spread": True})
 
 
@@ -19,7 +20,7 @@ def message(kind, clientType=0, clientExtra=0, **body):
 
 
 def inBytes(envelope):
-  """So that two NaN are the same when their bits are."""
+  """The bytes of a message, so that NaNs compare by their bits."""
   return encodeFrame([item("reply", message=envelope)])
 
 
