@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""units_test CMAKE BUILD: installs the router's systemd units and verifies them with systemd-analyze.
+"""units_test CMAKE BUILD: installs the router's systemd units, and verifies them with
+systemd-analyze.
 
 Exits with 77, which ctest shows as skipped, on a host without systemd-analyze.
 """
@@ -21,7 +22,7 @@ def install(cmake, build, prefix):
 
 
 def stand_in(prefix):
-    """Installs a stand-in for mpf-router, because systemd-analyze checks that the program exists."""
+    """Installs a stand-in for mpf-router: systemd-analyze checks that the program exists."""
     program = os.path.join(prefix, "bin", "mpf-router")
     os.makedirs(os.path.dirname(program))
     shutil.copy("/bin/true", program)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Connects the two roles of the peer with each other, without a program: both must implement the same
-# protocol.
+# Connects the two roles of the peer with each other, without a program: both must implement the
+# same protocol.
 import unittest
 
 from client_role import ClientRouter
@@ -73,9 +73,13 @@ class Alone(unittest.TestCase):
   def testMessagesThatAreTooLargeEndLocally(self):
     self.client = self.joined(maxMessageBytes=1000)
     self.assertEqual(self.end(message("char8Array", value=bytes(1001)))[2], "by this side")
-    self.assertEqual(self.end(message("char8Array", value=bytes(1001)), careful=False)[1], "refused")
+    self.assertEqual(
+      self.end(message("char8Array", value=bytes(1001)), careful=False)[1], "refused"
+    )
     self.far.answer = lambda request: request.reply(message("user", value=bytes(1 << 20)))
-    self.assertEqual(self.end(message("int32")), ("fate", "outcomeUnknown", "the reply is too large"))
+    self.assertEqual(
+      self.end(message("int32")), ("fate", "outcomeUnknown", "the reply is too large")
+    )
 
   def testWindowLimitsReplies(self):
     self.client = client = self.joined(window=128)
@@ -92,15 +96,24 @@ class Alone(unittest.TestCase):
 
   # Each violation is answered with a farewell of the right code.
   def testFarewells(self):
-    for near, far, code in (({"protocolMajor": 2, "version": "newer"}, {}, "version"), ({"maxFrameBytes": 65535}, {}, "protocol")):
+    for near, far, code in (
+      ({"protocolMajor": 2, "version": "newer"}, {}, "version"),
+      ({"maxFrameBytes": 65535}, {}, "protocol"),
+    ):
       self.server = ServerRouter(**far)
       router = ClientRouter(self.server.address, **near)
       self.assertEqual(router.connection.awaitEnding(), ("theirs", code))
       self.server.close()
-    for raw, code in (([item("reply", {})], "protocol"), ([item("open", client=1)], "protocol"), ([item("credit", client=7)], "protocol"),
-                      ([item("open", client=0)], "protocol"), ([item("request", client=1, message=message("int32"))], "protocol"),
-                      ([item("bind", binding=1, location=1, server="far")], "protocol"),
-                      (b"\0\0\0\0\xff\xff\xff\xff", "limit"), (b"\0\0\0\0\1\0\0\0" + b"\xff" * 8, "protocol")):
+    for raw, code in (
+      ([item("reply", {})], "protocol"),
+      ([item("open", client=1)], "protocol"),
+      ([item("credit", client=7)], "protocol"),
+      ([item("open", client=0)], "protocol"),
+      ([item("request", client=1, message=message("int32"))], "protocol"),
+      ([item("bind", binding=1, location=1, server="far")], "protocol"),
+      (b"\0\0\0\0\xff\xff\xff\xff", "limit"),
+      (b"\0\0\0\0\1\0\0\0" + b"\xff" * 8, "protocol"),
+    ):
       self.client = self.joined()
       self.near.connection.sendBytes(encodeFrame(raw) if isinstance(raw, list) else raw)
       self.assertEqual(self.near.connection.awaitEnding(), ("theirs", code))

@@ -54,7 +54,13 @@ class Client:
     """Sends a request. If not `careful`, sends it even when the protocol forbids it."""
     with self.router_.changed:
       asked = Asked(requestId or self.nextId(), wasWritten=True)
-      one = item("request", client=self.number, requestId=asked.requestId, takeWithinNs=takeWithinNs, message=message)
+      one = item(
+        "request",
+        client=self.number,
+        requestId=asked.requestId,
+        takeWithinNs=takeWithinNs,
+        message=message,
+      )
       refusal = careful and self.refusal(message, one)
       if refusal:
         asked.wasWritten, asked.end = False, ("fate", refusal, "by this side")
@@ -66,8 +72,15 @@ class Client:
   def refusal(self, message, one):
     if not self.isOpen:
       return "neverTaken"
-    tooLarge = bodyBytes(message) > min(self.life["maxMessageBytes"], self.router_.connection.theirs["maxMessageBytes"])
-    if self.isRefused or tooLarge or len(self.unanswered) >= self.life["maxOutstanding"] or not self.router_.connection.fits(one):
+    tooLarge = bodyBytes(message) > min(
+      self.life["maxMessageBytes"], self.router_.connection.theirs["maxMessageBytes"]
+    )
+    if (
+      self.isRefused
+      or tooLarge
+      or len(self.unanswered) >= self.life["maxOutstanding"]
+      or not self.router_.connection.fits(one)
+    ):
       return "refused"
     return None
 
@@ -89,18 +102,30 @@ class Client:
     if message["kind"] in ("connect", "requestFate"):
       raise Violation("protocol", f"a reply that is a {message['kind']}")
     if body["isFirst"] != (asked is not None):
-      raise Violation("protocol", "a first reply to nothing" if body["isFirst"] else "a further reply before the first")
+      raise Violation(
+        "protocol",
+        "a first reply to nothing" if body["isFirst"] else "a further reply before the first",
+      )
     if asked:
-      self.finish(requestId, ("reply", message) if isKnown else ("fate", "outcomeUnknown", "a reply of a kind that is not known here"))
+      self.finish(
+        requestId,
+        ("reply", message)
+        if isKnown
+        else ("fate", "outcomeUnknown", "a reply of a kind that is not known here"),
+      )
     elif isKnown:
       self.answered.setdefault(requestId, Asked(requestId, False)).further.append(message)
     self.taken += 1
-    self.uncredited += kReplyBytes + bodyBytes(message) if isKnown else self.window  # a window never grows beyond its size in `open`
+    self.uncredited += (
+      kReplyBytes + bodyBytes(message) if isKnown else self.window
+    )  # a window never grows beyond its size in `open`
     self.sendCredit()
 
   def sendCredit(self):
     if self.givesCredit and self.uncredited * 4 > self.window:
-      self.router_.connection.send(item("credit", client=self.number, bytes=min(self.uncredited, 0xFFFFFFFF)))
+      self.router_.connection.send(
+        item("credit", client=self.number, bytes=min(self.uncredited, 0xFFFFFFFF))
+      )
       self.uncredited = 0
 
   def finish(self, requestId, end):
@@ -125,7 +150,13 @@ class ClientRouter:
     self.changed = threading.Condition()
     self.bindings = {}
     self.clients = {}
-    self.connection = Connection(socket.create_connection(address), self, greeting(**fields) if greets else None, version, spread)
+    self.connection = Connection(
+      socket.create_connection(address),
+      self,
+      greeting(**fields) if greets else None,
+      version,
+      spread,
+    )
     self.connection.start()
 
   # ---- actions
@@ -148,7 +179,9 @@ class ClientRouter:
       client = Client(self, len(self.clients) + 1, binding, window)
       self.clients[client.number] = client
       life = binding.states[-1]["incarnation"]
-      self.connection.send(item("open", client=client.number, binding=binding.number, incarnation=life, window=window))
+      self.connection.send(
+        item("open", client=client.number, binding=binding.number, incarnation=life, window=window)
+      )
       return client
 
   def awaitState(self, binding, state):
@@ -160,7 +193,7 @@ class ClientRouter:
     return asked.end
 
   def awaitPong(self, stamp):
-    """Waits until the other side has read all earlier items and its immediate answers have arrived."""
+    """Waits until all earlier items have been read and immediate answers have arrived."""
     self.connection.send(item("ping", stamp=stamp))
     self.connection.await_(lambda: stamp in self.connection.stamps)
 
@@ -181,7 +214,11 @@ class ClientRouter:
     if kind == "reply":
       client.onReply(body)
     elif kind == "fate" and body["requestId"] in client.unanswered:
-      fate = body["fate"] if body["fate"] in ("refused", "neverTaken", "expired", "outcomeUnknown") else "outcomeUnknown"
+      fate = (
+        body["fate"]
+        if body["fate"] in ("refused", "neverTaken", "expired", "outcomeUnknown")
+        else "outcomeUnknown"
+      )
       client.finish(body["requestId"], ("fate", fate, body["reason"]))
     elif kind == "queueFull":
       client.queueFull += 1

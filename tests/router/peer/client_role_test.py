@@ -54,10 +54,17 @@ class AsClientRouter(PeerCase):
       for binding in (ints, chars):
         self.assertNotEqual(router.awaitState(binding, "there")["incarnation"], 0)
       first, second, reader = router.open(ints), router.open(ints), router.open(chars, window=1024)
-      asked = {(client, value): client.ask(message("int32", value, 8, value=value)) for value in range(50) for client in (first, second)}
+      asked = {
+        (client, value): client.ask(message("int32", value, 8, value=value))
+        for value in range(50)
+        for client in (first, second)
+      }
       for (_, value), one in asked.items():
         kind, reply = router.awaitEnd(one)
-        self.assertEqual((kind, reply["clientType"], reply["clientExtra"], reply["body"]["value"]), ("reply", value, 8, value))
+        self.assertEqual(
+          (kind, reply["clientType"], reply["clientExtra"], reply["body"]["value"]),
+          ("reply", value, 8, value),
+        )
       for size in range(0, 1000, 100):  # more than the window in all
         end = router.awaitEnd(reader.ask(message("char8Array", value=bytes(size))))
         self.assertEqual(end[0], "reply", (size, end))
@@ -71,12 +78,13 @@ class AsClientRouter(PeerCase):
       self.leave(router)
 
   def throughTwoRouters(self, **speech):
-    """Connects this peer as a client, two real routers on one backplane, and this peer as a server."""
+    """This peer as a client, two real routers on one backplane, and this peer as a server."""
     far = ServerRouter(**speech)
     server = far.add(FarServer("far", 5))
     between = self.programs.backplane("between")
     self.programs.remoteRouter(between, 5, far.address)
-    self.assertEqual(self.programs.called(between, "far", "int32", "--location", 5)[2], 0)  # now it is there for all clients
+    # A successful call shows that the server is there for all clients.
+    self.assertEqual(self.programs.called(between, "far", "int32", "--location", 5)[2], 0)
     _, address = self.programs.router(between, "--serve", 5)
     router = ClientRouter(address, **speech)
     binding = router.bind(5, "far")
@@ -111,7 +119,10 @@ class AsClientRouter(PeerCase):
     router.awaitEnd(client.ask(message("int32")))
 
     router.connection.await_(lambda: client.queueFull == 1 and 0 in client.answered)
-    self.assertEqual([(one["kind"], one["body"]["value"]) for one in client.answered[0].further], [("outOfBand", 5)])
+    self.assertEqual(
+      [(one["kind"], one["body"]["value"]) for one in client.answered[0].further],
+      [("outOfBand", 5)],
+    )
     far.close()
 
   # While a server is stopped, its queue fills: further requests are refused, those with a deadline
@@ -172,7 +183,9 @@ class AsClientRouter(PeerCase):
     self.assertNotEqual(router.awaitState(client.binding, "there")["incarnation"], old)
     self.assertEqual(router.awaitEnd(router.open(client.binding).ask(message("int32")))[0], "reply")
     client.binding.states[-1]["incarnation"] = old
-    self.assertEqual(router.awaitEnd(router.open(client.binding).ask(message("int32")))[:2], ("fate", "neverTaken"))
+    self.assertEqual(
+      router.awaitEnd(router.open(client.binding).ask(message("int32")))[:2], ("fate", "neverTaken")
+    )
     self.leave(router)
 
   # Each violation ends the connection with the right code.
@@ -181,11 +194,21 @@ class AsClientRouter(PeerCase):
     again = {"binding": 1, "location": 1, "server": "echo"}
     broken = struct.pack("<IIQ", 0, 1, 0xFFFFFFFFFFFFFFFF)
     for raw, code in (
-        ([item("bind", again)], "protocol"), ([item("reply", client=1)], "protocol"), ([item("open", client=1, binding=1)], "protocol"),
-        ([item("open", client=0, binding=1)], "protocol"), ([item("request", client=9, requestId=1, message=message("int32"))], "protocol"),
-        ([item("credit", client=9, bytes=1)], "protocol"), ([item("request", client=1, requestId=0, message=message("int32"))], "protocol"),
-        ([item("request", client=1, requestId=1, message=message("char8Array", eomString=b"12345"))], "protocol"),
-        (broken, "protocol"), (joined([encodeFrame([])[8:]] + [b""] * 512), "protocol"), (struct.pack("<II", 0, 0xFFFFFFF), "limit")):
+      ([item("bind", again)], "protocol"),
+      ([item("reply", client=1)], "protocol"),
+      ([item("open", client=1, binding=1)], "protocol"),
+      ([item("open", client=0, binding=1)], "protocol"),
+      ([item("request", client=9, requestId=1, message=message("int32"))], "protocol"),
+      ([item("credit", client=9, bytes=1)], "protocol"),
+      ([item("request", client=1, requestId=0, message=message("int32"))], "protocol"),
+      (
+        [item("request", client=1, requestId=1, message=message("char8Array", eomString=b"12345"))],
+        "protocol",
+      ),
+      (broken, "protocol"),
+      (joined([encodeFrame([])[8:]] + [b""] * 512), "protocol"),
+      (struct.pack("<II", 0, 0xFFFFFFF), "limit"),
+    ):
       with self.subTest(code=code, raw=raw):
         router, _ = self.opened()
         router.connection.sendBytes(encodeFrame(raw) if isinstance(raw, list) else raw)
@@ -196,8 +219,12 @@ class AsClientRouter(PeerCase):
     self.assertEqual(router.connection.awaitEnding(), ("theirs", "limit"))
 
   def testConnectionsWithoutAGreeting(self):
-    for first, code in ((item("ping", stamp=1), "protocol"), (item(99, {}), "protocol"), (item("none", {}), "protocol"),
-                        (item("greeting", greeting(maxFrameBytes=65535)), "protocol")):
+    for first, code in (
+      (item("ping", stamp=1), "protocol"),
+      (item(99, {}), "protocol"),
+      (item("none", {}), "protocol"),
+      (item("greeting", greeting(maxFrameBytes=65535)), "protocol"),
+    ):
       router = ClientRouter(self.address, greets=False)
       router.connection.sendBytes(encodeFrame([first]))
       self.assertEqual(router.connection.awaitEnding(), ("theirs", code))
@@ -216,12 +243,18 @@ class AsClientRouter(PeerCase):
   # Messages up to the announced limit can be sent; the reason of a refusal names the limit.
   def testMessagesUpToTheLimit(self):
     self.programs.stop(self.router)
-    self.router, self.address = self.programs.router(self.near, "--serve", 1, "--max-message-size", 1000)
+    self.router, self.address = self.programs.router(
+      self.near, "--serve", 1, "--max-message-size", 1000
+    )
     self.serve("mpf-char8-array-server")
     router, client = self.opened()
-    self.assertEqual((client.life["maxMessageBytes"], router.connection.theirs["maxMessageBytes"]), (1000, 1000))
+    self.assertEqual(
+      (client.life["maxMessageBytes"], router.connection.theirs["maxMessageBytes"]), (1000, 1000)
+    )
 
-    self.assertEqual(router.awaitEnd(client.ask(message("char8Array", value=bytes(1000))))[0], "reply")
+    self.assertEqual(
+      router.awaitEnd(client.ask(message("char8Array", value=bytes(1000))))[0], "reply"
+    )
     end = router.awaitEnd(client.ask(message("char8Array", value=bytes(1001)), careful=False))
 
     self.assertEqual(end[:2], ("fate", "refused"))
@@ -230,7 +263,9 @@ class AsClientRouter(PeerCase):
 
   def testSilenceEndsTheConnection(self):
     self.programs.stop(self.router)
-    self.router, self.address = self.programs.router(self.near, "--serve", 1, "--dead-time", "200ms")
+    self.router, self.address = self.programs.router(
+      self.near, "--serve", 1, "--dead-time", "200ms"
+    )
     router = ClientRouter(self.address)
     router.connection.answersPings = False
     self.assertEqual(router.connection.awaitEnding(), ("theirs", "silence"))
@@ -247,7 +282,9 @@ class AsClientRouter(PeerCase):
 
     self.programs.kill(server)
 
-    self.assertEqual([router.awaitEnd(one)[:2] for one in asked[2:]], [("fate", "outcomeUnknown")] * 3)
+    self.assertEqual(
+      [router.awaitEnd(one)[:2] for one in asked[2:]], [("fate", "outcomeUnknown")] * 3
+    )
     self.leave(router)
 
   # Items that were sent before a change arrived, and unknown items of a newer peer, are ignored.
@@ -259,9 +296,16 @@ class AsClientRouter(PeerCase):
     stray = Binding(77, 1, "echo")  # it was never sent to the router
     stray.states = client.binding.states
 
-    router.connection.send(item("unbind", 77), item("close", 77), item("close", gone.number), item("credit", client=gone.number, bytes=1),
-                           item("request", client=gone.number, requestId=1, message=message("int32")), item(99, {}), item("none", {}),
-                           item("greeting", greeting(protocolMajor=7)))
+    router.connection.send(
+      item("unbind", 77),
+      item("close", 77),
+      item("close", gone.number),
+      item("credit", client=gone.number, bytes=1),
+      item("request", client=gone.number, requestId=1, message=message("int32")),
+      item(99, {}),
+      item("none", {}),
+      item("greeting", greeting(protocolMajor=7)),
+    )
     never = router.open(stray).ask(message("int32"))
 
     self.assertEqual(router.awaitEnd(client.ask(message("int32")))[0], "reply")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-# The part of Cap'n Proto that frames need: a frame is one message in standard stream framing, with a
-# Frame as its root.
+# The part of Cap'n Proto that frames need: a frame is one message in standard stream framing, with
+# a Frame as its root.
 #
-#   struct   {field: value}; with a union also kind, the name of the member or the number of an unknown
-#            one, and body, its value
+#   struct   {field: value}; with a union also kind, the name of the member or the number of an
+#            unknown one, and body, its value
 #   enum     its name, or the number of an unknown value
 #   Data     bytes; Text is str; List(...) is a list
 import struct
@@ -36,7 +36,7 @@ def padded(size):
 # ---- writing
 
 class _Writer:
-  """Writes all objects to segment 0 or, if `spread`, each to a segment of its own, with far pointers."""
+  """Writes all objects to segment 0 or, if `spread`, each to its own one, with far pointers."""
 
   def __init__(self, layouts, spread):
     self.layouts_ = layouts
@@ -72,7 +72,9 @@ class _Writer:
   def pointToStruct(self, name, segment, at, value):
     layout = self.layouts_[name]
     size = 8 * (layout.dataWords + layout.pointers)
-    self.fill(layout, *self.place(segment, at, 0, layout.dataWords | layout.pointers << 16, size), value)
+    self.fill(
+      layout, *self.place(segment, at, 0, layout.dataWords | layout.pointers << 16, size), value
+    )
 
   def fill(self, layout, segment, at, value):
     value = {**layout.presets, **value}
@@ -96,9 +98,13 @@ class _Writer:
     elif kind in _numbers:
       self.put(kind, segment, at + place, value)
     elif kind in kEnums:
-      self.put("u16", segment, at + place, value if isinstance(value, int) else kEnums[kind].index(value))
+      self.put(
+        "u16", segment, at + place, value if isinstance(value, int) else kEnums[kind].index(value)
+      )
     elif kind in ("text", "data"):
-      self.pointToBytes(segment, pointer, value.encode() + b"\0" if kind == "text" else bytes(value))
+      self.pointToBytes(
+        segment, pointer, value.encode() + b"\0" if kind == "text" else bytes(value)
+      )
     elif kind.startswith("["):
       self.pointToList(kind[1:-1], segment, pointer, value)
     else:
@@ -116,15 +122,21 @@ class _Writer:
       return
     layout = self.layouts_[kind]
     size = 8 * (layout.dataWords + layout.pointers)
-    target, start = self.place(segment, at, 1, 7 | len(values) * size // 8 << 3, 8 + len(values) * size)
-    self.put("u64", target, start, len(values) << 2 | layout.dataWords << 32 | layout.pointers << 48)
+    target, start = self.place(
+      segment, at, 1, 7 | len(values) * size // 8 << 3, 8 + len(values) * size
+    )
+    self.put(
+      "u64", target, start, len(values) << 2 | layout.dataWords << 32 | layout.pointers << 48
+    )
     for index, value in enumerate(values):
       self.fill(layout, target, start + 8 + index * size, value)
 
 
 def joined(segments):
   """Segments behind their table."""
-  table = struct.pack(f"<{len(segments) + 1}I", len(segments) - 1, *(len(segment) // 8 for segment in segments))
+  table = struct.pack(
+    f"<{len(segments) + 1}I", len(segments) - 1, *(len(segment) // 8 for segment in segments)
+  )
   return table.ljust(padded(len(table)), b"\0") + b"".join(segments)
 
 
@@ -150,7 +162,7 @@ class FrameReader:
     return len(self.bytes_)
 
   def tryNext(self):
-    """Segments of the next frame; None when it has not come whole. Looks at no byte that has not come."""
+    """The segments of the next frame; None until it has arrived completely."""
     if len(self.bytes_) < 4:
       return None
     count = struct.unpack_from("<I", self.bytes_)[0] + 1
@@ -230,14 +242,22 @@ class _Reader:
         return place < 8 * dataWords and bool(self.segments_[segment][start + place] & 1)
       if kind in _numbers or kind in kEnums:
         number = _numbers.get(kind, "<H")
-        value = struct.unpack_from(number, self.segments_[segment], start + place)[0] if place < 8 * dataWords else 0
+        value = (
+          struct.unpack_from(number, self.segments_[segment], start + place)[0]
+          if place < 8 * dataWords
+          else 0
+        )
         return kEnums[kind][value] if kind in kEnums and value < len(kEnums[kind]) else value
       where = (segment, start + 8 * (dataWords + place)) if place < pointers else None
       if kind in ("text", "data"):
         return self.bytes(kind, where, level + 1)
       if kind.startswith("["):
         return self.list(kind[1:-1], where, level + 1)
-      return self.struct(kind, *where, level + 1) if where else self.content(kLayouts[kind], 0, 0, 0, 0, level + 1)
+      return (
+        self.struct(kind, *where, level + 1)
+        if where
+        else self.content(kLayouts[kind], 0, 0, 0, 0, level + 1)
+      )
 
     value = {name: field(*place) for name, place in layout.fields.items()}
     if layout.members:
@@ -275,7 +295,9 @@ class _Reader:
       if code != _listSizes[kind]:
         raise NoFrame("elements of another size")
       self.claim(segment, start, padded(count * _elementBits[code] // 8) // 8)
-      return list(struct.unpack_from(f"<{count}{_numbers[kind][1]}", self.segments_[segment], start))
+      return list(
+        struct.unpack_from(f"<{count}{_numbers[kind][1]}", self.segments_[segment], start)
+      )
     if code != 7:
       raise NoFrame("a list of structs without a tag")
     tag = self.word(segment, start)
@@ -284,7 +306,10 @@ class _Reader:
     if tag & 3 or elements * (dataWords + pointers) > count:
       raise NoFrame("a list that is shorter than its elements")
     size = 8 * (dataWords + pointers)
-    return [self.content(kLayouts[kind], segment, start + 8 + index * size, dataWords, pointers, level) for index in range(elements)]
+    return [
+      self.content(kLayouts[kind], segment, start + 8 + index * size, dataWords, pointers, level)
+      for index in range(elements)
+    ]
 
 
 def decodeFrame(segments):

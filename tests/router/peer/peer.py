@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-# One end of a connection between routers, for both roles: sends the greeting, writes and reads frames,
-# answers pings, checks signs of life, and sends the farewell. client_role.py and server_role.py handle
-# the other items.
+# One end of a connection between routers, for both roles: sends the greeting, writes and reads
+# frames, answers pings, checks signs of life, and sends the farewell. client_role.py and
+# server_role.py handle the other items.
 #
-# Threads  each connection has a thread, which calls its role with `changed` held. Any thread may call
-#          send(), leave() and await_().
+# Threads  each connection has a thread, which calls its role with `changed` held. Any thread may
+#          call send(), leave() and await_().
 # Trust    a violation of docs/wire-format.md raises Violation, which ends the connection with a
 #          farewell.
 import itertools
@@ -27,7 +27,7 @@ _lives = itertools.count(os.getpid() << 20 | 1)
 
 
 class Violation(Exception):
-  """The other side violated the protocol or sent no sign of life: the farewell's code and reason."""
+  """The other side violated the protocol or fell silent: the farewell's code and reason."""
 
 
 class Ended(Exception):
@@ -36,13 +36,25 @@ class Ended(Exception):
 
 def greeting(**fields):
   """The body of a greeting for tests; deadTimeMs is long, because the host may be busy."""
-  return {"protocolMajor": kMajor, "protocolMinor": 0, "router": "peer", "program": "a peer for tests", "incarnation": next(_lives),
-          "maxFrameBytes": 1 << 20, "maxMessageBytes": 1 << 19, "deadTimeMs": 20000, "maxClients": 100, **fields}
+  return {
+    "protocolMajor": kMajor,
+    "protocolMinor": 0,
+    "router": "peer",
+    "program": "a peer for tests",
+    "incarnation": next(_lives),
+    "maxFrameBytes": 1 << 20,
+    "maxMessageBytes": 1 << 19,
+    "deadTimeMs": 20000,
+    "maxClients": 100,
+    **fields,
+  }
 
 
 def bodyBytes(message):
-  """The bytes that maxMessageBytes and the window count: of an array's elements or of a `user` value."""
-  perElement = {"int32Array": 4, "float64Array": 8, "char8Array": 1, "user": 1}.get(message["kind"], 0)
+  """The bytes that maxMessageBytes and the window count: those of elements or of a `user` value."""
+  perElement = {"int32Array": 4, "float64Array": 8, "char8Array": 1, "user": 1}.get(
+    message["kind"], 0
+  )
   return perElement and perElement * len(message["body"].get("value", ()))
 
 
@@ -54,11 +66,11 @@ def mustBeCarried(message):
 class Connection(threading.Thread):
   """
   connected  a connected socket; this object closes it
-  role       has changed, kTakes (the kinds of items that it handles), onGreeting(), onItem(kind, body),
-             nextTime(), onTime(now) and onEnd()
+  role       has changed, kTakes (the kinds of items that it handles), onGreeting(),
+             onItem(kind, body), nextTime(), onTime(now) and onEnd()
   mine       the body of the greeting; None: sends no greeting
-  version    "": protocol 1.0; "newer": a later minor version, with additional fields and with items of
-             unknown kinds around each item; "older": an earlier one, with fewer fields
+  version    "": protocol 1.0; "newer": a later minor version, with additional fields and with
+             items of unknown kinds around each item; "older": an earlier one, with fewer fields
   spread     writes each object to a segment of its own
   """
 
@@ -123,7 +135,9 @@ class Connection(threading.Thread):
       self.serve()
     except Violation as violation:
       self.end("mine", *violation.args)
-      self.out_ += self.encoded([item("farewell", code=violation.args[0], reason=violation.args[1])])
+      self.out_ += self.encoded(
+        [item("farewell", code=violation.args[0], reason=violation.args[1])]
+      )
     except OSError as error:
       self.end("none", None, str(error))
     finally:
@@ -159,7 +173,11 @@ class Connection(threading.Thread):
         if self.ending and not self.out_:
           return
         wanted = [self.socket_] if self.out_ else []
-        times = [lastReceive + deadTime, lastPing + deadTime / 4 if self.theirs else None, self.role_.nextTime()]
+        times = [
+          lastReceive + deadTime,
+          lastPing + deadTime / 4 if self.theirs else None,
+          self.role_.nextTime(),
+        ]
       wait = max(0, min(when for when in times if when is not None) - now)
       readable, writable, _ = select.select([self.socket_, self.wakeReceiver_], wanted, [], wait)
       if self.wakeReceiver_ in readable:
@@ -227,7 +245,11 @@ class Connection(threading.Thread):
     if self.theirs and self.waiting_:
       items, self.waiting_ = self.waiting_, []
       if self.version_ == "newer":
-        items = [item("novelty", "?"), *(new for old in items for new in (old, item(0xFFFF, {}))), item("novelty", "!")]
+        items = [
+          item("novelty", "?"),
+          *(new for old in items for new in (old, item(0xFFFF, {}))),
+          item("novelty", "!"),
+        ]
       self.out_ += self.frames(items)
 
   def frames(self, items):
@@ -252,7 +274,9 @@ class Connection(threading.Thread):
         select.select([], [self.socket_], [])
         del self.out_[:self.socket_.send(self.out_)]
       self.socket_.shutdown(socket.SHUT_WR)
-      while self.socket_ in select.select([self.socket_], [], [], 5)[0] and self.socket_.recv(kReadBytes):
+      while self.socket_ in select.select([self.socket_], [], [], 5)[0] and self.socket_.recv(
+        kReadBytes
+      ):
         pass
     except OSError:
       pass

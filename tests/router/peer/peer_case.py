@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The common part of the tests of both roles: the real programs, a watchdog, messages of every type, and
-# the protocol versions of the peer.
+# The common part of the tests of both roles: the real programs, a watchdog, messages of every type,
+# and the protocol versions of the peer.
 import os
 import struct
 import sys
@@ -26,11 +26,24 @@ def inBytes(envelope):
 
 _standard = {"timeout": 1, "cmd": 2, "status": -3, "address": 4, "extra": 5}
 kMessages = (
-    message("int32", 11, -12, **_standard, value=-7), message("int32Array", **_standard, value=[1, -2, 3]),
-    message("float64", **_standard, value=kNaN), message("float64Array", **_standard, value=[0.5, kNaN, -0.0]),
-    message("char8Array", **_standard, numberRetrys=6, eomLen=2, eomString=b"\r\n\0\0", value=bytes(range(256))),
-    message("serialConfig", baud=9600, stopBits=1, bitsPerChar=8, parity=ord("E"), flowControl=ord("N")),
-    message("outOfBand", **_standard, value=9), message("user", value=encodeFrame([])))
+  message("int32", 11, -12, **_standard, value=-7),
+  message("int32Array", **_standard, value=[1, -2, 3]),
+  message("float64", **_standard, value=kNaN),
+  message("float64Array", **_standard, value=[0.5, kNaN, -0.0]),
+  message(
+    "char8Array",
+    **_standard,
+    numberRetrys=6,
+    eomLen=2,
+    eomString=b"\r\n\0\0",
+    value=bytes(range(256)),
+  ),
+  message(
+    "serialConfig", baud=9600, stopBits=1, bitsPerChar=8, parity=ord("E"), flowControl=ord("N")
+  ),
+  message("outOfBand", **_standard, value=9),
+  message("user", value=encodeFrame([])),
+)
 
 
 class PeerCase(unittest.TestCase):

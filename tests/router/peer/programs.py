@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Starts the real programs, on backplanes of this process. stopAll() and the watchdog end all of them.
+# Starts the real programs, on backplanes of this process. stopAll() and the watchdog end all of
+# them.
 import faulthandler
 import json
 import os
@@ -22,7 +23,9 @@ class Programs:
 
   def start(self, backplane, program, *arguments, **options):
     command = [os.path.join(self.folder_, program), *map(str, arguments)]
-    started = subprocess.Popen(command, env={**os.environ, "MPF_BACKPLANE": backplane}, text=True, **options)
+    started = subprocess.Popen(
+      command, env={**os.environ, "MPF_BACKPLANE": backplane}, text=True, **options
+    )
     self.running.append(started)
     return started
 
@@ -30,8 +33,19 @@ class Programs:
     """Starts a router that listens; returns the program and its address."""
     ready, write = os.pipe()
     try:
-      router = self.start(backplane, "mpf-router", "--backplane", backplane, *arguments, "--listen", "127.0.0.1:0", "--plain",
-                          "--ready-fd", write, pass_fds=(write,))
+      router = self.start(
+        backplane,
+        "mpf-router",
+        "--backplane",
+        backplane,
+        *arguments,
+        "--listen",
+        "127.0.0.1:0",
+        "--plain",
+        "--ready-fd",
+        write,
+        pass_fds=(write,),
+      )
     finally:
       os.close(write)
     with os.fdopen(ready) as lines:
@@ -41,11 +55,22 @@ class Programs:
   def remoteRouter(self, backplane, location, address, *options):
     """Starts a router that connects to `address` for the servers at `location`."""
     remote = f"{location}={address[0]}:{address[1]}"
-    return self.start(backplane, "mpf-router", "--backplane", backplane, "--remote", remote, "--plain", *options)
+    return self.start(
+      backplane, "mpf-router", "--backplane", backplane, "--remote", remote, "--plain", *options
+    )
 
   def call(self, backplane, *arguments):
     """Starts `mpf call` with a long timeout; the caller reads its output."""
-    return self.start(backplane, "mpf", "call", *arguments, "--timeout", 600, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return self.start(
+      backplane,
+      "mpf",
+      "call",
+      *arguments,
+      "--timeout",
+      600,
+      stdout=subprocess.PIPE,
+      stderr=subprocess.PIPE,
+    )
 
   def called(self, backplane, *arguments):
     """Runs `mpf call --json`; returns its output, its errors and its exit status."""
@@ -75,7 +100,11 @@ class Programs:
   def clean(self):
     """Removes the segments of killed programs."""
     for backplane in self.backplanes_:
-      subprocess.run([os.path.join(self.folder_, "mpf"), "clean", "--backplane", backplane], stdout=subprocess.DEVNULL, check=False)
+      subprocess.run(
+        [os.path.join(self.folder_, "mpf"), "clean", "--backplane", backplane],
+        stdout=subprocess.DEVNULL,
+        check=False,
+      )
 
   def watchdog(self, seconds):
     """Ends this process and its programs when a test hangs."""

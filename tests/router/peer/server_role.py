@@ -25,9 +25,15 @@ def echo(request):
 class FarServer:
   """answer(request) is called with `changed` held; it may keep the request and answer later."""
 
-  def __init__(self, name, location, answer=echo, queueSize=100, maxOutstanding=256, maxMessageBytes=1 << 18):
+  def __init__(
+    self, name, location, answer=echo, queueSize=100, maxOutstanding=256, maxMessageBytes=1 << 18
+  ):
     self.key, self.answer = (location, name), answer
-    self.queueSize, self.maxOutstanding, self.maxMessageBytes = queueSize, maxOutstanding, maxMessageBytes
+    self.queueSize, self.maxOutstanding, self.maxMessageBytes = (
+      queueSize,
+      maxOutstanding,
+      maxMessageBytes,
+    )
     self.incarnation = next(_lives)
     self.isThere = True
     self.takes = True  # whether it takes requests from its queues
@@ -39,14 +45,22 @@ class Asked:
 
   def __init__(self, client, body):
     self.client_ = client
-    self.requestId, self.message, self.takeWithinNs = body["requestId"], body["message"], body["takeWithinNs"]
+    self.requestId, self.message, self.takeWithinNs = (
+      body["requestId"],
+      body["message"],
+      body["takeWithinNs"],
+    )
     self.dueAt = time.monotonic() + self.takeWithinNs / 1e9 if self.takeWithinNs else None
     self.isTaken = False
     self.hasReply_ = False
 
   def reply(self, message):
     """Sends a reply. The first one ends the request; others may follow."""
-    envelope = {**message, "clientType": self.message["clientType"], "clientExtra": self.message["clientExtra"]}
+    envelope = {
+      **message,
+      "clientType": self.message["clientType"],
+      "clientExtra": self.message["clientExtra"],
+    }
     isFirst, self.hasReply_ = not self.hasReply_, True
     self.client_.reply(self.requestId, isFirst, envelope)
 
@@ -98,14 +112,18 @@ class SessionClient:
       return "its place is occupied"
     if len(self.unanswered) >= self.server.maxOutstanding:
       return "too many without an end"
-    if body["message"]["kind"] in ("connect", "requestFate") or isinstance(body["message"]["kind"], int):
+    if body["message"]["kind"] in ("connect", "requestFate") or isinstance(
+      body["message"]["kind"], int
+    ):
       return "such a message is not a request"
     if bodyBytes(body["message"]) > self.server.maxMessageBytes:
       return "too large"
     return None
 
   def sendFate(self, requestId, fate, reason):
-    self.session_.connection.send(item("fate", client=self.number, requestId=requestId, fate=fate, reason=reason))
+    self.session_.connection.send(
+      item("fate", client=self.number, requestId=requestId, fate=fate, reason=reason)
+    )
 
   def fate(self, requestId, fate, reason):
     del self.unanswered[requestId]
@@ -116,7 +134,9 @@ class SessionClient:
       return
     body = {"client": self.number, "requestId": requestId, "isFirst": isFirst, "message": envelope}
     connection = self.session_.connection
-    if bodyBytes(envelope) <= connection.theirs["maxMessageBytes"] and connection.fits(item("reply", body)):
+    if bodyBytes(envelope) <= connection.theirs["maxMessageBytes"] and connection.fits(
+      item("reply", body)
+    ):
       self.held.append(body)
       self.sendHeld()
     elif isFirst:
@@ -144,7 +164,9 @@ class SessionClient:
 
   def serverGone(self):
     for requestId, asked in list(self.unanswered.items()):
-      self.fate(requestId, "outcomeUnknown" if asked.isTaken else "neverTaken", "the server is gone")
+      self.fate(
+        requestId, "outcomeUnknown" if asked.isTaken else "neverTaken", "the server is gone"
+      )
     self.close()
 
   def close(self):
@@ -194,24 +216,42 @@ class Session:
     if number in self.bindings:
       raise Violation("protocol", "a binding whose number is in use")
     self.bound.append(body)
-    if body["location"] not in self.connection.mine["locations"] or len(self.bindings) >= kMaxBindings:
-      self.connection.send(item("server", binding=number, state="refused", reason="this location is not served here"))
+    if (
+      body["location"] not in self.connection.mine["locations"]
+      or len(self.bindings) >= kMaxBindings
+    ):
+      self.connection.send(
+        item("server", binding=number, state="refused", reason="this location is not served here")
+      )
       return
     self.bindings[number] = (body["location"], body["server"])
     self.sendState(number, self.router_.find(self.bindings[number]))
 
   def sendState(self, number, server):
     if not server or not server.isThere:
-      self.connection.send(item("server", binding=number, state="absent", reason="the server is not running"))
+      self.connection.send(
+        item("server", binding=number, state="absent", reason="the server is not running")
+      )
       return
-    self.connection.send(item(
-        "server", binding=number, state="there", incarnation=server.incarnation, queueSize=server.queueSize,
-        maxMessageBytes=server.maxMessageBytes, maxOutstanding=server.maxOutstanding))
+    self.connection.send(
+      item(
+        "server",
+        binding=number,
+        state="there",
+        incarnation=server.incarnation,
+        queueSize=server.queueSize,
+        maxMessageBytes=server.maxMessageBytes,
+        maxOutstanding=server.maxOutstanding,
+      )
+    )
 
   def onOpen(self, body):
     if body["client"] <= max(self.clients, default=0):
       raise Violation("protocol", "a client whose number is not greater")
-    if sum(client.isOpen and client.server is not None for client in self.clients.values()) >= self.connection.mine["maxClients"]:
+    if (
+      sum(client.isOpen and client.server is not None for client in self.clients.values())
+      >= self.connection.mine["maxClients"]
+    ):
       raise Violation("limit", "too many clients")
     server = self.router_.find(self.bindings.get(body["binding"]))
     isMade = server and server.isThere and server.incarnation == body["incarnation"]
@@ -239,7 +279,12 @@ class Session:
     return min((asked.dueAt for asked in self.untaken() if asked.dueAt), default=None)
 
   def untaken(self):
-    return [asked for client in self.clients.values() for asked in client.unanswered.values() if not asked.isTaken]
+    return [
+      asked
+      for client in self.clients.values()
+      for asked in client.unanswered.values()
+      if not asked.isTaken
+    ]
 
   def onTime(self, now):
     """The servers take the requests that wait for them, unless their deadline has passed."""

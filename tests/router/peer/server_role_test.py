@@ -21,7 +21,9 @@ class AsServerRouter(PeerCase):
   def connected(self, options=(), **speech):
     """Starts this peer with a server "far" at location 2, and a real router that connects to it."""
     far = ServerRouter(**speech)
-    server = far.add(FarServer("far", 2, maxMessageBytes=min(far.fields.get("maxMessageBytes", 1 << 18), 1 << 18)))
+    server = far.add(
+      FarServer("far", 2, maxMessageBytes=min(far.fields.get("maxMessageBytes", 1 << 18), 1 << 18))
+    )
     self.real = self.programs.remoteRouter(self.near, 2, far.address, *options)
     return far, server
 
@@ -39,8 +41,21 @@ class AsServerRouter(PeerCase):
 
   def follow(self, *arguments, **options):
     """Starts a client that prints replies until it is stopped."""
-    return self.programs.start(self.near, "mpf", "call", "far", *arguments, "--location", 2, "--timeout", 600, "--follow", 600, "--print",
-                               **{"stdout": subprocess.PIPE, **options})
+    return self.programs.start(
+      self.near,
+      "mpf",
+      "call",
+      "far",
+      *arguments,
+      "--location",
+      2,
+      "--timeout",
+      600,
+      "--follow",
+      600,
+      "--print",
+      **{"stdout": subprocess.PIPE, **options},
+    )
 
   def session(self):
     self.far.await_(lambda: self.far.sessions)
@@ -49,11 +64,20 @@ class AsServerRouter(PeerCase):
   def testEchoesEveryTypeOfMessage(self):
     for speech in kSpeech:
       self.again(**speech)
-      for kind, value in (("int32", "7"), ("int32Array", "1,-2"), ("float64", "0.5"), ("float64Array", "0.5,nan"), ("char8Array", "abc"),
-                          ("outOfBand", "3"), ("user", "0011")):
+      for kind, value in (
+        ("int32", "7"),
+        ("int32Array", "1,-2"),
+        ("float64", "0.5"),
+        ("float64Array", "0.5,nan"),
+        ("char8Array", "abc"),
+        ("outOfBand", "3"),
+        ("user", "0011"),
+      ):
         self.assertEqual(self.replies(kind, f"value={value}")[0]["type"], kind)
       self.assertEqual(self.replies("serialConfig", "baud=9600")[0]["baud"], 9600)
-      self.assertEqual([request.message["kind"] for request in self.server.taken[-2:]], ["user", "serialConfig"])
+      self.assertEqual(
+        [request.message["kind"] for request in self.server.taken[-2:]], ["user", "serialConfig"]
+      )
 
   def testSeveralRepliesToOneRequest(self):
     def answer(request):
@@ -69,7 +93,13 @@ class AsServerRouter(PeerCase):
     self.assertEqual([line.rsplit("=", 1)[1] for line in lines], ["1", "2", "3"])
 
   def testFates(self):
-    for fate, said in (("refused",) * 2, ("neverTaken",) * 2, ("expired",) * 2, ("outcomeUnknown",) * 2, (17, "outcomeUnknown")):
+    for fate, said in (
+      ("refused",) * 2,
+      ("neverTaken",) * 2,
+      ("expired",) * 2,
+      ("outcomeUnknown",) * 2,
+      (17, "outcomeUnknown"),
+    ):
       self.server.answer = lambda request: request.fail(fate, "chosen by the test")
       out, _, status = self.programs.called(self.near, "far", "int32", "--location", 2)
       self.assertEqual(status, 1)
@@ -85,11 +115,14 @@ class AsServerRouter(PeerCase):
     out, _, _ = self.programs.called(self.near, "far", "int32", "--location", 2)
     self.assertIn("no reply: refused", next(iter(out["why"])))
 
-  # A message that is too large for a peer is refused on this host, with an error that names the limit.
+  # A message that is too large for a peer is refused on this host, with an error that names the
+  # limit.
   def testLimitsAreNamed(self):
     for fields, limit in (({"maxMessageBytes": 1000}, 1000), ({"maxFrameBytes": 65536}, 64512)):
       self.again(**fields)
-      out, error, status = self.programs.called(self.near, "far", "char8Array", f"value={'x' * (limit + 1)}", "--location", 2)
+      out, error, status = self.programs.called(
+        self.near, "far", "char8Array", f"value={'x' * (limit + 1)}", "--location", 2
+      )
       self.assertEqual(status, 1)
       self.assertRegex(next(iter(out["why"])), f"not sent: .*: [0-9]+ bytes, the limit is {limit}$")
       self.assertEqual(self.server.taken, [])
@@ -122,10 +155,14 @@ class AsServerRouter(PeerCase):
 
     self.assertEqual(session.connection.awaitEnding(), ("theirs", "protocol"))
 
-  # A request that is sent before `absent` arrives was never taken; after any other new state its outcome
-  # is unknown.
+  # A request that is sent before `absent` arrives was never taken; after any other new state its
+  # outcome is unknown.
   def testRequestThatCrossedTheEndOfItsServer(self):
-    for state, fate in (("absent", "neverTaken"), ("refused", "outcomeUnknown"), (9, "outcomeUnknown")):
+    for state, fate in (
+      ("absent", "neverTaken"),
+      ("refused", "outcomeUnknown"),
+      (9, "outcomeUnknown"),
+    ):
       self.again()
       self.server.takes = False
       call = self.programs.call(self.near, "far", "int32", "--location", 2)
@@ -153,7 +190,9 @@ class AsServerRouter(PeerCase):
   def testRespectsCredits(self):
     size, window = 2000, 4096
     self.again(options=("--window-size", window))
-    count = 2 * self.server.maxOutstanding + window // size  # more than its queue and the window hold
+    count = (
+      2 * self.server.maxOutstanding + window // size
+    )  # more than its queue and the window hold
     self.server.takes = False
     def answer(request):
       for _ in range(count):
@@ -178,8 +217,21 @@ class AsServerRouter(PeerCase):
     self.server.takes = False
     self.far.await_(lambda: self.far.sessions)
     error = ""
-    while not self.session().connection.counts["request"]:  # the deadline may pass before the request reaches the router
-      call = self.programs.start(self.near, "mpf", "call", "far", "int32", "--location", 2, "--timeout", 0.2, stderr=subprocess.PIPE)
+    while not self.session().connection.counts[
+      "request"
+    ]:  # the deadline may pass before the request reaches the router
+      call = self.programs.start(
+        self.near,
+        "mpf",
+        "call",
+        "far",
+        "int32",
+        "--location",
+        2,
+        "--timeout",
+        0.2,
+        stderr=subprocess.PIPE,
+      )
       error = call.communicate()[1]
 
     self.assertRegex(error, "expired|outcomeUnknown")  # the client may notice the deadline first
