@@ -150,9 +150,9 @@ class Connection(threading.Thread):
         for end in (self.socket_, self.wakeReceiver_, self.wakeSender_):
           end.close()
 
-  def end(self, who, code, why):
+  def end(self, sender, code, why):
     with self.role_.changed:
-      self.ending = self.ending or (who, code, why)
+      self.ending = self.ending or (sender, code, why)
 
   def serve(self):
     reader = FrameReader(kLeastFrameBytes)

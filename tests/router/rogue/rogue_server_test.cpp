@@ -218,14 +218,14 @@ TEST_F(RogueServerTest, NotificationsOfFullQueuesDoNotAccumulate) {
 
 TEST_F(RogueServerTest, AServerThatRestartsOftenDoesNotAffectOthers) {
   auto peer = rogue();
-  std::vector<Fill> lives;
+  std::vector<Fill> items;
   for (std::uint64_t life = 0; life < 1000; ++life) {
-    lives.push_back(server(binding_, wire::Server::State::ABSENT));
-    lives.push_back(server(binding_, wire::Server::State::THERE, kIncarnation + 1 + life));
+    items.push_back(server(binding_, wire::Server::State::ABSENT));
+    items.push_back(server(binding_, wire::Server::State::THERE, kIncarnation + 1 + life));
   }
-  lives.push_back(ping(4242));
+  items.push_back(ping(4242));
 
-  peer.sendItems(lives);
+  peer.sendItems(items);
   expectHonestWork();
   while (await(peer, wire::Item::PONG).getPong().getStamp() != 4242) {
   }
@@ -236,7 +236,7 @@ TEST_F(RogueServerTest, AServerThatRestartsOftenDoesNotAffectOthers) {
   for (auto at = said.find(" is available"); at != std::string::npos;
        at = said.find(" is available", at + 1))
     ++lines;
-  EXPECT_LT(lines, lives.size() / 10) << "the log would become too long";
+  EXPECT_LT(lines, items.size() / 10) << "the log would become too long";
 }
 
 // As a newer peer may send it.
