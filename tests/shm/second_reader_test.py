@@ -15,11 +15,12 @@ DOCUMENT, TRAFFIC = sys.argv.pop(1), sys.argv.pop(1)
 
 
 class Layout(reader.Layout):
-    """The document's tables, for the reader of layout 1.0, which calls a pending bind a wish."""
+    """The document's tables, for the reader of layout 1.0, which calls a pending bind a wish, as older documents do."""
 
     def __init__(self, document):
         super().__init__(document)
-        self.kinds["wish"] = self.kinds["pendingBind"]
+        if "pendingBind" in self.kinds:
+            self.kinds["wish"] = self.kinds["pendingBind"]
 
 
 def look(backplane):
