@@ -16,6 +16,7 @@
 
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf {
 namespace {
@@ -27,10 +28,6 @@ constexpr int kClaims = 50;
 constexpr std::chrono::milliseconds kClaimAgain{1};
 // Time for another process to mask its line before the interrupt is unmasked again.
 constexpr std::chrono::microseconds kForOthers{100};
-
-timespec toTimespec(std::chrono::nanoseconds time) noexcept {
-  return {.tv_sec = time.count() / 1'000'000'000, .tv_nsec = time.count() % 1'000'000'000};
-}
 
 }  // namespace
 
@@ -221,7 +218,7 @@ void Tpci200::wait() {
   std::array<pollfd, 2> events{
       {{.fd = wakeUp_.get(), .events = POLLIN, .revents = 0},
        {.fd = interrupt_ ? interrupt_->descriptor() : -1, .events = POLLIN, .revents = 0}}};
-  const auto timeout = toTimespec(pollEvery_);
+  const auto timeout = timespecOf(pollEvery_);
   ::ppoll(events.data(), events.size(), hasSomethingToPoll() ? &timeout : nullptr, nullptr);
 }
 
@@ -240,7 +237,7 @@ void Tpci200::takeInterrupt() {
     return;
   }
   if (serve()) {
-    const auto pause = toTimespec(kForOthers);
+    const auto pause = timespecOf(kForOthers);
     ::ppoll(nullptr, 0, &pause, nullptr);
   }
   interrupt_->unmask();
