@@ -4,6 +4,7 @@
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 
 #include "drivers/serial/late_line.h"
+#include "drivers/serial/polled_serial_port.h"
 #include "octal_uart_fixture.h"
 
 namespace mpf::test {
@@ -15,7 +16,7 @@ using testing::HasSubstr;
 class OctalUartFaultTest : public OctalUartTest {
  protected:
   // The next attempts to open get rarer with each that fails.
-  static void waitUntil(const OctalUartPort& port, SerialPortState state) {
+  static void waitUntil(const SerialPort& port, SerialPortState state) {
     EXPECT_TRUE(port.waitForState(state, Deadline::never()));
   }
 };
@@ -34,7 +35,7 @@ TEST_F(OctalUartFaultTest, ASiteWithoutMemoryIsAnErrorThatSaysSo) {
     FAIL() << "it started";
   } catch (const IndustryPackError& error) {
     EXPECT_EQ(error.status(), IndustryPackStatus::badAddress);
-    EXPECT_THAT(error.what(), HasSubstr("the carrier gives carrier bare, site IP_b no memory"));
+    EXPECT_THAT(error.what(), HasSubstr("carrier bare, site IP_b has no memory space"));
   }
 }
 
@@ -115,9 +116,9 @@ TEST_F(OctalUartFaultTest, ALineThatIsMaskedInAStormIsNotCalledDead) {
 TEST_F(OctalUartFaultTest, WhatIsWrongBeforeSomebodyListensIsToldLater) {
   plug({});
   OctalUart uart(modules_.create("UART", "ipac", "IP_a", kOctalUart), {.pollEvery = 1ms});
-  const OctalUartPort port(uart, 0, {});
+  const auto port = openOctalUartPort(uart, 0, {});
   carrier_.setFault("IP_a", ModelFault::busError);
-  waitUntil(port, SerialPortState::unplugged);
+  waitUntil(*port, SerialPortState::unplugged);
   while (uart.counters().alarms == 0) std::this_thread::yield();
   carrier_.setFault("IP_a", ModelFault::interruptStorm, 0);  // its thread goes on to other things
   for (const auto before = uart.counters().interrupts; uart.counters().interrupts == before;)
@@ -230,7 +231,7 @@ TEST_F(OctalUartFaultTest, AnotherModelIsNotTouchedByAPortThatComesLater) {
   carrier_.unplug("IP_a");
   plug({.model = 0x48});
 
-  EXPECT_THROW(OctalUartPort(uart, 1, {}), std::runtime_error);
+  EXPECT_THROW(static_cast<void>(openOctalUartPort(uart, 1, {})), std::runtime_error);
   uart_.reset();
 
   EXPECT_EQ(model_->writes(), 0U);
@@ -263,13 +264,13 @@ TEST_F(OctalUartFaultTest, APortMayWaitForItsModule) {
   auto& uart = start();
   carrier_.setFault("IP_a", ModelFault::busError);
   while (uart.counters().alarms == 0) std::this_thread::yield();
-  EXPECT_THROW(OctalUartPort(uart, 1, {}), std::runtime_error);
-  const OctalUartPort port(uart, 1, {.settings = kFast, .waitForModule = true});
-  EXPECT_EQ(port.state(), SerialPortState::unplugged);
+  EXPECT_THROW(static_cast<void>(openOctalUartPort(uart, 1, {})), std::runtime_error);
+  const auto port = openOctalUartPort(uart, 1, {.settings = kFast, .waitForModule = true});
+  EXPECT_EQ(port->state(), SerialPortState::unplugged);
 
   carrier_.setFault("IP_a", ModelFault::none);
 
-  waitUntil(port, SerialPortState::plugged);
+  waitUntil(*port, SerialPortState::plugged);
 }
 
 // Of a module, or a carrier, that was never there.
@@ -329,7 +330,7 @@ TEST_F(OctalUartFaultTest, PortsThatAQuadModuleDoesNotHaveAreMasked) {
 TEST_F(OctalUartFaultTest, TheChipIsSilentAfterwards) {
   {
     auto& uart = start();
-    const OctalUartPort port(uart, 0, {});
+    const auto port = openOctalUartPort(uart, 0, {});
   }
   uart_.reset();
 

@@ -11,6 +11,7 @@
 
 #include <mpf/drivers/industry_pack/model_carrier.h>
 
+#include "drivers/octal_uart/octal_uart_line.h"
 #include "drivers/octal_uart/octal_uart_model.h"
 #include "drivers/octal_uart/octal_uart_port.h"
 #include "tests/drivers/serial/line_collector.h"
@@ -41,12 +42,13 @@ class AlarmLog {
   std::map<OctalUartAlarm, int> counts_;
 };
 
-// A port with who is bound to it.
+// A port and the handler that is bound to it.
 struct BoundOctalPort {
   BoundOctalPort(OctalUart& uart, int number, const SerialSettings& settings)
-      : port(uart, number, {.settings = settings}) {}
+      : owner(openOctalUartPort(uart, number, {.settings = settings})) {}
   LineCollector collector{"\r"};
-  OctalUartPort port;
+  std::unique_ptr<SerialPort> owner;
+  SerialPort& port{*owner};
   BoundSerialPort line{port, collector};
 };
 

@@ -28,7 +28,7 @@ TEST_F(OctalUartSettingsTest, ModesAreWhatTheOldDriverWrote) {
 }
 
 TEST_F(OctalUartSettingsTest, EverySettingReachesTheChip) {
-  OctalUartPort port(start(), 5, {});
+  const auto port = openOctalUartPort(start(), 5, {});
 
   for (const int baud : scc2698b::kBauds) {
     for (const char parity : {'E', 'O', 'N'}) {
@@ -36,7 +36,7 @@ TEST_F(OctalUartSettingsTest, EverySettingReachesTheChip) {
         for (const int bits : {5, 6, 7, 8}) {
           for (const char flow : {'H', 'N'}) {
             const SerialSettings settings{baud, stopBits, bits, parity, flow};
-            ASSERT_EQ(port.config(settings), "");
+            ASSERT_EQ(port->config(settings), "");
             ASSERT_EQ(settingsInChip(5), settings);
           }
         }
@@ -46,17 +46,17 @@ TEST_F(OctalUartSettingsTest, EverySettingReachesTheChip) {
 }
 
 TEST_F(OctalUartSettingsTest, WhatIsNotSaidIsUsual) {
-  const OctalUartPort port(start(), 0, {.settings = {.baud = 19200}});
+  const auto port = openOctalUartPort(start(), 0, {.settings = {.baud = 19200}});
 
   EXPECT_EQ(settingsInChip(0), (SerialSettings{19200, 1, 8, 'N', 'N'}));
 }
 
 // The old driver took 19200 instead, and said nothing.
 TEST_F(OctalUartSettingsTest, ASpeedThatTheChipDoesNotMakeIsNamedAndChangesNothing) {
-  OctalUartPort port(start(), 0, {.settings = kFast});
+  const auto port = openOctalUartPort(start(), 0, {.settings = kFast});
 
-  EXPECT_EQ(port.config({.baud = 57600, .parity = 'E'}),
-            "baud 57600: this chip makes 75, 110, 150, 300, 600, 1200, 1800, 2000, 2400, 4800, "
+  EXPECT_EQ(port->config({.baud = 57600, .parity = 'E'}),
+            "baud 57600: the chip supports 75, 110, 150, 300, 600, 1200, 1800, 2000, 2400, 4800, "
             "9600, 19200, 38400");
 
   EXPECT_EQ(settingsInChip(0), kFast);
@@ -65,19 +65,19 @@ TEST_F(OctalUartSettingsTest, ASpeedThatTheChipDoesNotMakeIsNamedAndChangesNothi
 TEST_F(OctalUartSettingsTest, APortThatIsToBeSoIsRefused) {
   auto& uart = start();
   try {
-    const OctalUartPort port(uart, 3, {.settings = {.baud = 115200}});
+    const auto port = openOctalUartPort(uart, 3, {.settings = {.baud = 115200}});
     FAIL() << "there is such a speed";
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), HasSubstr("port 3 of UART (carrier ipac, site IP_a): baud 115200: "));
   }
 
-  const OctalUartPort port(uart, 3, {});  // it was left free
+  const auto port = openOctalUartPort(uart, 3, {});  // it was left free
 }
 
 TEST_F(OctalUartSettingsTest, Rs485HasNoHardwareFlowControl) {
-  OctalUartPort port(start({.model = 0x48}), 0, {});
+  const auto port = openOctalUartPort(start({.model = 0x48}), 0, {});
 
-  EXPECT_THAT(port.config({.flowControl = 'H'}), HasSubstr("flow control 'H'"));
+  EXPECT_THAT(port->config({.flowControl = 'H'}), HasSubstr("flow control 'H'"));
 }
 
 TEST_F(OctalUartSettingsTest, AByteTakesAllItsBits) {

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
+#include <mpf/drivers/serial/posix_terminal.h>
 #include <mpf/drivers/serial/serial_port_registry.h>
 
-#include "drivers/serial/posix_terminal_port.h"
 #include "tests/drivers/serial/line_collector.h"
 #include "tests/support/instrument.h"
 #include "tests/support/temporary_folder.h"
@@ -28,7 +28,8 @@ class SerialPortTest : public testing::Test {
   TemporaryFolder folder_;
   Instrument instrument_{folder_.file("tty")};
   LineCollector collector_;
-  PosixTerminalPort port_{{.device = folder_.file("tty")}};
+  const std::unique_ptr<SerialPort> owner_ = openPosixTerminal({.device = folder_.file("tty")});
+  SerialPort& port_ = *owner_;
 };
 
 TEST_F(SerialPortTest, WriteReadGetsTheAnswerWithItsTerminator) {
@@ -242,8 +243,7 @@ TEST(SerialPortRegistry, FindsByName) {
   const TemporaryFolder folder;
   const Instrument instrument(folder.file("tty"));
   SerialPortRegistry registry;
-  const auto port =
-      std::make_shared<PosixTerminalPort>(PosixTerminalOptions{.device = folder.file("tty")});
+  const std::shared_ptr<SerialPort> port = openPosixTerminal({.device = folder.file("tty")});
 
   registry.registerName("UART[0]", port);
 
@@ -259,8 +259,7 @@ TEST(SerialPortRegistry, BindsByName) {
   Instrument instrument(folder.file("tty"));
   LineCollector collector;
   SerialPortRegistry registry;
-  registry.registerName("UART[0]", std::make_shared<PosixTerminalPort>(
-                                       PosixTerminalOptions{.device = folder.file("tty")}));
+  registry.registerName("UART[0]", openPosixTerminal({.device = folder.file("tty")}));
 
   const auto line = registry.bind("UART[0]", collector);
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-#include "drivers/serial/tcp_address.h"
+#include <mpf/drivers/serial/tcp_address.h>
 
 namespace mpf {
 namespace {
