@@ -60,11 +60,11 @@ bool Binding::takeOne() {
     case MessageLink::Take::message:
       if (tryDeliverReply(envelope)) return true;
       break;
-    case MessageLink::Take::nonsense:
+    case MessageLink::Take::invalid:
       break;
   }
   count(dispatcher_.endpoint().control().protocolErrors);
-  disconnect("the server sent nonsense", Ending::nonsense);
+  disconnect("the server sent nonsense", Ending::protocolError);
   return true;
 }
 
@@ -74,7 +74,7 @@ bool Binding::onLinkState() {
   const auto state = link.peerState();
   if (link.isLost() || link.peer()->isLost()) {
     count(dispatcher_.endpoint().control().protocolErrors);
-    disconnect("somebody cut the connection's shared memory", Ending::nonsense);
+    disconnect("somebody cut the connection's shared memory", Ending::protocolError);
     return true;
   }
   if (state == layout::LinkState::open && !isConnected()) {
@@ -121,7 +121,7 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
   }
   Message message;
   switch (channel_->tryFinish(envelope, message)) {
-    case MessageLink::Finish::nonsense:
+    case MessageLink::Finish::invalid:
       return false;
     case MessageLink::Finish::unavailable:
       if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
@@ -240,9 +240,10 @@ void Binding::endAll() {
   end_->isInterrupted = false;
   deliverTheRest(channel.get());
   requests->forEach([&](Request& request) {
-    deliverFate(request, ending != Ending::nonsense && !channel->link().isTaken(request.ordinal)
-                             ? Fate::neverTaken
-                             : Fate::outcomeUnknown);
+    deliverFate(request,
+                ending != Ending::protocolError && !channel->link().isTaken(request.ordinal)
+                    ? Fate::neverTaken
+                    : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
   const bool wasConnected = end_->wasConnected;

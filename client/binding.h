@@ -49,9 +49,10 @@ class Binding : public std::enable_shared_from_this<Binding> {
   // One message or change of state of the link. False when there was none.
   bool takeOne();
   enum class Ending {
-    serverGone,  // dead, or it closed the link: what it has not taken it never will
-    refused,  // it is there and does not want us: ask again later
-    nonsense,  // we end it: the server may go on taking for a while
+    serverGone,     // dead, or it closed the link: what it has not taken it never will
+    refused,        // it is there and does not want us: ask again later
+    // the client ends the connection: the server may go on taking requests for a while
+    protocolError,
   };
   void disconnect(const std::string& reason, Ending ending);
   void cancel(std::uint32_t requestId);

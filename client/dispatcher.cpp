@@ -50,15 +50,17 @@ void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
   hasThread_ = true;
   thread_ = std::thread([self] {
     ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
-    const auto turn = self->enterAnyway();
+    const auto guard = self->acquireLock();
     while (!self->ended_.load(std::memory_order_relaxed)) {
       try {
-        self->runOnce(Deadline::never());
-      } catch (...) {  // of a callback, and no caller of ours could handle it
+        self->runOnce(Deadline::atNs(self->errors_.dueNs()));
+      } catch (...) {  // thrown by a callback: this thread has no caller that could handle it
         self->endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed);
         self->errors_.report();
       }
+      self->errors_.writeDue();
     }
+    self->errors_.writeHeld();
   });
 }
 
@@ -89,16 +91,16 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
   endpoint_.interrupt();
 }
 
-RunnerTurn Dispatcher::Impl::enter() {
+RunnerGuard Dispatcher::Impl::becomeRunner() {
   endpoint_.forkGuard().check("Dispatcher");
-  if (lock_.isMine()) return RunnerTurn(nullptr);
-  if (hasThread_) RunnerLock::refuse();
-  return enterAnyway();
+  if (lock_.isMine()) return RunnerGuard(nullptr);
+  if (hasThread_) RunnerLock::throwOtherRunner();
+  return acquireLock();
 }
 
-RunnerTurn Dispatcher::Impl::enterAnyway() {
-  lock_.enter([this] { endpoint_.interrupt(); });
-  return RunnerTurn(&lock_);
+RunnerGuard Dispatcher::Impl::acquireLock() {
+  lock_.acquire([this] { endpoint_.interrupt(); });
+  return RunnerGuard(&lock_);
 }
 
 bool Dispatcher::Impl::takeStop() noexcept {
@@ -106,16 +108,17 @@ bool Dispatcher::Impl::takeStop() noexcept {
 }
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
-  const auto turn = enter();
+  const auto guard = becomeRunner();
   return run(deadline, [this] { return takeStop(); });
 }
 
 bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()>& isDone) {
   const bool isNested = lock_.isMine();
-  if (!isNested && (hasThread_ || !lock_.mayRunAsGuest() || !lock_.tryEnterAsGuest())) return false;
-  const RunnerTurn turn(isNested ? nullptr : &lock_);
-  const auto isWanted = [&] { return !isNested && lock_.isWanted(); };
-  while (!isDone() && !deadline.hasPassed() && !isWanted()) run(deadline, isWanted);
+  if (!isNested && (hasThread_ || lock_.hasOtherRunner() || !lock_.tryAcquireTemporarily()))
+    return false;
+  const RunnerGuard guard(isNested ? nullptr : &lock_);
+  const auto isOver = [&] { return !isNested && lock_.isRunnerWaiting(); };
+  while (!isDone() && !deadline.hasPassed() && !isOver()) run(deadline, isOver);
   if (hasDescriptor_) endpoint_.callAgain();  // running has disarmed it
   return true;
 }
@@ -124,8 +127,9 @@ bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()
 template <class IsOver>
 bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
   const auto me = std::this_thread::get_id();
-  // PAIR(ran-last): before we look how long we may wait.
-  if (ranLast_.load(std::memory_order_relaxed) != me) ranLast_.store(me, std::memory_order_seq_cst);
+  // PAIR(waiting-thread): before we look how long we may wait.
+  if (waitingThread_.load(std::memory_order_relaxed) != me)
+    waitingThread_.store(me, std::memory_order_seq_cst);
   for (std::uint32_t vain = 0;;) {
     // In a loop that is never idle there would be no other look.
     if (isOver()) return false;
@@ -184,7 +188,7 @@ int Dispatcher::Impl::descriptor() {
 }
 
 bool Dispatcher::Impl::runPending(int most) {
-  const auto turn = enter();
+  const auto guard = becomeRunner();
   // Peers may send, or invent news, for ever: the program's loop has its turn all the same.
   for (int batches = 0; batches < most; ++batches) {
     if (step()) continue;
@@ -209,16 +213,16 @@ void Dispatcher::Impl::postLater(std::function<void()> command) {
   endpoint_.interrupt();
 }
 
-void Dispatcher::Impl::runQuietly(const std::function<void()>& command) {
+void Dispatcher::Impl::runOrPost(const std::function<void()>& command) {
   if (lock_.isMine()) return command();
-  if (!lock_.tryEnterAsGuest()) return postLater(command);
-  const RunnerTurn turn(&lock_);
+  if (!lock_.tryAcquireTemporarily()) return postLater(command);
+  const RunnerGuard guard(&lock_);
   command();
 }
 
 // The thread that runs the dispatcher may stop to do so before it has seen the command: then the
 // caller runs it.
-void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
+void Dispatcher::Impl::runOrPostAndWait(const std::function<void()>& command) {
   if (lock_.isMine()) return command();
   struct State {
     bool isStarted = false;  // under lock_
@@ -236,8 +240,8 @@ void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
   };
   const auto isDone = [&] { return state->isDone; };
   for (bool isPosted = false;; isPosted = true) {
-    if (lock_.tryEnterAsGuest()) {
-      const RunnerTurn turn(&lock_);
+    if (lock_.tryAcquireTemporarily()) {
+      const RunnerGuard guard(&lock_);
       return runFirst();
     }
     if (!isPosted) postLater(runFirst);
@@ -249,12 +253,12 @@ void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
 
 void Dispatcher::Impl::noteDue(std::int64_t ns) noexcept {
   auto due = dueNs_.load(std::memory_order_relaxed);
-  // PAIR(ran-last): before we look which thread waits.
+  // PAIR(waiting-thread): before we look which thread waits.
   while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst,
                                                    std::memory_order_relaxed)) {
   }
-  // PAIR(ran-last): after our time, which that thread looks at, or we see it here.
-  if (ns < due && ranLast_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
+  // PAIR(waiting-thread): after our time, which that thread looks at, or we see it here.
+  if (ns < due && waitingThread_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
     endpoint_.interrupt();
 }
 
@@ -379,7 +383,7 @@ std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
 
 bool Dispatcher::runOnce(Deadline deadline) { return impl_->runOnce(deadline); }
 void Dispatcher::run() {
-  const auto turn = impl_->enter();
+  const auto guard = impl_->becomeRunner();
   while (impl_->runOnce(Deadline::never())) {
   }
 }

@@ -37,9 +37,10 @@ class Dispatcher::Impl {
   void endThread();
 
   // --- any thread, as long as no other thread runs the dispatcher ---
-  // Makes the calling thread the runner, if it is not yet.
+  // Makes the calling thread the runner until the guard ends; changes nothing when it has the lock
+  // already.
   //   throws  std::logic_error when another thread runs the dispatcher
-  [[nodiscard]] RunnerTurn enter();
+  [[nodiscard]] RunnerGuard becomeRunner();
   bool runOnce(Deadline deadline);
   bool runPending(int most);
   int descriptor();
@@ -50,7 +51,7 @@ class Dispatcher::Impl {
   // --- any thread ---
   void interrupt() noexcept;
   [[nodiscard]] Deadline nextDue() const noexcept {
-    // PAIR(ran-last): after the name of the thread that waits until then.
+    // PAIR(waiting-thread): after the name of the thread that waits until then.
     return Deadline::atNs(dueNs_.load(std::memory_order_seq_cst));
   }
   // Runs `command`, which may call back, on the thread that runs the dispatcher: now when that is
@@ -58,11 +59,11 @@ class Dispatcher::Impl {
   void post(std::function<void()> command);
   // In the next step, and not before the callback that is running has returned.
   void postLater(std::function<void()> command);
-  // Runs `command`, which calls nobody back: now when no other thread runs the dispatcher, else in
+  // Runs `command`, which calls no callback: now when no other thread runs the dispatcher, else in
   // the next step.
-  void runQuietly(const std::function<void()>& command);
+  void runOrPost(const std::function<void()>& command);
   // The same, and waits until it has run.
-  void runQuietlyAndWait(const std::function<void()>& command);
+  void runOrPostAndWait(const std::function<void()>& command);
   // Something is due at `ns`.
   void noteDue(std::int64_t ns) noexcept;
 
@@ -81,7 +82,7 @@ class Dispatcher::Impl {
   void noteThrower(const std::string& server, std::int32_t location) noexcept;
 
  private:
-  RunnerTurn enterAnyway();
+  RunnerGuard acquireLock();
   template <class IsOver>
   bool run(Deadline deadline, const IsOver& isOver);
   bool takeStop() noexcept;
@@ -110,7 +111,8 @@ class Dispatcher::Impl {
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
   RunnerLock lock_;
-  std::atomic<std::thread::id> ranLast_;  // the thread that waits, or the last one that did
+  // the thread that waits in run(), or the last one that did
+  std::atomic<std::thread::id> waitingThread_;
   CallbackErrors errors_;
   int depth_ = 0;  // of steps, in callbacks of steps
   bool hasDescriptor_ = false;

@@ -115,7 +115,7 @@ std::optional<int> RouterArguments::start(int argc, const char* const* argv) {
                                       option->get_name(), file_));
     }
     takeTransport();
-    config_ = load();
+    config_ = loadConfig();
   } catch (const ConfigError& error) {
     if (file_.empty()) return refuseArguments(kProgram, error.what());
     printError("{}: {}\n", kProgram, error.what());

@@ -16,6 +16,7 @@
 #include "router/incoming/server_router.h"
 #include "router/outgoing/client_router.h"
 #include "router/transport/listener.h"
+#include "shm/watcher.h"
 
 namespace mpf::router {
 

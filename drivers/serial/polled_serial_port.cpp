@@ -79,9 +79,9 @@ SerialPortStatus PolledSerialPort::sendBreak(Milliseconds duration) {
 
 SerialPortStatus PolledSerialPort::execute(Request& request) {
   std::function<void()> ask;
-  if (isHopeless_) {
+  if (isAbandoned_) {
     ask = [&] {
-      if (isHopeless_()) giveUp(request);
+      if (isAbandoned_()) abandon(request);
     };
   }
   tasks_.callUntil(request.done, [&] { begin(request); }, ask);
@@ -89,7 +89,7 @@ SerialPortStatus PolledSerialPort::execute(Request& request) {
   return request.status;
 }
 
-void PolledSerialPort::giveUp(const Request& request) {
+void PolledSerialPort::abandon(const Request& request) {
   tasks_.call([&] {
     if (request_ == &request) end(SerialPortStatus::failure);
   });

@@ -45,8 +45,8 @@ class PolledSerialPort : public SerialPort {
 
   void bind(ByteHandler& handler) override;
   void release() override;
-  void giveUpWhen(std::function<bool()> isHopeless) override {
-    isHopeless_ = std::move(isHopeless);
+  void abandonWhen(std::function<bool()> isAbandoned) override {
+    isAbandoned_ = std::move(isAbandoned);
   }
   SerialPortStatus sendBreak(Milliseconds duration) override;
   [[nodiscard]] SerialPortStatus getStatus() const noexcept override;
@@ -90,7 +90,7 @@ class PolledSerialPort : public SerialPort {
   void send();
   void receive();
   void receiveAll();
-  void giveUp(const Request& request);
+  void abandon(const Request& request);
   void deliver(const LineByte& byte);
   void takeOverruns();
   void fail(LineFault fault, std::uint64_t count);
@@ -101,7 +101,7 @@ class PolledSerialPort : public SerialPort {
   void countFault(LineFault fault);
   void show(ByteDirection direction, std::span<const LineByte> bytes) const;
 
-  std::function<bool()> isHopeless_;  // used by the binder's threads
+  std::function<bool()> isAbandoned_;  // used by the binder's threads
   PortTasks tasks_;
   LineKeeper keeper_;
   // used by the port's thread only:

@@ -11,9 +11,9 @@
 // Throws   an exception that leaves a callback leaves the call that runs it: runOnce(), run(),
 //          runPending() or connectWait(). The message of that callback has been delivered;
 //          everything else is intact, and the next call continues with what is left. On the shared
-//          dispatcher's thread there is no such call: it writes what() to stderr, at most once a
-//          second, counts the exception as an alarm of its window, and continues. Servers follow
-//          the same rule: see MessageServer.
+//          dispatcher's thread there is no such call: it writes what() to stderr (32 lines at once,
+//          then one each 10 s), counts the exception as an alarm of its window, and continues.
+//          Servers follow the same rule: see MessageServer.
 // Crash    see MessageClient.
 // Trust    see MessageClient.
 #pragma once
@@ -23,8 +23,8 @@
 #include <string>
 
 #include <mpf/backplane.h>
-#include <mpf/wait_mode.h>
 #include <mpf/clock.h>
+#include <mpf/wait_mode.h>
 
 namespace mpf {
 

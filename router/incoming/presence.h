@@ -13,6 +13,7 @@
 #include <mpf/backplane.h>
 
 #include "router/outgoing/pending_binds.h"
+#include "shm/watcher.h"
 
 namespace mpf::router {
 

@@ -12,6 +12,7 @@
 
 #include "router/incoming/presence.h"
 #include "router/readable.h"
+#include "shm/watcher.h"
 
 namespace mpf::router {
 

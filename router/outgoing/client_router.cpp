@@ -11,7 +11,8 @@
 namespace mpf::router {
 namespace {
 
-constexpr std::int64_t kLingerNs = 60'000'000'000;    // of a proxy that nobody uses
+constexpr std::int64_t kIdleProxyNs =
+    60'000'000'000;  // a proxy without clients is removed after this time
 constexpr std::int64_t kBindAgainNs = 2'000'000'000;  // after a refusal
 constexpr int kTurn = 16;  // requests of one server before those of the next
 constexpr int kMaxTurns = 256;  // before everything else that the loop has to do
@@ -299,7 +300,7 @@ void ClientRouter::sweep() {
     if (!wanted.proxy && wanted.offer && connected_) makeProxy(name, wanted);
     if (wanted.proxy && wanted.proxy->hasClients()) wanted.idleSinceNs = 0;
     else if (wanted.proxy && wanted.idleSinceNs == 0) wanted.idleSinceNs = nowNs;
-    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kLingerNs) {
+    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kIdleProxyNs) {
       ++each;
       continue;
     }

@@ -90,7 +90,7 @@ void Line::end(FarewellCode code, const std::string& why) {
   });
   phase_ = Phase::leaving;
   farewell_ = text;
-  lingers_ = code != FarewellCode::SILENCE;
+  drains_ = code != FarewellCode::SILENCE;
   lastMoment_ = timer_.afterDelay(kLastMoment)
                     .then([this, text] { finish({text}); })
                     .eagerlyEvaluate(nullptr);

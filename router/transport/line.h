@@ -198,8 +198,9 @@ class Line {
   Phase phase_ = Phase::running;
   std::vector<Carried> late_;  // requests that came behind our farewell
   std::string farewell_;  // what we ended it with
-  // until the peer has closed: what we do not read would take the farewell back
-  bool lingers_ = false;
+  // After the farewell, input is read and discarded until the peer closes: TCP would reset the
+  // connection because of unread input, and the peer could lose the farewell.
+  bool drains_ = false;
   std::int64_t heardNs_ = 0;  // when there was a sign of life
   std::size_t heardBytes_ = 0;  // since then, of a frame that is still coming
   bool overdue_ = false;  // at the last look

@@ -59,7 +59,7 @@ void Line::onWriteFailure(const std::string& why) {
 kj::Promise<void> Line::writeAll() {
   if (queue_.empty()) {
     writing_ = false;
-    if (isEnding() && lingers_) stream_->shutdownWrite();
+    if (isEnding() && drains_) stream_->shutdownWrite();
     else if (isEnding()) finish({farewell_});
     return kj::READY_NOW;
   }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <filesystem>
 
+#include "shm/watcher.h"
 #include "tests/client/client_fixture.h"
 #include "tests/support/sanitized.h"
 

@@ -221,7 +221,7 @@ TEST_F(ClientTest, RequestIdsAreNotUsedAgainOnTheNextConnection) {
   static_cast<void>(next());
 }
 
-// connectWait() runs the dispatcher only until the thread comes that runs it for good.
+// connectWait() runs the dispatcher only until another thread runs it.
 TEST_F(ClientTest, AWaitGivesWayToTheThreadThatRunsTheDispatcher) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
@@ -253,7 +253,7 @@ TEST_F(ClientTest, AWaitGivesWayToTheThreadThatRunsTheDispatcher) {
   serving.join();
 }
 
-// Its last runner has gone: connectWait() runs the dispatcher as if nobody ever had.
+// The last thread that ran the dispatcher has ended: connectWait() runs it as if no thread ever had.
 TEST_F(ClientTest, AWaitRunsADispatcherWhoseThreadHasEnded) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
@@ -262,6 +262,30 @@ TEST_F(ClientTest, AWaitRunsADispatcherWhoseThreadHasEnded) {
 
   EXPECT_TRUE(client_.connectWait(100s));
 
+  server.interrupt();
+  serving.join();
+}
+
+// The second thread probably gets the stack and the thread-local memory of the first one, which has ended.
+TEST_F(ClientTest, AWaitDoesNotRunADispatcherWhoseSecondThreadIsAlive) {
+  auto& server = startServer();
+  std::thread serving([&] { server.run(); });
+  std::thread([&] { dispatcher_.runOnce(Deadline::after(1ms)); }).join();
+  std::binary_semaphore hasRun(0);
+  std::binary_semaphore mayEnd(0);
+  std::thread second([&] {
+    dispatcher_.runOnce(Deadline::after(1ms));
+    hasRun.release();
+    mayEnd.acquire();
+  });
+  hasRun.acquire();
+  client_.bind("device[0]/a");
+
+  EXPECT_FALSE(client_.connectWait(20ms));
+
+  mayEnd.release();
+  second.join();
+  EXPECT_TRUE(client_.connectWait(100s));
   server.interrupt();
   serving.join();
 }

@@ -12,6 +12,7 @@
 
 #include "router/surroundings.h"
 #include "router/transport/frame_reader.h"
+#include "shm/watcher.h"
 #include "tests/fuzz/choices.h"
 #include "tests/router/rogue/random_items.h"
 

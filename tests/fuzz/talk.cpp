@@ -74,7 +74,7 @@ bool Talk::tryTakeOne(std::uint64_t choice) {
     return true;
   }
   Message message;
-  isOver_ = take == MessageLink::Take::nonsense ||
+  isOver_ = take == MessageLink::Take::invalid ||
             channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
   if (isOver_) return false;
   lookAt(message);

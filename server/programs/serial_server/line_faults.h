@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: MIT
-// LineFaults: tells people and clients what a serial line has lost and damaged.
+// LineFaults: reports the bytes that a serial line has lost and damaged, to people and to clients.
 //
-//   port's counters ── look() ──► alarms, one for each fault     log, at most one line in `quiet`, with the counts since the line before
+//   port's counters ── look() ──► one alarm for each fault
+//                            └──► a line of the log with the counts since the start
 //   an answer's faults ──► status and `extra` of its reply (include/mpf/serial_commands.h)
 //
+// The log limits lines of one kind (LogLimiter). Each line has the counts since the start, so that
+// a line that stands for many others contains the sum of all faults.
+//
 // Threads  look() from any: the port's thread after each fault, the server's thread after each
-//          request. setAnswer() and what tells a reply: the server's thread.
-// Trust    a line that does nothing but fail costs one line of log each `quiet`.
+//          request. The other functions: the server's thread.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <mutex>
 #include <string>
 
-#include <mpf/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/message_server.h>
 #include <mpf/message_types.h>
@@ -28,17 +29,14 @@ namespace mpf {
 
 class LineFaults {
  public:
-  static constexpr std::chrono::seconds kQuiet{10};
-
-  // What has happened until now is not told. All that is passed must outlive this.
-  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log,
-             std::chrono::milliseconds quiet = kQuiet);
-  // Tells the rest.
+  // Faults that happened before this are not reported. All that is passed must outlive this.
+  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log);
+  // Reports the faults since the last look().
   ~LineFaults();
   LineFaults(const LineFaults&) = delete;
   LineFaults& operator=(const LineFaults&) = delete;
 
-  // Takes what the port has counted since the last time.
+  // Reports the faults that the port has counted since the last time.
   void look();
 
   // The bits of the answer that is about to be sent; 0 at the beginning of each attempt.
@@ -55,21 +53,21 @@ class LineFaults {
     [[nodiscard]] std::uint64_t sum() const noexcept {
       return overruns + parity + framing + breaks;
     }
+    friend Counts operator-(const Counts& a, const Counts& b) noexcept {
+      return {a.overruns - b.overruns, a.parity - b.parity, a.framing - b.framing,
+              a.breaks - b.breaks};
+    }
   };
   [[nodiscard]] Counts counted() const;
-  void tell(std::int64_t nowNs);
-  [[nodiscard]] static std::string textOf(const Counts& counts, const std::string& when);
+  [[nodiscard]] static std::string textOf(const Counts& counts);
 
   MessageServer& server_;
   const SerialPort& port_;
   const ServerLog& log_;
-  const Nanoseconds quiet_;
+  const Counts start_;
   std::uint8_t answer_ = 0;
-  std::mutex mutex_;  // all below
-  Counts seen_;
-  Counts untold_;
-  std::int64_t untoldSinceNs_ = 0;
-  std::int64_t nextLineNs_ = 0;
+  std::mutex mutex_;
+  Counts reported_;  // under mutex_: what the port had counted at the last look()
 };
 
 }  // namespace mpf

@@ -53,11 +53,11 @@ class LineReader final : public ByteHandler {
   enum class Sync {
     inStep,  // the request may be sent now
     noSilence,  // `until` has passed
-    hopeless,  // isHopeless() said so
+    abandoned,  // isAbandoned() returned true
   };
   // Waits until a request may be sent. Before a question the input is thrown away, and what arrives
   // during the wait.
-  Sync getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isHopeless);
+  Sync getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isAbandoned);
   // A plain write has ended.
   void noteWritten();
 
@@ -83,13 +83,13 @@ class LineReader final : public ByteHandler {
     syncing,  // a question waits for silence: input is thrown away
     armed,  // it is about to be sent: input would disturb it
     reading,
-    lingering,  // its answer is late, and is collected all the same
+    collectingLate,  // the request has timed out; its late answer is collected for a retry
   };
   // Length of the first complete answer in the input; 0 when there is none.
   [[nodiscard]] std::size_t completeBytes() const;
   ByteHandlerResult collect(std::uint8_t byte);
   void noteSurplus();
-  void stopLingering();
+  void dropLateAnswer();
 
   const std::function<void()> onFault_;
   std::mutex mutex_;

@@ -210,12 +210,12 @@ TEST_F(PolledSerialPortTest, AnAnswerEndsAWriteReadThoughTheLineIsBusy) {
 
 TEST_F(PolledSerialPortTest, ARequestThatItsBinderGivesUpFails) {
   int asked = 0;
-  line_->giveUpWhen([&] { return ++asked == 2; });
+  line_->abandonWhen([&] { return ++asked == 2; });
 
   EXPECT_EQ(line_->read(Deadline::never()), SerialPortStatus::failure);
 
   EXPECT_EQ(asked, 2);
-  line_->giveUpWhen({});
+  line_->abandonWhen({});
   const auto tap = port_.attachTap(answering(script_, {{'a'}, {'\r'}, {'\n'}}));
   EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::success);
 }

@@ -127,7 +127,7 @@ class Connection(threading.Thread):
       with self.role_.changed:
         self.role_.onEnd()
         self.role_.changed.notify_all()
-      self.linger()
+      self.drain()
       with self.role_.changed:
         for end in (self.socket_, self.wakeReceiver_, self.wakeSender_):
           end.close()
@@ -240,7 +240,7 @@ class Connection(threading.Thread):
     layouts = {"newer": kNewerLayouts, "older": kOlderLayouts}.get(self.version_, kLayouts)
     return encodeFrame(items, layouts, self.spread_ and len(items) < 8)
 
-  def linger(self):
+  def drain(self):
     """Writes what is left, then reads until the other side closes: a reset would take the farewell from it."""
     try:
       while self.out_:

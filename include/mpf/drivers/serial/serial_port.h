@@ -151,9 +151,9 @@ class SerialPort {
     return transfer(data, true, deadline);
   }
   // Sets a condition that ends requests early. The thread that waits for a request calls
-  // `isHopeless` every 20 ms; when it returns true, the request ends with failure. An empty
+  // `isAbandoned` every 20 ms; when it returns true, the request ends with failure. An empty
   // function removes the condition. To be called by the binder, between requests.
-  virtual void giveUpWhen(std::function<bool()> isHopeless) = 0;
+  virtual void abandonWhen(std::function<bool()> isAbandoned) = 0;
   // Holds the line in the break state for `duration`.
   //   returns  failure as for a write, and when this kind of line cannot send a break
   virtual SerialPortStatus sendBreak(Milliseconds duration) = 0;
