@@ -23,7 +23,7 @@ namespace {
 
 const PciKind kTpci200{.name = "TPCI200", .vendor = 0x1498, .device = 0x30c8};
 
-// Another process may hold the lock of a site for a moment, in silenceIfNobodys().
+// Another process may hold the lock of a site for a moment, in maskIfUnowned().
 constexpr int kClaims = 50;
 constexpr std::chrono::milliseconds kClaimAgain{1};
 // Time for another process to mask its line before the interrupt is unmasked again.
@@ -254,13 +254,13 @@ bool Tpci200::serve() {
       sites_[i]->serve(status);
     } else {
       isOthers = true;
-      silenceIfNobodys(i);
+      maskIfUnowned(i);
     }
   }
   return isOthers;
 }
 
-void Tpci200::silenceIfNobodys(std::size_t number) {
+void Tpci200::maskIfUnowned(std::size_t number) {
   if (!locks_.tryLock(static_cast<int>(number))) return;
   for (int line = 0; line < 2; ++line) board_.acknowledge(number, line);
   board_.setLines(number, 0);
