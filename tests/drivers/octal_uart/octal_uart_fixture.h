@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// OctalUartTest: an octal UART on a model, and ports of it.
+// OctalUartTest: the driver of an octal UART on a device model, and ports of it.
 #pragma once
 
 #include <condition_variable>
@@ -19,7 +19,7 @@
 
 namespace mpf::test {
 
-// The alarms that a module has told.
+// Counts the alarms of a module.
 class AlarmLog {
  public:
   void add(OctalUartAlarm alarm) {
@@ -60,7 +60,7 @@ class OctalUartTest : public testing::Test {
     model_ = &carrier_.plug("IP_a", std::make_unique<OctalUartModel>(options));
     return *model_;
   }
-  // Plugs a model, and drives it.
+  // Plugs a model and starts the driver.
   OctalUart& start(const OctalUartModelOptions& model = {}, const OctalUartOptions& options = {}) {
     plug(model);
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), options);
@@ -76,7 +76,7 @@ class OctalUartTest : public testing::Test {
     return model_->with(
         number, [](const OctalUartModelChannel& channel) { return channel.requestsToSend(); });
   }
-  // Whether a command gets through and its answer back.
+  // Returns whether the far end receives a command and the port receives the answer.
   bool echoes(BoundOctalPort& bound, int number) {
     const auto tap = bound.port.attachTap([this, number](std::span<const PeekedByte> bytes) {
       if (bytes.front().direction == ByteDirection::sent) model_->say(number, "yes\r");
@@ -90,7 +90,7 @@ class OctalUartTest : public testing::Test {
   IndustryPackCarriers carriers_;
   ModelCarrier& carrier_ = addCarrier(std::make_unique<ModelCarrier>());
   IndustryPackModules modules_{carriers_};
-  OctalUartModel* model_ = nullptr;  // the carrier's
+  OctalUartModel* model_ = nullptr;  // owned by the carrier
   std::optional<OctalUart> uart_;
 
   ModelCarrier& addCarrier(std::unique_ptr<ModelCarrier> carrier,

@@ -13,7 +13,7 @@
 namespace mpf::test {
 namespace {
 
-// Keeps what a tap showed, as text: T before what was sent, R before what was received.
+// Records the bytes of a tap as text: "T:" before sent bytes, "R:" before received bytes.
 class Recorder {
  public:
   PeekHandler handler() {
@@ -96,7 +96,7 @@ TEST_F(PeekTest, ADetachedTapSeesNothingMore) {
   EXPECT_EQ(recorder.text(), "T:ECHO a\nR:a\r\n");
 }
 
-TEST_F(PeekTest, TapsComeAndGoWithoutDisturbingRequests) {
+TEST_F(PeekTest, AttachingAndDetachingTapsDoesNotDisturbRequests) {
   std::jthread fidget([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       Recorder recorder;

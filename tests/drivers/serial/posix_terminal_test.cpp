@@ -52,7 +52,7 @@ TEST_F(PosixTerminalTest, StartsWithItsSettings) {
   EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
 }
 
-TEST_F(PosixTerminalTest, NamedSpeedsGoByTheirNames) {
+TEST_F(PosixTerminalTest, NamedSpeedsAreSetByTheirConstants) {
   const auto port = openPosixTerminal(options());
   const std::vector<std::pair<int, speed_t>> speeds = {
       {50, B50},         {110, B110},         {300, B300},         {1200, B1200},
@@ -67,7 +67,7 @@ TEST_F(PosixTerminalTest, NamedSpeedsGoByTheirNames) {
   }
 }
 
-TEST_F(PosixTerminalTest, TakesSpeedsThatHaveNoName) {
+TEST_F(PosixTerminalTest, AcceptsSpeedsWithoutAConstant) {
   const auto port = openPosixTerminal(options());
 
   EXPECT_EQ(port->config({.baud = 250'000}), "");
@@ -90,7 +90,7 @@ TEST_F(PosixTerminalTest, ZeroLeavesASettingAsItIs) {
   EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
 }
 
-// A pseudo-terminal has 8 bits and no parity, whatever is asked of it, and reports success.
+// A pseudo-terminal always has 8 bits and no parity, but reports success for all settings.
 TEST_F(PosixTerminalTest, NamesTheSettingThatTheLineDoesNotAccept) {
   const auto port = openPosixTerminal(optionsWith({.baud = 9600}));
 
@@ -103,7 +103,7 @@ TEST_F(PosixTerminalTest, NamesTheSettingThatTheLineDoesNotAccept) {
   EXPECT_EQ(::cfgetospeed(&line), speed_t{B9600}) << "all or nothing";
 }
 
-TEST_F(PosixTerminalTest, SaysWhyItCannotStart) {
+TEST_F(PosixTerminalTest, ReportsWhyItCannotBeOpened) {
   EXPECT_THAT(whyNot({.device = folder_.file("absent")}),
               AllOf(HasSubstr("open"), HasSubstr("absent"), HasSubstr("No such file")));
   EXPECT_THAT(whyNot({.device = "/dev/null"}), HasSubstr("open /dev/null: not a terminal"));
@@ -112,7 +112,7 @@ TEST_F(PosixTerminalTest, SaysWhyItCannotStart) {
   EXPECT_THAT(whyNot(optionsWith({.stopBits = 5})), HasSubstr("stop bits 5"));
 }
 
-TEST_F(PosixTerminalTest, OpensTheDeviceForItselfAlone) {
+TEST_F(PosixTerminalTest, OpensTheDeviceExclusively) {
   {
     const auto port = openPosixTerminal(options());
     EXPECT_THAT(whyNot(options()),
@@ -122,8 +122,8 @@ TEST_F(PosixTerminalTest, OpensTheDeviceForItselfAlone) {
   EXPECT_EQ(whyNot(options()), "");
 }
 
-// The far end takes nothing: the kernel's buffer fills, the rest is late.
-TEST_F(PosixTerminalTest, AWriteThatTheFarEndHoldsUpEndsInTimeout) {
+// The far end reads nothing, so the kernel's buffer fills and the remaining bytes time out.
+TEST_F(PosixTerminalTest, AWriteTimesOutWhileTheFarEndDoesNotRead) {
   const auto port = openPosixTerminal(options());
   const BoundSerialPort line(*port, collector_);
   instrument_.setReading(false);
@@ -136,7 +136,7 @@ TEST_F(PosixTerminalTest, AWriteThatTheFarEndHoldsUpEndsInTimeout) {
   EXPECT_EQ(line->writeRead(bytesOf("\n*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(PosixTerminalTest, UnplugFailsTheRequestThatIsOutstanding) {
+TEST_F(PosixTerminalTest, UnplugFailsAnOutstandingRequest) {
   const auto port = openPosixTerminal(options());
   const BoundSerialPort line(*port, collector_);
   instrument_.behave({.isSilent = true});
@@ -162,7 +162,7 @@ TEST_F(PosixTerminalTest, WhileUnpluggedRequestsAndSettingsFailAtOnce) {
   EXPECT_THAT(line->config({.baud = 9600}), HasSubstr("unplugged"));
 }
 
-TEST_F(PosixTerminalTest, ReturnsWithItsSettings) {
+TEST_F(PosixTerminalTest, KeepsItsSettingsWhenTheDeviceReturns) {
   const auto port = openPosixTerminal(optionsWith({.baud = 19200, .stopBits = 2}));
   const BoundSerialPort line(*port, collector_);
   ASSERT_EQ(line->config({.baud = 4800}), "");
@@ -182,7 +182,7 @@ TEST_F(PosixTerminalTest, ReturnsWithItsSettings) {
   }
 }
 
-TEST_F(PosixTerminalTest, MayStartBeforeItsDevice) {
+TEST_F(PosixTerminalTest, MayBeOpenedBeforeItsDeviceIsPresent) {
   instrument_.unplug();
   const auto port = openPosixTerminal({.device = folder_.file("tty"), .waitForDevice = true});
   const BoundSerialPort line(*port, collector_);
@@ -210,17 +210,17 @@ TEST_F(PosixTerminalTest, TapsSurviveAnUnplug) {
   EXPECT_EQ(seen, 10);
 }
 
-TEST_F(PosixTerminalTest, TellsEachChangeOfStateOnce) {
+TEST_F(PosixTerminalTest, ReportsEachChangeOfStateOnce) {
   const Watchdog dog("change of state");
   const auto port = openPosixTerminal(options());
-  std::vector<std::string> told;
+  std::vector<std::string> reports;
   port->onStateChange([&](SerialPortState state, const std::string& because) {
-    told.push_back(std::string(toString(state)) + (because.empty() ? "" : ", and says why"));
+    reports.push_back(std::string(toString(state)) + (because.empty() ? "" : ", with a reason"));
   });
   instrument_.unplug();
   ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
   const auto lost = port->unpluggedBecause();
-  // until an attempt to open has failed, which is no change
+  // until an attempt to open has failed, which is not a change of the state
   while (port->unpluggedBecause() == lost) std::this_thread::yield();
   instrument_.plugIn();
   ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
@@ -229,7 +229,7 @@ TEST_F(PosixTerminalTest, TellsEachChangeOfStateOnce) {
   instrument_.unplug();
   ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
 
-  EXPECT_THAT(told, ElementsAre("unplugged, and says why", "plugged"));
+  EXPECT_THAT(reports, ElementsAre("unplugged, with a reason", "plugged"));
 }
 
 }  // namespace

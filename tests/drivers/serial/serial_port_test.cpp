@@ -65,7 +65,7 @@ TEST_F(SerialPortTest, AllByteValuesPassUnchangedBothWays) {
   EXPECT_TRUE(collector.waitForAll(every));
 }
 
-TEST_F(SerialPortTest, ASlowAnswerIsWaitedFor) {
+TEST_F(SerialPortTest, WaitsForASlowAnswer) {
   const BoundSerialPort line(port_, collector_);
   instrument_.behave({.delay = 50ms});
 
@@ -74,7 +74,7 @@ TEST_F(SerialPortTest, ASlowAnswerIsWaitedFor) {
   EXPECT_EQ(collector_.answer(), "1.234\r\n");
 }
 
-TEST_F(SerialPortTest, AnAnswerInPiecesIsPutTogether) {
+TEST_F(SerialPortTest, JoinsAnAnswerThatArrivesInPieces) {
   const BoundSerialPort line(port_, collector_);
   instrument_.behave({.gap = 2ms});
 
@@ -104,7 +104,7 @@ TEST_F(SerialPortTest, SilenceEndsInTimeout) {
   EXPECT_EQ(line->counters().timeouts, 1U);
 }
 
-TEST_F(SerialPortTest, ADeadlineThatBeganEarlierCounts) {
+TEST_F(SerialPortTest, ADeadlineThatWasSetEarlierApplies) {
   const BoundSerialPort line(port_, collector_);
   instrument_.behave({.isSilent = true});
   const auto deadline = Deadline::after(20ms);
@@ -115,7 +115,7 @@ TEST_F(SerialPortTest, ADeadlineThatBeganEarlierCounts) {
   EXPECT_TRUE(deadline.hasPassed());
 }
 
-TEST_F(SerialPortTest, TimeoutZeroReturnsAtOnceWithWhatIsThere) {
+TEST_F(SerialPortTest, TimeoutZeroReturnsAtOnceWithTheBytesThatHaveArrived) {
   const BoundSerialPort line(port_, collector_);
   instrument_.say("begun");
   ASSERT_TRUE(collector_.waitForAll("begun"));
@@ -125,7 +125,7 @@ TEST_F(SerialPortTest, TimeoutZeroReturnsAtOnceWithWhatIsThere) {
   EXPECT_EQ(collector_.all(), "begun");
 }
 
-TEST_F(SerialPortTest, WriteWithTimeoutZeroSucceedsWhenTheKernelTakesAll) {
+TEST_F(SerialPortTest, WriteWithTimeoutZeroSucceedsWhenTheKernelAcceptsAllBytes) {
   const BoundSerialPort line(port_, collector_);
 
   EXPECT_EQ(line->write(bytesOf("ECHO\n"), 0ms), kSuccess);
@@ -133,7 +133,7 @@ TEST_F(SerialPortTest, WriteWithTimeoutZeroSucceedsWhenTheKernelTakesAll) {
   EXPECT_TRUE(instrument_.waitForReceived("ECHO\n"));
 }
 
-TEST_F(SerialPortTest, NegativeAndHugeTimeoutsMeanAtOnceAndForEver) {
+TEST_F(SerialPortTest, NegativeTimeoutsEndAtOnceAndHugeOnesNever) {
   const BoundSerialPort line(port_, collector_);
 
   EXPECT_EQ(line->read(std::chrono::milliseconds::min()), kTimeout);
@@ -149,8 +149,8 @@ TEST_F(SerialPortTest, HandlerGetsBytesWithNoReadOutstanding) {
   EXPECT_THAT(collector_.ends(), ElementsAre());
 }
 
-// Circular buffer mode without a race between looking into the buffer and beginning to read.
-TEST_F(SerialPortTest, ALineThatCameEarlierMaySatisfyARead) {
+// Circular buffer mode: no race between the check of the buffer and the start of the read.
+TEST_F(SerialPortTest, BytesThatArrivedEarlierMaySatisfyARead) {
   collector_.acceptEarlier();
   const BoundSerialPort line(port_, collector_);
   instrument_.say("alarm\r\n");
@@ -207,7 +207,7 @@ TEST_F(SerialPortTest, ReleaseEndsARequestThatIsOutstanding) {
   EXPECT_THAT(collector_.ends(), ElementsAre(kFailure));
 }
 
-TEST_F(SerialPortTest, ASecondRequestAtTheSameTimeFailsAndDisturbsNothing) {
+TEST_F(SerialPortTest, ASecondRequestAtTheSameTimeFailsAndDoesNotDisturbTheFirst) {
   const BoundSerialPort line(port_, collector_);
   auto first = std::async(std::launch::async, [&] { return port_.read(kWatchdog); });
   ASSERT_TRUE(collector_.waitForRead());
@@ -230,7 +230,7 @@ TEST_F(SerialPortTest, SettingsMayChangeWhileAReadIsOutstanding) {
   EXPECT_EQ(status.get(), kSuccess);
 }
 
-TEST_F(SerialPortTest, BreakLastsAndSucceeds) {
+TEST_F(SerialPortTest, SendBreakLastsForItsDuration) {
   const BoundSerialPort line(port_, collector_);
   const auto end = Deadline::after(20ms);
 

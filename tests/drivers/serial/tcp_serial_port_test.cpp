@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// One port of a terminal server on this host, on a free TCP port->
+// A port of a terminal server, simulated on a free TCP port of this host.
 class TerminalServer {
  public:
   explicit TerminalServer(int family = AF_INET) : family_(family) { listen(0); }
@@ -32,7 +32,7 @@ class TerminalServer {
     pollfd ready{listener_.get(), POLLIN, 0};
     const auto watchdogMs = static_cast<int>(std::chrono::milliseconds(kWatchdog).count());
     if (retryInterrupted([&] { return ::poll(&ready, 1, watchdogMs); }) != 1)
-      throw std::runtime_error("nobody connects");
+      throw std::runtime_error("accept: no connection within the time of the watchdog");
     return FileDescriptor(
         checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
   }
@@ -101,7 +101,7 @@ TEST_F(TcpSerialPortTest, AllByteValuesPassUnchangedBothWays) {
   EXPECT_TRUE(collector.waitForAll(every));
 }
 
-TEST_F(TcpSerialPortTest, TakesNames) {
+TEST_F(TcpSerialPortTest, AcceptsHostNames) {
   const auto port = openTcpSerialPort({.address = {"localhost", server_.address().port}});
   instrument_.connect(server_.accept());
   const BoundSerialPort line(*port, collector_);
@@ -109,7 +109,7 @@ TEST_F(TcpSerialPortTest, TakesNames) {
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(TcpSerialPortTest, TakesIpv6) {
+TEST_F(TcpSerialPortTest, AcceptsIpv6Addresses) {
   std::optional<TerminalServer> server;
   try {
     server.emplace(AF_INET6);
@@ -138,7 +138,7 @@ TEST_F(TcpSerialPortTest, CannotSendABreak) {
   EXPECT_EQ(line->sendBreak(1ms), SerialPortStatus::failure);
 }
 
-TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
+TEST_F(TcpSerialPortTest, ReportsWhyItCannotBeOpened) {
   server_.switchOff();
 
   EXPECT_THAT(whyNot({.address = server_.address()}),
@@ -147,8 +147,8 @@ TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
               HasSubstr("resolve no-such-host.invalid:1"));
 }
 
-// The accept queue is full, so that the kernel does not answer.
-TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
+// The accept queue is full, so the kernel does not answer.
+TEST_F(TcpSerialPortTest, TimesOutWhenTheServerDoesNotAnswer) {
   const TcpSerialOptions options{
       .address = server_.address(), .connectTimeout = 50ms, .waitForServer = true};
   std::array<std::unique_ptr<SerialPort>, 4> fillers;
@@ -164,7 +164,7 @@ TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
   EXPECT_THAT(reason, HasSubstr("no answer within 50 ms"));
 }
 
-TEST_F(TcpSerialPortTest, ALostConnectionFailsTheRequestThatIsOutstanding) {
+TEST_F(TcpSerialPortTest, ALostConnectionFailsAnOutstandingRequest) {
   const auto port = openTcpSerialPort({.address = server_.address()});
   instrument_.connect(server_.accept());
   const BoundSerialPort line(*port, collector_);
@@ -180,7 +180,7 @@ TEST_F(TcpSerialPortTest, ALostConnectionFailsTheRequestThatIsOutstanding) {
   EXPECT_EQ(port->counters().unplugs, 1U);
 }
 
-TEST_F(TcpSerialPortTest, ConnectsAgain) {
+TEST_F(TcpSerialPortTest, ReconnectsAfterALoss) {
   const auto port = openTcpSerialPort({.address = server_.address()});
   instrument_.connect(server_.accept());
   const BoundSerialPort line(*port, collector_);
@@ -195,7 +195,7 @@ TEST_F(TcpSerialPortTest, ConnectsAgain) {
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(TcpSerialPortTest, MayStartBeforeItsServer) {
+TEST_F(TcpSerialPortTest, MayBeOpenedBeforeItsServerIsPresent) {
   server_.switchOff();
   const auto port = openTcpSerialPort({.address = server_.address(), .waitForServer = true});
   const BoundSerialPort line(*port, collector_);
@@ -207,7 +207,7 @@ TEST_F(TcpSerialPortTest, MayStartBeforeItsServer) {
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(TcpSerialPortTest, AFloodDoesNotKeepARequestFromItsDeadline) {
+TEST_F(TcpSerialPortTest, AFloodDoesNotDelayTheDeadlineOfARequest) {
   LineCollector collector("never comes");
   const auto port = openTcpSerialPort({.address = server_.address()});
   const auto far = server_.accept();
