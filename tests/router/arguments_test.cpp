@@ -113,13 +113,13 @@ TEST_F(ArgumentsTest, StillHoldWhenTheFileIsLoadedAnew) {
   ASSERT_EQ(start({file, "--name", "option"}).status, std::nullopt);
   folder_.write("r.toml", "name = \"file\"\nbackplane = \"changed\"\n" + remote);
 
-  const auto changed = arguments_->load();
+  const auto changed = arguments_->loadConfig();
 
   EXPECT_EQ(changed.name, "option");
   EXPECT_EQ(changed.backplane, "changed");
   EXPECT_EQ(config().backplane, "") << "what was loaded stays";
   folder_.write("r.toml", "nam = 1\n" + remote);
-  EXPECT_THROW(static_cast<void>(arguments_->load()), ConfigError);
+  EXPECT_THROW(static_cast<void>(arguments_->loadConfig()), ConfigError);
 }
 
 TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
