@@ -48,7 +48,7 @@ class LineFaultsTest : public testing::Test {
     model_ = &carrier_.plug("IP_a",
                             std::make_unique<OctalUartModel>(OctalUartModelOptions{.time = time}));
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
-    port_.emplace(*uart_, 0, OctalUartPortOptions{.settings = kFast});
+    port_ = openOctalUartPort(*uart_, 0, {.settings = kFast});
     log_.emplace("test", logLevel);
     server_.emplace(backplane_, kServer);
     serial_.emplace(*server_, *port_, SerialServerOptions{}, *log_);
@@ -105,7 +105,7 @@ class LineFaultsTest : public testing::Test {
   IndustryPackModules modules_{carriers_};
   OctalUartModel* model_ = nullptr;
   std::optional<OctalUart> uart_;
-  std::optional<OctalUartPort> port_;
+  std::unique_ptr<SerialPort> port_;
   std::optional<ServerLog> log_;
   std::optional<MessageServer> server_;
   std::optional<SerialServer> serial_;
