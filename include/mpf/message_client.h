@@ -28,7 +28,7 @@
 
 #include <mpf/clock.h>
 #include <mpf/dispatcher.h>
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 
 namespace mpf {
 

@@ -32,7 +32,7 @@
 
 #include <mpf/backplane.h>
 #include <mpf/clock.h>
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 #include <mpf/rights.h>
 #include <mpf/wait_mode.h>
 

@@ -37,7 +37,7 @@
 #include <string_view>
 #include <vector>
 
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 
 namespace mpf::serial {
 

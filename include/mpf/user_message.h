@@ -19,7 +19,7 @@
 #include <capnp/message.h>
 #include <capnp/serialize.h>
 
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 
 namespace mpf {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 
 #include <algorithm>
 #include <gmock/gmock.h>
@@ -129,7 +129,7 @@ TEST(Message, RefusesALengthAboveItsRoomWithASentence) {
     message.setLength(101);
     FAIL() << "101 elements fit into room for 100";
   } catch (const std::length_error& error) {
-    EXPECT_STREQ(error.what(), "int32Array: length 101 was asked for, there is room for 100");
+    EXPECT_STREQ(error.what(), "int32Array: length 101 is too large: there is room for 100");
   }
   EXPECT_EQ(message.getLength(), 100U);
   EXPECT_THROW(message.setLength(SIZE_MAX), std::length_error);
