@@ -115,7 +115,7 @@ TEST_F(EndTest, AConnectThatFailsCostsNoPlace) {
   EXPECT_THAT(client_.notConnectedBecause(), testing::HasSubstr("not accepted"));
   runUntil([&] {
     return client_.isConnected() ||
-           client_.notConnectedBecause().find("no more are possible") != std::string::npos;
+           client_.notConnectedBecause().find("which is the maximum") != std::string::npos;
   });
   EXPECT_TRUE(client_.isConnected());
 }

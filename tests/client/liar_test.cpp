@@ -15,7 +15,7 @@ class LiarTest : public ClientTest {
     runUntil([&] { return news_.size() == 2; });
 
     EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo));
-    EXPECT_EQ(client_.notConnectedBecause(), "the server sent nonsense");
+    EXPECT_EQ(client_.notConnectedBecause(), "the server sent invalid data");
     EXPECT_EQ(fateOf(next()), Fate::outcomeUnknown);
   }
 };
@@ -56,7 +56,7 @@ TEST_F(LiarTest, AFateAfterTheReplyEndsNothing) {
   runUntil([&] { return news_.size() == 2; });
 
   EXPECT_TRUE(next().tryAs<Int32>());
-  EXPECT_EQ(client_.notConnectedBecause(), "the server sent nonsense");
+  EXPECT_EQ(client_.notConnectedBecause(), "the server sent invalid data");
 }
 
 }  // namespace
