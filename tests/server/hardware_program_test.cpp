@@ -136,7 +136,7 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
   const auto notAFile = folder_.write("letter", "a letter");
   for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
            {{"dac", "ipac"}, "site is required"},
-           {{"dac", "ipac", "IP_a"}, "nothing says what carrier \"ipac\" is"},
+           {{"dac", "ipac", "IP_a"}, "carrier \"ipac\" is not defined"},
            {{"dac", "ipac", "IP_x", "--carrier", "ipac=model"}, "no site \"IP_x\""},
            {{"dac", "ipac", "IP_a", "0", "--carrier", "ipac=model"},
             "queuesize: 0 is out of range"},
@@ -149,8 +149,8 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
   for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
            {{"20", "0", "256"}, "intvec: 256 is out of range"},
            {{"20", "0", "1", "0x1ffffffff"}, "risingmask"},
-           {{"--kind", "IP-Unidig-T"}, "there is no \"IP-Unidig-T\"; there are IP-Unidig-E"},
-           {{"--input", "32=dac.0"}, "\"32=dac.0\" is no BIT=WIRE"},
+           {{"--kind", "IP-Unidig-T"}, "unknown kind \"IP-Unidig-T\"; the kinds are IP-Unidig-E"},
+           {{"--input", "32=dac.0"}, "\"32=dac.0\" does not have the form BIT=WIRE"},
            {{"--input", "3=dac.0"}, "--input requires --wires"}}) {
     auto all = words;
     all.insert(all.begin(), {"dio", "ipac", "IP_b"});
@@ -165,7 +165,7 @@ TEST_F(HardwareProgramTest, SaysWhenAModelCannotInterrupt) {
   EXPECT_EQ(HardwareAsker(backplane_, "dioIn").ask({.cmd = digital::cmdStartMonitor}).value,
             0xffffff);
   expectEndsWell(*dio);
-  EXPECT_THAT(dio->errors(), HasSubstr("IP-Unidig cannot interrupt: changes are seen by polling"));
+  EXPECT_THAT(dio->errors(), HasSubstr("IP-Unidig has no interrupts: changes are found by polling"));
 }
 
 TEST_F(HardwareProgramTest, ShowTheirOldCommandsInTheirHelp) {

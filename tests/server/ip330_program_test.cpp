@@ -56,7 +56,7 @@ TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) 
   EXPECT_THAT(server->errors(),
               AllOf(HasSubstr("serving the Acromag IP330 at carrier ipac, site IP_a (channels 0 to "
                               "15, -5to5 V, burstContinuous, 1000 us"),
-                    HasSubstr(R"(as "adc", "adcConfig")"), HasSubstr("ends")));
+                    HasSubstr(R"(as "adc", "adcConfig")"), HasSubstr("stopped")));
 }
 
 TEST_F(Ip330ProgramTest, ServesAllThatItIsToldOverOneBoard) {
@@ -117,7 +117,7 @@ TEST_F(Ip330ProgramTest, ServesScansWhileItWaitsForADac) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   EXPECT_THAT(server->errors(), AllOf(HasSubstr(R"(as "s", "c")"),
-                                      HasSubstr("the board is not there yet"), HasSubstr("ends")));
+                                      HasSubstr("the board is not there yet"), HasSubstr("stopped")));
 }
 
 TEST_F(Ip330ProgramTest, ShowsTheOldCommandsInItsHelp) {
@@ -154,13 +154,13 @@ TEST_F(Ip330ProgramTest, SaysWhatIsWrongWithItsArguments) {
            {{"--scan-mode", "7"}, "scan mode 7"},
            {{"--trigger", "in"}, "use Input or Output"},
            {{"--scan", "a,0"}, "last channel"},
-           {{"--scan", "a,0,x"}, "\"x\" is no number"},
+           {{"--scan", "a,0,x"}, "\"x\" is not a whole number"},
            {{"--scan", "a,-1,5"}, "first channel -1: use 0 or more"},
            {{"--scan", "a,0,15,-100"}, "averaging time -100: use 0 or more"},
            {{"--sweep", "a,0,1"}, "points is missing"},
            {{"--config", "a,0"}, "use 1 to 16384"},
-           {{"--config", "a,1,2"}, "\"2\" is too much"},
-           {{"--pid", "p,0,dac,2"}, "no --dac is named dac"},
+           {{"--config", "a,1,2"}, "unexpected field \"2\""},
+           {{"--pid", "p,0,dac,2"}, "no --dac has the name dac"},
            {{"--dac", "d,ipac,IP_b", "--pid", "p,16,d,2"}, "channel 16: the board"},
            {{"--signal", "0=square:1"}, "unknown kind of signal \"square\""},
            {{"--scan", "a,0,20"}, "the board scans 0 to 15"}}) {

@@ -96,19 +96,19 @@ TEST_F(LogStormTest, OfTheDac128vServer) {
 TEST_F(LogStormTest, OfTheDigitalIoServersOutputs) {
   start({MPF_TEST_DIGITAL_IO_SERVER, "dio", "ipac", "IP_b", "--carrier", "ipac=model"});
   storm("dioOut", Int32Message({.cmd = 4711}));
-  expectShortLog("outputs: there is no cmd 4711");
+  expectShortLog("outputs: unknown cmd 4711");
 }
 
 TEST_F(LogStormTest, OfTheDigitalIoServersInputs) {
   start({MPF_TEST_DIGITAL_IO_SERVER, "dio", "ipac", "IP_b", "--carrier", "ipac=model"});
   storm("dioIn", Int32Message({.cmd = 4711}));
-  expectShortLog("inputs: there is no cmd 4711");
+  expectShortLog("inputs: unknown cmd 4711");
 }
 
 TEST_F(LogStormTest, OfTheIp440Server) {
   start({MPF_TEST_IP440_SERVER, "door", "ipac", "IP_c", "--carrier", "ipac=model"});
   storm("door", Int32Message({.cmd = 4711}));
-  expectShortLog("there is no cmd 4711");
+  expectShortLog("unknown cmd 4711");
 }
 
 TEST_F(LogStormTest, OfTheSerialServer) {

@@ -126,9 +126,9 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
   expectRefused({"dmm"}, "port is required");
   expectRefused({"dmm", "x", "--octal-uart", "U,ipac"}, "--octal-uart: U,ipac: site is missing");
   expectRefused({"dmm", "x", "--octal-uart", "U,ipac,IP_a,many"},
-                R"(number of ports "many" is no number)");
+                R"(number of ports "many" is not a whole number)");
   expectRefused(with({"dmm", "x", "--octal-port", "x,V,0"}),
-                "--octal-port: x: no --octal-uart is called V");
+                "--octal-port: x: no --octal-uart has the name V");
   expectRefused(with({"dmm", "x", "--octal-port", "x,U,0", "--octal-port", "x,U,1"}),
                 "two ports have that name");
   expectRefused(with({"dmm", "x", "--server", "other,x", "--octal-port", "x,U,0"}),
@@ -137,9 +137,9 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
                 "end of message \\q\\q\\q: use 0 to 2 bytes");
   expectRefused({"--server", "dmm,/dev/null,1000,99999"}, "queue size 99999: use 1 to 16384");
   expectRefused({"--server", "dmm,/dev/null,0"}, "longest answer 0: use 1 to 1048576 bytes");
-  expectRefused({"--server", "dmm,/dev/null,1000,20,\\r,1,more"}, "\"more\" is too much");
+  expectRefused({"--server", "dmm,/dev/null,1000,20,\\r,1,more"}, "unexpected field \"more\"");
   expectRefused(with({"dmm", "x", "--octal-port", "x,U,0,9600,none"}),
-                "parity \"none\" is no letter");
+                "parity \"none\" is not one letter");
   expectRefused(with({"dmm", "x", "--octal-port", "x,U,0", "--server", "other,tcp:host:1", "--baud",
                       "19200"}),
                 "--baud is for terminal devices, and no port is one");
@@ -155,7 +155,7 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsModule) {
            {"U,ipac,IP_a,6", "x,U,0", "6 ports: there are modules of 4 and of 8"},
            {"U,ipac,IP_a,8", "x,U,0,57600", "baud 57600: this chip makes"},
            {"U,ipac,IP_a,8,256", "x,U,0", "interrupt vector 256 is not 0 to 255"},
-           {"U,other,IP_a,8", "x,U,0", "nothing says what carrier \"other\" is"}}) {
+           {"U,other,IP_a,8", "x,U,0", "carrier \"other\" is not defined"}}) {
     const auto server = startWith(uart, port);
     const auto status = server->wait();
     ASSERT_TRUE(WIFEXITED(status)) << complaint;
@@ -184,7 +184,7 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
   const auto server = startWith("tpci200:9");
   EXPECT_THAT(server->waitForLine("the board is not there yet"),
               HasSubstr("this host has no TPCI200"));
-  EXPECT_NE(server->waitForLine("the line is not there yet"), "");
+  EXPECT_NE(server->waitForLine("waiting for the line"), "");
   EXPECT_EQ(ask("dmm", "*IDN?\n"), "refused");
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
@@ -197,7 +197,7 @@ TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   EXPECT_THAT(server->errors(),
-              HasSubstr("interrupts are served at ordinary priority, as --real-time 0 says"));
+              HasSubstr("interrupts are served at ordinary priority (--real-time 0)"));
 }
 
 // A module that is not there keeps nobody waiting but who wants its ports, and they are told so.
@@ -213,7 +213,7 @@ TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   const auto said = server->errors();
-  EXPECT_THAT(said, HasSubstr("the line is not there yet: this host has no TPCI200"));
+  EXPECT_THAT(said, HasSubstr("waiting for the line: this host has no TPCI200"));
   EXPECT_THAT(said, HasSubstr("serving port 0 of U (carrier ipac, site IP_a)"));
 }
 

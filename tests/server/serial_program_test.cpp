@@ -181,16 +181,16 @@ TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
   const auto fromServer = std::stable_partition(lines.begin(), lines.end(), ofLine);
   EXPECT_THAT(std::vector(lines.begin(), fromServer),
               ElementsAre(HasSubstr("warning mpf-serial-server: the line is lost: "),
-                          HasSubstr("the line is there")));
+                          HasSubstr("the line is connected")));
   lines.erase(lines.begin(), fromServer);
   ASSERT_THAT(
       lines,
       ElementsAre(AllOf(HasSubstr("serving " + path_ +
                                   " (19200 baud, 8N1, no flow control) as \"dmm\" at location 0"),
                         HasSubstr("\"dmm.sniff\"")),
-                  HasSubstr("info mpf-serial-server: the first client asks"),
+                  HasSubstr("info mpf-serial-server: first request"),
                   HasSubstr("requests fail: "), HasSubstr("requests succeed again"),
-                  HasSubstr("ends")));
+                  HasSubstr("stopped")));
   EXPECT_THAT(lines[0],
               MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}[.][0-9]{3} info "
                            "mpf-serial-server: .*"));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// LineFaults: tells people and clients what a serial line has lost and damaged.
+// LineFaults: reports lost and damaged bytes of a serial line, in the log and in replies.
 //
-//   port's counters ── look() ──► alarms, one for each fault     log, at most one line in `quiet`, with the counts since the line before
+//   port's counters ── look() ──► one alarm for each fault
+//                            └──► log, at most one line in `quiet`, with the counts since the last
 //   an answer's faults ──► status and `extra` of its reply (include/mpf/serial_commands.h)
 //
-// Threads  look() from any: the port's thread after each fault, the server's thread after each
-//          request. setAnswer() and what tells a reply: the server's thread.
-// Trust    a line that does nothing but fail costs one line of log each `quiet`.
+// Threads  any thread calls look(): the port's thread after each fault, the server's thread after
+//          each request. The server's thread calls the functions for answers.
+// Trust    a line that fails all the time causes one line of the log in each `quiet`.
 #pragma once
 
 #include <chrono>
@@ -23,25 +24,25 @@
 
 namespace mpf {
 
-// The bit of serial_server.h that says so in a reply; 0 for none.
+// The serialFault... bit of <mpf/serial_commands.h> for a fault; 0 for LineFault::none.
 [[nodiscard]] std::uint8_t faultBit(LineFault fault) noexcept;
 
 class LineFaults {
  public:
   static constexpr std::chrono::seconds kQuiet{10};
 
-  // What has happened until now is not told. All that is passed must outlive this.
+  // Does not report earlier faults. The arguments must outlive this object.
   LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log,
              std::chrono::milliseconds quiet = kQuiet);
-  // Tells the rest.
+  // Logs the faults that were not logged yet.
   ~LineFaults();
   LineFaults(const LineFaults&) = delete;
   LineFaults& operator=(const LineFaults&) = delete;
 
-  // Takes what the port has counted since the last time.
+  // Reports the faults that the port has counted since the last call.
   void look();
 
-  // The bits of the answer that is about to be sent; 0 at the beginning of each attempt.
+  // Sets the fault bits of the present answer; 0 at the beginning of each attempt.
   void setAnswer(std::uint8_t faults) noexcept { answer_ = faults; }
   [[nodiscard]] bool hasAnswerFaults() const noexcept { return answer_ != 0; }
   // The status of an answer that would have had `status` without its faults.

@@ -23,7 +23,7 @@ SerialPorts::SerialPorts(SerialStartOptions& options, const ServerLog& log)
 
 // ---- modules
 
-// False: it may come later.
+// Returns false when the module is missing and --wait waits for it.
 bool SerialPorts::tryOpenModule(const OctalUartStart& start) {
   try {
     openModule(start);
@@ -113,7 +113,7 @@ std::shared_ptr<SerialPort> SerialPorts::openOctalPort(const OctalPortStart& sta
   return std::make_shared<OctalUartPort>(openUart(uart), start.number, octal);
 }
 
-// What is wrong with the command line is told now: no module that comes would mend it.
+// Reports errors of the command line now, since a module that appears later cannot mend them.
 std::shared_ptr<SerialPort> SerialPorts::openLater(const OctalPortStart& port,
                                                    const OctalUartStart& uart) {
   auto description = fmt::format("port {} of {} (carrier {}, site {})", port.number, port.module,
