@@ -90,7 +90,7 @@ bool atFates(const Message& message) { return message.tryAs<RequestFate>() != nu
 
 // ---- clients
 
-TEST_F(CallbackErrorTest, EachRequestOfADisconnectHasItsEndAndTheClientConnectsAgain) {
+TEST_F(CallbackErrorTest, EachRequestOfADisconnectGetsItsFateAndTheClientReconnects) {
   startServer();
   auto& client = makeThrower(always);
   holdRequests(client, 5);
@@ -107,7 +107,7 @@ TEST_F(CallbackErrorTest, EachRequestOfADisconnectHasItsEndAndTheClientConnectsA
 }
 
 // What the server sent before it went comes first, one by one.
-TEST_F(CallbackErrorTest, RepliesOfAServerThatWentAreNotLost) {
+TEST_F(CallbackErrorTest, RepliesOfAServerThatEndedAreNotLost) {
   startServer();
   auto& client = makeThrower(always);
   holdRequests(client, 3);
@@ -122,7 +122,7 @@ TEST_F(CallbackErrorTest, RepliesOfAServerThatWentAreNotLost) {
   EXPECT_EQ(caught_, 6);
 }
 
-TEST_F(CallbackErrorTest, RepliesBehindTheOneOfTheExceptionArrive) {
+TEST_F(CallbackErrorTest, RepliesAfterTheOneWhoseCallbackThrewArrive) {
   startServer();
   auto& client = makeThrower(always);
   holdRequests(client, 20);
@@ -133,7 +133,7 @@ TEST_F(CallbackErrorTest, RepliesBehindTheOneOfTheExceptionArrive) {
   EXPECT_EQ(caught_, 21);
 }
 
-TEST_F(CallbackErrorTest, EachCancelledRequestHasItsEnd) {
+TEST_F(CallbackErrorTest, EachCancelledRequestGetsItsFate) {
   startServer();
   auto& client = makeThrower(atFates);
   holdRequests(client, 3);
@@ -145,7 +145,7 @@ TEST_F(CallbackErrorTest, EachCancelledRequestHasItsEnd) {
   EXPECT_THAT(told_, testing::ElementsAre("connectYes", cancelled, cancelled, cancelled));
 }
 
-TEST_F(CallbackErrorTest, EachExpiredRequestHasItsEnd) {
+TEST_F(CallbackErrorTest, EachExpiredRequestGetsItsFate) {
   startServer();
   auto& client = makeThrower(atFates);
   runCatching([&] { return client.isConnected(); });
@@ -160,7 +160,7 @@ TEST_F(CallbackErrorTest, EachExpiredRequestHasItsEnd) {
 }
 
 // A client may end before its callback has had all fates.
-TEST_F(CallbackErrorTest, AClientMayEndAfterAnExceptionInItsDisconnect) {
+TEST_F(CallbackErrorTest, AClientMayBeDestroyedAfterAnExceptionInItsDisconnect) {
   startServer();
   auto& client = makeThrower(atFates);
   holdRequests(client, 3);
@@ -176,7 +176,7 @@ TEST_F(CallbackErrorTest, AClientMayEndAfterAnExceptionInItsDisconnect) {
 }
 
 // Other clients of the dispatcher do not notice.
-TEST_F(CallbackErrorTest, OtherClientsHearOfTheirServersDeath) {
+TEST_F(CallbackErrorTest, OtherClientsGetTheirDisconnects) {
   startServer();
   client_.bind("device[0]/a");
   auto& client = makeThrower(always);
@@ -326,7 +326,7 @@ TEST_F(CallbackErrorTest, TheDescriptorOfAServerStaysReadableAfterAnException) {
   EXPECT_EQ(fateOf(next()), Fate::refused);
 }
 
-TEST_F(CallbackErrorTest, EachNewsOfAClientIsToldAlthoughTheyThrow) {
+TEST_F(CallbackErrorTest, EachConnectAndDisconnectIsReportedAlthoughCallbacksThrow) {
   auto& server = startServer();
   std::vector<bool> news;
   server.onClient([&](std::uint64_t, bool isThere) {

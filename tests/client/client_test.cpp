@@ -35,7 +35,7 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
 }
 
 // In a process that lives on: nothing dies, and there is no link that it could close.
-TEST_F(ClientTest, AServerThatEndsBeforeItAcceptsItsClientIsGoneAllTheSame) {
+TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   startServer();
   serverRuns_ = false;
   client_.bind("device[0]/a");
@@ -51,7 +51,7 @@ TEST_F(ClientTest, AServerThatEndsBeforeItAcceptsItsClientIsGoneAllTheSame) {
 }
 
 // One hint tells of messages and of the end behind them: for any number of them.
-TEST_F(ClientTest, AServerHearsOfAClientThatLeftRightBehindItsRequests) {
+TEST_F(ClientTest, AServerNoticesAClientThatDisconnectsRightAfterItsRequests) {
   constexpr int kMost = 40;
   int gone = 0;
   startServer().onClient([&](std::uint64_t, bool isThere) { gone += isThere ? 0 : 1; });
@@ -65,7 +65,7 @@ TEST_F(ClientTest, AServerHearsOfAClientThatLeftRightBehindItsRequests) {
   runUntil([&] { return gone == kMost; });
 }
 
-TEST_F(ClientTest, AClientHearsOfAServerThatWentRightBehindItsReplies) {
+TEST_F(ClientTest, AClientNoticesAServerThatEndsRightAfterItsReplies) {
   constexpr int kMost = 40;
   serverRuns_ = false;
   for (std::size_t replies = 1; replies <= kMost; ++replies) {
@@ -119,7 +119,7 @@ TEST_F(ClientTest, EchoesEveryScalarTypeWithItsMarks) {
 
 class ArraySizes : public ClientTest, public testing::WithParamInterface<std::size_t> {};
 
-TEST_P(ArraySizes, ArriveAndComeBackWhole) {
+TEST_P(ArraySizes, ArriveAndReturnUnchanged) {
   auto& server = startServer();
   server.on<Float64Array>([](Float64ArrayMessage&) {});
   server.on<Int32Array>([&](Int32ArrayMessage&& request) {
@@ -144,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(InLineInChunksAndLarge, ArraySizes,
                          testing::Values(0, 1, 2, 3, 30, 42, 43, 1000, 100'000,
                                          (64u << 20) / 4 - 6));
 
-TEST_F(ClientTest, ARequestComesBackInTheMemoryItWasBuiltIn) {
+TEST_F(ClientTest, ARequestReturnsInTheMemoryThatItWasBuiltIn) {
   auto& server = startServer();
   server.on<Char8Array>([](Char8Array& request) { request.status = 1; });
   bind();
@@ -158,7 +158,7 @@ TEST_F(ClientTest, ARequestComesBackInTheMemoryItWasBuiltIn) {
   EXPECT_EQ((*reply)->status, 1);
 }
 
-TEST_F(ClientTest, MemoryOfLargeMessagesIsUsedAgain) {
+TEST_F(ClientTest, MemoryOfLargeMessagesIsReused) {
   auto& server = startServer({.maxPoolBytes = 4 << 20});
   server.on<Float64Array>([&](Float64ArrayMessage&& request) {
     EXPECT_EQ(server.reply(server.allocReplyMessage<Float64Array>(request, 20'000)),
@@ -172,7 +172,7 @@ TEST_F(ClientTest, MemoryOfLargeMessagesIsUsedAgain) {
   }
 }
 
-TEST_F(ClientTest, AHeldRequestIsAnsweredManyTimesLater) {
+TEST_F(ClientTest, AStoredRequestGetsManyRepliesLater) {
   auto& server = startServer();
   Message held;
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
@@ -199,7 +199,7 @@ TEST_F(ClientTest, AHeldRequestIsAnsweredManyTimesLater) {
   EXPECT_EQ(last.tryAs<Int32>()->value, 99);
 }
 
-TEST_F(ClientTest, StreamedRepliesAreRefusedWhileTheClientDoesNotTakeThem) {
+TEST_F(ClientTest, FurtherRepliesAreRefusedWhileTheClientDoesNotReceiveThem) {
   auto& server = startServer({.queueSize = 8});
   Message held;
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
@@ -215,7 +215,7 @@ TEST_F(ClientTest, StreamedRepliesAreRefusedWhileTheClientDoesNotTakeThem) {
   EXPECT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
   EXPECT_NE(next().tryAs<Int32>(), nullptr);
 }
-TEST_F(ClientTest, AServerKnowsWhichClientARequestIsFromAndWhenThatIsGone) {
+TEST_F(ClientTest, AServerIdentifiesTheClientOfARequestWhileItIsConnected) {
   std::vector<Message> requests;
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) { requests.push_back(std::move(request)); });
@@ -269,7 +269,7 @@ TEST_F(ClientTest, ANameIsServedOnceAtALocation) {
 
 // A server that many wait for: some connect in a step, so that whatever else the dispatcher has to
 // do gets its turn.
-TEST_F(ClientTest, ManyThatConnectAtOnceDoSoInSteps) {
+TEST_F(ClientTest, ManyClientsConnectInSteps) {
   constexpr int kCrowd = 100;
   std::vector<std::unique_ptr<MessageClient>> crowd;
   for (int i = 0; i < kCrowd; ++i) {

@@ -48,7 +48,7 @@ int codeOf(const std::function<void()>& construct) {
   return 0;
 }
 
-TEST(Constructors, SayThatSharedMemoryIsFull) {
+TEST(Constructors, ReportThatSharedMemoryIsFull) {
   const TestBackplane backplane;
   reserving = ENOSPC;
 
@@ -77,7 +77,7 @@ TEST(Constructors, DoNotThrowForMemoryOfAConnection) {
   EXPECT_THAT(client.notConnectedBecause(), testing::HasSubstr("No space left"));
 }
 
-TEST(Constructors, SayThatNoThreadStarts) {
+TEST(Constructors, ReportThatNoThreadCanBeStarted) {
   if (kIsSanitized) GTEST_SKIP() << "the sanitizer starts threads itself";
   const TestBackplane backplane;
   startingThread = EAGAIN;

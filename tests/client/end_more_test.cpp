@@ -88,7 +88,7 @@ TEST_F(EndMoreTest, AClientWithoutDescriptorsKeepsTheServerOfALargeReply) {
 
 // A client that ends within its callback lives until that returns, although the dispatcher runs on
 // meanwhile.
-TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItReturns) {
+TEST_F(EndMoreTest, AClientDestroyedInACallbackThatRunsTheDispatcherStaysAliveUntilItReturns) {
   startServer().on<Int32>([](Int32&) {});
   MessageClient other(dispatcher_, [](const Message&) {});
   other.bind("absent");
@@ -111,7 +111,7 @@ TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItR
 
 // Who is paused finds what was sent before the end, and then hears of it; the successor comes
 // after.
-TEST_F(EndMoreTest, APausedClientGetsWhatAServerThatEndedSent) {
+TEST_F(EndMoreTest, APausedClientGetsTheMessagesThatItsServerSentBeforeItEnded) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     for (int i = 0; i < 3; ++i) {
@@ -186,7 +186,7 @@ FileDescriptor watchRemovals() {
 }
 
 // Whoever is killed meanwhile leaves no gap in their numbers, behind which nobody would look.
-TEST_F(EndMoreTest, NamesOfAPoolGoLastOneFirst) {
+TEST_F(EndMoreTest, NamesOfAPoolAreRemovedLastOneFirst) {
   startServer().on<Float64Array>([](Float64Array&) {});
   std::optional<MessageClient> leaver(std::in_place, dispatcher_, [this](Message&& message) {
     messages_.push_back(std::move(message));
@@ -252,7 +252,7 @@ TEST_F(EndMoreTest, ACallbackMayWaitForTheNextConnection) {
 
 // Another thread binds a client while the dispatcher tells of an end, after which it looks for
 // servers of its own accord.
-TEST(EndOfOthers, AClientThatIsBoundMeanwhileConnectsOnce) {
+TEST(EndOfOthers, AClientThatIsBoundDuringADisconnectConnectsOnce) {
   MPF_NEEDS_A_CHILD;
   const Watchdog watchdog("bound meanwhile");
   TestBackplane backplane;

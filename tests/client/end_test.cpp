@@ -62,7 +62,7 @@ TEST_F(EndTest, AReplyInThePoolOfAServerThatEndsArrives) {
 }
 
 // Its memory has gone with it: that is an end, and no nonsense.
-TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoNonsense) {
+TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoProtocolError) {
   auto& server = startServer();
   int handled = 0;
   server.on<Float64Array>([&](Float64ArrayMessage&&) { ++handled; });
@@ -78,7 +78,7 @@ TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoNonsense) {
 
 // A window of a client that is gone is of no use to the server, although the client's process goes
 // on.
-TEST_F(EndTest, AServerLetsGoOfTheWindowsOfClientsThatLeft) {
+TEST_F(EndTest, AServerUnmapsTheWindowsOfClientsThatDisconnected) {
   startServer();
   withLeaver([](auto&, auto&) {});
   server_->handleOne();
@@ -93,7 +93,7 @@ TEST_F(EndTest, AServerLetsGoOfTheWindowsOfClientsThatLeft) {
 }
 
 // A connect that fails for lack of memory costs nothing for good.
-TEST_F(EndTest, AConnectThatFailsCostsNoPlace) {
+TEST_F(EndTest, AFailedConnectUsesUpNoIndex) {
   if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
   startServer();
   static_cast<void>(::signal(SIGXFSZ, SIG_IGN));
@@ -121,7 +121,7 @@ TEST_F(EndTest, AConnectThatFailsCostsNoPlace) {
 }
 
 // What a server is to do, as a process of another user than its client's.
-TEST(EndOfUsers, NothingIsLeftOfAServerAndItsClientOfAnotherUser) {
+TEST(EndOfUsers, AServerAndItsClientOfAnotherUserLeaveNoFiles) {
   MPF_NEEDS_A_CHILD;
   if (::getuid() != 0) GTEST_SKIP() << "needs to be root";
   const Watchdog watchdog("users");
@@ -156,7 +156,7 @@ TEST(EndOfUsers, NothingIsLeftOfAServerAndItsClientOfAnotherUser) {
 
 // The server takes what is in the ring of a client that ended in order, whether or not its process
 // has ended, too.
-TEST_F(EndTest, WhatAClientSentBeforeItAndItsProcessEndedIsTaken) {
+TEST_F(EndTest, RequestsOfAClientWhoseProcessExitedAreReceived) {
   MPF_NEEDS_A_CHILD;
   auto& server = startServer();
   int handled = 0;
@@ -189,7 +189,7 @@ TEST_F(EndTest, WhatAClientSentBeforeItAndItsProcessEndedIsTaken) {
 }
 
 // One of them lay in memory that is gone: the others did not.
-TEST_F(EndTest, WhatAClientThatEndedSentBehindALargeRequestIsTaken) {
+TEST_F(EndTest, RequestsAfterALargeRequestOfAClientThatEndedAreReceived) {
   auto& server = startServer();
   int handled = 0;
   server.on<Int32>([&](Int32&) { ++handled; });
@@ -207,7 +207,7 @@ TEST_F(EndTest, WhatAClientThatEndedSentBehindALargeRequestIsTaken) {
 
 // A callback may wait for another client's connection: the dispatcher then runs within the end of
 // this one.
-TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllNewsOfAnEnd) {
+TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllMessagesOfADisconnect) {
   std::vector<int> told;  // 0: a fate, 1: connected, 2: disconnected
   bool nested = false;
   auto& server = startServer();
@@ -238,7 +238,7 @@ TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllNewsOfAnEnd) {
 
 // A server object follows another one in the same process; somebody still holds a request of the
 // first.
-TEST_F(EndTest, ARequestOfAServerThatIsGoneCannotBeAnsweredByItsSuccessor) {
+TEST_F(EndTest, ANewServerCannotReplyToARequestOfTheFormerServer) {
   startServer();
   auto held = heldRequest();
   server_.reset();

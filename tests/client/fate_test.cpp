@@ -29,7 +29,7 @@ TEST_F(ClientTest, ATypeWithoutHandlerIsRefused) {
   EXPECT_EQ(fateOf(next()), Fate::refused);
 }
 
-TEST_F(ClientTest, AFullQueueRefusesAtOnceAndSaysSoOnce) {
+TEST_F(ClientTest, AFullQueueRefusesImmediatelyAndIsReportedOnce) {
   startServer({.queueSize = 5}).on<Int32>([](Int32&) {});
   bind();
   serverRuns_ = false;
@@ -56,7 +56,7 @@ TEST_F(ClientTest, AMessageAboveTheLimitIsRefused) {
   EXPECT_EQ(client_.send(client_.alloc<Char8Array>(961)), SendResult::tooLarge);
 }
 
-TEST_F(ClientTest, ARequestThatIsNotTakenInTimeExpiresOnce) {
+TEST_F(ClientTest, ARequestThatIsNotReceivedInTimeExpiresOnce) {
   int handled = 0;
   startServer().on<Int32>([&](Int32&) { ++handled; });
   bind();
@@ -95,7 +95,7 @@ TEST_F(ClientTest, ALateReplyOfACancelledRequestIsNotDelivered) {
 
 // The server knows a request by its place in a table; a cancelled one that it holds has its place
 // until it answers.
-TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
+TEST_F(ClientTest, RepliesToCancelledRequestsAreNotMistakenForLaterOnes) {
   auto& server = startServer({.queueSize = 4});
   std::vector<Message> held;
   server.on<Int32>([&](Int32Message&& request) { held.push_back(std::move(request)); });
@@ -149,7 +149,7 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
   EXPECT_EQ(fateOf(next()), Fate::refused);
 }
 
-TEST_F(ClientTest, AServerThatEndsGivesEachRequestItsFate) {
+TEST_F(ClientTest, EachRequestOfAServerThatEndsGetsItsFate) {
   startServer();
   auto held = heldRequest();
   serverRuns_ = false;

@@ -31,7 +31,7 @@ class ForRoutersTest : public ClientTest {
   std::vector<std::pair<std::uint64_t, bool>> comings_;
 };
 
-TEST_F(ForRoutersTest, AServerHearsOfItsClients) {
+TEST_F(ForRoutersTest, AServerReportsClientsThatConnectAndDisconnect) {
   startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -51,7 +51,7 @@ TEST_F(ForRoutersTest, AServerHearsOfItsClients) {
   EXPECT_EQ(comings_[2], std::pair(comings_[1].first, false));
 }
 
-TEST_F(ForRoutersTest, AReplyReachesItsRequestByNumbers) {
+TEST_F(ForRoutersTest, AReplyByNumbersReachesItsRequest) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message({.value = 3})), SendResult::sent);
@@ -81,7 +81,7 @@ TEST_F(ForRoutersTest, AReplyReachesItsRequestByNumbers) {
   EXPECT_EQ(second.tryAs<Int32>()->value, 5);
 }
 
-TEST_F(ForRoutersTest, ARequestHasTheIdThatWasAskedFor) {
+TEST_F(ForRoutersTest, ARequestHasTheIdThatTheCallerChose) {
   startWatched();
   bindByHand();
   ASSERT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent);
@@ -97,7 +97,7 @@ TEST_F(ForRoutersTest, ARequestHasTheIdThatWasAskedFor) {
   static_cast<void>(next());
 }
 
-TEST_F(ForRoutersTest, AServerLearnsHowMuchTimeARequestHas) {
+TEST_F(ForRoutersTest, AServerGetsTheDeadlineOfARequest) {
   startWatched();
   bindByHand();
   const auto until = Deadline::after(1h);
@@ -112,7 +112,7 @@ TEST_F(ForRoutersTest, AServerLearnsHowMuchTimeARequestHas) {
 }
 
 // While a client pauses, its server finds the queue of replies full; afterwards nothing is missing.
-TEST_F(ForRoutersTest, APausedClientLeavesRepliesWhereTheyAre) {
+TEST_F(ForRoutersTest, APausedClientLeavesRepliesInTheQueue) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -133,7 +133,7 @@ TEST_F(ForRoutersTest, APausedClientLeavesRepliesWhereTheyAre) {
 }
 
 // A router tells so that a queue behind it is full.
-TEST_F(ForRoutersTest, AServerMayTellThatAQueueIsFull) {
+TEST_F(ForRoutersTest, AServerMayReportThatAQueueIsFull) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);

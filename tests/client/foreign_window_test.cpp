@@ -57,7 +57,7 @@ class ForeignWindow : public ClientTest, public testing::WithParamInterface<Fore
   std::string path_;
 };
 
-TEST_P(ForeignWindow, IsNamedByTheClientWhichGoesOnOnceItIsGone) {
+TEST_P(ForeignWindow, IsReportedByTheClientWhichConnectsOnceItIsRemoved) {
   GetParam().put(path_);
 
   client_.bind("device[0]/a", 0);
@@ -71,7 +71,7 @@ TEST_P(ForeignWindow, IsNamedByTheClientWhichGoesOnOnceItIsGone) {
   EXPECT_EQ(client_.notConnectedBecause(), "");
 }
 
-TEST_P(ForeignWindow, IsNamedToTheServerThatWantsItsPlace) {
+TEST_P(ForeignWindow, IsReportedToAServerOfTheSameName) {
   GetParam().put(path_);
 
   try {
@@ -137,7 +137,7 @@ class JunkTest : public ClientTest {
 };
 
 // Its header makes sense, but no window is that small.
-TEST_F(JunkTest, AWindowThatIsTooSmallIsNamedByTheClient) {
+TEST_F(JunkTest, AClientReportsAWindowThatIsTooSmall) {
   const auto path = segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
   writeWindow(path, [](layout::SegmentHeader& header) { header.totalBytes = 1000; }, 1000);
 
@@ -147,7 +147,7 @@ TEST_F(JunkTest, AWindowThatIsTooSmallIsNamedByTheClient) {
   std::filesystem::remove(path);
 }
 
-TEST_F(JunkTest, HintsOfAServerThatAreCutAreNamedByTheClient) {
+TEST_F(JunkTest, AClientReportsTruncatedHintsOfAServer) {
   const auto& server = startServer({.location = 0});
   const auto window =
       PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, server.getName()),
@@ -166,7 +166,7 @@ TEST_F(JunkTest, HintsOfAServerThatAreCutAreNamedByTheClient) {
 }
 
 // Links that are none, of every kind: the server counts them, and goes on serving those that are.
-TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
+TEST_F(JunkTest, InvalidLinksDoNotKeepAServerFromItsClients) {
   auto& server = startServer({.location = 0});
   server.on<Int32>([](Int32&) {});
   bind();
@@ -209,7 +209,7 @@ TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
 }
 
 // A client died while it knocked, and somebody removed its window: nobody else knows of the link.
-TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
+TEST_F(JunkTest, AServerRemovesALinkWhoseClientIsDead) {
   startServer({.location = 0});
   auto dead = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
   dead->bind("device[0]/a", 0);
@@ -235,7 +235,7 @@ TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
   runUntil([&] { return !std::filesystem::exists(segments::path(name)); });
 }
 
-TEST_F(JunkTest, WhoAttachesRemovesWhatNobodyCanUseAndLeavesOtherLayoutsAlone) {
+TEST_F(JunkTest, AttachRemovesUnusableFilesAndKeepsThoseOfOtherLayouts) {
   const auto link = [&](std::uint64_t number) {
     return SegmentName::link(backplane_.name(), 0x77, number);
   };
@@ -263,7 +263,7 @@ class AsNobody {
   AsNobody& operator=(const AsNobody&) = delete;
 };
 
-class SomebodyElsesWindow : public ClientTest {
+class WindowOfAnotherUser : public ClientTest {
  protected:
   void SetUp() override {
     if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
@@ -276,7 +276,7 @@ class SomebodyElsesWindow : public ClientTest {
       segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
 };
 
-TEST_F(SomebodyElsesWindow, ThatCannotBeReadIsNamedByTheClient) {
+TEST_F(WindowOfAnotherUser, ThatCannotBeReadIsReportedByTheClient) {
   writeWindow(path_, [](layout::SegmentHeader&) {});
   ASSERT_EQ(::chmod(path_.c_str(), 0600), 0);
   {
@@ -292,7 +292,7 @@ TEST_F(SomebodyElsesWindow, ThatCannotBeReadIsNamedByTheClient) {
   runUntil([&] { return client_.isConnected(); });
 }
 
-TEST_F(SomebodyElsesWindow, ThatCannotBeRemovedIsNamedToTheServer) {
+TEST_F(WindowOfAnotherUser, ThatCannotBeRemovedIsReportedToTheServer) {
   writeWindow(path_, [](layout::SegmentHeader&) {});
   for (const mode_t mode : {0600u, 0644u, 0666u}) {
     ASSERT_EQ(::chmod(path_.c_str(), mode), 0);

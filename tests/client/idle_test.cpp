@@ -128,9 +128,9 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
   std::vector<std::shared_ptr<PeerWindow>> windows_;
 };
 
-TEST_P(IdleTest, NobodyIsWokenWhileNobodySends) { EXPECT_EQ(waitUntilIdle().size(), 51u); }
+TEST_P(IdleTest, NoThreadIsWokenWhileNoMessageIsSent) { EXPECT_EQ(waitUntilIdle().size(), 51u); }
 
-TEST_P(IdleTest, OneThatSendsWakesTheServerAndNoOtherClient) {
+TEST_P(IdleTest, AClientThatSendsWakesTheServerAndNoOtherClient) {
   auto before = waitUntilIdle();
 
   for (int i = 0; i < 20; ++i)

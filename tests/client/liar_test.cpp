@@ -20,7 +20,7 @@ class LiarTest : public ClientTest {
   }
 };
 
-TEST_F(LiarTest, NewsOfTheConnectionIsNotTheServersToTell) {
+TEST_F(LiarTest, AServerMustNotSendConnectMessages) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<Connect>(request);
@@ -31,7 +31,7 @@ TEST_F(LiarTest, NewsOfTheConnectionIsNotTheServersToTell) {
   expectToBeLeft();
 }
 
-TEST_F(LiarTest, AFateThatNamesAnotherRequestEndsNone) {
+TEST_F(LiarTest, AFateOfAnotherRequestEndsNoRequest) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<RequestFate>(request);

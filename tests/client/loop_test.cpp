@@ -34,7 +34,7 @@ TEST_F(ClientTest, ADescriptorWakesAnEventLoop) {
   messages_.clear();
 }
 
-TEST_F(ClientTest, AClientMayEndInItsOwnCallback) {
+TEST_F(ClientTest, AClientMayBeDestroyedInItsOwnCallback) {
   startServer().on<Int32>([](Int32&) {});
   std::unique_ptr<MessageClient> brief;
   brief = std::make_unique<MessageClient>(dispatcher_, [&](const Message& message) {
@@ -145,7 +145,7 @@ TEST_F(ClientTest, AnInterruptEndsTheServerBetweenTwoRequests) {
   EXPECT_EQ(fateOf(next()), Fate::neverTaken);
 }
 
-TEST(SyncClientTest, TakesWhatIsThereWithoutWaiting) {
+TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
   const TestBackplane backplane;
   MessageServer server(backplane, "device");
   Message held;
@@ -166,7 +166,7 @@ TEST(SyncClientTest, TakesWhatIsThereWithoutWaiting) {
   EXPECT_FALSE(client.receive(0s));
 }
 
-TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
+TEST(SyncClientTest, ReportsWhyThereIsNoReply) {
   const Watchdog watchdog("sync client");
   const TestBackplane backplane;
   SyncClient client(backplane, "echo");

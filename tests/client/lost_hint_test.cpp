@@ -44,13 +44,13 @@ class LostHintTest : public ClientTest {
   }
 };
 
-TEST_F(LostHintTest, AKnockThatIsLostDelaysTheConnection) {
+TEST_F(LostHintTest, ALostKnockDelaysTheConnection) {
   lose(hintsOf(layout::SegmentKind::serverWindow));
 
   runUntil([&] { return client_.isConnected(); });
 }
 
-TEST_F(LostHintTest, AnAcceptanceOfWhichTheClientIsNotToldIsFound) {
+TEST_F(LostHintTest, AnAcceptanceWhoseHintIsLostIsFound) {
   const auto hints = hintsOf(layout::SegmentKind::clientWindow);
   EXPECT_FALSE(server_->receive());
 
@@ -59,7 +59,7 @@ TEST_F(LostHintTest, AnAcceptanceOfWhichTheClientIsNotToldIsFound) {
   runUntil([&] { return client_.isConnected(); });
 }
 
-TEST_F(LostHintTest, ARequestOfWhichTheServerIsNotToldIsAnswered) {
+TEST_F(LostHintTest, ARequestWhoseHintIsLostGetsItsReply) {
   const auto hints = hintsOf(layout::SegmentKind::serverWindow);
   runUntil([&] { return client_.isConnected(); });
   for (int i = 0; i < 3; ++i) {
@@ -72,7 +72,7 @@ TEST_F(LostHintTest, ARequestOfWhichTheServerIsNotToldIsAnswered) {
   }
 }
 
-TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
+TEST_F(LostHintTest, AReplyWhoseHintIsLostIsDelivered) {
   const auto hints = hintsOf(layout::SegmentKind::clientWindow);
   runUntil([&] { return client_.isConnected(); });
   for (int i = 0; i < 3; ++i) {
@@ -88,7 +88,7 @@ TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
 }
 
 // Whoever may ring may also take rings.
-TEST_F(LostHintTest, ARingThatSomebodyElseTookIsRepeated) {
+TEST_F(LostHintTest, ARingThatAnotherProcessConsumedIsRepeated) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const auto incarnation = hintsOf(layout::SegmentKind::serverWindow).header().ownerWindow;
@@ -128,7 +128,7 @@ class Inventor {
   std::jthread thread_;
 };
 
-TEST_F(LostHintTest, InventedNewsKeepsNoClientFromItsDeadline) {
+TEST_F(LostHintTest, FalseHintsDoNotKeepAClientFromItsDeadline) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const Inventor inventor(hintsOf(layout::SegmentKind::clientWindow));
@@ -137,7 +137,7 @@ TEST_F(LostHintTest, InventedNewsKeepsNoClientFromItsDeadline) {
   while (dispatcher_.runOnce(deadline)) continue;  // true: it had something of its own to do
 }
 
-TEST_F(LostHintTest, InventedNewsKeepsNoEventLoopFromItsTurn) {
+TEST_F(LostHintTest, FalseHintsDoNotBlockAnEventLoop) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   pollfd readable{dispatcher_.descriptor(), POLLIN, 0};
@@ -155,7 +155,7 @@ TEST_F(LostHintTest, InventedNewsKeepsNoEventLoopFromItsTurn) {
   EXPECT_EQ(next().tryAs<Int32>()->value, 5);
 }
 
-TEST_F(LostHintTest, InventedNewsKeepsNoServerFromItsReceiverNorFromItsClients) {
+TEST_F(LostHintTest, FalseHintsBlockNeitherReceiveNorClients) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const Inventor inventor(hintsOf(layout::SegmentKind::serverWindow));

@@ -92,7 +92,7 @@ TEST_F(QueueTest, RequestsWithoutReplyHaveALimitAndRefusalsAreCounted) {
   EXPECT_EQ(nextValues(1).front(), 7);
 }
 
-TEST_F(QueueTest, ARefusedArrayIsStillTheCallersAndGoesLater) {
+TEST_F(QueueTest, ARefusedArrayStaysWithTheCallerAndCanBeSentLater) {
   startServer({.queueSize = 1}).on<Float64Array>([](Float64ArrayMessage&) {});
   bind();
   serverRuns_ = false;
@@ -108,7 +108,7 @@ TEST_F(QueueTest, ARefusedArrayIsStillTheCallersAndGoesLater) {
   EXPECT_EQ(next().valueAs<Float64Array>()[4999], 0.5);
 }
 
-TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
+TEST_F(QueueTest, EachSeriesOfRefusalsIsReportedOnceAndInOrder) {
   startServer({.queueSize = 2}).on<Int32>([](Int32&) {});
   bind();
   for (std::size_t run = 1; run <= 3; ++run) {
@@ -133,7 +133,7 @@ TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
                                    ConnectStatus::connectNo));
 }
 
-TEST_F(QueueTest, ANewQueueSizeIsForLaterClients) {
+TEST_F(QueueTest, ANewQueueSizeAppliesToLaterClients) {
   auto& server = startServer({.queueSize = 5});
   server.on<Int32>([](Int32&) {});
   bind();
@@ -161,7 +161,7 @@ TEST_F(QueueTest, AQueueSizeOutsideTheLimitsIsAnError) {
   EXPECT_NO_THROW(server.setQueueSize(16384));
 }
 
-TEST_F(QueueTest, RepliesThatAClientDoesNotTakeAreRefusedCountedAndHurtNobodyElse) {
+TEST_F(QueueTest, RepliesThatAClientDoesNotReceiveAreRefusedAndCountedAndOthersAreNotAffected) {
   auto& server = startServer({.queueSize = 8});
   Message held;
   server.on<Int32>([&](Int32Message&& request) {
@@ -230,7 +230,7 @@ TEST_F(QueueTest, AFullQueueOfOneClientDoesNotDelayOthers) {
   for (int i = 0; i < 1000; ++i) EXPECT_NE(next().tryAs<Int32>(), nullptr);
 }
 
-TEST_F(QueueTest, WhatIsSentAgainAfterRefusalsArrivesInOrder) {
+TEST_F(QueueTest, MessagesSentAgainAfterRefusalsArriveInOrder) {
   startServer({.queueSize = 3}).on<Int32>([](Int32&) {});
   bind();
   serverRuns_ = false;

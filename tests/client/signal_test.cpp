@@ -85,7 +85,7 @@ class SignalTest : public testing::TestWithParam<WaitMode> {
   struct sigaction before_{};
 };
 
-TEST_P(SignalTest, AServerThatWaitsForEverGetsItsMessage) {
+TEST_P(SignalTest, AServerThatWaitsWithoutADeadlineGetsItsMessage) {
   auto server = makeServer();
   SyncClient client(backplane_, "device", 0);
   int ended = 0;
@@ -156,7 +156,7 @@ TEST_P(SignalTest, AClientWaitsForItsServer) {
   EXPECT_TRUE(result);
 }
 
-TEST_P(SignalTest, AClientsPatienceHolds) {
+TEST_P(SignalTest, AClientsTimeoutHolds) {
   Dispatcher dispatcher(backplane_, {GetParam(), {}});
   MessageClient client(dispatcher, [](const Message&) {});
   client.bind("device", 0);
@@ -197,7 +197,7 @@ TEST_P(SignalTest, ACallGetsItsReply) {
   EXPECT_EQ(answer->message().tryAs<Int32>()->value, 5);
 }
 
-TEST_P(SignalTest, ACallWithoutReplyEndsInItsTime) {
+TEST_P(SignalTest, ACallWithoutReplyEndsAfterItsTimeout) {
   auto server = makeServer();
   Message held;
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
@@ -247,7 +247,7 @@ TEST_P(SignalTest, AReceiverGetsALaterReply) {
   EXPECT_EQ(got.tryAs<Int32>()->value, 9);
 }
 
-TEST_P(SignalTest, AReceiversPatienceHolds) {
+TEST_P(SignalTest, AReceiversTimeoutHolds) {
   SyncClient client(backplane_, "device", 0, GetParam());
   const auto deadline = Deadline::after(100ms);
   std::int64_t endedNs = 0;
@@ -292,7 +292,7 @@ TEST_P(SignalTest, ADispatchersDeadlineHolds) {
 INSTANTIATE_TEST_SUITE_P(InEachWaitMode, SignalTest, kWaitModes, nameOfWaitMode);
 
 // The wait for the dispatcher's own thread is another one: on a condition variable.
-TEST(SharedDispatcherSignals, AClientWaitsForItsServerAndItsPatienceHolds) {
+TEST(SharedDispatcherSignals, AClientWaitsForItsServerAndItsTimeoutHolds) {
   const Watchdog watchdog("signal test");
   struct sigaction action{};
   struct sigaction before{};

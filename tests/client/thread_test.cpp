@@ -127,7 +127,7 @@ TEST_P(ThreadTest, EachRequestHasOneEndWhileManyThreadsCancel) {
 }
 
 // Clients come and go on several threads while others send.
-TEST_P(ThreadTest, ManyThreadsBindWaitAndEndTheirClients) {
+TEST_P(ThreadTest, ManyThreadsBindWaitAndDestroyTheirClients) {
   constexpr int kRounds = kIsSanitized ? 20 : 100;
   std::vector<std::thread> threads;
   std::atomic<int> connected{0};
@@ -179,7 +179,7 @@ TEST_F(ClientTest, CancelLeavesTheFateToTheThreadThatRunsTheDispatcher) {
 }
 
 // In a callback there is no other thread to leave it to.
-TEST_F(ClientTest, CancelInACallbackEndsTheRequestAtOnce) {
+TEST_F(ClientTest, CancelInACallbackEndsTheRequestImmediately) {
   startServer().on<Int32>([](Int32&) {});
   std::vector<Message> held;
   server_->on<Float64>([&](Float64Message&& request) { held.push_back(std::move(request)); });
@@ -203,7 +203,7 @@ TEST_F(ClientTest, CancelInACallbackEndsTheRequestAtOnce) {
 }
 
 // A cancel() that comes late finds no other request of that name on the next connection.
-TEST_F(ClientTest, RequestIdsAreNotUsedAgainOnTheNextConnection) {
+TEST_F(ClientTest, RequestIdsAreNotReusedOnTheNextConnection) {
   startServer().on<Int32>([](Int32&) {});
   bind();
   std::uint32_t first = 0;
@@ -222,7 +222,7 @@ TEST_F(ClientTest, RequestIdsAreNotUsedAgainOnTheNextConnection) {
 }
 
 // connectWait() runs the dispatcher only until the thread comes that runs it for good.
-TEST_F(ClientTest, AWaitGivesWayToTheThreadThatRunsTheDispatcher) {
+TEST_F(ClientTest, AWaitingThreadYieldsToTheThreadThatRunsTheDispatcher) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
   std::binary_semaphore waiterRuns(0);
@@ -254,7 +254,7 @@ TEST_F(ClientTest, AWaitGivesWayToTheThreadThatRunsTheDispatcher) {
 }
 
 // Its last runner has gone: connectWait() runs the dispatcher as if nobody ever had.
-TEST_F(ClientTest, AWaitRunsADispatcherWhoseThreadHasEnded) {
+TEST_F(ClientTest, AWaitingThreadRunsADispatcherWhoseThreadHasEnded) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
   std::thread([&] { dispatcher_.runOnce(Deadline::after(1ms)); }).join();
@@ -266,7 +266,7 @@ TEST_F(ClientTest, AWaitRunsADispatcherWhoseThreadHasEnded) {
   serving.join();
 }
 
-TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherIsToldSo) {
+TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherGetsAnError) {
   startServer();
   std::binary_semaphore isInside(0);
   std::binary_semaphore mayLeave(0);
@@ -290,7 +290,7 @@ TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherIsToldSo) {
   dispatcher_.runOnce(Deadline::atNs(0));
 }
 
-TEST_F(ClientTest, NobodyElseRunsASharedDispatcher) {
+TEST_F(ClientTest, OtherThreadsCannotRunASharedDispatcher) {
   const auto shared = Dispatcher::shared(backplane_);
   MessageClient client(backplane_, [](const Message&) {});
   client.bind("absent");

@@ -62,7 +62,7 @@ class HardwareProgramTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-TEST_F(HardwareProgramTest, ServesAndEndsAndLeavesNothing) {
+TEST_F(HardwareProgramTest, ServesAndStopsAndLeavesNoFiles) {
   for (const auto signal : {SIGTERM, SIGINT}) {
     const auto dac = startDac({"--carrier", "ipac=model"});
     const auto dio = startDio({"--carrier", "ipac=model"});
@@ -88,7 +88,7 @@ TEST_F(HardwareProgramTest, ServesAndEndsAndLeavesNothing) {
   }
 }
 
-TEST_F(HardwareProgramTest, AreWiredToEachOtherByAFile) {
+TEST_F(HardwareProgramTest, AreConnectedByAFileOfWires) {
   const auto wires = folder_.file("wires");
   const auto dac =
       startDac({"--carrier", "ipac=model", "--wires", wires, "--ranges", "0to10,-10to10"});
@@ -114,7 +114,7 @@ TEST_F(HardwareProgramTest, AreWiredToEachOtherByAFile) {
   expectEndsWell(*dio);
 }
 
-TEST_F(HardwareProgramTest, FollowsWiresWithAnIp440) {
+TEST_F(HardwareProgramTest, FollowsWires) {
   const auto wires = folder_.file("wires");
   const auto dac = startDac({"--carrier", "ipac=model", "--wires", wires});
   const auto door =
@@ -132,7 +132,7 @@ TEST_F(HardwareProgramTest, FollowsWiresWithAnIp440) {
               HasSubstr("serving the Acromag IP440 at carrier ipac, site IP_c as \"door\""));
 }
 
-TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
+TEST_F(HardwareProgramTest, ReportsInvalidArguments) {
   const auto notAFile = folder_.write("letter", "a letter");
   for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
            {{"dac", "ipac"}, "site is required"},
@@ -160,12 +160,13 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_F(HardwareProgramTest, SaysWhenAModelCannotInterrupt) {
+TEST_F(HardwareProgramTest, ReportsThatAModelHasNoInterrupts) {
   const auto dio = startDio({"--carrier", "ipac=model", "--kind", "IP-Unidig"});
   EXPECT_EQ(HardwareAsker(backplane_, "dioIn").ask({.cmd = digital::cmdStartMonitor}).value,
             0xffffff);
   expectEndsWell(*dio);
-  EXPECT_THAT(dio->errors(), HasSubstr("IP-Unidig has no interrupts: changes are found by polling"));
+  EXPECT_THAT(dio->errors(),
+              HasSubstr("IP-Unidig has no interrupts: changes are found by polling"));
 }
 
 TEST_F(HardwareProgramTest, ShowTheirOldCommandsInTheirHelp) {

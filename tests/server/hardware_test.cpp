@@ -34,7 +34,7 @@ class HardwareOpenTest : public testing::Test {
   Hardware hardware_;
 };
 
-TEST_F(HardwareOpenTest, GoesOnWhenTheBoardComesAndSaysEachReasonOnce) {
+TEST_F(HardwareOpenTest, ContinuesWhenTheBoardAppearsAndLogsEachReasonOnce) {
   parse("--carrier ipac=model --wait");
   int calls = 0;
   testing::internal::CaptureStderr();
@@ -54,7 +54,7 @@ TEST_F(HardwareOpenTest, GoesOnWhenTheBoardComesAndSaysEachReasonOnce) {
   EXPECT_THAT(said, HasSubstr("the board is not there yet: no clock"));
 }
 
-TEST_F(HardwareOpenTest, WaitsForNothingWithoutWait) {
+TEST_F(HardwareOpenTest, DoesNotWaitWithoutTheOptionWait) {
   parse("--carrier ipac=model");
   int calls = 0;
   const Hardware::MakeModel none = [&]() -> std::unique_ptr<DeviceModel> {
@@ -66,7 +66,7 @@ TEST_F(HardwareOpenTest, WaitsForNothingWithoutWait) {
 }
 
 // Time does not mend it, and its owner would wait for ever.
-TEST_F(HardwareOpenTest, DoesNotWaitForAnotherFileOfWires) {
+TEST_F(HardwareOpenTest, DoesNotWaitWhenTheFileOfWiresIsInvalid) {
   parse("--carrier ipac=model --wait --wires " + folder_.write("letter", "a letter"));
   EXPECT_ANY_THROW(static_cast<void>(open([&] {
     static_cast<void>(hardware_.wires());

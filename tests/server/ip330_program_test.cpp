@@ -41,7 +41,7 @@ class Ip330ProgramTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) {
+TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsRelease1Dash4) {
   const auto server = start({"adc", "ipac", "IP_a", "D", "-5to5", "0", "15", "10", "120",
                              "--carrier", "ipac=model", "--signal", "3=dc:-2.5,4=sine:5:1"});
 
@@ -59,7 +59,7 @@ TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) 
                     HasSubstr(R"(as "adc", "adcConfig")"), HasSubstr("stopped")));
 }
 
-TEST_F(Ip330ProgramTest, ServesAllThatItIsToldOverOneBoard) {
+TEST_F(Ip330ProgramTest, ServesAllRequestedServersOfOneBoard) {
   const auto server =
       start({"--scan", "s1,0,3,100,30", "--scan", "s2,4,7", "--config", "c", "--sweep", "w,0,1,50",
              "--pid", "p,0,dac,2,25", "--dac", "dac,ipac,IP_b", "adc", "ipac", "IP_a", "S", "0to10",
@@ -116,8 +116,9 @@ TEST_F(Ip330ProgramTest, ServesScansWhileItWaitsForADac) {
   EXPECT_EQ(read("s", 3).status, 0);
 
   EXPECT_EQ(server->end(SIGTERM), 0);
-  EXPECT_THAT(server->errors(), AllOf(HasSubstr(R"(as "s", "c")"),
-                                      HasSubstr("the board is not there yet"), HasSubstr("stopped")));
+  EXPECT_THAT(server->errors(),
+              AllOf(HasSubstr(R"(as "s", "c")"), HasSubstr("the board is not there yet"),
+                    HasSubstr("stopped")));
 }
 
 TEST_F(Ip330ProgramTest, ShowsTheOldCommandsInItsHelp) {
@@ -138,13 +139,13 @@ TEST_F(Ip330ProgramTest, ShowsTheOldCommandsInItsHelp) {
           HasSubstr(R"(initIp330PID("server", ip330, channel, dac, dacChannel, queuesize))")));
 }
 
-TEST_F(Ip330ProgramTest, SaysThatThereIsNoSuchCarrier) {
+TEST_F(Ip330ProgramTest, ReportsAnUnknownCarrier) {
   const auto server = start({"adc", "ipac", "IP_a", "--carrier", "ipac=no-such-kind"});
   EXPECT_NE(server->wait(), 0);
   EXPECT_THAT(server->errors(), HasSubstr("no-such-kind"));
 }
 
-TEST_F(Ip330ProgramTest, SaysWhatIsWrongWithItsArguments) {
+TEST_F(Ip330ProgramTest, ReportsInvalidArguments) {
   for (const auto& [options, complaint] :
        std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"X"}, "type \"X\": use D"},

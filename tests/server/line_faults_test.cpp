@@ -112,7 +112,7 @@ class LineFaultsTest : public testing::Test {
   std::optional<SyncClient> client_;
 };
 
-TEST_F(LineFaultsTest, AnAnswerThatLostBytesWhileNobodyReadIsNotOk) {
+TEST_F(LineFaultsTest, AnAnswerThatLostBytesOutsideOfReadsIsNotOk) {
   start(OctalUartModelTime::stepped);
   model_->say(0, "abcdef\r");
   model_->advance(10 * byteTime(kFast));  // all at once: the chip loses three bytes
@@ -127,7 +127,7 @@ TEST_F(LineFaultsTest, AnAnswerThatLostBytesWhileNobodyReadIsNotOk) {
   EXPECT_EQ(alarmsOf(backplane_, kServer), 1U);
 }
 
-TEST_F(LineFaultsTest, TheRestOfAnAnswerBehindAGapIsNotOk) {
+TEST_F(LineFaultsTest, TheRestOfAnAnswerAfterAGapIsNotOk) {
   start(OctalUartModelTime::stepped);
   saySlowly("first\r");
   model_->say(0, "abcdefgh");
@@ -174,7 +174,7 @@ TEST_F(LineFaultsTest, AFaultEndsTheReadThatIsOutstanding) {
       << "the rest of a damaged answer";
 }
 
-TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWhenAllIsWell) {
+TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWithoutAFault) {
   start();
   model_->say(0, "12345");
   waitForBytes(5);
@@ -184,7 +184,7 @@ TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWhenAllIsWell) {
       << "no command, and no fault of the line";
 }
 
-TEST_F(LineFaultsTest, AFlushTakesTheFaultsAwayWithTheBytes) {
+TEST_F(LineFaultsTest, AFlushRemovesTheFaultsWithTheBytes) {
   start();
   model_->say(0, "1");
   model_->say(0, "2", LineFault::framing);
@@ -196,7 +196,7 @@ TEST_F(LineFaultsTest, AFlushTakesTheFaultsAwayWithTheBytes) {
   EXPECT_EQ(ask(cmdWriteRead | cmdFlush, "?"), (Answer{serialServerStatusOK, 0, "ok\r"}));
 }
 
-TEST_F(LineFaultsTest, AnAnswerThatAnUnplugHasCutIsNotOk) {
+TEST_F(LineFaultsTest, AnAnswerThatAnUnplugTruncatedIsNotOk) {
   start();
   model_->say(0, "whole\r12");
   waitForBytes(8);
@@ -221,7 +221,7 @@ TEST_F(LineFaultsTest, AnUnplugBetweenAnswersDamagesNone) {
 }
 
 // A line of log for the first fault, and one for all the others.
-TEST_F(LineFaultsTest, AStormIsTwoLinesOfLogWithPortKindsAndCounts) {
+TEST_F(LineFaultsTest, AStormCausesTwoLogLinesWithPortKindsAndCounts) {
   constexpr int kFaults = 1000;
   testing::internal::CaptureStderr();
   start(OctalUartModelTime::instant, "warning");

@@ -58,7 +58,7 @@ TEST_F(LogTest, LimitsEachObjectByItself) {
   EXPECT_THAT(lines_, SizeIs(kAtOnce + 2));
 }
 
-TEST_F(LogTest, SaysWhenItHasLinesToWriteAndWritesThem) {
+TEST_F(LogTest, ReportsWhenHeldLinesAreDueAndWritesThem) {
   std::vector<std::int64_t> due;
   log_.onHeld([&](std::int64_t dueNs) { due.push_back(dueNs); });
   for (int i = 0; i < 1000; ++i) refuse(log_, i);

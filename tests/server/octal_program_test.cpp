@@ -84,7 +84,7 @@ TEST_F(OctalProgramTest, ServesEightPortsOfOneModule) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-TEST_F(OctalProgramTest, ServesOnePortAsItServesATerminal) {
+TEST_F(OctalProgramTest, ServesOnePortLikeATerminal) {
   const auto server =
       start({"dmm", "UART0[3]", "1000", "20", "\\r\\n", "--carrier", "ipac=model", "--octal-uart",
              "UART0,ipac,IP_a,4", "--octal-port", "UART0[3],UART0,3"});
@@ -103,7 +103,7 @@ TEST_F(OctalProgramTest, ServesOnePortAsItServesATerminal) {
 // A host that is busy with other things may let the driver come late. Then the line has not turned
 // round when the answer begins, or the chip has no room for it: bytes are lost, as they are on a
 // real line, and the question is asked again.
-TEST_F(OctalProgramTest, BytesMayTakeTheirTime) {
+TEST_F(OctalProgramTest, ServesAModelWithRealTiming) {
   const auto server = start({"dmm", "line", "1000", "20", "\\r\\n", "--octal-port",
                              "line,UART0,0,1200", "--octal-uart", "UART0,ipac,IP_b,8", "--carrier",
                              "ipac=model", "--octal-timing", "--octal-model", "485"});
@@ -116,7 +116,7 @@ TEST_F(OctalProgramTest, BytesMayTakeTheirTime) {
   EXPECT_GE(std::chrono::steady_clock::now() - begin, 28 * 8ms);
 }
 
-TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
+TEST_F(OctalProgramTest, ReportsInvalidOptions) {
   const std::vector<std::string> uart{"--carrier", "ipac=model", "--octal-uart", "U,ipac,IP_a,8"};
   const auto with = [&](std::vector<std::string> more) {
     more.insert(more.end(), uart.begin(), uart.end());
@@ -145,7 +145,7 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
                 "--baud is for terminal devices, and no port is one");
 }
 
-TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsModule) {
+TEST_F(OctalProgramTest, ReportsAnInvalidModule) {
   const auto startWith = [&](const std::string& uart, const std::string& port) {
     return start(
         {"dmm", "x", "--carrier", "ipac=model", "--octal-uart", uart, "--octal-port", port});
@@ -167,7 +167,7 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsModule) {
 
 // A board that this host cannot have is not waited for, nor are wrong parameters; one that is not
 // there yet is.
-TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
+TEST_F(OctalProgramTest, WaitsOnlyForBoardsThatMayAppear) {
   const auto startWith = [&](const std::string& carrier) {
     return start({"dmm", "x", "--wait", "--carrier", "ipac=" + carrier, "--octal-uart",
                   "U,ipac,IP_a,8", "--octal-port", "x,U,0"});
@@ -189,7 +189,7 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
 
-TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
+TEST_F(OctalProgramTest, LogsThePriorityOfInterrupts) {
   const auto server = start({"dmm", "x", "--real-time", "0", "--carrier", "ipac=model",
                              "--octal-uart", "U,ipac,IP_a,8", "--octal-port", "x,U,0"});
   SyncClient client(backplane_, "dmm");
@@ -201,7 +201,7 @@ TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
 }
 
 // A module that is not there keeps nobody waiting but who wants its ports, and they are told so.
-TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
+TEST_F(OctalProgramTest, AllServersRunWhileOneModuleIsMissing) {
   const auto path = folder_.file("line");
   Instrument instrument(path);
   const auto server =

@@ -101,7 +101,7 @@ class OctalServerTest : public testing::Test {
   std::array<std::optional<OctalStation>, 8> stations_;
 };
 
-TEST_F(OctalServerTest, EightServersTalkAtOnce) {
+TEST_F(OctalServerTest, EightServersWorkAtTheSameTime) {
   std::vector<std::thread> clients;
   for (int i = 0; i < 8; ++i) {
     clients.emplace_back([this, i] {
@@ -124,7 +124,7 @@ TEST_F(OctalServerTest, SettingsThatTheChipDoesNotHaveAreAnErrorStatus) {
   EXPECT_EQ(settings, (SerialSettings{300, 1, 8, 'E', 'N'}));
 }
 
-TEST_F(OctalServerTest, EveryRequestIsAnsweredWhileTheModuleIsGone) {
+TEST_F(OctalServerTest, EveryRequestGetsAReplyWhileTheModuleIsMissing) {
   carrier_.setFault("IP_a", ModelFault::busError);
   EXPECT_TRUE(station(5).port().waitForState(SerialPortState::unplugged, Deadline::never()));
 

@@ -103,7 +103,7 @@ class SerialProgramTest : public testing::Test {
 class SerialProgramSignalTest : public SerialProgramTest,
                                 public testing::WithParamInterface<int> {};
 
-TEST_P(SerialProgramSignalTest, EndsItDuringALongReadAndLeavesNothing) {
+TEST_P(SerialProgramSignalTest, StopsItDuringALongReadAndLeavesNoFiles) {
   const auto server = start();
   {
     Asker asker(backplane_);
@@ -126,7 +126,7 @@ TEST_P(SerialProgramSignalTest, EndsItDuringALongReadAndLeavesNothing) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_P(SerialProgramSignalTest, EndsItDuringAWriteThatTheLineHoldsUp) {
+TEST_P(SerialProgramSignalTest, StopsItDuringAWriteThatTheLineBlocks) {
   const auto server = start();
   {
     Asker asker(backplane_);
@@ -146,7 +146,7 @@ TEST_P(SerialProgramSignalTest, EndsItDuringAWriteThatTheLineHoldsUp) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_P(SerialProgramSignalTest, EndsItWhileItWaitsForItsLine) {
+TEST_P(SerialProgramSignalTest, StopsItWhileItWaitsForItsLine) {
   instrument_.unplug();
   const auto server = start({"--wait"});
   const auto connected = std::make_unique<Asker>(backplane_);
@@ -157,7 +157,7 @@ TEST_P(SerialProgramSignalTest, EndsItWhileItWaitsForItsLine) {
 
 INSTANTIATE_TEST_SUITE_P(Signals, SerialProgramSignalTest, testing::Values(SIGTERM, SIGINT));
 
-TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
+TEST_F(SerialProgramTest, LogsItsEventsOnStderr) {
   const auto server = start({"--baud", "19200"});
   Asker asker(backplane_);
   ASSERT_EQ(asker.ask("ECHO a\n"), serialServerStatusOK);
@@ -188,9 +188,8 @@ TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
       ElementsAre(AllOf(HasSubstr("serving " + path_ +
                                   " (19200 baud, 8N1, no flow control) as \"dmm\" at location 0"),
                         HasSubstr("\"dmm.sniff\"")),
-                  HasSubstr("info mpf-serial-server: first request"),
-                  HasSubstr("requests fail: "), HasSubstr("requests succeed again"),
-                  HasSubstr("stopped")));
+                  HasSubstr("info mpf-serial-server: first request"), HasSubstr("requests fail: "),
+                  HasSubstr("requests succeed again"), HasSubstr("stopped")));
   EXPECT_THAT(lines[0],
               MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}[.][0-9]{3} info "
                            "mpf-serial-server: .*"));
@@ -218,7 +217,7 @@ TEST_F(SerialProgramTest, ReportsSurplusInputOnce) {
   EXPECT_EQ(log.find("late"), std::string::npos) << "the log shows no input";
 }
 
-TEST_F(SerialProgramTest, RefusesLimitsThatCannotBe) {
+TEST_F(SerialProgramTest, RefusesInvalidLimits) {
   for (const auto& [option, value] :
        std::vector<std::array<std::string, 2>>{{"--settle-time", "-1"},
                                                {"--quiet-time", "9999999999"},
@@ -232,7 +231,7 @@ TEST_F(SerialProgramTest, RefusesLimitsThatCannotBe) {
   }
 }
 
-TEST_F(SerialProgramTest, SaysNothingWhenToldSo) {
+TEST_F(SerialProgramTest, LogsNothingAtLevelOff) {
   const auto server = start({"--log-level", "off"});
   Asker asker(backplane_);
   ASSERT_EQ(asker.ask("ECHO a\n"), serialServerStatusOK);
@@ -242,7 +241,7 @@ TEST_F(SerialProgramTest, SaysNothingWhenToldSo) {
   EXPECT_EQ(server->errors(), "");
 }
 
-TEST_F(SerialProgramTest, LetsInWhomItIsTold) {
+TEST_F(SerialProgramTest, AdmitsTheClientsOfItsMode) {
   const auto* group = ::getgrgid(::getegid());
   ASSERT_NE(group, nullptr);
   const auto server = start({"--mode", "0660", "--group", group->gr_name});
@@ -257,7 +256,7 @@ TEST_F(SerialProgramTest, LetsInWhomItIsTold) {
   }
 }
 
-TEST_F(SerialProgramTest, RefusesOptionsThatMakeNoSense) {
+TEST_F(SerialProgramTest, RefusesInvalidOptions) {
   for (const auto& [option, value, complaint] : std::vector<std::array<std::string, 3>>{
            {"--mode", "0990", "--mode: 0990: use an octal number"},
            {"--group", "root", "--group requires --mode"},
@@ -274,7 +273,7 @@ TEST_F(SerialProgramTest, RefusesOptionsThatMakeNoSense) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_F(SerialProgramTest, NamesThePortThatItCannotOpen) {
+TEST_F(SerialProgramTest, ReportsThePortThatItCannotOpen) {
   instrument_.unplug();
   const auto server = start();
 

@@ -122,14 +122,14 @@ class LateAnswerTest : public SerialServerTest, public testing::WithParamInterfa
   }
 };
 
-TEST_P(LateAnswerTest, GoesToNobody) {
+TEST_P(LateAnswerTest, IsNotDelivered) {
   startWith();
   askTooEarly();
 
   EXPECT_EQ(wrongOf(client_, "a", 20), 0);
 }
 
-TEST_P(LateAnswerTest, GoesToNoneOfTenClients) {
+TEST_P(LateAnswerTest, IsNotDeliveredToAnyOfTenClients) {
   startWith();
   askTooEarly();
 
@@ -146,7 +146,7 @@ TEST_P(LateAnswerTest, GoesToNoneOfTenClients) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST_P(LateAnswerTest, IsAnAlarmOnceAndSeenByThoseWhoListen) {
+TEST_P(LateAnswerTest, IsOneAlarmAndListenersReceiveIt) {
   std::mutex mutex;
   std::string seen;
   const auto tap = port_.attachTap([&](std::span<const PeekedByte> bytes) {
@@ -164,7 +164,7 @@ TEST_P(LateAnswerTest, IsAnAlarmOnceAndSeenByThoseWhoListen) {
   EXPECT_THAT(seen, HasSubstr("late\r\n"));
 }
 
-TEST_P(LateAnswerTest, IsTheAnswerOfARetry) {
+TEST_P(LateAnswerTest, IsUsedAsTheAnswerOfARetry) {
   startWith();
   instrument_.behave({.delay = 750ms});
   auto fields = fieldsOf(cmdWriteRead, 250);
@@ -186,7 +186,7 @@ TEST_P(LateAnswerTest, SecondAnswersAreSurplus) {
 }
 
 // An instrument that never stops: nobody can tell its answers.
-TEST_P(LateAnswerTest, WithoutSilenceNothingIsSent) {
+TEST_P(LateAnswerTest, NothingIsSentWithoutSilence) {
   startWith({.quietTime = 1h, .resyncLimit = 10ms});
   askTooEarly();
   std::atomic<bool> isOver = false;
@@ -225,7 +225,7 @@ TEST_F(SerialServerTest, AnInstrumentThatSendsManyLinesIsReadLineByLine) {
   EXPECT_EQ(alarmsOf(backplane_, "serial[0]"), 0U);
 }
 
-TEST_F(SerialServerTest, AWriteReadWithNothingToWriteReadsWhatComesFromNowOn) {
+TEST_F(SerialServerTest, AWriteReadWithoutDataReadsTheBytesThatArriveLater) {
   start();
   ASSERT_EQ(ask("", fieldsOf(cmdWriteRead, 0)).status, serialServerStatusTimeout);
 
@@ -234,7 +234,7 @@ TEST_F(SerialServerTest, AWriteReadWithNothingToWriteReadsWhatComesFromNowOn) {
 
 // ---- a request that would not end
 
-TEST_F(SerialServerTest, WhatIsNoCommandIsNotRetried) {
+TEST_F(SerialServerTest, AnInvalidCommandIsNotRetried) {
   start();
 
   const auto reply = ask("", {.cmd = 5, .numberRetrys = INT32_MAX});
@@ -281,7 +281,7 @@ TEST_F(SerialServerTest, TheRequestOfAClientThatIsKilledEnds) {
   EXPECT_EQ(ask("ECHO free\n", fieldsOf(cmdWriteRead)).text, "free\r\n");
 }
 
-TEST_F(SerialServerTest, TheRequestOfAClientThatLeavesEnds) {
+TEST_F(SerialServerTest, TheRequestOfAClientThatDisconnectsEnds) {
   start({.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = kNoLimit});
   instrument_.behave({.isSilent = true});
   {
@@ -298,7 +298,7 @@ TEST_F(SerialServerTest, TheRequestOfAClientThatLeavesEnds) {
 }
 
 // As an IOC's that sends its last command and ends.
-TEST_F(SerialServerTest, AWriteIsDoneThoughItsClientLeavesAtOnce) {
+TEST_F(SerialServerTest, AWriteContinuesWhenItsClientExits) {
   start();
   for (int i = 0; i < 20; ++i) {
     const auto text = fmt::format("OFF {}\n", i);

@@ -98,7 +98,7 @@ class SniffTest : public SerialServerTest {
   std::unique_ptr<SniffServer> sniff_;
 };
 
-TEST_F(SniffTest, TwoListenersHearEveryByteInTheOrderOfTheLine) {
+TEST_F(SniffTest, TwoListenersReceiveEveryByteInTheOrderOfTheLine) {
   startWithListening();
   Listener first(backplane_);
   Listener second(backplane_);
@@ -140,7 +140,7 @@ TEST_F(SniffTest, BytesThatTheLineDamagedAreMarked) {
                                                        SniffRecord{5, SniffKind::breakSignal, 0}));
 }
 
-TEST_F(SniffTest, ALargeBatchGoesAtOnce) {
+TEST_F(SniffTest, ALargeBatchIsSentImmediately) {
   startWithListening({.maxAge = 24h, .largeBytes = 20});
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
@@ -152,7 +152,7 @@ TEST_F(SniffTest, ALargeBatchGoesAtOnce) {
   EXPECT_TRUE(spoken.starts_with(listener.text()));
 }
 
-TEST_F(SniffTest, AStopBringsWhatWasBeforeAndNothingComesAfterIt) {
+TEST_F(SniffTest, AStopReturnsEarlierBytesAndNothingFollowsIt) {
   startWithListening(kNever);
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
@@ -181,7 +181,7 @@ TEST_F(SniffTest, AStopEndsTheListeningOfItsOwnClientOnly) {
   EXPECT_EQ(listener.text(), spoken);
 }
 
-TEST_F(SniffTest, WhoListensLaterHearsWhatComesLater) {
+TEST_F(SniffTest, ALaterListenerReceivesLaterBytesOnly) {
   startWithListening(kNever);
   Listener early(backplane_);
   Listener late(backplane_);
@@ -197,7 +197,7 @@ TEST_F(SniffTest, WhoListensLaterHearsWhatComesLater) {
   EXPECT_EQ(late.text(), after);
 }
 
-TEST_F(SniffTest, ASecondStartTakesThePlaceOfTheFirst) {
+TEST_F(SniffTest, ASecondStartReplacesTheFirst) {
   startWithListening(kNever);
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(1), sniffStatusOK);
@@ -226,7 +226,7 @@ TEST_F(SniffTest, OtherCommandsAndOtherTypesAreErrors) {
   EXPECT_EQ(number.message().tryAs<Float64>()->status, -1);
 }
 
-TEST_F(SniffTest, ThePortIsTappedWhileSomebodyListens) {
+TEST_F(SniffTest, ThePortIsTappedWhileThereAreListeners) {
   startWithListening();
   EXPECT_TRUE(port_.taps().isEmpty());
   Listener first(backplane_);
@@ -243,7 +243,7 @@ TEST_F(SniffTest, ThePortIsTappedWhileSomebodyListens) {
 }
 
 // It loses bytes, is told how many, and nobody else notices.
-TEST_F(SniffTest, AListenerThatTakesNothingCostsItselfBytes) {
+TEST_F(SniffTest, AListenerThatDoesNotReceiveLosesBytes) {
   startWithListening(kAtOnce);
   Listener idle(backplane_);
   Listener busy(backplane_);
@@ -272,7 +272,7 @@ TEST_F(SniffTest, AListenerThatTakesNothingCostsItselfBytes) {
   EXPECT_EQ(heard + idle.lost(), kQuestions * kBytesOfOne);
 }
 
-TEST_F(SniffTest, AStopTellsWhatIsMissingAtTheEnd) {
+TEST_F(SniffTest, AStopCountsTheBytesMissingAtTheEnd) {
   startWithListening(kAtOnce);
   Listener idle(backplane_);
   Listener busy(backplane_);
@@ -292,7 +292,7 @@ TEST_F(SniffTest, AStopTellsWhatIsMissingAtTheEnd) {
             kQuestions * kBytesOfOne);
 }
 
-TEST_F(SniffTest, WhatTheServerCouldNotKeepIsToldToAll) {
+TEST_F(SniffTest, BytesThatTheServerLostAreReportedToAllListeners) {
   startWithListening({.maxAge = 24h, .largeBytes = 1'000'000, .maxBytes = 10});
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
@@ -304,7 +304,7 @@ TEST_F(SniffTest, WhatTheServerCouldNotKeepIsToldToAll) {
   EXPECT_EQ(10U + static_cast<std::size_t>(reply.address), spoken.size() - 4);
 }
 
-TEST_F(SniffTest, AListenerThatIsKilledOrGoesAwayIsForgotten) {
+TEST_F(SniffTest, AListenerThatIsKilledOrDisconnectsIsRemoved) {
   startWithListening();
   Victim killed("listen", backplane_.name());
   auto leaving = std::make_unique<Listener>(backplane_);
@@ -325,7 +325,7 @@ TEST_F(SniffTest, AListenerThatIsKilledOrGoesAwayIsForgotten) {
   EXPECT_TRUE(port_.taps().isEmpty());
 }
 
-TEST_F(SniffTest, TheServerMayEndWhileTheyListenAndTheLineIsBusy) {
+TEST_F(SniffTest, TheServerMayEndDuringListeningOnABusyLine) {
   startWithListening(kAtOnce);
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
