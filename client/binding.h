@@ -32,7 +32,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
       : dispatcher_(dispatcher), callback_(std::move(callback)) {}
 
   // --- any thread ---
-  //   requestId   in: the id that the request is to have, or 0 for any; out: its id when it was sent
+  //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
   SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isConnected() const noexcept {

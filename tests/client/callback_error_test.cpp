@@ -20,7 +20,7 @@ struct Thrown : std::runtime_error {
 
 class CallbackErrorTest : public ClientTest {
  protected:
-  // A client whose callback notes each message and then throws, if `mayThrow` says so.
+  // A client whose callback records each message and then throws, if `mayThrow` is set.
   MessageClient& makeThrower(std::function<bool(const Message&)> mayThrow) {
     thrower_ =
         std::make_unique<MessageClient>(dispatcher_, [this, mayThrow](const Message& message) {
@@ -46,7 +46,7 @@ class CallbackErrorTest : public ClientTest {
       }
     }
   }
-  // The server, which holds that many requests of the thrower.
+  // Receives that many requests of the client that throws, and keeps them.
   void holdRequests(MessageClient& client, std::size_t requests) {
     server_->on<Int32>([this](Int32Message&& request) { held_.push_back(std::move(request)); });
     runCatching([&] { return client.isConnected(); });
@@ -106,7 +106,7 @@ TEST_F(CallbackErrorTest, EachRequestOfADisconnectGetsItsFateAndTheClientReconne
   EXPECT_TRUE(client.isConnected());
 }
 
-// What the server sent before it went comes first, one by one.
+// The replies that the server sent before it ended are delivered first, one by one.
 TEST_F(CallbackErrorTest, RepliesOfAServerThatEndedAreNotLost) {
   startServer();
   auto& client = makeThrower(always);
@@ -159,7 +159,7 @@ TEST_F(CallbackErrorTest, EachExpiredRequestGetsItsFate) {
   EXPECT_THAT(told_, testing::ElementsAre("connectYes", expired, expired, expired));
 }
 
-// A client may end before its callback has had all fates.
+// A client may be destroyed before its callback has received all fates.
 TEST_F(CallbackErrorTest, AClientMayBeDestroyedAfterAnExceptionInItsDisconnect) {
   startServer();
   auto& client = makeThrower(atFates);
@@ -175,7 +175,7 @@ TEST_F(CallbackErrorTest, AClientMayBeDestroyedAfterAnExceptionInItsDisconnect) 
   EXPECT_EQ(countNames(backplane_, NameKind::link), 0);
 }
 
-// Other clients of the dispatcher do not notice.
+// Other clients of the dispatcher are not affected.
 TEST_F(CallbackErrorTest, OtherClientsGetTheirDisconnects) {
   startServer();
   client_.bind("device[0]/a");
@@ -219,7 +219,7 @@ TEST_F(CallbackErrorTest, AnExceptionLeavesAWaitForAConnection) {
   serving.join();
 }
 
-// No caller could handle it there: it is written to stderr and counted.
+// The shared thread has no caller that could handle it: it is written to stderr and counted.
 TEST_F(CallbackErrorTest, ASharedDispatcherReportsTheExceptionAndContinues) {
   constexpr int kRequests = 5;
   startServer().on<Int32>([](Int32&) {});
@@ -284,7 +284,7 @@ TEST_F(CallbackErrorTest, ARequestWhoseHandlerThrowsIsRefusedAndTheServerContinu
   EXPECT_EQ(fateOf(next()), Fate::refused);
   EXPECT_NE(next().tryAs<Float64>(), nullptr);
   EXPECT_EQ(fateOf(next()), Fate::refused);
-  EXPECT_EQ(fateOf(next()), Fate::refused) << "that handler replies to nothing";
+  EXPECT_EQ(fateOf(next()), Fate::refused) << "that handler sends no reply";
 }
 
 TEST_F(CallbackErrorTest, AnExceptionOfAHandlerLeavesRunWhichMayBeCalledAgain) {

@@ -34,7 +34,7 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
                                           ConnectStatus::connectYes));
 }
 
-// In a process that lives on: nothing dies, and there is no link that it could close.
+// The process of the server does not exit, and there is no link that the server could close.
 TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   startServer();
   serverRuns_ = false;
@@ -50,7 +50,7 @@ TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// One hint tells of messages and of the end behind them: for any number of them.
+// One hint announces any number of messages and the end after them.
 TEST_F(ClientTest, AServerNoticesAClientThatDisconnectsRightAfterItsRequests) {
   constexpr int kMost = 40;
   int gone = 0;
@@ -195,7 +195,7 @@ TEST_F(ClientTest, AStoredRequestGetsManyRepliesLater) {
   runUntil([&] { return static_cast<bool>(held); });
   EXPECT_EQ(server.reply(std::move(held)), ReplyResult::sent);
   const auto last = next();
-  ASSERT_NE(last.tryAs<Int32>(), nullptr) << "an answered request has no fate";
+  ASSERT_NE(last.tryAs<Int32>(), nullptr) << "a request with a reply has no fate";
   EXPECT_EQ(last.tryAs<Int32>()->value, 99);
 }
 
@@ -267,8 +267,8 @@ TEST_F(ClientTest, ANameIsServedOnceAtALocation) {
   EXPECT_EQ(elsewhere.location(), 7);
 }
 
-// A server that many wait for: some connect in a step, so that whatever else the dispatcher has to
-// do gets its turn.
+// When a server appears, each step connects some of its clients, so that other work of the
+// dispatcher is not delayed.
 TEST_F(ClientTest, ManyClientsConnectInSteps) {
   constexpr int kCrowd = 100;
   std::vector<std::unique_ptr<MessageClient>> crowd;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What constructors throw when memory or threads are short. This file stands between the program
-// and the answers of the kernel.
+// What constructors throw when memory or threads are exhausted. This file replaces system calls
+// with functions that fail.
 #include <fcntl.h>
 #include <pthread.h>
 
@@ -37,7 +37,7 @@ extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attribute
 namespace mpf::test {
 namespace {
 
-// The code of the std::system_error that `construct` throws; 0 when it throws none.
+// Returns the code of the std::system_error that `construct` throws; 0 when it throws nothing.
 int codeOf(const std::function<void()>& construct) {
   try {
     construct();
@@ -63,7 +63,8 @@ TEST(Constructors, ReportThatSharedMemoryIsFull) {
   EXPECT_FALSE(client.connectWait(1ms));
 }
 
-// The memory for a connection is not the constructor's: bind() returns, and says why it waits.
+// The constructor does not allocate the memory of a connection: bind() returns and reports the
+// reason.
 TEST(Constructors, DoNotThrowForMemoryOfAConnection) {
   const TestBackplane backplane;
   MessageServer server(backplane, "device");

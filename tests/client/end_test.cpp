@@ -31,7 +31,8 @@ class EndTest : public ClientTest {
     }
     work(leaver, another);
   }
-  // Calls back when the process of a client is gone; 0 while there is no such client.
+  // Calls `callback` when the process of a client has exited; returns 0 while there is no such
+  // client.
   Watcher::Token watch(pid_t process, std::function<void()> callback) {
     for (const auto& name : backplane_.segmentNames()) {
       const auto parsed = SegmentName::tryParse(name);
@@ -44,7 +45,7 @@ class EndTest : public ClientTest {
   }
 };
 
-// Whatever was sent before an end in order is there to be taken, wherever it lies.
+// Messages that were sent before an orderly end are received, wherever their bodies are.
 TEST_F(EndTest, AReplyInThePoolOfAServerThatEndsArrives) {
   auto& server = startServer();
   const auto held = heldRequest();
@@ -61,7 +62,7 @@ TEST_F(EndTest, AReplyInThePoolOfAServerThatEndsArrives) {
   EXPECT_EQ(nonsenseRead(), 0u);
 }
 
-// Its memory has gone with it: that is an end, and no nonsense.
+// Its memory no longer exists: that is the end of a link, not a protocol error.
 TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoProtocolError) {
   auto& server = startServer();
   int handled = 0;
@@ -76,8 +77,8 @@ TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoProtocolError) {
   EXPECT_EQ(nonsenseRead(), 0u);
 }
 
-// A window of a client that is gone is of no use to the server, although the client's process goes
-// on.
+// The server does not need the window of a client that has disconnected, although the client's
+// process is still running.
 TEST_F(EndTest, AServerUnmapsTheWindowsOfClientsThatDisconnected) {
   startServer();
   withLeaver([](auto&, auto&) {});
@@ -92,7 +93,7 @@ TEST_F(EndTest, AServerUnmapsTheWindowsOfClientsThatDisconnected) {
   EXPECT_LE(openDescriptors(), before + 4);
 }
 
-// A connect that fails for lack of memory costs nothing for good.
+// A connect that fails because of missing memory uses up nothing permanently.
 TEST_F(EndTest, AFailedConnectUsesUpNoIndex) {
   if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
   startServer();
@@ -120,7 +121,7 @@ TEST_F(EndTest, AFailedConnectUsesUpNoIndex) {
   EXPECT_TRUE(client_.isConnected());
 }
 
-// What a server is to do, as a process of another user than its client's.
+// The work of a server, in a process of another user than its client.
 TEST(EndOfUsers, AServerAndItsClientOfAnotherUserLeaveNoFiles) {
   MPF_NEEDS_A_CHILD;
   if (::getuid() != 0) GTEST_SKIP() << "needs to be root";
@@ -154,8 +155,8 @@ TEST(EndOfUsers, AServerAndItsClientOfAnotherUserLeaveNoFiles) {
   EXPECT_THAT(backplane.segmentNames(), testing::IsEmpty());
 }
 
-// The server takes what is in the ring of a client that ended in order, whether or not its process
-// has ended, too.
+// The server receives the messages in the ring of a client that ended in order, even when the
+// process of the client has exited as well.
 TEST_F(EndTest, RequestsOfAClientWhoseProcessExitedAreReceived) {
   MPF_NEEDS_A_CHILD;
   auto& server = startServer();
@@ -188,7 +189,7 @@ TEST_F(EndTest, RequestsOfAClientWhoseProcessExitedAreReceived) {
   backplane_.watcher().forget(token);
 }
 
-// One of them lay in memory that is gone: the others did not.
+// One of them was in memory that no longer exists; the others were not.
 TEST_F(EndTest, RequestsAfterALargeRequestOfAClientThatEndedAreReceived) {
   auto& server = startServer();
   int handled = 0;
@@ -236,8 +237,8 @@ TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllMessagesOfADisconnect) {
   held.clear();
 }
 
-// A server object follows another one in the same process; somebody still holds a request of the
-// first.
+// A server object follows another one in the same process, and a handle of a request to the first
+// still exists.
 TEST_F(EndTest, ANewServerCannotReplyToARequestOfTheFormerServer) {
   startServer();
   auto held = heldRequest();

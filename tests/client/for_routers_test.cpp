@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What routers need of clients and servers: to speak in the name of others.
+// Functions of clients and servers for routers, which act on behalf of others.
 #include "tests/client/client_fixture.h"
 
 namespace mpf::test {
@@ -14,7 +14,7 @@ class ForRoutersTest : public ClientTest {
     serverRuns_ = false;
     return server;
   }
-  // The next request, taken by hand.
+  // The next request, without a handler.
   Message take() {
     for (;;) {
       if (auto request = server_->receive()) return request;
@@ -111,7 +111,8 @@ TEST_F(ForRoutersTest, AServerGetsTheDeadlineOfARequest) {
   static_cast<void>(next());
 }
 
-// While a client pauses, its server finds the queue of replies full; afterwards nothing is missing.
+// While a client is paused, the reply queue of its server becomes full; after resume() no reply is
+// missing.
 TEST_F(ForRoutersTest, APausedClientLeavesRepliesInTheQueue) {
   auto& server = startWatched();
   bindByHand();
@@ -132,7 +133,7 @@ TEST_F(ForRoutersTest, APausedClientLeavesRepliesInTheQueue) {
   for (int got = 0; got < sent; ++got) EXPECT_EQ(next().tryAs<Int32>()->value, got);
 }
 
-// A router tells so that a queue behind it is full.
+// A router reports in this way that a queue behind it is full.
 TEST_F(ForRoutersTest, AServerMayReportThatAQueueIsFull) {
   auto& server = startWatched();
   bindByHand();

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Something else lies where a window should be: clients and servers say what it is, and go on once
-// it is gone.
+// SPDX-License-Identifier: MIT An invalid file has the name of a window: clients and servers report
+// what it is, and continue when it has been removed.
 #include <fcntl.h>
 #include <sys/fsuid.h>
 #include <sys/stat.h>
@@ -76,7 +75,7 @@ TEST_P(ForeignWindow, IsReportedToAServerOfTheSameName) {
 
   try {
     startServer({.location = 0});
-    FAIL() << "it took the place of something that is not a dead server's window";
+    FAIL() << "the server replaced a file that is not the window of a dead server";
   } catch (const std::exception& error) {
     EXPECT_THAT(error.what(),
                 testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(GetParam().saying),
@@ -84,7 +83,7 @@ TEST_P(ForeignWindow, IsReportedToAServerOfTheSameName) {
   }
 
   EXPECT_TRUE(std::filesystem::exists(std::filesystem::symlink_status(path_)))
-      << "it is not ours to remove";
+      << "the server must not remove it";
   EXPECT_THAT(backplane_.removeDead(),
               testing::Not(testing::Contains(std::filesystem::path(path_).filename())));
   std::filesystem::remove(path_);
@@ -130,13 +129,13 @@ class JunkTest : public ClientTest {
     }
     ClientTest::TearDown();
   }
-  // The path of something named with the number 77.
+  // The path of a file that is named with the number 77.
   std::string junk(NameKind kind) const {
     return segments::path(SegmentName::keyed(backplane_.name(), kind, 0x77));
   }
 };
 
-// Its header makes sense, but no window is that small.
+// Its header is valid, but the file is too small for a window.
 TEST_F(JunkTest, AClientReportsAWindowThatIsTooSmall) {
   const auto path = segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
   writeWindow(path, [](layout::SegmentHeader& header) { header.totalBytes = 1000; }, 1000);
@@ -165,7 +164,7 @@ TEST_F(JunkTest, AClientReportsTruncatedHintsOfAServer) {
   runUntil([&] { return client_.isConnected(); });
 }
 
-// Links that are none, of every kind: the server counts them, and goes on serving those that are.
+// Invalid links of every kind: the server counts them, and continues to serve valid links.
 TEST_F(JunkTest, InvalidLinksDoNotKeepAServerFromItsClients) {
   auto& server = startServer({.location = 0});
   server.on<Int32>([](Int32&) {});
@@ -190,7 +189,7 @@ TEST_F(JunkTest, InvalidLinksDoNotKeepAServerFromItsClients) {
   std::filesystem::create_directory(link(0x776));
   checkCall(::mkfifo(link(0x777).c_str(), 0600), "mkfifo");
 
-  // More knocks than there are places for: the server looks for links by name, too.
+  // More knocks than the window has room for: the server also searches links by name.
   for (std::uint64_t number = 0x770; number < 0x770 + 200; ++number) window->knock(number);
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(client_.send(Int32Message({.value = i})), SendResult::sent);
@@ -208,7 +207,7 @@ TEST_F(JunkTest, InvalidLinksDoNotKeepAServerFromItsClients) {
   EXPECT_TRUE(client_.isConnected());
 }
 
-// A client died while it knocked, and somebody removed its window: nobody else knows of the link.
+// A client died while it knocked, and its window was removed: only the server can find the link.
 TEST_F(JunkTest, AServerRemovesALinkWhoseClientIsDead) {
   startServer({.location = 0});
   auto dead = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
@@ -254,7 +253,7 @@ TEST_F(JunkTest, AttachRemovesUnusableFilesAndKeepsThoseOfOtherLayouts) {
       << "a program of another version may use it";
 }
 
-// For the thread that it lives in, files are those of somebody else who is not root.
+// While this object exists, the files of its thread belong to another user who is not root.
 class AsNobody {
  public:
   AsNobody() { ::setfsuid(65534); }
@@ -300,9 +299,9 @@ TEST_F(WindowOfAnotherUser, ThatCannotBeRemovedIsReportedToTheServer) {
 
     try {
       const MessageServer server(backplane_, "device[0]/a", {.location = 0});
-      FAIL() << "it took the place of another user's window";
+      FAIL() << "the server replaced the window of another user";
     } catch (const std::exception& error) {
-      // One that cannot even be read may be in use.
+      // A window that cannot be read may be in use.
       EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr(path_),
                                                testing::HasSubstr(mode == 0600 ? "Permission denied"
                                                                                : "remove")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server that says what is not its to say: it is treated as one that sends nonsense.
+// A server that sends messages that only MPF may send: its client ends the connection.
 #include "tests/client/client_fixture.h"
 
 namespace mpf::test {
@@ -7,7 +7,7 @@ namespace {
 
 class LiarTest : public ClientTest {
  protected:
-  // Asks the server, whose answer must cost it the client.
+  // Sends a request to the server, whose reply must end the connection.
   void expectToBeLeft() {
     bind();
     ASSERT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);

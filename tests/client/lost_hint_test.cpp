@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Hints are written by every peer, and so can be lost or invented by any: that costs time, never a
-// message.
+// SPDX-License-Identifier: MIT Every peer writes hints, so any peer can erase hints or write false
+// ones: that costs time, never a message.
 #include <poll.h>
 
 #include <thread>
@@ -28,14 +27,14 @@ class LostHintTest : public ClientTest {
     }
     return {};
   }
-  // Whatever its owner was told and has not looked at yet is gone.
+  // Erases the hints that the owner has not read yet.
   static void lose(const Segment& segment) {
     auto& hints = segment.at<layout::WindowHints>(0);
     for (auto& knock : hints.knocks) knock.store(0);
     for (auto& word : hints.readyWords) word.store(0);
     for (auto& bits : hints.readyBits) bits.store(0);
   }
-  // Waits until the client expects nothing more, and neither side polls the link.
+  // Waits until the client expects no more messages, and neither side polls the link.
   void settle() {
     runUntil([&] { return dispatcher_.nextDeadline().isNever(); });
     while (server_->waitForMessage(Deadline::after(1ms))) EXPECT_FALSE(server_->receive());
@@ -87,7 +86,7 @@ TEST_F(LostHintTest, AReplyWhoseHintIsLostIsDelivered) {
   }
 }
 
-// Whoever may ring may also take rings.
+// A process that may ring a doorbell may also consume its rings.
 TEST_F(LostHintTest, ARingThatAnotherProcessConsumedIsRepeated) {
   runUntil([&] { return client_.isConnected(); });
   settle();
@@ -109,7 +108,7 @@ TEST_F(LostHintTest, ARingThatAnotherProcessConsumedIsRepeated) {
   EXPECT_EQ(next().tryAs<Int32>()->value, 5);
 }
 
-// Writes news of everything into hints, for as long as it lives.
+// Sets all hints repeatedly until it is destroyed.
 class Inventor {
  public:
   explicit Inventor(Segment segment)
@@ -134,7 +133,7 @@ TEST_F(LostHintTest, FalseHintsDoNotKeepAClientFromItsDeadline) {
   const Inventor inventor(hintsOf(layout::SegmentKind::clientWindow));
 
   const auto deadline = Deadline::after(20ms);
-  while (dispatcher_.runOnce(deadline)) continue;  // true: it had something of its own to do
+  while (dispatcher_.runOnce(deadline)) continue;  // true: it has done something
 }
 
 TEST_F(LostHintTest, FalseHintsDoNotBlockAnEventLoop) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Any thread may bind, send, cancel and wait, whichever kind of dispatcher the client has;
 // callbacks run on the thread that runs the dispatcher, and each request that was accepted has one
-// end.
+// reply or fate.
 #include <thread>
 
 #include <array>
@@ -37,7 +37,7 @@ class ThreadTest : public testing::TestWithParam<Kind> {
       dispatcher_.emplace(backplane_);
       running_ = std::thread([this] { runDispatcher(); });
     }
-    // Before a thread has run the dispatcher, a thread that waits for a connection may.
+    // A thread that waits for a connection may run the dispatcher before another thread has run it.
     auto first = makeClient([](const Message&) {});
     first->bind("echo");
     while (!first->isConnected()) std::this_thread::yield();
@@ -116,7 +116,7 @@ TEST_P(ThreadTest, EachRequestHasOneEndWhileManyThreadsCancel) {
   }
   for (auto& thread : threads) thread.join();
   while (seen.ended != kSenders * kEach) std::this_thread::yield();
-  // Nothing comes after the last one: the client ends on the dispatcher's thread, or without it.
+  // Nothing follows the last one: the client ends on the dispatcher's thread, or without it.
   client.reset();
 
   EXPECT_THAT(seen.ends, testing::Each(1));
@@ -126,7 +126,7 @@ TEST_P(ThreadTest, EachRequestHasOneEndWhileManyThreadsCancel) {
   }
 }
 
-// Clients come and go on several threads while others send.
+// Several threads create and destroy clients while others send.
 TEST_P(ThreadTest, ManyThreadsBindWaitAndDestroyTheirClients) {
   constexpr int kRounds = kIsSanitized ? 20 : 100;
   std::vector<std::thread> threads;
@@ -178,7 +178,7 @@ TEST_F(ClientTest, CancelLeavesTheFateToTheThreadThatRunsTheDispatcher) {
   EXPECT_EQ(fateOf(next()), Fate::cancelled);
 }
 
-// In a callback there is no other thread to leave it to.
+// In a callback, the calling thread itself delivers the fate.
 TEST_F(ClientTest, CancelInACallbackEndsTheRequestImmediately) {
   startServer().on<Int32>([](Int32&) {});
   std::vector<Message> held;
@@ -202,7 +202,7 @@ TEST_F(ClientTest, CancelInACallbackEndsTheRequestImmediately) {
   runUntil([&] { return !fates.empty(); });
 }
 
-// A cancel() that comes late finds no other request of that name on the next connection.
+// A late cancel() finds no other request with that number on the next connection.
 TEST_F(ClientTest, RequestIdsAreNotReusedOnTheNextConnection) {
   startServer().on<Int32>([](Int32&) {});
   bind();
@@ -221,7 +221,7 @@ TEST_F(ClientTest, RequestIdsAreNotReusedOnTheNextConnection) {
   static_cast<void>(next());
 }
 
-// connectWait() runs the dispatcher only until the thread comes that runs it for good.
+// connectWait() runs the dispatcher only until another thread calls run().
 TEST_F(ClientTest, AWaitingThreadYieldsToTheThreadThatRunsTheDispatcher) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
@@ -253,7 +253,7 @@ TEST_F(ClientTest, AWaitingThreadYieldsToTheThreadThatRunsTheDispatcher) {
   serving.join();
 }
 
-// Its last runner has gone: connectWait() runs the dispatcher as if nobody ever had.
+// Its last runner has ended: connectWait() runs the dispatcher as if no thread had run it before.
 TEST_F(ClientTest, AWaitingThreadRunsADispatcherWhoseThreadHasEnded) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });

@@ -126,9 +126,9 @@ TEST_F(DigitalIoServerTest, SendsAMonitorTheInputsImmediatelyAndEachChange) {
   }
 }
 
-// One that asks without a pause, with many requests on their way, does not keep news back: at most
-// one more of its requests is answered before them. Bit 5 is low in reads that begin after the
-// server has heard the news, and the bus is slow, so that requests wait.
+// A client that reads without a pause, with many requests in transit, does not delay changes: the
+// server replies to at most one more of its requests before it sends them. Bit 5 is low in reads
+// that begin after the server has received the change, and the bus is slow, so that requests wait.
 TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   start({.pollEvery = kNever, .vector = 116, .falling = 1});
   std::atomic<bool> isHeard{false}, ends{false};
@@ -169,7 +169,7 @@ TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   model_->connect(5, {});
 }
 
-// The original had one monitor, which a second client took away from the first.
+// The original MPF had one monitor: a second client replaced that of the first.
 TEST_F(DigitalIoServerTest, HasAnyNumberOfMonitors) {
   start();
   std::vector<std::unique_ptr<HardwareAsker>> askers;
@@ -205,7 +205,7 @@ TEST_F(DigitalIoServerTest, SendsNothingAfterAStop) {
   EXPECT_TRUE(in_.isSilent());
 }
 
-// The original dropped the monitor when any other command came.
+// The original MPF dropped the monitor at any other command.
 TEST_F(DigitalIoServerTest, KeepsAMonitorDuringOtherRequestsOfItsClient) {
   start();
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
@@ -242,7 +242,7 @@ TEST_F(DigitalIoServerTest, RemovesMonitorsOfClientsThatDieOrDisconnect) {
   EXPECT_EQ(in_.next().address, 1);
 }
 
-// A client that does not take its messages loses its monitor; others hear all.
+// A client that does not receive its messages loses its monitor; others receive all changes.
 TEST_F(DigitalIoServerTest, EndsOnlyTheMonitorOfAClientThatDoesNotReceive) {
   start();
   HardwareAsker stuck(backplane_, "dioIn");
@@ -258,7 +258,7 @@ TEST_F(DigitalIoServerTest, EndsOnlyTheMonitorOfAClientThatDoesNotReceive) {
   model_->setInputs(0x2, 0);
   EXPECT_EQ(in_.next().address & 2, 2);
   EXPECT_EQ(stuck.ask({.cmd = cmdReadBits, .address = 2}).status,
-            0);  // it may ask, and monitor again
+            0);  // it may send requests, and monitor again
   EXPECT_EQ(stuck.ask({.cmd = cmdStartMonitor}).status, 0);
 }
 
@@ -272,7 +272,7 @@ TEST_F(DigitalIoServerTest, SetsTheEdgesThatInterrupt) {
 
 // ---- faults
 
-// Nobody would hear of anything any more: the program has to end, and start again.
+// No client would receive changes any more: the program has to exit, and to be restarted.
 TEST_F(DigitalIoServerTest, ReportsThatTheInputServerFailed) {
   start();
   std::atomic<bool> throws{false};
@@ -283,7 +283,7 @@ TEST_F(DigitalIoServerTest, ReportsThatTheInputServerFailed) {
   throws = true;
   static_cast<void>(in_.client().client().connectWait(60s));
   EXPECT_EQ(in_.client().client().send(Int32Message({.cmd = cmdStartMonitor})), SendResult::sent);
-  thread_.join();  // the output server was told to end
+  thread_.join();  // the output server was stopped
   EXPECT_TRUE(hasFailed_);
   model_->connect(3, {});
 }

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Programs that drive modules, as processes: how they start, what they say, how they end, and wires
-// from one to the other.
+// SPDX-License-Identifier: MIT Programs that drive modules, as processes: how they start, what they
+// log, how they stop, and wires from one to the other.
 #include <array>
 #include <cstdio>
 
@@ -17,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// What a program writes to stdout when it is asked for help.
+// The output of a program with --help.
 std::string helpOf(const std::string& program) {
   std::string help;
   auto* const output = ::popen((program + " --help").c_str(), "r");

@@ -65,7 +65,7 @@ TEST_F(HardwareOpenTest, DoesNotWaitWithoutTheOptionWait) {
   EXPECT_EQ(calls, 1);
 }
 
-// Time does not mend it, and its owner would wait for ever.
+// The program would otherwise wait without end.
 TEST_F(HardwareOpenTest, DoesNotWaitWhenTheFileOfWiresIsInvalid) {
   parse("--carrier ipac=model --wait --wires " + folder_.write("letter", "a letter"));
   EXPECT_ANY_THROW(static_cast<void>(open([&] {

@@ -107,7 +107,7 @@ TEST_F(Ip330ProgramTest, FeedsBackThroughAWireFromTheDacToTheAdc) {
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
 
-// A DAC on a PCI board that no host has.
+// A DAC on a PCI board that does not exist.
 TEST_F(Ip330ProgramTest, ServesScansWhileItWaitsForADac) {
   const auto server = start({"adc", "ipac", "IP_a", "--carrier", "ipac=model", "--carrier",
                              "pci=tpci200:ffff:ff:1f.7", "--wait", "--scan", "s", "--config", "c",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The servers over one IP330, through clients.
+// The servers of one IP330, through clients.
 #include "ip330_fixture.h"
 
 namespace mpf::test {
@@ -66,7 +66,7 @@ TEST_F(Ip330ServersTest, AreConfiguredWhileTheyServe) {
   EXPECT_EQ(servers_.board().counters().calibrations, calibrations + 2);
   const auto time = ask("config", {.cmd = cmdSetMicrosecondsPerScan, .value = 2001});
   EXPECT_EQ(time.status, 0);
-  EXPECT_EQ(time.value, 2004);  // what the timer can
+  EXPECT_EQ(time.value, 2004);  // the nearest time of the timer
   EXPECT_EQ(ask("config", {.cmd = cmdSetScanMode, .value = 1}).status, 0);
   EXPECT_EQ(ask("scan", {.address = 0}).status, 0);
   EXPECT_EQ(ask("config", {.cmd = cmdSetScanMode, .value = 4}).status, 0);

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// What clients, `mpf msr` and the log say of a serial line that loses and damages bytes: on a port
-// of an octal UART.
+// SPDX-License-Identifier: MIT What clients, `mpf msr` and the log report of a serial line that
+// loses and damages bytes: on a port of an octal UART.
 #include "server/programs/serial_server/line_faults.h"
 
 #include <array>
@@ -65,10 +64,10 @@ class LineFaultsTest : public testing::Test {
   }
   void TearDown() override { stop(); }
 
-  // Returns once all that the far end has said is in the server's buffer, or lost.
+  // Returns when all bytes that the far end has sent are in the server's buffer, or lost.
   void waitForBytes(std::uint64_t count) {
     while (port_->counters().bytesIn < count) std::this_thread::yield();
-    static_cast<void>(port_->config({}));  // behind what the port's thread does with them
+    static_cast<void>(port_->config({}));  // returns after the port's thread has handled them
   }
   // A byte at a time: nothing gets lost.
   void saySlowly(const std::string& text) {
@@ -122,7 +121,7 @@ TEST_F(LineFaultsTest, AnAnswerThatLostBytesOutsideOfReadsIsNotOk) {
 
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOverflow, serialFaultOverrun, "abc\r"}));
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "next\r"}))
-      << "the gap is not in this one";
+      << "this answer does not contain the gap";
 
   EXPECT_EQ(alarmsOf(backplane_, kServer), 1U);
 }
@@ -181,7 +180,7 @@ TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWithoutAFault) {
 
   EXPECT_EQ(ask(cmdRead, {}, 4), (Answer{serialServerStatusOK, 4, "1234"}));
   EXPECT_EQ(ask(0, {}, 4), (Answer{serialServerStatusError, 0, ""}))
-      << "no command, and no fault of the line";
+      << "an invalid command is no fault of the line";
 }
 
 TEST_F(LineFaultsTest, AFlushRemovesTheFaultsWithTheBytes) {
@@ -220,7 +219,7 @@ TEST_F(LineFaultsTest, AnUnplugBetweenAnswersDamagesNone) {
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "two\r"}));
 }
 
-// A line of log for the first fault, and one for all the others.
+// One log line for the first fault, and one for all others.
 TEST_F(LineFaultsTest, AStormCausesTwoLogLinesWithPortKindsAndCounts) {
   constexpr int kFaults = 1000;
   testing::internal::CaptureStderr();

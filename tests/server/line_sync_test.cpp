@@ -35,7 +35,7 @@ TEST(LineSync, ALineWaitsForAMissingAnswer) {
   sync.unanswered(1000_ms);
 
   EXPECT_EQ(sync.readyAtNs(true), 2000_ms);
-  EXPECT_EQ(sync.readyAtNs(false), 2000_ms) << "its answer could be taken for the late one";
+  EXPECT_EQ(sync.readyAtNs(false), 2000_ms) << "its answer could be mistaken for the late one";
 }
 
 TEST(LineSync, ALateAnswerIsOverAfterItsEndAndSilence) {

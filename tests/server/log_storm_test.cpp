@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ten thousand refused requests to each server program: its log stays short, and counts them all.
+// Ten thousand invalid requests to each server program: its log stays short and counts all of them.
 #include <atomic>
 #include <future>
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ class LogStormTest : public testing::Test {
     program_ = std::make_unique<Program>(std::move(command));
     said_ = std::async(std::launch::async, [this] { return program_->errors(); });
   }
-  // Sends it to `server` again and again, many at once, and waits for all ends.
+  // Sends `request` to `server` kRequests times, many at once, and waits for all replies and fates.
   void storm(const std::string& server, const Message& request) {
     std::atomic<std::uint64_t> ends{0};
     MessageClient client(backplane_, [&](const Message& message) {
@@ -56,7 +56,7 @@ class LogStormTest : public testing::Test {
     if (const auto* config = request.tryAs<SerialConfig>()) return SerialConfigMessage(*config);
     return Int32Message(*request.tryAs<Int32>());
   }
-  // The program ends; `text` stands in the lines about each request.
+  // Stops the program. `text` is in the lines about each request.
   void expectShortLog(const std::string& text, std::uint64_t lines = kRequests) {
     program_->signal(SIGTERM);
     const auto said = said_.get();
@@ -127,7 +127,7 @@ TEST_F(LogStormTest, OfTheSerialServersSettings) {
   expectShortLog("settings refused");
 }
 
-// They say nothing about requests of other types.
+// They log nothing about requests of other types.
 TEST_F(LogStormTest, OfTheEchoServers) {
   start({MPF_TEST_INT32_SERVER});
   storm("Int32", Float64Message({.value = 1}));

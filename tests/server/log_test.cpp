@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A program's log: levels, storms, and what is left at the end.
+// The log of a program: levels, storms, and the lines that are left at the end.
 #include "server/programs/log.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ constexpr auto kAtOnce = static_cast<std::size_t>(LogLimiter::kAtOnce);
 
 class LogTest : public testing::Test {
  protected:
-  // Always the same statement.
+  // Logs from always the same statement.
   static void refuse(const Log& log, int number) { log.warn("request {} is refused", number); }
 
   std::int64_t nowNs_ = 1'000'000'000'000;
@@ -65,7 +65,7 @@ TEST_F(LogTest, ReportsWhenHeldLinesAreDueAndWritesThem) {
   ASSERT_THAT(due, SizeIs(1));
   lines_.clear();
 
-  EXPECT_EQ(log_.writeDue(), due[0]) << "it is too early";
+  EXPECT_EQ(log_.writeDue(), due[0]) << "no line is due yet";
   EXPECT_THAT(lines_, IsEmpty());
   nowNs_ = due[0];
 

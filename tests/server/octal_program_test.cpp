@@ -45,7 +45,7 @@ class OctalProgramTest : public testing::Test {
         askSerial(client, text, {.timeout = timeoutSeconds, .cmd = serial::cmdWriteRead});
     return reply.status == serial::serialServerStatusOK ? reply.text : "refused";
   }
-  // The program ends with status 2 and says so.
+  // Expects that the program exits with status 2 and this message.
   void expectRefused(const std::vector<std::string>& options, const std::string& complaint) const {
     const auto server = start(options);
     const auto status = server->wait();
@@ -100,9 +100,9 @@ TEST_F(OctalProgramTest, ServesOnePortLikeATerminal) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
 }
 
-// A host that is busy with other things may let the driver come late. Then the line has not turned
-// round when the answer begins, or the chip has no room for it: bytes are lost, as they are on a
-// real line, and the question is asked again.
+// A busy host may delay the driver. Then the line has not turned round when the answer begins, or
+// the chip has no room for the answer: bytes are lost, as on a real line, and the question is sent
+// again.
 TEST_F(OctalProgramTest, ServesAModelWithRealTiming) {
   const auto server = start({"dmm", "line", "1000", "20", "\\r\\n", "--octal-port",
                              "line,UART0,0,1200", "--octal-uart", "UART0,ipac,IP_b,8", "--carrier",
@@ -165,8 +165,8 @@ TEST_F(OctalProgramTest, ReportsAnInvalidModule) {
   }
 }
 
-// A board that this host cannot have is not waited for, nor are wrong parameters; one that is not
-// there yet is.
+// --wait does not wait for a board that this host cannot have, or for wrong parameters to change;
+// it waits for a missing board.
 TEST_F(OctalProgramTest, WaitsOnlyForBoardsThatMayAppear) {
   const auto startWith = [&](const std::string& carrier) {
     return start({"dmm", "x", "--wait", "--carrier", "ipac=" + carrier, "--octal-uart",
@@ -200,7 +200,7 @@ TEST_F(OctalProgramTest, LogsThePriorityOfInterrupts) {
               HasSubstr("interrupts are served at ordinary priority (--real-time 0)"));
 }
 
-// A module that is not there keeps nobody waiting but who wants its ports, and they are told so.
+// A missing module delays only the clients of its ports, whose requests get an error status.
 TEST_F(OctalProgramTest, AllServersRunWhileOneModuleIsMissing) {
   const auto path = folder_.file("line");
   Instrument instrument(path);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Serial servers on the eight ports of an octal UART: what clients see of it, and of what goes
-// wrong with it.
+// Serial servers on the eight ports of an octal UART: what clients see of it and of its faults.
 #include <array>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -78,7 +77,7 @@ class OctalStation {
   SerialServer serial_;
   std::thread thread_;
   SyncClient client_;
-  PeekTap tap_;  // last: ends before what it uses
+  PeekTap tap_;  // last: destroyed before the members that it uses
 };
 
 class OctalServerTest : public testing::Test {

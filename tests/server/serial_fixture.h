@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // SerialServerTest: a serial server on a real pseudo-terminal with an instrument at its far end,
-// and a client that asks it.
+// and its client.
 #pragma once
 
 #include <unistd.h>

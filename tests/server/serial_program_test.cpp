@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-serial-server as a process: how it ends, what it says, whom it lets in.
+// mpf-serial-server as a process: how it stops, what it logs, which clients it admits.
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -59,7 +59,7 @@ class Asker {
     messages_.pop_front();
     return message;
   }
-  // Asks and returns the status.
+  // Sends a request and returns the status of the reply.
   std::int32_t ask(std::string_view text) {
     send(text, {.timeout = 60, .cmd = cmdWriteRead});
     const auto reply = next();
@@ -173,7 +173,7 @@ TEST_F(SerialProgramTest, LogsItsEventsOnStderr) {
   std::vector<std::string> lines;
   std::istringstream text(server->errors());
   for (std::string line; std::getline(text, line);) lines.push_back(line);
-  // The line has a thread and the server has one: only the order of what one of them says is
+  // The line and the server have separate threads: only the order of the lines of one thread is
   // certain.
   const auto ofLine = [](const std::string& line) {
     return line.find("the line is ") != std::string::npos;
@@ -247,11 +247,11 @@ TEST_F(SerialProgramTest, AdmitsTheClientsOfItsMode) {
   const auto server = start({"--mode", "0660", "--group", group->gr_name});
   const Asker asker(backplane_);
 
-  // What the server made, both for its requests and for listeners, and the client's link to it.
+  // The files of the server, for requests and for listeners, and the client's link to it.
   for (const auto* const name : {".s.0.dmm", ".s.0.dmm%2Esniff"}) {
     struct stat file{};
     ASSERT_EQ(::stat(("/dev/shm/mpf." + backplane_.name() + name).c_str(), &file), 0) << name;
-    EXPECT_EQ(file.st_mode & 0777U, 0640U) << name;  // nobody but the server writes to its window
+    EXPECT_EQ(file.st_mode & 0777U, 0640U) << name;  // only the server may write to its window
     EXPECT_EQ(file.st_gid, ::getegid()) << name;
   }
 }

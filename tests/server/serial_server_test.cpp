@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A serial server on a real pseudo-terminal with an instrument at its far end, asked through shared
+// A serial server on a real pseudo-terminal with an instrument at its far end, used through shared
 // memory.
 #include <mpf/serial_commands.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Each answer goes to its own question, whatever an instrument does; and no request has the line
-// for ever.
+// Each answer is returned to its own question, whatever an instrument does, and no request uses the
+// line without end.
 #include <atomic>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ struct Outcome {
   std::atomic<int> right = 0, wrong = 0, timeouts = 0, others = 0;
 };
 
-// Asks questions 0, 1, 2, ... of `next`, with options and timeouts at random.
+// Sends questions 0, 1, 2, ... of `next`, with random options and timeouts.
 void askAll(const Backplane& backplane, std::atomic<int>& next, int end, Random& random,
             Outcome& outcome) {
   SyncClient client(backplane, "fickle");
@@ -58,7 +58,7 @@ void askAll(const Backplane& backplane, std::atomic<int>& next, int end, Random&
 
 class FickleInstrumentTest : public testing::TestWithParam<bool> {};
 
-// MPF_TEST_QUESTIONS=100000 asks more.
+// MPF_TEST_QUESTIONS=100000 sends more.
 TEST_P(FickleInstrumentTest, NoQuestionGetsAnAnswerToAnother) {
   const Watchdog watchdog("fickle instrument test",
                           std::chrono::seconds(120 + questionsToAsk() / 50));
@@ -99,11 +99,11 @@ INSTANTIATE_TEST_SUITE_P(Circular, FickleInstrumentTest, testing::Bool());
 
 class LateAnswerTest : public SerialServerTest, public testing::WithParamInterface<bool> {
  protected:
-  // The answer is waited for, however slow the machine is.
+  // The server waits for the answer, however slow the machine is.
   void startWith(const LineLimits& limits = {.resyncLimit = 60s}) {
     start({.bufferBytes = 100, .eom = "\r\n", .circularBuffer = GetParam(), .limits = limits});
   }
-  // A question whose answer comes after its time is over.
+  // A question whose answer arrives after its timeout.
   void askTooEarly() {
     instrument_.behave({.delay = 750ms});
     EXPECT_EQ(ask("ECHO late\n", fieldsOf(cmdWriteRead, 250)).status, serialServerStatusTimeout);
@@ -173,7 +173,7 @@ TEST_P(LateAnswerTest, IsUsedAsTheAnswerOfARetry) {
   const auto reply = ask("ECHO late\n", fields);
 
   EXPECT_EQ(reply, (SerialReply{serialServerStatusOK, "late\r\n"}));
-  EXPECT_EQ(port_.counters().bytesOut, 10U) << "asked once";
+  EXPECT_EQ(port_.counters().bytesOut, 10U) << "sent once";
 }
 
 TEST_P(LateAnswerTest, SecondAnswersAreSurplus) {
@@ -185,7 +185,7 @@ TEST_P(LateAnswerTest, SecondAnswersAreSurplus) {
   EXPECT_GE(alarmsOf(backplane_, "serial[0]"), 2U);
 }
 
-// An instrument that never stops: nobody can tell its answers.
+// An instrument that never stops sending: its answers cannot be recognised.
 TEST_P(LateAnswerTest, NothingIsSentWithoutSilence) {
   startWith({.quietTime = 1h, .resyncLimit = 10ms});
   askTooEarly();
@@ -200,7 +200,7 @@ TEST_P(LateAnswerTest, NothingIsSentWithoutSilence) {
   EXPECT_EQ(ask("ECHO unsent\n", fieldsOf(cmdWriteRead)).status, serialServerStatusError);
 
   isOver = true;
-  EXPECT_EQ(port_.counters().bytesOut, 10U) << "the first question alone";
+  EXPECT_EQ(port_.counters().bytesOut, 10U) << "only the first question was sent";
 }
 
 TEST_P(LateAnswerTest, AcknowledgementsOfWritesAreNoAlarm) {
@@ -253,7 +253,7 @@ TEST_F(SerialServerTest, RetriesAreLimited) {
 
   EXPECT_EQ(ask("?\n", fields).status, serialServerStatusTimeout);
 
-  EXPECT_EQ(port_.counters().bytesOut, 8U) << "asked four times";
+  EXPECT_EQ(port_.counters().bytesOut, 8U) << "sent four times";
 }
 
 TEST_F(SerialServerTest, TimeoutsAreLimitedWithTheRetries) {
@@ -264,7 +264,7 @@ TEST_F(SerialServerTest, TimeoutsAreLimitedWithTheRetries) {
       ask("?\n", {.timeout = INT32_MAX, .cmd = cmdWriteRead, .numberRetrys = INT32_MAX});
 
   EXPECT_EQ(reply.status, serialServerStatusTimeout);
-  EXPECT_EQ(port_.counters().bytesOut, 2U) << "asked once";
+  EXPECT_EQ(port_.counters().bytesOut, 2U) << "sent once";
 }
 
 constexpr LineLimits kNoLimit{.resyncLimit = 10ms, .maxTimeout = 24h, .maxRetries = 1'000'000};
@@ -297,7 +297,7 @@ TEST_F(SerialServerTest, TheRequestOfAClientThatDisconnectsEnds) {
   EXPECT_EQ(ask("ECHO free\n", fieldsOf(cmdWriteRead)).text, "free\r\n");
 }
 
-// As an IOC's that sends its last command and ends.
+// For example an IOC that sends its last command and exits.
 TEST_F(SerialServerTest, AWriteContinuesWhenItsClientExits) {
   start();
   for (int i = 0; i < 20; ++i) {

@@ -34,9 +34,9 @@ class Listener {
     request.setClientExtra(mark);
     return call(std::move(request)).status;
   }
-  // Returns the reply; what came before it is taken.
+  // Receives the messages before the reply, and returns the reply.
   Int32 stop() { return call(Int32Message({.cmd = cmdSniffStop})); }
-  // Takes all that the server has sent until now.
+  // Receives all messages that the server has sent until now.
   void takeWhatIsThere() { EXPECT_EQ(call(Int32Message({.cmd = 77})).status, sniffStatusError); }
   void takeUntil(std::size_t records) {
     while (records_.size() < records) keep(client_.receive(60s));
@@ -45,7 +45,7 @@ class Listener {
   [[nodiscard]] std::span<const SniffRecord> records() const { return records_; }
   [[nodiscard]] std::string text() const { return textOf(records_); }
   [[nodiscard]] std::size_t lost() const { return lost_; }
-  // Of each record, the mark of the start that it belongs to.
+  // For each record, the mark of the start that it belongs to.
   [[nodiscard]] const std::vector<std::int32_t>& marks() const { return marks_; }
   [[nodiscard]] SyncClient& client() { return client_; }
 
@@ -84,9 +84,9 @@ class SniffTest : public SerialServerTest {
         {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = {.settleTime = 0ms}});
     sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_,
                                            batching);
-    sniff_->start([] { FAIL() << "it cannot serve"; });
+    sniff_->start([] { FAIL() << "the sniff server failed"; });
   }
-  // One question and its answer. Returns what a listener hears of it.
+  // Sends one question. Returns the records that a listener must receive of it and its answer.
   std::string talk(const std::string& word) {
     EXPECT_EQ(ask("ECHO " + word + "\n", fieldsOf(cmdWriteRead)).text, word + "\r\n");
     return "T:ECHO " + word + "\nR:" + word + "\r\n";
@@ -242,7 +242,7 @@ TEST_F(SniffTest, ThePortIsTappedWhileThereAreListeners) {
   EXPECT_TRUE(port_.taps().isEmpty());
 }
 
-// It loses bytes, is told how many, and nobody else notices.
+// It loses bytes and learns their number; other listeners are not affected.
 TEST_F(SniffTest, AListenerThatDoesNotReceiveLosesBytes) {
   startWithListening(kAtOnce);
   Listener idle(backplane_);
@@ -262,7 +262,7 @@ TEST_F(SniffTest, AListenerThatDoesNotReceiveLosesBytes) {
   EXPECT_EQ(busy.lost(), 0U);
 
   idle.takeWhatIsThere();
-  EXPECT_EQ(idle.lost(), 0U);  // not told yet
+  EXPECT_EQ(idle.lost(), 0U);  // not reported yet
   const auto heard = idle.records().size();
   EXPECT_LT(heard, kQuestions * kBytesOfOne);
   EXPECT_GT(heard, 0U);
