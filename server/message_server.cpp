@@ -14,7 +14,7 @@ const char* toString(ReplyResult result) noexcept {
     case ReplyResult::sent:
       return "sent";
     case ReplyResult::clientGone:
-      return "client gone";
+      return "the client has disconnected";
     case ReplyResult::queueFull:
       return "reply queue full";
     case ReplyResult::tooLarge:

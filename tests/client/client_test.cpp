@@ -34,7 +34,7 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
                                           ConnectStatus::connectYes));
 }
 
-// The process of the server does not exit, and there is no link that the server could close.
+// The process of the server does not exit, and the server could not close a link.
 TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   startServer();
   serverRuns_ = false;
@@ -53,16 +53,17 @@ TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
 // One hint announces any number of messages and the end after them.
 TEST_F(ClientTest, AServerNoticesAClientThatDisconnectsRightAfterItsRequests) {
   constexpr int kMost = 40;
-  int gone = 0;
-  startServer().onClient([&](std::uint64_t, bool isThere) { gone += isThere ? 0 : 1; });
+  int disconnected = 0;
+  startServer().onClient(
+      [&](std::uint64_t, bool isConnected) { disconnected += isConnected ? 0 : 1; });
   for (int requests = 1; requests <= kMost; ++requests) {
     MessageClient leaving(dispatcher_, [](const Message&) {});
     leaving.bind("device[0]/a");
     runUntil([&] { return leaving.isConnected(); });
     for (int i = 0; i < requests; ++i) static_cast<void>(leaving.send(Int32Message()));
-    // and goes
+    // The destructor disconnects the client.
   }
-  runUntil([&] { return gone == kMost; });
+  runUntil([&] { return disconnected == kMost; });
 }
 
 TEST_F(ClientTest, AClientNoticesAServerThatEndsRightAfterItsReplies) {

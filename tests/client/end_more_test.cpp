@@ -34,7 +34,7 @@ using EndMoreTest = ClientTest;
 
 // A request whose memory cannot be mapped because no descriptor is left is not a protocol error.
 TEST_F(EndMoreTest, AServerWithoutDescriptorsKeepsTheClientOfALargeRequest) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   auto& server = startServer();
   server.on<Float64Array>([](Float64Array&) {});
   bind();
@@ -51,7 +51,7 @@ TEST_F(EndMoreTest, AServerWithoutDescriptorsKeepsTheClientOfALargeRequest) {
 
 // A link that cannot be mapped is not a protocol error either.
 TEST_F(EndMoreTest, AServerWithoutDescriptorsAcceptsItsClientLater) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   auto& server = startServer();
   client_.bind("device[0]/a");
   {
@@ -65,7 +65,7 @@ TEST_F(EndMoreTest, AServerWithoutDescriptorsAcceptsItsClientLater) {
 
 // A reply whose memory cannot be mapped is not a protocol error either.
 TEST_F(EndMoreTest, AClientWithoutDescriptorsKeepsTheServerOfALargeReply) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto reply = server.allocReplyMessage<Float64Array>(request, kBeyondRings);
@@ -255,7 +255,7 @@ TEST_F(EndMoreTest, ACallbackMayWaitForTheNextConnection) {
 // for servers by itself.
 TEST(EndOfOthers, AClientThatIsBoundDuringADisconnectConnectsOnce) {
   MPF_NEEDS_A_CHILD;
-  const Watchdog watchdog("bound meanwhile");
+  const Watchdog watchdog("bind during a disconnect");
   TestBackplane backplane;
   const auto child = inAChild([&] {
     MessageServer mortal(Backplane::named(backplane.name()), "mortal");

@@ -95,7 +95,7 @@ TEST_F(EndTest, AServerUnmapsTheWindowsOfClientsThatDisconnected) {
 
 // A connect that fails because of missing memory uses up nothing permanently.
 TEST_F(EndTest, AFailedConnectUsesUpNoIndex) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   startServer();
   static_cast<void>(::signal(SIGXFSZ, SIG_IGN));
   rlimit old{};
@@ -182,7 +182,7 @@ TEST_F(EndTest, RequestsOfAClientWhoseProcessExitedAreReceived) {
   int status = -1;
   ::waitpid(child, &status, 0);
   EXPECT_EQ(status, 0);
-  isNoticed.wait(false);  // and so has the server, when it looks up from other things
+  isNoticed.wait(false);  // the server notices it with its next receive()
 
   while (handled < 5) server.handleOne();
 

@@ -21,7 +21,7 @@ void writeFile(const std::string& path, const void* bytes, std::size_t size) {
       .write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
 }
 
-// A window whose owner is dead, with one thing changed.
+// The window of a dead owner, with one field changed.
 void writeWindow(const std::string& path, const std::function<void(layout::SegmentHeader&)>& change,
                  std::size_t size = layout::kWindowBytes) {
   std::vector<std::byte> bytes(layout::kWindowBytes);

@@ -87,7 +87,7 @@ class FickleLine : public SerialLine {
   };
   using Ns = std::chrono::nanoseconds;
 
-  // Up to `most`, which it does not reach.
+  // A random time from 0 to less than `most`.
   std::int64_t someNs(Ns most) {
     return static_cast<std::int64_t>(
         random_.below(static_cast<std::uint64_t>(std::max<std::int64_t>(most.count(), 1))));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // HardwareTest: a carrier of models and a backplane, for tests of servers that drive modules;
-// HardwareAsker: a client of one.
+// HardwareAsker: a client of such a server.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -38,7 +38,7 @@ class HardwareAsker {
     EXPECT_TRUE(message);
     return message ? take(message) : Int32{.status = -99};
   }
-  // Whether no further reply arrived before the last reply.
+  // Whether the server sent no further reply before the last reply.
   [[nodiscard]] bool isSilent() { return !client_.receive(0s); }
   [[nodiscard]] SyncClient& client() noexcept { return client_; }
 

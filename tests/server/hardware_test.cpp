@@ -48,10 +48,10 @@ TEST_F(HardwareOpenTest, ContinuesWhenTheBoardAppearsAndLogsEachReasonOnce) {
   const auto said = testing::internal::GetCapturedStderr();
   EXPECT_NE(module, nullptr);
   EXPECT_EQ(calls, 4);
-  const auto first = said.find("the board is not there yet: no power");
+  const auto first = said.find("waiting for the board: no power");
   EXPECT_NE(first, std::string::npos) << said;
   EXPECT_EQ(said.find("no power", first + 40), std::string::npos) << said;
-  EXPECT_THAT(said, HasSubstr("the board is not there yet: no clock"));
+  EXPECT_THAT(said, HasSubstr("waiting for the board: no clock"));
 }
 
 TEST_F(HardwareOpenTest, DoesNotWaitWithoutTheOptionWait) {

@@ -137,7 +137,7 @@ TEST_F(LogStormTest, OfTheEchoServers) {
   expectShortLog("Float64", 0);
 }
 
-// A server of another type refuses each message of the client at once.
+// A server of another type refuses each message of the client immediately.
 TEST_F(LogStormTest, OfAClientProgramWhoseMessagesAreRefused) {
   constexpr std::uint64_t kMessages = 2000;  // one by one
   start({MPF_TEST_CHAR8_ARRAY_SERVER});

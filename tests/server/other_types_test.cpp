@@ -11,7 +11,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// As a serial server has it: two types of its own, one of them SerialConfig.
+// As for a serial server: it handles two types, one of them SerialConfig.
 TEST_F(HardwareTest, RepliesToAllTypesExceptTheHandledOnes) {
   MessageServer server(backplane_, "server");
   std::vector<MessageType> noted;

@@ -49,7 +49,7 @@ class SerialServerTest : public testing::Test {
   }
 
   using Reply = SerialReply;
-  // Asks with a timeout in milliseconds, unless `fields` say otherwise.
+  // Sends a request with a timeout in milliseconds, unless `fields` has another cmd.
   Reply ask(std::string_view text, const Char8Array& fields) {
     return askSerial(client_, text, fields);
   }

@@ -109,7 +109,7 @@ class LateAnswerTest : public SerialServerTest, public testing::WithParamInterfa
     EXPECT_EQ(ask("ECHO late\n", fieldsOf(cmdWriteRead, 250)).status, serialServerStatusTimeout);
     instrument_.behave({});
   }
-  // Returns how many of `count` questions were answered by the answer to another one.
+  // Returns how many of `count` questions got the answer to another question.
   static int wrongOf(SyncClient& client, const std::string& who, int count) {
     int wrong = 0;
     for (int i = 0; i < count; ++i) {
@@ -232,7 +232,7 @@ TEST_F(SerialServerTest, AWriteReadWithoutDataReadsTheBytesThatArriveLater) {
   EXPECT_EQ(ask("ECHO next\n", fieldsOf(cmdWriteRead)).text, "next\r\n");
 }
 
-// ---- a request that would not end
+// ---- requests without end
 
 TEST_F(SerialServerTest, AnInvalidCommandIsNotRetried) {
   start();

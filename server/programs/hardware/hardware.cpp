@@ -85,7 +85,7 @@ IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& k
     } catch (const std::runtime_error& error) {
       if (!waits_ || isForGood(error)) throw;
       if (std::exchange(logged, error.what()) != error.what())
-        log->warn("the board is not there yet: {}", error.what());
+        log->warn("waiting for the board: {}", error.what());
     }
     if (stop.wait(kRetryEvery)) return nullptr;
   }

@@ -64,7 +64,7 @@ class Hardware {
   // before if the carrier is one of models. With --wait it waits for both, and logs the reason
   // whenever it changes. Returns null when SIGINT or SIGTERM arrived while it waited.
   //   throws  what wires(), createCarrier() and IndustryPackModules::create() throw;
-  //           std::invalid_argument when no option says what the carrier is
+  //           std::invalid_argument when no option defines the carrier
   [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind,
                                          const MakeModel& makeModel, const ServerLog& log);
   // The same for a program that already serves: returns null as well when `stop` has rung before.

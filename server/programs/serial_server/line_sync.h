@@ -2,7 +2,7 @@
 // LineSync: computes when the next request may be sent, so that no late answer is mistaken for its
 // answer.
 //
-//   in step ── asked ──► answer owed ── answered ──► in step          settleTime of silence
+//   in step ── asked ──► outstanding ── answered ──► in step          settleTime of silence
 //                            └─ unanswered ──► late ─┬─ seen ───────► quietTime of silence
 //                                                    └─ resyncLimit ► quietTime of silence
 //   in step ── input without a request ──► surplus ─────────────────► quietTime of silence

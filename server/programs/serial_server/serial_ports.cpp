@@ -30,7 +30,7 @@ bool SerialPorts::tryOpenModule(const OctalUartStart& start) {
     return true;
   } catch (const std::runtime_error& error) {
     if (!options_.hardware.waits() || Hardware::isForGood(error)) throw;
-    log_->warn("the board is not there yet: {}", error.what());
+    log_->warn("waiting for the board: {}", error.what());
     return false;
   }
 }
