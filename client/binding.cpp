@@ -39,7 +39,7 @@ bool Binding::takeOne() {
     case MessageLink::Take::message:
       if (tryDeliverReply(envelope)) return true;
       break;
-    case MessageLink::Take::nonsense:
+    case MessageLink::Take::invalid:
       break;
   }
   count(dispatcher_.endpoint().control().protocolErrors);
@@ -100,7 +100,7 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
   }
   Message message;
   switch (channel_->tryFinish(envelope, message)) {
-    case MessageLink::Finish::nonsense:
+    case MessageLink::Finish::invalid:
       return false;
     case MessageLink::Finish::unavailable:
       if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);

@@ -52,7 +52,8 @@ class Binding : public std::enable_shared_from_this<Binding> {
   enum class Ending {
     serverGone,  // dead, or it closed the link: it will not receive the remaining requests
     refused,  // the server refused the link: try again later
-    protocolError,  // the client ends the connection: the server may still receive requests
+    // The client ends the connection: the server may receive requests for a while.
+    protocolError,
   };
   void disconnect(const std::string& reason, Ending ending);
   void cancel(std::uint32_t requestId);

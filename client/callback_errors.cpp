@@ -11,8 +11,6 @@
 namespace mpf {
 namespace {
 
-constexpr std::int64_t kReportEveryNs = 1'000'000'000;
-
 std::string textOfException() {
   try {
     throw;
@@ -33,22 +31,33 @@ void CallbackErrors::note(const std::string& server, std::int32_t location) noex
 
 void CallbackErrors::report() noexcept try {
   const auto client = std::exchange(client_, {});
-  const auto nowNs = Clock::nowNs();
-  if (reportedNs_ != 0 && nowNs - reportedNs_ < kReportEveryNs) {
-    ++leftOut_;
-    return;
-  }
-  reportedNs_ = nowNs;
-  const auto leftOut = std::exchange(leftOut_, 0);
-  const auto more = leftOut == 0 ? "" : fmt::format(" ({} more since the last report)", leftOut);
   const auto text = fmt::format(
       "mpf: the callback{} threw an exception: {}. The dispatcher continues; catch the exception "
       "in the "
-      "callback.{}\n",
-      client, textOfException(), more);
-  std::fwrite(text.data(), 1, text.size(), stderr);
+      "callback.",
+      client, textOfException());
+  if (limiter_.admit({}, 0, text, Clock::nowNs())) write({{0, text}});
 } catch (const std::exception&) {
-  ++leftOut_;  // no memory for the text
+  // No memory for the text: the alarm of the dispatcher counts the exception.
+}
+
+void CallbackErrors::writeDue() noexcept try {
+  if (dueNs() != INT64_MAX) write(limiter_.takeDue(Clock::nowNs()));
+} catch (const std::exception&) {
+  // as above
+}
+
+void CallbackErrors::writeHeld() noexcept try {
+  write(limiter_.takeAll(Clock::nowNs()));
+} catch (const std::exception&) {
+  // as above
+}
+
+void CallbackErrors::write(const std::vector<LogLimiter::Line>& lines) {
+  for (const auto& line : lines) {
+    const auto text = line.text + '\n';
+    std::fwrite(text.data(), 1, text.size(), stderr);
+  }
 }
 
 }  // namespace mpf

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: MIT
-// CallbackErrors: writes to stderr what callbacks throw on a thread on which no caller could catch
+// CallbackErrors: writes to stderr what callbacks throw on a thread on which no caller can catch
 // it.
 //
 //   mpf: the callback of the client of server "dac" at location 0 threw an exception: no such
-//   record. The dispatcher continues; catch the exception in the callback. (41 more since the last
-//   report)
+//   record. The dispatcher continues; catch the exception in the callback. (repeated 41 times in
+//   10.0 s)
+//
+// A LogLimiter holds back the reports of a callback that throws again and again.
 //
 // Threads  one.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include "base/log_limiter.h"
 
 namespace mpf {
 
@@ -18,14 +23,19 @@ class CallbackErrors {
  public:
   // The client whose callback threw the exception that is reported next.
   void note(const std::string& server, std::int32_t location) noexcept;
-  // Reports the exception that is being handled; not more often than once a second, with the number
-  // of those that were left out.
+  // Reports the exception that is being handled: now, or from dueNs() on.
   void report() noexcept;
+  // When writeDue() has something to write; INT64_MAX: nothing is held.
+  [[nodiscard]] std::int64_t dueNs() const noexcept { return limiter_.dueNs(); }
+  void writeDue() noexcept;
+  // Writes all that is held: before the thread ends.
+  void writeHeld() noexcept;
 
  private:
+  static void write(const std::vector<LogLimiter::Line>& lines);
+
   std::string client_;
-  std::int64_t reportedNs_ = 0;  // when; 0: never
-  std::uint64_t leftOut_ = 0;
+  LogLimiter limiter_;
 };
 
 }  // namespace mpf

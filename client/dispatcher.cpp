@@ -51,15 +51,17 @@ void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
   hasThread_ = true;
   thread_ = std::thread([self] {
     ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
-    const auto turn = self->enterAnyway();
+    const auto guard = self->acquireLock();
     while (!self->ended_.load(std::memory_order_relaxed)) {
       try {
-        self->runOnce(Deadline::never());
+        self->runOnce(Deadline::atNs(self->errors_.dueNs()));
       } catch (...) {  // thrown by a callback; this thread has no caller that could handle it
         self->endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed);
         self->errors_.report();
       }
+      self->errors_.writeDue();
     }
+    self->errors_.writeHeld();
   });
 }
 
@@ -90,16 +92,16 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
   endpoint_.interrupt();
 }
 
-RunnerTurn Dispatcher::Impl::enter() {
+RunnerGuard Dispatcher::Impl::becomeRunner() {
   endpoint_.forkGuard().check("Dispatcher");
-  if (lock_.isMine()) return RunnerTurn(nullptr);
-  if (hasThread_) RunnerLock::refuse();
-  return enterAnyway();
+  if (lock_.isMine()) return RunnerGuard(nullptr);
+  if (hasThread_) RunnerLock::throwOtherRunner();
+  return acquireLock();
 }
 
-RunnerTurn Dispatcher::Impl::enterAnyway() {
-  lock_.enter([this] { endpoint_.interrupt(); });
-  return RunnerTurn(&lock_);
+RunnerGuard Dispatcher::Impl::acquireLock() {
+  lock_.acquire([this] { endpoint_.interrupt(); });
+  return RunnerGuard(&lock_);
 }
 
 bool Dispatcher::Impl::takeStop() noexcept {
@@ -107,16 +109,17 @@ bool Dispatcher::Impl::takeStop() noexcept {
 }
 
 bool Dispatcher::Impl::runOnce(Deadline deadline) {
-  const auto turn = enter();
+  const auto guard = becomeRunner();
   return run(deadline, [this] { return takeStop(); });
 }
 
 bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()>& isDone) {
   const bool isNested = lock_.isMine();
-  if (!isNested && (hasThread_ || !lock_.mayRunAsGuest() || !lock_.tryEnterAsGuest())) return false;
-  const RunnerTurn turn(isNested ? nullptr : &lock_);
-  const auto isWanted = [&] { return !isNested && lock_.isWanted(); };
-  while (!isDone() && !deadline.hasPassed() && !isWanted()) run(deadline, isWanted);
+  if (!isNested && (hasThread_ || lock_.hasOtherRunner() || !lock_.tryAcquireTemporarily()))
+    return false;
+  const RunnerGuard guard(isNested ? nullptr : &lock_);
+  const auto isOver = [&] { return !isNested && lock_.isRunnerWaiting(); };
+  while (!isDone() && !deadline.hasPassed() && !isOver()) run(deadline, isOver);
   if (hasDescriptor_) endpoint_.callAgain();  // running has made it unreadable
   return true;
 }
@@ -125,8 +128,9 @@ bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()
 template <class IsOver>
 bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
   const auto me = std::this_thread::get_id();
-  // PAIR(ran-last): stored before this thread reads how long it may wait.
-  if (ranLast_.load(std::memory_order_relaxed) != me) ranLast_.store(me, std::memory_order_seq_cst);
+  // PAIR(waiting-thread): stored before this thread reads how long it may wait.
+  if (waitingThread_.load(std::memory_order_relaxed) != me)
+    waitingThread_.store(me, std::memory_order_seq_cst);
   for (std::uint32_t wakeups = 0;;) {
     // Checked even when every step finds work: a busy dispatcher must stop, too.
     if (isOver()) return false;
@@ -186,7 +190,7 @@ int Dispatcher::Impl::descriptor() {
 }
 
 bool Dispatcher::Impl::runPending(int most) {
-  const auto turn = enter();
+  const auto guard = becomeRunner();
   // Peers may send messages and hints without end: the event loop must have its turn.
   for (int batches = 0; batches < most; ++batches) {
     if (step()) continue;
@@ -211,16 +215,16 @@ void Dispatcher::Impl::postLater(std::function<void()> command) {
   endpoint_.interrupt();
 }
 
-void Dispatcher::Impl::runQuietly(const std::function<void()>& command) {
+void Dispatcher::Impl::runOrPost(const std::function<void()>& command) {
   if (lock_.isMine()) return command();
-  if (!lock_.tryEnterAsGuest()) return postLater(command);
-  const RunnerTurn turn(&lock_);
+  if (!lock_.tryAcquireTemporarily()) return postLater(command);
+  const RunnerGuard guard(&lock_);
   command();
 }
 
 // The thread that runs the dispatcher may stop before it has seen the command; then the caller runs
 // the command.
-void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
+void Dispatcher::Impl::runOrPostAndWait(const std::function<void()>& command) {
   if (lock_.isMine()) return command();
   struct State {
     bool isStarted = false;  // under lock_
@@ -238,8 +242,8 @@ void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
   };
   const auto isDone = [&] { return state->isDone; };
   for (bool isPosted = false;; isPosted = true) {
-    if (lock_.tryEnterAsGuest()) {
-      const RunnerTurn turn(&lock_);
+    if (lock_.tryAcquireTemporarily()) {
+      const RunnerGuard guard(&lock_);
       return runFirst();
     }
     if (!isPosted) postLater(runFirst);
@@ -251,12 +255,12 @@ void Dispatcher::Impl::runQuietlyAndWait(const std::function<void()>& command) {
 
 void Dispatcher::Impl::noteDue(std::int64_t ns) noexcept {
   auto due = dueNs_.load(std::memory_order_relaxed);
-  // PAIR(ran-last): stored before this thread reads which thread waits.
+  // PAIR(waiting-thread): stored before this thread reads which thread waits.
   while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst,
                                                    std::memory_order_relaxed)) {
   }
-  // PAIR(ran-last): the waiting thread reads the time stored above, or its id is read here.
-  if (ns < due && ranLast_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
+  // PAIR(waiting-thread): the waiting thread reads the time stored above, or its id is read here.
+  if (ns < due && waitingThread_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
     endpoint_.interrupt();
 }
 
@@ -381,7 +385,7 @@ std::shared_ptr<Dispatcher> Dispatcher::shared(const Backplane& backplane) {
 
 bool Dispatcher::runOnce(Deadline deadline) { return impl_->runOnce(deadline); }
 void Dispatcher::run() {
-  const auto turn = impl_->enter();
+  const auto guard = impl_->becomeRunner();
   while (impl_->runOnce(Deadline::never())) {
   }
 }

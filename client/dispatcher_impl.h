@@ -37,9 +37,10 @@ class Dispatcher::Impl {
   void endThread();
 
   // --- any thread, as long as no other thread runs the dispatcher ---
-  // Makes the calling thread the runner, unless it already is.
+  // Makes the calling thread the runner until the guard ends; changes nothing when it has the lock
+  // already.
   //   throws  std::logic_error when another thread runs the dispatcher
-  [[nodiscard]] RunnerTurn enter();
+  [[nodiscard]] RunnerGuard becomeRunner();
   bool runOnce(Deadline deadline);
   bool runPending(int most);
   int descriptor();
@@ -50,7 +51,7 @@ class Dispatcher::Impl {
   // --- any thread ---
   void interrupt() noexcept;
   [[nodiscard]] Deadline nextDue() const noexcept {
-    // PAIR(ran-last): read after the waiting thread has stored its id in ranLast_.
+    // PAIR(waiting-thread): read after the waiting thread has stored its id in waitingThread_.
     return Deadline::atNs(dueNs_.load(std::memory_order_seq_cst));
   }
   // Runs `command`, which may run callbacks, on the thread that runs the dispatcher: now when that
@@ -60,9 +61,9 @@ class Dispatcher::Impl {
   void postLater(std::function<void()> command);
   // Runs `command`, which runs no callback: now when no other thread runs the dispatcher, else in
   // the next step.
-  void runQuietly(const std::function<void()>& command);
-  // As runQuietly(), and waits until the command has run.
-  void runQuietlyAndWait(const std::function<void()>& command);
+  void runOrPost(const std::function<void()>& command);
+  // As runOrPost(), and waits until the command has run.
+  void runOrPostAndWait(const std::function<void()>& command);
   // Makes sure that the dispatcher wakes up at `ns`.
   void noteDue(std::int64_t ns) noexcept;
 
@@ -80,7 +81,7 @@ class Dispatcher::Impl {
   void noteThrower(const std::string& server, std::int32_t location) noexcept;
 
  private:
-  RunnerTurn enterAnyway();
+  RunnerGuard acquireLock();
   template <class IsOver>
   bool run(Deadline deadline, const IsOver& isOver);
   bool takeStop() noexcept;
@@ -109,7 +110,8 @@ class Dispatcher::Impl {
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
   RunnerLock lock_;
-  std::atomic<std::thread::id> ranLast_;  // the thread that waits, or waited last
+  // The thread that waits in run(), or waited there last.
+  std::atomic<std::thread::id> waitingThread_;
   CallbackErrors errors_;
   int depth_ = 0;  // of nested steps: a callback may run the dispatcher
   bool hasDescriptor_ = false;

@@ -39,13 +39,13 @@ MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callba
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
     : dispatcher_(dispatcher.impl_),
       binding_(std::make_shared<Binding>(*dispatcher_, std::move(callback))) {
-  dispatcher_->runQuietly(
+  dispatcher_->runOrPost(
       [dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
 }
 
 MessageClient::~MessageClient() {
   if (isInherited()) return;
-  dispatcher_->runQuietlyAndWait([&] {
+  dispatcher_->runOrPostAndWait([&] {
     binding_->leave();
     dispatcher_->remove(binding_);
   });
@@ -54,7 +54,7 @@ MessageClient::~MessageClient() {
 void MessageClient::bind(const std::string& server, std::int32_t location) {
   dispatcher_->endpoint().forkGuard().check("MessageClient");
   binding_->setServer(server, location);
-  dispatcher_->runQuietly([binding = binding_] { binding->tryConnect(); });
+  dispatcher_->runOrPost([binding = binding_] { binding->tryConnect(); });
 }
 
 SendResult MessageClient::send(Message&& message, Deadline takeBefore,

@@ -6,7 +6,7 @@
 namespace mpf {
 namespace {
 
-// Lives as long as the calling thread.
+// An object that is destroyed when the calling thread ends.
 const std::shared_ptr<void>& lifeOfThread() {
   thread_local const std::shared_ptr<void> life = std::make_shared<char>();
   return life;
@@ -14,12 +14,12 @@ const std::shared_ptr<void>& lifeOfThread() {
 
 }  // namespace
 
-bool RunnerLock::tryEnterAsGuest() noexcept {
-  return !isWanted() && tryTake(thisThread() | kGuest);
+bool RunnerLock::tryAcquireTemporarily() noexcept {
+  return !isRunnerWaiting() && tryTake(thisThread() | kTemporary);
 }
 
-void RunnerLock::leave() noexcept {
-  if ((owner_.load(std::memory_order_relaxed) & kGuest) == 0) {
+void RunnerLock::release() noexcept {
+  if ((owner_.load(std::memory_order_relaxed) & kTemporary) == 0) {
     // PAIR(runner): before another thread takes the lock.
     owner_.store(0, std::memory_order_release);
     return;
@@ -29,39 +29,37 @@ void RunnerLock::leave() noexcept {
     // PAIR(runner): as above.
     owner_.store(0, std::memory_order_release);
   }
-  left_.notify_all();
+  released_.notify_all();
 }
 
-bool RunnerLock::mayRunAsGuest() {
+bool RunnerLock::hasOtherRunner() {
   const std::lock_guard lock(mutex_);
-  return lastRunner_.load(std::memory_order_relaxed) == thisThread() ||
-         lastRunnerIsAlive_.expired();
+  return lastRunner_.load(std::memory_order_relaxed) != thisThread() && !lastRunnerAlive_.expired();
 }
 
-void RunnerLock::refuse() {
+void RunnerLock::throwOtherRunner() {
   throw std::logic_error(
       "Dispatcher: another thread runs this dispatcher. Let one thread run it (a shared dispatcher "
-      "has a "
-      "thread of its own); bind(), send() and cancel() work from every thread.");
+      "has a thread of its own); bind(), send() and cancel() work from every thread.");
 }
 
-void RunnerLock::waitForGuest() {
+void RunnerLock::waitForTemporaryOwner() {
   std::unique_lock lock(mutex_);
   for (;;) {
     if (tryTake(thisThread())) return;
     const auto owner = owner_.load(std::memory_order_relaxed);
-    if (owner != 0 && (owner & kGuest) == 0) refuse();
-    if (owner != 0) left_.wait(lock);
+    if (owner != 0 && (owner & kTemporary) == 0) throwOtherRunner();
+    if (owner != 0) released_.wait(lock);
   }
 }
 
 void RunnerLock::noteLastRunner() try {
   const auto& life = lifeOfThread();
   const std::lock_guard lock(mutex_);
-  lastRunnerIsAlive_ = life;
+  lastRunnerAlive_ = life;
   lastRunner_.store(thisThread(), std::memory_order_relaxed);
 } catch (...) {  // std::bad_alloc
-  leave();
+  release();
   throw;
 }
 

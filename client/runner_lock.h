@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 // RunnerLock: at most one thread at a time runs a dispatcher.
 //
-//   free ── enter() ───────────► runOnce(), run(), runPending() ──────────── leave() ──► free
-//   free ── tryEnterAsGuest() ─► bind(), connectWait(), ~MessageClient() ─── leave() ──► free
+//   free ── acquire() ───────────────► owned by a runner ─── release() ──► free
+//                                      runOnce(), run(), runPending()
+//   free ── tryAcquireTemporarily() ─► owned temporarily ─── release() ──► free
+//                                      bind(), connectWait(), the end of a client
 //
-// A guest leaves as soon as another thread waits in enter(). Two threads that both want to enter()
-// are an error of the program, and the second one gets an exception.
+//   when another thread      acquire()                                tryAcquireTemporarily()
+//   is the runner            throws: two runners are a program error  returns false
+//   is the temporary owner   waits: isRunnerWaiting() makes the       returns false
+//                            owner release the lock
 //
 // Threads  any.
 #pragma once
@@ -21,76 +25,85 @@ namespace mpf {
 class RunnerLock {
  public:
   [[nodiscard]] bool isMine() const noexcept {
-    return (owner_.load(std::memory_order_relaxed) & ~kGuest) == thisThread();
+    return (owner_.load(std::memory_order_relaxed) & ~kTemporary) == thisThread();
   }
 
-  // The calling thread, which does not have the lock, gets it and is the dispatcher's last runner.
-  //   wakeGuest  makes a guest call isWanted()
-  //   throws     std::logic_error when another thread that is no guest has the lock
-  template <class WakeGuest>
-  void enter(const WakeGuest& wakeGuest) {
+  // Makes the calling thread, which does not own the lock, the runner.
+  //   wakeOwner  makes a temporary owner call isRunnerWaiting()
+  //   throws     std::logic_error when another thread is the runner
+  template <class WakeOwner>
+  void acquire(const WakeOwner& wakeOwner) {
     if (!tryTake(thisThread())) {
-      const Waiter waiter(waiters_);
-      wakeGuest();
-      waitForGuest();
+      const WaitingRunner waiting(waitingRunners_);
+      wakeOwner();
+      waitForTemporaryOwner();
     }
     if (lastRunner_.load(std::memory_order_relaxed) != thisThread()) noteLastRunner();
   }
 
-  [[noreturn]] static void refuse();
+  // Throws the std::logic_error of acquire().
+  [[noreturn]] static void throwOtherRunner();
 
-  // False when another thread has the lock or waits for it.
-  [[nodiscard]] bool tryEnterAsGuest() noexcept;
-  void leave() noexcept;
+  // False when another thread owns the lock or waits in acquire().
+  [[nodiscard]] bool tryAcquireTemporarily() noexcept;
+  void release() noexcept;
 
-  // Whether a guest should leave.
-  [[nodiscard]] bool isWanted() const noexcept { return waiters_.load() != 0; }
+  // True when a temporary owner must release the lock.
+  [[nodiscard]] bool isRunnerWaiting() const noexcept {
+    // PAIR(runner-waiting): seen false, the waiting thread wakes this one after it.
+    return waitingRunners_.load(std::memory_order_seq_cst) != 0;
+  }
 
-  // Whether no other living thread has called enter() later than the calling one.
-  [[nodiscard]] bool mayRunAsGuest();
+  // True when the last runner is another thread that has not ended: callbacks belong on that
+  // thread.
+  [[nodiscard]] bool hasOtherRunner();
 
  private:
-  static constexpr std::uintptr_t kGuest = 1;
+  static constexpr std::uint64_t kTemporary = 1;
 
-  struct Waiter {
-    explicit Waiter(std::atomic<int>& number) noexcept : waiters(number) { ++waiters; }
-    ~Waiter() { --waiters; }
-    Waiter(const Waiter&) = delete;
-    Waiter& operator=(const Waiter&) = delete;
-    std::atomic<int>& waiters;
+  struct WaitingRunner {
+    explicit WaitingRunner(std::atomic<int>& number) noexcept : number_(number) {
+      // PAIR(runner-waiting): before wakeOwner().
+      number_.fetch_add(1, std::memory_order_seq_cst);
+    }
+    ~WaitingRunner() { number_.fetch_sub(1, std::memory_order_relaxed); }
+    WaitingRunner(const WaitingRunner&) = delete;
+    WaitingRunner& operator=(const WaitingRunner&) = delete;
+    std::atomic<int>& number_;
   };
 
-  // Differs between the threads that live at the same time; even.
-  static std::uintptr_t thisThread() noexcept {
-    static thread_local const std::uint16_t mark = 0;
-    return reinterpret_cast<std::uintptr_t>(&mark);
+  // A number that no other thread of the process has or had; even.
+  static std::uint64_t thisThread() noexcept {
+    static std::atomic<std::uint64_t> last{0};
+    thread_local const std::uint64_t number = last.fetch_add(2, std::memory_order_relaxed) + 2;
+    return number;
   }
-  bool tryTake(std::uintptr_t owner) noexcept {
-    std::uintptr_t nobody = 0;
-    // PAIR(runner): what the thread that had the lock before did.
-    return owner_.compare_exchange_strong(nobody, owner, std::memory_order_acquire,
+  bool tryTake(std::uint64_t owner) noexcept {
+    std::uint64_t free = 0;
+    // PAIR(runner): what the previous owner did.
+    return owner_.compare_exchange_strong(free, owner, std::memory_order_acquire,
                                           std::memory_order_relaxed);
   }
-  void waitForGuest();
+  void waitForTemporaryOwner();
   void noteLastRunner();
 
-  std::atomic<std::uintptr_t> owner_{0};  // thisThread() of the owner, with kGuest for a guest
-  std::atomic<int> waiters_{0};  // threads that wait in enter()
-  std::atomic<std::uintptr_t> lastRunner_{0};  // written under mutex_
+  std::atomic<std::uint64_t> owner_{0};  // thisThread() of the owner, plus kTemporary; 0: free
+  std::atomic<int> waitingRunners_{0};  // threads that wait in acquire()
+  std::atomic<std::uint64_t> lastRunner_{0};  // its thisThread(); written under mutex_
   std::mutex mutex_;
-  std::condition_variable left_;  // a guest has left
-  std::weak_ptr<void> lastRunnerIsAlive_;  // under mutex_; expires with the thread
+  std::condition_variable released_;  // by a temporary owner
+  std::weak_ptr<void> lastRunnerAlive_;  // under mutex_; expires when that thread ends
 };
 
-// Leaves the lock, if there is one, at the end of its life.
-class RunnerTurn {
+// Releases `lock`, unless it is nullptr, at the end of the scope.
+class RunnerGuard {
  public:
-  explicit RunnerTurn(RunnerLock* lock) noexcept : lock_(lock) {}
-  ~RunnerTurn() {
-    if (lock_ != nullptr) lock_->leave();
+  explicit RunnerGuard(RunnerLock* lock) noexcept : lock_(lock) {}
+  ~RunnerGuard() {
+    if (lock_ != nullptr) lock_->release();
   }
-  RunnerTurn(const RunnerTurn&) = delete;
-  RunnerTurn& operator=(const RunnerTurn&) = delete;
+  RunnerGuard(const RunnerGuard&) = delete;
+  RunnerGuard& operator=(const RunnerGuard&) = delete;
 
  private:
   RunnerLock* lock_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Alarm: calls back once at a time, the earliest that it was set to. It may be set again from
-// within: a kj promise that replaced itself while it runs would be an error.
+// Alarm: calls back once, at the earliest of the times that it was set to. The callback may set it
+// again, which a single kj promise does not permit: a promise must not replace itself while it
+// runs.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -25,10 +26,10 @@ class Alarm {
   void setAt(Deadline due) {
     if (due.ns() >= dueNs_) return;
     dueNs_ = due.ns();
-    if (!pending_.insert(dueNs_).second) return;  // from before an earlier time was set
+    if (!pending_.insert(dueNs_).second) return;  // a task for this time still exists
     tasks_.add(timer_.afterDelay(toKj(due.left())).then([this, ns = dueNs_] {
       pending_.erase(ns);
-      if (ns != dueNs_) return;  // it was set to an earlier time, which has been
+      if (ns != dueNs_) return;  // it was set to an earlier time, which has passed
       dueNs_ = kNever;
       callback_();
     }));
@@ -40,7 +41,7 @@ class Alarm {
   kj::Timer& timer_;
   std::function<void()> callback_;
   std::int64_t dueNs_ = kNever;
-  std::set<std::int64_t> pending_;  // times for which there is a task
+  std::set<std::int64_t> pending_;  // times for which a task exists
   FatalTasks tasks_;
 };
 

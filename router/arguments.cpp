@@ -19,7 +19,7 @@ constexpr const char* kFooter =
     "Examples: mpf-router /etc/mpf/router.toml\n"
     "          mpf-router --serve 1 --listen 10.0.0.7:9900 --plain     on the host of the servers\n"
     "          mpf-router --remote 1=10.0.0.7:9900 --plain             on the host of the clients\n"
-    "SIGHUP reads the file again; connections that it does not change stay.\n"
+    "SIGHUP reloads the file; connections whose entries are unchanged continue.\n"
     "Exit status: 0 stopped by SIGINT or SIGTERM; 1 failed; 2 usage error, or an error in the "
     "configuration.";
 
@@ -30,7 +30,7 @@ std::int32_t parseLocation(std::string_view text) {
   throw std::invalid_argument(fmt::format("\"{}\" is not a location: write an integer", text));
 }
 
-// "1", or "1=0" of a location that is called otherwise here.
+// Parses "1", or "1=0" for a location that has another number on this host.
 Serve parseServe(const std::string& text) {
   const auto equals = text.find('=');
   const auto location = parseLocation(std::string_view(text).substr(0, equals));
@@ -39,7 +39,7 @@ Serve parseServe(const std::string& text) {
                         : parseLocation(std::string_view(text).substr(equals + 1))};
 }
 
-// "1,2=ioc1.lab:9900".
+// Parses "1,2=ioc1.lab:9900".
 Remote parseRemote(const std::string& text) {
   const auto equals = text.find('=');
   if (equals == std::string::npos)
@@ -53,7 +53,7 @@ Remote parseRemote(const std::string& text) {
   return remote;
 }
 
-// Errors of a value are said as those of its option.
+// Calls `function` and reports an invalid value as an error of `option`.
 template <class Function>
 void asOption(const std::string& option, Function function) try {
   function();
@@ -61,7 +61,7 @@ void asOption(const std::string& option, Function function) try {
   throw CLI::ValidationError(option, error.what());
 }
 
-// What an option adds to the configuration, with its own place.
+// Adds an option of which each value becomes an entry of the configuration and its place.
 template <class Value, class Parse>
 CLI::Option* addEntries(CLI::App& app, const std::string& option, const std::string& type,
                         std::vector<Value>& values, std::vector<Places>& places, Parse parse,
@@ -78,7 +78,7 @@ CLI::Option* addEntries(CLI::App& app, const std::string& option, const std::str
       ->allow_extra_args(false);
 }
 
-// Sets what an option that goes before a file says; see RouterArguments::overrides_.
+// Sets the value of an option that overrides the file; see RouterArguments::overrides_.
 void applyOverride(WrittenConfig& to, const std::string& name, const std::string& value) {
   auto& config = to.config;
   const std::map<std::string, std::string*> texts{
@@ -100,22 +100,23 @@ void applyOverride(WrittenConfig& to, const std::string& name, const std::string
 std::optional<int> RouterArguments::start(int argc, const char* const* argv) {
   CLI::App app("mpf-router - joins this host's backplane with those of other hosts, over TCP",
                kProgram);
-  const auto inPlaceOfFile = addFile(app);
+  const auto insteadOfFile = addFile(app);
   addOverrides(app);
-  app.add_flag("--check", checkOnly_, "Only load the configuration, and say what it means");
+  app.add_flag("--check", checkOnly_, "Check the configuration, print its meaning, and exit");
   app.add_option("--ready-fd", readyDescriptor_,
-                 "Write the listening addresses there, a line each, once it listens, and close it")
+                 "Write the listening addresses to this descriptor, one per line, and close it")
       ->type_name("FD");
   app.footer(kFooter);
   if (const auto status = parseCommandLine(app, argc, argv)) return status;
   try {
-    for (const auto* const option : inPlaceOfFile) {
+    for (const auto* const option : insteadOfFile) {
       if (!file_.empty() && option->count() != 0)
-        throw ConfigError(fmt::format("{}: it stands in place of a file; write it into {}",
-                                      option->get_name(), file_));
+        throw ConfigError(
+            fmt::format("{}: it cannot be combined with a configuration file; write it into {}",
+                        option->get_name(), file_));
     }
-    takeTransport();
-    config_ = load();
+    applyTransport();
+    config_ = loadConfig();
   } catch (const ConfigError& error) {
     if (file_.empty()) return refuseArguments(kProgram, error.what());
     printError("{}: {}\n", kProgram, error.what());
@@ -130,31 +131,32 @@ std::vector<CLI::Option*> RouterArguments::addFile(CLI::App& app) {
   auto& [options, places] = options_;
   places.isFile = false;
   places.root = places.tls = places.limits = {{"", ""}};
-  app.add_option("file", file_, "Configuration in TOML; without it, options say what to do")
+  app.add_option("file", file_, "Configuration file (TOML); without it, use the options below")
       ->type_name("FILE");
   std::vector<CLI::Option*> instead{
       addEntries(
           app, "--serve", "LOCATION[=LOCAL]", options.serve, places.serve, parseServe,
-          "Clients elsewhere reach servers of this host at LOCATION; here they are at LOCAL"),
+          "Offer servers of this host at LOCATION to other hosts; their location here is LOCAL"),
       addEntries(
           app, "--listen", "HOST:PORT", options.listen, places.listen,
           [](const std::string& text) { return Listen{parseAddress(text)}; },
-          "Where routers of clients connect: a name, 10.0.0.7:9900, [fd00::7]:9900, *:9900"),
-      addEntries(app, "--remote", "LOCATION[,LOCATION]=HOST:PORT", options.remotes, places.remotes,
-                 parseRemote,
-                 "Clients of this host reach these locations through the router there"),
-      app.add_flag("--plain", plain_, "TCP as it is, in place of TLS"),
+          "Accept routers of other hosts here: a host name, 10.0.0.7:9900, [fd00::7]:9900, *:9900"),
+      addEntries(
+          app, "--remote", "LOCATION[,LOCATION]=HOST:PORT", options.remotes, places.remotes,
+          parseRemote,
+          "Connect clients of this host to these locations, through the router at HOST:PORT"),
+      app.add_flag("--plain", plain_, "Use plain TCP instead of TLS"),
       app.add_flag("--allow-public-plain", options.allowPublicPlain,
-                   "That, too, at addresses that are neither private nor link-local"),
+                   "Allow --plain also at public addresses and on all networks (*)"),
       app.add_option("--tls-name", tlsName_,
-                     "Name in the certificate of the --remote, when it is not its host's")
+                     "Name in the certificate of the --remote; default: its host name")
           ->type_name("NAME")};
-  for (auto* const option : instead) option->group("In place of a file");
+  for (auto* const option : instead) option->group("Instead of a file");
   return instead;
 }
 
-// They are tried when they are parsed, so that an error names the option, and applied by each
-// load().
+// Values are checked when they are parsed, so that an error names the option. Each loadConfig()
+// applies them.
 void RouterArguments::addOverrides(CLI::App& app) {
   const auto add = [&](const std::string& name, const std::string& type, const std::string& text) {
     const auto take = [this, name](const std::string& value) {
@@ -164,26 +166,28 @@ void RouterArguments::addOverrides(CLI::App& app) {
     };
     app.add_option_function<std::string>("--" + name, take, text)
         ->type_name(type)
-        ->group("Whatever a file says");
+        ->group("Override the file");
   };
-  add("tls-certificate", "FILE", "Our certificate, and the chain up to its authority: PEM");
-  add("tls-key", "FILE", "Its key: PEM, without a password");
-  add("tls-authorities", "FILE", "Certificates of those who sign our peers' certificates: PEM");
-  add("name", "NAME", "What others call this router; default: the name of this host");
+  add("tls-certificate", "FILE", "Certificate of this router, followed by its chain: PEM");
+  add("tls-key", "FILE", "Private key of the certificate: PEM, without a password");
+  add("tls-authorities", "FILE",
+      "Certificates of the authorities that sign the peers' certificates: PEM");
+  add("name", "NAME",
+      "Name of this router, as peers and `mpf mrr` show it; default: the host name");
   add("backplane", "NAME", "Backplane; default: $MPF_BACKPLANE, or \"default\"");
   add("mode", "MODE",
-      "Who of this host may be a client of remote servers, octal as for chmod; default: 0600, the "
-      "router's own user");
-  add("group", "GROUP", "The group that --mode speaks of; default: the user's own");
+      "Which users of this host may be clients of remote servers, octal as for chmod; default: "
+      "0600, the router's own user");
+  add("group", "GROUP", "Group to which --mode applies; default: the user's own");
   add("log-level", "LEVEL",
-      "Least weight of what it says on stderr: trace, debug, info, warning, error, critical, off; "
+      "Lowest level of the messages on stderr: trace, debug, info, warning, error, critical, off; "
       "default: info");
   for (const auto& name : limitNames())
     add(name, limitType(name),
         fmt::format("{}; default: {}", limitPurpose(name), limitText({}, name)));
 }
 
-void RouterArguments::takeTransport() {
+void RouterArguments::applyTransport() {
   auto& config = options_.config;
   const auto security = plain_ ? Security::plain : Security::tls;
   for (auto& listen : config.listen) listen.security = security;
@@ -192,7 +196,8 @@ void RouterArguments::takeTransport() {
     remote.tlsName = tlsName_;
   }
   if (!tlsName_.empty() && config.remotes.size() != 1)
-    throw ConfigError("--tls-name: it is that of one --remote; a file can name more");
+    throw ConfigError(
+        "--tls-name: it applies to a single --remote; for several, write a configuration file");
 }
 
 RouterConfig RouterArguments::loadConfig() const {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// RouterArguments: the command line of mpf-router. A file says everything; without one, options
-// make a simple router:
+// RouterArguments: the command line of mpf-router. Either a file contains the whole configuration,
+// or options describe a simple one:
 //
 //   mpf-router /etc/mpf/router.toml
 //   mpf-router --serve 1 --listen 10.0.0.7:9900 --plain
-//   mpf-router --remote 1,2=ioc1.lab:9900 --tls-certificate our.pem --tls-key our.key
-//   --tls-authorities lab.pem
+//   mpf-router --remote 1,2=ioc1.lab:9900
+//     --tls-certificate our.pem --tls-key our.key --tls-authorities lab.pem
 //
 // Threads  one.
 #pragma once
@@ -26,32 +26,33 @@ namespace mpf::router {
 
 class RouterArguments {
  public:
-  // Takes the arguments and loads the configuration. The exit status, when the program shall end:
-  // after --help, --version and --check, and when something is wrong, which has been said by then.
+  // Parses the arguments and loads the configuration. Returns the exit status when the program must
+  // exit: after --help, --version and --check, and after an error, which it has printed.
   [[nodiscard]] std::optional<int> start(int argc, const char* const* argv);
 
-  // Where to say that we listen; -1: nowhere.
+  // The descriptor of --ready-fd; -1: none.
   [[nodiscard]] int readyDescriptor() const noexcept { return readyDescriptor_; }
-  // What start() loaded.
+  // The configuration that start() has loaded.
   [[nodiscard]] const RouterConfig& config() const noexcept { return config_; }
-  // The same from the files as they are now: the configuration, with the options that go before it,
-  // and those of TLS.
+  // Loads the configuration again from the current file, applies the options that override it, and
+  // checks the TLS files.
   //   throws  ConfigError
   [[nodiscard]] RouterConfig loadConfig() const;
 
  private:
-  std::vector<CLI::Option*> addFile(CLI::App& app);  // and those options that stand in place of it
+  // Adds the file and the options that replace it; returns these options.
+  std::vector<CLI::Option*> addFile(CLI::App& app);
   void addOverrides(CLI::App& app);
-  void takeTransport();
+  void applyTransport();
 
-  std::string file_;  // empty: none
+  std::string file_;  // empty: no file
   bool checkOnly_ = false;
   int readyDescriptor_ = -1;
   bool plain_ = false;
   std::string tlsName_;
-  WrittenConfig options_;  // what they say in place of a file
-  std::map<std::string, std::string>
-      overrides_;  // what they say whatever a file says: "info" of --log-level is under "log-level"
+  WrittenConfig options_;  // from the options that replace a file
+  // Values of the options that override a file: for --log-level info, "info" under "log-level".
+  std::map<std::string, std::string> overrides_;
   RouterConfig config_;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// FatalTasks: what runs on the event loop and is to go on for as long as its owner. An exception
-// that it lets through ends the program: without it the router would seem to live, and be deaf in
-// one ear.
+// FatalTasks: tasks of the event loop that run as long as their owner exists. An exception from a
+// task ends the program, because a router without this task would appear to work but ignore some
+// events.
 //
 // Threads  that of the event loop.
 #pragma once

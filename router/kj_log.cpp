@@ -7,7 +7,7 @@ namespace mpf::router {
 
 void KjLog::logMessage(kj::LogSeverity severity, const char* /*file*/, int /*line*/,
                        int /*contextDepth*/, kj::String&& text) {
-  const auto said = forPeople(kj::StringPtr(text));
+  const auto said = displayText(kj::StringPtr(text));
   if (severity == kj::LogSeverity::ERROR || severity == kj::LogSeverity::FATAL)
     log_.error("Cap'n Proto: {}", said);
   else if (severity == kj::LogSeverity::WARNING) log_.warn("Cap'n Proto: {}", said);
@@ -17,12 +17,12 @@ void KjLog::logMessage(kj::LogSeverity severity, const char* /*file*/, int /*lin
 namespace {
 
 MPF_KEEPS_KJ_LOG void runInThread(const Log& log, kj::Function<void()>& run) {
-  const KjLog ofThisThread(log);
+  const KjLog logOfThisThread(log);
   try {
     run();
   } catch (const kj::Exception& error) {
     if (error.getType() != kj::Exception::Type::DISCONNECTED) throw;
-    log.debug("a look-up of a name ended after nobody waited for it any more");
+    log.debug("a name look-up ended after it had been cancelled");
   }
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// KjLog: what kj reports by itself goes to the router's log instead of stderr, in the thread that
-// made it and in the threads that kj starts there for look-ups of names.
+// KjLog: writes the messages of kj to the router's log instead of stderr, for the thread that
+// creates it and for the threads that kj starts from there for name look-ups.
 //
-// A look-up that nobody waits for any more cannot be stopped. Its thread finds its pipe closed at
-// the end, and kj would report that as an error of a detached thread: such an exception ends here.
+// A name look-up that has been cancelled cannot be stopped. At its end its thread finds its pipe
+// closed, which kj would report as an error of a detached thread; KjLog catches that exception.
 //
-// Threads  one makes it, on its stack (kj requires that).
+// Threads  one thread creates it, on its stack (kj requires that).
 #pragma once
 
 #include <kj/exception.h>
@@ -15,8 +15,8 @@
 
 namespace mpf::router {
 
-// For functions that make a KjLog: AddressSanitizer may put the variables of others beside the
-// stack, where kj refuses it.
+// For functions that create a KjLog. AddressSanitizer may place local variables outside of the
+// stack, where kj refuses them.
 #define MPF_KEEPS_KJ_LOG [[gnu::no_sanitize_address, gnu::noinline]]
 
 #pragma GCC diagnostic push

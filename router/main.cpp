@@ -22,12 +22,12 @@ using mpf::router::Router;
 using mpf::router::RouterArguments;
 using mpf::router::ServiceManager;
 
-constexpr auto kToStop = 2 * kj::SECONDS;  // for farewells
-constexpr unsigned kTurnsBetweenLooks = 32;  // at descriptors, timers and signals
+constexpr auto kStopTimeout = 2 * kj::SECONDS;  // for sending farewells
+constexpr unsigned kTurnsBetweenPolls = 32;     // polls of descriptors, timers and signals
 
-// Each listening address on a line of its own: for who starts us with port 0 and waits until we
-// listen.
-void tellAddresses(int fd, Router& router) {
+// Writes each listening address on a line of its own, for a parent process that uses port 0 or
+// waits until the router listens.
+void writeAddresses(int fd, Router& router) {
   if (fd < 0) return;
   std::string text;
   for (const auto& address : router.listening()) text += address.text() + '\n';
@@ -39,16 +39,16 @@ void tellAddresses(int fd, Router& router) {
   mpf::closeDescriptor(fd);
 }
 
-// A configuration that is wrong is told, and changes nothing.
+// An error in the configuration is logged and changes nothing.
 void reload(Router& router, const RouterArguments& arguments, const mpf::ServerLog& log) {
-  ServiceManager::tellReloading();
+  ServiceManager::notifyReloading();
   try {
     router.reload(arguments.loadConfig());
-    log->info("the configuration has been read again");
+    log->info("the configuration has been reloaded");
   } catch (const std::exception& error) {
-    log->error("the configuration stays as it was: {}", error.what());
+    log->error("cannot reload the configuration, the old one stays in effect: {}", error.what());
   }
-  ServiceManager::tellReady();
+  ServiceManager::notifyReady();
 }
 
 kj::Promise<void> reloadAtHangup(kj::UnixEventPort& port, Router& router,
@@ -64,28 +64,29 @@ kj::Promise<void> serve(kj::UnixEventPort& port, Router& router, const RouterArg
                         const mpf::ServerLog& log) {
   return router.start().then([&] {
     for (const auto& address : router.listening()) log->info("listening on {}", address.text());
-    tellAddresses(arguments.readyDescriptor(), router);
-    ServiceManager::tellReady();
+    writeAddresses(arguments.readyDescriptor(), router);
+    ServiceManager::notifyReady();
     return reloadAtHangup(port, router, arguments, log);
   });
 }
 
 MPF_KEEPS_KJ_LOG int run(const RouterArguments& arguments) {
-  // before there are threads
+  // Before the first thread starts.
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kj::UnixEventPort::captureSignal(signal);
   const mpf::ServerLog log("mpf-router", arguments.config().logLevel);
   const mpf::router::KjLog kjLog(*log);
   auto io = kj::setupAsyncIo();
-  // or a peer whose bytes come faster than they are read would be all that there is
-  io.waitScope.setBusyPollInterval(kTurnsBetweenLooks);
+  // Otherwise a peer that sends faster than the router reads would keep the event loop from
+  // polling.
+  io.waitScope.setBusyPollInterval(kTurnsBetweenPolls);
   auto& port = io.unixEventPort;
   Router router(io, arguments.config(), *log);
-  auto toEnd = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
-  // also while it starts; who ends reloads no more
-  serve(port, router, arguments, log).exclusiveJoin(kj::mv(toEnd)).wait(io.waitScope);
-  ServiceManager::tellStopping();
-  log->info("ends");
-  router.stop().exclusiveJoin(io.provider->getTimer().afterDelay(kToStop)).wait(io.waitScope);
+  auto stopSignal = port.onSignal(SIGTERM).exclusiveJoin(port.onSignal(SIGINT)).ignoreResult();
+  // The signals also end the start-up. SIGHUP is ignored from here on.
+  serve(port, router, arguments, log).exclusiveJoin(kj::mv(stopSignal)).wait(io.waitScope);
+  ServiceManager::notifyStopping();
+  log->info("stopping");
+  router.stop().exclusiveJoin(io.provider->getTimer().afterDelay(kStopTimeout)).wait(io.waitScope);
   return 0;
 }
 
@@ -93,7 +94,7 @@ int route(int argc, char** argv) try {
   RouterArguments arguments;
   if (const auto status = arguments.start(argc, argv)) return *status;
   return run(arguments);
-} catch (const kj::Exception& error) {  // its what() has places of source files and a stack trace
+} catch (const kj::Exception& error) {  // its what() contains source locations and a stack trace
   throw std::runtime_error(mpf::router::toStd(error.getDescription()));
 }
 

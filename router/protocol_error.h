@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ProtocolError: what a peer sent, or did not send, that ends its connection.
+// ProtocolError: a violation of the protocol or of a limit by the peer, which ends the connection.
 #pragma once
 
 #include <stdexcept>

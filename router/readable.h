@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Readable: calls back on the event loop whenever a descriptor has become readable. Bell: the same,
-// rung by any thread.
+// Readable: calls back on the event loop when a descriptor becomes readable. Bell: calls back on
+// the event loop when any thread rings it.
 //
 // Threads  that of the event loop; Bell::ring() any.
 #pragma once
@@ -20,7 +20,8 @@ namespace mpf::router {
 
 class Readable {
  public:
-  // `fd` outlives this. The callback runs once soon, and takes all that there is each time.
+  // `fd` outlives this object. The callback is also called once at the start. Each time, it must
+  // read until nothing is left.
   Readable(kj::UnixEventPort& port, int fd, std::function<void()> callback)
       : observer_(port, fd, kj::UnixEventPort::FdObserver::OBSERVE_READ),
         callback_(std::move(callback)) {
@@ -29,7 +30,7 @@ class Readable {
 
  private:
   kj::Promise<void> loop() {
-    // before we look: nothing that comes meanwhile is missed
+    // Before the callback reads: data that arrives during the callback is not missed.
     auto next = observer_.whenBecomesReadable();
     callback_();
     return next.then([this] { return loop(); });

@@ -13,9 +13,10 @@
 namespace mpf::router {
 namespace {
 
-// a thousand clients that come at once are looked at together
+// The delay before pending binds are read: binds of many clients that start at once are read
+// together.
 constexpr auto kPendingBindsAfter = std::chrono::milliseconds(5);
-constexpr auto kPendingBindsAgain = std::chrono::seconds(1);       // when not all could be seen
+constexpr auto kPendingBindsAgain = std::chrono::seconds(1);  // when not all could be read
 
 }  // namespace
 
@@ -58,11 +59,14 @@ kj::Promise<void> Router::start() {
 }
 
 Listener& Router::listen(const Listen& listen) {
-  auto hear = [this, listen](Listener::Caller caller) { onCaller(listen, std::move(caller)); };
-  return *listeners_.emplace_back(std::make_shared<Listener>(here_, listen, std::move(hear)));
+  auto onCaller = [this, listen](Listener::Caller caller) {
+    this->onCaller(listen, std::move(caller));
+  };
+  return *listeners_.emplace_back(std::make_shared<Listener>(here_, listen, std::move(onCaller)));
 }
 
-// One that cannot listen goes, and the next reload tries it again. It may have gone before it knew.
+// Removes a listener that cannot listen; the next reload tries it again. A reload may have removed
+// it before its result arrives.
 void Router::listenLate(const Listen& listen) {
   auto started = this->listen(listen).start();
   tasks_.add(started.catch_([this, late = std::weak_ptr(listeners_.back())](kj::Exception&& error) {
@@ -81,8 +85,8 @@ std::vector<Address> Router::listening() {
 
 void Router::onCaller(const Listen& listen, Listener::Caller caller) {
   if (sessions_.size() >= here_.config.limits.maxConnections && !tryMakeRoom()) {
-    here_.log.warn("{}: turned away: there are {} connections (max-connections)", caller.address,
-                   sessions_.size());
+    here_.log.warn("{}: rejected: there are already {} connections (max-connections)",
+                   caller.address, sessions_.size());
     return turnedAway_.add(
         kj::mv(caller.stream), FarewellCode::LIMIT,
         fmt::format("this router has {} connections, its limit (max-connections)",
@@ -99,8 +103,8 @@ void Router::onCaller(const Listen& listen, Listener::Caller caller) {
   }));
 }
 
-// Of the callers that have not greeted yet, the oldest one of the host with the most of them goes.
-// Each makes room once: it stays in the list until the event loop has closed it.
+// Closes a connection whose peer has not sent its greeting: the oldest one of the host with the
+// most of them. It stays in the list until the event loop has closed it, but counts only once.
 bool Router::tryMakeRoom() {
   const auto isIdle = [](const Session& session) {
     return session.end && !session.router->hasGreeted();
@@ -116,8 +120,9 @@ bool Router::tryMakeRoom() {
     return isIdle(session) && counts[session.host] == most;
   });
   here_.log.warn(
-      "{} connections (max-connections), {} of them with {}, which has not greeted: the oldest one "
-      "of these is closed",
+      "{} connections (max-connections), {} of them from {} without a greeting: closing the oldest "
+      "of "
+      "these",
       sessions_.size(), most, victim->host);
   std::exchange(victim->end, nullptr)->fulfill();
   return true;
@@ -140,7 +145,8 @@ void Router::readPendingBinds() {
   }
   if (!problem.empty()) {
     if (pendingBindProblem_.empty())
-      here_.log.warn("cannot read which servers some clients wait for, trying again: {}", problem);
+      here_.log.warn("cannot read all pending binds of clients of this host, trying again: {}",
+                     problem);
     pendingBindsDue_.setAt(Deadline::after(kPendingBindsAgain));
   }
   pendingBindProblem_ = std::move(problem);
@@ -150,7 +156,7 @@ void Router::reload(const RouterConfig& config) {
   openTls(config);
   if (config.backplane != here_.config.backplane || config.name != here_.config.name)
     here_.log.warn(
-        "a new name or backplane takes effect when the router starts again: this is still {}",
+        "a new name or backplane takes effect when the router is restarted; the name is still {}",
         here_.config.name);
   here_.log.setLevel(config.logLevel);
   here_.config = config;

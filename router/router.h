@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Router: joins this host's backplane to those of others: a ClientRouter for each remote, a
-// ServerRouter for each caller.
+// Router: joins this host's backplane to those of other hosts, with a ClientRouter for each remote
+// and a ServerRouter for each accepted connection.
 //
-//   pending binds here ─► ClientRouter ══ TCP ══ ServerRouter elsewhere
-//   servers here ◄── ServerRouter ══ TCP ══ ClientRouter elsewhere
+//   pending binds here ─► ClientRouter ══ TCP ══ ServerRouter on another host
+//   servers here ◄── ServerRouter ══ TCP ══ ClientRouter on another host
 //
 // Threads  that of the event loop.
-// Crash    whatever ends a connection ends that connection.
+// Crash    an error on one connection ends that connection only.
 #pragma once
 
 #include <list>
@@ -16,6 +16,7 @@
 #include "router/incoming/server_router.h"
 #include "router/outgoing/client_router.h"
 #include "router/transport/listener.h"
+#include "shm/watcher.h"
 
 namespace mpf::router {
 
@@ -25,14 +26,14 @@ class Router final : private kj::TaskSet::ErrorHandler {
   Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log);
   ~Router();
 
-  // Resolves once it listens everywhere that it shall.
+  // Resolves when all listening addresses of the configuration are open.
   [[nodiscard]] kj::Promise<void> start();
   [[nodiscard]] std::vector<Address> listening();
-  // Keeps what stays the same: its connections notice nothing. Limits and TLS files hold for
-  // connections made from now on.
-  //   throws  ConfigError (TLS files), and nothing has changed
+  // Replaces the configuration. Connections whose entries are unchanged continue. New limits and
+  // TLS files apply to new connections.
+  //   throws  ConfigError (TLS files); then nothing has changed
   void reload(const RouterConfig& config);
-  // Says farewell to everybody.
+  // Ends all connections with a farewell.
   [[nodiscard]] kj::Promise<void> stop();
 
  private:
@@ -47,9 +48,9 @@ class Router final : private kj::TaskSet::ErrorHandler {
   void taskFailed(kj::Exception&& error) override;
 
   struct Session {
-    Listen listen;  // where it called
+    Listen listen;  // the address that accepted it
     std::unique_ptr<ServerRouter> router;
-    std::string host;  // that called
+    std::string host;  // of the peer
     kj::Own<kj::PromiseFulfiller<void>> end;  // fulfilling it closes the connection; nullptr: done
   };
 
@@ -63,7 +64,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   std::list<std::unique_ptr<ClientRouter>> remotes_;
   std::list<Session> sessions_;
   Alarm pendingBindsDue_;
-  std::string pendingBindProblem_;  // that was logged last
+  std::string pendingBindProblem_;  // last problem that was logged
   TurnedAway turnedAway_;
   kj::TaskSet tasks_;
 };

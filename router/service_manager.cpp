@@ -13,21 +13,21 @@
 
 namespace mpf::router {
 
-void ServiceManager::tellReloading() noexcept {
-  tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000));
+void ServiceManager::notifyReloading() noexcept {
+  notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000));
 }
 
-void ServiceManager::tell(const std::string& state) noexcept {
-  const char* const path =
-      std::getenv("NOTIFY_SOCKET");  // NOLINT(concurrency-mt-unsafe): nobody sets it
+void ServiceManager::notify(const std::string& state) noexcept {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread changes the environment
+  const char* const path = std::getenv("NOTIFY_SOCKET");
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path == nullptr || *path == '\0' || std::strlen(path) >= sizeof address.sun_path) return;
   const auto length = std::strlen(path);
   std::memcpy(address.sun_path, path, length);
-  if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // an abstract name
+  if (address.sun_path[0] == '@') address.sun_path[0] = '\0';  // an abstract socket name
   const FileDescriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  // Whoever does not listen is no reason to stop.
+  // A failure is ignored: the router works without a service manager.
   static_cast<void>(::sendto(socket.get(), state.data(), state.size(), MSG_NOSIGNAL,
                              reinterpret_cast<const sockaddr*>(&address),
                              static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length)));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ServiceManager: tells systemd how the program is doing (sd_notify(3), whose protocol is one
-// datagram to $NOTIFY_SOCKET). Without a service manager it tells nobody.
+// ServiceManager: reports the state of the program to systemd, with one datagram to $NOTIFY_SOCKET
+// (sd_notify(3)). Does nothing when the variable is not set.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@ namespace mpf::router {
 
 class ServiceManager {
  public:
-  static void tellReady() noexcept { tell("READY=1"); }
-  static void tellReloading() noexcept;
-  static void tellStopping() noexcept { tell("STOPPING=1"); }
+  static void notifyReady() noexcept { notify("READY=1"); }
+  static void notifyReloading() noexcept;
+  static void notifyStopping() noexcept { notify("STOPPING=1"); }
 
  private:
-  static void tell(const std::string& state) noexcept;
+  static void notify(const std::string& state) noexcept;
 };
 
 }  // namespace mpf::router

@@ -25,7 +25,7 @@ void zero(layout::RouterLine& line) noexcept {
 
 template <std::size_t n>
 void PeerRecord::setText(std::array<char, n>& to, const std::string& text) noexcept {
-  // A reader that meets an odd number, or another one afterwards, reads again.
+  // A reader reads again when the number is odd, or when it has changed after the read.
   line_.texts.fetch_add(1, std::memory_order_relaxed);
   // PAIR(router-texts): the number before the text that it announces.
   std::atomic_thread_fence(std::memory_order_release);
@@ -36,7 +36,7 @@ void PeerRecord::setText(std::array<char, n>& to, const std::string& text) noexc
   line_.texts.fetch_add(1, std::memory_order_release);
 }
 
-// Trying again and again is one time without a connection.
+// sinceNs does not change while the state alternates between waiting and connecting.
 void PeerRecord::setState(layout::RouterLineState state) noexcept {
   using State = layout::RouterLineState;
   const auto was = line_.state.load(std::memory_order_relaxed);
@@ -84,7 +84,7 @@ Statistics::Statistics(const Backplane& backplane, const std::string& name)
   name.copy(header.name.data(), header.name.size() - 1);
   if (!segment_.tryPublish(
           SegmentName::keyed(backplane.name(), NameKind::router, header.incarnation))) {
-    throw std::runtime_error("an incarnation number came twice");
+    throw std::runtime_error("duplicate incarnation number");
   }
   for (std::size_t row = layout::kRouterLines; row-- != 0;) free_.push_back(row);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Statistics: what a router says of its connections, in a segment of its own, for `mpf mrr` and the
-// like to read without asking it.
+// Statistics: the state and the counters of a router's connections, in a shared-memory segment that
+// `mpf mrr` and other tools read.
 //
 // Threads  that of the event loop.
-// Crash    the segment is locked for the router's life; whoever cleans up removes it afterwards.
+// Crash    the router locks the segment while it runs. After a crash, the removal of stale segments
+//          removes it.
 #pragma once
 
 #include <memory>
@@ -17,8 +18,8 @@
 
 namespace mpf::router {
 
-// One row. Counters are written in place; a connection beyond those that there are rows for counts
-// where nobody sees it.
+// One row of the segment. Counters are written in place. When all rows are in use, further
+// connections count in memory of the process, which no tool sees.
 class PeerRecord {
  public:
   explicit PeerRecord(layout::RouterLine& line) noexcept : line_(line) {}
@@ -29,7 +30,7 @@ class PeerRecord {
   void setPeer(const std::string& name, const std::string& program) noexcept;
   void setAddress(const std::string& address) noexcept;
   void setLocations(const std::vector<std::int32_t>& locations);
-  // Why there is no connection; empty: there is one, or nothing is known.
+  // Sets why there is no connection; empty: connected, or no reason is known.
   void setProblem(const std::string& problem) noexcept;
   void clear() noexcept;
 
@@ -41,14 +42,14 @@ class PeerRecord {
 
 class Statistics {
  public:
-  //   name  what this router calls itself
+  //   name    the name of this router
   //   throws  std::system_error
   Statistics(const Backplane& backplane, const std::string& name);
   ~Statistics();
   Statistics(const Statistics&) = delete;
   Statistics& operator=(const Statistics&) = delete;
 
-  // A row until its holder dies; all zero but for its role.
+  // Returns a row for as long as the pointer exists. All fields but the role are zero.
   [[nodiscard]] std::shared_ptr<PeerRecord> add(layout::RouterRole role);
 
  private:

@@ -18,9 +18,9 @@ std::string hostForKj(const Address& address) {
                                                      : fmt::format("[{}]", address.host);
 }
 
-void prepare(kj::AsyncIoStream& stream, const Limits& limits) {
-  // What a peer does not acknowledge or does not read for so long is lost: our own signs of life do
-  // not get through, either.
+void setSocketOptions(kj::AsyncIoStream& stream, const Limits& limits) {
+  // When a peer has not acknowledged or read any data for this time, it has received no sign of
+  // life of ours, either.
   const auto timeoutMs = static_cast<unsigned>(2 * limits.deadTime.count());
   stream.setsockopt(IPPROTO_TCP, TCP_USER_TIMEOUT, &timeoutMs, sizeof timeoutMs);
   const int on = 1;
@@ -34,13 +34,13 @@ void checkPlain(kj::NetworkAddress& address, const RouterConfig& config) {
   for (std::string one; std::getline(each, one, ',');) {
     const auto parsed = parseAddress(one);
     if (isPublic(parsed.host)) {
-      throw std::runtime_error(fmt::format(
-          "{} is a public address: plain TCP there only with allow-public-plain = true", one));
+      throw std::runtime_error(
+          fmt::format("{} is a public address: use TLS, or write allow-public-plain = true", one));
     }
   }
 }
 
-void introduce(wire::Greeting::Builder greeting, const Surroundings& here) {
+void fillGreeting(wire::Greeting::Builder greeting, const Surroundings& here) {
   Line::describe(greeting, here.config.limits);
   greeting.setRouter(here.config.name);
   greeting.setProgram(fmt::format("mpf-router {}", kVersion));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Surroundings: what every part of a router works with.
+// Surroundings: the objects that all parts of a router share.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -27,21 +27,21 @@ struct Surroundings {
   Log log;
   Statistics& statistics;
   Presences& presences;
-  RouterConfig config;                 // as it is now; a reload changes it
-  std::shared_ptr<Tls> tls;            // nullptr: nothing uses TLS
-  std::uint64_t incarnation = 0;       // which life of this router
+  RouterConfig config;            // replaced by a reload
+  std::shared_ptr<Tls> tls;       // nullptr: no connection uses TLS
+  std::uint64_t incarnation = 0;  // distinguishes restarts of this router
 };
 
-// Options of every TCP connection, before TLS.
-void prepare(kj::AsyncIoStream& stream, const Limits& limits);
+// Sets the socket options of a TCP connection, before TLS.
+void setSocketOptions(kj::AsyncIoStream& stream, const Limits& limits);
 
-// An address's host as kj parses it.
+// The host of an address in the form that kj parses.
 [[nodiscard]] std::string hostForKj(const Address& address);
 
-// Throws std::runtime_error when plain TCP to or on one of these is not allowed.
+// Throws std::runtime_error when plain TCP is not allowed with one of these addresses.
 void checkPlain(kj::NetworkAddress& address, const RouterConfig& config);
 
-// What this router says of itself; the rest of its greeting is the caller's.
-void introduce(wire::Greeting::Builder greeting, const Surroundings& here);
+// Fills in the fields of a greeting that are the same for client and server routers.
+void fillGreeting(wire::Greeting::Builder greeting, const Surroundings& here);
 
 }  // namespace mpf::router

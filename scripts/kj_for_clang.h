@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// For clang-tidy and `make fuzz` only, included before everything: two operators that kj/string.h
-// 0.9 (Debian 12) leaves to C++20's rewriting of ==, which clang 16 and newer do not do where a
-// matching != exists (P2468). g++ 12 does.
+// Included before every source, by clang-tidy and `make fuzz` only. Defines two operators that
+// kj/string.h 0.9 (Debian 12) expects from C++20's rewriting of ==. clang 16 and newer do not
+// rewrite == if a matching != exists (P2468); g++ 12 does.
 #pragma once
 
 #include <kj/string.h>

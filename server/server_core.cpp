@@ -228,7 +228,7 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     case MessageLink::Take::nothing:
       closeIfClientDid(connection);
       return false;
-    case MessageLink::Take::nonsense:
+    case MessageLink::Take::invalid:
       count(control.protocolErrors);
       close(connection);
       return false;
@@ -253,7 +253,7 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     return false;
   }
   switch (connection.channel->tryFinish(envelope, message)) {
-    case MessageLink::Finish::nonsense:
+    case MessageLink::Finish::invalid:
       count(control.protocolErrors);
       close(connection);
       return false;

@@ -11,14 +11,13 @@
 
 #include "base/step.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 #include "shm/segment.h"
 
 namespace mpf::doorbell {
 
 void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) noexcept {
-  timespec until{};
-  until.tv_sec = deadline.ns() / 1'000'000'000;
-  until.tv_nsec = deadline.ns() % 1'000'000'000;
+  const auto until = timespecOf(deadline.ns());
   // FUTEX_WAIT_BITSET: an absolute CLOCK_MONOTONIC deadline, so that restarts after signals do not
   // stretch the wait.
   ::syscall(SYS_futex, &bell, FUTEX_WAIT_BITSET, seen, deadline.isNever() ? nullptr : &until,

@@ -16,6 +16,7 @@
 #include "base/signals_blocked.h"
 #include "base/step.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 #include "shm/process.h"
 #include "shm/segment_name.h"
 
@@ -209,9 +210,7 @@ void Watcher::poll() {
 }
 
 void Watcher::pollAtOnce() {
-  itimerspec spec{};
-  spec.it_value.tv_nsec = 1;
-  spec.it_interval.tv_nsec = kPollNs;
+  const itimerspec spec{.it_interval = timespecOf(kPollNs), .it_value = timespecOf(1)};
   ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
   polls_ = true;
 }
@@ -223,7 +222,7 @@ void Watcher::updateTimer() {
   if (needed == polls_) return;
   polls_ = needed;
   itimerspec spec{};
-  if (needed) spec.it_value.tv_nsec = spec.it_interval.tv_nsec = kPollNs;
+  if (needed) spec.it_value = spec.it_interval = timespecOf(kPollNs);
   ::timerfd_settime(timer_.get(), 0, &spec, nullptr);
 }
 

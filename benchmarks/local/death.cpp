@@ -21,6 +21,7 @@
 
 #include "base/print_error.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 #include "benchmarks/peers/mpf_peer.h"
 #include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/meter.h"
@@ -124,7 +125,7 @@ struct Durations {
 };
 
 void sleepUntil(std::int64_t ns) {
-  const timespec until{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+  const auto until = timespecOf(ns);
   while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
   }
 }

@@ -16,6 +16,7 @@
 
 #include "base/print_error.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf::bench {
 
@@ -80,8 +81,7 @@ void killProcess(int pid) noexcept {
 bool hasEnded(int pid) noexcept { return ::waitpid(pid, nullptr, WNOHANG) != 0; }
 
 void sleepFor(Nanoseconds duration) {
-  const timespec pause{static_cast<time_t>(duration.count() / 1'000'000'000),
-                       static_cast<long>(duration.count() % 1'000'000'000)};
+  const auto pause = timespecOf(duration);
   ::nanosleep(&pause, nullptr);
 }
 

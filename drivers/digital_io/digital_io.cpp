@@ -308,9 +308,10 @@ void DigitalIo::noteStorms() {
   const bool isCalm = std::exchange(spurious_, counters.spurious) == counters.spurious;
   if (std::exchange(storms_, counters.storms) != counters.storms) {
     pauseEnds_ = Deadline::after(stormPause_);
-    goesOn_ = false;
+    isAfterPause_ = false;
     if (!std::exchange(isStorming_, true)) tell({DigitalIoNews::Kind::storm, state_.inputs, 0});
-  } else if (isStorming_ && pauseEnds_.hasPassed() && std::exchange(goesOn_, true) && isCalm) {
+  } else if (isStorming_ && pauseEnds_.hasPassed() && std::exchange(isAfterPause_, true) &&
+             isCalm) {
     isStorming_ = false;
   }
 }

@@ -181,7 +181,7 @@ class DigitalIo {
   bool mayBeLost_ = false;  // the last poll found an edge whose interrupt may still be under way
   bool isLosing_ = false;  // lostInterrupt was reported
   bool isStorming_ = false;  // storm was reported
-  bool goesOn_ = false;  // the last poll was after the pause
+  bool isAfterPause_ = false;  // the last poll was after the pause
   Deadline pauseEnds_ = Deadline::never();
   std::uint64_t storms_ = 0, spurious_ = 0;  // as counted at the last poll
   struct Subscriber {

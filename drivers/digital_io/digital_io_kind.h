@@ -7,10 +7,11 @@
 //
 // Source  IP-Unidig, 16-bit words from the start of the I/O space:
 //           0, 1  outputs           6     control             b, c  polarity (1: rising edge)
-//           2, 3  inputs            8     interrupt vector    d, e  pending edges; writing ones
-//           clears them 4, 5  output enable     9, a  interrupt enable    e     DAC of the
-//           comparator, -HV models
-//         The first EPICS driver had the low output enable at 8, which is the vector; 4 is right.
+//           2, 3  inputs            8     interrupt vector    d, e  pending edges
+//           4, 5  output enable     9, a  interrupt enable    e     DAC of the comparator, -HV
+//                                                                   models
+//         Writing ones clears pending edges. The first EPICS driver had the low output enable at 8,
+//         which is the vector; 4 is right.
 //         DIO316I: 0, 1 outputs; 2 inputs; 3 output enable by port; 4 direction by port.
 //         T and P models (timers, ports) have other registers and are not supported.
 #pragma once

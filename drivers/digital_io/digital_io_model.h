@@ -6,7 +6,7 @@
 //   model.connect(5, [wire] { return wire.get(); });  // bit 5 follows a wire, in volts
 //
 //   outputs, enables ─► driver ─┐
-//   outside: 5 V, 0 V, a wire ──┴► line ─► comparator ─► inputs ─► enabled edge ─► pending ─► IntReq0*
+//   outside: 5 V, 0 V, a wire ──┴► line ─► comparator ─► inputs ─► edge ─► pending ─► IntReq0*
 //
 // A line that is not driven is pulled up. The outputs of the DIO316I and of the -HV and -12I12O
 // models are not inputs: use OnOutput to see them and connect() to drive inputs.

@@ -2,9 +2,9 @@
 // CarrierParameters: reads and checks the parameter strings of the VME and ISA carriers of old
 // startup files.
 //
-//   const auto carrier = parseCarrierParameters("vipc616_01", "0x3000,0xa0000000");   //
-//   ipacAddCarrier(&vipc616_01, "0x3000,0xa0000000") carrier.sites[1].memory
-//   // 0xa0800000, in VME A32
+//   // of the startup file: ipacAddCarrier(&vipc616_01, "0x3000,0xa0000000")
+//   const auto carrier = parseCarrierParameters("vipc616_01", "0x3000,0xa0000000");
+//   carrier.sites[1].memory                                  // 0xa0800000, in VME A32
 //
 // Nothing is opened: MPF cannot reach these buses. The result gives the addresses of the modules.
 //
@@ -47,7 +47,7 @@ struct CarrierParameters {
 // Returns whether `kind` names such a carrier: a symbol of drvIpac ("&vipc616_01", "ipmv162") or a
 // command ("ipacAddVIPC616_01"), in upper or lower case.
 [[nodiscard]] bool isParameterKind(std::string_view kind);
-// The symbols of all such carriers: "vipc310", ....
+// The symbols of all such carriers: "vipc310" and others.
 [[nodiscard]] std::vector<std::string> parameterKinds();
 
 // Reads the parameter string of a carrier.

@@ -12,13 +12,14 @@
 
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf {
 namespace {
 
 constexpr std::chrono::milliseconds kPollWhilePaused{100};
-constexpr int kOneMakesUpFor = 2;
-constexpr int kPausesToCalm = 10;
+constexpr int kSpuriousCompensated = 2;  // by an interrupt with a request
+constexpr int kPausesToCalm = 10;        // storms within that time are reported as one
 
 }  // namespace
 
@@ -74,10 +75,10 @@ void InterruptThread::serveInterrupt() {
   interrupts_.fetch_add(1, std::memory_order_relaxed);
   lateInRow_ = 0;
   if (handler_(Cause::interrupt)) {
-    inVain_ = std::max(0, inVain_ - kOneMakesUpFor);
+    spuriousExcess_ = std::max(0, spuriousExcess_ - kSpuriousCompensated);
   } else {
     spurious_.fetch_add(1, std::memory_order_relaxed);
-    if (++inVain_ >= options_.stormLimit) return pause();
+    if (++spuriousExcess_ >= options_.stormLimit) return pause();
   }
   interrupt_.enable();
 }
@@ -85,7 +86,7 @@ void InterruptThread::serveInterrupt() {
 void InterruptThread::servePoll() {
   if (handler_(Cause::poll)) {
     late_.fetch_add(1, std::memory_order_relaxed);
-    if (!isPaused() && ++lateInRow_ == options_.lateLimit) tell(InterruptTrouble::never);
+    if (!isPaused() && ++lateInRow_ == options_.lateLimit) report(InterruptTrouble::never);
   }
   const auto period =
       isPaused() && options_.pollEvery.count() == 0 ? kPollWhilePaused : options_.pollEvery;
@@ -96,13 +97,13 @@ void InterruptThread::servePoll() {
 void InterruptThread::pause() {
   storms_.fetch_add(1, std::memory_order_relaxed);
   pausedUntil_ = Deadline::after(options_.stormPause);
-  if (stormEnds_.hasPassed()) tell(InterruptTrouble::storm);
+  if (stormEnds_.hasPassed()) report(InterruptTrouble::storm);
   stormEnds_ = Deadline::after((1 + kPausesToCalm) * options_.stormPause);
   servePoll();
 }
 
 void InterruptThread::resume() {
-  inVain_ = lateInRow_ = 0;
+  spuriousExcess_ = lateInRow_ = 0;
   pausedUntil_ = Deadline::never();
   pollAt_ =
       options_.pollEvery.count() == 0 ? Deadline::never() : Deadline::after(options_.pollEvery);
@@ -112,10 +113,10 @@ void InterruptThread::resume() {
 void InterruptThread::followPolling() {
   if (isPolled_ || !interrupt_.isPolled()) return;
   isPolled_ = true;
-  tell(InterruptTrouble::polled);
+  report(InterruptTrouble::polled);
 }
 
-void InterruptThread::tell(InterruptTrouble trouble) const {
+void InterruptThread::report(InterruptTrouble trouble) const {
   if (trouble_) trouble_(trouble);
 }
 
@@ -123,8 +124,7 @@ void InterruptThread::wait() const {
   std::array<pollfd, 2> events{{{.fd = interrupt_.descriptor(), .events = POLLIN, .revents = 0},
                                 {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0}}};
   const auto next = std::min(pollAt_, pausedUntil_);
-  const auto left = next.left().count();
-  const timespec timeout{.tv_sec = left / 1'000'000'000, .tv_nsec = left % 1'000'000'000};
+  const auto timeout = timespecOf(next.left());
   ::ppoll(events.data(), events.size(), next.isNever() ? nullptr : &timeout, nullptr);
 }
 

@@ -2,8 +2,9 @@
 // Parameters of carriers whose addresses and interrupt levels are set with switches or by software:
 //   TEWS TVME200        the settings of its six rotary switches, "6010D0"
 //   Hytec 8002, 8004    slot,level [IPMEM=1|2|4|8] [MEMBASE=high half of the address] [IPCLK=8|32]
-//   [ROAK=0|1] Acromag AVME-96xx   base,level [R] [A=megabytes,address] ... SBS ATC40 (ISA)
-//   address [16384 [irq]]
+//                       [ROAK=0|1]
+//   Acromag AVME-96xx   base,level [R] [A=megabytes,address] ...
+//   SBS ATC40 (ISA)     address [16384 [irq]]
 #include <algorithm>
 #include <cctype>
 #include <fmt/format.h>

@@ -16,21 +16,18 @@
 
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf {
 namespace {
 
 const PciKind kTpci200{.name = "TPCI200", .vendor = 0x1498, .device = 0x30c8};
 
-// Another process may hold the lock of a site for a moment, in silenceIfNobodys().
+// Another process may hold the lock of a site for a moment, in maskIfUnowned().
 constexpr int kClaims = 50;
 constexpr std::chrono::milliseconds kClaimAgain{1};
 // Time for another process to mask its line before the interrupt is unmasked again.
 constexpr std::chrono::microseconds kForOthers{100};
-
-timespec toTimespec(std::chrono::nanoseconds time) noexcept {
-  return {.tv_sec = time.count() / 1'000'000'000, .tv_nsec = time.count() % 1'000'000'000};
-}
 
 }  // namespace
 
@@ -221,7 +218,7 @@ void Tpci200::wait() {
   std::array<pollfd, 2> events{
       {{.fd = wakeUp_.get(), .events = POLLIN, .revents = 0},
        {.fd = interrupt_ ? interrupt_->descriptor() : -1, .events = POLLIN, .revents = 0}}};
-  const auto timeout = toTimespec(pollEvery_);
+  const auto timeout = timespecOf(pollEvery_);
   ::ppoll(events.data(), events.size(), hasSomethingToPoll() ? &timeout : nullptr, nullptr);
 }
 
@@ -240,7 +237,7 @@ void Tpci200::takeInterrupt() {
     return;
   }
   if (serve()) {
-    const auto pause = toTimespec(kForOthers);
+    const auto pause = timespecOf(kForOthers);
     ::ppoll(nullptr, 0, &pause, nullptr);
   }
   interrupt_->unmask();
@@ -257,13 +254,13 @@ bool Tpci200::serve() {
       sites_[i]->serve(status);
     } else {
       isOthers = true;
-      silenceIfNobodys(i);
+      maskIfUnowned(i);
     }
   }
   return isOthers;
 }
 
-void Tpci200::silenceIfNobodys(std::size_t number) {
+void Tpci200::maskIfUnowned(std::size_t number) {
   if (!locks_.tryLock(static_cast<int>(number))) return;
   for (int line = 0; line < 2; ++line) board_.acknowledge(number, line);
   board_.setLines(number, 0);

@@ -83,7 +83,7 @@ class Tpci200 final : public IndustryPackCarrier {
   // Announces the active lines of this process's sites. Returns whether lines of other sites are
   // active.
   bool serve();
-  void silenceIfNobodys(std::size_t number);
+  void maskIfUnowned(std::size_t number);
   void pollFromNowOn() noexcept { isPolled_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] bool hasSomethingToPoll();
 

@@ -3,12 +3,12 @@
 // "ip330Scan").
 //
 //   interrupt ─► interrupt thread ─► mailboxes ─► corrected codes ─► every subscriber, scan by scan
-//   keeper thread: calibrates periodically; checks that the board is present, scans and is
-//   programmed
+//   keeper thread: calibrates periodically; checks that the board is present, scans and has its
+//                  settings
 //
 //   Ip330 board(module, {.type = parseIp330Type("D"), .lastChannel = 15});
-//   const auto subscription = board.subscribe([&](const Ip330Sample& sample) {
-//   ...sample.corrected[3]... });
+//   const auto subscription =
+//       board.subscribe([&](const Ip330Sample& sample) { use(sample.corrected[3]); });
 //
 // A calibration is stored for each gain, so a change to a gain that was calibrated before needs no
 // measurement. Calibration holds the lock that the interrupt thread needs, and the interrupts of

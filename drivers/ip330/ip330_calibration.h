@@ -2,8 +2,9 @@
 // Ip330Calibration: corrects the codes of the converter, using its codes for two reference voltages
 // of the board.
 //
-//   corrected = slope * (raw + offset), 0 to 65535 covers the range; a perfect converter has slope
-//   1, offset 0
+//   corrected = slope * (raw + offset)      0 to 65535 covers the range
+//
+// A perfect converter has slope 1 and offset 0.
 //
 // Range 0to5 at gain code 3 (a gain of 8): the lowest reference above 0 V is nearly at the end of
 // the range, so 0 V must be the lower reference. A converter with a negative offset gives code 0

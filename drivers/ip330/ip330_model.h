@@ -2,9 +2,9 @@
 // Ip330Model: device model of an Acromag IP330: registers, timer, converter with errors, mailboxes,
 // interrupts.
 //
-//   Ip330Model model({.range = Ip330Range::minus5to5, .gainError = {0.01}, .noise = 0.4,
-//   .isRealTime = false}); model.setSignal(0, sineSignal(5, 2)); model.step();
-//   // one period of the timer
+//   Ip330Model model({.range = Ip330Range::minus5to5, .noise = 0.4, .isRealTime = false});
+//   model.setSignal(0, sineSignal(5, 2));
+//   model.step();                                            // one period of the timer
 //
 // In real time a thread of the model runs the timer; otherwise step() does. Single scans and
 // calibration take no time. After a change of the input source the first conversion has wrong

@@ -12,14 +12,12 @@ namespace mpf {
 inline constexpr int kIp330Channels = 32;  // 16 with differential inputs
 inline constexpr int kIp330Gains = 4;
 
-enum class Ip330Type : std::uint8_t { differential, singleEnded };                    // "D", "S"
-enum class Ip330Range : std::uint8_t {
-  minus5to5,
-  minus10to10,
-  from0to5,
-  from0to10
-};  // as set by DIP switches: "-5to5", ...
-enum class Ip330Trigger : std::uint8_t { input, output };  // "Input", "Output"
+// Values of the startup commands: "D", "S".
+enum class Ip330Type : std::uint8_t { differential, singleEnded };
+// "-5to5", "-10to10", "0to5", "0to10". DIP switches set the range.
+enum class Ip330Range : std::uint8_t { minus5to5, minus10to10, from0to5, from0to10 };
+// "Input", "Output".
+enum class Ip330Trigger : std::uint8_t { input, output };
 enum class Ip330ScanMode : std::uint8_t {
   disable,  // no scans
   uniformContinuous,  // the channels one after the other, evenly over the period

@@ -2,10 +2,10 @@
 // Ip330Timer: the two timer registers of the chip for a time per scan, and the exact time that they
 // give.
 //
-//   uniform   each timer period converts one channel                          period of a scan =
-//             channels * timer
-//   burst     each timer period converts all channels, then the timer runs    period of a scan =
-//             channels * 15 us + timer
+//   uniform   each timer period converts one channel
+//             period of a scan = channels * timer
+//   burst     each timer period converts all channels, then the timer runs
+//             period of a scan = channels * 15 us + timer
 //   timer = prescaler * conversion / 8 us (clock 8 MHz); prescaler 64 to 255, conversion 1 to 65535
 //
 // Threads  any number of callers at a time.

@@ -3,8 +3,7 @@
 // on request; it does not use the module's events and interrupts.
 //
 //   Ip440 inputs(modules.create("door", "ipac", "IP_c", Ip440::kind()));
-//   if (const auto bits = inputs.tryRead()) ...                            // bit 0 is IN00, 1 is
-//   on
+//   if (const auto bits = inputs.tryRead()) ...     // bit 0 is IN00; 1 is on
 //
 // Threads  any number of callers at a time.
 // Crash    the driver never writes to the module, so a crash leaves nothing behind.

@@ -11,24 +11,27 @@
 namespace mpf {
 namespace {
 
-using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): the names of the data sheet
+using namespace scc2698b;
 
 constexpr std::uint16_t kOctal485 = 0x48;
 constexpr int kBlocksPerLine = 2;
-constexpr int kMostPasses = 64;  // per interrupt; one that still waits comes again
+// For each interrupt. If the chip still has a request then, the line is still active, and the next
+// interrupt follows.
+constexpr int kMaxPasses = 64;
 constexpr int kPortsPerLine = 4;
-constexpr std::size_t kMostAlarmsToBeTold = 100;  // to a handler that may come
+constexpr std::size_t kMaxPendingAlarms = 100;  // until a handler is set
 
 OctalUartOptions checked(const OctalUartOptions& options, IndustryPackModule& module) {
   if (options.ports != 4 && options.ports != 8)
-    throw std::invalid_argument(fmt::format(
-        "module \"{}\": {} ports: there are modules of 4 and of 8", module.name(), options.ports));
+    throw std::invalid_argument(
+        fmt::format("module \"{}\": {} ports: a module has 4 or 8", module.name(), options.ports));
   static_cast<void>(module.checkedVector(options.vector));
   if (module.memory().size() == 0) {
     throw IndustryPackError(
         IndustryPackStatus::badAddress,
-        fmt::format("module \"{}\": the carrier gives {} no memory, where its interrupt vector is; "
-                    "its parameters say how much memory a site has",
+        fmt::format("module \"{}\": {} has no memory space, which contains the interrupt vector "
+                    "register: set the memory of the site in the parameters of the carrier",
                     module.name(), module.where()));
   }
   return options;
@@ -41,7 +44,7 @@ OctalUart::OctalUart(IndustryPackModule& module, const OctalUartOptions& options
       io_(module.io()),
       options_(checked(options, module)),
       isRs485_(module.idProm().model == kOctal485),
-      isTaken_(static_cast<std::size_t>(options.ports)) {
+      isReserved_(static_cast<std::size_t>(options.ports)) {
   channels_.reserve(kChannels);
   for (int i = 0; i < kChannels; ++i)
     channels_.emplace_back(io_, i, isRs485_, imr_.at(static_cast<std::size_t>(i / 2)));
@@ -52,8 +55,8 @@ OctalUart::OctalUart(IndustryPackModule& module, const OctalUartOptions& options
 OctalUart::~OctalUart() {
   for (auto& thread : threads_) thread.reset();
   const std::lock_guard lock(mutex_);
-  lookAt(true);
-  if (!isReady_) return;  // what is there now, if anything, is not ours
+  loseIfAbsent(true);
+  if (!isReady_) return;  // lost: the site may be empty or have another module
   for (auto& channel : channels_) channel.close();
 }
 
@@ -61,7 +64,7 @@ void OctalUart::startThread(int line) {
   InterruptThreadOptions options{.pollEvery = options_.pollEvery,
                                  .stormLimit = options_.stormLimit,
                                  .stormPause = options_.stormPause};
-  // nothing is there to be found
+  // A Quad module has no ports on its second request line.
   if (line * kPortsPerLine >= options_.ports) options.pollEvery = {};
   threads_.at(static_cast<std::size_t>(line)) = std::make_unique<InterruptThread>(
       module_.interrupt(line), options,
@@ -87,37 +90,37 @@ OctalUart::Counters OctalUart::counters() const {
 
 // ---- ports
 
-void OctalUart::takePort(int number) {
+void OctalUart::reservePort(int number) {
   const std::lock_guard lock(mutex_);
   if (number < 0 || number >= options_.ports) {
-    throw std::invalid_argument(fmt::format("module \"{}\": port {}: its ports are 0 to {}",
+    throw std::invalid_argument(fmt::format("module \"{}\": port {}: the module has ports 0 to {}",
                                             module_.name(), number, options_.ports - 1));
   }
-  if (isTaken_[static_cast<std::size_t>(number)])
+  if (isReserved_[static_cast<std::size_t>(number)])
     throw std::invalid_argument(
-        fmt::format("module \"{}\": port {} is in use already", module_.name(), number));
-  isTaken_[static_cast<std::size_t>(number)] = true;
+        fmt::format("module \"{}\": port {} is in use", module_.name(), number));
+  isReserved_[static_cast<std::size_t>(number)] = true;
 }
 
-void OctalUart::leavePort(int number) noexcept {
+void OctalUart::releasePort(int number) noexcept {
   const std::lock_guard lock(mutex_);
-  isTaken_[static_cast<std::size_t>(number)] = false;
+  isReserved_[static_cast<std::size_t>(number)] = false;
 }
 
 std::string OctalUart::tryOpen(int number, const SerialSettings& settings) {
   const std::lock_guard lock(mutex_);
-  lookAt(true);
+  loseIfAbsent(true);
   if (!isReady_) {
     if (auto problem = module_.problem(); !problem.empty()) return problem;
   }
-  // Nobody would have noticed a reset while no port was open.
+  // Resets are detected only while a port is open, so the first port sets the chip up.
   if (!isReady_ || std::ranges::none_of(channels_, &OctalUartChannel::isOpen)) setUp();
   channels_[static_cast<std::size_t>(number)].open(settings);
   return {};
 }
 
-// All channels, used or not, also those behind the ports of a Quad module: one that floats must not
-// interrupt.
+// Sets up all channels, also those of a Quad module that have no port: their inputs float, and must
+// not cause interrupts.
 void OctalUart::setUp() {
   for (int block = 0; block < kBlocks; ++block) {
     imr_.at(static_cast<std::size_t>(block)) = 0;
@@ -133,17 +136,18 @@ void OctalUart::setUp() {
 // ---- interrupts
 
 bool OctalUart::serve(int line, InterruptThread::Cause cause) {
-  bool hadSomething = false;
+  bool hadRequest = false;
   {
     const std::lock_guard lock(mutex_);
-    hadSomething =
+    hadRequest =
         cause == InterruptThread::Cause::interrupt ? serveInterrupt(line) : servePoll(line);
   }
-  tellAlarms();
-  return hadSomething;
+  reportAlarms();
+  return hadRequest;
 }
 
-// Its own half of the chip; the other one for boards that have one line only.
+// Serves the half of the chip that belongs to this line. If it has no request, serves the other
+// half, because some boards have one line only.
 bool OctalUart::serveInterrupt(int line) {
   const int first = line * kBlocksPerLine;
   return serveBlocks(first, kBlocksPerLine) || serveBlocks(kBlocksPerLine - first, kBlocksPerLine);
@@ -161,7 +165,7 @@ void OctalUart::note(int line, InterruptTrouble trouble) {
     raise(trouble == InterruptTrouble::storm ? OctalUartAlarm::storm : OctalUartAlarm::noInterrupts,
           textOf(line, trouble));
   }
-  tellAlarms();
+  reportAlarms();
 }
 
 std::string OctalUart::textOf(int line, InterruptTrouble trouble) const {
@@ -171,43 +175,43 @@ std::string OctalUart::textOf(int line, InterruptTrouble trouble) const {
   switch (trouble) {
     case InterruptTrouble::storm:
       return fmt::format(
-          "{} asks without end and wants nothing: masked for {} ms, again and again until that "
-          "ends",
+          "{} is stuck active without a request of the chip: it is masked for {} ms at a time "
+          "until it is released",
           which, options_.stormPause.count());
     case InterruptTrouble::polled:
       return fmt::format(
           "{} is polled by its carrier from now on, which is too slow for fast lines", which);
     case InterruptTrouble::never:
       return fmt::format(
-          "{} does not come when they have something: polled every {} ms, which is too slow for "
-          "fast lines",
+          "{} stays inactive although the chip has requests: it is polled every {} ms, which is "
+          "too slow for fast lines",
           which, options_.pollEvery.count());
   }
   return which;
 }
 
-// Until it asks for nothing. A block at a time would let the others wait for as long as one has
-// something.
+// Serves the blocks in turn until none of them has a request. Serving one block to its end would
+// delay the others for as long as it has requests.
 bool OctalUart::serveBlocks(int first, int count) {
-  bool hadSomething = false;
-  for (int pass = 0; pass < kMostPasses && isReady_; ++pass) {
-    bool asks = false;
+  bool hadRequest = false;
+  for (int pass = 0; pass < kMaxPasses && isReady_; ++pass) {
+    bool hasRequest = false;
     for (int block = first; block < std::min(first + count, options_.ports / 2) && isReady_;
          ++block) {
       const auto pending = pendingOf(block);
       if (pending == 0) continue;
-      asks = true;
+      hasRequest = true;
       serveBlock(block, pending);
     }
-    if (!asks) break;
-    hadSomething = true;
+    if (!hasRequest) break;
+    hadRequest = true;
   }
-  return hadSomething;
+  return hadRequest;
 }
 
 std::uint8_t OctalUart::pendingOf(int block) {
   const auto isr = io_.read8(atBlock(block, kIsr));
-  lookAt(isr == kOnes);
+  loseIfAbsent(isr == kOnes);
   return isReady_ ? isr & imr_.at(static_cast<std::size_t>(block)) : 0;
 }
 
@@ -216,24 +220,25 @@ void OctalUart::serveBlock(int block, std::uint8_t pending) {
     const auto ours = static_cast<std::uint8_t>((number % 2 == 0 ? pending : pending >> 4) & 0xf);
     auto& channel = channels_[static_cast<std::size_t>(number)];
     if (ours == 0 || channel.serve(ours, false)) continue;
-    lookAt(true);
+    loseIfAbsent(true);
     if (isReady_) static_cast<void>(channel.serve(ours, true));
   }
 }
 
-// ---- is it there?
+// ---- presence
 
 void OctalUart::checkPresence() {
   for (auto& channel : channels_) {
     if (!isReady_ || !channel.isOpen() || channel.isAsConfigured()) continue;
-    lookAt(true);
+    loseIfAbsent(true);
     if (isReady_) lose("the module has been reset");
   }
 }
 
-// A register may say ones and mean it; an ID PROM never does.
-void OctalUart::lookAt(bool mayBeGone) {
-  if (!mayBeGone || !isReady_) return;
+// Reads the ID PROM when the module may be absent. A register of a module that is present may read
+// as all ones; its ID PROM never does.
+void OctalUart::loseIfAbsent(bool isSuspected) {
+  if (!isSuspected || !isReady_) return;
   if (const auto problem = module_.problem(); !problem.empty()) lose(problem);
 }
 
@@ -245,16 +250,17 @@ void OctalUart::lose(const std::string& because) {
 
 void OctalUart::raise(OctalUartAlarm alarm, std::string what) {
   ++alarmCount_;
-  if (alarms_.size() < kMostAlarmsToBeTold) alarms_.emplace_back(alarm, std::move(what));
+  if (pendingAlarms_.size() < kMaxPendingAlarms)
+    pendingAlarms_.emplace_back(alarm, std::move(what));
 }
 
-void OctalUart::tellAlarms() {
-  const std::lock_guard telling(alarmMutex_);
+void OctalUart::reportAlarms() {
+  const std::lock_guard handlerLock(alarmMutex_);
   if (!alarmHandler_) return;
   std::vector<std::pair<OctalUartAlarm, std::string>> alarms;
   {
     const std::lock_guard lock(mutex_);
-    alarms.swap(alarms_);
+    alarms.swap(pendingAlarms_);
   }
   for (const auto& [alarm, what] : alarms) alarmHandler_(alarm, what);
 }

@@ -11,11 +11,14 @@
 namespace mpf {
 namespace {
 
-using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): the names of the data sheet
+using namespace scc2698b;
 
-constexpr int kMostAtOnce = 64;  // bytes per serve(): the others of the chip shall have their turn
+// The most bytes in each direction for one serve(), so that no channel delays the others.
+constexpr int kMaxBytesAtOnce = 64;
 
-// What the chip said of the byte that is read next. A break is a byte of zeroes without a stop bit.
+// The fault that the status register reports for the byte that is read next. A break is a byte of
+// zeros without a stop bit, so it has precedence over a framing error.
 LineFault faultOf(std::uint8_t sr) noexcept {
   if ((sr & kSrBreak) != 0) return LineFault::breakSignal;
   if ((sr & kSrFraming) != 0) return LineFault::framing;
@@ -32,8 +35,8 @@ OctalUartChannel::OctalUartChannel(Registers& io, int number, bool isRs485, std:
       imr_(imr),
       bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd", "for a serial port")) {}
 
-// The chip wants some clocks between two commands to a channel: reading from it takes longer than
-// that, and passes no bridge before the write.
+// The chip needs some clocks between two commands to a channel. The read takes longer than that,
+// and no bridge on the way lets it overtake the write.
 void OctalUartChannel::command(unsigned value) {
   write(kCr, static_cast<std::uint8_t>(value));
   static_cast<void>(read(kSr));
@@ -63,7 +66,7 @@ void OctalUartChannel::configure(const SerialSettings& settings) {
   write(kMr, mode_.mr1);
   write(kMr, mode_.mr2);
   write(kCsr, mode_.csr);
-  // Of RS-485 RTS is the transmitter's switch.
+  // On an RS-485 port RTS switches the transmitter on.
   command((isRs485_ && !isTalking_ ? kCrNegateRts : kCrAssertRts) |
           (isTalking_ ? kCrDisableRx : kCrEnableRx) | kCrEnableTx);
 }
@@ -87,20 +90,21 @@ void OctalUartChannel::lose(const std::string& because) {
   ring();
 }
 
-// The register behind MR1 can be read at any time; after a reset it would be 0, or MR1.
+// MR1 and MR2 have one address, which reads as MR2 once MR1 was accessed. After a reset it reads as
+// 0 or MR1.
 bool OctalUartChannel::isAsConfigured() { return read(kMr) == mode_.mr2; }
 
-bool OctalUartChannel::serve(std::uint8_t isr, bool isThere) {
+bool OctalUartChannel::serve(std::uint8_t isr, bool isPresent) {
   const auto before = received_.size();
-  const auto isOnes = [isThere](std::uint8_t sr) { return !isThere && sr == kOnes; };
+  const auto isOnes = [isPresent](std::uint8_t sr) { return !isPresent && sr == kOnes; };
   auto sr = read(kSr);
-  for (int i = 0; i < kMostAtOnce && (sr & kSrRxRdy) != 0 && !isOnes(sr); ++i) {
+  for (int i = 0; i < kMaxBytesAtOnce && (sr & kSrRxRdy) != 0 && !isOnes(sr); ++i) {
     receive(sr);
     sr = read(kSr);
   }
   noteEmpty(sr);
   const bool sends = (isr & kIsrTxRdy) != 0;
-  if (sends && !isOnes(sr)) sr = transmit(sr, isThere);
+  if (sends && !isOnes(sr)) sr = transmit(sr, isPresent);
   if (unsent_.empty()) setMask(kIsrTxRdy, false);
   const bool hasRoom = lacksRoom_ && unsent_.size() <= kMaxUnsent / 2;
   const bool endsSoon = sends && unsent_.empty();
@@ -108,10 +112,10 @@ bool OctalUartChannel::serve(std::uint8_t isr, bool isThere) {
   return !isOnes(sr);
 }
 
-// Gives the chip what it takes now. Returns its status then.
-std::uint8_t OctalUartChannel::transmit(std::uint8_t sr, bool isThere) {
-  for (int i = 0;
-       i < kMostAtOnce && (sr & kSrTxRdy) != 0 && (isThere || sr != kOnes) && !unsent_.empty();
+// Writes as many bytes as the chip accepts now. Returns the status register after that.
+std::uint8_t OctalUartChannel::transmit(std::uint8_t sr, bool isPresent) {
+  for (int i = 0; i < kMaxBytesAtOnce && (sr & kSrTxRdy) != 0 && (isPresent || sr != kOnes) &&
+                  !unsent_.empty();
        ++i) {
     write(kThr, unsent_.front());
     unsent_.pop_front();
@@ -120,7 +124,8 @@ std::uint8_t OctalUartChannel::transmit(std::uint8_t sr, bool isThere) {
   return sr;
 }
 
-// The errors are reset before the byte is read: afterwards they would be those of the next one.
+// Resets the error bits before it reads the byte; after the read, the bits would be those of the
+// next byte.
 void OctalUartChannel::receive(std::uint8_t sr) {
   if ((sr & kSrErrors) != 0) command(kCrResetErrors);
   if ((sr & kSrOverrun) != 0) noteOverrun();
@@ -135,9 +140,9 @@ void OctalUartChannel::receive(std::uint8_t sr) {
   }
 }
 
-// The chip says so as soon as it has lost the byte in its shift register, and keeps the three in
-// its FIFO. One of the three may have been read since the status was read last: what came instead
-// of the lost byte is the third or the fourth byte from now on.
+// The chip sets the overrun bit when it has lost the byte in its shift register; it keeps the three
+// bytes of its FIFO. One of the three may have been read since the previous read of the status. So
+// the byte that arrived after the lost one is the third or the fourth byte from now on.
 void OctalUartChannel::noteOverrun() {
   constexpr unsigned kThirdAndFourth = 0b1100;
   ++overruns_;
@@ -150,7 +155,7 @@ bool OctalUartChannel::takeGap() noexcept {
   return isHere;
 }
 
-// All has been read that came before now, the byte after the gap included.
+// When the chip is empty, the byte after the gap has been read as well.
 void OctalUartChannel::noteEmpty(std::uint8_t sr) noexcept {
   if ((sr & kSrRxRdy) == 0) gaps_ = 0;
 }
@@ -180,7 +185,7 @@ void OctalUartChannel::discardUnsent() {
   lacksRoom_ = false;
   if (!isOpen_) return;
   setMask(kIsrTxRdy, false);
-  // Apart: Philips' sheets of this family name these two as ones that one write must not join.
+  // Two writes: the Philips data sheets of this family forbid these two commands in one write.
   command(kCrResetTx);
   command(kCrEnableTx);
   tryTurn();

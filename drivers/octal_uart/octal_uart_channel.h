@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: MIT
-// OctalUartChannel: one of a chip's serial channels, between its registers and what a port has
-// received and wants to send.
+// OctalUartChannel: one serial channel of the chip, with a buffer for received bytes and a buffer
+// for unsent bytes.
 //
-//   chip ── serve() ──► received ──► take()        port's thread
-//   chip ◄── serve() ── unsent ◄──── put()         bell: rung when there is something to take, room to put, nothing
-//                                                          left to send, or the line is lost
+//   interrupt thread                          port's thread
+//   chip ─── serve() ──► received bytes ──► take()
+//   chip ◄── serve() ─── unsent bytes ◄──── put()
 //
-// RS-485: the transmitter is switched on by put() and off by tryTurn(), the receiver the other way
-// round: who talks does not hear itself.
+// The bell wakes the port's thread: when there are bytes to take, when put() has room again, when
+// no byte is left to send, and when the channel is lost.
 //
-// Threads  none of its own: who calls holds the lock of the chip (OctalUart). The bell may be
-//          polled by any.
-// Trust    a chip that says for ever that it has a byte costs a bounded time per serve().
-// Source   SCC2698B data sheet; order of commands as drvIpac's tyGSOctal has them.
+// RS-485: put() switches the transmitter on and the receiver off; tryTurn() does the reverse. So a
+// port does not receive the bytes that it sends.
+//
+// Threads  the caller holds the lock of the chip (OctalUart). Any thread may poll the bell.
+// Trust    a chip that always reports a byte costs a bounded time for each serve().
+// Source   SCC2698B data sheet; order of commands as in tyGSOctal of drvIpac.
 #pragma once
 
 #include <chrono>
@@ -33,49 +35,54 @@ namespace mpf {
 
 class OctalUartChannel {
  public:
-  // As many bytes may wait for a port's thread: 17 s at 38400 baud. Further ones are lost, and
-  // counted.
+  // Capacity of the buffer for received bytes: 17 s at 38400 baud. When it is full, further bytes
+  // are lost, and counted as overruns.
   static constexpr std::size_t kMaxReceived = 65536;
   static constexpr std::size_t kMaxUnsent = 4096;
 
-  //   imr     what the mask register of its block holds, which its neighbour shares
-  //   throws  std::system_error
+  //   imr     the value of the mask register of the block, which two channels share
+  //   throws  std::system_error when no descriptor can be created
   OctalUartChannel(Registers& io, int number, bool isRs485, std::uint8_t& imr);
 
+  // For poll(): readable when the bell was rung; take() resets it.
   [[nodiscard]] int bell() const noexcept { return bell_.get(); }
   [[nodiscard]] bool isOpen() const noexcept { return isOpen_; }
-  // Why it is not open any more.
+  // Why the channel was lost.
   [[nodiscard]] const std::string& lostBecause() const noexcept { return lostBecause_; }
 
-  // Resets both directions and enables them.
+  // Resets and enables the receiver and the transmitter.
   void open(const SerialSettings& settings);
   void configure(const SerialSettings& settings);
-  // Silences it, also when it was never open.
+  // Disables both directions and their interrupts, also of a channel that was never open.
   void close();
-  // Its module does not answer any more.
+  // Marks the channel as lost, because its module does not answer. Does not access the chip.
   void lose(const std::string& because);
-  // The chip still has what was written to it; otherwise it has been reset.
+  // Returns whether the chip still has the settings that were written to it; if not, it was reset.
   [[nodiscard]] bool isAsConfigured();
 
-  // Takes all that the chip has received, and gives it what there is to send.
-  //   isr      the bits of this channel, as those of channel a
-  //   isThere  the chip is known to be there: a status of all ones is one
-  //   returns  false at a status of all ones, otherwise: is it there?
-  [[nodiscard]] bool serve(std::uint8_t isr, bool isThere);
+  // Reads all bytes that the chip has received, and writes unsent bytes.
+  //   isr        the interrupt bits of this channel, at the positions of channel a
+  //   isPresent  true when the chip is known to be present: then a status register of all ones is
+  //              valid
+  //   returns    false when the status register reads as all ones and isPresent is false: then call
+  //              again after a check of the module
+  [[nodiscard]] bool serve(std::uint8_t isr, bool isPresent);
 
-  // What was received. A byte that follows a gap says so; after an overrun in the chip two bytes
-  // may, of which one does.
+  // Moves the received bytes to the end of `bytes`. LineByte::followsGap marks the byte after a
+  // gap. After an overrun in the chip it marks two bytes, one of which follows the gap.
   void take(std::vector<LineByte>& bytes);
+  // Returns the number of bytes lost since the last call.
   [[nodiscard]] std::uint64_t takeOverruns() noexcept;
-  // Returns how many of `bytes` it had room for.
+  // Sends bytes, or keeps them to be sent. Returns the number of bytes that it had room for.
   [[nodiscard]] std::size_t put(std::span<const std::uint8_t> bytes);
   void discardUnsent();
   void setBreak(bool on);
 
-  // How long until all is out, at least; 0 when it is. What a lost line had to send is never out.
+  // The least time until all bytes are sent; 0 when they are. Never 0 for a lost channel, because
+  // its bytes are never sent.
   [[nodiscard]] std::chrono::nanoseconds timeToSend();
-  // RS-485: whether the transmitter is on and to be switched off by tryTurn(), which does it when
-  // all is out.
+  // RS-485: returns whether the transmitter is on and must be switched off. tryTurn() switches it
+  // off when all bytes are sent.
   [[nodiscard]] bool waitsForTurn() const noexcept { return isTalking_ && !isBreaking_; }
   void tryTurn();
 
@@ -93,7 +100,7 @@ class OctalUartChannel {
   void noteOverrun();
   bool takeGap() noexcept;
   void noteEmpty(std::uint8_t sr) noexcept;
-  std::uint8_t transmit(std::uint8_t sr, bool isThere);
+  std::uint8_t transmit(std::uint8_t sr, bool isPresent);
   [[nodiscard]] bool isAllOut() {
     return unsent_.empty() && (read(scc2698b::kSr) & scc2698b::kSrTxEmt) != 0;
   }
@@ -107,16 +114,16 @@ class OctalUartChannel {
   bool isOpen_ = false;
   bool isTalking_ = false;
   bool isBreaking_ = false;
-  bool lacksRoom_ = false;  // put() could not take all
+  bool lacksRoom_ = false;  // put() had no room for all bytes
   std::string lostBecause_;
   OctalUartMode mode_;
   std::chrono::nanoseconds byteTime_{};
   std::vector<LineByte> received_;
   std::deque<std::uint8_t> unsent_;
   std::uint64_t overruns_ = 0;
-  // bit n: bytes may be missing before the byte that is n bytes behind the next one in the chip
+  // bit n: a gap may be before the byte that is read from the chip after n other bytes
   unsigned gaps_ = 0;
-  // received_ had no room: bytes are missing before the next one that goes into it
+  // received_ was full: a gap is before the next byte that is put into it
   bool isCut_ = false;
 };
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf {
 namespace {
@@ -38,14 +39,14 @@ OctalUartLine::OctalUartLine(OctalUart& uart, int number, const SerialSettings& 
       events_(checkCall(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1", "for a serial port")) {
   if (const auto refused = octalUartProblemOf(settings, uart.isRs485()); !refused.empty())
     throw std::invalid_argument(fmt::format("{}: {}", description_, refused));
-  uart.takePort(number);
+  uart.reservePort(number);
   watch(events_, uart.with(number, [](OctalUartChannel& channel) { return channel.bell(); }));
   watch(events_, timer_.get());
 }
 
 OctalUartLine::~OctalUartLine() {
   close();
-  uart_.leavePort(number_);
+  uart_.releasePort(number_);
 }
 
 SerialLine::OpenState OctalUartLine::tryOpen() {
@@ -67,7 +68,7 @@ bool OctalUartLine::isThere(OctalUartChannel& channel) {
 bool OctalUartLine::tryRead(std::vector<LineByte>& bytes) {
   return uart_.with(number_, [&](OctalUartChannel& channel) {
     channel.take(bytes);
-    overruns_ += channel.takeOverruns();  // with the bytes: none of a gap that is in later ones
+    overruns_ += channel.takeOverruns();  // under the same lock, so they belong to these bytes
     turnOrWait(channel);
     return isThere(channel);
   });
@@ -80,16 +81,15 @@ std::optional<std::size_t> OctalUartLine::tryWrite(std::span<const std::uint8_t>
   });
 }
 
-// While bytes wait in memory their interrupts tell how it goes; then only asking the chip does.
+// RS-485: switches the transmitter off when all bytes are sent, or sets the timer to try again. The
+// end of the last byte causes no interrupt, so the chip must be polled for it.
 void OctalUartLine::turnOrWait(OctalUartChannel& channel) const {
   std::uint64_t expirations = 0;
   static_cast<void>(::read(timer_.get(), &expirations, sizeof expirations));
   channel.tryTurn();
   if (!channel.waitsForTurn()) return;
   const auto wait = channel.timeToSend() / 4;
-  itimerspec when{};
-  when.it_value.tv_sec = wait.count() / 1'000'000'000;
-  when.it_value.tv_nsec = wait.count() % 1'000'000'000;
+  const itimerspec when{.it_interval = {}, .it_value = timespecOf(wait)};
   ::timerfd_settime(timer_.get(), 0, &when, nullptr);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// OctalUartLine: the line of an OctalUartPort: a channel of a chip, with a bell and, for RS-485, a
-// timer in one descriptor.
+// OctalUartLine: a channel of an OctalUart as a SerialLine. Its descriptor joins the bell of the
+// channel with a timer, which RS-485 needs to switch the transmitter off.
 //
 // Threads  the port's thread.
 // Crash    see OctalUart.
@@ -19,10 +19,12 @@ namespace mpf {
 
 class OctalUartLine final : public SerialLine {
  public:
-  //   uart      outlives this
-  //   settings  0 in a field: 9600 baud, 8 bits, no parity, 1 stop bit, no flow control
-  //   throws    std::invalid_argument for settings that the chip does not have, for a port that is
-  //             not there or is taken
+  // Reserves port `number` of the module; tryOpen() sets it up.
+  //   uart      outlives this object
+  //   settings  a field that is 0 means the usual value: 9600 baud, 8 bits, no parity, 1 stop bit,
+  //             no flow control
+  //   throws    std::invalid_argument for settings that the chip does not support, and when the
+  //             module has no such port or the port is in use
   OctalUartLine(OctalUart& uart, int number, const SerialSettings& settings);
   ~OctalUartLine() override;
 
@@ -49,9 +51,9 @@ class OctalUartLine final : public SerialLine {
   const std::string description_;
   SerialSettings settings_;
   std::string problem_;
-  std::uint64_t overruns_ = 0;  // of what tryRead() has given
-  FileDescriptor timer_;  // when an RS-485 line may have to be turned
-  // epoll over the channel's bell and the timer: never writable, unlike a bell
+  std::uint64_t overruns_ = 0;  // of the bytes that tryRead() has returned
+  FileDescriptor timer_;  // RS-485: the next call of tryTurn()
+  // epoll of the channel's bell and the timer; unlike the bell alone, it is never writable
   FileDescriptor events_;
 };
 

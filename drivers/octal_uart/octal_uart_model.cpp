@@ -16,16 +16,18 @@
 
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf {
 namespace {
 
-using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): the names of the data sheet
+using namespace scc2698b;
 
 constexpr std::size_t kChannelBytes = 0x10;
 constexpr std::uint8_t kVectorAtPowerUp = 0x0f;
-constexpr std::size_t kMostIncoming = 4096;  // of a terminal; the rest waits in the kernel
-constexpr std::int64_t kLookAgainNs = 5'000'000;
+constexpr std::size_t kMaxIncoming = 4096;  // from a terminal; more bytes stay in the kernel
+constexpr std::int64_t kCheckRoomEveryNs = 5'000'000;
 
 }  // namespace
 
@@ -161,7 +163,7 @@ void OctalUartModel::reset() {
   proceed();
 }
 
-// ---- what follows from an access, or from time
+// ---- effects of an access, or of time
 
 std::int64_t OctalUartModel::nowNs() const {
   return options_.time == OctalUartModelTime::clock ? Clock::nowNs() : steppedNs_;
@@ -256,14 +258,13 @@ void OctalUartModel::run(const std::stop_token& stop) {
     const auto wait = Deadline::atNs(wakeAtNs());
     for (std::size_t i = 0; i < terminals_.size(); ++i) {
       const bool mayRead = options_.terminals && with(static_cast<int>(i), [](const auto& channel) {
-                             return channel.incoming.size() < kMostIncoming;
+                             return channel.incoming.size() < kMaxIncoming;
                            });
       entries.at(i) = {
           .fd = mayRead ? terminals_.at(i).master.get() : -1, .events = POLLIN, .revents = 0};
     }
     entries.back() = {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0};
-    const auto left = wait.left().count();
-    const timespec timeout{.tv_sec = left / 1'000'000'000, .tv_nsec = left % 1'000'000'000};
+    const auto timeout = timespecOf(wait.left());
     ::ppoll(entries.data(), entries.size(), wait.isNever() ? nullptr : &timeout, nullptr);
     eventfd_t rings = 0;
     static_cast<void>(::eventfd_read(wakeUp_.get(), &rings));
@@ -273,22 +274,23 @@ void OctalUartModel::run(const std::stop_token& stop) {
   }
 }
 
-// A terminal that is not read because enough of it waits here is looked at again soon.
+// A terminal whose bytes exceed kMaxIncoming is not polled; its room is checked again after
+// kCheckRoomEveryNs.
 std::int64_t OctalUartModel::wakeAtNs() {
   const std::lock_guard lock(mutex_);
   auto next = INT64_MAX;
   for (const auto& channel : channels_) {
     if (options_.time == OctalUartModelTime::clock) next = std::min(next, channel.nextEventNs());
-    if (channel.incoming.size() >= kMostIncoming)
-      next = std::min(next, Clock::nowNs() + kLookAgainNs);
+    if (channel.incoming.size() >= kMaxIncoming)
+      next = std::min(next, Clock::nowNs() + kCheckRoomEveryNs);
   }
   return next;
 }
 
 void OctalUartModel::readTerminals(std::span<const short> events) {
   const std::lock_guard lock(mutex_);
-  std::array<std::uint8_t, 1024>
-      bytes;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): read() fills it
+  std::array<std::uint8_t, 1024> bytes;
   for (std::size_t i = 0; i < events.size(); ++i) {
     if ((events[i] & POLLIN) == 0) continue;
     const auto length = ::read(terminals_.at(i).master.get(), bytes.data(), bytes.size());

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// OctalUartModel: an Octal 232, 422 or 485 that is not there, with a line at each of its eight
-// ports.
+// OctalUartModel: a model of an Octal 232, 422 or 485, with a far end at each of its eight ports.
 //
-//   auto& uart = carrier.plug("IP_a",
-//   std::make_unique<OctalUartModel>(OctalUartModelOptions{.terminals = true})); uart.terminal(3)
-//   // /dev/pts/7: what an instrument's program opens
+//   const OctalUartModelOptions options{.terminals = true};
+//   auto& uart = carrier.plug("IP_a", std::make_unique<OctalUartModel>(options));
+//   uart.terminal(3);                   // "/dev/pts/7", which the program of an instrument opens
 //
-//   uart.say(3, "1.234\r");             // or without terminals: the far end in memory
+//   uart.say(3, "1.234\r");             // without terminals: the far end in memory
 //   uart.waitUntilHeard(3, "MEAS?\r");
 //
-// Time: bytes are instant, and none is ever lost; or take what the baud rate says, by the clock or
-// by a test's hand.
+// A byte takes no time, and none is lost; or it takes the time of its baud rate, by the clock or in
+// steps that a test makes.
 //
-// Threads  any; one of its own for the clock and terminals.
+// Threads  any number of callers at a time. The model has one thread of its own when it uses the
+//          clock or terminals.
 // Source   SCC2698B data sheet. Not modelled: counter, input pins, auto-echo, remote loopback.
 #pragma once
 
@@ -35,20 +35,21 @@
 namespace mpf {
 
 enum class OctalUartModelTime : std::uint8_t {
-  instant,
-  clock,
-  stepped,  // advance() lets it pass
+  instant,  // a byte takes no time
+  clock,  // CLOCK_MONOTONIC
+  stepped,  // only advance() lets time pass
 };
 
 struct OctalUartModelOptions {
   std::uint16_t model = 0x22;  // 0x2a: Octal 422, 0x48: Octal 485
   OctalUartModelTime time = OctalUartModelTime::instant;
-  bool terminals = false;  // behind each port a pseudo-terminal, instead of say() and heard()
+  // A pseudo-terminal is the far end of each port; otherwise say() and heard() are.
+  bool terminals = false;
 };
 
 class OctalUartModel final : public DeviceModel {
  public:
-  // throws  std::system_error when there are no pseudo-terminals
+  //   throws  std::system_error when no pseudo-terminal, descriptor or thread can be created
   explicit OctalUartModel(const OctalUartModelOptions& options = {});
   ~OctalUartModel() override;
 
@@ -56,43 +57,45 @@ class OctalUartModel final : public DeviceModel {
   void write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) override;
 
   // --- the far ends
-  // The path of a port's pseudo-terminal. Bytes that nobody reads there are lost when its buffer is
-  // full.
+  // The path of a port's pseudo-terminal. When its buffer is full, further bytes are lost.
   [[nodiscard]] const std::string& terminal(int port) const {
     return terminals_.at(index(port)).path;
   }
-  // Sends `text`; what `fault` is not none damages each of its bytes.
+  // The far end sends `text`. `fault` damages each byte of it.
   void say(int port, std::string_view text, LineFault fault = LineFault::none);
-  // All that has come from that port.
+  // All bytes that the far end has received from the port.
   [[nodiscard]] std::string heard(int port) const;
+  // Waits until these bytes end with `text`.
   void waitUntilHeard(int port, std::string_view text) const;
+  // Sets the CTS input of the port.
   void setClearToSend(int port, bool clear);
 
-  // A look at, or at any time a change of, a channel.
-  template <class SnapshotDelta>
-  auto with(int port, SnapshotDelta look) const {
+  // Calls `look` with a channel, under the lock, and returns its result.
+  template <class Look>
+  auto with(int port, Look look) const {
     const std::lock_guard lock(mutex_);
     return look(std::as_const(channels_.at(index(port))));
   }
   [[nodiscard]] std::uint8_t vector() const;
-  // The longest time that it asked for something and nobody touched that half of it, since the last
-  // call; by the clock.
+  // The longest time, since the last call, for which a request line was active and no register of
+  // its half of the chip was accessed. Only with OctalUartModelTime::clock.
   [[nodiscard]] std::chrono::nanoseconds takeLongestWait();
-  // How often something was written to it.
+  // The number of write cycles.
   [[nodiscard]] std::uint64_t writes() const;
-  // The chip forgets all, as when its power fails.
+  // Resets the chip, as after a power failure.
   void reset();
 
   // --- time, when it is stepped
   void advance(std::chrono::nanoseconds time);
-  // Waits until the chip asks for nothing.
+  // Waits until the chip has no request.
   void waitUntilServed() const;
 
  private:
   struct Terminal {
     std::string path;
     FileDescriptor master;
-    FileDescriptor slave;  // held open, or the master would see a hang-up when an instrument leaves
+    // kept open, so that the master sees no hang-up when the program of an instrument closes it
+    FileDescriptor slave;
   };
   static std::size_t index(int port) noexcept { return static_cast<std::size_t>(port); }
   static Terminal openTerminal();
@@ -111,18 +114,18 @@ class OctalUartModel final : public DeviceModel {
   const OctalUartModelOptions options_;
   std::array<Terminal, scc2698b::kChannels> terminals_;
   FileDescriptor wakeUp_;
-  mutable std::mutex mutex_;  // all below
+  mutable std::mutex mutex_;  // guards the members below, except thread_
   mutable std::condition_variable changed_;
   std::array<OctalUartModelChannel, scc2698b::kChannels> channels_;
   std::array<std::uint8_t, scc2698b::kBlocks> imr_{};
   std::array<bool, 2> isActive_{};  // request lines
-  // of a line that is active: when it became so, or its half was touched
+  // when the request line became active, or its half of the chip was accessed last
   std::array<std::int64_t, 2> waitsSinceNs_{};
   std::int64_t longestWaitNs_ = 0;
   std::uint8_t vector_ = 0x0f;
   std::uint64_t writes_ = 0;
   std::int64_t steppedNs_ = 0;
-  std::jthread thread_;  // last: ends before what it uses
+  std::jthread thread_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

@@ -9,12 +9,13 @@
 namespace mpf {
 namespace {
 
-using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): the names of the data sheet
+using namespace scc2698b;
 
 std::uint8_t statusOf(LineFault fault) {
   switch (fault) {
     case LineFault::none:
-    case LineFault::overrun:  // arrive() sees to it
+    case LineFault::overrun:  // set by arrive()
     case LineFault::unplugged:
       return 0;
     case LineFault::parity:
@@ -85,7 +86,7 @@ void OctalUartModelChannel::writeCr(std::uint8_t value) {
       thr_.reset();
       txShift_.reset();
       break;
-    case kCrResetErrors:  // also those of the byte that is read next
+    case kCrResetErrors:  // also resets the errors of the byte that is read next
       hasOverrun_ = false;
       if (!fifo_.empty()) fifo_.front().status = 0;
       break;
@@ -103,8 +104,8 @@ void OctalUartModelChannel::writeCr(std::uint8_t value) {
     default:
       break;
   }
-  // A reset and an enabling of the same half in one write contradict each other: the data sheet
-  // forbids it, and here the reset counts.
+  // The data sheet forbids to reset and enable the same direction in one write; here the reset has
+  // precedence.
   if ((value & kCrEnableRx) != 0 && (value & 0xf0) != kCrResetRx) isRxEnabled_ = true;
   if ((value & kCrDisableRx) != 0) isRxEnabled_ = false;
   if ((value & kCrEnableTx) != 0 && (value & 0xf0) != kCrResetTx) isTxEnabled_ = true;
@@ -145,7 +146,7 @@ void OctalUartModelChannel::arrive(LineByte byte) {
   const Received received{static_cast<std::uint8_t>(byte.value & ((1U << bits) - 1)),
                           statusOf(byte.fault)};
   if (byte.fault == LineFault::breakSignal) hasBreakChanged_ = true;
-  if (rxShift_) {  // what is in the FIFO stays
+  if (rxShift_) {  // overwritten; the bytes of the FIFO stay
     hasOverrun_ = true;
     ++overrun_;
   }
@@ -176,7 +177,7 @@ void OctalUartModelChannel::runInstantly() {
     start(0);
     finish();
   }
-  // Somebody who is nobody's listener talks to the wind; others are heard.
+  // A byte for a disabled receiver is lost at once; other bytes wait until the FIFO has room.
   while (!incoming.empty() && (!isRxEnabled_ || fifo_.size() < kFifoBytes)) {
     arrive(incoming.front());
     incoming.pop_front();

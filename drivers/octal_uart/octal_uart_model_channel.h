@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// OctalUartModelChannel: one channel of the chip of an OctalUartModel: what is in it, and its line.
+// OctalUartModelChannel: one channel in the chip of an OctalUartModel, and its line.
 //
-//   THR ─► shift register ─► line                     line ─► shift register ─► FIFO of 3, each with its status ─► RHR
+//   THR ─► shift register ─► line
+//   line ─► shift register ─► FIFO of 3 bytes, each with its status ─► RHR
 //
-// Threads  none of its own: the model's lock is held.
+// Threads  the caller holds the lock of the model.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +21,7 @@ class OctalUartModelChannel {
  public:
   static constexpr std::size_t kFifoBytes = 3;
 
-  // --- as the processor sees it
+  // --- the registers
   [[nodiscard]] std::uint8_t readMr();
   [[nodiscard]] std::uint8_t readSr() const;
   [[nodiscard]] std::uint8_t readRhr();
@@ -28,31 +29,33 @@ class OctalUartModelChannel {
   void writeCsr(std::uint8_t value) { mode_.csr = value; }
   void writeCr(std::uint8_t value);
   void writeThr(std::uint8_t value);
-  // Its bits of ISR, as those of channel a.
+  // The bits of this channel in ISR, at the positions of channel a.
   [[nodiscard]] std::uint8_t isr() const;
 
-  // --- as the line sees it
-  // What comes next, and what has gone out.
+  // --- the line
+  // The bytes that the far end sends, and all bytes that it has received.
   std::deque<LineByte> incoming;
   std::string outgoing;
   void setClearToSend(bool clear) { clearToSend_ = clear; }
-  // RTSN is low: somebody may send, or of RS-485 this one does.
+  // Returns whether RTSN is low: the far end may send; on RS-485, the transmitter is on.
   [[nodiscard]] bool requestsToSend() const;
   [[nodiscard]] bool isBreaking() const { return isBreaking_; }
   [[nodiscard]] int breaks() const { return breaks_; }
-  // Bytes that came and were overwritten before they were read, or while the receiver was disabled.
+  // Received bytes that were overwritten before they were read.
   [[nodiscard]] std::uint64_t overrun() const { return overrun_; }
+  // Bytes that arrived while the receiver was disabled.
   [[nodiscard]] std::uint64_t unheard() const { return unheard_; }
   [[nodiscard]] SerialSettings settings() const { return settingsOf(mode_); }
 
   // --- time
-  // Lets happen what happens until then. A byte takes no time and comes when there is room for it,
-  // or the time that it takes on the line.
-  //   mayLag  time that nobody looked did not pass: late bytes come one after the other, not all at
-  //           once
+  // Advances the channel to the time `nowNs`.
+  //   takesTime  true: a byte takes the time of the baud rate; false: a byte takes no time, and
+  //              arrives when there is room for it
+  //   mayLag     true: bytes that are late because this function was called late arrive one after
+  //              the other, as on a line, and not all at once
   void runUntil(std::int64_t nowNs, bool takesTime, bool mayLag);
-  // When the next byte has come or gone, at the speeds that are set; INT64_MAX: never, as it looks
-  // now.
+  // When the next byte has been sent or received at the present baud rate; INT64_MAX: no byte is on
+  // the line.
   [[nodiscard]] std::int64_t nextEventNs() const;
 
  private:
@@ -78,8 +81,8 @@ class OctalUartModelChannel {
   std::deque<Received> fifo_;
   std::optional<Received> rxShift_;  // waits for room in the FIFO
   std::optional<std::uint8_t> thr_, txShift_;
-  std::int64_t sentAtNs_ = 0;  // when txShift_ is out
-  std::optional<std::int64_t> arrivesAtNs_;  // when the first of incoming is in
+  std::int64_t sentAtNs_ = 0;  // when txShift_ has been sent
+  std::optional<std::int64_t> arrivesAtNs_;  // when the first byte of incoming has been received
   int breaks_ = 0;
   std::uint64_t overrun_ = 0, unheard_ = 0;
 };

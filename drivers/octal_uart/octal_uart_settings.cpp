@@ -10,9 +10,10 @@
 namespace mpf {
 namespace {
 
-using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): the names of the data sheet
+using namespace scc2698b;
 
-constexpr int kShortest = 5;  // bits per character
+constexpr int kMinBitsPerChar = 5;
 
 }  // namespace
 
@@ -21,17 +22,17 @@ std::string octalUartProblemOf(const SerialSettings& settings, bool isRs485) {
   if (settings.baud != 0 && std::ranges::find(kBauds, settings.baud) == kBauds.end()) {
     auto bauds = kBauds;
     std::ranges::sort(bauds);
-    return fmt::format("baud {}: this chip makes {}", settings.baud, fmt::join(bauds, ", "));
+    return fmt::format("baud {}: the chip supports {}", settings.baud, fmt::join(bauds, ", "));
   }
   if (isRs485 && settings.flowControl == 'H')
-    return "flow control 'H': an RS-485 line has no lines for it";
+    return "flow control 'H': an RS-485 port has no RTS/CTS lines; use 'N'";
   return {};
 }
 
 OctalUartMode octalUartModeOf(const SerialSettings& settings) {
   const auto code =
       static_cast<unsigned>(std::ranges::find(kBauds, settings.baud) - kBauds.begin());
-  unsigned mr1 = static_cast<unsigned>(settings.bitsPerChar - kShortest);
+  unsigned mr1 = static_cast<unsigned>(settings.bitsPerChar - kMinBitsPerChar);
   unsigned mr2 = settings.stopBits == 2 ? kMr2TwoStop : kMr2OneStop;
   if (settings.parity == 'O') mr1 |= kMr1Odd;
   if (settings.parity == 'N') mr1 |= kMr1NoParity;
@@ -49,7 +50,7 @@ SerialSettings settingsOf(const OctalUartMode& mode) {
   SerialSettings settings;
   settings.baud = kBauds.at(code);
   settings.stopBits = (mode.mr2 & kMr2TwoStop) == kMr2TwoStop ? 2 : 1;
-  settings.bitsPerChar = kShortest + (mode.mr1 & kMr1Bits);
+  settings.bitsPerChar = kMinBitsPerChar + (mode.mr1 & kMr1Bits);
   settings.parity = (mode.mr1 & kMr1Odd) != 0 ? 'O' : 'E';
   if ((mode.mr1 & kMr1NoParity) != 0) settings.parity = 'N';
   settings.flowControl = (mode.mr1 & kMr1RxRts) != 0 && (mode.mr2 & kMr2TxCts) != 0 ? 'H' : 'N';

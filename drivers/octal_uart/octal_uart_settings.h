@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SerialSettings as an SCC2698B has them in its registers.
+// OctalUartMode: SerialSettings as the values of the mode registers of an SCC2698B.
 #pragma once
 
 #include <chrono>
@@ -18,17 +18,18 @@ struct OctalUartMode {
   friend bool operator==(const OctalUartMode&, const OctalUartMode&) = default;
 };
 
-// Says which value the chip does not have, in a sentence; empty when it can be driven so.
-//   isRs485   RTS switches the transmitter on and is not there for flow control
+// Returns a sentence that names the first value that the chip does not support; empty when it
+// supports all of them.
+//   isRs485   RTS switches the transmitter on, and cannot be used for flow control
 [[nodiscard]] std::string octalUartProblemOf(const SerialSettings& settings, bool isRs485);
 
-// All fields of `settings` must be set, and octalUartProblemOf() them empty.
+// Requires that all fields of `settings` are set and octalUartProblemOf() is empty.
 [[nodiscard]] OctalUartMode octalUartModeOf(const SerialSettings& settings);
 
-// The reverse, for models.
+// The settings of these register values. For models.
 [[nodiscard]] SerialSettings settingsOf(const OctalUartMode& mode);
 
-// What a byte needs on the line, start, parity and stop bits included.
+// The time that a byte needs on the line, with start, parity and stop bits.
 [[nodiscard]] std::chrono::nanoseconds byteTime(const SerialSettings& settings) noexcept;
 
 }  // namespace mpf

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The registers of an SCC2698B, eight serial channels in four blocks, as GreenSpring's modules have
-// it in their I/O space.
+// The registers of an SCC2698B, a chip with eight serial channels in four blocks, in the I/O space
+// of a GreenSpring module.
 //
-//   block    0        1        2        3           32 bytes each; request line 0 is that of blocks
-//            0 and 1, line 1 that of 2 and 3
-//   channel  a0  b1   a2  b3   a4  b5   a6  b7      16 bytes each; registers are bytes at odd
-//            addresses
+//   request line  0                 1
+//   block         0        1        2        3        32 bytes each
+//   channel       a0  b1   a2  b3   a4  b5   a6  b7   16 bytes each
 //
-// Source   SCC2698B data sheet (Philips, 2000), tables 1 to 8; of bits with two values the one that
-//          is 0 has no name.
+// Each register is a byte at an odd address. A value of a bit field that is 0 has no name here.
+//
+// Source   SCC2698B data sheet (Philips, 2000), tables 1 to 8.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ namespace mpf::scc2698b {
 inline constexpr int kBlocks = 4;
 inline constexpr int kChannels = 8;
 
-// Of a channel; the first name is that of reading, the second that of writing where they differ.
+// Registers of a channel. Two names with one offset: the first is read, the second is written.
 enum ChannelRegister : std::size_t {
   kMr = 0x1,
   kSr = 0x3,
@@ -29,9 +29,9 @@ enum ChannelRegister : std::size_t {
   kRhr = 0x7,
   kThr = 0x7
 };
-// Of a block.
+// Registers of a block.
 enum BlockRegister : std::size_t { kAcr = 0x9, kIsr = 0xb, kImr = 0xb, kOpcr = 0x1b };
-// In the module's memory space: the low byte of the word at 0.
+// The interrupt vector, in the memory space of the module: the low byte of the word at 0.
 inline constexpr std::size_t kVector = 1;
 
 constexpr std::size_t at(int channel, ChannelRegister which) noexcept {
@@ -41,7 +41,8 @@ constexpr std::size_t atBlock(int block, BlockRegister which) noexcept {
   return static_cast<std::size_t>(block) * 0x20 + which;
 }
 
-// MR1, and MR2 behind the same address once MR1 has been accessed.
+// MR1 and MR2 have the same address. After kCrResetMr the first access is to MR1, and all later
+// ones are to MR2.
 enum Mr1 : std::uint8_t {
   kMr1Bits = 0x03,
   kMr1Odd = 0x04,
@@ -63,13 +64,14 @@ enum Sr : std::uint8_t {
   kSrTxRdy = 0x04,
   kSrTxEmt = 0x08,
   kSrOverrun = 0x10,
-  kSrParity = 0x20,  // this and below: of the byte that is to be read next
+  // of the byte that is read next:
+  kSrParity = 0x20,
   kSrFraming = 0x40,
   kSrBreak = 0x80,
 };
 inline constexpr std::uint8_t kSrErrors = kSrOverrun | kSrParity | kSrFraming | kSrBreak;
 
-// The lower half of CR: bits. The upper half: one of these commands.
+// CR: the lower four bits enable and disable; the upper four bits are one command.
 enum Cr : std::uint8_t {
   kCrEnableRx = 0x01,
   kCrDisableRx = 0x02,
@@ -86,10 +88,10 @@ enum Cr : std::uint8_t {
   kCrNegateRts = 0x90,
 };
 
-// What every register reads as when there is no chip.
+// The value of each register when no chip answers.
 inline constexpr std::uint8_t kOnes = 0xff;
 
-// ISR and IMR: of a block's channel a, those of channel b are 4 bits higher.
+// Bits of ISR and IMR for channel a of a block; those for channel b are 4 bits higher.
 enum Isr : std::uint8_t { kIsrTxRdy = 0x01, kIsrRxRdy = 0x02, kIsrBreakChange = 0x04 };
 constexpr std::uint8_t isrOf(int channel, std::uint8_t bits) noexcept {
   return static_cast<std::uint8_t>(channel % 2 == 0 ? bits : bits << 4);
@@ -98,8 +100,8 @@ constexpr std::uint8_t isrOf(int channel, std::uint8_t bits) noexcept {
 inline constexpr std::uint8_t kAcrSet2 = 0x80;  // the second set of baud rates
 inline constexpr std::uint8_t kOpcrMppOutput = 0x80;  // MPP pins are outputs, MPO pins are RTSN
 
-// Set 2; the index is what CSR has for the receiver (upper half) and for the transmitter (lower
-// half).
+// The baud rates of set 2. The index is the code in CSR: for the receiver in the upper four bits,
+// for the transmitter in the lower four bits.
 inline constexpr std::array<int, 13> kBauds{75,   110,  38400, 150,  300,  600,  1200,
                                             2000, 2400, 4800,  1800, 9600, 19200};
 

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// LateLine: a line that can be made only once its hardware is there. Until then it cannot be
-// opened, and says what is missing.
+// LateLine: a line whose hardware may be absent when its port is created. It creates the real line
+// when the hardware is present. Until then each attempt to open it fails, and problem() says what
+// is missing.
 //
-//   PolledSerialPort port(std::make_unique<LateLine>("port 3 of UART0", [&] { return
-//   std::make_unique<OctalUartLine>(uart(), 3, settings); }), true);
+//   const auto makeLine = [&] { return std::make_unique<OctalUartLine>(uart(), 3, settings); };
+//   PolledSerialPort port(std::make_unique<LateLine>("port 3 of UART0", makeLine), true);
 //
 // Threads  the port's thread.
-// Trust    as that of the line that is made.
+// Trust    see the line that `make` returns.
 #pragma once
 
 #include <functional>
@@ -19,8 +20,8 @@ namespace mpf {
 
 class LateLine final : public SerialLine {
  public:
-  // Runs at each attempt to open the line, until it does not throw; what it throws, a
-  // std::exception, says what is missing.
+  // Creates the real line. Called at each attempt to open, until it returns; throws a
+  // std::exception that says what is missing.
   using Make = std::function<std::unique_ptr<SerialLine>()>;
 
   LateLine(std::string description, Make make);
@@ -43,7 +44,7 @@ class LateLine final : public SerialLine {
   const std::string description_;
   const Make make_;
   std::string problem_;
-  std::unique_ptr<SerialLine> line_;  // null until it could be made
+  std::unique_ptr<SerialLine> line_;  // nullptr until make_ has returned
 };
 
 }  // namespace mpf

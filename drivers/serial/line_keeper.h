@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// LineKeeper: keeps a line open: opens it, and after a loss tries again, ever less often, until it
-// is back.
+// LineKeeper: keeps a line open. It opens the line, and after a loss opens it again; the pause
+// between two attempts grows from 20 ms to one second.
 //
 //   tryOpen ──► open ──► lost ──► 20 ms ──► tryOpen ──► 40 ms ──► tryOpen ──► ... ──► every second
-//                 └─ after a second up, the next loss starts at 20 ms again
+//                 └─ after more than a second in this state, the next pause is 20 ms again
 //
-// Threads  service() and the like on the port's thread; state, reason and wait from any.
-// Trust    a far end that accepts and hangs up at once is called back once a second at most.
+// Threads  the functions for the port's thread are marked; any thread may call the others.
+// Trust    a far end that accepts each connection and closes it at once causes at most one attempt
+//          each second, after the first few.
 #pragma once
 
 #include <condition_variable>
@@ -25,23 +26,25 @@ class LineKeeper {
  public:
   explicit LineKeeper(std::unique_ptr<SerialLine> line) : line_(std::move(line)) {}
 
-  // For the port's thread: what to poll and until when; then service() with what poll said, which
-  // opens when it is time.
+  // --- for the port's thread
+  // What to poll, and until when. Then call service() with the events that poll() returned; it
+  // opens the line when an attempt is due.
   [[nodiscard]] pollfd waitsFor() const noexcept;
   [[nodiscard]] Deadline wakeAt() const noexcept;
   void service(short readyEvents);
-  // The line is gone: line().problem() says why.
+  // Closes the line and schedules the next attempt. Call it when the line is lost; line().problem()
+  // says why.
   void lose();
   [[nodiscard]] bool isOpen() const noexcept { return phase_ == Phase::open; }
   [[nodiscard]] SerialLine& line() noexcept { return *line_; }
   [[nodiscard]] const SerialLine& line() const noexcept { return *line_; }
 
-  // For any thread.
+  // --- for any thread; see SerialPort
   [[nodiscard]] SerialPortState state() const;
   [[nodiscard]] std::string unpluggedBecause() const;
   [[nodiscard]] bool waitForState(SerialPortState state, Deadline deadline) const;
   void onStateChange(StateHandler handler);
-  // Waits for the end of the first attempt to open; returns what went wrong, or empty.
+  // Waits for the end of the first attempt to open. Returns why it failed; empty when it succeeded.
   [[nodiscard]] std::string waitForFirstAttempt() const;
 
  private:
@@ -52,9 +55,9 @@ class LineKeeper {
 
   std::unique_ptr<SerialLine> line_;
   Phase phase_ = Phase::closed;
-  // when closed: the next attempt; when opening: the end of this one
+  // when closed: the time of the next attempt; when opening: the end of this attempt
   Deadline attemptAt_ = Deadline::atNs(0);
-  Nanoseconds backoff_{};  // before the next attempt
+  Nanoseconds backoff_{};  // the last pause between two attempts
   std::int64_t openedAtNs_ = 0;
 
   mutable std::mutex mutex_;

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// MarkDecoder: takes the marks out of a terminal's bytes, which PARMRK puts before those that the
-// line damaged (termios(3)).
+// MarkDecoder: removes the marks from the bytes of a terminal. In the mode PARMRK the kernel puts a
+// mark before each byte that the line damaged (termios(3)).
 //
-//   x            x                      ff 00 x    x, damaged
-//   ff ff        ff                     ff 00 00   a break
+//   from the terminal   meaning
+//   x                   x
+//   ff ff               the byte ff
+//   ff 00 x             the byte x, damaged
+//   ff 00 00            a break
 //
-// Threads  one. Marks may be split between calls.
+// Threads  one at a time.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +21,8 @@ namespace mpf {
 
 class MarkDecoder {
  public:
-  // Appends what `raw` says. The kernel does not tell parity from framing: damaged bytes come as
-  // `damage`.
+  // Decodes `raw` and appends the bytes. A mark may be split between two calls.
+  //   damage  the fault of damaged bytes: the kernel does not distinguish parity and framing errors
   void decode(std::span<const std::uint8_t> raw, LineFault damage, std::vector<LineByte>& bytes) {
     for (const auto value : raw) decode(value, damage, bytes);
   }

@@ -52,9 +52,9 @@ NameLookup::NameLookup(const TcpAddress& address) : answer_(std::make_shared<Ans
       answer->result = std::move(result);
     }
     const std::uint64_t one = 1;
-    static_cast<void>(retryInterrupted([&] {
-      return ::write(answer->ready.get(), &one, sizeof one);
-    }));  // a first write to an eventfd succeeds
+    // the first write to an eventfd cannot fail
+    static_cast<void>(
+        retryInterrupted([&] { return ::write(answer->ready.get(), &one, sizeof one); }));
   }).detach();
 }
 

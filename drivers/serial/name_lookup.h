@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// NameLookup: getaddrinfo() that keeps nobody waiting: it runs in a thread of its own, which may
-// outlive this object.
+// NameLookup: looks up a host name without blocking the caller. getaddrinfo() runs in a thread of
+// its own, which may outlive this object.
 //
-//   NameLookup ──► answer ◄── thread in getaddrinfo()        both hold the answer; the descriptor becomes readable
+//   NameLookup ──► Answer ◄── thread in getaddrinfo()     both own the answer
 //
-// Threads  one caller.
-// Trust    a name server that does not answer costs a thread until the resolver gives up.
+// Threads  one at a time.
+// Trust    a name server that does not answer costs one thread until the resolver gives up.
 #pragma once
 
 #include <sys/socket.h>
@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/serial/tcp_address.h"
+#include <mpf/drivers/serial/tcp_address.h>
 
 namespace mpf {
 
@@ -28,11 +28,14 @@ class NameLookup {
  public:
   struct Result {
     std::vector<SocketAddress> addresses;
-    std::string problem;  // when there are none
+    std::string problem;  // why there are no addresses; else empty
   };
+  // Starts the lookup.
+  //   throws  std::system_error when no descriptor or thread can be created
   explicit NameLookup(const TcpAddress& address);
-  // Readable once there is a result.
+  // For poll(): readable once the lookup has ended. Valid as long as this object.
   [[nodiscard]] int descriptor() const noexcept;
+  // Returns the result, once; nullopt before the lookup has ended.
   [[nodiscard]] std::optional<Result> tryTake();
 
  private:

@@ -11,14 +11,13 @@
 
 #include "base/signals_blocked.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf {
 namespace {
 
 void pollUntil(std::span<pollfd> entries, Deadline deadline) noexcept {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  const auto leftNs = deadline.left().count();
-  const timespec left{.tv_sec = leftNs / kNsPerSecond, .tv_nsec = leftNs % kNsPerSecond};
+  const auto left = timespecOf(deadline.left());
   if (::ppoll(entries.data(), entries.size(), deadline.isNever() ? nullptr : &left, nullptr) >= 0)
     return;
   for (auto& entry : entries) entry.revents = 0;
@@ -34,13 +33,13 @@ std::uint64_t valueOf(const std::atomic<std::uint64_t>& counter) noexcept {
 
 }  // namespace
 
-PolledSerialPort::PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayComeLater)
+PolledSerialPort::PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayBeAbsent)
     : keeper_(std::move(line)) {
   {
     const SignalsBlocked blocked;
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
-  if (mayComeLater) return;
+  if (mayBeAbsent) return;
   if (const auto problem = keeper_.waitForFirstAttempt(); !problem.empty())
     throw std::runtime_error(problem);
 }
@@ -56,7 +55,8 @@ void PolledSerialPort::bind(ByteHandler& handler) {
     if (isFree) handler_ = &handler;
   });
   if (!isFree)
-    throw std::runtime_error(fmt::format("serial port {} is bound already", description()));
+    throw std::runtime_error(
+        fmt::format("bind serial port {}: it is bound already", description()));
 }
 
 void PolledSerialPort::release() {
@@ -79,9 +79,9 @@ SerialPortStatus PolledSerialPort::sendBreak(Milliseconds duration) {
 
 SerialPortStatus PolledSerialPort::execute(Request& request) {
   std::function<void()> ask;
-  if (isHopeless_) {
+  if (isAbandoned_) {
     ask = [&] {
-      if (isHopeless_()) giveUp(request);
+      if (isAbandoned_()) abandon(request);
     };
   }
   tasks_.callUntil(request.done, [&] { begin(request); }, ask);
@@ -89,7 +89,7 @@ SerialPortStatus PolledSerialPort::execute(Request& request) {
   return request.status;
 }
 
-void PolledSerialPort::giveUp(const Request& request) {
+void PolledSerialPort::abandon(const Request& request) {
   tasks_.call([&] {
     if (request_ == &request) end(SerialPortStatus::failure);
   });
@@ -103,8 +103,10 @@ std::string PolledSerialPort::config(const SerialSettings& settings) {
   auto problem = problemOf(settings);
   if (!problem.empty()) return problem;
   tasks_.call([&] {
-    problem = keeper_.isOpen() ? keeper_.line().tryConfigure(settings)
-                               : fmt::format("unplugged, nothing changed: {}", unpluggedBecause());
+    problem = keeper_.isOpen()
+                  ? keeper_.line().tryConfigure(settings)
+                  : fmt::format("the settings did not change, because the line is unplugged: {}",
+                                unpluggedBecause());
   });
   return problem;
 }
@@ -151,7 +153,7 @@ Deadline PolledSerialPort::wakeAt() const {
 }
 
 void PolledSerialPort::begin(Request& request) {
-  receiveAll();  // older than the request
+  receiveAll();  // these bytes are older than the request
   if (handler_ == nullptr || request_ != nullptr || !keeper_.isOpen()) {
     add(counters_.failures);
     return tasks_.finish(request.done);
@@ -164,7 +166,7 @@ void PolledSerialPort::begin(Request& request) {
   advance();
 }
 
-// Ends the request that has all it waits for, or whose time is over.
+// Ends the request when it is complete or its deadline has passed.
 void PolledSerialPort::advance() {
   if (request_ == nullptr) return;
   auto& request = *request_;
@@ -206,7 +208,8 @@ void PolledSerialPort::receive() {
   if (!alive) loseLine();
 }
 
-// All that the kernel has, unless it gets more as fast as we read.
+// Receives all bytes that the kernel has. Stops after kMostReads, in case bytes arrive as fast as
+// they are read.
 void PolledSerialPort::receiveAll() {
   constexpr int kMostReads = 64;
   for (int reads = 0; reads < kMostReads && keeper_.isOpen(); ++reads) {
@@ -215,21 +218,22 @@ void PolledSerialPort::receiveAll() {
   }
 }
 
-// A line that does not say where bytes are missing may miss them anywhere in what has come.
+// If no byte is marked as following a gap, the gap may be anywhere in the received bytes, and is
+// reported before them.
 void PolledSerialPort::takeOverruns() {
   const auto overruns = keeper_.line().takeOverruns();
   if (overruns == 0) return;
   add(counters_.overruns, overruns);
   const bool isPlaceKnown = std::ranges::any_of(received_, &LineByte::followsGap);
   if (isPlaceKnown) {
-    overrunsToTell_ += overruns;
+    unreportedOverruns_ += overruns;
   } else {
     fail(LineFault::overrun, overruns);
   }
 }
 
 void PolledSerialPort::deliver(const LineByte& byte) {
-  if (byte.followsGap) fail(LineFault::overrun, std::exchange(overrunsToTell_, 0));
+  if (byte.followsGap) fail(LineFault::overrun, std::exchange(unreportedOverruns_, 0));
   if (byte.fault != LineFault::none) {
     countFault(byte.fault);
     fail(byte.fault, 1);
@@ -285,8 +289,8 @@ void PolledSerialPort::countFault(LineFault fault) {
     case LineFault::breakSignal:
       add(counters_.breaks);
       break;
-    case LineFault::overrun:  // counted by takeOverruns() and loseLine()
-    case LineFault::unplugged:
+    case LineFault::overrun:  // counted by takeOverruns()
+    case LineFault::unplugged:  // counted by loseLine()
       break;
   }
 }

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// PolledSerialPort: what is the same for all ports: one thread that polls the line and does
-// everything with it.
+// PolledSerialPort: the SerialPort for all kinds of SerialLine. One thread polls the line and makes
+// all calls to it.
 //
 //   poll(tasks, line, next deadline)
 //     ├─ tasks    begin a request, bind, release, configure
-//     ├─ line     open ── send what is left ── receive ── taps, byte handler
-//     └─ time     requests that are late, attempts to open
+//     ├─ line     open ── send unsent bytes ── receive ── taps, byte handler
+//     └─ time     end a request whose deadline has passed, try to open the line
 //
-// Because one thread sends, receives and shows, taps see bytes in the order of the line, and a
-// request needs no lock.
+// Because one thread sends, receives and calls the taps, taps see the bytes in the order of the
+// line, and a request needs no lock.
 //
-// Threads  the port's own, with all signals blocked; callers wait for it, and it waits for none of
+// Threads  the port's thread, with all signals blocked. Callers wait for it; it never waits for
 //          them.
 // Crash    nothing here survives the process.
 // Trust    see SerialPort.
@@ -33,18 +33,20 @@ namespace mpf {
 
 class PolledSerialPort : public SerialPort {
  public:
-  // Opens `line`.
-  //   mayComeLater  when it cannot be opened: true waits for it, unplugged, and returns at once;
-  //                 false throws
-  //   throws        std::runtime_error that names the call, the object and the reason
-  PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayComeLater);
-  // Ends a request that is outstanding with failure.
+  // Starts the port's thread, which opens `line`.
+  //   mayBeAbsent  true: the constructor returns at once, and the port is unplugged until the line
+  //                could be opened; false: the constructor waits for the first attempt
+  //   throws       std::runtime_error, unless mayBeAbsent is set, when the first attempt fails:
+  //                what() is SerialLine::problem(); std::system_error when no descriptor or thread
+  //                can be created
+  PolledSerialPort(std::unique_ptr<SerialLine> line, bool mayBeAbsent);
+  // Ends an outstanding request with failure.
   ~PolledSerialPort() override;
 
   void bind(ByteHandler& handler) override;
   void release() override;
-  void giveUpWhen(std::function<bool()> isHopeless) override {
-    isHopeless_ = std::move(isHopeless);
+  void abandonWhen(std::function<bool()> isAbandoned) override {
+    isAbandoned_ = std::move(isAbandoned);
   }
   SerialPortStatus sendBreak(Milliseconds duration) override;
   [[nodiscard]] SerialPortStatus getStatus() const noexcept override;
@@ -62,12 +64,12 @@ class PolledSerialPort : public SerialPort {
   SerialPortStatus transfer(Bytes data, bool wantsRead, Deadline deadline) override;
 
  private:
-  // The request that is outstanding; lives in its caller's frame.
+  // The outstanding request, in the stack frame of its caller.
   struct Request {
     Bytes unsent;
-    bool hasSent = false;  // the kernel took some of it
+    bool hasSent = false;  // the line has accepted at least one byte
     bool awaitsAnswer = false;
-    bool awaitsIdleLine = false;  // all bytes out of the kernel's queue
+    bool awaitsIdleLine = false;  // waits until all bytes have left the queue of the line
     bool isBreak = false;
     Deadline deadline;
     SerialPortStatus status = SerialPortStatus::failure;
@@ -88,7 +90,7 @@ class PolledSerialPort : public SerialPort {
   void send();
   void receive();
   void receiveAll();
-  void giveUp(const Request& request);
+  void abandon(const Request& request);
   void deliver(const LineByte& byte);
   void takeOverruns();
   void fail(LineFault fault, std::uint64_t count);
@@ -99,16 +101,18 @@ class PolledSerialPort : public SerialPort {
   void countFault(LineFault fault);
   void show(ByteDirection direction, std::span<const LineByte> bytes) const;
 
-  std::function<bool()> isHopeless_;  // the binder's threads
+  std::function<bool()> isAbandoned_;  // used by the binder's threads
   PortTasks tasks_;
   LineKeeper keeper_;
-  ByteHandler* handler_ = nullptr;  // this and below: the port's thread
+  // used by the port's thread only:
+  ByteHandler* handler_ = nullptr;
   Request* request_ = nullptr;
   std::vector<LineByte> received_;
-  std::uint64_t overrunsToTell_ = 0;  // counted; the byte after the gap has not been delivered yet
+  // overruns that are counted but not yet reported, because the byte after the gap follows
+  std::uint64_t unreportedOverruns_ = 0;
   Counters counters_{};
   std::atomic<SerialPortStatus> status_{SerialPortStatus::success};
-  std::jthread thread_;  // last: ends before what it uses
+  std::jthread thread_;  // last: ends before the members that it uses
 };
 
 }  // namespace mpf

@@ -14,7 +14,7 @@ PortTasks::PortTasks() : bell_(checkCall(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK
 
 void PortTasks::wake() const noexcept {
   const std::uint64_t one = 1;
-  // full: it is awake already
+  // fails only when the counter of the eventfd is full, and then it is readable already
   static_cast<void>(retryInterrupted([&] { return ::write(bell_.get(), &one, sizeof one); }));
 }
 
@@ -42,7 +42,7 @@ void PortTasks::call(const std::function<void()>& task) {
 
 void PortTasks::runAll() {
   std::uint64_t rings = 0;
-  // nothing to read: not rung
+  // the read fails when the eventfd was not written, which is not an error
   static_cast<void>(retryInterrupted([&] { return ::read(bell_.get(), &rings, sizeof rings); }));
   std::vector<std::function<void()>> tasks;
   {
@@ -53,7 +53,7 @@ void PortTasks::runAll() {
 }
 
 void PortTasks::finish(bool& done) {
-  // notified under the lock: `done` lives in the caller's frame, which may go right after
+  // `done` is in the stack frame of the caller, which may return as soon as the lock is released.
   const std::lock_guard lock(mutex_);
   done = true;
   finished_.notify_all();

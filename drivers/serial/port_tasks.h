@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// PortTasks: hands work to a port's thread and waits for it.
+// PortTasks: passes work to the port's thread and waits until it is done.
 //
-//   caller         call(task) ── queue ── wake ── wait ──────────────────── done ──► goes on
-//                                                   └─ callUntil: asks now and then
+//   caller         call(task) ── queue ── wake ── wait ──────────────────── done ──► returns
+//                                                   └─ callUntil: calls whileWaiting
 //   port's thread        poll(descriptor()) ──► runAll(): task ... finish(done) ┘
 //
-// Threads  any may call; one runs the tasks and never blocks in one, so a caller waits as long as
-//          its task says.
+// Threads  any number of callers at a time; one thread runs the tasks. No task blocks, so a task
+//          never delays the caller of another one.
 #pragma once
 
 #include <chrono>
@@ -23,20 +23,20 @@ class PortTasks {
  public:
   PortTasks();
 
-  // Readable when there is something to run, or when woken.
+  // For poll(): readable after call(), callUntil() or wake(), until runAll().
   [[nodiscard]] int descriptor() const noexcept { return bell_.get(); }
   void wake() const noexcept;
 
-  // Runs `begin` on the port's thread and returns once `done`, which the port's thread sets by
-  // finish().
-  //   whileWaiting  runs on the caller's thread every kAskEvery as long as the wait lasts; it may
-  //                 call()
+  // Runs `begin` on the port's thread and returns when `done` is true, which the port's thread sets
+  // with finish(), during `begin` or later.
+  //   whileWaiting  called on the caller's thread every kAskEvery during the wait; may use call()
   void callUntil(const bool& done, std::function<void()> begin,
                  const std::function<void()>& whileWaiting = {});
   static constexpr std::chrono::milliseconds kAskEvery{20};
+  // Runs `task` on the port's thread and returns when it has run.
   void call(const std::function<void()>& task);
 
-  // For the port's thread.
+  // --- for the port's thread
   void runAll();
   void finish(bool& done);
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// SerialLine: what differs between kinds of line. All else about a port is in PolledSerialPort.
+// SerialLine: the part of a serial port that differs between kinds of line. PolledSerialPort is the
+// common part, and calls it.
 //
-//             tryOpen()                           read(), tryWrite() say gone
-//   closed ──────────────► open ─────────────────────────────────────────────► close()
-//      └──► opening ──► tryOpen() again, each time waitsFor() is ready
+//            tryOpen()         tryRead() or tryWrite() reports the loss
+//   closed ────────────► open ─────────────────────────────────────────► close()
+//      └──► opening ──► tryOpen() again, each time that waitsFor() is ready
 //
-// Threads  the port's thread alone. Nothing here blocks.
+// Threads  the port's thread only. No function blocks.
 #pragma once
 
 #include <poll.h>
@@ -25,12 +26,12 @@ namespace mpf {
 struct LineByte {
   std::uint8_t value = 0;
   LineFault fault = LineFault::none;
-  bool followsGap = false;  // bytes may be missing between the byte before and this one
+  bool followsGap = false;  // bytes may be missing between the previous byte and this one
 
   friend bool operator==(const LineByte&, const LineByte&) = default;
 };
 
-// Bytes that a line takes from the kernel at once.
+// The most bytes that a line reads from the kernel with one call.
 inline constexpr std::size_t kReadBytes = 4096;
 
 class SerialLine {
@@ -42,33 +43,39 @@ class SerialLine {
   SerialLine& operator=(const SerialLine&) = delete;
   virtual ~SerialLine() = default;
 
+  // The device or the address, for messages to people.
   [[nodiscard]] virtual std::string description() const = 0;
-  // What went wrong last: the call, the object and the reason.
+  // The last failure: the call, the object and the reason.
   [[nodiscard]] virtual std::string problem() const = 0;
 
+  // Begins or continues an attempt to open the line, and applies its settings.
+  //   returns  opening: call again when waitsFor() is ready; failed: problem() says why
   [[nodiscard]] virtual OpenState tryOpen() = 0;
-  // How long an attempt may take.
+  // The longest time that an attempt may last.
   [[nodiscard]] virtual std::chrono::milliseconds openTimeout() const = 0;
   virtual void close() noexcept = 0;
-  // What to poll: for tryOpen() while opening, for bytes while open.
+  // What to poll: while opening, for the next tryOpen(); while open, for received bytes.
   [[nodiscard]] virtual pollfd waitsFor() const noexcept = 0;
 
-  // Appends what has come, without waiting. Returns false when the line is gone.
+  // Appends the bytes that have arrived. Returns false when the line is lost.
   [[nodiscard]] virtual bool tryRead(std::vector<LineByte>& bytes) = 0;
-  // Returns how many bytes the kernel took, nullopt when the line is gone.
+  // Sends as many bytes as the line accepts now.
+  //   returns  their number; nullopt when the line is lost
   [[nodiscard]] virtual std::optional<std::size_t> tryWrite(
       std::span<const std::uint8_t> bytes) = 0;
-  // Bytes that the kernel has taken and not sent yet, as the time that they need; 0 when all are
-  // out or nobody knows.
+  // The time until the line has sent all bytes that it has accepted, at most 20 ms; 0 when all are
+  // sent, or the line cannot report it. Ask again after that time.
   [[nodiscard]] virtual std::chrono::milliseconds timeToSend() const { return {}; }
+  // Discards the accepted bytes that are not sent yet, where the line can do so.
   virtual void discardUnsent() noexcept {}
-  // Bytes lost on the way since the last call. Where they are missing, LineByte::followsGap says as
-  // exactly as the line can.
+  // Returns the number of received bytes that were lost since the last call. LineByte::followsGap
+  // marks the places, as exactly as the line can tell them.
   [[nodiscard]] virtual std::uint64_t takeOverruns() noexcept { return 0; }
 
-  // Returns empty, or what this line does not accept; then nothing has changed. Settings are
-  // applied again by each tryOpen().
+  // Changes the settings, all or none. Each later tryOpen() applies them again.
+  //   returns  empty; or a sentence that names the value that this line does not accept
   [[nodiscard]] virtual std::string tryConfigure(const SerialSettings& settings) = 0;
+  // Begins or ends the break state. Returns false when this line cannot do so.
   [[nodiscard]] virtual bool trySetBreak(bool on) noexcept = 0;
 };
 

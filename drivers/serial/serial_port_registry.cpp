@@ -9,10 +9,11 @@ namespace mpf {
 
 void SerialPortRegistry::registerName(const std::string& portName,
                                       std::shared_ptr<SerialPort> port) {
-  if (portName.empty()) throw std::invalid_argument("a serial port needs a name");
+  if (portName.empty()) throw std::invalid_argument("register a serial port: the name is empty");
   const std::lock_guard lock(mutex_);
   if (!ports_.emplace(portName, std::move(port)).second) {
-    throw std::invalid_argument(fmt::format("there is a serial port \"{}\" already", portName));
+    throw std::invalid_argument(
+        fmt::format("register serial port \"{}\": the name is in use", portName));
   }
 }
 
@@ -24,7 +25,8 @@ std::shared_ptr<SerialPort> SerialPortRegistry::find(const std::string& portName
 
 BoundSerialPort SerialPortRegistry::bind(const std::string& portName, ByteHandler& handler) const {
   auto port = find(portName);
-  if (!port) throw std::invalid_argument(fmt::format("there is no serial port \"{}\"", portName));
+  if (!port)
+    throw std::invalid_argument(fmt::format("bind serial port \"{}\": unknown name", portName));
   return {std::move(port), handler};
 }
 

@@ -11,7 +11,7 @@ bool isOneOf(char value, std::string_view values) noexcept {
   return value == 0 || values.find(value) != std::string_view::npos;
 }
 
-// A client may send any byte: one that does not print is shown by its number.
+// A client may send any byte. A byte that is not printable is shown as a number.
 std::string shown(char value) {
   return value > ' ' && value <= '~' ? fmt::format("'{}'", value)
                                      : fmt::format("0x{:02x}", static_cast<unsigned char>(value));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "drivers/serial/tcp_address.h"
+#include <mpf/drivers/serial/tcp_address.h>
 
 #include <fmt/format.h>
 #include <stdexcept>
@@ -9,7 +9,7 @@ namespace mpf {
 TcpAddress TcpAddress::parse(std::string_view text) {
   const auto fail = [&]() -> TcpAddress {
     throw std::invalid_argument(
-        fmt::format(R"("{}" is no address: write host:port or [IPv6 address]:port)", text));
+        fmt::format(R"("{}" is not a TCP address: write host:port or [IPv6 address]:port)", text));
   };
   const auto colon = text.rfind(':');
   if (colon == std::string_view::npos || colon == 0 || colon + 1 == text.size()) return fail();

@@ -19,7 +19,7 @@ constexpr int kKeepAliveEverySeconds = 5;
 constexpr int kKeepAliveProbes = 3;
 constexpr int kUnacknowledgedMs = 25'000;
 
-// A socket without one of these still works, so nobody is told.
+// Errors are ignored: a socket without one of these options still works.
 void setOptions(int socket) noexcept {
   const auto set = [&](int level, int option, int value) {
     ::setsockopt(socket, level, option, &value, sizeof value);
@@ -43,7 +43,8 @@ SerialLine::OpenState TcpLine::tryOpen() {
 SerialLine::OpenState TcpLine::beginLookup() try {
   lookup_.emplace(address_);
   return OpenState::opening;
-} catch (const std::system_error& error) {  // no descriptor or no thread to be had: perhaps later
+} catch (
+    const std::system_error& error) {  // no descriptor or no thread; the next attempt may get one
   problem_ = fmt::format("resolve {}: {}", address_.toString(), error.what());
   return OpenState::failed;
 }
@@ -103,13 +104,14 @@ pollfd TcpLine::waitsFor() const noexcept {
 }
 
 void TcpLine::note(const char* call, int error) {
-  problem_ = fmt::format("{} {}: {}", call, address_.toString(),
-                         error == 0 ? "hung up" : std::generic_category().message(error));
+  problem_ = fmt::format(
+      "{} {}: {}", call, address_.toString(),
+      error == 0 ? "the far end closed the connection" : std::generic_category().message(error));
 }
 
 bool TcpLine::tryRead(std::vector<LineByte>& bytes) {
-  std::array<std::uint8_t, kReadBytes>
-      raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): recv() fills it
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): recv() fills it
+  std::array<std::uint8_t, kReadBytes> raw;
   const auto length =
       retryInterrupted([&] { return ::recv(socket_.get(), raw.data(), raw.size(), 0); });
   for (const auto value :

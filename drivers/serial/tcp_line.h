@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// TcpLine: the line of a TcpSerialPort: a TCP connection to a port of a terminal server, in raw
-// mode.
+// TcpLine: a TCP connection to a port of a terminal server as a SerialLine.
 //
-//   look the name up ──► connect to its first address ──► refused: the next one ──► connected
-//                                        └── no answer: the next attempt goes on with the next one
+//   look up the name ──► connect to its first address ──► connected
+//                          ├── refused: connect to its next address
+//                          └── no answer: the next attempt begins with its next address
 //
 // Threads  the port's thread.
-// Trust    a peer that vanished without a word is noticed by keepalive, or by bytes that nobody
-//          acknowledges, within half a minute.
+// Trust    a peer that vanishes without closing the connection is detected within about 30 s: by
+//          TCP keepalive, or because it does not acknowledge sent bytes.
 #pragma once
 
 #include <chrono>
@@ -15,11 +15,11 @@
 #include <string>
 #include <vector>
 
+#include <mpf/drivers/serial/tcp_address.h>
 #include <mpf/file_descriptor.h>
 
 #include "drivers/serial/name_lookup.h"
 #include "drivers/serial/serial_line.h"
-#include "drivers/serial/tcp_address.h"
 
 namespace mpf {
 
@@ -50,7 +50,7 @@ class TcpLine : public SerialLine {
   const std::chrono::milliseconds connectTimeout_;
   std::string problem_;
   std::optional<NameLookup> lookup_;
-  std::vector<SocketAddress> untried_;  // addresses, the next one last
+  std::vector<SocketAddress> untried_;  // the next address is the last element
   FileDescriptor socket_;
   bool isConnected_ = false;
 };

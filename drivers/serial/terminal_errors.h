@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: MIT
-// TerminalErrors: what the error counters of a terminal's driver (TIOCGICOUNT) say about the bytes
+// TerminalErrors: interprets the error counters of a terminal's driver (TIOCGICOUNT) for the bytes
 // that were just read.
 //
-//   driver    counts an overrun, passes the bytes on         bytes reach read() some milliseconds
-//             later
-//   read()    bytes, counters                                the gap is among these bytes, or among
-//   the next ones
-//
 // The driver marks damaged bytes in the stream (MarkDecoder), but not the place where bytes were
-// lost: every byte that is read within kMayBeLate after the counter has grown may follow the gap.
+// lost. It increments the overrun counter in its interrupt, and the bytes reach read() some
+// milliseconds later. So each byte that is read within kMayBeLate after the counter has changed may
+// follow the gap.
 //
-// Threads  one.
+// Threads  one at a time.
 #pragma once
 
 #include <chrono>
@@ -25,22 +22,23 @@ namespace mpf {
 
 class TerminalErrors {
  public:
-  struct Counts {  // the driver's, since the device was plugged in
+  // Counters of the driver since the device was plugged in.
+  struct Counts {
     std::uint64_t framing = 0;
     std::uint64_t overruns = 0;
   };
-  // The way of bytes from the driver's interrupt to read(), on a host that is busy.
+  // The longest time from the driver's interrupt to read() on a busy host.
   static constexpr std::chrono::milliseconds kMayBeLate{20};
 
-  // The device was opened. Without counts nothing is known of it: pseudo-terminals and some USB
-  // adapters have none.
+  // Starts with the counters of a device that was opened. nullopt: the driver has no counters, as
+  // for pseudo-terminals and some USB adapters.
   void begin(std::optional<Counts> counts) {
     seen_ = counts.value_or(Counts{});
     suspectUntil_ = Deadline::atNs(0);
   }
 
-  // Bytes were read, and the driver has counted so much by now. Returns what happened to those of
-  // them that it marked as damaged.
+  // Call it after each read, with the present counters. Returns the fault of the bytes that the
+  // driver has marked as damaged.
   LineFault take(const std::optional<Counts>& counts, bool hasParity) {
     if (!counts) return hasParity ? LineFault::parity : LineFault::framing;
     const auto before = std::exchange(seen_, *counts);
@@ -48,8 +46,9 @@ class TerminalErrors {
     overruns_ += counts->overruns - before.overruns;
     return hasParity && counts->framing == before.framing ? LineFault::parity : LineFault::framing;
   }
-  // Bytes may be missing before or between the bytes that take() was told of.
+  // Returns whether bytes may be missing before or between the bytes of the last read.
   [[nodiscard]] bool mayFollowGap() const { return !suspectUntil_.hasPassed(); }
+  // Returns the number of bytes lost since the last call.
   [[nodiscard]] std::uint64_t takeOverruns() noexcept { return std::exchange(overruns_, 0); }
 
  private:

@@ -50,7 +50,7 @@ SerialLine::OpenState TerminalLine::tryOpen() {
   return OpenState::open;
 }
 
-// Returns empty or the reason. Nothing is changed on a device that somebody else has.
+// Returns empty or the reason. Changes nothing on a device that another program uses.
 std::string TerminalLine::tryPrepare() const {
   if (::isatty(fd_.get()) == 0) return "not a terminal";
   if (::flock(fd_.get(), LOCK_EX | LOCK_NB) < 0) return "in use by another program";
@@ -61,23 +61,21 @@ std::string TerminalLine::tryPrepare() const {
 }
 
 void TerminalLine::closeDevice() noexcept {
-  if (fd_)
-    ::ioctl(
-        fd_.get(),
-        // or it would stay exclusive while somebody else has it open; a device that is gone does
-        // not mind
-        TIOCNXCL);
+  // Without TIOCNXCL the device would stay exclusive as long as another program has it open. On a
+  // device that was unplugged the call fails, which does not matter.
+  if (fd_) ::ioctl(fd_.get(), TIOCNXCL);
   fd_.reset();
 }
 
 void TerminalLine::note(const char* call, int error) {
-  problem_ = fmt::format("{} {}: {}", call, device_,
-                         error == 0 ? "hung up" : std::generic_category().message(error));
+  problem_ =
+      fmt::format("{} {}: {}", call, device_,
+                  error == 0 ? "the device hung up" : std::generic_category().message(error));
 }
 
 bool TerminalLine::tryRead(std::vector<LineByte>& bytes) {
-  std::array<std::uint8_t, kReadBytes>
-      raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): read() fills it
+  std::array<std::uint8_t, kReadBytes> raw;
   const auto length = retryInterrupted([&] { return ::read(fd_.get(), raw.data(), raw.size()); });
   if (length > 0) {
     append(std::span(raw).first(static_cast<std::size_t>(length)), bytes);

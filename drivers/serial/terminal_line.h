@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// TerminalLine: the line of a PosixTerminalPort: a terminal device, opened exclusively, raw, with
-// its settings.
+// TerminalLine: a terminal device as a SerialLine, opened exclusively and in raw mode.
 //
-//   open ─ is it a terminal? ─ lock ─ TIOCEXCL ─ raw ─ settings         read: 0, EIO, ENXIO: the device is gone
+//   open ─► isatty ─► flock ─► TIOCEXCL ─► raw mode ─► settings ─► open
+//
+// A read() that returns 0 or an error other than EAGAIN means that the device is gone.
 //
 // Threads  the port's thread.
-// Crash    the kernel closes the device, which ends lock and exclusiveness.
-// Trust    the lock keeps out other ports of ours and the programs that flock() terminals; TIOCEXCL
-//          all others but root's.
+// Crash    the kernel closes the device, which ends the lock and the exclusive mode.
+// Trust    the lock keeps out other ports of MPF and the programs that flock() terminals; TIOCEXCL
+//          keeps out all other programs, except those of root.
 #pragma once
 
 #include <string>
@@ -22,7 +23,7 @@ namespace mpf {
 
 class TerminalLine : public SerialLine {
  public:
-  // Throws std::invalid_argument for settings that no line can have.
+  //   throws  std::invalid_argument for settings that problemOf() refuses
   TerminalLine(std::string device, const SerialSettings& settings);
   ~TerminalLine() override { closeDevice(); }
 

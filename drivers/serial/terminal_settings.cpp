@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/serial/terminal_settings.h"
 
-// termios2 is the kernel's; <termios.h> has another struct termios and must not be included beside
-// it.
+// termios2 is declared by the kernel's header. <termios.h> declares another struct termios, and
+// cannot be included in the same file.
 #include <asm/termbits.h>
 #include <sys/ioctl.h>
 
@@ -20,7 +20,8 @@ struct Speed {
   unsigned baud;
   unsigned flag;
 };
-// Programs that know only termios show these speeds by name; all others go as BOTHER.
+// These speeds are set by their constants, so that programs that use termios show them. All other
+// speeds are set with BOTHER.
 constexpr std::array kNamedSpeeds = {
     Speed{50, B50},           Speed{75, B75},           Speed{110, B110},
     Speed{134, B134},         Speed{150, B150},         Speed{200, B200},
@@ -35,8 +36,8 @@ constexpr std::array kNamedSpeeds = {
 constexpr std::array<unsigned, 4> kCharSizes = {CS5, CS6, CS7, CS8};
 constexpr int kShortestChar = 5;
 
-// A receiver samples the tenth bit within its half up to 5 % of difference; half of that is left
-// for the far end.
+// A receiver still samples the tenth bit correctly when the speeds differ by up to 5 %. Half of
+// that is left for the far end.
 constexpr long kTolerancePercent = 2;
 
 void setFlags(unsigned& flags, unsigned mask, unsigned value) noexcept {
@@ -88,10 +89,10 @@ termios2 with(termios2 line, const SerialSettings& settings) noexcept {
   return line;
 }
 
-// What was asked for and is not there.
+// Names the first setting that the line did not accept; empty when it accepted all.
 std::string refusal(const SerialSettings& asked, const termios2& is) {
   const auto sentence = [](const char* what, auto wanted, auto got) {
-    return fmt::format("the line does not accept {} {}, it keeps {}", what, wanted, got);
+    return fmt::format("the line does not accept {} {}: it keeps {}", what, wanted, got);
   };
   if (asked.baud != 0 && !isNear(is.c_ospeed, asked.baud))
     return sentence("baud", asked.baud, is.c_ospeed);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Terminal settings: SerialSettings in the terms of termios2, which knows every speed, not only
-// those that have a constant.
+// Terminal settings: applies SerialSettings with termios2, which can set any speed, not only those
+// that have a constant.
 //
-// Threads  one at a time per descriptor.
-// Trust    a driver takes what it likes and reports no error: what it took is read back.
+// Threads  one caller at a time for each descriptor.
+// Trust    a driver may ignore a setting without an error, so the settings are read back.
 #pragma once
 
 #include <chrono>
@@ -13,14 +13,16 @@
 
 namespace mpf::terminal {
 
-// Bytes pass as they are, without echo; damaged ones are marked, see MarkDecoder. Returns empty or
-// the reason.
+// Sets the raw mode: bytes pass unchanged and without echo, and damaged bytes are marked (see
+// MarkDecoder). Returns empty or the reason of the failure.
 [[nodiscard]] std::string tryMakeRaw(int fd);
 
-// All or nothing. Returns empty, or a sentence that names the value that the line did not accept.
+// Applies all settings, or none.
+//   returns  empty; or a sentence that names the value that the line did not accept
 [[nodiscard]] std::string tryApply(int fd, const SerialSettings& settings);
 
-// How long the line needs for `bytes` at its present speed, start, parity and stop bits included.
+// The time that the line needs for `bytes` at its present speed, with start, parity and stop bits;
+// 0 when it is unknown.
 [[nodiscard]] std::chrono::microseconds timeFor(int fd, int bytes);
 
 }  // namespace mpf::terminal

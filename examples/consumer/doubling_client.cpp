@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// doubling_client VALUE: asks doubling_server, which may start before or after, and prints the
-// answer.
+// doubling_client VALUE: sends VALUE to doubling_server, which may start before or after this
+// program, and prints the reply.
 #include <chrono>
 #include <cstdlib>
 #include <iostream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// event_loop_client COUNT: sends COUNT requests to doubling_server from a poll() loop and prints
+// event_loop_client COUNT: sends COUNT requests to doubling_server from a poll() loop, and prints
 // the replies and fates.
 #include <poll.h>
 
@@ -11,8 +11,8 @@
 
 namespace {
 
-// How long poll() may wait: until the dispatcher has something to do by itself, such as a request
-// that expires.
+// The longest time that poll() may wait: until the dispatcher must act on a deadline, such as that
+// of a request.
 int pollTimeoutMs(const mpf::Dispatcher& dispatcher) {
   const auto deadline = dispatcher.nextDeadline();
   if (deadline.isNever()) return -1;

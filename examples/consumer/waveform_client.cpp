@@ -14,8 +14,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   mpf::SyncClient client(mpf::Backplane::attach(), "waveform");
-  auto first = client.call(mpf::Int32Message(),
-                           5s);  // the first reply ends the request; the server goes on sending
+  // The first reply ends the request; the server continues to send waveforms.
+  auto first = client.call(mpf::Int32Message(), 5s);
   if (!first) {
     std::cerr << "waveform_client: " << first.why() << '\n';
     return 1;

@@ -60,11 +60,11 @@ std::optional<double> DemoDevices::measure() {
 // server.
 std::optional<std::uint8_t> DemoDevices::followInputs() {
   while (const auto message = in_.receive(0s)) {
-    const auto* const news = message.tryAs<Int32>();
-    if (news == nullptr) continue;
-    ++told_;
-    inputs_ =
-        news->status == 0 ? std::optional(static_cast<std::uint8_t>(news->value)) : std::nullopt;
+    const auto* const change = message.tryAs<Int32>();
+    if (change == nullptr) continue;
+    ++reportedChanges_;
+    inputs_ = change->status == 0 ? std::optional(static_cast<std::uint8_t>(change->value))
+                                  : std::nullopt;
   }
   if (!in_.client().isConnected()) isMonitoring_ = false;
   if (isMonitoring_) return inputs_;

@@ -36,7 +36,7 @@ class DemoDevices {
   void give(double volts, std::uint8_t bits);
   Sample look();
   // Number of messages that reported changes of the inputs.
-  [[nodiscard]] std::uint64_t told() const noexcept { return told_; }
+  [[nodiscard]] std::uint64_t reportedChanges() const noexcept { return reportedChanges_; }
 
  private:
   std::optional<Int32> call(SyncClient& client, const Int32& request);
@@ -48,7 +48,7 @@ class DemoDevices {
   SyncClient dac_, adc_, out_, in_, instrument_;
   Sample given_;
   bool isMonitoring_ = false;
-  std::uint64_t told_ = 0;
+  std::uint64_t reportedChanges_ = 0;
   std::optional<std::uint8_t> inputs_;
 };
 

@@ -31,12 +31,12 @@ namespace {
 using namespace std::chrono_literals;
 using mpf::demo::Sample;
 
-// between writing and reading; longer than the averaging time of the ADC
+// The pause between writing and reading, longer than the averaging time of the ADC.
 constexpr auto kPause = 40ms;
 constexpr double kPeriodSeconds = 4, kAmplitudeVolts = 4;
 constexpr int kRoundsPerLine = 10;
 constexpr double kCloseVolts = 0.05;
-constexpr double kAwayVolts = 1;  // distance from 0 V, which an ADC without a wire also measures
+constexpr double kAwayVolts = 1;  // an ADC without a wire measures about 0 V
 constexpr int kMoreRounds = 100;  // further rounds after the time if something was not seen yet
 
 struct Options {
@@ -82,9 +82,9 @@ class Rounds {
     if (end_.hasPassed()) ++late_;
   }
   [[nodiscard]] std::vector<mpf::tools::TopLine> lines(int rows, int columns) const {
-    return picture_.lines(rows, columns, devices_.told());
+    return picture_.lines(rows, columns, devices_.reportedChanges());
   }
-  [[nodiscard]] std::string line() const { return picture_.line(devices_.told()); }
+  [[nodiscard]] std::string line() const { return picture_.line(devices_.reportedChanges()); }
   [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
   // True when the user has ended the run, or when the time is over and all parts were seen or no
   // rounds are left.
@@ -142,22 +142,22 @@ int run(const Options& options) {
   (hasTerminal ? draw : print)(rounds);
   const auto& verdict = rounds.verdict();
   fmt::print(
-      "of {} rounds: the ADC measured what the DAC gave in {}, inputs followed outputs in {}, the "
-      "voltmeter answered in {}\n",
+      "of {} rounds: the ADC measured the output of the DAC in {}, inputs followed outputs in {}, "
+      "the voltmeter answered in {}\n",
       verdict.rounds, verdict.measured, verdict.followed, verdict.instrument);
   return verdict.isGood() || isStopped.load(std::memory_order_relaxed) ? 0 : 1;
 }
 
 int demo(int argc, char** argv) {
   Options options;
-  CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws what they say",
+  CLI::App app("mpf-demo - a client of the servers that demo/hardware starts: draws their values",
                "mpf-demo");
   app.add_option("--backplane", options.backplane,
                  "Backplane; default: $MPF_BACKPLANE, or \"default\"");
   app.add_option("--seconds", options.seconds,
-                 "End after so long; without a terminal 5, else with q")
+                 "Time until the program ends [s]; default 5 without a terminal, else until q")
       ->check(mpf::number(0.1, 1e9));
-  app.add_option("--patience", options.patience, "Wait so long for an answer [s]; default 0.25")
+  app.add_option("--patience", options.patience, "Longest wait for an answer [s]; default 0.25")
       ->check(mpf::number(0.001, 1e6));
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
   return run(options);

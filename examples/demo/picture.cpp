@@ -70,12 +70,12 @@ std::string Picture::bars(std::size_t columns) const {
   return text;
 }
 
-std::vector<tools::TopLine> Picture::lines(int rows, int columns, std::uint64_t told) const {
+std::vector<tools::TopLine> Picture::lines(int rows, int columns, std::uint64_t changes) const {
   constexpr int kOtherRows = 9;
   const auto& last = samples_.back();
   const auto width = static_cast<std::size_t>(std::max(columns - 7, 10));
   std::vector<tools::TopLine> lines{
-      {"MPF: four servers, each in a process of its own; this is a client of all of them",
+      {"MPF: four servers, each in a process of its own; this is a client of all four",
        Style::title},
       {"", Style::plain},
       {fmt::format("DAC channel 0 · {}   ── a wire ──►   ADC channel 0 ● {}",
@@ -85,8 +85,8 @@ std::vector<tools::TopLine> Picture::lines(int rows, int columns, std::uint64_t 
     lines.push_back({std::move(text), Style::plain});
   lines.push_back({fmt::format("digital lines 15..8  {}  outputs", lamps(last.outputs, "● ", "○ ")),
                    Style::plain});
-  lines.push_back({fmt::format("               7..0  {}  inputs, wired to them: {} changes told",
-                               lamps(last.inputs, "● ", "○ "), told),
+  lines.push_back({fmt::format("               7..0  {}  inputs, wired to them: {} changes",
+                               lamps(last.inputs, "● ", "○ "), changes),
                    Style::plain});
   lines.push_back({fmt::format("a voltmeter on a serial line  {}", voltsText(last.instrument)),
                    Style::heading});
@@ -95,11 +95,11 @@ std::vector<tools::TopLine> Picture::lines(int rows, int columns, std::uint64_t 
   return lines;
 }
 
-std::string Picture::line(std::uint64_t told) const {
+std::string Picture::line(std::uint64_t changes) const {
   const auto& last = samples_.back();
-  return fmt::format("DAC {}  ADC {}  outputs {}  inputs {}  told {:4}  voltmeter {}",
+  return fmt::format("DAC {}  ADC {}  outputs {}  inputs {}  changes {:4}  voltmeter {}",
                      voltsText(last.written), voltsText(last.measured),
-                     lamps(last.outputs, "1", "0"), lamps(last.inputs, "1", "0"), told,
+                     lamps(last.outputs, "1", "0"), lamps(last.inputs, "1", "0"), changes,
                      voltsText(last.instrument));
 }
 

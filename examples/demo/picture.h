@@ -18,9 +18,10 @@ class Picture {
  public:
   void add(const Sample& sample);
   // The picture for a screen of this size.
-  [[nodiscard]] std::vector<tools::TopLine> lines(int rows, int columns, std::uint64_t told) const;
+  [[nodiscard]] std::vector<tools::TopLine> lines(int rows, int columns,
+                                                  std::uint64_t changes) const;
   // The last round as one line.
-  [[nodiscard]] std::string line(std::uint64_t told) const;
+  [[nodiscard]] std::string line(std::uint64_t changes) const;
 
  private:
   [[nodiscard]] std::vector<std::string> chart(std::size_t rows, std::size_t columns) const;

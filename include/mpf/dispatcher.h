@@ -17,9 +17,9 @@
 // Throws   an exception that leaves a callback leaves the call that runs it: runOnce(), run(),
 //          runPending() or connectWait(). The message of that callback counts as delivered, nothing
 //          else is lost, and the next call continues with the remaining messages. The thread of the
-//          shared dispatcher has no such caller: it writes what() to stderr, at most once a second,
-//          counts the exception as an alarm of its window, and continues. Servers follow the same
-//          rule: see MessageServer.
+//          shared dispatcher has no such caller: it writes what() to stderr (32 lines at once, then
+//          one each 10 s), counts the exception as an alarm of its window, and continues. Servers
+//          follow the same rule: see MessageServer.
 // Crash    as MessageClient.
 // Trust    as MessageClient.
 // Source   manual, "Message Client": callbacks; the dispatcher replaces their task.

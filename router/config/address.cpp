@@ -33,7 +33,7 @@ bool isHostName(const std::string& host) {
          std::ranges::all_of(host, [](char c) { return c == '.' || mayBeInName(c); });
 }
 
-// As every program writes this address; empty when it is none.
+// Returns the canonical text of an IPv6 address; empty when `host` is not an IPv6 address.
 std::string canonicalIpv6(const std::string& host) {
   in6_addr address{};
   std::array<char, INET6_ADDRSTRLEN> text{};
@@ -45,7 +45,7 @@ std::string checkedHost(const std::string& text, const std::string& host) {
   if (host.starts_with('[')) {
     auto canonical = canonicalIpv6(host.substr(1, host.size() - 2));
     if (!host.ends_with(']') || canonical.empty())
-      refuseAddress(text, "has no IPv6 address in its brackets");
+      refuseAddress(text, "has no valid IPv6 address in its brackets");
     return canonical;
   }
   if (host == "*") return host;
@@ -54,9 +54,8 @@ std::string checkedHost(const std::string& text, const std::string& host) {
   in_addr address{};
   const bool isNumber = host.find_first_not_of("0123456789.") == std::string::npos;
   if (isNumber ? ::inet_pton(AF_INET, host.c_str(), &address) != 1 : !isHostName(host)) {
-    refuseAddress(text,
-                  fmt::format("has no host: {}", host.empty() ? "nothing stands before the port"
-                                                              : host + " cannot be one"));
+    refuseAddress(text, host.empty() ? "has no host before the port"
+                                     : fmt::format("has an invalid host, \"{}\"", host));
   }
   return host;
 }
@@ -73,7 +72,7 @@ struct Ipv4Network {
   std::uint32_t address;
   unsigned bits;
 };
-// Loopback, RFC 1918, link-local.
+// Loopback, private (RFC 1918) and link-local networks.
 constexpr std::array kNotPublic{Ipv4Network{0x7f00'0000, 8}, Ipv4Network{0x0a00'0000, 8},
                                 Ipv4Network{0xac10'0000, 12}, Ipv4Network{0xc0a8'0000, 16},
                                 Ipv4Network{0xa9fe'0000, 16}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What no value can tell by itself: whether all of them together make sense.
+// completeConfig(): fills in defaults, and checks that the values of a configuration fit together.
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr std::size_t kLongestRouterName = 63;
 constexpr std::array<const char*, 7> kLogLevels{"trace", "debug",    "info", "warning",
                                                 "error", "critical", "off"};
 
-// What is missing on a command line has no place.
+// `place` is empty for an option that is missing on the command line.
 [[noreturn]] void refuse(const std::string& place, const std::string& why) {
   throw ConfigError((place.empty() ? "" : place + ": ") + why);
 }
@@ -36,7 +36,7 @@ class Completion {
 
   void run() {
     checkRoot();
-    checkThatItDoesSomething();
+    checkThatItHasATask();
     checkServe();
     checkListen();
     checkRemotes();
@@ -62,7 +62,7 @@ class Completion {
     constexpr mode_t kGroupReadsAndWrites = 0060;
     if (config_.rights.group != Rights().group &&
         (config_.rights.mode & kGroupReadsAndWrites) == 0) {
-      refuse(root.of("group"), "a group that mode does not let in: write mode 0660, too");
+      refuse(root.of("group"), "the mode gives this group no access; write mode 0660, too");
     }
     try {
       if (!config_.backplane.empty()) SegmentName::checkBackplane(config_.backplane);
@@ -71,24 +71,22 @@ class Completion {
     }
   }
 
-  void checkThatItDoesSomething() const {
+  void checkThatItHasATask() const {
     const auto serve = places_.entry("serve");
     const auto listen = places_.entry("listen");
     if (config_.serve.empty() && config_.listen.empty() && config_.remotes.empty()) {
-      refuse(
-          places_.root.at(""),
-          fmt::format(
-              "nothing to do: write {} and {} for servers of this host that clients elsewhere use, "
-              "or {} for servers elsewhere that clients of this host use",
-              serve, listen, places_.entry("remote")));
+      refuse(places_.root.at(""), fmt::format("nothing to do: write {} and {} to offer servers of "
+                                              "this host to other hosts, or {} to "
+                                              "reach servers of other hosts",
+                                              serve, listen, places_.entry("remote")));
     }
     if (!config_.serve.empty() && config_.listen.empty()) {
       refuse(places_.serve.front().at(""),
-             fmt::format("what is served cannot be reached: write {}, too", listen));
+             fmt::format("no client can reach the served locations; write {}, too", listen));
     }
     if (config_.serve.empty() && !config_.listen.empty()) {
       refuse(places_.listen.front().at(""),
-             fmt::format("whoever connects finds nothing that is served: write {}, too", serve));
+             fmt::format("this router listens, but serves no location; write {}, too", serve));
     }
   }
 
@@ -111,15 +109,16 @@ class Completion {
       for (std::size_t earlier = 0; earlier < i; ++earlier) {
         if (listen.address.port == 0 || config_.listen[earlier].address != listen.address) continue;
         refuse(places.of("address"),
-               fmt::format("{} is listened at twice; write it once", listen.address.text()));
+               fmt::format("{} appears twice; write it once", listen.address.text()));
       }
     }
   }
 
-  // A name is only known when it is resolved; who does that asks isPublic() again.
+  // A host name has no address until it is resolved; the code that resolves it calls isPublic()
+  // again.
   void checkPlain(Security security, const Address& address, const Places& places) const {
-    const auto isKnown = address.host == "*" || isIpAddress(address.host);
-    if (security == Security::tls || config_.allowPublicPlain || !isKnown ||
+    const auto isResolved = address.host == "*" || isIpAddress(address.host);
+    if (security == Security::tls || config_.allowPublicPlain || !isResolved ||
         !isPublic(address.host))
       return;
     refuse(places.of("security"),
@@ -138,30 +137,30 @@ class Completion {
       for (const auto location : remote.locations) {
         if (!seen.insert(location).second)
           refuse(places.of("locations"),
-                 fmt::format("location {} is reached twice; write it once", location));
-        checkThatItIsElsewhere(location, places);
+                 fmt::format("location {} appears twice in remotes; write it once", location));
+        checkThatItIsRemote(location, places);
       }
       if (isAny(remote.address.host)) {
         refuse(places.of("address"),
-               fmt::format("{} is an address to listen at; write that of one host",
+               fmt::format("{} is a wildcard address to listen on; write the address of one host",
                            remote.address.text()));
       }
       if (remote.address.port == 0)
         refuse(places.of("address"),
-               fmt::format("{}: the port to connect to is 1 to 65535", remote.address.text()));
+               fmt::format("{}: the port must be 1 to 65535", remote.address.text()));
       checkPlain(remote.security, remote.address, places);
       completeTlsName(remote, places);
     }
   }
 
-  void checkThatItIsElsewhere(std::int32_t location, const Places& places) const {
+  void checkThatItIsRemote(std::int32_t location, const Places& places) const {
     for (std::size_t i = 0; i < config_.serve.size(); ++i) {
       const auto& serve = config_.serve[i];
       if (serve.location != location && serve.local != location) continue;
       refuse(places.of("locations"),
-             fmt::format("location {} is elsewhere and here, by {}; each location has one place",
-                         location,
-                         places_.serve[i].of(serve.location == location ? "location" : "local")));
+             fmt::format(
+                 "location {} is remote here, but served by this host at {}; use another location",
+                 location, places_.serve[i].of(serve.location == location ? "location" : "local")));
     }
   }
 
@@ -169,17 +168,18 @@ class Completion {
     const auto key = places_.isFile ? "tls-name" : "--tls-name";
     const auto isNumber = isIpAddress(remote.address.host);
     if (remote.security == Security::plain && !remote.tlsName.empty())
-      refuse(places.of("tls-name"), fmt::format("{} without TLS; leave it out", key));
+      refuse(places.of("tls-name"), fmt::format("{} has no effect without TLS; remove it", key));
     if (remote.security == Security::plain) return;
     if (remote.tlsName.empty() && isNumber) {
-      refuse(places.of("address"), fmt::format("{} is no name that a certificate can have; write "
-                                               "{}, too: the name in the certificate of "
-                                               "the router there",
-                                               remote.address.host, key));
+      refuse(
+          places.of("address"),
+          fmt::format("{} is an IP address, and a certificate has a name; write {}, too: the name "
+                      "in the certificate of that router",
+                      remote.address.host, key));
     }
     if (isIpAddress(remote.tlsName))
       refuse(places.of("tls-name"),
-             fmt::format("{} {} is an address; write a name", key, remote.tlsName));
+             fmt::format("{} {} is an IP address; write a name", key, remote.tlsName));
     if (remote.tlsName.empty()) remote.tlsName = remote.address.host;
   }
 
@@ -198,13 +198,14 @@ class Completion {
       }
       if (std::ranges::find(allow.servers, "") != allow.servers.end() || allow.peer.empty()) {
         refuse(places.of(allow.peer.empty() ? "peer" : "servers"),
-               "an empty pattern fits nothing; \"*\" fits everything");
+               "an empty pattern matches nothing; \"*\" matches everything");
       }
       if (allow.peer.find_first_not_of('*') != std::string::npos &&
           std::ranges::none_of(config_.listen, isTls)) {
         refuse(places.of("peer"),
-               fmt::format("peer \"{}\" cannot come: only TLS tells names, and no {} uses it",
-                           allow.peer, places_.entry("listen")));
+               fmt::format(
+                   "peer \"{}\" cannot match: peers have names only with TLS, and no {} uses TLS",
+                   allow.peer, places_.entry("listen")));
       }
     }
   }
@@ -218,25 +219,26 @@ class Completion {
   }
 
   void checkTls() const {
-    const auto* const user = whoUsesTls();
-    if (user == nullptr) return;
+    const auto* const place = firstTlsPlace();
+    if (place == nullptr) return;
     const auto& tls = config_.tls;
     for (const auto& [key, file] : {std::pair{"certificate", &tls.certificate},
                                     {"key", &tls.key},
                                     {"authorities", &tls.authorities}}) {
       if (!file->empty()) continue;
       refuse(
-          *user,
+          *place,
           places_.isFile
-              ? R"(TLS needs [tls] with certificate, key and authorities; or write security = "plain")"
+              ? "TLS needs [tls] with certificate, key and authorities; or write security = "
+                "\"plain\""
               : fmt::format("TLS needs --tls-certificate, --tls-key and --tls-authorities; or add "
                             "--plain"));
     }
     checkTlsFiles(tls, places_.tls);
   }
 
-  // The place of the first that does; nullptr: nobody.
-  [[nodiscard]] const std::string* whoUsesTls() const {
+  // The place of the first entry that uses TLS; nullptr when no entry uses it.
+  [[nodiscard]] const std::string* firstTlsPlace() const {
     for (std::size_t i = 0; i < config_.listen.size(); ++i) {
       if (config_.listen[i].security == Security::tls) return &places_.listen[i].of("security");
     }

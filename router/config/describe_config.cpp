@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a configuration means, for people: `mpf-router --check`.
+// describe(): the text that `mpf-router --check` prints.
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -34,7 +34,7 @@ std::string remoteText(const Remote& remote) {
                      fmt::join(remote.locations, ", "));
 }
 
-// Only one that was asked for: else it is the user's own.
+// Empty for the default, the user's own group.
 std::string groupText(std::uint32_t group) {
   if (group == Rights().group) return {};
   const auto* const entry = ::getgrgid(group);

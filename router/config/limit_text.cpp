@@ -91,35 +91,34 @@ constexpr Limit timeLimit(const char* name, const char* purpose, std::uint64_t l
 constexpr std::uint64_t kGiB = 1u << 30;
 constexpr std::array<Limit, 10> kLimits{{
     numberLimit<&Limits::queueSize>("queue-size",
-                                    "Messages that may wait for the line, of one connection",
+                                    "Messages of one connection that may wait to be sent",
                                     Kind::count, 1, 1'000'000),
     numberLimit<&Limits::bufferBytes>("buffer-size",
-                                      "Messages that wait share a frame of at most this size",
+                                      "Waiting messages share a frame of at most this size",
                                       Kind::size, 256, 64u << 20),
     numberLimit<&Limits::maxMessageBytes>(
         "max-message-size", "Largest message; larger ones are refused", Kind::size, 256, kGiB),
-    numberLimit<&Limits::windowBytes>("window-size",
-                                      "Replies on their way to one client that it has not taken",
+    numberLimit<&Limits::windowBytes>("window-size", "Replies on their way to one client",
                                       Kind::size, 4096, kGiB),
     numberLimit<&Limits::maxClients>("max-clients", "Clients of one connection", Kind::count, 1,
                                      layout::kMaxLinks),
-    numberLimit<&Limits::maxConnections>("max-connections", "Connections that are accepted",
-                                         Kind::count, 1, 100'000),
-    timeLimit<&Limits::deadTime>("dead-time", "A line without a sign of life for so long is cut",
-                                 100),
+    numberLimit<&Limits::maxConnections>("max-connections", "Accepted connections", Kind::count, 1,
+                                         100'000),
+    timeLimit<&Limits::deadTime>(
+        "dead-time", "A connection without a sign of life for this time is closed", 100),
     timeLimit<&Limits::handshakeTime>(
         "handshake-time", "Longest time for a peer's TLS handshake, and then for its greeting",
         100),
     timeLimit<&Limits::firstRetry>(
         "first-retry",
-        "Pause before the first try to connect anew; each further one is twice as long", 1),
-    timeLimit<&Limits::lastRetry>("last-retry", "Longest pause before a try to connect anew", 1),
+        "Pause before the first attempt to reconnect; each further pause is twice as long", 1),
+    timeLimit<&Limits::lastRetry>("last-retry", "Longest pause before an attempt to reconnect", 1),
 }};
 
 const Limit& limitOf(const std::string& name) {
   const auto* const limit = std::ranges::find(kLimits, name, &Limit::name);
   if (limit == kLimits.end())
-    throw std::invalid_argument(fmt::format("there is no limit \"{}\"", name));
+    throw std::invalid_argument(fmt::format("unknown limit \"{}\"", name));
   return *limit;
 }
 

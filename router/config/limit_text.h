@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// LimitText: the limits of a router by the names that they have in files ("queue-size") and as
-// options ("--queue-size"), with units.
+// LimitText: the limits of a router as text, by their names in files ("queue-size") and as options
+// ("--queue-size"), with units.
 //
 // Threads  plain data.
 #pragma once
@@ -12,26 +12,26 @@
 
 namespace mpf::router {
 
-// "500ms", "2s", "1min"; nothing without a unit.
-//   throws  std::invalid_argument that says how it is written
+// Parses "500ms", "2s" or "1min". The unit is required.
+//   throws  std::invalid_argument that shows the form
 [[nodiscard]] std::chrono::milliseconds parseTime(const std::string& text);
 
-// "4096", "64KiB", "4MiB", "1GiB".
-//   throws  std::invalid_argument that says how it is written
+// Parses "4096", "64KiB", "4MiB" or "1GiB".
+//   throws  std::invalid_argument that shows the form
 [[nodiscard]] std::uint64_t parseBytes(const std::string& text);
 
-// Names of all limits.
+// The names of all limits.
 [[nodiscard]] const std::vector<std::string>& limitNames();
 
-// What it limits, and what it is written as: "SIZE".
+// What the limit means, and the type of its value: "SIZE", "TIME" or "NUMBER".
 [[nodiscard]] std::string limitPurpose(const std::string& name);
 [[nodiscard]] std::string limitType(const std::string& name);
 
-// Sets the limit `name`, one of limitNames(), to what `text` says.
-//   throws  std::invalid_argument that says how it is written and within which bounds
+// Sets the limit `name`, one of limitNames(), to the value in `text`.
+//   throws  std::invalid_argument that shows the form or the range
 void setLimit(Limits& limits, const std::string& name, const std::string& text);
 
-// What setLimit() understands; with the largest unit that loses nothing.
+// The value in the form that setLimit() reads, with the largest unit that divides it.
 [[nodiscard]] std::string limitText(const Limits& limits, const std::string& name);
 
 }  // namespace mpf::router

@@ -3,14 +3,13 @@
 
 namespace mpf::router {
 
-// Of the stars only the last one is ever tried again: what an earlier one took more, this one can
-// take as well.
-bool fits(const std::string& pattern, const std::string& name) {
+// Backtracks to the last star only: whatever more an earlier star could match, the last one can
+// match as well.
+bool matches(const std::string& pattern, const std::string& name) {
   std::size_t p = 0;
   std::size_t n = 0;
-  // the last star, and how much of the name was used up by then
-  std::size_t star = std::string::npos;
-  std::size_t used = 0;
+  std::size_t star = std::string::npos;  // position of the last star
+  std::size_t used = 0;  // characters of the name before its match
   while (n < name.size()) {
     if (p < pattern.size() && pattern[p] == '*') {
       star = p++;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a TOML file to a RouterConfig: which keys there are, and what they are called.
+// readConfig(): reads a RouterConfig from a TOML file; this file names all keys.
 #include <filesystem>
 #include <fmt/format.h>
 #include <system_error>
@@ -61,8 +61,8 @@ void readAllow(TomlTable& table, WrittenConfig& to) {
   to.places.allow.push_back(table.places());
 }
 
-// Paths are meant from where the file is: a service has another working directory than who wrote
-// them.
+// Paths are relative to the folder of the configuration file, because a service has another working
+// directory than the user that wrote the file.
 void readTls(TomlTable& table, WrittenConfig& to, const std::filesystem::path& folder) {
   auto& tls = to.config.tls;
   for (const auto& [key, path] : {std::pair{"certificate", &tls.certificate},

@@ -14,7 +14,7 @@
 namespace mpf::router {
 namespace {
 
-constexpr std::size_t kLongestChain = 10;  // kj's
+constexpr std::size_t kLongestChain = 10;  // the limit of kj
 
 template <auto function>
 struct FreeBy {
@@ -27,13 +27,13 @@ using Bio = std::unique_ptr<BIO, FreeBy<BIO_free_all>>;
 using Certificate = std::unique_ptr<X509, FreeBy<X509_free>>;
 using Key = std::unique_ptr<EVP_PKEY, FreeBy<EVP_PKEY_free>>;
 
-// One of the files, and how errors about it begin.
+// One of the files, and the text that errors about it begin with.
 struct PemFile {
   PemFile(const Places& places, const char* name, std::string path)
       : file(std::move(path)), prefix(places.empty() ? file : places.of(name) + ": " + file) {}
 
   [[noreturn]] void refuse(const std::string& why) const {
-    ERR_clear_error();  // or whoever asks OpenSSL next is told of it
+    ERR_clear_error();  // otherwise a later call would report this error of OpenSSL
     throw ConfigError(prefix + " " + why);
   }
   [[nodiscard]] std::string text() const try {
@@ -65,7 +65,7 @@ std::vector<Certificate> certificatesIn(const PemFile& file, const std::string& 
   return all;
 }
 
-// A password would have to be asked for, and nobody is there.
+// A router has no terminal at which it could ask for a password.
 int noPassword(char*, int, int, void* wasAsked) {
   *static_cast<bool*>(wasAsked) = true;
   return -1;
@@ -129,7 +129,7 @@ void checkTlsFiles(const TlsFiles& files, const Places& places) {
     file.refuse(fmt::format("expired on {}; renew it", timeText(end)));
   if (::X509_cmp_current_time(begin) > 0)
     file.refuse(
-        fmt::format("is not valid before {}; is this host's clock right?", timeText(begin)));
+        fmt::format("is not valid before {}; check the clock of this host", timeText(begin)));
 }
 
 std::string certificateText(const TlsFiles& files) {

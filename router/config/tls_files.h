@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// TlsFiles, looked at before anybody connects: a file that is not there, or holds something else,
-// is an error of the configuration.
+// Checks and reads TlsFiles before the first connection, so that a missing or invalid file is
+// reported as an error in the configuration.
 //
 // Threads  any.
 #pragma once
@@ -12,23 +12,25 @@
 
 namespace mpf::router {
 
-// What stands in the files, in PEM form.
+// The contents of the files, in PEM form.
 struct TlsTexts {
-  std::string certificate;  // and its chain
+  std::string certificate;  // followed by its chain
   std::string key;
   std::vector<std::string> authorities;  // one certificate each
 };
 
-// Every part is what it should be, and the key is the certificate's.
-//   places  "certificate", "key" and "authorities", which errors begin with; none: errors begin
-//           with the file's name
-//   throws  ConfigError that names the file and says what is wrong with it
+// Reads the files, checks that each has the expected content, and that the key belongs to the
+// certificate.
+//   places  where the keys "certificate", "key" and "authorities" are written; errors begin with
+//           that place, or with the name of the file when `places` is empty
+//   throws  ConfigError that names the file and its error
 [[nodiscard]] TlsTexts readTlsFiles(const TlsFiles& files, const Places& places = {});
 
-// The same, and our certificate is valid today.
+// As readTlsFiles(), and also checks that our certificate is valid now.
 void checkTlsFiles(const TlsFiles& files, const Places& places = {});
 
-// Whose our certificate is and until when: "ioc1, valid until 2027-01-01 00:00 UTC".
+// The name in our certificate and the end of its validity: "ioc1, valid until 2027-01-01 00:00
+// UTC".
 [[nodiscard]] std::string certificateText(const TlsFiles& files);
 
 }  // namespace mpf::router

@@ -28,7 +28,7 @@ const char* kindOf(const toml::node& node) {
   }
 }
 
-// How many letters one adds, leaves out or changes to make one of the other.
+// The Levenshtein distance: how many characters are inserted, deleted or replaced to turn a into b.
 std::size_t distanceOf(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -82,7 +82,8 @@ void TomlTable::takeEach(const char* key, const std::function<void(const toml::n
   const auto* const list = node->as_array();
   if (list == nullptr) return use(*node);
   if (list->empty())
-    throw ConfigError(fmt::format("{}: {} is an empty list", placeOf(node->source()), key));
+    throw ConfigError(fmt::format("{}: {} is an empty list; write at least one value",
+                                  placeOf(node->source()), key));
   for (const auto& one : *list) use(one);
 }
 
@@ -165,10 +166,10 @@ ConfigError TomlTable::unknown(const toml::key& key) const {
   const auto nearest = std::ranges::min(
       known_, {}, [&](const std::string& one) { return distanceOf(one, key.str()); });
   const auto isNear = distanceOf(nearest, key.str()) <= key.length() / 2;
-  return ConfigError(fmt::format("{}: {}there is no key \"{}\"; {}", placeOf(key.source()),
+  return ConfigError(fmt::format("{}: {}unknown key \"{}\"; {}", placeOf(key.source()),
                                  header_.empty() ? "" : header_ + ": ", key.str(),
                                  isNear ? fmt::format("did you mean \"{}\"?", nearest)
-                                        : fmt::format("there are {}", fmt::join(known_, ", "))));
+                                        : fmt::format("the keys are {}", fmt::join(known_, ", "))));
 }
 
 }  // namespace mpf::router

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// TomlTable: one table of a configuration file, read key by key. Whatever is wrong is a ConfigError
-// that begins with file and line.
+// TomlTable: one table of a configuration file, read key by key. Each error is a ConfigError that
+// begins with the file and the line.
 //
 //   TomlTable table(root, "FILE", "");
-//   table.read("location", serve.location);   // leaves it as it is when the key is not there
-//   table.finish();                           // after all reads: they say which keys there are
+//   table.read("location", serve.location);   // no change when the key is absent
+//   table.finish();                           // after all reads: refuses all other keys
 //
 // Threads  one.
 #pragma once
@@ -21,29 +21,29 @@ namespace mpf::router {
 
 class TomlTable {
  public:
-  // `header` as it is written: "[tls]", "[[listen]]"; empty: the file itself. `table` must outlive
-  // this object.
+  // `header` is the written form: "[tls]", "[[listen]]", or empty for the root table of the file.
+  // `table` outlives this object.
   TomlTable(const toml::table& table, std::string file, std::string header);
 
   void read(const char* key, std::string& value);
   void read(const char* key, std::int32_t& value);
   void read(const char* key, bool& value);
-  // One value, or a list of them.
+  // Reads one value or a list of values.
   void read(const char* key, std::vector<std::int32_t>& values);
   void read(const char* key, std::vector<std::string>& values);
-  // Hands a string or an integer, as text, to `use`, whose std::invalid_argument says what is wrong
-  // with it.
+  // Passes a string or an integer, as text, to `use`, which throws std::invalid_argument when the
+  // value is wrong.
   void readWith(const char* key, const std::function<void(const std::string&)>& use);
 
-  // Calls `use` with [key], if it is there, or with each [[key]].
+  // Calls `use` with the table [key], if it exists, or with each table [[key]].
   void readTable(const char* key, const std::function<void(TomlTable&)>& use);
   void readTables(const char* key, const std::function<void(TomlTable&)>& use);
 
-  // Refuses keys that no read asked for, then that one of `required` is not there. Each shows how
-  // it may be written: "location = 1".
+  // Refuses keys that were not read, and then the absence of a required key. `required` has an
+  // example for each required key: "location = 1".
   void finish(const std::vector<std::string>& required = {}) const;
 
-  // Where all keys are.
+  // The places of all keys.
   [[nodiscard]] Places places() const;
 
  private:

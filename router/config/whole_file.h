@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// WholeFile: a small file, read at once.
+// Reads small files.
 #pragma once
 
 #include <string>
 
 namespace mpf::router {
 
+// Returns the whole content of a file.
 //   throws  std::system_error
 [[nodiscard]] std::string readWholeFile(const std::string& file);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// WrittenConfig: a configuration, and where its parts were written, so that errors found later
-// begin with file and line, too.
+// WrittenConfig: a configuration together with the places at which its values are written, so that
+// errors that are found later also begin with the file and the line.
 //
 //   readConfig(FILE) ─┐
 //   options ──────────┴─► WrittenConfig ─► completeConfig() ─► RouterConfig
@@ -16,12 +16,12 @@
 
 namespace mpf::router {
 
-// Where each key of a table was written, as an error about it begins: "FILE:LINE" or "--listen".
-// Under "": the table itself.
+// The place of each key of a table, in the form in which errors begin: "FILE:LINE" or "--listen".
+// The key "" is the table itself.
 struct Places : std::map<std::string, std::string> {
   using map::map;
 
-  // Of `key`, or of the table when it is not there.
+  // The place of `key`, or of the table when the key is absent.
   [[nodiscard]] const std::string& of(const std::string& key) const {
     const auto found = find(key);
     return found != end() ? found->second : at("");
@@ -31,9 +31,9 @@ struct Places : std::map<std::string, std::string> {
 struct ConfigPlaces {
   bool isFile = true;
   Places root, tls, limits;
-  std::vector<Places> serve, listen, remotes, allow;  // one for each of the configuration's
+  std::vector<Places> serve, listen, remotes, allow;  // one for each entry of the configuration
 
-  // How an entry is written.
+  // The written form of an entry: "[[listen]]" in a file, or "--listen".
   [[nodiscard]] std::string entry(const std::string& name) const {
     return isFile ? "[[" + name + "]]" : "--" + name;
   }
@@ -44,12 +44,12 @@ struct WrittenConfig {
   ConfigPlaces places;
 };
 
-// Reads a TOML file, and checks each value by itself.
+// Reads a TOML file and checks each value by itself.
 //   throws  ConfigError
 [[nodiscard]] WrittenConfig readConfig(const std::string& file);
 
-// Fills in defaults that depend on other values; checks that all values together make sense, and
-// that the files of TLS are there.
+// Fills in defaults that depend on other values, checks that the values fit together, and checks
+// the TLS files.
 //   throws  ConfigError
 void completeConfig(WrittenConfig& written);
 

@@ -11,9 +11,10 @@ namespace mpf::router {
 
 namespace {
 
-// For a server that is stopped while its clients come. One request, of any size, always has room.
-constexpr std::size_t kMaxHeld = std::size_t{4} << 20;        // of a client
-constexpr std::size_t kMaxHeldOfAll = std::size_t{64} << 20;  // of a connection
+// Bytes of requests that are held until the server accepts the client, for example while the server
+// is stopped. A connection that holds none may always hold one request of any size.
+constexpr std::size_t kMaxHeld = std::size_t{4} << 20;  // for a client
+constexpr std::size_t kMaxHeldOfAll = std::size_t{64} << 20;  // for a connection
 
 }  // namespace
 
@@ -34,7 +35,7 @@ FarClient::~FarClient() { owner_.heldBytes() -= waitingBytes_; }
 void FarClient::request(wire::Request::Reader request) {
   const auto id = request.getRequestId();
   if (id == 0) throw ProtocolError(FarewellCode::PROTOCOL, "requestId 0");
-  if (gaveUp_) return endRequest(id, *gaveUp_, gaveUpBecause_);
+  if (gaveUp_) return endRequest(id, *gaveUp_, giveUpReason_);
   ConversionError error;
   auto message = tryFromWire(
       request.getMessage(), {static_cast<std::size_t>(owner_.line().limits().maxMessageBytes)},
@@ -42,7 +43,7 @@ void FarClient::request(wire::Request::Reader request) {
   if (!message) {
     if (error.fault == ConversionFault::malformed)
       throw ProtocolError(FarewellCode::PROTOCOL, error.text);
-    // what a newer peer may send is sound, too: throws
+    // A message type that only a newer peer defines must be well-formed, too: totalSize() throws.
     static_cast<void>(request.getMessage().totalSize());
     return endRequest(id, Fate::refused, error.text);
   }
@@ -60,25 +61,25 @@ void FarClient::send(Waiting waiting) {
   if (result == SendResult::sent) return;
   std::string why = toString(result);
   if (result == SendResult::tooLarge) {
-    const auto bytes = waiting.message.body()
-                           .size();  // NOLINT(bugprone-use-after-move): not sent, it is as it was
+    // A message that was not sent is unchanged.
+    const auto bytes = waiting.message.body().size();  // NOLINT(bugprone-use-after-move)
     why += fmt::format(": {} bytes, the limit is {}", bytes, client_->maxMessageBytes());
   }
   endRequest(id, Fate::refused, why);
 }
 
-// Until the server has accepted us; as its own queue would.
+// Holds a request until the server accepts this client, with the limits of the server's own queue.
 void FarClient::hold(Waiting waiting) {
   auto& all = owner_.heldBytes();
   const auto bytes = waiting.bytes();
-  const bool isMuch = waiting_.size() >= terms_.queueSize || waitingBytes_ + bytes > kMaxHeld ||
-                      all + bytes > kMaxHeldOfAll;
-  if (isMuch && all != 0) {
+  const bool exceedsLimit = waiting_.size() >= terms_.queueSize ||
+                            waitingBytes_ + bytes > kMaxHeld || all + bytes > kMaxHeldOfAll;
+  if (exceedsLimit && all != 0) {
     endRequest(waiting.requestId, Fate::refused, toString(SendResult::queueFull));
-    if (!std::exchange(fullTold_, true)) tellQueueFull();
+    if (!std::exchange(queueFullSent_, true)) sendQueueFull();
     return;
   }
-  fullTold_ = false;
+  queueFullSent_ = false;
   waitingBytes_ += bytes;
   all += bytes;
   const auto takeBefore = waiting.takeBefore;
@@ -86,12 +87,12 @@ void FarClient::hold(Waiting waiting) {
   expiry_.setAt(takeBefore);
 }
 
-void FarClient::letGo(std::size_t bytes) noexcept {
+void FarClient::releaseHeld(std::size_t bytes) noexcept {
   waitingBytes_ -= bytes;
   owner_.heldBytes() -= bytes;
 }
 
-// Those whose time has passed end; and again when the next one's has.
+// Ends the held requests whose deadline has passed, and sets the timer for the next deadline.
 void FarClient::expire() {
   auto next = Deadline::never();
   std::erase_if(waiting_, [&](const Waiting& waiting) {
@@ -100,60 +101,61 @@ void FarClient::expire() {
       return false;
     }
     endRequest(waiting.requestId, Fate::expired, {});
-    letGo(waiting.bytes());
+    releaseHeld(waiting.bytes());
     return true;
   });
   expiry_.setAt(next);
 }
 
-// Its replies may fill its window, so that it would not look.
-void FarClient::hearOfEnd() {
-  serverEnds_ = true;
+// The client may be paused because its window is used up.
+void FarClient::onServerGone() {
+  serverGone_ = true;
   client_->resume();
 }
 
 void FarClient::giveUp(Fate fate, const std::string& why) {
   gaveUp_ = fate;
-  gaveUpBecause_ = why;
+  giveUpReason_ = why;
   for (const auto& waiting : waiting_) endRequest(waiting.requestId, fate, why);
   waiting_.clear();
-  letGo(waitingBytes_);
-  client_.reset();  // or it would try to connect again and again
+  releaseHeld(waitingBytes_);
+  client_.reset();  // it would try to connect repeatedly
 }
 
-// ---- from it
+// ---- from the server
 
 void FarClient::onMessage(Message&& message) {
-  if (const auto* news = message.tryAs<Connect>()) return onNews(*news);
+  if (const auto* connect = message.tryAs<Connect>()) return onConnect(*connect);
   const bool isFirst = MessageClient::endsRequest(message);
   const auto requestId = message.route().requestId;
   if (const auto* fate = message.tryAs<RequestFate>()) return endRequest(requestId, fate->fate, {});
-  // Of a server that has gone: what it sent comes at once.
+  // The server is gone, and its remaining replies are received at once. Those that exceed the
+  // window are dropped.
   if (window_ <= 0)
     return isFirst ? endRequest(requestId, Fate::outcomeUnknown,
-                                "the server went before its replies were taken")
+                                "the server ended before its replies were received")
                    : void();
   window_ -= windowBytesOf(message);
-  if (window_ <= 0 && !serverEnds_) client_->pause();
+  if (window_ <= 0 && !serverGone_) client_->pause();
   owner_.line().send(Carried{.isFirst = isFirst,
                              .client = terms_.number,
                              .requestId = requestId,
                              .message = std::move(message)});
 }
 
-void FarClient::onNews(const Connect& news) {
-  switch (news.status) {
+void FarClient::onConnect(const Connect& connect) {
+  switch (connect.status) {
     case ConnectStatus::connectYes:
-      if (news.incarnation != terms_.incarnation)
+      if (connect.incarnation != terms_.incarnation)
         return giveUp(Fate::neverTaken, "the server is gone");
       connected_ = true;
       owner_.onConnected(*this);
-      letGo(waitingBytes_);
+      releaseHeld(waitingBytes_);
       for (auto waiting = std::exchange(waiting_, {}); !waiting.empty(); waiting.pop_front())
         send(std::move(waiting.front()));
       return;
     case ConnectStatus::connectQueueFull:
-      return tellQueueFull();
+      return sendQueueFull();
     case ConnectStatus::connectRefused: {
       const auto why = client_->notConnectedBecause();
       giveUp(Fate::refused, why);
@@ -165,7 +167,7 @@ void FarClient::onNews(const Connect& news) {
   }
 }
 
-void FarClient::tellQueueFull() {
+void FarClient::sendQueueFull() {
   count(owner_.record()->queueFull);
   owner_.line().send(
       [number = terms_.number](wire::Item::Builder item) { item.setQueueFull(number); });
@@ -177,7 +179,7 @@ void FarClient::endRequest(std::uint32_t requestId, Fate fate, const std::string
     end.setClient(number);
     end.setRequestId(requestId);
     end.setFate(static_cast<wire::Fate>(fate));
-    if (!why.empty()) end.setReason(forPeople(why));
+    if (!why.empty()) end.setReason(displayText(why));
   });
 }
 

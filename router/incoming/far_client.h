@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// FarClient: a client on another host, as a client of a server on this one.
+// FarClient: represents a client of another host as a client of a server on this one.
 //
-//   Line ─► held until the server has accepted it ─► MessageClient        Line ◄── while its window lasts ◄── MessageClient
+//   Line ─► held until the server accepts the client ─► MessageClient
+//   Line ◄── as long as the window has room ◄── MessageClient
 //
-// Threads  that of the event loop, which runs the Dispatcher, too.
-// Crash    the fates that MessageClient tells when the server is gone go on to the far client.
-// Trust    until the server has accepted it, a far client holds no more here than the server's
-//          queue would, and the clients of a connection not more than so many bytes; replies that
-//          wait for credit stay in the link.
+// Threads  that of the event loop, which also runs the Dispatcher.
+// Crash    when the server exits, the fates that MessageClient delivers are sent to the far client.
+// Trust    until the server accepts the client, at most as many requests are held as the server's
+//          queue would hold, and at most kMaxHeld bytes for a client and kMaxHeldOfAll for all
+//          clients of a connection. Replies that wait for credit stay in the link.
 #pragma once
 
 #include <deque>
@@ -28,14 +29,14 @@ class FarClient {
    public:
     virtual Line& line() = 0;
     virtual PeerRecord& record() = 0;
-    // Bytes that the clients of this connection hold.
+    // Bytes of the requests that all clients of this connection hold.
     virtual std::size_t& heldBytes() = 0;
-    // Tells its peer that it is not had, and why.
+    // Reports to the peer that the server does not accept this client, and why.
     virtual void refuseClient(std::uint32_t number, const std::string& why) = 0;
     // The server has accepted it.
     virtual void onConnected(FarClient& client) = 0;
-    // The server is gone, or it closed this client's link; nothing is owed to it any more. Called
-    // from its callback: do not destroy it.
+    // The server is gone, or it has closed this client's link; all requests have ended. Called from
+    // the client's callback: do not destroy the client.
     virtual void onDisconnected(FarClient& client) = 0;
 
    protected:
@@ -45,9 +46,8 @@ class FarClient {
   struct Terms {
     std::uint32_t number = 0;
     std::uint32_t binding = 0;
-    // the life of the server that it is a client of; it is none of any other
-    std::uint64_t incarnation = 0;
-    std::uint32_t queueSize = 0;  // that server's
+    std::uint64_t incarnation = 0;  // of the server; requests never go to another incarnation
+    std::uint32_t queueSize = 0;  // of the server
     std::uint32_t window = 0;  // bytes of replies that may be on their way
   };
   FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, const Terms& terms);
@@ -58,9 +58,10 @@ class FarClient {
   void bind(const std::string& server, std::int32_t location) { client_->bind(server, location); }
   void request(wire::Request::Reader request);
   void credit(std::uint32_t bytes);
-  // The server has gone: it hears so now, of that and of what it still had sent.
-  void hearOfEnd();
-  // No more can come of it: what it holds and what still comes ends so.
+  // The server is gone: receives what it had sent, regardless of the window, and then the
+  // disconnection.
+  void onServerGone();
+  // Ends all held requests, and those that arrive later, with `fate`.
   void giveUp(Fate fate, const std::string& why);
 
   [[nodiscard]] std::uint32_t binding() const noexcept { return terms_.binding; }
@@ -76,28 +77,28 @@ class FarClient {
     }
   };
   void onMessage(Message&& message);
-  void onNews(const Connect& news);
+  void onConnect(const Connect& connect);
   void send(Waiting waiting);
   void hold(Waiting waiting);
-  void letGo(std::size_t bytes) noexcept;
+  void releaseHeld(std::size_t bytes) noexcept;
   void expire();
-  void tellQueueFull();
+  void sendQueueFull();
   void endRequest(std::uint32_t requestId, Fate fate, const std::string& why);
 
   Surroundings& here_;
   Owner& owner_;
   Terms terms_;
-  std::int64_t window_;  // bytes of replies that may yet be sent
+  std::int64_t window_;  // bytes of replies that may be sent before the next credit
   std::int64_t fullWindow_;
   bool connected_ = false;
-  bool serverEnds_ = false;  // what is left of it is taken, whatever the window
-  std::optional<Fate> gaveUp_;
-  std::string gaveUpBecause_;
+  bool serverGone_ = false;  // its remaining messages are received regardless of the window
+  std::optional<Fate> gaveUp_;  // set by giveUp()
+  std::string giveUpReason_;
   std::deque<Waiting> waiting_;
   std::size_t waitingBytes_ = 0;
-  bool fullTold_ = false;  // this run of refusals of waiting requests
+  bool queueFullSent_ = false;  // in this run of refused requests
   Alarm expiry_;
-  std::unique_ptr<MessageClient> client_;  // until it gives up
+  std::unique_ptr<MessageClient> client_;  // nullptr after giveUp()
 };
 
 }  // namespace mpf::router

@@ -8,8 +8,8 @@
 
 namespace mpf::router {
 
-Presence::Presence(Backplane backplane, ServerName name, std::function<void()> news)
-    : backplane_(std::move(backplane)), name_(std::move(name)), news_(std::move(news)) {}
+Presence::Presence(Backplane backplane, ServerName name, std::function<void()> onChange)
+    : backplane_(std::move(backplane)), name_(std::move(name)), onChange_(std::move(onChange)) {}
 
 Presence::~Presence() { forget(); }
 
@@ -22,7 +22,7 @@ bool Presence::look() {
   const auto before = incarnation();
   const bool hadFailed = failed_;
   const bool isThere = find();
-  if ((before != 0 || hadFailed) && incarnation() != before) news_();
+  if ((before != 0 || hadFailed) && incarnation() != before) onChange_();
   return isThere;
 }
 
@@ -32,12 +32,12 @@ bool Presence::find() try {
     return true;
   forget();
   failed_ = false;
-  problem_ = "it is not there";
+  problem_ = "the server is not running";
   auto window = PeerWindow::tryOpen(
       SegmentName::serverWindow(backplane_.name(), name_.location, name_.server),
       layout::SegmentKind::serverWindow);
   if (!window || window->isClosed() || !window->hasOwner()) return false;
-  token_ = backplane_.watcher().watchPeer(window, news_);
+  token_ = backplane_.watcher().watchPeer(window, onChange_);
   window_ = std::move(window);
   problem_.clear();
   return true;

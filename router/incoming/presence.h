@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Presence: whether a server of this backplane is there, and what it offers. It takes part in
-// nothing: no link, no message.
+// Presence: observes whether a server of this backplane is running, and what it offers, without
+// connecting to it.
 //
-// Threads  that of the event loop; `news` is called by the watcher's thread, too.
-// Trust    what a server's window says is bounded before use.
+// Threads  that of the event loop; `onChange` is also called by the watcher's thread.
+// Trust    values that are read from a server's window are bounded before use.
 #pragma once
 
 #include <functional>
@@ -13,23 +13,25 @@
 #include <mpf/backplane.h>
 
 #include "router/outgoing/pending_binds.h"
+#include "shm/watcher.h"
 
 namespace mpf::router {
 
 class Presence {
  public:
-  // `news` when the process of the server that look() found is gone; of one that ended in a process
-  // that lives on, isDoubtful() tells. Also when look() itself finds another answer than
-  // isDoubtful() would have told of: for those who share this, and did not look.
-  Presence(Backplane backplane, ServerName name, std::function<void()> news);
+  // Calls `onChange` when the process of the server that look() found exits, and when look() finds
+  // that a known server has changed or, after a failure, that it is running: the other users of
+  // this object have not called look(). When the server ends but its process continues, only
+  // isDoubtful() shows it.
+  Presence(Backplane backplane, ServerName name, std::function<void()> onChange);
   ~Presence();
   Presence(const Presence&) = delete;
   Presence& operator=(const Presence&) = delete;
 
-  // Asks the kernel. True: it is there, and the following speak of it.
+  // Asks the kernel whether the server is running. If true, the accessors below describe it.
   bool look();
 
-  // look() may find another answer now, though nobody told.
+  // Whether the next look() may have another result although `onChange` was not called.
   [[nodiscard]] bool isDoubtful() const noexcept { return window_ ? window_->isClosed() : failed_; }
 
   [[nodiscard]] std::uint64_t incarnation() const noexcept {
@@ -39,7 +41,7 @@ class Presence {
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
     return window_->header().maxMessageBytes;
   }
-  // Why it is not there.
+  // Why the last look() found no server.
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 
  private:
@@ -47,11 +49,11 @@ class Presence {
   void forget() noexcept;
   Backplane backplane_;
   ServerName name_;
-  std::function<void()> news_;
+  std::function<void()> onChange_;
   std::shared_ptr<PeerWindow> window_;
   Watcher::Token token_ = 0;
   std::string problem_;
-  bool failed_ = false;  // to look: no descriptor was left, say
+  bool failed_ = false;  // the last look() failed, for example because no descriptor was left
 };
 
 }  // namespace mpf::router

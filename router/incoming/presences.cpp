@@ -4,8 +4,8 @@
 namespace mpf::router {
 
 Presences::Presences(const Backplane& backplane, kj::UnixEventPort& port,
-                     std::function<void()> news)
-    : backplane_(backplane), bell_(port, std::move(news)) {
+                     std::function<void()> onChange)
+    : backplane_(backplane), bell_(port, std::move(onChange)) {
   names_ = backplane_.watcher().watchNames(NameKind::serverWindow, [this] { bell_.ring(); });
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Presences: one Presence for each server of this host that somebody elsewhere has bound to,
-// whoever that is and how often. Each takes descriptors and memory, and a peer may bind as often as
-// it likes.
+// Presences: one Presence for each server of this host that clients of other hosts have bound to.
+// All bindings to a server share it, because each Presence needs descriptors and memory, and peers
+// may open many bindings.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -12,25 +12,26 @@
 
 #include "router/incoming/presence.h"
 #include "router/readable.h"
+#include "shm/watcher.h"
 
 namespace mpf::router {
 
 class Presences {
  public:
-  // `news` when a server may have come or gone: all who have bound look again, as another's look
-  // may have been the one that found it.
-  Presences(const Backplane& backplane, kj::UnixEventPort& port, std::function<void()> news);
+  // Calls `onChange` when a server may have started or ended. All bindings must then call look()
+  // again, because the look() of one binding consumes the change for all.
+  Presences(const Backplane& backplane, kj::UnixEventPort& port, std::function<void()> onChange);
   ~Presences() noexcept;
   Presences(const Presences&) = delete;
   Presences& operator=(const Presences&) = delete;
 
-  // It goes with the last one who has it, who goes before this.
+  // The Presence is destroyed with its last reference, which must not outlive this object.
   [[nodiscard]] std::shared_ptr<Presence> of(const ServerName& name);
 
  private:
   struct Shared {
-    Shared(const Backplane& backplane, const ServerName& name, std::function<void()> news)
-        : presence(backplane, name, std::move(news)) {}
+    Shared(const Backplane& backplane, const ServerName& name, std::function<void()> onChange)
+        : presence(backplane, name, std::move(onChange)) {}
     Presence presence;
     std::weak_ptr<Presence> users;
   };

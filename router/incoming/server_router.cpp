@@ -11,11 +11,11 @@
 namespace mpf::router {
 namespace {
 
-// of messages of the dispatcher, between looks at the line and the clock
+// Batches of messages that the dispatcher runs between two looks at the line and the clock.
 constexpr int kBatches = 8;
-// before everything else that the loop has to do
-constexpr std::chrono::milliseconds kWithClients{1};
-constexpr std::size_t kMaxBindings = 4096;  // of one connection
+// The time for the dispatcher before the event loop runs its other tasks.
+constexpr std::chrono::milliseconds kDispatcherTurn{1};
+constexpr std::size_t kMaxBindings = 4096;  // per connection
 constexpr std::chrono::seconds kLookEvery{1};
 
 bool isServerName(kj::StringPtr text) try {
@@ -46,14 +46,14 @@ kj::Promise<void> ServerRouter::run() {
   return line_
       ->run([this](wire::Item::Builder item) {
         auto greeting = item.initGreeting();
-        introduce(greeting, here_);
+        fillGreeting(greeting, here_);
         const auto& serve = here_.config.serve;
         auto locations = greeting.initLocations(static_cast<capnp::uint>(serve.size()));
         for (capnp::uint at = 0; at < locations.size(); ++at) locations.set(at, serve[at].location);
         greeting.setMaxClients(line_->limits().maxClients);
       })
       .then([this](const LineEnd& end) {
-        here_.log.info("{} at {} is gone: {}",
+        here_.log.info("{} at {} disconnected: {}",
                        line_->peer().router.empty() ? "a peer" : line_->peer().router, address_,
                        end.text);
       });
@@ -66,7 +66,7 @@ void ServerRouter::noteLocations() {
   record_->setLocations(locations);
 }
 
-void ServerRouter::stop() { line_->end(FarewellCode::STOPPING, "the router ends"); }
+void ServerRouter::stop() { line_->end(FarewellCode::STOPPING, "the router is stopping"); }
 
 void ServerRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
@@ -82,11 +82,13 @@ const Serve* ServerRouter::served(const ServerName& name) const {
   const auto serve = std::ranges::find(config.serve, name.location, &Serve::location);
   if (serve == config.serve.end()) return nullptr;
   const auto allows = [&](const Allow& allow) {
-    const auto fitsServer = [&](const std::string& pattern) { return fits(pattern, name.server); };
-    return fits(allow.peer, peer_) &&
+    const auto matchesServer = [&](const std::string& pattern) {
+      return matches(pattern, name.server);
+    };
+    return matches(allow.peer, peer_) &&
            (allow.locations.empty() ||
             std::ranges::find(allow.locations, name.location) != allow.locations.end()) &&
-           std::ranges::any_of(allow.servers, fitsServer);
+           std::ranges::any_of(allow.servers, matchesServer);
   };
   return config.allow.empty() || std::ranges::any_of(config.allow, allows) ? &*serve : nullptr;
 }
@@ -98,17 +100,17 @@ void ServerRouter::onBind(wire::Bind::Reader bind) {
   if (bindings_.size() >= kMaxBindings)
     return refuse(number, fmt::format("more than {} bindings", kMaxBindings));
   if (!isServerName(bind.getServer()))
-    return refuse(
-        number, fmt::format("\"{}\" is not a valid name of a server", forPeople(bind.getServer())));
+    return refuse(number,
+                  fmt::format("\"{}\" is not a valid server name", displayText(bind.getServer())));
   const ServerName name{bind.getLocation(), toStd(bind.getServer())};
   const auto* serve = served(name);
   if (serve == nullptr)
-    return refuse(number, fmt::format("server {} at location {} is not for this peer", name.server,
-                                      name.location));
+    return refuse(number, fmt::format("server {} at location {} is not allowed for this peer",
+                                      name.server, name.location));
   auto& binding = bindings_.try_emplace(number, name, here_.presences, serve->local).first->second;
   countAll();
   look(number, binding);
-  if (binding.told == 0) tellAbsent(number, binding);
+  if (binding.announced == 0) sendAbsent(number, binding);
 }
 
 void ServerRouter::onUnbind(std::uint32_t number) {
@@ -128,7 +130,7 @@ void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
     auto server = item.initServer();
     server.setBinding(number);
     server.setState(wire::Server::State::REFUSED);
-    server.setReason(forPeople(why));
+    server.setReason(displayText(why));
   });
 }
 
@@ -137,7 +139,7 @@ void ServerRouter::refuseClient(std::uint32_t number, const std::string& why) {
   line_->send([number, why](wire::Item::Builder item) {
     auto refusal = item.initRefuse();
     refusal.setClient(number);
-    refusal.setReason(forPeople(why));
+    refusal.setReason(displayText(why));
   });
 }
 
@@ -149,37 +151,37 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
   lookSoon();
   const bool isThere = binding.presence->look();
   const bool hasFailed = !isThere && binding.presence->isDoubtful();
-  if (hasFailed && !binding.failureSaid) {
+  if (hasFailed && !binding.failureLogged) {
     here_.log.warn("{} at location {} cannot be offered to {}: {}", binding.name.server,
                    binding.name.location, address_, binding.presence->problem());
   }
-  binding.failureSaid = hasFailed;
-  if (isThere && binding.told == binding.presence->incarnation()) return;
-  if (binding.told != 0 && !binding.isEnding) {
+  binding.failureLogged = hasFailed;
+  if (isThere && binding.announced == binding.presence->incarnation()) return;
+  if (binding.announced != 0 && !binding.isEnding) {
     binding.isEnding = true;
     for (auto& [clientNumber, client] : clients_) {
       if (client->binding() != number) continue;
-      if (client->isConnected()) client->hearOfEnd();
+      if (client->isConnected()) client->onServerGone();
       else client->giveUp(Fate::neverTaken, "the server is gone");
     }
   }
   if (binding.isEnding) return endIfDone(number, binding);
-  if (isThere) tellThere(number, binding);
+  if (isThere) sendThere(number, binding);
 }
 
-// A server that nobody has connected to may end without a sound, and what could not be looked at
-// may be there.
+// Looks again at servers that may have changed without a notification: one to which no client is
+// connected, and one at which the last look failed.
 void ServerRouter::lookAtDoubtful() {
   for (auto& [number, binding] : bindings_) {
     if (binding.presence->isDoubtful()) look(number, binding);
-    else if (binding.told != 0 && binding.connected == 0) lookSoon();
+    else if (binding.announced != 0 && binding.connected == 0) lookSoon();
   }
 }
 
 void ServerRouter::lookSoon() { looks_.setAt(Deadline::after(kLookEvery)); }
 
-// "Absent" comes after the ends of all that was asked of the server: when each client has heard
-// that it is gone.
+// Sends "absent" once all requests to the server have ended, which is when all of its clients are
+// disconnected.
 void ServerRouter::endIfDone(std::uint32_t number, Binding& binding) {
   if (binding.connected != 0) return;
   for (auto each = clients_.begin(); each != clients_.end();) {
@@ -192,16 +194,16 @@ void ServerRouter::endIfDone(std::uint32_t number, Binding& binding) {
   }
   countAll();
   binding.isEnding = false;
-  binding.told = 0;
-  tellAbsent(number, binding);
-  if (binding.presence->look()) tellThere(number, binding);
+  binding.announced = 0;
+  sendAbsent(number, binding);
+  if (binding.presence->look()) sendThere(number, binding);
 }
 
-void ServerRouter::tellThere(std::uint32_t number, Binding& binding) {
-  binding.told = binding.presence->incarnation();
+void ServerRouter::sendThere(std::uint32_t number, Binding& binding) {
+  binding.announced = binding.presence->incarnation();
   const auto queueSize = binding.queueSize = binding.presence->queueSize();
   const auto maxBodyBytes = std::max(binding.presence->maxMessageBytes(), kMostBesideElements);
-  line_->send([number, queueSize, incarnation = binding.told,
+  line_->send([number, queueSize, incarnation = binding.announced,
                maxMessageBytes = std::min(maxBodyBytes - kMostBesideElements,
                                           line_->maxMessageBytes())](wire::Item::Builder item) {
     auto server = item.initServer();
@@ -214,12 +216,12 @@ void ServerRouter::tellThere(std::uint32_t number, Binding& binding) {
   });
 }
 
-void ServerRouter::tellAbsent(std::uint32_t number, Binding& binding) {
+void ServerRouter::sendAbsent(std::uint32_t number, Binding& binding) {
   line_->send([number, why = binding.presence->problem()](wire::Item::Builder item) {
     auto server = item.initServer();
     server.setBinding(number);
     server.setState(wire::Server::State::ABSENT);
-    server.setReason(forPeople(why));
+    server.setReason(displayText(why));
   });
 }
 
@@ -241,21 +243,23 @@ void ServerRouter::onConfig() {
 void ServerRouter::onOpen(wire::Open::Reader open) {
   const auto number = open.getClient();
   if (number == 0 || number <= lastClient_)
-    throw ProtocolError(FarewellCode::PROTOCOL,
-                        fmt::format("client {} after {}", number, lastClient_));
+    throw ProtocolError(
+        FarewellCode::PROTOCOL,
+        fmt::format("client number {} is not greater than the last one, {}", number, lastClient_));
   if (clients_.size() >= line_->limits().maxClients) {
     throw ProtocolError(FarewellCode::LIMIT,
                         fmt::format("more than {} clients", line_->limits().maxClients));
   }
   lastClient_ = number;
   const auto binding = bindings_.find(open.getBinding());
-  // The server that it was meant for went while this was on its way: its requests find nobody.
-  const bool isMeant = binding != bindings_.end() && binding->second.told != 0 &&
-                       binding->second.told == open.getIncarnation();
-  if (!isMeant || binding->second.isEnding) return;
+  // If the server ended while this item was on its way, the requests of this client end as
+  // neverTaken.
+  const bool isCurrent = binding != bindings_.end() && binding->second.announced != 0 &&
+                         binding->second.announced == open.getIncarnation();
+  if (!isCurrent || binding->second.isEnding) return;
   try {
     addClient(open, binding->second);
-  } catch (const std::exception& error) {  // no memory or no descriptor for its dispatcher
+  } catch (const std::exception& error) {  // no memory or no file descriptor is left
     refuseClient(number, error.what());
   }
 }
@@ -297,7 +301,7 @@ void ServerRouter::onConnected(FarClient& client) {
     ++binding->second.connected;
 }
 
-// Within the callback of that client.
+// Called from the callback of that client.
 void ServerRouter::onDisconnected(FarClient& client) {
   const auto binding = bindings_.find(client.binding());
   if (binding == bindings_.end()) return;
@@ -311,16 +315,16 @@ void ServerRouter::onDisconnected(FarClient& client) {
 
 void ServerRouter::runDispatcher() {
   if (!line_->hasRoom()) return;
-  const auto end = Deadline::after(kWithClients);
-  bool isThrough = false;
-  while (!isThrough && !end.hasPassed() && line_->hasRoom())
-    isThrough = dispatcher_->runPending(kBatches);
+  const auto end = Deadline::after(kDispatcherTurn);
+  bool isDrained = false;
+  while (!isDrained && !end.hasPassed() && line_->hasRoom())
+    isDrained = dispatcher_->runPending(kBatches);
   dropped_.clear();
-  if (!isThrough && line_->hasRoom()) return timer_.setAt(Deadline::after(Nanoseconds(0)));
+  if (!isDrained && line_->hasRoom()) return timer_.setAt(Deadline::after(Nanoseconds(0)));
   scheduleTimer();
 }
 
-// The dispatcher has things to do at times, too.
+// Runs the dispatcher also when one of its deadlines is due.
 void ServerRouter::scheduleTimer() { timer_.setAt(dispatcher_->nextDeadline()); }
 
 // ---- from the line
@@ -364,7 +368,7 @@ void ServerRouter::onItem(wire::Item::Reader item) {
     case wire::Item::FATE:
     case wire::Item::QUEUE_FULL:
       throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a server router sends");
-    default:  // of a newer peer
+    default:  // an item that only a newer peer defines
       return;
   }
 }
@@ -373,11 +377,11 @@ void ServerRouter::onRoom() {
   if (dispatcher_) runDispatcher();
 }
 
-// What was asked for has been done, but what came of it cannot be said.
+// The server has handled the request, but its reply cannot be sent.
 void ServerRouter::onUnsendable(const Carried& carried, const std::string& why,
                                 wire::Item::Builder instead) {
-  here_.log.warn("a reply to {} is lost: {}", address_, why);
-  // The window that it took comes back from nobody else.
+  here_.log.warn("a reply to {} cannot be sent and is lost: {}", address_, why);
+  // The peer gives no credit for a reply that it does not receive.
   if (const auto client = clients_.find(carried.client); client != clients_.end())
     client->second->credit(windowBytesOf(carried.message));
   if (!carried.isFirst) return;
@@ -385,7 +389,7 @@ void ServerRouter::onUnsendable(const Carried& carried, const std::string& why,
   end.setClient(carried.client);
   end.setRequestId(carried.requestId);
   end.setFate(wire::Fate::OUTCOME_UNKNOWN);
-  end.setReason(forPeople(why));
+  end.setReason(displayText(why));
 }
 
 }  // namespace mpf::router

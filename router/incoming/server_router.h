@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// ServerRouter: one accepted connection: a client router elsewhere, and the servers of this host
-// that its clients use ("RMRServer" in the manual's report).
+// ServerRouter: one accepted connection from the client router of another host, and the servers of
+// this host that its clients use ("RMRServer" in the manual's report).
 //
-//   bind ─► Presence, which all share ─► "there" / "absent"          open ─► FarClient ─► server
+//   bind ─► Presence, shared by all connections ─► "there" / "absent"
+//   open ─► FarClient ─► server
 //
-// Each connection has a dispatcher of its own, which stands still while the line has no room: then
-// the servers are told that their replies are not taken, and nobody else notices.
+// Each connection has its own dispatcher, which does not run while the line has no room. The queues
+// of its clients then fill up, and other connections are not affected.
 //
 // Threads  that of the event loop.
-// Crash    when the line ends, its clients are gone, as the servers see it; requests on their way
-//          to them are not sent again.
-// Trust    a peer sees what it is allowed to, opens so many clients and no more; nonsense is a
-//          ProtocolError.
+// Crash    when the line ends, its clients disconnect from the servers. Requests that were on their
+//          way to the servers are not sent again.
+// Trust    a peer can bind only to servers that it is allowed to use, and can open at most
+//          Limits::maxClients clients. Any violation of the protocol is a ProtocolError.
 #pragma once
 
 #include <map>
@@ -27,32 +28,33 @@ namespace mpf::router {
 
 class ServerRouter final : public Line::Owner, public FarClient::Owner {
  public:
-  //   peer     the common name of its certificate; empty: plain TCP
-  //   address  where it called from
+  //   peer     the common name of the peer's certificate; empty: plain TCP
+  //   address  the address from which the peer has connected
   ServerRouter(Surroundings& here, kj::Own<kj::AsyncIoStream> stream, std::string peer,
                const std::string& address, bool isTls);
 
-  // Until the line has ended.
+  // Resolves when the line has ended.
   [[nodiscard]] kj::Promise<void> run();
   void stop();
   [[nodiscard]] bool hasGreeted() const noexcept { return line_->hasGreeted(); }
-  // What is served or allowed has changed.
+  // The served locations or the rules in [[allow]] have changed.
   void onConfig();
-  // Servers may have come or gone.
+  // Servers may have started or ended.
   void lookAtAll();
 
  private:
   struct Binding {
     Binding(const ServerName& asCalled, Presences& presences, std::int32_t where)
         : name(asCalled), local(where), presence(presences.of({local, asCalled.server})) {}
-    ServerName name;  // as the peer calls it
-    std::int32_t local;  // its location here
-    std::shared_ptr<Presence> presence;  // it may know of another life than we
-    std::uint32_t queueSize = 0;  // that the peer was told of
-    std::uint64_t told = 0;  // incarnation that the peer was told of; 0: absent
-    bool isEnding = false;  // that one is gone, and some clients have not heard of it yet
-    std::size_t connected = 0;  // clients that have yet to hear of its end
-    bool failureSaid = false;  // that we cannot look at it
+    ServerName name;  // with the location that the peer uses
+    std::int32_t local;  // the location on this host
+    // Shared: it may already describe a later incarnation than `announced`.
+    std::shared_ptr<Presence> presence;
+    std::uint32_t queueSize = 0;  // as announced to the peer
+    std::uint64_t announced = 0;  // incarnation announced to the peer; 0: absent
+    bool isEnding = false;  // that server is gone, and some clients are still connected to it
+    std::size_t connected = 0;  // clients that have connected and have not been disconnected
+    bool failureLogged = false;  // that `presence` cannot look at the server
   };
   void onBind(wire::Bind::Reader bind);
   void onUnbind(std::uint32_t number);
@@ -65,8 +67,8 @@ class ServerRouter final : public Line::Owner, public FarClient::Owner {
   void lookAtDoubtful();
   void lookSoon();
   void endIfDone(std::uint32_t number, Binding& binding);
-  void tellThere(std::uint32_t number, Binding& binding);
-  void tellAbsent(std::uint32_t number, Binding& binding);
+  void sendThere(std::uint32_t number, Binding& binding);
+  void sendAbsent(std::uint32_t number, Binding& binding);
   void countAll();
   void noteLocations();
   void runDispatcher();
@@ -91,13 +93,13 @@ class ServerRouter final : public Line::Owner, public FarClient::Owner {
   std::string address_;
   std::shared_ptr<PeerRecord> record_;
   std::unique_ptr<Line> line_;
-  std::unique_ptr<Dispatcher> dispatcher_;  // from the first client on
+  std::unique_ptr<Dispatcher> dispatcher_;  // created with the first client
   std::unique_ptr<Readable> readable_;
   std::map<std::uint32_t, Binding> bindings_;
-  std::size_t heldBytes_ = 0;  // by clients
+  std::size_t heldBytes_ = 0;  // of the requests that all clients hold
   std::unordered_map<std::uint32_t, std::unique_ptr<FarClient>> clients_;
   std::uint32_t lastClient_ = 0;
-  std::vector<std::unique_ptr<FarClient>> dropped_;  // after the callback that dropped them
+  std::vector<std::unique_ptr<FarClient>> dropped_;  // destroyed after the callback has returned
   Alarm timer_;
   Alarm looks_;
 };

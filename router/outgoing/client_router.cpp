@@ -2,27 +2,26 @@
 #include "router/outgoing/client_router.h"
 
 #include <fmt/format.h>
-#include <sstream>
 
-#include "router/config/limit_text.h"
 #include "router/transport/kj_text.h"
 #include "shm/link.h"
 
 namespace mpf::router {
 namespace {
 
-constexpr std::int64_t kLingerNs = 60'000'000'000;    // of a proxy that nobody uses
-constexpr std::int64_t kBindAgainNs = 2'000'000'000;  // after a refusal
-constexpr int kTurn = 16;  // requests of one server before those of the next
-constexpr int kMaxTurns = 256;  // before everything else that the loop has to do
-constexpr std::chrono::seconds kSweepEvery{1};  // while there is something to wait for
+constexpr std::int64_t kIdleProxyNs = 60'000'000'000;  // how long a proxy without clients is kept
+constexpr std::int64_t kBindAgainNs = 2'000'000'000;  // pause after a refused bind
+constexpr int kTurn = 16;  // requests of one server before those of the next server
+constexpr int kMaxTurns = 256;  // turns before the event loop runs its other tasks
+constexpr std::chrono::seconds kSweepEvery{1};  // while isPending() is true for a server
 
-// One that a newer peer knows promises nothing.
+// A fate that only a newer peer defines becomes outcomeUnknown, which promises nothing.
 Fate fateOf(wire::Fate fate) noexcept {
   return fate <= wire::Fate::CANCELLED ? static_cast<Fate>(fate) : Fate::outcomeUnknown;
 }
 
-// As much of it as keeps our clients' ids apart at the far side, too.
+// The largest queue size with which a local client has no more outstanding requests than the far
+// server accepts from each of its clients.
 std::uint32_t queueSizeOf(wire::Server::Reader server) {
   auto queueSize = std::min<std::uint32_t>(server.getQueueSize(), LinkGeometry::kMaxQueueSize);
   while (queueSize > 1 &&
@@ -38,7 +37,8 @@ ClientRouter::ClientRouter(Surroundings& here, const Remote& remote)
       remote_(remote),
       record_(here.statistics.add(layout::RouterRole::client)),
       log_(here.log.forObject()),
-      retry_(here.config.limits.firstRetry),
+      connector_(here, remote_),
+      retryDelay_(here.config.limits.firstRetry),
       pumpAgain_(here.timer,
                  [this] {
                    if (line_) onRoom();
@@ -53,19 +53,19 @@ ClientRouter::ClientRouter(Surroundings& here, const Remote& remote)
 }
 
 ClientRouter::~ClientRouter() {
-  if (line_) onLineEnd("the router ends");
+  if (line_) onLineEnd("the router is stopping");
 }
 
 kj::Promise<void> ClientRouter::stop() {
   stopping_ = true;
   if (!line_) return kj::READY_NOW;
-  line_->end(FarewellCode::STOPPING, "the router ends");
+  line_->end(FarewellCode::STOPPING, "the router is stopping");
   return loop_.addBranch();
 }
 
 // ---- the line
 
-// What goes wrong on the way there is a line's end, and it is tried again.
+// A failure to connect is handled as the end of a line: the router waits and tries again.
 kj::Promise<void> ClientRouter::connectLoop() {
   return kj::evalNow([this] { return runOnce(); })
       .then([this](const LineEnd& end) { onLineEnd(end.text); },
@@ -76,80 +76,22 @@ kj::Promise<void> ClientRouter::connectLoop() {
       });
 }
 
-// Between half of the time and all of it: routers that lost the same peer at once do not come back
-// at once.
+// Returns a random time between half of the delay and all of it, so that routers which lost the
+// same peer at the same moment do not reconnect at the same moment.
 kj::Duration ClientRouter::nextDelay() {
-  const auto now = retry_.count();
-  retry_ = std::min(2 * retry_, here_.config.limits.lastRetry);
-  return (now / 2 +
-          static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(now / 2 + 1))) *
+  const auto halfMs = retryDelay_.count() / 2;
+  retryDelay_ = std::min(2 * retryDelay_, here_.config.limits.lastRetry);
+  return (halfMs + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(halfMs + 1))) *
          kj::MILLISECONDS;
 }
 
 kj::Promise<LineEnd> ClientRouter::runOnce() {
   record_->setState(layout::RouterLineState::connecting);
-  return connect().then([this](kj::Own<kj::AsyncIoStream> stream) {
+  return connector_.connect().then([this](kj::Own<kj::AsyncIoStream> stream) {
     line_ =
         std::make_unique<Line>(kj::mv(stream), here_.timer, here_.config.limits, *record_, *this);
-    return line_->run([this](wire::Item::Builder item) { introduce(item.initGreeting(), here_); });
-  });
-}
-
-// A name may stand for several addresses, the first of which may answer nothing.
-kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connect() {
-  const auto& address = remote_.address;
-  auto lookUp =
-      kj::evalNow([&] { return here_.network.parseAddress(hostForKj(address), address.port); });
-  return within(fmt::format("the look-up of {}", address.host), kj::mv(lookUp))
-      .then([this](kj::Own<kj::NetworkAddress> parsed) {
-        if (remote_.security == Security::plain) checkPlain(*parsed, here_.config);
-        std::vector<std::string> addresses;
-        std::istringstream all(toStd(parsed->toString()));
-        for (std::string one; std::getline(all, one, ',');) addresses.push_back(one);
-        return connectToOne(std::move(addresses));
-      });
-}
-
-kj::Exception ClientRouter::failed(const std::string& step, const kj::Exception& error) const {
-  const auto deadTime = limitText(here_.config.limits, "dead-time");
-  const auto why = reasonOf(error);
-  const auto text = why == kTimeout
-                        ? fmt::format("{} took longer than {} (dead-time)", step, deadTime)
-                        : fmt::format("{} failed: {}", step, why);
-  return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
-}
-
-kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connectToOne(
-    std::vector<std::string> addresses) {
-  const auto next = addresses.front();
-  addresses.erase(addresses.begin());
-  return within(fmt::format("the connection to {}", next), connectTo(next))
-      .catch_([this, addresses = std::move(addresses)](
-                  kj::Exception&& error) mutable -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
-        if (addresses.empty()) return kj::mv(error);
-        return connectToOne(std::move(addresses));
-      });
-}
-
-kj::Promise<kj::Own<kj::AsyncIoStream>> ClientRouter::connectTo(const std::string& address) {
-  return here_.network.parseAddress(address).then([this](kj::Own<kj::NetworkAddress> parsed) {
-    auto connected = parsed->connectAuthenticated();
-    return connected.attach(kj::mv(parsed))
-        .then([this](kj::AuthenticatedStream caller) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
-          prepare(*caller.stream, here_.config.limits);
-          if (remote_.security == Security::plain) return kj::mv(caller.stream);
-          return here_.tls
-              ->connect(kj::mv(caller),
-                        remote_.tlsName.empty() ? remote_.address.host : remote_.tlsName)
-              .then(
-                  [](kj::AuthenticatedStream secured) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
-                    return kj::mv(secured.stream);
-                  },
-                  [](kj::Exception&& error) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
-                    return kj::Exception(kj::Exception::Type::FAILED, __FILE__, __LINE__,
-                                         kj::heapString(tlsTrouble(error)));
-                  });
-        });
+    return line_->run(
+        [this](wire::Item::Builder item) { fillGreeting(item.initGreeting(), here_); });
   });
 }
 
@@ -165,18 +107,19 @@ void ClientRouter::onGreeting(const PeerGreeting& greeting) {
   bindWanted();
 }
 
-// Requests that did not reach the line were not done, and that is said; of the others the local
-// clients know as much as we do.
+// Requests that were never written to the connection end as neverTaken. All others end at the local
+// clients when the proxies are destroyed, as with any server that exits.
 void ClientRouter::onLineEnd(const std::string& why) {
   if (!stopping_ && (connected_ || problem_ != why)) {
-    log_.warn("{} {}: {}", connected_ ? "lost" : "cannot reach", remote_.address.text(), why);
+    log_.warn("{} {}: {}", connected_ ? "lost the connection to" : "cannot reach",
+              remote_.address.text(), why);
   }
   problem_ = why;
-  // One that greets and goes is called less and less often, too.
+  // The delay grows also when a peer greets and closes the connection soon afterwards.
   const bool lasted =
       connected_ && Clock::nowNs() - connectedNs_ >=
                         std::chrono::nanoseconds(here_.config.limits.deadTime).count();
-  if (lasted) retry_ = here_.config.limits.firstRetry;
+  if (lasted) retryDelay_ = here_.config.limits.firstRetry;
   connected_ = false;
   record_->setState(layout::RouterLineState::waiting);
   record_->setProblem(why);
@@ -197,11 +140,11 @@ void ClientRouter::onLineEnd(const std::string& why) {
   bindings_.clear();
   clients_.clear();
   lastBinding_ = lastClient_ = 0;
-  saidFull_ = false;
+  maxClientsLogged_ = false;
   line_.reset();
 }
 
-// ---- servers that somebody wants
+// ---- servers that local clients use or wait for
 
 void ClientRouter::setPendingBinds(const std::set<ServerName>& pendingBinds) {
   for (auto& [name, wanted] : wanted_) {
@@ -237,25 +180,25 @@ void ClientRouter::bind(const ServerName& name, Wanted& wanted) {
 
 void ClientRouter::onServer(wire::Server::Reader server) {
   const auto binding = bindings_.find(server.getBinding());
-  if (binding == bindings_.end()) return;  // unbound meanwhile
+  if (binding == bindings_.end()) return;  // it was unbound while this item was on its way
   auto& wanted = wanted_.at(binding->second);
   switch (server.getState()) {
     case wire::Server::State::THERE:
       wanted.offer = Proxy::Offer{server.getBinding(), server.getIncarnation(), queueSizeOf(server),
                                   server.getMaxMessageBytes()};
-      if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);  // of an earlier life
+      if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);  // it was for an earlier incarnation
       break;
     case wire::Server::State::REFUSED:
-      onRefusal(binding->second, wanted, forPeople(server.getReason()));
+      onRefusal(binding->second, wanted, displayText(server.getReason()));
       bindings_.erase(binding);
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
       break;
-    case wire::Server::State::ABSENT:  // what has no end by now was on its way
+    case wire::Server::State::ABSENT:  // requests that are still open had not arrived there
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);
       break;
-    default:  // what a newer peer may say promises nothing
+    default:  // a state that only a newer peer defines
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
       break;
@@ -263,10 +206,10 @@ void ClientRouter::onServer(wire::Server::Reader server) {
   sweep();
 }
 
-// Its configuration may change.
+// Binds again after a while, since the configuration of the peer may change.
 void ClientRouter::onRefusal(const ServerName& name, Wanted& wanted, const std::string& why) {
   if (wanted.problem != why)
-    log_.warn("{} at location {}: {} refuses: {}", name.server, name.location,
+    log_.warn("{} at location {}: {} refused the bind: {}", name.server, name.location,
               remote_.address.text(), why);
   wanted.problem = why;
   wanted.binding = 0;
@@ -278,7 +221,7 @@ void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
   wanted.proxy = std::make_unique<Proxy>(here_, *this, name, *wanted.offer);
   wanted.offer.reset();
   wanted.problem.clear();
-  log_.info("{} at location {} is there", name.server, name.location);
+  log_.info("{} at location {} is available", name.server, name.location);
 } catch (const std::exception& error) {
   if (wanted.problem != error.what())
     log_.warn("{} at location {} cannot be offered here: {}", name.server, name.location,
@@ -286,20 +229,20 @@ void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
   wanted.problem = error.what();
 }
 
-// Proxies whose requests have all had their end go, new ones come, and what nobody has wanted for
-// long is forgotten.
+// Destroys proxies that are done, makes proxies for new offers, and unbinds servers that no client
+// has used or waited for during kIdleProxyNs.
 void ClientRouter::sweep() {
   const auto nowNs = Clock::nowNs();
   for (auto each = wanted_.begin(); each != wanted_.end();) {
     auto& [name, wanted] = *each;
     if (wanted.proxy && wanted.proxy->isDone()) {
-      log_.info("{} at location {} is gone", name.server, name.location);
+      log_.info("{} at location {} is no longer available", name.server, name.location);
       wanted.proxy.reset();
     }
     if (!wanted.proxy && wanted.offer && connected_) makeProxy(name, wanted);
     if (wanted.proxy && wanted.proxy->hasClients()) wanted.idleSinceNs = 0;
     else if (wanted.proxy && wanted.idleSinceNs == 0) wanted.idleSinceNs = nowNs;
-    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kLingerNs) {
+    if (wanted.idleSinceNs == 0 || nowNs - wanted.idleSinceNs < kIdleProxyNs) {
       ++each;
       continue;
     }
@@ -314,7 +257,7 @@ void ClientRouter::sweep() {
     sweepSoon();
 }
 
-// Whether time alone will change something.
+// Whether a later sweep may change something although nothing else happens.
 bool ClientRouter::isPending(const Wanted& wanted) const {
   return wanted.idleSinceNs != 0 || (wanted.binding == 0 && connected_) ||
          (wanted.offer && !wanted.proxy) || (wanted.proxy && wanted.proxy->isDraining());
@@ -339,14 +282,15 @@ Proxy* ClientRouter::openedProxyOf(std::uint32_t client) {
 std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
   const auto most = line_->peer().maxClients;
   if (most != 0 && clients_.size() >= most) {
-    if (!std::exchange(saidFull_, true))
+    if (!std::exchange(maxClientsLogged_, true))
       log_.warn(
-          "{} accepts at most {} clients of this connection (its max-clients): others are refused",
+          "{} accepts at most {} clients per connection (its max-clients): further clients are "
+          "refused",
           remote_.address.text(), most);
     return std::nullopt;
   }
   if (lastClient_ == UINT32_MAX) {
-    line_->end(FarewellCode::STOPPING, "out of numbers for clients");
+    line_->end(FarewellCode::STOPPING, "all client numbers have been used");
     return std::nullopt;
   }
   clients_[++lastClient_] = &proxy;
@@ -360,7 +304,7 @@ void ClientRouter::dropClient(std::uint32_t number) {
   (*record_)->clients.store(clients_.size(), std::memory_order_relaxed);
 }
 
-// What is said of a client that has gone meanwhile is of no interest any more.
+// Items for a client that has disconnected in the meantime are ignored.
 void ClientRouter::onItem(wire::Item::Reader item) {
   switch (item.which()) {
     case wire::Item::SERVER:
@@ -376,7 +320,7 @@ void ClientRouter::onItem(wire::Item::Reader item) {
       auto* proxy = openedProxyOf(end.getClient());
       if (proxy == nullptr) return;
       proxy->endRequest(end.getClient(), end.getRequestId(), fateOf(end.getFate()),
-                        forPeople(end.getReason()));
+                        displayText(end.getReason()));
       if (proxy->isDone()) sweep();
       return;
     }
@@ -385,7 +329,7 @@ void ClientRouter::onItem(wire::Item::Reader item) {
       return;
     case wire::Item::REFUSE:
       if (auto* proxy = openedProxyOf(item.getRefuse().getClient()))
-        proxy->refuse(item.getRefuse().getClient(), forPeople(item.getRefuse().getReason()));
+        proxy->refuse(item.getRefuse().getClient(), displayText(item.getRefuse().getReason()));
       return;
     case wire::Item::BIND:
     case wire::Item::UNBIND:
@@ -394,12 +338,13 @@ void ClientRouter::onItem(wire::Item::Reader item) {
     case wire::Item::REQUEST:
     case wire::Item::CREDIT:
       throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a client router sends");
-    default:  // of a newer peer
+    default:  // an item that only a newer peer defines
       return;
   }
 }
 
-// In turn, some of each, from behind the last one on: nobody waits for a flood to end.
+// Takes up to kTurn requests of each server in turn, beginning after the server that was last: a
+// flood of requests to one server does not delay requests to the others.
 void ClientRouter::onRoom() {
   auto next = wanted_.upper_bound(pumped_);
   const ServerName* pumped = nullptr;
@@ -419,7 +364,7 @@ void ClientRouter::onRoom() {
 
 void ClientRouter::onUnsendable(const Carried& carried, const std::string& why,
                                 wire::Item::Builder /*instead*/) {
-  log_.warn("a request is refused: {}", why);
+  log_.warn("a request cannot be sent to {} and is refused: {}", remote_.address.text(), why);
   if (auto* proxy = proxyOf(carried.client))
     proxy->endRequest(carried.client, carried.requestId, Fate::refused, why);
 }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// ClientRouter: the clients of this host, at one remote router ("RMRClient" in the manual's
-// report).
+// ClientRouter: the connection to one remote router, for the clients of this host ("RMRClient" in
+// the manual's report).
 //
-//   waiting ─time─► connecting ─greeted─► connected ─line ends─► waiting (longer each time, jittered)
+//   waiting ─time─► connecting ─greeted─► connected ─line ends─► waiting (longer each time)
 //
-//   pending binds ─► bind ─► the far side says "there" ─► Proxy ... "absent" ─► drained, gone
+//   pending binds ─► bind ─► the peer reports "there" ─► Proxy ... "absent" ─► drained, destroyed
 //
 // Threads  that of the event loop.
-// Crash    whatever ends the line ends the proxies: their clients are disconnected, pending bind
-//          again, and are bound again when it is back.
+// Crash    when the line ends, for any reason, the proxies are destroyed. Their clients are
+//          disconnected, publish pending binds, and are bound again after a reconnect.
 #pragma once
 
 #include <map>
@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "router/fatal_tasks.h"
+#include "router/outgoing/connector.h"
 #include "router/outgoing/proxy.h"
 
 namespace mpf::router {
@@ -30,33 +31,23 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   ~ClientRouter();
 
   [[nodiscard]] const Remote& remote() const noexcept { return remote_; }
-  // What the clients of this host wait for now, at any location.
+  // Sets which servers the clients of this host wait for now, at any location.
   void setPendingBinds(const std::set<ServerName>& pendingBinds);
-  // Says farewell; afterwards the promise is done.
+  // Ends the connection with a farewell. The promise resolves when it is closed.
   [[nodiscard]] kj::Promise<void> stop();
 
  private:
   struct Wanted {
-    std::uint32_t binding = 0;  // 0: the far side was not told yet
+    std::uint32_t binding = 0;  // 0: no bind has been sent
     std::unique_ptr<Proxy> proxy;
-    std::optional<Proxy::Offer> offer;  // that has no proxy yet: somebody else has its name here
-    std::string problem;  // of making it, that was logged last
-    std::int64_t bindAgainNs = 0;  // after the far side refused it
-    std::int64_t idleSinceNs = 0;  // 0: it is wished for or used
+    // An offer for which there is no proxy yet, for example because its name is in use here.
+    std::optional<Proxy::Offer> offer;
+    std::string problem;  // last logged reason why there is no proxy
+    std::int64_t bindAgainNs = 0;  // earliest time of the next bind, after a refusal
+    std::int64_t idleSinceNs = 0;  // 0: clients use it or wait for it
   };
   kj::Promise<void> connectLoop();
   kj::Promise<LineEnd> runOnce();
-  kj::Promise<kj::Own<kj::AsyncIoStream>> connect();
-  kj::Promise<kj::Own<kj::AsyncIoStream>> connectToOne(std::vector<std::string> addresses);
-  kj::Promise<kj::Own<kj::AsyncIoStream>> connectTo(const std::string& address);
-  // Each step of connecting may take the dead time. An error names the step.
-  template <class T>
-  kj::Promise<T> within(const std::string& step, kj::Promise<T> promise) {
-    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise))
-        .catch_(
-            [this, step](kj::Exception&& error) -> kj::Promise<T> { return failed(step, error); });
-  }
-  [[nodiscard]] kj::Exception failed(const std::string& step, const kj::Exception& error) const;
   [[nodiscard]] kj::Duration nextDelay();
   void onLineEnd(const std::string& why);
   void bindWanted();
@@ -89,17 +80,18 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   std::unique_ptr<Line> line_;
   bool connected_ = false;
   bool stopping_ = false;
-  std::string problem_;  // that was logged last
+  std::string problem_;  // last logged reason why there is no connection
   std::map<ServerName, Wanted> wanted_;
   std::unordered_map<std::uint32_t, ServerName> bindings_;
   std::unordered_map<std::uint32_t, Proxy*> clients_;
   std::uint32_t lastBinding_ = 0;
   std::uint32_t lastClient_ = 0;
-  bool saidFull_ = false;
+  bool maxClientsLogged_ = false;  // during this connection
   Log log_;
-  std::chrono::milliseconds retry_{};
+  Connector connector_;
+  std::chrono::milliseconds retryDelay_{};
   std::int64_t connectedNs_ = 0;
-  ServerName pumped_;  // the last one whose requests had their turn
+  ServerName pumped_;  // the server whose requests were taken last
   Alarm pumpAgain_;
   std::minstd_rand random_{std::random_device{}()};
   Alarm sweeps_;

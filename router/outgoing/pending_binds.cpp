@@ -11,8 +11,8 @@
 namespace mpf::router {
 namespace {
 
-// Of something of which there may be more in a while.
-bool isShortage(const std::exception& error) noexcept {
+// Whether a resource is exhausted that may be available again in a while.
+bool isResourceExhaustion(const std::exception& error) noexcept {
   const auto* const failure = dynamic_cast<const std::system_error*>(&error);
   const auto code = failure != nullptr ? failure->code().value() : 0;
   return code == EMFILE || code == ENFILE || code == ENOMEM;
@@ -35,15 +35,16 @@ std::set<ServerName> PendingBinds::look() {
         known[name] = {{header->location, segments::rawText(header->name)}, header->ownerWindow};
       }
     } catch (const std::exception& error) {
-      if (isShortage(error)) problem_ = error.what();
-      else known[name] = {};  // nobody's, or not for us to read: it has no name that anybody serves
+      // A segment that is invalid or that we may not read names no server.
+      if (isResourceExhaustion(error)) problem_ = error.what();
+      else known[name] = {};
     }
   }
   known_ = std::move(known);
   std::set<ServerName> names;
-  std::map<std::uint64_t, bool> lives;
+  std::map<std::uint64_t, bool> alive;  // by incarnation of the client's window
   for (const auto& [segment, pendingBind] : known_) {
-    const auto [found, isNew] = lives.try_emplace(pendingBind.client, false);
+    const auto [found, isNew] = alive.try_emplace(pendingBind.client, false);
     if (isNew) {
       const auto window = SegmentName::keyed(backplane, NameKind::clientWindow, pendingBind.client);
       found->second =

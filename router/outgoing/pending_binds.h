@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-// PendingBinds: which servers the clients of this host wait for, at the locations that a router
-// reaches.
+// PendingBinds: the servers that clients of this host wait for.
 //
-//   a client binds to a server that is not there ─► its pending bind segment ─► look()
+//   a client binds to an absent server ─► it publishes a pending bind segment ─► look()
 //
 // Threads  that of the event loop.
-// Trust    a pending bind counts while its client's window has an owner.
+// Trust    a pending bind is ignored unless the process that owns its client's window is alive.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +27,12 @@ class PendingBinds {
  public:
   explicit PendingBinds(Backplane backplane) : backplane_(std::move(backplane)) {}
 
-  // What is wished for now, at any location. A pending bind that was seen before is not read again.
-  //   throws  std::system_error: no descriptor was left, say
+  // Returns the servers that are waited for now, at any location. A pending bind that an earlier
+  // call has read is not read again.
+  //   throws  std::system_error, for example when no file descriptor is left
   [[nodiscard]] std::set<ServerName> look();
-  // Why the last look() has not seen all: there was too little of something, and the next one may
-  // see more. Empty: it has.
+  // The resource that the last look() lacked, so that its result is incomplete; a later call may
+  // succeed. Empty: the result was complete.
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 
  private:
@@ -41,7 +41,7 @@ class PendingBinds {
     std::uint64_t client = 0;  // incarnation of its window
   };
   Backplane backplane_;
-  std::map<std::string, Known> known_;  // by segment
+  std::map<std::string, Known> known_;  // by the name of the segment
   std::string problem_;
 };
 

@@ -9,11 +9,12 @@
 namespace mpf::router {
 namespace {
 
-constexpr std::chrono::milliseconds kFirstRetry{1};  // of a reply that a client had no room for
+// Pauses before a held reply is sent to its client again.
+constexpr std::chrono::milliseconds kFirstRetry{1};
 constexpr std::chrono::milliseconds kLastRetry{50};
-constexpr int kAtOnce = 1024;  // requests, before everything else that the loop has to do
-constexpr std::chrono::seconds kOpenAgain{1};  // after a refusal
-constexpr std::uint32_t kCreditShare = 4;  // of the window: given back in such portions
+constexpr int kAtOnce = 1024;  // requests before the event loop runs its other tasks
+constexpr std::chrono::seconds kOpenAgain{1};  // pause after a refusal
+constexpr std::uint32_t kCreditShare = 4;      // credit is sent for a quarter of the window
 
 ServerOptions optionsFor(const Surroundings& here, const ServerName& name,
                          const Proxy::Offer& offer, std::uint64_t maxMessageBytes) {
@@ -50,12 +51,13 @@ Proxy::~Proxy() {
 
 // ---- to the far server
 
-// Those that are refused at once take no room of the line: there may be any number of them.
+// Requests that are refused at once take no room in the line. Their number is not bounded, so the
+// rest waits for the next turn of the event loop.
 void Proxy::onReadable() {
   if (pump(kAtOnce) && owner_.line().hasRoom()) again_.setAt(Deadline::after(Nanoseconds(0)));
 }
 
-// False: the far side has no place for it now.
+// Returns false when the peer accepts no more clients now.
 bool Proxy::tryOpen(std::uint64_t local) {
   const auto number = owner_.tryNewClient(*this);
   numbers_[local] = number.value_or(0);
@@ -102,14 +104,15 @@ bool Proxy::pump(int most) {
 
 void Proxy::forward(Message request) {
   const auto found = numbers_.find(server_.clientOf(request));
-  if (found == numbers_.end()) return;  // it has gone meanwhile
+  if (found == numbers_.end()) return;  // its client has disconnected
   if (const auto known = clients_.find(found->second);
       known != clients_.end() && known->second.owed == 0 && known->second.openAgain.hasPassed()) {
     close(found->second);
     found->second = 0;
   }
-  if (found->second == 0 && !tryOpen(found->first)) return;  // its handle's death refuses it
-  // From here on its end is ours to tell: the handle's death must not.
+  // Destroying the handle refuses the request.
+  if (found->second == 0 && !tryOpen(found->first)) return;
+  // From here on, the far server or this class ends the request, not the destructor of its handle.
   auto route = request.route();
   route.keeper = nullptr;
   request.setRoute(route);
@@ -141,9 +144,9 @@ bool Proxy::isDone() const noexcept {
   return isEmpty || drainUntil_.hasPassed();
 }
 
-// ---- from it
+// ---- from the far server
 
-// Whether a request has had no end, be it one that is held.
+// Whether a request is pending: no reply or fate has been delivered, and none is held for it.
 bool Proxy::awaits(const Client& client, std::uint32_t requestId) const noexcept {
   return server_.owes(client.local, requestId) &&
          std::ranges::none_of(client.held,
@@ -157,14 +160,14 @@ void Proxy::ended(Client& client) noexcept {
 
 void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
   const auto found = clients_.find(number);
-  if (found == clients_.end() || isDraining()) return;  // it has gone
+  if (found == clients_.end() || isDraining()) return;  // the client has disconnected
   auto& client = found->second;
   const bool isOwed = awaits(client, reply.getRequestId());
   if (reply.getIsFirst() != isOwed) {
-    throw ProtocolError(
-        FarewellCode::PROTOCOL,
-        fmt::format("a reply to request {} of client {}, which {}", reply.getRequestId(), number,
-                    isOwed ? "is to get its first one" : "has had its end"));
+    throw ProtocolError(FarewellCode::PROTOCOL,
+                        fmt::format("a {} reply to request {} of client {}, which {}",
+                                    reply.getIsFirst() ? "first" : "later", reply.getRequestId(),
+                                    number, isOwed ? "has had no first reply" : "is not pending"));
   }
   if (client.unpaid >= client.window)
     throw ProtocolError(
@@ -186,11 +189,11 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
   deliver(number, client, reply.getRequestId(), std::move(*message));
 }
 
-// It was done, and what came of it cannot be said.
+// The server has handled the request, but its reply cannot be delivered.
 void Proxy::loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why) {
   log_.warn("{} at location {}: a reply is lost: {}", name_.server, name_.location, why);
   if (reply.getIsFirst()) endRequest(number, reply.getRequestId(), Fate::outcomeUnknown, why);
-  // At least what it took.
+  // At least as many bytes as the reply took from the window.
   giveCredit(number, clients_.at(number),
              kWindowBytesBeside + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
 }
@@ -226,7 +229,7 @@ void Proxy::refuse(std::uint32_t number, const std::string& why) {
   found->second.openAgain = Deadline::after(kOpenAgain);
 }
 
-// In order: behind what is held.
+// Keeps the order: a message is queued behind those that are held.
 void Proxy::deliver(std::uint32_t number, Client& client, std::uint32_t requestId,
                     Message&& message) {
   if (client.held.empty() && tryDeliver(number, client, requestId, message)) return;
@@ -235,19 +238,19 @@ void Proxy::deliver(std::uint32_t number, Client& client, std::uint32_t requestI
   retry_.setAt(Deadline::after(retryAfter_));
 }
 
-// False: the client has no room for it now.
+// Returns false when the client has no room for the message now.
 bool Proxy::tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId,
                        Message& message) {
   const bool isOwed = server_.owes(client.local, requestId);
-  const bool isNews = message.getType() == MessageType::connect;
-  const bool isOurs = isNews || message.getType() == MessageType::requestFate;
+  const bool isConnectMessage = message.getType() == MessageType::connect;
+  const bool isOurs = isConnectMessage || message.getType() == MessageType::requestFate;
   const auto bytes = windowBytesOf(message);
   switch (server_.replyTo(client.local, requestId, std::move(message))) {
     case ReplyResult::queueFull:
     case ReplyResult::noMemory:
       return false;
     case ReplyResult::tooLarge:
-      log_.warn("{} at location {}: a reply is larger than its client can get", name_.server,
+      log_.warn("{} at location {}: a reply is larger than its client can receive", name_.server,
                 name_.location);
       if (isOwed)
         static_cast<void>(server_.replyTo(
@@ -259,7 +262,7 @@ bool Proxy::tryDeliver(std::uint32_t number, Client& client, std::uint32_t reque
       break;
   }
   if (isOwed) ended(client);
-  if (isNews) client.heldQueueFull = false;
+  if (isConnectMessage) client.heldQueueFull = false;
   if (!isOurs) giveCredit(number, client, bytes);
   return true;
 }
@@ -283,9 +286,9 @@ void Proxy::retryHeld() {
       client.held.pop_front();
     }
   }
-  const bool some =
+  const bool someAreHeld =
       std::ranges::any_of(clients_, [](const auto& each) { return !each.second.held.empty(); });
-  if (!some) return;
+  if (!someAreHeld) return;
   retryAfter_ = std::min(2 * retryAfter_, kLastRetry);
   retry_.setAt(Deadline::after(retryAfter_));
 }

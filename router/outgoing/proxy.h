@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Proxy: a server elsewhere, as a server of this backplane.
+// Proxy: represents a server of another host as a server on this backplane.
 //
-//   local client ─► MessageServer(name, location) ─► Line      one client of the far server for each one here
-//   local client ◄── held while it does not take ◄── Line
+//   local client ─► MessageServer(name, location) ─► Line     one far client for each local client
+//   local client ◄── held while the client's queue is full ◄── Line
 //
 // Threads  that of the event loop.
-// Crash    when the far server is gone, each request gets its end from there, or was never taken;
-//          when the line is gone, requests that never reached it end as neverTaken, and the local
-//          clients find the others' ends as they do with any server that ended: outcomeUnknown.
-// Trust    a reply to what was not asked, or beyond the window, is the peer's mistake:
-//          ProtocolError. So what is held for a client that does not take is bounded.
+// Crash    when the far server exits, the peer sends the fate of each request that it received; the
+//          others end as neverTaken. When the line ends, requests that were never written to it end
+//          as neverTaken; the others end at the local clients as outcomeUnknown, as with any server
+//          that exits.
+// Trust    a reply that answers no pending request, or that exceeds the window, is a ProtocolError.
+//          This bounds the replies that are held for a client that does not receive them.
 #pragma once
 
 #include <deque>
@@ -30,21 +31,21 @@ namespace mpf::router {
 
 class Proxy {
  public:
-  // What a proxy wants of the connection that it belongs to.
+  // The connection that a proxy belongs to.
   class Owner {
    public:
     virtual Line& line() = 0;
-    // A number for a client of the far server; nullopt: it has as many clients as it takes.
+    // Returns the number of a new client; nullopt: the peer accepts no more clients.
     virtual std::optional<std::uint32_t> tryNewClient(Proxy& proxy) = 0;
     virtual void dropClient(std::uint32_t number) = 0;
     virtual PeerRecord& record() = 0;
-    virtual const Log& log() = 0;  // of the connection
+    virtual const Log& log() = 0;
 
    protected:
     ~Owner() = default;
   };
 
-  // What the far side said of the server.
+  // The far server, as the peer describes it.
   struct Offer {
     std::uint32_t binding = 0;
     std::uint64_t incarnation = 0;
@@ -52,22 +53,21 @@ class Proxy {
     std::uint64_t maxMessageBytes = 0;
   };
 
-  //   throws  NameInUse and whatever else a MessageServer's constructor throws
+  //   throws  as the constructor of MessageServer, for example NameInUse
   Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Offer& offer);
   ~Proxy();
 
-  // Takes requests for as long as the line has room, at most `most`. False: there is none left to
-  // take.
+  // Takes requests while the line has room, at most `most`. Returns false when no request is left.
   bool pump(int most);
   [[nodiscard]] bool hasMore() const noexcept { return hasMore_; }
-  // From the far server, to client `number`.
+  // Hand an item of the far server to client `number`.
   void reply(std::uint32_t number, wire::Reply::Reader reply);
   void endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why);
   void queueFull(std::uint32_t number);
   void refuse(std::uint32_t number, const std::string& why);
 
-  // The far server is gone: no more requests are taken, and those without an end have this one.
-  // Afterwards, once every reply and fate has been delivered or that took too long, isDone().
+  // The far server is gone: takes no more requests and ends all pending ones with `fate`. isDone()
+  // becomes true when all replies and fates are delivered, at the latest after Limits::deadTime.
   void drain(Fate fate);
   [[nodiscard]] bool isDraining() const noexcept { return !drainUntil_.isNever(); }
   [[nodiscard]] bool isDone() const noexcept;
@@ -79,15 +79,15 @@ class Proxy {
     Message message;
   };
   struct Client {
-    std::uint64_t local = 0;  // as MessageServer calls it
-    std::uint32_t owed = 0;  // requests without an end
-    std::uint32_t window = 0;  // as it was opened
-    std::uint64_t unpaid = 0;  // bytes of replies that the far side was given no credit for
-    std::uint32_t taken = 0;  // those of them that it took
-    bool heldQueueFull = false;  // such news is among what is held
-    std::deque<Held> held;  // replies that it has no room for
-    std::optional<std::string> refusal;  // why the far server does not have it
-    Deadline openAgain = Deadline::never();  // when it may be opened anew, after a refusal
+    std::uint64_t local = 0;  // its number in MessageServer
+    std::uint32_t owed = 0;  // requests that have not ended
+    std::uint32_t window = 0;  // as sent in `open`
+    std::uint64_t unpaid = 0;  // bytes of replies for which no credit has been sent
+    std::uint32_t taken = 0;  // of these, bytes that the client has received
+    bool heldQueueFull = false;  // `held` contains a connectQueueFull
+    std::deque<Held> held;  // replies for which the client has no room
+    std::optional<std::string> refusal;  // why the far server does not accept it
+    Deadline openAgain = Deadline::never();  // after a refusal: when it may be opened again
   };
   void onReadable();
   void onClient(std::uint64_t local, bool isThere);
@@ -108,12 +108,13 @@ class Proxy {
   ServerName name_;
   Offer offer_;
   std::unordered_map<std::uint32_t, Client> clients_;  // by number
-  // of local clients; 0: the far side has no place for it
+  // Numbers of the local clients; 0: the peer has accepted no more clients.
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
   Log log_;
   std::uint64_t owed_ = 0;
-  bool hasMore_ = true;  // requests may wait that were not taken: else we are told of the next
-  Deadline drainUntil_ = Deadline::never();  // not never: it is draining
+  // False: no request waits, and readable_ calls back when the next one arrives.
+  bool hasMore_ = true;
+  Deadline drainUntil_ = Deadline::never();  // set by drain()
   std::chrono::milliseconds retryAfter_{};
   Alarm retry_;
   MessageServer server_;

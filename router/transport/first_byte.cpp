@@ -7,8 +7,8 @@ namespace mpf::router {
 namespace {
 
 #pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // of kj; a kj::Own knows what it owns
-// A stream whose first byte has been read, and is read again.
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // kj::Own destroys the dynamic type
+// A stream of which the first byte has been read already; it is read once more.
 class WithFirstByte final : public kj::AsyncIoStream {
  public:
   WithFirstByte(kj::byte first, kj::Own<kj::AsyncIoStream> stream)

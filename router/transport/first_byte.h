@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// FirstByte: looks at the first byte of a connection, so that a caller with the wrong security can
-// be told.
+// FirstByte: examines the first byte of a connection, so that a peer with the wrong security gets
+// an error message.
 //
-//   stream ─► readFirstByte() ─► first byte, and the stream with all its bytes
+//   stream ─► readFirstByte() ─► the first byte, and the stream with all of its bytes
 //
 // Threads  that of the event loop.
 #pragma once
@@ -11,11 +11,12 @@
 
 namespace mpf::router {
 
-inline constexpr kj::byte kTlsHandshakeByte = 0x16;  // of a record of TLS
-inline constexpr kj::byte kFrameByte = 0;  // of the greeting of a router: a frame of one segment
+inline constexpr kj::byte kTlsHandshakeByte = 0x16;  // the first byte of a TLS handshake record
+// The first byte of a router's greeting, which is a frame of one segment.
+inline constexpr kj::byte kFrameByte = 0;
 
 struct FirstByte {
-  kj::Maybe<kj::byte> value;  // nullptr: the caller closed the connection
+  kj::Maybe<kj::byte> value;  // nullptr: the peer closed the connection
   kj::Own<kj::AsyncIoStream> stream;
 };
 

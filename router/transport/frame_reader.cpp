@@ -11,8 +11,9 @@ namespace {
 constexpr std::size_t kWord = sizeof(capnp::word);
 constexpr std::size_t kFirstRoom = std::size_t{64} << 10;
 constexpr std::size_t kLeastRoom = std::size_t{4} << 10;
-constexpr std::size_t kGoodRoom = std::size_t{16} << 10;  // for the next part of a long frame
-// what a long frame needed beyond is given back
+// Room for the next part of a long frame.
+constexpr std::size_t kGoodRoom = std::size_t{16} << 10;
+// A buffer that a long frame has made larger than this is freed afterwards.
 constexpr std::size_t kKeptRoom = std::size_t{4} << 20;
 
 std::uint32_t littleEndian32(const kj::byte* bytes) noexcept {
@@ -20,8 +21,8 @@ std::uint32_t littleEndian32(const kj::byte* bytes) noexcept {
          std::uint32_t{bytes[3]} << 24;
 }
 
-// Pointers may lead to the same words again, which a reader must not follow for ever: four times
-// through is plenty for honest frames.
+// Several pointers may lead to the same words, so a small frame could take very long to read. Valid
+// frames are read fewer than four times.
 capnp::ReaderOptions readerOptions(std::size_t bytes) {
   return {.traversalLimitInWords = 4 * (bytes / kWord) + 1024, .nestingLimit = 16};
 }
@@ -47,8 +48,8 @@ kj::ArrayPtr<kj::byte> FrameReader::room() {
   return buffer_.asBytes().slice(end_, buffer_.size() * kWord);
 }
 
-// Moves what is pending to the beginning of a buffer that holds at least `bytes`, and some more
-// than what is pending.
+// Moves the pending bytes to the beginning of a buffer that has at least `bytes` bytes and room for
+// more than the pending ones.
 void FrameReader::makeRoom(std::size_t bytes) {
   const auto words = (std::max(bytes, pending() + kLeastRoom) + kWord - 1) / kWord;
   const auto used = pending();
@@ -63,7 +64,7 @@ void FrameReader::makeRoom(std::size_t bytes) {
   end_ = used;
 }
 
-// Length of the frame that begins at begin_; nullopt while its segment table has not come.
+// Length of the frame that begins at begin_; nullopt until its segment table has arrived.
 std::optional<std::uint64_t> FrameReader::frameBytes() const {
   if (pending() < sizeof(std::uint32_t)) return std::nullopt;
   const std::uint64_t segments = std::uint64_t{littleEndian32(at(begin_))} + 1;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// FrameReader: bytes in as they come, whole frames out.
+// FrameReader: assembles frames from the bytes of a connection.
 //
-//   room() ◄── read() ── line        | segment table | segments |  | segment table | seg...
+//   room() ◄── read() ── stream      | segment table | segments |  | segment table | seg...
 //   filled(n) ─► tryNext() ─► Frame
 //
-// Memory grows with what has arrived, never with what a peer says will come.
+// Memory grows with the bytes that have arrived, never with a length that a peer announces.
 //
 // Threads  one.
-// Trust    the bytes may be anything: what cannot be is a ProtocolError, and a Frame's pointers are
-//          checked where they are followed.
+// Trust    the bytes may have any value. An invalid segment table is a ProtocolError; the pointers
+//          of a frame are checked when they are followed.
 #pragma once
 
 #include <capnp/serialize.h>
@@ -23,26 +23,26 @@ namespace mpf::router {
 class FrameReader {
  public:
   explicit FrameReader(std::uint64_t maxFrameBytes);
-  // From the next frame on.
+  // Applies from the next frame on.
   void setMaxFrameBytes(std::uint64_t bytes) noexcept { maxFrameBytes_ = bytes; }
 
-  // Where the next bytes go; never empty. Valid until the next call.
+  // The memory for the next bytes; never empty. Valid until the next call of a function.
   [[nodiscard]] kj::ArrayPtr<kj::byte> room();
   void filled(std::size_t bytes) noexcept { end_ += bytes; }
 
-  // The next frame that is complete, readable until the next call of room() or tryNext(); nullptr
-  // when there is none.
-  //   throws  ProtocolError: too long, too many segments
+  // Returns the next complete frame, valid until the next call of room() or tryNext(); nullptr when
+  // no frame is complete.
+  //   throws  ProtocolError: the frame is too long or has too many segments
   [[nodiscard]] capnp::MessageReader* tryNext();
 
-  // Whether what has come is a record of TLS (handshake, alert), which is never the beginning of a
-  // frame.
+  // Whether the pending bytes begin a TLS record (handshake, alert), which is never the beginning
+  // of a frame.
   [[nodiscard]] bool beginsAsTls() const noexcept;
 
-  // Bytes of the frame that has begun to come.
+  // The number of bytes that have arrived and have not been handed out as a frame.
   [[nodiscard]] std::size_t pending() const noexcept { return end_ - begin_; }
 
-  static constexpr std::uint32_t kMaxSegments = 512;  // as Cap'n Proto's own readers have it
+  static constexpr std::uint32_t kMaxSegments = 512;  // the limit of Cap'n Proto's own readers
 
  private:
   [[nodiscard]] std::optional<std::uint64_t> frameBytes() const;
@@ -53,7 +53,7 @@ class FrameReader {
 
   std::uint64_t maxFrameBytes_;
   kj::Array<capnp::word> buffer_;
-  std::size_t begin_ = 0;  // of what has not been handed out; a multiple of a word
+  std::size_t begin_ = 0;  // of the pending bytes; a multiple of the word size
   std::size_t end_ = 0;
   std::optional<capnp::FlatArrayMessageReader> frame_;
 };

@@ -10,17 +10,20 @@ constexpr std::size_t kMaxText = 200;  // bytes
 
 // Cuts a text to kMaxText, between two characters of UTF-8.
 std::string shortened(std::string text) {
-  const auto isWithin = [](char c) { return (static_cast<unsigned char>(c) & 0xC0u) == 0x80; };
+  const auto isContinuation = [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0u) == 0x80;
+  };
   auto size = kMaxText;
-  while (size < text.size() && size != 0 && isWithin(text[size])) --size;
+  while (size < text.size() && size != 0 && isContinuation(text[size])) --size;
   if (size < text.size()) text.resize(size);
   return text;
 }
 
 }  // namespace
 
-// A peer may send megabytes: the text is cut first, and again when its escapes made it longer.
-std::string forPeople(const std::string& text) { return shortened(printable(shortened(text))); }
+// A peer may send megabytes: the text is cut before it is converted, and once more because escape
+// sequences make it longer.
+std::string displayText(const std::string& text) { return shortened(printable(shortened(text))); }
 
 std::string reasonOf(const kj::Exception& error) {
   const auto said = toStd(error.getDescription());

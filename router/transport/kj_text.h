@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Texts and times between kj and the standard library.
+// Converts texts and times between kj and the standard library.
 #pragma once
 
 #include <chrono>
@@ -12,12 +12,14 @@
 namespace mpf::router {
 
 [[nodiscard]] inline std::string toStd(kj::StringPtr text) { return {text.begin(), text.size()}; }
-// What a peer said, printable() and at most 200 bytes.
-[[nodiscard]] std::string forPeople(const std::string& text);
-[[nodiscard]] inline std::string forPeople(kj::StringPtr text) { return forPeople(toStd(text)); }
+// The text of a peer, made printable() and cut to at most 200 bytes.
+[[nodiscard]] std::string displayText(const std::string& text);
+[[nodiscard]] inline std::string displayText(kj::StringPtr text) {
+  return displayText(toStd(text));
+}
 
-// Why something failed, without the names of kj's variables: "Connection refused" of "connect():
-// Connection refused"; kTimeout when a timer ended it.
+// The reason of an error without kj's context: "Connection refused" from "connect(): Connection
+// refused"; kTimeout after a timeout.
 inline constexpr std::string_view kTimeout = "timeout";
 [[nodiscard]] std::string reasonOf(const kj::Exception& error);
 

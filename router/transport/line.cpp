@@ -10,12 +10,13 @@
 namespace mpf::router {
 namespace {
 
-// so much of a long frame is a sign of life
+// This many bytes of a frame that is still arriving are a sign of life.
 constexpr std::size_t kProgressBytes = std::size_t{64} << 10;
-// the round trip, where the peer's pings make ours needless
+// Interval of pings that measure the round trip, when the peer's pings make other pings
+// unnecessary.
 constexpr std::int64_t kMeasureEveryNs = 10'000'000'000;
-constexpr std::int64_t kTurnNs = 2'000'000;  // with one peer's items, while others wait
-// what each side must read, and the longest greeting
+constexpr std::int64_t kTurnNs = 2'000'000;  // longest turn with the items of one peer
+// The frame size that each side must accept, and the largest size of a greeting.
 constexpr std::uint64_t kLeastFrame = std::uint64_t{64} << 10;
 
 constexpr const char* kTlsOnPlain =
@@ -23,7 +24,7 @@ constexpr const char* kTlsOnPlain =
     "\"plain\", at both routers";
 
 std::uint64_t maxFrameBytes(const Limits& limits) {
-  constexpr std::uint64_t kFields = std::uint64_t{1} << 20;  // around bodies
+  constexpr std::uint64_t kFields = std::uint64_t{1} << 20;  // for everything but the bodies
   return std::max<std::uint64_t>(limits.maxMessageBytes, limits.bufferBytes) + kFields;
 }
 
@@ -37,7 +38,7 @@ Line::Line(kj::Own<kj::AsyncIoStream> stream, kj::Timer& timer, const Limits& li
       record_(record),
       owner_(owner),
       reader_(kLeastFrame),
-      lookAfterNs_(halfDeadNs()) {
+      checkAfterNs_(halfDeadNs()) {
   record_->queueSize.store(limits.queueSize, std::memory_order_relaxed);
 }
 
@@ -54,19 +55,20 @@ void Line::describe(wire::Greeting::Builder greeting, const Limits& limits) {
 kj::Promise<LineEnd> Line::run(Note greeting) {
   auto paf = kj::newPromiseAndFulfiller<LineEnd>();
   ended_ = kj::mv(paf.fulfiller);
-  heardNs_ = Clock::nowNs();
-  greetBeforeNs_ = heardNs_ + std::chrono::nanoseconds(limits_.handshakeTime).count();
+  lastReceiveNs_ = Clock::nowNs();
+  greetingDueNs_ = lastReceiveNs_ + std::chrono::nanoseconds(limits_.handshakeTime).count();
   send([greeting = std::move(greeting)](wire::Item::Builder item) { greeting(item); });
   reads_ = watched(&Line::readLoop);
-  life_ = watched(&Line::aliveLoop);
+  liveness_ = watched(&Line::livenessLoop);
   return kj::mv(paf.promise);
 }
 
-// Whatever stops a loop ends the line: a peer that is gone by now may stop it at once.
+// Any exception from a loop ends the line. A loop may also throw before it returns its promise,
+// when the peer has closed the connection already.
 kj::Promise<void> Line::watched(kj::Promise<void> (Line::*loop)()) {
   return kj::evalNow([&] { return (this->*loop)(); })
       .eagerlyEvaluate([this](kj::Exception&& error) {
-        finish({farewell_.empty() ? tlsTrouble(error) : farewell_});
+        finish({farewell_.empty() ? tlsProblem(error) : farewell_});
       });
 }
 
@@ -76,13 +78,14 @@ void Line::finish(LineEnd end) {
 }
 
 std::uint64_t Line::maxMessageBytes() const noexcept {
-  constexpr std::uint64_t kAround = 1024;
-  return std::min({limits_.maxMessageBytes, peer_.maxMessageBytes, peer_.maxFrameBytes - kAround});
+  constexpr std::uint64_t kFrameOverhead = 1024;
+  return std::min(
+      {limits_.maxMessageBytes, peer_.maxMessageBytes, peer_.maxFrameBytes - kFrameOverhead});
 }
 
 void Line::end(FarewellCode code, const std::string& why) {
   if (isEnding()) return;
-  const auto text = forPeople(why);
+  const auto text = displayText(why);
   send([code, text](wire::Item::Builder item) {
     auto farewell = item.initFarewell();
     farewell.setCode(code);
@@ -90,10 +93,10 @@ void Line::end(FarewellCode code, const std::string& why) {
   });
   phase_ = Phase::leaving;
   farewell_ = text;
-  lingers_ = code != FarewellCode::SILENCE;
-  lastMoment_ = timer_.afterDelay(kLastMoment)
-                    .then([this, text] { finish({text}); })
-                    .eagerlyEvaluate(nullptr);
+  drains_ = code != FarewellCode::SILENCE;
+  farewellTimer_ = timer_.afterDelay(kFarewellTime)
+                       .then([this, text] { finish({text}); })
+                       .eagerlyEvaluate(nullptr);
 }
 
 // ---- in
@@ -103,25 +106,25 @@ kj::Promise<void> Line::readLoop() {
   return stream_->tryRead(room.begin(), 1, room.size())
       .then([this, most = room.size()](std::size_t bytes) -> kj::Promise<void> {
         if (bytes == 0) {
-          finish({farewell_.empty() ? closed() : farewell_});
+          finish({farewell_.empty() ? closedReason() : farewell_});
           return kj::READY_NOW;
         }
-        if (isDeaf()) return readAndDiscard();
+        if (discardsInput()) return readAndDiscard();
         count(record_->bytesReceived, bytes);
-        heardBytes_ += bytes;
+        partialBytes_ += bytes;
         hasMore_ = bytes == most;
         reader_.filled(bytes);
-        return readOn();
+        return handleReceived();
       });
 }
 
-std::string Line::closed() const {
+std::string Line::closedReason() const {
   if (greeted_) return "the peer closed the connection";
   return "the peer closed the connection before its greeting: is it a router, and does it have the "
          "same security, \"tls\" or \"plain\"?";
 }
 
-// What comes behind our own farewell matters no more, but for its end.
+// After our own farewell, only the end of the peer's data matters.
 kj::Promise<void> Line::readAndDiscard() {
   constexpr std::size_t kReadBytes = std::size_t{64} << 10;
   auto room = kj::heapArray<kj::byte>(kReadBytes);
@@ -133,51 +136,52 @@ kj::Promise<void> Line::readAndDiscard() {
   });
 }
 
-// Handles what has come: in turns, of a peer that sends more than a turn takes, and while it reads
-// what it gets.
-kj::Promise<void> Line::readOn() {
-  if (isDeaf()) return readAndDiscard();
-  bool isThrough = false;
+// Handles the received items, in turns of at most kTurnNs. Continues with the next turn when the
+// peer has read enough of the answers.
+kj::Promise<void> Line::handleReceived() {
+  if (discardsInput()) return readAndDiscard();
+  bool isDone = false;
   try {
-    isThrough = handleSome();
+    isDone = handleSome();
   } catch (const ProtocolError& error) {
     end(error.code(), error.what());
-  } catch (const kj::Exception& error) {  // a pointer that leads nowhere
+  } catch (const kj::Exception& error) {  // an invalid pointer in the frame
     end(FarewellCode::PROTOCOL, fmt::format("the peer sent a frame that cannot be read: {}",
                                             toStd(error.getDescription())));
-  } catch (const std::exception& error) {  // ours, for lack of memory or descriptors
+  } catch (
+      const std::exception& error) {  // not caused by the peer: no memory or no descriptor is left
     end(FarewellCode::STOPPING, error.what());
   }
-  if (isDeaf()) return readAndDiscard();
-  if (isThrough && !hasMore_) return readLoop();
-  return whenAnswersHaveGone().then(
-      [this, isThrough] { return isThrough ? readLoop() : readOn(); });
+  if (discardsInput()) return readAndDiscard();
+  if (isDone && !hasMore_) return readLoop();
+  return whenAnswersAreSent().then(
+      [this, isDone] { return isDone ? readLoop() : handleReceived(); });
 }
 
-kj::Promise<void> Line::whenAnswersHaveGone() {
-  // others have their turn
-  if (answers_ < kManyNotes) return timer_.afterDelay(0 * kj::NANOSECONDS);
+kj::Promise<void> Line::whenAnswersAreSent() {
+  // Let the other tasks of the event loop run.
+  if (answers_ < kMaxNotes) return timer_.afterDelay(0 * kj::NANOSECONDS);
   auto paf = kj::newPromiseAndFulfiller<void>();
-  readOn_ = kj::mv(paf.fulfiller);
+  resumeReading_ = kj::mv(paf.fulfiller);
   return kj::mv(paf.promise);
 }
 
-// False: there is more, for the next turn.
+// Returns false when items are left for the next turn.
 bool Line::handleSome() {
-  constexpr unsigned kLooks = 16;  // items between looks at the clock
+  constexpr unsigned kItemsPerCheck = 16;  // between two looks at the clock
   const auto endNs = Clock::nowNs() + kTurnNs;
-  if (items_) heardNs_ = Clock::nowNs();  // it is we who are late
+  if (items_) lastReceiveNs_ = Clock::nowNs();  // the peer is not late: its items wait here
   handling_ = true;
   KJ_DEFER(handling_ = false);
-  for (unsigned handled = 1; answers_ < kManyNotes; ++handled) {
-    if (handled % kLooks == 0 && Clock::nowNs() >= endNs) return false;
+  for (unsigned handled = 1; answers_ < kMaxNotes; ++handled) {
+    if (handled % kItemsPerCheck == 0 && Clock::nowNs() >= endNs) return false;
     if (!items_ && !tryNextFrame()) return true;
     if (!items_ || nextItem_ == items_->size()) {
       items_.reset();
       continue;
     }
     handle((*items_)[nextItem_++]);
-    if (isDeaf()) return true;
+    if (discardsInput()) return true;
   }
   return false;
 }
@@ -186,8 +190,8 @@ bool Line::tryNextFrame() {
   if (!greeted_ && reader_.beginsAsTls()) throw ProtocolError(FarewellCode::PROTOCOL, kTlsOnPlain);
   auto* frame = reader_.tryNext();
   if (frame == nullptr) return false;
-  heardNs_ = Clock::nowNs();
-  heardBytes_ = 0;
+  lastReceiveNs_ = Clock::nowNs();
+  partialBytes_ = 0;
   count(record_->framesReceived);
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
@@ -206,7 +210,8 @@ void Line::handle(wire::Item::Reader item) {
     case wire::Item::GREETING:
       return;
     case wire::Item::FAREWELL:
-      return finish({fmt::format("the peer says: {}", forPeople(item.getFarewell().getReason()))});
+      return finish({fmt::format("the peer ended the connection: {}",
+                                 displayText(item.getFarewell().getReason()))});
     case wire::Item::PING:
       return onPing(item.getPing().getStamp());
     case wire::Item::PONG: {
@@ -230,15 +235,15 @@ void Line::takeGreeting(wire::Greeting::Reader greeting) {
                                     greeting.getProtocolMajor(), greeting.getProtocolMinor(),
                                     wire::PROTOCOL_MAJOR));
   }
-  peer_.router = forPeople(greeting.getRouter());
-  peer_.program = forPeople(greeting.getProgram());
+  peer_.router = displayText(greeting.getRouter());
+  peer_.program = displayText(greeting.getProgram());
   peer_.maxFrameBytes = greeting.getMaxFrameBytes();
   peer_.maxMessageBytes = greeting.getMaxMessageBytes();
   peer_.maxClients = greeting.getMaxClients();
   if (peer_.maxFrameBytes < kLeastFrame) {
-    throw ProtocolError(
-        FarewellCode::PROTOCOL,
-        fmt::format("maxFrameBytes {}: at least {} are needed", peer_.maxFrameBytes, kLeastFrame));
+    throw ProtocolError(FarewellCode::PROTOCOL,
+                        fmt::format("maxFrameBytes is {}; at least {} are required",
+                                    peer_.maxFrameBytes, kLeastFrame));
   }
   reader_.setMaxFrameBytes(maxFrameBytes(limits_));
   limits_.bufferBytes = static_cast<std::uint32_t>(
@@ -252,71 +257,72 @@ void Line::takeGreeting(wire::Greeting::Reader greeting) {
 
 // ---- signs of life
 
-// Time until the next look: now and then, and when the peer is overdue.
-std::int64_t Line::nextLookNs(std::int64_t nowNs) {
-  auto dueNs = heardNs_ + std::chrono::nanoseconds(limits_.deadTime).count();
-  if (!greeted_) dueNs = std::min(dueNs, greetBeforeNs_);
+// Time until the next check: at most checkAfterNs_, and no later than the peer's deadline.
+std::int64_t Line::nextCheckNs(std::int64_t nowNs) {
+  auto dueNs = lastReceiveNs_ + std::chrono::nanoseconds(limits_.deadTime).count();
+  if (!greeted_) dueNs = std::min(dueNs, greetingDueNs_);
   return std::clamp<std::int64_t>(dueNs - nowNs, 1'000'000,
-                                  std::exchange(lookAfterNs_, halfDeadNs()));
+                                  std::exchange(checkAfterNs_, halfDeadNs()));
 }
 
-// What the peer did not do in time; empty: it is in time.
-std::string Line::silence(std::int64_t nowNs) const {
-  if (nowNs - heardNs_ >= std::chrono::nanoseconds(limits_.deadTime).count()) {
-    return fmt::format("nothing was heard of the peer for {} ms (dead-time)",
-                       (nowNs - heardNs_) / 1'000'000);
+// Which deadline the peer has missed; empty: none.
+std::string Line::silenceReason(std::int64_t nowNs) const {
+  if (nowNs - lastReceiveNs_ >= std::chrono::nanoseconds(limits_.deadTime).count()) {
+    return fmt::format("received nothing from the peer for {} ms (dead-time)",
+                       (nowNs - lastReceiveNs_) / 1'000'000);
   }
-  if (greeted_ || nowNs < greetBeforeNs_) return {};
+  if (greeted_ || nowNs < greetingDueNs_) return {};
   return fmt::format("the peer sent no greeting within {} ms (handshake-time)",
                      limits_.handshakeTime.count());
 }
 
-kj::Promise<void> Line::aliveLoop() {
-  const auto lookNs = nextLookNs(Clock::nowNs());
-  return timer_.afterDelay(lookNs * kj::NANOSECONDS)
-      .then([this, dueNs = Clock::nowNs() + lookNs]() -> kj::Promise<void> {
+kj::Promise<void> Line::livenessLoop() {
+  const auto checkNs = nextCheckNs(Clock::nowNs());
+  return timer_.afterDelay(checkNs * kj::NANOSECONDS)
+      .then([this, dueNs = Clock::nowNs() + checkNs]() -> kj::Promise<void> {
         const auto nowNs = Clock::nowNs();
-    // while we do not run, the peer need not, either
+        // Time during which this process did not run does not count against the peer.
         const auto lateNs = std::max<std::int64_t>(nowNs - dueNs, 0);
-        heardNs_ = std::min(heardNs_ + lateNs, nowNs);
-        greetBeforeNs_ += lateNs;
-        if (heardBytes_ >= kProgressBytes) {
-          heardNs_ = nowNs;
-          heardBytes_ = 0;
+        lastReceiveNs_ = std::min(lastReceiveNs_ + lateNs, nowNs);
+        greetingDueNs_ += lateNs;
+        if (partialBytes_ >= kProgressBytes) {
+          lastReceiveNs_ = nowNs;
+          partialBytes_ = 0;
         }
-        // Twice: if we did not run for long, what it said meanwhile has yet to be read.
-        if (const auto text = silence(nowNs); text.empty()) {
+        // Only the second check in a row counts: if this process did not run for a while, data of
+        // the peer may not have been read yet.
+        if (const auto text = silenceReason(nowNs); text.empty()) {
           overdue_ = false;
         } else if (std::exchange(overdue_, true)) {
-          if (writing_) finish({text});  // it does not take a farewell, either
+          if (writing_) finish({text});  // the peer would not read a farewell, either
           else end(FarewellCode::SILENCE, text);
           return kj::NEVER_DONE;
         }
         if (greeted_ && !isEnding()) ping();
-        return aliveLoop();
+        return livenessLoop();
       });
 }
 
 void Line::ping() {
-  pingedNs_ = Clock::nowNs();
+  lastPingNs_ = Clock::nowNs();
   send([](wire::Item::Builder item) {
     item.initPing().setStamp(static_cast<std::uint64_t>(Clock::nowNs()));
   });
 }
 
-// While the peer asks for signs of life we hear some, too, and put off asking ourselves: at rest
-// one of both does it, and half of the frames go. By how long is left to chance, or both might do
-// so at once again and again.
+// A ping of the peer is a sign of life, so this side postpones its own ping. On an idle connection
+// only one side sends pings, which halves the number of frames. The delay is random, because
+// otherwise both sides might send their pings at the same time again and again.
 void Line::onPing(std::uint64_t stamp) {
   send([stamp](wire::Item::Builder pong) { pong.initPong().setStamp(stamp); });
   const auto nowNs = Clock::nowNs();
-  if (nowNs - pingedNs_ >= kMeasureEveryNs) ping();
+  if (nowNs - lastPingNs_ >= kMeasureEveryNs) ping();
   const auto quarter = halfDeadNs() / 4;
-  if (nowNs - putOffNs_ < quarter) return;
-  putOffNs_ = nowNs;
-  lookAfterNs_ = halfDeadNs() + quarter +
-                 static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(quarter + 1));
-  life_ = watched(&Line::aliveLoop);
+  if (nowNs - lastPostponeNs_ < quarter) return;
+  lastPostponeNs_ = nowNs;
+  checkAfterNs_ = halfDeadNs() + quarter +
+                  static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(quarter + 1));
+  liveness_ = watched(&Line::livenessLoop);
 }
 
 }  // namespace mpf::router

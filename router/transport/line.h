@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Line: one connection to another router: frames both ways, a queue of what is to go, signs of
-// life, and the end.
+// Line: one connection to another router: receives and sends frames, queues items, checks signs of
+// life, and ends the connection with a farewell.
 //
-//   send...() ─► queue ─► one frame of all that waits, up to a size ─► stream      while one is being written, the next one gathers
+//   send() ─► queue ─► a frame of all that waits, up to Limits::bufferBytes ─► stream
 //   stream ─► frames ─► Owner::onItem
 //
-// A message that waits is kept as it came, in the shared memory of its sender, and is converted
-// when its frame is built. A peer that does not read what it asked for is not read, either. A long
-// frame is handled in turns with what else the loop has to do.
+// While a frame is being written, items for the next one gather in the queue. A waiting message
+// stays in the shared memory of its sender, and is converted when its frame is built. When a peer
+// does not read the answers to its items, its items are not read, either. A long frame is handled
+// in turns with the other tasks of the event loop.
 //
 // Threads  that of the event loop.
-// Crash    a peer that is gone, stopped or cut off is noticed within Limits::deadTime.
-// Trust    nonsense ends the line with a farewell that says what was wrong.
+// Crash    the line ends when a peer has crashed, is stopped or unreachable for Limits::deadTime.
+// Trust    a protocol error ends the line with a farewell that names it.
 #pragma once
 
 #include <algorithm>
@@ -33,25 +34,25 @@
 
 namespace mpf::router {
 
-// A message on its way, as an item of a frame.
+// A message that is sent as an item of a frame.
 struct Carried {
   bool isRequest = false;
-  bool isFirst = false;  // of a reply
+  bool isFirst = false;  // of a reply: it ends the request
   std::uint32_t client = 0;
   std::uint32_t requestId = 0;
   Deadline takeBefore = Deadline::never();  // of a request
   Message message;
 };
 
-// What a reply takes of its client's window (router.capnp, Credit): the bytes of its elements, and
-// some for the rest.
+// The bytes that a reply takes from its client's window (router.capnp, Credit): those of its
+// elements, and a fixed number for the rest.
 inline constexpr std::uint32_t kWindowBytesBeside = 64;
 [[nodiscard]] inline std::uint32_t windowBytesOf(const Message& reply) noexcept {
   return kWindowBytesBeside + reply.arrayLength() * layoutOf(reply.getType()).elementBytes;
 }
 
-// The largest body but for its elements. Limits on the wire are of elements, those of shared memory
-// of whole bodies.
+// The largest size of a body without its elements. Limits on the wire count elements, those in
+// shared memory count whole bodies.
 inline constexpr std::uint64_t kMostBesideElements = [] {
   std::uint64_t most = 0;
   for (std::uint16_t type = 1; layoutOf(static_cast<MessageType>(type)).headerBytes != 0; ++type) {
@@ -60,7 +61,7 @@ inline constexpr std::uint64_t kMostBesideElements = [] {
   return most;
 }();
 
-// What a peer said of itself.
+// The fields of a peer's greeting.
 struct PeerGreeting {
   std::string router;
   std::string program;
@@ -69,7 +70,7 @@ struct PeerGreeting {
   std::uint32_t maxClients = 0;
 };
 
-// Why a line ended, for people.
+// Why a line ended, as text for logs and tools.
 struct LineEnd {
   std::string text;
 };
@@ -80,14 +81,14 @@ class Line {
 
   class Owner {
    public:
-    // The peer's greeting has come and is one that we understand.
+    // A valid greeting of the peer has arrived.
     virtual void onGreeting(const PeerGreeting& greeting) = 0;
-    // Any later item but pings and farewells. May throw ProtocolError.
+    // A later item that is not a ping, pong or farewell has arrived. May throw ProtocolError.
     virtual void onItem(wire::Item::Reader item) = 0;
     // hasRoom() may have become true.
     virtual void onRoom() = 0;
-    // A message that cannot go, and why; its request, if it is one, was not done. `instead`: goes
-    // in its place, and may be filled.
+    // A message cannot be sent, for the reason `why`. If it is a request, it has not been handled.
+    // `instead` is sent in its place; it is empty unless this function fills it.
     virtual void onUnsendable(const Carried& carried, const std::string& why,
                               wire::Item::Builder instead) = 0;
 
@@ -101,62 +102,62 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
-  // Greets and runs until the line ends. Once.
+  // Sends the greeting, and runs until the line ends. Call it once.
   [[nodiscard]] kj::Promise<LineEnd> run(Note greeting);
-  // Ends it with a farewell: once what waits has gone and the peer has closed, too, or a moment has
-  // passed.
+  // Ends the line with a farewell, behind the items that wait. The line is finished when the peer
+  // has also closed the connection, at the latest after kFarewellTime.
   void end(FarewellCode code, const std::string& why);
 
-  // Always taken. Those that come of what the peer sent are bounded: when too many wait, no more is
-  // read of it.
+  // Queues an item that is not a message, even without room. Answers to items of the peer are
+  // bounded: when too many wait, no more is read from the peer.
   void send(Note note);
-  // Taken even without room; who has a choice looks at hasRoom() first.
+  // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
   [[nodiscard]] bool hasRoom() const noexcept {
-    return greeted_ && !isEnding() && waiting_ < limits_.queueSize && notes() < kManyNotes;
+    return greeted_ && !isEnding() && waiting_ < limits_.queueSize && notes() < kMaxNotes;
   }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
   [[nodiscard]] bool hasGreeted() const noexcept { return greeted_; }
-  // Those that it began with: what we greeted with.
+  // The limits at the start of the line, as in its greeting.
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
-  // Largest body that may be sent.
+  // The largest body that may be sent.
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
 
-  // Requests that never reached the stream, once the line has ended.
+  // After the end of the line: returns the requests that were never written to the stream.
   [[nodiscard]] std::vector<Carried> takeUnsentRequests();
 
-  // What the greeting says of the limits.
+  // Fills in the fields of a greeting that follow from the limits.
   static void describe(wire::Greeting::Builder greeting, const Limits& limits);
 
  private:
-  struct Answer {  // a note that came of what the peer sent
+  struct Answer {  // a note that answers an item of the peer
     Note note;
   };
   enum class Phase {
     running,
-    leaving,  // our farewell is on its way
-    broken,  // nothing can be sent: a farewell of the peer would say why
-    finished,  // its owner knows
+    leaving,  // our farewell is queued or sent
+    broken,  // writing has failed; still reads, because the peer may have sent a farewell
+    finished,  // the promise of run() is fulfilled
   };
   [[nodiscard]] bool isEnding() const noexcept { return phase_ != Phase::running; }
-  // Whatever comes yet matters no more.
-  [[nodiscard]] bool isDeaf() const noexcept {
+  // Whether items of the peer are no longer handled.
+  [[nodiscard]] bool discardsInput() const noexcept {
     return phase_ == Phase::leaving || phase_ == Phase::finished;
   }
   using Outgoing = std::variant<Note, Answer, Carried>;
-  static constexpr std::size_t kManyNotes = 4096;
-  static constexpr auto kLastMoment = 500 * kj::MILLISECONDS;  // for the farewell to be written
+  static constexpr std::size_t kMaxNotes = 4096;
+  static constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
   kj::Promise<void> readLoop();
-  kj::Promise<void> aliveLoop();
-  [[nodiscard]] std::int64_t nextLookNs(std::int64_t nowNs);
-  [[nodiscard]] std::string silence(std::int64_t nowNs) const;
+  kj::Promise<void> livenessLoop();
+  [[nodiscard]] std::int64_t nextCheckNs(std::int64_t nowNs);
+  [[nodiscard]] std::string silenceReason(std::int64_t nowNs) const;
   void onPing(std::uint64_t stamp);
   void ping();
   kj::Promise<void> watched(kj::Promise<void> (Line::*loop)());
-  kj::Promise<void> readOn();
-  [[nodiscard]] std::string closed() const;
+  kj::Promise<void> handleReceived();
+  [[nodiscard]] std::string closedReason() const;
   kj::Promise<void> readAndDiscard();
-  kj::Promise<void> whenAnswersHaveGone();
+  kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
   void handle(wire::Item::Reader item);
@@ -168,7 +169,7 @@ class Line {
   void onWriteFailure(const std::string& why);
   struct FrameSize {
     std::size_t items;
-    std::size_t bytes;  // about
+    std::size_t bytes;  // an estimate
   };
   [[nodiscard]] FrameSize sizeOfNextFrame() const;
   void noteQueue() noexcept;
@@ -188,34 +189,35 @@ class Line {
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled
   capnp::uint nextItem_ = 0;
   bool handling_ = false;
-  bool hasMore_ = false;  // bytes that have come, and were not read yet
+  bool hasMore_ = false;  // the last read filled its buffer: more bytes may be waiting
   PeerGreeting peer_;
   bool greeted_ = false;
   std::deque<Outgoing> queue_;
-  std::size_t waiting_ = 0;  // messages among them
-  std::size_t answers_ = 0;
+  std::size_t waiting_ = 0;  // messages in queue_
+  std::size_t answers_ = 0;  // answers in queue_
   bool writing_ = false;
   Phase phase_ = Phase::running;
-  std::vector<Carried> late_;  // requests that came behind our farewell
-  std::string farewell_;  // what we ended it with
-  // until the peer has closed: what we do not read would take the farewell back
-  bool lingers_ = false;
-  std::int64_t heardNs_ = 0;  // when there was a sign of life
-  std::size_t heardBytes_ = 0;  // since then, of a frame that is still coming
-  bool overdue_ = false;  // at the last look
-  std::int64_t greetBeforeNs_ = 0;  // the peer
-  std::int64_t lookAfterNs_;  // at most, from the last look on
-  std::int64_t pingedNs_ = 0;  // when we asked last
-  std::int64_t putOffNs_ = 0;  // when we put off asking last
+  std::vector<Carried> lateRequests_;  // requests that were sent after our farewell
+  std::string farewell_;  // the text of our farewell
+  // After our farewell, read until the peer closes: with unread data the kernel would reset the
+  // connection, and the peer might not receive the farewell.
+  bool drains_ = false;
+  std::int64_t lastReceiveNs_ = 0;  // time of the last sign of life
+  std::size_t partialBytes_ = 0;  // received since then, of a frame that is still arriving
+  bool overdue_ = false;  // the last check has found the peer overdue
+  std::int64_t greetingDueNs_ = 0;  // deadline of the peer's greeting
+  std::int64_t checkAfterNs_;  // longest time until the next check
+  std::int64_t lastPingNs_ = 0;  // when the last ping was sent
+  std::int64_t lastPostponeNs_ = 0;  // when the own ping was postponed last
   std::minstd_rand random_{std::random_device{}()};
   kj::Array<capnp::word> scratch_;
   kj::Own<capnp::MallocMessageBuilder> frame_;
   kj::Own<kj::PromiseFulfiller<LineEnd>> ended_;
-  kj::Own<kj::PromiseFulfiller<void>> readOn_;  // nobody waits for it: nullptr
+  kj::Own<kj::PromiseFulfiller<void>> resumeReading_;  // nullptr: reading is not suspended
   kj::Promise<void> writes_ = nullptr;
   kj::Promise<void> reads_ = nullptr;
-  kj::Promise<void> life_ = nullptr;
-  kj::Promise<void> lastMoment_ = nullptr;
+  kj::Promise<void> liveness_ = nullptr;
+  kj::Promise<void> farewellTimer_ = nullptr;
 };
 
 }  // namespace mpf::router

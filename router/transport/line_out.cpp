@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Line, continued: the way out.
+// The sending side of Line: the queue, and the frames that are built from it.
 #include <algorithm>
 #include <capnp/serialize-async.h>
 #include <iterator>
@@ -10,8 +10,9 @@
 namespace mpf::router {
 namespace {
 
-constexpr std::size_t kItemBytes = 256;  // an item without its body, generously
-constexpr std::size_t kKeptScratch = std::size_t{4} << 20;  // memory that stays for the next frame
+constexpr std::size_t kItemBytes = 256;  // upper estimate for an item without its body
+constexpr std::size_t kKeptScratch = std::size_t{4}
+                                     << 20;  // memory that is kept for the next frame
 
 }  // namespace
 
@@ -28,7 +29,7 @@ void Line::send(Note note) {
 
 void Line::send(Carried carried) {
   if (isEnding()) {
-    if (carried.isRequest) late_.push_back(std::move(carried));
+    if (carried.isRequest) lateRequests_.push_back(std::move(carried));
     return;
   }
   queue_.emplace_back(std::move(carried));
@@ -39,27 +40,28 @@ void Line::send(Carried carried) {
 
 void Line::noteQueue() noexcept { record_->inQueue.store(waiting_, std::memory_order_relaxed); }
 
-// After all that is to be done now: what it sends shares the frame.
+// Writes after all tasks that are ready now, so that what they send shares the frame.
 void Line::scheduleWrite() {
   if (std::exchange(writing_, true)) return;
   writes_ =
       kj::evalLast([this] { return writeAll(); }).eagerlyEvaluate([this](kj::Exception&& error) {
-        onWriteFailure(tlsTrouble(error));
+        onWriteFailure(tlsProblem(error));
       });
 }
 
-// The peer may have said why it takes nothing any more.
+// Keeps reading for a while: the peer may have sent a farewell with the reason.
 void Line::onWriteFailure(const std::string& why) {
   if (isEnding()) return finish({farewell_.empty() ? why : farewell_});
   phase_ = Phase::broken;
-  lastMoment_ =
-      timer_.afterDelay(kLastMoment).then([this, why] { finish({why}); }).eagerlyEvaluate(nullptr);
+  farewellTimer_ = timer_.afterDelay(kFarewellTime)
+                       .then([this, why] { finish({why}); })
+                       .eagerlyEvaluate(nullptr);
 }
 
 kj::Promise<void> Line::writeAll() {
   if (queue_.empty()) {
     writing_ = false;
-    if (isEnding() && lingers_) stream_->shutdownWrite();
+    if (isEnding() && drains_) stream_->shutdownWrite();
     else if (isEnding()) finish({farewell_});
     return kj::READY_NOW;
   }
@@ -67,16 +69,17 @@ kj::Promise<void> Line::writeAll() {
   count(record_->framesSent);
   return capnp::writeMessage(*stream_, *frame_).then([this] {
     frame_ = nullptr;
-    if (readOn_) {
-      heardNs_ = Clock::nowNs();  // it reads, and is not read: what it said meanwhile is not heard
-      if (answers_ < kManyNotes) std::exchange(readOn_, nullptr)->fulfill();
+    if (resumeReading_) {
+      // The peer is alive: it reads, while its own items are not read here.
+      lastReceiveNs_ = Clock::nowNs();
+      if (answers_ < kMaxNotes) std::exchange(resumeReading_, nullptr)->fulfill();
     }
     if (!isEnding()) owner_.onRoom();
     return writeAll();
   });
 }
 
-// Items for the next frame: at least one, and no more bytes than may share one.
+// The items for the next frame: at least one, and as many as fit into Limits::bufferBytes.
 Line::FrameSize Line::sizeOfNextFrame() const {
   FrameSize size{0, 0};
   for (const auto& outgoing : queue_) {
@@ -85,12 +88,12 @@ Line::FrameSize Line::sizeOfNextFrame() const {
     if (size.items != 0 && size.bytes + bytes > limits_.bufferBytes) break;
     ++size.items;
     size.bytes += bytes;
-    if (!greeted_) break;  // the greeting stands alone
+    if (!greeted_) break;  // the greeting has a frame of its own
   }
   return size;
 }
 
-// Zeroed memory for the next frame, kept from frame to frame.
+// Prepares zeroed memory for the next frame. It is kept from frame to frame.
 void Line::makeScratch(std::size_t bytes) {
   constexpr std::size_t kLeast = std::size_t{16} << 10;
   bytes = std::min(kLeast + bytes, kKeptScratch);
@@ -125,24 +128,24 @@ void Line::buildFrame() {
 void Line::build(wire::Item::Builder item, Carried& carried) {
   const ConversionLimits limits{static_cast<std::size_t>(maxMessageBytes())};
   ConversionError error;
-  bool isSound = false;
+  bool isConverted = false;
   if (carried.isRequest) {
     auto request = item.initRequest();
     request.setClient(carried.client);
     request.setRequestId(carried.requestId);
-    // One that has passed already is the far side's to say, as any other.
+    // The far side handles a deadline that has already passed like any other.
     if (!carried.takeBefore.isNever())
       request.setTakeWithinNs(
           static_cast<std::uint64_t>(std::max<std::int64_t>(carried.takeBefore.left().count(), 1)));
-    isSound = tryToWire(carried.message, request.initMessage(), limits, error);
+    isConverted = tryToWire(carried.message, request.initMessage(), limits, error);
   } else {
     auto reply = item.initReply();
     reply.setClient(carried.client);
     reply.setRequestId(carried.requestId);
     reply.setIsFirst(carried.isFirst);
-    isSound = tryToWire(carried.message, reply.initMessage(), limits, error);
+    isConverted = tryToWire(carried.message, reply.initMessage(), limits, error);
   }
-  if (isSound) return;
+  if (isConverted) return;
   item.setNone();
   owner_.onUnsendable(carried, error.text, item);
 }
@@ -154,7 +157,7 @@ std::vector<Carried> Line::takeUnsentRequests() {
     if (carried != nullptr && carried->isRequest) requests.push_back(std::move(*carried));
   }
   queue_.clear();
-  std::ranges::move(std::exchange(late_, {}), std::back_inserter(requests));
+  std::ranges::move(std::exchange(lateRequests_, {}), std::back_inserter(requests));
   return requests;
 }
 

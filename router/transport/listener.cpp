@@ -11,7 +11,7 @@
 namespace mpf::router {
 namespace {
 
-// no descriptor left, say: others may close theirs
+// Pause after a failure to accept, for example because no descriptor is left.
 constexpr auto kAfterFailure = 100 * kj::MILLISECONDS;
 
 constexpr std::size_t kMaxHandshakes = 256;
@@ -20,7 +20,7 @@ constexpr const char* kExpectsTls =
     "this port expects TLS: write security = \"tls\" for this remote and the files in [tls], or "
     "leave out --plain";
 
-// Where somebody called from, or says it did.
+// The address of the peer.
 std::string addressOf(kj::PeerIdentity& identity) {
   const auto text = identity.toString();
   return {text.begin(), text.size()};
@@ -67,8 +67,8 @@ Address Listener::address() {
   return address;
 }
 
-// Whatever goes wrong with one caller, the next one is heard. It may go wrong at once:
-// acceptAuthenticated() throws that.
+// An error with one connection does not prevent the next one from being accepted.
+// acceptAuthenticated() may also throw an error directly.
 kj::Promise<void> Listener::acceptLoop() {
   return kj::evalNow([this] { return receivers_.front()->acceptAuthenticated(); })
       .then([this](kj::AuthenticatedStream caller) {
@@ -89,13 +89,13 @@ kj::Promise<void> Listener::acceptLoop() {
 
 void Listener::admit(kj::AuthenticatedStream caller) {
   auto address = addressOf(*caller.peerIdentity);
-  prepare(*caller.stream, here_.config.limits);
+  setSocketOptions(*caller.stream, here_.config.limits);
   if (listen_.security == Security::plain)
     return onCaller_({kj::mv(caller.stream), {}, std::move(address), false});
-  shakeHands(kj::mv(caller), address);
+  startHandshake(kj::mv(caller), address);
 }
 
-void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& address) {
+void Listener::startHandshake(kj::AuthenticatedStream caller, const std::string& address) {
   if (handshakes_.size() >= kMaxHandshakes) makeRoom();
   auto end = kj::newPromiseAndFulfiller<void>();
   const auto number = ++lastHandshake_;
@@ -105,13 +105,14 @@ void Listener::shakeHands(kj::AuthenticatedStream caller, const std::string& add
                                kj::evalNow([&] { return handshake(kj::mv(caller), address); }))
                  .then([]() {},
                        [this, address](kj::Exception&& error) {
-                         here_.log.warn("{}: no TLS connection: {}", address, tlsTrouble(error));
+                         here_.log.warn("{}: the TLS handshake failed: {}", address,
+                                        tlsProblem(error));
                        })
                  .exclusiveJoin(kj::mv(end.promise))
                  .attach(kj::defer([this, number] { handshakes_.erase(number); })));
 }
 
-// A host that opens many connections loses the oldest one of its own.
+// Closes the oldest handshake of the host with the most handshakes.
 void Listener::makeRoom() {
   std::map<std::string, std::size_t> counts;
   for (const auto& [number, each] : handshakes_) ++counts[each.host];
@@ -120,7 +121,7 @@ void Listener::makeRoom() {
   const auto victim = std::ranges::find_if(
       handshakes_, [&](const auto& each) { return counts[each.second.host] == most; });
   here_.log.warn(
-      "{}: {} TLS handshakes are under way, {} of them with {}: the oldest one of these is closed",
+      "{}: {} TLS handshakes are in progress, {} of them with {}: closing the oldest of these",
       listen_.address.text(), handshakes_.size(), most, victim->second.host);
   victim->second.end->fulfill();
   handshakes_.erase(victim);

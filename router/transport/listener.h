@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Listener: one listening address. It accepts callers, over TLS unless the configuration says
-// plain, and hands them on.
+// Listener: one listening address. It accepts connections, does the TLS handshake unless the
+// configuration selects plain TCP, and hands the connections to its owner.
 //
 //   accept ─► first byte ─ TLS ──► handshake ─► OnCaller
-//                        ├ frame ► a farewell in plain TCP: this port expects TLS
+//                        ├ frame ► a farewell over plain TCP: this port expects TLS
 //                        └ other ► closed
 //
 // Threads  that of the event loop.
-// Trust    a caller has Limits::handshakeTime for its handshake, first byte included. Of too many
-//          handshakes, the oldest one of the host with the most makes room: callers that idle keep
-//          no other host out.
+// Trust    a peer has Limits::handshakeTime for its handshake, including the first byte. When too
+//          many handshakes are in progress, the oldest one of the host with the most is closed, so
+//          that idle connections of one host do not keep other hosts out.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@ class Listener final : private kj::TaskSet::ErrorHandler {
  public:
   struct Caller {
     kj::Own<kj::AsyncIoStream> stream;
-    std::string name;  // common name of its certificate; empty: plain
+    std::string name;  // common name of its certificate; empty: plain TCP
     std::string address;
     bool isTls = false;
   };
@@ -34,20 +34,20 @@ class Listener final : private kj::TaskSet::ErrorHandler {
 
   Listener(Surroundings& here, const Listen& listen, OnCaller onCaller);
 
-  // Resolves once it listens. The look-up of its name is the Listener's own and ends with it: who
-  // waits has the result and no more.
-  //   throws  kj::Exception (the promise): the address is in use, is none, or is public and plain;
-  //           or the Listener has gone before
+  // Resolves when it listens. Dropping the promise does not cancel the start; destroying the
+  // Listener does.
+  //   throws  kj::Exception (the promise): the address is in use, is invalid, or is public and
+  //           plain; or the Listener was destroyed before
   [[nodiscard]] kj::Promise<void> start();
   [[nodiscard]] const Listen& listen() const noexcept { return listen_; }
-  // With the port that the kernel chose.
+  // The listening address, with the port that the kernel chose.
   [[nodiscard]] Address address();
 
  private:
   kj::Promise<void> open();
   kj::Promise<void> acceptLoop();
   void admit(kj::AuthenticatedStream caller);
-  void shakeHands(kj::AuthenticatedStream caller, const std::string& address);
+  void startHandshake(kj::AuthenticatedStream caller, const std::string& address);
   kj::Promise<void> handshake(kj::AuthenticatedStream caller, const std::string& address);
   kj::Promise<void> openTls(kj::AuthenticatedStream caller, kj::byte first,
                             const std::string& address);
@@ -62,9 +62,9 @@ class Listener final : private kj::TaskSet::ErrorHandler {
     std::string host;
     kj::Own<kj::PromiseFulfiller<void>> end;  // fulfilling it closes the connection
   };
-  std::map<std::uint64_t, Handshake> handshakes_;  // under way, the oldest one first
+  std::map<std::uint64_t, Handshake> handshakes_;  // in progress, the oldest one first
   std::uint64_t lastHandshake_ = 0;
-  std::string problem_;  // of accepting, that was logged last
+  std::string problem_;  // last error of accepting that was logged
   TurnedAway turnedAway_;
   kj::TaskSet tasks_;
 };

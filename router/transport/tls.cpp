@@ -14,13 +14,14 @@
 namespace mpf::router {
 namespace {
 
-// What kj 0.9 makes of one past its last enumerator: no TLS 1.2. A test sees to it.
+// kj 0.9 has no enumerator for TLS 1.3. It accepts the value after its last one, and then refuses
+// TLS 1.2; a test checks this.
 constexpr auto kTls13 = static_cast<kj::TlsVersion>(static_cast<int>(kj::TlsVersion::TLS_1_2) + 1);
 
 enum class Side { server, client };
 
-// The client side looks at the certificate after the handshake, and can then say what is wrong with
-// it; that is why it does not verify in it.
+// kj verifies the server's certificate on the client side after the handshake, with a specific
+// error, so only the server side requests verification during the handshake.
 kj::TlsContext contextOf(const TlsTexts& texts, Side side) {
   const kj::TlsKeypair ours{
       kj::TlsPrivateKey(kj::StringPtr(texts.key.c_str(), texts.key.size())),
@@ -42,38 +43,38 @@ constexpr const char* kNoTls =
     "the peer does not use TLS: set the same security, \"tls\" or \"plain\", at both routers";
 constexpr const char* kNotVersion13 =
     "the peer does not support TLS 1.3, the only version that routers use";
-constexpr const char* kLeft = "the peer closed the connection during the TLS handshake";
+constexpr const char* kClosed = "the peer closed the connection during the TLS handshake";
 
-struct Trouble {
-  std::string_view said;  // by OpenSSL or kj
-  std::string_view means;
+struct Problem {
+  std::string_view reported;  // part of the text of OpenSSL or kj
+  std::string_view meaning;
 };
-constexpr std::array kTroubles{
-    Trouble{"peer did not return a certificate", "the peer sent no certificate"},
-    Trouble{"certificate verify failed",
+constexpr std::array kProblems{
+    Problem{"peer did not return a certificate", "the peer sent no certificate"},
+    Problem{"certificate verify failed",
             "the peer's certificate was not signed by one of our authorities, or is not valid now"},
-    Trouble{"reason = certificate has expired", "the peer's certificate has expired"},
-    Trouble{"reason = certificate is not yet valid", "the peer's certificate is not valid yet"},
-    Trouble{"reason = hostname mismatch", "the peer's certificate is for another name"},
-    Trouble{"reason = unable to get local issuer",
+    Problem{"reason = certificate has expired", "the peer's certificate has expired"},
+    Problem{"reason = certificate is not yet valid", "the peer's certificate is not valid yet"},
+    Problem{"reason = hostname mismatch", "the peer's certificate is for another name"},
+    Problem{"reason = unable to get local issuer",
             "the peer's certificate was not signed by one of our authorities"},
-    Trouble{"reason = self-signed certificate",
+    Problem{"reason = self-signed certificate",
             "the peer's certificate was not signed by one of our authorities"},
-    Trouble{"alert certificate expired", "the peer refused our certificate: it has expired"},
-    Trouble{"alert unknown ca",
+    Problem{"alert certificate expired", "the peer refused our certificate: it has expired"},
+    Problem{"alert unknown ca",
             "the peer refused our certificate: its authorities did not sign it"},
-    Trouble{"alert bad certificate", "the peer refused our certificate"},
-    Trouble{"alert certificate required",
+    Problem{"alert bad certificate", "the peer refused our certificate"},
+    Problem{"alert certificate required",
             "the peer requires a certificate, and this router has sent none"},
-    Trouble{"alert protocol version", kNotVersion13},
-    Trouble{"unsupported protocol", kNotVersion13},
-    Trouble{"unable to continue I/O", kLeft},
-    Trouble{"wrong version number", kNoTls},
-    Trouble{"http request", kNoTls},
-    Trouble{"packet length too long", kNoTls},
-    Trouble{"record layer failure", kNoTls},
-    Trouble{"unexpected message", kNoTls},
-    Trouble{"operation timed out",
+    Problem{"alert protocol version", kNotVersion13},
+    Problem{"unsupported protocol", kNotVersion13},
+    Problem{"unable to continue I/O", kClosed},
+    Problem{"wrong version number", kNoTls},
+    Problem{"http request", kNoTls},
+    Problem{"packet length too long", kNoTls},
+    Problem{"record layer failure", kNoTls},
+    Problem{"unexpected message", kNoTls},
+    Problem{"operation timed out",
             "the peer did not finish the TLS handshake in time (handshake-time)"},
 };
 
@@ -98,13 +99,13 @@ kj::Promise<kj::AuthenticatedStream> Tls::connect(kj::AuthenticatedStream connec
   return limited(client_.wrapClient(kj::mv(connection), name.c_str()));
 }
 
-// That the peer has shown its certificate is what all depends on, so it is looked at again.
+// The security depends on the peer's certificate, so this checks once more that there is one.
 kj::Promise<kj::AuthenticatedStream> Tls::limited(kj::Promise<kj::AuthenticatedStream> handshake) {
   return timer_.timeoutAfter(handshake_, kj::mv(handshake))
       .then([](kj::AuthenticatedStream connected) {
         auto* const peer = dynamic_cast<kj::TlsPeerIdentity*>(connected.peerIdentity.get());
         if (peer == nullptr || !peer->hasCertificate())
-          kj::throwFatalException(KJ_EXCEPTION(DISCONNECTED, kLeft));
+          kj::throwFatalException(KJ_EXCEPTION(DISCONNECTED, kClosed));
         return connected;
       });
 }
@@ -113,18 +114,18 @@ std::string peerName(kj::PeerIdentity& peer) {
   auto* const tls = dynamic_cast<kj::TlsPeerIdentity*>(&peer);
   if (tls == nullptr || !tls->hasCertificate()) return {};
   std::string name;
-  static_cast<void>(kj::runCatchingExceptions([&] {  // there may be other names, and no common one
+  static_cast<void>(kj::runCatchingExceptions([&] {  // a certificate may have no common name
     const auto common = tls->getCommonName();
     name.assign(common.begin(), common.size());
   }));
   return name;
 }
 
-std::string tlsTrouble(const kj::Exception& error) {
+std::string tlsProblem(const kj::Exception& error) {
   const std::string said = error.getDescription().cStr();
-  const auto* const trouble = std::ranges::find_if(
-      kTroubles, [&](const Trouble& one) { return said.find(one.said) != std::string::npos; });
-  return trouble != kTroubles.end() ? std::string(trouble->means) : reasonOf(error);
+  const auto* const problem = std::ranges::find_if(
+      kProblems, [&](const Problem& one) { return said.find(one.reported) != std::string::npos; });
+  return problem != kProblems.end() ? std::string(problem->meaning) : reasonOf(error);
 }
 
 }  // namespace mpf::router

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Tls: TCP connections on which both sides have shown a certificate that one of our authorities
-// signed.
+// Tls: wraps TCP connections in TLS. Both sides must present a certificate that one of the
+// configured authorities has signed.
 //
-// TLS 1.3, so the client side has done its part before the server side has looked at its
-// certificate: a client that is refused is told by its first read, not by connect().
+// With TLS 1.3 the client side completes its handshake before the server side has checked the
+// client's certificate. A client that is refused sees this at its first read, not in connect().
 //
 // Threads  that of the event loop.
-// Crash    a connection outlives the Tls that made it: a reloaded configuration makes a new one,
-//          and what is connected stays.
-// Trust    whoever shows no certificate, one of another authority or an expired one, speaks
-//          something else or stops speaking, costs itself the connection. There are no revocation
-//          lists: replace the authority, or leave the name out of [[allow]].
+// Crash    a connection outlives the Tls that created it. A reload creates a new Tls, and existing
+//          connections continue.
+// Trust    a peer without a certificate, with a certificate that is expired or from another
+//          authority, or with invalid or incomplete data loses its connection. Revocation lists are
+//          not supported: replace the authority, or remove the name from [[allow]].
 #pragma once
 
 #include <chrono>
@@ -25,13 +25,13 @@ class Tls {
  public:
   //   timer      outlives this object
   //   handshake  longest time from the connection to the end of the handshake
-  //   throws     ConfigError that names the file and says what is wrong with it
+  //   throws     ConfigError that names the file and its error
   Tls(const TlsFiles& files, kj::Timer& timer, std::chrono::milliseconds handshake = kHandshake);
 
-  // The connection as TLS, once the handshake is over. The promise breaks when that fails;
-  // tlsTrouble() says why.
+  // Resolves with the TLS connection after the handshake. If the handshake fails, tlsProblem() of
+  // the exception says why.
   [[nodiscard]] kj::Promise<kj::AuthenticatedStream> accept(kj::AuthenticatedStream connection);
-  //   name  that the certificate of the other side must have: Remote::tlsName
+  //   name  the name that the certificate of the peer must have: Remote::tlsName
   [[nodiscard]] kj::Promise<kj::AuthenticatedStream> connect(kj::AuthenticatedStream connection,
                                                              const std::string& name);
 
@@ -46,10 +46,10 @@ class Tls {
   kj::TlsContext client_;
 };
 
-// The common name of the peer's certificate; empty when it has none, as on plain TCP.
+// The common name of the peer's certificate; empty when it has no common name, and on plain TCP.
 [[nodiscard]] std::string peerName(kj::PeerIdentity& peer);
 
-// Why a handshake failed, or the first read after it, as people read it.
-[[nodiscard]] std::string tlsTrouble(const kj::Exception& error);
+// Says in plain words why a handshake, or the first read after it, has failed.
+[[nodiscard]] std::string tlsProblem(const kj::Exception& error);
 
 }  // namespace mpf::router

@@ -10,9 +10,10 @@
 namespace mpf::router {
 namespace {
 
-constexpr auto kMoment = 500 * kj::MILLISECONDS;
+constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
 
-// What it sends does not matter any more. Unread, it would make the kernel take the farewell back.
+// Discards what the peer sends. If it stayed unread, the kernel would reset the connection, and the
+// peer might not receive the farewell.
 kj::Promise<void> readToEnd(kj::AsyncIoStream& caller) {
   constexpr std::size_t kReadBytes = 4096;
   auto room = kj::heapArray<kj::byte>(kReadBytes);
@@ -31,14 +32,14 @@ void TurnedAway::add(kj::Own<kj::AsyncIoStream> caller, FarewellCode code, const
   auto message = kj::heap<capnp::MallocMessageBuilder>();
   auto farewell = message->initRoot<wire::Frame>().initItems(1)[0].initFarewell();
   farewell.setCode(code);
-  farewell.setReason(forPeople(why));
+  farewell.setReason(displayText(why));
   auto& stream = *caller;
   auto& frame = *message;
-  auto told = kj::evalNow([&] { return capnp::writeMessage(stream, frame); }).then([&stream] {
+  auto sent = kj::evalNow([&] { return capnp::writeMessage(stream, frame); }).then([&stream] {
     stream.shutdownWrite();
     return readToEnd(stream);
   });
-  tasks_.add(timer_.timeoutAfter(kMoment, kj::mv(told))
+  tasks_.add(timer_.timeoutAfter(kFarewellTime, kj::mv(sent))
                  .attach(kj::defer([this] { --callers_; }), kj::mv(message), kj::mv(caller)));
 }
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// TurnedAway: callers that are told why they cannot stay, before their connection is closed.
+// TurnedAway: rejected connections. Each peer is sent a farewell with the reason before its
+// connection is closed.
 //
 // Threads  that of the event loop.
-// Trust    a caller that does not read is closed after a moment; of too many, the later ones are
-//          closed at once.
+// Trust    the connection of a peer that does not read is closed after a short time. When kMost
+//          connections wait for their farewell, further ones are closed at once.
 #pragma once
 
 #include <kj/async-io.h>
@@ -17,12 +18,12 @@ class TurnedAway final : private kj::TaskSet::ErrorHandler {
  public:
   explicit TurnedAway(kj::Timer& timer) : timer_(timer), tasks_(*this) {}
 
-  // Sends a farewell, and closes once the caller has closed.
+  // Sends a farewell, and closes the connection after the peer has closed it.
   void add(kj::Own<kj::AsyncIoStream> caller, FarewellCode code, const std::string& why);
 
  private:
   static constexpr unsigned kMost = 64;
-  void taskFailed(kj::Exception&&) override {}  // it has gone
+  void taskFailed(kj::Exception&&) override {}  // the connection is already closed
 
   kj::Timer& timer_;
   unsigned callers_ = 0;

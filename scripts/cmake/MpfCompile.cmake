@@ -1,11 +1,11 @@
-# How every target is compiled.
+# Compiler and linker settings of all targets.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
-# All programs stand in one place, where the demo, the tests and `make bench` find them.
+# All programs are in one folder, where the demo, the tests and `make bench` find them.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
 # Public headers are included as users do: <mpf/message.h>. All others are named from the root: "shm/link.h".
@@ -14,28 +14,34 @@ add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}" "SHELL:-iquote ${CMAKE_B
 add_library(mpf_warnings INTERFACE)
 target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Werror)
 
-# Optimising, g++ 12 takes "a" + std::string(...) for copies that may overlap (GCC bug 105651).
+# With optimisation, g++ 12 reports overlapping copies in "a" + std::string(...) (GCC bug 105651).
 target_compile_options(mpf_warnings INTERFACE $<$<CONFIG:Release>:-Wno-restrict>)
 
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang) # for fuzzing
   add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/scripts/kj_for_clang.h")
-  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations) # of what libstdc++ 12 itself uses
+  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations) # in libstdc++ 12 itself
 endif()
 
-set(MPF_SANITIZE "" CACHE STRING "Sanitizers, as -fsanitize= takes them: address,undefined or thread")
+set(MPF_SANITIZE "" CACHE STRING "Sanitizers, in the notation of -fsanitize=: address,undefined or thread")
 if(MPF_SANITIZE)
-  # -Og -g1: half the time to compile of -O1 -g, and the reports still name lines. g++ 12 takes what a sanitizer adds for uses of what may be uninitialised.
+  # -Og -g1 compiles in half the time of -O1 -g, and reports still contain line numbers. In the code
+  # that a sanitizer adds, g++ 12 warns of variables that may be uninitialised.
   add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -Og -g1 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-  if(MPF_SANITIZE MATCHES undefined) # what AddressSanitizer sees, too, or this processor does not mind: a fifth of the time to compile
+  # These checks cost a fifth of the compile time. AddressSanitizer detects the same errors, or the
+  # error is harmless on this processor.
+  if(MPF_SANITIZE MATCHES undefined)
     add_compile_options(-fno-sanitize=null,alignment,vptr,object-size)
   endif()
   add_link_options(-fsanitize=${MPF_SANITIZE})
 endif()
-if(MPF_SANITIZE STREQUAL thread) # g++ warns that ThreadSanitizer does not model std::atomic_thread_fence; the tests tell whether it matters
+# g++ warns that ThreadSanitizer does not model std::atomic_thread_fence; the tests show whether
+# this causes false reports.
+if(MPF_SANITIZE STREQUAL thread)
   target_compile_options(mpf_warnings INTERFACE -Wno-tsan)
 endif()
 
-# Each build links some fifty programs: what GNU ld needs a second for takes mold a moment. What is released is linked as everywhere.
+# Each build links some fifty programs. GNU ld needs a second for each, mold a fraction of that.
+# Release builds use the default linker.
 find_program(MPF_MOLD mold)
 if(MPF_MOLD AND CMAKE_BUILD_TYPE STREQUAL Debug AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CROSSCOMPILING)
   add_link_options(-fuse-ld=mold)

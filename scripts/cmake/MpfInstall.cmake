@@ -17,13 +17,15 @@ function(mpf_find_targets out folder type)
   set(${out} "${${out}}" PARENT_SCOPE)
 endfunction()
 
-# The libraries that other repositories link, as one archive libmpf.a: no link order to know, one name to write. Those of drivers/ are all public.
+# The public libraries, which other repositories link as one archive libmpf.a: one name, and no link
+# order to get right. All libraries of drivers/ are public.
 set(publicLibraries mpf_base mpf_schema mpf_shm mpf_message_link mpf_client mpf_server)
 if(drivers IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/drivers/CMakeLists.txt")
   mpf_find_targets(publicLibraries "${CMAKE_SOURCE_DIR}/drivers" STATIC_LIBRARY)
 endif()
 
-# What those may link from outside, and how a consumer finds it: target, find_package() arguments, pkg-config name ("-": none needed).
+# External libraries that the public libraries may link, and how a consumer finds them: target,
+# find_package() arguments, pkg-config name ("-": not needed).
 set(outsideTargets Threads::Threads Boost::headers CapnProto::capnp CapnProto::kj fmt::fmt spdlog::spdlog)
 set(outsidePackages Threads "Boost 1.74" CapnProto CapnProto fmt spdlog)
 set(outsideModules - - capnp kj fmt spdlog)
@@ -55,7 +57,7 @@ set(findDependencies "")
 foreach(link IN LISTS links)
   list(FIND outsideTargets "${link}" at)
   if(at LESS 0)
-    message(FATAL_ERROR "A public library links ${link}: say in scripts/cmake/MpfInstall.cmake how a consumer finds it")
+    message(FATAL_ERROR "A public library links ${link}, which is not in the table in scripts/cmake/MpfInstall.cmake: add it there")
   endif()
   list(GET outsidePackages ${at} package)
   list(GET outsideModules ${at} module)
@@ -122,7 +124,7 @@ if(MPF_BUILD_MAN_PAGES AND MPF_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
       COMMAND "${CMAKE_SOURCE_DIR}/scripts/cmake/make-man-page" $<TARGET_FILE:${program}> "${page}" "MPF ${PROJECT_VERSION}"
       COMMENT "Man page of ${program}" VERBATIM)
     list(APPEND pages "${page}")
-    install(DIRECTORY "${CMAKE_BINARY_DIR}/man/${name}.d/" DESTINATION ${CMAKE_INSTALL_MANDIR}/man1) # of its subcommands
+    install(DIRECTORY "${CMAKE_BINARY_DIR}/man/${name}.d/" DESTINATION ${CMAKE_INSTALL_MANDIR}/man1) # pages of its subcommands
   endforeach()
   add_custom_target(mpf_man_pages ALL DEPENDS ${pages})
   if(pages)

@@ -26,7 +26,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] Link& link() noexcept { return *link_; }
   [[nodiscard]] SpinLock& lock() noexcept { return *lock_; }
 
-  enum class Take { nothing, message, nonsense };
+  enum class Take { nothing, message, invalid };
   // Begins the next message: its envelope is copied and it counts as taken. `nothing` changes
   // nothing.
   Take tryBegin(Envelope& envelope) noexcept {
@@ -36,11 +36,11 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
     const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
     return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room)
                ? Take::message
-               : Take::nonsense;
+               : Take::invalid;
   }
   // `unavailable`: the memory of the body went with its owner, or cannot be had now. The message is
   // lost, and the link is sound.
-  enum class Finish { message, nonsense, unavailable };
+  enum class Finish { message, invalid, unavailable };
   // The body of the message begun into `message`, then done with its slots. `message` is empty when
   // there is none.
   [[nodiscard]] Finish tryFinish(const Envelope& envelope, Message& message) noexcept {
@@ -54,7 +54,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
       finish = readBody(envelope, message);
     }
     link_->end();
-    if (!message) return finish == Finish::message ? Finish::nonsense : finish;
+    if (!message) return finish == Finish::message ? Finish::invalid : finish;
     message.setClientType(envelope.clientType);
     message.setClientExtra(envelope.clientExtra);
     return finish;

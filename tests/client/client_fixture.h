@@ -91,7 +91,7 @@ class ClientTest : public testing::Test {
     return message;
   }
   // The sum over all windows of the backplane.
-  [[nodiscard]] std::uint64_t nonsenseRead() const {
+  [[nodiscard]] std::uint64_t protocolErrors() const {
     return sumOf(&layout::WindowControl::protocolErrors);
   }
   // A counter of all windows.

@@ -266,6 +266,31 @@ TEST_F(ClientTest, AWaitingThreadRunsADispatcherWhoseThreadHasEnded) {
   serving.join();
 }
 
+// The second thread probably gets the stack and the thread-local memory of the first one, which has
+// ended.
+TEST_F(ClientTest, AWaitingThreadDoesNotRunADispatcherWhoseSecondThreadIsAlive) {
+  auto& server = startServer();
+  std::thread serving([&] { server.run(); });
+  std::thread([&] { dispatcher_.runOnce(Deadline::after(1ms)); }).join();
+  std::binary_semaphore hasRun(0);
+  std::binary_semaphore mayEnd(0);
+  std::thread second([&] {
+    dispatcher_.runOnce(Deadline::after(1ms));
+    hasRun.release();
+    mayEnd.acquire();
+  });
+  hasRun.acquire();
+  client_.bind("device[0]/a");
+
+  EXPECT_FALSE(client_.connectWait(20ms));
+
+  mayEnd.release();
+  second.join();
+  EXPECT_TRUE(client_.connectWait(100s));
+  server.interrupt();
+  serving.join();
+}
+
 TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherGetsAnError) {
   startServer();
   std::binary_semaphore isInside(0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Choices: a fuzzer's input as a run of choices; zeros, and what stands behind its end, choose the
-// usual.
+// Choices: the input of a fuzzer as a sequence of choices. Zero bytes, and the bytes after the end
+// of the input, choose the usual case.
 //
 // Threads  one.
 #pragma once
@@ -15,13 +15,13 @@ class Choices {
   explicit Choices(std::span<const std::uint8_t> input) noexcept : input_(input) {}
 
   [[nodiscard]] bool isOver() const noexcept { return input_.empty(); }
-  // 0 to end - 1.
+  // A number from 0 to end - 1.
   std::uint64_t below(std::uint64_t end) noexcept {
     return take(end <= 256 ? 1 : end <= 65536 ? 2 : 8) % end;
   }
   bool oneIn(std::uint64_t n) noexcept { return below(n) == n - 1; }
   std::uint64_t bits() noexcept { return take(8); }
-  // Numbers of all magnitudes.
+  // A number of any magnitude, often next to a power of two.
   std::uint64_t nasty() noexcept {
     const auto byte = take(1);
     const auto power = std::uint64_t{1} << byte % 64;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A client attaches to a server that lies: its window, its hints, and then its half of the link.
-//   files: 0 server window, 1 its hints, 2 the link, once there is one
+// A client connects to a server whose window, hints and half of the link have invalid contents.
+//   files: 0 server window, 1 its hints, 2 the link, once it exists
 #include <optional>
 
 #include "shm/segment_name.h"
@@ -19,7 +19,7 @@ class Client {
   void turn(std::uint64_t value) try {
     if (!talk_) attach(value);
     else talk_->turn(value);
-  } catch (const std::exception&) {  // as a client's dispatcher does: that server is not for us
+  } catch (const std::exception&) {  // as a client's dispatcher does: it gives up this server
     talk_.reset();
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A client router, two clients that use servers through it, and a peer that sends anything.
+// A client router, two clients that use servers through it, and a peer that sends random items.
 #include <memory>
 #include <set>
 #include <vector>
@@ -15,11 +15,11 @@ namespace {
 
 constexpr std::int32_t kLocation = 1;
 
-// Every address leads to `connect`.
-class PretendedNetwork final : public kj::Network {
+// A network in which a connection to any address calls `connect`.
+class SimulatedNetwork final : public kj::Network {
  public:
   using Connect = std::function<kj::Promise<kj::Own<kj::AsyncIoStream>>()>;
-  explicit PretendedNetwork(Connect connect) : connect_(std::move(connect)) {}
+  explicit SimulatedNetwork(Connect connect) : connect_(std::move(connect)) {}
   kj::Promise<kj::Own<kj::NetworkAddress>> parseAddress(kj::StringPtr, kj::uint) override {
     return kj::Own<kj::NetworkAddress>(kj::heap<Address>(connect_));
   }
@@ -28,7 +28,7 @@ class PretendedNetwork final : public kj::Network {
   }
   kj::Own<kj::Network> restrictPeers(kj::ArrayPtr<const kj::StringPtr>,
                                      kj::ArrayPtr<const kj::StringPtr>) override {
-    return kj::heap<PretendedNetwork>(connect_);
+    return kj::heap<SimulatedNetwork>(connect_);
   }
 
  private:
@@ -36,7 +36,9 @@ class PretendedNetwork final : public kj::Network {
    public:
     explicit Address(Connect connect) : connect_(std::move(connect)) {}
     kj::Promise<kj::Own<kj::AsyncIoStream>> connect() override { return connect_(); }
-    kj::Own<kj::ConnectionReceiver> listen() override { KJ_UNIMPLEMENTED("nobody listens here"); }
+    kj::Own<kj::ConnectionReceiver> listen() override {
+      KJ_UNIMPLEMENTED("a client router does not listen");
+    }
     kj::Own<kj::NetworkAddress> clone() override { return kj::heap<Address>(connect_); }
     kj::String toString() override { return kj::str("127.0.0.1:1"); }
 
@@ -46,7 +48,7 @@ class PretendedNetwork final : public kj::Network {
   Connect connect_;
 };
 
-// A client and its requests: each has one end.
+// A client that checks that each of its requests ends once.
 class Local {
  public:
   explicit Local(Dispatcher& dispatcher)
@@ -117,7 +119,7 @@ class Play {
 
  private:
   kj::Promise<kj::Own<kj::AsyncIoStream>> connect() {
-    constexpr std::size_t kMost = 4;  // of an input
+    constexpr std::size_t kMost = 4;  // connections for one input
     if (ends_.size() == kMost) return kj::NEVER_DONE;
     auto pipe = makeConnection();
     ends_.push_back(std::make_unique<FarEnd>(kj::mv(pipe.ends[1]), items_));
@@ -147,7 +149,7 @@ class Play {
   RouterScene& scene_;
   Choices choices_;
   RandomItems<Choices> items_{choices_, Side::server};
-  PretendedNetwork network_{[this] { return connect(); }};
+  SimulatedNetwork network_{[this] { return connect(); }};
   router::Surroundings here_;
   Dispatcher dispatcher_;
   std::unique_ptr<Local> first_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whatever comes over a line, cut into frames, and all that is in them read. The input is what
-// comes, behind a byte that says in which parts.
+// Reads all fields of the frames in an input. The first byte of the input sets the size of the
+// parts in which the rest arrives.
 #include <algorithm>
 #include <capnp/message.h>
 #include <cstring>
@@ -26,24 +26,24 @@ void look(wire::Envelope::Reader envelope) {
 }
 
 void look(wire::Item::Reader item) {
-  using router::forPeople;
+  using router::displayText;
   switch (item.which()) {
     case wire::Item::GREETING:
-      static_cast<void>(forPeople(item.getGreeting().getRouter()));
-      static_cast<void>(forPeople(item.getGreeting().getProgram()));
+      static_cast<void>(displayText(item.getGreeting().getRouter()));
+      static_cast<void>(displayText(item.getGreeting().getProgram()));
       for ([[maybe_unused]] const auto location : item.getGreeting().getLocations()) {
       }
       return;
     case wire::Item::FAREWELL:
-      return static_cast<void>(forPeople(item.getFarewell().getReason()));
+      return static_cast<void>(displayText(item.getFarewell().getReason()));
     case wire::Item::BIND:
       return static_cast<void>(router::toStd(item.getBind().getServer()));
     case wire::Item::SERVER:
-      return static_cast<void>(forPeople(item.getServer().getReason()));
+      return static_cast<void>(displayText(item.getServer().getReason()));
     case wire::Item::REFUSE:
-      return static_cast<void>(forPeople(item.getRefuse().getReason()));
+      return static_cast<void>(displayText(item.getRefuse().getReason()));
     case wire::Item::FATE:
-      return static_cast<void>(forPeople(item.getFate().getReason()));
+      return static_cast<void>(displayText(item.getFate().getReason()));
     case wire::Item::REQUEST:
       return look(item.getRequest().getMessage());
     case wire::Item::REPLY:
@@ -69,9 +69,8 @@ void play(std::span<const std::uint8_t> input) try {
       for (const auto item : frame->getRoot<wire::Frame>().getItems()) look(item);
     }
   }
-} catch (
-    const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): it costs the peer its connection
-} catch (const kj::Exception&) {  // NOLINT(bugprone-empty-catch): likewise
+} catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): ends the connection
+} catch (const kj::Exception&) {       // NOLINT(bugprone-empty-catch): ends the connection
 }
 
 }  // namespace mpf::test

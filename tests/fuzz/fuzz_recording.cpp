@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf replay reads a file of any content. The input is the file.
+// Reads a recording as `mpf replay` does. The input is the content of the file.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -37,7 +37,7 @@ void play(std::span<const std::uint8_t> input) try {
   tools::RecordingReader reader(fmt::format("/proc/self/fd/{}", file.get()));
   while (reader.tryNext(take)) {
   }
-} catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): mpf replay says so
+} catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): mpf replay reports it
 }
 
 }  // namespace mpf::test

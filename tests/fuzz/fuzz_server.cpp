@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server attaches to the link of a client that lies.
+// A server accepts a client whose link, window, hints and pool have invalid contents.
 //   files: 0 link, 1 client window, 2 its hints, 3 the client's pool, 4 the server's hints
 #include <optional>
 
@@ -19,7 +19,7 @@ class Server {
   void turn(std::uint64_t value) try {
     if (!talk_) attach();
     if (talk_) talk_->turn(value);
-  } catch (const std::exception&) {  // as ServerCore::accept() does: not a link that we can use
+  } catch (const std::exception&) {  // as ServerCore::accept() does: it gives up this link
     talk_.reset();
   }
 
@@ -46,7 +46,7 @@ class Server {
 void play(std::span<const std::uint8_t> input) {
   static Scene scene;
   static HostileFiles files = [] {
-    scene.serverLink.reset();  // ours comes in its place
+    scene.serverLink.reset();  // Server::attach() replaces it
     return HostileFiles(
         scene.backplane,
         {scene.clientLink->link().name(), scene.clientName(), scene.hintsOf(scene.client),

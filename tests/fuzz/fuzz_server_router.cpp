@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server router, a server that its peer may use, and a peer that sends anything.
+// A server router, a server that its peer may use, and a peer that sends random items.
 #include <memory>
 
 #include <mpf/message_server.h>
@@ -61,7 +61,7 @@ class Play {
       server_ = std::make_unique<MessageServer>(scene_.backplane, "echo",
                                                 ServerOptions{.location = 0, .queueSize = 4});
   }
-  // What an honest server may do with each request.
+  // Does with each request something that a valid server may do.
   void serve() {
     constexpr int kMost = 16;
     for (int i = 0; server_ && i < kMost; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The tools look at the files of a server and a client that lie both: mpf inspect, ls, top and tap.
+// The tools mpf inspect, ls, top and tap read the invalid files of a server and a client.
 //   files: 0 link, 1 server window, 2 client window, 3 and 4 their hints, 5 and 6 the client's and
 //   the server's pool
 #include <memory>
@@ -17,9 +17,9 @@
 namespace mpf::test {
 namespace {
 
-class Onlooker {
+class Reader {
  public:
-  Onlooker(const Scene& scene, const HostileFiles& files) : scene_(scene), files_(files) {}
+  Reader(const Scene& scene, const HostileFiles& files) : scene_(scene), files_(files) {}
 
   void turn(std::uint64_t value) {
     const auto what = value % 16;
@@ -33,7 +33,8 @@ class Onlooker {
     const auto tree = tools::tryDissect(segments::path(files_.name(file)),
                                         {.last = value / 16 % 16, .raw = value / 256 % 8 == 7});
     if (tree) static_cast<void>(tools::outline(*tree));
-  } catch (const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool says so, and goes on
+  } catch (
+      const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool reports it and continues
   }
 
   void follow(std::uint64_t value) try {
@@ -48,7 +49,8 @@ class Onlooker {
     }
     static_cast<void>(follower_->missed());
     static_cast<void>(follower_->isOver());
-  } catch (const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool says so, and goes on
+  } catch (
+      const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool reports it and continues
   }
   const Scene& scene_;
   const HostileFiles& files_;
@@ -63,7 +65,7 @@ void play(std::span<const std::uint8_t> input) {
       scene.backplane, {scene.clientLink->link().name(), scene.serverName(), scene.clientName(),
                         scene.hintsOf(scene.server), scene.hintsOf(scene.client),
                         scene.bulkName(LinkSide::client), scene.bulkName(LinkSide::server)});
-  files.play(input, [] { return Onlooker(scene, files); });
+  files.play(input, [] { return Reader(scene, files); });
 }
 
 }  // namespace mpf::test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What each fuzzer is: a function of its own that plays one input (fuzzer.cpp hands it to
-// libFuzzer, or to replay.cpp).
+// The interface of each fuzzer: play() runs one input. fuzzer.cpp passes it to libFuzzer or to
+// replay.cpp.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace mpf::test {
 
-// Leaves nothing behind that the next input could see.
+// Leaves no state for the next input.
 void play(std::span<const std::uint8_t> input);
 
 }  // namespace mpf::test

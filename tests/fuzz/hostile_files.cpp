@@ -22,7 +22,7 @@
 namespace mpf::test {
 namespace {
 
-constexpr std::uint64_t kCheckEvery = 1024;  // inputs; a check takes as long as some tens of them
+constexpr std::uint64_t kCheckEvery = 1024;  // inputs; a check takes as long as tens of inputs
 
 std::vector<std::string> sortedNames(const Backplane& backplane) {
   auto names = backplane.segmentNames();
@@ -30,12 +30,12 @@ std::vector<std::string> sortedNames(const Backplane& backplane) {
   return names;
 }
 
-// Descriptors and mappings of segments that this process has. Others are none of ours: the
-// sanitizer has its own.
+// The number of descriptors and mappings of segments in this process. Others are not counted,
+// because the sanitizer has some of its own.
 std::size_t segmentsInUse() {
   std::size_t used = Usage::of(::getpid()).segments;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    std::error_code gone;  // the directory itself
+    std::error_code gone;  // for the descriptor of the directory itself
     used += std::filesystem::read_symlink(entry, gone).string().starts_with("/dev/shm") ? 1 : 0;
   }
   return used;
@@ -51,8 +51,8 @@ std::vector<std::byte> contentOf(int file) {
 
 }  // namespace
 
-// Removes what runs left that crashed. Files of a run that goes on, beside this one, say anything,
-// also that their owners are dead.
+// Removes the backplanes of crashed runs. The files of a run that is still active may have any
+// content, even an owner that is dead, so the process id in the name decides.
 Backplane fuzzBackplane() {
   constexpr std::string_view kPrefix = "fuzz-";
   for (const auto& name : Backplane::names()) {
@@ -76,23 +76,24 @@ void HostileFiles::add(const std::string& name) {
   files_.push_back({name, std::move(file), std::move(content)});
 }
 
-void HostileFiles::deceive(std::span<const std::uint8_t> input,
-                           const std::function<void(std::uint64_t)>& turn) {
-  for (; input.size() >= Deed::kBytes; input = input.subspan(Deed::kBytes)) {
-    const Deed deed(input.first<Deed::kBytes>());
-    if (deed.what == Deed::What::turn) turn(deed.value);
-    else act(deed);
+void HostileFiles::applyInput(std::span<const std::uint8_t> input,
+                              const std::function<void(std::uint64_t)>& turn) {
+  for (; input.size() >= Operation::kBytes; input = input.subspan(Operation::kBytes)) {
+    const Operation operation(input.first<Operation::kBytes>());
+    if (operation.what == Operation::What::turn) turn(operation.value);
+    else apply(operation);
   }
   turn(0);
 }
 
-void HostileFiles::act(const Deed& deed) {
+void HostileFiles::apply(const Operation& operation) {
   constexpr std::array<std::size_t, 4> kWidths{8, 4, 1, 1};
-  const auto& [name, file, before] = files_[deed.file % files_.size()];
-  const auto width = kWidths[static_cast<std::size_t>(deed.what)];
-  const auto offset = static_cast<off_t>(deed.at * width % before.size());
-  if (deed.what == Deed::What::cut) checkCall(::ftruncate(file.get(), offset), "cut a file");
-  else checkCall(::pwrite(file.get(), &deed.value, width, offset), "write to a file");
+  const auto& [name, file, before] = files_[operation.file % files_.size()];
+  const auto width = kWidths[static_cast<std::size_t>(operation.what)];
+  const auto offset = static_cast<off_t>(operation.at * width % before.size());
+  if (operation.what == Operation::What::cut)
+    checkCall(::ftruncate(file.get(), offset), "cut a file");
+  else checkCall(::pwrite(file.get(), &operation.value, width, offset), "write to a file");
 }
 
 void HostileFiles::restore() {

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Hostile files: a fuzzer's input, done to the files of a system that was legal, while somebody
-// looks at them.
+// HostileFiles: applies the input of a fuzzer to the files of a valid system, while the code under
+// test (the victim) uses them.
 //
-//   input = | what | file | at | value | what | file | at | value | ...     a deed is 12 bytes: u8,
-//   u8, u16, u64
-//   what    0 write `value` over the word number `at`, 1 its lower half over a half, 2 its lowest
-//           byte over a byte; 3 cut the file before byte `at`; 4 the victim's turn
-//           modulo 5, places modulo what there is
+//   input = | what | file | at | value | what | file | at | value | ...
 //
-// So the fuzzer starts behind magic numbers and lengths that fit, and needs few bytes to lie about
-// one of them.
+// An operation has 12 bytes: what (u8), file (u8), at (u16) and value (u64). Files and offsets are
+// taken modulo their number and size, and `what` modulo 5:
+//   0  writes `value` to word number `at`
+//   1  writes the lower half of `value` to half word number `at`
+//   2  writes the lowest byte of `value` to byte `at`
+//   3  truncates the file to `at` bytes
+//   4  runs a turn of the victim
+//
+// So the fuzzer starts with valid magic numbers and lengths, and changes one of them with a few
+// bytes.
 //
 // Threads  one.
-// Crash    what a fuzzer that crashed has left, the next one removes.
-// Trust    none: any input will do.
+// Crash    the next fuzzer removes the files that a crashed fuzzer has left.
+// Trust    any input is allowed.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +32,11 @@
 
 namespace mpf::test {
 
-struct Deed {
+struct Operation {
   enum class What : std::uint8_t { word, half, byte, cut, turn };
   static constexpr std::size_t kBytes = 12;
 
-  explicit Deed(std::span<const std::uint8_t, kBytes> bytes) noexcept
+  explicit Operation(std::span<const std::uint8_t, kBytes> bytes) noexcept
       : what(static_cast<What>(bytes[0] % 5)), file(bytes[1]) {
     std::memcpy(&at, &bytes[2], sizeof at);
     std::memcpy(&value, &bytes[4], sizeof value);
@@ -43,25 +47,25 @@ struct Deed {
   std::uint64_t value = 0;
 };
 
-// A backplane for one fuzzer, on which those before it leave nothing.
+// Creates a backplane for this fuzzer, and removes those of crashed fuzzers.
 Backplane fuzzBackplane();
 
 class HostileFiles {
  public:
-  // Inputs name files by their place in `names`.
+  // Inputs name a file by its index in `names`.
   HostileFiles(const Backplane& backplane, const std::vector<std::string>& names);
 
-  // Plays an input with a victim of its own, which makeVictim() returns. It has a turn(value)
-  // wherever the input says so, and one more at the end. Afterwards all files are as they were.
+  // Plays an input with a victim that makeVictim() returns. Calls its turn(value) for each
+  // operation 4, and once more at the end. Then restores all files.
   template <class MakeVictim>
   void play(std::span<const std::uint8_t> input, MakeVictim makeVictim) {
     {
       auto victim = makeVictim();
-      deceive(input, [&](std::uint64_t value) { victim.turn(value); });
+      applyInput(input, [&](std::uint64_t value) { victim.turn(value); });
     }
     restore();
   }
-  // A file that came while the input was played; deeds reach it like the others.
+  // Adds a file that was created while the input is played; later operations apply to it, too.
   void add(const std::string& name);
   [[nodiscard]] const std::string& name(std::size_t file) const {
     return files_[file % files_.size()].name;
@@ -74,18 +78,19 @@ class HostileFiles {
     FileDescriptor file;
     std::vector<std::byte> before;
   };
-  void deceive(std::span<const std::uint8_t> input, const std::function<void(std::uint64_t)>& turn);
-  // The victim has let go of everything: when it has not, that is the end.
+  void applyInput(std::span<const std::uint8_t> input,
+                  const std::function<void(std::uint64_t)>& turn);
+  // Aborts when the victim has left a file, a descriptor or a mapping.
   void restore();
-  void act(const Deed& deed);
+  void apply(const Operation& operation);
   void checkNothingLeft();
 
   Backplane backplane_;
   std::vector<File> files_;
-  std::size_t lasting_;  // those of the start
+  std::size_t lasting_;  // the number of files at the start
   std::uint64_t runs_ = 0;
-  std::vector<std::string> names_;  // between two inputs: on the backplane, sorted
-  std::size_t used_ = 0;  // segments open or mapped in this process
+  std::vector<std::string> names_;  // sorted names on the backplane between two inputs
+  std::size_t used_ = 0;  // segments that are open or mapped in this process
 };
 
 }  // namespace mpf::test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// replay FOLDER MUTATIONS: each file of the folder as an input, and so many inputs that differ a
-// little from it. MPF_TEST_SEED repeats them.
+// replay FOLDER MUTATIONS: runs each file of the folder as an input, and so many mutations of it.
+// MPF_TEST_SEED repeats the mutations of an earlier run.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -21,7 +21,7 @@ namespace {
 
 using Input = std::vector<std::uint8_t>;
 
-constexpr std::size_t kBlock = 12;  // as long as a deed (hostile_files.h)
+constexpr std::size_t kBlock = 12;  // the size of an operation (hostile_files.h)
 
 std::vector<std::filesystem::path> filesOf(const char* folder) {
   std::vector<std::filesystem::path> files;
@@ -50,7 +50,7 @@ void mutateOnce(Input& input, Random& random) {
     case 1:
       put(input, block + 4, random.nasty(), 8);
       break;
-    case 2:  // a block twice
+    case 2:  // insert a copy of the last block
       input.insert(input.begin() + static_cast<std::ptrdiff_t>(block), kBlock, 0);
       std::copy_n(input.end() - kBlock, kBlock, input.begin() + static_cast<std::ptrdiff_t>(block));
       break;
@@ -68,7 +68,7 @@ void feed(const Input& input) {
 
 void replay(const std::filesystem::path& file, int mutations, Random& random) {
   const Watchdog watchdog(file.string());
-  // the last line names what an input that crashes came from
+  // After a crash, the last line names the file.
   std::cout << file.filename().string() << std::endl;
   const auto input = contentOf(file);
   feed(input);

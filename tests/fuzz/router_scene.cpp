@@ -17,7 +17,7 @@ router::RouterConfig configOf(const Backplane& backplane) {
   config.name = "fuzz";
   config.backplane = backplane.name();
   config.serve = {{.location = 1, .local = 0}};
-  config.limits.deadTime = std::chrono::minutes(10);  // nobody waits here
+  config.limits.deadTime = std::chrono::minutes(10);  // no test waits for it
   config.limits.maxClients = 8;
   config.limits.windowBytes = 4096;
   config.limits.maxMessageBytes = 1u << 16;
@@ -25,10 +25,10 @@ router::RouterConfig configOf(const Backplane& backplane) {
   return config;
 }
 
-// One end of a pipe, as if it were a socket.
-class PretendedSocket final : public kj::AsyncIoStream {
+// One end of a pipe that accepts socket options.
+class SimulatedSocket final : public kj::AsyncIoStream {
  public:
-  explicit PretendedSocket(kj::Own<kj::AsyncIoStream> pipe) : pipe_(kj::mv(pipe)) {}
+  explicit SimulatedSocket(kj::Own<kj::AsyncIoStream> pipe) : pipe_(kj::mv(pipe)) {}
   kj::Promise<std::size_t> tryRead(void* buffer, std::size_t least, std::size_t most) override {
     return pipe_->tryRead(buffer, least, most);
   }
@@ -70,7 +70,7 @@ RouterScene::RouterScene()
 
 kj::TwoWayPipe makeConnection() {
   auto pipe = kj::newTwoWayPipe();
-  pipe.ends[0] = kj::heap<PretendedSocket>(kj::mv(pipe.ends[0]));
+  pipe.ends[0] = kj::heap<SimulatedSocket>(kj::mv(pipe.ends[0]));
   return pipe;
 }
 
@@ -94,13 +94,13 @@ void FarEnd::send(Bytes bytes) {
 
 void FarEnd::setReading(bool reads) {
   reading_ = reads;
-  if (reading_ && readOn_) std::exchange(readOn_, nullptr)->fulfill();
+  if (reading_ && resumeReading_) std::exchange(resumeReading_, nullptr)->fulfill();
 }
 
 kj::Promise<void> FarEnd::readLoop() {
   if (!reading_) {
     auto paf = kj::newPromiseAndFulfiller<void>();
-    readOn_ = kj::mv(paf.fulfiller);
+    resumeReading_ = kj::mv(paf.fulfiller);
     return paf.promise.then([this] { return readLoop(); });
   }
   auto room = reader_.room();
@@ -113,7 +113,7 @@ kj::Promise<void> FarEnd::readLoop() {
             for (const auto item : frame->getRoot<wire::Frame>().getItems()) note(item);
           }
         } catch (...) {
-          check(false, "sent a frame that is none");
+          check(false, "sent an invalid frame");
         }
         if (over_) return kj::READY_NOW;
         return readLoop();
@@ -123,16 +123,16 @@ kj::Promise<void> FarEnd::readLoop() {
 void FarEnd::note(wire::Item::Reader item) {
   items_.learn(item);
   const auto ended = [&](std::uint32_t client, std::uint32_t id) {
-    if (knowsWhatItSent_) check(asked_[{client, id}]-- > 0, "ended a request that had no end due");
+    if (sentIsValid_) check(asked_[{client, id}]-- > 0, "ended a request that was not pending");
   };
   if (item.isReply() && item.getReply().getIsFirst())
     ended(item.getReply().getClient(), item.getReply().getRequestId());
   if (item.isFate()) ended(item.getFate().getClient(), item.getFate().getRequestId());
 }
 
-// As the router reads it.
+// Reads the sent bytes as the router does, and counts the requests in them.
 void FarEnd::noteSent(const Bytes& bytes) try {
-  for (std::span<const std::uint8_t> rest = bytes; knowsWhatItSent_ && !rest.empty();) {
+  for (std::span<const std::uint8_t> rest = bytes; sentIsValid_ && !rest.empty();) {
     auto room = sent_.room();
     const auto part = rest.first(std::min(room.size(), rest.size()));
     std::ranges::copy(part, room.begin());
@@ -145,8 +145,8 @@ void FarEnd::noteSent(const Bytes& bytes) try {
       }
     }
   }
-} catch (...) {  // none of it is a frame any more
-  knowsWhatItSent_ = false;
+} catch (...) {  // the rest is no longer a sequence of frames
+  sentIsValid_ = false;
 }
 
 }  // namespace mpf::test

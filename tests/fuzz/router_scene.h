@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// RouterScene: what a router's parts work with, in memory as far as it goes. FarEnd: the peer of
+// RouterScene: the environment of a router's parts, in memory where possible. FarEnd: the peer of
 // one line.
 //
 // Threads  one, with its event loop.
@@ -12,6 +12,7 @@
 
 #include "router/surroundings.h"
 #include "router/transport/frame_reader.h"
+#include "shm/watcher.h"
 #include "tests/fuzz/choices.h"
 #include "tests/router/rogue/random_items.h"
 
@@ -22,35 +23,36 @@ struct RouterScene {
   ~RouterScene() { backplane.watcher().forget(names); }
   RouterScene(const RouterScene&) = delete;
   RouterScene& operator=(const RouterScene&) = delete;
-  // All that can happen now has happened.
+  // Runs the event loop until no task is ready.
   void settle() { io.waitScope.poll(); }
 
   kj::AsyncIoContext io = kj::setupAsyncIo();
   Backplane backplane;
   router::Statistics statistics;
-  std::function<void()> onServers = [] {};  // called when they may have come or gone
+  std::function<void()> onServers = [] {};  // called when servers may have started or ended
   router::Presences presences{backplane, io.unixEventPort, [this] { onServers(); }};
   router::Surroundings here;
-  // Somebody always watches: to begin and end that takes the kernel longer than all the rest of an
+  // Keeps the watch open, because starting and ending a watch takes longer than the rest of an
   // input.
   Watcher::Token names = backplane.watcher().watchNames(NameKind::pendingBind, [] {});
 };
 
-// The two ends of a connection: one for the router, whose options can be set, and one for its peer.
+// Makes the two ends of a connection: ends[0] for the router, which accepts socket options, and
+// ends[1] for its peer.
 kj::TwoWayPipe makeConnection();
 
-// Sends what it is told, and reads what comes: each frame must be sound, and each request have one
-// end.
+// Sends frames, and checks what the router sends: each frame must be valid, and each request must
+// end once.
 class FarEnd {
  public:
   FarEnd(kj::Own<kj::AsyncIoStream> stream, RandomItems<Choices>& items);
 
-  // One of the input's frames.
+  // Sends a frame that the input chooses.
   void send();
-  // Other bytes, behind those that have not gone yet.
+  // Sends `bytes` after those that still wait.
   void send(Bytes bytes);
   void setReading(bool reads);
-  // The router has closed.
+  // Whether the router has closed the connection.
   [[nodiscard]] bool isOver() const noexcept { return over_; }
 
  private:
@@ -62,12 +64,12 @@ class FarEnd {
   RandomItems<Choices>& items_;
   router::FrameReader reader_;
   router::FrameReader sent_;
-  // requests of a client and id that had no end
+  // The number of pending requests of a client and id.
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> asked_;
-  bool knowsWhatItSent_ = true;
+  bool sentIsValid_ = true;
   bool over_ = false;
   bool reading_ = true;
-  kj::Own<kj::PromiseFulfiller<void>> readOn_;
+  kj::Own<kj::PromiseFulfiller<void>> resumeReading_;
   kj::Promise<void> writes_ = kj::READY_NOW;
   kj::Promise<void> reads_ = nullptr;
 };

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Scene: a server and a client with a link, as the code makes them, and some requests and replies
-// of every form under way.
+// Scene: a valid server and client with a link, and with pending requests and replies of every
+// form.
 //
-//   requests ring: in one slot, in three, in a chunk        replies ring: in one slot, in a chunk
+//   request ring: in one slot, in three slots, in a chunk     reply ring: in one slot, in a chunk
 //
-// Small, so that a fuzzer restores it in microseconds.
+// The files are small, so that a fuzzer restores them in microseconds.
 #pragma once
 
 #include <memory>
@@ -21,11 +21,11 @@ struct Scene {
   Scene();
 
   [[nodiscard]] const std::string& backplaneName() const noexcept { return backplane.name(); }
-  // Names of a window's files.
+  // Names of segments.
   [[nodiscard]] std::string serverName() const;
   [[nodiscard]] std::string clientName() const;
   [[nodiscard]] std::string hintsOf(const OwnWindow& window) const;
-  // The first segment of a pool.
+  // The first segment of a side's pool.
   [[nodiscard]] std::string bulkName(LinkSide side) const;
 
   Backplane backplane;

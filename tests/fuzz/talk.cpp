@@ -14,7 +14,7 @@
 namespace mpf::test {
 namespace {
 
-// What the last page of a link has behind its rings: nobody has business there.
+// The rest of the last page of a link, after its rings. No code may access it.
 std::span<const std::byte> behind(Link& link) {
   const auto* begin =
       reinterpret_cast<const std::byte*>(&link.control()) - layout::kLinkControlOffset;
@@ -43,13 +43,13 @@ void lookAt(const Message& message) {
 
 Talk::Talk(std::unique_ptr<Link> link)
     : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<SpinLock>())) {
-  [[maybe_unused]] const auto nobodys = behind(channel_->link());
-  ASAN_POISON_MEMORY_REGION(nobodys.data(), nobodys.size());
+  [[maybe_unused]] const auto unused = behind(channel_->link());
+  ASAN_POISON_MEMORY_REGION(unused.data(), unused.size());
 }
 
 Talk::~Talk() {
-  [[maybe_unused]] const auto nobodys = behind(channel_->link());
-  ASAN_UNPOISON_MEMORY_REGION(nobodys.data(), nobodys.size());
+  [[maybe_unused]] const auto unused = behind(channel_->link());
+  ASAN_UNPOISON_MEMORY_REGION(unused.data(), unused.size());
 }
 
 void Talk::turn(std::uint64_t value) {
@@ -66,7 +66,7 @@ void Talk::turn(std::uint64_t value) {
   link.notifyPeer();
 }
 
-// False: there is none, or nonsense, which ends the talk.
+// Returns false when no message waits, or when invalid data ends the talk.
 bool Talk::tryTakeOne(std::uint64_t choice) {
   Envelope envelope;
   const auto take = channel_->tryBegin(envelope);
@@ -76,7 +76,7 @@ bool Talk::tryTakeOne(std::uint64_t choice) {
     return true;
   }
   Message message;
-  isOver_ = take == MessageLink::Take::nonsense ||
+  isOver_ = take == MessageLink::Take::invalid ||
             channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
   if (isOver_) return false;
   lookAt(message);

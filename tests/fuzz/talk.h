@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Talk: what an honest program does with its end of a link, whatever the other end writes.
+// Talk: uses one end of a link as a valid program does, whatever the other end writes.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 namespace mpf::test {
 
-// Sends an array, built in the link's pool when it is long.
+// Sends an array; a long one is built in the pool of the link.
 LinkSend sendArray(MessageLink& link, std::uint32_t requestId, std::size_t bytes);
-// Looks at all of a message that a program might: as text, as JSON, on the wire.
+// Reads all of a message: converts it to text, to JSON and to the wire format.
 void lookAt(const Message& message);
 
 class Talk {
@@ -21,7 +21,8 @@ class Talk {
   Talk(const Talk&) = delete;
   Talk& operator=(const Talk&) = delete;
 
-  // Takes some messages, sends some back, sends one of its own. `value` chooses how.
+  // Receives some messages, returns some as replies, and sends a message. `value` chooses the
+  // details.
   void turn(std::uint64_t value);
 
  private:
@@ -29,7 +30,7 @@ class Talk {
   void sendBack(Envelope envelope, Message& message);
 
   std::shared_ptr<MessageLink> channel_;
-  Message kept_;  // a body that is given back late
+  Message kept_;  // its body is released late
   bool isOver_ = false;
 };
 

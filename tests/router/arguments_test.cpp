@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The command line of mpf-router: a file, or options in its place, and options that go before a
+// The command line of mpf-router: a file, options that replace a file, and options that override a
 // file.
 #include "router/arguments.h"
 
@@ -40,7 +40,7 @@ class ArgumentsTest : public ConfigTest {
   std::unique_ptr<RouterArguments> arguments_;
 };
 
-TEST_F(ArgumentsTest, MakeASimpleServerRouter) {
+TEST_F(ArgumentsTest, ConfigureASimpleServerRouter) {
   const auto started = start({"--serve", "1=0", "--serve", "3", "--listen", "127.0.0.1:9900",
                               "--listen", "[::1]:9900", "--plain"});
 
@@ -51,7 +51,7 @@ TEST_F(ArgumentsTest, MakeASimpleServerRouter) {
   EXPECT_EQ(config().limits, Limits());
 }
 
-TEST_F(ArgumentsTest, MakeASimpleClientRouter) {
+TEST_F(ArgumentsTest, ConfigureASimpleClientRouter) {
   const auto tls = Certificates(folder_, "lab").files("ioc1");
 
   const auto started = start({"--remote",
@@ -92,7 +92,7 @@ TEST_F(ArgumentsTest, MakeASimpleClientRouter) {
   EXPECT_EQ(config().limits.deadTime, 5s);
 }
 
-TEST_F(ArgumentsTest, GoBeforeWhatAFileSays) {
+TEST_F(ArgumentsTest, OverrideTheFile) {
   const auto file = folder_.write(
       "r.toml",
       "name = \"file\"\nbackplane = \"file\"\n[limits]\nqueue-size = 7\nmax-clients = 8\n"
@@ -107,28 +107,28 @@ TEST_F(ArgumentsTest, GoBeforeWhatAFileSays) {
   EXPECT_EQ(config().limits.maxClients, 8U);
 }
 
-TEST_F(ArgumentsTest, StillHoldWhenTheFileIsLoadedAnew) {
+TEST_F(ArgumentsTest, OverrideTheFileAgainAfterAReload) {
   const std::string remote = "[[remote]]\nlocations = 1\naddress = \"a:1\"\nsecurity = \"plain\"\n";
   const auto file = folder_.write("r.toml", remote);
   ASSERT_EQ(start({file, "--name", "option"}).status, std::nullopt);
   folder_.write("r.toml", "name = \"file\"\nbackplane = \"changed\"\n" + remote);
 
-  const auto changed = arguments_->load();
+  const auto changed = arguments_->loadConfig();
 
   EXPECT_EQ(changed.name, "option");
   EXPECT_EQ(changed.backplane, "changed");
-  EXPECT_EQ(config().backplane, "") << "what was loaded stays";
+  EXPECT_EQ(config().backplane, "") << "the loaded configuration does not change";
   folder_.write("r.toml", "nam = 1\n" + remote);
-  EXPECT_THROW(static_cast<void>(arguments_->load()), ConfigError);
+  EXPECT_THROW(static_cast<void>(arguments_->loadConfig()), ConfigError);
 }
 
-TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
+TEST_F(ArgumentsTest, AreNamedInErrors) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
       {{},
-       "nothing to do: write --serve and --listen for servers of this host that clients elsewhere "
-       "use, or --remote for servers elsewhere "
-       "that clients of this host use"},
-      {{"--serve", "1"}, "--serve 1: what is served cannot be reached: write --listen, too"},
+       "nothing to do: write --serve and --listen to offer servers of this host to other hosts, or "
+       "--remote to reach servers of other hosts"},
+      {{"--serve", "1"},
+       "--serve 1: no client can reach the served locations; write --listen, too"},
       {{"--serve", "one"}, "--serve: \"one\" is not a location: write an integer"},
       {{"--serve", "1="}, "--serve: \"\" is not a location: write an integer"},
       {{"--remote", "ioc1:9900"}, "--remote: \"ioc1:9900\": write LOCATION[,LOCATION]=HOST:PORT"},
@@ -137,27 +137,24 @@ TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
        "--remote: \"ioc1\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, "
        "[fd00::7]:9900 or, to listen, *:9900"},
       {{"--remote", "1=a:1", "--remote", "1=b:1", "--plain"},
-       "--remote 1=b:1: location 1 is reached twice; write it once"},
+       "--remote 1=b:1: location 1 appears twice in remotes; write it once"},
       {{"--remote", "1=a:1"},
        "--remote 1=a:1: TLS needs --tls-certificate, --tls-key and --tls-authorities; or add "
        "--plain"},
       {{"--remote", "1=10.0.0.7:1"},
-       "--remote 1=10.0.0.7:1: 10.0.0.7 is no name that a certificate can have; write --tls-name, "
-       "too: the name in the certificate of the "
-       "router there"},
+       "--remote 1=10.0.0.7:1: 10.0.0.7 is an IP address, and a certificate has a name; write "
+       "--tls-name, too: the name in the certificate of that router"},
       {{"--remote", "1=a:1", "--remote", "2=b:1", "--tls-name", "x"},
-       "--tls-name: it is that of one --remote; a file can name more"},
+       "--tls-name: it applies to a single --remote; for several, write a configuration file"},
       {{"--serve", "1", "--listen", "*:1", "--plain"},
        "--listen *:1: plain TCP at *:1, which is every network of this host: use TLS, or a "
-       "loopback, private or link-local address, or "
-       "write "
-       "--allow-public-plain"},
+       "loopback, private or link-local address, or write --allow-public-plain"},
       {{"--queue-size", "0"}, "--queue-size: 0 is out of range: use 1 to 1000000"},
       {{"--dead-time", "2"},
        "--dead-time: \"2\": write a time with its unit, such as 500ms, 2s or 1min"},
       {{"--mode", "7"}, "--mode: 7: use an octal number between 0600 and 0666, such as 0660"},
       {{"--group", "no-such-group"}, "--group: no-such-group: there is no group of this name"},
-      {{"--group", "root"}, "--group: a group that mode does not let in: write mode 0660, too"},
+      {{"--group", "root"}, "--group: the mode gives this group no access; write mode 0660, too"},
       {{"--remote", "1=a:1", "--plain", "--log-level", "loud"},
        "--log-level: log-level \"loud\": use trace, debug, info, warning, error, critical, off"},
       {{"--remote", "1=a:1", "--plain", "--backplane", "a.b"},
@@ -175,23 +172,24 @@ TEST_F(ArgumentsTest, ThatAreWrongAreNamed) {
   }
 }
 
-TEST_F(ArgumentsTest, AFileThatIsWrongIsNamedWithItsLine) {
+TEST_F(ArgumentsTest, ErrorsOfAFileNameItsLine) {
   const auto started = start({folder_.write("r.toml", "\nnam = \"a\"\n")});
 
   EXPECT_EQ(started.status, 2);
-  EXPECT_EQ(started.err, "mpf-router: r.toml:2: there is no key \"nam\"; did you mean \"name\"?\n");
+  EXPECT_EQ(started.err, "mpf-router: r.toml:2: unknown key \"nam\"; did you mean \"name\"?\n");
 }
 
-TEST_F(ArgumentsTest, SomeStandInPlaceOfAFile) {
+TEST_F(ArgumentsTest, SomeCannotBeCombinedWithAFile) {
   for (const auto& words : std::vector<std::vector<std::string>>{
            {"--serve", "1", "r.toml"}, {"--plain", "r.toml"}, {"r.toml", "--tls-name", "a"}}) {
     const auto& option = words[0] == "r.toml" ? words[1] : words[0];
     EXPECT_EQ(start(words).err,
-              "mpf-router: " + option + ": it stands in place of a file; write it into r.toml\n");
+              "mpf-router: " + option +
+                  ": it cannot be combined with a configuration file; write it into r.toml\n");
   }
 }
 
-TEST_F(ArgumentsTest, CheckSaysWhatAConfigurationMeans) {
+TEST_F(ArgumentsTest, CheckDescribesTheConfiguration) {
   const auto tls = Certificates(folder_, "lab").files("ioc1");
   const auto file = folder_.write(
       "r.toml", "name = \"ioc1\"\nbackplane = \"b\"\nmode = \"0666\"\n[tls]\ncertificate = \"" +

@@ -10,7 +10,7 @@
 namespace mpf::router::test {
 namespace {
 
-// `openssl ca` is the one that takes dates.
+// A configuration for `openssl ca`, the only command that accepts dates.
 std::string authorityConfig(const std::string& folder, const std::string& authority) {
   return "[ca]\ndefault_ca=it\n[it]\ndatabase=" + folder + "/" + authority +
          ".index\nnew_certs_dir=" + folder +

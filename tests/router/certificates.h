@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Certificates: an authority of the test's own, and what it signs, made by the command `openssl` in
-// the test's folder.
+// Certificates: an authority of the test, and certificates that it signs. The command `openssl`
+// makes them in the folder of the test.
 //
 //   const Certificates ours(folder, "ours");
-//   Tls tls(ours.files("ioc1"), timer);       // certificate of ioc1, its key, and whom it trusts
+//   Tls tls(ours.files("ioc1"), timer);       // certificate and key of ioc1, and its authorities
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ enum class Valid { now, notAnyMore, notYet };
 
 class Certificates {
  public:
-  // The authority's own name and that of its files.
+  // `authority` is the common name of the authority and the name of its files.
   Certificates(const mpf::test::TemporaryFolder& folder, std::string authority);
 
   // A certificate and a key whose common name and only host name is `name`.
@@ -32,7 +32,7 @@ class Certificates {
   std::string authorities_;
 };
 
-// Runs `openssl`; throws what it said when it did not do it.
+// Runs `openssl`; throws std::runtime_error with its output when it fails.
 void openssl(std::vector<std::string> arguments);
 
 }  // namespace mpf::router::test

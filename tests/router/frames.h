@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames: bytes as routers send them, made by hand.
+// Frames: builds frames as routers send them.
 //
 // Threads  any.
 #pragma once
@@ -25,7 +25,8 @@ inline Bytes bytesOf(capnp::MessageBuilder& message) {
   return {bytes.begin(), bytes.end()};
 }
 
-// A frame of these items. `segmentWords`: of its first segment, when it shall have many.
+// Builds a frame of these items. `segmentWords`: the size of each segment, for a frame of several
+// segments.
 inline Bytes frameOf(const std::vector<Fill>& items,
                      capnp::uint segmentWords = capnp::SUGGESTED_FIRST_SEGMENT_WORDS) {
   capnp::MallocMessageBuilder message(segmentWords,
@@ -41,7 +42,7 @@ inline Fill ping(std::uint64_t stamp) {
   return [stamp](wire::Item::Builder item) { item.initPing().setStamp(stamp); };
 }
 
-// What MPF's own router says first; change it at will.
+// The greeting of MPF's own router; `change` may modify it.
 inline Fill greeting(const std::function<void(wire::Greeting::Builder)>& change = [](auto) {}) {
   return [change](wire::Item::Builder item) {
     auto greeting = item.initGreeting();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// HeldNetwork: a network that looks up no name until the test says what it stands for, in which
-// order it likes.
+// HeldNetwork: a network whose name look-ups end only when the test fulfills or rejects them, in
+// any order.
 //
 //   HeldIo io;
 //   Router router(io.context(), config, log);
@@ -21,7 +21,7 @@ namespace mpf::router::test {
 using FoundAddress = kj::Own<kj::NetworkAddress>;
 
 #pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // of kj; a kj::Own knows what it owns
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // kj::Own destroys the dynamic type
 class HeldNetwork final : public kj::Network {
  public:
   explicit HeldNetwork(kj::Network& real) : real_(real) {}
@@ -39,8 +39,7 @@ class HeldNetwork final : public kj::Network {
     return real_.restrictPeers(allow, deny);
   }
 
-  // In the order in which they were asked for. One that nobody waits for any more says so:
-  // isWaiting().
+  // In the order of the requests. isWaiting() is false for a look-up that has been cancelled.
   std::vector<kj::Own<kj::PromiseFulfiller<FoundAddress>>> lookups;
 
  private:
@@ -51,11 +50,11 @@ class HeldIo {
  public:
   [[nodiscard]] kj::AsyncIoContext& context() noexcept { return held_; }
   [[nodiscard]] HeldNetwork& network() noexcept { return network_; }
-  // What the name of a look-up stands for.
+  // Makes an address with which a look-up can be fulfilled.
   [[nodiscard]] FoundAddress addressOf(const std::string& text) {
     return real_.provider->getNetwork().parseAddress(text).wait(real_.waitScope);
   }
-  // Everything that needs nobody else.
+  // Runs the event loop until no task is ready.
   void run() { real_.waitScope.poll(); }
 
  private:

@@ -1,5 +1,5 @@
-# What a router of a later minor version may send: router.capnp and message.capnp with more fields, items and message types at the end.
-# Structs that did not change stand here as far as their neighbours in a union need it.
+# The items of a router of a later minor version: router.capnp and message.capnp with additional
+# fields, items and message types. Unchanged structs are declared only where a union refers to them.
 @0xb1d7c2f5a8e3940d;
 
 using Cxx = import "/capnp/c++.capnp";
@@ -49,7 +49,7 @@ struct Greeting {
   timeZone @11 :Int16;       # new
 }
 
-# As it would be had deadTimeMs and maxClients come with a later version.
+# The greeting of an earlier version, without deadTimeMs and maxClients.
 struct OlderFrame {
   items @0 :List(OlderItem);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A router whose look-ups of names take their time: what it does not want any more ends, whatever
-// comes of them later.
+// A router with slow name look-ups: a look-up that is no longer needed is cancelled, and its result
+// is ignored.
 #include "router/router.h"
 
 #include <gmock/gmock.h>
@@ -52,7 +52,7 @@ class HeldRouterTest : public testing::Test {
       testing::UnitTest::GetInstance()->current_test_info()->name()};
   const mpf::test::TestBackplane backplane_;
   std::string said_;
-  bool isFull_ = false;  // there is no room for another line
+  bool isFull_ = false;  // the log has no room for another line
   const Log log_{[this](Log::Level, const std::string& text) {
     if (isFull_) throw std::runtime_error("no room");
     said_ += text + '\n';
@@ -63,7 +63,7 @@ class HeldRouterTest : public testing::Test {
 
 using SlowLookupTest = HeldRouterTest;
 
-TEST_F(SlowLookupTest, EndsWithAListenerThatAReloadNamesNoMore) {
+TEST_F(SlowLookupTest, EndsWhenAReloadRemovesItsListener) {
   router_->reload(withListener());
   ASSERT_EQ(lookups().size(), 1u);
 
@@ -84,8 +84,8 @@ TEST_F(SlowLookupTest, EndsWithTheRouter) {
   EXPECT_EQ(said_, "");
 }
 
-// At start-up, when somebody waits for it.
-TEST_F(SlowLookupTest, EndsWithARouterThatHasYetToStart) {
+// While start() waits for the look-up.
+TEST_F(SlowLookupTest, EndsWithTheRouterDuringItsStart) {
   router_.emplace(io_.context(), withListener(), log_);
   auto started = router_->start();
 
@@ -95,7 +95,7 @@ TEST_F(SlowLookupTest, EndsWithARouterThatHasYetToStart) {
   EXPECT_ANY_THROW(started.wait(io_.context().waitScope));
 }
 
-TEST_F(SlowLookupTest, ThatFailsIsToldAndTheNextReloadTriesItAgain) {
+TEST_F(SlowLookupTest, ThatFailsIsLoggedAndRepeatedByTheNextReload) {
   router_->reload(withListener());
   fail(0);
   EXPECT_THAT(said_, testing::HasSubstr("slow.lab:9900: no such name"));
@@ -110,7 +110,7 @@ TEST_F(SlowLookupTest, ThatFailsIsToldAndTheNextReloadTriesItAgain) {
   EXPECT_NE(router_->listening()[0].port, 9900) << "it listens";
 }
 
-TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
+TEST_F(SlowLookupTest, IsRepeatedForAListenerThatIsAddedAgain) {
   router_->reload(withListener());
   router_->reload(config());
   router_->reload(withListener());
@@ -121,7 +121,7 @@ TEST_F(SlowLookupTest, OfAnEarlierLifeOfAListenerIsNotThatOfTheNext) {
   EXPECT_EQ(router_->listening().size(), 1u);
 }
 
-TEST_F(SlowLookupTest, ThatFailsNamesItsStepAndTheReason) {
+TEST_F(SlowLookupTest, ThatFailsIsLoggedWithItsStepAndReason) {
   router_->reload(withRemote());
   lookups()[0]->reject(KJ_EXCEPTION(FAILED,
                                     "DNS lookup failed.; params.host = slow.lab; "
@@ -143,10 +143,11 @@ TEST(ReasonOf, LeavesOutTheNamesOfCallsAndVariables) {
   EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "something else; whatever")), "something else; whatever");
 }
 
-// A line end that cannot be told, say: the remote would be called no more, and nobody would know.
+// For example when the end of a connection cannot be logged: otherwise the router would keep
+// running without reconnecting.
 using RemoteTest = HeldRouterTest;
 
-TEST_F(RemoteTest, ThatCannotGoOnEndsTheProgram) {
+TEST_F(RemoteTest, EndsTheProgramWhenItCannotContinue) {
   isFull_ = true;
   router_->reload(withRemote());
   ASSERT_EQ(lookups().size(), 1u);

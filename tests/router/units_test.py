@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""units_test CMAKE BUILD: what `cmake --install` makes of the router's systemd units, and what systemd says of it.
+"""units_test CMAKE BUILD: installs the router's systemd units, and verifies them with
+systemd-analyze.
 
-Exits 77, which ctest shows as skipped, where there is no systemd-analyze.
+Exits with 77, which ctest shows as skipped, on a host without systemd-analyze.
 """
 import os
 import shutil
@@ -14,13 +15,14 @@ SKIPPED = 77
 
 
 def install(cmake, build, prefix):
-    """The units alone: their folder has an install script of its own."""
+    """Installs only the units, with the install script of their folder."""
     script = os.path.join(build, "router", "systemd", "cmake_install.cmake")
-    subprocess.run([cmake, f"-DCMAKE_INSTALL_PREFIX={prefix}", "-P", script], check=True, stdout=subprocess.DEVNULL)
+    command = [cmake, f"-DCMAKE_INSTALL_PREFIX={prefix}", "-P", script]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def stand_in(prefix):
-    """systemd-analyze asks whether the program is there."""
+    """Installs a stand-in for mpf-router: systemd-analyze checks that the program exists."""
     program = os.path.join(prefix, "bin", "mpf-router")
     os.makedirs(os.path.dirname(program))
     shutil.copy("/bin/true", program)
@@ -28,7 +30,8 @@ def stand_in(prefix):
 
 
 def complaints(unit):
-    verified = subprocess.run(["systemd-analyze", "verify", "--man=no", unit], capture_output=True, text=True)
+    command = ["systemd-analyze", "verify", "--man=no", unit]
+    verified = subprocess.run(command, capture_output=True, text=True)
     said = verified.stdout + verified.stderr
     return said or (f"exit status {verified.returncode}" if verified.returncode else "")
 
@@ -36,8 +39,10 @@ def complaints(unit):
 def check(unit, program, configuration):
     with open(unit, encoding="utf-8") as file:
         text = file.read()
-    found = [f"{unit}: {part} is not in it" for part in ("Type=notify", "User=mpf", f"ExecStart={program} {configuration}\n") if part not in text]
-    found += [f"{unit}: {part} is left" for part in ("@MPF",) if part in text]
+    required = ("Type=notify", "User=mpf", f"ExecStart={program} {configuration}\n")
+    found = [f"{unit}: {part} is missing" for part in required if part not in text]
+    if "@MPF" in text:
+        found.append(f"{unit}: @MPF has not been replaced")
     if said := complaints(unit):
         found.append(said)
     return found
@@ -46,7 +51,7 @@ def check(unit, program, configuration):
 def main():
     cmake, build = sys.argv[1:]
     if not shutil.which("systemd-analyze"):
-        print("no systemd-analyze on this host")
+        print("systemd-analyze is not installed on this host")
         return SKIPPED
     with tempfile.TemporaryDirectory() as prefix:
         install(cmake, build, prefix)
@@ -55,8 +60,8 @@ def main():
         found = check(os.path.join(units, "mpf-router.service"), program, "/etc/mpf/router.toml")
         found += check(os.path.join(units, "mpf-router@.service"), program, "/etc/mpf/%i.toml")
         if not os.path.exists(os.path.join(prefix, "lib", "sysusers.d", "mpf.conf")):
-            found.append("no lib/sysusers.d/mpf.conf")
-    print("\n".join(found) or "two units, nothing to complain about")
+            found.append("lib/sysusers.d/mpf.conf is missing")
+    print("\n".join(found) or "both units are valid")
     return 1 if found else 0
 
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/message_of.h>
-
 #include <algorithm>
 #include <gmock/gmock.h>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <mpf/message_of.h>
 
 #include "schema/visit.h"
 

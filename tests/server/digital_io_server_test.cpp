@@ -158,7 +158,7 @@ TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   client->bind("dioIn");
   ASSERT_TRUE(client->connectWait(60s));
   ASSERT_EQ(client->send(Int32Message({.cmd = cmdStartMonitor, .address = 1})), SendResult::sent);
-  for (int i = 0; i < 90; ++i) ask();
+  for (int i = 0; i < 20; ++i) ask();
   started.get_future().wait();
 
   model_->setInputs(0x1, 0);

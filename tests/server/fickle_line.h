@@ -20,6 +20,7 @@
 #include <mpf/file_descriptor.h>
 
 #include "base/system_call.h"
+#include "base/timespec.h"
 #include "drivers/serial/serial_line.h"
 #include "server/programs/serial_server/line_limits.h"
 #include "tests/support/random.h"
@@ -133,10 +134,7 @@ class FickleLine : public SerialLine {
   }
   void setTimer() {
     itimerspec at{};
-    if (!outputs_.empty()) {
-      at.it_value.tv_sec = outputs_.front().atNs / 1'000'000'000;
-      at.it_value.tv_nsec = outputs_.front().atNs % 1'000'000'000;
-    }
+    if (!outputs_.empty()) at.it_value = timespecOf(outputs_.front().atNs);
     checkCall(::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &at, nullptr), "timerfd_settime");
   }
 

@@ -151,9 +151,9 @@ TEST_F(OctalProgramTest, ReportsAnInvalidModule) {
         {"dmm", "x", "--carrier", "ipac=model", "--octal-uart", uart, "--octal-port", port});
   };
   for (const auto& [uart, port, complaint] : std::vector<std::array<std::string, 3>>{
-           {"U,ipac,IP_a,8", "x,U,8", "port 8: its ports are 0 to 7"},
-           {"U,ipac,IP_a,6", "x,U,0", "6 ports: there are modules of 4 and of 8"},
-           {"U,ipac,IP_a,8", "x,U,0,57600", "baud 57600: this chip makes"},
+           {"U,ipac,IP_a,8", "x,U,8", "port 8: the module has ports 0 to 7"},
+           {"U,ipac,IP_a,6", "x,U,0", "6 ports: a module has 4 or 8"},
+           {"U,ipac,IP_a,8", "x,U,0,57600", "baud 57600: the chip supports"},
            {"U,ipac,IP_a,8,256", "x,U,0", "interrupt vector 256 is not 0 to 255"},
            {"U,other,IP_a,8", "x,U,0", "carrier \"other\" is not defined"}}) {
     const auto server = startWith(uart, port);

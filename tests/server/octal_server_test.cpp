@@ -28,12 +28,12 @@ class OctalStation {
   OctalStation(const Backplane& backplane, OctalUart& uart, OctalUartModel& model, int number)
       : model_(model),
         number_(number),
-        port_(uart, number, {.settings = {38400, 1, 8, 'N', 'N'}}),
+        port_(openOctalUartPort(uart, number, {.settings = {38400, 1, 8, 'N', 'N'}})),
         server_(backplane, "UART[" + std::to_string(number) + "]"),
-        serial_(server_, port_, {}, log_),
+        serial_(server_, *port_, {}, log_),
         thread_([this] { server_.run(); }),
         client_(backplane, server_.getName()),
-        tap_(port_.attachTap([this](std::span<const PeekedByte> bytes) { follow(bytes); })) {
+        tap_(port_->attachTap([this](std::span<const PeekedByte> bytes) { follow(bytes); })) {
     EXPECT_TRUE(client_.connectWait(60s));
   }
   ~OctalStation() {
@@ -43,7 +43,7 @@ class OctalStation {
   OctalStation(const OctalStation&) = delete;
   OctalStation& operator=(const OctalStation&) = delete;
 
-  OctalUartPort& port() { return port_; }
+  SerialPort& port() { return *port_; }
   void setSilent() { isSilent_ = true; }
   SerialReply ask(std::string_view text) {
     return askSerial(client_, text, {.timeout = 60, .cmd = serial::cmdWriteRead});
@@ -72,7 +72,7 @@ class OctalStation {
   std::atomic<bool> isSilent_{false};
   std::string question_;
   ServerLog log_{"test", "off"};
-  OctalUartPort port_;
+  std::unique_ptr<SerialPort> port_;
   MessageServer server_;
   SerialServer serial_;
   std::thread thread_;

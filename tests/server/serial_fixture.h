@@ -10,10 +10,12 @@
 #include <gtest/gtest.h>
 #include <thread>
 
+#include <mpf/drivers/serial/posix_terminal.h>
 #include <mpf/serial_commands.h>
 #include <mpf/sync_client.h>
 
-#include "drivers/serial/posix_terminal_port.h"
+#include "drivers/serial/polled_serial_port.h"
+#include "drivers/serial/terminal_line.h"
 #include "server/programs/serial_server/serial_server.h"
 #include "tests/server/ask_serial.h"
 #include "tests/support/instrument.h"
@@ -24,9 +26,12 @@ namespace mpf::test {
 
 using namespace std::chrono_literals;
 
-// Tests may look at its taps, and show them bytes that no pseudo-terminal can have.
-struct OpenPort : PosixTerminalPort {
-  using PosixTerminalPort::PosixTerminalPort;
+// The port of openPosixTerminal(), with public taps(): tests look at its taps, and show them bytes
+// that a pseudo-terminal cannot deliver.
+struct OpenPort : PolledSerialPort {
+  explicit OpenPort(const PosixTerminalOptions& options)
+      : PolledSerialPort(std::make_unique<TerminalLine>(options.device, options.settings),
+                         options.waitForDevice) {}
   using SerialPort::taps;
 };
 

@@ -27,7 +27,7 @@ class ServedPortTest : public testing::Test {
     options_.servers.push_back({.server = "dmm", .port = "line"});
     carrier_.plug("IP_a", std::make_unique<OctalUartModel>());
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
-    port_.emplace(*uart_, 0, OctalUartPortOptions{});
+    port_ = openOctalUartPort(*uart_, 0, {});
     served_.emplace(backplane_, options_, options_.servers[0], *port_);
     served_->start([this] { hasFailed_ = true; });
   }
@@ -41,7 +41,7 @@ class ServedPortTest : public testing::Test {
   ModelCarrier& carrier_ = addModelCarrier(carriers_);
   IndustryPackModules modules_{carriers_};
   std::optional<OctalUart> uart_;
-  std::optional<OctalUartPort> port_;
+  std::unique_ptr<SerialPort> port_;
   std::optional<ServedPort> served_;
   std::atomic<bool> hasFailed_ = false;
 };

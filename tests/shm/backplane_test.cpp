@@ -6,6 +6,7 @@
 #include <fstream>
 #include <vector>
 
+#include "shm/watcher.h"
 #include "tests/shm/child.h"
 #include "tests/shm/endpoint_pair.h"
 #include "tests/shm/shm_fixture.h"

@@ -184,7 +184,7 @@ inline nlohmann::json layoutKinds() {
           {"hints", SegmentKind::hints},
           {"link", SegmentKind::link},
           {"bulk", SegmentKind::bulk},
-          {"wish", SegmentKind::pendingBind},
+          {"pendingBind", SegmentKind::pendingBind},
           {"router", SegmentKind::router}};
 }
 

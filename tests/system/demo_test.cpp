@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the
-// client that draws what they say.
+// client that draws their values.
 #include <filesystem>
 #include <gmock/gmock.h>
 #include <string>
@@ -46,8 +46,8 @@ TEST_F(Demo, PrintsWhatComesBackWithoutATerminal) {
   EXPECT_EQ(demo.status, 0) << demo.output;
   EXPECT_THAT(demo.output,
               AllOf(HasSubstr("$ mpf-ip330-server adc ipac IP_b"), HasSubstr("VOLTMETER"),
-                    HasSubstr("  voltmeter "), HasSubstr("the ADC measured what the DAC gave in"),
-                    HasSubstr("dioOut")));
+                    HasSubstr("  voltmeter "),
+                    HasSubstr("the ADC measured the output of the DAC in"), HasSubstr("dioOut")));
 }
 
 TEST_F(Demo, ShowsWhatAServerSaidThatDoesNotStart) {
@@ -62,13 +62,13 @@ TEST_F(Demo, FailsWhenNothingComesOverAWire) {
       buildWithAdc("exec " MPF_TEST_BUILD "/bin/mpf-ip330-server \"${@/0=wire:dac.0/0=dc:0}\"\n"));
 
   EXPECT_NE(demo.status, 0) << demo.output;
-  EXPECT_THAT(demo.output, HasSubstr("the ADC measured what the DAC gave in"));
+  EXPECT_THAT(demo.output, HasSubstr("the ADC measured the output of the DAC in"));
 }
 
 TEST_F(Demo, DrawsOnATerminalUntilQ) {
   Terminal demo({MPF_TEST_DEMO, MPF_TEST_BUILD}, 30, 100);
-  ASSERT_TRUE(demo.waitFor("changes told"));
-  ASSERT_TRUE(demo.waitUntilGone("wired to them: 0 changes told"));
+  ASSERT_TRUE(demo.waitFor(" changes"));
+  ASSERT_TRUE(demo.waitUntilGone("wired to them: 0 changes"));
   EXPECT_TRUE(demo.waitFor("●"));
 
   demo.type("q");

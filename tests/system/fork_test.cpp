@@ -17,6 +17,7 @@
 #include <mpf/sync_client.h>
 
 #include "base/system_call.h"
+#include "shm/segment.h"
 #include "shm/segment_name.h"
 #include "tests/shm/child.h"
 #include "tests/support/test_backplane.h"

@@ -14,6 +14,7 @@
 #include <mpf/sync_client.h>
 
 #include "base/system_call.h"
+#include "shm/segment.h"
 #include "shm/segment_name.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/victim.h"

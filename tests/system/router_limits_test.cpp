@@ -95,7 +95,7 @@ TEST_F(RouterLimitsTest, ConnectionsBeyondTheLimitAreTurnedAwayUntilOthersEnd) {
   runUntil([&] { return caller_->isConnected(); });
 
   const Neighbour neighbour(routers_.address());
-  routers_.farRouter().waitUntilSaid("turned away");
+  routers_.farRouter().waitUntilSaid("rejected: there are already");
   expectAnswer();
 
   routers_.nearRouter().end(SIGTERM);

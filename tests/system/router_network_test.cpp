@@ -49,7 +49,7 @@ class RouterNetworkTest : public WiredHosts, public RouterTest {
   // After the dead time; the kernel, which would miss the other one too, waits longer.
   void expectBothMissedTheOther() {
     for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()})
-      router->waitUntilSaid("nothing was heard of the peer");
+      router->waitUntilSaid("received nothing from the peer");
   }
 };
 

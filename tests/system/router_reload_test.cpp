@@ -40,7 +40,7 @@ class RouterReloadTest : public RouterTest {
     }
     folder_.write("near.toml", text + more);
   }
-  static void reload(const RouterProcess& router, const std::string& said = "has been read again") {
+  static void reload(const RouterProcess& router, const std::string& said = "has been reloaded") {
     router.signal(SIGHUP);
     router.waitUntilSaid(said);
   }
@@ -123,9 +123,9 @@ TEST_F(RouterReloadTest, AMistakeInTheFileChangesNothing) {
   expectAnswerOfOther();
 
   writeFar({1}, "no-such-key = 1\n");
-  reload(*farRouter_, "the configuration stays as it was");
+  reload(*farRouter_, "the old one stays in effect");
   writeNear({1}, "[limits]\ndead-time = 2\n");
-  reload(*nearRouter_, "the configuration stays as it was");
+  reload(*nearRouter_, "the old one stays in effect");
 
   expectAnswerOfOther();
   expectThatTheFirstNoticedNothing();
@@ -171,10 +171,10 @@ TEST_F(RouterReloadTest, WhoEndsReloadsNoMore) {
                   FreePort().address()));
 
   nearRouter_->signal(SIGTERM);
-  nearRouter_->waitUntilSaid(" ends");
+  nearRouter_->waitUntilSaid(" stopping");
   EXPECT_EQ(nearRouter_->end(SIGHUP), 0);
 
-  EXPECT_THAT(nearRouter_->said(), testing::Not(testing::HasSubstr("read again")));
+  EXPECT_THAT(nearRouter_->said(), testing::Not(testing::HasSubstr("reloaded")));
   farRouter_->resume();
 }
 

@@ -80,7 +80,7 @@ TEST_F(RouterStrangersTest, CallersThatDoNotGreetMakeRoomForAPeer) {
   const auto near = call({"--plain"});
 
   near->waitUntilSaid("connected to ");
-  far->waitUntilSaid("which has not greeted: the oldest one of these is closed");
+  far->waitUntilSaid("without a greeting: closing the oldest of these");
 }
 
 TEST_F(RouterStrangersTest, ACallerThatIsTurnedAwayReadsWhy) {
@@ -152,7 +152,7 @@ TEST_F(RouterSlowNameTest, ALookUpThatTakesTooLongIsGivenUpInSilence) {
       checkCall(::open(fifo_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", fifo_));
   checkCall(::write(lookUp.get(), "x", 1), "write", fifo_);
 
-  router.waitUntilSaid("a look-up of a name ended after nobody waited for it any more");
+  router.waitUntilSaid("a name look-up ended after it had been cancelled");
   EXPECT_THAT(router.said(), Not(HasSubstr("detached thread")));
 }
 

@@ -11,6 +11,7 @@
 
 #include <mpf/message_server.h>
 
+#include "shm/segment.h"
 #include "shm/segment_name.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/victim.h"

@@ -25,6 +25,7 @@
 
 #include "base/system_call.h"
 #include "shm/segment_name.h"
+#include "shm/window.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/victim.h"
 #include "tests/support/watchdog.h"

@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_sources TOP: the rules of the house that no compiler checks. Prints file:line: complaint; exits 1 if there is one.
+"""check_sources TOP: rules of this project that compilers do not check.
 
-A rule is a function of all files ({path: text}) that yields (path, line, complaint); self_test.py shows that each one can fail.
+Prints file:line: complaint for each violation, and exits with 1 if there is one. A rule is a
+function of all files ({path: text}) that yields (path, line, complaint); self_test.py shows that
+each rule can fail.
 """
 import os
 import re
 import subprocess
 import sys
 
-# Which folders a folder may include directly; what those may include comes with them. Call order is dependency order.
+# The folders that a folder may include directly; it may also include what they may include. Call
+# order is dependency order.
 MAY_INCLUDE = {
     "base": [],
     "schema": ["base"],
@@ -20,7 +23,8 @@ MAY_INCLUDE = {
     "client": ["schema", "shm", "shm/messages"],
     "client/programs": ["client"],
     "drivers": ["base"],
-    "router": ["schema", "shm", "client", "server", "server/programs"],  # it looks like a server to local clients, and like a client to local servers
+    # A router is a server to local clients, and a client to local servers.
+    "router": ["schema", "shm", "client", "server", "server/programs"],
     "epics": ["client"],
     "crate": ["base"],
     "benchmarks": ["client", "server"],
@@ -38,7 +42,7 @@ PUBLIC_HEADERS = {
 }
 
 MAX_LINES = 400
-PAIR_REACH = 3  # lines above an ordered access in which its PAIR line stands
+PAIR_REACH = 3  # the PAIR line is within so many lines above an ordered access
 
 ORDERED = re.compile(r"\bmemory_order(_|::)(acquire|release|acq_rel|seq_cst|consume)\b|\.load\(\)")
 PAIR = re.compile(r"\bPAIR\(([\w-]+)\)")
@@ -143,7 +147,7 @@ def licences(files):
     for path, text in files.items():
         first = text.splitlines()[:2] if text.startswith("#!") else text.splitlines()[:1]
         if (is_cpp(path) or text.startswith("#!")) and not any("SPDX-License-Identifier: MIT" in line for line in first):
-            yield path, 1, "does not begin with its SPDX line"
+            yield path, 1, "does not begin with the SPDX line"
 
 
 def sizes(files):
@@ -158,11 +162,11 @@ def unfinished(files):
     for path, text in files.items():
         for number, line in lines(text):
             if match := mark.search(line):
-                yield path, number, f"{match[0]}: do it, or put it into an issue"
+                yield path, number, f"{match[0]}: finish it, or open an issue"
 
 
 def shown_code(files):
-    """Where a document shows code under the name of its file (`drivers/x.h`: and a block), each line of it is one of that file."""
+    """A block after the name of a file (`drivers/x.h`:) in a document shows lines of that file."""
     block = re.compile(r"^`([\w./-]+)`:\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
     for path, text in files.items():
         for match in block.finditer(text) if path.endswith(".md") else ():
@@ -178,16 +182,16 @@ def named_functions(files):
     for path, text in files.items():
         for match in row.finditer(text) if path.endswith(".md") else ():
             if not re.search(rf"\b{match[1]}\(", files.get(match[2], "")):
-                yield path, line_of(text, match.start()), f"names {match[1]}(), which {match[2]} does not have"
+                yield path, line_of(text, match.start()), f"names {match[1]}(), which is not in {match[2]}"
 
 
 def machine_paths(files):
-    """Nothing depends on where somebody keeps the tree or gets packages from."""
+    """No file depends on the place of the tree or on a package host."""
     place = re.compile(r"(?<![\w.$}-])/(work|root|home/\w+)/[\w.]|\b(pypi|debian|npmjs|docker|ghcr)\.(org|com|io)\b/(?!doc)|\bdeb\.debian\.org\b")
     for path, text in files.items():
         for number, line in lines(text):
             if match := place.search(line):
-                yield path, number, f"names a place of somebody's machine or a package host: {match[0]}"
+                yield path, number, f"names a path of a machine or a package host: {match[0]}"
 
 
 def errors_never_throw(files):
@@ -198,7 +202,7 @@ def errors_never_throw(files):
         for number, line in lines(text):
             code = line.split("//")[0]
             if re.search(r"\bprint\(stderr\b|\bstd::(cerr|clog)\b|\bfprintf\(stderr\b", code):
-                yield path, number, "may throw or be lost when stderr is closed or full: use printError()"
+                yield path, number, "may throw or lose the message if stderr is closed or full: use printError()"
             if re.match(r"int main\(", code) and not re.search(r"\brun(Main|Echo\w+)\(", text):
                 yield path, number, "main() without runMain()"
 
@@ -215,7 +219,7 @@ def read_tree(top):
             with open(os.path.join(top, path), encoding="utf-8") as file:
                 files[path] = file.read()
         except (FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
-            pass  # deleted but still tracked; a folder of another repository; binary
+            pass  # deleted but still tracked; a submodule; binary
     return files
 
 

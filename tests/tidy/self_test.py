@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Each rule of check_sources refuses a bad sample, at the right line, and passes a good one."""
+"""Each rule of check_sources reports an invalid sample, at its line, and accepts a valid one."""
 import unittest
 
 import check_sources as check
 
 SPDX = "// SPDX-License-Identifier: MIT\n"
 ACQUIRE = "a.load(std::memory_order_acquire);\n"
-UNFINISHED = "TO" + "DO"  # in pieces, so that this file passes
+UNFINISHED = "TO" + "DO"  # in two parts, so that this file is accepted
 
 
 class Rules(unittest.TestCase):

@@ -20,32 +20,34 @@
 namespace mpf::test {
 namespace {
 
-using namespace scc2698b;  // NOLINT(google-build-using-namespace): the data sheet's words, all of them
+// NOLINTNEXTLINE(google-build-using-namespace): the names of the data sheet
+using namespace scc2698b;
 using testing::HasSubstr;
 
-// A channel whose transmitter is ready interrupts for as long as its mask lets it.
-class Asker {
+// Causes interrupts with a channel: its transmitter is ready, so the channel requests an interrupt
+// while its mask bit is set.
+class InterruptSource {
  public:
-  Asker(IndustryPackSite& site, int channel)
+  InterruptSource(IndustryPackSite& site, int channel)
       : io_(site.io()), line_(site.interrupt(channel / 4)), channel_(channel) {
     io_.write8(at(channel, kCr), kCrResetTx);
     io_.write8(at(channel, kCr), kCrEnableTx);
   }
-  ~Asker() { ask(false); }
-  Asker(const Asker&) = delete;
-  Asker& operator=(const Asker&) = delete;
+  ~InterruptSource() { request(false); }
+  InterruptSource(const InterruptSource&) = delete;
+  InterruptSource& operator=(const InterruptSource&) = delete;
 
-  void ask(bool on) {
+  void request(bool on) {
     io_.write8(atBlock(channel_ / 2, kImr), on ? isrOf(channel_, kIsrTxRdy) : std::uint8_t{0});
   }
-  // Asks, waits until it was heard, is served.
+  // Causes one interrupt, waits for it and serves it.
   void interruptOnce() {
     line_.enable();
-    ask(true);
+    request(true);
     pollfd readable{.fd = line_.descriptor(), .events = POLLIN, .revents = 0};
     ASSERT_EQ(::poll(&readable, 1, -1), 1);
     EXPECT_EQ(line_.take(), 1U);
-    ask(false);
+    request(false);
   }
 
  private:
@@ -54,18 +56,18 @@ class Asker {
   int channel_;
 };
 
-TEST(PolledBoard, IsSwitchedOnAndPassesInterrupts) {
+TEST(PolledBoard, IsEnabledAndPassesInterrupts) {
   Tpci200 carrier({});
   EXPECT_THAT(carrier.remark(), HasSubstr("modprobe uio_pci_generic"));
-  Asker asker(carrier.site(0), 0);
-  for (int i = 0; i < 10; ++i) asker.interruptOnce();
+  InterruptSource source(carrier.site(0), 0);
+  for (int i = 0; i < 10; ++i) source.interruptOnce();
 }
 
-TEST(PolledBoard, BelongsToRoot) {
+TEST(PolledBoard, RequiresThePermissionsOfRoot) {
   ::setfsuid(65534);
   try {
     const Tpci200 carrier({});
-    ADD_FAILURE() << "nobody may use it";
+    ADD_FAILURE() << "a user without permission can open the board";
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("no permission to read and write /sys/bus/pci/devices/"));
   }
@@ -84,7 +86,7 @@ TEST(Board, HasTheIdPromsOfItsModules) {
   EXPECT_THROW(static_cast<void>(readIdProm(carrier.site(2).id(), "IP_c")), IndustryPackError);
 }
 
-TEST(Board, HasRegistersOfEachWidthWhereTheyBelong) {
+TEST(Board, HasRegistersOfEachWidthAtTheirAddresses) {
   Tpci200 carrier({});
   auto& io = carrier.site(0).io();
   const auto mode = at(5, kMr);
@@ -101,8 +103,8 @@ TEST(Board, HasRegistersOfEachWidthWhereTheyBelong) {
 TEST(Board, InterruptsThroughTheKernel) {
   Tpci200 carrier({});
   EXPECT_EQ(carrier.remark(), "");
-  Asker onLine0(carrier.site(0), 1);
-  Asker onLine1(carrier.site(1), 6);
+  InterruptSource onLine0(carrier.site(0), 1);
+  InterruptSource onLine1(carrier.site(1), 6);
   for (int i = 0; i < 100; ++i) {
     onLine0.interruptOnce();
     onLine1.interruptOnce();
@@ -113,21 +115,21 @@ TEST(Board, IsSharedByProcesses) {
   const auto child = ::fork();
   if (child == 0) {
     Tpci200 carrier({});
-    Asker asker(carrier.site(1), 0);
-    for (int i = 0; i < 200; ++i) asker.interruptOnce();
+    InterruptSource source(carrier.site(1), 0);
+    for (int i = 0; i < 200; ++i) source.interruptOnce();
     ::_exit(testing::Test::HasFailure() ? 1 : 0);
   }
   {
     Tpci200 carrier({});
-    Asker asker(carrier.site(0), 0);
-    for (int i = 0; i < 200; ++i) asker.interruptOnce();
+    InterruptSource source(carrier.site(0), 0);
+    for (int i = 0; i < 200; ++i) source.interruptOnce();
   }
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   EXPECT_EQ(status, 0);
 }
 
-TEST(Board, KeepsASiteForOneProcessUntilThatEnds) {
+TEST(Board, ReservesASiteForOneProcessUntilThatEnds) {
   std::array<int, 2> ready{};
   ASSERT_EQ(::pipe(ready.data()), 0);
   const auto child = ::fork();
@@ -142,7 +144,7 @@ TEST(Board, KeepsASiteForOneProcessUntilThatEnds) {
   Tpci200 carrier({});
   try {
     static_cast<void>(carrier.site(0));
-    ADD_FAILURE() << "two have it";
+    ADD_FAILURE() << "two processes have the site";
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("site IP_a is in use by another process"));
   }
@@ -151,8 +153,9 @@ TEST(Board, KeepsASiteForOneProcessUntilThatEnds) {
   static_cast<void>(carrier.site(0));
 }
 
-// A process that stands still, or was killed, and whose module asks: others go on.
-TEST(Board, IsNotHeldUpByTheModuleOfAStoppedOrKilledProcess) {
+// A process is stopped or killed while its module requests an interrupt. Other processes still get
+// their interrupts.
+TEST(Board, ServesOtherProcessesWhenOneIsStoppedOrKilled) {
   std::array<int, 2> ready{};
   ASSERT_EQ(::pipe(ready.data()), 0);
   const auto child = ::fork();
@@ -165,20 +168,20 @@ TEST(Board, IsNotHeldUpByTheModuleOfAStoppedOrKilledProcess) {
   char byte = 0;
   ASSERT_EQ(::read(ready[0], &byte, 1), 1);
   Tpci200 carrier({});
-  Asker asker(carrier.site(0), 0);
-  asker.interruptOnce();
+  InterruptSource source(carrier.site(0), 0);
+  source.interruptOnce();
   ::kill(child, SIGSTOP);
   ASSERT_EQ(::waitpid(child, nullptr, WUNTRACED), child);
   const PciDevice board({}, {.name = "TPCI200", .vendor = 0x1498, .device = 0x30c8}, "");
   const auto window = board.map(3, 0x100, 0x80);
-  MemoryRegisters ofTheChild(window.data(), window.size());
-  ofTheChild.write8(at(0, kCr), kCrEnableTx);
-  ofTheChild.write8(atBlock(0, kImr), kIsrTxRdy);
-  for (int i = 0; i < 20; ++i) asker.interruptOnce();
+  MemoryRegisters registersOfChild(window.data(), window.size());
+  registersOfChild.write8(at(0, kCr), kCrEnableTx);
+  registersOfChild.write8(atBlock(0, kImr), kIsrTxRdy);
+  for (int i = 0; i < 20; ++i) source.interruptOnce();
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
-  for (int i = 0; i < 100; ++i) asker.interruptOnce();
-  ofTheChild.write8(atBlock(0, kImr), 0);
+  for (int i = 0; i < 100; ++i) source.interruptOnce();
+  registersOfChild.write8(atBlock(0, kImr), 0);
 }
 
 }  // namespace

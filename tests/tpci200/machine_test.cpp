@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Boots the machine of this folder, which runs board_test.cpp and two serial servers on octal UARTs
-// behind the TPCI200; instruments are here, at the far ends of their lines. `make test-tpci200`
-// sets MPF_TEST_TPCI200 to the build that the machine was made of.
+// Boots the emulated machine of this folder, which runs board_test.cpp and two serial servers on
+// the octal UARTs of a TPCI200. The instruments at the far ends of the lines run in this process.
+// `make test-tpci200` sets MPF_TEST_TPCI200 to the build whose programs the machine runs.
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -25,7 +25,7 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
-// An instrument where QEMU finds it, should it come.
+// An instrument on a Unix socket, to which QEMU connects a serial line.
 class Line {
  public:
   explicit Line(std::string path)
@@ -43,7 +43,8 @@ class Line {
       if (line) instrument_.connect(std::move(line));
     });
   }
-  ~Line() { ::shutdown(listener_.get(), SHUT_RDWR); }  // nobody came: the thread waits no longer
+  // The shutdown ends the accept4() of the thread if QEMU has not connected.
+  ~Line() { ::shutdown(listener_.get(), SHUT_RDWR); }
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
@@ -53,10 +54,11 @@ class Line {
   std::string path_;
   FileDescriptor listener_;
   Instrument instrument_;
-  std::jthread thread_;  // last: ends before what it uses
+  std::jthread thread_;  // last: ends before the members that it uses
 };
 
-// Until it ends. They are shown as they come: who waits for nothing sees where.
+// Returns the lines of the program's output until it ends. Prints each line at once, so that the
+// output shows the progress when the machine hangs.
 std::vector<std::string> linesOf(const Program& program) {
   std::vector<std::string> lines;
   for (auto line = program.line(); !line.empty(); line = program.line()) {
@@ -69,21 +71,20 @@ std::vector<std::string> linesOf(const Program& program) {
 
 TEST(Tpci200Machine, ServesInstrumentsOnOctalUarts) {
   const char* const build = std::getenv("MPF_TEST_TPCI200");
-  if (build == nullptr)
-    GTEST_SKIP() << "no emulated machine with a TPCI200: make test-tpci200 makes one";
+  if (build == nullptr) GTEST_SKIP() << "needs an emulated machine: run make test-tpci200";
   const Watchdog watchdog("the machine");
   const TemporaryFolder folder;
   const Line voltmeter(folder.file("voltmeter"));
   const Line counter(folder.file("counter"));
 
   const Program machine({MPF_TEST_BOOT, "boot", build, voltmeter.path(), counter.path()});
-  const auto said = linesOf(machine);
+  const auto output = linesOf(machine);
 
   for (const auto* const part : {"no driver", "uio_pci_generic", "voltmeter", "counter", "msr"})
-    EXPECT_THAT(said, Contains(std::string("status of ") + part + ": 0"));
-  EXPECT_THAT(said, Contains(HasSubstr("the end, after")));
-  EXPECT_THAT(said, Contains(HasSubstr("carrier ipac is TPCI200 at ")).Times(2));
-  EXPECT_THAT(said, Contains(HasSubstr("value=\"MPF,INSTRUMENT,0,1.0\\r\\n\"")).Times(40));
+    EXPECT_THAT(output, Contains(std::string("status of ") + part + ": 0"));
+  EXPECT_THAT(output, Contains(HasSubstr("the end, after")));
+  EXPECT_THAT(output, Contains(HasSubstr("carrier ipac is TPCI200 at ")).Times(2));
+  EXPECT_THAT(output, Contains(HasSubstr("value=\"MPF,INSTRUMENT,0,1.0\\r\\n\"")).Times(40));
   std::string asked;
   for (int i = 0; i < 20; ++i) asked += "*IDN?\n";
   EXPECT_EQ(voltmeter.received(), asked);

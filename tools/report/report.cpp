@@ -31,7 +31,7 @@ int reportEach(const ReportArguments& arguments,
   const auto backplanes =
       arguments.backplane.empty() ? Backplane::names() : std::vector{arguments.backplane};
   for (const auto& backplane : backplanes) {
-    const SnapshotDelta look(backplane, std::chrono::milliseconds(arguments.intervalMs));
+    const SnapshotDelta delta(backplane, std::chrono::milliseconds(arguments.intervalMs));
     if (arguments.json) collect(delta, list);
     else print(delta);
   }

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstring>
 
+#include "base/timespec.h"
 #include "shm/segment.h"
 
 namespace mpf::tools {
@@ -37,8 +38,7 @@ std::optional<std::vector<std::string>> NameWatch::take() {
 
 void NameWatch::wait(Nanoseconds limit) const noexcept {
   pollfd poll{.fd = inotify_ ? inotify_.get() : -1, .events = POLLIN, .revents = 0};
-  const timespec timeout{.tv_sec = limit.count() / 1'000'000'000,
-                         .tv_nsec = limit.count() % 1'000'000'000};
+  const auto timeout = timespecOf(limit);
   ::ppoll(&poll, 1, &timeout, nullptr);
 }
 

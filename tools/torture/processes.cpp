@@ -11,6 +11,7 @@
 
 #include "base/print_error.h"
 #include "base/system_call.h"
+#include "base/timespec.h"
 
 namespace mpf::torture {
 namespace {
@@ -82,8 +83,7 @@ void Processes::handleEvents(Nanoseconds patience) {
   }
   if (any) return;
   const auto set = childSignal();
-  timespec wait{};
-  wait.tv_nsec = patience.count();
+  const auto wait = timespecOf(patience);
   ::sigtimedwait(&set, nullptr, &wait);
 }
 

@@ -9,8 +9,6 @@
 
 #include <mpf/serial_commands.h>
 
-#include "base/duration_text.h"
-
 namespace mpf {
 namespace {
 
@@ -43,15 +41,10 @@ std::uint8_t faultBit(LineFault fault) noexcept {
   return 0;
 }
 
-LineFaults::LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log,
-                       std::chrono::milliseconds quiet)
-    : server_(server), port_(port), log_(log), quiet_(quiet), seen_(counted()) {}
+LineFaults::LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log)
+    : server_(server), port_(port), log_(log), start_(counted()), reported_(start_) {}
 
-LineFaults::~LineFaults() {
-  look();
-  const std::lock_guard lock(mutex_);
-  if (untold_.sum() > 0) tell(Clock::nowNs());
-}
+LineFaults::~LineFaults() { look(); }
 
 LineFaults::Counts LineFaults::counted() const {
   const auto counters = port_.counters();
@@ -61,34 +54,21 @@ LineFaults::Counts LineFaults::counted() const {
 void LineFaults::look() {
   const std::lock_guard lock(mutex_);
   const auto now = counted();
-  const auto before = std::exchange(seen_, now);
-  const auto alarms = now.sum() - before.sum();
-  const auto nowNs = Clock::nowNs();
-  if (alarms > 0 && untold_.sum() == 0) untoldSinceNs_ = nowNs;
-  untold_.overruns += now.overruns - before.overruns;
-  untold_.parity += now.parity - before.parity;
-  untold_.framing += now.framing - before.framing;
-  untold_.breaks += now.breaks - before.breaks;
+  const auto alarms = now.sum() - std::exchange(reported_, now).sum();
+  if (alarms == 0) return;
   for (std::uint64_t i = 0; i < std::min(alarms, kMostAlarmsAtOnce); ++i) server_.countAlarm();
-  if (untold_.sum() > 0 && nowNs >= nextLineNs_) tell(nowNs);
+  log_->warn("{}: the line lost or damaged bytes; since the server started: {}",
+             port_.description(), textOf(now - start_));
 }
 
-void LineFaults::tell(std::int64_t nowNs) {
-  const auto counts = std::exchange(untold_, {});
-  const auto forNs = static_cast<double>(nowNs - untoldSinceNs_);
-  const auto when = forNs > 0 ? fmt::format(" within {}", durationText(forNs)) : std::string();
-  log_->warn("{}: the line lost or damaged bytes: {}", port_.description(), textOf(counts, when));
-  nextLineNs_ = nowNs + quiet_.count();
-}
-
-std::string LineFaults::textOf(const Counts& counts, const std::string& when) {
+std::string LineFaults::textOf(const Counts& counts) {
   std::vector<std::string> kinds;
   if (counts.overruns > 0) kinds.push_back(withCount(counts.overruns, "overrun", "overruns"));
   if (counts.parity > 0) kinds.push_back(withCount(counts.parity, "parity error", "parity errors"));
   if (counts.framing > 0)
     kinds.push_back(withCount(counts.framing, "framing error", "framing errors"));
   if (counts.breaks > 0) kinds.push_back(withCount(counts.breaks, "break", "breaks"));
-  auto text = fmt::format("{}{}", fmt::join(kinds, ", "), when);
+  auto text = fmt::format("{}", fmt::join(kinds, ", "));
   if (counts.overruns > 0) text += "; this program got no processor in time, see mpf doctor";
   if (counts.parity + counts.framing > 0)
     text += "; do both ends have the same settings, and is the cable good?";

@@ -2,20 +2,20 @@
 // LineFaults: reports lost and damaged bytes of a serial line, in the log and in replies.
 //
 //   port's counters ── look() ──► one alarm for each fault
-//                            └──► log, at most one line in `quiet`, with the counts since the last
+//                            └──► a line of the log with the counts since the start
 //   an answer's faults ──► status and `extra` of its reply (include/mpf/serial_commands.h)
 //
+// The log limits lines of one kind (LogLimiter). Each line has the counts since the start, so that
+// a line that stands for many others contains the sum of all faults.
+//
 // Threads  any thread calls look(): the port's thread after each fault, the server's thread after
-//          each request. The server's thread calls the functions for answers.
-// Trust    a line that fails all the time causes one line of the log in each `quiet`.
+//          each request. The server's thread calls the other functions.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <mutex>
 #include <string>
 
-#include <mpf/clock.h>
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/message_server.h>
 #include <mpf/message_types.h>
@@ -29,12 +29,9 @@ namespace mpf {
 
 class LineFaults {
  public:
-  static constexpr std::chrono::seconds kQuiet{10};
-
   // Does not report earlier faults. The arguments must outlive this object.
-  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log,
-             std::chrono::milliseconds quiet = kQuiet);
-  // Logs the faults that were not logged yet.
+  LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log);
+  // Reports the faults since the last look().
   ~LineFaults();
   LineFaults(const LineFaults&) = delete;
   LineFaults& operator=(const LineFaults&) = delete;
@@ -56,21 +53,21 @@ class LineFaults {
     [[nodiscard]] std::uint64_t sum() const noexcept {
       return overruns + parity + framing + breaks;
     }
+    friend Counts operator-(const Counts& a, const Counts& b) noexcept {
+      return {a.overruns - b.overruns, a.parity - b.parity, a.framing - b.framing,
+              a.breaks - b.breaks};
+    }
   };
   [[nodiscard]] Counts counted() const;
-  void tell(std::int64_t nowNs);
-  [[nodiscard]] static std::string textOf(const Counts& counts, const std::string& when);
+  [[nodiscard]] static std::string textOf(const Counts& counts);
 
   MessageServer& server_;
   const SerialPort& port_;
   const ServerLog& log_;
-  const Nanoseconds quiet_;
+  const Counts start_;
   std::uint8_t answer_ = 0;
-  std::mutex mutex_;  // all below
-  Counts seen_;
-  Counts untold_;
-  std::int64_t untoldSinceNs_ = 0;
-  std::int64_t nextLineNs_ = 0;
+  std::mutex mutex_;
+  Counts reported_;  // under mutex_: what the port had counted at the last look()
 };
 
 }  // namespace mpf

@@ -37,7 +37,7 @@ void LineReader::setCircular(bool circular) {
 
 void LineReader::prepareRead(bool flush, std::size_t maxBytes) {
   const std::lock_guard lock(mutex_);
-  stopLingering();
+  dropLateAnswer();
   isQuestion_ = false;
   flush_ = flush;
   maxBytes_ = maxBytes;
@@ -46,7 +46,7 @@ void LineReader::prepareRead(bool flush, std::size_t maxBytes) {
 
 void LineReader::prepareQuestion(std::size_t maxBytes, bool mayBeLate) {
   const std::lock_guard lock(mutex_);
-  stopLingering();
+  dropLateAnswer();
   isQuestion_ = true;
   mayBeLate_ = mayBeLate;
   maxBytes_ = maxBytes;
@@ -55,16 +55,16 @@ void LineReader::prepareQuestion(std::size_t maxBytes, bool mayBeLate) {
 
 bool LineReader::tryContinue() {
   const std::lock_guard lock(mutex_);
-  continues_ = phase_ == Phase::lingering;
+  continues_ = phase_ == Phase::collectingLate;
   mayBeLate_ = false;
   if (continues_) answer_ = {};
   return continues_;
 }
 
 LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until,
-                                       const std::function<bool()>& isHopeless) {
+                                       const std::function<bool()>& isAbandoned) {
   std::unique_lock lock(mutex_);
-  stopLingering();
+  dropLateAnswer();
   phase_ = isQuestion ? Phase::syncing : Phase::idle;
   if (isQuestion && !std::exchange(input_, {}).empty()) noteSurplus();
   for (;;) {
@@ -72,11 +72,11 @@ LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until,
     if (readyAt.hasPassed()) return Sync::inStep;
     const bool isLate = until.hasPassed();
     lock.unlock();
-    const bool isOver = isLate || isHopeless();
+    const bool isOver = isLate || isAbandoned();
     lock.lock();
     if (isOver) {
       phase_ = Phase::idle;
-      return isLate ? Sync::noSilence : Sync::hopeless;
+      return isLate ? Sync::noSilence : Sync::abandoned;
     }
     answerSeen_.wait_for(lock, std::min({readyAt, until, Deadline::after(kCheckEvery)}).left());
   }
@@ -87,10 +87,10 @@ void LineReader::noteWritten() {
   sync_.written(Clock::nowNs());
 }
 
-// The lingering bytes were in the reply with the status "timeout".
-void LineReader::stopLingering() {
+// The reply with status "timeout" contained the bytes that had been received until then.
+void LineReader::dropLateAnswer() {
   continues_ = false;
-  if (phase_ != Phase::lingering) return;
+  if (phase_ != Phase::collectingLate) return;
   phase_ = Phase::idle;
   input_.clear();
 }
@@ -130,7 +130,7 @@ ByteHandlerResult LineReader::byteReceived(std::uint8_t byte) {
       answer_.wasDisturbed = true;
       return ByteHandlerResult::error;
     case Phase::reading:
-    case Phase::lingering:
+    case Phase::collectingLate:
       return collect(byte);
   }
   return ByteHandlerResult::ok;
@@ -145,8 +145,8 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
       input_.push_back(static_cast<char>(byte));
       return ByteHandlerResult::endRead;
     }
-    if (phase_ == Phase::lingering) {
-      stopLingering();
+    if (phase_ == Phase::collectingLate) {
+      dropLateAnswer();
       return ByteHandlerResult::ok;
     }
     input_.erase(0, 1);  // circular buffer: drop the oldest byte
@@ -205,7 +205,7 @@ void LineReader::readEnds(SerialPortStatus status) {
   }
   // An answer whose end cannot be recognised is not collected any further.
   if (mayBeLate_ && status == SerialPortStatus::timeout && (!eom_.empty() || maxBytes_ != 0)) {
-    phase_ = Phase::lingering;
+    phase_ = Phase::collectingLate;
   } else {
     input_.erase(0, bytes);
   }
@@ -217,7 +217,7 @@ void LineReader::lineFailed(LineFault fault, std::uint64_t /*count*/) {
     // A lost line damages only an answer that was incomplete.
     const bool isBetweenAnswers = input_.empty() || (!eom_.empty() && input_.endsWith(eom_));
     const bool cuts = fault != LineFault::unplugged || !isBetweenAnswers;
-    const bool isKept = phase_ == Phase::reading || phase_ == Phase::lingering ||
+    const bool isKept = phase_ == Phase::reading || phase_ == Phase::collectingLate ||
                         (phase_ == Phase::idle && circular_);
     if (cuts && isKept) input_.mark(faultBit(fault));
     if (phase_ == Phase::reading)

@@ -56,11 +56,11 @@ class LineReader final : public ByteHandler {
   enum class Sync {
     inStep,  // the request may be sent now
     noSilence,  // `until` has passed
-    hopeless,  // isHopeless() said so
+    abandoned,  // isAbandoned() returned true
   };
   // Waits until a request may be sent. Before a write-read it drops the input, and the bytes that
   // arrive while it waits.
-  Sync getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isHopeless);
+  Sync getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isAbandoned);
   // A plain write has ended.
   void noteWritten();
 
@@ -86,13 +86,13 @@ class LineReader final : public ByteHandler {
     syncing,  // a write-read waits for silence: input is dropped
     armed,  // a write-read is about to be sent: input stops it
     reading,  // a request collects its answer
-    lingering,  // the answer of a write-read is late and is still collected
+    collectingLate,  // the request has timed out; its late answer is collected for a retry
   };
   // [bytes] Length of the first complete answer in the input; 0 when no answer is complete.
   [[nodiscard]] std::size_t completeBytes() const;
   ByteHandlerResult collect(std::uint8_t byte);
   void noteSurplus();
-  void stopLingering();
+  void dropLateAnswer();
 
   const std::function<void()> onFault_;
   std::mutex mutex_;

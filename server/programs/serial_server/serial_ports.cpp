@@ -5,10 +5,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include <mpf/drivers/serial/posix_terminal.h>
+#include <mpf/drivers/serial/tcp_serial_port.h>
+
+#include "drivers/octal_uart/octal_uart_line.h"
 #include "drivers/octal_uart/octal_uart_port.h"
 #include "drivers/serial/late_line.h"
-#include "drivers/serial/posix_terminal_port.h"
-#include "drivers/serial/tcp_serial_port.h"
+#include "drivers/serial/polled_serial_port.h"
 
 namespace mpf {
 
@@ -95,13 +98,13 @@ std::shared_ptr<SerialPort> SerialPorts::openPort(const std::string& port) {
     TcpSerialOptions tcp;
     tcp.address = TcpAddress::parse(*address);
     tcp.waitForServer = waits;
-    return std::make_shared<TcpSerialPort>(tcp);
+    return openTcpSerialPort(tcp);
   }
   PosixTerminalOptions terminal;
   terminal.device = port;
   terminal.settings = options_.settings;
   terminal.waitForDevice = waits;
-  return std::make_shared<PosixTerminalPort>(terminal);
+  return openPosixTerminal(terminal);
 }
 
 std::shared_ptr<SerialPort> SerialPorts::openOctalPort(const OctalPortStart& start) {
@@ -110,7 +113,7 @@ std::shared_ptr<SerialPort> SerialPorts::openOctalPort(const OctalPortStart& sta
   OctalUartPortOptions octal;
   octal.settings = start.settings;
   octal.waitForModule = options_.hardware.waits();
-  return std::make_shared<OctalUartPort>(openUart(uart), start.number, octal);
+  return openOctalUartPort(openUart(uart), start.number, octal);
 }
 
 // Reports errors of the command line now, since a module that appears later cannot mend them.
@@ -120,7 +123,7 @@ std::shared_ptr<SerialPort> SerialPorts::openLater(const OctalPortStart& port,
                                  uart.place.carrier, uart.place.site);
   if (port.number < 0 || port.number >= uart.ports)
     throw std::invalid_argument(
-        fmt::format("{}: its ports are 0 to {}", description, uart.ports - 1));
+        fmt::format("{}: the module has ports 0 to {}", description, uart.ports - 1));
   if (const auto refused = octalUartProblemOf(port.settings, false); !refused.empty())
     throw std::invalid_argument(fmt::format("{}: {}", description, refused));
   auto line = std::make_unique<LateLine>(std::move(description), [this, &port, &uart] {

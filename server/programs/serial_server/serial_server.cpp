@@ -95,24 +95,19 @@ std::string SerialServer::whyFailed(const Work& work) const {
 
 void SerialServer::noteSurplus() {
   server_.countAlarm();
-  const auto times = surplusLog_.note();
-  if (!times) return;
   log_->warn(
-      "surplus input, {} {} since the last report: bytes arrived outside of requests; "
-      "the next request waits until the line is silent",
-      *times, *times == 1 ? "time" : "times");
+      "surplus input: bytes arrived outside of requests; the next request waits until the line is "
+      "silent");
 }
 
 void SerialServer::noteLimits(const Char8Array& request) {
   if (timeoutOf(request) <= limits_.maxTimeout && request.numberRetrys <= limits_.maxRetries)
     return;
-  if (const auto times = limitLog_.note()) {
-    log_->warn(
-        "{} of clients limited to {} s (--max-timeout) and {} retries (--max-retries): cmd {:#x}, "
-        "timeout {}, numberRetrys {}",
-        *times == 1 ? "a request" : fmt::format("{} requests", *times), limits_.maxTimeout.count(),
-        limits_.maxRetries, request.cmd, request.timeout, request.numberRetrys);
-  }
+  log_->warn(
+      "a request is limited to {} s (--max-timeout) and {} retries (--max-retries): cmd {:#x}, "
+      "timeout {}, numberRetrys {}",
+      limits_.maxTimeout.count(), limits_.maxRetries, request.cmd, request.timeout,
+      request.numberRetrys);
 }
 
 // ---- requests
@@ -139,10 +134,10 @@ void SerialServer::handle(Char8ArrayMessage&& request) {
   applyOptions(work.fields);
   writeEnds_ = Deadline::never();
   const bool isWrite = commandOf(work.fields) == cmdWrite;
-  work.isHopeless = [this, &request, isWrite] { return isHopeless(request, isWrite); };
-  port_->giveUpWhen(work.isHopeless);
+  work.isAbandoned = [this, &request, isWrite] { return isAbandoned(request, isWrite); };
+  port_->abandonWhen(work.isAbandoned);
   serve(work);
-  port_->giveUpWhen({});
+  port_->abandonWhen({});
   if (work.status == serialServerStatusError && !server_.isAwaited(request)) {
     log_->info("a client disconnected during its request (cmd {:#x})", work.fields.cmd);
   } else if (!isStopped_.load(std::memory_order_relaxed)) {
@@ -161,9 +156,7 @@ void SerialServer::reply(const Char8ArrayMessage& request, const Work& work) {
   static_cast<void>(server_.reply(std::move(reply)));
 }
 
-// Whether to end a request early, because the server stops, the line is lost, or the client has
-// disconnected.
-bool SerialServer::isHopeless(const Char8ArrayMessage& request, bool isWrite) {
+bool SerialServer::isAbandoned(const Char8ArrayMessage& request, bool isWrite) {
   if (isStopped_.load(std::memory_order_relaxed) || port_->state() == SerialPortState::unplugged)
     return true;
   if (server_.isAwaited(request)) return false;
@@ -175,7 +168,7 @@ bool SerialServer::isHopeless(const Char8ArrayMessage& request, bool isWrite) {
 void SerialServer::serve(Work& work) {
   for (;;) {
     attempt(work);
-    if (work.status == serialServerStatusOK || work.retries == 0 || work.isHopeless()) return;
+    if (work.status == serialServerStatusOK || work.retries == 0 || work.isAbandoned()) return;
     if (work.status == serialServerStatusTimeout && commandOf(work.fields) == cmdWriteRead)
       takeLateAnswer(work);
     if (work.status == serialServerStatusOK || work.until.hasPassed()) return;
@@ -246,7 +239,7 @@ bool SerialServer::takeAnswer(Work& work, SerialPortStatus status) {
 }
 
 bool SerialServer::isInStep(Work& work, bool isQuestion, Deadline until) {
-  const auto sync = reader_.getInStep(isQuestion, std::min(until, work.until), work.isHopeless);
+  const auto sync = reader_.getInStep(isQuestion, std::min(until, work.until), work.isAbandoned);
   if (sync == LineReader::Sync::inStep) return true;
   work.status = serialServerStatusError;
   work.answer.clear();

@@ -22,7 +22,6 @@
 #include <mpf/drivers/serial/serial_port.h>
 #include <mpf/message_server.h>
 
-#include "server/programs/rare_log.h"
 #include "server/programs/serial_server/line_faults.h"
 #include "server/programs/serial_server/line_reader.h"
 #include "server/programs/server_log.h"
@@ -56,7 +55,7 @@ class SerialServer {
     std::vector<std::uint8_t> data;
     Deadline until = Deadline::never();  // of all attempts together
     int retries = 0;  // left
-    std::function<bool()> isHopeless = {};  // nobody is there for the answer
+    std::function<bool()> isAbandoned = {};
     std::int32_t status = 0;  // a serialServerStatus
     std::string answer = {};  // what was read last
     std::string problem = {};  // why the status is serialServerStatusError, if that is known
@@ -67,7 +66,9 @@ class SerialServer {
   void reply(const Char8ArrayMessage& request, const Work& work);
   void applyOptions(const Char8Array& request);
   [[nodiscard]] Work workOf(const Char8ArrayMessage& request);
-  [[nodiscard]] bool isHopeless(const Char8ArrayMessage& request, bool isWrite);
+  // True when the request ends without its answer: the server stops, the line is unplugged, or the
+  // client is gone.
+  [[nodiscard]] bool isAbandoned(const Char8ArrayMessage& request, bool isWrite);
 
   void serve(Work& work);
   void attempt(Work& work);
@@ -89,8 +90,6 @@ class SerialServer {
   MessageServer& server_;
   const ServerLog& log_;
   const LineLimits limits_;
-  RareLog surplusLog_;  // under the reader's mutex
-  RareLog limitLog_;
   LineFaults faults_;  // of the line
   bool isAsked_ = false;  // there was a request
   bool isFailing_ = false;  // the last one was an error

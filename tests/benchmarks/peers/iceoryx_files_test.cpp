@@ -42,7 +42,9 @@ TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
   folder.write("mpf-bench-1-server.lock", "");
   leaveSocket(folder.file("mpf-bench-1-server"));
   folder.write("another.lock", "");
-  folder.write("mpf-bench-roudi-XXXXXX", "[general]");
+  // a name that mkstemp() has not filled in
+  const auto settings = "mpf-bench-roudi-" + std::string(6, 'X');
+  folder.write(settings, "[general]");
   const FileDescriptor held(
       ::open(folder.write("mpf-bench-2-client.lock", "").c_str(), O_RDWR | O_CLOEXEC));
   leaveSocket(folder.file("mpf-bench-2-client"));
@@ -51,8 +53,8 @@ TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
   removeIceoryxFiles(folder.path());
 
   EXPECT_THAT(namesIn(folder.path()),
-              testing::UnorderedElementsAre("another.lock", "mpf-bench-roudi-XXXXXX",
-                                            "mpf-bench-2-client.lock", "mpf-bench-2-client"));
+              testing::UnorderedElementsAre("another.lock", settings, "mpf-bench-2-client.lock",
+                                            "mpf-bench-2-client"));
 }
 
 TEST(IceoryxFiles, ThoseOfADaemonThatIsGoneAreRemoved) {

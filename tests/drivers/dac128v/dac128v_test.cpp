@@ -35,7 +35,7 @@ class Dac128vTest : public testing::Test {
   }
 };
 
-TEST_F(Dac128vTest, IsInTheMiddleAfterPowerUpAndStaysThere) {
+TEST_F(Dac128vTest, KeepsTheMiddleCodeOfThePowerUp) {
   for (int channel = 0; channel < Dac128v::kChannels; ++channel) {
     EXPECT_EQ(dac_.tryRead(channel), 2048);
     EXPECT_EQ(model_.volts(channel), channel < 4 ? 0.0 : 2.5);
@@ -50,14 +50,14 @@ TEST_F(Dac128vTest, GivesEachChannelItsOwnCode) {
     EXPECT_EQ(dac_.tryRead(channel), 100 * channel);
 }
 
-TEST_F(Dac128vTest, TakesBothEndsOfItsRange) {
+TEST_F(Dac128vTest, AcceptsBothEndsOfItsRange) {
   EXPECT_EQ(dac_.tryWrite(0, 0), Dac128vStatus::success);
   EXPECT_EQ(model_.volts(0), -10);
   EXPECT_EQ(dac_.tryWrite(0, 4095), Dac128vStatus::success);
   EXPECT_DOUBLE_EQ(model_.volts(0), 10 - 20.0 / 4096);
 }
 
-TEST_F(Dac128vTest, LeavesTheRegisterWhereTheCodeOrTheChannelIsNone) {
+TEST_F(Dac128vTest, RefusesInvalidCodesAndChannelsAndWritesNothing) {
   ASSERT_EQ(dac_.tryWrite(7, 1234), Dac128vStatus::success);
 
   for (const int code : {-1, 4096, 0x10000, INT32_MIN, INT32_MAX})
@@ -71,7 +71,7 @@ TEST_F(Dac128vTest, LeavesTheRegisterWhereTheCodeOrTheChannelIsNone) {
   EXPECT_EQ(dac_.tryRead(0), Dac128v::kPowerUpCode);
 }
 
-TEST_F(Dac128vTest, GivesAllChannelsWhatTheyHadWhenTheModuleLostIt) {
+TEST_F(Dac128vTest, RestoresAllChannelsAfterAResetOfTheModule) {
   for (const int channel : {1, 5, 6})
     ASSERT_EQ(dac_.tryWrite(channel, 100 * channel), Dac128vStatus::success);
   carrier_.unplug("IP_a");
@@ -87,7 +87,7 @@ TEST_F(Dac128vTest, GivesAllChannelsWhatTheyHadWhenTheModuleLostIt) {
   EXPECT_EQ(dac_.restorations(), 1u);
 }
 
-TEST_F(Dac128vTest, CountsARegisterThatBreaksOnceAndGoesOn) {
+TEST_F(Dac128vTest, CountsABrokenRegisterOnceAndWritesTheOtherChannels) {
   ASSERT_EQ(dac_.tryWrite(1, 1), Dac128vStatus::success);
   model_.setStuck(1, 1);
   model_.write(DeviceModel::Space::io, 2, 0, DeviceModel::kBoth);
@@ -97,7 +97,7 @@ TEST_F(Dac128vTest, CountsARegisterThatBreaksOnceAndGoesOn) {
   EXPECT_EQ(dac_.restorations(), 1u);
 }
 
-TEST_F(Dac128vTest, WritesNothingToAModuleThatIsNoDac) {
+TEST_F(Dac128vTest, WritesNothingToAnotherModule) {
   ASSERT_EQ(dac_.tryWrite(1, 100), Dac128vStatus::success);
   carrier_.unplug("IP_a");
   auto& other = carrier_.plug("IP_a", std::make_unique<PlainModel>());
@@ -109,21 +109,21 @@ TEST_F(Dac128vTest, WritesNothingToAModuleThatIsNoDac) {
 }
 
 // This also holds for the first write, when the contents of the registers are unknown.
-TEST_F(Dac128vTest, WritesNothingToAModuleThatCameBeforeItsFirstWrite) {
+TEST_F(Dac128vTest, WritesNothingToAModuleThatWasReplacedBeforeTheFirstWrite) {
   carrier_.unplug("IP_a");
   auto& other = carrier_.plug("IP_a", std::make_unique<PlainModel>());
   EXPECT_EQ(dac_.tryWrite(2, 7), Dac128vStatus::gone);
   EXPECT_EQ(other.read(DeviceModel::Space::io, 4, DeviceModel::kBoth), 0);
 }
 
-TEST_F(Dac128vTest, SaysWhenTheRegisterHoldsSomethingElse) {
+TEST_F(Dac128vTest, ReportsARegisterThatHoldsAnotherCode) {
   model_.setStuck(2, 0x800);
 
   EXPECT_EQ(dac_.tryWrite(2, 0x801), Dac128vStatus::readBackDiffers);
   EXPECT_EQ(dac_.tryWrite(2, 0x7ff), Dac128vStatus::success);
 }
 
-TEST_F(Dac128vTest, SaysWhenNothingAnswers) {
+TEST_F(Dac128vTest, ReportsAnAbsentModule) {
   carrier_.setFault("IP_a", ModelFault::busError);
   EXPECT_EQ(dac_.tryWrite(0, 4095), Dac128vStatus::gone);
   EXPECT_EQ(dac_.tryRead(0), std::nullopt);
@@ -150,7 +150,7 @@ TEST_F(Dac128vTest, ReadsBackItsOwnWriteWhenTwoThreadsWriteAtOnce) {
   EXPECT_EQ(failures, 0);
 }
 
-TEST(Dac128vModel, TellsWhatItsOutputsGive) {
+TEST(Dac128vModel, ReportsTheVoltagesOfItsOutputs) {
   std::vector<std::pair<int, double>> told;
   Dac128vModel model(kRanges,
                      [&](int channel, double volts) { told.emplace_back(channel, volts); });
@@ -172,7 +172,7 @@ TEST(Dac128vRange, GivesTheNearestCode) {
   EXPECT_EQ(kRanges[0].tryCodeOf(std::numeric_limits<double>::quiet_NaN()), std::nullopt);
 }
 
-TEST(Dac128vRanges, AreWhatJumpersCanSay) {
+TEST(Dac128vRanges, AcceptTheSettingsOfTheJumpers) {
   EXPECT_EQ(parseDac128vRanges("-10to10")[1], (Dac128vRange{-10, 10}));
   EXPECT_EQ(parseDac128vRanges("-5to+5,0to10")[1], (Dac128vRange{0, 10}));
   EXPECT_EQ(parseDac128vRanges("-5to+5,0to10")[0], (Dac128vRange{-5, 5}));

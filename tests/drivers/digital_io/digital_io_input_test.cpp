@@ -37,7 +37,7 @@ TEST_F(DigitalIoTest, SeesBothEdgesByInterrupt) {
   }
 }
 
-TEST_F(DigitalIoTest, SeesOnlyTheEdgesThatItIsTold) {
+TEST_F(DigitalIoTest, InterruptsOnlyForTheSelectedEdges) {
   // bit 0 rising, bit 1 falling, bit 2 both, bit 3 no edges
   auto& io = start("IP-Unidig-I", interruptsOnly(0x5, 0x6));
   model_->setInputs(0xf, 0x0);
@@ -60,7 +60,7 @@ TEST_F(DigitalIoTest, SeesOnlyTheEdgesThatItIsTold) {
   EXPECT_EQ(listener.next().changed, 0x4u);
 }
 
-TEST_F(DigitalIoTest, TellsOfAPulseThatIsOver) {
+TEST_F(DigitalIoTest, ReportsAPulseThatHasEnded) {
   auto& io = start("IP-Unidig-I", interruptsOnly(0x1, 0));
   model_->setInputs(0x1, 0);
   io.look();
@@ -73,7 +73,7 @@ TEST_F(DigitalIoTest, TellsOfAPulseThatIsOver) {
   EXPECT_EQ(inputs.changed & 1, 1u);
 }
 
-TEST_F(DigitalIoTest, MayBeToldOtherEdges) {
+TEST_F(DigitalIoTest, AcceptsOtherEdgesLater) {
   auto& io = start("IP-Unidig-I", interruptsOnly(0, 0));
   DigitalIoListener listener(io);
   model_->setInputs(0x3, 0);
@@ -89,11 +89,11 @@ TEST_F(DigitalIoTest, MayBeToldOtherEdges) {
   EXPECT_EQ(listener.next().changed, 0x1u);
 }
 
-TEST_F(DigitalIoTest, HasNoEdgesToSetWhereItCannotInterrupt) {
+TEST_F(DigitalIoTest, RefusesEdgesWithoutInterrupts) {
   EXPECT_EQ(start("IP-Unidig").trySetEdges(1, 1), DigitalIoStatus::noInterrupts);
 }
 
-TEST_F(DigitalIoTest, IsSilentAfterItsEnd) {
+TEST_F(DigitalIoTest, DisablesInterruptsWhenItIsDestroyed) {
   start("IP-Unidig-I", interruptsOnly(0xffffff, 0xffffff));
   EXPECT_EQ(word(9), 0xffff);
   io_.reset();
@@ -103,7 +103,7 @@ TEST_F(DigitalIoTest, IsSilentAfterItsEnd) {
 
 // However the lines change, the last report has their final state; without polls, by interrupts
 // alone.
-TEST_F(DigitalIoTest, NeverGetsOutOfStepWithLinesThatMoveAtAnyTime) {
+TEST_F(DigitalIoTest, ReportsTheFinalStateOfLinesThatChangeAtAnyTime) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE(seed);
   std::mt19937 engine(seed);
@@ -122,7 +122,7 @@ TEST_F(DigitalIoTest, NeverGetsOutOfStepWithLinesThatMoveAtAnyTime) {
   }
 }
 
-TEST_F(DigitalIoTest, TellsEachSubscriberUntilItEnds) {
+TEST_F(DigitalIoTest, ReportsToEachSubscriberUntilItsSubscriptionEnds) {
   auto& io = start("IP-Unidig-I", interruptsOnly(0xffffff, 0xffffff));
   std::vector<std::unique_ptr<DigitalIoListener>> listeners;
   for (int i = 0; i < 20; ++i) listeners.push_back(std::make_unique<DigitalIoListener>(io));
@@ -135,7 +135,7 @@ TEST_F(DigitalIoTest, TellsEachSubscriberUntilItEnds) {
   for (auto& listener : listeners) EXPECT_EQ(listener->next().changed, 2u);
 }
 
-TEST_F(DigitalIoTest, SeesChangesByPollWhenInterruptsAreLostAndSaysSoOnce) {
+TEST_F(DigitalIoTest, SeesChangesByPollingWhenInterruptsAreLostAndReportsItOnce) {
   auto options = interruptsOnly(0xffffff, 0xffffff);
   options.pollEvery = 1ms;
   auto& io = start("IP-Unidig-I", options);
@@ -155,7 +155,7 @@ TEST_F(DigitalIoTest, SeesChangesByPollWhenInterruptsAreLostAndSaysSoOnce) {
   EXPECT_EQ(listener.next().kind, Kind::inputs);
 }
 
-TEST_F(DigitalIoTest, SeesChangesDuringAStormAndTellsOfIt) {
+TEST_F(DigitalIoTest, SeesChangesDuringAStormAndReportsIt) {
   auto options = interruptsOnly(0xffffff, 0xffffff);
   options.pollEvery = 1ms;
   options.storm = {.stormLimit = 50, .stormPause = 24h};
@@ -169,7 +169,7 @@ TEST_F(DigitalIoTest, SeesChangesDuringAStormAndTellsOfIt) {
   EXPECT_EQ(io.counters().storms, 1u);
 }
 
-TEST_F(DigitalIoTest, TellsOfAStormOnceUntilItWasCalm) {
+TEST_F(DigitalIoTest, ReportsAStormOnceUntilItHasEnded) {
   auto options = interruptsOnly(0xffffff, 0xffffff);
   options.pollEvery = 1ms;
   options.storm = {.stormLimit = 50, .stormPause = 1ms};
@@ -194,7 +194,7 @@ TEST_F(DigitalIoTest, TellsOfAStormOnceUntilItWasCalm) {
   }
 }
 
-TEST_F(DigitalIoTest, TellsWhenItIsGoneAndBackAndGoesOn) {
+TEST_F(DigitalIoTest, ReportsAnAbsentModuleAndItsReturnAndContinues) {
   auto options = interruptsOnly(0xffffff, 0xffffff);
   options.pollEvery = 1ms;
   auto& io = start("IP-Unidig-I", options);
@@ -221,7 +221,7 @@ TEST_F(DigitalIoTest, TellsWhenItIsGoneAndBackAndGoesOn) {
   while (io.counters().interrupts == interrupts) std::this_thread::yield();
 }
 
-TEST_F(DigitalIoTest, IsNotGoneWhenAllInputsAreHigh) {
+TEST_F(DigitalIoTest, IsPresentWhenAllInputsAreHigh) {
   auto& io = start("DIO316I", {.pollEvery = 1ms});
   DigitalIoListener listener(io);
   model_->setInputs(0xffff, 0);
@@ -231,7 +231,7 @@ TEST_F(DigitalIoTest, IsNotGoneWhenAllInputsAreHigh) {
   EXPECT_TRUE(io.look().isThere);
 }
 
-TEST_F(DigitalIoTest, WaitsForAModuleThatIsNotThereYet) {
+TEST_F(DigitalIoTest, WaitsForAModuleThatIsAbsentAtTheStart) {
   start("IP-Unidig-I", {.pollEvery = 1h});
   auto* const module = modules_->find("dio");
   io_.reset();

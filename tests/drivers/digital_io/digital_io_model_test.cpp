@@ -50,7 +50,7 @@ TEST_F(DigitalIoModelTest, PullsALineDownByAZeroOnly) {
   EXPECT_EQ(model_.driven(), 0x5u);
 }
 
-TEST_F(DigitalIoModelTest, AsksAtAnEdgeThatIsEnabledUntilItIsCleared) {
+TEST_F(DigitalIoModelTest, RequestsAnInterruptAtAnEnabledEdgeUntilItIsCleared) {
   watchInterrupt();
   write(at::kPolarity, 0x1);
   write(at::kInterruptEnable, 0x3);
@@ -81,7 +81,7 @@ TEST_F(DigitalIoModelTest, SeesEdgesOfItsOwnOutputs) {
   EXPECT_EQ(read(at::kPending + 1), 0xff80);
 }
 
-TEST_F(DigitalIoModelTest, HasNoInterruptRegistersWhereItCannotInterrupt) {
+TEST_F(DigitalIoModelTest, HasNoInterruptRegistersWithoutInterrupts) {
   DigitalIoModel plain(*findDigitalIoKind("IP-Unidig"));
   for (const auto word : {8U, 9U, 10U, 11U, 12U}) {
     plain.write(DeviceModel::Space::io, 2 * word, 0xff, DeviceModel::kBoth);
@@ -89,7 +89,7 @@ TEST_F(DigitalIoModelTest, HasNoInterruptRegistersWhereItCannotInterrupt) {
   }
 }
 
-TEST(DigitalIoModel, TellsWhatItsOutputsGive) {
+TEST(DigitalIoModel, ReportsTheVoltagesOfItsOutputs) {
   std::vector<std::pair<int, double>> told;
   DigitalIoModel model(*findDigitalIoKind("IP-Unidig-HV-16I8O"),
                        [&](int bit, double volts) { told.emplace_back(bit, volts); });

@@ -11,7 +11,7 @@ namespace {
 
 constexpr auto kSuccess = DigitalIoStatus::success;
 
-TEST_F(DigitalIoTest, LeavesOutputsAsPowerUpDoes) {
+TEST_F(DigitalIoTest, KeepsTheOutputsOfThePowerUp) {
   auto& io = start("IP-Unidig");
   EXPECT_EQ(io.tryReadOutputs(), 0xffffffu);
   EXPECT_EQ(io.tryReadInputs(), 0xffffffu);
@@ -28,7 +28,7 @@ TEST_F(DigitalIoTest, SetsAndClearsTheBitsOfAMaskOnly) {
   EXPECT_EQ(io.tryReadOutputs(), 0xfafafau);
 }
 
-TEST_F(DigitalIoTest, KeepsItsOutputsOverARestart) {
+TEST_F(DigitalIoTest, KeepsItsOutputsWhenTheDriverRestarts) {
   ASSERT_EQ(start("IP-Unidig-I", {.vector = 1, .rising = 1}).tryClearBits(0x5), kSuccess);
   io_.reset();
 
@@ -57,7 +57,7 @@ TEST_F(DigitalIoTest, LosesNoBitWhenManyWriteAtOnce) {
   EXPECT_EQ(io.tryReadOutputs(), 0xffffffu);
 }
 
-TEST_F(DigitalIoTest, ReadsWhatOthersDriveOnLinesThatItLetsGo) {
+TEST_F(DigitalIoTest, ReadsLinesThatItDoesNotDrive) {
   auto& io = start("IP-Unidig");
   model_->setInputs(0xff, 0x0f);
   EXPECT_EQ(io.tryReadInputs(), 0xffff0fu);
@@ -66,7 +66,7 @@ TEST_F(DigitalIoTest, ReadsWhatOthersDriveOnLinesThatItLetsGo) {
 }
 
 // The first EPICS driver wrote the low enables to word 8, which is the interrupt vector.
-TEST_F(DigitalIoTest, EnablesSwitchedDriversInTheirOwnRegister) {
+TEST_F(DigitalIoTest, EnablesSwitchedDriversInTheOutputEnableRegister) {
   auto& io = start("IP-Unidig-I-D", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   EXPECT_EQ(model_->driven(), 0u);
 
@@ -88,7 +88,7 @@ TEST_F(DigitalIoTest, SwitchesTheDriversOfOpticalModelsOn) {
   }
 }
 
-TEST_F(DigitalIoTest, SetsUpTheSystran) {
+TEST_F(DigitalIoTest, ProgramsADio316I) {
   auto& io = start("DIO316I");
   EXPECT_EQ(word(3), 0xf);
   EXPECT_EQ(word(4), 0x3);
@@ -150,7 +150,7 @@ TEST_F(DigitalIoTest, KeepsTheThresholdWhileItServesInterrupts) {
   EXPECT_EQ(threshold(), 100);
 }
 
-TEST_F(DigitalIoTest, SaysWhenTheRegisterHoldsSomethingElse) {
+TEST_F(DigitalIoTest, ReportsARegisterThatHoldsAnotherValue) {
   auto& io = start("IP-Unidig");
   model_->setStuck(0x100);
   EXPECT_EQ(io.trySetBits(0x100), DigitalIoStatus::readBackDiffers);
@@ -158,7 +158,7 @@ TEST_F(DigitalIoTest, SaysWhenTheRegisterHoldsSomethingElse) {
 }
 
 // All ones may be a written value, or the reading of an absent module.
-TEST_F(DigitalIoTest, SaysWhenNothingAnswers) {
+TEST_F(DigitalIoTest, ReportsAnAbsentModule) {
   for (const auto* const name : {"IP-Unidig-HV-16I8O", "DIO316I"}) {
     auto& io = start(name);
     EXPECT_EQ(io.trySetBits(0xff0000), kSuccess);
@@ -174,7 +174,7 @@ TEST_F(DigitalIoTest, SaysWhenNothingAnswers) {
   }
 }
 
-TEST_F(DigitalIoTest, RefusesVectorsThatCannotBe) {
+TEST_F(DigitalIoTest, RefusesInvalidVectors) {
   start("IP-Unidig-I");
   for (const int vector : {-1, 256}) {
     try {
@@ -188,7 +188,7 @@ TEST_F(DigitalIoTest, RefusesVectorsThatCannotBe) {
 
 // Outputs, enables and threshold are restored after a loss of power; bits that were never written
 // are not.
-TEST_F(DigitalIoTest, GivesAModuleThatComesBackWhatWasWritten) {
+TEST_F(DigitalIoTest, RestoresTheOutputsOfAModuleThatReturns) {
   auto& io = start("IP-Unidig-I-D", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   DigitalIoListener listener(io);
   ASSERT_EQ(io.tryWriteBits(0x810003, 0x800001), kSuccess);
@@ -203,7 +203,7 @@ TEST_F(DigitalIoTest, GivesAModuleThatComesBackWhatWasWritten) {
   EXPECT_EQ(listener.next().kind, Kind::back);
 }
 
-TEST_F(DigitalIoTest, GivesAModuleThatComesBackItsThreshold) {
+TEST_F(DigitalIoTest, RestoresTheThresholdOfAModuleThatReturns) {
   auto& io = start("IP-Unidig-HV-16I8O");
   ASSERT_EQ(io.trySetThreshold(1601), kSuccess);
   plugAgain("IP-Unidig-HV-16I8O");
@@ -212,7 +212,7 @@ TEST_F(DigitalIoTest, GivesAModuleThatComesBackItsThreshold) {
 }
 
 // A reset between two polls is detected by one register, in each kind of module.
-TEST_F(DigitalIoTest, SeesThatAModuleWasReset) {
+TEST_F(DigitalIoTest, DetectsAResetOfTheModule) {
   for (const auto& kind : digitalIoKinds()) {
     if (kind.outputs == 0) continue;
     const std::string name(kind.name);
@@ -235,7 +235,7 @@ TEST_F(DigitalIoTest, SeesThatAModuleWasReset) {
 }
 
 // Other bits of the same register are kept, too.
-TEST_F(DigitalIoTest, MendsAModuleThatWasResetBeforeItWritesToIt) {
+TEST_F(DigitalIoTest, RestoresAResetModuleBeforeItWrites) {
   auto& io = start("IP-Unidig-I-O-24IO", {.pollEvery = kNever, .vector = 1});
   ASSERT_EQ(io.tryClearBits(0x1), kSuccess);
   plugAgain("IP-Unidig-I-O-24IO");
@@ -246,7 +246,7 @@ TEST_F(DigitalIoTest, MendsAModuleThatWasResetBeforeItWritesToIt) {
   EXPECT_EQ(model_->outputs(), 0xfffffcu);
 }
 
-TEST_F(DigitalIoTest, TellsABrokenRegisterOnce) {
+TEST_F(DigitalIoTest, ReportsABrokenRegisterOnce) {
   auto& io = start("IP-Unidig");
   ASSERT_EQ(io.trySetBits(0x100), kSuccess);
   DigitalIoListener listener(io);
@@ -263,7 +263,7 @@ TEST_F(DigitalIoTest, TellsABrokenRegisterOnce) {
   EXPECT_TRUE(listener.isEmpty());
 }
 
-TEST_F(DigitalIoTest, WritesNothingToAModuleThatIsNoneOfDigitalLines) {
+TEST_F(DigitalIoTest, WritesNothingToAModuleOfAnotherKind) {
   auto& io = start("IP-Unidig-I-D",
                    {.pollEvery = kNever, .vector = 0x74, .rising = 0xff, .falling = 0xff});
   ASSERT_EQ(io.tryClearBits(0x3), kSuccess);
@@ -282,7 +282,7 @@ TEST_F(DigitalIoTest, WritesNothingToAModuleThatIsNoneOfDigitalLines) {
 }
 
 // The destructor writes, too; it must check the module itself, since there was no look in between.
-TEST_F(DigitalIoTest, WritesNothingAtItsEndToAnotherModule) {
+TEST_F(DigitalIoTest, WritesNothingToAnotherModuleWhenItIsDestroyed) {
   start("IP-Unidig-I", {.pollEvery = kNever, .vector = 0x74, .rising = 0xff});
   carrier_.unplug("IP_a");
   auto& other = carrier_.plug("IP_a", std::make_unique<PlainModel>());

@@ -101,7 +101,7 @@ constexpr GoodParameters kGood[]{
      "fc0300 fc0380 fc2000+2K 5,5"},
 };
 
-TEST(CarrierParametersTest, SayWhereTheSitesAre) {
+TEST(CarrierParametersTest, GiveTheAddressesOfTheSites) {
   for (const auto& [kind, text, sites] : kGood)
     EXPECT_EQ(textOf(parseCarrierParameters(kind, text)), sites) << kind << " \"" << text << '"';
 }
@@ -192,11 +192,11 @@ void expectRefused(const BadParameters& bad) {
   }
 }
 
-TEST(CarrierParametersTest, ThatCannotBeAreAnErrorThatNamesTheWrongPart) {
+TEST(CarrierParametersTest, AreRefusedWithAnErrorThatNamesTheInvalidPart) {
   for (const auto& bad : kBad) expectRefused(bad);
 }
 
-TEST(CarrierParametersTest, SayWhatElseTheBoardDoes) {
+TEST(CarrierParametersTest, GiveClockWidthResetAndAddressSpaces) {
   const auto hytec = parseCarrierParameters("hy8004", "3,2 IPCLK=32 ROAK=1");
   EXPECT_EQ(hytec.clockMHz, 32);
   EXPECT_TRUE(hytec.releasesOnAcknowledge);
@@ -210,14 +210,14 @@ TEST(CarrierParametersTest, SayWhatElseTheBoardDoes) {
   EXPECT_EQ(parseCarrierParameters("vipc616", "3000,D00000,64").memory, BusSpace::vmeA24);
 }
 
-TEST(CarrierParametersTest, OfAnUnknownKindNameTheKnownOnes) {
+TEST(CarrierParametersTest, OfAnUnknownKindAreRefused) {
   EXPECT_FALSE(isParameterKind("vipc999"));
   EXPECT_THROW(static_cast<void>(parseCarrierParameters("vipc999", "")), std::invalid_argument);
 }
 
 // The parameters of a carrier that MPF cannot reach are checked nevertheless, so that an error in
 // an old startup file is found.
-TEST(CreateCarrierTest, SaysThatThisHostReachesNoVmeAndWhatToUse) {
+TEST(CreateCarrierTest, RefusesVmeAndIsaCarriersAndNamesTheAlternatives) {
   const auto problemOf = [](const char* kind, const char* parameters) {
     try {
       static_cast<void>(createCarrier(kind, parameters));

@@ -20,7 +20,7 @@ struct CrcVector {
 
 class IdPromCrc : public testing::TestWithParam<CrcVector> {};
 
-TEST_P(IdPromCrc, IsThatOfTheModule) {
+TEST_P(IdPromCrc, MatchesTheCrcOfTheModule) {
   const auto& [name, manufacturer, model, crc] = GetParam();
   EXPECT_EQ(wordsOf({.manufacturer = manufacturer, .model = model}).at(11), crc);
 }
@@ -65,12 +65,12 @@ TEST_F(IdPromTest, OfFormatTwoIsReadBack) {
   EXPECT_EQ(readIdProm(space(prom), "IP_a"), prom);
 }
 
-TEST_F(IdPromTest, TellsAWrongCrc) {
+TEST_F(IdPromTest, ReportsAWrongCrc) {
   EXPECT_FALSE(readIdProm(space({.manufacturer = 0xf0, .model = 0x22, .isCrcRight = false}), "IP_a")
                    .isCrcRight);
 }
 
-TEST_F(IdPromTest, TellsAWrongCrcOfFormatTwo) {
+TEST_F(IdPromTest, ReportsAWrongCrcOfFormatTwo) {
   EXPECT_FALSE(readIdProm(space({.format = IdProm::Format::two,
                                  .manufacturer = 1,
                                  .bytesUsed = 26,
@@ -79,12 +79,12 @@ TEST_F(IdPromTest, TellsAWrongCrcOfFormatTwo) {
                    .isCrcRight);
 }
 
-TEST_F(IdPromTest, ThatUsesMoreBytesThanThereAreIsWrong) {
+TEST_F(IdPromTest, WithMoreBytesUsedThanExistHasAWrongCrc) {
   const IdProm prom{.manufacturer = 0xf0, .model = 0x22, .bytesUsed = 255};
   EXPECT_FALSE(readIdProm(space(prom), "IP_a").isCrcRight);
 }
 
-TEST_F(IdPromTest, IsMissedWhereNothingAnswers) {
+TEST_F(IdPromTest, IsRefusedWhenNothingAnswers) {
   try {
     static_cast<void>(readIdProm(carrier_.site(1).id(), "carrier ipac, site IP_b"));
     FAIL();
@@ -94,7 +94,7 @@ TEST_F(IdPromTest, IsMissedWhereNothingAnswers) {
   }
 }
 
-TEST_F(IdPromTest, IsMissedInWhatIsSomethingElse) {
+TEST_F(IdPromTest, IsRefusedWhenTheContentsAreNotAnIdProm) {
   std::array<std::uint16_t, 64> zeroes{};
   MemoryRegisters memory(zeroes.data(), sizeof(zeroes));
   try {
@@ -105,7 +105,7 @@ TEST_F(IdPromTest, IsMissedInWhatIsSomethingElse) {
   }
 }
 
-TEST(MemoryRegistersTest, AreBigEndianAndOfTheWidthAskedFor) {
+TEST(MemoryRegistersTest, AreBigEndianAndAccessedWithTheGivenWidth) {
   alignas(4) std::array<std::uint8_t, 8> window{0x12, 0x34, 0x56, 0x78};
   MemoryRegisters registers(window.data(), window.size());
   EXPECT_EQ(registers.read8(1), 0x34);
@@ -118,7 +118,7 @@ TEST(MemoryRegistersTest, AreBigEndianAndOfTheWidthAskedFor) {
   EXPECT_EQ(window[7], 4);
 }
 
-TEST(MemoryRegistersTest, RefuseWhatIsOutsideOrOdd) {
+TEST(MemoryRegistersTest, RefuseOffsetsThatAreOutsideOrUnaligned) {
   alignas(4) std::array<std::uint8_t, 8> window{};
   MemoryRegisters registers(window.data(), window.size());
   EXPECT_THROW(static_cast<void>(registers.read16(8)), std::out_of_range);

@@ -43,13 +43,13 @@ TEST_F(InterruptThreadTest, ServesEachInterrupt) {
   EXPECT_EQ(thread.counters().storms, 0u);
 }
 
-TEST_F(InterruptThreadTest, ServesOneThatWasThereBefore) {
+TEST_F(InterruptThreadTest, ServesAnInterruptThatIsPendingAtTheStart) {
   io().write16(0, 1);
   InterruptThread thread(carrier_.site(0).interrupt(0), {}, serve());
   served_.acquire();
 }
 
-TEST_F(InterruptThreadTest, HasThePriorityOfItsInterruptWhereItMay) {
+TEST_F(InterruptThreadTest, HasThePriorityOfItsInterruptWherePermitted) {
   for (const int priority : {kInterruptPriority, 0}) {
     const bool mayHave = priority > 0 && RealTimePriority::isAllowed(priority);
     std::atomic<int> policy{-1};
@@ -66,9 +66,9 @@ TEST_F(InterruptThreadTest, HasThePriorityOfItsInterruptWhereItMay) {
   }
 }
 
-// The handler always has something to do: no storm ends it, and what it waits for may need the same
-// processor.
-TEST_F(InterruptThreadTest, OneThatNeverSleepsLosesItsPriority) {
+// The handler always finds a request, so no storm pauses it; a thread that it waits for may need
+// the same processor.
+TEST_F(InterruptThreadTest, LosesItsPriorityWhenItNeverSleeps) {
   std::atomic<bool> isOrdinary{false};
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   InterruptThread thread(carrier_.site(0).interrupt(0), {}, [&](InterruptThread::Cause) {
@@ -79,7 +79,7 @@ TEST_F(InterruptThreadTest, OneThatNeverSleepsLosesItsPriority) {
   while (!isOrdinary) std::this_thread::yield();
 }
 
-TEST_F(InterruptThreadTest, PollsForOneThatNeverComes) {
+TEST_F(InterruptThreadTest, FindsLostInterruptsByPolling) {
   carrier_.setFault("IP_a", ModelFault::interruptsLost);
   InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms}, serve());
   io().write16(0, 1);
@@ -101,7 +101,7 @@ TEST_F(InterruptThreadTest, MasksAStormAndStillPolls) {
 }
 
 // One interrupt of four has a request, as on a stuck line while the chip is busy.
-TEST_F(InterruptThreadTest, MasksAStormThatTrafficInterrupts) {
+TEST_F(InterruptThreadTest, MasksAStormDespiteTraffic) {
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   std::counting_semaphore<> storms{0};
   InterruptThread thread(
@@ -117,7 +117,7 @@ TEST_F(InterruptThreadTest, MasksAStormThatTrafficInterrupts) {
   EXPECT_EQ(thread.counters().storms, 1u);
 }
 
-TEST_F(InterruptThreadTest, ToleratesInterruptsInVainAmongUsefulOnes) {
+TEST_F(InterruptThreadTest, ToleratesSpuriousInterruptsAmongInterruptsWithARequest) {
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 100, .stormPause = 1h},
                          [i = 0](InterruptThread::Cause) mutable { return ++i % 3 == 0; });
@@ -125,7 +125,7 @@ TEST_F(InterruptThreadTest, ToleratesInterruptsInVainAmongUsefulOnes) {
   EXPECT_EQ(thread.counters().storms, 0u);
 }
 
-TEST_F(InterruptThreadTest, TellsOfAStormWhenItBeginsAndNotAfterEachPause) {
+TEST_F(InterruptThreadTest, ReportsAStormWhenItBeginsAndNotAfterEachPause) {
   std::atomic<int> told = 0;
   InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 10ms},
                          serve(), [&](InterruptTrouble) { ++told; });
@@ -137,7 +137,7 @@ TEST_F(InterruptThreadTest, TellsOfAStormWhenItBeginsAndNotAfterEachPause) {
   EXPECT_LT(told, 10);  // 1, unless this process did not run for a while
 }
 
-TEST_F(InterruptThreadTest, TellsOnceOfALineThatIsDead) {
+TEST_F(InterruptThreadTest, ReportsADeadLineOnce) {
   std::atomic<int> told = 0;
   InterruptThread thread(carrier_.site(0).interrupt(0), {.pollEvery = 1ms, .lateLimit = 3}, serve(),
                          [&](InterruptTrouble trouble) {
@@ -153,7 +153,7 @@ TEST_F(InterruptThreadTest, TellsOnceOfALineThatIsDead) {
   EXPECT_EQ(told, 1);
 }
 
-TEST_F(InterruptThreadTest, CallsNoLineDeadThatItMasksItself) {
+TEST_F(InterruptThreadTest, DoesNotReportALineAsDeadThatItHasMasked) {
   std::atomic<int> dead = 0;
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   InterruptThread thread(
@@ -168,7 +168,7 @@ TEST_F(InterruptThreadTest, CallsNoLineDeadThatItMasksItself) {
   EXPECT_EQ(dead, 0);
 }
 
-TEST_F(InterruptThreadTest, GoesOnAfterAStorm) {
+TEST_F(InterruptThreadTest, ServesInterruptsAgainAfterAStorm) {
   carrier_.setFault("IP_a", ModelFault::interruptStorm);
   InterruptThread thread(carrier_.site(0).interrupt(0), {.stormLimit = 10, .stormPause = 1ms},
                          serve());

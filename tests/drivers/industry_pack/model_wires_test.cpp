@@ -41,7 +41,7 @@ class ModelWiresTest : public testing::Test {
   std::string path_ = folder_.file("wires");
 };
 
-TEST_F(ModelWiresTest, CarryWhatWasSetToWhoeverKnowsTheName) {
+TEST_F(ModelWiresTest, CarryValuesBetweenObjectsByName) {
   ModelWires one(path_);
   ModelWires other(path_);
   const auto output = one.wire("dac.0");
@@ -55,7 +55,7 @@ TEST_F(ModelWiresTest, CarryWhatWasSetToWhoeverKnowsTheName) {
   EXPECT_EQ(other.wire("dio.5").get(), 5);
 }
 
-TEST_F(ModelWiresTest, AreThereForWhoComesLater) {
+TEST_F(ModelWiresTest, KeepTheirValuesWithoutAProcess) {
   {
     ModelWires(path_).wire("dac.7").set(10);
   }
@@ -86,7 +86,7 @@ TEST_F(ModelWiresTest, ReachAnotherProcess) {
   for (const auto end : go) ::close(end);
 }
 
-TEST_F(ModelWiresTest, TellNobodyWhenNothingChanged) {
+TEST_F(ModelWiresTest, DoNotNotifyWhenTheValueIsUnchanged) {
   ModelWires wires(path_);
   const auto wire = wires.wire("dac.0");
   wire.set(1);
@@ -99,7 +99,7 @@ TEST_F(ModelWiresTest, TellNobodyWhenNothingChanged) {
 }
 
 // When many processes create the file at once, all have the same wires, and each name is one wire.
-TEST_F(ModelWiresTest, AreMadeOnceByManyAtOnce) {
+TEST_F(ModelWiresTest, AreCreatedOnceByManyThreadsAtATime) {
   for (int round = 0; round < 20; ++round) {
     std::filesystem::remove(path_);
     {
@@ -125,7 +125,7 @@ TEST_F(ModelWiresTest, AreMadeOnceByManyAtOnce) {
   }
 }
 
-TEST_F(ModelWiresTest, GoOnWhereTheMakerWasKilled) {
+TEST_F(ModelWiresTest, CompleteAFileWhoseCreatorWasKilled) {
   {
     const ModelWires wires(path_);
   }
@@ -134,7 +134,7 @@ TEST_F(ModelWiresTest, GoOnWhereTheMakerWasKilled) {
   EXPECT_EQ(ModelWires(path_).wire("dac.0").get(), 0);
 }
 
-TEST_F(ModelWiresTest, GoOnWhereANameWasHalfWritten) {
+TEST_F(ModelWiresTest, ReuseAnEntryWithAnIncompleteName) {
   {
     static_cast<void>(ModelWires(path_).wire("first"));
   }
@@ -146,7 +146,7 @@ TEST_F(ModelWiresTest, GoOnWhereANameWasHalfWritten) {
   EXPECT_EQ(wires.wire("first").get(), 0);
 }
 
-TEST_F(ModelWiresTest, RefuseAFileThatIsNone) {
+TEST_F(ModelWiresTest, RefuseAFileWithOtherContents) {
   folder_.write("wires", "a letter");
   expectRefused("it has 8 bytes, not 65600; remove it or name another file");
   folder_.write("wires", std::string(65600, 'x'));
@@ -169,12 +169,12 @@ TEST_F(ModelWiresTest, RefuseADamagedFile) {
   expectRefused("wire 0 has a damaged name");
 }
 
-TEST_F(ModelWiresTest, RefuseAFolderAndAPathThatCannotBe) {
+TEST_F(ModelWiresTest, RefuseAFolderAndAnInvalidPath) {
   EXPECT_THROW(const ModelWires wires(folder_.path().string()), std::system_error);
   EXPECT_THROW(const ModelWires wires(folder_.file("no/folder")), std::system_error);
 }
 
-TEST_F(ModelWiresTest, RefuseNamesThatAreNone) {
+TEST_F(ModelWiresTest, RefuseInvalidNames) {
   ModelWires wires(path_);
   for (const auto& name :
        {std::string(), std::string(44, 'n'), std::string("a b"), std::string("a\n")})

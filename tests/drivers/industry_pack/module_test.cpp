@@ -44,49 +44,49 @@ TEST_F(ModuleTest, IsFoundByNameAndByPlace) {
   EXPECT_EQ(module.problem(), "");
 }
 
-TEST_F(ModuleTest, ThatIsAbsentIsAClearError) {
+TEST_F(ModuleTest, ThatIsAbsentIsRefused) {
   expectError(IndustryPackStatus::noModule, "no module at carrier ipac, site IP_a");
 }
 
-TEST_F(ModuleTest, OfAnotherManufacturerIsAClearError) {
+TEST_F(ModuleTest, OfAnotherManufacturerIsRefused) {
   model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0x45, .model = 0x11}));
   expectError(IndustryPackStatus::badModule,
               "is not the expected Acromag IP330: its manufacturer is 0x45, not 0xa3");
 }
 
-TEST_F(ModuleTest, OfAnotherModelIsAClearError) {
+TEST_F(ModuleTest, OfAnotherModelIsRefused) {
   model_->plug("IP_a", std::make_unique<PlainModel>(IdProm{.manufacturer = 0xa3, .model = 0x12}));
   expectError(IndustryPackStatus::badModule, "its model is 0x12");
 }
 
-TEST_F(ModuleTest, MayBeOfAnyMakerThatItsKindHas) {
+TEST_F(ModuleTest, MayBeOfAnyManufacturerOfItsKind) {
   kind_.others.push_back({.manufacturer = kSystran, .models = {0x63}});
   model_->plug("IP_a",
                std::make_unique<PlainModel>(IdProm{.manufacturer = kSystran, .model = 0x63}));
   EXPECT_EQ(modules_.create("dio", "ipac", "IP_a", kind_).idProm().manufacturer, kSystran);
 }
 
-TEST_F(ModuleTest, OfAMakersOtherModelIsAClearError) {
+TEST_F(ModuleTest, OfAnotherModelOfAKnownManufacturerIsRefused) {
   kind_.others.push_back({.manufacturer = kSystran, .models = {0x63}});
   model_->plug("IP_a",
                std::make_unique<PlainModel>(IdProm{.manufacturer = kSystran, .model = 0x11}));
   expectError(IndustryPackStatus::badModule, "its model is 0x11, not 0x63");
 }
 
-TEST_F(ModuleTest, WithAWrongCrcIsAClearError) {
+TEST_F(ModuleTest, WithAWrongCrcIsRefused) {
   model_->plug("IP_a", std::make_unique<PlainModel>(
                            IdProm{.manufacturer = 0xa3, .model = 0x11, .isCrcRight = false}));
   expectError(IndustryPackStatus::badCrc, "CRC");
 }
 
-TEST_F(ModuleTest, MayNotBeThereTwice) {
+TEST_F(ModuleTest, CannotBeCreatedTwice) {
   model_->plug("IP_a", std::make_unique<PlainModel>());
   modules_.create("adc", "ipac", "IP_a", kind_);
   EXPECT_THROW(modules_.create("adc", "ipac", "IP_b", kind_), std::invalid_argument);
   EXPECT_THROW(modules_.create("adc2", "ipac", "IP_a", kind_), std::invalid_argument);
 }
 
-TEST_F(ModuleTest, NeedsACarrierAndASiteThatThereAre) {
+TEST_F(ModuleTest, NeedsAnExistingCarrierAndSite) {
   EXPECT_THROW(modules_.create("adc", "ipac1", "IP_a", kind_), std::invalid_argument);
   EXPECT_THROW(modules_.create("adc", "ipac", "IP_e", kind_), std::invalid_argument);
   EXPECT_THROW(modules_.create("adc", "ipac", "a", kind_), std::invalid_argument);
@@ -100,7 +100,7 @@ TEST_F(ModuleTest, ThatIsPulledOutHasAProblem) {
   EXPECT_EQ(module.io().read16(0), 0xffff);
 }
 
-TEST_F(ModuleTest, ThatIsExchangedForAnotherOfItsKindHasAProblem) {
+TEST_F(ModuleTest, ThatIsReplacedByAnotherModelOfItsKindHasAProblem) {
   kind_.models.push_back(0x12);
   model_->plug("IP_a", std::make_unique<PlainModel>());
   auto& module = modules_.create("adc", "ipac", "IP_a", kind_);
@@ -116,7 +116,7 @@ TEST_F(ModuleTest, ThatIsExchangedForAnotherOfItsKindHasAProblem) {
   EXPECT_EQ(module.problem(), "");
 }
 
-TEST_F(ModuleTest, SharesItsVectorWithNobody) {
+TEST_F(ModuleTest, SharesItsVectorWithNoOtherModule) {
   model_->plug("IP_a", std::make_unique<PlainModel>());
   model_->plug("IP_b", std::make_unique<PlainModel>());
   auto& a = modules_.create("a", "ipac", "IP_a", kind_);
@@ -127,7 +127,7 @@ TEST_F(ModuleTest, SharesItsVectorWithNobody) {
   EXPECT_THROW(modules_.takeVector(256, b), IndustryPackError);
 }
 
-TEST(CarriersTest, AreNoMoreThanTwentyOne) {
+TEST(CarriersTest, AreLimitedToTwentyOne) {
   IndustryPackCarriers carriers;
   for (int i = 0; i < 21; ++i)
     carriers.add("ipac" + std::to_string(i), std::make_unique<ModelCarrier>());

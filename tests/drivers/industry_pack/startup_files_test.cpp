@@ -40,7 +40,7 @@ void addLinesOf(const std::filesystem::path& file, std::vector<CarrierLine>& fou
   }
 }
 
-TEST(StartupFilesTest, HaveCarriersWhoseParametersAreUnderstood) {
+TEST(StartupFilesTest, HaveCarriersWithParametersThatAreUnderstood) {
   const auto folder = startupFolder();
   if (!std::filesystem::is_directory(folder))
     GTEST_SKIP() << "no startup files of users in " << folder;

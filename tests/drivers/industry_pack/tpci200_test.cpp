@@ -81,7 +81,7 @@ TEST_F(Tpci200Test, IsFoundByAddressNumberOrAsTheFirst) {
   EXPECT_EQ(Tpci200(options("")).description(), "TPCI200 at 0000:03:00.0");
 }
 
-TEST_F(Tpci200Test, ThatIsNotThereIsAClearError) {
+TEST_F(Tpci200Test, ThatIsAbsentIsRefused) {
   EXPECT_THAT(problem(), HasSubstr("this host has no TPCI200 (PCI id 0x1498:0x30c8)"));
   pci_.add(kBoard);
   pci_.add("0000:02:00.0", "0x8086", "0x100e");
@@ -95,7 +95,7 @@ TEST_F(Tpci200Test, ThatIsNotThereIsAClearError) {
       HasSubstr("the PCI device at 0000:02:00.0 is not a TPCI200: its id is 0x8086:0x100e"));
 }
 
-TEST_F(Tpci200Test, ThatAnotherDriverHasIsAnErrorThatSaysHowToGetIt) {
+TEST_F(Tpci200Test, ThatIsBoundToAnotherDriverIsRefusedWithTheCommandsToRebindIt) {
   pci_.add(kBoard);
   pci_.setDriver(kBoard, "tpci200");
   const auto said = problem();
@@ -105,7 +105,7 @@ TEST_F(Tpci200Test, ThatAnotherDriverHasIsAnErrorThatSaysHowToGetIt) {
                               pci_.file(kBoard, "driver_override")));
 }
 
-TEST_F(Tpci200Test, WithoutTheRightToItIsAnErrorThatNamesTheFile) {
+TEST_F(Tpci200Test, WithoutPermissionIsRefusedWithTheNameOfTheFile) {
   pci_.add(kBoard);
   std::filesystem::permissions(pci_.file(kBoard, "resource2"), std::filesystem::perms::none);
   const NoRoot noRoot;
@@ -114,7 +114,7 @@ TEST_F(Tpci200Test, WithoutTheRightToItIsAnErrorThatNamesTheFile) {
   EXPECT_THAT(said, HasSubstr("chgrp GROUP"));
 }
 
-TEST_F(Tpci200Test, WithoutTheRightToItsInterruptPollsAndNamesTheFile) {
+TEST_F(Tpci200Test, WithoutPermissionForTheInterruptPollsAndNamesTheFile) {
   pci_.add(kBoard);
   pci_.giveInterrupt(kBoard);
   std::filesystem::permissions(pci_.places().dev + "/uio7", std::filesystem::perms::none);
@@ -126,7 +126,7 @@ TEST_F(Tpci200Test, WithoutTheRightToItsInterruptPollsAndNamesTheFile) {
   EXPECT_THAT(carrier.remark(), HasSubstr("/dev/uio7 cannot be opened (Permission denied)"));
 }
 
-TEST_F(Tpci200Test, WithoutAWindowIsAClearError) {
+TEST_F(Tpci200Test, WithoutAWindowIsRefused) {
   pci_.add(kBoard);
   pci_.write(kBoard, "resource", "0x0 0x0 0x0\n");
   EXPECT_THAT(problem(), HasSubstr("window 2 is too small"));
@@ -135,20 +135,20 @@ TEST_F(Tpci200Test, WithoutAWindowIsAClearError) {
   EXPECT_THAT(problem(), HasSubstr("resource3 cannot be opened: No such file"));
 }
 
-TEST_F(Tpci200Test, ThatDoesNotAnswerIsAClearError) {
+TEST_F(Tpci200Test, ThatDoesNotAnswerIsRefused) {
   pci_.add(kBoard);
   pci_.set(kBoard, "resource0", kInPage + 0x2c, UINT32_MAX);
   EXPECT_THAT(problem(), HasSubstr("TPCI200 at 0000:03:00.0 does not answer"));
 }
 
-TEST_F(Tpci200Test, IsSwitchedOn) {
+TEST_F(Tpci200Test, EnablesTheBoard) {
   pci_.add(kBoard);
   pci_.write(kBoard, "enable", "0\n");
   const Tpci200 carrier(options());
   EXPECT_EQ(pci_.get<char>(kBoard, "enable", 0), '1');
 }
 
-TEST_F(Tpci200Test, HasItsBridgeTurnTheBytesOfModulesOnly) {
+TEST_F(Tpci200Test, SwapsTheBytesOfModulesOnly) {
   pci_.add(kBoard);
   pci_.set(kBoard, "resource0", kInPage + 0x28, htole32(0xd54160a0));
   const Tpci200 carrier(options());
@@ -162,7 +162,7 @@ TEST_F(Tpci200Test, HasItsBridgeTurnTheBytesOfModulesOnly) {
   EXPECT_FALSE(isBig(0x34));
 }
 
-TEST_F(Tpci200Test, HasTheSpacesOfEachSiteWhereTheyBelong) {
+TEST_F(Tpci200Test, HasTheSpacesOfEachSiteAtTheirAddresses) {
   pci_.add(kBoard);
   Tpci200 carrier(options());
   ASSERT_EQ(carrier.siteCount(), 4U);
@@ -210,7 +210,7 @@ TEST_F(Tpci200Test, GivesASiteToOneProcessAtATime) {
   static_cast<void>(first.site(0));
 }
 
-TEST_F(Tpci200Test, MasksWhatAKilledProcessLeftEnabled) {
+TEST_F(Tpci200Test, MasksInterruptsThatAKilledProcessLeftEnabled) {
   pci_.add(kBoard);
   setControl(2, 0xc0);
   setControl(3, 0xc0);
@@ -221,7 +221,7 @@ TEST_F(Tpci200Test, MasksWhatAKilledProcessLeftEnabled) {
   EXPECT_EQ(control(3), 0xc0);
 }
 
-TEST_F(Tpci200Test, PassesAnInterruptOnceAndLetsTheNextThrough) {
+TEST_F(Tpci200Test, PassesEachInterruptOnce) {
   pci_.add(kBoard);
   pci_.giveInterrupt(kBoard);
   Tpci200 carrier(options());
@@ -259,7 +259,7 @@ TEST_F(Tpci200Test, PassesNoInterruptThatIsNotEnabled) {
   EXPECT_EQ(other.take(), 0U);
 }
 
-TEST_F(Tpci200Test, SilencesTheSiteOfNobodyButNotThatOfAnother) {
+TEST_F(Tpci200Test, MasksASiteWithoutAProcessButNotThatOfAnotherProcess) {
   pci_.add(kBoard);
   pci_.giveInterrupt(kBoard);
   Tpci200 another(options());
@@ -286,7 +286,7 @@ TEST_F(Tpci200Test, MasksItsLinesAtTheEnd) {
   EXPECT_EQ(control(0), 0);
 }
 
-TEST_F(Tpci200Test, PollsWhereThereAreNoInterrupts) {
+TEST_F(Tpci200Test, PollsWithoutPciInterrupts) {
   pci_.add(kBoard);
   Tpci200 carrier(options());
   EXPECT_THAT(carrier.remark(), HasSubstr("its interrupts are polled, every 1000 us"));
@@ -303,7 +303,7 @@ TEST_F(Tpci200Test, PollsWhereThereAreNoInterrupts) {
   waitFor(line);
 }
 
-TEST_F(Tpci200Test, PollsWhenTheKernelTakesTheInterruptAway) {
+TEST_F(Tpci200Test, PollsWhenTheBoardIsUnboundFromItsDriver) {
   pci_.add(kBoard);
   pci_.giveInterrupt(kBoard);
   Tpci200 carrier(options());
@@ -315,7 +315,7 @@ TEST_F(Tpci200Test, PollsWhenTheKernelTakesTheInterruptAway) {
   EXPECT_TRUE(line.isPolled());
 }
 
-TEST_F(Tpci200Test, ALineThatIsPolledLaterIsToldOf) {
+TEST_F(Tpci200Test, ReportsALineThatIsPolledLater) {
   pci_.add(kBoard);
   pci_.giveInterrupt(kBoard);
   Tpci200 carrier(options());

@@ -73,7 +73,7 @@ std::array<double, kTestVoltages> meansOf(Ip330Board& with, int scans) {
   return sums;
 }
 
-TEST_P(Ip330CalibrationTest, TakesTheErrorsAwayToOneAndAHalfCodes) {
+TEST_P(Ip330CalibrationTest, CorrectsTheCodesToWithinOneAndAHalf) {
   const auto& [type, range, gain, sign] = GetParam();
   const auto offsets = times(sign, {-70, 55, -40, 90});
   Ip330Board with({.type = type, .range = range, .secondsBetweenCalibrate = 0},
@@ -106,7 +106,7 @@ TEST_P(Ip330CalibrationTest, TakesTheErrorsAwayToOneAndAHalfCodes) {
 
 INSTANTIATE_TEST_SUITE_P(Each, Ip330CalibrationTest, testing::ValuesIn(allCases()), nameOf);
 
-TEST(Ip330Correction, IsNoneForAPerfectConverter) {
+TEST(Ip330Correction, IsZeroForAPerfectConverter) {
   for (const auto& [type, range, gain, sign] : allCases()) {
     if (cannotBeCalibrated(range, gain, 0)) continue;
     const auto [low, high] = calibrationPointsOf(range, gain);
@@ -118,7 +118,7 @@ TEST(Ip330Correction, IsNoneForAPerfectConverter) {
   }
 }
 
-TEST(Ip330Correction, RefusesWhatNoConverterGives) {
+TEST(Ip330Correction, RefusesImplausibleCodes) {
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 65535, 65535));  // an absent board
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 0, 0));
   EXPECT_FALSE(correctionOf(Ip330Range::minus5to5, 0, 40000, 30000));
@@ -138,14 +138,14 @@ TEST(Ip330Correction, GivesClientsCodesWithinTheRange) {
   EXPECT_EQ(clampedCode(1e6), 0xffff);
 }
 
-TEST(Ip330Calibration, IsNotDoneWhenNeverIsAskedFor) {
+TEST(Ip330Calibration, IsNotDoneWithANegativePeriod) {
   Ip330Board with({.secondsBetweenCalibrate = -1}, {.offsetError = {100}, .isRealTime = false});
 
   EXPECT_NEAR(meansOf(with, 1)[0], 32868, 0);
   EXPECT_EQ(with.board.counters().calibrations, 0u);
 }
 
-TEST(Ip330Calibration, IsDoneAgainWhenAskedFor) {
+TEST(Ip330Calibration, IsRepeatedOnRequest) {
   Ip330Board with({.secondsBetweenCalibrate = -1}, {.offsetError = {100}, .isRealTime = false});
 
   EXPECT_TRUE(with.board.trySetSecondsBetweenCalibrate(0));
@@ -156,13 +156,13 @@ TEST(Ip330Calibration, IsDoneAgainWhenAskedFor) {
   EXPECT_EQ(with.board.counters().calibrations, 2u);
 }
 
-TEST(Ip330Calibration, IsDoneEverySoManySeconds) {
+TEST(Ip330Calibration, IsRepeatedPeriodically) {
   Ip330Board with({.secondsBetweenCalibrate = 1}, {.isRealTime = false}, kWatchful);
 
   while (with.board.counters().calibrations < 3) std::this_thread::yield();
 }
 
-TEST(Ip330Calibration, OfAGainThatWasCalibratedCostsNone) {
+TEST(Ip330Calibration, OfACalibratedGainNeedsNoMeasurement) {
   Ip330Board with({.secondsBetweenCalibrate = 0});
   EXPECT_TRUE(with.board.trySetGain(0, 1));
   const auto before = with.board.counters().calibrations;
@@ -173,7 +173,7 @@ TEST(Ip330Calibration, OfAGainThatWasCalibratedCostsNone) {
   EXPECT_EQ(with.board.counters().calibrations, before);
 }
 
-TEST(Ip330Calibration, ThatNeverEndsIsSaidAndTheBoardGoesOn) {
+TEST(Ip330Calibration, ThatNeverEndsIsReportedAndTheBoardContinues) {
   Ip330Board with({.secondsBetweenCalibrate = 0}, {.isRealTime = false},
                   {.conversion = 1ms, .silence = 1h, .lookEvery = 1h});
   with.model.setStuck(true);
@@ -189,7 +189,7 @@ TEST(Ip330Calibration, ThatNeverEndsIsSaidAndTheBoardGoesOn) {
 }
 
 // A gain that is not in use fails; the other gains must not be calibrated repeatedly because of it.
-TEST(Ip330Calibration, OfAGainThatCannotBeLeavesTheChannelAsItWas) {
+TEST(Ip330Calibration, ThatFailsForAGainLeavesTheChannelUnchanged) {
   Ip330Board with(
       {.range = Ip330Range::from0to5, .secondsBetweenCalibrate = 0},
       {.range = Ip330Range::from0to5, .offsetError = {5, 5, 5, -20}, .isRealTime = false});
@@ -206,7 +206,7 @@ TEST(Ip330Calibration, OfAGainThatCannotBeLeavesTheChannelAsItWas) {
   EXPECT_TRUE(with.notes.has("-calibration succeeds"));
 }
 
-TEST(Ip330Calibration, OfOneGainThatIsNonsenseDoesNotKeepTheOthersFromIt) {
+TEST(Ip330Calibration, ThatFailsForOneGainDoesNotPreventTheOtherGains) {
   Ip330Board with({.secondsBetweenCalibrate = -1},
                   {.gainError = {-0.5}, .offsetError = {0, 40}, .isRealTime = false});
   ASSERT_TRUE(with.board.trySetGain(1, 1));
@@ -224,7 +224,7 @@ TEST(Ip330Calibration, OfOneGainThatIsNonsenseDoesNotKeepTheOthersFromIt) {
   EXPECT_NEAR(last.corrected[1], 32768, 1);
 }
 
-TEST(Ip330Calibration, IsTriedAgainUntilItSucceeds) {
+TEST(Ip330Calibration, IsRetriedUntilItSucceeds) {
   Ip330Board with({.secondsBetweenCalibrate = 0}, {.isRealTime = true}, kWatchful);
   with.model.setStuck(true);
   EXPECT_FALSE(with.board.trySetGain(0, 2));

@@ -45,7 +45,7 @@ class Ip330ChipTest : public testing::Test {
 
 using Codes = std::vector<int>;
 
-TEST_F(Ip330ChipTest, WritesAllThatIsSet) {
+TEST_F(Ip330ChipTest, WritesAllSettings) {
   gains_[7] = 3;
 
   start(Ip330Type::singleEnded);
@@ -72,7 +72,7 @@ TEST_F(Ip330ChipTest, TakesEachScanOnce) {
   EXPECT_FALSE(scans_.isMissing);
 }
 
-TEST_F(Ip330ChipTest, SaysThatAScanWasOverwritten) {
+TEST_F(Ip330ChipTest, ReportsAnOverwrittenScan) {
   start(Ip330Type::singleEnded);
   model_.step(2);
   EXPECT_EQ(take(), Codes{200});
@@ -137,7 +137,7 @@ TEST_F(Ip330ChipTest, DoesNotScanWhenDisabled) {
   EXPECT_EQ(take(), Codes{});
 }
 
-TEST_F(Ip330ChipTest, MeasuresACalibrationVoltageWhateverIsOnTheInputs) {
+TEST_F(Ip330ChipTest, MeasuresACalibrationVoltageIndependentlyOfTheInputs) {
   start(Ip330Type::differential);
   chip_.stop();
   EXPECT_EQ(chip_.tryMeasure(ip330::kSource4V9000, 0, 1h), 64881);  // 9.9 V of 10 V, rounded
@@ -146,7 +146,7 @@ TEST_F(Ip330ChipTest, MeasuresACalibrationVoltageWhateverIsOnTheInputs) {
 }
 
 // EPICS ip330 R1-0 gave a wrong reading after each calibration.
-TEST_F(Ip330ChipTest, ThrowsAwayWhatTheConverterGivesBeforeItHasSettled) {
+TEST_F(Ip330ChipTest, DiscardsCodesFromBeforeTheConverterHasSettled) {
   start(Ip330Type::singleEnded);
   chip_.stop();
   ASSERT_TRUE(chip_.tryMeasure(ip330::kSource4V9000, 0, 1h));
@@ -156,7 +156,7 @@ TEST_F(Ip330ChipTest, ThrowsAwayWhatTheConverterGivesBeforeItHasSettled) {
   EXPECT_EQ(take(), Codes{100});
 }
 
-TEST_F(Ip330ChipTest, ThrowsAwayAScanThatHadBegunWithOtherGains) {
+TEST_F(Ip330ChipTest, DiscardsAScanThatBeganWithOtherGains) {
   start(Ip330Type::singleEnded);
   model_.beginScanBeforeDisable();
   gains_[7] = 1;
@@ -166,14 +166,14 @@ TEST_F(Ip330ChipTest, ThrowsAwayAScanThatHadBegunWithOtherGains) {
   EXPECT_EQ(take(), Codes{});
 }
 
-TEST_F(Ip330ChipTest, GivesUpOnAConversionThatNeverEnds) {
+TEST_F(Ip330ChipTest, StopsWaitingForAConversionThatNeverEnds) {
   start(Ip330Type::singleEnded);
   chip_.stop();
   model_.setStuck(true);
   EXPECT_EQ(chip_.tryMeasure(ip330::kSource4V9000, 0, 1ms), std::nullopt);
 }
 
-TEST_F(Ip330ChipTest, KnowsABoardThatIsGoneAndOneThatForgot) {
+TEST_F(Ip330ChipTest, DetectsAnAbsentBoardAndAResetBoard) {
   start(Ip330Type::singleEnded);
   carrier_.setFault("IP_a", ModelFault::busError);
   EXPECT_EQ(chip_.presence(), Ip330Chip::Presence::absent);

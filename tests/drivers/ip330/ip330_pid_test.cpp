@@ -30,7 +30,7 @@ TEST(PidLoop, HasNoChangeOfErrorInItsFirstStep) {
   EXPECT_DOUBLE_EQ(loop.terms().d, 2 * 3 * (-1 / 0.5));
 }
 
-TEST(PidLoop, BeginsWithWhatTheOutputIs) {
+TEST(PidLoop, StartsWithThePresentOutput) {
   auto loop = loopOf(1, 2, 0);
   loop.turnOn(42);
   EXPECT_DOUBLE_EQ(loop.step(10, 1), 42);
@@ -55,7 +55,7 @@ TEST(PidLoop, DoesNotWindUpAtALimit) {
   EXPECT_DOUBLE_EQ(loop.terms().output, 0);
 }
 
-TEST(PidLoop, HasItsIntegralAtALimitWhenItHasNone) {
+TEST(PidLoop, HasItsIntegralAtALimitWithoutKi) {
   auto loop = loopOf(1, 0, 0);
   loop.turnOn(50);
   loop.step(9, 1);
@@ -99,7 +99,7 @@ class Ip330PidTest : public testing::Test {
   Ip330Pid pid_{with_.board, 1, output_, 0, 4095, outputNotes_.hook()};
 };
 
-TEST_F(Ip330PidTest, LeavesTheOutputAloneUntilItIsStarted) {
+TEST_F(Ip330PidTest, DoesNotWriteTheOutputUntilItIsStarted) {
   with_.scan(5);
   EXPECT_EQ(output_.writes, 0);
   EXPECT_NEAR(pid_.status().terms.actual, 32768 + 1311, 1);
@@ -116,7 +116,7 @@ TEST_F(Ip330PidTest, BringsTheInputToTheSetPoint) {
   EXPECT_EQ(output_.writes, writes);
 }
 
-TEST_F(Ip330PidTest, StepsAsSlowlyAsItIsTold) {
+TEST_F(Ip330PidTest, StepsWithTheGivenPeriod) {
   ASSERT_TRUE(pid_.trySetSecondsPerScan(0.004));
   EXPECT_DOUBLE_EQ(pid_.status().secondsPerScan, 4 * with_.board.microsecondsPerScan() / 1e6);
   pid_.start();
@@ -127,7 +127,7 @@ TEST_F(Ip330PidTest, StepsAsSlowlyAsItIsTold) {
 }
 
 // Gain code 1 of the converter has such a large error that it cannot be calibrated.
-TEST(Ip330Pid, SaysThatItsChannelIsNotCalibrated) {
+TEST(Ip330Pid, ReportsThatItsChannelIsNotCalibrated) {
   FakeOutput output;
   Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0},
                   {.gainError = {-0.5}, .isRealTime = false});
@@ -139,7 +139,7 @@ TEST(Ip330Pid, SaysThatItsChannelIsNotCalibrated) {
   EXPECT_TRUE(pid.status().isGood);
 }
 
-TEST_F(Ip330PidTest, SaysThatTheOutputFailsAndGoesOnFromWhereItIsThen) {
+TEST_F(Ip330PidTest, ReportsAFailedOutputAndContinuesFromItsLaterValue) {
   output_.answers = false;
   pid_.start();
   with_.scan(2);

@@ -8,7 +8,7 @@
 namespace mpf::test {
 namespace {
 
-TEST(RunningMean, IsOfTheLastSamplesThatEachReaderWants) {
+TEST(RunningMean, CoversTheNumberOfSamplesOfEachReader) {
   RunningMean mean;
   mean.reserve(1000);
   for (int i = 1; i <= 5000; ++i) mean.add(i);
@@ -17,7 +17,7 @@ TEST(RunningMean, IsOfTheLastSamplesThatEachReaderWants) {
   EXPECT_DOUBLE_EQ(mean.mean(1000), 4500.5);
 }
 
-TEST(RunningMean, KeepsWhatItHasWhenItGrows) {
+TEST(RunningMean, KeepsItsSamplesWhenItGrows) {
   RunningMean mean;
   for (int i = 1; i <= 200; ++i) mean.add(-i);
   mean.reserve(10000);
@@ -27,7 +27,7 @@ TEST(RunningMean, KeepsWhatItHasWhenItGrows) {
   EXPECT_DOUBLE_EQ(mean.mean(10000), -(400 + 138) / 2.0);
 }
 
-TEST(RunningMean, IsOfWhatCameSinceTheRestart) {
+TEST(RunningMean, CoversSamplesSinceTheRestartOnly) {
   RunningMean mean;
   for (int i = 0; i < 100; ++i) mean.add(7);
   mean.restart();
@@ -58,7 +58,7 @@ TEST_F(Ip330ScanTest, EachReaderHasItsOwnTime) {
 
 // EPICS ip330 R1-7 returned the corrected value of code 0 when no sample had come since the last
 // reading.
-TEST_F(Ip330ScanTest, WithoutATimeItIsWhatCameSinceTheLastReadingAndNeverNothing) {
+TEST_F(Ip330ScanTest, WithoutATimeCoversAtLeastOneSampleSinceTheLastReading) {
   ramp();
   with_.scan(3);
   EXPECT_EQ(scan_.tryRead(5, 0, 0ms), 32768 + 200);
@@ -88,7 +88,7 @@ TEST_F(Ip330ScanTest, AfterAChangeOfGainWaitsForASampleWithIt) {
 
 // Two readers want different gains and one gets its gain; no scan comes, so neither has a sample
 // yet.
-TEST_F(Ip330ScanTest, WhoseGainIsTakenAwayByAnotherWaitsNoMore) {
+TEST_F(Ip330ScanTest, StopsWaitingWhenAnotherReaderChangesTheGain) {
   Ip330Scan other(with_.board, 2, 5);
   std::atomic<int> ended{0};
   std::optional<int> one;
@@ -110,7 +110,7 @@ TEST_F(Ip330ScanTest, WhoseGainIsTakenAwayByAnotherWaitsNoMore) {
   EXPECT_NE(one.has_value(), two.has_value());
 }
 
-TEST_F(Ip330ScanTest, RefusesWhatIsNotThere) {
+TEST_F(Ip330ScanTest, RefusesInvalidArguments) {
   with_.scan(1);
   EXPECT_EQ(scan_.tryRead(1, 0, 0ms), std::nullopt);
   EXPECT_EQ(scan_.tryRead(6, 0, 0ms), std::nullopt);
@@ -134,7 +134,7 @@ TEST_F(Ip330ScanTest, ReadsNothingWhenNothingIsScanned) {
   EXPECT_EQ(scan_.tryRead(2, 0, 0ms), std::nullopt);
 }
 
-TEST_F(Ip330ScanTest, ReadsNothingOfBeforeAnotherMode) {
+TEST_F(Ip330ScanTest, ReadsNoSamplesFromBeforeAChangeOfMode) {
   ramp();
   with_.scan(3);
   EXPECT_EQ(scan_.tryRead(5, 0, 100ms), 32768 + 200);
@@ -166,7 +166,7 @@ TEST(Ip330Scan, GivesCodesWithinTheRange) {
   EXPECT_EQ(scan.tryRead(1, 0, 0ms), 0xffff);
 }
 
-TEST(Ip330Scan, ReadsNothingFromABoardThatIsGone) {
+TEST(Ip330Scan, ReadsNothingFromAnAbsentBoard) {
   Ip330Board with({.secondsBetweenCalibrate = 0}, {.isRealTime = true}, kWatchful);
   Ip330Scan scan(with.board, 0, 1);
   with.carrier.unplug("IP_a");

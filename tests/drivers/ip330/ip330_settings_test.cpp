@@ -25,7 +25,7 @@ struct TimerRow {
 
 class Ip330TimerTest : public testing::TestWithParam<TimerRow> {};
 
-TEST_P(Ip330TimerTest, MakesTheTimeAskedFor) {
+TEST_P(Ip330TimerTest, GivesTheRequestedTime) {
   const auto& row = GetParam();
 
   const auto timer = ip330TimerOf(row.mode, row.channels, row.asked);
@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(
         TimerRow{Mode::uniformContinuous, 10, 10000, 64, 125, 10000},
         TimerRow{Mode::uniformSingle, 1, 16, 64, 2, 16}));
 
-TEST(Ip330Timer, IsNotUsedWhereTriggersSayWhen) {
+TEST(Ip330Timer, IsNotUsedWithTriggers) {
   for (const auto mode : {Mode::disable, Mode::burstSingle, Mode::convertOnExternalTriggerOnly}) {
     const auto timer = ip330TimerOf(mode, 4, 0);
     EXPECT_EQ(timer.problem, "");
@@ -60,7 +60,7 @@ TEST(Ip330Timer, IsNotUsedWhereTriggersSayWhen) {
   }
 }
 
-TEST(Ip330Timer, RefusesWhatCannotBeInsteadOfTakingAnotherTime) {
+TEST(Ip330Timer, RefusesImpossibleTimes) {
   EXPECT_THAT(ip330TimerOf(Mode::burstContinuous, 16, 247).problem, HasSubstr("use 248 to "));
   EXPECT_EQ(ip330TimerOf(Mode::burstContinuous, 16, 248).problem, "");
   EXPECT_THAT(ip330TimerOf(Mode::uniformContinuous, 16, 239).problem, HasSubstr("use 240 to "));
@@ -70,7 +70,7 @@ TEST(Ip330Timer, RefusesWhatCannotBeInsteadOfTakingAnotherTime) {
       HasSubstr("use 15"));
 }
 
-TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
+TEST(Ip330Settings, AreReadFromTheArgumentsOfTheOldCommands) {
   EXPECT_EQ(parseIp330Type("D"), Ip330Type::differential);
   EXPECT_EQ(parseIp330Type("S"), Ip330Type::singleEnded);
   EXPECT_EQ(parseIp330Range("-10to10"), Ip330Range::minus10to10);
@@ -85,7 +85,7 @@ TEST(Ip330Settings, AreReadFromTheWordsOfTheOldCommands) {
   EXPECT_THROW(static_cast<void>(parseIp330ScanMode(-1)), std::invalid_argument);
 }
 
-TEST(Ip330Settings, SayWhatCannotBe) {
+TEST(Ip330Settings, NameTheInvalidSetting) {
   EXPECT_EQ(Ip330Settings().problem(), "");
   EXPECT_THAT((Ip330Settings{.type = Ip330Type::differential, .lastChannel = 16}.problem()),
               HasSubstr("use 0 to 15"));

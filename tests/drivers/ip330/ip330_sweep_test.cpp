@@ -33,7 +33,7 @@ class Ip330SweepTest : public testing::Test {
   Ip330Sweep sweep_{with_.board, 2, 5, 4};
 };
 
-TEST_F(Ip330SweepTest, TakesAPointAScanUntilItIsFull) {
+TEST_F(Ip330SweepTest, RecordsAPointForEachScanUntilItIsFull) {
   with_.scan(1);
   sweep_.start();
   with_.scan(2);
@@ -56,7 +56,7 @@ TEST_F(Ip330SweepTest, PointsAreMeansInEveryChannelTheLastIncluded) {
     EXPECT_EQ(read(channel), (Points{200, 500, 0, 0})) << channel;
 }
 
-TEST_F(Ip330SweepTest, GoesOnWhereItStopped) {
+TEST_F(Ip330SweepTest, ContinuesAfterAStop) {
   sweep_.start();
   with_.scan(1);
   sweep_.stop();
@@ -66,7 +66,7 @@ TEST_F(Ip330SweepTest, GoesOnWhereItStopped) {
   EXPECT_EQ(read(2), (Points{100, 300, 0, 0}));
 }
 
-TEST_F(Ip330SweepTest, BeginsAgainWhenErased) {
+TEST_F(Ip330SweepTest, RestartsWhenErased) {
   sweep_.start();
   with_.scan(2);
   sweep_.erase();
@@ -75,7 +75,7 @@ TEST_F(Ip330SweepTest, BeginsAgainWhenErased) {
   EXPECT_EQ(read(2), (Points{300, 0, 0, 0}));
 }
 
-TEST_F(Ip330SweepTest, HasAsManyPointsAsItIsTold) {
+TEST_F(Ip330SweepTest, HasTheGivenNumberOfPoints) {
   ASSERT_TRUE(sweep_.trySetPoints(2));
   sweep_.start();
   with_.scan(3);
@@ -94,7 +94,7 @@ TEST_F(Ip330SweepTest, EndsAtThePresetTime) {
   EXPECT_EQ(sweep_.status().acquired, 0);
 }
 
-TEST_F(Ip330SweepTest, RefusesWhatIsNotThere) {
+TEST_F(Ip330SweepTest, RefusesInvalidArguments) {
   EXPECT_EQ(sweep_.tryRead(1), std::nullopt);
   EXPECT_EQ(sweep_.tryRead(6), std::nullopt);
   EXPECT_FALSE(sweep_.trySetSecondsPerPoint(-1));

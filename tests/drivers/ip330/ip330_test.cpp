@@ -30,7 +30,7 @@ TEST(Ip330, EverySubscriberGetsEveryScan) {
   EXPECT_EQ(second, 5);
 }
 
-TEST(Ip330, TakesAsManySubscribersAsItWasTold) {
+TEST(Ip330, AcceptsTheGivenNumberOfSubscribers) {
   Ip330Board with({.maxClients = 1});
   const auto one = with.board.subscribe([](const Ip330Sample&) {});
   EXPECT_THROW(static_cast<void>(with.board.subscribe([](const Ip330Sample&) {})),
@@ -55,7 +55,7 @@ TEST(Ip330, DifferentialSamplesOfARampAreAllDistinct) {
   EXPECT_EQ(with.board.counters().missed, 0u);
 }
 
-TEST(Ip330, RefusesGainsAndChannelsThatItHasNot) {
+TEST(Ip330, RefusesInvalidGainsAndChannels) {
   Ip330Board with({.firstChannel = 2, .lastChannel = 5});
   EXPECT_TRUE(with.board.trySetGain(2, 3));
   EXPECT_EQ(with.board.gain(2), 3);
@@ -80,7 +80,7 @@ TEST(Ip330, CanBeSetToAnotherModeAndTime) {
   while (with.board.counters().scans == before) std::this_thread::yield();
 }
 
-TEST(Ip330, ConvertsWhenToldToInTheSingleModesAlone) {
+TEST(Ip330, ConvertsOnCommandInTheSingleModesOnly) {
   Ip330Board with({.lastChannel = 1});
   EXPECT_FALSE(with.board.tryStartConvert());
   for (const auto mode : {Ip330ScanMode::disable, Ip330ScanMode::uniformContinuous,
@@ -94,14 +94,14 @@ TEST(Ip330, ConvertsWhenToldToInTheSingleModesAlone) {
   EXPECT_FALSE(with.board.tryStartConvert());
 }
 
-TEST(Ip330, RefusesSettingsThatCannotBe) {
+TEST(Ip330, RefusesInvalidSettings) {
   ModelCarrier carrier;
   carrier.plug("IP_a", std::make_unique<Ip330Model>());
   IndustryPackModule module("adc", "a model", carrier.site(0), kIp330);
   EXPECT_THROW(Ip330(module, {.lastChannel = 32}), std::invalid_argument);
 }
 
-TEST(Ip330, LeavesTheBoardSilent) {
+TEST(Ip330, DisablesTheBoardWhenItIsDestroyed) {
   ModelCarrier carrier;
   carrier.plug("IP_a", std::make_unique<Ip330Model>());
   IndustryPackModule module("adc", "a model", carrier.site(0), kIp330);
@@ -123,7 +123,7 @@ class Ip330FaultTest : public testing::Test {
       {.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.isRealTime = true}, kWatchful};
 };
 
-TEST_F(Ip330FaultTest, InterruptsThatNeverComeAreMadeUpForByLooking) {
+TEST_F(Ip330FaultTest, FindsScansByPollingWhenInterruptsAreLost) {
   with_.carrier.setFault("IP_a", ModelFault::interruptsLost);
   with_.notes.waitFor("+the board's interrupts do not come");
   waitForScans(10);
@@ -131,7 +131,7 @@ TEST_F(Ip330FaultTest, InterruptsThatNeverComeAreMadeUpForByLooking) {
   with_.notes.waitFor("-the board's interrupts come");
 }
 
-TEST_F(Ip330FaultTest, AStormIsMaskedAndScansStillCome) {
+TEST_F(Ip330FaultTest, MasksAStormAndStillDeliversScans) {
   with_.carrier.setFault("IP_a", ModelFault::interruptStorm);
   with_.notes.waitFor("+the board interrupts without a reason");
   waitForScans(10);
@@ -140,7 +140,7 @@ TEST_F(Ip330FaultTest, AStormIsMaskedAndScansStillCome) {
   waitForScans(10);
 }
 
-TEST_F(Ip330FaultTest, ABoardThatReadsAllOnesIsGoneUntilItAnswers) {
+TEST_F(Ip330FaultTest, ABoardThatReadsAllOnesIsAbsentUntilItAnswers) {
   with_.carrier.setFault("IP_a", ModelFault::busError);
   with_.notes.waitFor("+the board is gone");
   EXPECT_FALSE(with_.board.isDelivering());
@@ -168,7 +168,7 @@ class OtherModel final : public DeviceModel {
   std::atomic<int>& writes_;
 };
 
-TEST(Ip330OfWhichTheModuleIsAnother, WritesNothing) {
+TEST(Ip330WithAnotherModule, WritesNothing) {
   std::atomic<int> writes{0};
   {
     Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0}, {.isRealTime = true},
@@ -184,7 +184,7 @@ TEST(Ip330OfWhichTheModuleIsAnother, WritesNothing) {
   EXPECT_EQ(writes.load(), 0);
 }
 
-TEST(Ip330OfWhichTheModuleIsAnother, GoesOnWithTheNextBoardByItsOwnCalibration) {
+TEST(Ip330WithAnotherModule, ContinuesWithTheNextBoardAndItsOwnCalibration) {
   std::atomic<int> writes{0};
   Ip330Board with({.lastChannel = 3, .secondsBetweenCalibrate = 0},
                   {.offsetError = {90}, .isRealTime = true}, kWatchful);
@@ -209,14 +209,14 @@ TEST(Ip330OfWhichTheModuleIsAnother, GoesOnWithTheNextBoardByItsOwnCalibration) 
   EXPECT_EQ(writes.load(), 0);
 }
 
-TEST_F(Ip330FaultTest, ABoardThatForgotIsProgrammedAgain) {
+TEST_F(Ip330FaultTest, ABoardThatWasResetIsProgrammedAgain) {
   ASSERT_TRUE(with_.board.trySetGain(0, 2));
   with_.model.powerCycle();
   while (with_.carrier.site(0).io().read8(0x20) != 2) std::this_thread::yield();
   waitForScans(10);
 }
 
-TEST_F(Ip330FaultTest, ABoardThatStopsScanningIsSilentUntilItDoes) {
+TEST_F(Ip330FaultTest, ABoardThatStopsScanningIsSilentUntilItScans) {
   with_.model.setStuck(true);
   with_.notes.waitFor("+the board does not scan");
   EXPECT_FALSE(with_.board.isDelivering());
@@ -226,7 +226,7 @@ TEST_F(Ip330FaultTest, ABoardThatStopsScanningIsSilentUntilItDoes) {
 }
 
 // Each failed calibration restarts the scans; a restart does not count as a scan.
-TEST_F(Ip330FaultTest, ABoardIsSilentThatIsCalibratedInVainAgainAndAgain) {
+TEST_F(Ip330FaultTest, ABoardIsSilentWhileItsCalibrationFailsRepeatedly) {
   with_.model.setStuck(true);
   while (!with_.notes.has("+the board does not scan")) EXPECT_FALSE(with_.board.tryCalibrate());
   EXPECT_FALSE(with_.board.isDelivering());

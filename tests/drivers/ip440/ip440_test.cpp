@@ -29,7 +29,7 @@ TEST_F(Ip440Test, ReadsEachInputAsItsBit) {
   }
 }
 
-TEST_F(Ip440Test, TellsAllInputsOnFromAModuleThatIsGone) {
+TEST_F(Ip440Test, DistinguishesAllInputsOnFromAnAbsentModule) {
   model_.setInputs(0xffffffff);
   EXPECT_EQ(inputs_.tryRead(), 0xffffffffu);
 
@@ -40,7 +40,7 @@ TEST_F(Ip440Test, TellsAllInputsOnFromAModuleThatIsGone) {
   EXPECT_EQ(inputs_.tryRead(), 0xffffffffu);
 }
 
-TEST_F(Ip440Test, ReadsNothingOfAnotherModuleInItsPlace) {
+TEST_F(Ip440Test, ReadsNothingFromAnotherModule) {
   carrier_.unplug("IP_c");
   EXPECT_EQ(inputs_.tryRead(), std::nullopt);
   carrier_.plug("IP_c", std::make_unique<PlainModel>());
@@ -51,7 +51,7 @@ TEST_F(Ip440Test, ReadsNothingOfAnotherModuleInItsPlace) {
   EXPECT_EQ(inputs_.tryRead(), 0x5u);
 }
 
-TEST_F(Ip440Test, ReadsWhatItsInputsAreConnectedTo) {
+TEST_F(Ip440Test, ReadsConnectedVoltages) {
   double volts = 0;
   model_.connect(31, [&] { return volts; });
   EXPECT_EQ(inputs_.tryRead(), 0x1u);

@@ -4,6 +4,7 @@
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 
 #include "drivers/serial/late_line.h"
+#include "drivers/serial/polled_serial_port.h"
 #include "octal_uart_fixture.h"
 
 namespace mpf::test {
@@ -14,8 +15,8 @@ using testing::HasSubstr;
 
 class OctalUartFaultTest : public OctalUartTest {
  protected:
-  // The next attempts to open get rarer with each that fails.
-  static void waitUntil(const OctalUartPort& port, SerialPortState state) {
+  // Has no time limit, because the pause between two attempts to open grows with each failure.
+  static void waitUntil(const SerialPort& port, SerialPortState state) {
     EXPECT_TRUE(port.waitForState(state, Deadline::never()));
   }
 };
@@ -26,23 +27,23 @@ TEST_F(OctalUartFaultTest, WritesItsVectorIntoMemorySpace) {
   EXPECT_EQ(model_->vector(), 0x68);
 }
 
-TEST_F(OctalUartFaultTest, ASiteWithoutMemoryIsAnErrorThatSaysSo) {
+TEST_F(OctalUartFaultTest, ASiteWithoutMemoryIsRefused) {
   auto& bare = addCarrier(std::make_unique<ModelCarrier>(4, 0), "bare");
   bare.plug("IP_b", std::make_unique<OctalUartModel>());
   try {
     OctalUart uart(modules_.create("UART", "bare", "IP_b", kOctalUart), {});
-    FAIL() << "it started";
+    FAIL() << "no error";
   } catch (const IndustryPackError& error) {
     EXPECT_EQ(error.status(), IndustryPackStatus::badAddress);
-    EXPECT_THAT(error.what(), HasSubstr("the carrier gives carrier bare, site IP_b no memory"));
+    EXPECT_THAT(error.what(), HasSubstr("carrier bare, site IP_b has no memory space"));
   }
 }
 
-TEST_F(OctalUartFaultTest, ThereAreModulesOfFourAndEight) {
+TEST_F(OctalUartFaultTest, RefusesOtherNumbersOfPortsThanFourAndEight) {
   EXPECT_THROW(start({}, {.ports = 6}), std::invalid_argument);
 }
 
-TEST_F(OctalUartFaultTest, KnowsItsThreeKinds) {
+TEST_F(OctalUartFaultTest, AcceptsItsThreeModels) {
   for (const auto kind : kOctalUart.models) {
     IndustryPackModules modules(carriers_);
     plug({.model = kind});
@@ -51,7 +52,7 @@ TEST_F(OctalUartFaultTest, KnowsItsThreeKinds) {
   }
 }
 
-TEST_F(OctalUartFaultTest, AStormIsAnAlarmAndEveryPortGoesOn) {
+TEST_F(OctalUartFaultTest, AStormIsAnAlarmAndEveryPortKeepsWorking) {
   BoundOctalPort low(start({}, {.pollEvery = 1ms}), 1, kFast);
   BoundOctalPort high(*uart_, 6, kFast);
 
@@ -63,10 +64,10 @@ TEST_F(OctalUartFaultTest, AStormIsAnAlarmAndEveryPortGoesOn) {
   EXPECT_EQ(low.port.state(), SerialPortState::plugged);
 }
 
-// A stuck line uses up a processor, whatever is said on the ports meanwhile.
-TEST_F(OctalUartFaultTest, AStormIsSeenThroughTraffic) {
-  BoundOctalPort low(start({}, {.stormLimit = 20'000}), 1,
-                     kFast);  // more than there are in vain in a row
+// A stuck line uses one processor permanently, also while the ports have traffic.
+TEST_F(OctalUartFaultTest, AStormIsDetectedDespiteTraffic) {
+  // more than the number of spurious interrupts in a row
+  BoundOctalPort low(start({}, {.stormLimit = 20'000}), 1, kFast);
   BoundOctalPort high(*uart_, 6, kFast);
 
   carrier_.setFault("IP_a", ModelFault::interruptStorm, 0);
@@ -77,7 +78,7 @@ TEST_F(OctalUartFaultTest, AStormIsSeenThroughTraffic) {
   }
 }
 
-TEST_F(OctalUartFaultTest, AStormIsToldWhenItBeginsAndNotAfterEachPause) {
+TEST_F(OctalUartFaultTest, AStormIsReportedWhenItBeginsAndNotAfterEachPause) {
   constexpr int kLimit = 100;
   auto& uart = start({}, {.stormLimit = kLimit, .stormPause = 10ms});
 
@@ -85,11 +86,11 @@ TEST_F(OctalUartFaultTest, AStormIsToldWhenItBeginsAndNotAfterEachPause) {
   while (uart.counters().spurious < 10ULL * kLimit) std::this_thread::yield();
 
   alarms_.waitFor(OctalUartAlarm::storm);
-  EXPECT_LT(alarms_.count(OctalUartAlarm::storm),
-            9);  // 1, unless the host forgot this process for a while
+  // 1, unless this process did not run for some time
+  EXPECT_LT(alarms_.count(OctalUartAlarm::storm), 9);
 }
 
-TEST_F(OctalUartFaultTest, ALineThatIsDeadIsNoticedWhileTheOtherIsBusy) {
+TEST_F(OctalUartFaultTest, ADeadLineIsDetectedWhileTheOtherIsBusy) {
   BoundOctalPort low(start({}, {.pollEvery = 1ms}), 1, kFast);
   BoundOctalPort high(*uart_, 6, kFast);
 
@@ -101,8 +102,9 @@ TEST_F(OctalUartFaultTest, ALineThatIsDeadIsNoticedWhileTheOtherIsBusy) {
   }
 }
 
-// Until the pause is over it is polled, which does not mean that it is dead.
-TEST_F(OctalUartFaultTest, ALineThatIsMaskedInAStormIsNotCalledDead) {
+// During the pause the line is masked and polled, so polls that find a request do not mean that it
+// is dead.
+TEST_F(OctalUartFaultTest, ALineThatIsMaskedInAStormIsNotReportedAsDead) {
   BoundOctalPort high(start({}, {.pollEvery = 1ms, .stormLimit = 100, .stormPause = 1h}), 6, kFast);
   carrier_.setFault("IP_a", ModelFault::interruptStorm, 1);
   alarms_.waitFor(OctalUartAlarm::storm);
@@ -112,14 +114,14 @@ TEST_F(OctalUartFaultTest, ALineThatIsMaskedInAStormIsNotCalledDead) {
   EXPECT_EQ(alarms_.count(OctalUartAlarm::noInterrupts), 0);
 }
 
-TEST_F(OctalUartFaultTest, WhatIsWrongBeforeSomebodyListensIsToldLater) {
+TEST_F(OctalUartFaultTest, AlarmsFromBeforeTheHandlerIsSetAreReportedLater) {
   plug({});
   OctalUart uart(modules_.create("UART", "ipac", "IP_a", kOctalUart), {.pollEvery = 1ms});
-  const OctalUartPort port(uart, 0, {});
+  const auto port = openOctalUartPort(uart, 0, {});
   carrier_.setFault("IP_a", ModelFault::busError);
-  waitUntil(port, SerialPortState::unplugged);
+  waitUntil(*port, SerialPortState::unplugged);
   while (uart.counters().alarms == 0) std::this_thread::yield();
-  carrier_.setFault("IP_a", ModelFault::interruptStorm, 0);  // its thread goes on to other things
+  carrier_.setFault("IP_a", ModelFault::interruptStorm, 0);  // the thread serves later interrupts
   for (const auto before = uart.counters().interrupts; uart.counters().interrupts == before;)
     std::this_thread::yield();
 
@@ -128,7 +130,7 @@ TEST_F(OctalUartFaultTest, WhatIsWrongBeforeSomebodyListensIsToldLater) {
   alarms_.waitFor(OctalUartAlarm::lost);
 }
 
-TEST_F(OctalUartFaultTest, WithoutInterruptsItIsPolledAndSaysSo) {
+TEST_F(OctalUartFaultTest, WithoutInterruptsItIsPolledAndReportsIt) {
   BoundOctalPort bound(start({}, {.pollEvery = 1ms}), 6, kFast);
 
   carrier_.setFault("IP_a", ModelFault::interruptsLost);
@@ -137,7 +139,7 @@ TEST_F(OctalUartFaultTest, WithoutInterruptsItIsPolledAndSaysSo) {
   EXPECT_EQ(bound.port.state(), SerialPortState::plugged);
 }
 
-TEST_F(OctalUartFaultTest, NothingIsAlarmingWhenAllIsWell) {
+TEST_F(OctalUartFaultTest, NormalTrafficCausesNoAlarm) {
   BoundOctalPort bound(start({}, {.pollEvery = 1ms}), 6, kFast);
 
   for (int i = 0; i < 300; ++i) ASSERT_TRUE(echoes(bound, 6));
@@ -167,7 +169,7 @@ TEST_F(OctalUartFaultTest, AModuleThatReadsAsOnesUnplugsItsPorts) {
   EXPECT_EQ(alarms_.count(OctalUartAlarm::lost), 1);
 }
 
-TEST_F(OctalUartFaultTest, ARequestThatIsOnTheLineFails) {
+TEST_F(OctalUartFaultTest, AnOutstandingRequestFailsWhenTheModuleIsLost) {
   BoundOctalPort bound(start(), 3, kFast);
   SerialPortStatus status{};
   std::thread reader([&] { status = bound.line->writeRead(bytesOf("?"), kWatchdog); });
@@ -179,7 +181,7 @@ TEST_F(OctalUartFaultTest, ARequestThatIsOnTheLineFails) {
   EXPECT_EQ(status, SerialPortStatus::failure);
 }
 
-TEST_F(OctalUartFaultTest, AnotherModuleInItsPlaceIsSetUpAsTheFirst) {
+TEST_F(OctalUartFaultTest, AReplacementModuleGetsTheSameSettings) {
   BoundOctalPort bound(start({}, {.vector = 0x70}), 4, {4800, 2, 7, 'E', 'N'});
   carrier_.unplug("IP_a");
   waitUntil(bound.port, SerialPortState::unplugged);
@@ -192,7 +194,7 @@ TEST_F(OctalUartFaultTest, AnotherModuleInItsPlaceIsSetUpAsTheFirst) {
   EXPECT_TRUE(echoes(bound, 4));
 }
 
-TEST_F(OctalUartFaultTest, SomethingElseInItsPlaceIsNotTouched) {
+TEST_F(OctalUartFaultTest, AModuleOfAnotherKindInItsPlaceIsNotAccessed) {
   BoundOctalPort bound(start(), 4, kFast);
   carrier_.unplug("IP_a");
   waitUntil(bound.port, SerialPortState::unplugged);
@@ -205,8 +207,8 @@ TEST_F(OctalUartFaultTest, SomethingElseInItsPlaceIsNotTouched) {
   EXPECT_EQ(model_->vector(), 0x0f);
 }
 
-// An Octal 485 drives its line when RTS is asserted, which a 232 has all the time.
-TEST_F(OctalUartFaultTest, AnotherModelInItsPlaceIsNotTouched) {
+// An Octal 485 drives its line while RTS is asserted; on an Octal 232, RTS is always asserted.
+TEST_F(OctalUartFaultTest, AnotherModelInItsPlaceIsNotWrittenTo) {
   {
     BoundOctalPort bound(start(), 4, kFast);
     carrier_.unplug("IP_a");
@@ -225,18 +227,18 @@ TEST_F(OctalUartFaultTest, AnotherModelInItsPlaceIsNotTouched) {
   EXPECT_EQ(model_->writes(), 0U);
 }
 
-TEST_F(OctalUartFaultTest, AnotherModelIsNotTouchedByAPortThatComesLater) {
+TEST_F(OctalUartFaultTest, AnotherModelIsNotWrittenToByAPortThatIsOpenedLater) {
   auto& uart = start();
   carrier_.unplug("IP_a");
   plug({.model = 0x48});
 
-  EXPECT_THROW(OctalUartPort(uart, 1, {}), std::runtime_error);
+  EXPECT_THROW(static_cast<void>(openOctalUartPort(uart, 1, {})), std::runtime_error);
   uart_.reset();
 
   EXPECT_EQ(model_->writes(), 0U);
 }
 
-TEST_F(OctalUartFaultTest, AModuleThatWasExchangedWhileNobodyHadAPortIsSetUp) {
+TEST_F(OctalUartFaultTest, AModuleThatWasReplacedWhileNoPortWasOpenIsSetUp) {
   auto& uart = start({}, {.vector = 0x70});
   carrier_.unplug("IP_a");
   plug({});
@@ -247,7 +249,7 @@ TEST_F(OctalUartFaultTest, AModuleThatWasExchangedWhileNobodyHadAPortIsSetUp) {
   EXPECT_TRUE(echoes(bound, 1));
 }
 
-TEST_F(OctalUartFaultTest, AChipThatForgotItsSettingsGetsThemAgain) {
+TEST_F(OctalUartFaultTest, AChipThatWasResetGetsItsSettingsAgain) {
   BoundOctalPort bound(start(), 2, {4800, 2, 7, 'E', 'N'});
 
   model_->reset();
@@ -263,17 +265,17 @@ TEST_F(OctalUartFaultTest, APortMayWaitForItsModule) {
   auto& uart = start();
   carrier_.setFault("IP_a", ModelFault::busError);
   while (uart.counters().alarms == 0) std::this_thread::yield();
-  EXPECT_THROW(OctalUartPort(uart, 1, {}), std::runtime_error);
-  const OctalUartPort port(uart, 1, {.settings = kFast, .waitForModule = true});
-  EXPECT_EQ(port.state(), SerialPortState::unplugged);
+  EXPECT_THROW(static_cast<void>(openOctalUartPort(uart, 1, {})), std::runtime_error);
+  const auto port = openOctalUartPort(uart, 1, {.settings = kFast, .waitForModule = true});
+  EXPECT_EQ(port->state(), SerialPortState::unplugged);
 
   carrier_.setFault("IP_a", ModelFault::none);
 
-  waitUntil(port, SerialPortState::plugged);
+  waitUntil(*port, SerialPortState::plugged);
 }
 
-// Of a module, or a carrier, that was never there.
-TEST_F(OctalUartFaultTest, ALateLineComesWithItsModule) {
+// Also for a module or a carrier that was absent at the start.
+TEST_F(OctalUartFaultTest, ALateLineOpensWhenItsModuleIsPresent) {
   auto line = std::make_unique<LateLine>("port 3 of UART", [this] {
     if (!uart_)
       uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), OctalUartOptions{});
@@ -294,8 +296,8 @@ TEST_F(OctalUartFaultTest, ALateLineComesWithItsModule) {
   EXPECT_EQ(port.description(), "port 3 of UART");
 }
 
-// What a write had still to send is lost with the line: it must not look as if it were out.
-TEST_F(OctalUartFaultTest, AWriteOnALineThatIsLostIsNeverOut) {
+// The unsent bytes of a write are lost with the line; they must not be reported as sent.
+TEST_F(OctalUartFaultTest, BytesOnALostLineAreNeverReportedAsSent) {
   auto& uart = start({.time = OctalUartModelTime::stepped});
   OctalUartLine line(uart, 3, kFast);
   ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
@@ -307,8 +309,8 @@ TEST_F(OctalUartFaultTest, AWriteOnALineThatIsLostIsNeverOut) {
   EXPECT_GT(line.timeToSend(), 0ms);
 }
 
-// Also one that the program before left interrupting.
-TEST_F(OctalUartFaultTest, PortsThatAQuadModuleDoesNotHaveAreMasked) {
+// Also a channel that the previous program left with its interrupt enabled.
+TEST_F(OctalUartFaultTest, ChannelsWithoutAPortOnAQuadModuleAreMasked) {
   plug({});
   auto& io = carrier_.site(0).io();
   io.write8(scc2698b::atBlock(3, scc2698b::kImr), scc2698b::kOnes);
@@ -326,14 +328,14 @@ TEST_F(OctalUartFaultTest, PortsThatAQuadModuleDoesNotHaveAreMasked) {
   EXPECT_EQ(line.take(), 0U);
 }
 
-TEST_F(OctalUartFaultTest, TheChipIsSilentAfterwards) {
+TEST_F(OctalUartFaultTest, TheChipIsDisabledWhenTheDriverIsDestroyed) {
   {
     auto& uart = start();
-    const OctalUartPort port(uart, 0, {});
+    const auto port = openOctalUartPort(uart, 0, {});
   }
   uart_.reset();
 
-  model_->say(0, "nobody hears");
+  model_->say(0, "not received");
 
   EXPECT_EQ(carrier_.site(0).interrupt(0).take(), 0U);
   carrier_.site(0).interrupt(0).enable();

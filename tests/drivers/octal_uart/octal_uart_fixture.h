@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// OctalUartTest: an octal UART on a model, and ports of it.
+// OctalUartTest: the driver of an octal UART on a device model, and ports of it.
 #pragma once
 
 #include <condition_variable>
@@ -11,6 +11,7 @@
 
 #include <mpf/drivers/industry_pack/model_carrier.h>
 
+#include "drivers/octal_uart/octal_uart_line.h"
 #include "drivers/octal_uart/octal_uart_model.h"
 #include "drivers/octal_uart/octal_uart_port.h"
 #include "tests/drivers/serial/line_collector.h"
@@ -18,7 +19,7 @@
 
 namespace mpf::test {
 
-// The alarms that a module has told.
+// Counts the alarms of a module.
 class AlarmLog {
  public:
   void add(OctalUartAlarm alarm) {
@@ -41,12 +42,13 @@ class AlarmLog {
   std::map<OctalUartAlarm, int> counts_;
 };
 
-// A port with who is bound to it.
+// A port and the handler that is bound to it.
 struct BoundOctalPort {
   BoundOctalPort(OctalUart& uart, int number, const SerialSettings& settings)
-      : port(uart, number, {.settings = settings}) {}
+      : owner(openOctalUartPort(uart, number, {.settings = settings})) {}
   LineCollector collector{"\r"};
-  OctalUartPort port;
+  std::unique_ptr<SerialPort> owner;
+  SerialPort& port{*owner};
   BoundSerialPort line{port, collector};
 };
 
@@ -58,7 +60,7 @@ class OctalUartTest : public testing::Test {
     model_ = &carrier_.plug("IP_a", std::make_unique<OctalUartModel>(options));
     return *model_;
   }
-  // Plugs a model, and drives it.
+  // Plugs a model and starts the driver.
   OctalUart& start(const OctalUartModelOptions& model = {}, const OctalUartOptions& options = {}) {
     plug(model);
     uart_.emplace(modules_.create("UART", "ipac", "IP_a", kOctalUart), options);
@@ -74,7 +76,7 @@ class OctalUartTest : public testing::Test {
     return model_->with(
         number, [](const OctalUartModelChannel& channel) { return channel.requestsToSend(); });
   }
-  // Whether a command gets through and its answer back.
+  // Returns whether the far end receives a command and the port receives the answer.
   bool echoes(BoundOctalPort& bound, int number) {
     const auto tap = bound.port.attachTap([this, number](std::span<const PeekedByte> bytes) {
       if (bytes.front().direction == ByteDirection::sent) model_->say(number, "yes\r");
@@ -88,7 +90,7 @@ class OctalUartTest : public testing::Test {
   IndustryPackCarriers carriers_;
   ModelCarrier& carrier_ = addCarrier(std::make_unique<ModelCarrier>());
   IndustryPackModules modules_{carriers_};
-  OctalUartModel* model_ = nullptr;  // the carrier's
+  OctalUartModel* model_ = nullptr;  // owned by the carrier
   std::optional<OctalUart> uart_;
 
   ModelCarrier& addCarrier(std::unique_ptr<ModelCarrier> carrier,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Eight ports at 38400 baud at once: the chip keeps four bytes of each, so they must be served
-// every 1.04 ms.
+// Eight ports at 38400 baud at once. The chip stores four bytes of each port, so the driver must
+// serve it every 1.04 ms.
 #include <array>
 #include <thread>
 
@@ -26,7 +26,7 @@ class OctalUartLoadTest : public OctalUartTest {
     return model_->with(number,
                         [](const OctalUartModelChannel& channel) { return channel.overrun(); });
   }
-  // What the instruments have still to say.
+  // Returns whether the instruments have sent all their bytes.
   [[nodiscard]] bool isQuiet() const {
     for (int i = 0; i < 8; ++i) {
       if (!model_->with(
@@ -35,8 +35,8 @@ class OctalUartLoadTest : public OctalUartTest {
     }
     return true;
   }
-  // Every port sends and every instrument says so many bytes at once; returns when all are off the
-  // line.
+  // Every port and every instrument sends `bytes` bytes at the same time. Returns when all bytes
+  // have been sent.
   void talkBothWays(std::size_t bytes) {
     for (int i = 0; i < 8; ++i) model_->say(i, textOf(i, bytes));
     std::vector<std::thread> writers;
@@ -55,8 +55,8 @@ class OctalUartLoadTest : public OctalUartTest {
   std::array<std::optional<BoundOctalPort>, 8> ports_;
 };
 
-// The old driver took one byte of a port at a time, at most twice.
-TEST_F(OctalUartLoadTest, OneInterruptTakesAllThatTheChipHas) {
+// The old driver read one byte of a port at a time, at most twice for each interrupt.
+TEST_F(OctalUartLoadTest, OneInterruptReadsAllBytesOfTheChip) {
   start({.time = OctalUartModelTime::stepped});
   open(kFast);
   for (int i = 0; i < 8; ++i) model_->say(i, "abcd");
@@ -67,7 +67,7 @@ TEST_F(OctalUartLoadTest, OneInterruptTakesAllThatTheChipHas) {
   EXPECT_EQ(uart_->counters().interrupts, 2U) << "one on each line";
 }
 
-TEST_F(OctalUartLoadTest, NoByteIsLostByWhoComesThreeBytesLate) {
+TEST_F(OctalUartLoadTest, NoByteIsLostWhenTheDriverIsThreeBytesLate) {
   start({.time = OctalUartModelTime::stepped});
   open(kFast);
   constexpr int kBytes = 3000;
@@ -85,10 +85,9 @@ TEST_F(OctalUartLoadTest, NoByteIsLostByWhoComesThreeBytesLate) {
   }
 }
 
-// By the clock, both ways at once. A host that is busy with other things may let the driver come
-// late, and then a round may lose bytes, and is repeated; one in which the driver was there in time
-// may not.
-TEST_F(OctalUartLoadTest, NoByteIsLostByTheClock) {
+// With the real clock, in both directions at once. On a busy host the driver may be late and lose
+// bytes, and then the round is repeated. A round in which the driver was in time may lose none.
+TEST_F(OctalUartLoadTest, NoByteIsLostInRealTime) {
   const SerialSettings settings{kIsSanitized ? 1200 : 38400, 1, 8, 'N', 'N'};
   start({.time = OctalUartModelTime::clock});
   open(settings);
@@ -107,7 +106,7 @@ TEST_F(OctalUartLoadTest, NoByteIsLostByTheClock) {
     }
     if (lostNow == 0) break;
     ASSERT_GT(model_->takeLongestWait(), 2 * byteTime(settings))
-        << lostNow << " bytes lost, and nobody was late";
+        << lostNow << " bytes lost, although the driver was in time";
     for (int i = 0; i < 8; ++i) port(i).collector.clear();
   }
   for (int i = 0; i < 8; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The model behaves as the data sheet says. What it does wrong, the driver's tests would not see.
+// The model behaves as the data sheet says. The tests of the driver would not find its errors.
 #include "drivers/octal_uart/octal_uart_model.h"
 
 #include <fcntl.h>
@@ -12,7 +12,7 @@ namespace {
 
 using namespace scc2698b;
 
-constexpr int kChannel = 2;  // a of block 1
+constexpr int kChannel = 2;  // channel a of block 1
 
 class OctalUartModelTest : public OctalUartTest {
  protected:
@@ -31,7 +31,7 @@ class OctalUartModelTest : public OctalUartTest {
   std::chrono::nanoseconds byte() { return byteTime({9600, 1, 8, 'N', 'N'}); }
 };
 
-TEST_F(OctalUartModelTest, ModesAlternateAfterTheirPointerWasReset) {
+TEST_F(OctalUartModelTest, Mr1IsAccessedOnceAfterItsPointerWasReset) {
   plug({});
 
   setUp();
@@ -43,7 +43,7 @@ TEST_F(OctalUartModelTest, ModesAlternateAfterTheirPointerWasReset) {
   EXPECT_EQ(get(kMr), kMr2OneStop);
 }
 
-TEST_F(OctalUartModelTest, KeepsThreeBytesAndOneInItsShiftRegister) {
+TEST_F(OctalUartModelTest, HoldsThreeBytesAndOneInItsShiftRegister) {
   auto& model = plug({.time = OctalUartModelTime::stepped});
   setUp();
   model.say(kChannel, "abcdef");
@@ -62,7 +62,7 @@ TEST_F(OctalUartModelTest, KeepsThreeBytesAndOneInItsShiftRegister) {
   EXPECT_EQ(get(kSr) & kSrErrors, 0);
 }
 
-TEST_F(OctalUartModelTest, TellsErrorsWithTheirByte) {
+TEST_F(OctalUartModelTest, ReportsErrorsWithTheirByte) {
   auto& model = plug({});
   setUp();
   model.say(kChannel, "a");
@@ -76,7 +76,7 @@ TEST_F(OctalUartModelTest, TellsErrorsWithTheirByte) {
   }
 }
 
-TEST_F(OctalUartModelTest, SendsOneByteWhileTheNextOneWaits) {
+TEST_F(OctalUartModelTest, SendsOneByteWhileTheNextOneIsStored) {
   auto& model = plug({.time = OctalUartModelTime::stepped});
   setUp();
 
@@ -94,8 +94,8 @@ TEST_F(OctalUartModelTest, SendsOneByteWhileTheNextOneWaits) {
   EXPECT_EQ(model.heard(kChannel), "ab");
 }
 
-// Philips' sheets of this family: "enable transmitter and reset transmitter" cannot be in one
-// command word.
+// The Philips data sheets of this family: "enable transmitter and reset transmitter" cannot be in
+// one command word.
 TEST_F(OctalUartModelTest, IsNotEnabledByTheWriteThatResetsIt) {
   auto& model = plug({});
   setUp();
@@ -111,7 +111,7 @@ TEST_F(OctalUartModelTest, IsNotEnabledByTheWriteThatResetsIt) {
   EXPECT_EQ(get(kSr), kSrTxRdy | kSrTxEmt);
 }
 
-TEST_F(OctalUartModelTest, TalksToItselfInLocalLoopback) {
+TEST_F(OctalUartModelTest, ReceivesItsOwnBytesInLocalLoopback) {
   auto& model = plug({});
   setUp(kMr2OneStop | kMr2LocalLoopback);
   set(kCr, kCrDisableRx);
@@ -123,7 +123,7 @@ TEST_F(OctalUartModelTest, TalksToItselfInLocalLoopback) {
   EXPECT_EQ(model.heard(kChannel), "");
 }
 
-TEST_F(OctalUartModelTest, InterruptsForWhatIsNotMasked) {
+TEST_F(OctalUartModelTest, InterruptsForUnmaskedBitsOnly) {
   auto& model = plug({});
   auto& interrupt = carrier_.site(0).interrupt(0);
   interrupt.enable();
@@ -141,7 +141,7 @@ TEST_F(OctalUartModelTest, InterruptsForWhatIsNotMasked) {
   EXPECT_EQ(interrupt.take(), 0U);
 }
 
-TEST_F(OctalUartModelTest, TheOtherHalfHasTheOtherLine) {
+TEST_F(OctalUartModelTest, TheSecondHalfUsesTheSecondRequestLine) {
   plug({});
   auto& interrupt = carrier_.site(0).interrupt(1);
   interrupt.enable();

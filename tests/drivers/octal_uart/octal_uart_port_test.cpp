@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 class OctalUartPortTest : public OctalUartTest {
  protected:
-  // Lets time pass until `done`.
+  // Advances the time of the model until done().
   template <class Done>
   void stepUntil(Done done) {
     while (!done()) {
@@ -30,7 +30,7 @@ class OctalUartPortTest : public OctalUartTest {
   }
 };
 
-TEST_F(OctalUartPortTest, EveryPortTalksAndListens) {
+TEST_F(OctalUartPortTest, EveryPortSendsAndReceives) {
   auto& uart = start();
   for (int i = 0; i < 8; ++i) {
     BoundOctalPort bound(uart, i, kFast);
@@ -53,7 +53,7 @@ TEST_F(OctalUartPortTest, LongTextsPassInOrder) {
   EXPECT_TRUE(bound.collector.waitForAll(text));
 }
 
-TEST_F(OctalUartPortTest, AWriteEndsWhenTheLastBitIsOut) {
+TEST_F(OctalUartPortTest, AWriteEndsWhenTheLastBitIsSent) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 1, kFast);
   std::atomic<bool> isDone = false;
   std::thread writer([&] {
@@ -67,8 +67,9 @@ TEST_F(OctalUartPortTest, AWriteEndsWhenTheLastBitIsOut) {
   writer.join();
 }
 
-// The estimate of the time that bytes need is of use only until the last one is in the chip.
-TEST_F(OctalUartPortTest, WhoWritesIsToldThatTheChipHasAll) {
+// timeToSend() is an estimate until the chip has the last byte, so the line must become readable
+// then.
+TEST_F(OctalUartPortTest, TheLineIsReadableWhenTheChipHasAllBytes) {
   auto& uart = start({.time = OctalUartModelTime::stepped});
   OctalUartLine line(uart, 1, kFast);
   ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
@@ -80,7 +81,7 @@ TEST_F(OctalUartPortTest, WhoWritesIsToldThatTheChipHasAll) {
   EXPECT_EQ(::poll(&bell, 1, -1), 1);
 }
 
-TEST_F(OctalUartPortTest, ALineThatTakesNoTimeTakesNone) {
+TEST_F(OctalUartPortTest, AnInstantLineNeedsNoTimeToSend) {
   auto& uart = start();
   OctalUartLine line(uart, 1, {75, 1, 8, 'N', 'N'});
   ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
@@ -91,7 +92,7 @@ TEST_F(OctalUartPortTest, ALineThatTakesNoTimeTakesNone) {
   EXPECT_EQ(line.timeToSend(), 0ms);
 }
 
-TEST_F(OctalUartPortTest, DamagedBytesFailTheReadAndAreTold) {
+TEST_F(OctalUartPortTest, DamagedBytesAreReportedAndCounted) {
   BoundOctalPort bound(start(), 2, kFast);
   std::vector<LineFault> faults;
   {
@@ -115,19 +116,19 @@ TEST_F(OctalUartPortTest, DamagedBytesFailTheReadAndAreTold) {
   EXPECT_EQ(counters.overruns, 0U);
 }
 
-TEST_F(OctalUartPortTest, AnOverrunIsCountedAndCostsNoOtherByte) {
+TEST_F(OctalUartPortTest, AnOverrunIsCountedAndLosesNoOtherByte) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
   model_->say(0, "abcdef");
 
-  model_->advance(10 * byteTime(kFast));  // all at once: nobody can read in between
+  model_->advance(10 * byteTime(kFast));  // in one step: the driver cannot read in between
 
   EXPECT_TRUE(bound.collector.waitForAll("abcf"));
   EXPECT_EQ(bound.port.counters().overruns, 1U);
 }
 
-// The chip says that it has lost bytes, and the driver that they are missing before the third or
-// the fourth byte from there on.
-TEST_F(OctalUartPortTest, AnOverrunIsToldWhereBytesAreMissing) {
+// The chip reports that it has lost bytes; the driver reports that they are missing before the
+// third or the fourth byte after that.
+TEST_F(OctalUartPortTest, AnOverrunIsReportedWhereBytesAreMissing) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
   const auto pass = [&](int bytes) {
     model_->advance(bytes * byteTime(kFast));
@@ -139,11 +140,11 @@ TEST_F(OctalUartPortTest, AnOverrunIsToldWhereBytesAreMissing) {
   for (int i = 0; i < 4; ++i) pass(1);
 
   EXPECT_TRUE(bound.collector.waitForAll("12345678abc\rnext"));
-  EXPECT_THAT(bound.collector.faults(), ElementsAre(ToldFault{10, LineFault::overrun, 1},
-                                                    ToldFault{11, LineFault::overrun, 0}));
+  EXPECT_THAT(bound.collector.faults(), ElementsAre(ReportedFault{10, LineFault::overrun, 1},
+                                                    ReportedFault{11, LineFault::overrun, 0}));
 }
 
-TEST_F(OctalUartPortTest, NobodyLosesWhatFitsIntoTheChip) {
+TEST_F(OctalUartPortTest, BytesThatFitIntoTheChipAreNotLost) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
   model_->say(0, "abcd");
 
@@ -164,7 +165,7 @@ TEST_F(OctalUartPortTest, SendsABreak) {
   EXPECT_TRUE(echoes(bound, 4));
 }
 
-TEST_F(OctalUartPortTest, AFarEndThatHoldsItsLineMakesAWriteLate) {
+TEST_F(OctalUartPortTest, AWriteTimesOutWhileCtsIsInactive) {
   BoundOctalPort bound(start(), 3, {38400, 1, 8, 'N', 'H'});
   model_->setClearToSend(3, false);
 
@@ -172,27 +173,27 @@ TEST_F(OctalUartPortTest, AFarEndThatHoldsItsLineMakesAWriteLate) {
   model_->setClearToSend(3, true);
 
   EXPECT_TRUE(echoes(bound, 3));
-  EXPECT_EQ(model_->heard(3), "ok?\r") << "what was late is discarded";
+  EXPECT_EQ(model_->heard(3), "ok?\r") << "the late bytes are discarded";
 }
 
-TEST_F(OctalUartPortTest, WithoutFlowControlNobodyHoldsItUp) {
+TEST_F(OctalUartPortTest, WithoutFlowControlCtsIsIgnored) {
   BoundOctalPort bound(start(), 3, kFast);
   model_->setClearToSend(3, false);
 
   EXPECT_TRUE(echoes(bound, 3));
 }
 
-TEST_F(OctalUartPortTest, RequestsToSendAsLongAsItIsOpen) {
+TEST_F(OctalUartPortTest, AssertsRtsWhileItIsOpen) {
   auto& uart = start();
   {
-    const OctalUartPort port(uart, 6, {});
+    const auto port = openOctalUartPort(uart, 6, {});
     EXPECT_TRUE(requestsToSend(6));
   }
   EXPECT_FALSE(requestsToSend(6));
 }
 
-// RTS switches the transmitter on, and the receiver is off meanwhile.
-TEST_F(OctalUartPortTest, Rs485TalksOrListens) {
+// RTS switches the transmitter on; the receiver is off while the port sends.
+TEST_F(OctalUartPortTest, Rs485SendsOrReceives) {
   BoundOctalPort bound(start({.model = 0x48, .time = OctalUartModelTime::stepped}), 5, kFast);
   EXPECT_FALSE(requestsToSend(5));
   std::atomic<bool> isDone = false;
@@ -216,7 +217,7 @@ TEST_F(OctalUartPortTest, Rs485TalksOrListens) {
             3U);
 }
 
-TEST_F(OctalUartPortTest, Rs485HearsAnAnswerAtOnce) {
+TEST_F(OctalUartPortTest, Rs485ReceivesAnAnswerAtOnce) {
   BoundOctalPort bound(start({.model = 0x48}), 5, kFast);
   std::thread instrument([&] {
     for (int i = 0; i < 100; ++i) {
@@ -233,7 +234,7 @@ TEST_F(OctalUartPortTest, Rs485HearsAnAnswerAtOnce) {
   instrument.join();
 }
 
-TEST_F(OctalUartPortTest, Rs485SendsABreakAndTurns) {
+TEST_F(OctalUartPortTest, Rs485SendsABreakAndSwitchesTheTransmitterOff) {
   BoundOctalPort bound(start({.model = 0x48}), 5, kFast);
 
   EXPECT_EQ(bound.line->sendBreak(20ms), SerialPortStatus::success);
@@ -241,33 +242,33 @@ TEST_F(OctalUartPortTest, Rs485SendsABreakAndTurns) {
   while (requestsToSend(5)) std::this_thread::yield();
 }
 
-TEST_F(OctalUartPortTest, HasASpeedOfItsOwn) {
+TEST_F(OctalUartPortTest, EachPortHasItsOwnSpeed) {
   auto& uart = start();
-  const OctalUartPort slow(uart, 0, {.settings = {.baud = 1200}});
-  const OctalUartPort fast(uart, 1, {.settings = {.baud = 38400}});
+  const auto slow = openOctalUartPort(uart, 0, {.settings = {.baud = 1200}});
+  const auto fast = openOctalUartPort(uart, 1, {.settings = {.baud = 38400}});
 
   EXPECT_EQ(settingsInChip(0).baud, 1200);
   EXPECT_EQ(settingsInChip(1).baud, 38400);
 }
 
-TEST_F(OctalUartPortTest, OnePortIsOnesOwn) {
+TEST_F(OctalUartPortTest, APortCannotBeOpenedTwice) {
   auto& uart = start();
-  const OctalUartPort port(uart, 2, {});
+  const auto port = openOctalUartPort(uart, 2, {});
   try {
-    const OctalUartPort other(uart, 2, {});
-    FAIL() << "two have it";
+    const auto other = openOctalUartPort(uart, 2, {});
+    FAIL() << "no error";
   } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("port 2 is in use already"));
+    EXPECT_THAT(error.what(), HasSubstr("port 2 is in use"));
   }
 }
 
-TEST_F(OctalUartPortTest, AModuleOfFourHasFour) {
+TEST_F(OctalUartPortTest, AQuadModuleHasFourPorts) {
   auto& uart = start({}, {.ports = 4});
   BoundOctalPort bound(uart, 3, kFast);
 
   EXPECT_TRUE(echoes(bound, 3));
-  EXPECT_THROW(OctalUartPort(uart, 4, {}), std::invalid_argument);
-  EXPECT_THROW(OctalUartPort(uart, -1, {}), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(openOctalUartPort(uart, 4, {})), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(openOctalUartPort(uart, -1, {})), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// LineCollector: a byte handler as a server would have it: reads end at an end-of-message string.
-// And waits of tests.
+// LineCollector: a byte handler like that of a server: a read ends at an end-of-message string.
+// Also the watchdog of waits.
 #pragma once
 
 #include <condition_variable>
@@ -20,7 +20,7 @@ namespace mpf::test {
 using std::chrono_literals::operator""ms;
 using std::chrono_literals::operator""s;
 
-// no upper time limit: what it guards against is a hang
+// Not an upper time limit of an operation: it only ends a test that hangs.
 constexpr auto kWatchdog = Watchdog::kPatience;
 
 inline Deadline watchdog() { return Deadline::after(kWatchdog); }
@@ -29,12 +29,12 @@ inline std::span<const std::uint8_t> bytesOf(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-// What a port has told of a fault, and how many bytes had come before.
-struct ToldFault {
-  std::size_t at = 0;
+// A call of lineFailed().
+struct ReportedFault {
+  std::size_t at = 0;  // bytes received before it
   LineFault fault = LineFault::none;
   std::uint64_t count = 0;
-  friend bool operator==(const ToldFault&, const ToldFault&) = default;
+  friend bool operator==(const ReportedFault&, const ReportedFault&) = default;
 };
 
 class LineCollector : public ByteHandler {
@@ -73,12 +73,13 @@ class LineCollector : public ByteHandler {
     all_.clear();
     start_ = 0;
   }
-  // Circular buffer mode: a line that came before the read satisfies it.
+  // Circular buffer mode: a message that arrived before the read satisfies it.
   void acceptEarlier() { acceptsEarlier_ = true; }
+  // The bytes of the last read.
   [[nodiscard]] std::string answer() const { return copyOf(answer_); }
   [[nodiscard]] std::string all() const { return copyOf(all_); }
   [[nodiscard]] std::vector<SerialPortStatus> ends() const { return copyOf(ends_); }
-  [[nodiscard]] std::vector<ToldFault> faults() const { return copyOf(faults_); }
+  [[nodiscard]] std::vector<ReportedFault> faults() const { return copyOf(faults_); }
   [[nodiscard]] int readsBegun() const { return copyOf(readsBegun_); }
   [[nodiscard]] bool waitForAll(std::string_view text) const {
     std::unique_lock lock(mutex_);
@@ -105,7 +106,7 @@ class LineCollector : public ByteHandler {
   std::size_t start_ = 0;
   int readsBegun_ = 0;
   std::vector<SerialPortStatus> ends_;
-  std::vector<ToldFault> faults_;
+  std::vector<ReportedFault> faults_;
 };
 
 }  // namespace mpf::test

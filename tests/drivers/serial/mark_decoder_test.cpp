@@ -20,24 +20,24 @@ TEST(MarkDecoder, PassesPlainBytes) {
   EXPECT_EQ(decoded({{'a', 0, 0xfe}}), (Bytes{{'a'}, {0}, {0xfe}}));
 }
 
-TEST(MarkDecoder, HalvesDoubledMarks) {
+TEST(MarkDecoder, RemovesOneOfTwoEqualMarks) {
   EXPECT_EQ(decoded({{0xff, 0xff, 'a'}}), (Bytes{{0xff}, {'a'}}));
 }
 
-TEST(MarkDecoder, TellsDamagedBytes) {
+TEST(MarkDecoder, MarksDamagedBytes) {
   EXPECT_EQ(decoded({{'a', 0xff, 0, 'b', 'c'}}), (Bytes{{'a'}, {'b', kDamage}, {'c'}}));
 }
 
-TEST(MarkDecoder, TellsADamagedMarkByte) {
+TEST(MarkDecoder, MarksADamagedByteThatEqualsAMark) {
   EXPECT_EQ(decoded({{0xff, 0, 0xff, 'a'}}), (Bytes{{0xff, kDamage}, {'a'}}));
 }
 
-TEST(MarkDecoder, TellsBreaks) {
+TEST(MarkDecoder, ReportsBreaks) {
   EXPECT_EQ(decoded({{0xff, 0, 0, 'a'}}), (Bytes{{0, LineFault::breakSignal}, {'a'}}));
 }
 
-// A read may end anywhere.
-TEST(MarkDecoder, PutsSplitMarksTogether) {
+// A read may end at any byte.
+TEST(MarkDecoder, AcceptsMarksThatAreSplitBetweenReads) {
   EXPECT_EQ(decoded({{'a', 0xff}, {0}, {'b', 0xff}, {0xff, 'c'}}),
             (Bytes{{'a'}, {'b', kDamage}, {0xff}, {'c'}}));
 }

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include <mpf/drivers/serial/peek_taps.h>
+#include <mpf/drivers/serial/posix_terminal.h>
 
-#include "drivers/serial/posix_terminal_port.h"
 #include "tests/drivers/serial/line_collector.h"
 #include "tests/support/instrument.h"
 #include "tests/support/temporary_folder.h"
@@ -13,7 +13,7 @@
 namespace mpf::test {
 namespace {
 
-// Keeps what a tap showed, as text: T before what was sent, R before what was received.
+// Records the bytes of a tap as text: "T:" before sent bytes, "R:" before received bytes.
 class Recorder {
  public:
   PeekHandler handler() {
@@ -51,7 +51,8 @@ class PeekTest : public testing::Test {
   TemporaryFolder folder_;
   Instrument instrument_{folder_.file("tty")};
   LineCollector collector_;
-  PosixTerminalPort port_{{.device = folder_.file("tty")}};
+  const std::unique_ptr<SerialPort> owner_ = openPosixTerminal({.device = folder_.file("tty")});
+  SerialPort& port_ = *owner_;
   BoundSerialPort line_{port_, collector_};
 
   void ask(std::string_view command) {
@@ -95,7 +96,7 @@ TEST_F(PeekTest, ADetachedTapSeesNothingMore) {
   EXPECT_EQ(recorder.text(), "T:ECHO a\nR:a\r\n");
 }
 
-TEST_F(PeekTest, TapsComeAndGoWithoutDisturbingRequests) {
+TEST_F(PeekTest, AttachingAndDetachingTapsDoesNotDisturbRequests) {
   std::jthread fidget([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       Recorder recorder;
@@ -114,8 +115,8 @@ TEST(PeekTap, MayOutliveThePort) {
   Recorder recorder;
   PeekTap tap;
   {
-    PosixTerminalPort port({.device = folder.file("tty")});
-    tap = port.attachTap(recorder.handler());
+    const auto port = openPosixTerminal({.device = folder.file("tty")});
+    tap = port->attachTap(recorder.handler());
   }
 
   tap.detach();

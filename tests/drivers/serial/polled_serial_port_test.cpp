@@ -17,10 +17,10 @@ namespace {
 
 using testing::ElementsAre;
 
-// What happens on the played line; the test's thread and the port's both look at it.
+// The simulated line. The test's thread and the port's thread use it.
 class Script {
  public:
-  // Lets `bytes` arrive, after which `overruns` more had been lost.
+  // Lets `bytes` arrive; `overruns` more bytes were lost.
   void arrive(const std::vector<LineByte>& bytes, std::uint64_t overruns = 0) {
     const std::lock_guard lock(mutex_);
     arrived_.insert(arrived_.end(), bytes.begin(), bytes.end());
@@ -41,7 +41,7 @@ class Script {
   }
 
   const FileDescriptor bell{checkCall(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC), "eventfd")};
-  std::atomic<bool> isHeldUp = false;  // bytes stay in the kernel's queue
+  std::atomic<bool> isHeldUp = false;  // sent bytes stay in the kernel's queue
   std::atomic<int> discards = 0;
   std::atomic<bool> isInBreak = false;
 
@@ -51,10 +51,10 @@ class Script {
   std::uint64_t overruns_ = 0;
 };
 
-class PlayedLine : public SerialLine {
+class SimulatedLine : public SerialLine {
  public:
-  explicit PlayedLine(Script& script) : script_(script) {}
-  std::string description() const override { return "played"; }
+  explicit SimulatedLine(Script& script) : script_(script) {}
+  std::string description() const override { return "simulated"; }
   std::string problem() const override { return {}; }
   OpenState tryOpen() override { return OpenState::open; }
   std::chrono::milliseconds openTimeout() const override { return {}; }
@@ -84,11 +84,11 @@ class PolledSerialPortTest : public testing::Test {
  protected:
   Script script_;
   LineCollector collector_;
-  PolledSerialPort port_{std::make_unique<PlayedLine>(script_), false};
+  PolledSerialPort port_{std::make_unique<SimulatedLine>(script_), false};
   BoundSerialPort line_{port_, collector_};
 };
 
-// Lets bytes arrive as soon as something is sent.
+// A tap that lets `answer` arrive when bytes are sent.
 PeekHandler answering(Script& script, const std::vector<LineByte>& answer) {
   return [&script, answer](std::span<const PeekedByte> bytes) {
     if (bytes.front().direction == ByteDirection::sent) script.arrive(answer);
@@ -117,7 +117,7 @@ TEST_F(PolledSerialPortTest, TapsSeeDamagedBytesWithTheirFault) {
   script_.arrive({{'a'}, {'b', LineFault::parity}, {'\n'}});
   EXPECT_TRUE(collector_.waitForAll("a\n"));
 
-  line_->release();  // so that nothing is shown any more while we look
+  line_->release();  // no bytes are shown after this
 
   EXPECT_THAT(faults, ElementsAre(LineFault::none, LineFault::parity, LineFault::none));
 }
@@ -132,8 +132,8 @@ TEST_F(PolledSerialPortTest, ReadingIsEnabledBeforeTheFirstByteIsSent) {
   EXPECT_EQ(readsBegun, 1);
 }
 
-// Or a flush at the beginning of a request would leave what is still in the kernel.
-TEST_F(PolledSerialPortTest, WhatCameBeforeTheRequestBelongsToNoRead) {
+// Otherwise a flush at the start of a request would leave bytes in the kernel.
+TEST_F(PolledSerialPortTest, BytesFromBeforeTheRequestBelongToNoRead) {
   for (int round = 0; round < 100; ++round) {
     script_.arrive({{'a'}, {'\r'}, {'\n'}});
 
@@ -156,29 +156,29 @@ TEST_F(PolledSerialPortTest, AnAnswerWithAGapFailsTheRead) {
   EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::failure);
 }
 
-TEST_F(PolledSerialPortTest, AGapIsToldBetweenTheBytesWhereItIs) {
+TEST_F(PolledSerialPortTest, AGapIsReportedAtItsPlace) {
   script_.arrive({{'a'}, {'b', LineFault::none, true}, {'c'}, {'d', LineFault::none, true}}, 3);
 
   EXPECT_TRUE(collector_.waitForAll("abcd"));
-  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{1, LineFault::overrun, 3},
-                                               ToldFault{3, LineFault::overrun, 0}));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ReportedFault{1, LineFault::overrun, 3},
+                                               ReportedFault{3, LineFault::overrun, 0}));
 }
 
-TEST_F(PolledSerialPortTest, AGapThatMayBeAnywhereIsToldBeforeTheBytes) {
+TEST_F(PolledSerialPortTest, AGapAtAnUnknownPlaceIsReportedBeforeTheBytes) {
   script_.arrive({{'a'}, {'b'}}, 2);
 
   EXPECT_TRUE(collector_.waitForAll("ab"));
-  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{0, LineFault::overrun, 2}));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ReportedFault{0, LineFault::overrun, 2}));
 }
 
-TEST_F(PolledSerialPortTest, DamageIsToldWhereTheByteWas) {
+TEST_F(PolledSerialPortTest, DamageIsReportedAtThePlaceOfTheByte) {
   script_.arrive({{'a'}, {'b', LineFault::framing}, {'c'}});
 
   EXPECT_TRUE(collector_.waitForAll("ac"));
-  EXPECT_THAT(collector_.faults(), ElementsAre(ToldFault{1, LineFault::framing, 1}));
+  EXPECT_THAT(collector_.faults(), ElementsAre(ReportedFault{1, LineFault::framing, 1}));
 }
 
-TEST_F(PolledSerialPortTest, AWriteThatTheLineHoldsUpIsLateAndDiscarded) {
+TEST_F(PolledSerialPortTest, AWriteThatIsNotSentInTimeIsDiscarded) {
   script_.isHeldUp = true;
 
   EXPECT_EQ(line_->write(bytesOf("a"), 20ms), SerialPortStatus::timeout);
@@ -200,27 +200,27 @@ TEST_F(PolledSerialPortTest, AReadThatTimesOutDiscardsNoOutput) {
   EXPECT_EQ(script_.discards, 0);
 }
 
-// The answer may be there before the last bytes are known to be out.
-TEST_F(PolledSerialPortTest, AnAnswerEndsAWriteReadThoughTheLineIsBusy) {
+// The answer may arrive before the line reports that the last bytes are sent.
+TEST_F(PolledSerialPortTest, AnAnswerEndsAWriteReadBeforeAllBytesAreSent) {
   script_.isHeldUp = true;
   const auto tap = port_.attachTap(answering(script_, {{'a'}, {'\r'}, {'\n'}}));
 
   EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(PolledSerialPortTest, ARequestThatItsBinderGivesUpFails) {
+TEST_F(PolledSerialPortTest, ARequestThatItsBinderAbandonsFails) {
   int asked = 0;
-  line_->giveUpWhen([&] { return ++asked == 2; });
+  line_->abandonWhen([&] { return ++asked == 2; });
 
   EXPECT_EQ(line_->read(Deadline::never()), SerialPortStatus::failure);
 
   EXPECT_EQ(asked, 2);
-  line_->giveUpWhen({});
+  line_->abandonWhen({});
   const auto tap = port_.attachTap(answering(script_, {{'a'}, {'\r'}, {'\n'}}));
   EXPECT_EQ(line_->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::success);
 }
 
-// A handler that refuses the read, and counts what begins to be sent.
+// A handler that refuses reads, and counts calls of sendBegins().
 struct Refuser : ByteHandler {
   ByteHandlerResult byteReceived(std::uint8_t /*byte*/) override { return ByteHandlerResult::ok; }
   ByteHandlerResult readBegins() override {
@@ -231,14 +231,14 @@ struct Refuser : ByteHandler {
   std::atomic<int> sends = 0;
 };
 
-TEST_F(PolledSerialPortTest, AHandlerThatRefusesAReadKeepsItsRequestFromTheLine) {
+TEST_F(PolledSerialPortTest, ARequestThatItsHandlerRefusesIsNotSent) {
   line_->release();
   Refuser refuser;
   const BoundSerialPort line(port_, refuser);
 
   EXPECT_EQ(line->writeRead(bytesOf("?"), kWatchdog), SerialPortStatus::failure);
   EXPECT_EQ(line->counters().bytesOut, 0U);
-  EXPECT_EQ(script_.discards, 0) << "what an earlier request left in the kernel stays there";
+  EXPECT_EQ(script_.discards, 0) << "bytes of an earlier request stay in the kernel";
 
   refuser.refuses = false;
   EXPECT_EQ(line->writeRead(bytesOf("?"), 1ms), SerialPortStatus::timeout);

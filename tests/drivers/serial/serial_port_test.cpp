@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
+#include <mpf/drivers/serial/posix_terminal.h>
 #include <mpf/drivers/serial/serial_port_registry.h>
 
-#include "drivers/serial/posix_terminal_port.h"
 #include "tests/drivers/serial/line_collector.h"
 #include "tests/support/instrument.h"
 #include "tests/support/temporary_folder.h"
@@ -28,7 +28,8 @@ class SerialPortTest : public testing::Test {
   TemporaryFolder folder_;
   Instrument instrument_{folder_.file("tty")};
   LineCollector collector_;
-  PosixTerminalPort port_{{.device = folder_.file("tty")}};
+  const std::unique_ptr<SerialPort> owner_ = openPosixTerminal({.device = folder_.file("tty")});
+  SerialPort& port_ = *owner_;
 };
 
 TEST_F(SerialPortTest, WriteReadGetsTheAnswerWithItsTerminator) {
@@ -64,7 +65,7 @@ TEST_F(SerialPortTest, AllByteValuesPassUnchangedBothWays) {
   EXPECT_TRUE(collector.waitForAll(every));
 }
 
-TEST_F(SerialPortTest, ASlowAnswerIsWaitedFor) {
+TEST_F(SerialPortTest, WaitsForASlowAnswer) {
   const BoundSerialPort line(port_, collector_);
   instrument_.behave({.delay = 50ms});
 
@@ -73,7 +74,7 @@ TEST_F(SerialPortTest, ASlowAnswerIsWaitedFor) {
   EXPECT_EQ(collector_.answer(), "1.234\r\n");
 }
 
-TEST_F(SerialPortTest, AnAnswerInPiecesIsPutTogether) {
+TEST_F(SerialPortTest, JoinsAnAnswerThatArrivesInPieces) {
   const BoundSerialPort line(port_, collector_);
   instrument_.behave({.gap = 2ms});
 
@@ -103,7 +104,7 @@ TEST_F(SerialPortTest, SilenceEndsInTimeout) {
   EXPECT_EQ(line->counters().timeouts, 1U);
 }
 
-TEST_F(SerialPortTest, ADeadlineThatBeganEarlierCounts) {
+TEST_F(SerialPortTest, ADeadlineThatWasSetEarlierApplies) {
   const BoundSerialPort line(port_, collector_);
   instrument_.behave({.isSilent = true});
   const auto deadline = Deadline::after(20ms);
@@ -114,7 +115,7 @@ TEST_F(SerialPortTest, ADeadlineThatBeganEarlierCounts) {
   EXPECT_TRUE(deadline.hasPassed());
 }
 
-TEST_F(SerialPortTest, TimeoutZeroReturnsAtOnceWithWhatIsThere) {
+TEST_F(SerialPortTest, TimeoutZeroReturnsAtOnceWithTheBytesThatHaveArrived) {
   const BoundSerialPort line(port_, collector_);
   instrument_.say("begun");
   ASSERT_TRUE(collector_.waitForAll("begun"));
@@ -124,7 +125,7 @@ TEST_F(SerialPortTest, TimeoutZeroReturnsAtOnceWithWhatIsThere) {
   EXPECT_EQ(collector_.all(), "begun");
 }
 
-TEST_F(SerialPortTest, WriteWithTimeoutZeroSucceedsWhenTheKernelTakesAll) {
+TEST_F(SerialPortTest, WriteWithTimeoutZeroSucceedsWhenTheKernelAcceptsAllBytes) {
   const BoundSerialPort line(port_, collector_);
 
   EXPECT_EQ(line->write(bytesOf("ECHO\n"), 0ms), kSuccess);
@@ -132,7 +133,7 @@ TEST_F(SerialPortTest, WriteWithTimeoutZeroSucceedsWhenTheKernelTakesAll) {
   EXPECT_TRUE(instrument_.waitForReceived("ECHO\n"));
 }
 
-TEST_F(SerialPortTest, NegativeAndHugeTimeoutsMeanAtOnceAndForEver) {
+TEST_F(SerialPortTest, NegativeTimeoutsEndAtOnceAndHugeOnesNever) {
   const BoundSerialPort line(port_, collector_);
 
   EXPECT_EQ(line->read(std::chrono::milliseconds::min()), kTimeout);
@@ -148,8 +149,8 @@ TEST_F(SerialPortTest, HandlerGetsBytesWithNoReadOutstanding) {
   EXPECT_THAT(collector_.ends(), ElementsAre());
 }
 
-// Circular buffer mode without a race between looking into the buffer and beginning to read.
-TEST_F(SerialPortTest, ALineThatCameEarlierMaySatisfyARead) {
+// Circular buffer mode: no race between the check of the buffer and the start of the read.
+TEST_F(SerialPortTest, BytesThatArrivedEarlierMaySatisfyARead) {
   collector_.acceptEarlier();
   const BoundSerialPort line(port_, collector_);
   instrument_.say("alarm\r\n");
@@ -206,7 +207,7 @@ TEST_F(SerialPortTest, ReleaseEndsARequestThatIsOutstanding) {
   EXPECT_THAT(collector_.ends(), ElementsAre(kFailure));
 }
 
-TEST_F(SerialPortTest, ASecondRequestAtTheSameTimeFailsAndDisturbsNothing) {
+TEST_F(SerialPortTest, ASecondRequestAtTheSameTimeFailsAndDoesNotDisturbTheFirst) {
   const BoundSerialPort line(port_, collector_);
   auto first = std::async(std::launch::async, [&] { return port_.read(kWatchdog); });
   ASSERT_TRUE(collector_.waitForRead());
@@ -229,7 +230,7 @@ TEST_F(SerialPortTest, SettingsMayChangeWhileAReadIsOutstanding) {
   EXPECT_EQ(status.get(), kSuccess);
 }
 
-TEST_F(SerialPortTest, BreakLastsAndSucceeds) {
+TEST_F(SerialPortTest, SendBreakLastsForItsDuration) {
   const BoundSerialPort line(port_, collector_);
   const auto end = Deadline::after(20ms);
 
@@ -242,8 +243,7 @@ TEST(SerialPortRegistry, FindsByName) {
   const TemporaryFolder folder;
   const Instrument instrument(folder.file("tty"));
   SerialPortRegistry registry;
-  const auto port =
-      std::make_shared<PosixTerminalPort>(PosixTerminalOptions{.device = folder.file("tty")});
+  const std::shared_ptr<SerialPort> port = openPosixTerminal({.device = folder.file("tty")});
 
   registry.registerName("UART[0]", port);
 
@@ -259,8 +259,7 @@ TEST(SerialPortRegistry, BindsByName) {
   Instrument instrument(folder.file("tty"));
   LineCollector collector;
   SerialPortRegistry registry;
-  registry.registerName("UART[0]", std::make_shared<PosixTerminalPort>(
-                                       PosixTerminalOptions{.device = folder.file("tty")}));
+  registry.registerName("UART[0]", openPosixTerminal({.device = folder.file("tty")}));
 
   const auto line = registry.bind("UART[0]", collector);
 

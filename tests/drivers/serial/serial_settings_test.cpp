@@ -5,16 +5,16 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-#include "drivers/serial/tcp_address.h"
+#include <mpf/drivers/serial/tcp_address.h>
 
 namespace mpf {
 namespace {
 
 using testing::HasSubstr;
 
-TEST(SerialSettings, AllZeroIsPossible) { EXPECT_EQ(problemOf({}), ""); }
+TEST(SerialSettings, AcceptsAllZero) { EXPECT_EQ(problemOf({}), ""); }
 
-TEST(SerialSettings, AcceptsWhatTheManualHas) {
+TEST(SerialSettings, AcceptsTheValuesOfTheManual) {
   for (const char parity : {'E', 'O', 'N'}) {
     for (const int bits : {5, 6, 7, 8}) {
       EXPECT_EQ(problemOf({.baud = 19200,
@@ -36,7 +36,7 @@ TEST(SerialSettings, ProblemNamesTheValue) {
   EXPECT_THAT(problemOf({.flowControl = '\x07'}), HasSubstr("flow control 0x07"));
 }
 
-TEST(SerialSettings, ZeroKeepsWhatWas) {
+TEST(SerialSettings, ZeroKeepsThePresentValue) {
   const SerialSettings before{
       .baud = 9600, .stopBits = 1, .bitsPerChar = 8, .parity = 'N', .flowControl = 'N'};
 
@@ -55,7 +55,7 @@ TEST(TcpAddress, HasHostAndPort) {
   EXPECT_EQ(TcpAddress::parse("[::1]:4001").toString(), "[::1]:4001");
 }
 
-TEST(TcpAddress, RefusesAnythingElse) {
+TEST(TcpAddress, RefusesOtherTexts) {
   for (const char* text : {"", "host", "host:", ":4001", "::1:4001", "[]:1", "fe80::1"}) {
     EXPECT_THROW(static_cast<void>(TcpAddress::parse(text)), std::invalid_argument) << text;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "drivers/serial/tcp_serial_port.h"
+#include <mpf/drivers/serial/tcp_serial_port.h>
 
 #include <netinet/in.h>
 #include <poll.h>
@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// One port of a terminal server on this host, on a free TCP port.
+// A port of a terminal server, simulated on a free TCP port of this host.
 class TerminalServer {
  public:
   explicit TerminalServer(int family = AF_INET) : family_(family) { listen(0); }
@@ -32,7 +32,7 @@ class TerminalServer {
     pollfd ready{listener_.get(), POLLIN, 0};
     const auto watchdogMs = static_cast<int>(std::chrono::milliseconds(kWatchdog).count());
     if (retryInterrupted([&] { return ::poll(&ready, 1, watchdogMs); }) != 1)
-      throw std::runtime_error("nobody connects");
+      throw std::runtime_error("accept: no connection within the time of the watchdog");
     return FileDescriptor(
         checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
   }
@@ -69,7 +69,7 @@ class TcpSerialPortTest : public testing::Test {
 
 std::string whyNot(const TcpSerialOptions& options) {
   try {
-    const TcpSerialPort port(options);
+    const auto port = openTcpSerialPort(options);
     return {};
   } catch (const std::exception& error) {
     return error.what();
@@ -77,9 +77,9 @@ std::string whyNot(const TcpSerialOptions& options) {
 }
 
 TEST_F(TcpSerialPortTest, WriteReadGetsTheAnswer) {
-  TcpSerialPort port({.address = server_.address()});
+  const auto port = openTcpSerialPort({.address = server_.address()});
   instrument_.connect(server_.accept());
-  const BoundSerialPort line(port, collector_);
+  const BoundSerialPort line(*port, collector_);
 
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 
@@ -90,9 +90,9 @@ TEST_F(TcpSerialPortTest, AllByteValuesPassUnchangedBothWays) {
   std::string every;
   for (int value = 0; value < 256; ++value) every += static_cast<char>(value);
   LineCollector collector("never comes");
-  TcpSerialPort port({.address = server_.address()});
+  const auto port = openTcpSerialPort({.address = server_.address()});
   instrument_.connect(server_.accept());
-  const BoundSerialPort line(port, collector);
+  const BoundSerialPort line(*port, collector);
 
   EXPECT_EQ(line->write(bytesOf(every), kWatchdog), SerialPortStatus::success);
   instrument_.say(every);
@@ -101,44 +101,44 @@ TEST_F(TcpSerialPortTest, AllByteValuesPassUnchangedBothWays) {
   EXPECT_TRUE(collector.waitForAll(every));
 }
 
-TEST_F(TcpSerialPortTest, TakesNames) {
-  TcpSerialPort port({.address = {"localhost", server_.address().port}});
+TEST_F(TcpSerialPortTest, AcceptsHostNames) {
+  const auto port = openTcpSerialPort({.address = {"localhost", server_.address().port}});
   instrument_.connect(server_.accept());
-  const BoundSerialPort line(port, collector_);
+  const BoundSerialPort line(*port, collector_);
 
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(TcpSerialPortTest, TakesIpv6) {
+TEST_F(TcpSerialPortTest, AcceptsIpv6Addresses) {
   std::optional<TerminalServer> server;
   try {
     server.emplace(AF_INET6);
   } catch (const std::system_error& error) {
     GTEST_SKIP() << "this host has no IPv6: " << error.what();
   }
-  TcpSerialPort port({.address = server->address()});
+  const auto port = openTcpSerialPort({.address = server->address()});
   instrument_.connect(server->accept());
-  const BoundSerialPort line(port, collector_);
+  const BoundSerialPort line(*port, collector_);
 
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
 TEST_F(TcpSerialPortTest, SettingsBelongToTheTerminalServer) {
-  TcpSerialPort port({.address = server_.address()});
+  const auto port = openTcpSerialPort({.address = server_.address()});
 
-  EXPECT_EQ(port.config({}), "");
-  EXPECT_THAT(port.config({.baud = 9600}),
+  EXPECT_EQ(port->config({}), "");
+  EXPECT_THAT(port->config({.baud = 9600}),
               HasSubstr("not supported over TCP: set it on the terminal server"));
 }
 
 TEST_F(TcpSerialPortTest, CannotSendABreak) {
-  TcpSerialPort port({.address = server_.address()});
-  const BoundSerialPort line(port, collector_);
+  const auto port = openTcpSerialPort({.address = server_.address()});
+  const BoundSerialPort line(*port, collector_);
 
   EXPECT_EQ(line->sendBreak(1ms), SerialPortStatus::failure);
 }
 
-TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
+TEST_F(TcpSerialPortTest, ReportsWhyItCannotBeOpened) {
   server_.switchOff();
 
   EXPECT_THAT(whyNot({.address = server_.address()}),
@@ -147,12 +147,12 @@ TEST_F(TcpSerialPortTest, SaysWhyItCannotStart) {
               HasSubstr("resolve no-such-host.invalid:1"));
 }
 
-// The accept queue is full, so that the kernel does not answer.
-TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
+// The accept queue is full, so the kernel does not answer.
+TEST_F(TcpSerialPortTest, TimesOutWhenTheServerDoesNotAnswer) {
   const TcpSerialOptions options{
       .address = server_.address(), .connectTimeout = 50ms, .waitForServer = true};
-  std::array<std::unique_ptr<TcpSerialPort>, 4> fillers;
-  for (auto& filler : fillers) filler = std::make_unique<TcpSerialPort>(options);
+  std::array<std::unique_ptr<SerialPort>, 4> fillers;
+  for (auto& filler : fillers) filler = openTcpSerialPort(options);
 
   const auto reason = [&] {
     for (;;) {
@@ -164,10 +164,10 @@ TEST_F(TcpSerialPortTest, GivesUpOnAServerThatDoesNotAnswer) {
   EXPECT_THAT(reason, HasSubstr("no answer within 50 ms"));
 }
 
-TEST_F(TcpSerialPortTest, ALostConnectionFailsTheRequestThatIsOutstanding) {
-  TcpSerialPort port({.address = server_.address()});
+TEST_F(TcpSerialPortTest, ALostConnectionFailsAnOutstandingRequest) {
+  const auto port = openTcpSerialPort({.address = server_.address()});
   instrument_.connect(server_.accept());
-  const BoundSerialPort line(port, collector_);
+  const BoundSerialPort line(*port, collector_);
   instrument_.behave({.isSilent = true});
   auto status = std::async(std::launch::async,
                            [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
@@ -177,41 +177,41 @@ TEST_F(TcpSerialPortTest, ALostConnectionFailsTheRequestThatIsOutstanding) {
   instrument_.unplug();
 
   EXPECT_EQ(status.get(), SerialPortStatus::failure);
-  EXPECT_EQ(port.counters().unplugs, 1U);
+  EXPECT_EQ(port->counters().unplugs, 1U);
 }
 
-TEST_F(TcpSerialPortTest, ConnectsAgain) {
-  TcpSerialPort port({.address = server_.address()});
+TEST_F(TcpSerialPortTest, ReconnectsAfterALoss) {
+  const auto port = openTcpSerialPort({.address = server_.address()});
   instrument_.connect(server_.accept());
-  const BoundSerialPort line(port, collector_);
+  const BoundSerialPort line(*port, collector_);
   server_.switchOff();
   instrument_.unplug();
-  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
 
   server_.switchOn();
   instrument_.connect(server_.accept());
 
-  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(TcpSerialPortTest, MayStartBeforeItsServer) {
+TEST_F(TcpSerialPortTest, MayBeOpenedBeforeItsServerIsPresent) {
   server_.switchOff();
-  TcpSerialPort port({.address = server_.address(), .waitForServer = true});
-  const BoundSerialPort line(port, collector_);
+  const auto port = openTcpSerialPort({.address = server_.address(), .waitForServer = true});
+  const BoundSerialPort line(*port, collector_);
 
   server_.switchOn();
   instrument_.connect(server_.accept());
 
-  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(TcpSerialPortTest, AFloodDoesNotKeepARequestFromItsDeadline) {
+TEST_F(TcpSerialPortTest, AFloodDoesNotDelayTheDeadlineOfARequest) {
   LineCollector collector("never comes");
-  TcpSerialPort port({.address = server_.address()});
+  const auto port = openTcpSerialPort({.address = server_.address()});
   const auto far = server_.accept();
-  const BoundSerialPort line(port, collector);
+  const BoundSerialPort line(*port, collector);
   std::jthread flood([&](const std::stop_token& stop) {
     const std::string noise(1000, '#');
     while (!stop.stop_requested() &&

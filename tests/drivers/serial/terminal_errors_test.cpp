@@ -8,11 +8,11 @@ namespace {
 
 using Counts = TerminalErrors::Counts;
 
-TEST(TerminalErrors, AnOverrunMakesBytesSuspectForAWhile) {
+TEST(TerminalErrors, AnOverrunMakesBytesSuspectForSomeTime) {
   TerminalErrors errors;
   errors.begin(Counts{.framing = 0, .overruns = 7});
   EXPECT_EQ(errors.take(Counts{.framing = 0, .overruns = 7}, false), LineFault::framing);
-  EXPECT_FALSE(errors.mayFollowGap()) << "what was before the device was opened does not count";
+  EXPECT_FALSE(errors.mayFollowGap()) << "overruns from before the device was opened do not count";
 
   const auto before = Clock::nowNs();
   errors.take(Counts{.framing = 0, .overruns = 10}, false);
@@ -33,10 +33,10 @@ TEST(TerminalErrors, DamageIsParityUnlessFramingErrorsWereCounted) {
   EXPECT_EQ(errors.take(Counts{.framing = 1, .overruns = 0}, true), LineFault::framing);
   EXPECT_EQ(errors.take(Counts{.framing = 1, .overruns = 0}, true), LineFault::parity);
   EXPECT_EQ(errors.take(Counts{}, false), LineFault::framing)
-      << "without parity it can be nothing else";
+      << "a line without parity has no parity errors";
 }
 
-TEST(TerminalErrors, WithoutCountersNothingIsSuspect) {
+TEST(TerminalErrors, WithoutCountersNoByteIsSuspect) {
   TerminalErrors errors;
   errors.begin(std::nullopt);
   EXPECT_EQ(errors.take(std::nullopt, true), LineFault::parity);

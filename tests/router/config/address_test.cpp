@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// HOST:PORT, which of them are public, and patterns.
+// HOST:PORT, public addresses, and patterns.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ TEST(RouterAddress, IsWrittenAsItIsRead) {
     EXPECT_EQ(parseAddress(text).text(), text);
 }
 
-TEST(RouterAddress, WhatIsWrongWithItIsSaid) {
+TEST(RouterAddress, ErrorsQuoteTheTextAndShowTheForm) {
   const std::vector<std::pair<std::string, std::string>> wrong{
       {"",
        "\"\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, [fd00::7]:9900 "
@@ -44,17 +44,17 @@ TEST(RouterAddress, WhatIsWrongWithItIsSaid) {
       {"ioc1:65536", "\"ioc1:65536\" has no port from 0 to 65535 at its end;"},
       {"ioc1:-1", "\"ioc1:-1\" has no port from 0 to 65535 at its end;"},
       {"ioc1:99x", "\"ioc1:99x\" has no port from 0 to 65535 at its end;"},
-      {":9900", "\":9900\" has no host: nothing stands before the port;"},
-      {"10.0.0.777:1", "\"10.0.0.777:1\" has no host: 10.0.0.777 cannot be one;"},
-      {"10.0.7:1", "\"10.0.7:1\" has no host: 10.0.7 cannot be one;"},
-      {"a b:1", "\"a b:1\" has no host: a b cannot be one;"},
-      {"a..b:1", "\"a..b:1\" has no host: a..b cannot be one;"},
+      {":9900", "\":9900\" has no host before the port;"},
+      {"10.0.0.777:1", "\"10.0.0.777:1\" has an invalid host, \"10.0.0.777\";"},
+      {"10.0.7:1", "\"10.0.7:1\" has an invalid host, \"10.0.7\";"},
+      {"a b:1", "\"a b:1\" has an invalid host, \"a b\";"},
+      {"a..b:1", "\"a..b:1\" has an invalid host, \"a..b\";"},
       {"fd00::7:9900",
        "\"fd00::7:9900\" is an IPv6 address without brackets, or has more than one port;"},
-      {"[fd00::7x]:1", "\"[fd00::7x]:1\" has no IPv6 address in its brackets;"},
-      {"[10.0.0.7]:1", "\"[10.0.0.7]:1\" has no IPv6 address in its brackets;"},
-      {"[fe80::1%eth0]:1", "\"[fe80::1%eth0]:1\" has no IPv6 address in its brackets;"},
-      {"[:1", "\"[:1\" has no IPv6 address in its brackets;"},
+      {"[fd00::7x]:1", "\"[fd00::7x]:1\" has no valid IPv6 address in its brackets;"},
+      {"[10.0.0.7]:1", "\"[10.0.0.7]:1\" has no valid IPv6 address in its brackets;"},
+      {"[fe80::1%eth0]:1", "\"[fe80::1%eth0]:1\" has no valid IPv6 address in its brackets;"},
+      {"[:1", "\"[:1\" has no valid IPv6 address in its brackets;"},
   };
   for (const auto& [text, complaint] : wrong)
     EXPECT_THAT(complaintOfAddress(text), StartsWith(complaint));
@@ -74,7 +74,6 @@ TEST(RouterAddress, LoopbackPrivateAndLinkLocalAreNotPublic) {
   }
 }
 
-// The socket address of `ip`.
 TEST(RouterPattern, StarsStandForAnythingAndQuestionMarksForOne) {
   for (const auto& [pattern, name] :
        std::vector<std::pair<std::string, std::string>>{{"", ""},
@@ -90,7 +89,7 @@ TEST(RouterPattern, StarsStandForAnythingAndQuestionMarksForOne) {
                                                         {"**", "x"},
                                                         {"serial[0]", "serial[0]"},
                                                         {"*a*b*", "xxaxxbxx"}}) {
-    EXPECT_TRUE(fits(pattern, name)) << pattern << " " << name;
+    EXPECT_TRUE(matches(pattern, name)) << pattern << " " << name;
   }
   for (const auto& [pattern, name] :
        std::vector<std::pair<std::string, std::string>>{{"", "a"},
@@ -103,17 +102,16 @@ TEST(RouterPattern, StarsStandForAnythingAndQuestionMarksForOne) {
                                                         {"*.lab", "ioc1.lab.x"},
                                                         {"*ab*ab", "xab"},
                                                         {"serial[0]", "serial0"}}) {
-    EXPECT_FALSE(fits(pattern, name)) << pattern << " " << name;
+    EXPECT_FALSE(matches(pattern, name)) << pattern << " " << name;
   }
 }
 
-// A peer chooses its name, and somebody the pattern: together they must not cost more than their
-// product.
-TEST(RouterPattern, ManyStarsCostNothing) {
+// A peer chooses its own name: matching takes at most the product of both lengths.
+TEST(RouterPattern, ManyStarsAreMatchedQuickly) {
   std::string pattern;
   for (int i = 0; i < 1000; ++i) pattern += "*a";
 
-  EXPECT_FALSE(fits(pattern + "b", std::string(5000, 'a')));
+  EXPECT_FALSE(matches(pattern + "b", std::string(5000, 'a')));
 }
 
 }  // namespace

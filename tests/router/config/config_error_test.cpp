@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Files that are wrong: each with its line and its text.
+// Invalid configuration files: the line and the text of each error.
 #include <vector>
 
 #include "tests/router/certificates.h"
 #include "tests/router/config/config_fixture.h"
 
-// NOLINTBEGIN(modernize-raw-string-literal): a line of TOML ends with \n here, so that one test case is one line
+// Lines of TOML end with \n here, so that one test case is one line.
+// NOLINTBEGIN(modernize-raw-string-literal)
 namespace mpf::router::test {
 namespace {
 
@@ -36,7 +37,7 @@ class ConfigErrorTest : public ConfigTest {
   }
 };
 
-TEST_F(ConfigErrorTest, WhatIsNoToml) {
+TEST_F(ConfigErrorTest, InvalidToml) {
   EXPECT_THAT(complaintOf("name = \"a\"\n\nname = \"b\"\n"),
               HasSubstr("router.toml:3: Error while parsing key-value pair: cannot redefine "
                         "existing string 'name'"));
@@ -46,24 +47,24 @@ TEST_F(ConfigErrorTest, WhatIsNoToml) {
   EXPECT_THAT(complaintOf("# \xff\n"), HasSubstr("router.toml:1: "));
 }
 
-TEST_F(ConfigErrorTest, KeysThatThereAreNot) {
+TEST_F(ConfigErrorTest, UnknownKeys) {
   expectComplaints({
-      {"nam = \"a\"\n", "1: there is no key \"nam\"; did you mean \"name\"?"},
+      {"nam = \"a\"\n", "1: unknown key \"nam\"; did you mean \"name\"?"},
       {kRemote + "adress = \"a:1\"\n",
-       "5: [[remote]]: there is no key \"adress\"; did you mean \"address\"?"},
+       "5: [[remote]]: unknown key \"adress\"; did you mean \"address\"?"},
       {"[[remote]]\nlocation = 1\n",
-       "2: [[remote]]: there is no key \"location\"; did you mean \"locations\"?"},
+       "2: [[remote]]: unknown key \"location\"; did you mean \"locations\"?"},
       {kServe + "locations = [1]\n",
-       "3: [[serve]]: there is no key \"locations\"; did you mean \"location\"?"},
+       "3: [[serve]]: unknown key \"locations\"; did you mean \"location\"?"},
       {"[limits]\nqueue_size = 1\n",
-       "2: [limits]: there is no key \"queue_size\"; did you mean \"queue-size\"?"},
+       "2: [limits]: unknown key \"queue_size\"; did you mean \"queue-size\"?"},
       {"[tls]\n\npassword = \"x\"\n",
-       "3: [tls]: there is no key \"password\"; there are certificate, key, authorities"},
-      {"[[remotes]]\nlocations = 1\n", "1: there is no key \"remotes\"; did you mean \"remote\"?"},
+       "3: [tls]: unknown key \"password\"; the keys are certificate, key, authorities"},
+      {"[[remotes]]\nlocations = 1\n", "1: unknown key \"remotes\"; did you mean \"remote\"?"},
   });
 }
 
-TEST_F(ConfigErrorTest, KeysThatMustBeThere) {
+TEST_F(ConfigErrorTest, MissingKeys) {
   expectComplaints({
       {"\n[[serve]]\nlocal = 0\n", "2: [[serve]] has no location; write location = 1"},
       {kServe + "[[listen]]\n", "3: [[listen]] has no address; write address = \"*:9900\""},
@@ -75,7 +76,7 @@ TEST_F(ConfigErrorTest, KeysThatMustBeThere) {
   });
 }
 
-TEST_F(ConfigErrorTest, ValuesOfAnotherKind) {
+TEST_F(ConfigErrorTest, ValuesOfTheWrongType) {
   expectComplaints({
       {"name = 7\n", "1: name is an integer; write a string in quotes"},
       {"name = [\n \"a\"]\n", "1: name is a list; write a string in quotes"},
@@ -86,7 +87,7 @@ TEST_F(ConfigErrorTest, ValuesOfAnotherKind) {
       {"[[serve]]\nlocation = 3000000000\n",
        "2: location 3000000000 is out of range: use -2147483648 to 2147483647"},
       {"[[remote]]\nlocations = [\n1,\n\"2\"]\n", "4: locations is a string; write an integer"},
-      {"[[remote]]\nlocations = []\n", "2: locations is an empty list"},
+      {"[[remote]]\nlocations = []\n", "2: locations is an empty list; write at least one value"},
       {"[[allow]]\nservers = [1]\n", "2: servers is an integer; write strings in quotes"},
       {"[limits]\ndead-time = 2024-01-01\n",
        "2: dead-time is a date or a time; write a string in quotes"},
@@ -97,13 +98,13 @@ TEST_F(ConfigErrorTest, ValuesOfAnotherKind) {
   });
 }
 
-TEST_F(ConfigErrorTest, ValuesThatCannotBe) {
+TEST_F(ConfigErrorTest, InvalidValues) {
   expectComplaints({
       {"mode = \"0888\"\n",
        "1: mode: 0888: use an octal number between 0600 and 0666, such as 0660"},
       {"group = \"no-such-group\"\n", "1: group: no-such-group: there is no group of this name"},
       {"group = \"root\"\n" + kRemote,
-       "1: a group that mode does not let in: write mode 0660, too"},
+       "1: the mode gives this group no access; write mode 0660, too"},
       {"log-level = \"loud\"\n" + kRemote,
        "1: log-level \"loud\": use trace, debug, info, warning, error, critical, off"},
       {"\nname = \"a\\tb\"\n" + kRemote, "2: name \"a\tb\": use 1 to 63 printable characters"},
@@ -121,45 +122,48 @@ TEST_F(ConfigErrorTest, ValuesThatCannotBe) {
   });
 }
 
-TEST_F(ConfigErrorTest, ARouterThatWouldDoNothing) {
+TEST_F(ConfigErrorTest, ARouterWithNothingToDo) {
   expectComplaints({
       {"",
-       "1: nothing to do: write [[serve]] and [[listen]] for servers of this host that clients "
-       "elsewhere use, or [[remote]] for servers "
-       "elsewhere that clients of this host use"},
-      {"\n" + kServe, "2: what is served cannot be reached: write [[listen]], too"},
-      {kListen, "1: whoever connects finds nothing that is served: write [[serve]], too"},
+       "1: nothing to do: write [[serve]] and [[listen]] to offer servers of this host to other "
+       "hosts, or [[remote]] to reach servers of other hosts"},
+      {"\n" + kServe, "2: no client can reach the served locations; write [[listen]], too"},
+      {kListen, "1: this router listens, but serves no location; write [[serve]], too"},
       {kRemote + "[[allow]]\n", "5: [[allow]] without [[serve]]: there is nothing to allow"},
   });
 }
 
-TEST_F(ConfigErrorTest, LocationsInTwoPlaces) {
+TEST_F(ConfigErrorTest, DuplicateLocationsAndAddresses) {
   expectComplaints({
       {kServe + kServe + kListen, "4: location 1 is served twice; write it once"},
-      {kRemote + kRemote, "6: location 2 is reached twice; write it once"},
+      {kRemote + kRemote, "6: location 2 appears twice in remotes; write it once"},
       {"[[remote]]\nlocations = [3, 3]\naddress = \"a:1\"\nsecurity = \"plain\"\n",
-       "2: location 3 is reached twice; write it once"},
+       "2: location 3 appears twice in remotes; write it once"},
       {"[[serve]]\nlocation = 2\nlocal = 0\n" + kListen + kRemote,
-       "8: location 2 is elsewhere and here, by router.toml:2; each location has one place"},
+       "8: location 2 is remote here, but served by this host at router.toml:2; use "
+       "another location"},
       {"[[serve]]\nlocation = 5\nlocal = 2\n" + kListen + kRemote,
-       "8: location 2 is elsewhere and here, by router.toml:3; each location has one place"},
+       "8: location 2 is remote here, but served by this host at router.toml:3; use "
+       "another location"},
       {kServe + kListen + kListen +
            "[[listen]]\naddress = \"10.0.0.1:7\"\nsecurity = \"plain\"\n[[listen]]\naddress = "
            "\"10.0.0.1:7\"\n",
-       "13: 10.0.0.1:7 is listened at twice; write it once"},
+       "13: 10.0.0.1:7 appears twice; write it once"},
       {kServe + kListen + "[[allow]]\nlocations = [1,\n 2]\n", "7: location 2 is not served here"},
   });
 }
 
-TEST_F(ConfigErrorTest, AddressesThatCannotBeCalled) {
+TEST_F(ConfigErrorTest, AddressesThatCannotBeConnectedTo) {
   expectComplaints({
-      {remoteAt("*:9900"), "3: *:9900 is an address to listen at; write that of one host"},
-      {remoteAt("[::]:9900"), "3: [::]:9900 is an address to listen at; write that of one host"},
-      {remoteAt("ioc1:0"), "3: ioc1:0: the port to connect to is 1 to 65535"},
+      {remoteAt("*:9900"),
+       "3: *:9900 is a wildcard address to listen on; write the address of one host"},
+      {remoteAt("[::]:9900"),
+       "3: [::]:9900 is a wildcard address to listen on; write the address of one host"},
+      {remoteAt("ioc1:0"), "3: ioc1:0: the port must be 1 to 65535"},
   });
 }
 
-TEST_F(ConfigErrorTest, PlainTcpWhereEverybodyListens) {
+TEST_F(ConfigErrorTest, PlainTcpWithPublicAddresses) {
   const auto how =
       ": use TLS, or a loopback, private or link-local address, or write allow-public-plain = true";
   expectComplaints({
@@ -180,15 +184,15 @@ TEST_F(ConfigErrorTest, PlainTcpWhereEverybodyListens) {
 TEST_F(ConfigErrorTest, Patterns) {
   expectComplaints({
       {kServe + kListen + "[[allow]]\npeer = \"ioc*\"\n",
-       "7: peer \"ioc*\" cannot come: only TLS tells names, and no [[listen]] uses it"},
+       "7: peer \"ioc*\" cannot match: peers have names only with TLS, and no [[listen]] uses TLS"},
       {kServe + kListen + "[[allow]]\npeer = \"\"\n",
-       "7: an empty pattern fits nothing; \"*\" fits everything"},
+       "7: an empty pattern matches nothing; \"*\" matches everything"},
       {kServe + kListen + "[[allow]]\nservers = [\"a\", \"\"]\n",
-       "7: an empty pattern fits nothing; \"*\" fits everything"},
+       "7: an empty pattern matches nothing; \"*\" matches everything"},
   });
 }
 
-TEST_F(ConfigErrorTest, TlsThatIsNotComplete) {
+TEST_F(ConfigErrorTest, IncompleteTls) {
   const auto needs =
       ": TLS needs [tls] with certificate, key and authorities; or write security = \"plain\"";
   expectComplaints({
@@ -196,15 +200,16 @@ TEST_F(ConfigErrorTest, TlsThatIsNotComplete) {
       {listenAt("*:9900") + "security = \"tls\"\n", std::string("5") + needs},
       {remoteAt("ioc1:9900"), std::string("1") + needs},
       {remoteAt("10.0.0.7:9900"),
-       "3: 10.0.0.7 is no name that a certificate can have; write tls-name, too: the name in the "
-       "certificate of the router there"},
+       "3: 10.0.0.7 is an IP address, and a certificate has a name; write tls-name, too: the name "
+       "in "
+       "the certificate of that router"},
       {remoteAt("10.0.0.7:9900") + "tls-name = \"10.0.0.7\"\n",
-       "4: tls-name 10.0.0.7 is an address; write a name"},
-      {kRemote + "tls-name = \"a\"\n", "5: tls-name without TLS; leave it out"},
+       "4: tls-name 10.0.0.7 is an IP address; write a name"},
+      {kRemote + "tls-name = \"a\"\n", "5: tls-name has no effect without TLS; remove it"},
   });
 }
 
-TEST_F(ConfigErrorTest, FilesOfTls) {
+TEST_F(ConfigErrorTest, InvalidTlsFiles) {
   const auto tls = [](const std::string& certificate, const std::string& key,
                       const std::string& authorities) {
     return "[tls]\ncertificate = \"" + certificate + "\"\nkey = \"" + key + "\"\nauthorities = \"" +
@@ -232,7 +237,7 @@ TEST_F(ConfigErrorTest, FilesOfTls) {
   });
 }
 
-TEST_F(ConfigErrorTest, FilesThatCannotBeRead) {
+TEST_F(ConfigErrorTest, UnreadableFiles) {
   const auto complaintOfFile = [&](const std::string& file) -> std::string {
     try {
       static_cast<void>(loadConfig(file));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ConfigTest: configurations in a folder of the test's own, and what is said of them.
+// ConfigTest: loads configurations from a folder of the test, and returns their errors.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ class ConfigTest : public testing::Test {
     return loadConfig(folder_.write("router.toml", text));
   }
 
-  // What is wrong with a file; "nothing".
+  // Returns the error of a file, or "nothing".
   std::string complaintOf(const std::string& text) {
     try {
       static_cast<void>(load(text));

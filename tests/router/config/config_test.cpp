@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files that are right, and what they mean.
+// Valid configuration files.
 #include <unistd.h>
 
 #include <array>
@@ -34,7 +34,7 @@ TEST_F(ConfigTest, AFewLinesAreEnough) {
   ASSERT_EQ(config.remotes.size(), 1U);
   EXPECT_EQ(config.remotes[0], (Remote{{1}, {"ioc1", 9900}, Security::plain, {}}));
   EXPECT_EQ(config.name, ownHostName().substr(0, 63));
-  EXPECT_EQ(config.backplane, "") << "that of the environment, or \"default\"";
+  EXPECT_EQ(config.backplane, "") << "$MPF_BACKPLANE, or \"default\"";
   EXPECT_EQ(config.rights, Rights());
   EXPECT_EQ(config.limits, Limits());
   EXPECT_EQ(config.logLevel, "info");
@@ -44,7 +44,7 @@ TEST_F(ConfigTest, AFewLinesAreEnough) {
   EXPECT_THAT(config.allow, IsEmpty());
 }
 
-TEST_F(ConfigTest, EverythingThatIsWrittenIsTaken) {
+TEST_F(ConfigTest, ReadsEveryKey) {
   const auto* group = ::getgrgid(::getegid());
   ASSERT_NE(group, nullptr);
   const auto tls = Certificates(folder_, "all").files("ioc7.lab");
@@ -115,7 +115,7 @@ servers = "Int32"
   EXPECT_TRUE(config.allowPublicPlain);
   EXPECT_EQ(config.tls,
             (TlsFiles{folder_.file("ours.pem"), folder_.file("ours.key"), folder_.file("all.pem")}))
-      << "paths are meant from where the file is";
+      << "paths are relative to the folder of the file";
   EXPECT_EQ(config.limits, (Limits{40, 1500, 8u << 20, 64u << 10, 10, 3, 60s, 4s, 50ms, 2s}));
   EXPECT_THAT(config.serve, ElementsAre(Serve{1, 0}, Serve{3, 3}));
   EXPECT_THAT(config.listen, ElementsAre(Listen{{"*", 9900}, Security::tls},
@@ -127,15 +127,14 @@ servers = "Int32"
                                         Allow{"*", {}, {"Int32"}}));
 }
 
-// Nobody reads what nobody needs.
-TEST_F(ConfigTest, FilesOfTlsAreNotLookedAtWhenNothingUsesIt) {
+TEST_F(ConfigTest, TlsFilesAreNotReadWhenNoConnectionUsesTls) {
   EXPECT_EQ(
       complaintOf(std::string("[tls]\ncertificate = \"a\"\nkey = \"b\"\nauthorities = \"c\"\n") +
                   kOneRemote),
       "nothing");
 }
 
-TEST_F(ConfigTest, PlainTcpIsForAddressesThatAreNotPublic) {
+TEST_F(ConfigTest, PlainTcpIsAllowedWithAddressesThatAreNotPublic) {
   for (const std::string address :
        {"127.0.0.1:0", "10.1.2.3:1", "172.31.0.1:1", "192.168.0.1:1", "169.254.1.1:1", "[::1]:1",
         "[fd00::7]:1", "[fe80::1]:1", "localhost:1"}) {
@@ -146,7 +145,7 @@ TEST_F(ConfigTest, PlainTcpIsForAddressesThatAreNotPublic) {
   }
 }
 
-TEST_F(ConfigTest, ManyListenersMayLeaveTheirPortsToTheKernel) {
+TEST_F(ConfigTest, SeveralListenersMayHavePort0) {
   EXPECT_EQ(
       complaintOf("[[serve]]\nlocation=1\n" +
                   std::string("[[listen]]\naddress = \"127.0.0.1:0\"\nsecurity = \"plain\"\n") +

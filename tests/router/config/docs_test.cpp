@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// docs/router-configuration.md: its files can be loaded, and its table has every key with its
+// docs/router-configuration.md: its files can be loaded, and its table has each key with its
 // default.
 #include <unistd.h>
 
@@ -21,7 +21,7 @@ using testing::HasSubstr;
 
 class RouterDocs : public ConfigTest {
  protected:
-  // The ```toml blocks, as they can be loaded here: with a group that there is.
+  // The ```toml blocks, with a group that exists on this host.
   [[nodiscard]] std::vector<std::string> files() const {
     std::vector<std::string> all;
     constexpr std::string_view kBegin = "```toml\n";
@@ -36,7 +36,7 @@ class RouterDocs : public ConfigTest {
     }
     return all;
   }
-  // The names that the files of TLS have on the page.
+  // Makes the TLS files under the names that the page uses.
   void makeCertificates() {
     const Certificates lab(folder_, "lab");
     std::filesystem::create_directory(folder_.file("tls"));
@@ -90,13 +90,13 @@ TEST_F(RouterDocs, ShowEveryKeyInTheFirstFileAndNoDefault) {
   }
 }
 
-// The message that names all keys of a table is the code's own list of them.
-TEST_F(RouterDocs, HaveTheKeysThatTheProgramKnows) {
+// The error for an unknown key lists all keys that the code reads.
+TEST_F(RouterDocs, HaveEveryKeyThatTheProgramReads) {
   const auto keys = keysIn(files().front());
   for (const std::string table : {"", "[tls]\n", "[limits]\n", "[[serve]]\n", "[[listen]]\n",
                                   "[[remote]]\n", "[[allow]]\n"}) {
     const auto complaint = complaintOf(table + "qqqqqqqqqqqqqqqqqq = 1\n");
-    constexpr std::string_view kBegin = "there are ";
+    constexpr std::string_view kBegin = "the keys are ";
     ASSERT_THAT(complaint, HasSubstr(kBegin));
     std::istringstream known(complaint.substr(complaint.find(kBegin) + kBegin.size()));
     for (std::string key; known >> key;) {
@@ -106,7 +106,7 @@ TEST_F(RouterDocs, HaveTheKeysThatTheProgramKnows) {
   }
 }
 
-TEST_F(RouterDocs, TellTheDefaultsOfLimits) {
+TEST_F(RouterDocs, ShowTheDefaultsOfLimits) {
   for (const auto& name : limitNames()) {
     const auto text = limitText({}, name);
     const auto isNumber = text.find_first_not_of("0123456789") == std::string::npos;

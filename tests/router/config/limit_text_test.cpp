@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Limits as text: units, bounds, there and back.
+// Limits as text: units, ranges, and conversion in both directions.
 #include "router/config/limit_text.h"
 
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ TEST(RouterLimits, HaveUnits) {
   EXPECT_EQ(parseBytes("1GiB"), 1U << 30);
 }
 
-TEST(RouterLimits, AreReadAsTheyAreWritten) {
+TEST(RouterLimits, AreWrittenAsTheyAreRead) {
   Limits changed;
   const std::vector<std::pair<std::string, std::string>> texts{
       {"queue-size", "40"},     {"buffer-size", "1500"},  {"max-message-size", "8MiB"},
@@ -46,13 +46,13 @@ TEST(RouterLimits, AreReadAsTheyAreWritten) {
   for (const auto& [name, text] : texts) EXPECT_EQ(limitText(changed, name), text);
 }
 
-// What nobody wrote down must be something that one may write down.
-TEST(RouterLimits, DefaultsAreWithinTheirBounds) {
+// Each default value is one that a file may also contain.
+TEST(RouterLimits, HaveDefaultsWithinTheirRange) {
   for (const auto& name : limitNames())
     EXPECT_EQ(complaintOfLimit(name, limitText(Limits(), name)), "nothing") << name;
 }
 
-TEST(RouterLimits, WhatIsWrongWithThemIsSaid) {
+TEST(RouterLimits, ErrorsNameTheValueAndTheForm) {
   EXPECT_EQ(complaintOfLimit("dead-time", "2"),
             "\"2\": write a time with its unit, such as 500ms, 2s or 1min");
   EXPECT_EQ(complaintOfLimit("dead-time", "2.5s"),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Certificates and keys: what is wrong with them is said before anybody connects.
+// Certificates and keys are checked before the first connection.
 #include "router/config/tls_files.h"
 
 #include <fstream>
@@ -37,14 +37,14 @@ class TlsFilesTest : public testing::Test {
   TlsFiles good_ = ours_.files("ioc1");
 };
 
-TEST_F(TlsFilesTest, AreTakenWhenAllIsWell) {
+TEST_F(TlsFilesTest, AreAcceptedWhenValid) {
   EXPECT_EQ(complaintOf(good_), "nothing");
   const auto texts = readTlsFiles(good_);
   EXPECT_THAT(texts.authorities, testing::ElementsAre(contents(ours_.authorities())));
 }
 
-// A chain, and more than one authority.
-TEST_F(TlsFilesTest, MayHoldMoreThanOneCertificate) {
+// A chain, and several authorities.
+TEST_F(TlsFilesTest, MayContainSeveralCertificates) {
   const Certificates theirs(folder_, "theirs");
   good_.certificate =
       folder_.write("chain.pem", contents(good_.certificate) + contents(ours_.authorities()));
@@ -56,7 +56,7 @@ TEST_F(TlsFilesTest, MayHoldMoreThanOneCertificate) {
               testing::ElementsAre(contents(ours_.authorities()), contents(theirs.authorities())));
 }
 
-TEST_F(TlsFilesTest, WhatIsWrongWithThemIsSaid) {
+TEST_F(TlsFilesTest, ErrorsNameTheFileAndTheReason) {
   const auto damaged = folder_.write(
       "damaged.pem", "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n");
   const auto damagedKey = folder_.write(
@@ -93,7 +93,7 @@ TEST_F(TlsFilesTest, WhatIsWrongWithThemIsSaid) {
       {ours_.files("old", Valid::notAnyMore),
        "ours-old1.pem expired on 2021-02-03 04:05 UTC; renew it"},
       {ours_.files("new", Valid::notYet),
-       "ours-new2.pem is not valid before 2098-01-02 03:04 UTC; is this host's clock right?"},
+       "ours-new2.pem is not valid before 2098-01-02 03:04 UTC; check the clock of this host"},
   };
   for (const auto& [files, complaint] : wrong) EXPECT_EQ(complaintOf(files), complaint);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whether a server is there, when not all that it takes to look is to be had.
+// Presence: a server that cannot be watched for lack of memory, and one Presence for several users.
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -20,14 +20,14 @@
 namespace mpf::router::test {
 namespace {
 
-// Memory for a window and for much else, but not for the stack of a thread.
+// Limits the memory so that a window can be mapped, but no thread can be started.
 class NoMoreThreads {
  public:
   NoMoreThreads() {
     constexpr std::size_t kLeftBytes = 64 << 20;
     ::pthread_attr_init(&threads_);
-    ::pthread_attr_setstacksize(&threads_,
-                                2 * kLeftBytes);  // none that has ended had one that would do
+    // Larger than any cached stack of a thread that has ended.
+    ::pthread_attr_setstacksize(&threads_, 2 * kLeftBytes);
     ::pthread_setattr_default_np(&threads_);
     ::getrlimit(RLIMIT_AS, &before_);
     std::size_t pages = 0;
@@ -48,12 +48,12 @@ class NoMoreThreads {
   pthread_attr_t threads_{};
 };
 
-// Nobody would say when it ends: whoever asks again, later, finds it.
-TEST(Presence, OfAServerThatCannotBeWatchedIsInDoubt) {
-  if (mpf::test::kIsSanitized) GTEST_SKIP() << "the sanitizer has all memory for its own";
+// The end of the server would not be noticed. A later look() finds the server.
+TEST(Presence, IsDoubtfulWhenTheServerCannotBeWatched) {
+  if (mpf::test::kIsSanitized) GTEST_SKIP() << "the sanitizer reserves the address space";
   const mpf::test::TestBackplane servers;
   const MessageServer server(servers, "echo", {});
-  // whose watcher has yet to begin
+  // With a backplane of its own, whose watcher thread has not started.
   Presence presence(Backplane::attach(servers.name()), {0, "echo"}, [] {});
 
   {
@@ -67,8 +67,8 @@ TEST(Presence, OfAServerThatCannotBeWatchedIsInDoubt) {
   EXPECT_EQ(presence.problem(), "");
 }
 
-// However many have bound to it, there is one; and none once they have all gone.
-TEST(Presences, HaveOneOfEachServer) {
+// All users of a server share one Presence, which is destroyed with the last of them.
+TEST(Presences, HaveOnePresenceForEachServer) {
   const mpf::test::TestBackplane servers;
   auto io = kj::setupAsyncIo();
   Presences presences(servers, io.unixEventPort, [] {});
@@ -85,25 +85,25 @@ TEST(Presences, HaveOneOfEachServer) {
   EXPECT_TRUE(gone.expired());
 }
 
-// Who did not look himself hears that there is something to see.
-TEST(Presences, TellWhoDidNotLook) {
+// A look() that finds a change notifies the users that did not call it.
+TEST(Presences, NotifyAllUsersOfAChange) {
   const mpf::test::Watchdog watchdog("presences");
   const mpf::test::TestBackplane servers;
   auto io = kj::setupAsyncIo();
-  int news = 0;
-  Presences presences(servers, io.unixEventPort, [&] { ++news; });
+  int changes = 0;
+  Presences presences(servers, io.unixEventPort, [&] { ++changes; });
   const auto presence = presences.of({0, "echo"});
   io.waitScope.poll();
   std::optional<MessageServer> server(std::in_place, servers, "echo", ServerOptions{});
   ASSERT_TRUE(presence->look());
-  while (news == 0) io.waitScope.poll();  // of its name
+  while (changes == 0) io.waitScope.poll();  // the name of the server has appeared
 
   server.reset();
-  news = 0;
+  changes = 0;
   EXPECT_FALSE(presence->look());
   EXPECT_FALSE(presence->isDoubtful());
   io.waitScope.poll();
-  EXPECT_GT(news, 0);
+  EXPECT_GT(changes, 0);
 }
 
 }  // namespace

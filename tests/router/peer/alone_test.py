@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The peer's two roles with each other, without any program: the page read twice must give one protocol.
+# Connects the two roles of the peer with each other, without a program: both must implement the
+# same protocol.
 import unittest
 
 from client_role import ClientRouter
@@ -18,7 +19,7 @@ class Alone(unittest.TestCase):
     self.server.close()
 
   def joined(self, near=None, far=None, window=65536, **options):
-    """Both roles, and a client of "far"."""
+    """Connects both roles, and returns a client of "far"."""
     self.server = ServerRouter(**(far or {}))
     self.far = self.server.add(FarServer("far", 1, **options))
     self.near = ClientRouter(self.server.address, **(near or {}))
@@ -54,7 +55,7 @@ class Alone(unittest.TestCase):
     self.client = self.near.open(client.binding)
     self.assertEqual(self.end(message("int32"), takeWithinNs=1)[:2], ("fate", "expired"))
 
-  def testServersThatAreNotHere(self):
+  def testAbsentAndRefusedServers(self):
     self.client = self.joined()
     absent, refused = self.near.bind(1, "other"), self.near.bind(2, "far")
     self.near.awaitState(refused, "refused")
@@ -62,21 +63,25 @@ class Alone(unittest.TestCase):
     self.server.add(FarServer("other", 1))
     self.near.awaitState(absent, "there")
 
-  def testRefusedClientHasItsEnds(self):
+  def testRequestsOfARefusedClientAreRefused(self):
     self.client = client = self.joined(answer=lambda request: request.client_.refuse("no room"))
     asked = client.ask(message("int32"))
     self.near.awaitEnd(asked)
     self.assertEqual(asked.end[:2], ("fate", "refused"))
     self.assertEqual(self.end(message("int32"), careful=False)[:2], ("fate", "refused"))
 
-  def testTooLargeEndsWhereItIs(self):
+  def testMessagesThatAreTooLargeEndLocally(self):
     self.client = self.joined(maxMessageBytes=1000)
     self.assertEqual(self.end(message("char8Array", value=bytes(1001)))[2], "by this side")
-    self.assertEqual(self.end(message("char8Array", value=bytes(1001)), careful=False)[1], "refused")
+    self.assertEqual(
+      self.end(message("char8Array", value=bytes(1001)), careful=False)[1], "refused"
+    )
     self.far.answer = lambda request: request.reply(message("user", value=bytes(1 << 20)))
-    self.assertEqual(self.end(message("int32")), ("fate", "outcomeUnknown", "the reply is too large"))
+    self.assertEqual(
+      self.end(message("int32")), ("fate", "outcomeUnknown", "the reply is too large")
+    )
 
-  def testWindowHoldsRepliesBack(self):
+  def testWindowLimitsReplies(self):
     self.client = client = self.joined(window=128)
     client.givesCredit = False
     asked = [client.ask(message("int32")) for _ in range(4)]
@@ -85,27 +90,36 @@ class Alone(unittest.TestCase):
     self.assertEqual(client.taken, 2)
 
     client.givesCredit = True
-    client.tellCredit()
+    client.sendCredit()
 
     self.assertEqual([self.near.awaitEnd(one)[0] for one in asked], ["reply"] * 4)
 
-  # The other side, sending what cannot be, is told so.
+  # Each violation is answered with a farewell of the right code.
   def testFarewells(self):
-    for near, far, code in (({"protocolMajor": 2, "version": "newer"}, {}, "version"), ({"maxFrameBytes": 65535}, {}, "protocol")):
+    for near, far, code in (
+      ({"protocolMajor": 2, "version": "newer"}, {}, "version"),
+      ({"maxFrameBytes": 65535}, {}, "protocol"),
+    ):
       self.server = ServerRouter(**far)
       router = ClientRouter(self.server.address, **near)
       self.assertEqual(router.connection.awaitEnding(), ("theirs", code))
       self.server.close()
-    for raw, code in (([item("reply", {})], "protocol"), ([item("open", client=1)], "protocol"), ([item("credit", client=7)], "protocol"),
-                      ([item("open", client=0)], "protocol"), ([item("request", client=1, message=message("int32"))], "protocol"),
-                      ([item("bind", binding=1, location=1, server="far")], "protocol"),
-                      (b"\0\0\0\0\xff\xff\xff\xff", "limit"), (b"\0\0\0\0\1\0\0\0" + b"\xff" * 8, "protocol")):
+    for raw, code in (
+      ([item("reply", {})], "protocol"),
+      ([item("open", client=1)], "protocol"),
+      ([item("credit", client=7)], "protocol"),
+      ([item("open", client=0)], "protocol"),
+      ([item("request", client=1, message=message("int32"))], "protocol"),
+      ([item("bind", binding=1, location=1, server="far")], "protocol"),
+      (b"\0\0\0\0\xff\xff\xff\xff", "limit"),
+      (b"\0\0\0\0\1\0\0\0" + b"\xff" * 8, "protocol"),
+    ):
       self.client = self.joined()
       self.near.connection.sendBytes(encodeFrame(raw) if isinstance(raw, list) else raw)
       self.assertEqual(self.near.connection.awaitEnding(), ("theirs", code))
       self.server.close()
 
-  def testSilenceIsNotedAndSaid(self):
+  def testSilenceEndsTheConnection(self):
     self.server = ServerRouter(deadTimeMs=200)
     router = ClientRouter(self.server.address)
     router.connection.answersPings = False

@@ -1,31 +1,32 @@
 # SPDX-License-Identifier: MIT
-# The peer as a client router: it connects, binds to servers, opens clients of them, and sends their requests.
+# The peer as a client router: connects, binds to servers, opens clients, and sends their requests.
 #
 #   router = ClientRouter((host, port))
 #   binding = router.bind(1, "Int32"); router.awaitState(binding, "there")
 #   client = router.open(binding)
-#   asked = client.ask(message); router.awaitEnd(asked); asked.end      ("reply", message) or ("fate", its name, reason)
+#   asked = client.ask(message); router.awaitEnd(asked)
+#   asked.end   ("reply", message) or ("fate", name of the fate, reason)
 import socket
 import threading
 
 from codec import item
 from peer import Connection, Violation, bodyBytes, greeting, kFromServerRouter, mustBeCarried
 
-kReplyBytes = 64  # what a reply takes of the window besides its body
+kReplyBytes = 64  # bytes that a reply takes from the window besides its body
 
 
 class Binding:
   def __init__(self, number, location, server):
     self.number, self.location, self.server = number, location, server
-    self.news = []  # bodies of `server`, in order
+    self.states = []  # bodies of the `server` items, in order
     self.isClosed = False
 
   def state(self):
-    return self.news[-1]["state"] if self.news else None
+    return self.states[-1]["state"] if self.states else None
 
 
 class Asked:
-  """A request: `end` once it has one, and the further replies."""
+  """A request: its `end`, or None while it is pending, and its further replies."""
 
   def __init__(self, requestId, wasWritten):
     self.requestId = requestId
@@ -38,22 +39,28 @@ class Client:
   def __init__(self, router, number, binding, window):
     self.router_ = router
     self.number, self.binding, self.window = number, binding, window
-    self.life = binding.news[-1]
+    self.life = binding.states[-1]
     self.isOpen = True
     self.isRefused = False
     self.givesCredit = True
-    self.untold = 0     # bytes of replies taken, credit for which has not been given back
-    self.taken = 0      # replies
-    self.queueFull = 0  # news of it
+    self.uncredited = 0  # bytes of received replies for which no credit has been sent
+    self.taken = 0       # received replies
+    self.queueFull = 0   # received `queueFull` items
     self.unanswered = {}  # id: Asked
     self.answered = {}
     self.lastId_ = 0
 
   def ask(self, message, takeWithinNs=0, requestId=None, careful=True):
-    """Not careful: sends whatever the page says of it."""
+    """Sends a request. If not `careful`, sends it even when the protocol forbids it."""
     with self.router_.changed:
       asked = Asked(requestId or self.nextId(), wasWritten=True)
-      one = item("request", client=self.number, requestId=asked.requestId, takeWithinNs=takeWithinNs, message=message)
+      one = item(
+        "request",
+        client=self.number,
+        requestId=asked.requestId,
+        takeWithinNs=takeWithinNs,
+        message=message,
+      )
       refusal = careful and self.refusal(message, one)
       if refusal:
         asked.wasWritten, asked.end = False, ("fate", refusal, "by this side")
@@ -65,8 +72,15 @@ class Client:
   def refusal(self, message, one):
     if not self.isOpen:
       return "neverTaken"
-    tooLarge = bodyBytes(message) > min(self.life["maxMessageBytes"], self.router_.connection.theirs["maxMessageBytes"])
-    if self.isRefused or tooLarge or len(self.unanswered) >= self.life["maxOutstanding"] or not self.router_.connection.fits(one):
+    tooLarge = bodyBytes(message) > min(
+      self.life["maxMessageBytes"], self.router_.connection.theirs["maxMessageBytes"]
+    )
+    if (
+      self.isRefused
+      or tooLarge
+      or len(self.unanswered) >= self.life["maxOutstanding"]
+      or not self.router_.connection.fits(one)
+    ):
       return "refused"
     return None
 
@@ -88,19 +102,31 @@ class Client:
     if message["kind"] in ("connect", "requestFate"):
       raise Violation("protocol", f"a reply that is a {message['kind']}")
     if body["isFirst"] != (asked is not None):
-      raise Violation("protocol", "a first reply to nothing" if body["isFirst"] else "a further reply before the first")
+      raise Violation(
+        "protocol",
+        "a first reply to nothing" if body["isFirst"] else "a further reply before the first",
+      )
     if asked:
-      self.finish(requestId, ("reply", message) if isKnown else ("fate", "outcomeUnknown", "a reply of a kind that is not known here"))
+      self.finish(
+        requestId,
+        ("reply", message)
+        if isKnown
+        else ("fate", "outcomeUnknown", "a reply of a kind that is not known here"),
+      )
     elif isKnown:
       self.answered.setdefault(requestId, Asked(requestId, False)).further.append(message)
     self.taken += 1
-    self.untold += kReplyBytes + bodyBytes(message) if isKnown else self.window  # it never grows beyond what it was
-    self.tellCredit()
+    self.uncredited += (
+      kReplyBytes + bodyBytes(message) if isKnown else self.window
+    )  # a window never grows beyond its size in `open`
+    self.sendCredit()
 
-  def tellCredit(self):
-    if self.givesCredit and self.untold * 4 > self.window:
-      self.router_.connection.send(item("credit", client=self.number, bytes=min(self.untold, 0xFFFFFFFF)))
-      self.untold = 0
+  def sendCredit(self):
+    if self.givesCredit and self.uncredited * 4 > self.window:
+      self.router_.connection.send(
+        item("credit", client=self.number, bytes=min(self.uncredited, 0xFFFFFFFF))
+      )
+      self.uncredited = 0
 
   def finish(self, requestId, end):
     asked = self.unanswered.pop(requestId)
@@ -124,10 +150,16 @@ class ClientRouter:
     self.changed = threading.Condition()
     self.bindings = {}
     self.clients = {}
-    self.connection = Connection(socket.create_connection(address), self, greeting(**fields) if greets else None, version, spread)
+    self.connection = Connection(
+      socket.create_connection(address),
+      self,
+      greeting(**fields) if greets else None,
+      version,
+      spread,
+    )
     self.connection.start()
 
-  # ---- what it does
+  # ---- actions
 
   def bind(self, location, server):
     with self.changed:
@@ -146,24 +178,26 @@ class ClientRouter:
     with self.changed:
       client = Client(self, len(self.clients) + 1, binding, window)
       self.clients[client.number] = client
-      life = binding.news[-1]["incarnation"]
-      self.connection.send(item("open", client=client.number, binding=binding.number, incarnation=life, window=window))
+      life = binding.states[-1]["incarnation"]
+      self.connection.send(
+        item("open", client=client.number, binding=binding.number, incarnation=life, window=window)
+      )
       return client
 
   def awaitState(self, binding, state):
     self.connection.await_(lambda: binding.state() == state)
-    return binding.news[-1]
+    return binding.states[-1]
 
   def awaitEnd(self, asked):
     self.connection.await_(lambda: asked.end, afterEnd=True)
     return asked.end
 
   def awaitPong(self, stamp):
-    """Everything that was sent before has been read by then, and all that was said at once has come."""
+    """Waits until all earlier items have been read and immediate answers have arrived."""
     self.connection.send(item("ping", stamp=stamp))
     self.connection.await_(lambda: stamp in self.connection.stamps)
 
-  # ---- what comes
+  # ---- received items
 
   def onGreeting(self, body):
     pass
@@ -180,18 +214,22 @@ class ClientRouter:
     if kind == "reply":
       client.onReply(body)
     elif kind == "fate" and body["requestId"] in client.unanswered:
-      fate = body["fate"] if body["fate"] in ("refused", "neverTaken", "expired", "outcomeUnknown") else "outcomeUnknown"
+      fate = (
+        body["fate"]
+        if body["fate"] in ("refused", "neverTaken", "expired", "outcomeUnknown")
+        else "outcomeUnknown"
+      )
       client.finish(body["requestId"], ("fate", fate, body["reason"]))
     elif kind == "queueFull":
       client.queueFull += 1
     elif kind == "refuse":
-      client.isRefused = True  # news; the fates of its requests come one by one
+      client.isRefused = True  # a notification; the fates of its requests follow
 
   def onServer(self, body):
     binding = self.bindings.get(body["binding"])
     if binding is None or binding.isClosed:
       return
-    binding.news.append(body)
+    binding.states.append(body)
     if isinstance(body["state"], int):
       body["state"] = "absent"
     if body["state"] == "absent":

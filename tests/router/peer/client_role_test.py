@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The peer as a client router of a real one: client_role_test.py FOLDER-OF-THE-PROGRAMS [arguments of unittest]
+# Tests the peer as a client router with the real programs:
+#   client_role_test.py FOLDER-OF-THE-PROGRAMS [arguments of unittest]
 import signal
 import struct
 
@@ -19,7 +20,7 @@ class AsClientRouter(PeerCase):
     return self.programs.start(self.near, program, name, "--location", 1)
 
   def opened(self, **options):
-    """A router, and a client of "echo"."""
+    """Connects a router, and opens a client of "echo"."""
     router = ClientRouter(self.address, **options)
     binding = router.bind(1, "echo")
     router.awaitState(binding, "there")
@@ -29,7 +30,7 @@ class AsClientRouter(PeerCase):
     router.connection.leave()
     self.assertEqual(router.connection.awaitEnding(), ("mine", "stopping"))
 
-  def testSaysWhatItIs(self):
+  def testSendsItsGreeting(self):
     router = ClientRouter(self.address)
 
     router.connection.await_(lambda: router.connection.theirs)
@@ -40,7 +41,7 @@ class AsClientRouter(PeerCase):
     self.assertGreaterEqual(theirs["maxFrameBytes"], 65536)
     self.leave(router)
 
-  # From absent to farewell, as the page's picture has it; in each way of speaking.
+  # From `absent` to the farewell, with each version of the protocol.
   def testWholeConversation(self):
     routers = [ClientRouter(self.address, **speech) for speech in kSpeech]
     bindings = [(router.bind(1, "echo"), router.bind(1, "chars")) for router in routers]
@@ -53,15 +54,22 @@ class AsClientRouter(PeerCase):
       for binding in (ints, chars):
         self.assertNotEqual(router.awaitState(binding, "there")["incarnation"], 0)
       first, second, reader = router.open(ints), router.open(ints), router.open(chars, window=1024)
-      asked = {(client, value): client.ask(message("int32", value, 8, value=value)) for value in range(50) for client in (first, second)}
+      asked = {
+        (client, value): client.ask(message("int32", value, 8, value=value))
+        for value in range(50)
+        for client in (first, second)
+      }
       for (_, value), one in asked.items():
         kind, reply = router.awaitEnd(one)
-        self.assertEqual((kind, reply["clientType"], reply["clientExtra"], reply["body"]["value"]), ("reply", value, 8, value))
+        self.assertEqual(
+          (kind, reply["clientType"], reply["clientExtra"], reply["body"]["value"]),
+          ("reply", value, 8, value),
+        )
       for size in range(0, 1000, 100):  # more than the window in all
         end = router.awaitEnd(reader.ask(message("char8Array", value=bytes(size))))
         self.assertEqual(end[0], "reply", (size, end))
         self.assertEqual(end[1]["body"]["value"], bytes(size))
-      for one in (*kMessages[1:], {"kind": 77, "body": None}):  # this server takes none of them
+      for one in (*kMessages[1:], {"kind": 77, "body": None}):  # this server accepts none of them
         self.assertEqual(router.awaitEnd(first.ask(one))[:2], ("fate", "refused"))
       second.close()
       router.unbind(chars)
@@ -75,14 +83,15 @@ class AsClientRouter(PeerCase):
     server = far.add(FarServer("far", 5))
     between = self.programs.backplane("between")
     self.programs.remoteRouter(between, 5, far.address)
-    self.assertEqual(self.programs.called(between, "far", "int32", "--location", 5)[2], 0)  # from then on it is there for all
+    # A successful call shows that the server is there for all clients.
+    self.assertEqual(self.programs.called(between, "far", "int32", "--location", 5)[2], 0)
     _, address = self.programs.router(between, "--serve", 5)
     router = ClientRouter(address, **speech)
     binding = router.bind(5, "far")
     router.awaitState(binding, "there")
     return far, server, router, router.open(binding)
 
-  # What goes in comes out, to the last bit of a NaN.
+  # Messages arrive unchanged, including the bits of a NaN.
   def testEveryTypeOfMessageComesBackAsItWas(self):
     self.programs.stop(self.router)
     for speech in kSpeech:
@@ -97,8 +106,8 @@ class AsClientRouter(PeerCase):
       self.leave(router)
       far.close()
 
-  # What a server sends in answer to nothing comes as a further reply to request 0; news of a full queue come through, too.
-  def testHearsWhatAnswersNothing(self):
+  # A message without a request arrives as a further reply to request 0. `queueFull` arrives, too.
+  def testReceivesMessagesWithoutARequest(self):
     self.programs.stop(self.router)
     far, _, router, client = self.throughTwoRouters()
     def answer(request):
@@ -110,10 +119,14 @@ class AsClientRouter(PeerCase):
     router.awaitEnd(client.ask(message("int32")))
 
     router.connection.await_(lambda: client.queueFull == 1 and 0 in client.answered)
-    self.assertEqual([(one["kind"], one["body"]["value"]) for one in client.answered[0].further], [("outOfBand", 5)])
+    self.assertEqual(
+      [(one["kind"], one["body"]["value"]) for one in client.answered[0].further],
+      [("outOfBand", 5)],
+    )
     far.close()
 
-  # A server that does not take: the queue fills, what is too much is refused, what has a time expires, the rest is done later.
+  # While a server is stopped, its queue fills: further requests are refused, those with a deadline
+  # expire, and the others are handled later.
   def testQueueFullAndExpiry(self):
     server = self.serve()
     router, client = self.opened()
@@ -133,18 +146,18 @@ class AsClientRouter(PeerCase):
     self.assertGreater(sum(end[0] == "reply" for end in ends), 0)
     self.leave(router)
 
-  def testGetsNoMoreThanItsWindow(self):
+  def testReceivesNoMoreThanItsWindow(self):
     self.serve()
     router, client = self.opened()
     narrow = router.open(client.binding, window=65)
     narrow.givesCredit = False
-    router.awaitEnd(narrow.ask(message("int32")))  # of 65 there is 1 left, enough for one more
+    router.awaitEnd(narrow.ask(message("int32")))  # 1 byte of 65 is left, which permits one more
 
     asked = [narrow.ask(message("int32", value=number)) for number in range(4)]
 
     for taken in (2, 3, 4, 5):
       router.connection.await_(lambda: narrow.taken == taken)
-      router.awaitEnd(client.ask(message("int32")))  # the other client's replies come
+      router.awaitEnd(client.ask(message("int32")))  # the other client receives its replies
       router.awaitPong(taken)
       self.assertEqual(narrow.taken, taken)
       router.connection.send(item("credit", client=narrow.number, bytes=64))
@@ -152,8 +165,8 @@ class AsClientRouter(PeerCase):
       self.assertEqual(router.awaitEnd(one)[0], "reply")
     self.leave(router)
 
-  # Each request has had its end by the time that the server is said to be gone; another life of it is another server.
-  def testServerDiesAndComesAgain(self):
+  # All requests have ended when `absent` arrives. A restarted server is another server.
+  def testServerIsKilledAndRestarted(self):
     server = self.serve()
     router, client = self.opened()
     router.awaitEnd(client.ask(message("int32")))
@@ -169,21 +182,33 @@ class AsClientRouter(PeerCase):
     self.serve()
     self.assertNotEqual(router.awaitState(client.binding, "there")["incarnation"], old)
     self.assertEqual(router.awaitEnd(router.open(client.binding).ask(message("int32")))[0], "reply")
-    client.binding.news[-1]["incarnation"] = old
-    self.assertEqual(router.awaitEnd(router.open(client.binding).ask(message("int32")))[:2], ("fate", "neverTaken"))
+    client.binding.states[-1]["incarnation"] = old
+    self.assertEqual(
+      router.awaitEnd(router.open(client.binding).ask(message("int32")))[:2], ("fate", "neverTaken")
+    )
     self.leave(router)
 
-  # What ends a connection, and with which code.
+  # Each violation ends the connection with the right code.
   def testViolations(self):
     self.serve()
     again = {"binding": 1, "location": 1, "server": "echo"}
     broken = struct.pack("<IIQ", 0, 1, 0xFFFFFFFFFFFFFFFF)
     for raw, code in (
-        ([item("bind", again)], "protocol"), ([item("reply", client=1)], "protocol"), ([item("open", client=1, binding=1)], "protocol"),
-        ([item("open", client=0, binding=1)], "protocol"), ([item("request", client=9, requestId=1, message=message("int32"))], "protocol"),
-        ([item("credit", client=9, bytes=1)], "protocol"), ([item("request", client=1, requestId=0, message=message("int32"))], "protocol"),
-        ([item("request", client=1, requestId=1, message=message("char8Array", eomString=b"12345"))], "protocol"),
-        (broken, "protocol"), (joined([encodeFrame([])[8:]] + [b""] * 512), "protocol"), (struct.pack("<II", 0, 0xFFFFFFF), "limit")):
+      ([item("bind", again)], "protocol"),
+      ([item("reply", client=1)], "protocol"),
+      ([item("open", client=1, binding=1)], "protocol"),
+      ([item("open", client=0, binding=1)], "protocol"),
+      ([item("request", client=9, requestId=1, message=message("int32"))], "protocol"),
+      ([item("credit", client=9, bytes=1)], "protocol"),
+      ([item("request", client=1, requestId=0, message=message("int32"))], "protocol"),
+      (
+        [item("request", client=1, requestId=1, message=message("char8Array", eomString=b"12345"))],
+        "protocol",
+      ),
+      (broken, "protocol"),
+      (joined([encodeFrame([])[8:]] + [b""] * 512), "protocol"),
+      (struct.pack("<II", 0, 0xFFFFFFF), "limit"),
+    ):
       with self.subTest(code=code, raw=raw):
         router, _ = self.opened()
         router.connection.sendBytes(encodeFrame(raw) if isinstance(raw, list) else raw)
@@ -193,15 +218,19 @@ class AsClientRouter(PeerCase):
     router = ClientRouter(self.address, program="x" * 70000)
     self.assertEqual(router.connection.awaitEnding(), ("theirs", "limit"))
 
-  def testFirstItemsThatAreNoGreeting(self):
-    for first, code in ((item("ping", stamp=1), "protocol"), (item(99, {}), "protocol"), (item("none", {}), "protocol"),
-                        (item("greeting", greeting(maxFrameBytes=65535)), "protocol")):
+  def testConnectionsWithoutAGreeting(self):
+    for first, code in (
+      (item("ping", stamp=1), "protocol"),
+      (item(99, {}), "protocol"),
+      (item("none", {}), "protocol"),
+      (item("greeting", greeting(maxFrameBytes=65535)), "protocol"),
+    ):
       router = ClientRouter(self.address, greets=False)
       router.connection.sendBytes(encodeFrame([first]))
       self.assertEqual(router.connection.awaitEnding(), ("theirs", code))
 
-  # A reply that fits into no frame of ours cannot come; the connection stays.
-  def testReplyThatFitsIntoNoFrame(self):
+  # A reply that exceeds our maxFrameBytes cannot be sent, and the connection continues.
+  def testReplyThatExceedsTheFrameSize(self):
     self.serve("mpf-char8-array-server")
     router, client = self.opened(maxFrameBytes=65536)
 
@@ -211,67 +240,84 @@ class AsClientRouter(PeerCase):
     self.assertEqual(router.awaitEnd(client.ask(message("char8Array", value=b"1")))[0], "reply")
     self.leave(router)
 
-  # What the news of a server allow can be sent; the reason of a refusal names the limit.
+  # Messages up to the announced limit can be sent; the reason of a refusal names the limit.
   def testMessagesUpToTheLimit(self):
     self.programs.stop(self.router)
-    self.router, self.address = self.programs.router(self.near, "--serve", 1, "--max-message-size", 1000)
+    self.router, self.address = self.programs.router(
+      self.near, "--serve", 1, "--max-message-size", 1000
+    )
     self.serve("mpf-char8-array-server")
     router, client = self.opened()
-    self.assertEqual((client.life["maxMessageBytes"], router.connection.theirs["maxMessageBytes"]), (1000, 1000))
+    self.assertEqual(
+      (client.life["maxMessageBytes"], router.connection.theirs["maxMessageBytes"]), (1000, 1000)
+    )
 
-    self.assertEqual(router.awaitEnd(client.ask(message("char8Array", value=bytes(1000))))[0], "reply")
+    self.assertEqual(
+      router.awaitEnd(client.ask(message("char8Array", value=bytes(1000))))[0], "reply"
+    )
     end = router.awaitEnd(client.ask(message("char8Array", value=bytes(1001)), careful=False))
 
     self.assertEqual(end[:2], ("fate", "refused"))
     self.assertIn("1001 bytes, the limit is 1000", end[2])
     self.leave(router)
 
-  def testSilenceIsSaid(self):
+  def testSilenceEndsTheConnection(self):
     self.programs.stop(self.router)
-    self.router, self.address = self.programs.router(self.near, "--serve", 1, "--dead-time", "200ms")
+    self.router, self.address = self.programs.router(
+      self.near, "--serve", 1, "--dead-time", "200ms"
+    )
     router = ClientRouter(self.address)
     router.connection.answersPings = False
     self.assertEqual(router.connection.awaitEnding(), ("theirs", "silence"))
 
-  # The replies that a dead server leaves keep to the window; of those without room only the ends come.
-  def testRepliesOfADeadServerKeepToTheWindow(self):
+  # The remaining replies of a killed server respect the window; beyond it only the fates are sent.
+  def testRepliesOfAKilledServerRespectTheWindow(self):
     server = self.serve()
     router, client = self.opened()
     narrow = router.open(client.binding, window=65)
     narrow.givesCredit = False
     asked = [narrow.ask(message("int32", value=number)) for number in range(5)]
     self.assertEqual([router.awaitEnd(one)[0] for one in asked[:2]], ["reply"] * 2)
-    router.awaitEnd(client.ask(message("int32")))  # by now the server has answered all
+    router.awaitEnd(client.ask(message("int32")))  # the server has answered all requests
 
     self.programs.kill(server)
 
-    self.assertEqual([router.awaitEnd(one)[:2] for one in asked[2:]], [("fate", "outcomeUnknown")] * 3)
+    self.assertEqual(
+      [router.awaitEnd(one)[:2] for one in asked[2:]], [("fate", "outcomeUnknown")] * 3
+    )
     self.leave(router)
 
-  # What may have crossed something on its way, and what a newer peer may say, does no harm.
-  def testIgnored(self):
+  # Items that were sent before a change arrived, and unknown items of a newer peer, are ignored.
+  def testLateAndUnknownItemsAreIgnored(self):
     self.serve()
     router, client = self.opened()
     gone = router.open(client.binding)
     gone.close()
-    stray = Binding(77, 1, "echo")  # nobody was told of it
-    stray.news = client.binding.news
+    stray = Binding(77, 1, "echo")  # it was never sent to the router
+    stray.states = client.binding.states
 
-    router.connection.send(item("unbind", 77), item("close", 77), item("close", gone.number), item("credit", client=gone.number, bytes=1),
-                           item("request", client=gone.number, requestId=1, message=message("int32")), item(99, {}), item("none", {}),
-                           item("greeting", greeting(protocolMajor=7)))
+    router.connection.send(
+      item("unbind", 77),
+      item("close", 77),
+      item("close", gone.number),
+      item("credit", client=gone.number, bytes=1),
+      item("request", client=gone.number, requestId=1, message=message("int32")),
+      item(99, {}),
+      item("none", {}),
+      item("greeting", greeting(protocolMajor=7)),
+    )
     never = router.open(stray).ask(message("int32"))
 
     self.assertEqual(router.awaitEnd(client.ask(message("int32")))[0], "reply")
     self.assertEqual(router.awaitEnd(never), ("fate", "neverTaken", never.end[2]))
     self.leave(router)
 
-  def testOtherMajorVersionIsSentAway(self):
+  def testOtherMajorVersionIsRefused(self):
     for major in (0, 2):
       router = ClientRouter(self.address, version="newer", protocolMajor=major)
       self.assertEqual(router.connection.awaitEnding(), ("theirs", "version"))
 
-  def testRouterSaysFarewell(self):
+  def testRouterSendsAFarewell(self):
     router = ClientRouter(self.address)
     router.connection.await_(lambda: router.connection.theirs)
     self.programs.stop(self.router)

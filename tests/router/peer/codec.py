@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-# Cap'n Proto, as much of it as frames need: a frame is one message in standard stream framing, with a Frame as its root.
+# The part of Cap'n Proto that frames need: a frame is one message in standard stream framing, with
+# a Frame as its root.
 #
-#   struct   {field: value}; a union besides: kind, the member's name or the number of an unknown one, and body, what it holds
-#   enum     its name, or the number of an unknown one
+#   struct   {field: value}; with a union also kind, the name of the member or the number of an
+#            unknown one, and body, its value
+#   enum     its name, or the number of an unknown value
 #   Data     bytes; Text is str; List(...) is a list
 import struct
 
@@ -16,11 +18,11 @@ _elementBits = (0, 1, 8, 16, 32, 64, 64)
 
 
 class NoFrame(Exception):
-  """What no Cap'n Proto message with a Frame can be."""
+  """The bytes are not a Cap'n Proto message with a Frame."""
 
 
 class TooLong(Exception):
-  """More than the receiver takes."""
+  """The frame is longer than the receiver accepts."""
 
 
 def item(kind, body=None, **fields):
@@ -34,7 +36,7 @@ def padded(size):
 # ---- writing
 
 class _Writer:
-  """Puts one object behind the other into segment 0; or, spread, each into a segment of its own, behind far and double-far pointers."""
+  """Writes all objects to segment 0 or, if `spread`, each to its own one, with far pointers."""
 
   def __init__(self, layouts, spread):
     self.layouts_ = layouts
@@ -46,14 +48,14 @@ class _Writer:
     return len(self.segments) - 1
 
   def place(self, segment, at, low, high, size):
-    """Makes room for an object, sets the pointer at `at` to it, and returns where it is."""
+    """Allocates an object, sets the pointer at `at` to it, and returns its place."""
     word = low | high << 32
-    if not self.spread_ or size == 0:  # an empty segment is not to every reader's taste
+    if not self.spread_ or size == 0:  # some readers refuse empty segments
       target = len(self.segments[segment])
       self.segments[segment] += bytes(padded(size))
       self.put("u64", segment, at, word | (target - at - 8) // 8 << 2)
       return segment, target
-    if len(self.segments) % 2:  # far: the landing pad stands before the object
+    if len(self.segments) % 2:  # far: the landing pad precedes the object
       target = self.newSegment(8 + padded(size))
       self.put("u64", target, 0, word)
       self.put("u64", segment, at, 2 | target << 32)
@@ -70,7 +72,9 @@ class _Writer:
   def pointToStruct(self, name, segment, at, value):
     layout = self.layouts_[name]
     size = 8 * (layout.dataWords + layout.pointers)
-    self.fill(layout, *self.place(segment, at, 0, layout.dataWords | layout.pointers << 16, size), value)
+    self.fill(
+      layout, *self.place(segment, at, 0, layout.dataWords | layout.pointers << 16, size), value
+    )
 
   def fill(self, layout, segment, at, value):
     value = {**layout.presets, **value}
@@ -94,9 +98,13 @@ class _Writer:
     elif kind in _numbers:
       self.put(kind, segment, at + place, value)
     elif kind in kEnums:
-      self.put("u16", segment, at + place, value if isinstance(value, int) else kEnums[kind].index(value))
+      self.put(
+        "u16", segment, at + place, value if isinstance(value, int) else kEnums[kind].index(value)
+      )
     elif kind in ("text", "data"):
-      self.pointToBytes(segment, pointer, value.encode() + b"\0" if kind == "text" else bytes(value))
+      self.pointToBytes(
+        segment, pointer, value.encode() + b"\0" if kind == "text" else bytes(value)
+      )
     elif kind.startswith("["):
       self.pointToList(kind[1:-1], segment, pointer, value)
     else:
@@ -114,15 +122,21 @@ class _Writer:
       return
     layout = self.layouts_[kind]
     size = 8 * (layout.dataWords + layout.pointers)
-    target, start = self.place(segment, at, 1, 7 | len(values) * size // 8 << 3, 8 + len(values) * size)
-    self.put("u64", target, start, len(values) << 2 | layout.dataWords << 32 | layout.pointers << 48)
+    target, start = self.place(
+      segment, at, 1, 7 | len(values) * size // 8 << 3, 8 + len(values) * size
+    )
+    self.put(
+      "u64", target, start, len(values) << 2 | layout.dataWords << 32 | layout.pointers << 48
+    )
     for index, value in enumerate(values):
       self.fill(layout, target, start + 8 + index * size, value)
 
 
 def joined(segments):
   """Segments behind their table."""
-  table = struct.pack(f"<{len(segments) + 1}I", len(segments) - 1, *(len(segment) // 8 for segment in segments))
+  table = struct.pack(
+    f"<{len(segments) + 1}I", len(segments) - 1, *(len(segment) // 8 for segment in segments)
+  )
   return table.ljust(padded(len(table)), b"\0") + b"".join(segments)
 
 
@@ -148,7 +162,7 @@ class FrameReader:
     return len(self.bytes_)
 
   def tryNext(self):
-    """Segments of the next frame; None when it has not come whole. Looks at no byte that has not come."""
+    """The segments of the next frame; None until it has arrived completely."""
     if len(self.bytes_) < 4:
       return None
     count = struct.unpack_from("<I", self.bytes_)[0] + 1
@@ -179,19 +193,19 @@ class _Reader:
 
   def word(self, segment, at):
     if segment >= len(self.segments_) or not 0 <= at <= len(self.segments_[segment]) - 8:
-      raise NoFrame("a pointer out of the message")
+      raise NoFrame("a pointer outside of the message")
     return struct.unpack_from("<Q", self.segments_[segment], at)[0]
 
   def claim(self, segment, at, words, atLeast=0):
-    """Says that an object lies within its segment, and counts it."""
+    """Checks that an object is within its segment, and limits the total of all objects."""
     if segment >= len(self.segments_) or at < 0 or at + 8 * words > len(self.segments_[segment]):
-      raise NoFrame("an object out of the message")
+      raise NoFrame("an object outside of the message")
     self.words_ -= max(words, atLeast)
     if self.words_ < 0:
-      raise NoFrame("pointers to the same bytes over and over")
+      raise NoFrame("too many pointers to the same bytes")
 
   def follow(self, segment, at, level, kind):
-    """Where the pointer at `at` leads: segment, byte, upper half of the pointer; None for a null one."""
+    """The target of the pointer at `at`: segment, byte, upper half of the pointer; None if null."""
     if level > kMaxLevels:
       raise NoFrame("too many levels")
     word = self.word(segment, at)
@@ -220,7 +234,7 @@ class _Reader:
     return self.content(kLayouts[name], segment, start, sizes & 0xFFFF, sizes >> 16, level)
 
   def content(self, layout, segment, start, dataWords, pointers, level):
-    """A struct; fields that lie behind its end have their defaults."""
+    """Reads a struct; fields beyond its end have their default values."""
     def field(kind, place):
       if kind == "void":
         return None
@@ -228,14 +242,22 @@ class _Reader:
         return place < 8 * dataWords and bool(self.segments_[segment][start + place] & 1)
       if kind in _numbers or kind in kEnums:
         number = _numbers.get(kind, "<H")
-        value = struct.unpack_from(number, self.segments_[segment], start + place)[0] if place < 8 * dataWords else 0
+        value = (
+          struct.unpack_from(number, self.segments_[segment], start + place)[0]
+          if place < 8 * dataWords
+          else 0
+        )
         return kEnums[kind][value] if kind in kEnums and value < len(kEnums[kind]) else value
       where = (segment, start + 8 * (dataWords + place)) if place < pointers else None
       if kind in ("text", "data"):
         return self.bytes(kind, where, level + 1)
       if kind.startswith("["):
         return self.list(kind[1:-1], where, level + 1)
-      return self.struct(kind, *where, level + 1) if where else self.content(kLayouts[kind], 0, 0, 0, 0, level + 1)
+      return (
+        self.struct(kind, *where, level + 1)
+        if where
+        else self.content(kLayouts[kind], 0, 0, 0, 0, level + 1)
+      )
 
     value = {name: field(*place) for name, place in layout.fields.items()}
     if layout.members:
@@ -273,16 +295,21 @@ class _Reader:
       if code != _listSizes[kind]:
         raise NoFrame("elements of another size")
       self.claim(segment, start, padded(count * _elementBits[code] // 8) // 8)
-      return list(struct.unpack_from(f"<{count}{_numbers[kind][1]}", self.segments_[segment], start))
+      return list(
+        struct.unpack_from(f"<{count}{_numbers[kind][1]}", self.segments_[segment], start)
+      )
     if code != 7:
       raise NoFrame("a list of structs without a tag")
     tag = self.word(segment, start)
     elements, dataWords, pointers = tag >> 2 & 0x3FFFFFFF, tag >> 32 & 0xFFFF, tag >> 48
-    self.claim(segment, start, 1 + count, atLeast=elements)  # an element without a size costs a word, too
+    self.claim(segment, start, 1 + count, atLeast=elements)  # an element of size 0 counts as a word
     if tag & 3 or elements * (dataWords + pointers) > count:
       raise NoFrame("a list that is shorter than its elements")
     size = 8 * (dataWords + pointers)
-    return [self.content(kLayouts[kind], segment, start + 8 + index * size, dataWords, pointers, level) for index in range(elements)]
+    return [
+      self.content(kLayouts[kind], segment, start + 8 + index * size, dataWords, pointers, level)
+      for index in range(elements)
+    ]
 
 
 def decodeFrame(segments):

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-# One end of a connection between routers, for both roles: greets, fills and cuts frames, answers pings, listens for signs of life,
-# says farewell. client_role.py and server_role.py say what the items mean.
+# One end of a connection between routers, for both roles: sends the greeting, writes and reads
+# frames, answers pings, checks signs of life, and sends the farewell. client_role.py and
+# server_role.py handle the other items.
 #
-# Threads  each connection has one; it calls its role with `changed` held. send(), leave() and await_() are for any thread.
-# Trust    what the page forbids raises Violation, which ends the connection with a farewell.
+# Threads  each connection has a thread, which calls its role with `changed` held. Any thread may
+#          call send(), leave() and await_().
+# Trust    a violation of docs/wire-format.md raises Violation, which ends the connection with a
+#          farewell.
 import itertools
 import os
 import select
@@ -24,22 +27,34 @@ _lives = itertools.count(os.getpid() << 20 | 1)
 
 
 class Violation(Exception):
-  """The other side did what the page forbids, or fell silent: the code of the farewell, and why."""
+  """The other side violated the protocol or fell silent: the farewell's code and reason."""
 
 
 class Ended(Exception):
-  """What is waited for cannot come any more."""
+  """The connection has ended while a test waits for something."""
 
 
 def greeting(**fields):
-  """The body of a greeting with which a test can live; deadTimeMs is long, since the machine may be busy."""
-  return {"protocolMajor": kMajor, "protocolMinor": 0, "router": "peer", "program": "a peer for tests", "incarnation": next(_lives),
-          "maxFrameBytes": 1 << 20, "maxMessageBytes": 1 << 19, "deadTimeMs": 20000, "maxClients": 100, **fields}
+  """The body of a greeting for tests; deadTimeMs is long, because the host may be busy."""
+  return {
+    "protocolMajor": kMajor,
+    "protocolMinor": 0,
+    "router": "peer",
+    "program": "a peer for tests",
+    "incarnation": next(_lives),
+    "maxFrameBytes": 1 << 20,
+    "maxMessageBytes": 1 << 19,
+    "deadTimeMs": 20000,
+    "maxClients": 100,
+    **fields,
+  }
 
 
 def bodyBytes(message):
-  """The bytes that maxMessageBytes and the window count: those of the elements of an array, or of the value of `user`."""
-  perElement = {"int32Array": 4, "float64Array": 8, "char8Array": 1, "user": 1}.get(message["kind"], 0)
+  """The bytes that maxMessageBytes and the window count: those of elements or of a `user` value."""
+  perElement = {"int32Array": 4, "float64Array": 8, "char8Array": 1, "user": 1}.get(
+    message["kind"], 0
+  )
   return perElement and perElement * len(message["body"].get("value", ()))
 
 
@@ -50,12 +65,13 @@ def mustBeCarried(message):
 
 class Connection(threading.Thread):
   """
-  socket   a connected one; its ends are closed here
-  role     has changed, kTakes (kinds of items that it takes), onGreeting(), onItem(kind, body), nextTime(), onTime(now), onEnd()
-  mine     body of the greeting; None: greets not at all
-  version  of the sender, beside 1.0: "newer", a later minor version: structs with more fields, and items of unknown kinds around each
-           one; "older", an earlier one: fewer fields
-  spread   puts each object into a segment of its own
+  connected  a connected socket; this object closes it
+  role       has changed, kTakes (the kinds of items that it handles), onGreeting(),
+             onItem(kind, body), nextTime(), onTime(now) and onEnd()
+  mine       the body of the greeting; None: sends no greeting
+  version    "": protocol 1.0; "newer": a later minor version, with additional fields and with
+             items of unknown kinds around each item; "older": an earlier one, with fewer fields
+  spread     writes each object to a segment of its own
   """
 
   def __init__(self, connected, role, mine, version="", spread=False):
@@ -66,10 +82,10 @@ class Connection(threading.Thread):
     self.version_ = version
     self.spread_ = spread
     self.theirs = None      # body of their greeting
-    self.ending = None      # how it ended: (who: "theirs", "mine" or "none"; code; why)
+    self.ending = None      # (sender of the farewell: "theirs", "mine" or "none"; code; reason)
     self.answersPings = True
-    self.counts = Counter()  # items that came, by kind
-    self.stamps = []         # of the pongs that came
+    self.counts = Counter()  # received items, by kind
+    self.stamps = []         # of the received pongs
     self.waiting_ = []
     self.out_ = bytearray()
     self.wakeReceiver_, self.wakeSender_ = socket.socketpair()
@@ -85,7 +101,7 @@ class Connection(threading.Thread):
     self.wake()
 
   def sendBytes(self, raw):
-    """Past all that is careful here."""
+    """Sends bytes without any check."""
     with self.role_.changed:
       self.out_ += raw
     self.wake()
@@ -98,7 +114,7 @@ class Connection(threading.Thread):
     self.wake()
 
   def await_(self, holds, afterEnd=False):
-    """Waits until `holds()`; there is no limit, a watchdog of the test's is meant to be there."""
+    """Waits until `holds()`, without a time limit: the test has a watchdog."""
     with self.role_.changed:
       while not holds():
         if self.ending and not afterEnd:
@@ -119,34 +135,36 @@ class Connection(threading.Thread):
       self.serve()
     except Violation as violation:
       self.end("mine", *violation.args)
-      self.out_ += self.encoded([item("farewell", code=violation.args[0], reason=violation.args[1])])
+      self.out_ += self.encoded(
+        [item("farewell", code=violation.args[0], reason=violation.args[1])]
+      )
     except OSError as error:
       self.end("none", None, str(error))
     finally:
-      self.end("none", None, "a mistake in the peer")  # unless it has ended otherwise
+      self.end("none", None, "a defect of the peer")  # no effect when it has ended before
       with self.role_.changed:
         self.role_.onEnd()
         self.role_.changed.notify_all()
-      self.linger()
+      self.drain()
       with self.role_.changed:
         for end in (self.socket_, self.wakeReceiver_, self.wakeSender_):
           end.close()
 
-  def end(self, who, code, why):
+  def end(self, sender, code, why):
     with self.role_.changed:
-      self.ending = self.ending or (who, code, why)
+      self.ending = self.ending or (sender, code, why)
 
   def serve(self):
     reader = FrameReader(kLeastFrameBytes)
     deadTime = self.mine["deadTimeMs"] / 1000 if self.mine else 3600
-    heard = pinged = time.monotonic()
-    unheard = 0
+    lastReceive = lastPing = time.monotonic()
+    partialBytes = 0
     while True:
       now = time.monotonic()
-      if now > heard + deadTime:
+      if now > lastReceive + deadTime:
         raise Violation("silence", f"nothing for {deadTime} s")
-      if self.theirs and now >= pinged + deadTime / 4:
-        pinged = now
+      if self.theirs and now >= lastPing + deadTime / 4:
+        lastPing = now
         self.send(item("ping", stamp=time.monotonic_ns()))
       with self.role_.changed:
         if self.theirs:
@@ -155,7 +173,11 @@ class Connection(threading.Thread):
         if self.ending and not self.out_:
           return
         wanted = [self.socket_] if self.out_ else []
-        times = [heard + deadTime, pinged + deadTime / 4 if self.theirs else None, self.role_.nextTime()]
+        times = [
+          lastReceive + deadTime,
+          lastPing + deadTime / 4 if self.theirs else None,
+          self.role_.nextTime(),
+        ]
       wait = max(0, min(when for when in times if when is not None) - now)
       readable, writable, _ = select.select([self.socket_, self.wakeReceiver_], wanted, [], wait)
       if self.wakeReceiver_ in readable:
@@ -166,19 +188,19 @@ class Connection(threading.Thread):
       if self.socket_ in readable:
         received = self.socket_.recv(kReadBytes)
         if not received:
-          return self.end("none", None, "closed without a word")
+          return self.end("none", None, "closed without a farewell")
         reader.feed(received)
-        unheard += len(received)
-        if self.takeFrames(reader) or unheard >= 65536:
-          heard, unheard = time.monotonic(), 0
+        partialBytes += len(received)
+        if self.takeFrames(reader) or partialBytes >= 65536:
+          lastReceive, partialBytes = time.monotonic(), 0
 
   def takeFrames(self, reader):
-    """Whether at least one frame came whole."""
-    came = 0
+    """Handles all complete frames; returns whether there was one."""
+    count = 0
     with self.role_.changed:
       try:
         while not self.ending and (segments := reader.tryNext()) is not None:
-          came += 1
+          count += 1
           self.takeItems(decodeFrame(segments))
           reader.maxBytes = self.mine["maxFrameBytes"] if self.mine else kLeastFrameBytes
       except TooLong as error:
@@ -186,7 +208,7 @@ class Connection(threading.Thread):
       except NoFrame as error:
         raise Violation("protocol", str(error)) from error
       self.role_.changed.notify_all()
-    return came > 0
+    return count > 0
 
   def takeItems(self, items):
     for one in items:
@@ -219,11 +241,15 @@ class Connection(threading.Thread):
     self.role_.onGreeting(body)
 
   def fill(self):
-    """What waits becomes frames; nothing does before the other side has greeted."""
+    """Writes waiting items as frames, once the greeting of the other side has arrived."""
     if self.theirs and self.waiting_:
       items, self.waiting_ = self.waiting_, []
       if self.version_ == "newer":
-        items = [item("novelty", "?"), *(new for old in items for new in (old, item(0xFFFF, {}))), item("novelty", "!")]
+        items = [
+          item("novelty", "?"),
+          *(new for old in items for new in (old, item(0xFFFF, {}))),
+          item("novelty", "!"),
+        ]
       self.out_ += self.frames(items)
 
   def frames(self, items):
@@ -240,14 +266,17 @@ class Connection(threading.Thread):
     layouts = {"newer": kNewerLayouts, "older": kOlderLayouts}.get(self.version_, kLayouts)
     return encodeFrame(items, layouts, self.spread_ and len(items) < 8)
 
-  def linger(self):
-    """Writes what is left, then reads until the other side closes: a reset would take the farewell from it."""
+  def drain(self):
+    """Writes what is left, then reads until the other side closes; unread data would cause a reset,
+    and the other side might lose the farewell."""
     try:
       while self.out_:
         select.select([], [self.socket_], [])
         del self.out_[:self.socket_.send(self.out_)]
       self.socket_.shutdown(socket.SHUT_WR)
-      while self.socket_ in select.select([self.socket_], [], [], 5)[0] and self.socket_.recv(kReadBytes):
+      while self.socket_ in select.select([self.socket_], [], [], 5)[0] and self.socket_.recv(
+        kReadBytes
+      ):
         pass
     except OSError:
       pass
@@ -257,4 +286,4 @@ class Connection(threading.Thread):
       try:
         self.wakeSender_.send(b"!")
       except OSError:
-        pass  # it is awake enough, or has ended
+        pass  # a wake-up is already pending, or the connection has ended

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# What the tests of both roles share: the real programs, a watchdog, messages of every type, and the ways in which the peer speaks.
+# The common part of the tests of both roles: the real programs, a watchdog, messages of every type,
+# and the protocol versions of the peer.
 import os
 import struct
 import sys
@@ -10,7 +11,7 @@ from programs import Programs
 
 kWatchdogSeconds = 900
 kNaN = struct.unpack("<d", bytes.fromhex("efbeadde0000f87f"))[0]
-# As 1.0, as the minor versions after and before it, in many segments.
+# Protocol 1.0, a later and an earlier minor version, and 1.0 with many segments.
 kSpeech = ({}, {"version": "newer", "protocolMinor": 1}, {"version": "older"}, {"spread": True})
 
 
@@ -19,17 +20,30 @@ def message(kind, clientType=0, clientExtra=0, **body):
 
 
 def inBytes(envelope):
-  """So that two NaN are the same when their bits are."""
+  """The bytes of a message, so that NaNs compare by their bits."""
   return encodeFrame([item("reply", message=envelope)])
 
 
 _standard = {"timeout": 1, "cmd": 2, "status": -3, "address": 4, "extra": 5}
 kMessages = (
-    message("int32", 11, -12, **_standard, value=-7), message("int32Array", **_standard, value=[1, -2, 3]),
-    message("float64", **_standard, value=kNaN), message("float64Array", **_standard, value=[0.5, kNaN, -0.0]),
-    message("char8Array", **_standard, numberRetrys=6, eomLen=2, eomString=b"\r\n\0\0", value=bytes(range(256))),
-    message("serialConfig", baud=9600, stopBits=1, bitsPerChar=8, parity=ord("E"), flowControl=ord("N")),
-    message("outOfBand", **_standard, value=9), message("user", value=encodeFrame([])))
+  message("int32", 11, -12, **_standard, value=-7),
+  message("int32Array", **_standard, value=[1, -2, 3]),
+  message("float64", **_standard, value=kNaN),
+  message("float64Array", **_standard, value=[0.5, kNaN, -0.0]),
+  message(
+    "char8Array",
+    **_standard,
+    numberRetrys=6,
+    eomLen=2,
+    eomString=b"\r\n\0\0",
+    value=bytes(range(256)),
+  ),
+  message(
+    "serialConfig", baud=9600, stopBits=1, bitsPerChar=8, parity=ord("E"), flowControl=ord("N")
+  ),
+  message("outOfBand", **_standard, value=9),
+  message("user", value=encodeFrame([])),
+)
 
 
 class PeerCase(unittest.TestCase):

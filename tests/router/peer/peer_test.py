@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The peer against the real programs, in both roles: peer_test.py FOLDER-OF-THE-PROGRAMS [arguments of unittest]
+# Tests the peer in both roles with the real programs:
+#   peer_test.py FOLDER-OF-THE-PROGRAMS [arguments of unittest]
 from client_role_test import AsClientRouter
 from peer_case import main
 from server_role_test import AsServerRouter

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The real programs, on backplanes of this process's own. Nothing outlives stopAll(), nor the watchdog.
+# Starts the real programs, on backplanes of this process. stopAll() and the watchdog end all of
+# them.
 import faulthandler
 import json
 import os
@@ -15,23 +16,36 @@ class Programs:
     self.backplanes_ = []
 
   def backplane(self, name):
-    """A name of its own; `name` tells apart those of one test."""
+    """A unique name of a backplane; `name` distinguishes those of one test."""
     full = f"mpf-peer-{os.getpid()}-{len(self.backplanes_)}-{name}"
     self.backplanes_.append(full)
     return full
 
   def start(self, backplane, program, *arguments, **options):
     command = [os.path.join(self.folder_, program), *map(str, arguments)]
-    started = subprocess.Popen(command, env={**os.environ, "MPF_BACKPLANE": backplane}, text=True, **options)
+    started = subprocess.Popen(
+      command, env={**os.environ, "MPF_BACKPLANE": backplane}, text=True, **options
+    )
     self.running.append(started)
     return started
 
   def router(self, backplane, *arguments):
-    """One that listens; returns the program, and its address."""
+    """Starts a router that listens; returns the program and its address."""
     ready, write = os.pipe()
     try:
-      router = self.start(backplane, "mpf-router", "--backplane", backplane, *arguments, "--listen", "127.0.0.1:0", "--plain",
-                          "--ready-fd", write, pass_fds=(write,))
+      router = self.start(
+        backplane,
+        "mpf-router",
+        "--backplane",
+        backplane,
+        *arguments,
+        "--listen",
+        "127.0.0.1:0",
+        "--plain",
+        "--ready-fd",
+        write,
+        pass_fds=(write,),
+      )
     finally:
       os.close(write)
     with os.fdopen(ready) as lines:
@@ -39,16 +53,27 @@ class Programs:
     return router, (host, int(port))
 
   def remoteRouter(self, backplane, location, address, *options):
-    """One that connects to `address` for the servers of `location`."""
+    """Starts a router that connects to `address` for the servers at `location`."""
     remote = f"{location}={address[0]}:{address[1]}"
-    return self.start(backplane, "mpf-router", "--backplane", backplane, "--remote", remote, "--plain", *options)
+    return self.start(
+      backplane, "mpf-router", "--backplane", backplane, "--remote", remote, "--plain", *options
+    )
 
   def call(self, backplane, *arguments):
-    """`mpf call`, for a long time; its output is to be read from the process."""
-    return self.start(backplane, "mpf", "call", *arguments, "--timeout", 600, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    """Starts `mpf call` with a long timeout; the caller reads its output."""
+    return self.start(
+      backplane,
+      "mpf",
+      "call",
+      *arguments,
+      "--timeout",
+      600,
+      stdout=subprocess.PIPE,
+      stderr=subprocess.PIPE,
+    )
 
   def called(self, backplane, *arguments):
-    """What `mpf call --json` printed, and its exit status."""
+    """Runs `mpf call --json`; returns its output, its errors and its exit status."""
     call = self.call(backplane, *arguments, "--json")
     out, error = call.communicate()
     return (json.loads(out) if out.startswith("{") else out), error, call.returncode
@@ -73,12 +98,16 @@ class Programs:
     self.running, self.backplanes_ = [], []
 
   def clean(self):
-    """Removes what programs that were killed left."""
+    """Removes the segments of killed programs."""
     for backplane in self.backplanes_:
-      subprocess.run([os.path.join(self.folder_, "mpf"), "clean", "--backplane", backplane], stdout=subprocess.DEVNULL, check=False)
+      subprocess.run(
+        [os.path.join(self.folder_, "mpf"), "clean", "--backplane", backplane],
+        stdout=subprocess.DEVNULL,
+        check=False,
+      )
 
   def watchdog(self, seconds):
-    """Ends this process, and what it started, when it hangs."""
+    """Ends this process and its programs when a test hangs."""
     def bark():
       faulthandler.dump_traceback()
       for program in self.running:

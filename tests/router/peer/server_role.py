@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-# The peer as a server router: it listens, and whoever connects finds its servers.
+# The peer as a server router: listens, and offers its servers to routers that connect.
 #
 #   router = ServerRouter()
-#   server = router.add(FarServer("far", location=2))          an echo server; it is there at once
+#   server = router.add(FarServer("far", location=2))          an echo server, available at once
 #   server.takes = False; server.answer = ...; router.withdraw(server); router.comeBack(server)
 import itertools
 import socket
@@ -25,13 +25,19 @@ def echo(request):
 class FarServer:
   """answer(request) is called with `changed` held; it may keep the request and answer later."""
 
-  def __init__(self, name, location, answer=echo, queueSize=100, maxOutstanding=256, maxMessageBytes=1 << 18):
+  def __init__(
+    self, name, location, answer=echo, queueSize=100, maxOutstanding=256, maxMessageBytes=1 << 18
+  ):
     self.key, self.answer = (location, name), answer
-    self.queueSize, self.maxOutstanding, self.maxMessageBytes = queueSize, maxOutstanding, maxMessageBytes
+    self.queueSize, self.maxOutstanding, self.maxMessageBytes = (
+      queueSize,
+      maxOutstanding,
+      maxMessageBytes,
+    )
     self.incarnation = next(_lives)
     self.isThere = True
-    self.takes = True  # requests out of its queues
-    self.taken = []    # the requests that it took, in order
+    self.takes = True  # whether it takes requests from its queues
+    self.taken = []    # the requests that it has taken, in order
 
 
 class Asked:
@@ -39,14 +45,22 @@ class Asked:
 
   def __init__(self, client, body):
     self.client_ = client
-    self.requestId, self.message, self.takeWithinNs = body["requestId"], body["message"], body["takeWithinNs"]
+    self.requestId, self.message, self.takeWithinNs = (
+      body["requestId"],
+      body["message"],
+      body["takeWithinNs"],
+    )
     self.dueAt = time.monotonic() + self.takeWithinNs / 1e9 if self.takeWithinNs else None
     self.isTaken = False
     self.hasReply_ = False
 
   def reply(self, message):
-    """The first time it ends the request; further ones may follow."""
-    envelope = {**message, "clientType": self.message["clientType"], "clientExtra": self.message["clientExtra"]}
+    """Sends a reply. The first one ends the request; others may follow."""
+    envelope = {
+      **message,
+      "clientType": self.message["clientType"],
+      "clientExtra": self.message["clientExtra"],
+    }
     isFirst, self.hasReply_ = not self.hasReply_, True
     self.client_.reply(self.requestId, isFirst, envelope)
 
@@ -58,14 +72,14 @@ class SessionClient:
   def __init__(self, session, body, server):
     self.session_ = session
     self.number, self.binding = body["client"], body["binding"]
-    self.server = server  # None: it was never made
+    self.server = server  # None: the client was not created
     self.window = self.wholeWindow = body["window"]
     self.leastWindow = self.window
     self.isOpen = True
-    self.refusal = None   # why, for people
-    self.toldOfQueue_ = False
+    self.refusal = None   # the reason as text
+    self.queueFullSent_ = False
     self.unanswered = {}  # id: Asked
-    self.held = deque()   # replies for which there is no window: bodies of `reply`
+    self.held = deque()   # bodies of `reply` that wait for the window
 
   def request(self, body):
     requestId = body["requestId"]
@@ -74,19 +88,19 @@ class SessionClient:
     mustBeCarried(body["message"])
     asked = Asked(self, body)
     if self.server is None:
-      return self.say(requestId, "neverTaken", "it was another server or none")
+      return self.sendFate(requestId, "neverTaken", "another server or no server is there")
     if self.refusal is not None:
-      return self.say(requestId, "refused", self.refusal)
+      return self.sendFate(requestId, "refused", self.refusal)
     reason = self.reasonAgainst(body)
     if reason:
-      return self.say(requestId, "refused", reason)
+      return self.sendFate(requestId, "refused", reason)
     if sum(not other.isTaken for other in self.unanswered.values()) >= self.server.queueSize:
-      self.say(requestId, "refused", "the queue is full")
-      if not self.toldOfQueue_:
+      self.sendFate(requestId, "refused", "the queue is full")
+      if not self.queueFullSent_:
         self.session_.connection.send(item("queueFull", self.number))
-      self.toldOfQueue_ = True
+      self.queueFullSent_ = True
       return None
-    self.toldOfQueue_ = False
+    self.queueFullSent_ = False
     self.unanswered[requestId] = asked
     return None
 
@@ -98,25 +112,31 @@ class SessionClient:
       return "its place is occupied"
     if len(self.unanswered) >= self.server.maxOutstanding:
       return "too many without an end"
-    if body["message"]["kind"] in ("connect", "requestFate") or isinstance(body["message"]["kind"], int):
-      return "such a message is no request"
+    if body["message"]["kind"] in ("connect", "requestFate") or isinstance(
+      body["message"]["kind"], int
+    ):
+      return "such a message is not a request"
     if bodyBytes(body["message"]) > self.server.maxMessageBytes:
       return "too large"
     return None
 
-  def say(self, requestId, fate, reason):
-    self.session_.connection.send(item("fate", client=self.number, requestId=requestId, fate=fate, reason=reason))
+  def sendFate(self, requestId, fate, reason):
+    self.session_.connection.send(
+      item("fate", client=self.number, requestId=requestId, fate=fate, reason=reason)
+    )
 
   def fate(self, requestId, fate, reason):
     del self.unanswered[requestId]
-    self.say(requestId, fate, reason)
+    self.sendFate(requestId, fate, reason)
 
   def reply(self, requestId, isFirst, envelope):
     if not self.isOpen:
       return
     body = {"client": self.number, "requestId": requestId, "isFirst": isFirst, "message": envelope}
     connection = self.session_.connection
-    if bodyBytes(envelope) <= connection.theirs["maxMessageBytes"] and connection.fits(item("reply", body)):
+    if bodyBytes(envelope) <= connection.theirs["maxMessageBytes"] and connection.fits(
+      item("reply", body)
+    ):
       self.held.append(body)
       self.sendHeld()
     elif isFirst:
@@ -136,7 +156,7 @@ class SessionClient:
     self.sendHeld()
 
   def refuse(self, reason):
-    """It is news; the fates end the requests."""
+    """Notifies the other side; the fates end the requests."""
     self.refusal = reason
     self.session_.connection.send(item("refuse", client=self.number, reason=reason))
     for requestId in list(self.unanswered):
@@ -144,7 +164,9 @@ class SessionClient:
 
   def serverGone(self):
     for requestId, asked in list(self.unanswered.items()):
-      self.fate(requestId, "outcomeUnknown" if asked.isTaken else "neverTaken", "the server is gone")
+      self.fate(
+        requestId, "outcomeUnknown" if asked.isTaken else "neverTaken", "the server is gone"
+      )
     self.close()
 
   def close(self):
@@ -154,7 +176,7 @@ class SessionClient:
 
 
 class Session:
-  """What belongs to one connection."""
+  """The state of one connection."""
   kTakes = kFromClientRouter
 
   def __init__(self, router, connected, **options):
@@ -194,24 +216,42 @@ class Session:
     if number in self.bindings:
       raise Violation("protocol", "a binding whose number is in use")
     self.bound.append(body)
-    if body["location"] not in self.connection.mine["locations"] or len(self.bindings) >= kMaxBindings:
-      self.connection.send(item("server", binding=number, state="refused", reason="this location is not served here"))
+    if (
+      body["location"] not in self.connection.mine["locations"]
+      or len(self.bindings) >= kMaxBindings
+    ):
+      self.connection.send(
+        item("server", binding=number, state="refused", reason="this location is not served here")
+      )
       return
     self.bindings[number] = (body["location"], body["server"])
-    self.tell(number, self.router_.find(self.bindings[number]))
+    self.sendState(number, self.router_.find(self.bindings[number]))
 
-  def tell(self, number, server):
+  def sendState(self, number, server):
     if not server or not server.isThere:
-      self.connection.send(item("server", binding=number, state="absent", reason="it is not there"))
+      self.connection.send(
+        item("server", binding=number, state="absent", reason="the server is not running")
+      )
       return
-    self.connection.send(item(
-        "server", binding=number, state="there", incarnation=server.incarnation, queueSize=server.queueSize,
-        maxMessageBytes=server.maxMessageBytes, maxOutstanding=server.maxOutstanding))
+    self.connection.send(
+      item(
+        "server",
+        binding=number,
+        state="there",
+        incarnation=server.incarnation,
+        queueSize=server.queueSize,
+        maxMessageBytes=server.maxMessageBytes,
+        maxOutstanding=server.maxOutstanding,
+      )
+    )
 
   def onOpen(self, body):
     if body["client"] <= max(self.clients, default=0):
       raise Violation("protocol", "a client whose number is not greater")
-    if sum(client.isOpen and client.server is not None for client in self.clients.values()) >= self.connection.mine["maxClients"]:
+    if (
+      sum(client.isOpen and client.server is not None for client in self.clients.values())
+      >= self.connection.mine["maxClients"]
+    ):
       raise Violation("limit", "too many clients")
     server = self.router_.find(self.bindings.get(body["binding"]))
     isMade = server and server.isThere and server.incarnation == body["incarnation"]
@@ -228,25 +268,30 @@ class Session:
         for client in self.clients.values():
           if client.server is server and client.isOpen and client.binding == number:
             client.serverGone()
-        self.tell(number, server)
+        self.sendState(number, server)
 
   def serverCame(self, server):
     for number, bound in self.bindings.items():
       if bound == server.key:
-        self.tell(number, server)
+        self.sendState(number, server)
 
   def nextTime(self):
     return min((asked.dueAt for asked in self.untaken() if asked.dueAt), default=None)
 
   def untaken(self):
-    return [asked for client in self.clients.values() for asked in client.unanswered.values() if not asked.isTaken]
+    return [
+      asked
+      for client in self.clients.values()
+      for asked in client.unanswered.values()
+      if not asked.isTaken
+    ]
 
   def onTime(self, now):
-    """The servers take what waits for them, unless its time is over."""
+    """The servers take the requests that wait for them, unless their deadline has passed."""
     for asked in self.untaken():
       server = asked.client_.server
       if asked.dueAt and now >= asked.dueAt:
-        asked.fail("expired", "its time was over")
+        asked.fail("expired", "the deadline has passed")
       elif server.takes:
         asked.isTaken = True
         server.taken.append(asked)
@@ -315,7 +360,7 @@ class ServerRouter:
         session.serverCame(server)
 
   def resume(self, server):
-    """It takes requests again."""
+    """The server takes requests again."""
     with self.changed:
       server.takes = True
       for session in self.sessions:

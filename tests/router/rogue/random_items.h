@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RandomItems: items of all kinds with numbers that mean something now and then, in frames whose
-// bytes are not always sound.
+// RandomItems: items of all kinds, with numbers that are sometimes valid, in frames of which some
+// are damaged.
 //
 // Threads  one.
 #pragma once
@@ -15,13 +15,13 @@ namespace mpf::test {
 
 enum class Side { client, server };
 
-// `Choices` chooses as Random does; `side`: whose items they mostly are.
+// `Choices` has the interface of Random. Most items are those that `side` sends.
 template <class Choices = Random>
 class RandomItems {
  public:
   RandomItems(Choices& random, Side side) : random_(random), side_(side) {}
 
-  // What is known of the system: it is guessed right sometimes.
+  // Remembers numbers from an item of the peer, so that later items use valid numbers.
   void learn(wire::Item::Reader item) {
     if (item.isServer() && item.getServer().getIncarnation() != 0)
       incarnation_ = item.getServer().getIncarnation();
@@ -41,7 +41,7 @@ class RandomItems {
   [[nodiscard]] std::uint32_t number() {
     return static_cast<std::uint32_t>(random_.oneIn(8) ? random_.nasty() : random_.below(6));
   }
-  // One that there is, mostly.
+  // Usually a number from 1 to `last`.
   [[nodiscard]] std::uint32_t oneOf(std::uint32_t last) {
     return random_.oneIn(256) ? number() : static_cast<std::uint32_t>(random_.below(last) + 1);
   }
@@ -178,8 +178,8 @@ class RandomItems {
   Side side_;
   std::uint64_t incarnation_ = 77;
   std::uint32_t requestId_ = 1;
-  std::uint32_t client_ = 0;  // the last one
-  std::uint32_t binding_ = 0;  // likewise
+  std::uint32_t client_ = 0;   // the last number
+  std::uint32_t binding_ = 0;  // the last number
   std::uint32_t sent_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// RogueClientTest: a rogue calls a server router.
+// RogueClientTest: a rogue connects to a server router.
 #pragma once
 
 #include <string>
@@ -63,9 +63,10 @@ class RogueClientTest : public RogueTest {
              {});
   }
 
-  // A peer of the router that has yet to say something.
+  // A peer that has connected and sent nothing.
   [[nodiscard]] RoguePeer stranger() { return RoguePeer(routers_.address()); }
-  // A rogue that has been legal so far: greeted, bound to the server (1), with a client (1).
+  // A rogue that has followed the protocol so far: it has greeted, bound to the server (binding 1),
+  // and opened a client (1).
   [[nodiscard]] RoguePeer rogue() {
     auto peer = stranger();
     peer.sendItems({greeting()});
@@ -74,9 +75,9 @@ class RogueClientTest : public RogueTest {
     peer.sendItems({open(1, 1, incarnation_)});
     return peer;
   }
-  // One more message of a legal rogue.
+  // Another request of a rogue that follows the protocol.
   Fill message(RoguePeer&, const FillMessage& fill) { return requestOf(1, ++lastId_, fill); }
-  // It sends this and gets that farewell.
+  // A rogue sends `bytes` and receives `farewell`.
   void expectFarewell(const Bytes& bytes, const testing::Matcher<const std::string&>& farewell) {
     auto peer = rogue();
     EXPECT_TRUE(peer.send(bytes));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A rogue calls a server router. It costs itself the connection, and the honest ones nothing.
+// A rogue connects to a server router. A violation of the protocol ends its connection, and honest
+// clients are not affected.
 #include "tests/router/rogue/rogue_client.h"
 
 #include <cstring>
@@ -13,19 +14,19 @@ using testing::HasSubstr;
 
 constexpr std::size_t kSlackKb = 24 << 10;
 
-TEST_F(RogueClientTest, IsServedWhileItIsLegal) {
+TEST_F(RogueClientTest, IsServedWhileItFollowsTheProtocol) {
   auto peer = rogue();
 
   for (std::uint32_t id = 1; id <= 3; ++id) expectAnswer(peer, 1, id, 42);
 }
 
-TEST_F(RogueClientTest, ThatDoesNotGreetIsCut) {
+TEST_F(RogueClientTest, IsCutWithoutAGreeting) {
   RoguePeer peer(routers_.address());
   peer.sendItems({bind(1)});
   EXPECT_THAT(peer.farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("is not a greeting")));
 }
 
-// ---- items that cannot be
+// ---- invalid items
 
 TEST_F(RogueClientTest, UnknownNumbersAreCut) {
   expectFarewell(frameOf({request(2, 1)}),
@@ -34,13 +35,16 @@ TEST_F(RogueClientTest, UnknownNumbersAreCut) {
   expectFarewell(frameOf({credit(9, 1)}), HasSubstr("client 9 was never opened"));
 }
 
-TEST_F(RogueClientTest, NumbersThatComeTwiceAreCut) {
+TEST_F(RogueClientTest, DuplicateNumbersAreCut) {
   expectFarewell(frameOf({bind(1)}),
                  AllOf(HasSubstr("code = protocol"), HasSubstr("binding 1 is open already")));
   expectFarewell(frameOf({open(1, 1, 0)}),
-                 AllOf(HasSubstr("code = protocol"), HasSubstr("client 1 after 1")));
-  expectFarewell(frameOf({close(1), open(1, 1, 0)}), HasSubstr("client 1 after 1"));
-  expectFarewell(frameOf({open(0, 1, 0)}), HasSubstr("client 0 after 1"));
+                 AllOf(HasSubstr("code = protocol"),
+                       HasSubstr("client number 1 is not greater than the last one, 1")));
+  expectFarewell(frameOf({close(1), open(1, 1, 0)}),
+                 HasSubstr("client number 1 is not greater than the last one, 1"));
+  expectFarewell(frameOf({open(0, 1, 0)}),
+                 HasSubstr("client number 0 is not greater than the last one, 1"));
 }
 
 TEST_F(RogueClientTest, RequestsWithoutAnIdAreCut) {
@@ -58,7 +62,7 @@ TEST_F(RogueClientTest, ItemsOfTheOtherSideAreCut) {
   }
 }
 
-TEST_F(RogueClientTest, MoreClientsThanAllowedAreCut) {
+TEST_F(RogueClientTest, TooManyClientsAreCut) {
   auto peer = rogue();
   for (std::uint32_t client = 2; client <= 20; ++client)
     peer.sendItems({open(client, 1, incarnation_)});
@@ -69,7 +73,7 @@ TEST_F(RogueClientTest, MoreClientsThanAllowedAreCut) {
   EXPECT_THAT(peer.farewell(), AllOf(HasSubstr("code = limit"), HasSubstr("more than 20 clients")));
 }
 
-TEST_F(RogueClientTest, ABodyThatIsNoMessageIsCut) {
+TEST_F(RogueClientTest, AnInvalidMessageIsCut) {
   expectFarewell(frameOf({[](wire::Item::Builder item) {
                    auto request = item.initRequest();
                    request.setClient(1);
@@ -81,8 +85,9 @@ TEST_F(RogueClientTest, ABodyThatIsNoMessageIsCut) {
 
 // ---- bindings
 
-// As many as there may be: they share what it takes to see the one server that all are to.
-TEST_F(RogueClientTest, ThatBindsToOneServerAgainAndAgainTakesNoMoreFilesForIt) {
+// The largest number of bindings: all bindings to a server share the files with which it is
+// observed.
+TEST_F(RogueClientTest, ManyBindingsToOneServerNeedNoMoreFiles) {
   constexpr std::uint32_t kBindings = 4096;
   auto peer = rogue();
   expectAnswer(peer, 1, 1, 5);
@@ -99,9 +104,9 @@ TEST_F(RogueClientTest, ThatBindsToOneServerAgainAndAgainTakesNoMoreFilesForIt) 
   EXPECT_LE(usage().segments, before.segments);
 }
 
-// A server that ends in a process that lives on is found out by a look; of all whom it concerns one
-// looks first.
-TEST_F(RogueClientTest, ThatSharesAServerWithOthersHearsOfItsEndAsTheyDo) {
+// The end of a server whose process continues is only found by a look, and the first peer to look
+// must not be the only one that is notified.
+TEST_F(RogueClientTest, AllPeersAreNotifiedOfTheEndOfAServer) {
   honest_.reset();
   std::vector<RoguePeer> peers;
   for (int i = 0; i < 3; ++i) {
@@ -125,7 +130,7 @@ TEST_F(RogueClientTest, ThatSharesAServerWithOthersHearsOfItsEndAsTheyDo) {
   }
 }
 
-// ---- what is refused, and the line goes on
+// ---- items that are refused, and the connection continues
 
 TEST_F(RogueClientTest, AMessageThatIsTooLargeIsRefused) {
   auto peer = rogue();
@@ -161,7 +166,7 @@ TEST_F(RogueClientTest, ARequestIdInUseIsRefused) {
   expectAnswer(peer, 1, 2, 1);
 }
 
-TEST_F(RogueClientTest, WhatIsNotServedIsRefused) {
+TEST_F(RogueClientTest, ServersThatAreNotServedAreRefused) {
   auto peer = rogue();
   std::uint32_t binding = 1;
   for (const auto& [server, location] :
@@ -174,7 +179,7 @@ TEST_F(RogueClientTest, WhatIsNotServedIsRefused) {
   expectAnswer(peer, 1, 1, 1);
 }
 
-TEST_F(RogueClientTest, ABindingTooManyIsRefused) {
+TEST_F(RogueClientTest, TooManyBindingsAreRefused) {
   auto peer = rogue();
   constexpr std::uint32_t kMost = 4096;
   std::vector<Fill> binds;
@@ -191,8 +196,8 @@ TEST_F(RogueClientTest, ABindingTooManyIsRefused) {
   expectAnswer(peer, 1, 1, 1);
 }
 
-// It could be the incarnation that the far side knows for none.
-TEST_F(RogueClientTest, AClientOfAnAbsentServerIsNone) {
+// Incarnation 0 must not match an absent server.
+TEST_F(RogueClientTest, RequestsToAnAbsentServerAreNeverTaken) {
   auto peer = rogue();
   peer.sendItems({bind(2, "nobody"), open(2, 2, 0), request(2, 1), open(3, 77, 0), request(3, 1),
                   open(4, 1, incarnation_ + 1), request(4, 1)});
@@ -205,16 +210,16 @@ TEST_F(RogueClientTest, AClientOfAnAbsentServerIsNone) {
   expectAnswer(peer, 1, 1, 1);
 }
 
-TEST_F(RogueClientTest, CreditThatItDoesNotHaveIsWorthNothing) {
+TEST_F(RogueClientTest, ExcessiveCreditIsIgnored) {
   auto peer = rogue();
   peer.sendItems(std::vector<Fill>(100, credit(1, 0xffff'ffff)));
   expectAnswer(peer, 1, 1, 1);
 }
 
-// ---- frames that are none
+// ---- invalid frames
 
-// A thousand requests with one body of 900 kB.
-TEST_F(RogueClientTest, OneBodyForAThousandRequestsIsCut) {
+// A thousand requests that point to the same body of 900 kB.
+TEST_F(RogueClientTest, AThousandRequestsWithOneBodyAreCut) {
   constexpr capnp::uint kRequests = 1000;
   capnp::MallocMessageBuilder message(1u << 19);
   auto items = message.initRoot<wire::Frame>().initItems(kRequests);
@@ -245,7 +250,7 @@ TEST_F(RogueClientTest, ConnectionsBeyondTheLimitAreClosed) {
     auto& peer = *peers.emplace_back(std::make_unique<RoguePeer>(routers_.address()));
     peer.sendItems({greeting()});
     try {
-      peer.next(wire::Item::PING);  // it has taken our greeting
+      peer.next(wire::Item::PING);  // it has read our greeting
       ++kept;
     } catch (const std::runtime_error& farewell) {
       EXPECT_THAT(farewell.what(), HasSubstr("its limit (max-connections)"));
@@ -253,7 +258,7 @@ TEST_F(RogueClientTest, ConnectionsBeyondTheLimitAreClosed) {
     }
   }
 
-  EXPECT_EQ(kept, 29) << "and the honest one";
+  EXPECT_EQ(kept, 29) << "and the honest one is the 30th";
 }
 
 }  // namespace

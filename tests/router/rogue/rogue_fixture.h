@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RogueTest: two routers that do their work all the while, and a rogue that one of them has to do
-// with.
+// RogueTest: two routers with an honest client and server that work throughout the test, and a
+// rogue peer of one of the routers.
 //
 //   near: honest client ─► mpf-router ══════ mpf-router ─► server :far
 //                              ║                 ║
@@ -26,7 +26,7 @@
 
 namespace mpf::test {
 
-// A server that sends everything back, on a thread of its own.
+// A server that returns each request as its reply, on a thread of its own.
 class EchoServer {
  public:
   explicit EchoServer(const Backplane& backplane)
@@ -52,8 +52,8 @@ class EchoServer {
   std::thread thread_;
 };
 
-// A client that asks and asks, a little slower than it could, on a thread of its own, until the
-// first answer that is wrong.
+// A client that sends requests on a thread of its own, with short pauses, until the first wrong
+// answer.
 class HonestClient {
  public:
   explicit HonestClient(const Backplane& backplane)
@@ -65,34 +65,34 @@ class HonestClient {
   HonestClient(const HonestClient&) = delete;
   HonestClient& operator=(const HonestClient&) = delete;
 
-  // Waits for some more right answers; false: there was a wrong one.
+  // Waits for some more answers. Returns false after a wrong answer.
   [[nodiscard]] bool tryWork() const noexcept {
     constexpr int kMore = 5;
     auto answers = answers_.load();
-    for (const auto enough = answers + kMore; answers < enough && !hasTrouble_; answers = answers_)
+    for (const auto enough = answers + kMore; answers < enough && !hasFailed_; answers = answers_)
       answers_.wait(answers);
-    return !hasTrouble_;
+    return !hasFailed_;
   }
 
  private:
   void run() {
-    for (std::int32_t number = 0; !ends_ && !hasTrouble_; ++number) {
+    for (std::int32_t number = 0; !ends_ && !hasFailed_; ++number) {
       auto answer = client_.call(Int32Message({.value = number}), std::chrono::seconds(60));
       const auto* value = answer.message().tryAs<Int32>();
       if (value == nullptr || value->value != number) {
         std::cerr << "honest client: answer " << number << ": " << answer.why() << '\n';
-        hasTrouble_ = true;
+        hasFailed_ = true;
       }
       ++answers_;
       answers_.notify_all();
-      // the rogue needs a processor, too
+      // The rogue needs processor time, too.
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
   }
   SyncClient client_;
   std::atomic<bool> ends_{false};
   std::atomic<int> answers_{0};
-  std::atomic<bool> hasTrouble_{false};
+  std::atomic<bool> hasFailed_{false};
   std::thread thread_;
 };
 
@@ -105,10 +105,10 @@ class RogueTest : public testing::Test {
     honest_ = std::make_unique<HonestClient>(routers_.near());
     expectHonestWork();
   }
-  // The honest client gets right answers, some more from now on.
+  // Expects that the honest client receives some more correct answers.
   void expectHonestWork() { ASSERT_TRUE(honest_->tryWork()); }
-  // The router comes back to what it used before, once it is done with what it is about: connecting
-  // again, closing.
+  // Waits until the router uses no more resources than before; it may still be closing a connection
+  // or reconnecting.
   void expectUsageOf(pid_t router, const Usage& before, std::size_t slackKb) {
     for (auto now = Usage::of(router); !now.isWithin(before, slackKb); now = Usage::of(router)) {
       std::cout << before << " before, " << now << '\n';

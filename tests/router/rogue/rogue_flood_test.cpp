@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A rogue floods a server router, and reads nothing of what comes back. The router's memory stays
-// as it is, and the honest ones are served.
+// A rogue floods a server router and does not read the answers. The router's memory does not grow,
+// and honest clients are served.
 #include <chrono>
 #include <thread>
 
@@ -9,8 +9,8 @@
 namespace mpf::test {
 namespace {
 
-// Sends it again and again, as fast as the router takes it, until the router closes or nobody wants
-// more.
+// Sends the same bytes again and again, as fast as the router reads them, until the router closes
+// the connection or the Flood is destroyed.
 class Flood {
  public:
   Flood(RoguePeer& peer, const Bytes& bytes)
@@ -41,7 +41,7 @@ class RogueFloodTest : public RogueClientTest {
     const Flood flooding(peer, bytes);
     for (int round = 0; round < kRounds; ++round) {
       expectHonestWork();
-      EXPECT_LE(usage().residentKb, quiet.residentKb + kFloodKb) << "while it goes on";
+      EXPECT_LE(usage().residentKb, quiet.residentKb + kFloodKb) << "during the flood";
     }
   }
 };
@@ -65,7 +65,7 @@ TEST_F(RogueFloodTest, OfRequestsThatAreAnswered) {
   flood(frameOf(requests));
 }
 
-TEST_F(RogueFloodTest, OfRequestsForNobody) {
+TEST_F(RogueFloodTest, OfRequestsOfAClientWithoutAServer) {
   std::vector<Fill> requests;
   for (std::uint32_t id = 1; id < 10'000; ++id) requests.push_back(request(2, id));
   flood(frameOf(requests), {open(2, 77, 0)});
@@ -77,7 +77,7 @@ TEST_F(RogueFloodTest, OfRefusedBindings) {
   flood(frameOf(binds));
 }
 
-TEST_F(RogueFloodTest, OfClientsThatComeAndGo) {
+TEST_F(RogueFloodTest, OfClientsThatOpenAndClose) {
   auto peer = rogue();
   for (std::uint32_t client = 2; client < 2000; client += 10) {
     std::vector<Fill> items;
@@ -91,15 +91,15 @@ TEST_F(RogueFloodTest, OfClientsThatComeAndGo) {
   expectAnswer(peer, 5000, 3, 9);
 }
 
-// Lines of the router that have this in them.
+// The number of lines in `said` that contain `text`.
 std::int64_t linesWith(const std::string& text, const std::string& said) {
   std::int64_t lines = 0;
   for (auto at = said.find(text); at != std::string::npos; at = said.find(text, at + 1)) ++lines;
   return lines;
 }
 
-// Some at once, then one a second, of all callers together.
-TEST_F(RogueFloodTest, OfCallersThatComeAndGoLeavesTheLogShort) {
+// The log has some lines at once, and then one per second for all connections together.
+TEST_F(RogueFloodTest, OfConnectionsKeepsTheLogShort) {
   constexpr int kAtOnce = 32;
   const auto begun = std::chrono::steady_clock::now();
 
@@ -117,8 +117,8 @@ TEST_F(RogueFloodTest, OfCallersThatComeAndGoLeavesTheLogShort) {
   const auto seconds =
       std::chrono::ceil<std::chrono::seconds>(std::chrono::steady_clock::now() - begun).count();
   EXPECT_LE(linesWith(" is connected (", said), kAtOnce + 1 + seconds);
-  EXPECT_LE(linesWith(" is gone: ", said), kAtOnce + 1 + seconds);
-  EXPECT_LE(linesWith(" is not for this peer", said), kAtOnce + seconds);
+  EXPECT_LE(linesWith(" disconnected: ", said), kAtOnce + 1 + seconds);
+  EXPECT_LE(linesWith(" is not allowed for this peer", said), kAtOnce + seconds);
 }
 
 }  // namespace

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Input that no router would send, to a router that accepts and to one that connects: it costs the
-// sender its connection and the router nothing: memory, files and segments stay as they were, and
-// its honest users notice nothing.
+// Invalid input, to a router that accepts and to one that connects. The router closes the
+// connection; its memory, files and segments do not grow, and its honest clients are not affected.
 #include <cstdint>
 #include <cstring>
 #include <functional>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -26,7 +26,7 @@ void append32(Bytes& bytes, std::uint64_t value) {
     bytes.push_back(static_cast<std::uint8_t>(value >> shift));
 }
 
-// The beginning of a frame whose segments have so many words each.
+// The beginning of a frame of `segments` segments of `words` words each.
 Bytes segmentTable(std::uint32_t segments, std::uint64_t words) {
   Bytes table;
   append32(table, segments - 1);
@@ -35,20 +35,20 @@ Bytes segmentTable(std::uint32_t segments, std::uint64_t words) {
   return table;
 }
 
-// A message of a type that does not exist: a list with a list with a list...
+// A message of an unknown type, with lists that are nested `depth` deep.
 Bytes nestedFrame(const std::function<Fill(const FillMessage&)>& carry, std::uint32_t depth) {
-  // Its last word is the pointer of User, whose discriminant stands three words before that.
+  // The last word is the pointer of User; its discriminant is three words before that.
   auto bytes = frameOf({carry([](auto message) { message.initUser(); })});
   bytes[bytes.size() - 3 * kWord] = 99;
   std::uint32_t words = 0;
   std::memcpy(&words, &bytes[4], sizeof words);
   words += depth;
   std::memcpy(&bytes[4], &words, sizeof words);
-  const Bytes listOfOnePointer{0x01, 0, 0, 0, 0x0e, 0, 0, 0};  // which is the next word
+  const Bytes listOfOnePointer{0x01, 0, 0, 0, 0x0e, 0, 0, 0};  // the next word
   bytes.resize(bytes.size() - kWord);
   for (std::uint32_t level = 0; level < depth; ++level)
     bytes.insert(bytes.end(), listOfOnePointer.begin(), listOfOnePointer.end());
-  bytes.resize(bytes.size() + kWord);  // and a null
+  bytes.resize(bytes.size() + kWord);  // a null pointer
   return bytes;
 }
 
@@ -56,18 +56,16 @@ Bytes nestedFrame(const std::function<Fill(const FillMessage&)>& carry, std::uin
 template <class Fixture>
 class RogueInputTest : public Fixture {
  protected:
-  RogueInputTest() : Fixture("1s") {}
-
-  // The router that has to do with rogues, and has just done with one that was legal.
+  // Measures the router after it has served a rogue that follows the protocol.
   void SetUp() override {
     Fixture::SetUp();
     this->rogue().close();
     before_ = this->usage();
-    // a router that connects may be at it just now, or not
-    if (std::is_same_v<Fixture, RogueServerTest>) ++before_.files;
+    // A router that connects may or may not be connecting at this moment.
+    if (std::is_same_v<Fixture, RogueServerTest>) ++before_->files;
   }
   void TearDown() override {
-    this->expectUsage(before_, kSlackKb);
+    if (before_) this->expectUsage(*before_, kSlackKb);  // absent: SetUp() failed
     Fixture::TearDown();
   }
   [[nodiscard]] RoguePeer greeted() {
@@ -85,7 +83,7 @@ class RogueInputTest : public Fixture {
 
  private:
   static constexpr std::size_t kSlackKb = 24 << 10;
-  Usage before_;
+  std::optional<Usage> before_;
 };
 
 struct Roles {
@@ -100,7 +98,7 @@ TYPED_TEST_SUITE(RogueInputTest, BothRoles, Roles);
 TYPED_TEST(RogueInputTest, MalformedIsCut) {
   const std::string http = "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
   auto astray = frameOf({ping(1)});
-  astray[2 * kWord] ^= 0x80;  // where the list of items is
+  astray[2 * kWord] ^= 0x80;  // the pointer to the list of items
   auto emptyRoot = segmentTable(1, 1);
   emptyRoot.resize(emptyRoot.size() + kWord, 0xff);
 
@@ -111,8 +109,9 @@ TYPED_TEST(RogueInputTest, MalformedIsCut) {
   }
 }
 
-// What it had sent behind that is read, or it would take the farewell back.
-TYPED_TEST(RogueInputTest, AFarewellReachesWhoHadMoreToSay) {
+// The router reads the data behind the invalid frame; otherwise the connection would be reset
+// before the rogue reads the farewell.
+TYPED_TEST(RogueInputTest, AFarewellArrivesAlthoughMoreDataFollows) {
   auto input = segmentTable(513, 1);
   input.resize(input.size() + (std::size_t{1} << 20));
 
@@ -139,15 +138,15 @@ TYPED_TEST(RogueInputTest, OversizedIsCut) {
   const auto tooLong =
       AllOf(HasSubstr("code = limit"), HasSubstr("bytes; the limit is " + std::to_string(limit)));
 
-  this->expectCut(this->greeted(), segmentTable(1, limit / kWord), tooLong);  // and the table
+  this->expectCut(this->greeted(), segmentTable(1, limit / kWord), tooLong);  // plus the table
   this->expectCut(this->greeted(), segmentTable(1, kMost), tooLong);
   this->expectCut(this->greeted(), segmentTable(512, kMost), tooLong);
   this->expectCut(this->stranger(), segmentTable(1, (64 << 10) / kWord),
                   AllOf(HasSubstr("code = limit"), HasSubstr("65536")));
 }
 
-// One that may be so long, and of which little comes.
-TYPED_TEST(RogueInputTest, OversizedClaimsCostNoMemory) {
+// A frame of the largest permitted size, of which only a few bytes arrive.
+TYPED_TEST(RogueInputTest, AnAnnouncedFrameNeedsNoMemory) {
   constexpr std::size_t kLittleKb = 1024;
   auto peer = this->greeted();
   const auto limit = peer.next(wire::Item::GREETING).getGreeting().getMaxFrameBytes();
@@ -170,7 +169,7 @@ TYPED_TEST(RogueInputTest, DeeplyNestedIsCut) {
   }
 }
 
-// Some of it all the time, and never a whole frame.
+// A few bytes at a time, and never a whole frame.
 TYPED_TEST(RogueInputTest, SlowDripIsCut) {
   const auto frame = frameOf(std::vector<Fill>(1000, ping(1)));
   EXPECT_THAT(this->stranger().drip(frame), HasSubstr("code = silence"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RoguePeer: one end of a TCP connection to a router, and what it sends there made by hand.
-// RogueHost: where routers call one.
+// RoguePeer: one end of a TCP connection to a router, with items that the test makes by hand.
+// RogueHost: a listening address to which a router connects.
 //
 //   RoguePeer peer(routers.address());      // as a client router
 //   peer.sendItems({greeting()});
@@ -33,7 +33,7 @@ namespace mpf::test {
 
 class RoguePeer {
  public:
-  // Calls a router at "127.0.0.1:PORT".
+  // Connects to a router at "127.0.0.1:PORT".
   explicit RoguePeer(const std::string& address)
       : RoguePeer(FileDescriptor(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0))) {
     const auto colon = address.find(':');
@@ -45,7 +45,7 @@ class RoguePeer {
   }
   explicit RoguePeer(FileDescriptor socket) : socket_(std::move(socket)) {}
 
-  // False: the other side has closed.
+  // Returns false when the router has closed the connection.
   bool send(std::span<const std::uint8_t> bytes) {
     while (!bytes.empty()) {
       const auto sent = retryInterrupted(
@@ -57,15 +57,15 @@ class RoguePeer {
   }
   bool sendItems(const std::vector<Fill>& items) { return send(frameOf(items)); }
 
-  // The next item, until the one after it is asked for; nullopt at the end.
+  // Returns the next item, valid until the next call; nullopt at the end of the connection.
   std::optional<wire::Item::Reader> next() {
     while (!frame_ || at_ == itemsOf(*frame_).size()) {
       if (!readFrame()) return std::nullopt;
     }
     return itemsOf(*frame_)[at_++];
   }
-  // The next item of this kind; others are skipped, and pings answered. Throws std::runtime_error
-  // at the end.
+  // Returns the next item of this kind. Skips others, and answers pings. Throws std::runtime_error
+  // at the end of the connection.
   wire::Item::Reader next(wire::Item::Which kind) {
     while (auto item = next()) {
       if (item->which() == kind) return *item;
@@ -77,13 +77,12 @@ class RoguePeer {
     }
     throw std::runtime_error("the router has closed");
   }
-  // Whether next() has something to return, or to wait for a little; or will have, so many
-  // milliseconds later.
-  [[nodiscard]] bool hasNews(int waitMs = 0) const {
+  // Whether data for next() has arrived, or arrives within `waitMs` milliseconds.
+  [[nodiscard]] bool hasData(int waitMs = 0) const {
     pollfd readable{socket_.get(), POLLIN, 0};
     return (frame_ && at_ != itemsOf(*frame_).size()) || ::poll(&readable, 1, waitMs) > 0;
   }
-  // Everything until the end; returns the farewell as text, or "none".
+  // Reads until the end of the connection; returns the farewell as text, or "none".
   std::string farewell() {
     std::string last = "none";
     while (auto item = next()) {
@@ -97,7 +96,7 @@ class RoguePeer {
     constexpr int kPauseMs = 2;
     std::string last = "none";
     for (; !bytes.empty() && send(bytes.first(1)); bytes = bytes.subspan(1)) {
-      while (hasNews(kPauseMs)) {
+      while (hasData(kPauseMs)) {
         const auto item = next();
         if (!item) return last;
         if (item->isFarewell()) last = router::toStd(kj::str(*item));
@@ -105,9 +104,9 @@ class RoguePeer {
     }
     return last;
   }
-  // The router finds the end of what has come, and may still speak.
+  // Ends the data to the router; it may still send.
   void sendNoMore() { checkCall(::shutdown(socket_.get(), SHUT_WR), "shutdown"); }
-  // From any thread: no more either way.
+  // Ends the data in both directions; may be called by any thread.
   void hangUp() noexcept { ::shutdown(socket_.get(), SHUT_RDWR); }
   void close() { socket_.reset(); }
 
@@ -121,7 +120,7 @@ class RoguePeer {
     frame_ = std::make_unique<capnp::StreamFdMessageReader>(
         socket_.get(), capnp::ReaderOptions{.traversalLimitInWords = UINT64_MAX});
     return true;
-  } catch (const kj::Exception&) {  // the end, by close or reset
+  } catch (const kj::Exception&) {  // the connection was closed or reset
     return false;
   }
 
@@ -144,7 +143,7 @@ class RogueHost {
     address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
   }
   [[nodiscard]] const std::string& address() const noexcept { return address_; }
-  // The router's next call.
+  // Accepts the next connection of the router.
   [[nodiscard]] RoguePeer accept() {
     return RoguePeer(FileDescriptor(
         checkCall(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept")));

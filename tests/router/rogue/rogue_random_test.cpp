@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Rogues that send anything, until they are cut, again and again. MPF_TEST_SEEDS sets how often
-// (default 1).
+// Rogues that send random items until the router closes their connection. MPF_TEST_SEEDS multiplies
+// the number of rogues (default 1).
 #include <cstdlib>
 
 #include "tests/router/rogue/random_items.h"
@@ -18,13 +18,13 @@ class RandomRogueTest : public RogueTest {
     const char* set = std::getenv("MPF_TEST_SEEDS");
     return set != nullptr ? std::atoi(set) : 1;
   }
-  // Sends frames until the router has enough of it, or it has none left.
+  // Sends frames until the router closes the connection, at most kFrames.
   void play(RoguePeer peer, Side side) {
     constexpr int kFrames = 200;
     RandomItems items(random_, side);
     if (!random_.oneIn(16)) peer.sendItems({greeting()});
     for (int frame = 0; frame < kFrames && peer.send(items.frame()); ++frame) {
-      while (peer.hasNews()) {
+      while (peer.hasData()) {
         const auto item = peer.next();
         if (!item) return;
         items.learn(*item);
@@ -34,7 +34,7 @@ class RandomRogueTest : public RogueTest {
   Random random_;
 };
 
-TEST_F(RandomRogueTest, CallsAServerRouter) {
+TEST_F(RandomRogueTest, ConnectsToAServerRouter) {
   constexpr int kRogues = 200;
   startAll({}, {});
   const auto pid = routers_.farRouter().pid();
@@ -49,7 +49,7 @@ TEST_F(RandomRogueTest, CallsAServerRouter) {
   expectUsageOf(pid, before, kRandomSlackKb);
 }
 
-TEST_F(RandomRogueTest, IsCalledByAClientRouter) {
+TEST_F(RandomRogueTest, AcceptsAClientRouter) {
   constexpr int kRogues = 100;
   constexpr std::int32_t kLocation = 2;
   constexpr std::size_t kOutstanding = 10;
@@ -59,7 +59,7 @@ TEST_F(RandomRogueTest, IsCalledByAClientRouter) {
   const auto pid = routers_.nearRouter().pid();
   const auto before = Usage::of(pid);
   std::atomic<bool> ends{false};
-  // clients whose server is the rogue's; each request has one end, whatever it says
+  // Clients of the rogue's server: each of their requests ends once, whatever the rogue sends.
   std::thread local([&] {
     Dispatcher dispatcher(routers_.near());
     Caller first(dispatcher, "echo", kLocation);
@@ -67,7 +67,7 @@ TEST_F(RandomRogueTest, IsCalledByAClientRouter) {
     for (std::int32_t value = 0; !ends; ++value) {
       for (auto* caller : {&first, &second}) {
         std::uint32_t id = 0;
-        // its queue may be shorter: the rogue chooses
+        // The queue may be shorter than this, because the rogue sets its size.
         const bool isMany = caller->open.size() >= kOutstanding;
         if (!isMany && caller->client.send(Int32Message({.value = value}), Deadline::never(),
                                            &id) == SendResult::sent)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// RogueServerTest: a client router has called a rogue.
+// RogueServerTest: a client router has connected to a rogue.
 #pragma once
 
 #include <functional>
@@ -25,7 +25,7 @@ inline Fill server(std::uint32_t binding, wire::Server::State state,
     server.setQueueSize(10);
     server.setMaxOutstanding(20);
     server.setMaxMessageBytes(1u << 20);
-    server.setReason("the rogue says so");
+    server.setReason("a reason of the rogue");
   };
 }
 
@@ -54,19 +54,19 @@ inline Fill fate(std::uint32_t client, std::uint32_t id, std::uint16_t fate) {
   };
 }
 
-// Local clients whose server is the rogue's.
+// Local clients that are bound to a server of the rogue.
 class RogueServerTest : public RogueTest {
  protected:
-  static constexpr std::int32_t kRogues = 2;  // its location
+  static constexpr std::int32_t kRogueLocation = 2;
 
   explicit RogueServerTest(std::string deadTime = "5s") : deadTime_(std::move(deadTime)) {}
 
   void SetUp() override {
     startAll({},
-             {"--remote", std::to_string(kRogues) + "=" + host_.address(), "--window-size", "64KiB",
-              "--dead-time", deadTime_, "--first-retry", "10ms", "--last-retry", "10ms"});
+             {"--remote", std::to_string(kRogueLocation) + "=" + host_.address(), "--window-size",
+              "64KiB", "--dead-time", deadTime_, "--first-retry", "10ms", "--last-retry", "10ms"});
     dispatcher_.emplace(routers_.near());
-    caller_.emplace(*dispatcher_, "echo", kRogues);
+    caller_.emplace(*dispatcher_, "echo", kRogueLocation);
   }
   void TearDown() override {
     caller_.reset();
@@ -74,10 +74,10 @@ class RogueServerTest : public RogueTest {
     RogueTest::TearDown();
   }
 
-  // A peer of the router that has yet to say something.
+  // A peer that has accepted the connection and sent nothing.
   [[nodiscard]] RoguePeer stranger() { return host_.accept(); }
-  // A rogue that has been legal so far: greeted, with the server that was wished for, and its first
-  // client.
+  // A rogue that has followed the protocol so far: it has greeted and offered the server, which has
+  // its first client.
   [[nodiscard]] RoguePeer rogue() {
     auto peer = stranger();
     peer.sendItems({greeting()});
@@ -94,10 +94,10 @@ class RogueServerTest : public RogueTest {
   void runUntil(Condition condition) {
     while (!condition()) dispatcher_->runOnce(Deadline::after(std::chrono::microseconds(200)));
   }
-  // The next item of that kind, while the clients live.
+  // Returns the next item of this kind, and runs the local clients until it arrives.
   wire::Item::Reader await(RoguePeer& peer, wire::Item::Which kind) {
     for (;;) {
-      runUntil([&] { return peer.hasNews(); });
+      runUntil([&] { return peer.hasData(); });
       const auto item = peer.next();
       if (!item || item->isFarewell())
         throw std::runtime_error(item ? router::toStd(kj::str(*item)) : "closed");
@@ -107,17 +107,17 @@ class RogueServerTest : public RogueTest {
             {[stamp = item->getPing().getStamp()](auto pong) { pong.initPong().setStamp(stamp); }});
     }
   }
-  // A request that the rogue has got.
+  // Sends a request, waits until the rogue has received it, and returns its id.
   std::uint32_t asked(RoguePeer& peer) {
     caller_->send(Int32Message({.value = 1}));
     return await(peer, wire::Item::REQUEST).getRequest().getRequestId();
   }
-  // One more message of a legal rogue.
+  // A reply of a rogue that follows the protocol.
   Fill message(RoguePeer& peer, const FillMessage& fill) {
     return replyOf(client_, asked(peer), fill);
   }
-  // The rogue, asked once, answers so, and gets that farewell. Its client's request ends once,
-  // without a reply.
+  // The rogue receives a request, sends `answers`, and receives `farewell`. The request ends once,
+  // and the local client is disconnected.
   void expectFarewell(
       const std::function<std::vector<Fill>(std::uint32_t client, std::uint32_t id)>& answers,
       const testing::Matcher<const std::string&>& farewell) {
@@ -140,7 +140,7 @@ class RogueServerTest : public RogueTest {
     }
     return all;
   }
-  // The next reply that the client gets.
+  // The value of the next reply that the client receives.
   std::int32_t nextValue() {
     runUntil([&] { return !caller_->messages.empty(); });
     const auto message = caller_->take();

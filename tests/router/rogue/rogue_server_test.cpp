@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A client router has called a rogue. It costs the rogue the connection; its clients hear of ends
-// and of nothing else, others of nothing.
+// A client router has connected to a rogue. A violation of the protocol ends the rogue's
+// connection, so that the requests of its clients end. Other clients are not affected.
 #include "tests/router/rogue/rogue_server.h"
 
 namespace mpf::test {
@@ -11,7 +11,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST_F(RogueServerTest, ServesWhileItIsLegal) {
+TEST_F(RogueServerTest, ServesWhileItFollowsTheProtocol) {
   auto peer = rogue();
   for (int i = 0; i < 3; ++i) {
     const auto id = asked(peer);
@@ -21,7 +21,7 @@ TEST_F(RogueServerTest, ServesWhileItIsLegal) {
   }
 }
 
-TEST_F(RogueServerTest, ThatDoesNotGreetIsLeftAndCalledAgain) {
+TEST_F(RogueServerTest, ThatDoesNotGreetIsCutAndConnectedToAgain) {
   for (int i = 0; i < 3; ++i) {
     auto peer = host_.accept();
     peer.sendItems({server(1, wire::Server::State::THERE)});
@@ -34,11 +34,11 @@ TEST_F(RogueServerTest, ThatDoesNotGreetIsLeftAndCalledAgain) {
   EXPECT_EQ(nextValue(), 5);
 }
 
-// ---- replies that cannot be
+// ---- invalid replies
 
-TEST_F(RogueServerTest, AReplyToWhatWasNeverAskedIsCut) {
+TEST_F(RogueServerTest, AReplyToAnUnknownRequestIsCut) {
   expectFarewell([](auto client, auto id) { return std::vector{reply(client, id + 1, true)}; },
-                 AllOf(HasSubstr("code = protocol"), HasSubstr("has had its end")));
+                 AllOf(HasSubstr("code = protocol"), HasSubstr("is not pending")));
   EXPECT_THAT(fates(), ElementsAre(Fate::outcomeUnknown));
 }
 
@@ -47,20 +47,20 @@ TEST_F(RogueServerTest, ASecondFirstReplyIsCut) {
       [](auto client, auto id) {
         return std::vector{reply(client, id, true, 8), reply(client, id, true, 9)};
       },
-      AllOf(HasSubstr("code = protocol"), HasSubstr("has had its end")));
+      AllOf(HasSubstr("code = protocol"), HasSubstr("is not pending")));
   EXPECT_EQ(nextValue(), 8);
   EXPECT_THAT(caller_->messages, IsEmpty());
 }
 
-TEST_F(RogueServerTest, AFurtherReplyBeforeTheFirstIsCut) {
+TEST_F(RogueServerTest, ALaterReplyBeforeTheFirstIsCut) {
   expectFarewell([](auto client, auto id) { return std::vector{reply(client, id, false)}; },
-                 AllOf(HasSubstr("code = protocol"), HasSubstr("to get its first one")));
+                 AllOf(HasSubstr("code = protocol"), HasSubstr("has had no first reply")));
 }
 
 TEST_F(RogueServerTest, AReplyAfterAFateIsCut) {
   expectFarewell([](auto client,
                     auto id) { return std::vector{fate(client, id, 0), reply(client, id, true)}; },
-                 HasSubstr("has had its end"));
+                 HasSubstr("is not pending"));
   EXPECT_THAT(fates(), ElementsAre(Fate::refused));
 }
 
@@ -78,18 +78,18 @@ TEST_F(RogueServerTest, ClientsThatWereNeverOpenedAreCut) {
       unknown);
 }
 
-// The other one has not asked.
+// The other client has sent no request.
 TEST_F(RogueServerTest, AReplyToAnotherClientIsCut) {
   auto peer = rogue();
   const auto first = client_;
-  Caller other(*dispatcher_, "echo", kRogues);
+  Caller other(*dispatcher_, "echo", kRogueLocation);
   const auto second = await(peer, wire::Item::OPEN).getOpen().getClient();
   ASSERT_NE(first, second);
   const auto id = asked(peer);
 
   peer.sendItems({reply(second, id, true, 13)});
 
-  EXPECT_THAT(peer.farewell(), HasSubstr("has had its end"));
+  EXPECT_THAT(peer.farewell(), HasSubstr("is not pending"));
   peer.close();
   expectDisconnect();
   runUntil([&] { return !other.isConnected(); });
@@ -97,7 +97,7 @@ TEST_F(RogueServerTest, AReplyToAnotherClientIsCut) {
   EXPECT_THAT(fates(), ElementsAre(Fate::outcomeUnknown));
 }
 
-TEST_F(RogueServerTest, NewsThatOnlyRoutersTellAreCut) {
+TEST_F(RogueServerTest, MessagesThatOnlyMpfMaySendAreCut) {
   const auto onlyOurs = AllOf(HasSubstr("code = protocol"), HasSubstr("only MPF itself may send"));
   expectFarewell(
       [](auto client, auto id) {
@@ -117,9 +117,9 @@ TEST_F(RogueServerTest, ItemsOfTheOtherSideAreCut) {
       AllOf(HasSubstr("code = protocol"), HasSubstr("only a client router sends")));
 }
 
-// ---- what it may do, though nobody does
+// ---- unusual items that the protocol permits
 
-TEST_F(RogueServerTest, AMessageTypeThatNobodyKnowsIsOutcomeUnknown) {
+TEST_F(RogueServerTest, AnUnknownMessageTypeIsOutcomeUnknown) {
   auto peer = rogue();
   const auto id = asked(peer);
   auto bytes =
@@ -134,7 +134,7 @@ TEST_F(RogueServerTest, AMessageTypeThatNobodyKnowsIsOutcomeUnknown) {
   EXPECT_EQ(nextValue(), 3);
 }
 
-TEST_F(RogueServerTest, AFateThatNobodyKnowsIsOutcomeUnknown) {
+TEST_F(RogueServerTest, AnUnknownFateIsOutcomeUnknown) {
   auto peer = rogue();
   const auto id = asked(peer);
 
@@ -144,7 +144,7 @@ TEST_F(RogueServerTest, AFateThatNobodyKnowsIsOutcomeUnknown) {
   EXPECT_THAT(fates(), ElementsAre(Fate::outcomeUnknown));
 }
 
-TEST_F(RogueServerTest, ARefusedBindingIsTriedAgain) {
+TEST_F(RogueServerTest, ARefusedBindIsRepeated) {
   auto peer = host_.accept();
   peer.sendItems({greeting()});
   const auto binding = await(peer, wire::Item::BIND).getBind().getBinding();
@@ -156,7 +156,7 @@ TEST_F(RogueServerTest, ARefusedBindingIsTriedAgain) {
   EXPECT_GT(binding_, binding);
 }
 
-TEST_F(RogueServerTest, ARefusedClientIsAnsweredHere) {
+TEST_F(RogueServerTest, RequestsOfARefusedClientAreRefusedLocally) {
   auto peer = rogue();
   peer.sendItems({[this](auto item) { item.initRefuse().setClient(client_); }, ping(1)});
   await(peer, wire::Item::PONG);
@@ -167,11 +167,11 @@ TEST_F(RogueServerTest, ARefusedClientIsAnsweredHere) {
   EXPECT_THAT(fates(), ElementsAre(Fate::refused));
 }
 
-TEST_F(RogueServerTest, ThatTakesOneClientGetsOne) {
+TEST_F(RogueServerTest, ThatAcceptsOneClientGetsOne) {
   auto peer = host_.accept();
   peer.sendItems({greeting([](auto greeting) { greeting.setMaxClients(1); })});
   makeThere(peer);
-  Caller other(*dispatcher_, "echo", kRogues);
+  Caller other(*dispatcher_, "echo", kRogueLocation);
   runUntil([&] { return other.isConnected(); });
 
   other.send(Int32Message({.value = 1}));
@@ -193,14 +193,14 @@ TEST_F(RogueServerTest, RepliesBeyondTheWindowAreCut) {
   peer.sendItems({reply(client_, id, true)});
   const auto frame = frameOf(more);
 
-  while (peer.send(frame)) {  // its client takes none of them
+  while (peer.send(frame)) {  // its client receives none of them
   }
 
   expectUsage(before, 24 << 10);
   expectDisconnect();
 }
 
-TEST_F(RogueServerTest, NewsOfFullQueuesDoNotGather) {
+TEST_F(RogueServerTest, NotificationsOfFullQueuesDoNotAccumulate) {
   auto peer = rogue();
   asked(peer);
   const auto frame =
@@ -216,16 +216,16 @@ TEST_F(RogueServerTest, NewsOfFullQueuesDoNotGather) {
   expectHonestWork();
 }
 
-TEST_F(RogueServerTest, AServerThatComesAndGoesDisturbsNobody) {
+TEST_F(RogueServerTest, AServerThatRestartsOftenDoesNotAffectOthers) {
   auto peer = rogue();
-  std::vector<Fill> lives;
+  std::vector<Fill> items;
   for (std::uint64_t life = 0; life < 1000; ++life) {
-    lives.push_back(server(binding_, wire::Server::State::ABSENT));
-    lives.push_back(server(binding_, wire::Server::State::THERE, kIncarnation + 1 + life));
+    items.push_back(server(binding_, wire::Server::State::ABSENT));
+    items.push_back(server(binding_, wire::Server::State::THERE, kIncarnation + 1 + life));
   }
-  lives.push_back(ping(4242));
+  items.push_back(ping(4242));
 
-  peer.sendItems(lives);
+  peer.sendItems(items);
   expectHonestWork();
   while (await(peer, wire::Item::PONG).getPong().getStamp() != 4242) {
   }
@@ -233,14 +233,14 @@ TEST_F(RogueServerTest, AServerThatComesAndGoesDisturbsNobody) {
   runUntil([&] { return caller_->isConnected(); });
   const auto said = routers_.nearRouter().said();
   std::size_t lines = 0;
-  for (auto at = said.find(" is there"); at != std::string::npos;
-       at = said.find(" is there", at + 1))
+  for (auto at = said.find(" is available"); at != std::string::npos;
+       at = said.find(" is available", at + 1))
     ++lines;
-  EXPECT_LT(lines, lives.size() / 10) << "it does not fill the log";
+  EXPECT_LT(lines, items.size() / 10) << "the log would become too long";
 }
 
-// Of a newer peer.
-TEST_F(RogueServerTest, AStateThatNobodyKnowsPromisesNothing) {
+// As a newer peer may send it.
+TEST_F(RogueServerTest, AnUnknownStateIsOutcomeUnknown) {
   auto peer = rogue();
   asked(peer);
 
@@ -253,7 +253,7 @@ TEST_F(RogueServerTest, AStateThatNobodyKnowsPromisesNothing) {
 
 class RogueGreeterTest : public RogueTest {};
 
-TEST_F(RogueGreeterTest, WhoGreetsAndGoesIsCalledLessAndLessOften) {
+TEST_F(RogueGreeterTest, ThatClosesAfterItsGreetingIsConnectedToLessAndLessOften) {
   constexpr int kCalls = 10;
   // half of 1 ms, 2 ms, 4 ms...
   constexpr std::int64_t kAtLeastNs = ((1 << (kCalls - 1)) - 1) * 500'000;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// FrameReader: whatever way the bytes come, and whatever they are.
+// FrameReader: frames in parts of any size, and invalid bytes.
 #include "router/transport/frame_reader.h"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using testing::IsEmpty;
 
 constexpr std::uint64_t kLimit = std::uint64_t{64} << 20;
 
-// Each ping that came, by its stamp.
+// Feeds bytes to a FrameReader and records the stamps of the pings that it reads.
 class Reading {
  public:
   explicit Reading(std::uint64_t limit = kLimit) : reader_(limit) {}
@@ -39,10 +39,10 @@ class Reading {
       }
     }
   }
-  // How feeding these ends.
+  // Returns the code with which these bytes are refused.
   FarewellCode refusal(std::span<const std::uint8_t> bytes) try {
     feed(bytes);
-    ADD_FAILURE() << "was taken";
+    ADD_FAILURE() << "the bytes were accepted";
     return {};
   } catch (const ProtocolError& error) {
     return error.code();
@@ -57,7 +57,7 @@ class Reading {
   int frames_ = 0;
 };
 
-// A segment table that announces what never comes.
+// A segment table without its segments.
 Bytes tableOf(const std::vector<std::uint32_t>& segmentWords) {
   std::vector<std::uint32_t> table{static_cast<std::uint32_t>(segmentWords.size() - 1)};
   table.insert(table.end(), segmentWords.begin(), segmentWords.end());
@@ -70,7 +70,7 @@ Bytes tableOf(const std::vector<std::uint32_t>& segmentWords) {
   return bytes;
 }
 
-TEST(FrameReader, TakesFramesInTwoPartsOrThreeWhereverTheyAreCut) {
+TEST(FrameReader, ReadsFramesCutIntoThreePartsAtAnyByte) {
   const auto bytes =
       joined({frameOf({ping(1)}), frameOf({ping(2), ping(3)}), frameOf({}), frameOf({ping(4)})});
   const std::span all(bytes);
@@ -88,7 +88,7 @@ TEST(FrameReader, TakesFramesInTwoPartsOrThreeWhereverTheyAreCut) {
   }
 }
 
-TEST(FrameReader, TakesLongFramesDripByDrip) {
+TEST(FrameReader, ReadsALongFrameByteByByte) {
   std::vector<Fill> items;
   std::vector<std::uint64_t> stamps;
   for (std::uint64_t stamp = 0; stamp < 10'000; ++stamp) {
@@ -105,7 +105,7 @@ TEST(FrameReader, TakesLongFramesDripByDrip) {
   EXPECT_EQ(reading.reader().pending(), 0u);
 }
 
-TEST(FrameReader, TakesFramesOfSeveralSegments) {
+TEST(FrameReader, ReadsFramesOfSeveralSegments) {
   Reading reading;
   const auto bytes = frameOf({ping(1), ping(2), ping(3)}, 8);
   ASSERT_GT(bytes[0], 1) << "segments";
@@ -115,11 +115,11 @@ TEST(FrameReader, TakesFramesOfSeveralSegments) {
   EXPECT_THAT(reading.stamps(), ElementsAre(1, 2, 3));
 }
 
-TEST(FrameReader, TakesSegmentsUpToTheLimitOnly) {
+TEST(FrameReader, RefusesTooManySegments) {
   Reading reading;
 
   std::vector<std::uint32_t> words(FrameReader::kMaxSegments);
-  words.front() = 1;  // of zero: a frame of no items
+  words.front() = 1;  // a zero word: a frame without items
 
   reading.feed(joined({tableOf(words), Bytes(8)}));
 
@@ -129,7 +129,7 @@ TEST(FrameReader, TakesSegmentsUpToTheLimitOnly) {
   EXPECT_EQ(Reading().refusal(Bytes(8, 0xff)), FarewellCode::PROTOCOL);
 }
 
-TEST(FrameReader, TakesBytesUpToTheLimitOnly) {
+TEST(FrameReader, RefusesTooManyBytes) {
   const auto bytes = frameOf({ping(1)});
 
   Reading exact(bytes.size());
@@ -142,12 +142,12 @@ TEST(FrameReader, TakesBytesUpToTheLimitOnly) {
             FarewellCode::LIMIT);
 }
 
-// As soon as its length is known: nobody need send the rest to be refused.
-TEST(FrameReader, RefusesALongFrameByItsTable) {
+// It does not wait for the rest of the frame.
+TEST(FrameReader, RefusesALongFrameByItsSegmentTable) {
   EXPECT_EQ(Reading(1024).refusal(tableOf({128})), FarewellCode::LIMIT);
 }
 
-TEST(FrameReader, TakesAnotherLimitFromTheNextFrameOn) {
+TEST(FrameReader, AppliesANewLimitToTheNextFrame) {
   const auto bytes = frameOf({ping(1)});
   Reading reading(bytes.size());
   reading.feed(bytes);
@@ -157,7 +157,7 @@ TEST(FrameReader, TakesAnotherLimitFromTheNextFrameOn) {
   EXPECT_EQ(reading.refusal(bytes), FarewellCode::LIMIT);
 }
 
-TEST(FrameReader, GrowsWithWhatHasComeAndNotWithWhatIsAnnounced) {
+TEST(FrameReader, AllocatesForReceivedAndNotForAnnouncedBytes) {
   constexpr std::size_t kFirst = std::size_t{64} << 10;
   Reading reading;
   auto& reader = reading.reader();
@@ -171,7 +171,7 @@ TEST(FrameReader, GrowsWithWhatHasComeAndNotWithWhatIsAnnounced) {
   }
 }
 
-TEST(FrameReader, GivesBackWhatALongFrameTook) {
+TEST(FrameReader, FreesTheMemoryOfALongFrame) {
   capnp::MallocMessageBuilder message;
   message.initRoot<wire::Frame>().initItems(1)[0].initFarewell().initReason(16u << 20);
   Reading reading;
@@ -190,15 +190,15 @@ TEST(FrameReader, GivesBackWhatALongFrameTook) {
   EXPECT_THAT(reading.stamps(), ElementsAre(1));
 }
 
-// A thousand items that all point to one blob of 100 kB: 100 MB to copy for whoever believes it.
-TEST(FrameReader, DoesNotReadTheSameBytesOverAndOver) {
+// A thousand items point to the same text of 100 kB, so that a reader might copy 100 MB.
+TEST(FrameReader, LimitsHowOftenTheSameBytesAreRead) {
   constexpr capnp::uint kItems = 1000;
   capnp::MallocMessageBuilder message(1u << 20);
   auto items = message.initRoot<wire::Frame>().initItems(kItems);
   items[0].initFarewell().initReason(100'000);
   auto bytes = bytesOf(message);
-  // Each item is two words, its pointer the second one: a struct pointer's offset counts from
-  // behind itself.
+  // Each item has two words, the second of which is a struct pointer. Its offset counts from the
+  // word after the pointer.
   constexpr std::size_t kFirstItem = 8 + 3 * 8;
   std::uint64_t pointer = 0;
   std::memcpy(&pointer, &bytes[kFirstItem + 8], sizeof pointer);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Line, and the peer at its other end made by hand: what it sends are bytes, what it gets are
-// items as text.
+// LineTest: a Line, and a peer that the test plays: it sends bytes, and receives items as text.
 //
 // Threads  one, with its event loop.
 #pragma once
@@ -31,7 +30,7 @@ using router::ProtocolError;
 
 class LineTest : public testing::Test, public Line::Owner {
  protected:
-  // no pings but those that a test asks for
+  // A long dead time, so that the line sends pings only in tests that want them.
   LineTest() { limits_.deadTime = limits_.handshakeTime = std::chrono::minutes(10); }
   ~LineTest() noexcept override = default;
 
@@ -41,7 +40,7 @@ class LineTest : public testing::Test, public Line::Owner {
     running_ = nullptr;
     line_ = nullptr;
   }
-  // As before start().
+  // Returns to the state before start().
   void restart() {
     hangUp();
     pipe_ = kj::newTwoWayPipe();
@@ -59,17 +58,17 @@ class LineTest : public testing::Test, public Line::Owner {
                    .then([this](LineEnd end) { end_ = std::move(end.text); })
                    .eagerlyEvaluate(nullptr);
   }
-  // The same, and both have greeted.
+  // Starts the line and exchanges greetings.
   void startGreeted(const Fill& ours = greeting()) {
     start();
     EXPECT_THAT(receive(), testing::ElementsAre(testing::HasSubstr("greeting = ")));
     send(frameOf({ours}));
     EXPECT_THAT(receive(), testing::ElementsAre(testing::StartsWith("(ping = ")))
-        << "to know the round trip";
+        << "it measures the round trip";
     EXPECT_THAT(said_, testing::ElementsAre("greeted"));
     said_.clear();
   }
-  // Lets everything happen that can.
+  // Runs the event loop until no task is ready.
   void settle() { io_.waitScope.poll(); }
   void waitForEnd() {
     while (end_.empty()) io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
@@ -77,12 +76,12 @@ class LineTest : public testing::Test, public Line::Owner {
 
   // ---- the peer
 
-  // Until the line has read it all.
+  // Waits until the line has read all bytes.
   void send(const Bytes& bytes) {
     peer_->write(bytes.data(), bytes.size()).wait(io_.waitScope);
     settle();
   }
-  // Without waiting for that.
+  // Does not wait until the line has read the bytes.
   void beginToSend(Bytes bytes) {
     auto kept = kj::heap(std::move(bytes));
     sending_ = peer_->write(kept->data(), kept->size())
@@ -90,7 +89,7 @@ class LineTest : public testing::Test, public Line::Owner {
                    .then([this] { sent_ = true; })
                    .eagerlyEvaluate(nullptr);
   }
-  // Items of the next frame; "end" when there is none any more.
+  // The items of the next frame; "end" at the end of the stream.
   std::vector<std::string> receive() {
     settle();
     auto frame =
@@ -109,7 +108,7 @@ class LineTest : public testing::Test, public Line::Owner {
     peer_->shutdownWrite();
     settle();
   }
-  // The farewell's code and reason, when it is the next frame; the peer closes then, as it should.
+  // Returns the farewell, which is the next frame, and closes the connection as a peer must.
   std::string farewell() {
     const auto items = receive();
     close();
@@ -141,15 +140,15 @@ class LineTest : public testing::Test, public Line::Owner {
   const Watchdog watchdog_{"a line"};
   kj::AsyncIoContext io_ = kj::setupAsyncIo();
   router::Limits limits_;
-  // holds nothing: what is written waits for its reader
+  // Has no buffer: a write ends when its bytes have been read.
   kj::TwoWayPipe pipe_ = kj::newTwoWayPipe();
   kj::Own<kj::AsyncIoStream> peer_ = kj::mv(pipe_.ends[1]);
   layout::RouterLine row_{};
   router::PeerRecord record_{row_};
   std::unique_ptr<Line> line_;
-  std::vector<std::string> said_;  // to the owner
-  std::string end_;  // of the line
-  bool sent_ = false;  // what beginToSend() began
+  std::vector<std::string> said_;  // what the line has reported to its owner
+  std::string end_;                // why the line ended; empty: it has not
+  bool sent_ = false;              // the bytes of beginToSend() have been read
   std::function<void(wire::Item::Reader)> onItem_;
   std::function<void()> onRoom_;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Line: signs of life, which are asked for, given and missed.
+// Line: asks for signs of life, gives them, and ends when they are missing.
 #include "tests/router/transport/line_fixture.h"
 
 namespace mpf::test {
@@ -11,18 +11,18 @@ using testing::HasSubstr;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST_F(LineTest, EndsWhenNoGreetingComes) {
+TEST_F(LineTest, EndsWithoutAGreeting) {
   limits_.deadTime = 100ms;
   start();
   receive();
 
   EXPECT_THAT(farewell(), HasSubstr("code = silence"));
-  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for 1"));
+  EXPECT_THAT(end_, StartsWith("received nothing from the peer for 1"));
 }
 
-// They are signs of life, and no greeting.
-TEST_F(LineTest, EndsWhenOnlyEmptyFramesCome) {
-  pipe_ = io_.provider->newTwoWayPipe();  // the kernel's, which keeps what is written
+// Empty frames are signs of life, but they do not replace the greeting.
+TEST_F(LineTest, EndsWhenOnlyEmptyFramesArrive) {
+  pipe_ = io_.provider->newTwoWayPipe();  // of the kernel, which has a buffer
   peer_ = kj::mv(pipe_.ends[1]);
   limits_.handshakeTime = 100ms;
   start();
@@ -35,16 +35,16 @@ TEST_F(LineTest, EndsWhenOnlyEmptyFramesCome) {
   EXPECT_EQ(end_, "the peer sent no greeting within 100 ms (handshake-time)");
 }
 
-TEST_F(LineTest, EndsWhenThePeerFallsSilentAndDoesNotReadEither) {
+TEST_F(LineTest, EndsWhenThePeerNeitherSendsNorReads) {
   limits_.deadTime = 100ms;
   startGreeted();
 
   waitForEnd();
 
-  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for"));
+  EXPECT_THAT(end_, StartsWith("received nothing from the peer for"));
 }
 
-TEST_F(LineTest, PingsAndLivesWhileItIsAnswered) {
+TEST_F(LineTest, PingsAndContinuesWhileThePeerAnswers) {
   limits_.deadTime = 400ms;
   startGreeted();
 
@@ -56,8 +56,8 @@ TEST_F(LineTest, PingsAndLivesWhileItIsAnswered) {
   EXPECT_EQ(end_, "");
 }
 
-TEST_F(LineTest, HearsWhatWasSaidWhileItDidNotRun) {
-  pipe_ = io_.provider->newTwoWayPipe();  // the kernel's, which keeps what is written
+TEST_F(LineTest, ReadsDataThatArrivedWhileItDidNotRun) {
+  pipe_ = io_.provider->newTwoWayPipe();  // of the kernel, which has a buffer
   peer_ = kj::mv(pipe_.ends[1]);
   limits_.deadTime = 100ms;
   startGreeted();
@@ -70,8 +70,7 @@ TEST_F(LineTest, HearsWhatWasSaidWhileItDidNotRun) {
     ASSERT_THAT(items.back(), HasSubstr("ping"));
 }
 
-// A host that was stopped, with routers at both ends of a line: neither has anything to read at
-// first.
+// A host was suspended with both ends of a line, so that at first neither end has anything to read.
 TEST_F(LineTest, DoesNotCountTheTimeWhenItDidNotRun) {
   limits_.deadTime = 400ms;
   startGreeted();
@@ -83,8 +82,8 @@ TEST_F(LineTest, DoesNotCountTheTimeWhenItDidNotRun) {
   EXPECT_EQ(end_, "");
 }
 
-// A peer behind a thin line takes its time over a long message.
-TEST_F(LineTest, LivesWhileALongFrameComes) {
+// A long message may take longer than the dead time on a slow network.
+TEST_F(LineTest, ContinuesWhileALongFrameArrives) {
   limits_.deadTime = 400ms;
   startGreeted();
   const auto bytes = frameOf({[](wire::Item::Builder item) {
@@ -102,7 +101,7 @@ TEST_F(LineTest, LivesWhileALongFrameComes) {
   EXPECT_EQ(end_, "");
 }
 
-TEST_F(LineTest, EndsWhenAFrameComesDripByDrip) {
+TEST_F(LineTest, EndsWhenAFrameArrivesTooSlowly) {
   limits_.deadTime = 200ms;
   startGreeted();
   const auto bytes = frameOf({ping(1)});
@@ -112,10 +111,10 @@ TEST_F(LineTest, EndsWhenAFrameComesDripByDrip) {
     if (end_.empty()) send({bytes[at]});
   }
 
-  EXPECT_THAT(end_, StartsWith("nothing was heard of the peer for"));
+  EXPECT_THAT(end_, StartsWith("received nothing from the peer for"));
 }
 
-TEST_F(LineTest, SendsEachPingBack) {
+TEST_F(LineTest, AnswersEachPing) {
   startGreeted();
 
   beginToSend(frameOf({ping(7), ping(8)}));
@@ -123,9 +122,9 @@ TEST_F(LineTest, SendsEachPingBack) {
   EXPECT_THAT(receive(), ElementsAre("(pong = (stamp = 7))", "(pong = (stamp = 8))"));
 }
 
-// Counts its own pings in a second in which the peer asks again and again, as long as the peer did
-// so in time: it may be held up, too.
-TEST_F(LineTest, LeavesAskingForSignsOfLifeToAPeerThatDoesSo) {
+// Counts the pings of the line during a second in which the peer sends pings. Repeats this when the
+// test itself was delayed, so that a ping of the peer was late.
+TEST_F(LineTest, SendsNoPingsWhileThePeerSendsThem) {
   constexpr auto kHalf = 200ms;
   limits_.deadTime = 2 * kHalf;
   int pings = 0;

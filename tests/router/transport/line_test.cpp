@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Line: how it begins and ends, and what shares a frame.
+// Line: its start and its end, and the messages that share a frame.
 #include "tests/router/transport/line_fixture.h"
 
 namespace mpf::test {
@@ -13,16 +13,16 @@ using testing::IsEmpty;
 using testing::SizeIs;
 using testing::StartsWith;
 
-// ---- the beginning
+// ---- the start
 
-TEST_F(LineTest, GreetsAtOnceAndAlone) {
+TEST_F(LineTest, SendsItsGreetingAtOnceInAFrameOfItsOwn) {
   start();
 
   EXPECT_THAT(receive(), ElementsAre(AllOf(HasSubstr("greeting = "), HasSubstr("protocolMajor = 1"),
                                            HasSubstr("maxFrameBytes = 68157440"))));
 }
 
-TEST_F(LineTest, TellsItsOwnerOfThePeersGreetingAndOfItemsBehindIt) {
+TEST_F(LineTest, ReportsThePeersGreetingAndLaterItems) {
   start();
   receive();
 
@@ -49,7 +49,7 @@ INSTANTIATE_TEST_SUITE_P(AsFirstItem, NoGreetingTest,
                                          Fill([](wire::Item::Builder item) { item.setClose(1); }),
                                          Fill([](wire::Item::Builder) {})));
 
-TEST_F(LineTest, EndsAtAnotherMajorVersion) {
+TEST_F(LineTest, EndsWithAPeerOfAnotherMajorVersion) {
   start();
   receive();
 
@@ -59,11 +59,11 @@ TEST_F(LineTest, EndsAtAnotherMajorVersion) {
   EXPECT_THAT(end_, HasSubstr("this router 1.x"));
 }
 
-TEST_F(LineTest, TakesAnyMinorVersion) {
+TEST_F(LineTest, AcceptsAnyMinorVersion) {
   startGreeted(greeting([](auto greeting) { greeting.setProtocolMinor(999); }));
 }
 
-TEST_F(LineTest, EndsWhenThePeerReadsShortFramesOnly) {
+TEST_F(LineTest, EndsWhenThePeerAcceptsOnlyShortFrames) {
   start();
   receive();
 
@@ -72,8 +72,8 @@ TEST_F(LineTest, EndsWhenThePeerReadsShortFramesOnly) {
   EXPECT_THAT(farewell(), AllOf(HasSubstr("code = protocol"), HasSubstr("65535")));
 }
 
-// The beginning of a handshake, and the alert by which TLS answers a plain greeting.
-TEST_F(LineTest, SaysThatThePeerUsesTls) {
+// The first bytes of a handshake, and the alert with which TLS answers a plain greeting.
+TEST_F(LineTest, ReportsThatThePeerUsesTls) {
   for (const Bytes& bytes : {Bytes{0x16, 3, 1, 2, 0, 1}, Bytes{0x15, 3, 1, 0, 2, 2, 70}}) {
     start();
     receive();
@@ -85,7 +85,7 @@ TEST_F(LineTest, SaysThatThePeerUsesTls) {
   }
 }
 
-TEST_F(LineTest, SaysWhatMayBeWrongWithAPeerThatClosesBeforeItsGreeting) {
+TEST_F(LineTest, ExplainsAPeerThatClosesBeforeItsGreeting) {
   start();
   receive();
 
@@ -96,8 +96,8 @@ TEST_F(LineTest, SaysWhatMayBeWrongWithAPeerThatClosesBeforeItsGreeting) {
               StartsWith("the peer closed the connection before its greeting: is it a router"));
 }
 
-// Before it has said who it is, nobody gets memory.
-TEST_F(LineTest, TakesNoLongGreeting) {
+// A peer gets no memory for long frames before its greeting.
+TEST_F(LineTest, EndsAtALongGreeting) {
   start();
   receive();
 
@@ -107,7 +107,7 @@ TEST_F(LineTest, TakesNoLongGreeting) {
   EXPECT_THAT(farewell(), HasSubstr("code = limit"));
 }
 
-TEST_F(LineTest, CutsAndCleansWhatAPeerSaysForPeople) {
+TEST_F(LineTest, EscapesAndShortensTextsOfThePeer) {
   startGreeted(
       greeting([](auto greeting) { greeting.setRouter("evil\n\x1b[2J" + std::string(300, 'x')); }));
 
@@ -125,16 +125,16 @@ TEST_F(LineTest, EndsWhenThePeerCloses) {
   EXPECT_EQ(end_, "the peer closed the connection");
 }
 
-TEST_F(LineTest, EndsWhenThePeerSaysFarewell) {
+TEST_F(LineTest, EndsWithThePeersFarewell) {
   startGreeted();
 
   send(frameOf(
       {[](wire::Item::Builder item) { item.initFarewell().setReason("good night"); }, ping(1)}));
 
-  EXPECT_EQ(end_, "the peer says: good night");
+  EXPECT_EQ(end_, "the peer ended the connection: good night");
 }
 
-TEST_F(LineTest, SaysFarewellBehindWhatWaits) {
+TEST_F(LineTest, SendsItsFarewellAfterWaitingItems) {
   startGreeted();
   line_->send(request(1));
   settle();
@@ -145,7 +145,8 @@ TEST_F(LineTest, SaysFarewellBehindWhatWaits) {
 
   EXPECT_THAT(receive(), ElementsAre(HasSubstr("requestId = 1")));
   EXPECT_THAT(receive(), ElementsAre(HasSubstr("requestId = 2"), HasSubstr("code = stopping")));
-  EXPECT_EQ(end_, "") << "what the peer still sends would take the farewell back";
+  EXPECT_EQ(end_, "")
+      << "unread data of the peer would reset the connection before it reads the farewell";
   send(frameOf({ping(1)}));
   EXPECT_EQ(end_, "");
   close();
@@ -153,10 +154,10 @@ TEST_F(LineTest, SaysFarewellBehindWhatWaits) {
   EXPECT_THAT(line_->takeUnsentRequests(), SizeIs(1));
 }
 
-TEST_F(LineTest, GivesBackRequestsThatNeverReachedTheStream) {
+TEST_F(LineTest, ReturnsRequestsThatWereNeverWritten) {
   startGreeted();
   line_->send(request(1));
-  settle();  // is being written: it may arrive
+  settle();  // it is being written, and may arrive
   line_->send(request(2));
   line_->send(request(3));
 
@@ -169,10 +170,10 @@ TEST_F(LineTest, GivesBackRequestsThatNeverReachedTheStream) {
   EXPECT_EQ(unsent[1].requestId, 3u);
 }
 
-TEST_F(LineTest, EndsWithAFarewellWhenAFrameIsNone) {
+TEST_F(LineTest, EndsWithAFarewellAtAnInvalidFrame) {
   startGreeted();
   auto bytes = frameOf({ping(1)});
-  bytes[8] = 0xfc;  // the root leads nowhere
+  bytes[8] = 0xfc;  // an invalid root pointer
 
   send(bytes);
 
@@ -189,9 +190,9 @@ TEST_F(LineTest, EndsWithTheCodeThatItsOwnerThrows) {
   EXPECT_THAT(farewell(), AllOf(HasSubstr("code = limit"), HasSubstr("too many")));
 }
 
-// ---- what shares a frame
+// ---- messages that share a frame
 
-TEST_F(LineTest, OneMessageGoesAtOnceWhenTheLineIsFree) {
+TEST_F(LineTest, SendsAMessageAtOnceWhenItIsIdle) {
   startGreeted();
 
   for (std::uint32_t id = 1; id <= 3; ++id) {
@@ -200,7 +201,7 @@ TEST_F(LineTest, OneMessageGoesAtOnceWhenTheLineIsFree) {
   }
 }
 
-TEST_F(LineTest, MessagesThatComeWhileAFrameIsWrittenShareTheNext) {
+TEST_F(LineTest, MessagesQueuedDuringAWriteShareTheNextFrame) {
   startGreeted();
   line_->send(request(1));
   settle();
@@ -217,7 +218,7 @@ TEST_F(LineTest, MessagesThatComeWhileAFrameIsWrittenShareTheNext) {
     EXPECT_THAT(items[at], HasSubstr("requestId = " + std::to_string(at + 2) + ","));
 }
 
-TEST_F(LineTest, AFrameEndsAtItsSize) {
+TEST_F(LineTest, AFrameIsLimitedToTheBufferSize) {
   limits_.bufferBytes = 4096;
   startGreeted();
   const auto sendArray = [&](std::uint32_t id, std::size_t bytes) {
@@ -233,7 +234,7 @@ TEST_F(LineTest, AFrameEndsAtItsSize) {
 
   EXPECT_THAT(receive(), SizeIs(3));
   EXPECT_THAT(receive(), SizeIs(3));
-  EXPECT_THAT(receive(), SizeIs(1)) << "longer than a frame should be";
+  EXPECT_THAT(receive(), SizeIs(1)) << "larger than the buffer size";
   EXPECT_THAT(receive(), ElementsAre(HasSubstr("requestId = 8")));
 }
 
@@ -258,7 +259,7 @@ TEST_F(LineTest, HasNoRoomWhileItsQueueIsFull) {
 
 // ---- limits
 
-TEST_F(LineTest, AMessageThatIsTooLargeStaysWhereItIs) {
+TEST_F(LineTest, DoesNotSendAMessageThatIsTooLarge) {
   limits_.maxMessageBytes = 1000;
   startGreeted();
   auto message =
@@ -272,32 +273,32 @@ TEST_F(LineTest, AMessageThatIsTooLargeStaysWhereItIs) {
               ElementsAre(AllOf(HasSubstr("cannot send 1"), HasSubstr("the limit is 1000"))));
 }
 
-TEST_F(LineTest, SendsNoMoreThanThePeerTakes) {
+TEST_F(LineTest, SendsNoMessageThatExceedsThePeersFrames) {
   startGreeted(greeting([](auto greeting) { greeting.setMaxFrameBytes(65'536); }));
 
   EXPECT_LT(line_->maxMessageBytes(), 65'536u - 256);
 }
 
-// Its own questions, that is: answers would gather here for ever.
-TEST_F(LineTest, DoesNotReadAPeerThatDoesNotRead) {
+// Otherwise the answers to its pings would gather here without a limit.
+TEST_F(LineTest, StopsReadingFromAPeerThatDoesNotRead) {
   startGreeted();
   constexpr std::uint64_t kPings = 100'000;
   std::vector<Fill> pings;
   for (std::uint64_t stamp = 0; stamp < kPings; ++stamp) pings.push_back(ping(stamp));
 
-  beginToSend(joined({frameOf(pings), Bytes(std::size_t{8} << 20)}));  // which no buffer holds
+  beginToSend(joined({frameOf(pings), Bytes(std::size_t{8} << 20)}));  // too large for any buffer
   settle();
   EXPECT_FALSE(sent_);
 
   for (std::uint64_t stamp = 0; stamp < kPings;) {
     for (const auto& item : receive()) {
-      if (stamp == kPings) break;  // a farewell: the zeros are no frame
+      if (stamp == kPings) break;  // a farewell: the zeros are not a valid frame
       ASSERT_EQ(item, "(pong = (stamp = " + std::to_string(stamp++) + "))");
     }
   }
 }
 
-TEST_F(LineTest, LeavesTheLoopToOthersDuringALongFrame) {
+TEST_F(LineTest, LetsOtherTasksRunDuringALongFrame) {
   startGreeted();
   onItem_ = [until = std::int64_t{0}](auto) mutable {
     for (until = Clock::nowNs() + 100'000; Clock::nowNs() < until;) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A Line and a peer of another minor version: what is not known is ignored, what is not there is as
-// it was.
+// A Line and a peer of another minor version: unknown fields and items are ignored, and missing
+// fields have their default values.
 #include "tests/router/newer_router.capnp.h"
 #include "tests/router/transport/line_fixture.h"
 
@@ -11,7 +11,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// A frame of a newer peer, with all that is new in it.
+// A frame of a newer peer, with the fields that are new.
 Bytes newerFrame(const std::vector<std::function<void(newer::Item::Builder)>>& items) {
   capnp::MallocMessageBuilder message;
   auto frame = message.initRoot<newer::Frame>();
@@ -59,7 +59,7 @@ TEST_F(NewerPeerTest, IsGreeted) {
   EXPECT_EQ(line_->peer().maxClients, 77u);
 }
 
-// The owner gets them as they are, in their places, and leaves them alone.
+// The owner gets them in their order, and ignores them.
 TEST_F(NewerPeerTest, ItemsOfUnknownKindsDoNotEndTheLine) {
   int unknown = 0;
   onItem_ = [&](wire::Item::Reader item) {
@@ -93,7 +93,7 @@ TEST_F(NewerPeerTest, FieldsThatAreNewAreIgnored) {
                                        HasSubstr("clientType = 8"), HasSubstr("value = 10"))));
 }
 
-TEST_F(NewerPeerTest, AMessageOfAnUnknownTypeIsKnownAsSuch) {
+TEST_F(NewerPeerTest, AMessageOfAnUnknownTypeIsReportedAsSuch) {
   ConversionError error;
   onItem_ = [&](wire::Item::Reader item) {
     EXPECT_FALSE(tryFromWire(item.getRequest().getMessage(), {}, error));
@@ -108,7 +108,7 @@ TEST_F(NewerPeerTest, AMessageOfAnUnknownTypeIsKnownAsSuch) {
   EXPECT_EQ(end_, "");
 }
 
-// Its greeting is shorter than ours; a field that is not there is 0, "not said".
+// Its greeting is shorter than ours; a missing field is 0, which means "not specified".
 TEST_F(LineTest, AnOlderPeerIsGreeted) {
   start();
   receive();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who calls a listening address, and who only holds a place there.
+// Listener: TLS handshakes, and connections that never finish theirs.
 #include "router/transport/listener.h"
 
 #include <arpa/inet.h>
@@ -27,8 +27,8 @@ using testing::HasSubstr;
 
 constexpr int kIdlers = 300;
 
-// From this address of the host.
-FileDescriptor callAt(std::uint16_t port, std::uint32_t from = INADDR_LOOPBACK) {
+// Connects from the address `from` of this host.
+FileDescriptor connectTo(std::uint16_t port, std::uint32_t from = INADDR_LOOPBACK) {
   FileDescriptor caller(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -56,7 +56,7 @@ class ListenerTest : public testing::Test {
     listener_.start().wait(io_.waitScope);
     port_ = listener_.address().port;
   }
-  // A caller that has connected and has yet to do its handshake.
+  // Connects without a handshake.
   kj::Own<kj::AsyncIoStream> begin() {
     return network()
         .parseAddress("127.0.0.1", port_)
@@ -78,12 +78,12 @@ class ListenerTest : public testing::Test {
   bool tryCall() try { return call() == "honest"; } catch (const kj::Exception&) {
     return false;
   }
-  // Lets the listener work until that is so.
+  // Runs the event loop until `condition` is true.
   template <class Condition>
   void runUntil(Condition condition) {
     while (!condition()) io_.provider->getTimer().afterDelay(kj::MILLISECONDS).wait(io_.waitScope);
   }
-  static RouterConfig withPatience() {
+  static RouterConfig withLongHandshakeTime() {
     RouterConfig config;
     config.limits.handshakeTime = std::chrono::hours(1);
     return config;
@@ -106,7 +106,7 @@ class ListenerTest : public testing::Test {
       .log = Log([this](Log::Level, const std::string& text) { said_ += text + '\n'; }),
       .statistics = statistics_,
       .presences = presences_,
-      .config = withPatience(),
+      .config = withLongHandshakeTime(),
       .tls = std::make_shared<Tls>(ours_.files("server"), io_.provider->getTimer())};
   kj::Own<kj::PromiseFulfiller<std::string>> called_;
   Listener listener_{
@@ -119,7 +119,7 @@ class ListenerTest : public testing::Test {
 TEST_F(ListenerTest, ClosesTheOldestOfTooManyHandshakes) {
   listen();
   std::vector<FileDescriptor> idlers;
-  for (int i = 0; i < kIdlers; ++i) idlers.push_back(callAt(port_));
+  for (int i = 0; i < kIdlers; ++i) idlers.push_back(connectTo(port_));
 
   EXPECT_EQ(call(), "honest");
 
@@ -127,38 +127,38 @@ TEST_F(ListenerTest, ClosesTheOldestOfTooManyHandshakes) {
   EXPECT_FALSE(hasClosed(idlers.back()));
 }
 
-// However many another host begins.
-TEST_F(ListenerTest, KeepsTheHandshakeOfAHostThatHasFew) {
+// Even when another host begins many handshakes.
+TEST_F(ListenerTest, KeepsTheHandshakeOfAHostWithFew) {
   listen();
   auto slow = begin();
   std::vector<FileDescriptor> idlers;
-  for (int i = 0; i < kIdlers; ++i) idlers.push_back(callAt(port_, INADDR_LOOPBACK + 1));
+  for (int i = 0; i < kIdlers; ++i) idlers.push_back(connectTo(port_, INADDR_LOOPBACK + 1));
   runUntil([&] { return hasClosed(idlers.front()); });
 
   EXPECT_EQ(finish(kj::mv(slow)), "honest");
 }
 
-// Those that send nothing, and those that begin a handshake and stop.
+// Some peers send nothing; others begin a handshake and stop.
 TEST_F(ListenerTest, ClosesHandshakesThatTakeTooLongWhileOthersConnect) {
   here_.config.limits.handshakeTime = std::chrono::milliseconds(500);
   listen();
   std::vector<FileDescriptor> idlers;
   for (int i = 0; i < kIdlers; ++i) {
-    idlers.push_back(callAt(port_));
+    idlers.push_back(connectTo(port_));
     if (i % 2 == 0) {
       EXPECT_EQ(::send(idlers.back().get(), "\x16\x03\x01", 3, MSG_NOSIGNAL), 3);
     }
   }
 
-  while (!tryCall()) {  // on a busy host the time may be short for it, too
+  while (!tryCall()) {  // on a busy host this handshake may take too long as well
   }
   for (const auto& idler : idlers) runUntil([&] { return hasClosed(idler); });
   EXPECT_THAT(said_, HasSubstr("did not finish the TLS handshake in time (handshake-time)"));
 }
 
-TEST_F(ListenerTest, TellsACallerInPlainTcpThatItExpectsTls) {
+TEST_F(ListenerTest, SendsAFarewellToAPeerThatUsesPlainTcp) {
   listen();
-  const auto caller = callAt(port_);
+  const auto caller = connectTo(port_);
   const auto bytes = mpf::test::frameOf({mpf::test::greeting()});
   ASSERT_EQ(::send(caller.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL),
             static_cast<ssize_t>(bytes.size()));
@@ -176,9 +176,9 @@ TEST_F(ListenerTest, TellsACallerInPlainTcpThatItExpectsTls) {
   runUntil([&] { return hasClosed(caller); });
 }
 
-TEST_F(ListenerTest, ClosesCallersThatAreNoRouters) {
+TEST_F(ListenerTest, ClosesConnectionsOfOtherProtocols) {
   listen();
-  const auto caller = callAt(port_);
+  const auto caller = connectTo(port_);
   ASSERT_EQ(::send(caller.get(), "GET / HTTP/1.1\r\n\r\n", 18, MSG_NOSIGNAL), 18);
 
   runUntil([&] { return said_.find("the peer does not use TLS") != std::string::npos; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two routers' ends of a connection, with and without the right certificates.
+// Tls: both ends of a connection, with valid and with invalid certificates.
 #include "router/transport/tls.h"
 
 #include <cstdlib>
@@ -28,13 +28,13 @@ const std::string kNoTls =
 
 class TlsTest : public testing::Test {
  public:
-  ~TlsTest() noexcept override = default;  // what kj has may throw as it goes
+  ~TlsTest() noexcept override = default;  // kj's destructors may throw
 
  protected:
-  // How one side's handshake ended.
+  // The result of the handshake on one side.
   struct Side {
     kj::Maybe<kj::AuthenticatedStream> connected;
-    std::string trouble;  // or that of the first read, for the client side
+    std::string problem;  // of the handshake or, on the client side, of the first read
   };
   struct Sides {
     Side server, client;
@@ -45,7 +45,7 @@ class TlsTest : public testing::Test {
     return {kj::mv(stream), kj::UnknownPeerIdentity::newInstance()};
   }
 
-  // Lets both sides do their handshake, and the client side read what it gets.
+  // Does the handshake on both sides.
   Sides shakeHands(Tls& server, Tls& client, const std::string& name) {
     auto pipe = io_.provider->newTwoWayPipe();
     Sides sides;
@@ -55,31 +55,31 @@ class TlsTest : public testing::Test {
     connected.wait(io_.waitScope);
     return sides;
   }
-  // A connection is closed as soon as its handshake failed, as a router does.
+  // Closes the connection when its handshake fails, as a router does.
   kj::Promise<void> watch(Handshake handshake, Side& side) {
     return handshake
         .then([&](kj::AuthenticatedStream stream) { side.connected = kj::mv(stream); },
-              [&](kj::Exception&& error) { side.trouble = tlsTrouble(error); })
+              [&](kj::Exception&& error) { side.problem = tlsProblem(error); })
         .eagerlyEvaluate(nullptr);
   }
   static kj::AuthenticatedStream& streamOf(Side& side) {
     KJ_IF_MAYBE (stream, side.connected) return *stream;
-    throw std::runtime_error("the handshake failed: " + side.trouble);
+    throw std::runtime_error("the handshake failed: " + side.problem);
   }
   static std::string nameOf(Side& side) { return peerName(*streamOf(side).peerIdentity); }
-  // What the client side, which had connected, is told when it reads.
-  std::string troubleOfRead(Side& side) {
+  // Why the first read of the client side fails, after a successful connect().
+  std::string problemOfRead(Side& side) {
     char byte = 0;
-    std::string trouble = "nothing";
+    std::string problem = "nothing";
     streamOf(side)
         .stream->tryRead(&byte, 1, 1)
-        .then([&](std::size_t length) { trouble = length == 0 ? "end" : "a byte"; },
-              [&](kj::Exception&& error) { trouble = tlsTrouble(error); })
+        .then([&](std::size_t length) { problem = length == 0 ? "end" : "a byte"; },
+              [&](kj::Exception&& error) { problem = tlsProblem(error); })
         .wait(io_.waitScope);
-    return trouble;
+    return problem;
   }
-  // The trouble of a server side that somebody sends these bytes to.
-  std::string troubleOfAccepting(kj::StringPtr bytes) {
+  // Why the handshake fails on a server side that receives these bytes.
+  std::string problemOfAccepting(kj::StringPtr bytes) {
     Tls server(ours_.files("server"), io_.provider->getTimer());
     auto pipe = io_.provider->newTwoWayPipe();
     Side side;
@@ -88,7 +88,7 @@ class TlsTest : public testing::Test {
     pipe.ends[1]->shutdownWrite();
     accepted.wait(io_.waitScope);
     EXPECT_EQ(side.connected, nullptr);
-    return side.trouble;
+    return side.problem;
   }
   std::unique_ptr<Tls> tls(const TlsFiles& files) {
     return std::make_unique<Tls>(files, io_.provider->getTimer(), 1h);
@@ -100,7 +100,7 @@ class TlsTest : public testing::Test {
   kj::AsyncIoContext io_ = kj::setupAsyncIo();
 };
 
-TEST_F(TlsTest, CarriesBytesBothWaysAndNames) {
+TEST_F(TlsTest, CarriesBytesBothWaysAndShowsThePeersNames) {
   auto sides =
       shakeHands(*tls(ours_.files("server.lab")), *tls(ours_.files("client.lab")), "server.lab");
 
@@ -123,13 +123,12 @@ TEST_F(TlsTest, RefusesAClientOfAnotherAuthority) {
 
   auto sides = shakeHands(*tls(ours_.files("server")), *tls(stranger), "server");
 
-  EXPECT_EQ(sides.server.trouble, kNotOurs + ", or is not valid now");
-  EXPECT_EQ(troubleOfRead(sides.client),
+  EXPECT_EQ(sides.server.problem, kNotOurs + ", or is not valid now");
+  EXPECT_EQ(problemOfRead(sides.client),
             "the peer refused our certificate: its authorities did not sign it");
 }
 
-// Whom all programs of this host trust is not asked.
-TEST_F(TlsTest, DoesNotTrustWhomTheHostTrusts) {
+TEST_F(TlsTest, DoesNotTrustTheAuthoritiesOfTheHost) {
   const Certificates hosts(folder_, "hosts");
   ::setenv("SSL_CERT_FILE", hosts.authorities().c_str(), 1);
   auto stranger = hosts.files("client");
@@ -138,7 +137,7 @@ TEST_F(TlsTest, DoesNotTrustWhomTheHostTrusts) {
   auto sides = shakeHands(*tls(ours_.files("server")), *tls(stranger), "server");
 
   ::unsetenv("SSL_CERT_FILE");
-  EXPECT_EQ(sides.server.trouble, kNotOurs + ", or is not valid now");
+  EXPECT_EQ(sides.server.problem, kNotOurs + ", or is not valid now");
 }
 
 TEST_F(TlsTest, RefusesAServerOfAnotherAuthority) {
@@ -146,11 +145,11 @@ TEST_F(TlsTest, RefusesAServerOfAnotherAuthority) {
   auto stranger = theirs.files("server");
   stranger.authorities = ours_.authorities();
 
-  EXPECT_EQ(shakeHands(*tls(stranger), *tls(ours_.files("client")), "server").client.trouble,
+  EXPECT_EQ(shakeHands(*tls(stranger), *tls(ours_.files("client")), "server").client.problem,
             kNotOurs);
 }
 
-// The bundle of a change of authorities: the old one and the new one.
+// As during a change of authorities: the file contains the old one and the new one.
 TEST_F(TlsTest, TrustsEachOfItsAuthorities) {
   const Certificates theirs(folder_, "theirs");
   auto server = ours_.files("server");
@@ -170,23 +169,23 @@ TEST_F(TlsTest, RefusesCertificatesThatAreNotValidNow) {
   auto client = tls(ours_.files("client"));
 
   EXPECT_EQ(
-      shakeHands(*tls(ours_.files("server", Valid::notAnyMore)), *client, "server").client.trouble,
+      shakeHands(*tls(ours_.files("server", Valid::notAnyMore)), *client, "server").client.problem,
       "the peer's certificate has expired");
   EXPECT_EQ(
-      shakeHands(*tls(ours_.files("server", Valid::notYet)), *client, "server").client.trouble,
+      shakeHands(*tls(ours_.files("server", Valid::notYet)), *client, "server").client.problem,
       "the peer's certificate is not valid yet");
   auto sides = shakeHands(*server, *tls(ours_.files("client", Valid::notAnyMore)), "server");
-  EXPECT_EQ(sides.server.trouble, kNotOurs + ", or is not valid now");
-  EXPECT_EQ(troubleOfRead(sides.client), "the peer refused our certificate: it has expired");
+  EXPECT_EQ(sides.server.problem, kNotOurs + ", or is not valid now");
+  EXPECT_EQ(problemOfRead(sides.client), "the peer refused our certificate: it has expired");
   EXPECT_EQ(
-      shakeHands(*server, *tls(ours_.files("client", Valid::notYet)), "server").server.trouble,
+      shakeHands(*server, *tls(ours_.files("client", Valid::notYet)), "server").server.problem,
       kNotOurs + ", or is not valid now");
 }
 
 TEST_F(TlsTest, RefusesAServerOfAnotherName) {
   auto sides = shakeHands(*tls(ours_.files("server")), *tls(ours_.files("client")), "other");
 
-  EXPECT_EQ(sides.client.trouble, "the peer's certificate is for another name");
+  EXPECT_EQ(sides.client.problem, "the peer's certificate is for another name");
 }
 
 TEST_F(TlsTest, RefusesAClientWithoutCertificate) {
@@ -202,26 +201,28 @@ TEST_F(TlsTest, RefusesAClientWithoutCertificate) {
       watch(stranger.wrapClient(anonymous(kj::mv(pipe.ends[1])), "server"), sides.client);
 
   connected.wait(io_.waitScope);
-  EXPECT_THAT(sides.client.trouble, HasSubstr("was not signed")) << "nor does it know us";
+  EXPECT_THAT(sides.client.problem, HasSubstr("was not signed"))
+      << "the client does not trust our authority, either";
   accepted.wait(io_.waitScope);
-  EXPECT_EQ(sides.server.trouble, "the peer sent no certificate");
+  EXPECT_EQ(sides.server.problem, "the peer sent no certificate");
 }
 
-TEST_F(TlsTest, RefusesWhoSpeaksSomethingElse) {
-  EXPECT_EQ(troubleOfAccepting("GET / HTTP/1.1\r\n\r\n"), kNoTls);
-  EXPECT_EQ(troubleOfAccepting("hello, hello, hello\n"), kNoTls);
-  const std::string frame("\0\0\0\0\x09\0\0\0\0\0\0\0\x01\0\0\0", 16);  // as a plain router begins
-  EXPECT_EQ(troubleOfAccepting(kj::StringPtr(frame.c_str(), frame.size())), kNoTls);
+TEST_F(TlsTest, RefusesOtherProtocols) {
+  EXPECT_EQ(problemOfAccepting("GET / HTTP/1.1\r\n\r\n"), kNoTls);
+  EXPECT_EQ(problemOfAccepting("hello, hello, hello\n"), kNoTls);
+  const std::string frame("\0\0\0\0\x09\0\0\0\0\0\0\0\x01\0\0\0",
+                          16);  // as a router on plain TCP begins
+  EXPECT_EQ(problemOfAccepting(kj::StringPtr(frame.c_str(), frame.size())), kNoTls);
 }
 
-TEST_F(TlsTest, RefusesWhoLeavesEarly) {
-  EXPECT_EQ(troubleOfAccepting(""), "the peer closed the connection during the TLS handshake");
-  EXPECT_EQ(troubleOfAccepting(kj::StringPtr("\x16\x03\x01", 3)),
+TEST_F(TlsTest, ReportsAPeerThatClosesDuringTheHandshake) {
+  EXPECT_EQ(problemOfAccepting(""), "the peer closed the connection during the TLS handshake");
+  EXPECT_EQ(problemOfAccepting(kj::StringPtr("\x16\x03\x01", 3)),
             "the peer closed the connection during the TLS handshake");
 }
 
-// Another program's TLS, also with the version before.
-TEST_F(TlsTest, SpeaksVersion13AndNoOlderOne) {
+// The client is another program, with this version and with the one before.
+TEST_F(TlsTest, AcceptsOnlyTls13) {
   auto server = tls(ours_.files("server"));
   const auto client = ours_.files("client");
   auto port = io_.provider->getNetwork().parseAddress("127.0.0.1:0").wait(io_.waitScope)->listen();
@@ -240,11 +241,11 @@ TEST_F(TlsTest, SpeaksVersion13AndNoOlderOne) {
   const auto older = tryWith("-tls1_2");
 
   EXPECT_EQ(nameOf(current), "client");
-  EXPECT_EQ(older.trouble, "the peer does not support TLS 1.3, the only version that routers use");
+  EXPECT_EQ(older.problem, "the peer does not support TLS 1.3, the only version that routers use");
 }
 
-// Time stands still until the test lets it go on.
-TEST_F(TlsTest, WaitsForTheHandshakeNoLongerThanItShould) {
+// The test sets the time.
+TEST_F(TlsTest, LimitsTheTimeOfTheHandshake) {
   kj::TimerImpl timer(kj::origin<kj::TimePoint>());
   Tls tls(ours_.files("both"), timer, 3s);
   auto pipe = io_.provider->newTwoWayPipe();
@@ -260,13 +261,13 @@ TEST_F(TlsTest, WaitsForTheHandshakeNoLongerThanItShould) {
 
   accepted.wait(io_.waitScope);
   connected.wait(io_.waitScope);
-  EXPECT_EQ(sides.server.trouble,
+  EXPECT_EQ(sides.server.problem,
             "the peer did not finish the TLS handshake in time (handshake-time)");
-  EXPECT_EQ(sides.client.trouble,
+  EXPECT_EQ(sides.client.problem,
             "the peer did not finish the TLS handshake in time (handshake-time)");
 }
 
-// A reloaded configuration replaces the Tls; what is connected goes on.
+// A reload replaces the Tls, and existing connections continue.
 TEST_F(TlsTest, ConnectionsOutliveIt) {
   auto server = tls(ours_.files("server"));
   auto client = tls(ours_.files("client"));

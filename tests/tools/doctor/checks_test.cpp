@@ -12,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <mpf/clock.h>
 #include <mpf/file_descriptor.h>
 
 #include "base/system_call.h"

@@ -51,7 +51,7 @@ Snapshot snapshot(std::int64_t atNs, std::vector<WindowView> servers,
 constexpr std::int64_t kHalfASecond = 500'000'000;
 
 TEST(SnapshotDelta, AServersRatesAreWhatItTookAndSent) {
-  const SnapshotDelta look(snapshot(0, {server(100, 50)}),
+  const SnapshotDelta delta(snapshot(0, {server(100, 50)}),
                            snapshot(kHalfASecond, {server(200, 80)}));
 
   const auto rates = delta.ratesOf(delta.now().servers.front());
@@ -63,7 +63,7 @@ TEST(SnapshotDelta, AServersRatesAreWhatItTookAndSent) {
 // Clients that come, ask and go between two looks leave no link behind; their requests were handled
 // all the same.
 TEST(SnapshotDelta, AServersRatesDoNotDependOnItsClientsStaying) {
-  const SnapshotDelta look(snapshot(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}),
+  const SnapshotDelta delta(snapshot(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}),
                            snapshot(kHalfASecond, {server(130, 130)}));
 
   const auto rates = delta.ratesOf(delta.now().servers.front());
@@ -73,7 +73,7 @@ TEST(SnapshotDelta, AServersRatesDoNotDependOnItsClientsStaying) {
 }
 
 TEST(SnapshotDelta, AClientsRatesAreWhatItsLinksSentAndWhatItTook) {
-  const SnapshotDelta look(
+  const SnapshotDelta delta(
       snapshot(0, {}, {client(10, {link(7, {10, 10}), link(8, {1000, 1000})})}),
       snapshot(kHalfASecond, {}, {client(15, {link(7, {20, 20}), link(9, {5, 5})})}));
 
@@ -84,7 +84,7 @@ TEST(SnapshotDelta, AClientsRatesAreWhatItsLinksSentAndWhatItTook) {
 }
 
 TEST(SnapshotDelta, WhatWasNotThereBeforeHasNoRatesYet) {
-  const SnapshotDelta look(snapshot(0, {}), snapshot(kHalfASecond, {server(100, 100)}));
+  const SnapshotDelta delta(snapshot(0, {}), snapshot(kHalfASecond, {server(100, 100)}));
 
   EXPECT_DOUBLE_EQ(delta.ratesOf(delta.now().servers.front()).receivedPerSecond, 0);
 }
@@ -99,7 +99,7 @@ TEST(SnapshotDelta, CountersThatGoBackAndClocksThatStandGiveNoRates) {
 }
 
 TEST(SnapshotDelta, WindowsAreFoundByTheirIncarnation) {
-  const SnapshotDelta look(snapshot(0, {}), snapshot(1, {server(0, 0)}, {client(0)}));
+  const SnapshotDelta delta(snapshot(0, {}), snapshot(1, {server(0, 0)}, {client(0)}));
 
   EXPECT_EQ(delta.find(kServer), &delta.now().servers.front());
   EXPECT_EQ(delta.find(kClient), &delta.now().clients.front());
@@ -107,7 +107,7 @@ TEST(SnapshotDelta, WindowsAreFoundByTheirIncarnation) {
 }
 
 std::string serverState(const WindowView& before, const WindowView& now) {
-  const SnapshotDelta look(snapshot(0, {before}), snapshot(kHalfASecond, {now}));
+  const SnapshotDelta delta(snapshot(0, {before}), snapshot(kHalfASecond, {now}));
   return delta.stateOf(delta.now().servers.front());
 }
 
@@ -139,7 +139,7 @@ TEST(SnapshotDelta, AStalledServerStaysStalledWhenAClientLeaves) {
 
 TEST(SnapshotDelta, AClientThatDoesNotTakeItsRepliesIsStalled) {
   const auto stuck = client(2, {link(7, {5, 5}, {5, 2})});
-  const SnapshotDelta look(snapshot(0, {}, {stuck}), snapshot(kHalfASecond, {}, {stuck}));
+  const SnapshotDelta delta(snapshot(0, {}, {stuck}), snapshot(kHalfASecond, {}, {stuck}));
 
   EXPECT_EQ(delta.stateOf(delta.now().clients.front()), "stalled");
 }
@@ -255,7 +255,7 @@ TEST(SnapshotDelta, AWindowOfARouterLeadsToItsConnection) {
   proxy.routerRow = 3;
   auto is = snapshot(1, {proxy, server(0, 0)});
   is.routers = {router({line("a", 0)})};
-  const SnapshotDelta look(snapshot(0, {}), std::move(is));
+  const SnapshotDelta delta(snapshot(0, {}), std::move(is));
 
   EXPECT_EQ(delta.routerOf(delta.now().servers.front()).line,
             &delta.now().routers.front().lines.front());

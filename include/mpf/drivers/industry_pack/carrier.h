@@ -61,7 +61,7 @@ class IndustryPackCarrier {
   [[nodiscard]] virtual IndustryPackSite& site(std::size_t number) = 0;
 };
 
-// The name of a site by its number: "IP_a" for 0, "IP_b" for 1, ....
+// The name of a site by its number: "IP_a" for 0, "IP_b" for 1, and so on.
 [[nodiscard]] std::string siteName(std::size_t number);
 
 // The carriers of a program, by name.

@@ -2,12 +2,13 @@
 // InterruptThread: serves the interrupts of one module on a thread of its own; detects stuck lines
 // and lost interrupts.
 //
-//   InterruptThread thread(module.interrupt(0), {.pollEvery = 100ms}, [&](InterruptThread::Cause) {
-//   return chip.serve(); });
+//   InterruptThread thread(module.interrupt(0), {.pollEvery = 100ms},
+//                          [&](InterruptThread::Cause) { return chip.serve(); });
 //
-//   line active ──► handler ──► line enabled again     the handler returns whether the chip had a request
+//   line active ──► handler ──► line enabled again     the handler returns whether the chip had a
+//                                                      request
 //   pollEvery passes ──► handler (poll)                serves a request whose interrupt was lost
-//   stormLimit spurious interrupts ──► the line is masked for stormPause, and polled meanwhile
+//   stormLimit spurious interrupts ──► the line is masked and polled for stormPause
 //   lateLimit polls find a request ──► the line is dead
 //
 // Traffic does not hide a stuck line: an interrupt with a request compensates only two spurious
@@ -16,9 +17,8 @@
 //
 // Threads  both functions run on this object's thread, one call at a time, with all signals
 //          blocked; they must not destroy this object. The other functions may be called by any
-//          thread.
-//          The thread has the real-time priority of its interrupt where the process may set it; see
-//          RealTimePriority.
+//          thread. The thread has the real-time priority of its interrupt where the process may
+//          set it; see RealTimePriority.
 // Crash    the carrier masks the line when it is opened again.
 #pragma once
 
@@ -82,7 +82,7 @@ class InterruptThread {
   void pause();
   void resume();
   void wait() const;
-  void tell(InterruptTrouble trouble) const;
+  void report(InterruptTrouble trouble) const;
   void followPolling();
   [[nodiscard]] bool isPaused() const noexcept { return !pausedUntil_.isNever(); }
 
@@ -92,7 +92,7 @@ class InterruptThread {
   TroubleHandler trouble_;
   FileDescriptor wakeUp_;
   // spurious interrupts less compensation; this and below: used by the thread only
-  int inVain_ = 0;
+  int spuriousExcess_ = 0;
   int lateInRow_ = 0;  // polls in a row that found a request
   bool isPolled_;
   Deadline pausedUntil_ = Deadline::never();

@@ -9,7 +9,9 @@
 //   auto output = wires.wire("dac.0");
 //   output.set(2.5);
 //
-//   | magic, version, capacity, changes | wire 0: state, name, value | wire 1 | ... |     in the byte order of the host
+//   | magic, version, capacity, changes | wire 0: state, name, value | wire 1 | ... |
+//
+// Numbers in the file are in the byte order of the host.
 //
 // The first process creates the file. It stays, with the last values, when all processes have
 // ended; remove it to start with all wires at 0.

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: MIT
-// PeekTaps: the listeners of a port, each of which sees every byte that crosses the line (manual,
-// "setSniffHandler"; here any number).
+// PeekTaps: the listeners ("taps") of a serial port. Each tap sees every byte that the port sends
+// or receives, and does not disturb the requests (manual, "setSniffHandler"; a port can have any
+// number of taps).
 //
-// Threads  attach and detach from any thread; handlers run on the port's thread.
+//   const auto tap = port->attachTap([](std::span<const PeekedByte> bytes) { print(bytes); });
+//   ...                                  // the handler runs until `tap` is destroyed
+//
+// Threads  attach and detach by any thread, but not from a handler; handlers run on the port's
+//          thread, one at a time.
 // Crash    nothing here survives the process.
-// Trust    a handler that blocks holds the port up; one that attaches or detaches a tap of the same
-//          port locks up.
+// Trust    a handler is code of this process: a handler that blocks delays the port, and a handler
+//          that attaches or detaches a tap of the same port deadlocks.
 #pragma once
 
 #include <cstdint>
@@ -19,33 +24,43 @@ namespace mpf {
 
 enum class ByteDirection : std::uint8_t { sent, received };
 
-// What the line did to a received byte. Parity and framing may be told apart only where the driver
-// counts them. The last two are faults of the line and of no byte: overrun, bytes came and were
-// lost before anybody read them; unplugged, the line was away for some time.
-enum class LineFault : std::uint8_t { none, parity, framing, breakSignal, overrun, unplugged };
+// A fault of a serial line. The first three faults damage a byte; the last two concern the line.
+// The kernel does not distinguish parity and framing errors; where the driver of a terminal has no
+// error counters either, damage counts as `parity` on a line with parity, else as `framing`.
+enum class LineFault : std::uint8_t {
+  none,
+  parity,
+  framing,
+  breakSignal,
+  overrun,  // received bytes were lost before the port read them
+  unplugged,  // the line was absent for some time
+};
 
 struct PeekedByte {
-  // CLOCK_MONOTONIC, when the port had handed it to the kernel or got it from there
+  // CLOCK_MONOTONIC [ns]: when the port had passed the byte to the kernel or the chip, or had read
+  // it from there.
   std::int64_t atNs = 0;
   std::uint8_t value = 0;
   ByteDirection direction = ByteDirection::sent;
-  LineFault fault = LineFault::none;
+  LineFault fault = LineFault::none;  // none, parity, framing or breakSignal
 };
 
-// Gets the bytes in the order in which the port saw them, as many as came at once. Must not block,
-// must not throw.
+// Receives the bytes in the order in which the port saw them, as many as the port handled at once.
+// Must not block and must not throw.
 using PeekHandler = std::function<void(std::span<const PeekedByte>)>;
 
 class PeekTaps;
 
-// A listener's place. Destroying it detaches: afterwards the handler does not run any more. May
-// outlive the port.
+// An attached listener. Move-only; may outlive the port.
 class PeekTap {
  public:
+  // A tap that is not attached.
   PeekTap() noexcept = default;
   PeekTap(PeekTap&&) noexcept = default;
   PeekTap& operator=(PeekTap&& other) noexcept;
+  // Detaches.
   ~PeekTap();
+  // Ends the listening: the handler does not run after return. Waits for a handler that is running.
   void detach() noexcept;
 
  private:
@@ -56,11 +71,14 @@ class PeekTap {
   std::uint64_t id_ = 0;
 };
 
+// The taps of one port. Programs use SerialPort::attachTap().
 class PeekTaps : public std::enable_shared_from_this<PeekTaps> {
  public:
   [[nodiscard]] PeekTap attach(PeekHandler handler);
+  // Used by PeekTap.
   void detach(std::uint64_t id) noexcept;
   [[nodiscard]] bool isEmpty() const noexcept;
+  // Calls each handler with `bytes`. Used by the port.
   void show(std::span<const PeekedByte> bytes) const noexcept;
 
  private:
@@ -68,7 +86,7 @@ class PeekTaps : public std::enable_shared_from_this<PeekTaps> {
     std::uint64_t id = 0;
     PeekHandler handler;
   };
-  mutable std::mutex mutex_;  // held while handlers run, so that detach() can promise
+  mutable std::mutex mutex_;  // locked while handlers run, so that detach() waits for them
   std::vector<Entry> entries_;
   std::uint64_t lastId_ = 0;
 };

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// SerialPortRegistry: ports by name. main() owns it; the ports live as long as somebody holds them.
+// SerialPortRegistry: the serial ports of a program, by name. main() owns it. It shares the
+// ownership of each port with the callers of find() and bind().
 //
-//   registry.registerName("UART[0]", std::make_shared<PosixTerminalPort>(options));
+//   registry.registerName("UART[0]", openPosixTerminal(options));
 //   auto line = registry.bind("UART[0]", handler);
 //   auto tap = registry.find("UART[0]")->attachTap(print);
 //
-// Threads  any.
+// Threads  any number of callers at a time.
 #pragma once
 
 #include <map>
@@ -20,13 +21,15 @@ namespace mpf {
 
 class SerialPortRegistry {
  public:
-  // Throws std::invalid_argument when the name is empty or another port's.
+  //   throws  std::invalid_argument when the name is empty or in use
   void registerName(const std::string& portName, std::shared_ptr<SerialPort> port);
-  // Null when there is none.
+  // Returns nullptr when no port has this name.
   [[nodiscard]] std::shared_ptr<SerialPort> find(const std::string& portName) const;
-  // Throws std::invalid_argument when there is no such port, std::runtime_error when somebody else
-  // is bound to it.
+  // Binds `handler` to the port; see SerialPort::bind().
+  //   throws  std::invalid_argument when no port has this name, std::runtime_error when the port is
+  //           bound already
   [[nodiscard]] BoundSerialPort bind(const std::string& portName, ByteHandler& handler) const;
+  // All names, sorted.
   [[nodiscard]] std::vector<std::string> names() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "drivers/serial/posix_terminal_port.h"
+#include <mpf/drivers/serial/posix_terminal.h>
 
 #include <future>
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class PosixTerminalPortTest : public testing::Test {
+class PosixTerminalTest : public testing::Test {
  protected:
   PosixTerminalOptions options() const { return {.device = folder_.file("tty")}; }
   PosixTerminalOptions optionsWith(const SerialSettings& settings) const {
@@ -34,15 +34,15 @@ class PosixTerminalPortTest : public testing::Test {
 
 std::string whyNot(const PosixTerminalOptions& options) {
   try {
-    const PosixTerminalPort port(options);
+    const auto port = openPosixTerminal(options);
     return {};
   } catch (const std::exception& error) {
     return error.what();
   }
 }
 
-TEST_F(PosixTerminalPortTest, StartsWithItsSettings) {
-  const PosixTerminalPort port(optionsWith(
+TEST_F(PosixTerminalTest, StartsWithItsSettings) {
+  const auto port = openPosixTerminal(optionsWith(
       {.baud = 19200, .stopBits = 2, .bitsPerChar = 8, .parity = 'N', .flowControl = 'H'}));
 
   const auto line = instrument_.settings();
@@ -52,14 +52,14 @@ TEST_F(PosixTerminalPortTest, StartsWithItsSettings) {
   EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
 }
 
-TEST_F(PosixTerminalPortTest, NamedSpeedsGoByTheirNames) {
-  PosixTerminalPort port(options());
+TEST_F(PosixTerminalTest, NamedSpeedsAreSetByTheirConstants) {
+  const auto port = openPosixTerminal(options());
   const std::vector<std::pair<int, speed_t>> speeds = {
       {50, B50},         {110, B110},         {300, B300},         {1200, B1200},
       {9600, B9600},     {38400, B38400},     {115200, B115200},   {460800, B460800},
       {921600, B921600}, {1000000, B1000000}, {3000000, B3000000}, {4000000, B4000000}};
   for (const auto& [baud, constant] : speeds) {
-    EXPECT_EQ(port.config({.baud = baud}), "");
+    EXPECT_EQ(port->config({.baud = baud}), "");
 
     const auto line = instrument_.settings();
 
@@ -67,10 +67,10 @@ TEST_F(PosixTerminalPortTest, NamedSpeedsGoByTheirNames) {
   }
 }
 
-TEST_F(PosixTerminalPortTest, TakesSpeedsThatHaveNoName) {
-  PosixTerminalPort port(options());
+TEST_F(PosixTerminalTest, AcceptsSpeedsWithoutAConstant) {
+  const auto port = openPosixTerminal(options());
 
-  EXPECT_EQ(port.config({.baud = 250'000}), "");
+  EXPECT_EQ(port->config({.baud = 250'000}), "");
 
   // 100 characters of 10 bits.
   const FileDescriptor line(::open(folder_.file("tty").c_str(), O_RDWR | O_NOCTTY));
@@ -78,10 +78,11 @@ TEST_F(PosixTerminalPortTest, TakesSpeedsThatHaveNoName) {
   EXPECT_EQ(terminal::timeFor(line.get(), 100), 4ms);
 }
 
-TEST_F(PosixTerminalPortTest, ZeroLeavesASettingAsItIs) {
-  PosixTerminalPort port(optionsWith({.baud = 19200, .stopBits = 2, .flowControl = 'H'}));
+TEST_F(PosixTerminalTest, ZeroLeavesASettingAsItIs) {
+  const auto port =
+      openPosixTerminal(optionsWith({.baud = 19200, .stopBits = 2, .flowControl = 'H'}));
 
-  EXPECT_EQ(port.config({.baud = 4800}), "");
+  EXPECT_EQ(port->config({.baud = 4800}), "");
 
   const auto line = instrument_.settings();
   EXPECT_EQ(::cfgetospeed(&line), speed_t{B4800});
@@ -89,20 +90,20 @@ TEST_F(PosixTerminalPortTest, ZeroLeavesASettingAsItIs) {
   EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
 }
 
-// A pseudo-terminal has 8 bits and no parity, whatever is asked of it, and reports success.
-TEST_F(PosixTerminalPortTest, NamesTheSettingThatTheLineDoesNotAccept) {
-  PosixTerminalPort port(optionsWith({.baud = 9600}));
+// A pseudo-terminal always has 8 bits and no parity, but reports success for all settings.
+TEST_F(PosixTerminalTest, NamesTheSettingThatTheLineDoesNotAccept) {
+  const auto port = openPosixTerminal(optionsWith({.baud = 9600}));
 
-  EXPECT_THAT(port.config({.baud = 19200, .bitsPerChar = 7}),
+  EXPECT_THAT(port->config({.baud = 19200, .bitsPerChar = 7}),
               HasSubstr("does not accept bits per character 7"));
-  EXPECT_THAT(port.config({.baud = 19200, .parity = 'E'}), HasSubstr("does not accept parity E"));
-  EXPECT_THAT(port.config({.parity = 'Q'}), HasSubstr("parity 'Q'"));
+  EXPECT_THAT(port->config({.baud = 19200, .parity = 'E'}), HasSubstr("does not accept parity E"));
+  EXPECT_THAT(port->config({.parity = 'Q'}), HasSubstr("parity 'Q'"));
 
   const auto line = instrument_.settings();
   EXPECT_EQ(::cfgetospeed(&line), speed_t{B9600}) << "all or nothing";
 }
 
-TEST_F(PosixTerminalPortTest, SaysWhyItCannotStart) {
+TEST_F(PosixTerminalTest, ReportsWhyItCannotBeOpened) {
   EXPECT_THAT(whyNot({.device = folder_.file("absent")}),
               AllOf(HasSubstr("open"), HasSubstr("absent"), HasSubstr("No such file")));
   EXPECT_THAT(whyNot({.device = "/dev/null"}), HasSubstr("open /dev/null: not a terminal"));
@@ -111,9 +112,9 @@ TEST_F(PosixTerminalPortTest, SaysWhyItCannotStart) {
   EXPECT_THAT(whyNot(optionsWith({.stopBits = 5})), HasSubstr("stop bits 5"));
 }
 
-TEST_F(PosixTerminalPortTest, OpensTheDeviceForItselfAlone) {
+TEST_F(PosixTerminalTest, OpensTheDeviceExclusively) {
   {
-    const PosixTerminalPort port(options());
+    const auto port = openPosixTerminal(options());
     EXPECT_THAT(whyNot(options()),
                 AllOf(HasSubstr(folder_.file("tty")), HasSubstr("in use by another program")));
   }
@@ -121,10 +122,10 @@ TEST_F(PosixTerminalPortTest, OpensTheDeviceForItselfAlone) {
   EXPECT_EQ(whyNot(options()), "");
 }
 
-// The far end takes nothing: the kernel's buffer fills, the rest is late.
-TEST_F(PosixTerminalPortTest, AWriteThatTheFarEndHoldsUpEndsInTimeout) {
-  PosixTerminalPort port(options());
-  const BoundSerialPort line(port, collector_);
+// The far end reads nothing, so the kernel's buffer fills and the remaining bytes time out.
+TEST_F(PosixTerminalTest, AWriteTimesOutWhileTheFarEndDoesNotRead) {
+  const auto port = openPosixTerminal(options());
+  const BoundSerialPort line(*port, collector_);
   instrument_.setReading(false);
   const std::string much(1'000'000, 'x');
 
@@ -135,9 +136,9 @@ TEST_F(PosixTerminalPortTest, AWriteThatTheFarEndHoldsUpEndsInTimeout) {
   EXPECT_EQ(line->writeRead(bytesOf("\n*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(PosixTerminalPortTest, UnplugFailsTheRequestThatIsOutstanding) {
-  PosixTerminalPort port(options());
-  const BoundSerialPort line(port, collector_);
+TEST_F(PosixTerminalTest, UnplugFailsAnOutstandingRequest) {
+  const auto port = openPosixTerminal(options());
+  const BoundSerialPort line(*port, collector_);
   instrument_.behave({.isSilent = true});
   auto status = std::async(std::launch::async,
                            [&] { return line->writeRead(bytesOf("*IDN?\n"), kWatchdog); });
@@ -146,89 +147,89 @@ TEST_F(PosixTerminalPortTest, UnplugFailsTheRequestThatIsOutstanding) {
   instrument_.unplug();
 
   EXPECT_EQ(status.get(), SerialPortStatus::failure);
-  EXPECT_EQ(port.state(), SerialPortState::unplugged);
-  EXPECT_THAT(port.unpluggedBecause(), HasSubstr(folder_.file("tty")));
-  EXPECT_EQ(port.counters().unplugs, 1U);
+  EXPECT_EQ(port->state(), SerialPortState::unplugged);
+  EXPECT_THAT(port->unpluggedBecause(), HasSubstr(folder_.file("tty")));
+  EXPECT_EQ(port->counters().unplugs, 1U);
 }
 
-TEST_F(PosixTerminalPortTest, WhileUnpluggedRequestsAndSettingsFailAtOnce) {
-  PosixTerminalPort port(options());
-  const BoundSerialPort line(port, collector_);
+TEST_F(PosixTerminalTest, WhileUnpluggedRequestsAndSettingsFailAtOnce) {
+  const auto port = openPosixTerminal(options());
+  const BoundSerialPort line(*port, collector_);
   instrument_.unplug();
-  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
 
   EXPECT_EQ(line->read(Deadline::never()), SerialPortStatus::failure);
   EXPECT_THAT(line->config({.baud = 9600}), HasSubstr("unplugged"));
 }
 
-TEST_F(PosixTerminalPortTest, ReturnsWithItsSettings) {
-  PosixTerminalPort port(optionsWith({.baud = 19200, .stopBits = 2}));
-  const BoundSerialPort line(port, collector_);
+TEST_F(PosixTerminalTest, KeepsItsSettingsWhenTheDeviceReturns) {
+  const auto port = openPosixTerminal(optionsWith({.baud = 19200, .stopBits = 2}));
+  const BoundSerialPort line(*port, collector_);
   ASSERT_EQ(line->config({.baud = 4800}), "");
   for (unsigned round = 1; round <= 3; ++round) {
     instrument_.unplug();
-    ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+    ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
 
     instrument_.plugIn();
 
-    ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
-    EXPECT_EQ(port.unpluggedBecause(), "");
+    ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
+    EXPECT_EQ(port->unpluggedBecause(), "");
     EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
-    EXPECT_EQ(port.counters().unplugs, round);
+    EXPECT_EQ(port->counters().unplugs, round);
     const auto settings = instrument_.settings();
     EXPECT_EQ(::cfgetospeed(&settings), speed_t{B4800});
     EXPECT_TRUE((settings.c_cflag & CSTOPB) != 0);
   }
 }
 
-TEST_F(PosixTerminalPortTest, MayStartBeforeItsDevice) {
+TEST_F(PosixTerminalTest, MayBeOpenedBeforeItsDeviceIsPresent) {
   instrument_.unplug();
-  PosixTerminalPort port({.device = folder_.file("tty"), .waitForDevice = true});
-  const BoundSerialPort line(port, collector_);
+  const auto port = openPosixTerminal({.device = folder_.file("tty"), .waitForDevice = true});
+  const BoundSerialPort line(*port, collector_);
   EXPECT_EQ(line->read(kWatchdog), SerialPortStatus::failure);
 
   instrument_.plugIn();
 
-  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
   EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), SerialPortStatus::success);
 }
 
-TEST_F(PosixTerminalPortTest, TapsSurviveAnUnplug) {
-  PosixTerminalPort port(options());
-  const BoundSerialPort line(port, collector_);
+TEST_F(PosixTerminalTest, TapsSurviveAnUnplug) {
+  const auto port = openPosixTerminal(options());
+  const BoundSerialPort line(*port, collector_);
   std::atomic<int> seen = 0;
-  const auto tap = port.attachTap(
+  const auto tap = port->attachTap(
       [&](std::span<const PeekedByte> bytes) { seen += static_cast<int>(bytes.size()); });
   instrument_.unplug();
-  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
   instrument_.plugIn();
-  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
 
   EXPECT_EQ(line->writeRead(bytesOf("ECHO a\n"), kWatchdog), SerialPortStatus::success);
 
   EXPECT_EQ(seen, 10);
 }
 
-TEST_F(PosixTerminalPortTest, TellsEachChangeOfStateOnce) {
+TEST_F(PosixTerminalTest, ReportsEachChangeOfStateOnce) {
   const Watchdog dog("change of state");
-  PosixTerminalPort port(options());
-  std::vector<std::string> told;
-  port.onStateChange([&](SerialPortState state, const std::string& because) {
-    told.push_back(std::string(toString(state)) + (because.empty() ? "" : ", and says why"));
+  const auto port = openPosixTerminal(options());
+  std::vector<std::string> reports;
+  port->onStateChange([&](SerialPortState state, const std::string& because) {
+    reports.push_back(std::string(toString(state)) + (because.empty() ? "" : ", with a reason"));
   });
   instrument_.unplug();
-  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
-  const auto lost = port.unpluggedBecause();
-  // until an attempt to open has failed, which is no change
-  while (port.unpluggedBecause() == lost) std::this_thread::yield();
+  ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
+  const auto lost = port->unpluggedBecause();
+  // until an attempt to open has failed, which is not a change of the state
+  while (port->unpluggedBecause() == lost) std::this_thread::yield();
   instrument_.plugIn();
-  ASSERT_TRUE(port.waitForState(SerialPortState::plugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::plugged, watchdog()));
 
-  port.onStateChange({});
+  port->onStateChange({});
   instrument_.unplug();
-  ASSERT_TRUE(port.waitForState(SerialPortState::unplugged, watchdog()));
+  ASSERT_TRUE(port->waitForState(SerialPortState::unplugged, watchdog()));
 
-  EXPECT_THAT(told, ElementsAre("unplugged, and says why", "plugged"));
+  EXPECT_THAT(reports, ElementsAre("unplugged, with a reason", "plugged"));
 }
 
 }  // namespace

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#include "router/outgoing/connector.h"
+
+#include <fmt/format.h>
+#include <sstream>
+#include <utility>
+
+#include "router/config/limit_text.h"
+
+namespace mpf::router {
+
+// A name may have several addresses, and the first of them may not answer.
+kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connect() {
+  const auto& address = remote_.address;
+  auto lookUp =
+      kj::evalNow([&] { return here_.network.parseAddress(hostForKj(address), address.port); });
+  return withTimeout(fmt::format("the look-up of {}", address.host), kj::mv(lookUp))
+      .then([this](kj::Own<kj::NetworkAddress> parsed) {
+        if (remote_.security == Security::plain) checkPlain(*parsed, here_.config);
+        std::vector<std::string> addresses;
+        std::istringstream all(toStd(parsed->toString()));
+        for (std::string one; std::getline(all, one, ',');) addresses.push_back(one);
+        return connectToOne(std::move(addresses));
+      });
+}
+
+kj::Exception Connector::stepFailed(const std::string& step, const kj::Exception& error) const {
+  const auto deadTime = limitText(here_.config.limits, "dead-time");
+  const auto why = reasonOf(error);
+  const auto text = why == kTimeout
+                        ? fmt::format("{} took longer than {} (dead-time)", step, deadTime)
+                        : fmt::format("{} failed: {}", step, why);
+  return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
+}
+
+kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectToOne(
+    std::vector<std::string> addresses) {
+  const auto next = addresses.front();
+  addresses.erase(addresses.begin());
+  return withTimeout(fmt::format("the connection to {}", next), connectTo(next))
+      .catch_([this, addresses = std::move(addresses)](
+                  kj::Exception&& error) mutable -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+        if (addresses.empty()) return kj::mv(error);
+        return connectToOne(std::move(addresses));
+      });
+}
+
+kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectTo(const std::string& address) {
+  return here_.network.parseAddress(address).then([this](kj::Own<kj::NetworkAddress> parsed) {
+    auto connected = parsed->connectAuthenticated();
+    return connected.attach(kj::mv(parsed))
+        .then([this](kj::AuthenticatedStream peer) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+          setSocketOptions(*peer.stream, here_.config.limits);
+          if (remote_.security == Security::plain) return kj::mv(peer.stream);
+          return here_.tls
+              ->connect(kj::mv(peer),
+                        remote_.tlsName.empty() ? remote_.address.host : remote_.tlsName)
+              .then(
+                  [](kj::AuthenticatedStream secured) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+                    return kj::mv(secured.stream);
+                  },
+                  [](kj::Exception&& error) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
+                    return kj::Exception(kj::Exception::Type::FAILED, __FILE__, __LINE__,
+                                         kj::heapString(tlsProblem(error)));
+                  });
+        });
+  });
+}
+
+}  // namespace mpf::router

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Connector: opens connections to one remote router. It looks up the remote's name, tries its
+// addresses one after the other, and does the TLS handshake unless the remote uses plain TCP.
+//
+//   look-up ─► address 1 ─ fails ─► address 2 ...
+//   each address: TCP connection ─► TLS handshake
+//
+// Threads  that of the event loop.
+#pragma once
+
+#include <kj/async-io.h>
+#include <string>
+#include <vector>
+
+#include "router/surroundings.h"
+#include "router/transport/kj_text.h"
+
+namespace mpf::router {
+
+class Connector {
+ public:
+  // `here` and `remote` outlive this object.
+  Connector(Surroundings& here, const Remote& remote) : here_(here), remote_(remote) {}
+
+  // Resolves with a connection that is ready for the greeting. This object outlives the promise.
+  // Each step may take Limits::deadTime.
+  //   throws  kj::Exception (the promise): its text names the step that failed, and why
+  [[nodiscard]] kj::Promise<kj::Own<kj::AsyncIoStream>> connect();
+
+ private:
+  kj::Promise<kj::Own<kj::AsyncIoStream>> connectToOne(std::vector<std::string> addresses);
+  kj::Promise<kj::Own<kj::AsyncIoStream>> connectTo(const std::string& address);
+  template <class T>
+  kj::Promise<T> withTimeout(const std::string& step, kj::Promise<T> promise) {
+    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise))
+        .catch_([this, step](kj::Exception&& error) -> kj::Promise<T> {
+          return stepFailed(step, error);
+        });
+  }
+  [[nodiscard]] kj::Exception stepFailed(const std::string& step, const kj::Exception& error) const;
+
+  Surroundings& here_;
+  const Remote& remote_;
+};
+
+}  // namespace mpf::router
