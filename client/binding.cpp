@@ -12,11 +12,11 @@
 namespace mpf {
 namespace {
 
-// News of the connection is ours to tell, but for a queue that is full somewhere behind the server,
-// and a fate is the end of the request that it names.
-bool isForServersToSend(const Message& message, const Request* request) noexcept {
-  if (const auto* news = message.tryAs<Connect>())
-    return request == nullptr && news->status == ConnectStatus::connectQueueFull;
+// A server may send a ConnectMessage only to report a full queue behind it (a router does), not as
+// a reply; and a fate only as the reply to the request that it names.
+bool mayServerSend(const Message& message, const Request* request) noexcept {
+  if (const auto* connect = message.tryAs<Connect>())
+    return request == nullptr && connect->status == ConnectStatus::connectQueueFull;
   if (message.getType() != MessageType::requestFate) return true;
   const auto* fate = message.tryAs<RequestFate>();
   return fate != nullptr && request != nullptr &&
@@ -28,27 +28,6 @@ bool isForServersToSend(const Message& message, const Request* request) noexcept
 std::uint64_t Binding::maxMessageBytes() const noexcept {
   const std::lock_guard lock(*lock_);
   return isConnected() ? channel_->link().maxMessageBytes() : 0;
-}
-
-std::string Binding::notConnectedBecause() const {
-  if (isConnected()) return {};
-  const std::lock_guard lock(reasonMutex_);
-  return reason_;
-}
-
-void Binding::setReason(const std::string& reason) {
-  const std::lock_guard lock(reasonMutex_);
-  reason_ = reason;
-}
-
-bool Binding::waitConnected(Deadline deadline) {
-  std::unique_lock lock(reasonMutex_);
-  const auto connected = [this] { return isConnected(); };
-  if (deadline.isNever()) {
-    connectedChanged_.wait(lock, connected);
-    return true;
-  }
-  return connectedChanged_.wait_for(lock, deadline.left(), connected);
 }
 
 bool Binding::takeOne() {
@@ -64,17 +43,17 @@ bool Binding::takeOne() {
       break;
   }
   count(dispatcher_.endpoint().control().protocolErrors);
-  disconnect("the server sent nonsense", Ending::protocolError);
+  disconnect("the server sent invalid data", Ending::protocolError);
   return true;
 }
 
-// True when the state of the link was news.
+// Acts on a change of the state of the link. Returns false when there was none.
 bool Binding::onLinkState() {
   auto& link = channel_->link();
   const auto state = link.peerState();
   if (link.isLost() || link.peer()->isLost()) {
     count(dispatcher_.endpoint().control().protocolErrors);
-    disconnect("somebody cut the connection's shared memory", Ending::protocolError);
+    disconnect("the shared memory of the connection was truncated", Ending::protocolError);
     return true;
   }
   if (state == layout::LinkState::open && !isConnected()) {
@@ -82,7 +61,7 @@ bool Binding::onLinkState() {
                       layout::kMaxLinks);
     {
       const std::lock_guard lock(*lock_);
-      fullTold_ = false;
+      isFullReported_ = false;
       connected_.store(true, std::memory_order_relaxed);
     }
     MPF_STEP(connected);
@@ -99,14 +78,14 @@ bool Binding::onLinkState() {
     return true;
   }
   if (state == layout::LinkState::refused) {
-    disconnect("the server has no room for another client", Ending::refused);
+    disconnect("the server has its maximum number of clients", Ending::refused);
     deliverConnect(ConnectStatus::connectRefused);
     return true;
   }
   return false;
 }
 
-// False: nonsense, of which nothing was delivered.
+// Returns false on a protocol error; then it has delivered nothing.
 bool Binding::tryDeliverReply(const Envelope& envelope) {
   auto& control = dispatcher_.endpoint().control();
   count(control.received);
@@ -129,13 +108,13 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
     case MessageLink::Finish::message:
       break;
   }
-  if (!isForServersToSend(message, request)) return false;
+  if (!mayServerSend(message, request)) return false;
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
     noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
-  if (auto* news = message.tryAs<Connect>()) news->incarnation = incarnation_;
+  if (auto* connect = message.tryAs<Connect>()) connect->incarnation = incarnation_;
   if (request != nullptr) {
-    // A fate that the server sent without knowing them.
+    // The server sends fates without the marks of the client.
     if (message.getType() == MessageType::requestFate) {
       message.setClientType(request->clientType);
       message.setClientExtra(request->clientExtra);
@@ -160,7 +139,7 @@ void Binding::noteTimes(const Envelope& envelope, const Request* request) noexce
   if (endpoint.slept()) endpoint.noteWake(waitedNs);
 }
 
-// Before it is called all of the message's state is as it is to be after it: it may throw.
+// The callback may throw: callers have finished all other work on the message before.
 void Binding::deliver(Message&& message) try {
   if (!left_) callback_(std::move(message));
 } catch (...) {
@@ -172,7 +151,7 @@ void Binding::deliverConnect(ConnectStatus status) {
   deliver(ConnectMessage({.status = status, .incarnation = incarnation_}));
 }
 
-// A request that the server may still reply to keeps its entry until it has.
+// A cancelled or expired request keeps its entry until the server replies to it or refuses it.
 void Binding::deliverFate(Request& request, Fate fate) {
   if (request.isGivenUp) return;
   RequestFateMessage message(
@@ -193,15 +172,15 @@ bool Binding::hasDeadPeer() const noexcept {
   return channel_ && !end_ && channel_->link().peer()->isDead();
 }
 
-// What a server sent before it went. One that is not gone may send for ever: what fits its ring is
-// all that it had sent.
-void Binding::deliverTheRest(const MessageLink* channel) {
+// Delivers the messages that the server sent before it closed the link or died. A server that is
+// still alive could send without end, so at most one ring of messages is delivered.
+void Binding::deliverRemaining(const MessageLink* channel) {
   Envelope envelope;
-  while (channel_.get() == channel && end_->restSlots != 0) {
-    --end_->restSlots;
+  while (channel_.get() == channel && end_->remainingSlots != 0) {
+    --end_->remainingSlots;
     if (channel_->tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope))
       continue;
-    end_->restSlots = 0;
+    end_->remainingSlots = 0;
   }
 }
 
@@ -219,7 +198,7 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   resumeEnd();
 }
 
-// A callback that throws has had its message; onTime() comes back for what is left.
+// When a callback throws, its message counts as delivered, and onTime() continues the rest.
 void Binding::resumeEnd() {
   const auto self = shared_from_this();
   try {
@@ -238,7 +217,7 @@ void Binding::endAll() {
   const auto requests = requests_;
   const auto ending = end_->ending;
   end_->isInterrupted = false;
-  deliverTheRest(channel.get());
+  deliverRemaining(channel.get());
   requests->forEach([&](Request& request) {
     deliverFate(request,
                 ending != Ending::protocolError && !channel->link().isTaken(request.ordinal)
@@ -265,7 +244,7 @@ void Binding::closeChannel() {
   const bool serverDied = link.peer()->isDead();
   if (serverDied) count(endpoint.control().peersDied);
   link.setState(layout::LinkState::closed);
-  // It may have accepted us without our having looked since.
+  // The server may have accepted the link after the last look at its state.
   if (link.peerState() == layout::LinkState::open)
     link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) %
                       layout::kMaxLinks);
@@ -273,7 +252,7 @@ void Binding::closeChannel() {
   removeBulk(endpoint.backplane().name(), link.header().incarnation);
   MPF_STEP(bulk_removed);
   segments::remove(link.name());
-  resume();  // a callback may have paused us anew
+  resume();  // a callback may have called pause() again
   endpoint.detach(index_);
   dispatcher_.setLink(index_, nullptr);
   count(endpoint.control().linksClosed);
@@ -303,7 +282,7 @@ void Binding::resume() {
 
 void Binding::leave() {
   left_ = true;
-  if (channel_) disconnect("the client ended", Ending::serverGone);
+  if (channel_) disconnect("the client was destroyed", Ending::serverGone);
   if (pendingBind_) segments::remove(pendingBind_.name());
   pendingBind_ = {};
 }
@@ -318,7 +297,7 @@ void Binding::onTime(std::int64_t nowNs) {
     if (isBound() && !left_) tryConnect();
     return;
   }
-  // PAIR(due): a sender that lowers it from now on wakes us again.
+  // PAIR(due): a sender that lowers dueNs_ from now on wakes the dispatcher again.
   doorbell::fence();
   const auto self = shared_from_this();
   try {
@@ -349,8 +328,8 @@ void Binding::expire(std::int64_t nowNs) {
   });
 }
 
-// Hints may be lost to somebody who scribbles over them: while something is owed to us, ring again
-// now and then.
+// A faulty process may overwrite hints in shared memory. While a reply is outstanding, this rings
+// the server's doorbell again from time to time.
 void Binding::nudge(std::int64_t nowNs) {
   const bool connected = isConnected();
   if (connected && endNudging()) {
@@ -365,21 +344,21 @@ void Binding::nudge(std::int64_t nowNs) {
     if (connected) {
       link.notifyPeer();
     } else if (link.peer()->isClosed()) {
-      return disconnect("the server ended before it had accepted the client", Ending::serverGone);
+      return disconnect("the server exited before it accepted the client", Ending::serverGone);
     } else {
       link.peer()->knock(link.header().incarnation);
       setReason(notAcceptedBecause(*link.peer()));
       if (dispatcher_.endpoint().window().isNameless())
         setReason(
-            "somebody removed this process's files from /dev/shm (RemoveIPC of systemd-logind?): "
-            "no server finds it until it starts again");
+            "the files of this process in /dev/shm were removed (by RemoveIPC of systemd-logind?), "
+            "so no server can find this client: restart this process");
     }
-    takeOne();  // a reply, or what the server says of the link: we may not have been told
+    takeOne();  // a reply or a change of the link whose hint was lost
   }
   wakeAt(knockedNs_ + nudgeEveryNs_);
 }
 
-// True when nothing is owed to us: the next send() begins anew.
+// Returns true when no reply is outstanding; the next send() then starts the nudging again.
 bool Binding::endNudging() {
   const std::lock_guard lock(*lock_);
   if (requests_->awaited() != 0) return false;
@@ -391,12 +370,12 @@ void Binding::wakeAt(std::int64_t ns) noexcept {
   auto due = dueNs_.load(std::memory_order_relaxed);
   while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
   }
-  // PAIR(due): our time before, the dispatcher's after.
+  // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read.
   doorbell::fence();
   dispatcher_.noteDue(ns);
 }
 
-void Binding::tellQueueFull() {
+void Binding::reportQueueFull() {
   if (channel_ && isConnected()) deliverConnect(ConnectStatus::connectQueueFull);
 }
 

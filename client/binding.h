@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Binding: what ties one client to one server, through that server's lives.
+// Binding: the connection of one client to one server, through restarts of the server.
 //
-//   unbound ─bind─► waiting ─server there─► connecting ─accepted─► connected ─gone─► waiting ...
+//   unbound ─bind─► waiting ─server found─► connecting ─accepted─► connected ─server gone─► waiting
 //
-// Threads  send, cancel and the getters: any. The rest: the dispatcher's thread.
-// Crash    after the server's death: what it had sent is delivered, then a fate for each request,
-//          then the disconnect.
-// Trust    nonsense from the server ends the connection.
+// Threads  any thread calls send(), allocate(), setServer(), waitConnected() and the getters above
+//          them; the thread that runs the dispatcher calls the rest.
+// Crash    after the death of the server, the binding delivers the messages that the server had
+//          sent, then a fate for each remaining request, then the disconnect.
+// Trust    invalid data from the server ends the connection.
 #pragma once
 
 #include <atomic>
@@ -31,7 +32,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
       : dispatcher_(dispatcher), callback_(std::move(callback)) {}
 
   // --- any thread ---
-  // `requestId`: in, 0 or the id that the request shall have; out, its id when it was sent.
+  //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
   SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isConnected() const noexcept {
@@ -39,29 +40,29 @@ class Binding : public std::enable_shared_from_this<Binding> {
   }
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   [[nodiscard]] std::string notConnectedBecause() const;
-  // PAIR(bound): whom to.
+  // PAIR(bound): server_ and location_.
   [[nodiscard]] bool isBound() const noexcept { return bound_.load(std::memory_order_acquire); }
   void setServer(const std::string& server, std::int32_t location);
   bool waitConnected(Deadline deadline);
 
   // --- dispatcher's thread ---
   void tryConnect();
-  // One message or change of state of the link. False when there was none.
+  // Handles one message or one change of state of the link. Returns false when there was none.
   bool takeOne();
   enum class Ending {
-    serverGone,     // dead, or it closed the link: what it has not taken it never will
-    refused,        // it is there and does not want us: ask again later
-    // the client ends the connection: the server may go on taking requests for a while
+    serverGone,  // dead, or it closed the link: it will not receive the remaining requests
+    refused,  // the server refused the link: try again later
+    // The client ends the connection: the server may receive requests for a while.
     protocolError,
   };
   void disconnect(const std::string& reason, Ending ending);
   void cancel(std::uint32_t requestId);
-  // What the server sends stays where it is until go on.
+  // Between pause() and resume(), messages of the server stay in the link.
   void pause();
   void resume();
-  // No callback after this.
+  // Ends the connection. No callback runs after it.
   void leave();
-  // What is due at a time: expired requests, hints that may have been lost.
+  // Does what is due: ends expired requests, rings again for hints that may have been lost.
   void onTime(std::int64_t nowNs);
   [[nodiscard]] std::int64_t dueNs() const noexcept {
     return dueNs_.load(std::memory_order_relaxed);
@@ -69,14 +70,14 @@ class Binding : public std::enable_shared_from_this<Binding> {
   [[nodiscard]] bool hasLeft() const noexcept { return left_; }
   [[nodiscard]] bool isWaiting() const noexcept { return !channel_ && isBound() && !left_; }
   [[nodiscard]] bool hasDeadPeer() const noexcept;
-  void tellQueueFull();
+  void reportQueueFull();
 
  private:
   void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
   bool tryDeliverReply(const Envelope& envelope);
-  void deliverTheRest(const MessageLink* channel);
+  void deliverRemaining(const MessageLink* channel);
   void resumeEnd();
   void endAll();
   void closeChannel();
@@ -106,7 +107,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   std::shared_ptr<MessageLink> channel_;  // written by the dispatcher's thread under lock_
   std::shared_ptr<RequestTable> requests_;  // likewise
   std::atomic<bool> connected_{false};  // under lock_
-  bool fullTold_ = false;  // under lock_: this run of refusals has been reported
+  bool isFullReported_ = false;  // under lock_: the present series of refusals has been reported
   bool nudging_ = false;  // under lock_: a time for the next nudge() is set
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::int64_t knockedNs_ = 0;
@@ -115,11 +116,11 @@ class Binding : public std::enable_shared_from_this<Binding> {
   std::uint64_t incarnation_ = 0;  // of the server
   bool left_ = false;
   bool paused_ = false;
-  // What is left of a disconnect() that is calling back, or whose callback has thrown.
+  // The state of a disconnect() that is delivering messages, or whose callback has thrown.
   struct End {
     Ending ending;
     bool wasConnected;
-    std::uint32_t restSlots;  // of the server's ring: what it sent before it went
+    std::uint32_t remainingSlots;  // of the server's ring that are still to be delivered
     bool isInterrupted = false;  // by an exception: resumeEnd() is due
   };
   std::optional<End> end_;

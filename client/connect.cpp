@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Binding, continued: to whom, and how it gets there.
+// Binding: finds its server and makes the connection.
 #include <time.h>
 
 #include <array>
@@ -19,9 +19,9 @@ namespace mpf {
 
 namespace {
 
-constexpr std::int64_t kBusyNs = 20'000'000;
+constexpr std::int64_t kBusyNs = 20'000'000;  // of one request, after which a server counts as busy
 
-// The local time so long ago.
+// The local time `agoNs` ago.
 std::string timeText(std::int64_t agoNs) {
   const auto when = std::chrono::system_clock::now() - std::chrono::nanoseconds(agoNs);
   const auto seconds = std::chrono::system_clock::to_time_t(when);
@@ -39,17 +39,38 @@ void Binding::setServer(const std::string& server, std::int32_t location) {
     const std::lock_guard lock(reasonMutex_);
     if (isBound())
       throw std::logic_error(
-          fmt::format("bind: the client is bound to server \"{}\" already", server_));
+          fmt::format("bind: the client is already bound to server \"{}\"", server_));
     server_ = server;
     location_ = location;
-    // PAIR(bound): whom to, which the dispatcher's thread looks at.
+    // PAIR(bound): server_ and location_, which the dispatcher's thread reads.
     bound_.store(true, std::memory_order_release);
   }
   setReason(fmt::format("server \"{}\" at location {} is not there yet", server, location));
 }
 
+std::string Binding::notConnectedBecause() const {
+  if (isConnected()) return {};
+  const std::lock_guard lock(reasonMutex_);
+  return reason_;
+}
+
+void Binding::setReason(const std::string& reason) {
+  const std::lock_guard lock(reasonMutex_);
+  reason_ = reason;
+}
+
+bool Binding::waitConnected(Deadline deadline) {
+  std::unique_lock lock(reasonMutex_);
+  const auto connected = [this] { return isConnected(); };
+  if (deadline.isNever()) {
+    connectedChanged_.wait(lock, connected);
+    return true;
+  }
+  return connectedChanged_.wait_for(lock, deadline.left(), connected);
+}
+
 void Binding::tryConnect() try {
-  // somebody was quicker: another thread's bind(), a callback that ran the dispatcher
+  // Another thread in bind(), or a callback that ran the dispatcher, may have connected already.
   if (channel_ || left_) return;
   auto& endpoint = dispatcher_.endpoint();
   const auto& backplane = endpoint.backplane().name();
@@ -58,7 +79,7 @@ void Binding::tryConnect() try {
   if (!server) return pendingBind();
   const auto index = endpoint.tryReserve();
   if (!index) {
-    setReason(fmt::format("this process has {} clients on the backplane, no more are possible",
+    setReason(fmt::format("this process has {} clients on the backplane, which is the maximum",
                           layout::kMaxLinks));
     return wakeAt(Clock::nowNs() + kRetryNs);
   }
@@ -66,7 +87,7 @@ void Binding::tryConnect() try {
   try {
     makeChannel(server);
   } catch (...) {
-    endpoint.detach(index_);  // or each attempt would cost one
+    endpoint.detach(index_);  // else each failed attempt would use up an index
     throw;
   }
   auto& created = channel_->link();
@@ -81,23 +102,23 @@ void Binding::tryConnect() try {
   nudgeEveryNs_ = kFirstNudgeNs;
   wakeAt(knockedNs_ + nudgeEveryNs_);
 } catch (const std::exception& error) {
-  // No memory, no right, a window of another version: the reason is told, and it is tried again.
+  // No memory, no permission, a window of another version: report the reason and try again later.
   setReason(error.what());
   wakeAt(Clock::nowNs() + kRetryNs);
 }
 
-// Why a server that lacks something does not accept the client; empty when it lacks nothing.
+// The shortage at the server that keeps it from accepting the client; empty when it reports none.
 std::string Binding::shortageAt(const layout::WindowControl& server) const {
   switch (server.shortage.load(std::memory_order_relaxed)) {
     case layout::Shortage::descriptors:
       return fmt::format(
           "server \"{}\" cannot accept the client: its process has no file descriptor left; "
-          "start it with a higher limit (ulimit -n)",
+          "restart it with a higher limit (ulimit -n)",
           server_);
     case layout::Shortage::openFiles:
       return fmt::format(
-          "server \"{}\" cannot accept the client: its host has no open file left; raise "
-          "fs.file-max",
+          "server \"{}\" cannot accept the client: its host has the maximum number of open files; "
+          "raise fs.file-max",
           server_);
     case layout::Shortage::memory:
       return fmt::format("server \"{}\" cannot accept the client: it has no memory left", server_);
@@ -106,7 +127,7 @@ std::string Binding::shortageAt(const layout::WindowControl& server) const {
   }
 }
 
-// A server that works on a request accepts nobody meanwhile.
+// A server does not accept clients while it handles a request.
 std::string Binding::notAcceptedBecause(const PeerWindow& server) const {
   const auto& control = server.control();
   if (auto shortage = shortageAt(control); !shortage.empty()) return shortage;
@@ -125,7 +146,7 @@ std::string Binding::notAcceptedBecause(const PeerWindow& server) const {
 
 void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
   auto& endpoint = dispatcher_.endpoint();
-  endpoint.window().admit(Link::rightsAt(*server));  // it writes our hints
+  endpoint.window().admit(Link::rightsAt(*server));  // the server writes hints into this window
   auto link = Link::create(endpoint.backplane().name(), endpoint.window(), index_, server);
   auto requests = std::make_shared<RequestTable>(link->header().maxOutstanding,
                                                  requests_ ? requests_->lastId() : 0);
@@ -137,7 +158,7 @@ void Binding::makeChannel(const std::shared_ptr<PeerWindow>& server) {
   nudging_ = true;
 }
 
-// Shows whom we wait for, and has us told when a server appears.
+// Publishes the name of the missing server, for tools, and watches for new servers.
 void Binding::pendingBind() {
   setReason(fmt::format("server \"{}\" at location {} is not there", server_, location_));
   dispatcher_.waitForNames(true);

@@ -14,10 +14,11 @@
 namespace mpf {
 namespace {
 
-constexpr int kBatch = 16;  // messages of one link before the others have their turn
-// Of a window whose owner has no server yet: everybody may read it, as tools and routers do.
-constexpr mode_t kEverybodyReads = 0644;
-constexpr std::uint32_t kLooksInVain = 64;  // at news that is none, between looks at the clock
+constexpr int kBatch = 16;  // messages of one link before the next link has its turn
+// The mode of a client window before its first connection: all users may read it, as tools and
+// routers do.
+constexpr mode_t kReadableByAll = 0644;
+constexpr std::uint32_t kWakeupsPerClockCheck = 64;  // wake-ups without work between clock readings
 
 class DepthGuard {
  public:
@@ -34,7 +35,7 @@ class DepthGuard {
 
 Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
     : endpoint_(std::move(backplane), layout::SegmentKind::clientWindow, {},
-                Rights{.mode = kEverybodyReads}, options.waitMode,
+                Rights{.mode = kReadableByAll}, options.waitMode,
                 [&](layout::SegmentHeader& header) {
                   options.label.copy(header.name.data(), header.name.size() - 1);
                 }) {}
@@ -54,7 +55,7 @@ void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
     while (!self->ended_.load(std::memory_order_relaxed)) {
       try {
         self->runOnce(Deadline::atNs(self->errors_.dueNs()));
-      } catch (...) {  // thrown by a callback: this thread has no caller that could handle it
+      } catch (...) {  // thrown by a callback; this thread has no caller that could handle it
         self->endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed);
         self->errors_.report();
       }
@@ -69,7 +70,7 @@ void Dispatcher::Impl::endThread() {
   if (endpoint_.forkGuard().isInherited()) return ForkGuard::abandon(thread_);
   ended_.store(true, std::memory_order_relaxed);
   interrupt();
-  // The last client may be destroyed by a callback: then the thread ends after it.
+  // A callback may destroy the last client: then this thread ends after the callback.
   if (lock_.isMine()) {
     thread_.detach();
   } else {
@@ -77,7 +78,7 @@ void Dispatcher::Impl::endThread() {
   }
 }
 
-// A client may end before the command that adds it runs.
+// A client may be destroyed before the command that adds its binding runs.
 void Dispatcher::Impl::add(const std::shared_ptr<Binding>& binding) {
   if (!binding->hasLeft()) bindings_.insert(binding);
 }
@@ -86,7 +87,7 @@ void Dispatcher::Impl::remove(const std::shared_ptr<Binding>& binding) {
   bindings_.erase(binding);
   removed_.push_back(binding);
   if (namesToken_ == 0) return;
-  // It may have been the last that waited for a server: then names are of no interest any more.
+  // It may have been the last binding that waited for a server: then the watch of names can end.
   namesChanged_.store(true, std::memory_order_relaxed);
   endpoint_.interrupt();
 }
@@ -119,54 +120,55 @@ bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()
   const RunnerGuard guard(isNested ? nullptr : &lock_);
   const auto isOver = [&] { return !isNested && lock_.isRunnerWaiting(); };
   while (!isDone() && !deadline.hasPassed() && !isOver()) run(deadline, isOver);
-  if (hasDescriptor_) endpoint_.callAgain();  // running has disarmed it
+  if (hasDescriptor_) endpoint_.callAgain();  // running has made it unreadable
   return true;
 }
 
-// True when something was done; false at the deadline and when `isOver`.
+// Returns true when it has done something, false at the deadline and when isOver() returns true.
 template <class IsOver>
 bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
   const auto me = std::this_thread::get_id();
-  // PAIR(waiting-thread): before we look how long we may wait.
+  // PAIR(waiting-thread): stored before this thread reads how long it may wait.
   if (waitingThread_.load(std::memory_order_relaxed) != me)
     waitingThread_.store(me, std::memory_order_seq_cst);
-  for (std::uint32_t vain = 0;;) {
-    // In a loop that is never idle there would be no other look.
+  for (std::uint32_t wakeups = 0;;) {
+    // Checked even when every step finds work: a busy dispatcher must stop, too.
     if (isOver()) return false;
     if (step()) return true;
-    // The step takes the local news, and with it the news of an interrupt since the look above.
+    // The step clears the local hints, and with them that of an interrupt() since the check above.
     if (isOver()) return false;
     dropKnocks();
-    const bool hasNews = endpoint_.wait(std::min(deadline, nextDue()));
-    // Peers may invent news for ever.
-    if ((!hasNews || ++vain % kLooksInVain == 0) && deadline.hasPassed() && !nextDue().hasPassed())
+    const bool hasWoken = endpoint_.wait(std::min(deadline, nextDue()));
+    // Faulty peers may set hints without end, so the clock is read even when wait() returns true.
+    if ((!hasWoken || ++wakeups % kWakeupsPerClockCheck == 0) && deadline.hasPassed() &&
+        !nextDue().hasPassed())
       return false;
   }
 }
 
-// Nobody has reason to knock at a client.
+// Only servers accept clients: a knock at a client window is invalid.
 void Dispatcher::Impl::dropKnocks() noexcept {
   for (std::uint32_t knocks = 0; knocks < layout::kKnocks && endpoint_.takeKnock(); ++knocks) {
   }
   static_cast<void>(endpoint_.takeRescan());
 }
 
-// What a callback that throws leaves undone is local news: the next step does it at once.
+// When a callback throws, the interrupt() makes the next wait return immediately, for the rest.
 bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
   endpoint_.interrupt();
   throw;
 }
 
 bool Dispatcher::Impl::tryStep() {
-  // A callback may run us, too: whoever is being called back lives on.
+  // A callback may run the dispatcher, too: bindings whose callback is in progress stay alive.
   const DepthGuard inside(depth_);
   if (depth_ == 1) removed_.clear();
-  bool hasActed = endpoint_.takeLocalNews() && handleNews();
+  bool hasActed = endpoint_.takeLocalNews() && handleLocalHints();
   hasActed = resumeRounds() || hasActed;
   if (const auto index = endpoint_.next()) {
     auto* binding = *index < byIndex_.size() ? byIndex_[*index] : nullptr;
     int taken = 0;
-    // a binding that leaves lives until the next step
+    // A binding that a callback removes stays alive until the next step.
     while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;
     if (taken != 0) return true;
   }
@@ -189,7 +191,7 @@ int Dispatcher::Impl::descriptor() {
 
 bool Dispatcher::Impl::runPending(int most) {
   const auto guard = becomeRunner();
-  // Peers may send, or invent news, for ever: the program's loop has its turn all the same.
+  // Peers may send messages and hints without end: the event loop must have its turn.
   for (int batches = 0; batches < most; ++batches) {
     if (step()) continue;
     dropKnocks();
@@ -220,8 +222,8 @@ void Dispatcher::Impl::runOrPost(const std::function<void()>& command) {
   command();
 }
 
-// The thread that runs the dispatcher may stop to do so before it has seen the command: then the
-// caller runs it.
+// The thread that runs the dispatcher may stop before it has seen the command; then the caller runs
+// the command.
 void Dispatcher::Impl::runOrPostAndWait(const std::function<void()>& command) {
   if (lock_.isMine()) return command();
   struct State {
@@ -253,11 +255,11 @@ void Dispatcher::Impl::runOrPostAndWait(const std::function<void()>& command) {
 
 void Dispatcher::Impl::noteDue(std::int64_t ns) noexcept {
   auto due = dueNs_.load(std::memory_order_relaxed);
-  // PAIR(waiting-thread): before we look which thread waits.
+  // PAIR(waiting-thread): stored before this thread reads which thread waits.
   while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst,
                                                    std::memory_order_relaxed)) {
   }
-  // PAIR(waiting-thread): after our time, which that thread looks at, or we see it here.
+  // PAIR(waiting-thread): the waiting thread reads the time stored above, or its id is read here.
   if (ns < due && waitingThread_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
     endpoint_.interrupt();
 }
@@ -278,7 +280,7 @@ void Dispatcher::Impl::waitForNames(bool wait) {
       namesChanged_.store(true, std::memory_order_relaxed);
       endpoint_.interrupt();
     });
-    // A server that appeared before the watch began.
+    // For a server that appeared before the watch began.
     namesChanged_.store(true, std::memory_order_relaxed);
     endpoint_.interrupt();
   } else if (!wait && namesToken_ != 0) {
@@ -287,8 +289,8 @@ void Dispatcher::Impl::waitForNames(bool wait) {
   }
 }
 
-// True when it may have called back.
-bool Dispatcher::Impl::handleNews() {
+// Handles commands, deaths of peers and new names. Returns true when callbacks may have run.
+bool Dispatcher::Impl::handleLocalHints() {
   const bool hasCalled = hasCommands_.load(std::memory_order_relaxed);
   if (hasCalled) runCommands();
   if (endpoint_.takePeerDeath()) dead_.begin(bindings_);
@@ -296,12 +298,12 @@ bool Dispatcher::Impl::handleNews() {
   return hasCalled;
 }
 
-// True while there is more to do.
+// Returns true when a round was in progress.
 bool Dispatcher::Impl::resumeRounds() {
   if (dead_.isOver() && waiting_.isOver()) return false;
   dead_.resume([](Binding& binding) {
     if (!binding.hasDeadPeer()) return false;
-    binding.disconnect("the server's process ended", Binding::Ending::serverGone);
+    binding.disconnect("the process of the server exited", Binding::Ending::serverGone);
     return true;
   });
   if (waiting_.isOver()) return true;
@@ -316,8 +318,8 @@ bool Dispatcher::Impl::resumeRounds() {
   return true;
 }
 
-// Those that there are now. Each is taken before it runs: when it throws, the others are still
-// there.
+// Runs the commands that are posted now. Removes each before it runs: when it throws, the others
+// stay posted.
 void Dispatcher::Impl::runCommands() {
   std::size_t left = 0;
   {
@@ -343,8 +345,8 @@ std::function<void()> Dispatcher::Impl::takeCommand() {
 void Dispatcher::Impl::handleDue() {
   if (due_.isOver()) {
     dueNs_.store(INT64_MAX, std::memory_order_relaxed);
-    // PAIR(due): a sender that stored its deadline before we withdrew ours is seen below; a later
-    // one lowers ours again.
+    // PAIR(due): the round below sees a deadline that a sender stored before dueNs_ was reset; a
+    // later sender lowers dueNs_ again.
     doorbell::fence();
     due_.begin(bindings_);
   }
@@ -356,10 +358,10 @@ void Dispatcher::Impl::handleDue() {
       return true;
     });
   } catch (...) {
-    noteDue(nowNs);  // for the others, and for what it has not done yet
+    noteDue(nowNs);  // for the other bindings, and for the rest of this one
     throw;
   }
-  if (!due_.isOver()) return noteDue(nowNs);  // the others at once
+  if (!due_.isOver()) return noteDue(nowNs);  // the next step continues the round
   for (const auto& binding : bindings_) noteDue(binding->dueNs());
 }
 

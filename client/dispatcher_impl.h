@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Dispatcher::Impl: the endpoint of a process's clients, and what is due for them.
+// Dispatcher::Impl: the endpoint of the clients of a process, and the work that is due for them.
 //
-// Threads  the thread that has the RunnerLock, unless a function says that any thread may call it.
+// Threads  the thread that holds the RunnerLock, unless a comment says that any thread may call.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@ namespace mpf {
 
 class Dispatcher::Impl {
  public:
-  // Between looks whether another thread still runs a dispatcher without a thread of its own.
+  // How often a waiting thread checks whether another thread still runs the dispatcher.
   static constexpr Nanoseconds kLookForRunner = std::chrono::milliseconds(5);
 
   Impl(Backplane backplane, const DispatcherOptions& options);
@@ -51,34 +51,33 @@ class Dispatcher::Impl {
   // --- any thread ---
   void interrupt() noexcept;
   [[nodiscard]] Deadline nextDue() const noexcept {
-    // PAIR(waiting-thread): after the name of the thread that waits until then.
+    // PAIR(waiting-thread): read after the waiting thread has stored its id in waitingThread_.
     return Deadline::atNs(dueNs_.load(std::memory_order_seq_cst));
   }
-  // Runs `command`, which may call back, on the thread that runs the dispatcher: now when that is
-  // the calling thread, else in the next step.
+  // Runs `command`, which may run callbacks, on the thread that runs the dispatcher: now when that
+  // is the calling thread, else in the next step.
   void post(std::function<void()> command);
-  // In the next step, and not before the callback that is running has returned.
+  // Runs `command` in the next step, after the callback that is in progress has returned.
   void postLater(std::function<void()> command);
-  // Runs `command`, which calls no callback: now when no other thread runs the dispatcher, else in
+  // Runs `command`, which runs no callback: now when no other thread runs the dispatcher, else in
   // the next step.
   void runOrPost(const std::function<void()>& command);
-  // The same, and waits until it has run.
+  // As runOrPost(), and waits until the command has run.
   void runOrPostAndWait(const std::function<void()>& command);
-  // Something is due at `ns`.
+  // Makes sure that the dispatcher wakes up at `ns`.
   void noteDue(std::int64_t ns) noexcept;
 
   Endpoint& endpoint() noexcept { return endpoint_; }
   void add(const std::shared_ptr<Binding>& binding);
-  // The binding lives until no callback of it can be running.
+  // The binding stays alive until no callback of it can be in progress.
   void remove(const std::shared_ptr<Binding>& binding);
   void setLink(std::uint32_t index, Binding* binding);
-  // Looks for servers whenever a new one may have appeared, while `waiting` bindings do not have
-  // theirs.
+  // Starts or ends the watch for new servers, which bindings without a server need.
   void waitForNames(bool wait);
 
-  // The dispatcher's own thread runs it, and no other.
+  // True for a shared dispatcher: only its own thread runs it.
   [[nodiscard]] bool hasThread() const noexcept { return hasThread_; }
-  // The callback of a client of that server has thrown what is being handled.
+  // Called in a catch clause: the callback of a client of that server has thrown.
   void noteThrower(const std::string& server, std::int32_t location) noexcept;
 
  private:
@@ -89,7 +88,7 @@ class Dispatcher::Impl {
   bool step();
   bool tryStep();
   void dropKnocks() noexcept;
-  bool handleNews();
+  bool handleLocalHints();
   bool resumeRounds();
   void handleDue();
   void runCommands();
@@ -103,18 +102,18 @@ class Dispatcher::Impl {
   std::deque<std::function<void()>> commands_;  // under commandMutex_
   std::atomic<bool> hasCommands_{false};
   std::atomic<bool> namesChanged_{false};
-  Round dead_;  // of those whose server may have died
-  Round waiting_;  // of those whose server may be there
-  Round due_;
+  Round dead_;  // of bindings whose server may have died
+  Round waiting_;  // of bindings whose server may have appeared
+  Round due_;  // of bindings with work that is due
   Watcher::Token namesToken_ = 0;
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::atomic<bool> stop_{false};
   std::atomic<bool> ended_{false};
   RunnerLock lock_;
-  // the thread that waits in run(), or the last one that did
+  // The thread that waits in run(), or waited there last.
   std::atomic<std::thread::id> waitingThread_;
   CallbackErrors errors_;
-  int depth_ = 0;  // of steps, in callbacks of steps
+  int depth_ = 0;  // of nested steps: a callback may run the dispatcher
   bool hasDescriptor_ = false;
   bool hasThread_ = false;
   std::thread thread_;

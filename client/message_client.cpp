@@ -101,7 +101,7 @@ bool MessageClient::connectWait(Nanoseconds timeout) {
   const auto isDone = [this] { return isConnected(); };
   while (!isDone() && !deadline.hasPassed()) {
     if (dispatcher_->tryRunUntil(deadline, isDone)) continue;
-    // The thread that runs a dispatcher without a thread of its own may stop to do so.
+    // Another thread runs the dispatcher; if it stops, this thread must run it.
     static_cast<void>(binding_->waitConnected(
         dispatcher_->hasThread()
             ? deadline

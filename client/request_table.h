@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// RequestTable: the requests of one client that its server owes a reply. A request that was given
-// up (cancelled, expired) has had its end, and stays until the server is through with it: the
-// server knows it by its place in the table, which nobody else may get before.
+// RequestTable: the outstanding requests of one client. A request that was given up (cancelled,
+// expired) has had its fate, and keeps its entry until the server replies to it or refuses it: the
+// server identifies it by the place of that entry, so no other request may use the place before.
 //
-// Threads  add(): one thread at a time, under the client's lock. The rest: the dispatcher's thread.
+// Threads  tryReserve(), add() and takeBack(): one thread at a time, under the client's lock. The
+//          rest: the dispatcher's thread.
 #pragma once
 
 #include <atomic>
@@ -21,13 +22,12 @@ struct Request {
   std::uint64_t ordinal = 0;  // number of its message on the link
   std::int64_t deadlineNs = 0;
   std::int64_t sentNs = 0;  // of a timed request; else 0
-  bool isGivenUp = false;  // the dispatcher's
+  bool isGivenUp = false;  // used by the dispatcher's thread only
 };
 
 class RequestTable {
  public:
-  // `lastId`: of the table before, so that a late cancel() does not meet a request of the next
-  // connection.
+  //   lastId   of the previous connection's table: a late cancel() must not match a new request
   explicit RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId = 0)
       : size_(std::bit_ceil(maxOutstanding)),
         max_(maxOutstanding),
@@ -40,43 +40,43 @@ class RequestTable {
     return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
   }
 
-  // Without those that were given up.
+  // Outstanding requests that were not given up.
   [[nodiscard]] std::uint32_t awaited() const noexcept {
     return outstanding() - givenUp_.load(std::memory_order_relaxed);
   }
 
-  // A free entry, not yet added, with the id asked for or, for 0, one of its own; nullptr when max
-  // are outstanding, or another one has that place.
+  // Returns a free entry, not yet added, for the given id, or for a new id when it is 0; nullptr
+  // when the maximum is outstanding or another request has the place of that id.
   Request* tryReserve(std::uint32_t& id) noexcept {
     if (outstanding() >= max_) return nullptr;
     if (id != 0) {
       auto& request = requests_[id & (size_ - 1)];
-      // PAIR(request-ended): the dispatcher has finished with the entry.
+      // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
       return request.id.load(std::memory_order_acquire) == 0 ? &request : nullptr;
     }
     for (;;) {
       id = ++lastId_;
       auto& request = requests_[id & (size_ - 1)];
-      // PAIR(request-ended): the dispatcher has finished with the entry.
+      // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
       if (id != 0 && request.id.load(std::memory_order_acquire) == 0) return &request;
     }
   }
   void add(Request& request, std::uint32_t id) noexcept {
     added_.store(added_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    // PAIR(request-added): after its fields.
+    // PAIR(request-added): stored after the other fields of the entry.
     request.id.store(id, std::memory_order_release);
   }
 
-  // Its message was not sent after all.
+  // Undoes add() when the message could not be sent.
   void takeBack(Request& request) noexcept {
     added_.store(added_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
     request.id.store(0, std::memory_order_relaxed);
   }
 
-  // The request, if the server owes it a reply.
+  // Returns the entry of an outstanding request, or nullptr.
   Request* find(std::uint32_t id) noexcept {
     auto& request = requests_[id & (size_ - 1)];
-    // PAIR(request-added): its fields.
+    // PAIR(request-added): the fields of the entry.
     return id != 0 && request.id.load(std::memory_order_acquire) == id ? &request : nullptr;
   }
   void giveUp(Request& request) noexcept {
@@ -87,14 +87,14 @@ class RequestTable {
     if (std::exchange(request.isGivenUp, false))
       givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
     ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    // PAIR(request-ended): we have finished with the entry.
+    // PAIR(request-ended): this thread no longer uses the entry.
     request.id.store(0, std::memory_order_release);
   }
 
   template <class Visit>
   void forEach(Visit&& visit) {
     for (std::uint32_t at = 0; at < size_; ++at) {
-      // PAIR(request-added): its fields.
+      // PAIR(request-added): the fields of the entry.
       if (requests_[at].id.load(std::memory_order_acquire) != 0) visit(requests_[at]);
     }
   }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Round: all bindings of a dispatcher, some in each step. There may be thousands that have to
-// connect anew, and others have their turn meanwhile.
+// Round: visits all bindings of a dispatcher, some in each step. Thousands of bindings may have to
+// reconnect at once; messages of other clients are delivered between the steps.
 //
-// Threads  one. Callbacks may come back in here, and destroy clients.
+// Threads  one. Callbacks may call resume() again and destroy clients.
 #pragma once
 
 #include <memory>
@@ -15,24 +15,24 @@ namespace mpf {
 
 class Round {
  public:
-  // From the beginning, with those that there are now.
+  // Starts a round through `all`; a round in progress is dropped.
   void begin(const std::set<std::shared_ptr<Binding>>& all) {
     bindings_.assign(all.begin(), all.end());
     next_ = 0;
   }
   [[nodiscard]] bool isOver() const noexcept { return next_ == bindings_.size(); }
-  // Goes on until `act` has had something to do, and said so, for some of them.
+  // Calls `act` for one binding after the other until it has returned true for kPerStep of them.
   template <class Act>
   void resume(const Act& act) {
-    for (int acted = 0; acted < kInAStep && !isOver();) {
+    for (int acted = 0; acted < kPerStep && !isOver();) {
       const auto binding = bindings_[next_++].lock();
       if (binding && act(*binding)) ++acted;
     }
-    if (isOver()) begin({});  // nobody's memory waits for the next one
+    if (isOver()) begin({});  // release the references
   }
 
  private:
-  static constexpr int kInAStep = 8;
+  static constexpr int kPerStep = 8;
   std::vector<std::weak_ptr<Binding>> bindings_;
   std::size_t next_ = 0;
 };

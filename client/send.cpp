@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Binding, continued: the way out.
+// Binding: sends requests.
 #include <mutex>
 #include <utility>
 
@@ -37,7 +37,8 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
     request->deadlineNs = envelope.deadlineNs;
     request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
     if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
-    // Before the message goes: its reply may be here before we are.
+    // Before the message is sent: the dispatcher may receive the reply before trySendLocked()
+    // returns.
     requests_->add(*request, id);
     MPF_STEP(request_added);
     sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0, 0});
@@ -46,7 +47,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
       count(link.control().clientRefused);
       if (sent == LinkSend::full) noteFull();
     } else {
-      fullTold_ = false;
+      isFullReported_ = false;
       nudging = std::exchange(nudging_, true);
       link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
       link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
@@ -71,17 +72,17 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
   return SendResult::sent;
 }
 
-// Each refusal is counted; a run of them is told once, in its place among the other news.
+// Counts each refusal, and reports a series of them once, in its place among the other messages.
 void Binding::noteFull() noexcept try {
-  // Clients of other threads count here, too.
+  // Clients on other threads count here, too.
   dispatcher_.endpoint().control().queueFull.fetch_add(1, std::memory_order_relaxed);
-  if (fullTold_) return;
-  fullTold_ = true;
+  if (isFullReported_) return;
+  isFullReported_ = true;
   dispatcher_.postLater([weak = weak_from_this()] {
-    if (const auto self = weak.lock()) self->tellQueueFull();
+    if (const auto self = weak.lock()) self->reportQueueFull();
   });
 } catch (const std::bad_alloc&) {
-  fullTold_ = false;
+  isFullReported_ = false;
 }
 
 BodyBytes Binding::allocate(std::size_t bytes) {

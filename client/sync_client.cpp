@@ -38,7 +38,7 @@ void SyncClient::take(Message&& message) {
   }
 }
 
-// The calling thread becomes the one that runs the dispatcher, whichever thread did so before.
+// The calling thread runs the dispatcher, even when another thread ran it last.
 bool SyncClient::connectWait(Nanoseconds timeout) {
   if (client_.isInherited()) return false;
   const auto deadline = Deadline::after(timeout);
@@ -50,18 +50,19 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
   const auto deadline = Deadline::after(timeout);
   if (!client_.isConnected() && !connectWait(timeout)) return Answer(SendResult::notConnected);
   answer_.reset();
-  // While the message is on its way, no reply to it can be taken: that is this thread's work.
+  // send() may write awaited_ before the reply is handled: only this thread delivers replies.
   if (const auto result = client_.send(std::move(message), deadline, &awaited_);
       result != SendResult::sent) {
     awaited_ = 0;
-    // NOLINTNEXTLINE(bugprone-use-after-move): not sent, it is as it was
+    // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
     if (result == SendResult::tooLarge)
       return Answer(result, limitExceeded(message, client_.maxMessageBytes()));
     return Answer(result);
   }
   while (!answer_ && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
   if (!answer_) {
-    // What the server had not taken has expired by now; what it had taken may yet be done.
+    // Delivers `expired` if the server had not received the request. Otherwise it may still act on
+    // it.
     dispatcher_.runOnce(Deadline::atNs(0));
     if (!answer_) {
       client_.cancel(awaited_);
@@ -76,7 +77,7 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
 
 Message SyncClient::receive(Nanoseconds timeout) {
   const auto deadline = Deadline::after(timeout);
-  // Looks at least once: with a timeout of 0, what is there is taken.
+  // Runs the dispatcher at least once: with a timeout of 0, it returns a message that has arrived.
   for (bool isFirst = true; others_.empty() && (isFirst || !deadline.hasPassed()); isFirst = false)
     dispatcher_.runOnce(deadline);
   if (others_.empty()) return {};

@@ -4,6 +4,8 @@
 #include <kj/exception.h>
 #include <limits>
 
+#include <mpf/message_of.h>
+
 #include "schema/visit.h"
 #include "schema/wire_places.h"
 

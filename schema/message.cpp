@@ -13,8 +13,8 @@ namespace {
 class HeapLender final : public BodyLender {
  public:
   void takeBack(std::byte* data, std::size_t) noexcept override {
-    std::free(
-        data);  // NOLINT(cppcoreguidelines-no-malloc): owner of the memory of allocateHeapBody()
+    // NOLINTNEXTLINE(cppcoreguidelines-no-malloc): this lender owns what allocateHeapBody() returns
+    std::free(data);
   }
 };
 
@@ -57,7 +57,7 @@ Message Message::duplicate() const {
 
 void Message::refuseLength(MessageType type, std::size_t length, std::size_t room) {
   throw std::length_error(std::string(toString(type)) + ": length " + std::to_string(length) +
-                          " was asked for, there is room for " + std::to_string(room));
+                          " is too large: there is room for " + std::to_string(room));
 }
 
 }  // namespace mpf

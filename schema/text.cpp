@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include <mpf/message_of.h>
+
 #include "schema/visit.h"
 
 namespace mpf {

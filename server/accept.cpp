@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ServerCore, continued: clients come and go.
+// ServerCore: accepts clients and closes their connections.
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -18,11 +18,11 @@ namespace mpf {
 namespace {
 
 constexpr std::chrono::milliseconds kDrainTimeout{100};
-constexpr std::chrono::microseconds kLookAtThem{500};
-constexpr std::size_t kMostOfRescan = 1024;  // links to accept
-constexpr std::int64_t kRestAfterRescan = 9;  // as long as the look took, so many times
+constexpr std::chrono::microseconds kDrainPoll{500};
+constexpr std::size_t kMaxLinksPerRescan = 1024;
+constexpr std::int64_t kRestAfterRescan = 9;  // times the duration of the rescan
 
-// What this process lacks, if that is why something failed.
+// The shortage of this process or host that made an operation fail, if `error` says so.
 layout::Shortage shortageOf(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return layout::Shortage::memory;
   const auto* failed = dynamic_cast<const std::system_error*>(&error);
@@ -40,8 +40,9 @@ layout::Shortage shortageOf(const std::exception& error) {
 
 }  // namespace
 
-// Any user may fill /dev/shm with names, and every client may ask for this: the looks take a tenth
-// of the server's time at most. A client that is not found knocks again.
+// Accepts clients whose knock was lost. Any user may fill /dev/shm with names and any client may
+// request a rescan, so rescans use at most a tenth of the server's time. A client that a rescan
+// does not find knocks again.
 void ServerCore::acceptAll() {
   const auto fromNs = Clock::nowNs();
   if (fromNs < rescanFromNs_) return;
@@ -52,7 +53,7 @@ void ServerCore::acceptAll() {
   for (const auto& name : segments::list(prefix)) {
     const auto parsed = SegmentName::tryParse(name);
     if (!parsed || byLink_.contains(parsed->incarnation)) continue;
-    if (++accepted > kMostOfRescan) break;
+    if (++accepted > kMaxLinksPerRescan) break;
     accept(parsed->incarnation);
   }
   const auto nowNs = Clock::nowNs();
@@ -72,19 +73,19 @@ void ServerCore::accept(std::uint64_t incarnation) {
     auto client = endpoint_.peer(window, layout::SegmentKind::clientWindow);
     if (client && link->peerState() == layout::LinkState::open)
       return open(std::move(link), std::move(client));
-    // A client's window stands before its links do and goes after them: this client died while it
-    // knocked.
+    // A client creates its window before its links and removes it after them: without a window,
+    // this client died after it had created the link.
     if (!client && segments::probeOwner(window) == segments::Owner::absent)
       removeLink(name, incarnation);
   } catch (const std::exception& error) {
-    // Its client sees that nobody accepts it, and knocks again; we go on.
+    // The client is not accepted and knocks again; the server continues.
     const auto shortage = shortageOf(error);
     if (shortage == layout::Shortage::none) return count(endpoint_.control().protocolErrors);
     noteShortage(shortage, error.what());
   }
 }
 
-// One that begins is one alarm, however many clients it keeps away.
+// Each shortage counts as one alarm, for any number of clients that the server cannot accept.
 void ServerCore::noteShortage(layout::Shortage shortage, const std::string& why) {
   auto& control = endpoint_.control();
   const auto was = control.shortage.load(std::memory_order_relaxed);
@@ -92,7 +93,7 @@ void ServerCore::noteShortage(layout::Shortage shortage, const std::string& why)
   control.shortage.store(shortage, std::memory_order_relaxed);
   const bool isOver = shortage == layout::Shortage::none;
   if (!isOver && was == layout::Shortage::none) countAlarm();
-  if (tellShortage_) tellShortage_(isOver ? std::string() : why);
+  if (onShortage_) onShortage_(isOver ? std::string() : why);
 }
 
 void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client) {
@@ -125,7 +126,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
   opened.setState(layout::LinkState::open);
   MPF_STEP(link_accepted);
   opened.notifyPeer();
-  tell(nameOf(connection), true);
+  reportClient(nameOf(connection), true);
 }
 
 void ServerCore::closeIfClientDid(Connection& connection) noexcept {
@@ -141,7 +142,8 @@ void ServerCore::closeDead() {
     MPF_STEP(client_died);
     removeLinkOfDead(*connection);
     MPF_STEP(client_removed);
-    // It ended in order before its process did: take() closes behind what is left.
+    // The client closed the link before it died: take() closes the connection after the remaining
+    // requests.
     const auto& link = connection->channel->link();
     if (link.peerState() == layout::LinkState::closed && link.hasMessage()) continue;
     count(endpoint_.control().peersDied);
@@ -149,7 +151,7 @@ void ServerCore::closeDead() {
   }
 }
 
-// The client owned the link and is proven dead: its names are ours to remove.
+// The client owned the link and has died, so the server may remove its names.
 void ServerCore::removeLinkOfDead(const Connection& connection) noexcept {
   const auto& link = connection.channel->link();
   removeLink(link.name(), link.header().incarnation);
@@ -160,7 +162,7 @@ void ServerCore::removeLink(const std::string& name, std::uint64_t incarnation) 
   removeBulk(endpoint_.backplane().name(), incarnation);
 }
 
-// Whoever died and was not noticed yet leaves nothing behind: nobody is here to notice it later.
+// Also removes the files of clients whose death the server has not noticed yet: no later call will.
 void ServerCore::closeAll() noexcept {
   std::vector<std::shared_ptr<MessageLink>> others;
   for (const auto& connection : connections_) {
@@ -175,12 +177,12 @@ void ServerCore::closeAll() noexcept {
     }
     close(*connection);
   }
-  // Clients of other users may not remove what is ours, and find it no more once we have: they have
-  // a moment to take what they were sent.
-  const auto patience = Deadline::after(kDrainTimeout);
-  const auto isTaking = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
-  while (std::ranges::any_of(others, isTaking) && !patience.hasPassed())
-    std::this_thread::sleep_for(kLookAtThem);
+  // Clients of other users cannot remove the server's pool files, so the server removes them
+  // itself. It first gives these clients a moment to receive the replies that are in the pool.
+  const auto deadline = Deadline::after(kDrainTimeout);
+  const auto isReceiving = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
+  while (std::ranges::any_of(others, isReceiving) && !deadline.hasPassed())
+    std::this_thread::sleep_for(kDrainPoll);
 }
 
 void ServerCore::close(Connection& connection) noexcept {
@@ -198,7 +200,7 @@ void ServerCore::close(Connection& connection) noexcept {
   channel->link().setState(layout::LinkState::closed);
   channel->link().notifyPeer();
   count(endpoint_.control().linksClosed);
-  tell(name, false);
+  reportClient(name, false);
 }
 
 }  // namespace mpf

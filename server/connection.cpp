@@ -22,7 +22,7 @@ Connection::Pointer Connection::take() {
 }
 
 void Connection::GiveBack::operator()(Connection* connection) const noexcept {
-  // Open still: its server is the copy that a fork made, and so are its handles.
+  // Still open: this process is a forked child, and the server and its handles are copies.
   if (connection->channel) return delete connection;
   const std::lock_guard guard(freeMutex);
   connection->nextFree = std::exchange(freeConnections, connection);

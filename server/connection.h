@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Connection: one client's end at a server, used again and again; `generation` tells its lives
-// apart.
+// Connection: the server's end of one client's connection. Connections are reused; `generation`
+// distinguishes the clients that used one.
 //
-// Threads  as ServerCore says; take() and GiveBack any.
-// Crash    a handle of a request names its connection by address and may outlive its server: so
-//          they are never freed, and the servers of a process share them. There are as many as it
-//          had clients at once.
+// Threads  as ServerCore; any thread may call take() and GiveBack.
+// Lifetime a handle of a request refers to its connection by address and may outlive its server:
+//          connections are never freed, and the servers of a process share them. There are as many
+//          as the process had clients at the same time.
 #pragma once
 
 #include <atomic>
@@ -22,14 +22,14 @@ struct Connection {
     void operator()(Connection* connection) const noexcept;
   };
   using Pointer = std::unique_ptr<Connection, GiveBack>;
-  // One that is free.
+  // Returns a free connection.
   static Pointer take();
 
   std::shared_ptr<SpinLock> lock = std::make_shared<SpinLock>();
   std::shared_ptr<MessageLink> channel;  // under lock; empty: free
   std::uint32_t index = 0;
   std::uint32_t generation = 0;  // under lock
-  // a power of two: ids of requests that owe their first reply
+  // Ids of received requests without a reply, by their low bits; the size is a power of two.
   std::vector<std::atomic<std::uint32_t>> unanswered;
   std::uint32_t unansweredMask = 0;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ServerCore: what its window says of the request that it works on.
+// ServerCore: shows the request in progress, and the progress of requests, in its window.
 #include "shm/handling.h"
 
 #include <array>
@@ -19,7 +19,7 @@ constexpr std::int64_t kSlowNs = 10'000;
 template <class T>
 constexpr bool kHasCmd = requires { T::cmd; };
 
-// Which types have a `cmd`, by their numbers. It is at the same place in all of them.
+// Indexed by the number of a type: whether it has a `cmd`, which has the same offset in all types.
 constexpr std::size_t kCmdOffset = offsetof(Int32, cmd);
 template <class... T>
 constexpr auto typesWithCmd(std::type_identity<std::tuple<T...>> /*types*/) {
@@ -45,8 +45,8 @@ std::int32_t cmdOf(const Message& request) noexcept {
 
 }  // namespace
 
-// A fast server looks at the clock for one request in 64, a slow one for each: so the time is at
-// most 64 * kSlowNs too early.
+// A fast server reads the clock for one request in 64, a slow server for each request: the stored
+// time is at most 64 * kSlowNs too early.
 void ServerCore::noteProgress(std::int64_t nowNs) noexcept {
   auto& control = endpoint_.control();
   const auto taken = control.received.load(std::memory_order_relaxed);

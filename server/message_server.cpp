@@ -14,7 +14,7 @@ const char* toString(ReplyResult result) noexcept {
     case ReplyResult::sent:
       return "sent";
     case ReplyResult::clientGone:
-      return "client gone";
+      return "the client has disconnected";
     case ReplyResult::queueFull:
       return "reply queue full";
     case ReplyResult::tooLarge:
@@ -59,8 +59,8 @@ BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
 }
 int MessageServer::descriptor() { return impl_->core.descriptor(); }
 
-void MessageServer::onClient(std::function<void(std::uint64_t, bool)> news) {
-  impl_->core.onClient(std::move(news));
+void MessageServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
+  impl_->core.onClient(std::move(callback));
 }
 Deadline MessageServer::takeBefore() const noexcept { return impl_->core.takeBefore(); }
 ReplyResult MessageServer::replyTo(std::uint64_t client, std::uint32_t requestId,
@@ -93,7 +93,7 @@ void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> 
 void MessageServer::callHandler(const std::function<void(Message&&)>& handler,
                                 Message&& request) try {
   handler(std::move(request));
-} catch (...) {  // the request has been refused by now
+} catch (...) {  // the handler has destroyed the request, which has refused it
   impl_->core.endHandling();
   impl_->core.callAgain();
   throw;
@@ -126,8 +126,8 @@ int MessageServer::runUntilSignal() {
   return 0;
 }
 
-void MessageServer::onShortage(std::function<void(const std::string&)> tell) {
-  impl_->core.onShortage(std::move(tell));
+void MessageServer::onShortage(std::function<void(const std::string&)> callback) {
+  impl_->core.onShortage(std::move(callback));
 }
 void MessageServer::countAlarm() noexcept { impl_->core.countAlarm(); }
 

@@ -14,8 +14,8 @@
 
 namespace mpf {
 
-// Handles of requests may outlive their server, so keepers are never freed: some bytes for each
-// server of the process's life.
+// Handles of requests may outlive their server, so keepers are never freed: they cost a few bytes
+// for each server that the process creates.
 class ServerCore::Keeper final : public RouteKeeper {
  public:
   static Keeper* make(ServerCore& server) {
@@ -46,8 +46,8 @@ class ServerCore::Keeper final : public RouteKeeper {
 
 namespace {
 
-// More than there are links: each has been looked at.
-constexpr std::uint32_t kLooksInVain = 2 * layout::kMaxLinks;
+// More than the number of links, so that receive() looks at each link.
+constexpr std::uint32_t kMaxLooks = 2 * layout::kMaxLinks;
 
 int checkedQueueSize(int size) {
   if (size < 1 || size > static_cast<int>(LinkGeometry::kMaxQueueSize)) {
@@ -89,7 +89,7 @@ ServerCore::~ServerCore() {
   if (endpoint_.forkGuard().isInherited()) return;
   MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
-  clientNews_ = nullptr;
+  onClient_ = nullptr;
   closeAll();
 }
 
@@ -167,8 +167,8 @@ int ServerCore::descriptor() {
   return endpoint_.descriptor();
 }
 
-void ServerCore::lookAround() {
-  // A client that never stops to knock has its turn, and no more.
+void ServerCore::handleSideHints() {
+  // Limited, because a faulty client may knock without end.
   for (std::uint32_t knocks = 0; knocks < layout::kKnocks; ++knocks) {
     const auto incarnation = endpoint_.takeKnock();
     if (!incarnation) break;
@@ -182,9 +182,9 @@ void ServerCore::lookAround() {
 Message ServerCore::receive() {
   endpoint_.forkGuard().check("MessageServer");
   Message message;
-  // Clients may invent news for ever: who receives gets its turn all the same.
-  for (std::uint32_t looks = 0; looks < kLooksInVain; ++looks) {
-    if (endpoint_.hasSideNews()) lookAround();
+  // Limited, because faulty clients may set hints without end, and receive() must return.
+  for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
+    if (endpoint_.hasSideNews()) handleSideHints();
     if (!thrown_.empty()) throwNext();
     const auto index = endpoint_.next();
     if (index && take(*connections_[*index], message)) return message;
@@ -202,20 +202,21 @@ void ServerCore::callAgain() noexcept {
   if (hasDescriptor_) endpoint_.callAgain();
 }
 
-// An exception must not interrupt what changes the links: receive() throws it afterwards.
-void ServerCore::tell(std::uint64_t client, bool isThere) noexcept try {
-  if (clientNews_) clientNews_(client, isThere);
+// An exception must not interrupt a change of the links: receive() throws it afterwards.
+void ServerCore::reportClient(std::uint64_t client, bool isConnected) noexcept try {
+  if (onClient_) onClient_(client, isConnected);
 } catch (...) {
   try {
     thrown_.push_back(std::current_exception());
-  } catch (const std::bad_alloc&) {  // as many as there is memory for
+  } catch (const std::bad_alloc&) {  // the exception is lost
   }
 }
 
 void ServerCore::throwNext() {
   const auto first = std::move(thrown_.front());
   thrown_.pop_front();
-  endpoint_.interrupt();  // there may be more, and messages: the next wait() ends at once
+  endpoint_
+      .interrupt();  // more exceptions or requests may wait: the next wait() returns immediately
   std::rethrow_exception(first);
 }
 
@@ -277,8 +278,8 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
 }
 
 bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
-  // PAIR(taken-before-clock): the client sees that we counted the request as taken, or we see that
-  // its deadline has passed.
+  // PAIR(taken-before-clock): the client sees that the server counted the request as taken, or the
+  // server sees that the deadline has passed.
   doorbell::fence();
   return Clock::nowNs() >= envelope.deadlineNs;
 }

@@ -1,10 +1,9 @@
-// SPDX-License-Identifier: MIT
-// ServerCore: what MessageServer does with links: accepts them, takes requests, sends replies, ends
-// what must end.
+// SPDX-License-Identifier: MIT ServerCore: the links of a MessageServer: accepts clients, receives
+// requests, sends replies, closes connections.
 //
-// Threads  as MessageServer: one owner thread, replies from any.
-// Crash    a dead client's links are closed and their names removed, here.
-// Trust    nonsense from a client closes its link.
+// Threads  as MessageServer: one thread owns it, any thread may reply.
+// Crash    ServerCore closes the links of a dead client and removes their names.
+// Trust    invalid data from a client closes its link.
 #pragma once
 
 #include <atomic>
@@ -36,27 +35,30 @@ class ServerCore {
   bool wait(Deadline deadline);
   Message receive();
   void interrupt() noexcept;
-  // Whether the next wait() ends at once.
+  // Whether the next wait() returns immediately.
   [[nodiscard]] bool isInterrupted() const noexcept {
     return stop_.load(std::memory_order_relaxed);
   }
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   [[nodiscard]] bool isAwaited(const Message& request) const noexcept;
-  // The request received last is done with, or kept for later: the window does not show it any
-  // more.
+  // Removes the request that was received last from the window: it has been handled, or was kept.
   void endHandling() noexcept;
   ReplyResult reply(Message& message) noexcept;
   BodyBytes allocate(const Route& route, std::size_t bytes);
-  void onClient(std::function<void(std::uint64_t, bool)> news) { clientNews_ = std::move(news); }
+  void onClient(std::function<void(std::uint64_t, bool)> callback) {
+    onClient_ = std::move(callback);
+  }
   [[nodiscard]] Deadline takeBefore() const noexcept { return takeBefore_; }
-  // A route with link 0 when the client is gone.
+  // Returns a route with link 0 when no client ever had that number.
   [[nodiscard]] Route routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept;
   [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
   [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
   int descriptor();
-  // Leaves the descriptor readable: not all that there is was received.
+  // Keeps the descriptor readable, for requests that were not received yet.
   void callAgain() noexcept;
-  void onShortage(std::function<void(const std::string&)> tell) { tellShortage_ = std::move(tell); }
+  void onShortage(std::function<void(const std::string&)> callback) {
+    onShortage_ = std::move(callback);
+  }
   void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }
 
   struct Counts {
@@ -65,19 +67,19 @@ class ServerCore {
   };
   [[nodiscard]] Counts counts() const;
 
-  // Ends a request whose handle died unanswered.
+  // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
   void abandoned(const Route& route) noexcept;
 
  private:
   class Keeper;  // NOLINT(cppcoreguidelines-virtual-class-destructor): never destroyed
   static Connection& connectionOf(const Route& route) noexcept {
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): a route is opaque to everybody else
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): only ServerCore interprets a route
     return *reinterpret_cast<Connection*>(route.link);
   }
   static std::uint64_t nameOf(const Connection& connection) noexcept {
     return std::uint64_t{connection.index + 1} << 32 | connection.generation;
   }
-  void lookAround();
+  void handleSideHints();
   void accept(std::uint64_t incarnation);
   void acceptAll();
   void open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client);
@@ -88,7 +90,7 @@ class ServerCore {
   void removeLink(const std::string& name, std::uint64_t incarnation) noexcept;
   void noteShortage(layout::Shortage shortage, const std::string& why);
   void closeIfClientDid(Connection& connection) noexcept;
-  void tell(std::uint64_t client, bool isThere) noexcept;
+  void reportClient(std::uint64_t client, bool isConnected) noexcept;
   void throwNext();
   bool take(Connection& connection, Message& message) noexcept;
   bool hasExpired(const Envelope& envelope) noexcept;
@@ -105,16 +107,16 @@ class ServerCore {
   Keeper* keeper_;
   std::vector<Connection::Pointer> connections_;  // by index in the window
   std::map<std::uint64_t, Connection*> byLink_;
-  std::function<void(std::uint64_t, bool)> clientNews_;
-  std::deque<std::exception_ptr> thrown_;  // by clientNews_; receive() throws them, one each time
-  std::function<void(const std::string&)> tellShortage_;
-  std::int64_t rescanFromNs_ = 0;  // no look for links by name before
+  std::function<void(std::uint64_t, bool)> onClient_;
+  std::deque<std::exception_ptr> thrown_;  // by onClient_; receive() throws them, one each time
+  std::function<void(const std::string&)> onShortage_;
+  std::int64_t rescanFromNs_ = 0;  // no search for links by name before this time
   bool rescanDue_ = false;
-  Deadline takeBefore_ = Deadline::never();  // of the request taken last
+  Deadline takeBefore_ = Deadline::never();  // of the request received last
   bool isHandling_ = false;  // the window shows a request
-  bool isSlow_ = false;  // requests take so long that a look at the clock for each costs nothing
-  std::int64_t progressAtNs_ = 0;  // the last look at the clock,
-  std::uint64_t progressAt_ = 0;  // and the number of requests taken until then
+  bool isSlow_ = false;  // requests take so long that reading the clock for each costs little
+  std::int64_t progressAtNs_ = 0;  // when the clock was read last
+  std::uint64_t progressAt_ = 0;  // number of requests received until then
   std::atomic<bool> stop_{false};
   bool hasDescriptor_ = false;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 
+#include <mpf/message_of.h>
+
 #include "client/programs/echo_client.h"
 
 namespace {

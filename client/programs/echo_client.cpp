@@ -33,7 +33,7 @@ struct EchoOptions {
   std::size_t bytes = 100;
 };
 
-// What became of the calls, as a person reads it.
+// Counts the calls, reports failures on stderr, and prints a summary.
 class EchoStatistics {
  public:
   void add(std::int64_t roundTripNs) { roundTrips_->add(static_cast<std::uint64_t>(roundTripNs)); }
@@ -43,7 +43,7 @@ class EchoStatistics {
     if (limiter_.dueNs() <= nowNs) say(limiter_.takeDue(nowNs));
     if (limiter_.admit({}, 0, why, nowNs)) say({{0, why}});
   }
-  // Returns the exit status: 0 when every message came back.
+  // Prints the summary. Returns the exit status: 0 when the server echoed every message.
   int report() {
     say(limiter_.takeAll(Clock::nowNs()));
     const auto at = [&](double percent) {
@@ -61,7 +61,7 @@ class EchoStatistics {
     for (const auto& line : lines) printError("{}\n", line.text);
   }
 
-  LogLimiter limiter_;  // of failures: there may be as many as messages
+  LogLimiter limiter_;  // of lines for failures: each message may fail
   std::unique_ptr<LatencyRecorder> roundTrips_ = std::make_unique<LatencyRecorder>();
   std::uint64_t failures_ = 0;
 };
@@ -78,7 +78,7 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
       statistics.fail(
           fmt::format("message {}: {}{}{}", i, answer.why(), why.empty() ? "" : ": ", why));
     } else if (!echo.isEcho(i, options.bytes, answer.message())) {
-      statistics.fail(fmt::format("message {}: the reply is not its echo", i));
+      statistics.fail(fmt::format("message {}: the reply differs from the message", i));
     } else {
       statistics.add(Clock::nowNs() - sentNs);
     }
@@ -87,8 +87,8 @@ int callEchoServer(const EchoOptions& options, const EchoClient& echo) {
 }
 
 int callServer(int argc, char** argv, const EchoClient& echo) {
-  CLI::App app(fmt::format("{} - sends {}s to an echo server and checks what comes back",
-                           echo.program, echo.what),
+  CLI::App app(fmt::format("{} - sends {}s to an echo server and checks its replies", echo.program,
+                           echo.what),
                echo.program);
   EchoOptions options;
   options.server = echo.server;
@@ -103,7 +103,7 @@ int callServer(int argc, char** argv, const EchoClient& echo) {
   app.add_option("--timeout", options.timeoutMs, "Longest wait for a reply [ms]")
       ->capture_default_str()
       ->check(wholeNumber(1, kMost));
-  app.add_option("--bytes", options.bytes, "Length of an array message")
+  app.add_option("--bytes", options.bytes, "Size of the array in a Char8Array message [bytes]")
       ->capture_default_str()
       ->check(wholeNumber(0, kMostBytes));
   if (const auto status = parseCommandLine(app, argc, argv)) return *status;

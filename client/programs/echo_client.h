@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Echo clients: send numbered messages to an echo server and check what comes back (manual:
-// clientInt32, clientChar8Array).
+// Echo clients: send numbered messages to an echo server and check the replies (manual, "Example":
+// clientInt32).
 #pragma once
 
 #include <cstddef>
@@ -12,16 +12,16 @@
 namespace mpf {
 
 struct EchoClient {
-  std::string program;
-  std::string server;
-  std::string what;
+  std::string program;  // name of the program
+  std::string server;   // default name of the server
+  std::string what;     // name of the message type
   std::function<Message(int i, std::size_t bytes)> make;  // message number i
-  // whether a reply is its echo
+  // Whether `reply` is the echo of message number i.
   std::function<bool(int i, std::size_t bytes, const Message& reply)> isEcho;
 };
 
-// Parses the command line, calls the server and reports. Returns the exit status: 0 when every
-// message came back.
+// Parses the command line, sends the messages and prints a summary. Returns the exit status: 0 when
+// the server echoed every message.
 int runEchoClient(int argc, char** argv, const EchoClient& echo);
 
 }  // namespace mpf

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/message_of.h>
+
 #include "client/programs/echo_client.h"
 
 int main(int argc, char** argv) {

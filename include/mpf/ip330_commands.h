@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The messages between the servers of an Acromag IP330 and their clients. A request with an invalid
-// `cmd`, channel or value gets status -1.
+// The messages between the four servers of an Acromag IP330 and their clients. A request with an
+// invalid `cmd`, channel or value gets status -1.
 //
-//            request                                              reply
-//   scan     Int32 address=channel value=gain code 0..3           value=0..0xffff, status 0 or -1
+//   server   request                                        reply
+//   scan     Int32 address=channel value=gain code 0 to 3   Int32 value=0 to 0xffff, status
 //            extra=averaging time [ms], 0: the server's default
-//   config   Int32 cmd, value                                     Int32 status; value as below
-//   sweep    Float64 cmd, address=channel, value                  Float64; Int32Array or
-//            Float64Array as below
-//   PID      Float64 cmd, value                                   Float64; Float64Array as below
+//   config   Int32 cmd, value                               Int32 status; value as below
+//   sweep    Float64 cmd, address=channel, value            Float64; arrays as below
+//   PID      Float64 cmd, value                             Float64; arrays as below
+//
+// Source   manual, "EXAMPLE Implementation: ip330Scan"; the EPICS modules ip330, mca and std.
 #pragma once
 
 #include <cstddef>
@@ -18,23 +19,28 @@ namespace mpf::ip330server {
 
 // NOLINTBEGIN(readability-identifier-naming): names of the EPICS modules ip330, mca and std
 
-// also calibrates now; 0: only now; negative: never, values are raw
+// `cmd` of the config server. Calibrates now, and then every `value` seconds; 0: only now;
+// negative: never, and values are raw.
 inline constexpr std::int32_t cmdSetSecondsBetweenCalibrate = 0;
+// Calibrates now.
 inline constexpr std::int32_t cmdCalibrate = 1;
-inline constexpr std::int32_t cmdSetScanMode = 2;  // 0 to 5 as configIp330
-// the value of the reply is the time that the timer gives, rounded
+// value = 0 to 5, as configIp330.
+inline constexpr std::int32_t cmdSetScanMode = 2;
+// value = [us]; the value of the reply is the nearest time that the timer of the module can
+// produce.
 inline constexpr std::int32_t cmdSetMicrosecondsPerScan = 3;
-// starts a scan in the single modes; status -1 in others
+// Starts a scan in the single modes; status -1 in the other modes.
 inline constexpr std::int32_t cmdStartConvert = 4;
 
-// Commands of a sweep, with the numbers of mca.h. Commands without a meaning for a sweep are
-// accepted and have no effect.
+// `cmd` of the sweep server, with the numbers of mca.h. The server accepts commands that have no
+// meaning for a sweep, and ignores them.
 inline constexpr std::int32_t msgAcquire = 0;
-inline constexpr std::int32_t msgRead = 1;  // the reply is an Int32Array: all points of the channel
+// The reply is an Int32Array: all points of the channel.
+inline constexpr std::int32_t msgRead = 1;
 inline constexpr std::int32_t msgSetChannelAdvanceInternal = 2;
 inline constexpr std::int32_t msgSetChannelAdvanceExternal = 3;
 inline constexpr std::int32_t msgSetNChan = 4;  // number of points
-inline constexpr std::int32_t msgSetDwell = 5;  // seconds per point
+inline constexpr std::int32_t msgSetDwell = 5;  // [s] per point
 inline constexpr std::int32_t msgSetRealTime = 6;
 inline constexpr std::int32_t msgSetLiveTime = 7;
 inline constexpr std::int32_t msgSetCounts = 8;
@@ -44,13 +50,15 @@ inline constexpr std::int32_t msgSetNSweeps = 11;
 inline constexpr std::int32_t msgSetModePha = 12;
 inline constexpr std::int32_t msgSetModeMcs = 13;
 inline constexpr std::int32_t msgSetModeList = 14;
-inline constexpr std::int32_t msgGetAcqStatus =
-    15;  // the reply is a Float64Array: acquiring, real time, live time, total counts, dwell time
+// The reply is a Float64Array: acquiring (0 or 1), real time [s], live time [s], total counts,
+// dwell time [s].
+inline constexpr std::int32_t msgGetAcqStatus = 15;
 inline constexpr std::int32_t msgStopAcquisition = 16;
 inline constexpr std::int32_t msgErase = 17;
 inline constexpr std::int32_t msgSetSeq = 18;
 inline constexpr std::int32_t msgSetPscl = 19;
 
+// `cmd` of the PID server.
 inline constexpr std::int32_t cmdStartFeedback = 0;
 inline constexpr std::int32_t cmdStopFeedback = 1;
 inline constexpr std::int32_t cmdSetHighLimit = 2;
@@ -61,8 +69,10 @@ inline constexpr std::int32_t cmdSetKD = 6;
 inline constexpr std::int32_t cmdSetI = 7;
 inline constexpr std::int32_t cmdSetSecondsPerScan = 8;
 inline constexpr std::int32_t cmdSetSetPoint = 9;
-inline constexpr std::int32_t cmdGetParams = 10;  // the reply is a Float64Array with these elements
+// The reply is a Float64Array with the elements that follow.
+inline constexpr std::int32_t cmdGetParams = 10;
 
+// Indices of the elements.
 inline constexpr std::size_t offsetActual = 0;
 inline constexpr std::size_t offsetError = 1;
 inline constexpr std::size_t offsetOutput = 2;

@@ -1,81 +1,63 @@
 // SPDX-License-Identifier: MIT
-// Message: a handle that owns one message of any type. MessageOf<T>: a handle of a message of type
-// T.
+// Message: a handle that owns one message of any type. <mpf/message_of.h> adds MessageOf<T>, the
+// handle of a message of type T.
 //
-//   Message = | type, clientType, clientExtra | route | body: up to 32 bytes inline, or in memory
-//   of a lender |
+//   Message = | type, clientType, clientExtra | route | body: 32 bytes inline, or out of line |
 //
 // Sending moves the message away; a received message belongs to the receiver. A server may change a
 // request and reply with it, or allocate another message. Handles cannot be copied; duplicate()
 // copies a message.
 //
-// Threads  one at a time for a handle; the lender of the body is called by any thread.
-// Trust    a peer may write anything to a body, at any time. adopt() and copyOf() check the body
-//          once and store its array length; tryAs(), value() and setLength() use only the stored
-//          length.
+// Threads  one thread at a time uses a handle. The thread that destroys a handle calls the lender
+//          of its body.
+// Trust    a peer may write anything to a body in shared memory, at any time. adopt(), copyOf() and
+//          copyInline() check the body once and store its array length; tryAs(), valueAs() and
+//          MessageOf::setLength() use only the stored length.
+// Source   manual, "Message", "Overview". Free lists, toBuffer() and fromBuffer() have no
+//          counterpart: bodies have the form of <mpf/message_types.h> everywhere on a host.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <optional>
 #include <span>
-#include <utility>
 
 #include <mpf/detail/copy_words.h>
+#include <mpf/message_body.h>
 #include <mpf/message_types.h>
 
 namespace mpf {
 
-// Owner of the memory of out-of-line bodies: a link's pool, the heap. The handle that ends calls
-// takeBack() once for its body, on its own thread.
-class BodyLender {
- public:
-  virtual void takeBack(std::byte* data, std::size_t capacity) noexcept = 0;
-
- protected:
-  ~BodyLender() = default;
-};
-
-// An out-of-line body, for transports. It owns nothing: pass it to adopt() or takeBack() exactly
-// once.
-struct BodyBytes {
-  std::byte* data = nullptr;  // aligned to 8 bytes or more
-  std::size_t size = 0;  // bytes in use
-  std::size_t capacity = 0;  // bytes in all
-  BodyLender* lender = nullptr;
-};
-
-// Allocates memory of this process, aligned to 64 bytes. Throws std::bad_alloc.
-[[nodiscard]] BodyBytes allocateHeapBody(std::size_t bytes);
-[[nodiscard]] BodyLender& heapLender() noexcept;
-
-// Is told when the handle of a request is destroyed without a reply. Must outlive every handle.
 struct Route;
+// Receives a call when the handle of a request is destroyed without a reply. It must outlive every
+// handle whose route names it.
 class RouteKeeper {
  public:
+  // Runs on the thread that destroys the handle.
   virtual void abandoned(const Route& route) noexcept = 0;
 
  protected:
   ~RouteKeeper() = default;
 };
 
-// in the flags of a message that a client received: it ended its request
+// A value of Route::flags, in messages that a client received: the message ended its request.
 inline constexpr std::uint32_t kEndsRequest = 1;
-// Where a reply to this message goes. For transports: servers copy it into replies and do not read
-// it.
+
+// Where a reply to this message goes. Transports write and read it; servers copy it into their
+// replies and do not interpret it.
 struct Route {
-  std::uint64_t link{};
-  std::uint32_t requestId{};
+  std::uint64_t link{};  // the connection of the client; 0 in messages that a client received
+  std::uint32_t requestId{};  // the client's number of the request
   std::uint32_t flags{};
-  RouteKeeper* keeper = nullptr;  // of requests only
+  RouteKeeper* keeper = nullptr;  // of requests that have had no reply; not owned
 };
 
 class Message {
  public:
-  // Bodies up to this size, all scalars included, are in the handle; pointers to them are valid as
-  // long as the handle.
+  // [bytes] A body of at most this size, which includes every scalar, is inside the handle. Moving
+  // the handle moves such a body, and pointers to its fields become invalid.
   static constexpr std::size_t kInlineBytes = 32;
 
   Message() noexcept = default;
@@ -93,18 +75,20 @@ class Message {
   Message& operator=(const Message&) = delete;
   ~Message() { giveBack(); }
 
-  // False for an empty or moved-from handle.
+  // False for an empty handle: default constructed, moved from, sent, or reset().
   explicit operator bool() const noexcept { return state_.type != MessageType::none; }
   [[nodiscard]] MessageType getType() const noexcept { return state_.type; }
 
-  // Marks of the client, which replies return (manual, "Message"). DevMpf uses clientType for
-  // itself.
+  // Two numbers of the client's own choice, which every reply returns unchanged (manual, "Message",
+  // "Overview"). Servers should not use them. DevMpf uses clientType for itself.
   [[nodiscard]] std::int32_t getClientType() const noexcept { return state_.clientType; }
   void setClientType(std::int32_t type) noexcept { state_.clientType = type; }
   [[nodiscard]] std::int32_t getClientExtra() const noexcept { return state_.clientExtra; }
   void setClientExtra(std::int32_t extra) noexcept { state_.clientExtra = extra; }
 
-  // The fields; nullptr when the message is of another type or its body is invalid.
+  // The fields, in place: valid until the handle is moved, sent or destroyed. Returns nullptr when
+  // the message has another type than T or its body is invalid. A peer may change T::length at any
+  // time: use arrayLength() or valueAs().
   template <MessageBody T>
   [[nodiscard]] T* tryAs() noexcept {
     return isA<T>() ? reinterpret_cast<T*>(data()) : nullptr;
@@ -113,7 +97,8 @@ class Message {
   [[nodiscard]] const T* tryAs() const noexcept {
     return isA<T>() ? reinterpret_cast<const T*>(data()) : nullptr;
   }
-  // The elements of an array; empty when tryAs<T>() is nullptr.
+  // The elements of an array, in place, valid as long as the fields; empty when tryAs<T>() returns
+  // nullptr.
   template <ArrayBody T>
   [[nodiscard]] std::span<typename T::Element> valueAs() noexcept {
     if (!isA<T>()) return {};
@@ -125,21 +110,27 @@ class Message {
     return {reinterpret_cast<const typename T::Element*>(data() + sizeof(T)), state_.length};
   }
 
-  // False when the body is too short, misaligned or shorter than its array, or the type is unknown.
+  // False when the type is unknown, or the body is misaligned, shorter than the fields of its type,
+  // or too short for the length of its array. The check ran when the handle received the body.
   [[nodiscard]] bool isSound() const noexcept { return state_.sound; }
-  // Number of elements of an array; 0 for other types.
+  // Number of elements of an array, as it was checked; 0 for scalars and invalid bodies.
   [[nodiscard]] std::uint32_t arrayLength() const noexcept { return state_.length; }
+  // All bytes of the body, fields and elements, even when the body is invalid.
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {data(), size()}; }
 
-  // A copy with the same type, marks, route and bytes; large bodies on the heap (std::bad_alloc).
+  // Copies type, clientType, clientExtra, route and body; a large body is copied to the heap. The
+  // array length of the copy is the checked one. Only the original reports to the RouteKeeper.
+  //   throws  std::bad_alloc
   [[nodiscard]] Message duplicate() const;
 
   // ---- for transports
 
+  // The route is not owned: setRoute() drops the former one without a call of its keeper.
   [[nodiscard]] const Route& route() const noexcept { return state_.route; }
   void setRoute(const Route& route) noexcept { state_.route = route; }
 
-  // Takes over a body and checks it.
+  // Takes ownership of a body and checks it: isSound() is the result. The lender gets the body back
+  // when the handle is destroyed or reset.
   [[nodiscard]] static Message adopt(MessageType type, BodyBytes body) noexcept {
     Message message;
     message.state_.type = type;
@@ -148,10 +139,11 @@ class Message {
     message.check();
     return message;
   }
-  // Copies a body into the handle, or to the heap above kInlineBytes (std::bad_alloc), and checks
+  // Copies `bytes` into the handle, or to the heap when they are more than kInlineBytes, and checks
   // the copy.
+  //   throws  std::bad_alloc
   [[nodiscard]] static Message copyOf(MessageType type, std::span<const std::byte> bytes);
-  // The same for at most kInlineBytes bytes.
+  // As copyOf(), for at most kInlineBytes bytes; further bytes are dropped.
   [[nodiscard]] static Message copyInline(MessageType type,
                                           std::span<const std::byte> bytes) noexcept {
     Message message;
@@ -161,8 +153,8 @@ class Message {
     message.check();
     return message;
   }
-  // The same without a copy: `fill` gets the kInlineBytes bytes of this handle and writes `size` of
-  // them.
+  // As copyInline(), without a copy: resets this handle, then `fill` receives a span of its
+  // kInlineBytes bytes and writes the first `size` of them. `fill` must not throw.
   template <class Fill>
   void assignInline(MessageType type, std::size_t size, Fill&& fill) noexcept {
     reset();
@@ -171,21 +163,25 @@ class Message {
     fill(std::span<std::byte, kInlineBytes>(state_.at.inside));
     check();
   }
-  // Empties the handle and returns the body to its lender.
+  // Empties the handle: returns the body to its lender, and reports a request that has had no reply
+  // to its RouteKeeper.
   void reset() noexcept {
     giveBack();
     forget();
   }
-  // Owner of an out-of-line body; nullptr for an inline body.
+  // The owner of an out-of-line body; nullptr for an inline body.
   [[nodiscard]] BodyLender* lender() const noexcept {
     return state_.isOutside() ? state_.at.body.lender : nullptr;
   }
   [[nodiscard]] bool isInline() const noexcept { return !state_.isOutside(); }
-  // NOLINTNEXTLINE(clang-analyzer-core.uninitialized.UndefReturn): the analyzer does not follow the copy of the body word by word
+  // [bytes] The body could have this size in its present memory.
+  // The analyzer does not follow the copy of the body word by word.
+  // NOLINTNEXTLINE(clang-analyzer-core.uninitialized.UndefReturn)
   [[nodiscard]] std::size_t capacity() const noexcept {
     return state_.isOutside() ? state_.at.body.capacity : kInlineBytes;
   }
-  // Hands over an out-of-line body and empties the handle. An inline body is lost: data is nullptr.
+  // Empties the handle and passes ownership of its out-of-line body to the caller. Drops an inline
+  // body: `data` of the result is nullptr. Does not call the RouteKeeper.
   [[nodiscard]] BodyBytes releaseBody() noexcept {
     const BodyBytes body = state_.isOutside() ? state_.at.body : BodyBytes{};
     forget();
@@ -193,6 +189,7 @@ class Message {
   }
 
  protected:
+  // True when the type is T and the body is valid.
   template <class T>
   [[nodiscard]] bool isA() const noexcept {
     return state_.type == T::kType && state_.sound;
@@ -209,14 +206,15 @@ class Message {
   }
   // NOLINTEND(clang-analyzer-core.uninitialized.UndefReturn)
 
+  // The largest number of elements of T that fits the memory of the body; 0 for another type.
   template <ArrayBody T>
   [[nodiscard]] std::size_t maxLength() const noexcept {
     if (!isA<T>()) return 0;
     return std::min<std::size_t>((capacity() - sizeof(T)) / sizeof(typename T::Element),
                                  UINT32_MAX);
   }
-  // Sets the array length and the size of the body. Returns false, and changes nothing, if there is
-  // no room.
+  // Sets the array length and the size of the body. Returns false, and changes nothing, when the
+  // memory is too small.
   template <ArrayBody T>
   [[nodiscard]] bool trySetArrayLength(std::size_t length) noexcept {
     if (!isA<T>() || length > maxLength<T>()) return false;
@@ -227,7 +225,7 @@ class Message {
     else state_.inlineSize = static_cast<std::uint8_t>(bytes);
     return true;
   }
-  // Throws std::length_error: "int32Array: length 500 was asked for, there is room for 100".
+  // Throws std::length_error: "int32Array: length 500 is too large: there is room for 100".
   [[noreturn]] static void refuseLength(MessageType type, std::size_t length, std::size_t room);
 
  private:
@@ -247,7 +245,7 @@ class Message {
   struct State {
     Where at;
     Route route{};
-    std::uint32_t length = 0;  // of an array; checked, and not accessible to the peer
+    std::uint32_t length = 0;  // of an array; checked, and out of reach of the peer
     std::int32_t clientType = 0;
     std::int32_t clientExtra = 0;
     MessageType type = MessageType::none;
@@ -256,9 +254,8 @@ class Message {
 
     [[nodiscard]] bool isOutside() const noexcept { return inlineSize == kOutside; }
     State() noexcept = default;
-    State(const State& other) noexcept {
-      *this = other;
-    }  // NOLINT(cppcoreguidelines-pro-type-member-init)
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): the assignment sets every field
+    State(const State& other) noexcept { *this = other; }
     // Field by field: see copy_words.h.
     State& operator=(const State& other) noexcept {
       at = other.at;
@@ -282,7 +279,7 @@ class Message {
     state_.sound = layout.headerBytes != 0 && size() >= layout.headerBytes &&
                    reinterpret_cast<std::uintptr_t>(bytes) % 8 == 0;
     if (!state_.sound || layout.elementBytes == 0) return;
-    // Read once, since a peer may change it.
+    // Read once: a peer may change it between two reads.
     const std::uint32_t length =
         *reinterpret_cast<const volatile std::uint32_t*>(bytes + layout.lengthOffset);
     state_.sound = length <= (size() - layout.headerBytes) / layout.elementBytes;
@@ -305,130 +302,5 @@ class Message {
   State state_;
 };
 static_assert(sizeof(Message) <= 72);
-
-// A message of type T: `MessageOf(Int32{.address = 3, .value = 5})`;
-// `Int32ArrayMessage::allocValue(1000)`.
-template <MessageBody T>
-class MessageOf : public Message {
- public:
-  using Body = T;
-
-  MessageOf() noexcept
-    requires ScalarBody<T>
-      : MessageOf(T{}) {}
-  explicit MessageOf(const T& fields) noexcept
-    requires ScalarBody<T>
-      : Message(copyInline(T::kType, std::as_bytes(std::span(&fields, 1)))) {
-    static_assert(sizeof(T) <= kInlineBytes);
-  }
-
-  // An array of n elements on the heap: fields zero, elements not initialised. Throws
-  // std::bad_alloc.
-  [[nodiscard]] static MessageOf allocValue(std::size_t n)
-    requires ArrayBody<T>
-  {
-    if (n > UINT32_MAX) refuseLength(T::kType, n, UINT32_MAX);
-    return inBuffer(allocateHeapBody(bytesFor(n)), n);
-  }
-  // Bytes that an array of n elements needs, to be requested from a lender.
-  [[nodiscard]] static constexpr std::size_t bytesFor(std::size_t n) noexcept
-    requires ArrayBody<T>
-  {
-    return sizeof(T) + n * sizeof(typename T::Element);
-  }
-  // As allocValue() in memory of a lender; if n elements do not fit, returns it and throws
-  // std::length_error.
-  [[nodiscard]] static MessageOf inBuffer(BodyBytes buffer, std::size_t n)
-    requires ArrayBody<T>
-  {
-    if (buffer.capacity >= sizeof(T)) {
-      const T fields{};
-      std::memcpy(buffer.data, &fields, sizeof fields);
-      buffer.size = sizeof(T);
-    }
-    MessageOf message(adopt(T::kType, buffer), Known{});
-    if (!message.isSound()) refuseLength(T::kType, n, 0);
-    message.setCount(n);
-    return message;
-  }
-  // The typed handle of a message; nullopt, with `message` unchanged, for another type or an
-  // invalid body.
-  [[nodiscard]] static std::optional<MessageOf> tryFrom(Message&& message) noexcept {
-    if (message.tryAs<T>() == nullptr) return std::nullopt;
-    return MessageOf(std::move(message), Known{});
-  }
-
-  // The fields. The handle must not be empty.
-  [[nodiscard]] T& operator*() noexcept { return *reinterpret_cast<T*>(data()); }
-  [[nodiscard]] const T& operator*() const noexcept { return *reinterpret_cast<const T*>(data()); }
-  [[nodiscard]] T* operator->() noexcept { return &**this; }
-  [[nodiscard]] const T* operator->() const noexcept { return &**this; }
-
-  // The elements of the array.
-  [[nodiscard]] auto value() noexcept
-    requires ArrayBody<T>
-  {
-    return this->template valueAs<T>();
-  }
-  [[nodiscard]] auto value() const noexcept
-    requires ArrayBody<T>
-  {
-    return this->template valueAs<T>();
-  }
-
-  // Numeric arrays count elements. setLength throws std::length_error above getMaxLength().
-  [[nodiscard]] std::size_t getLength() const noexcept
-    requires CountedInElements<T>
-  {
-    return arrayLength();
-  }
-  [[nodiscard]] std::size_t getMaxLength() const noexcept
-    requires CountedInElements<T>
-  {
-    return this->template maxLength<T>();
-  }
-  void setLength(std::size_t length)
-    requires CountedInElements<T>
-  {
-    setCount(length);
-  }
-
-  // Char8Array and User count bytes. setSize throws std::length_error above getMaxSize().
-  [[nodiscard]] std::size_t getSize() const noexcept
-    requires CountedInBytes<T>
-  {
-    return arrayLength();
-  }
-  [[nodiscard]] std::size_t getMaxSize() const noexcept
-    requires CountedInBytes<T>
-  {
-    return this->template maxLength<T>();
-  }
-  void setSize(std::size_t size)
-    requires CountedInBytes<T>
-  {
-    setCount(size);
-  }
-
- private:
-  struct Known {};
-  MessageOf(Message&& message, Known) noexcept : Message(std::move(message)) {}
-
-  void setCount(std::size_t count) {
-    if (!this->template trySetArrayLength<T>(count))
-      refuseLength(T::kType, count, this->template maxLength<T>());
-  }
-};
-
-using ConnectMessage = MessageOf<Connect>;
-using Int32Message = MessageOf<Int32>;
-using Int32ArrayMessage = MessageOf<Int32Array>;
-using Float64Message = MessageOf<Float64>;
-using Float64ArrayMessage = MessageOf<Float64Array>;
-using Char8ArrayMessage = MessageOf<Char8Array>;
-using SerialConfigMessage = MessageOf<SerialConfig>;
-using OutOfBandMessage = MessageOf<OutOfBand>;
-using RequestFateMessage = MessageOf<RequestFate>;
-using UserMessage = MessageOf<User>;
 
 }  // namespace mpf

@@ -2,23 +2,23 @@
 // MessageClient: a client of one server (manual, "Message Client").
 //
 //   mpf::MessageClient client(backplane, [](mpf::Message message) { ... });
-//   client.bind("dac", 0);                                    // never waits; the server may come
-//   later, go and come back client.send(mpf::Int32Message({.address = 3, .value = 100}));
+//   client.bind("dac", 0);  // never waits; the server may start later, and restart
+//   const auto result = client.send(mpf::Int32Message({.address = 3, .value = 100}));
 //
-// The callback gets replies, ConnectMessages (connected, disconnected, queue full) and
-// RequestFateMessages, one at a time, in the order in which things happened. Each request that
-// send() accepted ends in a reply or in exactly one fate.
+// The callback receives replies, ConnectMessages (connected, disconnected, queue full) and
+// RequestFateMessages, one at a time, in the order of the events. Each request that send() accepted
+// ends in exactly one reply or one fate; a server may send further replies after the first.
 //
 // Threads  any thread may construct a client, bind, send, cancel and wait for the connection.
-//          Callbacks run on the thread that runs the dispatcher, and may do all of that, too, and
-//          end the client.
-// Throws   a callback may throw: see Dispatcher. Each other request still gets its end, and the
-//          client stays bound.
-// Crash    a server that dies is reported, its requests get their fates, and the client binds again
-//          when it is back.
-// Trust    a server that writes nonsense loses this link and is treated as gone.
-// Fork     in a child without exec, clients, servers and dispatchers of its parent refuse; the
-//          child makes its own.
+//          Callbacks run on the thread that runs the dispatcher; they may call all functions of the
+//          client and destroy it.
+// Throws   a callback may throw: see Dispatcher. All other requests still get their reply or fate,
+//          and the client stays bound.
+// Crash    when a server dies, the client delivers the replies that the server had sent, a fate for
+//          each other request, and a ConnectMessage. It connects again when the server restarts.
+// Trust    a server that sends invalid data loses the connection, as if it had died.
+// Fork     a child process that does not call exec cannot use the clients, servers and dispatchers
+//          of its parent: they refuse with an error. The child creates its own.
 #pragma once
 
 #include <cstdint>
@@ -28,96 +28,109 @@
 
 #include <mpf/clock.h>
 #include <mpf/dispatcher.h>
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 
 namespace mpf {
 
-// What became of a send.
+// The result of a send.
 enum class SendResult {
-  sent,
-  notConnected,
-  queueFull,
-  tooManyOutstanding,
-  tooLarge,
-  noMemory,
-  empty
+  sent,  // the server will receive the request, or the request gets a fate
+  notConnected,  // see MessageClient::notConnectedBecause()
+  queueFull,  // the server has not received the earlier requests yet
+  tooManyOutstanding,  // too many requests without a reply
+  tooLarge,  // larger than MessageClient::maxMessageBytes()
+  noMemory,  // the shared memory of the connection, or /dev/shm, is full
+  empty  // the handle has no message
 };
+// The result in words, for messages to people.
 [[nodiscard]] const char* toString(SendResult result) noexcept;
 
 class MessageClient {
  public:
+  // Owns the message that it receives.
   using Callback = std::function<void(Message&&)>;
 
-  // Callbacks run on the backplane's shared dispatcher thread.
+  // Callbacks run on the thread of the shared dispatcher of the backplane.
   //   throws  as Dispatcher::shared()
   MessageClient(const Backplane& backplane, Callback callback);
-  // Callbacks run where `dispatcher` runs, which must outlive the client.
-  //   throws  std::bad_alloc; the memory of a connection is not needed before bind()
+  // Callbacks run on the thread that runs `dispatcher`, which must outlive the client.
+  //   throws  std::bad_alloc; bind() allocates the memory of the connection
   MessageClient(Dispatcher& dispatcher, Callback callback);
-  // After return no callback runs. On another thread than the one that runs the dispatcher it waits
-  // until the callback that is running there has returned.
+  // No callback runs after the destructor has returned. Unless it is called on the thread that runs
+  // the dispatcher, it waits until a callback of this client that is in progress has returned.
   ~MessageClient();
   MessageClient(const MessageClient&) = delete;
   MessageClient& operator=(const MessageClient&) = delete;
 
-  // Binds to `server` at `location`, once in the client's life. What keeps it from a connection,
-  // full shared memory for example, is in notConnectedBecause(), and it tries again.
-  //   throws  std::invalid_argument for a name that cannot be one, std::logic_error when bound
-  //           already
+  // Binds to `server` at `location` (manual, "Message Client"), once for each client. Returns
+  // without waiting; the callback receives a ConnectMessage when the connection is made. When a
+  // connection fails, for example because /dev/shm is full, notConnectedBecause() returns the
+  // reason and the client tries again.
+  //   throws  std::invalid_argument when `server` is not a valid name, std::logic_error when the
+  //           client is already bound
   void bind(const std::string& server, std::int32_t location = Backplane::defaultLocation());
 
-  // Sends, and empties `message`; when the result is not `sent`, the message is as it was.
-  //   takeBefore  a request that the server has not taken by then ends as `expired`
-  //   requestId   out, when not null: names the request in cancel() and in its fate
+  // Sends `message` and empties it. When the result is not `sent`, the message is unchanged. Never
+  // waits.
+  //   takeBefore  a request that the server has not received by then ends as `expired`
+  //   requestId   out, unless null: the number of the request, for cancel() and in its fate
   [[nodiscard]] SendResult send(Message&& message, Deadline takeBefore = Deadline::never(),
                                 std::uint32_t* requestId = nullptr) noexcept;
 
-  // An array message of n elements, in the memory that is shared with the server when there is a
-  // connection. Throws std::bad_alloc.
+  // Allocates an array message of n elements in the memory that is shared with the server, or on
+  // the heap when there is no connection or the shared memory is full. Sending the former copies
+  // nothing.
+  //   throws  std::bad_alloc
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> alloc(std::size_t n) {
     return MessageOf<T>::inBuffer(allocate(MessageOf<T>::bytesFor(n)), n);
   }
 
-  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on it
-  // all the same, and until it has replied to it or refused it, the request counts as outstanding.
-  // In a callback the fate is delivered before cancel() returns, otherwise when the dispatcher runs
-  // next, before any reply.
+  // Ends the request with the fate `cancelled`, if it has not ended yet. The server may act on the
+  // request all the same, and the request counts as outstanding until the server has replied to it
+  // or refused it. Called in a callback, cancel() delivers the fate before it returns; otherwise
+  // the dispatcher delivers it when it runs next, before any reply.
   void cancel(std::uint32_t requestId);
 
-  // --- for routers, who are clients in the name of others; on the thread that runs the dispatcher
-  // As send(), with an id of the caller's choice, not 0; tooManyOutstanding when another request is
-  // in its way.
+  // --- for routers, which are clients on behalf of remote clients; call these functions on the
+  // thread that runs the dispatcher
+
+  // As send(), with a number that the caller chooses, not 0. Returns tooManyOutstanding also when
+  // another request occupies the place of that number in the table of requests.
   [[nodiscard]] SendResult sendAs(std::uint32_t requestId, Message&& message,
                                   Deadline takeBefore) noexcept;
-  // Whether a message that the callback got ended its request.
+  // Whether a message that the callback received ended its request.
   [[nodiscard]] static bool endsRequest(const Message& message) noexcept {
     return message.route().flags == kEndsRequest;
   }
-  // Until resume(), what the server sends waits in the link; when that is full, the server is told
-  // so. Ends with the connection.
+  // Stops the delivery of messages from the server until resume() or the end of the connection. The
+  // messages wait in the link; when it is full, the server's replies fail with queueFull.
   void pause();
   void resume();
-  // Memory to build the body of a request in, as alloc() uses it. Throws std::bad_alloc.
+  // Allocates memory for the body of a request, as alloc() does; the caller owns it: see BodyBytes.
+  //   throws  std::bad_alloc
   [[nodiscard]] BodyBytes allocateBody(std::size_t bytes) { return allocate(bytes); }
 
-  // Waits until the server is connected. Runs a dispatcher without a thread of its own meanwhile,
-  // unless another thread runs it or ran it last: then it waits until that thread has connected the
-  // client. SyncClient::connectWait() always runs its dispatcher.
+  // --- the connection
+
+  // Waits until the client is connected; returns false after `timeout`. While it waits, it runs a
+  // dispatcher that has no thread, unless another thread runs the dispatcher or ran it last: then
+  // it waits until that thread has connected the client. SyncClient::connectWait() always runs its
+  // dispatcher.
   //   throws  what a callback throws that it runs
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
   [[nodiscard]] bool isConnected() const noexcept;
-  // Largest body that the server takes; 0 without a connection.
+  // [bytes] The largest body that the server accepts; 0 without a connection.
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
-  // Why there is no connection, in words; empty when there is one.
+  // The reason why the client is not connected, in words; empty when it is connected.
   [[nodiscard]] std::string notConnectedBecause() const;
 
  private:
-  friend class SyncClient;  // isInherited()
+  friend class SyncClient;  // for isInherited()
   MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback);
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isInherited() const noexcept;
-  std::shared_ptr<Dispatcher> shared_;  // when the dispatcher is the backplane's
+  std::shared_ptr<Dispatcher> shared_;  // null when the client was given a dispatcher
   std::shared_ptr<Dispatcher::Impl> dispatcher_;
   std::shared_ptr<class Binding> binding_;
 };

@@ -2,24 +2,26 @@
 // MessageServer: a named server on a backplane (manual, "Message Server").
 //
 //   mpf::MessageServer server(mpf::Backplane::attach(), "dac");
-//   server.on<mpf::Int32>([&](mpf::Int32& request) { request.status =
-//   dac.trySetCounts(request.address, request.value) ? 0 : -1; }); return server.runUntilSignal();
+//   server.on<mpf::Int32>([&](mpf::Int32& request) {
+//     request.status = dac.trySetCounts(request.address, request.value) ? 0 : -1;
+//   });
+//   return server.runUntilSignal();
 //
-// or by hand, with replies now or later, one or many:
+// or without run(), with replies now or later, one or many:
 //
 //   while (server.waitForMessage()) {
 //     while (mpf::Message request = server.receive()) { ...; server.reply(std::move(request)); }
 //   }
 //
-// Threads  one thread waits and receives; reply(), allocReplyMessage() and interrupt() may be
-//          called by any.
-// Crash    a client that dies takes nothing along; what this server held of it goes when the
-//          handles go.
-// Trust    a client that writes nonsense loses its link; nobody else notices.
+// Threads  one thread waits and receives; any thread may call reply(), allocReplyMessage(),
+//          isAwaited(), countAlarm() and interrupt().
+// Crash    when a client dies, the handles of its requests stay valid; replies to them return
+//          clientGone. Its shared memory is freed when the last of these handles is destroyed.
+// Trust    a client that sends invalid data loses its connection; other clients are not affected.
 // Throws   an exception that leaves a handler leaves run(), runUntilSignal() or handleOne(); the
-//          request, if it has had no reply, ends as `refused`. One that leaves the callback of
-//          onClient() leaves receive(). Everything else is intact, and the next call continues with
-//          what is left. Clients follow the same rule: see Dispatcher.
+//          request, if it has had no reply, ends as `refused`. An exception that leaves the
+//          callback of onClient() leaves receive(). Nothing else is lost, and the next call
+//          continues with the remaining requests. Clients follow the same rule: see Dispatcher.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +34,7 @@
 
 #include <mpf/backplane.h>
 #include <mpf/clock.h>
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 #include <mpf/rights.h>
 #include <mpf/wait_mode.h>
 
@@ -40,83 +42,101 @@ namespace mpf {
 
 struct ServerOptions {
   std::int32_t location = Backplane::defaultLocation();
-  int queueSize = 100;  // requests of one client that may wait; 1 to 16384
-  std::uint64_t maxMessageBytes = 64ull << 20;  // largest body, either way
-  // shared memory for large messages of one client, each way
-  std::uint64_t maxPoolBytes = 320ull << 20;
-  WaitMode waitMode = WaitMode::adaptive;
-  Rights rights{};  // who may bind: mode 0660 and a group let its members in
+  int queueSize = 100;  // requests of one client that may wait, 1 to 16384
+  std::uint64_t maxMessageBytes = 64ull << 20;  // [bytes] largest body of a request or a reply
+  std::uint64_t maxPoolBytes = 320ull << 20;  // [bytes] of large messages, per client and direction
+  WaitMode waitMode = WaitMode::adaptive;  // how waitForMessage() waits
+  Rights rights{};  // which users may bind: mode 0660 and a group admit the members of the group
 };
 
-// What became of a reply.
-enum class ReplyResult { sent, clientGone, queueFull, tooLarge, noMemory };
+// The result of a reply.
+enum class ReplyResult {
+  sent,
+  clientGone,  // the client has disconnected or died, or the message is no reply
+  queueFull,  // further replies only: the client has not received the earlier ones yet
+  tooLarge,  // larger than ServerOptions::maxMessageBytes
+  noMemory  // the shared memory of the connection, or /dev/shm, is full
+};
+// The result in words, for messages to people.
 [[nodiscard]] const char* toString(ReplyResult result) noexcept;
 
 class MessageServer {
  public:
-  // Opens the server under `name` at once; requests wait until somebody receives them.
-  //   throws  NameInUse when another process serves that name at that location, SegmentError when
-  //           something foreign is in its place, std::invalid_argument for a name or an option that
-  //           cannot be, std::system_error: ENOSPC when /dev/shm is full, EMFILE when no descriptor
-  //           is left, ...
+  // Publishes the server under `name`: clients can connect as soon as this object receives, and
+  // their requests wait in its queues.
+  //   throws  NameInUse when another process serves that name at that location, SegmentError when a
+  //           file in /dev/shm that is not a server has its place, std::invalid_argument when the
+  //           name or an option is invalid, std::system_error, for example ENOSPC when /dev/shm is
+  //           full, EMFILE when the process has no file descriptor left
   MessageServer(const Backplane& backplane, const std::string& name,
                 const ServerOptions& options = {});
+  // Disconnects all clients. Requests that were not received end as `neverTaken`, others without a
+  // reply as `outcomeUnknown`. Handles of requests may outlive the server.
   ~MessageServer();
   MessageServer(const MessageServer&) = delete;
   MessageServer& operator=(const MessageServer&) = delete;
 
   [[nodiscard]] const std::string& getName() const noexcept;
   [[nodiscard]] std::int32_t location() const noexcept;
-  // For clients that connect from now on.
-  //   throws  std::invalid_argument outside 1 to 16384
+  // Sets the number of requests of one client that may wait, for clients that connect from now on.
+  //   throws  std::invalid_argument when `size` is not from 1 to 16384
   void setQueueSize(int size);
 
-  // Waits for a request. False: the deadline passed, or interrupt() was called.
+  // Waits until receive() may have a request. Returns false when the deadline passed or interrupt()
+  // was called.
   bool waitForMessage(Deadline deadline = Deadline::never());
-  // The next request; empty when there is none. A request whose deadline has passed ends as
-  // `expired` and is not seen here. A request that is neither replied to nor kept ends as `refused`
-  // when its handle dies.
+  // Returns the next request, or an empty handle when no request waits. Also accepts clients and
+  // closes the connections of dead ones. A request whose deadline has passed ends as `expired` and
+  // is not returned. A request ends as `refused` when its handle is destroyed before a reply.
+  //   throws  what the callback of onClient() throws
   Message receive();
-  // Ends waitForMessage() or run(), now or the next time; requests that wait stay where they are.
-  // Async-signal-safe.
+  // Ends the call of waitForMessage() or run() that is in progress, or else the next one; waiting
+  // requests stay in their queues. Any thread; async-signal-safe.
   void interrupt() noexcept;
-  // Names the client that `request` came from, as long as it is connected; 0 when it is gone. No
-  // two connections have the same name.
+  // Returns a number for the connection that `request` was received on; 0 when it is closed. Two
+  // connections never have the same number.
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
-  // Whether that client is still there: false once it has died or disconnected. For any thread, and
-  // during a handler: clientOf() names a client until this server's thread looks around again.
+  // Whether that client is still connected and alive. Any thread, also during a handler: clientOf()
+  // notices a dead client only when the thread of the server has called receive() again.
   [[nodiscard]] bool isAwaited(const Message& request) const noexcept;
 
-  // A reply to `request`, which must still exist: to be sent once, before or after the request
-  // itself is replied with.
+  // Returns a reply to `request`, with its clientType and clientExtra and all fields 0 (manual,
+  // "Message Server"). Send it with reply(), before or after a reply that reuses the request
+  // itself.
   template <ScalarBody T>
   [[nodiscard]] MessageOf<T> allocReplyMessage(const Message& request) {
     MessageOf<T> message;
     address(message, request);
     return message;
   }
-  // The same for n elements, in the memory that is shared with the client. Throws std::bad_alloc.
+  // The same for an array of n elements, in the memory that is shared with the client, or on the
+  // heap when that is full or the client is disconnected.
+  //   throws  std::bad_alloc
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> allocReplyMessage(const Message& request, std::size_t n) {
     auto message = MessageOf<T>::inBuffer(allocate(request, MessageOf<T>::bytesFor(n)), n);
     address(message, request);
     return message;
   }
-  // Sends `message` to the client that its request came from, and empties it; if it was not sent,
-  // it is as it was. The first reply ends the request; further ones are refused with queueFull
-  // while the client does not take them.
+  // Sends `message` to the client whose request it replies to. `message` is a request, changed or
+  // not, or was made by allocReplyMessage(). sent and clientGone empty it; the other results leave
+  // it unchanged. The first reply ends the request. Further replies are refused with queueFull when
+  // the client does not receive them. Any thread; never waits.
   ReplyResult reply(Message&& message);
   // Ends a request without a reply: its client gets the fate `refused`.
   void refuse(Message&& request);
 
-  // Handles each request of type T in run(). A handler of T& (its fields) or MessageOf<T>& (its
-  // elements, too) changes the request, which is the reply; one of MessageOf<T>&& owns the request.
+  // Sets the handler that run() and handleOne() call for each request of type T. A handler with the
+  // parameter T& (the fields) or MessageOf<T>& (the fields and the elements) changes the request,
+  // which is then sent as the reply. A handler with the parameter MessageOf<T>&& owns the request
+  // and replies to it itself, now or later.
   template <MessageBody T, class Handler>
   void on(Handler handler) {
     setHandler(T::kType, [this, handler = std::move(handler)](Message&& message) mutable {
       auto typed = MessageOf<T>::tryFrom(std::move(message));
       if (!typed)
-        return refuse(std::move(message));  // NOLINT(bugprone-use-after-move): then it is as it was
+        // NOLINTNEXTLINE(bugprone-use-after-move): tryFrom() has left it unchanged
+        return refuse(std::move(message));
       if constexpr (std::is_invocable_v<Handler&, T&>) {
         handler(**typed);
         static_cast<void>(reply(std::move(*typed)));
@@ -128,46 +148,53 @@ class MessageServer {
       }
     });
   }
-  // Handles requests until interrupt(), which takes effect between two requests. Types without a
-  // handler are refused.
-  //   throws  what a handler throws; requests wait until run() is called again
+  // Handles requests until interrupt(), which takes effect between two requests. Refuses requests
+  // of a type that has no handler.
+  //   throws  what a handler throws; the other requests wait until run() is called again
   void run();
   // As run(), until SIGINT or SIGTERM. Returns the exit status of a program: 0.
   int runUntilSignal();
-  // Handles one request if there is one. Throws what its handler throws.
+  // Handles one request without waiting; returns false when no request waits.
+  //   throws  what its handler throws
   bool handleOne();
 
-  // --- for routers, who serve in the name of others
-  // `news(client, true)` when a client has connected, `news(client, false)` when it is gone; from
-  // within receive() and waitForMessage(). Once, before the first of them. What it throws,
-  // receive() throws after it has brought its links in order.
-  void onClient(std::function<void(std::uint64_t client, bool isThere)> news);
-  // By when the request received last shall be taken.
+  // --- for routers, which serve on behalf of remote servers; `client` is a number of clientOf()
+
+  // Sets a callback for clients that connect (isConnected true) and disconnect or die (false).
+  // receive() calls it. Set it before the first receive(). When it throws, receive() finishes its
+  // work on the connections and then throws the same exception.
+  void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
+  // The deadline that the client gave to the request that receive() returned last.
   [[nodiscard]] Deadline takeBefore() const noexcept;
-  // As reply(), to a request whose handle is gone: that of clientOf(request) and
+  // As reply(), to a request whose handle no longer exists: its clientOf(request) and
   // request.route().requestId.
   ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
-  // Whether that request has had no reply yet.
+  // Whether that request still has no reply.
   [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
-  // The requests of a client that were received and have had no reply yet.
+  // The requests of a client that were received and still have no reply.
   [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
-  // Memory to build the body of a reply to one in. Throws std::bad_alloc.
+  // Allocates memory for the body of a reply to a client; the caller owns it: see BodyBytes.
+  //   throws  std::bad_alloc
   [[nodiscard]] BodyBytes allocateBody(std::uint64_t client, std::size_t bytes);
 
-  // Calls `tell` with the reason when no more clients can be accepted because this process lacks
-  // file descriptors or memory, and with an empty text once they can be: once each, from within
-  // receive() and waitForMessage(). An alarm is counted with or without it. Before the first of
-  // them.
-  void onShortage(std::function<void(const std::string& why)> tell);
+  // --- operation
 
-  // For servers that drive hardware: one more of its faults, for `mpf msr`. Any thread.
+  // Sets a callback for a shortage: receive() calls it with the reason when this process can accept
+  // no more clients because it has no file descriptors or memory left, and with an empty text when
+  // it can again. Each shortage also counts as an alarm. Set it before the first receive().
+  void onShortage(std::function<void(const std::string& why)> callback);
+
+  // Counts one fault of the hardware that the server drives; `mpf msr` shows the number. Any
+  // thread.
   void countAlarm() noexcept;
 
-  // For event loops: poll() the descriptor for reading, then receive() until empty, which arms it
-  // again.
+  // For event loops: poll() the descriptor for reading, then call receive() until it returns an
+  // empty handle, which makes the descriptor unreadable until there is something to do again. The
+  // server owns the descriptor.
   [[nodiscard]] int descriptor();
 
-  // The manual's `msr`, to stdout.
+  // Prints name, queueSize, inQueue, queueRequests, queueFullResponses and replyRequests to stdout
+  // (manual, "Diagnostic Aids": msr).
   void report() const;
 
  private:

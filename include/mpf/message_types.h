@@ -2,18 +2,19 @@
 // Message types: the body of each type of message in shared memory, with a description of its
 // fields, from which sizes, checks, printing, parsing and the wire format are derived.
 //
-//   scalar   | Int32 |                                    fixed fields only
-//   array    | Int32Array: fields, length | value[0] | value[1] | ...      elements follow the
-//            header, 8-aligned
+//   scalar   | Int32: fields |
+//   array    | Int32Array: fields, length | value[0] | value[1] | ...   elements aligned to 8 bytes
 //
-// The structs have fixed widths and the byte order of the host, since both ends are on one host.
-// Another host gets the structs of message.capnp instead.
+// The structs have fixed widths and the byte order of the host: client and server share memory.
+// Routers send the structs of message.capnp to other hosts instead.
 //
-// CONTRIBUTING.md says how to add a type. schema_test compares the structs with message.capnp.
+// CONTRIBUTING.md describes how to add a type. schema_test compares the structs with message.capnp.
 //
-// Trust    a peer may write to a body while it is read, so `length` in the header must not be used
-//          as the length of an array; use MessageOf::value().
-// Source   manual, "StandardFieldsMessage"; the names of types and fields are those of the manual.
+// Threads  plain data; the owner of the message handle is the only user of a body in this process.
+// Trust    a peer may write to a body while it is read: never use the field `length` as the length
+//          of an array. MessageOf::value() uses the length that was checked.
+// Source   manual, "Message", "StandardFieldsMessage" and the section of each type; types and
+//          fields have the names of the manual.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +28,9 @@
 
 namespace mpf {
 
+// The number of a type, in shared memory and on the wire. Numbers are never reused.
 enum class MessageType : std::uint16_t {
-  none = 0,
+  none = 0,  // of an empty handle; never sent
   connect = 1,
   int32 = 2,
   int32Array = 3,
@@ -44,30 +46,30 @@ enum class MessageType : std::uint16_t {
 // The status of a ConnectMessage (manual, "ConnectMessage"). Old clients treat every value other
 // than connectYes as a disconnect.
 enum class ConnectStatus : std::int32_t {
-  connectNo = 0,  // no server yet, or the server is gone
-  connectYes = 1,  // messages reach the server
-  // the server's queue was full: a message was refused, the client stays connected
-  connectQueueFull = 2,
-  connectRefused = 3,  // the server does not accept this client
+  connectNo = 0,  // disconnected; the client connects again by itself
+  connectYes = 1,  // connected: messages reach the server
+  connectQueueFull = 2,  // a queue was full and refused a message; the client stays connected
+  connectRefused = 3,  // the server does not accept another client; the client tries again
 };
+// Indexed by the value of the status.
 inline constexpr std::array<std::string_view, 4> kConnectStatusNames{
     "connectNo", "connectYes", "connectQueueFull", "connectRefused"};
 
-// How a request without a reply ended.
+// How a request without a reply ended. Each request ends in one reply or in one fate.
 enum class Fate : std::int32_t {
-  refused = 0,  // not accepted: queue full, too large, a type that the server does not take
-  neverTaken = 1,  // the server went away before it took the request: nothing was done
-  // the server took it and then went away, or did not reply: it may have been done
-  outcomeUnknown = 2,
-  expired = 3,  // its deadline passed before it was taken: nothing was done
-  cancelled = 4,  // the client cancelled it
+  refused = 0,  // the server did not accept it (full queue, size, type) or dropped it
+  neverTaken = 1,  // the connection ended before the server received it: nothing was done
+  outcomeUnknown = 2,  // the server received it and did not reply: it may have been done
+  expired = 3,  // its deadline passed before the server received it: nothing was done
+  cancelled = 4,  // the client cancelled it; the server may act on it all the same
 };
+// Indexed by the value of the fate.
 inline constexpr std::array<std::string_view, 5> kFateNames{
     "refused", "neverTaken", "outcomeUnknown", "expired", "cancelled"};
 
-// ---- the description of a type
+// ---- the description of a type: each T has kType, kName and fields(), and arrays have Element
 
-// A field: its name, which is the same in message.capnp and in texts, and the member.
+// A field: its name, which is the same in message.capnp, in texts and in JSON, and the member.
 template <class Body, class Value>
 struct Field {
   std::string_view name;
@@ -76,7 +78,8 @@ struct Field {
 template <class Body, class Value>
 Field(std::string_view, Value Body::*) -> Field<Body, Value>;
 
-// A short byte string inside the struct; the member `used` is the number of bytes in use.
+// A short byte string inside the struct; the member `used` is the number of bytes in use, which
+// readers limit to 0 to `room`.
 template <class Body, std::size_t room>
 struct BytesField {
   std::string_view name;
@@ -87,6 +90,13 @@ template <class Body, std::size_t room>
 BytesField(std::string_view, std::array<char, room> Body::*, std::int32_t Body::*)
     -> BytesField<Body, room>;
 
+// The five fields that most types have; client and server agree on their meaning (manual,
+// "StandardFieldsMessage"):
+//   timeout   how long the server may wait for its device, in seconds by convention
+//   cmd       a command; servers declare theirs in a header such as <mpf/serial_commands.h>
+//   status    of a reply, 0 by convention when the request succeeded
+//   address   for example the channel
+//   extra     anything else
 template <class Body>
 constexpr auto standardFields() {
   return std::tuple{Field{"timeout", &Body::timeout}, Field{"cmd", &Body::cmd},
@@ -94,18 +104,17 @@ constexpr auto standardFields() {
                     Field{"extra", &Body::extra}};
 }
 
-// The name of the elements of an array in message.capnp and in texts.
+// The name of the value, or of the elements of an array, in message.capnp and in texts.
 inline constexpr std::string_view kValueName = "value";
 
-// ---- the types; client and server agree on the meaning of timeout [s], cmd, status, address and
-// extra (manual, "StandardFieldsMessage")
+// ---- the types
 
-// Sent by MPF to a client: connected, disconnected, or a queue was full.
+// MPF sends it to a client when the connection is made or broken, or when a queue was full (manual,
+// "ConnectMessage").
 struct Connect {
   ConnectStatus status{};
   std::uint32_t reserved{};
-  // identifies one life of the server; another number: it was restarted
-  std::uint64_t incarnation{};
+  std::uint64_t incarnation{};  // of the server; another number means that it was restarted
 
   static constexpr auto kType = MessageType::connect;
   static constexpr std::string_view kName = "connect";
@@ -115,6 +124,7 @@ struct Connect {
   }
 };
 
+// One 32-bit integer (manual, "Int32Message").
 struct Int32 {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{}, value{};
 
@@ -125,9 +135,10 @@ struct Int32 {
   }
 };
 
+// An array of 32-bit integers (manual, "Int32ArrayMessage").
 struct Int32Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
-  std::uint32_t length{};  // number of elements that follow; set by setLength() only
+  std::uint32_t length{};  // number of elements that follow; written by setLength() only
 
   using Element = std::int32_t;
   static constexpr auto kType = MessageType::int32Array;
@@ -135,6 +146,7 @@ struct Int32Array {
   static constexpr auto fields() { return standardFields<Int32Array>(); }
 };
 
+// One double (manual, "Float64Message").
 struct Float64 {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t reserved{};
@@ -148,9 +160,10 @@ struct Float64 {
   }
 };
 
+// An array of doubles (manual, "Float64ArrayMessage").
 struct alignas(8) Float64Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
-  std::uint32_t length{};  // number of elements that follow; set by setLength() only
+  std::uint32_t length{};  // number of elements that follow; written by setLength() only
 
   using Element = double;
   static constexpr auto kType = MessageType::float64Array;
@@ -158,19 +171,19 @@ struct alignas(8) Float64Array {
   static constexpr auto fields() { return standardFields<Float64Array>(); }
 };
 
-// Bytes or text; MPF does not interpret them.
+// Bytes or text, which MPF does not interpret (manual, "Char8ArrayMessage").
 struct Char8Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
-  std::uint32_t length{};  // number of bytes that follow; set by setSize() only
-  std::int32_t numberRetrys{};
-  std::int32_t eomLen{};
-  std::array<char, 4> eomString{};
+  std::uint32_t length{};  // number of bytes that follow; written by setSize() only
+  std::int32_t numberRetrys{};  // how often the server repeats a command that failed
+  std::int32_t eomLen{};  // [bytes] length of the end-of-message string, 0 to 4
+  std::array<char, 4> eomString{};  // the end-of-message string, without a terminator
   std::uint32_t reserved{};
 
-  // The end-of-message string; eomLen, which a peer may have written, is limited to the size of
-  // eomString.
+  // The end-of-message string, valid as long as this struct. Limits eomLen, which a peer may have
+  // written, to 0 to 4.
   [[nodiscard]] std::string_view eom() const noexcept {
-    // read once: a peer may change it
+    // Read once: a peer may change it between two reads.
     const std::int32_t used = *static_cast<const volatile std::int32_t*>(&eomLen);
     return {eomString.data(), static_cast<std::size_t>(std::clamp(
                                   used, 0, static_cast<std::int32_t>(eomString.size())))};
@@ -188,11 +201,14 @@ struct Char8Array {
   }
 };
 
-// 0 in a field: keep the setting.
+// Settings of a serial line; 0 in a field keeps the present setting (manual,
+// "SerialConfigMessage"). The reply is an Int32 message with a status.
 struct SerialConfig {
-  std::int32_t baud{}, stopBits{}, bitsPerChar{};
-  char parity{};  // 'E', 'O', 'N'
-  char flowControl{};  // 'H', 'N'
+  std::int32_t baud{};  // [bit/s]
+  std::int32_t stopBits{};  // 1 or 2
+  std::int32_t bitsPerChar{};  // 5 to 8
+  char parity{};  // 'E' even, 'O' odd, 'N' none
+  char flowControl{};  // 'H' hardware (RTS/CTS), 'N' none
   std::uint16_t reserved{};
 
   static constexpr auto kType = MessageType::serialConfig;
@@ -205,7 +221,8 @@ struct SerialConfig {
   }
 };
 
-// Like Int32; sent by a server to a client without a request.
+// Like Int32; a server sends it to a client as a message that answers no request (manual,
+// "OutOfBandMessage").
 struct OutOfBand {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{}, value{};
 
@@ -217,10 +234,11 @@ struct OutOfBand {
   }
 };
 
-// Sent by MPF to a client: how a request without a reply ended.
+// MPF sends it to a client: how a request without a reply ended. The message has the clientType and
+// the clientExtra of the request.
 struct RequestFate {
   Fate fate{};
-  std::uint32_t requestId{};
+  std::uint32_t requestId{};  // the number that MessageClient::send() gave to the request
 
   static constexpr auto kType = MessageType::requestFate;
   static constexpr std::string_view kName = "requestFate";
@@ -230,10 +248,10 @@ struct RequestFate {
   }
 };
 
-// A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place.
-// MPF forwards it without reading it.
+// A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place:
+// see <mpf/user_message.h>. MPF forwards it and does not interpret it. It has no standard fields.
 struct alignas(8) User {
-  std::uint32_t length{};  // number of bytes that follow; set by setSize() only
+  std::uint32_t length{};  // number of bytes that follow; written by setSize() only
   std::uint32_t reserved{};
 
   using Element = std::byte;
@@ -242,7 +260,7 @@ struct alignas(8) User {
   static constexpr auto fields() { return std::tuple<>{}; }
 };
 
-// All types, in the order of their numbers.
+// All types, in the order of their numbers, which start at 1.
 using MessageTypes = std::tuple<Connect, Int32, Int32Array, Float64, Float64Array, Char8Array,
                                 SerialConfig, OutOfBand, RequestFate, User>;
 
@@ -254,29 +272,33 @@ static_assert(sizeof(Int32Array) == 24 && sizeof(Float64Array) == 24 && sizeof(C
 
 // ---- derived from the descriptions
 
+// A body with elements behind its fields.
 template <class T>
 concept ArrayBody = requires { typename T::Element; };
 
+// Any body.
 template <class T>
 concept MessageBody = requires {
   { T::kType } -> std::convertible_to<MessageType>;
 } && std::is_trivially_copyable_v<T>;
 
+// A body of fixed size.
 template <class T>
 concept ScalarBody = MessageBody<T> && !ArrayBody<T>;
 
+// An array of bytes: its handle has setSize(), as in the manual ("Char8ArrayMessage").
 template <class T>
-// has setSize(), the others setLength(), as in the manual
 concept CountedInBytes = ArrayBody<T> && sizeof(typename T::Element) == 1;
 
+// An array of numbers: its handle has setLength(), as in the manual ("Int32ArrayMessage").
 template <class T>
 concept CountedInElements = ArrayBody<T> && !CountedInBytes<T>;
 
-// The sizes that are needed to check a body. All are zero for an unknown type.
+// The sizes that are needed to check a body. All are 0 for MessageType::none and unknown types.
 struct BodyLayout {
-  std::uint32_t headerBytes = 0;
-  std::uint32_t elementBytes = 0;  // 0: not an array
-  std::uint32_t lengthOffset = 0;
+  std::uint32_t headerBytes = 0;  // size of the struct
+  std::uint32_t elementBytes = 0;  // size of an element; 0 for a scalar
+  std::uint32_t lengthOffset = 0;  // of the field `length` in the struct
   std::string_view name = "none";
 };
 
@@ -286,9 +308,9 @@ template <class T>
 constexpr BodyLayout layoutOf() {
   static_assert(std::is_standard_layout_v<T> && std::is_trivially_copyable_v<T> && alignof(T) <= 8);
   static_assert(std::has_unique_object_representations_v<T> || std::is_same_v<T, Float64>,
-                "padding would carry stray bytes to a peer");
+                "a struct with padding sends uninitialised bytes to a peer");
   if constexpr (ArrayBody<T>) {
-    static_assert(sizeof(T) % 8 == 0, "elements are 8-aligned");
+    static_assert(sizeof(T) % 8 == 0, "elements are aligned to 8 bytes");
     return {sizeof(T), sizeof(typename T::Element), offsetof(T, length), T::kName};
   } else {
     return {sizeof(T), 0, 0, T::kName};
@@ -306,12 +328,13 @@ inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
 
 }  // namespace detail
 
+// The layout of a type; one with sizes 0 and the name "unknown" for a number that has no type.
 [[nodiscard]] constexpr const BodyLayout& layoutOf(MessageType type) noexcept {
   const auto at = static_cast<std::size_t>(type);
   return at < detail::kLayouts.size() ? detail::kLayouts[at] : detail::kUnknownLayout;
 }
 
-// The name of a type, a status or a fate; "unknown" for a value of a newer peer.
+// The name of a type, a status or a fate; "unknown" for a value that only newer programs have.
 [[nodiscard]] constexpr std::string_view toString(MessageType type) noexcept {
   return layoutOf(type).name;
 }

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: MIT
-// SyncClient: asks a server and waits for the answer.
+// SyncClient: sends a request to a server and waits for the reply.
 //
 //   mpf::SyncClient client(backplane, "dac");
 //   auto answer = client.call(mpf::Int32Message({.address = 3}), 1s);
-//   if (!answer) std::cerr << answer.why();
+//   if (auto reply = answer.as<mpf::Int32>()) use((*reply)->value);
+//   else std::cerr << answer.why();
 //
-// Threads  one at a time; another thread may take over between two calls.
+// It is a MessageClient with a Dispatcher of its own, which runs only inside the calls below.
+//
+// Threads  one thread at a time; different threads may make successive calls.
+// Crash    as MessageClient: a request to a server that dies gets a fate as its answer.
+// Trust    as MessageClient.
+// Source   an addition: clients of the manual ("Message Client") receive replies in callbacks only.
 #pragma once
 
 #include <deque>
@@ -16,27 +22,31 @@
 
 namespace mpf {
 
-// A reply, or why there is none.
+// The reply to a request, or the reason why there is none: exactly one of message(), fate() and
+// refusal() has a value, until as() moves the reply out.
 class Answer {
  public:
   explicit Answer(Message reply) noexcept : reply_(std::move(reply)) {}
-  // `details` follow the refusal when it is put in words.
+  // `details` is appended to the words for the refusal in why().
   explicit Answer(SendResult refusal, std::string details = {}) noexcept
       : refusal_(refusal), details_(std::move(details)) {}
   explicit Answer(Fate fate) noexcept : fate_(fate) {}
 
+  // True when there is a reply.
   explicit operator bool() const noexcept { return static_cast<bool>(reply_); }
+  // The reply, owned by the answer; empty when there is none.
   [[nodiscard]] Message& message() noexcept { return reply_; }
-  // Moves the reply out as a T; nullopt when it is of another type.
+  // Moves the reply out. Returns nullopt, and leaves the reply here, when there is none or its type
+  // is not T.
   template <MessageBody T>
   [[nodiscard]] std::optional<MessageOf<T>> as() {
     return MessageOf<T>::tryFrom(std::move(reply_));
   }
-  // Of a request that was accepted and got no reply.
+  // How a request that was sent ended without a reply.
   [[nodiscard]] std::optional<Fate> fate() const noexcept { return fate_; }
-  // Of a request that was not accepted.
+  // Why a request was not sent.
   [[nodiscard]] std::optional<SendResult> refusal() const noexcept { return refusal_; }
-  // In words; empty when there is a reply.
+  // The fate or the refusal in words; empty when there is a reply.
   [[nodiscard]] std::string why() const;
 
  private:
@@ -48,24 +58,27 @@ class Answer {
 
 class SyncClient {
  public:
-  // Creates a client window in shared memory; the connection comes later, see
-  // client().notConnectedBecause().
-  //   throws  std::system_error: ENOSPC when /dev/shm is full, EMFILE when no descriptor is left,
-  //           ...; std::invalid_argument when `server` cannot be a name
+  // Creates a client window in shared memory and binds to the server. call() and connectWait() make
+  // the connection; client().notConnectedBecause() returns why there is none.
+  //   throws  std::system_error, for example ENOSPC when /dev/shm is full, EMFILE when the process
+  //           has no file descriptor left; std::invalid_argument when `server` is not a valid name
   SyncClient(const Backplane& backplane, const std::string& server,
              std::int32_t location = Backplane::defaultLocation(),
              WaitMode waitMode = WaitMode::adaptive);
 
-  // Sends `message` (waiting for the connection first, if need be) and waits for the first reply.
-  // After `timeout` the answer is a fate: `expired` when the server had not taken the request,
-  // `outcomeUnknown` when it had.
+  // Waits for the connection if necessary, sends `message` and waits for its first reply. `timeout`
+  // limits all three together. After it, the answer is a refusal if the request was not sent, else
+  // a fate: `expired` when the server had not received the request, `outcomeUnknown` when it had.
+  //   message   unchanged when it was not sent
   Answer call(Message&& message, Nanoseconds timeout);
-  // Further messages of the server: later replies of a subscription, OutOfBand. Empty after
-  // `timeout`.
+  // Waits for a message that is not the first reply to a call: a further reply, for example of a
+  // monitor, or an OutOfBand message. call() stores such messages until receive() returns them, in
+  // their order. Returns an empty handle after `timeout`.
   Message receive(Nanoseconds timeout);
 
-  // Waits until the server is connected.
+  // Waits until the client is connected; returns false after `timeout`.
   [[nodiscard]] bool connectWait(Nanoseconds timeout);
+  // The client inside, for isConnected(), alloc() and cancel(). Do not bind it.
   [[nodiscard]] MessageClient& client() noexcept { return client_; }
 
  private:

@@ -17,8 +17,9 @@ namespace mpf {
 namespace {
 
 int serve(int argc, char** argv, const EchoServer& echo) {
-  CLI::App app(fmt::format("{} - sends back each {} that it gets", echo.program, echo.what),
-               echo.program);
+  CLI::App app(
+      fmt::format("{} - replies to each {} with the same message", echo.program, echo.what),
+      echo.program);
   std::string name = echo.server;
   ServerArguments arguments;
   app.add_option("server", name, "Name under which clients find it")->capture_default_str();
@@ -36,7 +37,7 @@ int serve(int argc, char** argv, const EchoServer& echo) {
   echo.answer(server);
   log->info(R"(serving "{}" at location {})", name, server.location());
   const auto status = server.runUntilSignal();
-  log->info("ends");
+  log->info("stopped");
   return status;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Echo servers: send back what they get (manual, "Message Server": serverInt32, serverChar8Array).
+// Echo servers: reply to each message with the same message (manual, "Example": serverInt32;
+// "Serial Support": serverChar8Array).
 #pragma once
 
 #include <functional>
@@ -10,13 +11,13 @@
 namespace mpf {
 
 struct EchoServer {
-  std::string program;
-  std::string server;
-  std::string what;
+  std::string program;  // name of the program
+  std::string server;   // default name of the server
+  std::string what;     // name of the message type
   std::function<void(MessageServer&)> answer;  // adds the handler
 };
 
-// Echoes until SIGINT or SIGTERM. Returns the exit status.
+// Serves until SIGINT or SIGTERM. Returns the exit status.
 int runEchoServer(int argc, char** argv, const EchoServer& echo);
 
 }  // namespace mpf

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Log: what a program says to people, with a limit on lines of one kind (LogLimiter).
+// Log: the log of a program, with a limit on the number of lines of one kind (LogLimiter).
 //
-//   log.info("{} is back", port)
-//   const Log ofThisRemote = log.forObject();    // its lines have limits of their own
+//   log.info("{} is connected", port)
+//   const Log ofThisRemote = log.forObject();    // its lines have separate limits
 //
-// A kind is one statement in the source and one object. Statements that other users can cause share
-// the limits of their object, so do not give objects that others create a Log of their own.
+// A kind is one statement in the source for one object. Do not call forObject() for objects that
+// other users can create, such as clients: each would add lines without limit.
 //
-// Threads  any may log. `write` is called under a lock, in the order of the lines.
+// Threads  any thread may log. `write` is called under a lock, in the order of the lines.
 #pragma once
 
 #include <atomic>
@@ -27,7 +27,7 @@
 
 namespace mpf {
 
-// A format, and the statement that it stands in.
+// A format string and the source location of the statement that logs it.
 template <class... Arguments>
 struct LogFormat {
   template <class Text>
@@ -46,7 +46,7 @@ class Log {
 
   explicit Log(Write write, Level least = Level::info, Now now = Clock::nowNs);
 
-  // A log with limits of its own, for an object of the configuration.
+  // Returns a log with separate limits, for an object of the configuration.
   [[nodiscard]] Log forObject() const;
 
   template <class... Arguments>
@@ -71,15 +71,16 @@ class Log {
     say(Level::critical, format, std::forward<Arguments>(arguments)...);
   }
 
-  // One of ServerLog::levels().
+  //   name  one of ServerLog::levels()
   void setLevel(const std::string& name) const;
 
-  // Calls `held` with the time at which writeDue() has something to write, whenever that is earlier
-  // than it was. Under the lock: `held` calls no Log.
+  // Sets a callback that receives the time at which writeDue() must be called, whenever it becomes
+  // earlier. It runs under the lock and must not log.
   void onHeld(std::function<void(std::int64_t dueNs)> held) const;
-  // Writes what is due. Returns the time of the next call; INT64_MAX: nothing is held.
+  // Writes the held lines that are due. Returns the time of the next call; INT64_MAX: no line is
+  // held.
   std::int64_t writeDue() const;
-  // Writes all that is held: before the program ends.
+  // Writes all held lines. For the end of the program.
   void writeHeld() const;
 
  private:

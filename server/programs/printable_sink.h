@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// PrintableSink: where the log of a program goes to: stderr, one line for each message,
-// printable().
+// PrintableSink: writes log messages to stderr, each as one line of printable() text.
 //
 // Threads  any.
-// Crash    a line is one call of write(); what stderr does not take is lost, and nothing fails.
-// Trust    text of clients and of other hosts can neither add a line nor command a terminal.
+// Errors   a line is one call of write(). Bytes that stderr does not accept are lost silently.
+// Trust    text from clients and other hosts can neither add lines nor send escape sequences to a
+//          terminal.
 #pragma once
 
 #include <mutex>

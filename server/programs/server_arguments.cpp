@@ -13,11 +13,11 @@
 namespace mpf {
 namespace {
 
-constexpr int kQueueSizeAsBefore = 20;
+constexpr int kDefaultQueueSize = 20;
 const std::map<std::string, WaitMode> kWaitModes{
     {"spin", WaitMode::spin}, {"adaptive", WaitMode::adaptive}, {"block", WaitMode::block}};
 
-// What `parse` makes of the value of `option`.
+// Sets `into` to the value of `option` as `parse` reads it.
 template <class Value>
 void take(const char* option, const std::string& text, Value (*parse)(const std::string&),
           Value& into) try {
@@ -29,7 +29,7 @@ void take(const char* option, const std::string& text, Value (*parse)(const std:
 }  // namespace
 
 void ServerArguments::addQueueSizeTo(CLI::App& app) {
-  messages.queueSize = kQueueSizeAsBefore;
+  messages.queueSize = kDefaultQueueSize;
   app.add_option("queuesize", messages.queueSize, "Requests of one client that may wait")
       ->capture_default_str()
       ->check(wholeNumber(1, LinkGeometry::kMaxQueueSize));
@@ -41,8 +41,8 @@ void ServerArguments::addTo(CLI::App& app) {
   app.add_option_function<std::string>(
          "--wait-mode",
          [this](const std::string& name) { messages.waitMode = kWaitModes.at(name); },
-         "How it waits for requests: spin takes a processor, block sleeps at once, adaptive spins "
-         "for a while")
+         "How it waits for requests: spin uses a whole processor, block sleeps immediately, "
+         "adaptive spins for a while and then sleeps")
       ->check(CLI::IsMember(kWaitModes))
       ->default_str("adaptive");
   auto* const mode = app.add_option_function<std::string>(
@@ -50,17 +50,17 @@ void ServerArguments::addTo(CLI::App& app) {
                             [this](const std::string& text) {
                               take("--mode", text, parseMode, messages.rights.mode);
                             },
-                            "Who may be a client, octal as for chmod: 0600 its own user, 0660 also "
-                            "the group, 0666 everybody")
+                            "Which users may be clients, octal as for chmod: 0600 the user of the "
+                            "server, 0660 also the group, 0666 all users")
                          ->default_str("0600");
   app.add_option_function<std::string>(
          "--group",
          [this](const std::string& name) {
            take("--group", name, parseGroup, messages.rights.group);
          },
-         "The group that --mode speaks of; default: the user's own")
+         "The group of --mode; default: the primary group of the user")
       ->needs(mode);
-  app.add_option("--log-level", logLevel, "Least weight of what it says on stderr")
+  app.add_option("--log-level", logLevel, "Lowest level of log lines on stderr")
       ->check(CLI::IsMember(ServerLog::levels()))
       ->capture_default_str();
 }

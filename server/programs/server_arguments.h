@@ -20,10 +20,10 @@ struct ServerArguments {
   std::string logLevel = "info";
   ServerOptions messages;
 
-  // Adds the options to `app`, which fills this object when it parses and must not outlive it. A
-  // value that is none is a CLI::ValidationError that says which values there are.
+  // Adds the options to `app`, which fills this object when it parses and must not outlive it. An
+  // invalid value causes a CLI::ValidationError that names the valid values.
   void addTo(CLI::App& app);
-  // Adds what old commands call queuesize, an argument that may be left out.
+  // Adds the optional argument `queuesize`, as the old commands had it.
   void addQueueSizeTo(CLI::App& app);
 };
 

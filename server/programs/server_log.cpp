@@ -17,7 +17,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::size_t kLinesThatMayWait = 1024;
+constexpr std::size_t kMaxQueuedLines = 1024;
 
 }  // namespace
 
@@ -47,14 +47,14 @@ class ServerLog::Writer {
   void add(Log::Level level, std::string text) noexcept try {
     {
       const std::scoped_lock guard(lock_);
-      if (queue_.size() == kLinesThatMayWait) {
+      if (queue_.size() == kMaxQueuedLines) {
         queue_.pop_front();
         ++dropped_;
       }
       queue_.push_back({spdlog::log_clock::now(), level, std::move(text)});
     }
     changed_.notify_one();
-  } catch (...) {  // no memory for a line: the program is worth more than its log
+  } catch (...) {  // no memory for a line: the line is lost and the program continues
   }
 
   void wakeAt(std::int64_t dueNs) noexcept {
@@ -98,7 +98,7 @@ class ServerLog::Writer {
     const auto dropped = std::exchange(dropped_, 0);
     guard.unlock();
     if (dropped != 0)
-      logger_.warn("{} lines are missing here: nobody read stderr in time", dropped);
+      logger_.warn("{} lines are missing here: stderr was not read in time", dropped);
     for (const auto& line : lines)
       logger_.log(line.time, spdlog::source_loc{}, line.level, line.text);
     guard.lock();
@@ -114,7 +114,7 @@ class ServerLog::Writer {
   std::thread thread_;
 };
 
-// A Log that outlives this object keeps the queue, whose lines nobody writes any more.
+// A Log that outlives this object keeps the queue alive, but its lines are no longer written.
 ServerLog::ServerLog(const std::string& program, const std::string& level)
     : writer_(std::make_shared<Writer>(program)),
       log_(

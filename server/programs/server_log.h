@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// ServerLog: what a server program says to people, on stderr.
+// ServerLog: the log of a server program, on stderr.
 //
-//   2024-05-01 12:00:00.000 info mpf-serial-server: /dev/ttyS0 is lost: read /dev/ttyS0:
-//   Input/output error
+//   2024-05-01 12:00:00.000 info mpf-serial-server: the line is connected
 //
 //   threads ─► Log (limits lines of one kind) ─► queue ─► one thread ─► stderr
 //
-// Threads  any may log; none waits for stderr. When nobody reads stderr, the oldest lines in the
-//          queue are dropped, and a line says how many.
-// Crash    lines in the queue, and lines that the limit holds, are lost.
+// Threads  any thread may log, and no thread waits for stderr. When stderr is not read, the queue
+//          drops its oldest lines, and a line reports their number.
+// Crash    lines in the queue, and lines that the limit holds back, are lost.
 #pragma once
 
 #include <memory>
@@ -23,12 +22,12 @@ class ServerLog {
  public:
   // `level`: one of levels().
   ServerLog(const std::string& program, const std::string& level);
-  // Writes everything that was logged.
+  // Writes all lines that were logged.
   ~ServerLog();
   ServerLog(const ServerLog&) = delete;
   ServerLog& operator=(const ServerLog&) = delete;
 
-  // log->info("{} is back", port);
+  // log->info("{} is connected", port);
   const Log* operator->() const noexcept { return &log_; }
   const Log& operator*() const noexcept { return log_; }
 
@@ -43,8 +42,8 @@ class ServerLog {
 
 class MessageServer;
 
-// Says when `server` cannot accept clients for lack of descriptors or memory, and when it can
-// again.
+// Logs when `server` cannot accept clients because it has no file descriptors or memory left, and
+// when it can again.
 //   log  outlives the server
 void logShortages(MessageServer& server, const ServerLog& log);
 

@@ -20,7 +20,7 @@ void ServingThread::start(const ServerLog& log, std::function<void()> serve,
     } catch (const std::exception& error) {
       log->critical("{}", error.what());
     } catch (...) {
-      log->critical("the server stops: an exception that is not a std::exception left it");
+      log->critical("the server failed: it threw an exception that is not a std::exception");
     }
     failed();
   });

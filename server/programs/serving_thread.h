@@ -1,16 +1,15 @@
-// SPDX-License-Identifier: MIT
-// ServingThread: a thread that serves. When that ends by an exception, the log says why and the
-// program ends: a window that stays open while nobody serves it would take requests and never
-// answer them.
+// SPDX-License-Identifier: MIT ServingThread: a thread that runs a server. When the server throws
+// an exception, the thread logs it and ends the program: otherwise the server would still accept
+// requests and never reply.
 //
-//   ProgramFailure failure;                                        // main()'s
+//   ProgramFailure failure;                                        // in main()
 //   ServingThread thread;
 //   thread.start(log, [&] { server.run(); }, [&] { failure.report(); });
 //   ... wait for SIGINT or SIGTERM, stop the server ...
 //   thread.join();
 //   return failure.exitStatus();
 //
-// Threads  one starts and joins it.
+// Threads  one thread starts and joins it.
 #pragma once
 
 #include <atomic>
@@ -28,18 +27,18 @@ class ServingThread {
   ServingThread(const ServingThread&) = delete;
   ServingThread& operator=(const ServingThread&) = delete;
 
-  // `serve` runs with all signals blocked, until whoever started it has told it to return; `failed`
-  // after it has thrown.
+  // Runs `serve`, with all signals blocked, in a new thread, and `failed` if `serve` has thrown.
+  // The caller must make `serve` return before join().
   //   log  outlives the thread
   void start(const ServerLog& log, std::function<void()> serve, std::function<void()> failed);
-  // Waits for its end; returns at once when it was not started.
+  // Waits until the thread has ended; returns immediately when it was not started.
   void join();
 
  private:
   std::thread thread_;
 };
 
-// Ends the program as SIGTERM does, but for the exit status.
+// Ends the program as SIGTERM does, with exit status 1.
 class ProgramFailure {
  public:
   void report() noexcept;

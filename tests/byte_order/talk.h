@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <optional>
 
-#include <mpf/message.h>
+#include <mpf/message_of.h>
 
 namespace mpf::test {
 

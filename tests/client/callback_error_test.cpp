@@ -21,7 +21,7 @@ struct Thrown : std::runtime_error {
 
 class CallbackErrorTest : public ClientTest {
  protected:
-  // A client whose callback notes each message and then throws, if `mayThrow` says so.
+  // A client whose callback records each message and then throws, if `mayThrow` is set.
   MessageClient& makeThrower(std::function<bool(const Message&)> mayThrow) {
     thrower_ =
         std::make_unique<MessageClient>(dispatcher_, [this, mayThrow](const Message& message) {
@@ -47,7 +47,7 @@ class CallbackErrorTest : public ClientTest {
       }
     }
   }
-  // The server, which holds that many requests of the thrower.
+  // Receives that many requests of the client that throws, and keeps them.
   void holdRequests(MessageClient& client, std::size_t requests) {
     server_->on<Int32>([this](Int32Message&& request) { held_.push_back(std::move(request)); });
     runCatching([&] { return client.isConnected(); });
@@ -91,7 +91,7 @@ bool atFates(const Message& message) { return message.tryAs<RequestFate>() != nu
 
 // ---- clients
 
-TEST_F(CallbackErrorTest, EachRequestOfADisconnectHasItsEndAndTheClientConnectsAgain) {
+TEST_F(CallbackErrorTest, EachRequestOfADisconnectGetsItsFateAndTheClientReconnects) {
   startServer();
   auto& client = makeThrower(always);
   holdRequests(client, 5);
@@ -107,8 +107,8 @@ TEST_F(CallbackErrorTest, EachRequestOfADisconnectHasItsEndAndTheClientConnectsA
   EXPECT_TRUE(client.isConnected());
 }
 
-// What the server sent before it went comes first, one by one.
-TEST_F(CallbackErrorTest, RepliesOfAServerThatWentAreNotLost) {
+// The replies that the server sent before it ended are delivered first, one by one.
+TEST_F(CallbackErrorTest, RepliesOfAServerThatEndedAreNotLost) {
   startServer();
   auto& client = makeThrower(always);
   holdRequests(client, 3);
@@ -123,7 +123,7 @@ TEST_F(CallbackErrorTest, RepliesOfAServerThatWentAreNotLost) {
   EXPECT_EQ(caught_, 6);
 }
 
-TEST_F(CallbackErrorTest, RepliesBehindTheOneOfTheExceptionArrive) {
+TEST_F(CallbackErrorTest, RepliesAfterTheOneWhoseCallbackThrewArrive) {
   startServer();
   auto& client = makeThrower(always);
   holdRequests(client, 20);
@@ -134,7 +134,7 @@ TEST_F(CallbackErrorTest, RepliesBehindTheOneOfTheExceptionArrive) {
   EXPECT_EQ(caught_, 21);
 }
 
-TEST_F(CallbackErrorTest, EachCancelledRequestHasItsEnd) {
+TEST_F(CallbackErrorTest, EachCancelledRequestGetsItsFate) {
   startServer();
   auto& client = makeThrower(atFates);
   holdRequests(client, 3);
@@ -146,7 +146,7 @@ TEST_F(CallbackErrorTest, EachCancelledRequestHasItsEnd) {
   EXPECT_THAT(told_, testing::ElementsAre("connectYes", cancelled, cancelled, cancelled));
 }
 
-TEST_F(CallbackErrorTest, EachExpiredRequestHasItsEnd) {
+TEST_F(CallbackErrorTest, EachExpiredRequestGetsItsFate) {
   startServer();
   auto& client = makeThrower(atFates);
   runCatching([&] { return client.isConnected(); });
@@ -160,8 +160,8 @@ TEST_F(CallbackErrorTest, EachExpiredRequestHasItsEnd) {
   EXPECT_THAT(told_, testing::ElementsAre("connectYes", expired, expired, expired));
 }
 
-// A client may end before its callback has had all fates.
-TEST_F(CallbackErrorTest, AClientMayEndAfterAnExceptionInItsDisconnect) {
+// A client may be destroyed before its callback has received all fates.
+TEST_F(CallbackErrorTest, AClientMayBeDestroyedAfterAnExceptionInItsDisconnect) {
   startServer();
   auto& client = makeThrower(atFates);
   holdRequests(client, 3);
@@ -176,8 +176,8 @@ TEST_F(CallbackErrorTest, AClientMayEndAfterAnExceptionInItsDisconnect) {
   EXPECT_EQ(countNames(backplane_, NameKind::link), 0);
 }
 
-// Other clients of the dispatcher do not notice.
-TEST_F(CallbackErrorTest, OtherClientsHearOfTheirServersDeath) {
+// Other clients of the dispatcher are not affected.
+TEST_F(CallbackErrorTest, OtherClientsGetTheirDisconnects) {
   startServer();
   client_.bind("device[0]/a");
   auto& client = makeThrower(always);
@@ -292,7 +292,7 @@ TEST_F(CallbackErrorTest, ARequestWhoseHandlerThrowsIsRefusedAndTheServerContinu
   EXPECT_EQ(fateOf(next()), Fate::refused);
   EXPECT_NE(next().tryAs<Float64>(), nullptr);
   EXPECT_EQ(fateOf(next()), Fate::refused);
-  EXPECT_EQ(fateOf(next()), Fate::refused) << "that handler replies to nothing";
+  EXPECT_EQ(fateOf(next()), Fate::refused) << "that handler sends no reply";
 }
 
 TEST_F(CallbackErrorTest, AnExceptionOfAHandlerLeavesRunWhichMayBeCalledAgain) {
@@ -334,7 +334,7 @@ TEST_F(CallbackErrorTest, TheDescriptorOfAServerStaysReadableAfterAnException) {
   EXPECT_EQ(fateOf(next()), Fate::refused);
 }
 
-TEST_F(CallbackErrorTest, EachNewsOfAClientIsToldAlthoughTheyThrow) {
+TEST_F(CallbackErrorTest, EachConnectAndDisconnectIsReportedAlthoughCallbacksThrow) {
   auto& server = startServer();
   std::vector<bool> news;
   server.onClient([&](std::uint64_t, bool isThere) {
@@ -354,7 +354,7 @@ TEST_F(CallbackErrorTest, EachNewsOfAClientIsToldAlthoughTheyThrow) {
 
   EXPECT_THAT(news, testing::ElementsAre(true, true, false));
   EXPECT_NE(next().tryAs<Int32>(), nullptr);
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
 }
 
 }  // namespace

@@ -36,7 +36,8 @@ using namespace std::chrono_literals;
 #define MPF_NEEDS_A_CHILD
 #endif
 
-// Runs in a process of its own, which ends without the destructors of this one, and with it.
+// Runs in a child process, which exits without the destructors of this process, and together with
+// it.
 inline pid_t inAChild(const std::function<void()>& work) {
   const auto child = checkCall(::fork(), "fork");
   if (child == 0) {
@@ -73,7 +74,7 @@ class ClientTest : public testing::Test {
       dispatcher_.runOnce(Deadline::after(100us));
     }
   }
-  // A request of the client, which its server holds; both are connected then.
+  // Connects both, and returns a request of the client that the server has received.
   Message heldRequest() {
     const auto held = std::make_shared<Message>();
     server_->on<Int32>([held](Int32Message&& request) { *held = std::move(request); });
@@ -82,15 +83,15 @@ class ClientTest : public testing::Test {
     runUntil([&] { return static_cast<bool>(*held); });
     return std::move(*held);
   }
-  // The next message that is no ConnectMessage.
+  // The next message that is not a ConnectMessage.
   Message next() {
     runUntil([&] { return !messages_.empty(); });
     auto message = std::move(messages_.front());
     messages_.erase(messages_.begin());
     return message;
   }
-  // By all that are on the backplane.
-  [[nodiscard]] std::uint64_t nonsenseRead() const {
+  // The sum over all windows of the backplane.
+  [[nodiscard]] std::uint64_t protocolErrors() const {
     return sumOf(&layout::WindowControl::protocolErrors);
   }
   // A counter of all windows.

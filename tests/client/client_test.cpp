@@ -34,8 +34,8 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
                                           ConnectStatus::connectYes));
 }
 
-// In a process that lives on: nothing dies, and there is no link that it could close.
-TEST_F(ClientTest, AServerThatEndsBeforeItAcceptsItsClientIsGoneAllTheSame) {
+// The process of the server does not exit, and the server could not close a link.
+TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   startServer();
   serverRuns_ = false;
   client_.bind("device[0]/a");
@@ -50,22 +50,23 @@ TEST_F(ClientTest, AServerThatEndsBeforeItAcceptsItsClientIsGoneAllTheSame) {
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// One hint tells of messages and of the end behind them: for any number of them.
-TEST_F(ClientTest, AServerHearsOfAClientThatLeftRightBehindItsRequests) {
+// One hint announces any number of messages and the end after them.
+TEST_F(ClientTest, AServerNoticesAClientThatDisconnectsRightAfterItsRequests) {
   constexpr int kMost = 40;
-  int gone = 0;
-  startServer().onClient([&](std::uint64_t, bool isThere) { gone += isThere ? 0 : 1; });
+  int disconnected = 0;
+  startServer().onClient(
+      [&](std::uint64_t, bool isConnected) { disconnected += isConnected ? 0 : 1; });
   for (int requests = 1; requests <= kMost; ++requests) {
     MessageClient leaving(dispatcher_, [](const Message&) {});
     leaving.bind("device[0]/a");
     runUntil([&] { return leaving.isConnected(); });
     for (int i = 0; i < requests; ++i) static_cast<void>(leaving.send(Int32Message()));
-    // and goes
+    // The destructor disconnects the client.
   }
-  runUntil([&] { return gone == kMost; });
+  runUntil([&] { return disconnected == kMost; });
 }
 
-TEST_F(ClientTest, AClientHearsOfAServerThatWentRightBehindItsReplies) {
+TEST_F(ClientTest, AClientNoticesAServerThatEndsRightAfterItsReplies) {
   constexpr int kMost = 40;
   serverRuns_ = false;
   for (std::size_t replies = 1; replies <= kMost; ++replies) {
@@ -119,7 +120,7 @@ TEST_F(ClientTest, EchoesEveryScalarTypeWithItsMarks) {
 
 class ArraySizes : public ClientTest, public testing::WithParamInterface<std::size_t> {};
 
-TEST_P(ArraySizes, ArriveAndComeBackWhole) {
+TEST_P(ArraySizes, ArriveAndReturnUnchanged) {
   auto& server = startServer();
   server.on<Float64Array>([](Float64ArrayMessage&) {});
   server.on<Int32Array>([&](Int32ArrayMessage&& request) {
@@ -144,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(InLineInChunksAndLarge, ArraySizes,
                          testing::Values(0, 1, 2, 3, 30, 42, 43, 1000, 100'000,
                                          (64u << 20) / 4 - 6));
 
-TEST_F(ClientTest, ARequestComesBackInTheMemoryItWasBuiltIn) {
+TEST_F(ClientTest, ARequestReturnsInTheMemoryThatItWasBuiltIn) {
   auto& server = startServer();
   server.on<Char8Array>([](Char8Array& request) { request.status = 1; });
   bind();
@@ -158,7 +159,7 @@ TEST_F(ClientTest, ARequestComesBackInTheMemoryItWasBuiltIn) {
   EXPECT_EQ((*reply)->status, 1);
 }
 
-TEST_F(ClientTest, MemoryOfLargeMessagesIsUsedAgain) {
+TEST_F(ClientTest, MemoryOfLargeMessagesIsReused) {
   auto& server = startServer({.maxPoolBytes = 4 << 20});
   server.on<Float64Array>([&](Float64ArrayMessage&& request) {
     EXPECT_EQ(server.reply(server.allocReplyMessage<Float64Array>(request, 20'000)),
@@ -172,7 +173,7 @@ TEST_F(ClientTest, MemoryOfLargeMessagesIsUsedAgain) {
   }
 }
 
-TEST_F(ClientTest, AHeldRequestIsAnsweredManyTimesLater) {
+TEST_F(ClientTest, AStoredRequestGetsManyRepliesLater) {
   auto& server = startServer();
   Message held;
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
@@ -195,11 +196,11 @@ TEST_F(ClientTest, AHeldRequestIsAnsweredManyTimesLater) {
   runUntil([&] { return static_cast<bool>(held); });
   EXPECT_EQ(server.reply(std::move(held)), ReplyResult::sent);
   const auto last = next();
-  ASSERT_NE(last.tryAs<Int32>(), nullptr) << "an answered request has no fate";
+  ASSERT_NE(last.tryAs<Int32>(), nullptr) << "a request with a reply has no fate";
   EXPECT_EQ(last.tryAs<Int32>()->value, 99);
 }
 
-TEST_F(ClientTest, StreamedRepliesAreRefusedWhileTheClientDoesNotTakeThem) {
+TEST_F(ClientTest, FurtherRepliesAreRefusedWhileTheClientDoesNotReceiveThem) {
   auto& server = startServer({.queueSize = 8});
   Message held;
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
@@ -215,7 +216,7 @@ TEST_F(ClientTest, StreamedRepliesAreRefusedWhileTheClientDoesNotTakeThem) {
   EXPECT_EQ(server.reply(server.allocReplyMessage<Int32>(held)), ReplyResult::sent);
   EXPECT_NE(next().tryAs<Int32>(), nullptr);
 }
-TEST_F(ClientTest, AServerKnowsWhichClientARequestIsFromAndWhenThatIsGone) {
+TEST_F(ClientTest, AServerIdentifiesTheClientOfARequestWhileItIsConnected) {
   std::vector<Message> requests;
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) { requests.push_back(std::move(request)); });
@@ -267,9 +268,9 @@ TEST_F(ClientTest, ANameIsServedOnceAtALocation) {
   EXPECT_EQ(elsewhere.location(), 7);
 }
 
-// A server that many wait for: some connect in a step, so that whatever else the dispatcher has to
-// do gets its turn.
-TEST_F(ClientTest, ManyThatConnectAtOnceDoSoInSteps) {
+// When a server appears, each step connects some of its clients, so that other work of the
+// dispatcher is not delayed.
+TEST_F(ClientTest, ManyClientsConnectInSteps) {
   constexpr int kCrowd = 100;
   std::vector<std::unique_ptr<MessageClient>> crowd;
   for (int i = 0; i < kCrowd; ++i) {

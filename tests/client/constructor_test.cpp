@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What constructors throw when memory or threads are short. This file stands between the program
-// and the answers of the kernel.
+// What constructors throw when memory or threads are exhausted. This file replaces system calls
+// with functions that fail.
 #include <fcntl.h>
 #include <pthread.h>
 
@@ -37,7 +37,7 @@ extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attribute
 namespace mpf::test {
 namespace {
 
-// The code of the std::system_error that `construct` throws; 0 when it throws none.
+// Returns the code of the std::system_error that `construct` throws; 0 when it throws nothing.
 int codeOf(const std::function<void()>& construct) {
   try {
     construct();
@@ -48,7 +48,7 @@ int codeOf(const std::function<void()>& construct) {
   return 0;
 }
 
-TEST(Constructors, SayThatSharedMemoryIsFull) {
+TEST(Constructors, ReportThatSharedMemoryIsFull) {
   const TestBackplane backplane;
   reserving = ENOSPC;
 
@@ -63,7 +63,8 @@ TEST(Constructors, SayThatSharedMemoryIsFull) {
   EXPECT_FALSE(client.connectWait(1ms));
 }
 
-// The memory for a connection is not the constructor's: bind() returns, and says why it waits.
+// The constructor does not allocate the memory of a connection: bind() returns and reports the
+// reason.
 TEST(Constructors, DoNotThrowForMemoryOfAConnection) {
   const TestBackplane backplane;
   MessageServer server(backplane, "device");
@@ -77,7 +78,7 @@ TEST(Constructors, DoNotThrowForMemoryOfAConnection) {
   EXPECT_THAT(client.notConnectedBecause(), testing::HasSubstr("No space left"));
 }
 
-TEST(Constructors, SayThatNoThreadStarts) {
+TEST(Constructors, ReportThatNoThreadCanBeStarted) {
   if (kIsSanitized) GTEST_SKIP() << "the sanitizer starts threads itself";
   const TestBackplane backplane;
   startingThread = EAGAIN;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The ends of links, continued: no descriptors left, paused clients, callbacks that run the
-// dispatcher.
+// The ends of links: no descriptors left, paused clients, callbacks that run the dispatcher.
 #include <fcntl.h>
 #include <sys/inotify.h>
 #include <sys/resource.h>
@@ -17,7 +16,7 @@
 namespace mpf::test {
 namespace {
 
-// While it lives, this process opens nothing.
+// While this object exists, the process can open no files.
 class NoDescriptors {
  public:
   NoDescriptors() {
@@ -33,9 +32,9 @@ class NoDescriptors {
 
 using EndMoreTest = ClientTest;
 
-// A request whose memory cannot be mapped for want of descriptors is no nonsense of its client.
+// A request whose memory cannot be mapped because no descriptor is left is not a protocol error.
 TEST_F(EndMoreTest, AServerWithoutDescriptorsKeepsTheClientOfALargeRequest) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   auto& server = startServer();
   server.on<Float64Array>([](Float64Array&) {});
   bind();
@@ -46,13 +45,13 @@ TEST_F(EndMoreTest, AServerWithoutDescriptorsKeepsTheClientOfALargeRequest) {
   }
 
   EXPECT_EQ(fateOf(next()), Fate::refused);
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// Nor is a link that cannot be mapped.
+// A link that cannot be mapped is not a protocol error either.
 TEST_F(EndMoreTest, AServerWithoutDescriptorsAcceptsItsClientLater) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   auto& server = startServer();
   client_.bind("device[0]/a");
   {
@@ -60,13 +59,13 @@ TEST_F(EndMoreTest, AServerWithoutDescriptorsAcceptsItsClientLater) {
     server.handleOne();
   }
 
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
   runUntil([&] { return client_.isConnected(); });
 }
 
-// Nor is a reply nonsense of its server.
+// A reply whose memory cannot be mapped is not a protocol error either.
 TEST_F(EndMoreTest, AClientWithoutDescriptorsKeepsTheServerOfALargeReply) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto reply = server.allocReplyMessage<Float64Array>(request, kBeyondRings);
@@ -82,13 +81,13 @@ TEST_F(EndMoreTest, AClientWithoutDescriptorsKeepsTheServerOfALargeReply) {
   }
 
   EXPECT_EQ(fateOf(next()), Fate::outcomeUnknown);
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
   EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// A client that ends within its callback lives until that returns, although the dispatcher runs on
-// meanwhile.
-TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItReturns) {
+// A client that is destroyed within its callback stays alive until that returns, although the
+// callback runs the dispatcher.
+TEST_F(EndMoreTest, AClientDestroyedInACallbackThatRunsTheDispatcherStaysAliveUntilItReturns) {
   startServer().on<Int32>([](Int32&) {});
   MessageClient other(dispatcher_, [](const Message&) {});
   other.bind("absent");
@@ -109,9 +108,9 @@ TEST_F(EndMoreTest, AClientThatEndsInACallbackThatRunsTheDispatcherLivesUntilItR
   runUntil([&] { return done; });
 }
 
-// Who is paused finds what was sent before the end, and then hears of it; the successor comes
-// after.
-TEST_F(EndMoreTest, APausedClientGetsWhatAServerThatEndedSent) {
+// After resume(), a paused client gets the messages that were sent before the end, then the
+// disconnect, then the connection to the next server.
+TEST_F(EndMoreTest, APausedClientGetsTheMessagesThatItsServerSentBeforeItEnded) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     for (int i = 0; i < 3; ++i) {
@@ -136,11 +135,11 @@ TEST_F(EndMoreTest, APausedClientGetsWhatAServerThatEndedSent) {
     EXPECT_THAT(next().valueAs<Float64Array>(), testing::SizeIs(kBeyondRings << i));
   EXPECT_NE(next().tryAs<Int32>(), nullptr);
   runUntil([&] { return news_.size() == 3; });
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
 }
 
-// A handle keeps a link beyond its server's end; its client dies before it has seen that end. The
-// last one goes.
+// A handle keeps a link alive after its server has ended; its client dies before it has seen that
+// end. The last handle removes the link.
 TEST_F(EndMoreTest, AHandleThatOutlivesItsServerAndItsClientLeavesNoPool) {
   MPF_NEEDS_A_CHILD;
   auto& server = startServer();
@@ -157,11 +156,11 @@ TEST_F(EndMoreTest, AHandleThatOutlivesItsServerAndItsClientLeavesNoPool) {
     SyncClient own(Backplane::named(backplane_.name()), "device[0]/a");
     static_cast<void>(own.call(Int32Message(), 100s));
     static_cast<void>(::write(says.get(), "!", 1));
-    for (;;) ::pause();  // never looks again
+    for (;;) ::pause();  // never reads its messages again
   });
   while (!held) server.handleOne();
   char byte = 0;
-  ASSERT_EQ(::read(heard.get(), &byte, 1), 1);  // it has its reply
+  ASSERT_EQ(::read(heard.get(), &byte, 1), 1);  // it has received its reply
   server_.reset();
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
@@ -171,8 +170,8 @@ TEST_F(EndMoreTest, AHandleThatOutlivesItsServerAndItsClientLeavesNoPool) {
   EXPECT_EQ(countNames(backplane_, NameKind::bulk), 0);
 }
 
-// An inotify instance that tells of names that go. A user has few of them, and tests beside this
-// one have some: it waits for one.
+// An inotify instance that reports removed names. A user has few of them, and parallel tests use
+// some: it waits for one.
 FileDescriptor watchRemovals() {
   FileDescriptor watch;
   while (!watch) {
@@ -185,8 +184,9 @@ FileDescriptor watchRemovals() {
   return watch;
 }
 
-// Whoever is killed meanwhile leaves no gap in their numbers, behind which nobody would look.
-TEST_F(EndMoreTest, NamesOfAPoolGoLastOneFirst) {
+// A process that is killed during the removal leaves no gap in the numbers, where a search would
+// end.
+TEST_F(EndMoreTest, NamesOfAPoolAreRemovedLastOneFirst) {
   startServer().on<Float64Array>([](Float64Array&) {});
   std::optional<MessageClient> leaver(std::in_place, dispatcher_, [this](Message&& message) {
     messages_.push_back(std::move(message));
@@ -216,7 +216,7 @@ TEST_F(EndMoreTest, NamesOfAPoolGoLastOneFirst) {
   EXPECT_THAT(removed, testing::ElementsAre(testing::EndsWith(".0.1"), testing::EndsWith(".0.0")));
 }
 
-// Who hears of the end may wait for the next connection there and then.
+// The callback of a disconnect may wait for the next connection.
 TEST_F(EndMoreTest, ACallbackMayWaitForTheNextConnection) {
   startServer().on<Int32>([](Int32&) {});
   int connects = 0;
@@ -247,14 +247,15 @@ TEST_F(EndMoreTest, ACallbackMayWaitForTheNextConnection) {
 
   EXPECT_TRUE(client->isConnected());
   EXPECT_EQ(countNames(backplane_, NameKind::link), 1);
-  EXPECT_EQ(sumOf(&layout::WindowControl::linkCount), 2u) << "its end and the server's";
+  EXPECT_EQ(sumOf(&layout::WindowControl::linkCount), 2u)
+      << "the client's end and the server's end";
 }
 
-// Another thread binds a client while the dispatcher tells of an end, after which it looks for
-// servers of its own accord.
-TEST(EndOfOthers, AClientThatIsBoundMeanwhileConnectsOnce) {
+// Another thread binds a client while the dispatcher delivers a disconnect, after which it looks
+// for servers by itself.
+TEST(EndOfOthers, AClientThatIsBoundDuringADisconnectConnectsOnce) {
   MPF_NEEDS_A_CHILD;
-  const Watchdog watchdog("bound meanwhile");
+  const Watchdog watchdog("bind during a disconnect");
   TestBackplane backplane;
   const auto child = inAChild([&] {
     MessageServer mortal(Backplane::named(backplane.name()), "mortal");

@@ -32,7 +32,8 @@ class EndTest : public ClientTest {
     }
     work(leaver, another);
   }
-  // Calls back when the process of a client is gone; 0 while there is no such client.
+  // Calls `callback` when the process of a client has exited; returns 0 while there is no such
+  // client.
   Watcher::Token watch(pid_t process, std::function<void()> callback) {
     for (const auto& name : backplane_.segmentNames()) {
       const auto parsed = SegmentName::tryParse(name);
@@ -45,7 +46,7 @@ class EndTest : public ClientTest {
   }
 };
 
-// Whatever was sent before an end in order is there to be taken, wherever it lies.
+// Messages that were sent before an orderly end are received, wherever their bodies are.
 TEST_F(EndTest, AReplyInThePoolOfAServerThatEndsArrives) {
   auto& server = startServer();
   const auto held = heldRequest();
@@ -59,11 +60,11 @@ TEST_F(EndTest, AReplyInThePoolOfAServerThatEndsArrives) {
   EXPECT_THAT(arrived.valueAs<Float64Array>(),
               testing::AllOf(testing::SizeIs(kBeyondRings), testing::Each(2.5)));
   runUntil([&] { return news_.size() == 2; });
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
 }
 
-// Its memory has gone with it: that is an end, and no nonsense.
-TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoNonsense) {
+// Its memory no longer exists: that is the end of a link, not a protocol error.
+TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoProtocolError) {
   auto& server = startServer();
   int handled = 0;
   server.on<Float64Array>([&](Float64ArrayMessage&&) { ++handled; });
@@ -74,12 +75,12 @@ TEST_F(EndTest, ARequestInThePoolOfAClientThatEndedIsNoNonsense) {
   server.handleOne();
 
   EXPECT_EQ(handled, 0);
-  EXPECT_EQ(nonsenseRead(), 0u);
+  EXPECT_EQ(protocolErrors(), 0u);
 }
 
-// A window of a client that is gone is of no use to the server, although the client's process goes
-// on.
-TEST_F(EndTest, AServerLetsGoOfTheWindowsOfClientsThatLeft) {
+// The server does not need the window of a client that has disconnected, although the client's
+// process is still running.
+TEST_F(EndTest, AServerUnmapsTheWindowsOfClientsThatDisconnected) {
   startServer();
   withLeaver([](auto&, auto&) {});
   server_->handleOne();
@@ -93,9 +94,9 @@ TEST_F(EndTest, AServerLetsGoOfTheWindowsOfClientsThatLeft) {
   EXPECT_LE(openDescriptors(), before + 4);
 }
 
-// A connect that fails for lack of memory costs nothing for good.
-TEST_F(EndTest, AConnectThatFailsCostsNoPlace) {
-  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs what this takes away";
+// A connect that fails because of missing memory uses up nothing permanently.
+TEST_F(EndTest, AFailedConnectUsesUpNoIndex) {
+  if (kIsSanitized) GTEST_SKIP() << "the sanitizer needs the resources that this test uses up";
   startServer();
   static_cast<void>(::signal(SIGXFSZ, SIG_IGN));
   rlimit old{};
@@ -116,13 +117,13 @@ TEST_F(EndTest, AConnectThatFailsCostsNoPlace) {
   EXPECT_THAT(client_.notConnectedBecause(), testing::HasSubstr("not accepted"));
   runUntil([&] {
     return client_.isConnected() ||
-           client_.notConnectedBecause().find("no more are possible") != std::string::npos;
+           client_.notConnectedBecause().find("which is the maximum") != std::string::npos;
   });
   EXPECT_TRUE(client_.isConnected());
 }
 
-// What a server is to do, as a process of another user than its client's.
-TEST(EndOfUsers, NothingIsLeftOfAServerAndItsClientOfAnotherUser) {
+// The work of a server, in a process of another user than its client.
+TEST(EndOfUsers, AServerAndItsClientOfAnotherUserLeaveNoFiles) {
   MPF_NEEDS_A_CHILD;
   if (::getuid() != 0) GTEST_SKIP() << "needs to be root";
   const Watchdog watchdog("users");
@@ -155,9 +156,9 @@ TEST(EndOfUsers, NothingIsLeftOfAServerAndItsClientOfAnotherUser) {
   EXPECT_THAT(backplane.segmentNames(), testing::IsEmpty());
 }
 
-// The server takes what is in the ring of a client that ended in order, whether or not its process
-// has ended, too.
-TEST_F(EndTest, WhatAClientSentBeforeItAndItsProcessEndedIsTaken) {
+// The server receives the messages in the ring of a client that ended in order, even when the
+// process of the client has exited as well.
+TEST_F(EndTest, RequestsOfAClientWhoseProcessExitedAreReceived) {
   MPF_NEEDS_A_CHILD;
   auto& server = startServer();
   int handled = 0;
@@ -182,15 +183,15 @@ TEST_F(EndTest, WhatAClientSentBeforeItAndItsProcessEndedIsTaken) {
   int status = -1;
   ::waitpid(child, &status, 0);
   EXPECT_EQ(status, 0);
-  isNoticed.wait(false);  // and so has the server, when it looks up from other things
+  isNoticed.wait(false);  // the server notices it with its next receive()
 
   while (handled < 5) server.handleOne();
 
   backplane_.watcher().forget(token);
 }
 
-// One of them lay in memory that is gone: the others did not.
-TEST_F(EndTest, WhatAClientThatEndedSentBehindALargeRequestIsTaken) {
+// One of them was in memory that no longer exists; the others were not.
+TEST_F(EndTest, RequestsAfterALargeRequestOfAClientThatEndedAreReceived) {
   auto& server = startServer();
   int handled = 0;
   server.on<Int32>([&](Int32&) { ++handled; });
@@ -208,7 +209,7 @@ TEST_F(EndTest, WhatAClientThatEndedSentBehindALargeRequestIsTaken) {
 
 // A callback may wait for another client's connection: the dispatcher then runs within the end of
 // this one.
-TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllNewsOfAnEnd) {
+TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllMessagesOfADisconnect) {
   std::vector<int> told;  // 0: a fate, 1: connected, 2: disconnected
   bool nested = false;
   auto& server = startServer();
@@ -237,9 +238,9 @@ TEST_F(EndTest, ACallbackThatRunsTheDispatcherGetsAllNewsOfAnEnd) {
   held.clear();
 }
 
-// A server object follows another one in the same process; somebody still holds a request of the
-// first.
-TEST_F(EndTest, ARequestOfAServerThatIsGoneCannotBeAnsweredByItsSuccessor) {
+// A server object follows another one in the same process, and a handle of a request to the first
+// still exists.
+TEST_F(EndTest, ANewServerCannotReplyToARequestOfTheFormerServer) {
   startServer();
   auto held = heldRequest();
   server_.reset();

@@ -29,7 +29,7 @@ TEST_F(ClientTest, ATypeWithoutHandlerIsRefused) {
   EXPECT_EQ(fateOf(next()), Fate::refused);
 }
 
-TEST_F(ClientTest, AFullQueueRefusesAtOnceAndSaysSoOnce) {
+TEST_F(ClientTest, AFullQueueRefusesImmediatelyAndIsReportedOnce) {
   startServer({.queueSize = 5}).on<Int32>([](Int32&) {});
   bind();
   serverRuns_ = false;
@@ -37,7 +37,7 @@ TEST_F(ClientTest, AFullQueueRefusesAtOnceAndSaysSoOnce) {
 
   Int32Message sixth({.value = 6});
   EXPECT_EQ(client_.send(std::move(sixth)), SendResult::queueFull);
-  EXPECT_EQ(sixth->value, 6) << "a message that was refused is still the caller's";
+  EXPECT_EQ(sixth->value, 6) << "the caller still owns a message that was refused";
   EXPECT_EQ(client_.send(std::move(sixth)), SendResult::queueFull);
 
   runUntil([&] { return news_.size() == 2; });
@@ -56,7 +56,7 @@ TEST_F(ClientTest, AMessageAboveTheLimitIsRefused) {
   EXPECT_EQ(client_.send(client_.alloc<Char8Array>(961)), SendResult::tooLarge);
 }
 
-TEST_F(ClientTest, ARequestThatIsNotTakenInTimeExpiresOnce) {
+TEST_F(ClientTest, ARequestThatIsNotReceivedInTimeExpiresOnce) {
   int handled = 0;
   startServer().on<Int32>([&](Int32&) { ++handled; });
   bind();
@@ -71,7 +71,7 @@ TEST_F(ClientTest, ARequestThatIsNotTakenInTimeExpiresOnce) {
   serverRuns_ = true;
   server_->on<Float64>([](Float64&) {});
   ASSERT_EQ(client_.send(Float64Message()), SendResult::sent);
-  EXPECT_NE(next().tryAs<Float64>(), nullptr) << "the server passed the expired one without a word";
+  EXPECT_NE(next().tryAs<Float64>(), nullptr) << "the server must not receive the expired request";
   EXPECT_EQ(handled, 0);
 }
 
@@ -93,9 +93,9 @@ TEST_F(ClientTest, ALateReplyOfACancelledRequestIsNotDelivered) {
   EXPECT_NE(next().tryAs<Float64>(), nullptr);
 }
 
-// The server knows a request by its place in a table; a cancelled one that it holds has its place
-// until it answers.
-TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
+// The server identifies a request by its place in a table; a cancelled request keeps its place
+// until the server replies.
+TEST_F(ClientTest, RepliesToCancelledRequestsAreNotMistakenForLaterOnes) {
   auto& server = startServer({.queueSize = 4});
   std::vector<Message> held;
   server.on<Int32>([&](Int32Message&& request) { held.push_back(std::move(request)); });
@@ -107,13 +107,14 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
     runUntil([&] { return static_cast<int>(held.size()) == i + 1; });
     client_.cancel(id);
     EXPECT_EQ(fateOf(next()), Fate::cancelled);
-    client_.cancel(id);  // has ended: nothing comes
+    client_.cancel(id);  // has ended: no message follows
   }
 
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(client_.send(Float64Message({.value = i + 0.0})), SendResult::sent);
     const auto reply = next();
-    ASSERT_NE(reply.tryAs<Float64>(), nullptr) << "request " << i << " met a cancelled one";
+    ASSERT_NE(reply.tryAs<Float64>(), nullptr)
+        << "request " << i << " got the reply to a cancelled one";
     ASSERT_EQ(reply.tryAs<Float64>()->value, i);
   }
 
@@ -124,8 +125,8 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsDoNotMeetLaterOnes) {
   for (int i = 0; i < 4; ++i) EXPECT_NE(next().tryAs<Float64>(), nullptr);
 }
 
-// What the server holds is bounded by what may be outstanding, cancelled or not: its replies have
-// their room.
+// The server can have only as many requests as may be outstanding, cancelled or not, so that there
+// is always room for its first replies.
 TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
   auto& server = startServer({.queueSize = 4});
   std::vector<Message> held;
@@ -149,7 +150,7 @@ TEST_F(ClientTest, CancelledRequestsThatTheServerHoldsCountAsOutstanding) {
   EXPECT_EQ(fateOf(next()), Fate::refused);
 }
 
-TEST_F(ClientTest, AServerThatEndsGivesEachRequestItsFate) {
+TEST_F(ClientTest, EachRequestOfAServerThatEndsGetsItsFate) {
   startServer();
   auto held = heldRequest();
   serverRuns_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What routers need of clients and servers: to speak in the name of others.
+// Functions of clients and servers for routers, which act on behalf of others.
 #include "tests/client/client_fixture.h"
 
 namespace mpf::test {
@@ -14,7 +14,7 @@ class ForRoutersTest : public ClientTest {
     serverRuns_ = false;
     return server;
   }
-  // The next request, taken by hand.
+  // The next request, without a handler.
   Message take() {
     for (;;) {
       if (auto request = server_->receive()) return request;
@@ -31,7 +31,7 @@ class ForRoutersTest : public ClientTest {
   std::vector<std::pair<std::uint64_t, bool>> comings_;
 };
 
-TEST_F(ForRoutersTest, AServerHearsOfItsClients) {
+TEST_F(ForRoutersTest, AServerReportsClientsThatConnectAndDisconnect) {
   startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -51,7 +51,7 @@ TEST_F(ForRoutersTest, AServerHearsOfItsClients) {
   EXPECT_EQ(comings_[2], std::pair(comings_[1].first, false));
 }
 
-TEST_F(ForRoutersTest, AReplyReachesItsRequestByNumbers) {
+TEST_F(ForRoutersTest, AReplyByNumbersReachesItsRequest) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message({.value = 3})), SendResult::sent);
@@ -81,7 +81,7 @@ TEST_F(ForRoutersTest, AReplyReachesItsRequestByNumbers) {
   EXPECT_EQ(second.tryAs<Int32>()->value, 5);
 }
 
-TEST_F(ForRoutersTest, ARequestHasTheIdThatWasAskedFor) {
+TEST_F(ForRoutersTest, ARequestHasTheIdThatTheCallerChose) {
   startWatched();
   bindByHand();
   ASSERT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent);
@@ -97,7 +97,7 @@ TEST_F(ForRoutersTest, ARequestHasTheIdThatWasAskedFor) {
   static_cast<void>(next());
 }
 
-TEST_F(ForRoutersTest, AServerLearnsHowMuchTimeARequestHas) {
+TEST_F(ForRoutersTest, AServerGetsTheDeadlineOfARequest) {
   startWatched();
   bindByHand();
   const auto until = Deadline::after(1h);
@@ -111,8 +111,9 @@ TEST_F(ForRoutersTest, AServerLearnsHowMuchTimeARequestHas) {
   static_cast<void>(next());
 }
 
-// While a client pauses, its server finds the queue of replies full; afterwards nothing is missing.
-TEST_F(ForRoutersTest, APausedClientLeavesRepliesWhereTheyAre) {
+// While a client is paused, the reply queue of its server becomes full; after resume() no reply is
+// missing.
+TEST_F(ForRoutersTest, APausedClientLeavesRepliesInTheQueue) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -132,8 +133,8 @@ TEST_F(ForRoutersTest, APausedClientLeavesRepliesWhereTheyAre) {
   for (int got = 0; got < sent; ++got) EXPECT_EQ(next().tryAs<Int32>()->value, got);
 }
 
-// A router tells so that a queue behind it is full.
-TEST_F(ForRoutersTest, AServerMayTellThatAQueueIsFull) {
+// A router reports in this way that a queue behind it is full.
+TEST_F(ForRoutersTest, AServerMayReportThatAQueueIsFull) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Something else lies where a window should be: clients and servers say what it is, and go on once
-// it is gone.
+// SPDX-License-Identifier: MIT An invalid file has the name of a window: clients and servers report
+// what it is, and continue when it has been removed.
 #include <fcntl.h>
 #include <sys/fsuid.h>
 #include <sys/stat.h>
@@ -22,7 +21,7 @@ void writeFile(const std::string& path, const void* bytes, std::size_t size) {
       .write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
 }
 
-// A window whose owner is dead, with one thing changed.
+// The window of a dead owner, with one field changed.
 void writeWindow(const std::string& path, const std::function<void(layout::SegmentHeader&)>& change,
                  std::size_t size = layout::kWindowBytes) {
   std::vector<std::byte> bytes(layout::kWindowBytes);
@@ -57,7 +56,7 @@ class ForeignWindow : public ClientTest, public testing::WithParamInterface<Fore
   std::string path_;
 };
 
-TEST_P(ForeignWindow, IsNamedByTheClientWhichGoesOnOnceItIsGone) {
+TEST_P(ForeignWindow, IsReportedByTheClientWhichConnectsOnceItIsRemoved) {
   GetParam().put(path_);
 
   client_.bind("device[0]/a", 0);
@@ -71,12 +70,12 @@ TEST_P(ForeignWindow, IsNamedByTheClientWhichGoesOnOnceItIsGone) {
   EXPECT_EQ(client_.notConnectedBecause(), "");
 }
 
-TEST_P(ForeignWindow, IsNamedToTheServerThatWantsItsPlace) {
+TEST_P(ForeignWindow, IsReportedToAServerOfTheSameName) {
   GetParam().put(path_);
 
   try {
     startServer({.location = 0});
-    FAIL() << "it took the place of something that is not a dead server's window";
+    FAIL() << "the server replaced a file that is not the window of a dead server";
   } catch (const std::exception& error) {
     EXPECT_THAT(error.what(),
                 testing::AllOf(testing::HasSubstr(path_), testing::HasSubstr(GetParam().saying),
@@ -84,7 +83,7 @@ TEST_P(ForeignWindow, IsNamedToTheServerThatWantsItsPlace) {
   }
 
   EXPECT_TRUE(std::filesystem::exists(std::filesystem::symlink_status(path_)))
-      << "it is not ours to remove";
+      << "the server must not remove it";
   EXPECT_THAT(backplane_.removeDead(),
               testing::Not(testing::Contains(std::filesystem::path(path_).filename())));
   std::filesystem::remove(path_);
@@ -130,14 +129,14 @@ class JunkTest : public ClientTest {
     }
     ClientTest::TearDown();
   }
-  // The path of something named with the number 77.
+  // The path of a file that is named with the number 77.
   std::string junk(NameKind kind) const {
     return segments::path(SegmentName::keyed(backplane_.name(), kind, 0x77));
   }
 };
 
-// Its header makes sense, but no window is that small.
-TEST_F(JunkTest, AWindowThatIsTooSmallIsNamedByTheClient) {
+// Its header is valid, but the file is too small for a window.
+TEST_F(JunkTest, AClientReportsAWindowThatIsTooSmall) {
   const auto path = segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
   writeWindow(path, [](layout::SegmentHeader& header) { header.totalBytes = 1000; }, 1000);
 
@@ -147,7 +146,7 @@ TEST_F(JunkTest, AWindowThatIsTooSmallIsNamedByTheClient) {
   std::filesystem::remove(path);
 }
 
-TEST_F(JunkTest, HintsOfAServerThatAreCutAreNamedByTheClient) {
+TEST_F(JunkTest, AClientReportsTruncatedHintsOfAServer) {
   const auto& server = startServer({.location = 0});
   const auto window =
       PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, server.getName()),
@@ -165,8 +164,8 @@ TEST_F(JunkTest, HintsOfAServerThatAreCutAreNamedByTheClient) {
   runUntil([&] { return client_.isConnected(); });
 }
 
-// Links that are none, of every kind: the server counts them, and goes on serving those that are.
-TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
+// Invalid links of every kind: the server counts them, and continues to serve valid links.
+TEST_F(JunkTest, InvalidLinksDoNotKeepAServerFromItsClients) {
   auto& server = startServer({.location = 0});
   server.on<Int32>([](Int32&) {});
   bind();
@@ -190,7 +189,7 @@ TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
   std::filesystem::create_directory(link(0x776));
   checkCall(::mkfifo(link(0x777).c_str(), 0600), "mkfifo");
 
-  // More knocks than there are places for: the server looks for links by name, too.
+  // More knocks than the window has room for: the server also searches links by name.
   for (std::uint64_t number = 0x770; number < 0x770 + 200; ++number) window->knock(number);
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(client_.send(Int32Message({.value = i})), SendResult::sent);
@@ -208,8 +207,8 @@ TEST_F(JunkTest, LinksThatAreNoneDoNotKeepAServerFromItsClients) {
   EXPECT_TRUE(client_.isConnected());
 }
 
-// A client died while it knocked, and somebody removed its window: nobody else knows of the link.
-TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
+// A client died while it knocked, and its window was removed: only the server can find the link.
+TEST_F(JunkTest, AServerRemovesALinkWhoseClientIsDead) {
   startServer({.location = 0});
   auto dead = std::make_unique<MessageClient>(dispatcher_, [](const Message&) {});
   dead->bind("device[0]/a", 0);
@@ -235,7 +234,7 @@ TEST_F(JunkTest, ALinkWhoseClientIsGoneIsRemovedByItsServer) {
   runUntil([&] { return !std::filesystem::exists(segments::path(name)); });
 }
 
-TEST_F(JunkTest, WhoAttachesRemovesWhatNobodyCanUseAndLeavesOtherLayoutsAlone) {
+TEST_F(JunkTest, AttachRemovesUnusableFilesAndKeepsThoseOfOtherLayouts) {
   const auto link = [&](std::uint64_t number) {
     return SegmentName::link(backplane_.name(), 0x77, number);
   };
@@ -254,7 +253,7 @@ TEST_F(JunkTest, WhoAttachesRemovesWhatNobodyCanUseAndLeavesOtherLayoutsAlone) {
       << "a program of another version may use it";
 }
 
-// For the thread that it lives in, files are those of somebody else who is not root.
+// While this object exists, the files of its thread belong to another user who is not root.
 class AsNobody {
  public:
   AsNobody() { ::setfsuid(65534); }
@@ -263,7 +262,7 @@ class AsNobody {
   AsNobody& operator=(const AsNobody&) = delete;
 };
 
-class SomebodyElsesWindow : public ClientTest {
+class WindowOfAnotherUser : public ClientTest {
  protected:
   void SetUp() override {
     if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
@@ -276,7 +275,7 @@ class SomebodyElsesWindow : public ClientTest {
       segments::path(SegmentName::serverWindow(backplane_.name(), 0, "device[0]/a"));
 };
 
-TEST_F(SomebodyElsesWindow, ThatCannotBeReadIsNamedByTheClient) {
+TEST_F(WindowOfAnotherUser, ThatCannotBeReadIsReportedByTheClient) {
   writeWindow(path_, [](layout::SegmentHeader&) {});
   ASSERT_EQ(::chmod(path_.c_str(), 0600), 0);
   {
@@ -292,7 +291,7 @@ TEST_F(SomebodyElsesWindow, ThatCannotBeReadIsNamedByTheClient) {
   runUntil([&] { return client_.isConnected(); });
 }
 
-TEST_F(SomebodyElsesWindow, ThatCannotBeRemovedIsNamedToTheServer) {
+TEST_F(WindowOfAnotherUser, ThatCannotBeRemovedIsReportedToTheServer) {
   writeWindow(path_, [](layout::SegmentHeader&) {});
   for (const mode_t mode : {0600u, 0644u, 0666u}) {
     ASSERT_EQ(::chmod(path_.c_str(), mode), 0);
@@ -300,9 +299,9 @@ TEST_F(SomebodyElsesWindow, ThatCannotBeRemovedIsNamedToTheServer) {
 
     try {
       const MessageServer server(backplane_, "device[0]/a", {.location = 0});
-      FAIL() << "it took the place of another user's window";
+      FAIL() << "the server replaced the window of another user";
     } catch (const std::exception& error) {
-      // One that cannot even be read may be in use.
+      // A window that cannot be read may be in use.
       EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr(path_),
                                                testing::HasSubstr(mode == 0600 ? "Permission denied"
                                                                                : "remove")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who has nothing to do sleeps, and is not woken.
+// Threads without work sleep and are not woken.
 #include <poll.h>
 #include <sys/timerfd.h>
 
@@ -27,7 +27,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A client with a thread of its own.
+// A client with its own thread.
 class IdleClient {
  public:
   IdleClient(const Backplane& backplane, WaitMode mode)
@@ -59,7 +59,7 @@ class IdleClient {
 
 class IdleTest : public testing::TestWithParam<WaitMode> {
  protected:
-  // Wakes so far by window; empty while somebody is awake.
+  // The number of wake-ups of each window; empty while a thread is awake.
   using Wakes = std::map<std::string, std::uint64_t>;
 
   void SetUp() override {
@@ -92,8 +92,8 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
     }
     return wakes;
   }
-  // Waits until all sleep: twice in a row, for one that is seen asleep may be about to be woken by
-  // one that was not looked at yet.
+  // Waits until all threads sleep: seen twice in a row, because a sleeping thread may be woken by a
+  // thread that was not checked yet.
   Wakes waitUntilAllSleep() const {
     for (;;) {
       const auto wakes = wakesOfSleepers();
@@ -101,7 +101,7 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
       std::this_thread::yield();
     }
   }
-  // Longer than the longest time after which a client asks again for what it is owed.
+  // Longer than the longest time after which a client rings again for an outstanding reply.
   static void waitForTick() {
     const FileDescriptor timer(
         checkCall(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timerfd_create"));
@@ -112,8 +112,8 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
     checkCall(retryInterrupted([&] { return ::poll(&tick, 1, -1); }), "poll");
   }
 
-  // A client looks once more after its last reply; then there is a tick in which nothing happens.
-  // Something that polls or beats would go on for ever.
+  // A client wakes once more after its last reply; after that nothing may happen.
+  // A thread that polls or sends heartbeats would never stop.
   Wakes waitUntilIdle() const {
     auto before = waitUntilAllSleep();
     for (waitForTick(); wakesOfSleepers() != before; waitForTick()) before = waitUntilAllSleep();
@@ -128,9 +128,9 @@ class IdleTest : public testing::TestWithParam<WaitMode> {
   std::vector<std::shared_ptr<PeerWindow>> windows_;
 };
 
-TEST_P(IdleTest, NobodyIsWokenWhileNobodySends) { EXPECT_EQ(waitUntilIdle().size(), 51u); }
+TEST_P(IdleTest, NoThreadIsWokenWhileNoMessageIsSent) { EXPECT_EQ(waitUntilIdle().size(), 51u); }
 
-TEST_P(IdleTest, OneThatSendsWakesTheServerAndNoOtherClient) {
+TEST_P(IdleTest, AClientThatSendsWakesTheServerAndNoOtherClient) {
   auto before = waitUntilIdle();
 
   for (int i = 0; i < 20; ++i)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server that says what is not its to say: it is treated as one that sends nonsense.
+// A server that sends messages that only MPF may send: its client ends the connection.
 #include "tests/client/client_fixture.h"
 
 namespace mpf::test {
@@ -7,7 +7,7 @@ namespace {
 
 class LiarTest : public ClientTest {
  protected:
-  // Asks the server, whose answer must cost it the client.
+  // Sends a request to the server, whose reply must end the connection.
   void expectToBeLeft() {
     bind();
     ASSERT_EQ(client_.send(Int32Message({.value = 1})), SendResult::sent);
@@ -15,12 +15,12 @@ class LiarTest : public ClientTest {
     runUntil([&] { return news_.size() == 2; });
 
     EXPECT_THAT(news_, testing::ElementsAre(ConnectStatus::connectYes, ConnectStatus::connectNo));
-    EXPECT_EQ(client_.notConnectedBecause(), "the server sent nonsense");
+    EXPECT_EQ(client_.notConnectedBecause(), "the server sent invalid data");
     EXPECT_EQ(fateOf(next()), Fate::outcomeUnknown);
   }
 };
 
-TEST_F(LiarTest, NewsOfTheConnectionIsNotTheServersToTell) {
+TEST_F(LiarTest, AServerMustNotSendConnectMessages) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<Connect>(request);
@@ -31,7 +31,7 @@ TEST_F(LiarTest, NewsOfTheConnectionIsNotTheServersToTell) {
   expectToBeLeft();
 }
 
-TEST_F(LiarTest, AFateThatNamesAnotherRequestEndsNone) {
+TEST_F(LiarTest, AFateOfAnotherRequestEndsNoRequest) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<RequestFate>(request);
@@ -56,7 +56,7 @@ TEST_F(LiarTest, AFateAfterTheReplyEndsNothing) {
   runUntil([&] { return news_.size() == 2; });
 
   EXPECT_TRUE(next().tryAs<Int32>());
-  EXPECT_EQ(client_.notConnectedBecause(), "the server sent nonsense");
+  EXPECT_EQ(client_.notConnectedBecause(), "the server sent invalid data");
 }
 
 }  // namespace

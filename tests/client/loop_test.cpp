@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Event loops, threads, clients that end at odd moments, calls that wait.
+// Event loops, threads, clients that are destroyed in callbacks, calls that wait.
 #include <poll.h>
 
 #include <atomic>
@@ -34,7 +34,7 @@ TEST_F(ClientTest, ADescriptorWakesAnEventLoop) {
   messages_.clear();
 }
 
-TEST_F(ClientTest, AClientMayEndInItsOwnCallback) {
+TEST_F(ClientTest, AClientMayBeDestroyedInItsOwnCallback) {
   startServer().on<Int32>([](Int32&) {});
   std::unique_ptr<MessageClient> brief;
   brief = std::make_unique<MessageClient>(dispatcher_, [&](const Message& message) {
@@ -47,13 +47,13 @@ TEST_F(ClientTest, AClientMayEndInItsOwnCallback) {
   runUntil([&] { return !brief; });
 }
 
-// A loop that always has a next message still sees that it shall end.
+// A loop that always has another message notices interrupt().
 TEST_F(ClientTest, AnInterruptEndsAServerThatIsNeverIdle) {
   auto& server = startServer();
   int handled = 0;
   server.on<Int32>([&](Int32&) {
     if (++handled == 10) server.interrupt();
-    if (handled == 1000) return;  // it was not seen
+    if (handled == 1000) return;  // the interrupt was not noticed
     while (dispatcher_.runOnce(Deadline::atNs(0))) {
     }
     ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -74,7 +74,7 @@ TEST_F(ClientTest, AnInterruptEndsADispatcherThatIsNeverIdle) {
   MessageClient busy(dispatcher_, [&](const Message& message) {
     if (message.getType() != MessageType::int32) return;
     if (++replies == 50) dispatcher_.interrupt();
-    if (replies == 1000) return dispatcher_.interrupt();  // it was not seen
+    if (replies == 1000) return dispatcher_.interrupt();  // the interrupt was not noticed
     ASSERT_EQ(busy.send(Int32Message()), SendResult::sent);
     while (server.handleOne()) {
     }
@@ -90,14 +90,14 @@ TEST_F(ClientTest, AnInterruptEndsADispatcherThatIsNeverIdle) {
   EXPECT_LT(replies, 100);
 }
 
-// Callbacks of one client never run at the same time, whoever sends.
+// Callbacks of one client never run at the same time, whichever threads send.
 TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
   const Watchdog watchdog("shared dispatcher");
   const TestBackplane backplane;
   MessageServer server(backplane, "echo", {.queueSize = 1000});
   server.on<Int32>([](Int32&) {});
   std::thread serving([&] { server.run(); });
-  int replies = 0;  // unprotected: ThreadSanitizer looks on
+  int replies = 0;  // unprotected: ThreadSanitizer reports concurrent access
   std::atomic<int> done{0};
   constexpr int kThreads = 4;
   constexpr int kEach = 500;
@@ -125,7 +125,7 @@ TEST(SharedDispatcher, RunsOneCallbackAtATimeForManyThreads) {
   EXPECT_EQ(replies, kThreads * kEach);
 }
 
-// A server that always has work ends all the same, and what it has not taken it has not done.
+// A server that always has work stops, and the requests that it has not received are not performed.
 TEST_F(ClientTest, AnInterruptEndsTheServerBetweenTwoRequests) {
   int handled = 0;
   auto& server = startServer();
@@ -145,7 +145,7 @@ TEST_F(ClientTest, AnInterruptEndsTheServerBetweenTwoRequests) {
   EXPECT_EQ(fateOf(next()), Fate::neverTaken);
 }
 
-TEST(SyncClientTest, TakesWhatIsThereWithoutWaiting) {
+TEST(SyncClientTest, ReturnsMessagesThatHaveArrivedWithoutWaiting) {
   const TestBackplane backplane;
   MessageServer server(backplane, "device");
   Message held;
@@ -166,7 +166,7 @@ TEST(SyncClientTest, TakesWhatIsThereWithoutWaiting) {
   EXPECT_FALSE(client.receive(0s));
 }
 
-TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
+TEST(SyncClientTest, ReportsWhyThereIsNoReply) {
   const Watchdog watchdog("sync client");
   const TestBackplane backplane;
   SyncClient client(backplane, "echo");
@@ -178,7 +178,7 @@ TEST(SyncClientTest, SaysWhyThereIsNoAnswer) {
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
   std::thread serving([&] { server.run(); });
   ASSERT_TRUE(client.connectWait(60s));
-  // A server that was not on a processor in that time has not taken it.
+  // `expired` when the server had no processor in that time.
   auto patience = 50ms;
   auto unknown = client.call(Int32Message(), patience);
   for (; unknown.fate() == Fate::expired; unknown = client.call(Int32Message(), patience))

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Hints are written by every peer, and so can be lost or invented by any: that costs time, never a
-// message.
+// SPDX-License-Identifier: MIT Every peer writes hints, so any peer can erase hints or write false
+// ones: that costs time, never a message.
 #include <poll.h>
 
 #include <thread>
@@ -28,14 +27,14 @@ class LostHintTest : public ClientTest {
     }
     return {};
   }
-  // Whatever its owner was told and has not looked at yet is gone.
+  // Erases the hints that the owner has not read yet.
   static void lose(const Segment& segment) {
     auto& hints = segment.at<layout::WindowHints>(0);
     for (auto& knock : hints.knocks) knock.store(0);
     for (auto& word : hints.readyWords) word.store(0);
     for (auto& bits : hints.readyBits) bits.store(0);
   }
-  // Waits until the client expects nothing more, and neither side polls the link.
+  // Waits until the client expects no more messages, and neither side polls the link.
   void settle() {
     runUntil([&] { return dispatcher_.nextDeadline().isNever(); });
     while (server_->waitForMessage(Deadline::after(1ms))) EXPECT_FALSE(server_->receive());
@@ -44,13 +43,13 @@ class LostHintTest : public ClientTest {
   }
 };
 
-TEST_F(LostHintTest, AKnockThatIsLostDelaysTheConnection) {
+TEST_F(LostHintTest, ALostKnockDelaysTheConnection) {
   lose(hintsOf(layout::SegmentKind::serverWindow));
 
   runUntil([&] { return client_.isConnected(); });
 }
 
-TEST_F(LostHintTest, AnAcceptanceOfWhichTheClientIsNotToldIsFound) {
+TEST_F(LostHintTest, AnAcceptanceWhoseHintIsLostIsFound) {
   const auto hints = hintsOf(layout::SegmentKind::clientWindow);
   EXPECT_FALSE(server_->receive());
 
@@ -59,7 +58,7 @@ TEST_F(LostHintTest, AnAcceptanceOfWhichTheClientIsNotToldIsFound) {
   runUntil([&] { return client_.isConnected(); });
 }
 
-TEST_F(LostHintTest, ARequestOfWhichTheServerIsNotToldIsAnswered) {
+TEST_F(LostHintTest, ARequestWhoseHintIsLostGetsItsReply) {
   const auto hints = hintsOf(layout::SegmentKind::serverWindow);
   runUntil([&] { return client_.isConnected(); });
   for (int i = 0; i < 3; ++i) {
@@ -72,7 +71,7 @@ TEST_F(LostHintTest, ARequestOfWhichTheServerIsNotToldIsAnswered) {
   }
 }
 
-TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
+TEST_F(LostHintTest, AReplyWhoseHintIsLostIsDelivered) {
   const auto hints = hintsOf(layout::SegmentKind::clientWindow);
   runUntil([&] { return client_.isConnected(); });
   for (int i = 0; i < 3; ++i) {
@@ -87,8 +86,8 @@ TEST_F(LostHintTest, AReplyOfWhichTheClientIsNotToldIsDelivered) {
   }
 }
 
-// Whoever may ring may also take rings.
-TEST_F(LostHintTest, ARingThatSomebodyElseTookIsRepeated) {
+// A process that may ring a doorbell may also consume its rings.
+TEST_F(LostHintTest, ARingThatAnotherProcessConsumedIsRepeated) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const auto incarnation = hintsOf(layout::SegmentKind::serverWindow).header().ownerWindow;
@@ -109,7 +108,7 @@ TEST_F(LostHintTest, ARingThatSomebodyElseTookIsRepeated) {
   EXPECT_EQ(next().tryAs<Int32>()->value, 5);
 }
 
-// Writes news of everything into hints, for as long as it lives.
+// Sets all hints repeatedly until it is destroyed.
 class Inventor {
  public:
   explicit Inventor(Segment segment)
@@ -128,16 +127,16 @@ class Inventor {
   std::jthread thread_;
 };
 
-TEST_F(LostHintTest, InventedNewsKeepsNoClientFromItsDeadline) {
+TEST_F(LostHintTest, FalseHintsDoNotKeepAClientFromItsDeadline) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const Inventor inventor(hintsOf(layout::SegmentKind::clientWindow));
 
   const auto deadline = Deadline::after(20ms);
-  while (dispatcher_.runOnce(deadline)) continue;  // true: it had something of its own to do
+  while (dispatcher_.runOnce(deadline)) continue;  // true: it has done something
 }
 
-TEST_F(LostHintTest, InventedNewsKeepsNoEventLoopFromItsTurn) {
+TEST_F(LostHintTest, FalseHintsDoNotBlockAnEventLoop) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   pollfd readable{dispatcher_.descriptor(), POLLIN, 0};
@@ -155,7 +154,7 @@ TEST_F(LostHintTest, InventedNewsKeepsNoEventLoopFromItsTurn) {
   EXPECT_EQ(next().tryAs<Int32>()->value, 5);
 }
 
-TEST_F(LostHintTest, InventedNewsKeepsNoServerFromItsReceiverNorFromItsClients) {
+TEST_F(LostHintTest, FalseHintsBlockNeitherReceiveNorClients) {
   runUntil([&] { return client_.isConnected(); });
   settle();
   const Inventor inventor(hintsOf(layout::SegmentKind::serverWindow));

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Queues that are full: refused at once, counted, told in order; nothing is lost and nobody else
-// notices.
+// SPDX-License-Identifier: MIT Full queues: messages are refused immediately, counted, and reported
+// in order; no message is lost, and other clients are not affected.
 #include <algorithm>
 #include <numeric>
 #include <string>
@@ -13,7 +12,7 @@ namespace {
 
 class QueueTest : public ClientTest {
  protected:
-  // A second client of the same server, on a dispatcher of its own.
+  // A second client of the same server, with its own dispatcher.
   struct Other {
     explicit Other(const Backplane& backplane) : dispatcher(backplane) {
       client.bind("device[0]/a");
@@ -33,7 +32,7 @@ class QueueTest : public ClientTest {
     });
   }
   SendResult send(std::int32_t value) { return client_.send(Int32Message({.value = value})); }
-  // What anybody can read in the window of the only server or of the only dispatcher.
+  // The public part of the window of the only server or of the only dispatcher.
   const layout::WindowControl& control(layout::SegmentKind kind) {
     const auto* mark = kind == layout::SegmentKind::serverWindow ? ".s." : ".c.";
     for (const auto& name : backplane_.segmentNames()) {
@@ -92,7 +91,7 @@ TEST_F(QueueTest, RequestsWithoutReplyHaveALimitAndRefusalsAreCounted) {
   EXPECT_EQ(nextValues(1).front(), 7);
 }
 
-TEST_F(QueueTest, ARefusedArrayIsStillTheCallersAndGoesLater) {
+TEST_F(QueueTest, ARefusedArrayStaysWithTheCallerAndCanBeSentLater) {
   startServer({.queueSize = 1}).on<Float64Array>([](Float64ArrayMessage&) {});
   bind();
   serverRuns_ = false;
@@ -108,7 +107,7 @@ TEST_F(QueueTest, ARefusedArrayIsStillTheCallersAndGoesLater) {
   EXPECT_EQ(next().valueAs<Float64Array>()[4999], 0.5);
 }
 
-TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
+TEST_F(QueueTest, EachSeriesOfRefusalsIsReportedOnceAndInOrder) {
   startServer({.queueSize = 2}).on<Int32>([](Int32&) {});
   bind();
   for (std::size_t run = 1; run <= 3; ++run) {
@@ -118,8 +117,7 @@ TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
     EXPECT_EQ(send(2), SendResult::queueFull);
     EXPECT_EQ(send(2), SendResult::queueFull);
     runUntil([&] { return news_.size() == 1 + run; });
-    EXPECT_THAT(messages_, testing::IsEmpty())
-        << "the refusal comes before the replies that the server has yet to send";
+    EXPECT_THAT(messages_, testing::IsEmpty()) << "the refusal is delivered before later replies";
     serverRuns_ = true;
     EXPECT_EQ(nextValues(2), numbers(2));
   }
@@ -133,7 +131,7 @@ TEST_F(QueueTest, EachRunOfRefusalsIsToldOnceAndInOrder) {
                                    ConnectStatus::connectNo));
 }
 
-TEST_F(QueueTest, ANewQueueSizeIsForLaterClients) {
+TEST_F(QueueTest, ANewQueueSizeAppliesToLaterClients) {
   auto& server = startServer({.queueSize = 5});
   server.on<Int32>([](Int32&) {});
   bind();
@@ -161,7 +159,7 @@ TEST_F(QueueTest, AQueueSizeOutsideTheLimitsIsAnError) {
   EXPECT_NO_THROW(server.setQueueSize(16384));
 }
 
-TEST_F(QueueTest, RepliesThatAClientDoesNotTakeAreRefusedCountedAndHurtNobodyElse) {
+TEST_F(QueueTest, RepliesThatAClientDoesNotReceiveAreRefusedAndCountedAndOthersAreNotAffected) {
   auto& server = startServer({.queueSize = 8});
   Message held;
   server.on<Int32>([&](Int32Message&& request) {
@@ -187,7 +185,7 @@ TEST_F(QueueTest, RepliesThatAClientDoesNotTakeAreRefusedCountedAndHurtNobodyEls
 
   EXPECT_EQ(stream(), ReplyResult::queueFull);
   EXPECT_EQ(counters.replyQueueFull.load(), 2u);
-  // The client takes nothing, and sends all the same.
+  // The client receives nothing, but sends.
   for (int i = 0; i < 8; ++i) EXPECT_EQ(send(i), SendResult::sent);
   Other other(backplane_);
   while (other.replies.size() < 20) {
@@ -198,14 +196,15 @@ TEST_F(QueueTest, RepliesThatAClientDoesNotTakeAreRefusedCountedAndHurtNobodyEls
   while (server.handleOne()) {
   }
   EXPECT_EQ(counters.replyQueueFull.load(), 2u);
-  // Now it takes them all.
+  // Now it receives all replies.
   EXPECT_EQ(nextValues(sent), numbers(static_cast<std::size_t>(sent)));
   EXPECT_EQ(nextValues(8), numbers(8));
   EXPECT_EQ(stream(), ReplyResult::sent);
   EXPECT_EQ(nextValues(1).front(), sent);
 }
 
-// More clients than are polled all the time: those that were long silent have their turn, too.
+// More clients than the server polls: clients that were silent for a long time have their turn,
+// too.
 TEST_F(QueueTest, AFullQueueOfOneClientDoesNotDelayOthers) {
   auto& server = startServer({.queueSize = 1000});
   std::vector<std::int32_t> order;
@@ -230,7 +229,7 @@ TEST_F(QueueTest, AFullQueueOfOneClientDoesNotDelayOthers) {
   for (int i = 0; i < 1000; ++i) EXPECT_NE(next().tryAs<Int32>(), nullptr);
 }
 
-TEST_F(QueueTest, WhatIsSentAgainAfterRefusalsArrivesInOrder) {
+TEST_F(QueueTest, MessagesSentAgainAfterRefusalsArriveInOrder) {
   startServer({.queueSize = 3}).on<Int32>([](Int32&) {});
   bind();
   serverRuns_ = false;

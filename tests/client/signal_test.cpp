@@ -26,7 +26,7 @@ using namespace std::chrono_literals;
 std::atomic<int> handled{0};
 void handle(int) { handled.fetch_add(1, std::memory_order_relaxed); }
 
-// A thread that is sent SIGUSR1 all the time, with a handler that interrupts system calls.
+// A thread that receives SIGUSR1 continuously, with a handler that interrupts system calls.
 class Bombarded {
  public:
   explicit Bombarded(std::function<void()> work)
@@ -69,7 +69,7 @@ class SignalTest : public testing::TestWithParam<WaitMode> {
   MessageServer makeServer() const {
     return {backplane_, "device", {.location = 0, .waitMode = GetParam()}};
   }
-  // Runs `server` beside the test, undisturbed by signals.
+  // Runs `server` on another thread, without signals.
   struct Running {
     explicit Running(MessageServer& itsServer) : server(itsServer), thread([&] { server.run(); }) {}
     ~Running() {
@@ -85,7 +85,7 @@ class SignalTest : public testing::TestWithParam<WaitMode> {
   struct sigaction before_{};
 };
 
-TEST_P(SignalTest, AServerThatWaitsForEverGetsItsMessage) {
+TEST_P(SignalTest, AServerThatWaitsWithoutADeadlineGetsItsMessage) {
   auto server = makeServer();
   SyncClient client(backplane_, "device", 0);
   int ended = 0;
@@ -105,9 +105,8 @@ TEST_P(SignalTest, AServerThatWaitsForEverGetsItsMessage) {
   ASSERT_EQ(client.client().send(Int32Message({.value = 7})), SendResult::sent);
   waiting.join();
 
-  EXPECT_EQ(ended, 0) << "a wait without a deadline was ended by a signal";
-  EXPECT_LT(inVain, kSignals / 10)
-      << "a client that connects ends a wait now and then, signals do not";
+  EXPECT_EQ(ended, 0) << "a signal ended a wait without a deadline";
+  EXPECT_LT(inVain, kSignals / 10) << "connecting clients may end a wait, signals must not";
   EXPECT_EQ(got.tryAs<Int32>()->value, 7);
 }
 
@@ -156,7 +155,7 @@ TEST_P(SignalTest, AClientWaitsForItsServer) {
   EXPECT_TRUE(result);
 }
 
-TEST_P(SignalTest, AClientsPatienceHolds) {
+TEST_P(SignalTest, AClientsTimeoutHolds) {
   Dispatcher dispatcher(backplane_, {GetParam(), {}});
   MessageClient client(dispatcher, [](const Message&) {});
   client.bind("device", 0);
@@ -197,7 +196,7 @@ TEST_P(SignalTest, ACallGetsItsReply) {
   EXPECT_EQ(answer->message().tryAs<Int32>()->value, 5);
 }
 
-TEST_P(SignalTest, ACallWithoutReplyEndsInItsTime) {
+TEST_P(SignalTest, ACallWithoutReplyEndsAfterItsTimeout) {
   auto server = makeServer();
   Message held;
   server.on<Int32>([&](Int32Message&& request) { held = std::move(request); });
@@ -247,7 +246,7 @@ TEST_P(SignalTest, AReceiverGetsALaterReply) {
   EXPECT_EQ(got.tryAs<Int32>()->value, 9);
 }
 
-TEST_P(SignalTest, AReceiversPatienceHolds) {
+TEST_P(SignalTest, AReceiversTimeoutHolds) {
   SyncClient client(backplane_, "device", 0, GetParam());
   const auto deadline = Deadline::after(100ms);
   std::int64_t endedNs = 0;
@@ -291,8 +290,8 @@ TEST_P(SignalTest, ADispatchersDeadlineHolds) {
 
 INSTANTIATE_TEST_SUITE_P(InEachWaitMode, SignalTest, kWaitModes, nameOfWaitMode);
 
-// The wait for the dispatcher's own thread is another one: on a condition variable.
-TEST(SharedDispatcherSignals, AClientWaitsForItsServerAndItsPatienceHolds) {
+// The wait for the thread of a shared dispatcher uses a condition variable.
+TEST(SharedDispatcherSignals, AClientWaitsForItsServerAndItsTimeoutHolds) {
   const Watchdog watchdog("signal test");
   struct sigaction action{};
   struct sigaction before{};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Any thread may bind, send, cancel and wait, whichever kind of dispatcher the client has;
 // callbacks run on the thread that runs the dispatcher, and each request that was accepted has one
-// end.
+// reply or fate.
 #include <thread>
 
 #include <array>
@@ -37,7 +37,7 @@ class ThreadTest : public testing::TestWithParam<Kind> {
       dispatcher_.emplace(backplane_);
       running_ = std::thread([this] { runDispatcher(); });
     }
-    // Before a thread has run the dispatcher, a thread that waits for a connection may.
+    // A thread that waits for a connection may run the dispatcher before another thread has run it.
     auto first = makeClient([](const Message&) {});
     first->bind("echo");
     while (!first->isConnected()) std::this_thread::yield();
@@ -116,7 +116,7 @@ TEST_P(ThreadTest, EachRequestHasOneEndWhileManyThreadsCancel) {
   }
   for (auto& thread : threads) thread.join();
   while (seen.ended != kSenders * kEach) std::this_thread::yield();
-  // Nothing comes after the last one: the client ends on the dispatcher's thread, or without it.
+  // Nothing follows the last one: the client ends on the dispatcher's thread, or without it.
   client.reset();
 
   EXPECT_THAT(seen.ends, testing::Each(1));
@@ -126,8 +126,8 @@ TEST_P(ThreadTest, EachRequestHasOneEndWhileManyThreadsCancel) {
   }
 }
 
-// Clients come and go on several threads while others send.
-TEST_P(ThreadTest, ManyThreadsBindWaitAndEndTheirClients) {
+// Several threads create and destroy clients while others send.
+TEST_P(ThreadTest, ManyThreadsBindWaitAndDestroyTheirClients) {
   constexpr int kRounds = kIsSanitized ? 20 : 100;
   std::vector<std::thread> threads;
   std::atomic<int> connected{0};
@@ -178,8 +178,8 @@ TEST_F(ClientTest, CancelLeavesTheFateToTheThreadThatRunsTheDispatcher) {
   EXPECT_EQ(fateOf(next()), Fate::cancelled);
 }
 
-// In a callback there is no other thread to leave it to.
-TEST_F(ClientTest, CancelInACallbackEndsTheRequestAtOnce) {
+// In a callback, the calling thread itself delivers the fate.
+TEST_F(ClientTest, CancelInACallbackEndsTheRequestImmediately) {
   startServer().on<Int32>([](Int32&) {});
   std::vector<Message> held;
   server_->on<Float64>([&](Float64Message&& request) { held.push_back(std::move(request)); });
@@ -202,8 +202,8 @@ TEST_F(ClientTest, CancelInACallbackEndsTheRequestAtOnce) {
   runUntil([&] { return !fates.empty(); });
 }
 
-// A cancel() that comes late finds no other request of that name on the next connection.
-TEST_F(ClientTest, RequestIdsAreNotUsedAgainOnTheNextConnection) {
+// A late cancel() finds no other request with that number on the next connection.
+TEST_F(ClientTest, RequestIdsAreNotReusedOnTheNextConnection) {
   startServer().on<Int32>([](Int32&) {});
   bind();
   std::uint32_t first = 0;
@@ -221,8 +221,8 @@ TEST_F(ClientTest, RequestIdsAreNotUsedAgainOnTheNextConnection) {
   static_cast<void>(next());
 }
 
-// connectWait() runs the dispatcher only until another thread runs it.
-TEST_F(ClientTest, AWaitGivesWayToTheThreadThatRunsTheDispatcher) {
+// connectWait() runs the dispatcher only until another thread calls run().
+TEST_F(ClientTest, AWaitingThreadYieldsToTheThreadThatRunsTheDispatcher) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
   std::binary_semaphore waiterRuns(0);
@@ -253,8 +253,8 @@ TEST_F(ClientTest, AWaitGivesWayToTheThreadThatRunsTheDispatcher) {
   serving.join();
 }
 
-// The last thread that ran the dispatcher has ended: connectWait() runs it as if no thread ever had.
-TEST_F(ClientTest, AWaitRunsADispatcherWhoseThreadHasEnded) {
+// Its last runner has ended: connectWait() runs the dispatcher as if no thread had run it before.
+TEST_F(ClientTest, AWaitingThreadRunsADispatcherWhoseThreadHasEnded) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
   std::thread([&] { dispatcher_.runOnce(Deadline::after(1ms)); }).join();
@@ -266,8 +266,9 @@ TEST_F(ClientTest, AWaitRunsADispatcherWhoseThreadHasEnded) {
   serving.join();
 }
 
-// The second thread probably gets the stack and the thread-local memory of the first one, which has ended.
-TEST_F(ClientTest, AWaitDoesNotRunADispatcherWhoseSecondThreadIsAlive) {
+// The second thread probably gets the stack and the thread-local memory of the first one, which has
+// ended.
+TEST_F(ClientTest, AWaitingThreadDoesNotRunADispatcherWhoseSecondThreadIsAlive) {
   auto& server = startServer();
   std::thread serving([&] { server.run(); });
   std::thread([&] { dispatcher_.runOnce(Deadline::after(1ms)); }).join();
@@ -290,7 +291,7 @@ TEST_F(ClientTest, AWaitDoesNotRunADispatcherWhoseSecondThreadIsAlive) {
   serving.join();
 }
 
-TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherIsToldSo) {
+TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherGetsAnError) {
   startServer();
   std::binary_semaphore isInside(0);
   std::binary_semaphore mayLeave(0);
@@ -314,7 +315,7 @@ TEST_F(ClientTest, ASecondThreadThatRunsTheDispatcherIsToldSo) {
   dispatcher_.runOnce(Deadline::atNs(0));
 }
 
-TEST_F(ClientTest, NobodyElseRunsASharedDispatcher) {
+TEST_F(ClientTest, OtherThreadsCannotRunASharedDispatcher) {
   const auto shared = Dispatcher::shared(backplane_);
   MessageClient client(backplane_, [](const Message&) {});
   client.bind("absent");

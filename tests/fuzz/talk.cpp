@@ -5,6 +5,8 @@
 #include <mutex>
 #include <sanitizer/asan_interface.h>
 
+#include <mpf/message_of.h>
+
 #include "schema/conversion.h"
 #include "schema/json.h"
 #include "schema/text.h"

@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 
+#include <mpf/message_of.h>
+
 #include "schema/text.h"
 #include "tests/support/sanitized.h"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <mpf/message.h>
-
 #include <algorithm>
 #include <gmock/gmock.h>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <mpf/message_of.h>
 
 #include "schema/visit.h"
 
@@ -129,7 +129,7 @@ TEST(Message, RefusesALengthAboveItsRoomWithASentence) {
     message.setLength(101);
     FAIL() << "101 elements fit into room for 100";
   } catch (const std::length_error& error) {
-    EXPECT_STREQ(error.what(), "int32Array: length 101 was asked for, there is room for 100");
+    EXPECT_STREQ(error.what(), "int32Array: length 101 is too large: there is room for 100");
   }
   EXPECT_EQ(message.getLength(), 100U);
   EXPECT_THROW(message.setLength(SIZE_MAX), std::length_error);

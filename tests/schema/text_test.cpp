@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <sstream>
 
+#include <mpf/message_of.h>
+
 #include "schema/json.h"
 
 namespace {

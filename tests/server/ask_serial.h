@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// askSerial(): one request to a serial server, and what came of it.
+// askSerial(): sends one request to a serial server and returns its result.
 #pragma once
 
 #include <algorithm>

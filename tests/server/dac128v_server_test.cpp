@@ -27,7 +27,7 @@ class Dac128vServerTest : public HardwareTest {
   HardwareAsker asker_{backplane_, "dac"};
 };
 
-TEST_F(Dac128vServerTest, SetsAChannelAndSendsTheMessageBack) {
+TEST_F(Dac128vServerTest, SetsAChannelAndReplies) {
   const auto reply =
       asker_.ask({.timeout = 1, .cmd = 2, .status = 3, .address = 7, .extra = 4, .value = 4095});
 
@@ -40,7 +40,7 @@ TEST_F(Dac128vServerTest, SetsAChannelAndSendsTheMessageBack) {
   EXPECT_EQ(dac_.tryRead(7), 4095);
 }
 
-TEST_F(Dac128vServerTest, RefusesWhatIsOutOfRangeAndLeavesTheOutput) {
+TEST_F(Dac128vServerTest, RefusesValuesOutOfRangeAndKeepsTheOutput) {
   EXPECT_EQ(set(0, 1234), 0);
   EXPECT_EQ(set(0, 4096), -1);
   EXPECT_EQ(set(0, -1), -1);
@@ -50,9 +50,9 @@ TEST_F(Dac128vServerTest, RefusesWhatIsOutOfRangeAndLeavesTheOutput) {
   EXPECT_EQ(alarms("dac"), 0u);
 }
 
-TEST_F(Dac128vServerTest, AnswersRequestsOfEveryType) { asker_.expectRefusalOfOtherTypes(); }
+TEST_F(Dac128vServerTest, RepliesToRequestsOfEveryType) { asker_.expectRefusalOfOtherTypes(); }
 
-TEST_F(Dac128vServerTest, RingsAnAlarmForEachFaultAndGoesOn) {
+TEST_F(Dac128vServerTest, CountsAnAlarmForEachFaultAndContinues) {
   model_.setStuck(1, 0x1);
   EXPECT_EQ(set(1, 3), -1);
   EXPECT_EQ(alarms("dac"), 1u);
@@ -66,7 +66,7 @@ TEST_F(Dac128vServerTest, RingsAnAlarmForEachFaultAndGoesOn) {
   EXPECT_EQ(alarms("dac"), 3u);
 }
 
-TEST_F(Dac128vServerTest, RingsAnAlarmWhenTheModuleHadLostItsOutputs) {
+TEST_F(Dac128vServerTest, CountsAnAlarmWhenTheModuleHadLostItsOutputs) {
   EXPECT_EQ(set(3, 5), 0);
   carrier_.unplug("IP_a");
   auto& another = carrier_.plug("IP_a", std::make_unique<Dac128vModel>());
@@ -77,7 +77,7 @@ TEST_F(Dac128vServerTest, RingsAnAlarmWhenTheModuleHadLostItsOutputs) {
   EXPECT_EQ(alarms("dac"), 1u);
 }
 
-TEST_F(Dac128vServerTest, SurvivesItsModuleBeingPulledOut) {
+TEST_F(Dac128vServerTest, ContinuesWhenItsModuleIsRemoved) {
   carrier_.unplug("IP_a");
   EXPECT_EQ(set(0, 100), -1);
   auto& another = carrier_.plug("IP_a", std::make_unique<Dac128vModel>());

@@ -91,7 +91,7 @@ TEST_F(DigitalIoServerTest, ReadsBitsThroughAMask) {
   EXPECT_EQ(out_.ask({.cmd = cmdReadBits16, .address = 0xff, .extra = 4}).value, 0xf0);
 }
 
-TEST_F(DigitalIoServerTest, RefusesWhatItCannotDo) {
+TEST_F(DigitalIoServerTest, RefusesInvalidRequests) {
   start();
   EXPECT_EQ(out_.ask({.cmd = cmdSetBits, .address = 0x1000000}).status, -1);
   EXPECT_EQ(out_.ask({.cmd = cmdSetDAC, .value = 1}).status, -1);
@@ -104,7 +104,7 @@ TEST_F(DigitalIoServerTest, RefusesWhatItCannotDo) {
   EXPECT_EQ(alarms("dioIn"), 0u);
 }
 
-TEST_F(DigitalIoServerTest, AnswersRequestsOfEveryType) {
+TEST_F(DigitalIoServerTest, RepliesToRequestsOfEveryType) {
   start();
   in_.expectRefusalOfOtherTypes();
   out_.expectRefusalOfOtherTypes();
@@ -112,7 +112,7 @@ TEST_F(DigitalIoServerTest, AnswersRequestsOfEveryType) {
 
 // ---- monitors
 
-TEST_F(DigitalIoServerTest, TellsAMonitorTheInputsAtOnceAndEachChange) {
+TEST_F(DigitalIoServerTest, SendsAMonitorTheInputsImmediatelyAndEachChange) {
   start();
   const auto first = in_.ask({.cmd = cmdStartMonitor});
   EXPECT_EQ(first.status, 0);
@@ -126,10 +126,10 @@ TEST_F(DigitalIoServerTest, TellsAMonitorTheInputsAtOnceAndEachChange) {
   }
 }
 
-// One that asks without a pause, with many requests on their way, does not keep news back: at most
-// one more of its requests is answered before them. Bit 5 is low in reads that begin after the
-// server has heard the news, and the bus is slow, so that requests wait.
-TEST_F(DigitalIoServerTest, TellsAMonitorWhileAReaderAsksWithoutAPause) {
+// A client that reads without a pause, with many requests in transit, does not delay changes: the
+// server replies to at most one more of its requests before it sends them. Bit 5 is low in reads
+// that begin after the server has received the change, and the bus is slow, so that requests wait.
+TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   start({.pollEvery = kNever, .vector = 116, .falling = 1});
   std::atomic<bool> isHeard{false}, ends{false};
   // behind the server's
@@ -169,7 +169,7 @@ TEST_F(DigitalIoServerTest, TellsAMonitorWhileAReaderAsksWithoutAPause) {
   model_->connect(5, {});
 }
 
-// The original had one monitor, which a second client took away from the first.
+// The original MPF had one monitor: a second client replaced that of the first.
 TEST_F(DigitalIoServerTest, HasAnyNumberOfMonitors) {
   start();
   std::vector<std::unique_ptr<HardwareAsker>> askers;
@@ -183,7 +183,7 @@ TEST_F(DigitalIoServerTest, HasAnyNumberOfMonitors) {
   }
 }
 
-TEST_F(DigitalIoServerTest, TellsAMonitorOfItsBitsOnly) {
+TEST_F(DigitalIoServerTest, SendsAMonitorItsBitsOnly) {
   start();
   EXPECT_EQ(in_.ask({.cmd = cmdStartMonitor, .address = 0x2}).address, 0x2);
   model_->setInputs(0x1, 0);
@@ -194,7 +194,7 @@ TEST_F(DigitalIoServerTest, TellsAMonitorOfItsBitsOnly) {
   EXPECT_TRUE(in_.isSilent());
 }
 
-TEST_F(DigitalIoServerTest, TellsNothingAfterAStop) {
+TEST_F(DigitalIoServerTest, SendsNothingAfterAStop) {
   start();
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
   EXPECT_EQ(in_.ask({.cmd = cmdStopMonitor}).status, 0);
@@ -205,8 +205,8 @@ TEST_F(DigitalIoServerTest, TellsNothingAfterAStop) {
   EXPECT_TRUE(in_.isSilent());
 }
 
-// The original dropped the monitor when any other command came.
-TEST_F(DigitalIoServerTest, KeepsAMonitorWhileItsClientAsksOtherThings) {
+// The original MPF dropped the monitor at any other command.
+TEST_F(DigitalIoServerTest, KeepsAMonitorDuringOtherRequestsOfItsClient) {
   start();
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
   EXPECT_EQ(in_.ask({.cmd = 77}).status, -1);
@@ -225,7 +225,7 @@ TEST_F(DigitalIoServerTest, ReplacesTheMonitorOfTheSameClient) {
   EXPECT_TRUE(in_.isSilent());
 }
 
-TEST_F(DigitalIoServerTest, ForgetsMonitorsOfClientsThatDieOrLeave) {
+TEST_F(DigitalIoServerTest, RemovesMonitorsOfClientsThatDieOrDisconnect) {
   start();
   Victim killed("listen", backplane_.name(), {"dioIn", std::to_string(cmdStartMonitor)});
   auto leaving = std::make_unique<HardwareAsker>(backplane_, "dioIn");
@@ -242,8 +242,8 @@ TEST_F(DigitalIoServerTest, ForgetsMonitorsOfClientsThatDieOrLeave) {
   EXPECT_EQ(in_.next().address, 1);
 }
 
-// A client that does not take its messages loses its monitor; others hear all.
-TEST_F(DigitalIoServerTest, EndsOnlyTheMonitorThatCannotBeServed) {
+// A client that does not receive its messages loses its monitor; others receive all changes.
+TEST_F(DigitalIoServerTest, EndsOnlyTheMonitorOfAClientThatDoesNotReceive) {
   start();
   HardwareAsker stuck(backplane_, "dioIn");
   ASSERT_EQ(stuck.ask({.cmd = cmdStartMonitor}).status, 0);
@@ -258,11 +258,11 @@ TEST_F(DigitalIoServerTest, EndsOnlyTheMonitorThatCannotBeServed) {
   model_->setInputs(0x2, 0);
   EXPECT_EQ(in_.next().address & 2, 2);
   EXPECT_EQ(stuck.ask({.cmd = cmdReadBits, .address = 2}).status,
-            0);  // it may ask, and monitor again
+            0);  // it may send requests, and monitor again
   EXPECT_EQ(stuck.ask({.cmd = cmdStartMonitor}).status, 0);
 }
 
-TEST_F(DigitalIoServerTest, MayBeToldOtherEdges) {
+TEST_F(DigitalIoServerTest, SetsTheEdgesThatInterrupt) {
   start({.pollEvery = kNever, .vector = 1});
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
   EXPECT_EQ(in_.ask({.cmd = cmdSetEdges, .address = 0, .value = 0x4}).status, 0);
@@ -272,8 +272,8 @@ TEST_F(DigitalIoServerTest, MayBeToldOtherEdges) {
 
 // ---- faults
 
-// Nobody would hear of anything any more: the program has to end, and start again.
-TEST_F(DigitalIoServerTest, SaysWhenItCannotServeTheInputsAnyMore) {
+// No client would receive changes any more: the program has to exit, and to be restarted.
+TEST_F(DigitalIoServerTest, ReportsThatTheInputServerFailed) {
   start();
   std::atomic<bool> throws{false};
   model_->connect(3, [&] {
@@ -283,12 +283,12 @@ TEST_F(DigitalIoServerTest, SaysWhenItCannotServeTheInputsAnyMore) {
   throws = true;
   static_cast<void>(in_.client().client().connectWait(60s));
   EXPECT_EQ(in_.client().client().send(Int32Message({.cmd = cmdStartMonitor})), SendResult::sent);
-  thread_.join();  // the output server was told to end
+  thread_.join();  // the output server was stopped
   EXPECT_TRUE(hasFailed_);
   model_->connect(3, {});
 }
 
-TEST_F(DigitalIoServerTest, SeesChangesByPollWhenInterruptsAreLost) {
+TEST_F(DigitalIoServerTest, FindsChangesByPollingWhenInterruptsAreLost) {
   start({.pollEvery = 1ms, .vector = 116, .rising = kAll, .falling = kAll});
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor}).status, 0);
   carrier_.setFault("IP_a", ModelFault::interruptsLost);
@@ -299,7 +299,7 @@ TEST_F(DigitalIoServerTest, SeesChangesByPollWhenInterruptsAreLost) {
   EXPECT_EQ(in_.next().address, 1);
 }
 
-TEST_F(DigitalIoServerTest, SeesChangesDuringAStorm) {
+TEST_F(DigitalIoServerTest, FindsChangesDuringAnInterruptStorm) {
   start({.pollEvery = 1ms,
          .vector = 116,
          .rising = kAll,
@@ -313,7 +313,7 @@ TEST_F(DigitalIoServerTest, SeesChangesDuringAStorm) {
   EXPECT_EQ(out_.ask({.cmd = cmdClearBits, .address = 1}).status, 0);
 }
 
-TEST_F(DigitalIoServerTest, TellsThatItsModuleIsGoneAndBack) {
+TEST_F(DigitalIoServerTest, ReportsThatItsModuleFailsAndWorksAgain) {
   start({.pollEvery = 1ms, .vector = 116, .rising = kAll, .falling = kAll});
   ASSERT_EQ(in_.ask({.cmd = cmdStartMonitor, .address = 1}).status, 0);
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // FickleLine: a serial line with an instrument at its far end that answers "Q17\n" with "A17\r\n":
-// in time, late, in pieces, twice, half, or not at all, at random. It keeps the times that
-// LineLimits speaks of, exactly: what is due has arrived, whenever a thread comes to read it.
+// in time, late, in pieces, twice, half, or not at all, at random. It keeps the limits of
+// LineLimits exactly: bytes that are due have arrived, whenever a thread reads them.
 //
-//   tryWrite("Q17\n") ──► outputs: { due at, bytes }, ... ──► tryRead(): those that are due       a timer makes the line readable then
+//   tryWrite("Q17\n") ──► outputs: { due at, bytes }, ... ──► tryRead(): outputs that are due
+//                                    └─ a timer makes the line readable when one is due
 //
 // Threads  the port's; counts are read after the port has ended.
 #pragma once
@@ -43,7 +44,7 @@ using MoodCounts = std::array<std::uint64_t, kMoods.size()>;
 
 class FickleLine : public SerialLine {
  public:
-  // One question in `oneIn` is not answered at once and whole. A question may have any timeout, 0
+  // One question in `oneIn` has no complete answer immediately. A question may have any timeout, 0
   // included.
   FickleLine(const LineLimits& limits, std::uint64_t oneIn, MoodCounts& counts)
       : limits_(limits), oneIn_(oneIn), counts_(counts) {}
@@ -87,7 +88,7 @@ class FickleLine : public SerialLine {
   };
   using Ns = std::chrono::nanoseconds;
 
-  // Up to `most`, which it does not reach.
+  // A random time from 0 to less than `most`.
   std::int64_t someNs(Ns most) {
     return static_cast<std::int64_t>(
         random_.below(static_cast<std::uint64_t>(std::max<std::int64_t>(most.count(), 1))));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // HardwareTest: a carrier of models and a backplane, for tests of servers that drive modules;
-// HardwareAsker: a client of one.
+// HardwareAsker: a client of such a server.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -38,11 +38,11 @@ class HardwareAsker {
     EXPECT_TRUE(message);
     return message ? take(message) : Int32{.status = -99};
   }
-  // Whether nothing has come; of what the server sent before the last reply.
+  // Whether the server sent no further reply before the last reply.
   [[nodiscard]] bool isSilent() { return !client_.receive(0s); }
   [[nodiscard]] SyncClient& client() noexcept { return client_; }
 
-  // Asks with each type but Int32: the reply has status -1, that to a SerialConfig in an Int32.
+  // Sends each type except Int32: the reply has status -1; that to a SerialConfig is an Int32.
   void expectRefusalOfOtherTypes() {
     expectStatus<Int32Array>(Int32ArrayMessage::allocValue(1));
     expectStatus<Float64>(Float64Message());

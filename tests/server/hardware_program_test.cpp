@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Programs that drive modules, as processes: how they start, what they say, how they end, and wires
-// from one to the other.
+// SPDX-License-Identifier: MIT Programs that drive modules, as processes: how they start, what they
+// log, how they stop, and wires from one to the other.
 #include <array>
 #include <cstdio>
 
@@ -17,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// What a program writes to stdout when it is asked for help.
+// The output of a program with --help.
 std::string helpOf(const std::string& program) {
   std::string help;
   auto* const output = ::popen((program + " --help").c_str(), "r");
@@ -62,7 +61,7 @@ class HardwareProgramTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-TEST_F(HardwareProgramTest, ServesAndEndsAndLeavesNothing) {
+TEST_F(HardwareProgramTest, ServesAndStopsAndLeavesNoFiles) {
   for (const auto signal : {SIGTERM, SIGINT}) {
     const auto dac = startDac({"--carrier", "ipac=model"});
     const auto dio = startDio({"--carrier", "ipac=model"});
@@ -88,7 +87,7 @@ TEST_F(HardwareProgramTest, ServesAndEndsAndLeavesNothing) {
   }
 }
 
-TEST_F(HardwareProgramTest, AreWiredToEachOtherByAFile) {
+TEST_F(HardwareProgramTest, AreConnectedByAFileOfWires) {
   const auto wires = folder_.file("wires");
   const auto dac =
       startDac({"--carrier", "ipac=model", "--wires", wires, "--ranges", "0to10,-10to10"});
@@ -114,7 +113,7 @@ TEST_F(HardwareProgramTest, AreWiredToEachOtherByAFile) {
   expectEndsWell(*dio);
 }
 
-TEST_F(HardwareProgramTest, FollowsWiresWithAnIp440) {
+TEST_F(HardwareProgramTest, FollowsWires) {
   const auto wires = folder_.file("wires");
   const auto dac = startDac({"--carrier", "ipac=model", "--wires", wires});
   const auto door =
@@ -132,11 +131,11 @@ TEST_F(HardwareProgramTest, FollowsWiresWithAnIp440) {
               HasSubstr("serving the Acromag IP440 at carrier ipac, site IP_c as \"door\""));
 }
 
-TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
+TEST_F(HardwareProgramTest, ReportsInvalidArguments) {
   const auto notAFile = folder_.write("letter", "a letter");
   for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
            {{"dac", "ipac"}, "site is required"},
-           {{"dac", "ipac", "IP_a"}, "nothing says what carrier \"ipac\" is"},
+           {{"dac", "ipac", "IP_a"}, "carrier \"ipac\" is not defined"},
            {{"dac", "ipac", "IP_x", "--carrier", "ipac=model"}, "no site \"IP_x\""},
            {{"dac", "ipac", "IP_a", "0", "--carrier", "ipac=model"},
             "queuesize: 0 is out of range"},
@@ -149,8 +148,8 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
   for (const auto& [words, because] : std::vector<std::pair<OptionFields, std::string>>{
            {{"20", "0", "256"}, "intvec: 256 is out of range"},
            {{"20", "0", "1", "0x1ffffffff"}, "risingmask"},
-           {{"--kind", "IP-Unidig-T"}, "there is no \"IP-Unidig-T\"; there are IP-Unidig-E"},
-           {{"--input", "32=dac.0"}, "\"32=dac.0\" is no BIT=WIRE"},
+           {{"--kind", "IP-Unidig-T"}, "unknown kind \"IP-Unidig-T\"; the kinds are IP-Unidig-E"},
+           {{"--input", "32=dac.0"}, "\"32=dac.0\" does not have the form BIT=WIRE"},
            {{"--input", "3=dac.0"}, "--input requires --wires"}}) {
     auto all = words;
     all.insert(all.begin(), {"dio", "ipac", "IP_b"});
@@ -160,12 +159,13 @@ TEST_F(HardwareProgramTest, SaysWhatIsWrongWithItsArguments) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_F(HardwareProgramTest, SaysWhenAModelCannotInterrupt) {
+TEST_F(HardwareProgramTest, ReportsThatAModelHasNoInterrupts) {
   const auto dio = startDio({"--carrier", "ipac=model", "--kind", "IP-Unidig"});
   EXPECT_EQ(HardwareAsker(backplane_, "dioIn").ask({.cmd = digital::cmdStartMonitor}).value,
             0xffffff);
   expectEndsWell(*dio);
-  EXPECT_THAT(dio->errors(), HasSubstr("IP-Unidig cannot interrupt: changes are seen by polling"));
+  EXPECT_THAT(dio->errors(),
+              HasSubstr("IP-Unidig has no interrupts: changes are found by polling"));
 }
 
 TEST_F(HardwareProgramTest, ShowTheirOldCommandsInTheirHelp) {

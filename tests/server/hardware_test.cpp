@@ -34,7 +34,7 @@ class HardwareOpenTest : public testing::Test {
   Hardware hardware_;
 };
 
-TEST_F(HardwareOpenTest, GoesOnWhenTheBoardComesAndSaysEachReasonOnce) {
+TEST_F(HardwareOpenTest, ContinuesWhenTheBoardAppearsAndLogsEachReasonOnce) {
   parse("--carrier ipac=model --wait");
   int calls = 0;
   testing::internal::CaptureStderr();
@@ -48,13 +48,13 @@ TEST_F(HardwareOpenTest, GoesOnWhenTheBoardComesAndSaysEachReasonOnce) {
   const auto said = testing::internal::GetCapturedStderr();
   EXPECT_NE(module, nullptr);
   EXPECT_EQ(calls, 4);
-  const auto first = said.find("the board is not there yet: no power");
+  const auto first = said.find("waiting for the board: no power");
   EXPECT_NE(first, std::string::npos) << said;
   EXPECT_EQ(said.find("no power", first + 40), std::string::npos) << said;
-  EXPECT_THAT(said, HasSubstr("the board is not there yet: no clock"));
+  EXPECT_THAT(said, HasSubstr("waiting for the board: no clock"));
 }
 
-TEST_F(HardwareOpenTest, WaitsForNothingWithoutWait) {
+TEST_F(HardwareOpenTest, DoesNotWaitWithoutTheOptionWait) {
   parse("--carrier ipac=model");
   int calls = 0;
   const Hardware::MakeModel none = [&]() -> std::unique_ptr<DeviceModel> {
@@ -65,8 +65,8 @@ TEST_F(HardwareOpenTest, WaitsForNothingWithoutWait) {
   EXPECT_EQ(calls, 1);
 }
 
-// Time does not mend it, and its owner would wait for ever.
-TEST_F(HardwareOpenTest, DoesNotWaitForAnotherFileOfWires) {
+// The program would otherwise wait without end.
+TEST_F(HardwareOpenTest, DoesNotWaitWhenTheFileOfWiresIsInvalid) {
   parse("--carrier ipac=model --wait --wires " + folder_.write("letter", "a letter"));
   EXPECT_ANY_THROW(static_cast<void>(open([&] {
     static_cast<void>(hardware_.wires());

@@ -77,7 +77,7 @@ class Ip330ServersTest : public HardwareTest {
   IndustryPackModule adcModule_{"adc", "a model", carrier_.site(0), kIp330};
   IndustryPackModule dacModule_{"dac", "a model", carrier_.site(1), Dac128v::kind()};
   Dac128v dac_{dacModule_};
-  // A test that is held up for a while is no silence of the board.
+  // A delayed test must not be mistaken for a board that does not respond.
   Ip330Servers servers_{
       backplane_,
       {},

@@ -41,7 +41,7 @@ class Ip330ProgramTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) {
+TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsRelease1Dash4) {
   const auto server = start({"adc", "ipac", "IP_a", "D", "-5to5", "0", "15", "10", "120",
                              "--carrier", "ipac=model", "--signal", "3=dc:-2.5,4=sine:5:1"});
 
@@ -56,10 +56,10 @@ TEST_F(Ip330ProgramTest, ServesScansUnderTheModulesNameAsReleaseOneDashFourDid) 
   EXPECT_THAT(server->errors(),
               AllOf(HasSubstr("serving the Acromag IP330 at carrier ipac, site IP_a (channels 0 to "
                               "15, -5to5 V, burstContinuous, 1000 us"),
-                    HasSubstr(R"(as "adc", "adcConfig")"), HasSubstr("ends")));
+                    HasSubstr(R"(as "adc", "adcConfig")"), HasSubstr("stopped")));
 }
 
-TEST_F(Ip330ProgramTest, ServesAllThatItIsToldOverOneBoard) {
+TEST_F(Ip330ProgramTest, ServesAllRequestedServersOfOneBoard) {
   const auto server =
       start({"--scan", "s1,0,3,100,30", "--scan", "s2,4,7", "--config", "c", "--sweep", "w,0,1,50",
              "--pid", "p,0,dac,2,25", "--dac", "dac,ipac,IP_b", "adc", "ipac", "IP_a", "S", "0to10",
@@ -107,7 +107,7 @@ TEST_F(Ip330ProgramTest, FeedsBackThroughAWireFromTheDacToTheAdc) {
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
 
-// A DAC on a PCI board that no host has.
+// A DAC on a PCI board that does not exist.
 TEST_F(Ip330ProgramTest, ServesScansWhileItWaitsForADac) {
   const auto server = start({"adc", "ipac", "IP_a", "--carrier", "ipac=model", "--carrier",
                              "pci=tpci200:ffff:ff:1f.7", "--wait", "--scan", "s", "--config", "c",
@@ -117,7 +117,7 @@ TEST_F(Ip330ProgramTest, ServesScansWhileItWaitsForADac) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   EXPECT_THAT(server->errors(), AllOf(HasSubstr(R"(as "s", "c")"),
-                                      HasSubstr("the board is not there yet"), HasSubstr("ends")));
+                                      HasSubstr("waiting for the board"), HasSubstr("stopped")));
 }
 
 TEST_F(Ip330ProgramTest, ShowsTheOldCommandsInItsHelp) {
@@ -138,13 +138,13 @@ TEST_F(Ip330ProgramTest, ShowsTheOldCommandsInItsHelp) {
           HasSubstr(R"(initIp330PID("server", ip330, channel, dac, dacChannel, queuesize))")));
 }
 
-TEST_F(Ip330ProgramTest, SaysThatThereIsNoSuchCarrier) {
+TEST_F(Ip330ProgramTest, ReportsAnUnknownCarrier) {
   const auto server = start({"adc", "ipac", "IP_a", "--carrier", "ipac=no-such-kind"});
   EXPECT_NE(server->wait(), 0);
   EXPECT_THAT(server->errors(), HasSubstr("no-such-kind"));
 }
 
-TEST_F(Ip330ProgramTest, SaysWhatIsWrongWithItsArguments) {
+TEST_F(Ip330ProgramTest, ReportsInvalidArguments) {
   for (const auto& [options, complaint] :
        std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"X"}, "type \"X\": use D"},
@@ -154,13 +154,13 @@ TEST_F(Ip330ProgramTest, SaysWhatIsWrongWithItsArguments) {
            {{"--scan-mode", "7"}, "scan mode 7"},
            {{"--trigger", "in"}, "use Input or Output"},
            {{"--scan", "a,0"}, "last channel"},
-           {{"--scan", "a,0,x"}, "\"x\" is no number"},
+           {{"--scan", "a,0,x"}, "\"x\" is not a whole number"},
            {{"--scan", "a,-1,5"}, "first channel -1: use 0 or more"},
            {{"--scan", "a,0,15,-100"}, "averaging time -100: use 0 or more"},
            {{"--sweep", "a,0,1"}, "points is missing"},
            {{"--config", "a,0"}, "use 1 to 16384"},
-           {{"--config", "a,1,2"}, "\"2\" is too much"},
-           {{"--pid", "p,0,dac,2"}, "no --dac is named dac"},
+           {{"--config", "a,1,2"}, "unexpected field \"2\""},
+           {{"--pid", "p,0,dac,2"}, "no --dac has the name dac"},
            {{"--dac", "d,ipac,IP_b", "--pid", "p,16,d,2"}, "channel 16: the board"},
            {{"--signal", "0=square:1"}, "unknown kind of signal \"square\""},
            {{"--scan", "a,0,20"}, "the board scans 0 to 15"}}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The servers over one IP330, through clients.
+// The servers of one IP330, through clients.
 #include "ip330_fixture.h"
 
 namespace mpf::test {
@@ -11,7 +11,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-TEST_F(Ip330ServersTest, GiveTheCorrectedMeanOfAChannel) {
+TEST_F(Ip330ServersTest, ReturnTheCorrectedMeanOfAChannel) {
   const auto reply = ask("scan", {.address = 0, .value = 0});
   EXPECT_EQ(reply.status, 0);
   EXPECT_NEAR(reply.value, 49152, 2);
@@ -21,14 +21,14 @@ TEST_F(Ip330ServersTest, GiveTheCorrectedMeanOfAChannel) {
   EXPECT_NEAR(averaged.value, 49152, 2);
 }
 
-TEST_F(Ip330ServersTest, SetTheGainOfAChannelForWhoAsksForIt) {
+TEST_F(Ip330ServersTest, SetTheGainOfAChannelPerRequest) {
   volts_ = 0.5;
   EXPECT_NEAR(ask("scan", {.address = 1, .value = 2}).value, 32768 + 4 * 3277, 2);
   EXPECT_NEAR(ask("scan", {.address = 1, .value = 0}).value, 32768 + 3277, 2);
   EXPECT_EQ(servers_.board().gain(1), 0);
 }
 
-TEST_F(Ip330ServersTest, SayMinusOneToWhatCannotBe) {
+TEST_F(Ip330ServersTest, ReplyMinusOneToInvalidRequests) {
   for (const auto& request :
        {Int32{.address = -1}, Int32{.address = 4}, Int32{.address = INT32_MAX}, Int32{.value = 4},
         Int32{.value = -1}, Int32{.extra = -1}, Int32{.extra = INT32_MAX}}) {
@@ -46,7 +46,7 @@ TEST_F(Ip330ServersTest, SayMinusOneToWhatCannotBe) {
   EXPECT_EQ(ask("scan", {.address = 0}).status, 0);
 }
 
-TEST_F(Ip330ServersTest, AnswerMessagesOfOtherTypes) {
+TEST_F(Ip330ServersTest, ReplyToMessagesOfOtherTypes) {
   for (const auto* const name : {"scan", "config", "sweep", "pid"}) {
     SyncClient client(backplane_, name);
     auto array = call(client, Char8ArrayMessage::allocValue(3)).as<Char8Array>();
@@ -66,7 +66,7 @@ TEST_F(Ip330ServersTest, AreConfiguredWhileTheyServe) {
   EXPECT_EQ(servers_.board().counters().calibrations, calibrations + 2);
   const auto time = ask("config", {.cmd = cmdSetMicrosecondsPerScan, .value = 2001});
   EXPECT_EQ(time.status, 0);
-  EXPECT_EQ(time.value, 2004);  // what the timer can
+  EXPECT_EQ(time.value, 2004);  // the nearest time of the timer
   EXPECT_EQ(ask("config", {.cmd = cmdSetScanMode, .value = 1}).status, 0);
   EXPECT_EQ(ask("scan", {.address = 0}).status, 0);
   EXPECT_EQ(ask("config", {.cmd = cmdSetScanMode, .value = 4}).status, 0);
@@ -74,7 +74,7 @@ TEST_F(Ip330ServersTest, AreConfiguredWhileTheyServe) {
   EXPECT_EQ(ask("config", {.cmd = cmdSetSecondsBetweenCalibrate, .value = -1}).status, 0);
 }
 
-TEST_F(Ip330ServersTest, SayMinusOneToAConversionThatDoesNotBegin) {
+TEST_F(Ip330ServersTest, ReplyMinusOneWhenAConversionDoesNotStart) {
   EXPECT_EQ(ask("config", {.cmd = cmdStartConvert}).status, -1);  // the board scans by itself
   EXPECT_EQ(ask("config", {.cmd = cmdSetScanMode, .value = 0}).status, 0);
   EXPECT_EQ(ask("config", {.cmd = cmdStartConvert}).status, -1);
@@ -84,7 +84,7 @@ TEST_F(Ip330ServersTest, SayMinusOneToAConversionThatDoesNotBegin) {
   EXPECT_EQ(ask("config", {.cmd = cmdStartConvert}).status, -1);
 }
 
-TEST_F(Ip330ServersTest, SayMinusOneToArraysThatAreLargerThanAMessageMayBe) {
+TEST_F(Ip330ServersTest, ReplyMinusOneWhenAnArrayIsTooLargeForAMessage) {
   carrier_.plug("IP_c", std::make_unique<Ip330Model>());
   IndustryPackModule module("small", "a model", carrier_.site(2), kIp330);
   Ip330Servers small(backplane_, {.maxMessageBytes = 256}, module, {.lastChannel = 3}, log_);
@@ -150,7 +150,7 @@ TEST_F(Ip330ServersTest, FeedBackFromTheAdcToTheDac) {
   EXPECT_EQ(dac_.tryRead(2), code);
 }
 
-TEST_F(Ip330ServersTest, SayMinusOneWhileTheBoardIsGoneAndGoOn) {
+TEST_F(Ip330ServersTest, ReplyMinusOneWhileTheBoardFailsAndContinue) {
   EXPECT_EQ(ask("scan", {.address = 0}).status, 0);
   EXPECT_EQ(alarms("scan"), 0u);
   carrier_.setFault("IP_a", ModelFault::busError);
@@ -167,7 +167,7 @@ TEST_F(Ip330ServersTest, SayMinusOneWhileTheBoardIsGoneAndGoOn) {
   EXPECT_NEAR(ask("scan", {.address = 0, .extra = 1}).value, 49152, 2);
 }
 
-TEST_F(Ip330ServersTest, SayThatTheDacIsGone) {
+TEST_F(Ip330ServersTest, ReportThatTheDacFails) {
   EXPECT_EQ(tell("pid", cmdStartFeedback), 0);
   carrier_.setFault("IP_b", ModelFault::busError);
   while (askArray<Float64Array>("pid", cmdGetParams).status == 0) {
@@ -179,7 +179,7 @@ TEST_F(Ip330ServersTest, SayThatTheDacIsGone) {
   }
 }
 
-TEST_F(Ip330ServersTest, SayThatCalibrationDoesNotEndAndGoOn) {
+TEST_F(Ip330ServersTest, ReportThatCalibrationDoesNotEndAndContinue) {
   adc_.setStuck(true);
   EXPECT_EQ(ask("config", {.cmd = cmdCalibrate}).status, -1);
   adc_.setStuck(false);

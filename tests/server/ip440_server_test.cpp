@@ -40,7 +40,7 @@ TEST_F(Ip440ServerTest, ReadsTheBitsOfAMask) {
   EXPECT_EQ(read(0xf).value, 6);
 }
 
-TEST_F(Ip440ServerTest, AnswersWhatItCannotDoWithAStatus) {
+TEST_F(Ip440ServerTest, RepliesToInvalidRequestsWithAStatus) {
   for (const std::int32_t cmd : {0, digital::cmdSetBits, digital::cmdStartMonitor, -1, INT32_MAX})
     EXPECT_EQ(asker_.ask({.cmd = cmd}).status, -1);
   for (const std::int32_t lowest : {-1, 17})
@@ -49,7 +49,7 @@ TEST_F(Ip440ServerTest, AnswersWhatItCannotDoWithAStatus) {
   EXPECT_EQ(alarms("door"), 0u);
 }
 
-TEST_F(Ip440ServerTest, RingsAnAlarmWhileItsModuleIsGoneAndGoesOn) {
+TEST_F(Ip440ServerTest, CountsAlarmsWhileItsModuleFailsAndContinues) {
   carrier_.setFault("IP_c", ModelFault::busError);
   EXPECT_EQ(read(0x1).status, -1);
   EXPECT_EQ(read(0x1).status, -1);

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// What clients, `mpf msr` and the log say of a serial line that loses and damages bytes: on a port
-// of an octal UART.
+// SPDX-License-Identifier: MIT What clients, `mpf msr` and the log report of a serial line that
+// loses and damages bytes: on a port of an octal UART.
 #include "server/programs/serial_server/line_faults.h"
 
 #include <array>
@@ -66,10 +65,10 @@ class LineFaultsTest : public testing::Test {
   }
   void TearDown() override { stop(); }
 
-  // Returns once all that the far end has said is in the server's buffer, or lost.
+  // Returns when all bytes that the far end has sent are in the server's buffer, or lost.
   void waitForBytes(std::uint64_t count) {
     while (port_->counters().bytesIn < count) std::this_thread::yield();
-    static_cast<void>(port_->config({}));  // behind what the port's thread does with them
+    static_cast<void>(port_->config({}));  // returns after the port's thread has handled them
   }
   // A byte at a time: nothing gets lost.
   void saySlowly(const std::string& text) {
@@ -113,7 +112,7 @@ class LineFaultsTest : public testing::Test {
   std::optional<SyncClient> client_;
 };
 
-TEST_F(LineFaultsTest, AnAnswerThatLostBytesWhileNobodyReadIsNotOk) {
+TEST_F(LineFaultsTest, AnAnswerThatLostBytesOutsideOfReadsIsNotOk) {
   start(OctalUartModelTime::stepped);
   model_->say(0, "abcdef\r");
   model_->advance(10 * byteTime(kFast));  // all at once: the chip loses three bytes
@@ -123,12 +122,12 @@ TEST_F(LineFaultsTest, AnAnswerThatLostBytesWhileNobodyReadIsNotOk) {
 
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOverflow, serialFaultOverrun, "abc\r"}));
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "next\r"}))
-      << "the gap is not in this one";
+      << "this answer does not contain the gap";
 
   EXPECT_EQ(alarmsOf(backplane_, kServer), 1U);
 }
 
-TEST_F(LineFaultsTest, TheRestOfAnAnswerBehindAGapIsNotOk) {
+TEST_F(LineFaultsTest, TheRestOfAnAnswerAfterAGapIsNotOk) {
   start(OctalUartModelTime::stepped);
   saySlowly("first\r");
   model_->say(0, "abcdefgh");
@@ -175,17 +174,17 @@ TEST_F(LineFaultsTest, AFaultEndsTheReadThatIsOutstanding) {
       << "the rest of a damaged answer";
 }
 
-TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWhenAllIsWell) {
+TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWithoutAFault) {
   start();
   model_->say(0, "12345");
   waitForBytes(5);
 
   EXPECT_EQ(ask(cmdRead, {}, 4), (Answer{serialServerStatusOK, 4, "1234"}));
   EXPECT_EQ(ask(0, {}, 4), (Answer{serialServerStatusError, 0, ""}))
-      << "no command, and no fault of the line";
+      << "an invalid command is no fault of the line";
 }
 
-TEST_F(LineFaultsTest, AFlushTakesTheFaultsAwayWithTheBytes) {
+TEST_F(LineFaultsTest, AFlushRemovesTheFaultsWithTheBytes) {
   start();
   model_->say(0, "1");
   model_->say(0, "2", LineFault::framing);
@@ -197,7 +196,7 @@ TEST_F(LineFaultsTest, AFlushTakesTheFaultsAwayWithTheBytes) {
   EXPECT_EQ(ask(cmdWriteRead | cmdFlush, "?"), (Answer{serialServerStatusOK, 0, "ok\r"}));
 }
 
-TEST_F(LineFaultsTest, AnAnswerThatAnUnplugHasCutIsNotOk) {
+TEST_F(LineFaultsTest, AnAnswerThatAnUnplugTruncatedIsNotOk) {
   start();
   model_->say(0, "whole\r12");
   waitForBytes(8);
@@ -222,7 +221,7 @@ TEST_F(LineFaultsTest, AnUnplugBetweenAnswersDamagesNone) {
 }
 
 // The log limits the lines, and the last one has the counts of all faults.
-TEST_F(LineFaultsTest, AStormIsFewLinesOfLogWithPortKindsAndCounts) {
+TEST_F(LineFaultsTest, AStormCausesFewLogLinesWithPortKindsAndCounts) {
   constexpr int kFaults = 1000;
   testing::internal::CaptureStderr();
   start(OctalUartModelTime::instant, "warning");

@@ -29,13 +29,13 @@ TEST(LineSync, ALineInStepNeedsTheSettleTimeBeforeAQuestion) {
   EXPECT_EQ(sync.readyAtNs(false), 0);
 }
 
-TEST(LineSync, AnAnswerThatDoesNotComeIsWaitedFor) {
+TEST(LineSync, ALineWaitsForAMissingAnswer) {
   LineSync sync(kLimits);
   sync.asked("\r\n", 0);
   sync.unanswered(1000_ms);
 
   EXPECT_EQ(sync.readyAtNs(true), 2000_ms);
-  EXPECT_EQ(sync.readyAtNs(false), 2000_ms) << "its answer could be taken for the late one";
+  EXPECT_EQ(sync.readyAtNs(false), 2000_ms) << "its answer could be mistaken for the late one";
 }
 
 TEST(LineSync, ALateAnswerIsOverAfterItsEndAndSilence) {
@@ -53,7 +53,7 @@ TEST(LineSync, ALateAnswerIsOverAfterItsEndAndSilence) {
   EXPECT_EQ(sync.readyAtNs(true), 1600_ms);
 }
 
-TEST(LineSync, ALateAnswerThatComesAtTheLastMomentIsListenedTo) {
+TEST(LineSync, ALateAnswerThatBeginsAtTheLastMomentIsCollected) {
   LineSync sync(kLimits);
   sync.asked("\r\n", 0);
   sync.unanswered(1000_ms);
@@ -83,7 +83,7 @@ TEST(LineSync, WithoutAKnownEndAnyInputIsTheAnswer) {
   EXPECT_EQ(sync.readyAtNs(true), 1100_ms);
 }
 
-TEST(LineSync, ASecondReportOfTheSameQuestionDoesNotProlongTheWait) {
+TEST(LineSync, ASecondTimeoutOfTheSameQuestionDoesNotExtendTheWait) {
   LineSync sync(kLimits);
   sync.asked("\r", 0);
   sync.unanswered(1000_ms);
@@ -92,7 +92,7 @@ TEST(LineSync, ASecondReportOfTheSameQuestionDoesNotProlongTheWait) {
   EXPECT_EQ(sync.readyAtNs(true), 2000_ms);
 }
 
-TEST(LineSync, SurplusAsksForTheQuietTime) {
+TEST(LineSync, SurplusInputRequiresTheQuietTime) {
   LineSync sync(kLimits);
   sync.asked("\r", 0);
   receive(sync, "1\r", 1000_ms);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ten thousand refused requests to each server program: its log stays short, and counts them all.
+// Ten thousand invalid requests to each server program: its log stays short and counts all of them.
 #include <atomic>
 #include <future>
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ class LogStormTest : public testing::Test {
     program_ = std::make_unique<Program>(std::move(command));
     said_ = std::async(std::launch::async, [this] { return program_->errors(); });
   }
-  // Sends it to `server` again and again, many at once, and waits for all ends.
+  // Sends `request` to `server` kRequests times, many at once, and waits for all replies and fates.
   void storm(const std::string& server, const Message& request) {
     std::atomic<std::uint64_t> ends{0};
     MessageClient client(backplane_, [&](const Message& message) {
@@ -56,7 +56,7 @@ class LogStormTest : public testing::Test {
     if (const auto* config = request.tryAs<SerialConfig>()) return SerialConfigMessage(*config);
     return Int32Message(*request.tryAs<Int32>());
   }
-  // The program ends; `text` stands in the lines about each request.
+  // Stops the program. `text` is in the lines about each request.
   void expectShortLog(const std::string& text, std::uint64_t lines = kRequests) {
     program_->signal(SIGTERM);
     const auto said = said_.get();
@@ -96,19 +96,19 @@ TEST_F(LogStormTest, OfTheDac128vServer) {
 TEST_F(LogStormTest, OfTheDigitalIoServersOutputs) {
   start({MPF_TEST_DIGITAL_IO_SERVER, "dio", "ipac", "IP_b", "--carrier", "ipac=model"});
   storm("dioOut", Int32Message({.cmd = 4711}));
-  expectShortLog("outputs: there is no cmd 4711");
+  expectShortLog("outputs: unknown cmd 4711");
 }
 
 TEST_F(LogStormTest, OfTheDigitalIoServersInputs) {
   start({MPF_TEST_DIGITAL_IO_SERVER, "dio", "ipac", "IP_b", "--carrier", "ipac=model"});
   storm("dioIn", Int32Message({.cmd = 4711}));
-  expectShortLog("inputs: there is no cmd 4711");
+  expectShortLog("inputs: unknown cmd 4711");
 }
 
 TEST_F(LogStormTest, OfTheIp440Server) {
   start({MPF_TEST_IP440_SERVER, "door", "ipac", "IP_c", "--carrier", "ipac=model"});
   storm("door", Int32Message({.cmd = 4711}));
-  expectShortLog("there is no cmd 4711");
+  expectShortLog("unknown cmd 4711");
 }
 
 TEST_F(LogStormTest, OfTheSerialServer) {
@@ -127,7 +127,7 @@ TEST_F(LogStormTest, OfTheSerialServersSettings) {
   expectShortLog("settings refused");
 }
 
-// They say nothing about requests of other types.
+// They log nothing about requests of other types.
 TEST_F(LogStormTest, OfTheEchoServers) {
   start({MPF_TEST_INT32_SERVER});
   storm("Int32", Float64Message({.value = 1}));
@@ -137,7 +137,7 @@ TEST_F(LogStormTest, OfTheEchoServers) {
   expectShortLog("Float64", 0);
 }
 
-// A server of another type refuses each message of the client at once.
+// A server of another type refuses each message of the client immediately.
 TEST_F(LogStormTest, OfAClientProgramWhoseMessagesAreRefused) {
   constexpr std::uint64_t kMessages = 2000;  // one by one
   start({MPF_TEST_CHAR8_ARRAY_SERVER});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A program's log: levels, storms, and what is left at the end.
+// The log of a program: levels, storms, and the lines that are left at the end.
 #include "server/programs/log.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ constexpr auto kAtOnce = static_cast<std::size_t>(LogLimiter::kAtOnce);
 
 class LogTest : public testing::Test {
  protected:
-  // Always the same statement.
+  // Logs from always the same statement.
   static void refuse(const Log& log, int number) { log.warn("request {} is refused", number); }
 
   std::int64_t nowNs_ = 1'000'000'000'000;
@@ -58,14 +58,14 @@ TEST_F(LogTest, LimitsEachObjectByItself) {
   EXPECT_THAT(lines_, SizeIs(kAtOnce + 2));
 }
 
-TEST_F(LogTest, SaysWhenItHasLinesToWriteAndWritesThem) {
+TEST_F(LogTest, ReportsWhenHeldLinesAreDueAndWritesThem) {
   std::vector<std::int64_t> due;
   log_.onHeld([&](std::int64_t dueNs) { due.push_back(dueNs); });
   for (int i = 0; i < 1000; ++i) refuse(log_, i);
   ASSERT_THAT(due, SizeIs(1));
   lines_.clear();
 
-  EXPECT_EQ(log_.writeDue(), due[0]) << "it is too early";
+  EXPECT_EQ(log_.writeDue(), due[0]) << "no line is due yet";
   EXPECT_THAT(lines_, IsEmpty());
   nowNs_ = due[0];
 

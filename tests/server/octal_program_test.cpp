@@ -45,7 +45,7 @@ class OctalProgramTest : public testing::Test {
         askSerial(client, text, {.timeout = timeoutSeconds, .cmd = serial::cmdWriteRead});
     return reply.status == serial::serialServerStatusOK ? reply.text : "refused";
   }
-  // The program ends with status 2 and says so.
+  // Expects that the program exits with status 2 and this message.
   void expectRefused(const std::vector<std::string>& options, const std::string& complaint) const {
     const auto server = start(options);
     const auto status = server->wait();
@@ -84,7 +84,7 @@ TEST_F(OctalProgramTest, ServesEightPortsOfOneModule) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-TEST_F(OctalProgramTest, ServesOnePortAsItServesATerminal) {
+TEST_F(OctalProgramTest, ServesOnePortLikeATerminal) {
   const auto server =
       start({"dmm", "UART0[3]", "1000", "20", "\\r\\n", "--carrier", "ipac=model", "--octal-uart",
              "UART0,ipac,IP_a,4", "--octal-port", "UART0[3],UART0,3"});
@@ -100,10 +100,10 @@ TEST_F(OctalProgramTest, ServesOnePortAsItServesATerminal) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
 }
 
-// A host that is busy with other things may let the driver come late. Then the line has not turned
-// round when the answer begins, or the chip has no room for it: bytes are lost, as they are on a
-// real line, and the question is asked again.
-TEST_F(OctalProgramTest, BytesMayTakeTheirTime) {
+// A busy host may delay the driver. Then the line has not turned round when the answer begins, or
+// the chip has no room for the answer: bytes are lost, as on a real line, and the question is sent
+// again.
+TEST_F(OctalProgramTest, ServesAModelWithRealTiming) {
   const auto server = start({"dmm", "line", "1000", "20", "\\r\\n", "--octal-port",
                              "line,UART0,0,1200", "--octal-uart", "UART0,ipac,IP_b,8", "--carrier",
                              "ipac=model", "--octal-timing", "--octal-model", "485"});
@@ -116,7 +116,7 @@ TEST_F(OctalProgramTest, BytesMayTakeTheirTime) {
   EXPECT_GE(std::chrono::steady_clock::now() - begin, 28 * 8ms);
 }
 
-TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
+TEST_F(OctalProgramTest, ReportsInvalidOptions) {
   const std::vector<std::string> uart{"--carrier", "ipac=model", "--octal-uart", "U,ipac,IP_a,8"};
   const auto with = [&](std::vector<std::string> more) {
     more.insert(more.end(), uart.begin(), uart.end());
@@ -126,9 +126,9 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
   expectRefused({"dmm"}, "port is required");
   expectRefused({"dmm", "x", "--octal-uart", "U,ipac"}, "--octal-uart: U,ipac: site is missing");
   expectRefused({"dmm", "x", "--octal-uart", "U,ipac,IP_a,many"},
-                R"(number of ports "many" is no number)");
+                R"(number of ports "many" is not a whole number)");
   expectRefused(with({"dmm", "x", "--octal-port", "x,V,0"}),
-                "--octal-port: x: no --octal-uart is called V");
+                "--octal-port: x: no --octal-uart has the name V");
   expectRefused(with({"dmm", "x", "--octal-port", "x,U,0", "--octal-port", "x,U,1"}),
                 "two ports have that name");
   expectRefused(with({"dmm", "x", "--server", "other,x", "--octal-port", "x,U,0"}),
@@ -137,15 +137,15 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsOptions) {
                 "end of message \\q\\q\\q: use 0 to 2 bytes");
   expectRefused({"--server", "dmm,/dev/null,1000,99999"}, "queue size 99999: use 1 to 16384");
   expectRefused({"--server", "dmm,/dev/null,0"}, "longest answer 0: use 1 to 1048576 bytes");
-  expectRefused({"--server", "dmm,/dev/null,1000,20,\\r,1,more"}, "\"more\" is too much");
+  expectRefused({"--server", "dmm,/dev/null,1000,20,\\r,1,more"}, "unexpected field \"more\"");
   expectRefused(with({"dmm", "x", "--octal-port", "x,U,0,9600,none"}),
-                "parity \"none\" is no letter");
+                "parity \"none\" is not one letter");
   expectRefused(with({"dmm", "x", "--octal-port", "x,U,0", "--server", "other,tcp:host:1", "--baud",
                       "19200"}),
                 "--baud is for terminal devices, and no port is one");
 }
 
-TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsModule) {
+TEST_F(OctalProgramTest, ReportsAnInvalidModule) {
   const auto startWith = [&](const std::string& uart, const std::string& port) {
     return start(
         {"dmm", "x", "--carrier", "ipac=model", "--octal-uart", uart, "--octal-port", port});
@@ -155,7 +155,7 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsModule) {
            {"U,ipac,IP_a,6", "x,U,0", "6 ports: a module has 4 or 8"},
            {"U,ipac,IP_a,8", "x,U,0,57600", "baud 57600: the chip supports"},
            {"U,ipac,IP_a,8,256", "x,U,0", "interrupt vector 256 is not 0 to 255"},
-           {"U,other,IP_a,8", "x,U,0", "nothing says what carrier \"other\" is"}}) {
+           {"U,other,IP_a,8", "x,U,0", "carrier \"other\" is not defined"}}) {
     const auto server = startWith(uart, port);
     const auto status = server->wait();
     ASSERT_TRUE(WIFEXITED(status)) << complaint;
@@ -165,9 +165,9 @@ TEST_F(OctalProgramTest, SaysWhatIsWrongWithItsModule) {
   }
 }
 
-// A board that this host cannot have is not waited for, nor are wrong parameters; one that is not
-// there yet is.
-TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
+// --wait does not wait for a board that this host cannot have, or for wrong parameters to change;
+// it waits for a missing board.
+TEST_F(OctalProgramTest, WaitsOnlyForBoardsThatMayAppear) {
   const auto startWith = [&](const std::string& carrier) {
     return start({"dmm", "x", "--wait", "--carrier", "ipac=" + carrier, "--octal-uart",
                   "U,ipac,IP_a,8", "--octal-port", "x,U,0"});
@@ -182,14 +182,13 @@ TEST_F(OctalProgramTest, WaitsOnlyForWhatMayCome) {
     EXPECT_THAT(server->errors(), HasSubstr(complaint));
   }
   const auto server = startWith("tpci200:9");
-  EXPECT_THAT(server->waitForLine("the board is not there yet"),
-              HasSubstr("this host has no TPCI200"));
-  EXPECT_NE(server->waitForLine("the line is not there yet"), "");
+  EXPECT_THAT(server->waitForLine("waiting for the board"), HasSubstr("this host has no TPCI200"));
+  EXPECT_NE(server->waitForLine("waiting for the line"), "");
   EXPECT_EQ(ask("dmm", "*IDN?\n"), "refused");
   EXPECT_EQ(server->end(SIGTERM), 0);
 }
 
-TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
+TEST_F(OctalProgramTest, LogsThePriorityOfInterrupts) {
   const auto server = start({"dmm", "x", "--real-time", "0", "--carrier", "ipac=model",
                              "--octal-uart", "U,ipac,IP_a,8", "--octal-port", "x,U,0"});
   SyncClient client(backplane_, "dmm");
@@ -197,11 +196,11 @@ TEST_F(OctalProgramTest, SaysAtWhichPriorityInterruptsAreServed) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   EXPECT_THAT(server->errors(),
-              HasSubstr("interrupts are served at ordinary priority, as --real-time 0 says"));
+              HasSubstr("interrupts are served at ordinary priority (--real-time 0)"));
 }
 
-// A module that is not there keeps nobody waiting but who wants its ports, and they are told so.
-TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
+// A missing module delays only the clients of its ports, whose requests get an error status.
+TEST_F(OctalProgramTest, AllServersRunWhileOneModuleIsMissing) {
   const auto path = folder_.file("line");
   Instrument instrument(path);
   const auto server =
@@ -213,7 +212,7 @@ TEST_F(OctalProgramTest, EveryServerIsThereWhileAModuleIsWaitedFor) {
 
   EXPECT_EQ(server->end(SIGTERM), 0);
   const auto said = server->errors();
-  EXPECT_THAT(said, HasSubstr("the line is not there yet: this host has no TPCI200"));
+  EXPECT_THAT(said, HasSubstr("waiting for the line: this host has no TPCI200"));
   EXPECT_THAT(said, HasSubstr("serving port 0 of U (carrier ipac, site IP_a)"));
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Serial servers on the eight ports of an octal UART: what clients see of it, and of what goes
-// wrong with it.
+// Serial servers on the eight ports of an octal UART: what clients see of it and of its faults.
 #include <array>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -78,7 +77,7 @@ class OctalStation {
   SerialServer serial_;
   std::thread thread_;
   SyncClient client_;
-  PeekTap tap_;  // last: ends before what it uses
+  PeekTap tap_;  // last: destroyed before the members that it uses
 };
 
 class OctalServerTest : public testing::Test {
@@ -101,7 +100,7 @@ class OctalServerTest : public testing::Test {
   std::array<std::optional<OctalStation>, 8> stations_;
 };
 
-TEST_F(OctalServerTest, EightServersTalkAtOnce) {
+TEST_F(OctalServerTest, EightServersWorkAtTheSameTime) {
   std::vector<std::thread> clients;
   for (int i = 0; i < 8; ++i) {
     clients.emplace_back([this, i] {
@@ -124,7 +123,7 @@ TEST_F(OctalServerTest, SettingsThatTheChipDoesNotHaveAreAnErrorStatus) {
   EXPECT_EQ(settings, (SerialSettings{300, 1, 8, 'E', 'N'}));
 }
 
-TEST_F(OctalServerTest, EveryRequestIsAnsweredWhileTheModuleIsGone) {
+TEST_F(OctalServerTest, EveryRequestGetsAReplyWhileTheModuleIsMissing) {
   carrier_.setFault("IP_a", ModelFault::busError);
   EXPECT_TRUE(station(5).port().waitForState(SerialPortState::unplugged, Deadline::never()));
 

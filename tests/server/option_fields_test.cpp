@@ -36,7 +36,7 @@ TEST(WordsTest, LeftOutOrEmptyHaveTheirDefault) {
   EXPECT_EQ(words.word("mode", "fast"), "fast");
   EXPECT_EQ(words.number("last", 8), 5);
   EXPECT_EQ(words.letter("parity", 'N'), 'N');
-  EXPECT_EQ(words.queueSize(), OptionFields::kQueueSizeAsBefore);
+  EXPECT_EQ(words.queueSize(), OptionFields::kDefaultQueueSize);
   words.end();
 }
 
@@ -45,12 +45,12 @@ TEST(WordsTest, SayWhatIsWrong) {
               HasSubstr("--scan: : name is missing"));
   EXPECT_THAT(
       complaintOf("1x", [](OptionFields& words) { static_cast<void>(words.number("first")); }),
-      HasSubstr("first \"1x\" is no number"));
+      HasSubstr("first \"1x\" is not a whole number"));
   EXPECT_THAT(complaintOf("0", [](OptionFields& words) { static_cast<void>(words.queueSize()); }),
               HasSubstr("queue size 0: use 1 to 16384"));
   EXPECT_THAT(
       complaintOf("a,b", [](OptionFields& words) { static_cast<void>(words.word("name")); }),
-      HasSubstr("\"b\" is too much"));
+      HasSubstr("unexpected field \"b\""));
 }
 
 }  // namespace

@@ -11,8 +11,8 @@ namespace {
 
 using testing::ElementsAre;
 
-// As a serial server has it: two types of its own, one of them SerialConfig.
-TEST_F(HardwareTest, AnswersAllTypesButThoseThatItKnows) {
+// As for a serial server: it handles two types, one of them SerialConfig.
+TEST_F(HardwareTest, RepliesToAllTypesExceptTheHandledOnes) {
   MessageServer server(backplane_, "server");
   std::vector<MessageType> noted;
   server.on<Char8Array>([](Char8Array& request) { request.status = 5; });

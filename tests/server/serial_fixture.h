@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // SerialServerTest: a serial server on a real pseudo-terminal with an instrument at its far end,
-// and a client that asks it.
+// and its client.
 #pragma once
 
 #include <unistd.h>
@@ -54,7 +54,7 @@ class SerialServerTest : public testing::Test {
   }
 
   using Reply = SerialReply;
-  // Asks with a timeout in milliseconds, unless `fields` say otherwise.
+  // Sends a request with a timeout in milliseconds, unless `fields` has another cmd.
   Reply ask(std::string_view text, const Char8Array& fields) {
     return askSerial(client_, text, fields);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-serial-server as a process: how it ends, what it says, whom it lets in.
+// mpf-serial-server as a process: how it stops, what it logs, which clients it admits.
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -61,7 +61,7 @@ class Asker {
     messages_.pop_front();
     return message;
   }
-  // Asks and returns the status.
+  // Sends a request and returns the status of the reply.
   std::int32_t ask(std::string_view text) {
     send(text, {.timeout = 60, .cmd = cmdWriteRead});
     const auto reply = next();
@@ -105,7 +105,7 @@ class SerialProgramTest : public testing::Test {
 class SerialProgramSignalTest : public SerialProgramTest,
                                 public testing::WithParamInterface<int> {};
 
-TEST_P(SerialProgramSignalTest, EndsItDuringALongReadAndLeavesNothing) {
+TEST_P(SerialProgramSignalTest, StopsItDuringALongReadAndLeavesNoFiles) {
   const auto server = start();
   {
     Asker asker(backplane_);
@@ -128,7 +128,7 @@ TEST_P(SerialProgramSignalTest, EndsItDuringALongReadAndLeavesNothing) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_P(SerialProgramSignalTest, EndsItDuringAWriteThatTheLineHoldsUp) {
+TEST_P(SerialProgramSignalTest, StopsItDuringAWriteThatTheLineBlocks) {
   const auto server = start();
   {
     Asker asker(backplane_);
@@ -148,7 +148,7 @@ TEST_P(SerialProgramSignalTest, EndsItDuringAWriteThatTheLineHoldsUp) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_P(SerialProgramSignalTest, EndsItWhileItWaitsForItsLine) {
+TEST_P(SerialProgramSignalTest, StopsItWhileItWaitsForItsLine) {
   instrument_.unplug();
   const auto server = start({"--wait"});
   const auto connected = std::make_unique<Asker>(backplane_);
@@ -159,7 +159,7 @@ TEST_P(SerialProgramSignalTest, EndsItWhileItWaitsForItsLine) {
 
 INSTANTIATE_TEST_SUITE_P(Signals, SerialProgramSignalTest, testing::Values(SIGTERM, SIGINT));
 
-TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
+TEST_F(SerialProgramTest, LogsItsEventsOnStderr) {
   const auto server = start({"--baud", "19200"});
   Asker asker(backplane_);
   ASSERT_EQ(asker.ask("ECHO a\n"), serialServerStatusOK);
@@ -175,7 +175,7 @@ TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
   std::vector<std::string> lines;
   std::istringstream text(server->errors());
   for (std::string line; std::getline(text, line);) lines.push_back(line);
-  // The line has a thread and the server has one: only the order of what one of them says is
+  // The line and the server have separate threads: only the order of the lines of one thread is
   // certain.
   const auto ofLine = [](const std::string& line) {
     return line.find("the line is ") != std::string::npos;
@@ -183,16 +183,15 @@ TEST_F(SerialProgramTest, TellsItsStoryOnStderr) {
   const auto fromServer = std::stable_partition(lines.begin(), lines.end(), ofLine);
   EXPECT_THAT(std::vector(lines.begin(), fromServer),
               ElementsAre(HasSubstr("warning mpf-serial-server: the line is lost: "),
-                          HasSubstr("the line is there")));
+                          HasSubstr("the line is connected")));
   lines.erase(lines.begin(), fromServer);
   ASSERT_THAT(
       lines,
       ElementsAre(AllOf(HasSubstr("serving " + path_ +
                                   " (19200 baud, 8N1, no flow control) as \"dmm\" at location 0"),
                         HasSubstr("\"dmm.sniff\"")),
-                  HasSubstr("info mpf-serial-server: the first client asks"),
-                  HasSubstr("requests fail: "), HasSubstr("requests succeed again"),
-                  HasSubstr("ends")));
+                  HasSubstr("info mpf-serial-server: first request"), HasSubstr("requests fail: "),
+                  HasSubstr("requests succeed again"), HasSubstr("stopped")));
   EXPECT_THAT(lines[0],
               MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}[.][0-9]{3} info "
                            "mpf-serial-server: .*"));
@@ -221,7 +220,7 @@ TEST_F(SerialProgramTest, LogsSurplusInputWithEachAlarm) {
   EXPECT_EQ(log.find("late"), std::string::npos) << "the log shows no input";
 }
 
-TEST_F(SerialProgramTest, RefusesLimitsThatCannotBe) {
+TEST_F(SerialProgramTest, RefusesInvalidLimits) {
   for (const auto& [option, value] :
        std::vector<std::array<std::string, 2>>{{"--settle-time", "-1"},
                                                {"--quiet-time", "9999999999"},
@@ -235,7 +234,7 @@ TEST_F(SerialProgramTest, RefusesLimitsThatCannotBe) {
   }
 }
 
-TEST_F(SerialProgramTest, SaysNothingWhenToldSo) {
+TEST_F(SerialProgramTest, LogsNothingAtLevelOff) {
   const auto server = start({"--log-level", "off"});
   Asker asker(backplane_);
   ASSERT_EQ(asker.ask("ECHO a\n"), serialServerStatusOK);
@@ -245,22 +244,22 @@ TEST_F(SerialProgramTest, SaysNothingWhenToldSo) {
   EXPECT_EQ(server->errors(), "");
 }
 
-TEST_F(SerialProgramTest, LetsInWhomItIsTold) {
+TEST_F(SerialProgramTest, AdmitsTheClientsOfItsMode) {
   const auto* group = ::getgrgid(::getegid());
   ASSERT_NE(group, nullptr);
   const auto server = start({"--mode", "0660", "--group", group->gr_name});
   const Asker asker(backplane_);
 
-  // What the server made, both for its requests and for listeners, and the client's link to it.
+  // The files of the server, for requests and for listeners, and the client's link to it.
   for (const auto* const name : {".s.0.dmm", ".s.0.dmm%2Esniff"}) {
     struct stat file{};
     ASSERT_EQ(::stat(("/dev/shm/mpf." + backplane_.name() + name).c_str(), &file), 0) << name;
-    EXPECT_EQ(file.st_mode & 0777U, 0640U) << name;  // nobody but the server writes to its window
+    EXPECT_EQ(file.st_mode & 0777U, 0640U) << name;  // only the server may write to its window
     EXPECT_EQ(file.st_gid, ::getegid()) << name;
   }
 }
 
-TEST_F(SerialProgramTest, RefusesOptionsThatMakeNoSense) {
+TEST_F(SerialProgramTest, RefusesInvalidOptions) {
   for (const auto& [option, value, complaint] : std::vector<std::array<std::string, 3>>{
            {"--mode", "0990", "--mode: 0990: use an octal number"},
            {"--group", "root", "--group requires --mode"},
@@ -277,7 +276,7 @@ TEST_F(SerialProgramTest, RefusesOptionsThatMakeNoSense) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_F(SerialProgramTest, NamesThePortThatItCannotOpen) {
+TEST_F(SerialProgramTest, ReportsThePortThatItCannotOpen) {
   instrument_.unplug();
   const auto server = start();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A serial server on a real pseudo-terminal with an instrument at its far end, asked through shared
+// A serial server on a real pseudo-terminal with an instrument at its far end, used through shared
 // memory.
 #include <mpf/serial_commands.h>
 
@@ -10,7 +10,7 @@ namespace {
 
 using namespace serial;
 
-TEST_F(SerialServerTest, AQueryBringsTheAnswerWithItsTerminator) {
+TEST_F(SerialServerTest, AQueryReturnsTheAnswerWithItsTerminator) {
   start();
 
   const auto reply = ask("ECHO hello\n", fieldsOf(cmdWriteRead | cmdFlush));
@@ -27,7 +27,7 @@ TEST_F(SerialServerTest, ATimeoutInWholeSecondsIsAcceptedToo) {
   EXPECT_EQ(reply.status, serialServerStatusOK);
 }
 
-TEST_F(SerialServerTest, SilenceIsATimeout) {
+TEST_F(SerialServerTest, AMissingAnswerIsATimeout) {
   start();
   instrument_.behave({.isSilent = true});
 
@@ -37,7 +37,7 @@ TEST_F(SerialServerTest, SilenceIsATimeout) {
   EXPECT_EQ(reply.text, "");
 }
 
-TEST_F(SerialServerTest, ATimeoutStillCarriesWhatWasRead) {
+TEST_F(SerialServerTest, AReplyAfterATimeoutHasTheBytesThatWereRead) {
   start();
   instrument_.behave({.answerEnd = ""});
 
@@ -47,14 +47,14 @@ TEST_F(SerialServerTest, ATimeoutStillCarriesWhatWasRead) {
   EXPECT_EQ(reply.text, "half");
 }
 
-TEST_F(SerialServerTest, SplitAnswersArePutTogether) {
+TEST_F(SerialServerTest, PartsOfAnAnswerAreJoined) {
   start();
   instrument_.behave({.gap = 1ms});
 
   EXPECT_EQ(ask("ECHO one by one\n", fieldsOf(cmdWriteRead)).text, "one by one\r\n");
 }
 
-TEST_F(SerialServerTest, ExtraEndsAReadAfterSoManyBytes) {
+TEST_F(SerialServerTest, ExtraLimitsTheBytesOfARead) {
   start({.bufferBytes = 100, .eom = "", .circularBuffer = false});
   auto fields = fieldsOf(cmdWriteRead);
   fields.extra = 4;
@@ -74,7 +74,7 @@ TEST_F(SerialServerTest, AnAnswerLongerThanTheBufferOverflows) {
   EXPECT_EQ(reply.text, "much ");
 }
 
-TEST_F(SerialServerTest, NoByteIsLostBehindAnAnswerThatOverflows) {
+TEST_F(SerialServerTest, NoByteIsLostAfterAnAnswerThatOverflows) {
   start({.bufferBytes = 5, .eom = "\r\n", .circularBuffer = true});
 
   EXPECT_EQ(ask("ECHO much too\n", fieldsOf(cmdWriteRead)),
@@ -82,7 +82,7 @@ TEST_F(SerialServerTest, NoByteIsLostBehindAnAnswerThatOverflows) {
   EXPECT_EQ(ask("", fieldsOf(cmdRead)), (Reply{serialServerStatusOK, "too\r\n"}));
 }
 
-TEST_F(SerialServerTest, ANewTerminatorHoldsForLaterRequests) {
+TEST_F(SerialServerTest, ANewTerminatorAppliesToLaterRequests) {
   start();
   auto fields = fieldsOf(cmdWriteRead | cmdSetEom);
   fields.eomLen = 1;
@@ -124,7 +124,7 @@ TEST_F(SerialServerTest, RetriesUntilTheInstrumentAnswers) {
   EXPECT_EQ(reply.text, "late\r\n");
 }
 
-TEST_F(SerialServerTest, AnUnpluggedLineIsAnErrorAndComesBack) {
+TEST_F(SerialServerTest, AnUnpluggedLineIsAnErrorAndWorksAgainLater) {
   start();
   instrument_.unplug();
   ASSERT_TRUE(port_.waitForState(SerialPortState::unplugged, Deadline::never()));
@@ -136,13 +136,13 @@ TEST_F(SerialServerTest, AnUnpluggedLineIsAnErrorAndComesBack) {
   EXPECT_EQ(ask("ECHO hello\n", fieldsOf(cmdWriteRead)).text, "hello\r\n");
 }
 
-TEST_F(SerialServerTest, ACommandThatIsNoneIsAnError) {
+TEST_F(SerialServerTest, AnInvalidCommandIsAnError) {
   start();
 
   EXPECT_EQ(ask("", fieldsOf(cmdFlush)).status, serialServerStatusError);
 }
 
-TEST_F(SerialServerTest, SettingsAreAnsweredByAnInt32) {
+TEST_F(SerialServerTest, TheReplyToSettingsIsAnInt32) {
   start();
 
   auto accepted = client_.call(SerialConfigMessage({.baud = 19200}), 60s);
@@ -153,7 +153,7 @@ TEST_F(SerialServerTest, SettingsAreAnsweredByAnInt32) {
   EXPECT_EQ(refused.message().tryAs<Int32>()->status, serialServerStatusError);
 }
 
-TEST_F(SerialServerTest, OtherTypesAreAnsweredWithAStatus) {
+TEST_F(SerialServerTest, RequestsOfOtherTypesGetAStatus) {
   start();
 
   auto number = client_.call(Float64Message(), 60s);

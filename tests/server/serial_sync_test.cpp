@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Each answer goes to its own question, whatever an instrument does; and no request has the line
-// for ever.
+// Each answer is returned to its own question, whatever an instrument does, and no request uses the
+// line without end.
 #include <atomic>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ struct Outcome {
   std::atomic<int> right = 0, wrong = 0, timeouts = 0, others = 0;
 };
 
-// Asks questions 0, 1, 2, ... of `next`, with options and timeouts at random.
+// Sends questions 0, 1, 2, ... of `next`, with random options and timeouts.
 void askAll(const Backplane& backplane, std::atomic<int>& next, int end, Random& random,
             Outcome& outcome) {
   SyncClient client(backplane, "fickle");
@@ -58,7 +58,7 @@ void askAll(const Backplane& backplane, std::atomic<int>& next, int end, Random&
 
 class FickleInstrumentTest : public testing::TestWithParam<bool> {};
 
-// MPF_TEST_QUESTIONS=100000 asks more.
+// MPF_TEST_QUESTIONS=100000 sends more.
 TEST_P(FickleInstrumentTest, NoQuestionGetsAnAnswerToAnother) {
   const Watchdog watchdog("fickle instrument test",
                           std::chrono::seconds(120 + questionsToAsk() / 50));
@@ -99,17 +99,17 @@ INSTANTIATE_TEST_SUITE_P(Circular, FickleInstrumentTest, testing::Bool());
 
 class LateAnswerTest : public SerialServerTest, public testing::WithParamInterface<bool> {
  protected:
-  // The answer is waited for, however slow the machine is.
+  // The server waits for the answer, however slow the machine is.
   void startWith(const LineLimits& limits = {.resyncLimit = 60s}) {
     start({.bufferBytes = 100, .eom = "\r\n", .circularBuffer = GetParam(), .limits = limits});
   }
-  // A question whose answer comes after its time is over.
+  // A question whose answer arrives after its timeout.
   void askTooEarly() {
     instrument_.behave({.delay = 750ms});
     EXPECT_EQ(ask("ECHO late\n", fieldsOf(cmdWriteRead, 250)).status, serialServerStatusTimeout);
     instrument_.behave({});
   }
-  // Returns how many of `count` questions were answered by the answer to another one.
+  // Returns how many of `count` questions got the answer to another question.
   static int wrongOf(SyncClient& client, const std::string& who, int count) {
     int wrong = 0;
     for (int i = 0; i < count; ++i) {
@@ -122,14 +122,14 @@ class LateAnswerTest : public SerialServerTest, public testing::WithParamInterfa
   }
 };
 
-TEST_P(LateAnswerTest, GoesToNobody) {
+TEST_P(LateAnswerTest, IsNotDelivered) {
   startWith();
   askTooEarly();
 
   EXPECT_EQ(wrongOf(client_, "a", 20), 0);
 }
 
-TEST_P(LateAnswerTest, GoesToNoneOfTenClients) {
+TEST_P(LateAnswerTest, IsNotDeliveredToAnyOfTenClients) {
   startWith();
   askTooEarly();
 
@@ -146,7 +146,7 @@ TEST_P(LateAnswerTest, GoesToNoneOfTenClients) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST_P(LateAnswerTest, IsAnAlarmOnceAndSeenByThoseWhoListen) {
+TEST_P(LateAnswerTest, IsOneAlarmAndListenersReceiveIt) {
   std::mutex mutex;
   std::string seen;
   const auto tap = port_.attachTap([&](std::span<const PeekedByte> bytes) {
@@ -164,7 +164,7 @@ TEST_P(LateAnswerTest, IsAnAlarmOnceAndSeenByThoseWhoListen) {
   EXPECT_THAT(seen, HasSubstr("late\r\n"));
 }
 
-TEST_P(LateAnswerTest, IsTheAnswerOfARetry) {
+TEST_P(LateAnswerTest, IsUsedAsTheAnswerOfARetry) {
   startWith();
   instrument_.behave({.delay = 750ms});
   auto fields = fieldsOf(cmdWriteRead, 250);
@@ -173,7 +173,7 @@ TEST_P(LateAnswerTest, IsTheAnswerOfARetry) {
   const auto reply = ask("ECHO late\n", fields);
 
   EXPECT_EQ(reply, (SerialReply{serialServerStatusOK, "late\r\n"}));
-  EXPECT_EQ(port_.counters().bytesOut, 10U) << "asked once";
+  EXPECT_EQ(port_.counters().bytesOut, 10U) << "sent once";
 }
 
 TEST_P(LateAnswerTest, SecondAnswersAreSurplus) {
@@ -185,8 +185,8 @@ TEST_P(LateAnswerTest, SecondAnswersAreSurplus) {
   EXPECT_GE(alarmsOf(backplane_, "serial[0]"), 2U);
 }
 
-// An instrument that never stops: nobody can tell its answers.
-TEST_P(LateAnswerTest, WithoutSilenceNothingIsSent) {
+// An instrument that never stops sending: its answers cannot be recognised.
+TEST_P(LateAnswerTest, NothingIsSentWithoutSilence) {
   startWith({.quietTime = 10s, .resyncLimit = 10ms});
   askTooEarly();
   std::atomic<bool> isOver = false;
@@ -200,7 +200,7 @@ TEST_P(LateAnswerTest, WithoutSilenceNothingIsSent) {
   EXPECT_EQ(ask("ECHO unsent\n", fieldsOf(cmdWriteRead)).status, serialServerStatusError);
 
   isOver = true;
-  EXPECT_EQ(port_.counters().bytesOut, 10U) << "the first question alone";
+  EXPECT_EQ(port_.counters().bytesOut, 10U) << "only the first question was sent";
 }
 
 TEST_P(LateAnswerTest, AcknowledgementsOfWritesAreNoAlarm) {
@@ -225,16 +225,16 @@ TEST_F(SerialServerTest, AnInstrumentThatSendsManyLinesIsReadLineByLine) {
   EXPECT_EQ(alarmsOf(backplane_, "serial[0]"), 0U);
 }
 
-TEST_F(SerialServerTest, AWriteReadWithNothingToWriteReadsWhatComesFromNowOn) {
+TEST_F(SerialServerTest, AWriteReadWithoutDataReadsTheBytesThatArriveLater) {
   start();
   ASSERT_EQ(ask("", fieldsOf(cmdWriteRead, 0)).status, serialServerStatusTimeout);
 
   EXPECT_EQ(ask("ECHO next\n", fieldsOf(cmdWriteRead)).text, "next\r\n");
 }
 
-// ---- a request that would not end
+// ---- requests without end
 
-TEST_F(SerialServerTest, WhatIsNoCommandIsNotRetried) {
+TEST_F(SerialServerTest, AnInvalidCommandIsNotRetried) {
   start();
 
   const auto reply = ask("", {.cmd = 5, .numberRetrys = INT32_MAX});
@@ -253,7 +253,7 @@ TEST_F(SerialServerTest, RetriesAreLimited) {
 
   EXPECT_EQ(ask("?\n", fields).status, serialServerStatusTimeout);
 
-  EXPECT_EQ(port_.counters().bytesOut, 8U) << "asked four times";
+  EXPECT_EQ(port_.counters().bytesOut, 8U) << "sent four times";
 }
 
 TEST_F(SerialServerTest, TimeoutsAreLimitedWithTheRetries) {
@@ -264,7 +264,7 @@ TEST_F(SerialServerTest, TimeoutsAreLimitedWithTheRetries) {
       ask("?\n", {.timeout = INT32_MAX, .cmd = cmdWriteRead, .numberRetrys = INT32_MAX});
 
   EXPECT_EQ(reply.status, serialServerStatusTimeout);
-  EXPECT_EQ(port_.counters().bytesOut, 2U) << "asked once";
+  EXPECT_EQ(port_.counters().bytesOut, 2U) << "sent once";
 }
 
 constexpr LineLimits kNoLimit{.resyncLimit = 10ms, .maxTimeout = 24h, .maxRetries = 1'000'000};
@@ -281,7 +281,7 @@ TEST_F(SerialServerTest, TheRequestOfAClientThatIsKilledEnds) {
   EXPECT_EQ(ask("ECHO free\n", fieldsOf(cmdWriteRead)).text, "free\r\n");
 }
 
-TEST_F(SerialServerTest, TheRequestOfAClientThatLeavesEnds) {
+TEST_F(SerialServerTest, TheRequestOfAClientThatDisconnectsEnds) {
   start({.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = kNoLimit});
   instrument_.behave({.isSilent = true});
   {
@@ -297,8 +297,8 @@ TEST_F(SerialServerTest, TheRequestOfAClientThatLeavesEnds) {
   EXPECT_EQ(ask("ECHO free\n", fieldsOf(cmdWriteRead)).text, "free\r\n");
 }
 
-// As an IOC's that sends its last command and ends.
-TEST_F(SerialServerTest, AWriteIsDoneThoughItsClientLeavesAtOnce) {
+// For example an IOC that sends its last command and exits.
+TEST_F(SerialServerTest, AWriteContinuesWhenItsClientExits) {
   start();
   for (int i = 0; i < 20; ++i) {
     const auto text = fmt::format("OFF {}\n", i);

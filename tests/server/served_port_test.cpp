@@ -31,7 +31,7 @@ class ServedPortTest : public testing::Test {
     served_.emplace(backplane_, options_, options_.servers[0], *port_);
     served_->start([this] { hasFailed_ = true; });
   }
-  // Stops what was started, before what it uses goes.
+  // Stops the port before the objects that it uses are destroyed.
   void TearDown() override { served_.reset(); }
 
   Watchdog watchdog_{"served port test"};

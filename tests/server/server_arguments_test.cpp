@@ -30,7 +30,7 @@ std::string complaintOf(const std::string& line) {
   }
 }
 
-TEST(ServerArguments, AreThoseOfServerOptionsWhenNothingIsSaid) {
+TEST(ServerArguments, HaveTheDefaultsOfServerOptions) {
   const auto arguments = parse("");
 
   EXPECT_EQ(arguments.messages.location, Backplane::defaultLocation());
@@ -40,7 +40,7 @@ TEST(ServerArguments, AreThoseOfServerOptionsWhenNothingIsSaid) {
   EXPECT_EQ(arguments.logLevel, "info");
 }
 
-TEST(ServerArguments, AreTaken) {
+TEST(ServerArguments, AreReadFromTheCommandLine) {
   const auto* group = ::getgrgid(::getegid());
   ASSERT_NE(group, nullptr);
 

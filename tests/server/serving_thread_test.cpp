@@ -17,7 +17,7 @@ class ServingThreadTest : public testing::Test {
   ServerLog log_{"test", "off"};
 };
 
-TEST_F(ServingThreadTest, TellsOfAnException) {
+TEST_F(ServingThreadTest, ReportsAnException) {
   std::binary_semaphore failed(0);
   ServingThread thread;
 
@@ -27,7 +27,7 @@ TEST_F(ServingThreadTest, TellsOfAnException) {
   thread.join();
 }
 
-TEST_F(ServingThreadTest, EndsWithoutAWordWhenToldTo) {
+TEST_F(ServingThreadTest, EndsSilentlyWhenStopped) {
   std::binary_semaphore stop(0);
   ServingThread thread;
   thread.start(log_, [&] { stop.acquire(); }, [] { FAIL() << "nothing failed"; });
@@ -36,7 +36,7 @@ TEST_F(ServingThreadTest, EndsWithoutAWordWhenToldTo) {
   thread.join();
 }
 
-TEST_F(ServingThreadTest, MayEndUnstarted) {
+TEST_F(ServingThreadTest, MayBeDestroyedUnstarted) {
   ServingThread thread;
   thread.join();
 }

@@ -30,7 +30,7 @@ Taken takeFrom(SniffQueue& queue) {
   return taken;
 }
 
-TEST(SniffQueue, GivesBytesInOrderOnce) {
+TEST(SniffQueue, ReturnsBytesInOrderOnce) {
   SniffQueue queue({});
   static_cast<void>(queue.push(bytesOf("ab")));
   static_cast<void>(queue.push(bytesOf("c")));
@@ -61,7 +61,7 @@ TEST(SniffQueue, IsDueWhenItsFirstByteIsOld) {
   EXPECT_EQ(queue.dueAt(), due);
 }
 
-TEST(SniffQueue, IsDueAtOnceWhenLarge) {
+TEST(SniffQueue, IsDueImmediatelyWhenLarge) {
   SniffQueue queue({.maxAge = 24h, .largeBytes = 3});
   EXPECT_TRUE(queue.push(bytesOf("a")));
   EXPECT_FALSE(queue.push(bytesOf("b")));
@@ -73,7 +73,7 @@ TEST(SniffQueue, IsDueAtOnceWhenLarge) {
   EXPECT_FALSE(queue.push(bytesOf("e")));
 }
 
-TEST(SniffQueue, CountsWhatDoesNotFit) {
+TEST(SniffQueue, CountsBytesThatDoNotFit) {
   SniffQueue queue({.maxBytes = 4});
   static_cast<void>(queue.push(bytesOf("abc")));
 

@@ -34,9 +34,9 @@ class Listener {
     request.setClientExtra(mark);
     return call(std::move(request)).status;
   }
-  // Returns the reply; what came before it is taken.
+  // Receives the messages before the reply, and returns the reply.
   Int32 stop() { return call(Int32Message({.cmd = cmdSniffStop})); }
-  // Takes all that the server has sent until now.
+  // Receives all messages that the server has sent until now.
   void takeWhatIsThere() { EXPECT_EQ(call(Int32Message({.cmd = 77})).status, sniffStatusError); }
   void takeUntil(std::size_t records) {
     while (records_.size() < records) keep(client_.receive(60s));
@@ -45,7 +45,7 @@ class Listener {
   [[nodiscard]] std::span<const SniffRecord> records() const { return records_; }
   [[nodiscard]] std::string text() const { return textOf(records_); }
   [[nodiscard]] std::size_t lost() const { return lost_; }
-  // Of each record, the mark of the start that it belongs to.
+  // For each record, the mark of the start that it belongs to.
   [[nodiscard]] const std::vector<std::int32_t>& marks() const { return marks_; }
   [[nodiscard]] SyncClient& client() { return client_; }
 
@@ -84,9 +84,9 @@ class SniffTest : public SerialServerTest {
         {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = {.settleTime = 0ms}});
     sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_,
                                            batching);
-    sniff_->start([] { FAIL() << "it cannot serve"; });
+    sniff_->start([] { FAIL() << "the sniff server failed"; });
   }
-  // One question and its answer. Returns what a listener hears of it.
+  // Sends one question. Returns the records that a listener must receive of it and its answer.
   std::string talk(const std::string& word) {
     EXPECT_EQ(ask("ECHO " + word + "\n", fieldsOf(cmdWriteRead)).text, word + "\r\n");
     return "T:ECHO " + word + "\nR:" + word + "\r\n";
@@ -98,7 +98,7 @@ class SniffTest : public SerialServerTest {
   std::unique_ptr<SniffServer> sniff_;
 };
 
-TEST_F(SniffTest, TwoListenersHearEveryByteInTheOrderOfTheLine) {
+TEST_F(SniffTest, TwoListenersReceiveEveryByteInTheOrderOfTheLine) {
   startWithListening();
   Listener first(backplane_);
   Listener second(backplane_);
@@ -140,7 +140,7 @@ TEST_F(SniffTest, BytesThatTheLineDamagedAreMarked) {
                                                        SniffRecord{5, SniffKind::breakSignal, 0}));
 }
 
-TEST_F(SniffTest, ALargeBatchGoesAtOnce) {
+TEST_F(SniffTest, ALargeBatchIsSentImmediately) {
   startWithListening({.maxAge = 24h, .largeBytes = 20});
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
@@ -152,7 +152,7 @@ TEST_F(SniffTest, ALargeBatchGoesAtOnce) {
   EXPECT_TRUE(spoken.starts_with(listener.text()));
 }
 
-TEST_F(SniffTest, AStopBringsWhatWasBeforeAndNothingComesAfterIt) {
+TEST_F(SniffTest, AStopReturnsEarlierBytesAndNothingFollowsIt) {
   startWithListening(kNever);
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
@@ -181,7 +181,7 @@ TEST_F(SniffTest, AStopEndsTheListeningOfItsOwnClientOnly) {
   EXPECT_EQ(listener.text(), spoken);
 }
 
-TEST_F(SniffTest, WhoListensLaterHearsWhatComesLater) {
+TEST_F(SniffTest, ALaterListenerReceivesLaterBytesOnly) {
   startWithListening(kNever);
   Listener early(backplane_);
   Listener late(backplane_);
@@ -197,7 +197,7 @@ TEST_F(SniffTest, WhoListensLaterHearsWhatComesLater) {
   EXPECT_EQ(late.text(), after);
 }
 
-TEST_F(SniffTest, ASecondStartTakesThePlaceOfTheFirst) {
+TEST_F(SniffTest, ASecondStartReplacesTheFirst) {
   startWithListening(kNever);
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(1), sniffStatusOK);
@@ -226,7 +226,7 @@ TEST_F(SniffTest, OtherCommandsAndOtherTypesAreErrors) {
   EXPECT_EQ(number.message().tryAs<Float64>()->status, -1);
 }
 
-TEST_F(SniffTest, ThePortIsTappedWhileSomebodyListens) {
+TEST_F(SniffTest, ThePortIsTappedWhileThereAreListeners) {
   startWithListening();
   EXPECT_TRUE(port_.taps().isEmpty());
   Listener first(backplane_);
@@ -242,8 +242,8 @@ TEST_F(SniffTest, ThePortIsTappedWhileSomebodyListens) {
   EXPECT_TRUE(port_.taps().isEmpty());
 }
 
-// It loses bytes, is told how many, and nobody else notices.
-TEST_F(SniffTest, AListenerThatTakesNothingCostsItselfBytes) {
+// It loses bytes and learns their number; other listeners are not affected.
+TEST_F(SniffTest, AListenerThatDoesNotReceiveLosesBytes) {
   startWithListening(kAtOnce);
   Listener idle(backplane_);
   Listener busy(backplane_);
@@ -262,7 +262,7 @@ TEST_F(SniffTest, AListenerThatTakesNothingCostsItselfBytes) {
   EXPECT_EQ(busy.lost(), 0U);
 
   idle.takeWhatIsThere();
-  EXPECT_EQ(idle.lost(), 0U);  // not told yet
+  EXPECT_EQ(idle.lost(), 0U);  // not reported yet
   const auto heard = idle.records().size();
   EXPECT_LT(heard, kQuestions * kBytesOfOne);
   EXPECT_GT(heard, 0U);
@@ -272,7 +272,7 @@ TEST_F(SniffTest, AListenerThatTakesNothingCostsItselfBytes) {
   EXPECT_EQ(heard + idle.lost(), kQuestions * kBytesOfOne);
 }
 
-TEST_F(SniffTest, AStopTellsWhatIsMissingAtTheEnd) {
+TEST_F(SniffTest, AStopCountsTheBytesMissingAtTheEnd) {
   startWithListening(kAtOnce);
   Listener idle(backplane_);
   Listener busy(backplane_);
@@ -292,7 +292,7 @@ TEST_F(SniffTest, AStopTellsWhatIsMissingAtTheEnd) {
             kQuestions * kBytesOfOne);
 }
 
-TEST_F(SniffTest, WhatTheServerCouldNotKeepIsToldToAll) {
+TEST_F(SniffTest, BytesThatTheServerLostAreReportedToAllListeners) {
   startWithListening({.maxAge = 24h, .largeBytes = 1'000'000, .maxBytes = 10});
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);
@@ -304,7 +304,7 @@ TEST_F(SniffTest, WhatTheServerCouldNotKeepIsToldToAll) {
   EXPECT_EQ(10U + static_cast<std::size_t>(reply.address), spoken.size() - 4);
 }
 
-TEST_F(SniffTest, AListenerThatIsKilledOrGoesAwayIsForgotten) {
+TEST_F(SniffTest, AListenerThatIsKilledOrDisconnectsIsRemoved) {
   startWithListening();
   Victim killed("listen", backplane_.name());
   auto leaving = std::make_unique<Listener>(backplane_);
@@ -325,7 +325,7 @@ TEST_F(SniffTest, AListenerThatIsKilledOrGoesAwayIsForgotten) {
   EXPECT_TRUE(port_.taps().isEmpty());
 }
 
-TEST_F(SniffTest, TheServerMayEndWhileTheyListenAndTheLineIsBusy) {
+TEST_F(SniffTest, TheServerMayEndDuringListeningOnABusyLine) {
   startWithListening(kAtOnce);
   Listener listener(backplane_);
   ASSERT_EQ(listener.start(), sniffStatusOK);

@@ -4,7 +4,7 @@
 // comes after it.
 //
 //   Output output(std::move(readEnd));
-//   output.waitForLine("the line is not there yet");   // the order of lines of different threads
+//   output.waitForLine("waiting for the line");   // the order of lines of different threads
 //   does not matter
 //
 // Threads  any.

@@ -16,15 +16,14 @@ Dac128vServer::Dac128vServer(MessageServer& server, Dac128v& dac, const ServerLo
 }
 
 void Dac128vServer::handle(Int32& request) {
-  if (!std::exchange(isAsked_, true)) log_->info("the first client asks");
+  if (!std::exchange(isAsked_, true)) log_->info("first request");
   const auto channel = request.address;  // once: the client can write to the request while we work
   const auto code = request.value;
   const auto status = dac_.tryWrite(channel, code);
   request.status = status == Dac128vStatus::success ? 0 : -1;
   if (const auto now = dac_.restorations(); std::exchange(restorations_, now) != now)
     faults_.alarm(
-        "the module had lost its outputs, by a reset or a power cycle: they are as they were "
-        "written again");
+        "the module had lost its outputs, by a reset or a power cycle: they have been restored");
   if (status == Dac128vStatus::success) return faults_.success();
   if (isFault(status)) return faults_.fault(toString(status));
   log_->debug("channel {}, code {}: {}", channel, code, toString(status));

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Dac128vServer: requests of clients become codes on the outputs of a DAC128V (manual, "Systran
-// DAC128V Support").
+// Dac128vServer: writes the outputs of a DAC128V for clients (manual, "Systran DAC128V Support").
 //
 //   client                                 server
 //     Int32 address=channel value=code ──►
-//                                      ◄── the same with status 0, or -1: nothing was written, or it is not on the output
+//                                      ◄── the same with status 0, or -1: the output was not set
 //
-// A module that has lost what was written to it, by a reset or a power cycle, gets it again with
-// the next request: an alarm in `mpf msr`.
+// When a reset or a power cycle has cleared the outputs, the next request restores them and counts
+// an alarm (`mpf msr`).
 //
-// Threads  one: the server's.
+// Threads  the thread of the server.
 #pragma once
 
 #include <mpf/drivers/dac128v.h>
@@ -22,7 +21,7 @@ namespace mpf {
 
 class Dac128vServer {
  public:
-  // Answers every request of `server`. All that is passed must outlive this.
+  // Handles every request of `server`. The arguments must outlive this object.
   Dac128vServer(MessageServer& server, Dac128v& dac, const ServerLog& log);
 
  private:
@@ -32,7 +31,7 @@ class Dac128vServer {
   const ServerLog& log_;
   FaultNote faults_;
   bool isAsked_ = false;  // there was a request
-  std::uint64_t restorations_ = 0;  // of the module's outputs, as told
+  std::uint64_t restorations_ = 0;  // of the module's outputs that were reported
 };
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-dac128v-server: one DAC128V, one server, one process. The old command was
+// mpf-dac128v-server: a server for one DAC128V. The old command was
 // initDAC128V("module","carrier","site",queueSize).
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -29,18 +29,19 @@ struct Options {
         "mpf-dac128v-server - serves the eight outputs of a Systran DAC128V to the clients of a "
         "backplane",
         kProgram);
-    place.addTo(app, "Name of the module, under which clients find the server, too");
+    place.addTo(app, "Name of the module and of its server");
     arguments.addQueueSizeTo(app);
     app.add_option_function<std::string>(
            "--ranges", [this](const std::string& text) { takeRanges(text); },
-           "What the jumpers say, as LOWtoHIGH: for all, or for channels 0 to 3 and 4 to 7; for "
-           "models")
+           "Output ranges of a model, as its jumpers select them: LOWtoHIGH for all channels, or "
+           "two "
+           "ranges for channels 0 to 3 and 4 to 7")
         ->default_str("-10to10,-10to10");
     hardware.addTo(app);
     arguments.addTo(app);
     app.footer(
         "The old command: initDAC128V(\"module\", \"carrier\", \"site\", queuesize)\n"
-        "A model's outputs are the wires MODULE.0 to MODULE.7, in volts.\n"
+        "The outputs of a model drive the wires MODULE.0 to MODULE.7, in volts.\n"
         "Example: mpf-dac128v-server dac ipac IP_a 20 --carrier ipac=model");
     return mpf::parseCommandLine(app, argc, argv);
   }

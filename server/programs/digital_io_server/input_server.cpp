@@ -10,7 +10,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::size_t kMaxNews = 1000;
+constexpr std::size_t kMaxQueuedChanges = 1000;
 
 }  // namespace
 
@@ -38,7 +38,7 @@ void DigitalInputServer::run() {
   while (!ends_.load(std::memory_order_relaxed)) {
     static_cast<void>(server_.waitForMessage());
     deliver();
-    // who asks all the time must not keep news back
+    // deliver() after each request: a client that sends many requests must not delay monitors.
     while (!ends_.load(std::memory_order_relaxed) && server_.handleOne()) deliver();
     forgetGone();
   }
@@ -59,7 +59,7 @@ void DigitalInputServer::handle(Int32Message&& request) {
     if (isFault(status)) faults_.fault(toString(status));
     fields.status = status == DigitalIoStatus::success ? 0 : -1;
   } else {
-    log_->debug("inputs: there is no cmd {}", asked.cmd);
+    log_->debug("inputs: unknown cmd {}: status -1", asked.cmd);
     fields.status = -1;
   }
   answer(request, fields);
@@ -78,10 +78,10 @@ void DigitalInputServer::read(Int32& fields) {
   faults_.fault(toString(DigitalIoStatus::gone));
 }
 
-// What was before is not for the new one, and what it hears first is what the others know.
+// Delivers earlier changes before it adds the monitor, which first gets the present inputs.
 void DigitalInputServer::start(Int32Message&& request) {
   const auto client = server_.clientOf(request);
-  if (client == 0) return;  // gone already
+  if (client == 0) return;  // the client has disconnected
   const auto state = io_.look();
   deliver();
   if (const auto former = find(client); former != monitors_.end()) monitors_.erase(former);
@@ -101,12 +101,12 @@ std::int32_t DigitalInputServer::stop(const Int32Message& request) {
   return 0;
 }
 
-// On whatever thread has news.
+// Runs on a thread of the driver, or on a thread that calls the driver.
 void DigitalInputServer::hear(const DigitalIoNews& news) {
   {
     const std::lock_guard lock(mutex_);
     using Kind = DigitalIoNews::Kind;
-    if (news_.size() >= kMaxNews && news.kind == Kind::inputs &&
+    if (news_.size() >= kMaxQueuedChanges && news.kind == Kind::inputs &&
         news_.back().kind == Kind::inputs) {
       news_.back().inputs = news.inputs;
       news_.back().changed |= news.changed;
@@ -142,23 +142,23 @@ void DigitalInputServer::note(const DigitalIoNews& news) {
       return;
     case DigitalIoNews::Kind::back:
       log_->warn(
-          "the module is back, or was reset: it is set up anew, with what was written to its "
-          "outputs");
+          "the module works again, or was reset: its settings and outputs have been restored");
       break;
     case DigitalIoNews::Kind::gone:
-      log_->warn("the module is gone: nothing answers");
+      log_->warn("the module does not respond");
       break;
     case DigitalIoNews::Kind::lostInterrupt:
-      log_->warn("interrupts do not come: changes are seen when the inputs are polled");
+      log_->warn("interrupts do not arrive: changes are found by polling the inputs");
       break;
     case DigitalIoNews::Kind::storm:
-      log_->warn("an interrupt storm: interrupts are off for a while, the inputs are polled");
+      log_->warn(
+          "an interrupt storm: interrupts are disabled for a while, and the inputs are polled");
       break;
   }
   server_.countAlarm();
 }
 
-// False: it could not be delivered.
+// Returns false when the message could not be sent.
 bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
                               bool isThere) {
   auto message = server_.allocReplyMessage<Int32>(monitor.request);
@@ -169,7 +169,8 @@ bool DigitalInputServer::send(Monitor& monitor, std::uint32_t inputs, std::uint3
   const auto result = server_.reply(std::move(message));
   if (result == ReplyResult::sent) return true;
   if (result != ReplyResult::clientGone)
-    log_->warn("a client does not take its messages and loses its monitor: {}", toString(result));
+    log_->warn("a client does not receive its messages and loses its monitor: {}",
+               toString(result));
   return false;
 }
 
@@ -187,7 +188,8 @@ void DigitalInputServer::forgetGone() {
 
 void DigitalInputServer::followCount() {
   const auto now = monitors_.size();
-  if (count_.exchange(now, std::memory_order_relaxed) != now) log_->info("{} monitoring", now);
+  if (count_.exchange(now, std::memory_order_relaxed) != now)
+    log_->info("{} clients monitor the inputs", now);
 }
 
 }  // namespace mpf

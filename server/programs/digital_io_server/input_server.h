@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// DigitalInputServer: tells clients what the inputs of a digital module are, and each change, as
-// include/mpf/digital_io_commands.h promises.
+// DigitalInputServer: sends the inputs of a digital module, and their changes, to clients, as
+// described in include/mpf/digital_io_commands.h.
 //
-//   driver's thread ── news ──► queue ── own thread ──► monitor 1, monitor 2, ...
+//   driver's thread ── changes ──► queue ── own thread ──► monitor 1, monitor 2, ...
 //
-// Threads  its own, which waits for requests and news, and for nobody who listens. News go out
-//          before the next request is taken.
-// Crash    a client that dies is forgotten as soon as its death is known.
-// Trust    a client that does not take its messages loses its monitor. News that wait in the queue
-//          are joined when there are too many.
+// Threads  its own thread waits for requests and changes, and never for a client. It sends changes
+//          before it receives the next request.
+// Crash    the monitor of a client that dies is removed when the server notices its death.
+// Trust    a client that does not receive its messages loses its monitor. When too many changes of
+//          the inputs are queued, further ones are merged into the last.
 #pragma once
 
 #include <atomic>
@@ -31,7 +31,7 @@ namespace mpf {
 class DigitalInputServer {
  public:
   //   io      must outlive this, as `log`
-  //   failed  is called when this cannot serve any more, which the log says: the program shall end
+  //   failed  called when the server has failed, after it has logged the error
   //   throws  as MessageServer
   DigitalInputServer(const Backplane& backplane, const std::string& name,
                      const ServerOptions& options, DigitalIo& io, const ServerLog& log,
@@ -48,7 +48,7 @@ class DigitalInputServer {
 
  private:
   struct Monitor {
-    Int32Message request;  // its start, which the news are replies to
+    Int32Message request;  // cmdStartMonitor; the changes are further replies to it
     std::uint64_t client = 0;
     std::uint32_t mask = 0;
   };
@@ -71,10 +71,10 @@ class DigitalInputServer {
   DigitalIo& io_;
   const ServerLog& log_;
   MessageServer server_;
-  FaultNote faults_;  // of reads; this and below, but for what is guarded: the thread's
+  FaultNote faults_;  // of reads; used by the server's thread, as monitors_
   std::vector<Monitor> monitors_;
-  std::mutex mutex_;  // guards
-  std::deque<DigitalIoNews> news_;  // this
+  std::mutex mutex_;
+  std::deque<DigitalIoNews> news_;  // under mutex_
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
   DigitalIo::Subscription subscription_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// mpf-digital-io-server: one module of digital lines, two servers, one process. The old command was
-// initIpUnidig("module","carrier","site",queueSize,msecPoll,intVec,risingMask,fallingMask,biMask,maxClients).
+// mpf-digital-io-server: two servers, for the inputs and the outputs of one digital module. The old
+// command was initIpUnidig("module","carrier","site",queueSize,msecPoll,intVec,risingMask,
+// fallingMask,biMask,maxClients).
 #include <cstdio>
 #include <fmt/format.h>
 #include <memory>
@@ -17,7 +18,7 @@ namespace {
 constexpr const char* kProgram = "mpf-digital-io-server";
 constexpr int kLines = 32;
 
-// A model, its outputs and inputs at their wires.
+// Creates a model and connects its outputs and inputs to their wires.
 std::unique_ptr<mpf::DigitalIoModel> makeModel(const mpf::DigitalIoStartOptions& options,
                                                mpf::ModelWires* wires) {
   auto model = std::make_unique<mpf::DigitalIoModel>(
@@ -33,7 +34,7 @@ void describe(const mpf::DigitalIo& io, const mpf::IndustryPackModule& module,
             io.usesInterrupts() ? fmt::format("interrupts with vector {}", options.io.vector)
                                 : "no interrupts");
   if (options.io.vector != 0 && !io.usesInterrupts())
-    log->warn("{} cannot interrupt: changes are seen by polling", io.kind().name);
+    log->warn("{} has no interrupts: changes are found by polling", io.kind().name);
   if (options.maxClients != 0)
     log->info("maxclients {} is ignored: any number of clients may monitor the inputs",
               options.maxClients);
@@ -68,7 +69,8 @@ int serve(int argc, char** argv) {
   const auto stop = [](void* outputs) noexcept {
     static_cast<mpf::MessageServer*>(outputs)->interrupt();
   };
-  const mpf::StopSignals signals(stop, &server);  // before anybody has an answer, and may stop us
+  const mpf::StopSignals signals(stop,
+                                 &server);  // before the first reply: a client may stop us then
   mpf::logShortages(server, log);
   const mpf::DigitalOutputServer outputs(server, io, log);
   mpf::ProgramFailure failure;
@@ -78,7 +80,7 @@ int serve(int argc, char** argv) {
   log->info(R"(serving "{}" and "{}" at location {})", inputs.getName(), server.getName(),
             server.location());
   server.run();
-  log->info("ends");
+  log->info("stopped");
   return failure.exitStatus();
 }
 

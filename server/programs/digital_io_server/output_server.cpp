@@ -17,7 +17,7 @@ DigitalOutputServer::DigitalOutputServer(MessageServer& server, DigitalIo& io, c
 }
 
 void DigitalOutputServer::handle(Int32& shared) {
-  if (!std::exchange(isAsked_, true)) log_->info("the first client asks for outputs");
+  if (!std::exchange(isAsked_, true)) log_->info("first request for outputs");
   auto request = shared;  // a copy: the client can write to the request while we work
   request.status = 0;
   if (isReadRequest(request.cmd)) {
@@ -31,7 +31,7 @@ void DigitalOutputServer::handle(Int32& shared) {
     note(status, request);
   } else {
     request.status = -1;
-    log_->debug("outputs: there is no cmd {}", request.cmd);
+    log_->debug("outputs: unknown cmd {}: status -1", request.cmd);
   }
   shared = request;
 }

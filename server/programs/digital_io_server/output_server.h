@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// DigitalOutputServer: requests of clients become bits on the outputs of a digital module, as
-// include/mpf/digital_io_commands.h has it.
+// DigitalOutputServer: writes the outputs of a digital module for clients, as described in
+// include/mpf/digital_io_commands.h.
 //
-// Threads  one: the server's.
+// Threads  the thread of the server.
 #pragma once
 
 #include <mpf/digital_io_commands.h>
@@ -16,7 +16,7 @@ namespace mpf {
 
 class DigitalOutputServer {
  public:
-  // Answers every request of `server`. All that is passed must outlive this.
+  // Handles every request of `server`. The arguments must outlive this object.
   DigitalOutputServer(MessageServer& server, DigitalIo& io, const ServerLog& log);
 
  private:

@@ -9,7 +9,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::chrono::milliseconds kPollAsBefore{100};
+constexpr std::chrono::milliseconds kDefaultPoll{100};
 constexpr int kHighestBit = 31;
 
 const DigitalIoKind* kindNamed(const std::string& name) {
@@ -17,7 +17,7 @@ const DigitalIoKind* kindNamed(const std::string& name) {
   std::string names;
   for (const auto& kind : digitalIoKinds())
     names += (names.empty() ? "" : ", ") + std::string(kind.name);
-  throw CLI::ValidationError("--kind", "there is no \"" + name + "\"; there are " + names);
+  throw CLI::ValidationError("--kind", "unknown kind \"" + name + "\"; the kinds are " + names);
 }
 
 }  // namespace
@@ -32,16 +32,16 @@ std::optional<int> DigitalIoStartOptions::parse(int argc, char** argv, Hardware&
   std::string kindName = "IP-Unidig-I";
   place.addTo(app, "Name of the module; clients find its servers as <module>In and <module>Out");
   arguments.addQueueSizeTo(app);
-  app.add_option("mspoll", pollMs, "The inputs are read at least that often [ms]; 0: 100")
+  app.add_option("mspoll", pollMs, "Longest time between two readings of the inputs [ms]; 0: 100")
       ->check(wholeNumber(0, 3'600'000));
   app.add_option("intvec", io.vector, "Interrupt vector, 1 to 255; 0: no interrupts")
       ->check(wholeNumber(0, 255));
-  app.add_option("risingmask", io.rising, "Inputs that interrupt when they go high, as 0xff");
-  app.add_option("fallingmask", io.falling, "Inputs that interrupt when they go low");
-  app.add_option("bimask", both, "Inputs that interrupt either way");
+  app.add_option("risingmask", io.rising, "Inputs that interrupt on a rising edge, as 0xff");
+  app.add_option("fallingmask", io.falling, "Inputs that interrupt on a falling edge");
+  app.add_option("bimask", both, "Inputs that interrupt on both edges");
   app.add_option("maxclients", maxClients,
-                 "Ignored: as in old command lines; there may be any number of clients");
-  app.add_option("--kind", kindName, "What a model is; a real module says it itself")
+                 "Ignored, kept for old command lines: any number of clients may monitor");
+  app.add_option("--kind", kindName, "Kind of a model; a real module identifies itself")
       ->capture_default_str();
   hardware.addTo(app);
   inputs.addTo(app, kHighestBit);
@@ -50,11 +50,11 @@ std::optional<int> DigitalIoStartOptions::parse(int argc, char** argv, Hardware&
       "The old command: initIpUnidig(\"module\", \"carrier\", \"site\", queuesize, mspoll, intvec, "
       "risingmask, fallingmask, bimask, "
       "maxclients)\n"
-      "A model's outputs are the wires MODULE.0, MODULE.1, ..., at 0 or 5 volts.\n"
+      "The outputs of a model drive the wires MODULE.0, MODULE.1, ..., with 0 or 5 volts.\n"
       "Example: mpf-digital-io-server dio ipac IP_b 20 100 116 0xff 0xff --carrier ipac=model");
   app.callback([&] { kind = kindNamed(kindName); });
   if (const auto status = parseCommandLine(app, argc, argv)) return status;
-  io.pollEvery = pollMs == 0 ? kPollAsBefore : std::chrono::milliseconds(pollMs);
+  io.pollEvery = pollMs == 0 ? kDefaultPoll : std::chrono::milliseconds(pollMs);
   io.rising |= both;
   io.falling |= both;
   return std::nullopt;

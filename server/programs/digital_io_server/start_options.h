@@ -17,10 +17,10 @@ struct DigitalIoStartOptions {
   DigitalIoOptions io;
   const DigitalIoKind* kind = nullptr;  // of a model; never null after parse()
   InputWires inputs;                    // of a model
-  int maxClients = 0;                   // of old command lines; nothing follows from it
+  int maxClients = 0;                   // of old command lines; ignored
   ServerArguments arguments;
 
-  // The exit status when the program shall end: --help, or a line that is wrong.
+  // Returns the exit status when the program is to exit: after --help or a usage error.
   std::optional<int> parse(int argc, char** argv, Hardware& hardware);
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// tryAnswerBits(): cmdReadBits and cmdReadBits16 of include/mpf/digital_io_commands.h, which all
-// servers of digital lines have.
+// tryAnswerBits(): the commands cmdReadBits and cmdReadBits16 of include/mpf/digital_io_commands.h,
+// for all servers of digital lines.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,8 @@ namespace mpf {
   return cmd == digital::cmdReadBits || cmd == digital::cmdReadBits16;
 }
 
-// Puts what the request asks for of `bits` into its value. False: it cannot be asked.
+// Sets the value of the request to the bits that it requests. Returns false when `extra` is
+// invalid.
 [[nodiscard]] inline bool tryAnswerBits(Int32& request, std::int32_t cmd,
                                         std::uint32_t bits) noexcept {
   const auto mask = static_cast<std::uint32_t>(request.address);

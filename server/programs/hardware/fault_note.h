@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// FaultNote: counts the faults of a module for `mpf msr`, and says on stderr when they begin and
-// end; not each, for there may be thousands.
+// FaultNote: counts the faults of a module as alarms, and logs when a series of faults begins and
+// ends. It does not log each fault: there may be thousands.
 //
 // Threads  one.
 #pragma once
@@ -18,7 +18,7 @@ class FaultNote {
   // Both must outlive this.
   FaultNote(MessageServer& server, const ServerLog& log) : server_(server), log_(log) {}
 
-  // What happened once and is over.
+  // Counts and logs a fault that is already over.
   void alarm(const char* what) {
     server_.countAlarm();
     log_->warn("{}", what);

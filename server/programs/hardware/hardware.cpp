@@ -17,12 +17,12 @@
 namespace mpf {
 namespace {
 
-constexpr std::chrono::milliseconds kLookAgain{500};
+constexpr std::chrono::milliseconds kRetryEvery{500};
 
-std::string notSaid(const std::string& carrier) {
+std::string unknownCarrier(const std::string& carrier) {
   return fmt::format(
-      "nothing says what carrier \"{0}\" is; use --carrier {0}=KIND[:PARAMETERS], of which there "
-      "are:\n{1}",
+      "carrier \"{0}\" is not defined; use --carrier {0}=KIND[:PARAMETERS] with one of these "
+      "kinds:\n{1}",
       carrier, carrierKinds());
 }
 
@@ -30,8 +30,8 @@ std::string notSaid(const std::string& carrier) {
 
 void ModulePlace::addTo(CLI::App& app, const std::string& aboutName) {
   app.add_option("module", name, aboutName)->required();
-  app.add_option("carrier", carrier, "Name of the carrier that it is on")->required();
-  app.add_option("site", site, "Its place there: IP_a, IP_b, ...")->required();
+  app.add_option("carrier", carrier, "Name of the carrier board that holds the module")->required();
+  app.add_option("site", site, "Site of the module on the carrier: IP_a, IP_b, ...")->required();
 }
 
 void Hardware::addTo(CLI::App& app) {
@@ -41,22 +41,22 @@ void Hardware::addTo(CLI::App& app) {
            for (const auto& option : options) {
              const auto equals = option.find('=');
              if (equals == 0 || equals == std::string::npos)
-               throw CLI::ValidationError("--carrier",
-                                          "\"" + option + "\" is no NAME=KIND[:PARAMETERS]");
+               throw CLI::ValidationError(
+                   "--carrier", "\"" + option + "\" does not have the form NAME=KIND[:PARAMETERS]");
              kinds_[option.substr(0, equals)] = option.substr(equals + 1);
            }
          },
-         "What a carrier is, NAME=KIND[:PARAMETERS]; kinds:\n" + carrierKinds())
+         "Defines a carrier, NAME=KIND[:PARAMETERS]; kinds:\n" + carrierKinds())
       ->allow_extra_args(false)
       ->type_name("NAME=KIND");
-  app.add_flag("--wait", waits_, "Start even if the board is not there, and wait for it");
-  app.add_option(
-         "--wires", wiresPath_,
-         "File by which models of several programs are wired to each other; the first one makes it")
+  app.add_flag("--wait", waits_, "Start even if the board is missing, and wait for it");
+  app.add_option("--wires", wiresPath_,
+                 "File that connects the models of several programs; the first program creates it")
       ->type_name("FILE");
-  app.add_option("--real-time", priority_,
-                 "Real-time priority of the threads that serve interrupts, where the user may have "
-                 "it; 0: none")
+  app.add_option(
+         "--real-time", priority_,
+         "Real-time priority of the threads that serve interrupts, if the user may have it; "
+         "0: ordinary priority")
       ->type_name("N")
       ->check(CLI::Range(0, 99))
       ->capture_default_str();
@@ -76,18 +76,18 @@ IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& k
 IndustryPackModule* Hardware::open(const ModulePlace& place, const ModuleKind& kind,
                                    const MakeModel& makeModel, const ServerLog& log,
                                    StopBell& stop) {
-  static_cast<void>(wires());  // a file that is none of wires is not what to wait for
-  for (std::string said;;) {
+  static_cast<void>(wires());  // an invalid file is an error, even with --wait
+  for (std::string logged;;) {
     try {
       return &openNow(place, kind, makeModel, log);
     } catch (const std::invalid_argument&) {
-      throw;  // time does not mend it
+      throw;  // waiting does not help
     } catch (const std::runtime_error& error) {
       if (!waits_ || isForGood(error)) throw;
-      if (std::exchange(said, error.what()) != error.what())
-        log->warn("the board is not there yet: {}", error.what());
+      if (std::exchange(logged, error.what()) != error.what())
+        log->warn("waiting for the board: {}", error.what());
     }
-    if (stop.wait(kLookAgain)) return nullptr;
+    if (stop.wait(kRetryEvery)) return nullptr;
   }
 }
 
@@ -110,13 +110,13 @@ IndustryPackModule& Hardware::openNow(const ModulePlace& place, const ModuleKind
 
 void Hardware::logPriority(const ServerLog& log) const {
   if (priority_ == 0) {
-    log->info("interrupts are served at ordinary priority, as --real-time 0 says");
+    log->info("interrupts are served at ordinary priority (--real-time 0)");
   } else if (RealTimePriority::isAllowed(priority_)) {
     log->info("interrupts are served at real-time priority {}", priority_);
   } else {
     log->info(
         "interrupts are served at ordinary priority: this user may not have real-time priority {}; "
-        "mpf doctor says what helps",
+        "`mpf doctor` shows how to allow it",
         priority_);
   }
 }
@@ -124,9 +124,9 @@ void Hardware::logPriority(const ServerLog& log) const {
 void Hardware::createCarrierOf(const ModulePlace& place, const ServerLog& log) {
   const auto names = carriers_.names();
   if (std::find(names.begin(), names.end(), place.carrier) != names.end()) return;
-  const auto said = kinds_.find(place.carrier);
-  if (said == kinds_.end()) throw std::invalid_argument(notSaid(place.carrier));
-  const auto& text = said->second;
+  const auto kind = kinds_.find(place.carrier);
+  if (kind == kinds_.end()) throw std::invalid_argument(unknownCarrier(place.carrier));
+  const auto& text = kind->second;
   const auto colon = text.find(':');
   carriers_.add(place.carrier,
                 createCarrier(text.substr(0, colon),
@@ -148,7 +148,7 @@ int runServer(MessageServer& server, const IndustryPackModule& module, const Ser
   log->info(R"(serving the {} at {} as "{}" at location {})", module.kind().name, module.where(),
             server.getName(), server.location());
   const auto status = server.runUntilSignal();
-  log->info("ends");
+  log->info("stopped");
   return status;
 }
 

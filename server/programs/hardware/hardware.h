@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: MIT
-// Hardware: what all programs that drive Industry Pack modules have: carriers on the command line,
-// modules on them, and waiting for both.
+// Hardware: the carriers and modules of a program that drives Industry Pack modules: it reads them
+// from the command line, opens them, and waits for missing ones.
 //
 //   mpf-dac128v-server dac ipac IP_a --carrier ipac=tpci200:0000:03:00.0
 //   mpf-dac128v-server dac ipac IP_a --carrier ipac=model
 //
 //   Hardware hardware;
-//   hardware.addTo(app);                              // --carrier NAME=KIND[:PARAMETERS], --wait,
-//   --wires FILE, --real-time N ... parse ... auto* const module = hardware.open({"dac", "ipac",
-//   "IP_a"}, kDac128v, [] { return std::make_unique<Dac128vModel>(); }, log); if (module ==
-//   nullptr) return 0;                  // told to stop while it waited ... return
-//   runServer(server, *module, log);
+//   hardware.addTo(app);  // --carrier NAME=KIND[:PARAMETERS] --wait --wires FILE --real-time N
+//   ... parse ...
+//   auto* const module = hardware.open({"dac", "ipac", "IP_a"}, kDac128v,
+//                                      [] { return std::make_unique<Dac128vModel>(); }, log);
+//   if (module == nullptr) return 0;  // stopped while it waited
+//   ...
+//   return runServer(server, *module, log);
 //
-// Threads  one at a time: the program's main thread at start, or later whoever opens what was not
-//          there.
+// Threads  one at a time: the main thread of the program at start, later a thread that opens a
+//          module that was missing.
 #pragma once
 
 #include <functional>
@@ -45,7 +47,8 @@ struct ModulePlace {
   std::string carrier;
   std::string site;
 
-  // Adds them as arguments; `aboutName` says what the name is for. `app` must not outlive this.
+  // Adds them as arguments. `app` must not outlive this.
+  //   aboutName  the help text of the name
   void addTo(CLI::App& app, const std::string& aboutName);
 };
 
@@ -57,33 +60,34 @@ class Hardware {
 
   // Adds the options; `app` must not outlive this.
   void addTo(CLI::App& app);
-  // The module at `place`, and its carrier first if that is not there yet; on a carrier of models
-  // it is plugged in first. With --wait it waits for both, and says what for whenever that changes;
-  // null: SIGINT or SIGTERM came meanwhile.
+  // Returns the module at `place`. Creates its carrier before if necessary; plugs the module in
+  // before if the carrier is one of models. With --wait it waits for both, and logs the reason
+  // whenever it changes. Returns null when SIGINT or SIGTERM arrived while it waited.
   //   throws  what wires(), createCarrier() and IndustryPackModules::create() throw;
-  //           std::invalid_argument when no option says what the carrier is
+  //           std::invalid_argument when no option defines the carrier
   [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind,
                                          const MakeModel& makeModel, const ServerLog& log);
-  // The same for a program that has begun to serve: null as well when `stop` has rung before.
+  // The same for a program that already serves: returns null as well when `stop` has rung before.
   [[nodiscard]] IndustryPackModule* open(const ModulePlace& place, const ModuleKind& kind,
                                          const MakeModel& makeModel, const ServerLog& log,
                                          StopBell& stop);
 
   // As open() without --wait.
-  //   throws  in addition what isForGood() is for
+  //   throws  also the errors that --wait would wait for
   [[nodiscard]] IndustryPackModule& openNow(const ModulePlace& place, const ModuleKind& kind,
                                             const MakeModel& makeModel, const ServerLog& log);
-  // Wrong parameters and a bus that this host does not have: what is no use to wait for.
+  // True for errors that waiting does not mend: wrong parameters, a bus that this host does not
+  // have.
   [[nodiscard]] static bool isForGood(const std::runtime_error& error);
 
-  // Says at which priority the interrupts of modules are served, for a driver that has interrupts.
+  // Logs the priority at which the interrupts of modules are served, for drivers with interrupts.
   void logPriority(const ServerLog& log) const;
 
   // --wait
   [[nodiscard]] bool waits() const noexcept { return waits_; }
   [[nodiscard]] IndustryPackModules& modules() noexcept { return modules_; }
 
-  // What models of other processes are wired to; null without --wires. It outlives the models.
+  // The wires between models of several processes; null without --wires. They outlive the models.
   //   throws  as ModelWires
   [[nodiscard]] ModelWires* wires();
 
@@ -100,8 +104,8 @@ class Hardware {
   IndustryPackModules modules_;
 };
 
-// Says that `server` serves `module`, and serves it until SIGINT or SIGTERM. Returns the exit
-// status of the program.
+// Logs what `server` serves, and serves until SIGINT or SIGTERM. Returns the exit status of the
+// program.
 [[nodiscard]] int runServer(MessageServer& server, const IndustryPackModule& module,
                             const ServerLog& log);
 

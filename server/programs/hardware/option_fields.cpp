@@ -37,7 +37,7 @@ int OptionFields::number(const char* what) {
   const auto* const end = text.data() + text.size();
   const auto [last, error] = std::from_chars(text.data(), end, value);
   if (error != std::errc() || last != end)
-    complain(fmt::format("{} \"{}\" is no number", what, text));
+    complain(fmt::format("{} \"{}\" is not a whole number", what, text));
   return value;
 }
 
@@ -49,19 +49,19 @@ int OptionFields::number(const char* what, int otherwise) {
 
 char OptionFields::letter(const char* what, char otherwise) {
   const auto text = word(what, std::string_view(&otherwise, 1));
-  if (text.size() != 1) complain(fmt::format("{} \"{}\" is no letter", what, text));
+  if (text.size() != 1) complain(fmt::format("{} \"{}\" is not one letter", what, text));
   return text[0];
 }
 
 int OptionFields::queueSize() {
-  const int size = number("queue size", kQueueSizeAsBefore);
+  const int size = number("queue size", kDefaultQueueSize);
   constexpr int kMost = LinkGeometry::kMaxQueueSize;
   if (size < 1 || size > kMost) complain(fmt::format("queue size {}: use 1 to {}", size, kMost));
   return size;
 }
 
 void OptionFields::end() const {
-  if (next_ < words_.size()) complain(fmt::format("\"{}\" is too much", words_[next_]));
+  if (next_ < words_.size()) complain(fmt::format("unexpected field \"{}\"", words_[next_]));
 }
 
 void OptionFields::complain(const std::string& why) const {

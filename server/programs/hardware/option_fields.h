@@ -1,15 +1,14 @@
-// SPDX-License-Identifier: MIT
-// OptionFields: the value of an option that says several things, "a-Ip330Scan,0,15,100,20": they
-// are taken one after the other.
+// SPDX-License-Identifier: MIT OptionFields: the value of an option with several fields,
+// "a-Ip330Scan,0,15,100,20", which are read one after the other.
 //
-//   addWords(app, "--scan", "NAME[,FIRST[,QUEUE]]", "A server of means", [this](Words& words) {
+//   addWords(app, "--scan", "NAME[,FIRST[,QUEUE]]", "Adds a scan server", [this](auto& words) {
 //     auto name = words.word("name");
 //     const int first = words.number("first channel", 0);
 //     scans.push_back({name, first, words.queueSize()});
 //   });
 //
-// A word that is left out, or empty, has its default where there is one. All complaints are
-// CLI::ValidationErrors that name the option, its value and what is wrong with it.
+// A field that is missing or empty has its default, if it has one. Errors are CLI::ValidationErrors
+// that name the option, its value and the problem.
 //
 // Threads  the program's main thread, at start.
 #pragma once
@@ -28,20 +27,22 @@ namespace mpf {
 
 class OptionFields {
  public:
-  static constexpr int kQueueSizeAsBefore = 20;
+  static constexpr int kDefaultQueueSize = 20;
 
   OptionFields(std::string option, const std::string& text);
 
-  // The next one. `what` it is, for complaints.
+  // The next field. Each function throws when the field is missing without a default, or invalid.
+  //   what  the meaning of the field, for the error message
   [[nodiscard]] std::string word(const char* what);
   [[nodiscard]] std::string word(const char* what, std::string_view otherwise);
   [[nodiscard]] int number(const char* what);
   [[nodiscard]] int number(const char* what, int otherwise);
   [[nodiscard]] char letter(const char* what, char otherwise);
-  // As many requests of one client may wait.
+  // Requests of one client that may wait.
   [[nodiscard]] int queueSize();
-  // Complains about what has not been taken.
+  // Throws when fields are left.
   void end() const;
+  // Throws CLI::ValidationError.
   [[noreturn]] void complain(const std::string& why) const;
 
  private:
@@ -52,7 +53,7 @@ class OptionFields {
   std::size_t next_ = 0;
 };
 
-// Adds an option that may be given more than once; `take` takes the words of one. `app` must not
+// Adds an option that may be given more than once; `take` reads the fields of each. `app` must not
 // outlive what `take` refers to.
 //   form  "NAME[,FIRST[,LAST]]", for --help
 CLI::Option* addWords(CLI::App& app, const std::string& option, const char* form, const char* help,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// answerOtherTypes(): a reply is owed for every request, one of a type that the server does not
-// speak included.
+// answerOtherTypes(): replies to requests of the types that a server does not handle.
 #pragma once
 
 #include <concepts>
@@ -15,10 +14,10 @@ namespace mpf {
 template <class T>
 concept HasStatus = std::same_as<decltype(T::status), std::int32_t>;
 
-// Requests of all types but `Known` come back with status -1. A SerialConfig, which has none, is
-// answered with an Int32, as serial servers do; other types without a status are refused, as any
-// server does.
-//   note  runs for each of them, on the server's thread
+// Sets handlers for all types except `Known`, which reply with status -1. The reply to a
+// SerialConfig, which has no status, is an Int32, as for serial servers. Other types without a
+// status have no handler, so the server refuses them.
+//   note  called with the type of each such request, on the server's thread
 template <class... Known, class Note>
 void answerOtherTypes(MessageServer& server, Note note) {
   const auto answer = [&]<class T>(std::type_identity<T>) {

@@ -15,7 +15,7 @@ void InputWires::addTo(CLI::App& app, int highest) {
          [this, highest](const std::vector<std::string>& texts) {
            for (const auto& text : texts) add(text, highest);
          },
-         "A model's input that follows a wire, BIT=WIRE; as often as needed")
+         "Connects an input of a model to a wire, BIT=WIRE; may be repeated")
       ->allow_extra_args(false)
       ->needs("--wires")
       ->type_name("BIT=WIRE");
@@ -29,7 +29,8 @@ void InputWires::add(const std::string& text, int highest) {
   if (equals == std::string::npos || error != std::errc() || rest != end || bit < 0 ||
       bit > highest)
     throw CLI::ValidationError(
-        "--input", fmt::format("\"{}\" is no BIT=WIRE with a bit of 0 to {}", text, highest));
+        "--input", fmt::format("\"{}\" does not have the form BIT=WIRE with a bit from 0 to {}",
+                               text, highest));
   wires_[bit] = text.substr(equals + 1);
 }
 

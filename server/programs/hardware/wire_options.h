@@ -1,14 +1,13 @@
-// SPDX-License-Identifier: MIT
-// What digital and analog models of all programs have alike on wires: outputs that drive them,
-// inputs that follow them (--input BIT=WIRE).
+// SPDX-License-Identifier: MIT InputWires, wireOutputs(): connect models to wires: inputs follow
+// wires (--input BIT=WIRE), outputs drive them.
 //
-//   InputWires inputs;                                  // of the command line
+//   InputWires inputs;
 //   inputs.addTo(app, 31);
 //   ... parse, with Hardware::addTo() before ...
 //   inputs.connect(*model, hardware.wires());
 //   ... make_unique<Dac128vModel>(ranges, wireOutputs(hardware.wires(), "dac", 8));
 //
-// Threads  the program's main thread, at start; what is returned from any.
+// Threads  the main thread of the program, at start; any thread may call the returned function.
 #pragma once
 
 #include <functional>
@@ -29,8 +28,8 @@ class InputWires {
   // this.
   void addTo(CLI::App& app, int highest);
 
-  // Model has connect(int bit, callable that returns volts). `wires` is not null if the command
-  // line was right, and outlives `model`.
+  // Connects the inputs of `model`, which has connect(int bit, callable that returns volts).
+  // `wires` outlives `model`; it is not null, because --input requires --wires.
   template <class Model>
   void connect(Model& model, ModelWires* wires) const {
     for (const auto& [bit, name] : wires_)
@@ -42,8 +41,8 @@ class InputWires {
   std::map<int, std::string> wires_;  // by bit
 };
 
-// Told what outputs 0 to `count` - 1 of a model give, in volts, it sets the wires "<module>.0",
-// ...; empty when `wires` is null.
+// Returns a function that sets the wires "<module>.0" to "<module>.<count - 1>" to the voltages of
+// a model's outputs; an empty function when `wires` is null.
 [[nodiscard]] std::function<void(int output, double volts)> wireOutputs(ModelWires* wires,
                                                                         const std::string& module,
                                                                         int count);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dac128vOutput: a channel of a DAC128V as what a feedback drives.
+// Dac128vOutput: a channel of a DAC128V as the output of a feedback loop.
 #pragma once
 
 #include <algorithm>

@@ -13,7 +13,7 @@
 namespace mpf {
 namespace {
 
-// The output goes when the feedback that drives it is gone.
+// A feedback loop with its output, which is destroyed after it.
 struct DrivenPid {
   DrivenPid(Ip330& board, int channel, Dac128v& dac, int dacChannel, Ip330Faults::Hook hook)
       : output(dac, dacChannel),
@@ -40,7 +40,7 @@ Ip330Servers::~Ip330Servers() {
     unit->server->interrupt();
     unit->thread.join();
   }
-  for (const auto& unit : units_) {  // a feedback that ends here may still want to say something
+  for (const auto& unit : units_) {  // a feedback loop may call note() until it is destroyed
     unit->logic.reset();
     unit->device.reset();
   }
@@ -63,7 +63,8 @@ Ip330Servers::Unit& Ip330Servers::addUnit(const std::string& name, int queueSize
   units_.push_back(std::move(unit));
   const std::lock_guard lock(mutex_);
   alarmed_.push_back(units_.back()->server.get());
-  if (!board_->problem().empty()) units_.back()->server->countAlarm();  // it came before
+  // Counts a problem that the board reported before this server existed.
+  if (!board_->problem().empty()) units_.back()->server->countAlarm();
   return *units_.back();
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Ip330Servers: all servers over one board, each on a thread of its own, and the board.
+// Ip330Servers: a board and all its servers, each on its own thread.
 //
 //   scan, config, sweep, PID servers ──► Ip330Scan, Ip330Sweep, Ip330Pid ──► Ip330 ──► registers
 //                                                              └──► a DAC128V
 //   faults of the boards ──► stderr, and an alarm of every server
 //
-// Threads  add...() by one, at start. Then each server has its own, and the board its two.
+// Threads  one thread calls add...(), at start. Each server has a thread, and the board has two.
 #pragma once
 
 #include <functional>
@@ -27,14 +27,14 @@ namespace mpf {
 class Ip330Servers {
  public:
   // `backplane`, `module` and `log` must outlive this.
-  //   options  of each server, but for the length of its queue
-  //   failed   called by the thread of a server that cannot go on, after the log was told
+  //   options  of each server, except for the length of its queue
+  //   failed   called by the thread of a server that has failed, after it has logged the error
   //   throws   as Ip330
   Ip330Servers(
       const Backplane& backplane, const ServerOptions& options, IndustryPackModule& module,
       const Ip330Settings& settings, const ServerLog& log, const Ip330Limits& limits = {},
       std::function<void()> failed = [] {});
-  // Requests that wait for a sample get status -1; the board does not scan any more.
+  // Stops the servers and the board. Requests that wait for a sample get status -1.
   ~Ip330Servers();
   Ip330Servers(const Ip330Servers&) = delete;
   Ip330Servers& operator=(const Ip330Servers&) = delete;
@@ -50,16 +50,16 @@ class Ip330Servers {
   // `dac` must outlive this.
   void addPid(const std::string& name, int queueSize, int channel, Dac128v& dac, int dacChannel);
 
-  // The names of all, for people: "a", "b", "c"
+  // The names of all servers, for messages to people: "a", "b", "c".
   [[nodiscard]] std::string names() const;
 
  private:
-  // A server, what it serves from, its thread.
+  // A server with its device and its thread.
   struct Unit {
     std::shared_ptr<void> device;  // Ip330Scan, ...
     std::unique_ptr<MessageServer> server;
     std::shared_ptr<void> logic;  // Ip330ScanServer, ...
-    std::function<void()> stop;  // ends what its thread waits for
+    std::function<void()> stop;  // ends a wait of the thread for the device
     ServingThread thread;
   };
 
@@ -71,8 +71,8 @@ class Ip330Servers {
   const ServerOptions options_;
   const ServerLog& log_;
   const std::function<void()> failed_;
-  std::mutex mutex_;  // of the next one: faults come from the boards' threads
-  std::vector<MessageServer*> alarmed_;
+  std::mutex mutex_;
+  std::vector<MessageServer*> alarmed_;  // under mutex_: the board's threads report faults
   std::unique_ptr<Ip330> board_;
   std::vector<std::unique_ptr<Unit>> units_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-ip330-server: one Acromag IP330, all servers over it, one process. The old commands: --help.
+// mpf-ip330-server: all servers of one Acromag IP330. --help shows the old commands.
 #include <cstdio>
 #include <fmt/format.h>
 #include <map>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kProgram = "mpf-ip330-server";
 
-// A converter with errors as real ones have them, which calibration takes away.
+// Creates a model with the typical errors of a real converter, which calibration corrects.
 std::unique_ptr<mpf::Ip330Model> makeAdc(const mpf::Ip330StartOptions& options,
                                          mpf::ModelWires* wires) {
   auto model = std::make_unique<mpf::Ip330Model>(
@@ -51,7 +51,7 @@ void addServers(mpf::Ip330Servers& servers, const mpf::Ip330StartOptions& option
     servers.addSweep(sweep.name, sweep.queueSize, sweep.first, sweep.last, sweep.maxPoints);
 }
 
-// False: told to stop while it waited for one of them.
+// Returns false when it was stopped while it waited for a module.
 bool openDacs(mpf::Hardware& hardware, const mpf::Ip330StartOptions& options,
               const mpf::ServerLog& log, mpf::StopBell& stop,
               std::map<std::string, mpf::Dac128v>& dacs) {
@@ -91,13 +91,13 @@ int serve(int argc, char** argv) {
                             {}, [&] { failure.report(); });
   addServers(servers, options);
   if (!servers.names().empty()) describe(servers, servers.board(), *module, log);
-  if (openDacs(hardware, options, log, stop, dacs)) {  // those above do not wait for them
+  if (openDacs(hardware, options, log, stop, dacs)) {  // the other servers already serve
     for (const auto& pid : options.pids)
       servers.addPid(pid.name, pid.queueSize, pid.channel, dacs.at(pid.dac), pid.dacChannel);
     if (!options.pids.empty()) describe(servers, servers.board(), *module, log);
     stop.wait();
   }
-  log->info("ends");
+  log->info("stopped");
   return failure.exitStatus();
 }
 

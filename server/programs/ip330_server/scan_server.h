@@ -1,8 +1,7 @@
-// SPDX-License-Identifier: MIT
-// Ip330ScanServer: means of channels for clients (manual, "ip330Scan"); Ip330ConfigServer: how the
-// board scans and calibrates.
+// SPDX-License-Identifier: MIT Ip330ScanServer: mean values of channels (manual, "ip330Scan").
+// Ip330ConfigServer: the scan mode and the calibration of the board.
 //
-// Threads  one each: the server's.
+// Threads  the thread of its server.
 #pragma once
 
 #include <chrono>
@@ -16,8 +15,8 @@ namespace mpf {
 
 class Ip330ScanServer {
  public:
-  // Answers every request of `server`. All that is passed must outlive this.
-  //   average  for requests that do not say; 0: since the last such reading
+  // Handles every request of `server`. The arguments must outlive this object.
+  //   average  averaging time of requests without one; 0: since the last such request
   Ip330ScanServer(MessageServer& server, Ip330Scan& scan, std::chrono::milliseconds average,
                   const ServerLog& log);
 

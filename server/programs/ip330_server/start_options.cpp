@@ -49,11 +49,11 @@ void Ip330StartOptions::addBoard(CLI::App& app) {
   place.addTo(app, "Name of the module");
   app.add_option("type", type_, "Inputs: D (differential) or S (single ended)")
       ->capture_default_str();
-  app.add_option("range", range_, "What the DIP switches say: -5to5, -10to10, 0to5 or 0to10")
+  app.add_option("range", range_, "Range of the DIP switches: -5to5, -10to10, 0to5 or 0to10")
       ->capture_default_str();
   app.add_option("first", settings.firstChannel, "First channel")->capture_default_str();
   app.add_option("last", settings.lastChannel, "Last channel")->capture_default_str();
-  app.add_option("maxclients", settings.maxClients, "Scan, sweep and PID servers that there may be")
+  app.add_option("maxclients", settings.maxClients, "Highest number of scan, sweep and PID servers")
       ->capture_default_str();
   app.add_option("vector", settings.vector, "Interrupt vector")->capture_default_str();
   app.add_option("--scan-mode", scanMode_,
@@ -63,13 +63,13 @@ void Ip330StartOptions::addBoard(CLI::App& app) {
   app.add_option("--trigger", trigger_, "Direction of the external trigger: Input or Output")
       ->capture_default_str();
   app.add_option("--us-per-scan", settings.microsecondsPerScan,
-                 "Time from scan to scan of all channels [us]")
+                 "Time from one scan of all channels to the next [us]")
       ->capture_default_str();
   app.add_option("--seconds-between-calibrate", settings.secondsBetweenCalibrate,
-                 "0: once; -1: never, values are raw")
+                 "Time between calibrations [s]; 0: once, at start; -1: never, values are raw")
       ->capture_default_str();
   app.add_option("--signal", signals,
-                 "What is on a model's inputs: CHANNEL=dc:VOLTS, "
+                 "Signals at the inputs of a model: CHANNEL=dc:VOLTS, "
                  "CHANNEL=sine:HERTZ:VOLTS[:OFFSET], CHANNEL=wire:NAME, ...")
       ->type_name("TEXT");
 }
@@ -77,7 +77,8 @@ void Ip330StartOptions::addBoard(CLI::App& app) {
 void Ip330StartOptions::addServers(CLI::App& app) {
   addWords(
       app, "--scan", "NAME[,FIRST,LAST[,MS[,QUEUE]]]",
-      "A server of means; MS: averaging time of requests that do not say, 0: since the last",
+      "Adds a server of mean values; MS: averaging time of requests without one, 0: since the last "
+      "request",
       [this](OptionFields& words) {
         auto name = words.word("name");
         const int first =
@@ -88,12 +89,12 @@ void Ip330StartOptions::addServers(CLI::App& app) {
         const int average = notNegative(words, "averaging time", words.number("averaging time", 0));
         scans.push_back({std::move(name), first, last, average, words.queueSize()});
       });
-  addWords(app, "--config", "NAME[,QUEUE]", "A server for calibration and scan mode",
+  addWords(app, "--config", "NAME[,QUEUE]", "Adds a server for calibration and scan mode",
            [this](OptionFields& words) {
              auto name = words.word("name");
              configs.push_back({std::move(name), words.queueSize()});
            });
-  addWords(app, "--sweep", "NAME,FIRST,LAST,POINTS[,QUEUE]", "A server of arrays over time",
+  addWords(app, "--sweep", "NAME,FIRST,LAST,POINTS[,QUEUE]", "Adds a server of arrays over time",
            [this](OptionFields& words) {
              auto name = words.word("name");
              const int first = words.number("first channel");
@@ -103,18 +104,20 @@ void Ip330StartOptions::addServers(CLI::App& app) {
            });
   addWords(
       app, "--pid", "NAME,CHANNEL,DAC,DACCHANNEL[,QUEUE]",
-      "A server of fast feedback from a channel to that of a --dac", [this](OptionFields& words) {
+      "Adds a server of fast feedback from a channel to a channel of a --dac",
+      [this](OptionFields& words) {
         auto name = words.word("name");
         const int channel = words.number("channel");
         auto dac = words.word("name of the DAC");
         const int dacChannel = words.number("DAC channel");
         pids.push_back({std::move(name), channel, std::move(dac), dacChannel, words.queueSize()});
       });
-  addWords(app, "--dac", "MODULE,CARRIER,SITE", "A DAC128V for --pid", [this](OptionFields& words) {
-    auto name = words.word("module");
-    auto carrier = words.word("carrier");
-    dacs.push_back({std::move(name), std::move(carrier), words.word("site")});
-  });
+  addWords(app, "--dac", "MODULE,CARRIER,SITE", "Opens a DAC128V for --pid",
+           [this](OptionFields& words) {
+             auto name = words.word("module");
+             auto carrier = words.word("carrier");
+             dacs.push_back({std::move(name), std::move(carrier), words.word("site")});
+           });
 }
 
 void Ip330StartOptions::takeAll() {
@@ -126,7 +129,8 @@ void Ip330StartOptions::takeAll() {
     throw std::invalid_argument(problem);
   for (const auto& pid : pids) {
     if (std::ranges::none_of(dacs, [&](const ModulePlace& dac) { return dac.name == pid.dac; }))
-      throw std::invalid_argument(fmt::format("--pid {}: no --dac is named {}", pid.name, pid.dac));
+      throw std::invalid_argument(
+          fmt::format("--pid {}: no --dac has the name {}", pid.name, pid.dac));
     if (!settings.has(pid.channel))
       throw std::invalid_argument(fmt::format("--pid {}: channel {}: the board scans {} to {}",
                                               pid.name, pid.channel, settings.firstChannel,
@@ -156,8 +160,8 @@ std::optional<int> Ip330StartOptions::parse(int argc, char** argv, Hardware& har
   }
   if (scans.empty() && configs.empty() && sweeps.empty() && pids.empty()) {
     scans.push_back({place.name, settings.firstChannel, settings.lastChannel, 0,
-                     OptionFields::kQueueSizeAsBefore});
-    configs.push_back({place.name + "Config", OptionFields::kQueueSizeAsBefore});
+                     OptionFields::kDefaultQueueSize});
+    configs.push_back({place.name + "Config", OptionFields::kDefaultQueueSize});
   }
   return std::nullopt;
 }

@@ -46,13 +46,13 @@ struct Ip330StartOptions {
   std::string signals;  // as parseIp330Signals()
   ServerArguments arguments;
 
-  // The exit status when the program shall end: --help, or a line that is wrong.
+  // Returns the exit status when the program is to exit: after --help or a usage error.
   std::optional<int> parse(int argc, char** argv, Hardware& hardware);
 
  private:
   void addBoard(CLI::App& app);
   void addServers(CLI::App& app);
-  // What the texts below say. Throws std::invalid_argument.
+  // Converts the texts below into settings. Throws std::invalid_argument.
   void takeAll();
 
   std::string type_ = "S";

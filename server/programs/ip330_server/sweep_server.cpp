@@ -21,7 +21,7 @@ void answer(MessageServer& server, Float64Message&& request, bool isGood) {
   static_cast<void>(server.reply(std::move(request)));
 }
 
-// A reply with an array. False: it is larger than a message of this server may be.
+// Sends a reply with an array. Returns false when it is too large for a message of this server.
 //   throws  std::bad_alloc
 template <class Array, class Value>
 [[nodiscard]] bool sendArray(MessageServer& server, const Float64Message& request,
@@ -36,14 +36,14 @@ template <class Array, class Value>
   return result != ReplyResult::tooLarge && result != ReplyResult::noMemory;
 }
 
-// What `send` sends, or `request` with status -1 when that cannot be.
+// Calls `send`; replies with status -1 when it cannot send its reply.
 template <class Send>
 void answerBy(MessageServer& server, Float64Message&& request, Send send) {
   bool isSent = false;
   try {
     isSent = send(request);
   } catch (const std::bad_alloc&) {
-    isSent = false;  // as when it is too large
+    isSent = false;  // handled as a reply that is too large
   }
   if (!isSent) answer(server, std::move(request), false);
 }

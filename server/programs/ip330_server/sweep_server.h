@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Ip330SweepServer: a digitiser for clients that speak to an MCA; Ip330PidServer: fast feedback for
-// those of an EPID record. Their commands: include/mpf/ip330_commands.h.
+// Ip330SweepServer: a digitiser, for clients of the mca record. Ip330PidServer: fast feedback, for
+// clients of the epid record. Their commands are in include/mpf/ip330_commands.h.
 //
-// Threads  one each: the server's.
+// Threads  the thread of its server.
 #pragma once
 
 #include <mpf/message_server.h>
@@ -15,7 +15,7 @@ namespace mpf {
 
 class Ip330SweepServer {
  public:
-  // Answers every request of `server`. All that is passed must outlive this.
+  // Handles every request of `server`. The arguments must outlive this object.
   Ip330SweepServer(MessageServer& server, Ip330& board, Ip330Sweep& sweep, const ServerLog& log);
 
  private:

@@ -22,12 +22,12 @@ void Ip440Server::handle(Int32& shared) {
 
 bool Ip440Server::tryAnswer(Int32& request) {
   if (!isReadRequest(request.cmd)) {
-    log_->debug("there is no cmd {}", request.cmd);
+    log_->debug("unknown cmd {}: status -1", request.cmd);
     return false;
   }
   const auto bits = inputs_.tryRead();
   if (!bits) {
-    faults_.fault("nothing answers, or another module does");
+    faults_.fault("the module does not respond, or another module is in its site");
     return false;
   }
   faults_.success();

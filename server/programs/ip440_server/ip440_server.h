@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Ip440Server: clients read the inputs of an IP440, as include/mpf/digital_io_commands.h has it.
+// Ip440Server: reads the inputs of an IP440 for clients, as described in
+// include/mpf/digital_io_commands.h.
 //
 //   client                                   server
 //     Int32 cmdReadBits   address=mask ──►
 //           cmdReadBits16 address=mask extra=lowest bit ──►
-//                                        ◄── the same with status 0 and value=bits; or -1: there is no such cmd, or the module is gone
+//                                        ◄── the same with status 0 and value=bits,
+//                                            or status -1: unknown cmd, or the module fails
 //
-// Threads  one: the server's.
+// Threads  the thread of the server.
 #pragma once
 
 #include <mpf/message_server.h>
@@ -19,7 +21,7 @@ namespace mpf {
 
 class Ip440Server {
  public:
-  // Answers every request of `server`. All that is passed must outlive this.
+  // Handles every request of `server`. The arguments must outlive this object.
   Ip440Server(MessageServer& server, Ip440& inputs, const ServerLog& log);
 
  private:

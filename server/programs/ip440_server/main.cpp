@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-ip440-server: one IP440, one server, one process.
+// mpf-ip440-server: a server for one IP440.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fmt/format.h>
@@ -28,15 +28,15 @@ struct Options {
     CLI::App app(
         "mpf-ip440-server - serves the 32 inputs of an Acromag IP440 to the clients of a backplane",
         kProgram);
-    place.addTo(app, "Name of the module, under which clients find the server, too");
+    place.addTo(app, "Name of the module and of its server");
     arguments.addQueueSizeTo(app);
     app.add_option("--inputs", inputs,
-                   "A model's inputs that are on, as 0x80000001: bit 0 is IN00");
+                   "Inputs of a model that are on, as 0x80000001: bit 0 is IN00");
     hardware.addTo(app);
     wired.addTo(app, mpf::Ip440::kInputs - 1);
     arguments.addTo(app);
     app.footer(
-        "There was no such server among the old ones: the arguments are in their style.\n"
+        "The original MPF has no such server; the arguments follow its style.\n"
         "Example: mpf-ip440-server door ipac IP_c 20 --carrier ipac=model --inputs 0x5");
     return mpf::parseCommandLine(app, argc, argv);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// LineFaults: reports the bytes that a serial line has lost and damaged, to people and to clients.
+// LineFaults: reports lost and damaged bytes of a serial line, in the log and in replies.
 //
 //   port's counters ── look() ──► one alarm for each fault
 //                            └──► a line of the log with the counts since the start
@@ -8,8 +8,8 @@
 // The log limits lines of one kind (LogLimiter). Each line has the counts since the start, so that
 // a line that stands for many others contains the sum of all faults.
 //
-// Threads  look() from any: the port's thread after each fault, the server's thread after each
-//          request. The other functions: the server's thread.
+// Threads  any thread calls look(): the port's thread after each fault, the server's thread after
+//          each request. The server's thread calls the other functions.
 #pragma once
 
 #include <cstdint>
@@ -24,22 +24,22 @@
 
 namespace mpf {
 
-// The bit of serial_server.h that says so in a reply; 0 for none.
+// The serialFault... bit of <mpf/serial_commands.h> for a fault; 0 for LineFault::none.
 [[nodiscard]] std::uint8_t faultBit(LineFault fault) noexcept;
 
 class LineFaults {
  public:
-  // Faults that happened before this are not reported. All that is passed must outlive this.
+  // Does not report earlier faults. The arguments must outlive this object.
   LineFaults(MessageServer& server, const SerialPort& port, const ServerLog& log);
   // Reports the faults since the last look().
   ~LineFaults();
   LineFaults(const LineFaults&) = delete;
   LineFaults& operator=(const LineFaults&) = delete;
 
-  // Reports the faults that the port has counted since the last time.
+  // Reports the faults that the port has counted since the last call.
   void look();
 
-  // The bits of the answer that is about to be sent; 0 at the beginning of each attempt.
+  // Sets the fault bits of the present answer; 0 at the beginning of each attempt.
   void setAnswer(std::uint8_t faults) noexcept { answer_ = faults; }
   [[nodiscard]] bool hasAnswerFaults() const noexcept { return answer_ != 0; }
   // The status of an answer that would have had `status` without its faults.

@@ -26,17 +26,17 @@ void addTime(CLI::App& app, const std::string& option, Duration& time, int least
 
 void LineLimits::addTo(CLI::App& app) {
   addTime(app, "--settle-time", settleTime, 0, kLongestMs,
-          "Silence on a line before a write-read is sent [ms]. Longer than the pause before an "
+          "Silence on a line before a write-read is sent [ms]; use more than the pause before an "
           "answer that the instrument repeats");
   addTime(app, "--quiet-time", quietTime, 0, kLongestMs,
-          "The same after an answer that was late, damaged or too long [ms]. Longer than pauses "
-          "within an answer");
+          "The same after an answer that was late, damaged or too long [ms]; use more than the "
+          "pauses within an answer");
   addTime(app, "--resync-limit", resyncLimit, 0, kLongestMs,
-          "How long after its timeout an answer may still come [ms]: nothing is sent until it has, "
-          "or this is over");
+          "How long after its timeout an answer may still arrive [ms]: nothing is sent until it "
+          "has arrived or this time has passed");
   addTime(app, "--max-timeout", maxTimeout, 1, kLongestSeconds,
-          "Longest that one request may have the line, retries included [s]");
-  app.add_option("--max-retries", maxRetries, "Most retries of one request; more are not made")
+          "Longest time that one request may use the line, including retries [s]");
+  app.add_option("--max-retries", maxRetries, "Highest number of retries of one request")
       ->check(wholeNumber(0, kMostRetries))
       ->capture_default_str();
 }

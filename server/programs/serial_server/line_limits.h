@@ -1,13 +1,12 @@
-// SPDX-License-Identifier: MIT
-// LineLimits: how long a request may have a serial line, and how long the line must be silent
-// before a write-read is sent.
+// SPDX-License-Identifier: MIT LineLimits: how long a request may use a serial line, and how long
+// the line must be silent before a write-read is sent.
 //
 //   --settle-time --quiet-time --resync-limit --max-timeout --max-retries
 //
-// A write-read with status 0 has the answer to its own question as long as the instrument keeps two
-// times: an answer that comes at all begins before the timeout of its request plus `resyncLimit`,
-// and the pauses within an answer, and between an answer and its repetition, are shorter than
-// `settleTime` (after an answer in time) or `quietTime` (after a late one).
+// The reply to a write-read with status 0 has the answer to that write-read, provided that the
+// instrument keeps two limits: each answer begins before the timeout of its request plus
+// `resyncLimit`, and the pauses within an answer, and between an answer and its repetition, are
+// shorter than `settleTime` (after an answer in time) or `quietTime` (after a late one).
 #pragma once
 
 #include <algorithm>
@@ -21,13 +20,13 @@ namespace mpf {
 
 struct LineLimits {
   std::chrono::milliseconds settleTime{5};  // silence before each write-read
-  // instead of it after an answer that was late, damaged or too long
+  // The silence instead of it, after an answer that was late, damaged or too long.
   std::chrono::milliseconds quietTime{100};
-  std::chrono::milliseconds resyncLimit{1000};  // how long an answer that was missed is waited for
-  std::chrono::seconds maxTimeout{60};  // of one request, its retries included
+  std::chrono::milliseconds resyncLimit{1000};  // longest wait for a late answer
+  std::chrono::seconds maxTimeout{60};  // of one request, including its retries
   int maxRetries = 10;
 
-  // The longest wait for a line that can be used.
+  // The longest wait until a request can be sent.
   [[nodiscard]] std::chrono::milliseconds longestSync() const {
     return resyncLimit + std::max(quietTime, settleTime);
   }

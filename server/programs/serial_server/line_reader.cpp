@@ -9,7 +9,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::chrono::milliseconds kAskEvery{20};
+constexpr std::chrono::milliseconds kCheckEvery{20};
 
 }  // namespace
 
@@ -78,7 +78,7 @@ LineReader::Sync LineReader::getInStep(bool isQuestion, Deadline until,
       phase_ = Phase::idle;
       return isLate ? Sync::noSilence : Sync::abandoned;
     }
-    answerSeen_.wait_for(lock, std::min({readyAt, until, Deadline::after(kAskEvery)}).left());
+    answerSeen_.wait_for(lock, std::min({readyAt, until, Deadline::after(kCheckEvery)}).left());
   }
 }
 
@@ -87,7 +87,7 @@ void LineReader::noteWritten() {
   sync_.written(Clock::nowNs());
 }
 
-// The reply with status "timeout" contained what had been received until then.
+// The reply with status "timeout" contained the bytes that had been received until then.
 void LineReader::dropLateAnswer() {
   continues_ = false;
   if (phase_ != Phase::collectingLate) return;
@@ -97,7 +97,7 @@ void LineReader::dropLateAnswer() {
 
 LineReader::Answer LineReader::takeAnswer() {
   const std::lock_guard lock(mutex_);
-  if (phase_ == Phase::syncing) phase_ = Phase::idle;  // the port did not even begin
+  if (phase_ == Phase::syncing) phase_ = Phase::idle;  // the port has not begun to read
   return std::exchange(answer_, {});
 }
 
@@ -141,7 +141,7 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
   if (input_.size() >= bufferBytes_) {
     if (isRead) {
       answer_.overflow = true;
-      // behind what the answer has: the next one begins with it
+      // The byte follows the answer: the next answer begins with it.
       input_.push_back(static_cast<char>(byte));
       return ByteHandlerResult::endRead;
     }
@@ -149,7 +149,7 @@ ByteHandlerResult LineReader::collect(std::uint8_t byte) {
       dropLateAnswer();
       return ByteHandlerResult::ok;
     }
-    input_.erase(0, 1);  // circular: the oldest goes
+    input_.erase(0, 1);  // circular buffer: drop the oldest byte
   }
   input_.push_back(static_cast<char>(byte));
   return isRead && completeBytes() != 0 ? ByteHandlerResult::endRead : ByteHandlerResult::ok;
@@ -165,8 +165,8 @@ ByteHandlerResult LineReader::readBegins() {
   const std::lock_guard lock(mutex_);
   if (isQuestion_ && !continues_) {
     if (!std::exchange(input_, {}).empty()) noteSurplus();
-    // The port has passed all that had arrived; some of it may have come after the silence was
-    // seen.
+    // The port has passed on all bytes that had arrived; some may have arrived after getInStep()
+    // saw the silence.
     answer_.wasDisturbed = !Deadline::atNs(sync_.readyAtNs(true)).hasPassed();
     phase_ = answer_.wasDisturbed ? Phase::idle : Phase::armed;
     return answer_.wasDisturbed ? ByteHandlerResult::error : ByteHandlerResult::ok;
@@ -203,7 +203,7 @@ void LineReader::readEnds(SerialPortStatus status) {
   } else {
     sync_.unanswered(Clock::nowNs());
   }
-  // One whose end nobody can tell is not waited for.
+  // An answer whose end cannot be recognised is not collected any further.
   if (mayBeLate_ && status == SerialPortStatus::timeout && (!eom_.empty() || maxBytes_ != 0)) {
     phase_ = Phase::collectingLate;
   } else {
@@ -214,7 +214,7 @@ void LineReader::readEnds(SerialPortStatus status) {
 void LineReader::lineFailed(LineFault fault, std::uint64_t /*count*/) {
   {
     const std::lock_guard lock(mutex_);
-    // A line that was away has cut off only what had not come in full.
+    // A lost line damages only an answer that was incomplete.
     const bool isBetweenAnswers = input_.empty() || (!eom_.empty() && input_.endsWith(eom_));
     const bool cuts = fault != LineFault::unplugged || !isBetweenAnswers;
     const bool isKept = phase_ == Phase::reading || phase_ == Phase::collectingLate ||

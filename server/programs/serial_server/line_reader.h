@@ -1,16 +1,15 @@
-// SPDX-License-Identifier: MIT
-// LineReader: collects what a serial port receives into answers, and keeps questions apart from the
-// answers of others.
+// SPDX-License-Identifier: MIT LineReader: collects the bytes that a serial port receives into
+// answers, and keeps late bytes out of the answers to later requests.
 //
-//   bytes ─► input, at most bufferBytes ─► first end of message, `extra` bytes, or overflow ─► answer
-//   lost or damaged bytes ─► a mark in the input ─► the faults of each answer that spans it
+//   bytes ─► input, at most bufferBytes ─► end of message, `extra` bytes, or overflow ─► answer
+//   lost or damaged bytes ─► a mark in the input ─► the faults of each answer that contains it
 //
 //   read        (cmd 1)   may begin with what was received before it: the circular buffer
-//   write-read  (cmd 3)   tryGetInStep() ─► port.writeRead() ─► takeAnswer()
+//   write-read  (cmd 3)   getInStep() ─► port.writeRead() ─► takeAnswer()
 //                         nothing that arrived before its first byte was sent is in its answer
 //
-// Threads  the port calls byteReceived, readBegins, sendBegins and readEnds; the server's thread
-//          everything else. A mutex joins them.
+// Threads  the port calls byteReceived, readBegins, sendBegins, readEnds and lineFailed; the
+//          server's thread calls the rest. A mutex protects the state.
 #pragma once
 
 #include <condition_variable>
@@ -29,25 +28,29 @@ namespace mpf {
 
 class LineReader final : public ByteHandler {
  public:
-  // Called when input is thrown away that no request had read, once until the next write-read is
-  // sent. Runs under the reader's mutex, on either thread: it must not call the reader.
+  // Called when input that no request had read is dropped, at most once until the next write-read
+  // is sent. Runs under the reader's mutex, on either thread: it must not call the reader.
   using SurplusHandler = std::function<void()>;
 
-  // `eom`: 0 to 2 bytes that end an answer. `circular`: keep what is received while nobody reads.
-  // `onFault`: called after each fault of the line, on the port's thread.
+  //   eom       0 to 2 bytes that end an answer
+  //   circular  keep bytes that are received while no request reads
+  //   onFault   called after each fault of the line, on the port's thread
   LineReader(std::size_t bufferBytes, std::string eom, bool circular, const LineLimits& limits = {},
              SurplusHandler onSurplus = {}, std::function<void()> onFault = {});
 
   void setEom(std::string eom);
   void setCircular(bool circular);
 
-  // For the next read: drop what is there first; end after so many bytes, 0 for no such limit.
+  // Prepares the next read.
+  //   flush     drop the bytes that were received before
+  //   maxBytes  the answer ends after this number of bytes; 0: no limit
   void prepareRead(bool flush, std::size_t maxBytes);
-  // For the next write-read: its answer ends after so many bytes, 0 for no such limit. With
-  // `mayBeLate` an answer that does not come in time stays here, for a read after tryContinue().
+  // Prepares the next write-read.
+  //   maxBytes   the answer ends after this number of bytes; 0: no limit
+  //   mayBeLate  keep an answer that does not arrive in time, for a read after tryContinue()
   void prepareQuestion(std::size_t maxBytes, bool mayBeLate);
-  // The next read goes on with the answer that the last write-read did not get in time. False: its
-  // end could not be told, or it was not kept.
+  // Makes the next read continue the answer that the last write-read did not get in time. Returns
+  // false when that answer was not kept, or its end cannot be recognised.
   [[nodiscard]] bool tryContinue();
 
   enum class Sync {
@@ -55,8 +58,8 @@ class LineReader final : public ByteHandler {
     noSilence,  // `until` has passed
     abandoned,  // isAbandoned() returned true
   };
-  // Waits until a request may be sent. Before a question the input is thrown away, and what arrives
-  // during the wait.
+  // Waits until a request may be sent. Before a write-read it drops the input, and the bytes that
+  // arrive while it waits.
   Sync getInStep(bool isQuestion, Deadline until, const std::function<bool()>& isAbandoned);
   // A plain write has ended.
   void noteWritten();
@@ -68,7 +71,7 @@ class LineReader final : public ByteHandler {
     // bits of serial_server.h: bytes are missing or were damaged within it or right before it
     std::uint8_t faults = 0;
   };
-  // Of the read that has ended.
+  // Returns the answer of the read that has ended.
   Answer takeAnswer();
 
   ByteHandlerResult byteReceived(std::uint8_t byte) override;
@@ -80,12 +83,12 @@ class LineReader final : public ByteHandler {
  private:
   enum class Phase : std::uint8_t {
     idle,
-    syncing,  // a question waits for silence: input is thrown away
-    armed,  // it is about to be sent: input would disturb it
-    reading,
+    syncing,  // a write-read waits for silence: input is dropped
+    armed,  // a write-read is about to be sent: input stops it
+    reading,  // a request collects its answer
     collectingLate,  // the request has timed out; its late answer is collected for a retry
   };
-  // Length of the first complete answer in the input; 0 when there is none.
+  // [bytes] Length of the first complete answer in the input; 0 when no answer is complete.
   [[nodiscard]] std::size_t completeBytes() const;
   ByteHandlerResult collect(std::uint8_t byte);
   void noteSurplus();

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// LineSync: tells when the next request may be sent, so that its answer is not taken for another's.
+// LineSync: computes when the next request may be sent, so that no late answer is mistaken for its
+// answer.
 //
-//   in step ── asked ──► answer owed ── answered ──► in step          settleTime of silence
+//   in step ── asked ──► outstanding ── answered ──► in step          settleTime of silence
 //                            └─ unanswered ──► late ─┬─ seen ───────► quietTime of silence
 //                                                    └─ resyncLimit ► quietTime of silence
-//   in step ── input that nobody asked for ──► surplus ─────────────► quietTime of silence
+//   in step ── input without a request ──► surplus ─────────────────► quietTime of silence
 //
 // Threads  one at a time. It reads no clock: times are CLOCK_MONOTONIC in nanoseconds.
 #pragma once
@@ -21,11 +22,11 @@ class LineSync {
  public:
   explicit LineSync(const LineLimits& limits) : limits_(limits) {}
 
-  // The first byte of a question has left. Its answer ends with `eom`, or after `maxBytes`; with
+  // The first byte of a write-read was sent. Its answer ends with `eom`, or after `maxBytes`; with
   // neither (empty, 0) any input counts as the answer.
   void asked(std::string eom, std::size_t maxBytes);
   void answered() noexcept;
-  // The question ended without its whole answer, which may still come.
+  // The write-read ended without its complete answer, which may still arrive.
   void unanswered(std::int64_t nowNs) noexcept;
   // A request that expects no answer has ended.
   void written(std::int64_t nowNs) noexcept;
@@ -33,13 +34,13 @@ class LineSync {
   void received(std::uint8_t byte, std::int64_t nowNs);
   // The line lost or damaged bytes: it is not silent.
   void disturbed(std::int64_t nowNs) noexcept { activeNs_ = nowNs; }
-  // Input was thrown away that no request had read.
+  // Input that no request had read was dropped.
   void noteSurplus() noexcept { hasSurplus_ = true; }
 
-  // Whether input that comes now, unread, means that answers and questions may have got out of
-  // step.
+  // Whether input that no request reads is normal: the last request was not a write-read, and no
+  // answer is outstanding.
   [[nodiscard]] bool isSurplusExpected() const noexcept { return !wasAsked_ && !late_; }
-  // Whether the answer that is owed has been seen, or none is.
+  // Whether the outstanding answer has arrived completely, or no answer is outstanding.
   [[nodiscard]] bool isWhole() const noexcept { return !late_ || late_->isWhole; }
   // When a write-read, or a plain write, may be sent if nothing else arrives.
   [[nodiscard]] std::int64_t readyAtNs(bool isQuestion) const noexcept;

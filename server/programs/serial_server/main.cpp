@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-serial-server: serial lines, a server for each. The old commands were
+// mpf-serial-server: a server for each of several serial lines. The old commands were
 // initSerialServer("serverName","portName",bufSize,queueSize,"eomstr",circularBufferMode), and for
 // ports of an octal UART before it
 // initOctalUART("moduleName","carrierName","carrierSite",nports,intVec) and

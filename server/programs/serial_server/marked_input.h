@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
-// MarkedInput: bytes that a serial line has brought, with marks where the line has lost or damaged
-// bytes between them.
+// MarkedInput: bytes received from a serial line, with marks where the line lost or damaged bytes.
 //
-//   1 2 | 5 6 \r 7 8 \r        an overrun between 2 and 5: the answer "1256\r" spans it, the next
-//   one does not
+//   1 2 | 5 6 \r 7 8 \r   an overrun between 2 and 5: "1256\r" contains the mark, "78\r" does not
 //
-// A mark stands before a byte; a mark behind the last byte belongs to the byte that comes next.
+// A mark stands before a byte; a mark after the last byte belongs to the byte that arrives next.
 //
 // Threads  one at a time.
 #pragma once
@@ -32,25 +30,26 @@ class MarkedInput {
     bytes_.push_back(byte);
     marks_.push_back(std::exchange(nextMark_, std::uint8_t{0}));
   }
-  // With their marks; the mark behind the last byte stays.
+  // Removes bytes with their marks; a mark after the last byte stays.
   void erase(std::size_t from, std::size_t count) {
     bytes_.erase(from, count);
     const auto first = marks_.begin() + static_cast<std::ptrdiff_t>(from);
     marks_.erase(
         first, marks_.begin() + static_cast<std::ptrdiff_t>(std::min(from + count, marks_.size())));
   }
-  // All bytes and all marks.
+  // Removes all bytes and all marks.
   void clear() noexcept {
     bytes_.clear();
     marks_.clear();
     nextMark_ = 0;
   }
 
-  // Bytes are missing here, behind the last byte. `faults`: bits of serial_server.h.
+  // Adds a mark after the last byte.
+  //   faults  serialFault... bits of <mpf/serial_commands.h>
   void mark(std::uint8_t faults) noexcept {
     nextMark_ = static_cast<std::uint8_t>(nextMark_ | faults);
   }
-  // Which faults the first `count` bytes span.
+  // The faults of all marks before the first `count` bytes.
   [[nodiscard]] std::uint8_t faultsOfFirst(std::size_t count) const {
     std::uint8_t faults = 0;
     for (std::size_t i = 0; i < std::min(count, marks_.size()); ++i)

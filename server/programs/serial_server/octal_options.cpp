@@ -41,22 +41,22 @@ OctalPortStart readPort(OptionFields& words) {
 
 void OctalOptions::addTo(CLI::App& app) {
   addWords(app, "--octal-uart", kUartForm,
-           "A module of serial ports. All its ports are one process's",
+           "A module of serial ports; one process must serve all its ports",
            [this](OptionFields& words) { uarts.push_back(readUart(words)); });
   addWords(app, "--octal-port", kPortForm,
-           "A port of such a module: a PORT to serve. Unless said: 9600,N,1,8,N",
+           "A port of such a module, to be used as PORT; default settings: 9600,N,1,8,N",
            [this](OptionFields& words) { ports.push_back(readPort(words)); });
   app.add_option_function<std::string>(
          "--octal-model",
          [this](const std::string& kind) {
            model.model = kind == "232" ? 0x22 : kind == "422" ? 0x2a : 0x48;
          },
-         "On a carrier of models: which module it is")
+         "On a carrier of models: the kind of the module")
       ->check(CLI::IsMember({"232", "422", "485"}))
       ->default_str("232");
   app.add_flag_callback(
       "--octal-timing", [this] { model.time = OctalUartModelTime::clock; },
-      "On a carrier of models: bytes take as long as on a line, and may get lost");
+      "On a carrier of models: bytes take as long as on a real line, and may get lost");
 }
 
 const OctalPortStart* OctalOptions::find(const std::string& port) const {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// OctalOptions: the options that say which octal UARTs there are and which ports of theirs, as the
-// old commands said it.
+// OctalOptions: the options that define octal UARTs and their ports, with the parameters of the old
+// commands.
 //
 //   --octal-uart MODULE,CARRIER,SITE,NPORTS[,VECTOR]                        initOctalUART
 //   --octal-port PORT,MODULE,N[,BAUD[,PARITY[,STOPBITS[,BITS[,FLOW]]]]]     initOctalUARTPort
 //
-// Threads  the program's main thread, at start.
+// Threads  the main thread of the program, at start.
 #pragma once
 
 #include <optional>
@@ -39,7 +39,7 @@ struct OctalOptions {
 
   // Adds the options to `app`, which fills this and must not outlive it.
   void addTo(CLI::App& app);
-  // Null when no port, or module, has that name.
+  // Return null when no port, or module, has that name.
   [[nodiscard]] const OctalPortStart* find(const std::string& port) const;
   [[nodiscard]] const OctalUartStart* findUart(const std::string& module) const;
 };

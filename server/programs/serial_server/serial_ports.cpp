@@ -26,14 +26,14 @@ SerialPorts::SerialPorts(SerialStartOptions& options, const ServerLog& log)
 
 // ---- modules
 
-// False: it may come later.
+// Returns false when the module is missing and --wait waits for it.
 bool SerialPorts::tryOpenModule(const OctalUartStart& start) {
   try {
     openModule(start);
     return true;
   } catch (const std::runtime_error& error) {
     if (!options_.hardware.waits() || Hardware::isForGood(error)) throw;
-    log_->warn("the board is not there yet: {}", error.what());
+    log_->warn("waiting for the board: {}", error.what());
     return false;
   }
 }
@@ -116,7 +116,7 @@ std::shared_ptr<SerialPort> SerialPorts::openOctalPort(const OctalPortStart& sta
   return openOctalUartPort(openUart(uart), start.number, octal);
 }
 
-// What is wrong with the command line is told now: no module that comes would mend it.
+// Reports errors of the command line now, since a module that appears later cannot mend them.
 std::shared_ptr<SerialPort> SerialPorts::openLater(const OctalPortStart& port,
                                                    const OctalUartStart& uart) {
   auto description = fmt::format("port {} of {} (carrier {}, site {})", port.number, port.module,

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// SerialPorts: opens the ports that a command line speaks of, and owns them and the modules that
-// some of them are on.
+// SerialPorts: opens the ports of a command line, and owns them and the modules of octal UARTs.
 //
-// With --wait every port is there from the start, and unplugged until its line is there: a module
-// that is absent keeps no other line waiting.
+// With --wait every port exists from the start, and is unplugged until its line is found: a missing
+// module does not delay other lines.
 //
-// Threads  the program's main thread; a module that comes later is opened on the thread of one of
-//          its ports.
+// Threads  the main thread of the program; the thread of a port opens its module if that was
+//          missing at the start.
 #pragma once
 
 #include <functional>
@@ -25,18 +24,18 @@ namespace mpf {
 
 class SerialPorts {
  public:
-  // Told of a module's interrupts that come without end, or not at all, and which one it is. Of a
-  // line that is lost its port tells.
+  // Receives the name of a module whose interrupts arrive without end or not at all. A lost line is
+  // reported by its port instead.
   using AlarmHandler = std::function<void(const std::string& module)>;
 
-  // Opens all of them.
+  // Opens all ports.
   //   options, log  outlive this
   //   throws        what the ports' constructors throw
   SerialPorts(SerialStartOptions& options, const ServerLog& log);
 
   [[nodiscard]] SerialPort& find(const std::string& port) const { return *registry_.find(port); }
-  // What is wrong with modules is logged and told to `handler`, instead of the one before, which
-  // after return does not run any more.
+  // Sets the handler of alarms, which are logged as well. After return the former handler does not
+  // run any more.
   void onAlarm(AlarmHandler handler);
 
  private:

@@ -16,7 +16,7 @@ namespace {
 // NOLINTNEXTLINE(google-build-using-namespace): the manual's words, all of them
 using namespace serial;
 
-// A client that leaves right after its last command means it: as long as this may go on.
+// A client may exit right after a write: the write continues for this time.
 constexpr std::chrono::seconds kGraceOfWrites{2};
 
 std::int32_t commandOf(const Char8Array& request) { return request.cmd & cmdCommandMask; }
@@ -25,7 +25,7 @@ std::size_t maxBytesOf(const Char8Array& request) {
   return static_cast<std::size_t>(std::max(request.extra, 0));
 }
 
-// A timeout of 0 gives at once what is there.
+// A timeout of 0 returns the bytes that have been received, without waiting.
 std::chrono::milliseconds timeoutOf(const Char8Array& request) {
   const auto timeout = std::max(request.timeout, 0);
   if ((request.cmd & cmdTimeoutMilliseconds) != 0) return std::chrono::milliseconds(timeout);
@@ -65,22 +65,22 @@ SerialServer::SerialServer(MessageServer& server, SerialPort& port,
 
 void SerialServer::stop() {
   isStopped_.store(true, std::memory_order_relaxed);
-  // before the request that is on the line ends: the server shall take no other
+  // Before the request in progress ends: the server must not receive another.
   server_.interrupt();
   port_->release();
 }
 
-// ---- what the log says
+// ---- the log
 
 void SerialServer::noteRequest() {
-  if (!std::exchange(isAsked_, true)) log_->info("the first client asks");
+  if (!std::exchange(isAsked_, true)) log_->info("first request");
 }
 
 void SerialServer::noteStatus(const Work& work) {
   log_->debug("cmd {:#x}, timeout {}: status {}", work.fields.cmd, work.fields.timeout,
               work.status);
   faults_.look();
-  // `faults_` reports those of the line
+  // `faults_` reports the faults of the line.
   const bool fails = work.status == serialServerStatusError && !faults_.hasAnswerFaults();
   if (fails == std::exchange(isFailing_, fails)) return;
   if (!fails) return log_->info("requests succeed again");
@@ -90,14 +90,14 @@ void SerialServer::noteStatus(const Work& work) {
 std::string SerialServer::whyFailed(const Work& work) const {
   if (!work.problem.empty()) return work.problem;
   if (auto because = port_->unpluggedBecause(); !because.empty()) return because;
-  return "the line was lost, and is there again";
+  return "the line was lost for a while, and works again";
 }
 
 void SerialServer::noteSurplus() {
   server_.countAlarm();
   log_->warn(
-      "surplus input: bytes arrived that no request was waiting for; requests wait for a silent "
-      "line");
+      "surplus input: bytes arrived outside of requests; the next request waits until the line is "
+      "silent");
 }
 
 void SerialServer::noteLimits(const Char8Array& request) {
@@ -119,7 +119,7 @@ void SerialServer::applyOptions(const Char8Array& request) {
   if ((request.cmd & cmdSetEom) != 0) reader_.setEom(std::string(request.eom().substr(0, 2)));
 }
 
-// A copy: the client can write to the request while we work.
+// Copies the request, because the client can write to it at any time.
 SerialServer::Work SerialServer::workOf(const Char8ArrayMessage& request) {
   Work work{.fields = *request, .data = {request.value().begin(), request.value().end()}};
   work.until = Deadline::after(limits_.maxTimeout);
@@ -139,7 +139,7 @@ void SerialServer::handle(Char8ArrayMessage&& request) {
   serve(work);
   port_->abandonWhen({});
   if (work.status == serialServerStatusError && !server_.isAwaited(request)) {
-    log_->info("a client left while its request (cmd {:#x}) had the line", work.fields.cmd);
+    log_->info("a client disconnected during its request (cmd {:#x})", work.fields.cmd);
   } else if (!isStopped_.load(std::memory_order_relaxed)) {
     noteStatus(work);
   }
@@ -185,10 +185,10 @@ void SerialServer::attempt(Work& work) {
       return write(work);
     case cmdWriteRead:
       return ask(work);
-    default:  // options alone do no I/O, and are no command
+    default:  // options without a command are invalid
       work.status = serialServerStatusError;
       work.problem = fmt::format(
-          "cmd {:#x} is no command: use 1 (read), 2 (write) or 3 (write-read), plus options",
+          "cmd {:#x} has no command: use 1 (read), 2 (write) or 3 (write-read), plus options",
           work.fields.cmd);
       work.retries = 0;
   }
@@ -211,7 +211,7 @@ void SerialServer::write(Work& work) {
 }
 
 void SerialServer::ask(Work& work) {
-  if (work.data.empty()) {  // nothing to send: what arrives from now on
+  if (work.data.empty()) {  // nothing to send: reads the bytes that arrive from now on
     reader_.prepareRead(true, maxBytesOf(work.fields));
     takeAnswer(work, port_->read(deadlineOf(work)));
     return;
@@ -223,7 +223,7 @@ void SerialServer::ask(Work& work) {
   }
 }
 
-// An answer that is late for its request is in time for the retry, which need not ask again.
+// Reads on after a timeout: an answer that is late for its request can serve as that of the retry.
 void SerialServer::takeLateAnswer(Work& work) {
   if (!reader_.tryContinue()) return;
   takeAnswer(work, port_->read(std::min(work.until, Deadline::after(limits_.resyncLimit))));
@@ -245,8 +245,8 @@ bool SerialServer::isInStep(Work& work, bool isQuestion, Deadline until) {
   work.answer.clear();
   if (sync == LineReader::Sync::noSilence)
     work.problem = fmt::format(
-        "input does not stop, so a question cannot be told from its answers: not silent for {} ms "
-        "(--quiet-time)",
+        "the request was not sent, because input does not stop: the line was never silent for {} "
+        "ms (--quiet-time), so an answer could not be matched to its request",
         limits_.quietTime.count());
   return false;
 }

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// SerialServer: requests of clients become requests to a serial port (manual, "serialServer").
+// SerialServer: performs requests of clients on a serial port (manual, "serialServer").
 //
 //   request ─► in step? ─► port ─► answer, timeout, failure ─► retry? ─► reply
 //                 └ see LineSync
 //
-// A request has the line until its answer, its time or its retries are over, all of them limited by
-// LineLimits, or until its client is gone.
+// A request uses the line until it has its answer, or its time or its retries are used up, both
+// limited by LineLimits, or its client has disconnected.
 //
-// Threads  one: the server's; stop() from another.
-// Trust    a client asks for any timeout and any number of retries, or dies: it costs the others no
-//          more than LineLimits::maxTimeout.
+// Threads  one: the server's. Another thread may call stop().
+// Trust    a client may request any timeout and any number of retries, or die: other clients wait
+//          at most LineLimits::maxTimeout for it.
 #pragma once
 
 #include <atomic>
@@ -37,19 +37,19 @@ struct SerialServerOptions {
 
 class SerialServer {
  public:
-  // Surplus input is an alarm of `server`. Answers Char8Array and SerialConfig requests of
-  // `server`, and those of other types with status -1. All that is passed must outlive this, but
-  // for the options.
+  // Sets the handlers of `server`: it performs Char8Array and SerialConfig requests and replies to
+  // other types with status -1. Surplus input counts as an alarm of `server`.
+  //   server, port, log   must outlive this object
   SerialServer(MessageServer& server, SerialPort& port, const SerialServerOptions& options,
                const ServerLog& log);
 
-  // Ends the server's run(). A request that is on the line is answered at once with
-  // serialServerStatusError and what was read; those that the server has not taken end with it, as
-  // `neverTaken`.
+  // Ends the server's run(). The request in progress immediately gets a reply with
+  // serialServerStatusError and the bytes that were read. Requests that the server has not received
+  // end as `neverTaken` when the server is destroyed.
   void stop();
 
  private:
-  // The request in work.
+  // The request in progress.
   struct Work {
     Char8Array fields;
     std::vector<std::uint8_t> data;
@@ -76,7 +76,7 @@ class SerialServer {
   void write(Work& work);
   void ask(Work& work);
   void takeLateAnswer(Work& work);
-  // False: nothing was sent, because input arrived at the last moment.
+  // Returns false when nothing was sent, because input arrived immediately before.
   bool takeAnswer(Work& work, SerialPortStatus status);
   [[nodiscard]] bool isInStep(Work& work, bool isQuestion, Deadline until);
   [[nodiscard]] Deadline deadlineOf(const Work& work) const;

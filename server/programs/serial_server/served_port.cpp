@@ -13,7 +13,7 @@ ServerOptions messagesOf(const SerialStartOptions& options, const SerialServerSt
   return messages;
 }
 
-// Of several in one program each says who it is.
+// The name of the program, with the name of the server when there are several.
 std::string nameInLog(const SerialStartOptions& options, const SerialServerStart& start) {
   return options.servers.size() == 1 ? "mpf-serial-server"
                                      : fmt::format("mpf-serial-server {}", start.server);
@@ -31,7 +31,7 @@ ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& opt
       sniff_(backplane, start.server, messagesOf(options, start), port, log_) {
   logShortages(server_, log_);
   port.onStateChange([this](SerialPortState state, const std::string& because) {
-    if (state == SerialPortState::plugged) return log_->info("the line is there");
+    if (state == SerialPortState::plugged) return log_->info("the line is connected");
     log_->warn("the line is lost: {}", because);
     server_.countAlarm();
   });
@@ -39,7 +39,7 @@ ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& opt
              options.describeLine(start.port), server_.getName(), server_.location(),
              sniff_.getName());
   if (port.state() == SerialPortState::unplugged)
-    log_->warn("the line is not there yet: {}", port.unpluggedBecause());
+    log_->warn("waiting for the line: {}", port.unpluggedBecause());
 }
 
 ServedPort::~ServedPort() {
@@ -51,7 +51,7 @@ ServedPort::~ServedPort() {
 void ServedPort::start(std::function<void()> failed) {
   const auto serve = [this] {
     server_.run();
-    log_->info("ends");
+    log_->info("stopped");
   };
   thread_.start(log_, serve, failed);
   sniff_.start(std::move(failed));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// ServedPort: a serial port with its server and its listeners' server, run by a thread.
+// ServedPort: a serial port with its two servers, for requests and for listeners, each on a thread.
 //
-// Threads  its own after start(); stop() and countAlarm() from any.
+// Threads  one thread constructs, starts and joins it; any thread may call stop() and countAlarm().
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@ namespace mpf {
 
 class ServedPort {
  public:
-  // Opens both servers and says so.
+  // Opens both servers and logs their names.
   //   port    outlives this
   //   throws  as MessageServer
   ServedPort(const Backplane& backplane, const SerialStartOptions& options,
@@ -28,11 +28,11 @@ class ServedPort {
   ServedPort(const ServedPort&) = delete;
   ServedPort& operator=(const ServedPort&) = delete;
 
-  // Serves, until stop(). `failed` is called, on any thread, when one of both servers ended for
-  // another reason, which the log says.
+  // Serves until stop(). `failed` is called, on any thread, when one of the two servers has failed,
+  // after it has logged the error.
   void start(std::function<void()> failed);
   void stop() { serial_.stop(); }
-  // Waits for its end.
+  // Waits until the thread of the server has ended.
   void join() { thread_.join(); }
   void countAlarm() noexcept { server_.countAlarm(); }
   [[nodiscard]] const std::string& portName() const noexcept { return portName_; }

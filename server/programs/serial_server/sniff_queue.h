@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// SniffQueue: bytes of the line on their way from the port's thread to the listeners' one.
+// SniffQueue: passes bytes of the line from the port's thread to the thread of the sniff server.
 //
-//   port's thread ── push ──► | bytes, at most so many | ── take ──► listeners' thread, once the batch is large or old enough
+//   port's thread ── push ──► | at most maxBytes bytes | ── take ──► sniff server's thread,
+//                                                       when the batch is large or old enough
 //
-// Threads  one pushes and one takes. Pushing copies under a mutex that is held for a copy or a
-//          swap, never for a message.
+// Threads  one thread pushes and one takes. The mutex is held for a copy or a swap, never while a
+//          message is sent.
 #pragma once
 
 #include <cstdint>
@@ -18,21 +19,21 @@
 namespace mpf {
 
 struct SniffBatching {
-  Nanoseconds maxAge = std::chrono::milliseconds(20);  // a byte waits for others no longer
-  std::size_t largeBytes = 256;  // nor do so many
-  std::size_t maxBytes = 16384;  // what comes on top is lost
+  Nanoseconds maxAge = std::chrono::milliseconds(20);  // longest wait of a byte for further ones
+  std::size_t largeBytes = 256;  // a batch of this size does not wait
+  std::size_t maxBytes = 16384;  // capacity of the queue; further bytes are lost
 };
 
 class SniffQueue {
  public:
   explicit SniffQueue(const SniffBatching& batching);
 
-  // Takes what there is room for, and counts the rest as lost. True: dueAt() is another now.
+  // Adds the bytes that fit, and counts the rest as lost. Returns true when dueAt() has changed.
   [[nodiscard]] bool push(std::span<const PeekedByte> bytes);
-  // When to take; never when there is nothing.
+  // When take() must be called; never while the queue is empty.
   [[nodiscard]] Deadline dueAt() const;
-  // Moves all bytes into `bytes`, whose memory is used again. Returns how many were lost after
-  // them.
+  // Moves all bytes into `bytes`, whose memory is reused. Returns the number of bytes that were
+  // lost after them.
   std::uint64_t take(std::vector<PeekedByte>& bytes);
 
  private:

@@ -14,9 +14,9 @@ namespace {
 using serial::SniffKind;
 using serial::SniffRecord;
 
-// Listeners are in no hurry, and a thread that spun would take a processor from the line. For each
-// of them some 250 messages may wait, with bodies of at most 16 MB.
-ServerOptions optionsLike(ServerOptions options) {
+// The thread never spins: listeners need no low latency, and the line needs the processor. About
+// 250 messages may wait for each listener, with bodies of at most 16 MB.
+ServerOptions sniffOptions(ServerOptions options) {
   options.queueSize = 128;
   options.maxPoolBytes = 16ULL << 20;
   options.waitMode = WaitMode::block;
@@ -38,8 +38,8 @@ void writeRecords(std::span<const PeekedByte> bytes, std::vector<char>& records)
   }
 }
 
-// As much of a count as a field can tell.
-std::int32_t tellable(std::uint64_t count) noexcept {
+// The part of a count that fits a field.
+std::int32_t clamped(std::uint64_t count) noexcept {
   return static_cast<std::int32_t>(std::min<std::uint64_t>(count, INT32_MAX));
 }
 
@@ -51,7 +51,7 @@ SniffServer::SniffServer(const Backplane& backplane, const std::string& server,
     : log_(log),
       port_(port),
       queue_(batching),
-      server_(backplane, server + std::string(serial::sniffSuffix), optionsLike(like)) {
+      server_(backplane, server + std::string(serial::sniffSuffix), sniffOptions(like)) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
   answerOtherTypes<Int32>(server_, [this](MessageType type) {
     log_->debug("listeners: a request of type {}: status -1", toString(type));
@@ -90,9 +90,9 @@ void SniffServer::handle(Int32Message&& request) {
 }
 
 void SniffServer::listen(Int32Message&& request) {
-  deliver();  // what was before is not for this one
+  deliver();  // sends earlier bytes to the other listeners only
   const auto client = server_.clientOf(request);
-  if (client == 0) return;  // gone already
+  if (client == 0) return;  // the client has disconnected
   if (const auto former = find(client); former != listeners_.end()) listeners_.erase(former);
   if (!tap_) {
     tap_ = port_.attachTap([this](std::span<const PeekedByte> bytes) {
@@ -116,7 +116,7 @@ void SniffServer::leave(const Int32Message& request) {
 
 void SniffServer::answer(const Int32Message& request, std::int32_t status, std::uint64_t lost) {
   auto reply = server_.allocReplyMessage<Int32>(request);
-  *reply = {.cmd = request->cmd, .status = status, .address = tellable(lost)};
+  *reply = {.cmd = request->cmd, .status = status, .address = clamped(lost)};
   static_cast<void>(server_.reply(std::move(reply)));
 }
 
@@ -135,7 +135,7 @@ void SniffServer::forgetGone() {
 void SniffServer::followCount() {
   const auto before = count_.load(std::memory_order_relaxed);
   const auto now = listeners_.size();
-  if (now != before) log_->info("{} listening", now);
+  if (now != before) log_->info("{} clients listen to the line", now);
   if (now == 0 && tap_) {
     tap_.reset();
     queue_.take(bytes_);
@@ -149,18 +149,18 @@ void SniffServer::deliver() {
   writeRecords(bytes_, records_);
   for (auto& listener : listeners_) {
     send(listener);
-    listener.lost += lost;  // behind these bytes
+    listener.lost += lost;  // they were lost after these bytes
   }
 }
 
 void SniffServer::send(Listener& listener) {
   auto message = server_.allocReplyMessage<Char8Array>(listener.request, records_.size());
   message->extra = static_cast<std::int32_t>(bytes_.size());
-  message->address = tellable(listener.lost);
+  message->address = clamped(listener.lost);
   std::copy(records_.begin(), records_.end(), message.value().begin());
-  const auto told = static_cast<std::uint64_t>(message->address);
+  const auto reported = static_cast<std::uint64_t>(message->address);
   if (server_.reply(std::move(message)) == ReplyResult::sent) {
-    listener.lost -= told;
+    listener.lost -= reported;
   } else {
     listener.lost += bytes_.size();
   }

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// SniffServer: lets clients see every byte of a serial line, as include/mpf/serial_sniff.h promises
-// them.
+// SniffServer: sends every byte of a serial line to listeners, as described in
+// include/mpf/serial_sniff.h.
 //
 //   port's thread ── tap ──► SniffQueue ── own thread ──► a batch ──► listener 1, listener 2, ...
 //
-// The tap is attached while somebody listens, and the thread sleeps while there is nothing to tell.
+// The tap is attached while there are listeners; the thread sleeps while there is nothing to send.
 //
-// Threads  its own, which waits for the line and for nobody else. The port's thread copies bytes
-//          into a queue and rings.
-// Crash    a listener that dies is forgotten as soon as its death is known.
-// Trust    a listener that does not take its messages loses bytes, and is told how many.
+// Threads  its own thread waits for requests and bytes, and never for a listener. The port's thread
+//          copies bytes into the queue and wakes it.
+// Crash    a listener that dies is removed when the server notices its death.
+// Trust    a listener that does not receive its messages loses bytes; the next message counts them.
 #pragma once
 
 #include <atomic>
@@ -39,7 +39,8 @@ class SniffServer {
   SniffServer(const SniffServer&) = delete;
   SniffServer& operator=(const SniffServer&) = delete;
 
-  // Serves, until this object ends. `failed` is called when it cannot any more, which the log says.
+  // Serves until this object is destroyed. `failed` is called when the server has failed, after it
+  // has logged the error.
   void start(std::function<void()> failed);
   [[nodiscard]] const std::string& getName() const noexcept { return server_.getName(); }
   // How many clients listen now.
@@ -49,9 +50,9 @@ class SniffServer {
 
  private:
   struct Listener {
-    Int32Message request;  // its start, which the records are replies to
+    Int32Message request;  // cmdSniffStart; the records are further replies to it
     std::uint64_t client = 0;
-    std::uint64_t lost = 0;  // bytes that it has not been told of
+    std::uint64_t lost = 0;  // bytes that are missing and not reported yet
   };
 
   void run();
@@ -70,9 +71,9 @@ class SniffServer {
   SniffQueue queue_;
   MessageServer server_;
   std::vector<Listener> listeners_;  // this and below: the thread's
-  std::optional<PeekTap> tap_;  // there while somebody listens; ends before what it pushes to
+  std::optional<PeekTap> tap_;  // exists while there are listeners; destroyed before the queue
   std::vector<PeekedByte> bytes_;  // of the batch that is being delivered
-  std::vector<char> records_;  // the same, as listeners get it
+  std::vector<char> records_;  // the same as records
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
   ServingThread thread_;

@@ -26,7 +26,7 @@ std::optional<std::string> tryReadEom(const std::string& text) {
   return bytes;
 }
 
-// As far as the positional arguments' checks go.
+// Checks the fields as the positional arguments are checked.
 SerialServerStart readServer(OptionFields& words) {
   SerialServerStart start;
   start.server = words.word("server");
@@ -62,7 +62,7 @@ std::string SerialStartOptions::describeLine(const std::string& port) const {
                      line.stopBits, line.flowControl == 'H' ? "hardware" : "no");
 }
 
-// What options say of each other.
+// Returns a contradiction between options; empty when there is no problem.
 std::string SerialStartOptions::problem() const {
   if (servers.empty()) return "server is required";
   for (std::size_t i = 0; i < servers.size(); ++i) {
@@ -72,11 +72,12 @@ std::string SerialStartOptions::problem() const {
         std::count_if(servers.begin(), servers.end(),
                       [&](const SerialServerStart& other) { return other.port == start.port; });
     if (sames > 1)
-      return fmt::format("port {}: has two servers, and a line is one's own", start.port);
+      return fmt::format("port {}: has two servers; a line can have only one", start.port);
   }
   for (const auto& port : octal.ports) {
     if (octal.findUart(port.module) == nullptr)
-      return fmt::format("--octal-port: {}: no --octal-uart is called {}", port.name, port.module);
+      return fmt::format("--octal-port: {}: no --octal-uart has the name {}", port.name,
+                         port.module);
     if (octal.find(port.name) != &port)
       return fmt::format("--octal-port: {}: two ports have that name", port.name);
   }
@@ -108,10 +109,10 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
                  "End of message of the instrument: 0 to 2 bytes, with escapes as in C")
       ->capture_default_str();
   app.add_option("circular", first.serial.circularBuffer,
-                 "1: keep what is received while nobody reads; 0: drop it")
+                 "1: keep bytes that are received while no request reads; 0: drop them")
       ->capture_default_str();
   addWords(app, "--server", kServerForm,
-           "One more server, as the arguments above say one. Any number",
+           "Adds a server, with the fields of the arguments above; may be repeated",
            [&others](OptionFields& words) { others.push_back(readServer(words)); });
   const std::array ofTerminals{
       app.add_option("--baud", settings.baud, "Speed of terminal devices [bit/s]")
@@ -130,7 +131,7 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
   limits.addTo(app);
   hardware.addTo(app);
   app.get_option("--wait")->description(
-      "Start even if the line or its board is not there, and wait for it");
+      "Start even if the line or its board is missing, and wait for it");
   arguments.addTo(app);
   app.footer(
       "The old commands:\n"
@@ -160,8 +161,8 @@ std::optional<int> SerialStartOptions::parse(int argc, char** argv) {
     return refuseArguments(
         app.get_name(),
         fmt::format(
-            "{} is for terminal devices, and no port is one: --octal-port says it of its port, "
-            "and a terminal server keeps its settings itself",
+            "{} is for terminal devices, and no port is one: --octal-port has settings for its "
+            "port, and a terminal server keeps its own settings",
             (*useless)->get_name()));
   }
   return std::nullopt;

@@ -15,10 +15,10 @@
 
 namespace mpf {
 
-// One server, as the old initSerialServer had it.
+// The parameters of one server, as in the old initSerialServer.
 struct SerialServerStart {
   std::string server;
-  std::string port;  // that of an --octal-port, a terminal device, or tcp:HOST:PORT
+  std::string port;  // name of an --octal-port, terminal device, or tcp:HOST:PORT
   int queueSize = 20;
   SerialServerOptions serial = {};  // NOLINT(readability-redundant-member-init): g++ wants it
 };
@@ -31,10 +31,10 @@ struct SerialStartOptions {
   Hardware hardware;  // --carrier, --wait
   ServerArguments arguments;
 
-  // "9600 baud, 8N1, no flow control"; of a terminal server's port, whose settings it keeps itself,
-  // "a terminal server".
+  // "9600 baud, 8N1, no flow control"; "a terminal server" for the port of a terminal server, which
+  // keeps its own settings.
   [[nodiscard]] std::string describeLine(const std::string& port) const;
-  // The exit status when the program shall end: --help, or a line that is wrong.
+  // Returns the exit status when the program is to exit: after --help or a usage error.
   std::optional<int> parse(int argc, char** argv);
 
  private:
@@ -42,7 +42,7 @@ struct SerialStartOptions {
   [[nodiscard]] bool hasTerminal() const;
 };
 
-// The address when the port is one of a terminal server.
+// Returns HOST:PORT of the port of a terminal server; nullopt for other ports.
 [[nodiscard]] std::optional<std::string> tcpAddressOf(const std::string& port);
 
 }  // namespace mpf

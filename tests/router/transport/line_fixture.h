@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include <mpf/message_of.h>
+
 #include "router/transport/kj_text.h"
 #include "router/transport/line.h"
 #include "tests/router/frames.h"
