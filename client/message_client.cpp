@@ -66,15 +66,6 @@ SendResult MessageClient::send(Message&& message, Deadline takeBefore,
   return result;
 }
 
-SendResult MessageClient::sendAs(std::uint32_t requestId, Message&& message,
-                                 Deadline takeBefore) noexcept {
-  if (isInherited()) return SendResult::notConnected;
-  return binding_->send(message, takeBefore, requestId);
-}
-
-void MessageClient::pause() { binding_->pause(); }
-void MessageClient::resume() { binding_->resume(); }
-
 BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
 
 void MessageClient::cancel(std::uint32_t requestId) {

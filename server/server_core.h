@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT ServerCore: the links of a MessageServer: accepts clients, receives
-// requests, sends replies, closes connections.
+// SPDX-License-Identifier: MIT
+// ServerCore: the links of a MessageServer: accepts clients, receives requests, sends replies,
+// closes connections.
 //
 // Threads  as MessageServer: one thread owns it, any thread may reply.
 // Crash    ServerCore closes the links of a dead client and removes their names.

@@ -25,6 +25,7 @@
 #include "benchmarks/peers/mpf_peer.h"
 #include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/meter.h"
+#include "server/relay_server.h"
 
 namespace mpf::bench {
 namespace {
@@ -68,7 +69,7 @@ class SharedBoard {
 
 // Takes requests and keeps them, so that a client's request is open when its server dies.
 void serve(const std::string& backplane, Board& board) {
-  MessageServer server(Backplane::attach(backplane), kServer);
+  RelayServer server(Backplane::attach(backplane), kServer);
   server.onClient([&](std::uint64_t, bool isThere) {
     if (!isThere) board.newsNs.store(Clock::nowNs(), std::memory_order_relaxed);
   });

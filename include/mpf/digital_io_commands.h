@@ -1,6 +1,7 @@
-// SPDX-License-Identifier: MIT The messages between a digital I/O server and its clients. All
-// messages are Int32. Each request gets a reply with status 0, or with status -1 when the server
-// did nothing. Bits are numbered as in the module: bits 0 to 23 for 24 lines.
+// SPDX-License-Identifier: MIT
+// The messages between a digital I/O server and its clients. All messages are Int32. Each request
+// gets a reply with status 0, or with status -1 when the server did nothing. Bits are numbered as
+// in the module: bits 0 to 23 for 24 lines.
 //
 //   server <module>Out                       server <module>In
 //     cmdSetBits     address=mask              cmdStartMonitor  address=mask, 0: all bits

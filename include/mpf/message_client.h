@@ -92,25 +92,6 @@ class MessageClient {
   // the dispatcher delivers it when it runs next, before any reply.
   void cancel(std::uint32_t requestId);
 
-  // --- for routers, which are clients on behalf of remote clients; call these functions on the
-  // thread that runs the dispatcher
-
-  // As send(), with a number that the caller chooses, not 0. Returns tooManyOutstanding also when
-  // another request occupies the place of that number in the table of requests.
-  [[nodiscard]] SendResult sendAs(std::uint32_t requestId, Message&& message,
-                                  Deadline takeBefore) noexcept;
-  // Whether a message that the callback received ended its request.
-  [[nodiscard]] static bool endsRequest(const Message& message) noexcept {
-    return message.route().flags == kEndsRequest;
-  }
-  // Stops the delivery of messages from the server until resume() or the end of the connection. The
-  // messages wait in the link; when it is full, the server's replies fail with queueFull.
-  void pause();
-  void resume();
-  // Allocates memory for the body of a request, as alloc() does; the caller owns it: see BodyBytes.
-  //   throws  std::bad_alloc
-  [[nodiscard]] BodyBytes allocateBody(std::size_t bytes) { return allocate(bytes); }
-
   // --- the connection
 
   // Waits until the client is connected; returns false after `timeout`. While it waits, it runs a
@@ -127,6 +108,7 @@ class MessageClient {
 
  private:
   friend class SyncClient;  // for isInherited()
+  friend class RelayClient;  // internal, for routers
   MessageClient(std::shared_ptr<Dispatcher> shared, Callback callback);
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] bool isInherited() const noexcept;

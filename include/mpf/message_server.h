@@ -26,6 +26,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -158,25 +159,6 @@ class MessageServer {
   //   throws  what its handler throws
   bool handleOne();
 
-  // --- for routers, which serve on behalf of remote servers; `client` is a number of clientOf()
-
-  // Sets a callback for clients that connect (isConnected true) and disconnect or die (false).
-  // receive() calls it. Set it before the first receive(). When it throws, receive() finishes its
-  // work on the connections and then throws the same exception.
-  void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
-  // The deadline that the client gave to the request that receive() returned last.
-  [[nodiscard]] Deadline takeBefore() const noexcept;
-  // As reply(), to a request whose handle no longer exists: its clientOf(request) and
-  // request.route().requestId.
-  ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
-  // Whether that request still has no reply.
-  [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
-  // The requests of a client that were received and still have no reply.
-  [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
-  // Allocates memory for the body of a reply to a client; the caller owns it: see BodyBytes.
-  //   throws  std::bad_alloc
-  [[nodiscard]] BodyBytes allocateBody(std::uint64_t client, std::size_t bytes);
-
   // --- operation
 
   // Sets a callback for a shortage: receive() calls it with the reason when this process can accept
@@ -198,12 +180,13 @@ class MessageServer {
   void report() const;
 
  private:
-  class Impl;
+  friend class RelayServer;  // internal, for routers
   void setHandler(MessageType type, std::function<void(Message&&)> handler);
   void callHandler(const std::function<void(Message&&)>& handler, Message&& request);
   BodyBytes allocate(const Message& request, std::size_t bytes);
   static void address(Message& reply, const Message& request) noexcept;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<class ServerCore> core_;
+  std::map<MessageType, std::function<void(Message&&)>> handlers_;
 };
 
 }  // namespace mpf

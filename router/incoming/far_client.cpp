@@ -25,7 +25,7 @@ FarClient::FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, c
       window_(std::max<std::int64_t>(terms.window, 1)),
       fullWindow_(window_),
       expiry_(here.timer, [this] { expire(); }),
-      client_(std::make_unique<MessageClient>(
+      client_(std::make_unique<RelayClient>(
           dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
 
 FarClient::~FarClient() { owner_.heldBytes() -= waitingBytes_; }
@@ -126,7 +126,7 @@ void FarClient::giveUp(Fate fate, const std::string& why) {
 
 void FarClient::onMessage(Message&& message) {
   if (const auto* connect = message.tryAs<Connect>()) return onConnect(*connect);
-  const bool isFirst = MessageClient::endsRequest(message);
+  const bool isFirst = RelayClient::endsRequest(message);
   const auto requestId = message.route().requestId;
   if (const auto* fate = message.tryAs<RequestFate>()) return endRequest(requestId, fate->fate, {});
   // The server is gone, and its remaining replies are received at once. Those that exceed the

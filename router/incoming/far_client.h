@@ -17,6 +17,7 @@
 
 #include <mpf/message_client.h>
 
+#include "client/relay_client.h"
 #include "router/alarm.h"
 #include "router/surroundings.h"
 #include "router/transport/line.h"
@@ -98,7 +99,7 @@ class FarClient {
   std::size_t waitingBytes_ = 0;
   bool queueFullSent_ = false;  // in this run of refused requests
   Alarm expiry_;
-  std::unique_ptr<MessageClient> client_;  // nullptr after giveUp()
+  std::unique_ptr<RelayClient> client_;  // nullptr after giveUp()
 };
 
 }  // namespace mpf::router

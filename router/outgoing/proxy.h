@@ -26,6 +26,7 @@
 #include "router/readable.h"
 #include "router/surroundings.h"
 #include "router/transport/line.h"
+#include "server/relay_server.h"
 
 namespace mpf::router {
 
@@ -117,7 +118,7 @@ class Proxy {
   Deadline drainUntil_ = Deadline::never();  // set by drain()
   std::chrono::milliseconds retryAfter_{};
   Alarm retry_;
-  MessageServer server_;
+  RelayServer server_;
   Alarm again_;
   std::unique_ptr<Readable> readable_;
 };

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: MIT ServingThread: a thread that runs a server. When the server throws
-// an exception, the thread logs it and ends the program: otherwise the server would still accept
-// requests and never reply.
+// SPDX-License-Identifier: MIT
+// ServingThread: a thread that runs a server. When the server throws an exception, the thread logs
+// it and ends the program: otherwise the server would still accept requests and never reply.
 //
 //   ProgramFailure failure;                                        // in main()
 //   ServingThread thread;

@@ -20,6 +20,8 @@
 #include <mpf/sync_client.h>
 
 #include "base/system_call.h"
+#include "client/relay_client.h"
+#include "server/relay_server.h"
 #include "shm/segment_name.h"
 #include "shm/window.h"
 #include "tests/support/test_backplane.h"
@@ -59,8 +61,8 @@ inline std::ptrdiff_t countNames(const Backplane& backplane, NameKind kind) {
 
 class ClientTest : public testing::Test {
  protected:
-  MessageServer& startServer(ServerOptions options = {}) {
-    server_ = std::make_unique<MessageServer>(backplane_, "device[0]/a", options);
+  RelayServer& startServer(ServerOptions options = {}) {
+    server_ = std::make_unique<RelayServer>(backplane_, "device[0]/a", options);
     return *server_;
   }
   void bind() {
@@ -117,18 +119,18 @@ class ClientTest : public testing::Test {
 
   Watchdog watchdog_{"client test"};
   TestBackplane backplane_;
-  std::unique_ptr<MessageServer> server_;
+  std::unique_ptr<RelayServer> server_;
   bool serverRuns_ = true;
   std::vector<Message> messages_;
   std::vector<ConnectStatus> news_;
   Dispatcher dispatcher_{backplane_};
-  MessageClient client_{dispatcher_, [this](Message message) {
-                          if (const auto* connect = message.tryAs<Connect>()) {
-                            news_.push_back(connect->status);
-                          } else {
-                            messages_.push_back(std::move(message));
-                          }
-                        }};
+  RelayClient client_{dispatcher_, [this](Message message) {
+                        if (const auto* connect = message.tryAs<Connect>()) {
+                          news_.push_back(connect->status);
+                        } else {
+                          messages_.push_back(std::move(message));
+                        }
+                      }};
 };
 inline std::optional<Fate> fateOf(const Message& message) {
   const auto* fate = message.tryAs<RequestFate>();

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT An invalid file has the name of a window: clients and servers report
-// what it is, and continue when it has been removed.
+// SPDX-License-Identifier: MIT
+// An invalid file has the name of a window: clients and servers report what it is, and continue
+// when it has been removed.
 #include <fcntl.h>
 #include <sys/fsuid.h>
 #include <sys/stat.h>

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT Every peer writes hints, so any peer can erase hints or write false
-// ones: that costs time, never a message.
+// SPDX-License-Identifier: MIT
+// Every peer writes hints, so any peer can erase hints or write false ones: that costs time, never
+// a message.
 #include <poll.h>
 
 #include <thread>

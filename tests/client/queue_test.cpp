@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT Full queues: messages are refused immediately, counted, and reported
-// in order; no message is lost, and other clients are not affected.
+// SPDX-License-Identifier: MIT
+// Full queues: messages are refused immediately, counted, and reported in order; no message is
+// lost, and other clients are not affected.
 #include <algorithm>
 #include <numeric>
 #include <string>

@@ -85,7 +85,7 @@ struct Seen {
     const auto caller = std::this_thread::get_id();
     isOneThread = isOneThread && (thread == std::thread::id() || thread == caller);
     thread = caller;
-    if (!MessageClient::endsRequest(message)) return;
+    if (!RelayClient::endsRequest(message)) return;
     ++ends[static_cast<std::size_t>(message.getClientExtra())];
     ended.fetch_add(1);
   }

@@ -6,6 +6,7 @@
 
 #include <mpf/message_client.h>
 
+#include "client/relay_client.h"
 #include "router/outgoing/client_router.h"
 #include "tests/fuzz/fuzzer.h"
 #include "tests/fuzz/router_scene.h"
@@ -68,7 +69,7 @@ class Local {
 
  private:
   void note(Message&& message) {
-    if (MessageClient::endsRequest(message) && open_.erase(message.route().requestId) == 0)
+    if (RelayClient::endsRequest(message) && open_.erase(message.route().requestId) == 0)
       std::abort();
     kept_ = std::move(message);
   }

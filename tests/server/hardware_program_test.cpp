@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT Programs that drive modules, as processes: how they start, what they
-// log, how they stop, and wires from one to the other.
+// SPDX-License-Identifier: MIT
+// Programs that drive modules, as processes: how they start, what they log, how they stop, and
+// wires from one to the other.
 #include <array>
 #include <cstdio>
 

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT What clients, `mpf msr` and the log report of a serial line that
-// loses and damages bytes: on a port of an octal UART.
+// SPDX-License-Identifier: MIT
+// What clients, `mpf msr` and the log report of a serial line that loses and damages bytes: on a
+// port of an octal UART.
 #include "server/programs/serial_server/line_faults.h"
 
 #include <array>

@@ -7,6 +7,7 @@
 
 #include <mpf/message_client.h>
 
+#include "client/relay_client.h"
 #include "tests/support/log_lines.h"
 #include "tests/support/program.h"
 #include "tests/support/pty.h"
@@ -38,7 +39,7 @@ class LogStormTest : public testing::Test {
   void storm(const std::string& server, const Message& request) {
     std::atomic<std::uint64_t> ends{0};
     MessageClient client(backplane_, [&](const Message& message) {
-      if (!MessageClient::endsRequest(message)) return;
+      if (!RelayClient::endsRequest(message)) return;
       ++ends;
       ends.notify_one();
     });

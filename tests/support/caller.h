@@ -15,6 +15,7 @@
 
 #include <mpf/message_client.h>
 
+#include "client/relay_client.h"
 #include "tests/support/router_pair.h"
 
 namespace mpf::test {
@@ -57,7 +58,7 @@ class Caller {
       return;
     }
     const bool isSound =
-        !MessageClient::endsRequest(message) || open.erase(message.route().requestId) == 1;
+        !RelayClient::endsRequest(message) || open.erase(message.route().requestId) == 1;
     EXPECT_TRUE(isSound) << "an end of a request that is not open";
     messages.push_back(std::move(message));
   }

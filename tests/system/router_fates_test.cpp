@@ -11,7 +11,7 @@ class RouterFatesTest : public RouterTest {
   void SetUp() override { startAll(); }
   Fate nextFate(std::uint32_t id) {
     const auto message = next();
-    EXPECT_TRUE(MessageClient::endsRequest(message));
+    EXPECT_TRUE(RelayClient::endsRequest(message));
     EXPECT_EQ(message.route().requestId, id);
     EXPECT_EQ(message.getClientExtra(), 12) << "a fate carries the marks of its request";
     return fateOf(message).value();

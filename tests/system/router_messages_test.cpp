@@ -137,10 +137,10 @@ TEST_F(RouterMessagesTest, OneRequestMayHaveManyRepliesOfAnyType) {
 
   const auto first = next();
   EXPECT_EQ(first.arrayLength(), 3u);
-  EXPECT_TRUE(MessageClient::endsRequest(first));
+  EXPECT_TRUE(RelayClient::endsRequest(first));
   const auto second = next();
   EXPECT_EQ(second.tryAs<Int32>()->value, 3);
-  EXPECT_FALSE(MessageClient::endsRequest(second));
+  EXPECT_FALSE(RelayClient::endsRequest(second));
   const auto third = next();
   EXPECT_EQ(third.tryAs<OutOfBand>()->value, 4);
   for (const auto* reply : {&first, &second, &third}) EXPECT_EQ(reply->route().requestId, id);

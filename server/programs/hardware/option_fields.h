@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT OptionFields: the value of an option with several fields,
-// "a-Ip330Scan,0,15,100,20", which are read one after the other.
+// SPDX-License-Identifier: MIT
+// OptionFields: the value of an option with several fields, "a-Ip330Scan,0,15,100,20", which are
+// read one after the other.
 //
 //   addWords(app, "--scan", "NAME[,FIRST[,QUEUE]]", "Adds a scan server", [this](auto& words) {
 //     auto name = words.word("name");

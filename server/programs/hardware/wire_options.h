@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT InputWires, wireOutputs(): connect models to wires: inputs follow
-// wires (--input BIT=WIRE), outputs drive them.
+// SPDX-License-Identifier: MIT
+// InputWires, wireOutputs(): connect models to wires: inputs follow wires (--input BIT=WIRE),
+// outputs drive them.
 //
 //   InputWires inputs;
 //   inputs.addTo(app, 31);

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT Ip330ScanServer: mean values of channels (manual, "ip330Scan").
-// Ip330ConfigServer: the scan mode and the calibration of the board.
+// SPDX-License-Identifier: MIT
+// Ip330ScanServer: mean values of channels (manual, "ip330Scan"). Ip330ConfigServer: the scan mode
+// and the calibration of the board.
 //
 // Threads  the thread of its server.
 #pragma once

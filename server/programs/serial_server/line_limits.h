@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT LineLimits: how long a request may use a serial line, and how long
-// the line must be silent before a write-read is sent.
+// SPDX-License-Identifier: MIT
+// LineLimits: how long a request may use a serial line, and how long the line must be silent before
+// a write-read is sent.
 //
 //   --settle-time --quiet-time --resync-limit --max-timeout --max-retries
 //

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT LineReader: collects the bytes that a serial port receives into
-// answers, and keeps late bytes out of the answers to later requests.
+// SPDX-License-Identifier: MIT
+// LineReader: collects the bytes that a serial port receives into answers, and keeps late bytes out
+// of the answers to later requests.
 //
 //   bytes ─► input, at most bufferBytes ─► end of message, `extra` bytes, or overflow ─► answer
 //   lost or damaged bytes ─► a mark in the input ─► the faults of each answer that contains it

@@ -5,9 +5,9 @@
 namespace mpf::test {
 namespace {
 
-class ForRoutersTest : public ClientTest {
+class RelayTest : public ClientTest {
  protected:
-  MessageServer& startWatched() {
+  RelayServer& startWatched() {
     auto& server = startServer({.queueSize = 4});
     server.onClient(
         [this](std::uint64_t client, bool isThere) { comings_.emplace_back(client, isThere); });
@@ -31,7 +31,7 @@ class ForRoutersTest : public ClientTest {
   std::vector<std::pair<std::uint64_t, bool>> comings_;
 };
 
-TEST_F(ForRoutersTest, AServerReportsClientsThatConnectAndDisconnect) {
+TEST_F(RelayTest, AServerReportsClientsThatConnectAndDisconnect) {
   startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -51,7 +51,7 @@ TEST_F(ForRoutersTest, AServerReportsClientsThatConnectAndDisconnect) {
   EXPECT_EQ(comings_[2], std::pair(comings_[1].first, false));
 }
 
-TEST_F(ForRoutersTest, AReplyByNumbersReachesItsRequest) {
+TEST_F(RelayTest, AReplyByNumbersReachesItsRequest) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message({.value = 3})), SendResult::sent);
@@ -75,13 +75,13 @@ TEST_F(ForRoutersTest, AReplyByNumbersReachesItsRequest) {
 
   const auto first = next();
   const auto second = next();
-  EXPECT_TRUE(MessageClient::endsRequest(first));
-  EXPECT_FALSE(MessageClient::endsRequest(second));
+  EXPECT_TRUE(RelayClient::endsRequest(first));
+  EXPECT_FALSE(RelayClient::endsRequest(second));
   EXPECT_EQ(first.tryAs<Int32>()->value, 4);
   EXPECT_EQ(second.tryAs<Int32>()->value, 5);
 }
 
-TEST_F(ForRoutersTest, ARequestHasTheIdThatTheCallerChose) {
+TEST_F(RelayTest, ARequestHasTheIdThatTheCallerChose) {
   startWatched();
   bindByHand();
   ASSERT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent);
@@ -97,7 +97,7 @@ TEST_F(ForRoutersTest, ARequestHasTheIdThatTheCallerChose) {
   static_cast<void>(next());
 }
 
-TEST_F(ForRoutersTest, AServerGetsTheDeadlineOfARequest) {
+TEST_F(RelayTest, AServerGetsTheDeadlineOfARequest) {
   startWatched();
   bindByHand();
   const auto until = Deadline::after(1h);
@@ -113,7 +113,7 @@ TEST_F(ForRoutersTest, AServerGetsTheDeadlineOfARequest) {
 
 // While a client is paused, the reply queue of its server becomes full; after resume() no reply is
 // missing.
-TEST_F(ForRoutersTest, APausedClientLeavesRepliesInTheQueue) {
+TEST_F(RelayTest, APausedClientLeavesRepliesInTheQueue) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
@@ -134,7 +134,7 @@ TEST_F(ForRoutersTest, APausedClientLeavesRepliesInTheQueue) {
 }
 
 // A router reports in this way that a queue behind it is full.
-TEST_F(ForRoutersTest, AServerMayReportThatAQueueIsFull) {
+TEST_F(RelayTest, AServerMayReportThatAQueueIsFull) {
   auto& server = startWatched();
   bindByHand();
   ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);

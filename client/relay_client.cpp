@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+#include "client/relay_client.h"
+
+#include "client/binding.h"
+
+namespace mpf {
+
+SendResult RelayClient::sendAs(std::uint32_t requestId, Message&& message,
+                               Deadline takeBefore) noexcept {
+  if (isInherited()) return SendResult::notConnected;
+  return binding_->send(message, takeBefore, requestId);
+}
+
+void RelayClient::pause() { binding_->pause(); }
+void RelayClient::resume() { binding_->resume(); }
+
+}  // namespace mpf

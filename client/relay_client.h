@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// RelayClient: a client that sends on behalf of other clients. Routers use it.
+//
+// Threads  the thread that runs the dispatcher.
+#pragma once
+
+#include <mpf/message_client.h>
+
+namespace mpf {
+
+class RelayClient : public MessageClient {
+ public:
+  using MessageClient::MessageClient;
+
+  // As send(), with a number that the caller chooses, not 0. Returns tooManyOutstanding also when
+  // another request occupies the place of that number in the table of requests.
+  [[nodiscard]] SendResult sendAs(std::uint32_t requestId, Message&& message,
+                                  Deadline takeBefore) noexcept;
+  // Whether a message that the callback received ended its request.
+  [[nodiscard]] static bool endsRequest(const Message& message) noexcept {
+    return message.route().flags == kEndsRequest;
+  }
+  // Stops the delivery of messages from the server until resume() or the end of the connection. The
+  // messages wait in the link; when it is full, the server's replies fail with queueFull.
+  void pause();
+  void resume();
+  // Allocates memory for the body of a request, as alloc() does; the caller owns it: see BodyBytes.
+  //   throws  std::bad_alloc
+  [[nodiscard]] BodyBytes allocateBody(std::size_t bytes) { return allocate(bytes); }
+};
+
+}  // namespace mpf

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// RelayServer: a server that answers on behalf of another server. Routers use it.
+//
+//   client   a number of clientOf()
+//
+// Threads  as MessageServer.
+#pragma once
+
+#include <mpf/message_server.h>
+
+namespace mpf {
+
+class RelayServer : public MessageServer {
+ public:
+  using MessageServer::MessageServer;
+
+  // Sets a callback for clients that connect (isConnected true) and disconnect or die (false).
+  // receive() calls it. Set it before the first receive(). When it throws, receive() finishes its
+  // work on the connections and then throws the same exception.
+  void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
+  // The deadline that the client gave to the request that receive() returned last.
+  [[nodiscard]] Deadline takeBefore() const noexcept;
+  // As reply(), to a request whose handle no longer exists: its clientOf(request) and
+  // request.route().requestId.
+  ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
+  // Whether that request still has no reply.
+  [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
+  // The requests of a client that were received and still have no reply.
+  [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
+  // Allocates memory for the body of a reply to a client; the caller owns it: see BodyBytes.
+  //   throws  std::bad_alloc
+  [[nodiscard]] BodyBytes allocateBody(std::uint64_t client, std::size_t bytes);
+};
+
+}  // namespace mpf
