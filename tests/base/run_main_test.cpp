@@ -103,7 +103,7 @@ TEST(RunMain, AnExceptionIsALineAndAStatus) {
   EXPECT_EQ(failed, kExitFailed);
   EXPECT_EQ(wrong, kExitUsage);
   EXPECT_EQ(unknown, kExitFailed);
-  EXPECT_EQ(errors.text(), "x: bad \\x1b[2J\nx: odd\nx: failed for a reason that is not known\n");
+  EXPECT_EQ(errors.text(), "x: bad \\x1b[2J\nx: odd\nx: failed with an unknown exception\n");
 }
 
 TEST(RunMain, ToReportAnErrorNeverFails) {
