@@ -54,8 +54,8 @@ class Endpoint {
   void hold(std::uint32_t index) noexcept;
   void release(std::uint32_t index, Link& link) noexcept;
   // Returns the window of a peer, mapped once and watched; nullptr if there is no open window of
-  // this name whose owner is alive. The owner's death is reported as a local event; peer()->isDead()
-  // of its links is then true.
+  // this name whose owner is alive. The owner's death is reported as a local event; then
+  // peer()->isDead() of its links is true.
   //   throws  as PeerWindow::tryOpen()
   std::shared_ptr<PeerWindow> peer(const std::string& name, layout::SegmentKind kind);
 
