@@ -210,7 +210,7 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   EXPECT_EQ(error.fault, ConversionFault::unsound);
   EXPECT_EQ(error.text, "int32: a body of 10 bytes is invalid");
   EXPECT_FALSE(tryToWire(MessageOf(RequestFate{.fate = Fate{-3}}), envelope, {}, error));
-  EXPECT_EQ(error.text, "requestFate.fate: -3 is no such value");
+  EXPECT_EQ(error.text, "requestFate.fate: -3 is not a value of this type");
 }
 
 TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) {

@@ -84,7 +84,7 @@ TEST_F(StaleSegmentsTest, OfTheDeadTheFreeLockIsTheReason) {
   for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::dead) << file;
   EXPECT_THAT(
       all.at(pendingBind).reason,
-      AllOf(HasSubstr("nobody holds the lock of " + keyed(NameKind::clientWindow, incarnation)),
+      AllOf(HasSubstr("no process holds the lock of " + keyed(NameKind::clientWindow, incarnation)),
             HasSubstr("pid ")));
   for (const auto& [file, judged] : all) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
@@ -100,7 +100,7 @@ TEST_F(StaleSegmentsTest, WhatNobodyOwnsIsDead) {
   EXPECT_EQ(judgementOf(pendingBind).reason,
             "its owner's " + keyed(NameKind::clientWindow, 0x99) + " is gone");
   EXPECT_EQ(judgementOf(bulk).reason, "its link 55 is gone");
-  EXPECT_THAT(judgementOf(link).reason, HasSubstr("nobody can use it: "));
+  EXPECT_THAT(judgementOf(link).reason, HasSubstr("no program can use it: "));
   for (const auto& [file, judged] : judge()) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
 
