@@ -6,7 +6,7 @@
 namespace mpf {
 namespace {
 
-TEST(LatencyRecorder, TellsNothingOfNothing) {
+TEST(LatencyRecorder, ReturnsZerosWithoutSamples) {
   const LatencyRecorder recorder;
 
   EXPECT_EQ(recorder.count(), 0u);
@@ -29,7 +29,7 @@ TEST(LatencyRecorder, IsExactBelow256Nanoseconds) {
 }
 
 // One slow message in a thousand shows in p99.9's successor, the maximum, and nowhere below.
-TEST(LatencyRecorder, KeepsTheOutlierApart) {
+TEST(LatencyRecorder, ShowsASingleOutlierOnlyInTheMaximum) {
   LatencyRecorder recorder;
 
   for (int i = 0; i < 999; ++i) recorder.add(70);
@@ -41,7 +41,7 @@ TEST(LatencyRecorder, KeepsTheOutlierApart) {
   EXPECT_EQ(recorder.maxNs(), 12'345'678u);
 }
 
-TEST(LatencyRecorder, ErrsByLessThanAHundredthAtAnySize) {
+TEST(LatencyRecorder, HasAnErrorBelowOnePercentForAllDurations) {
   for (std::uint64_t ns = 1; ns < 100'000'000'000; ns = ns * 9 / 8 + 1) {
     LatencyRecorder recorder;
     recorder.add(ns);
@@ -54,7 +54,7 @@ TEST(LatencyRecorder, ErrsByLessThanAHundredthAtAnySize) {
   }
 }
 
-TEST(LatencyRecorder, TakesWhatIsLongerThanItsLastBucket) {
+TEST(LatencyRecorder, CountsDurationsBeyondTheLastBucket) {
   LatencyRecorder recorder;
 
   recorder.add(UINT64_MAX / 2);
@@ -63,7 +63,7 @@ TEST(LatencyRecorder, TakesWhatIsLongerThanItsLastBucket) {
   EXPECT_GT(recorder.percentileNs(50), 1'000'000'000'000u / 2);
 }
 
-TEST(LatencyRecorder, AddsAnother) {
+TEST(LatencyRecorder, AddsAnotherRecorder) {
   LatencyRecorder one;
   LatencyRecorder other;
   one.add(10);

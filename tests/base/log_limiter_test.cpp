@@ -35,7 +35,7 @@ class LogLimiterTest : public testing::Test {
   std::int64_t nowNs_ = 1'000'000'000'000;
 };
 
-TEST_F(LogLimiterTest, WritesSomeLinesAtOnceAndHoldsTheRest) {
+TEST_F(LogLimiterTest, WritesTheFirstLinesAtOnceAndHoldsTheRest) {
   useUp();
 
   EXPECT_FALSE(admit("one more"));
@@ -45,7 +45,7 @@ TEST_F(LogLimiterTest, WritesSomeLinesAtOnceAndHoldsTheRest) {
   EXPECT_LE(limiter_.dueNs(), nowNs_ + kEveryNs);
 }
 
-TEST_F(LogLimiterTest, CountsLinesThatAreAlike) {
+TEST_F(LogLimiterTest, CountsHeldLinesWithTheSameText) {
   useUp();
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("status -1"));
   nowNs_ += kEveryNs;
@@ -55,7 +55,7 @@ TEST_F(LogLimiterTest, CountsLinesThatAreAlike) {
   EXPECT_EQ(limiter_.dueNs(), INT64_MAX);
 }
 
-TEST_F(LogLimiterTest, KeepsTheLastOfLinesThatDiffer) {
+TEST_F(LogLimiterTest, KeepsTheLastOfHeldLinesThatDiffer) {
   useUp();
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("request " + std::to_string(i)));
   nowNs_ += kEveryNs;
@@ -64,7 +64,7 @@ TEST_F(LogLimiterTest, KeepsTheLastOfLinesThatDiffer) {
               ElementsAre("request 999 (the last of 1000 such lines in 10.0 s)"));
 }
 
-TEST_F(LogLimiterTest, WritesASingleHeldLineAsItIs) {
+TEST_F(LogLimiterTest, WritesASingleHeldLineUnchanged) {
   useUp();
   EXPECT_FALSE(admit("late", kKind, 3));
   nowNs_ += kEveryNs;
@@ -76,7 +76,7 @@ TEST_F(LogLimiterTest, WritesASingleHeldLineAsItIs) {
   EXPECT_EQ(due[0].level, 3);
 }
 
-TEST_F(LogLimiterTest, HoldsNothingBackAtTheEnd) {
+TEST_F(LogLimiterTest, ReturnsAllHeldLinesAtTheEnd) {
   useUp();
   EXPECT_FALSE(admit("last words"));
 
@@ -85,7 +85,7 @@ TEST_F(LogLimiterTest, HoldsNothingBackAtTheEnd) {
   EXPECT_THAT(texts(limiter_.takeAll(nowNs_)), IsEmpty());
 }
 
-TEST_F(LogLimiterTest, LimitsEachKindByItself) {
+TEST_F(LogLimiterTest, LimitsEachKindSeparately) {
   useUp();
   EXPECT_FALSE(admit("one more"));
 
@@ -95,7 +95,7 @@ TEST_F(LogLimiterTest, LimitsEachKindByItself) {
 }
 
 // A line never overtakes those of its kind that are held.
-TEST_F(LogLimiterTest, HoldsALineBehindHeldOnes) {
+TEST_F(LogLimiterTest, HoldsALineWhileEarlierLinesOfItsKindAreHeld) {
   useUp();
   EXPECT_FALSE(admit("second"));
   nowNs_ += kEveryNs;
@@ -106,7 +106,7 @@ TEST_F(LogLimiterTest, HoldsALineBehindHeldOnes) {
               ElementsAre("third (the last of 2 such lines in 10.0 s)"));
 }
 
-TEST_F(LogLimiterTest, GivesAKindItsLinesBackWithTime) {
+TEST_F(LogLimiterTest, LetsAKindWriteAgainAfterSomeTime) {
   useUp();
   nowNs_ += 3 * kEveryNs;
 
@@ -118,7 +118,7 @@ TEST_F(LogLimiterTest, GivesAKindItsLinesBackWithTime) {
 }
 
 // A storm of a day, with pauses: few lines, and no line is missing from the counts.
-TEST_F(LogLimiterTest, WritesFewLinesOfALongStormAndLosesNone) {
+TEST_F(LogLimiterTest, WritesFewOfManyLinesAndCountsAll) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE(seed);
   std::minstd_rand random(seed);

@@ -7,7 +7,7 @@
 namespace mpf {
 namespace {
 
-TEST(Printable, LeavesTextAsItIs) {
+TEST(Printable, LeavesPrintableTextUnchanged) {
   for (const std::string text : {"", "dac", "Ofen-Süd °C", "電圧", "\U0001F525", "a\\b \"c\" ~"})
     EXPECT_EQ(printable(text), text);
 }
@@ -39,9 +39,11 @@ TEST(Printable, EscapesEachByteThatIsNotUtf8) {
   EXPECT_EQ(printable("\x80\xff"), "\\x80\\xff");
 }
 
-TEST(Printable, OfLinesKeepsTheirEnds) { EXPECT_EQ(printableLines("a\r\nb\n"), "a\\r\nb\n"); }
+TEST(Printable, KeepsLineEndsInPrintableLines) {
+  EXPECT_EQ(printableLines("a\r\nb\n"), "a\\r\nb\n");
+}
 
-TEST(Printable, OfADocumentIsWhatItWasToAProgram) {
+TEST(Printable, KeepsTheMeaningOfAJsonDocument) {
   EXPECT_EQ(printableJson("{\n \"a\": \"b\u202e\x7f\u00fc\"\n}"),
             "{\n \"a\": \"b\\u202e\\u007f\u00fc\"\n}");
   EXPECT_EQ(printableJson("\"\U000e0041\""), "\"\\udb40\\udc41\"");

@@ -25,7 +25,7 @@ class RealTimePriorityTest : public testing::Test {
   }
 };
 
-TEST_F(RealTimePriorityTest, IsThatOfTheThreadAlone) {
+TEST_F(RealTimePriorityTest, AppliesOnlyToTheThreadItself) {
   std::thread([] {
     const RealTimePriority priority(kPriority);
     EXPECT_TRUE(priority.isHeld());
@@ -38,7 +38,7 @@ TEST_F(RealTimePriorityTest, IsThatOfTheThreadAlone) {
   EXPECT_EQ(policyOfThisThread(), SCHED_OTHER);
 }
 
-TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadAsItIs) {
+TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadUnchanged) {
   std::thread([] {
     RealTimePriority priority(0);
     priority.check();
@@ -48,7 +48,7 @@ TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadAsItIs) {
 }
 
 // Or it would starve the machine.
-TEST_F(RealTimePriorityTest, IsTakenFromAThreadThatNeverSleepsAndGivenBack) {
+TEST_F(RealTimePriorityTest, IsRemovedFromAThreadThatNeverSleepsAndRestored) {
   std::thread([] {
     RealTimePriority priority(kPriority);
     while (priority.isHeld()) priority.check();
@@ -59,7 +59,7 @@ TEST_F(RealTimePriorityTest, IsTakenFromAThreadThatNeverSleepsAndGivenBack) {
   }).join();
 }
 
-TEST(InheritingMutexTest, LetsOneInAtATime) {
+TEST(InheritingMutexTest, AdmitsOneThreadAtATime) {
   InheritingMutex mutex;
   int count = 0;
   const auto work = [&] {

@@ -64,7 +64,7 @@ class Errors {
   FileDescriptor file_;
 };
 
-TEST(RunMain, OpensWhichEverStandardDescriptorsAreClosed) {
+TEST(RunMain, OpensTheStandardDescriptorsThatAreClosed) {
   for (unsigned subset = 0; subset < 8; ++subset) {
     const auto end = endOf([&] {
       closeAll(subset);
@@ -80,7 +80,7 @@ TEST(RunMain, OpensWhichEverStandardDescriptorsAreClosed) {
   }
 }
 
-TEST(RunMain, LeavesOpenDescriptorsAlone) {
+TEST(RunMain, LeavesOpenDescriptorsUnchanged) {
   const auto end = endOf([] {
     redirect(STDOUT_FILENO, "/dev/zero");
     return runMain("x", [] { return isNull(STDOUT_FILENO) ? 1 : kGood; });
@@ -89,7 +89,7 @@ TEST(RunMain, LeavesOpenDescriptorsAlone) {
   EXPECT_EQ(end, kGood);
 }
 
-TEST(RunMain, AnExceptionIsALineAndAStatus) {
+TEST(RunMain, ReportsAnExceptionAsOneLineAndAStatus) {
   const Errors errors;
 
   const auto failed = endOf([&] {
@@ -106,7 +106,7 @@ TEST(RunMain, AnExceptionIsALineAndAStatus) {
   EXPECT_EQ(errors.text(), "x: bad \\x1b[2J\nx: odd\nx: failed with an unknown exception\n");
 }
 
-TEST(RunMain, ToReportAnErrorNeverFails) {
+TEST(RunMain, ReturnsTheStatusEvenIfStderrCannotBeWritten) {
   const auto fail = [] {
     return runMain("x", []() -> int { throw std::invalid_argument("odd"); });
   };
@@ -116,7 +116,7 @@ TEST(RunMain, ToReportAnErrorNeverFails) {
   EXPECT_EQ(endOf([&] { return redirect(STDERR_FILENO, "/dev/null"), fail(); }), kExitUsage);
 }
 
-TEST(RunMain, OutputThatCannotBeWrittenIsAFailure) {
+TEST(RunMain, FailsIfOutputCannotBeWritten) {
   const Errors errors;
 
   const auto end = endOf([&] {
@@ -131,7 +131,7 @@ TEST(RunMain, OutputThatCannotBeWrittenIsAFailure) {
             "x: standard output: not everything could be written: No space left on device\n");
 }
 
-TEST(CloseDescriptor, KeepsAStandardNumberInUse) {
+TEST(CloseDescriptor, KeepsAStandardDescriptorNumberInUse) {
   const auto end = endOf([] {
     closeDescriptor(STDERR_FILENO);
     if (!isNull(STDERR_FILENO)) return 1;

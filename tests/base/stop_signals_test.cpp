@@ -44,7 +44,7 @@ class StopSignalsTest : public testing::Test {
 };
 
 // What the callback uses may be destroyed right after.
-TEST_F(StopSignalsTest, EndOnceNoThreadIsInTheCallback) {
+TEST_F(StopSignalsTest, DestructorWaitsUntilNoThreadExecutesTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
     self.entered = true;
@@ -59,7 +59,7 @@ TEST_F(StopSignalsTest, EndOnceNoThreadIsInTheCallback) {
   EXPECT_FALSE(wasGone);
 }
 
-TEST_F(StopSignalsTest, EndInAChildThatWasForkedBesideTheCallback) {
+TEST_F(StopSignalsTest, DestructorReturnsInAChildForkedDuringTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
     self.entered = true;

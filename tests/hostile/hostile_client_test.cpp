@@ -32,7 +32,7 @@ class MadClient : public MischiefTest {
   }
 };
 
-TEST_P(MadClient, CostsItsServerThatLinkAlone) {
+TEST_P(MadClient, CostsItsServerOnlyThatLink) {
   Victim server("serve", backplane_.name());
   SyncClient honest(backplane_, "echo");
   int asked = 0;

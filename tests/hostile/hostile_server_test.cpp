@@ -64,7 +64,7 @@ class Unlucky {
   MessageClient client_;
 };
 
-TEST_P(MadServer, CostsItsClientThatLinkAlone) {
+TEST_P(MadServer, CostsItsClientOnlyThatLink) {
   Victim server("serve", backplane_.name());
   honest_->bind("echo");
   ASSERT_TRUE(honest_->connectWait(60s));

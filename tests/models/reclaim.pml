@@ -8,7 +8,7 @@
 //
 //   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless isOwned isNameOf probeOwner
 //   MODELS  shm/owner_lock.cpp: trySet isHeld isHeldByOwner Reaper tryBesideStrangers lockReaperFile isReaperFileLocked findWriteLock
-//   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
+//   MODELS  shm/window.cpp: publish checkConflict ~OwnWindow
 //   HOLDS   the name of a living window is removed by nobody but its owner
 //   HOLDS   never do two that live own the name
 //   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked, and no stranger

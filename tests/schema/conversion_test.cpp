@@ -73,7 +73,7 @@ TEST(Conversion, KeepsEveryFieldOfEveryScalar) {
   }
 }
 
-TEST(Conversion, KeepsTheClientsMarks) {
+TEST(Conversion, KeepsClientTypeAndClientExtra) {
   auto message = MessageOf(Int32{});
   message.setClientType(kMin);
   message.setClientExtra(kMax);
@@ -129,7 +129,7 @@ TEST(Conversion, KeepsArraysOfAnyLength) {
   expectSame(message);
 }
 
-TEST(Conversion, KeepsAnInt32ArrayOfExtremes) {
+TEST(Conversion, KeepsExtremeValuesOfAnInt32Array) {
   auto message = Int32ArrayMessage::allocValue(4);
   std::ranges::copy(std::array{kMin, kMax, 0, -1}, message.value().begin());
 
@@ -196,7 +196,7 @@ TEST(Conversion, NamesATypeFromANewerPeer) {
   EXPECT_EQ(error.fault, ConversionFault::unknownType);
 }
 
-TEST(Conversion, RefusesWhatIsNoMessageHere) {
+TEST(Conversion, RefusesUnknownTypesAndInvalidBodies) {
   capnp::MallocMessageBuilder builder;
   ConversionError error;
   const auto envelope = builder.initRoot<wire::Envelope>();
@@ -213,7 +213,7 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   EXPECT_EQ(error.text, "requestFate.fate: -3 is not a value of this type");
 }
 
-TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) {
+TEST(Conversion, KeepsAnUnknownStatusOfANewerPeer) {
   expectSame(MessageOf(Connect{.status = ConnectStatus{4000}}));
 }
 
@@ -229,7 +229,7 @@ TEST(Conversion, RefusesAnEndOfMessageStringThatDoesNotFit) {
   EXPECT_EQ(error.text, "char8Array.eomString: 8 bytes, there is room for 4");
 }
 
-TEST(Conversion, TakesAMissingStructForZeros) {
+TEST(Conversion, ReadsAMissingStructAsZeros) {
   capnp::MallocMessageBuilder builder;
   builder.initRoot<wire::Envelope>();
   ConversionError error;

@@ -57,7 +57,7 @@ class BackplaneTest : public ShmTest {
 };
 
 // Up to 4096 files it looks at all; beyond that, other users' names must not keep it waiting.
-TEST_F(BackplaneTest, WhoeverAttachesToACrowdOfNamesLooksAtSome) {
+TEST_F(BackplaneTest, AttachExaminesOnlySomeOfVeryManyFiles) {
   for (std::uint64_t number = 1; number <= 5000; ++number) {
     std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::pendingBind, number))};
   }
@@ -68,7 +68,7 @@ TEST_F(BackplaneTest, WhoeverAttachesToACrowdOfNamesLooksAtSome) {
   EXPECT_EQ(backplane_.removeDead().size(), 5000U - 4096U);
 }
 
-TEST_F(BackplaneTest, IsNamedByItsUserByTheEnvironmentOrDefault) {
+TEST_F(BackplaneTest, TakesItsNameFromTheCallerTheEnvironmentOrTheDefault) {
   ::setenv("MPF_BACKPLANE", name().c_str(), 1);
   EXPECT_EQ(Backplane::attach().name(), name());
   EXPECT_EQ(Backplane::attach(name() + "x").name(), name() + "x");
@@ -78,7 +78,7 @@ TEST_F(BackplaneTest, IsNamedByItsUserByTheEnvironmentOrDefault) {
   EXPECT_EQ(Backplane::attach().name(), "default");
 }
 
-TEST_F(BackplaneTest, ANameThatCannotBeOneIsRefusedByName) {
+TEST_F(BackplaneTest, RefusesAnInvalidNameAndNamesIt) {
   EXPECT_THAT(whatOf<std::invalid_argument>([] { Backplane::attach("a.b"); }),
               HasSubstr("\"a.b\""));
   ::setenv("MPF_BACKPLANE", "a/b", 1);
@@ -86,7 +86,7 @@ TEST_F(BackplaneTest, ANameThatCannotBeOneIsRefusedByName) {
   ::unsetenv("MPF_BACKPLANE");
 }
 
-TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
+TEST_F(BackplaneTest, TakesTheDefaultLocationFromTheEnvironmentOrZero) {
   ::unsetenv("MPF_LOCATION");
   EXPECT_EQ(Backplane::defaultLocation(), 0);
   ::setenv("MPF_LOCATION", "7", 1);
@@ -98,17 +98,17 @@ TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
   ::unsetenv("MPF_LOCATION");
 }
 
-TEST_F(BackplaneTest, IsolatedOnesDiffer) {
+TEST_F(BackplaneTest, IsolatedBackplanesHaveDifferentNames) {
   EXPECT_NE(Backplane::isolated().name(), Backplane::isolated().name());
 }
 
-TEST_F(BackplaneTest, CopiesShareTheirWatcher) {
+TEST_F(BackplaneTest, CopiesShareOneWatcher) {
   const Backplane copy = backplane_;
 
   EXPECT_EQ(&copy.watcher(), &backplane_.watcher());
 }
 
-TEST_F(BackplaneTest, KnowsItsOwnSegmentsAndNoOthers) {
+TEST_F(BackplaneTest, ListsOnlyItsOwnSegments) {
   const auto longer = Backplane::attach(name() + "-x");
   auto ours = createPage();
   auto theirs = createPage();
@@ -128,7 +128,7 @@ TEST_F(BackplaneTest, KnowsItsOwnSegmentsAndNoOthers) {
   EXPECT_THAT(Backplane::names(), Not(Contains(longer.name())));
 }
 
-TEST_F(BackplaneTest, WhatAKilledProcessLeftIsRemovedAndNamed) {
+TEST_F(BackplaneTest, RemovesAndReportsTheFilesOfAKilledProcess) {
   Child child([&](Child::Self& self) { occupy(self); });
   const auto left = backplane_.segmentNames();
   EXPECT_EQ(left.size(), kOccupied);
@@ -143,7 +143,7 @@ TEST_F(BackplaneTest, WhatAKilledProcessLeftIsRemovedAndNamed) {
   EXPECT_THAT(backplane_.removeDead(), IsEmpty());
 }
 
-TEST_F(BackplaneTest, AttachingRemovesWhatTheDeadLeft) {
+TEST_F(BackplaneTest, AttachRemovesTheFilesOfDeadProcesses) {
   Child child([&](Child::Self& self) { occupy(self); });
   child.end(SIGKILL);
 
@@ -152,7 +152,7 @@ TEST_F(BackplaneTest, AttachingRemovesWhatTheDeadLeft) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_F(BackplaneTest, WhatTheLivingOwnStaysWhenOthersDie) {
+TEST_F(BackplaneTest, KeepsTheFilesOfLivingProcesses) {
   Child dying([&](Child::Self& self) { occupy(self); });
   const auto server = makeServer();
   const OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
@@ -164,7 +164,7 @@ TEST_F(BackplaneTest, WhatTheLivingOwnStaysWhenOthersDie) {
 }
 
 // The server of the link dies, then its client: the link is the client's.
-TEST_F(BackplaneTest, ALinkStaysAsLongAsItsClientLives) {
+TEST_F(BackplaneTest, KeepsALinkUntilItsClientDies) {
   Child server([&](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader& header) {
@@ -189,7 +189,7 @@ TEST_F(BackplaneTest, ALinkStaysAsLongAsItsClientLives) {
   EXPECT_EQ(backplane_.removeDead().size(), 5u);
 }
 
-TEST_F(BackplaneTest, ALinkThatNobodyCanReadGoesWithItsClient) {
+TEST_F(BackplaneTest, RemovesAnUnreadableLinkWhenItsClientDies) {
   Child child([&](Child::Self& self) { occupy(self); });
   child.end(SIGKILL);
   for (const auto& file : backplane_.segmentNames()) {
@@ -202,7 +202,7 @@ TEST_F(BackplaneTest, ALinkThatNobodyCanReadGoesWithItsClient) {
 
 // A program of the next major version on the same backplane: its names and locks are as ours, the
 // rest is not ours to judge.
-TEST_F(BackplaneTest, LivingProgramsOfOtherVersionsKeepWhatIsTheirs) {
+TEST_F(BackplaneTest, KeepsTheFilesOfLivingProgramsOfOtherVersions) {
   const auto server = makeServer(layout::kMajor + 1);
   auto link = createPage(SegmentKind::link);
   link.sharedHeader().layoutMajor = layout::kMajor + 1;
@@ -216,7 +216,7 @@ TEST_F(BackplaneTest, LivingProgramsOfOtherVersionsKeepWhatIsTheirs) {
   segments::remove(bulk.name());
 }
 
-TEST_F(BackplaneTest, FilesWithOtherNamesAreLeftAlone) {
+TEST_F(BackplaneTest, LeavesFilesWithOtherNamesUnchanged) {
   const auto file = segments::path(SegmentName::prefix(name()) + "notes");
   std::ofstream{file} << "mine";
 
@@ -225,7 +225,7 @@ TEST_F(BackplaneTest, FilesWithOtherNamesAreLeftAlone) {
   EXPECT_EQ(::unlink(file.c_str()), 0);
 }
 
-TEST_F(BackplaneTest, ManyMayRemoveAtOnce) {
+TEST_F(BackplaneTest, ManyProcessesMayRemoveAtOnce) {
   constexpr int kReapers = 3;
   for (int round = 0; round < 30; ++round) {
     Child victim([&](Child::Self& self) { occupy(self); });

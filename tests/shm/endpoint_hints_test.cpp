@@ -56,7 +56,7 @@ class LostHints : public HintsTest,
 INSTANTIATE_TEST_SUITE_P(FewAndManyLinks, LostHints,
                          testing::Combine(kWaitModes, testing::Values(1, 100)));
 
-TEST_P(LostHints, BeforeAWaitLoseNoMessage) {
+TEST_P(LostHints, LostBeforeAWaitLoseNoMessage) {
   const auto [mode, links] = GetParam();
   End server(backplane_, "server", mode);
   End client(backplane_, "");
@@ -71,7 +71,7 @@ TEST_P(LostHints, BeforeAWaitLoseNoMessage) {
   }
 }
 
-TEST_P(LostHints, DuringAWaitLoseNoMessage) {
+TEST_P(LostHints, LostDuringAWaitLoseNoMessage) {
   const auto [mode, links] = GetParam();
   End server(backplane_, "server", mode);
   End client(backplane_, "");
@@ -94,7 +94,7 @@ TEST_P(LostHints, DuringAWaitLoseNoMessage) {
   sender.join();
 }
 
-TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutItsHint) {
+TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutAHint) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto flood = connect(client, server);
@@ -110,7 +110,7 @@ TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutItsHint) {
   }
 }
 
-TEST_F(HintsTest, AnEventLoopIsToldOfAMessageWithoutItsHint) {
+TEST_F(HintsTest, AnEventLoopIsNotifiedOfAMessageWithoutAHint) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto link = connect(client, server);
@@ -124,7 +124,7 @@ TEST_F(HintsTest, AnEventLoopIsToldOfAMessageWithoutItsHint) {
   EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
 }
 
-TEST_F(HintsTest, InventedOnesDoNoHarm) {
+TEST_F(HintsTest, HintsWithoutAMessageDoNoHarm) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto first = connect(client, server);
@@ -147,7 +147,7 @@ TEST_F(HintsTest, InventedOnesDoNoHarm) {
   EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms))) << "and then it is quiet";
 }
 
-TEST_F(HintsTest, ABusyScribblerStopsNobody) {
+TEST_F(HintsTest, APeerThatOverwritesHintsStopsNoOtherPeer) {
   constexpr std::uint32_t kTurns = 1000;
   End server(backplane_, "server", WaitMode::block);
   End client(backplane_, "", WaitMode::block);

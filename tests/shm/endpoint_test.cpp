@@ -50,7 +50,7 @@ TEST_P(WaitModes, AWaitEndsWithAMessage) {
   EXPECT_EQ(server.tryTake(*index), 7u);
 }
 
-TEST_P(WaitModes, AWaitWithoutNewsEndsAtItsDeadline) {
+TEST_P(WaitModes, AWaitWithoutAMessageEndsAtItsDeadline) {
   End server(backplane_, "server", GetParam());
 
   for (const auto patience : {-1ms, 0ms, 3ms}) {
@@ -144,7 +144,7 @@ TEST_F(EndpointTest, LinksTakeTurns) {
 }
 
 // More busy links than are polled directly.
-TEST_F(EndpointTest, ManyBusyLinksTakeTurnsToo) {
+TEST_F(EndpointTest, MoreBusyLinksThanArePolledTakeTurns) {
   constexpr int kLinks = 20;
   constexpr int kEach = 2000;
   End server(backplane_, "server");
@@ -161,7 +161,7 @@ TEST_F(EndpointTest, ManyBusyLinksTakeTurnsToo) {
 
 // Whoever asks "is there news?" before each message gets all of them, also of a link that is not
 // polled because others are.
-TEST_F(EndpointTest, AWaitBeforeEachMessageForgetsNone) {
+TEST_F(EndpointTest, AWaitBeforeEachMessageReturnsForEveryMessage) {
   constexpr std::uint32_t kLinks = 9;
   End server(backplane_, "server");
   End client(backplane_, "");
@@ -177,7 +177,7 @@ TEST_F(EndpointTest, AWaitBeforeEachMessageForgetsNone) {
   }
 }
 
-TEST_F(EndpointTest, AFloodLeavesOthersTheirTurn) {
+TEST_F(EndpointTest, AFloodOnOneLinkDoesNotStarveOthers) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto flood = connect(client, server);
@@ -198,7 +198,7 @@ TEST_F(EndpointTest, AFloodLeavesOthersTheirTurn) {
   EXPECT_LE(others, 20);
 }
 
-TEST_F(EndpointTest, IdleLinksAreNotLookedAt) {
+TEST_F(EndpointTest, DoesNotLookAtIdleLinks) {
   End server(backplane_, "server");
   End client(backplane_, "");
   for (int i = 0; i < 100; ++i) connect(client, server);
@@ -210,7 +210,7 @@ TEST_F(EndpointTest, IdleLinksAreNotLookedAt) {
   EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 100u);
 }
 
-TEST_F(EndpointTest, ABitIsUsedAgainAfterItsLinkIsGone) {
+TEST_F(EndpointTest, ReusesTheBitOfADetachedLink) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto first = connect(client, server);
@@ -227,7 +227,7 @@ TEST_F(EndpointTest, ABitIsUsedAgainAfterItsLinkIsGone) {
   EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 1u);
 }
 
-TEST_F(EndpointTest, ThereAreNoMoreBitsThanTheLayoutHas) {
+TEST_F(EndpointTest, ReservesNoMoreBitsThanTheLayoutHas) {
   End server(backplane_, "server");
 
   for (std::uint32_t i = 0; i < layout::kMaxLinks; ++i) ASSERT_EQ(server.endpoint.tryReserve(), i);
@@ -237,7 +237,7 @@ TEST_F(EndpointTest, ThereAreNoMoreBitsThanTheLayoutHas) {
   EXPECT_EQ(server.endpoint.tryReserve(), 7u);
 }
 
-TEST_F(EndpointTest, KnocksAreTakenOnce) {
+TEST_F(EndpointTest, TakesEachKnockOnce) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
@@ -258,7 +258,7 @@ TEST_F(EndpointTest, KnocksAreTakenOnce) {
   EXPECT_FALSE(server.endpoint.takeRescan());
 }
 
-TEST_F(EndpointTest, APeersDeathIsLocalNews) {
+TEST_F(EndpointTest, ReportsAPeersDeathAsALocalEvent) {
   Child child([&](Child::Self& self) {
     const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
@@ -279,7 +279,7 @@ TEST_F(EndpointTest, APeersDeathIsLocalNews) {
 }
 
 // A server that is killed while it ends has closed its window, but not yet its links.
-TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
+TEST_F(EndpointTest, WatchesThePeerOfAClosedWindowUntilItDies) {
   Child child([&](Child::Self& self) {
     const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
@@ -300,7 +300,7 @@ TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
   EXPECT_TRUE(peer->isDead());
 }
 
-TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
+TEST_F(EndpointTest, DescriptorIsReadableWhenAMessageArrives) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto link = connect(client, server);
@@ -328,7 +328,7 @@ TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
   server.endpoint.disarm();
 }
 
-TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUp) {
+TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUps) {
   constexpr std::uint32_t kTurns = 5000;
   End server(backplane_, "server");
   End client(backplane_, "");

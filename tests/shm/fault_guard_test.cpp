@@ -84,7 +84,7 @@ class FaultGuard : public ShmTest {
   int expectedFaultsOfTheProgram_ = 0;
 };
 
-TEST_F(FaultGuard, ASegmentThatIsCutReadsAsZeroesAndIsLost) {
+TEST_F(FaultGuard, ATruncatedSegmentReadsAsZeroesAndIsLost) {
   const auto segment = publish();
   const auto peers = Segment::tryOpen(file_, SegmentKind::bulk, Segment::Access::readOnly);
 
@@ -99,7 +99,7 @@ TEST_F(FaultGuard, ASegmentThatIsCutReadsAsZeroesAndIsLost) {
   EXPECT_TRUE(peers->isLost());
 }
 
-TEST_F(FaultGuard, WhatIsWrittenToALostSegmentStaysHere) {
+TEST_F(FaultGuard, WritesToALostSegmentStayInThisProcess) {
   const auto segment = publish();
   cut(file_);
 
@@ -109,7 +109,7 @@ TEST_F(FaultGuard, WhatIsWrittenToALostSegmentStaysHere) {
   EXPECT_EQ(fileBytes(file_), 0u);
 }
 
-TEST_F(FaultGuard, TheOtherSegmentsAreNotTouched) {
+TEST_F(FaultGuard, LeavesOtherSegmentsUnchanged) {
   const auto segment = publish();
   segments::remove(file_);
   const auto other = publish();
@@ -121,7 +121,7 @@ TEST_F(FaultGuard, TheOtherSegmentsAreNotTouched) {
   EXPECT_FALSE(segment.isLost());
 }
 
-TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByTheirOwner) {
+TEST_F(FaultGuard, TheOwnerGrowsTruncatedHintsAgain) {
   const auto server = makeServer();
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   cut(hintsOf(*server));
@@ -134,7 +134,7 @@ TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByTheirOwner) {
   EXPECT_FALSE(peer->isLost());
 }
 
-TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByAPeer) {
+TEST_F(FaultGuard, APeerGrowsTruncatedHintsAgain) {
   const auto server = makeServer();
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   const auto other = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
@@ -147,7 +147,7 @@ TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByAPeer) {
   EXPECT_FALSE(peer->isLost());
 }
 
-TEST_F(FaultGuard, HintsThatWereCutOrScribbledOverDoNotKeepNewPeersAway) {
+TEST_F(FaultGuard, NewPeersCanOpenTruncatedOrOverwrittenHints) {
   const auto server = makeServer();
   const auto hints = hintsOf(*server);
   cut(hints);
@@ -166,7 +166,7 @@ TEST_F(FaultGuard, HintsThatWereCutOrScribbledOverDoNotKeepNewPeersAway) {
   EXPECT_EQ(server->hints().readyBits[0].load(std::memory_order_relaxed), 1u << 5);
 }
 
-TEST_F(FaultGuard, AWindowThatIsCutIsLostToItsPeers) {
+TEST_F(FaultGuard, ATruncatedWindowIsLostToItsPeers) {
   const auto server = makeServer();
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   cut(serverName());
@@ -177,7 +177,7 @@ TEST_F(FaultGuard, AWindowThatIsCutIsLostToItsPeers) {
   EXPECT_TRUE(peer->hasOwner());
 }
 
-TEST_F(FaultGuard, ALinkThatIsCutIsLostAndItsChunksWithTheirSegment) {
+TEST_F(FaultGuard, ATruncatedLinkAndTruncatedChunksAreLost) {
   End server(backplane_, "server", WaitMode::block);
   End client(backplane_, "", WaitMode::block);
   const auto link = connect(client, server);
@@ -199,7 +199,7 @@ TEST_F(FaultGuard, ALinkThatIsCutIsLostAndItsChunksWithTheirSegment) {
   EXPECT_TRUE(link.server.isLost());
 }
 
-TEST_F(FaultGuard, AThreadOfOursCanMeetACutFile) {
+TEST_F(FaultGuard, RepairsAFaultInAnInternalThread) {
   const auto segment = publish();
   cut(file_);
   const SignalsBlocked blocked;
@@ -209,7 +209,7 @@ TEST_F(FaultGuard, AThreadOfOursCanMeetACutFile) {
   EXPECT_TRUE(segment.isLost());
 }
 
-TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
+TEST_F(FaultGuard, RepairsFaultsOfManyThreadsAtOnce) {
   for (int round = 0; round < 50; ++round) {
     const auto segment = publish();
     cut(file_);
@@ -223,7 +223,7 @@ TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
   }
 }
 
-TEST_F(FaultGuard, AFaultThatIsNotOursGoesToTheHandlerThatWasThereBefore) {
+TEST_F(FaultGuard, PassesOtherFaultsToThePreviousHandler) {
   const auto segment = publish();
   const FileDescriptor file(checkCall(::memfd_create("not ours", MFD_CLOEXEC), "memfd_create"));
   auto* const page = static_cast<volatile char*>(
@@ -237,7 +237,7 @@ TEST_F(FaultGuard, AFaultThatIsNotOursGoesToTheHandlerThatWasThereBefore) {
   expectedFaultsOfTheProgram_ = 2;
 }
 
-TEST_F(FaultGuard, HintsThatWereScribbledOverAreRemovedWithTheirDeadOwner) {
+TEST_F(FaultGuard, OverwrittenHintsAreRemovedWhenTheirOwnerIsDead) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
     std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header),
@@ -252,7 +252,7 @@ TEST_F(FaultGuard, HintsThatWereScribbledOverAreRemovedWithTheirDeadOwner) {
 }
 
 // A program whose handler comes later asks us first.
-TEST_F(FaultGuard, TellsAHandlerThatCameLaterWhatItRepaired) {
+TEST_F(FaultGuard, ReportsToALaterHandlerWhatItRepaired) {
   const auto segment = publish();
   cut(file_);
   siginfo_t fault{};

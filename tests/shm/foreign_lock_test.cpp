@@ -78,7 +78,7 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
   std::unique_ptr<Child> stranger_;
 };
 
-TEST_P(ForeignLock, OnAServersWindowLeavesItsNameToASuccessor) {
+TEST_P(ForeignLock, OnADeadServersWindowDoesNotBlockASuccessor) {
   const auto owner = startOwner(SegmentKind::serverWindow);
   const auto old = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   startStranger(serverName());
@@ -94,7 +94,7 @@ TEST_P(ForeignLock, OnAServersWindowLeavesItsNameToASuccessor) {
   EXPECT_EQ(nameOf(NameKind::reaper), "") << "a reaper's file goes with its reaper";
 }
 
-TEST_P(ForeignLock, OnAnyFileOfTheDeadLeavesItToWhoeverCleans) {
+TEST_P(ForeignLock, OnAFileOfADeadProcessDoesNotPreventItsRemoval) {
   for (const auto kind : {SegmentKind::serverWindow, SegmentKind::clientWindow}) {
     for (const auto locked :
          {kind == SegmentKind::serverWindow ? NameKind::serverWindow : NameKind::clientWindow,
@@ -114,7 +114,7 @@ TEST_P(ForeignLock, OnAnyFileOfTheDeadLeavesItToWhoeverCleans) {
   }
 }
 
-TEST_P(ForeignLock, OnAWindowHidesNoDeathFromAWatcher) {
+TEST_P(ForeignLock, OnAWindowDoesNotHideADeathFromTheWatcher) {
   const auto owner = startOwner(SegmentKind::serverWindow);
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   std::binary_semaphore died{0};
@@ -129,7 +129,7 @@ TEST_P(ForeignLock, OnAWindowHidesNoDeathFromAWatcher) {
 }
 
 // In another pid namespace only the lock tells, and a read lock is no owner's.
-TEST_P(ForeignLock, OfAReaderCountsNowhere) {
+TEST_P(ForeignLock, ForReadingIsNoEvidenceOfAnOwner) {
   if (GetParam().type != F_RDLCK) GTEST_SKIP() << "a write lock looks like the owner's there";
   const auto owner = std::make_unique<Child>([this](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
@@ -145,7 +145,7 @@ TEST_P(ForeignLock, OfAReaderCountsNowhere) {
   EXPECT_TRUE(makeServer());
 }
 
-TEST_P(ForeignLock, OnALivingWindowTakesNothingFromItsOwner) {
+TEST_P(ForeignLock, OnALivingWindowDoesNotHarmItsOwner) {
   const auto server = makeServer();
   startStranger(serverName());
 
@@ -160,7 +160,7 @@ INSTANTIATE_TEST_SUITE_P(Whole, ForeignLock, testing::Values(kReads, kWrites),
 
 // A reaper that was killed beside strangers leaves a file of its own. The next one uses it, and
 // takes it away.
-TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
+TEST_F(ForeignLock, AKilledReaperDoesNotBlockTheNextReaper) {
   const auto owner = startOwner(SegmentKind::serverWindow);
   const auto incarnation =
       PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation;
@@ -184,7 +184,7 @@ TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
   EXPECT_EQ(nameOf(NameKind::reaper), "");
 }
 
-TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
+TEST_F(ForeignLock, RemovalOfStaleFilesIncludesReaperFiles) {
   const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, 7);
   const FileDescriptor made(checkCall(
       ::open(segments::path(reaperFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "create"));
@@ -193,7 +193,7 @@ TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
 }
 
 // A stranger's file that claims to be the dead window of living hints proves nothing.
-TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
+TEST_F(ForeignLock, AWindowOfAnotherUserIsNoEvidenceAboutHints) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
   const OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
   auto fake = Segment::create(layout::kWindowBytes, SegmentKind::serverWindow, name(),
@@ -209,7 +209,7 @@ TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
 
 // A start time tells a later process with the same pid from the owner. This header's owner started
 // as the host booted.
-TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessIsOfTheDead) {
+TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessProvesDeath) {
   const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                          [](layout::SegmentHeader& header) { header.ownerStartTicks = 1; });
 
@@ -235,19 +235,19 @@ class AdmittedPeers : public ShmTest {
       name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
 };
 
-TEST_F(AdmittedPeers, AreNobodyAtFirst) {
+TEST_F(AdmittedPeers, IncludeOnlyTheOwnerAtFirst) {
   EXPECT_THAT(rightsOf(NameKind::clientWindow), testing::StartsWith("0644"));
   EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
   EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0600"));
 }
 
-TEST_F(AdmittedPeers, OfTheSameUserNeedNoMore) {
+TEST_F(AdmittedPeers, OfTheSameUserChangeNoRights) {
   client_.admit({.mode = 0600});
 
   EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
 }
 
-TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndPipe) {
+TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndFifo) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
   client_.admit({.mode = 0660, .group = kOperators});
 
@@ -255,7 +255,7 @@ TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndPipe) {
   EXPECT_EQ(rightsOf(NameKind::fifo), "0660 54321");
 }
 
-TEST_F(AdmittedPeers, OfTwoGroupsAreEverybody) {
+TEST_F(AdmittedPeers, OfTwoGroupsOpenTheHintsToEveryUser) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
   client_.admit({.mode = 0660, .group = kOperators});
   client_.admit({.mode = 0660, .group = kOperators + 1});

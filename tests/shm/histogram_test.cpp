@@ -12,7 +12,7 @@ namespace {
 
 constexpr auto kLast = layout::kHistogramBuckets - 1;
 
-TEST(Histogram, EachBucketHoldsWhatLiesBetweenItsEndAndTheOneBefore) {
+TEST(Histogram, EachBucketCoversTheDurationsUpToItsEnd) {
   for (std::uint32_t index = 0; index < kLast; ++index) {
     const auto end = HistogramBuckets::endNs(index);
 
@@ -22,7 +22,7 @@ TEST(Histogram, EachBucketHoldsWhatLiesBetweenItsEndAndTheOneBefore) {
   }
 }
 
-TEST(Histogram, ADurationIsBelowTheEndOfItsBucketAndWithinAQuarterOfIt) {
+TEST(Histogram, ADurationIsAtMostAQuarterBelowTheEndOfItsBucket) {
   Random random;
 
   for (int i = 0; i < 100'000; ++i) {
@@ -33,7 +33,7 @@ TEST(Histogram, ADurationIsBelowTheEndOfItsBucketAndWithinAQuarterOfIt) {
   }
 }
 
-TEST(Histogram, TheExtremesHaveABucket) {
+TEST(Histogram, ExtremeDurationsHaveABucket) {
   EXPECT_EQ(HistogramBuckets::indexOf(0), 0u);
   EXPECT_EQ(HistogramBuckets::indexOf(15), 0u);
   EXPECT_EQ(HistogramBuckets::indexOf(16), 0u);
@@ -44,7 +44,7 @@ TEST(Histogram, TheExtremesHaveABucket) {
   EXPECT_EQ(HistogramBuckets::indexOf(UINT64_MAX), kLast);
 }
 
-TEST(Histogram, RecordsEachDurationOnceAndKeepsTheLongest) {
+TEST(Histogram, CountsEachDurationOnceAndKeepsTheLongest) {
   const auto histogram = std::make_unique<layout::Histogram>();
 
   record(*histogram, 100);

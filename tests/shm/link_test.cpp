@@ -84,7 +84,7 @@ TEST_P(BodySizes, CrossInBothDirections) {
 INSTANTIATE_TEST_SUITE_P(InLineAndInChunks, BodySizes,
                          testing::Values(0, 1, 24, 25, 80, 192, 193, 4096, 100'000, 8 << 20));
 
-TEST_F(LinkTest, AChunkIsReadWhereItWasBuiltAndSentBackAsItIs) {
+TEST_F(LinkTest, AChunkIsReadInPlaceAndSentBackUnchanged) {
   const auto link = makeLink();
   const auto built = *link.client.tryAlloc(5000);
   built.data[4999] = std::byte{7};
@@ -103,7 +103,7 @@ TEST_F(LinkTest, AChunkIsReadWhereItWasBuiltAndSentBackAsItIs) {
   link.client.release(back->data);
 }
 
-TEST_F(LinkTest, WhatIsTooLargeForTheServerIsNotSent) {
+TEST_F(LinkTest, RefusesABodyAboveTheServersLimit) {
   const auto link = makeLink({.maxMessageBytes = 1000});
 
   EXPECT_EQ(sendBody(link.client, filled(1001)), LinkSend::tooLarge);
@@ -113,14 +113,14 @@ TEST_F(LinkTest, WhatIsTooLargeForTheServerIsNotSent) {
   EXPECT_FALSE(link.server.hasMessage());
 }
 
-TEST_F(LinkTest, NoMessageIsLongerThanAnEnvelopeCanSay) {
+TEST_F(LinkTest, RefusesABodyLongerThanAnEnvelopeCanRepresent) {
   const auto link = makeLink({.maxMessageBytes = UINT64_MAX});
 
   EXPECT_EQ(link.client.maxMessageBytes(), UINT32_MAX);
   EXPECT_EQ(link.server.maxMessageBytes(), UINT32_MAX);
 }
 
-TEST_F(LinkTest, WithoutMemoryNothingIsSentAndNothingIsLost) {
+TEST_F(LinkTest, SendsAndLosesNothingWithoutMemory) {
   const auto link = makeLink({.maxPoolBytes = 64 << 10});
   std::vector<Chunk> held;
   while (const auto chunk = link.client.tryAlloc(10'000)) held.push_back(*chunk);
@@ -134,7 +134,7 @@ TEST_F(LinkTest, WithoutMemoryNothingIsSentAndNothingIsLost) {
   EXPECT_EQ(take(link.server), filled(10'000));
 }
 
-TEST_F(LinkTest, AQueueTakesWhatItMayAndNoMore) {
+TEST_F(LinkTest, AcceptsMessagesUpToTheLimitOfTheQueue) {
   const auto link = makeLink({.queueSize = 4});
   for (int i = 0; i < 4; ++i)
     ASSERT_EQ(sendBody(link.client, filled(kLarge), {.waiting = 4}), LinkSend::sent);
@@ -146,7 +146,7 @@ TEST_F(LinkTest, AQueueTakesWhatItMayAndNoMore) {
 }
 
 // Long messages in line must not take the slots of short ones that the queue may still take.
-TEST_F(LinkTest, AQueueOfAnyBodiesHasItsFullLength) {
+TEST_F(LinkTest, AQueueHasItsFullLengthWithBodiesOfAnySize) {
   for (const std::uint32_t queue : {1u, 2u, 14u, 100u}) {
     const auto link = makeLink({.queueSize = queue});
     Random random;
@@ -164,7 +164,7 @@ TEST_F(LinkTest, AQueueOfAnyBodiesHasItsFullLength) {
   }
 }
 
-TEST_F(LinkTest, EachSideSaysItsStateAndSeesTheOthers) {
+TEST_F(LinkTest, EachSideSetsItsStateAndSeesThePeersState) {
   const auto link = makeLink();
   EXPECT_EQ(link.server.peerState(), LinkState::open) << "a client that knocks is open";
   EXPECT_EQ(link.client.peerState(), LinkState::none);
@@ -177,7 +177,7 @@ TEST_F(LinkTest, EachSideSaysItsStateAndSeesTheOthers) {
   EXPECT_EQ(link.client.peerState(), LinkState::open);
 }
 
-TEST_F(LinkTest, TheReadyBitIsSetWhileTheReceiverDoesNotWatch) {
+TEST_F(LinkTest, SetsTheReadyBitWhileTheReceiverDoesNotPoll) {
   const auto link = makeLink();
   auto& hints = server_->endpoint.window().hints();
   const auto takeBits = [&] { return hints.readyBits[0].exchange(0, std::memory_order_relaxed); };
@@ -194,7 +194,7 @@ TEST_F(LinkTest, TheReadyBitIsSetWhileTheReceiverDoesNotWatch) {
   take(link.server);
 }
 
-TEST_F(LinkTest, EveryMessageToASleeperIsTimedAndOneIn64ToWhoPolls) {
+TEST_F(LinkTest, TimesEveryMessageToASleepingPeerAndOneIn64ToAPollingOne) {
   const auto link = makeLink();
   link.server.setWatched(false);
   EXPECT_TRUE(link.client.shouldSampleTime());
@@ -210,7 +210,7 @@ TEST_F(LinkTest, EveryMessageToASleeperIsTimedAndOneIn64ToWhoPolls) {
   EXPECT_EQ(timed, 4);
 }
 
-TEST_F(LinkTest, GoesWithItsClientsSideAndItsPools) {
+TEST_F(LinkTest, EachSideRemovesItsFilesAtDestruction) {
   const auto link = makeLink();
   const auto before = backplane_.segmentNames().size();
   ASSERT_TRUE(link.client.tryAlloc(1000) && link.server.tryAlloc(1000));
@@ -223,7 +223,7 @@ TEST_F(LinkTest, GoesWithItsClientsSideAndItsPools) {
   EXPECT_EQ(backplane_.segmentNames().size(), before - 1);
 }
 
-TEST_F(LinkTest, OneThatIsGoneIsNotOpened) {
+TEST_F(LinkTest, DoesNotOpenALinkThatDoesNotExist) {
   makeEnds();
 
   EXPECT_EQ(Link::tryOpen(name(), SegmentName::link(name(), 1, 2), server_->endpoint.window()),
@@ -233,7 +233,7 @@ TEST_F(LinkTest, OneThatIsGoneIsNotOpened) {
 using Header = layout::SegmentHeader;
 class Geometries : public LinkTest, public testing::WithParamInterface<void (*)(Header&)> {};
 
-TEST_P(Geometries, ThatTheServerDidNotOfferAreRefused) { EXPECT_NE(refusal(GetParam()), ""); }
+TEST_P(Geometries, AreRefusedIfTheServerDidNotOfferThem) { EXPECT_NE(refusal(GetParam()), ""); }
 INSTANTIATE_TEST_SUITE_P(Nonsense, Geometries,
                          testing::Values([](Header& header) { header.queueSize = 0; },
                                          [](Header& header) { header.queueSize = 16385; },
@@ -249,7 +249,7 @@ INSTANTIATE_TEST_SUITE_P(Nonsense, Geometries,
                                          [](Header& header) { ++header.maxPoolBytes; },
                                          [](Header& header) { header.totalBytes = UINT64_MAX; }));
 
-TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
+TEST_F(LinkTest, RefusesALinkFileThatIsTooShortForItsRings) {
   const auto link = makeLink();
   const auto bytes =
       layout::linkBytes(link.client.header().queueSlots, link.client.header().replySlots) - 1;
@@ -272,7 +272,7 @@ std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try {
 
 // The client may write every byte of the link and of its own pool, at any time. The server goes on:
 // each of its calls ends, stays inside the memory it mapped, and gives memory to one holder only.
-TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
+TEST_F(LinkTest, APeerThatWritesInvalidDataDoesNotCrashOrBlockTheOtherSide) {
   Random random;
   const auto link = makeLink({.maxPoolBytes = 4 << 20});
   auto scribbled =

@@ -34,7 +34,7 @@ class Reserve : public ShmTest {
   }
 };
 
-TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
+TEST_F(Reserve, AShortageIsAnErrorThatNamesTheRequestedSize) {
   answer = [](off_t) { return ENOSPC; };
 
   const auto why = whatOf<std::system_error>([&] { static_cast<void>(create(4096)); });
@@ -44,7 +44,7 @@ TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
 }
 
 // As kernels do that undo a long reservation at each tick of a timer.
-TEST_F(Reserve, SignalsAreNoShortage) {
+TEST_F(Reserve, RetriesAfterSignals) {
   int calls = 0;
   answer = [&](off_t bytes) { return bytes > 1 << 20 || ++calls % 2 == 1 ? EINTR : 0; };
   constexpr std::size_t kBytes = (std::size_t{5} << 20) + 4096;
@@ -55,14 +55,14 @@ TEST_F(Reserve, SignalsAreNoShortage) {
   EXPECT_EQ(calls, 12);
 }
 
-TEST_F(Reserve, AShortageBetweenSignalsIsAnError) {
+TEST_F(Reserve, ReportsAShortageAfterSignals) {
   int calls = 0;
   answer = [&](off_t) { return ++calls < 5 ? EINTR : ENOSPC; };
 
   EXPECT_THROW(static_cast<void>(create(std::size_t{5} << 20)), std::system_error);
 }
 
-TEST_F(Reserve, AShortageIsNoChunkAndPasses) {
+TEST_F(Reserve, AllocatesNoChunkDuringAShortageAndOneAfterIt) {
   layout::ReturnRing returns{};
   PoolOwner pool({name(), 1, 0, 0}, Rights{}, 1 << 20, returns);
   answer = [](off_t) { return ENOSPC; };

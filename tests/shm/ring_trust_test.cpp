@@ -8,7 +8,7 @@ namespace {
 
 class SlotCounts : public RingTest, public testing::WithParamInterface<int> {};
 
-TEST_P(SlotCounts, ThatCannotBeHoldNoBodyAndEndInOneStep) {
+TEST_P(SlotCounts, OfInvalidValuesHaveNoBodyAndCountAsOneSlot) {
   ASSERT_TRUE(push(1));
   ASSERT_TRUE(push(2));
   ring_[0].slots = static_cast<std::uint8_t>(GetParam());
@@ -26,7 +26,7 @@ TEST_P(SlotCounts, ThatCannotBeHoldNoBodyAndEndInOneStep) {
 }
 INSTANTIATE_TEST_SUITE_P(Nonsense, SlotCounts, testing::Values(0, 5, 127, 200, 255));
 
-TEST_F(RingTest, TheSlotCountIsReadOnce) {
+TEST_F(RingTest, ReadsTheSlotCountOnce) {
   ASSERT_TRUE(push(1));
 
   static_cast<void>(consumer_.begin());
@@ -39,7 +39,7 @@ TEST_F(RingTest, TheSlotCountIsReadOnce) {
   EXPECT_TRUE(consumer_.hasMessage());
 }
 
-TEST_F(RingTest, ASequenceFromThePastOrTheFutureIsNoMessage) {
+TEST_F(RingTest, IgnoresASequenceOfAnotherPosition) {
   for (const std::uint64_t sequence :
        {std::uint64_t{0}, std::uint64_t{2}, std::uint64_t{kCapacity + 1}, UINT64_MAX}) {
     ring_[0].sequence.store(sequence, std::memory_order_relaxed);
@@ -47,7 +47,7 @@ TEST_F(RingTest, ASequenceFromThePastOrTheFutureIsNoMessage) {
   }
 }
 
-TEST_F(RingTest, FreedSlotsThatWereNeverUsedMakeNoMoreRoomThanTheRingHas) {
+TEST_F(RingTest, FreedSlotsThatWereNeverUsedAddNoRoom) {
   for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(push(i));
 
   control_.freed.store(UINT64_MAX, std::memory_order_relaxed);
@@ -56,7 +56,7 @@ TEST_F(RingTest, FreedSlotsThatWereNeverUsedMakeNoMoreRoomThanTheRingHas) {
   EXPECT_FALSE(producer_.hasFree(kCapacity + 1));
 }
 
-TEST_F(RingTest, FreedSlotsThatGoBackTakeNothingAway) {
+TEST_F(RingTest, AFreedPositionThatDecreasesRemovesNoRoom) {
   ASSERT_TRUE(push(1));
   take();
   ASSERT_TRUE(producer_.hasFree(kCapacity));
@@ -67,7 +67,7 @@ TEST_F(RingTest, FreedSlotsThatGoBackTakeNothingAway) {
   EXPECT_FALSE(push(99));
 }
 
-TEST_F(RingTest, ACountOfTakenMessagesIsHeldToWhatWasSent) {
+TEST_F(RingTest, LimitsTheCountOfTakenMessagesToThoseSent) {
   ASSERT_TRUE(push(1));
   ASSERT_TRUE(push(2));
 
@@ -81,7 +81,7 @@ TEST_F(RingTest, ACountOfTakenMessagesIsHeldToWhatWasSent) {
 
 // Each step is bounded and stays inside the ring (the fixture looks at the guards), whatever the
 // other side writes where.
-TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
+TEST_F(RingTest, InvalidDataAnywhereCrashesAndBlocksNoEnd) {
   Random random;
   Bytes body(layout::kInlineBodyBytes);
   constexpr auto kRingBytes = sizeof(layout::Slot) * kCapacity;

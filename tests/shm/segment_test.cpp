@@ -34,7 +34,7 @@ class SegmentTest : public ShmTest {
   std::string file_ = SegmentName::keyed(name(), NameKind::pendingBind, 1);
 };
 
-TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
+TEST_F(SegmentTest, IsZeroedAndItsHeaderNamesItsCreatorTimeAndKind) {
   const auto before = Clock::nowNs();
 
   const auto segment = createPage(SegmentKind::bulk);
@@ -62,7 +62,7 @@ TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
                           [](std::byte byte) { return byte == std::byte{0}; }));
 }
 
-TEST_F(SegmentTest, IsSeenUnderItsNameOnlyWhenItIsPublished) {
+TEST_F(SegmentTest, HasItsNameOnlyAfterItIsPublished) {
   auto segment = createPage();
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
   segment.sharedHeader().location = 7;
@@ -74,7 +74,7 @@ TEST_F(SegmentTest, IsSeenUnderItsNameOnlyWhenItIsPublished) {
             7);
 }
 
-TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItIsSeen) {
+TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItHasItsName) {
   std::atomic<int> seen{0};
   std::thread maker([&] {
     while (seen < 500) {
@@ -99,7 +99,7 @@ TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItIsSeen) {
   maker.join();
 }
 
-TEST_F(SegmentTest, ACreatorKilledBeforeItPublishedLeavesNothing) {
+TEST_F(SegmentTest, ACreatorKilledBeforePublishingLeavesNothing) {
   Child child([&](Child::Self& self) {
     auto segment = createPage();
     segment.lockForLife();
@@ -111,7 +111,7 @@ TEST_F(SegmentTest, ACreatorKilledBeforeItPublishedLeavesNothing) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-TEST_F(SegmentTest, TheSecondOfANameIsNotPublishedAndTheFirstStays) {
+TEST_F(SegmentTest, DoesNotPublishASecondSegmentOfTheSameName) {
   auto first = createPage();
   auto second = createPage();
   ASSERT_TRUE(first.tryPublish(file_));
@@ -123,7 +123,7 @@ TEST_F(SegmentTest, TheSecondOfANameIsNotPublishedAndTheFirstStays) {
       first.header().incarnation);
 }
 
-TEST_F(SegmentTest, OneOfManyCreatorsWins) {
+TEST_F(SegmentTest, OneOfManyCreatorsGetsTheName) {
   for (int round = 0; round < 200; ++round) {
     std::atomic<int> wins{0};
     std::vector<std::thread> creators;
@@ -140,7 +140,7 @@ TEST_F(SegmentTest, OneOfManyCreatorsWins) {
   }
 }
 
-TEST_F(SegmentTest, WhatOneWritesAnotherReads) {
+TEST_F(SegmentTest, ProcessesShareItsContents) {
   auto segment = createPage();
   ASSERT_TRUE(segment.tryPublish(file_));
   auto opened = Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readWrite);
@@ -152,14 +152,14 @@ TEST_F(SegmentTest, WhatOneWritesAnotherReads) {
   EXPECT_EQ(segment.at<std::uint32_t>(1000), 7u);
 }
 
-TEST_F(SegmentTest, ThereIsNoneUnderAnUnusedName) {
+TEST_F(SegmentTest, DoesNotOpenAnUnusedName) {
   EXPECT_FALSE(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
   EXPECT_FALSE(segments::remove(file_));
   EXPECT_FALSE(segments::removeIfOwnerless(file_));
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::absent);
 }
 
-TEST_F(SegmentTest, HasAnOwnerWhileItIsLockedAndNotAfterwards) {
+TEST_F(SegmentTest, HasAnOwnerOnlyWhileItIsLocked) {
   auto segment = createPage();
   segment.lockForLife();
   ASSERT_TRUE(segment.tryPublish(file_));
@@ -177,7 +177,7 @@ TEST_F(SegmentTest, HasAnOwnerWhileItIsLockedAndNotAfterwards) {
       << "another one's name now";
 }
 
-TEST_F(SegmentTest, TheLockGoesWithTheProcessThatIsKilled) {
+TEST_F(SegmentTest, TheLockOfAKilledProcessIsReleased) {
   Child child([&](Child::Self& self) {
     auto segment = createPage();
     segment.lockForLife();
@@ -197,7 +197,7 @@ TEST_F(SegmentTest, TheLockGoesWithTheProcessThatIsKilled) {
 
 // Reapers and successors at the same name: whoever holds the lock of a published segment finds it
 // under its name until it lets go.
-TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
+TEST_F(SegmentTest, ReapersNeverRemoveTheNameOfALivingOwner) {
   std::atomic<bool> end{false};
   std::vector<std::thread> reapers;
   for (int i = 0; i < 2; ++i) {
@@ -218,7 +218,7 @@ TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
   for (auto& reaper : reapers) reaper.join();
 }
 
-TEST_F(SegmentTest, IsItsCreatorsAloneUnlessRightsSayOtherwise) {
+TEST_F(SegmentTest, IsOnlyForItsCreatorUnlessRightsSayOtherwise) {
   auto mine = createPage();
   ASSERT_TRUE(mine.tryPublish(file_));
   EXPECT_EQ(status().st_mode & 07777, 0600u);
@@ -235,7 +235,7 @@ TEST_F(SegmentTest, IsItsCreatorsAloneUnlessRightsSayOtherwise) {
   EXPECT_EQ(status().st_gid, group);
 }
 
-TEST_F(SegmentTest, MoreMemoryThanThereIsIsAnErrorAtCreation) {
+TEST_F(SegmentTest, CreationFailsWithoutEnoughMemory) {
   for (const auto bytes : {std::size_t{1} << 50, std::size_t{1} << 62, SIZE_MAX}) {
     const auto why = whatOf<std::system_error>(
         [&] { static_cast<void>(Segment::create(bytes, SegmentKind::bulk, name(), {})); });

@@ -45,7 +45,7 @@ class StaleSegmentsTest : public ShmTest {
   }
 };
 
-TEST_F(StaleSegmentsTest, OfTheLivingTheLockIsTheReason) {
+TEST_F(StaleSegmentsTest, NamesTheHeldLockForFilesOfLivingProcesses) {
   const auto client = makeClient();
   const auto incarnation = client.header().incarnation;
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
@@ -67,7 +67,7 @@ TEST_F(StaleSegmentsTest, OfTheLivingTheLockIsTheReason) {
   segments::remove(pendingBind);
 }
 
-TEST_F(StaleSegmentsTest, OfTheDeadTheFreeLockIsTheReason) {
+TEST_F(StaleSegmentsTest, NamesTheFreeLockForFilesOfDeadProcesses) {
   std::uint64_t incarnation = 0;
   Child child([&](Child::Self& self) {
     const auto client = makeClient();
@@ -89,7 +89,7 @@ TEST_F(StaleSegmentsTest, OfTheDeadTheFreeLockIsTheReason) {
   for (const auto& [file, judged] : all) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
 
-TEST_F(StaleSegmentsTest, WhatNobodyOwnsIsDead) {
+TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
   leave(pendingBind, SegmentKind::pendingBind, 0x99);
   const auto bulk = SegmentName::bulk(name(), 0x55, 1, 0);
@@ -105,7 +105,7 @@ TEST_F(StaleSegmentsTest, WhatNobodyOwnsIsDead) {
 }
 
 // Somebody removed the name of a window whose owner lives on.
-TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsWhatIsItsOwn) {
+TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsItsOtherFiles) {
   const auto client = makeClient();
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
   leave(pendingBind, SegmentKind::pendingBind, client.header().incarnation);
@@ -118,7 +118,7 @@ TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsWhatIsItsOwn) {
   segments::remove(pendingBind);
 }
 
-TEST_F(StaleSegmentsTest, WhatCannotBeUnderstoodIsNotJudged) {
+TEST_F(StaleSegmentsTest, DoesNotJudgeUnknownFiles) {
   const auto notes = SegmentName::prefix(name()) + "notes";
   std::ofstream(segments::path(notes)) << "mine";
   leave(serverName("newer"), SegmentKind::serverWindow, 0, layout::kMajor + 1);
@@ -139,7 +139,7 @@ TEST_F(StaleSegmentsTest, WhatCannotBeUnderstoodIsNotJudged) {
 }
 
 // Judged dead, and then the name is a successor's: the removal asks the lock once more.
-TEST_F(StaleSegmentsTest, ASuccessorThatTookTheNameStays) {
+TEST_F(StaleSegmentsTest, DoesNotRemoveASuccessorOfTheSameName) {
   leave(serverName(), SegmentKind::serverWindow, 0);
   const auto judged = judgementOf(serverName());
   ASSERT_EQ(judged.verdict, Verdict::dead);
@@ -153,7 +153,7 @@ TEST_F(StaleSegmentsTest, ASuccessorThatTookTheNameStays) {
 }
 
 // Any user may fill /dev/shm with names.
-TEST_F(StaleSegmentsTest, OfManyNamesAsManyAreJudgedAsWasAskedFor) {
+TEST_F(StaleSegmentsTest, JudgesTheRequestedNumberOfManyFiles) {
   for (std::uint64_t number = 1; number <= 200; ++number)
     std::ofstream(segments::path(keyed(NameKind::pendingBind, number)));
 
@@ -163,7 +163,7 @@ TEST_F(StaleSegmentsTest, OfManyNamesAsManyAreJudgedAsWasAskedFor) {
 }
 
 // A pool hangs on its link: when that was not looked at, nothing is known of the pool.
-TEST_F(StaleSegmentsTest, APoolWhoseLinkWasNotLookedAtIsNotJudged) {
+TEST_F(StaleSegmentsTest, DoesNotJudgeAPoolWithoutItsLink) {
   const auto client = makeClient();
   const auto link = SegmentName::link(name(), 1, 2);
   leave(link, SegmentKind::link, client.header().incarnation);

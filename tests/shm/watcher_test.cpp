@@ -62,7 +62,7 @@ class WatcherTest : public ShmTest {
   Watcher& watcher_ = backplane_.watcher();
 };
 
-TEST_F(WatcherTest, ADeathIsReportedOnce) {
+TEST_F(WatcherTest, ReportsADeathOnce) {
   const auto server = startServer("server");
   const auto peer = open("server");
   News news;
@@ -77,7 +77,7 @@ TEST_F(WatcherTest, ADeathIsReportedOnce) {
   EXPECT_EQ(news.count(), 1);
 }
 
-TEST_F(WatcherTest, AWindowThatIsClosedInOrderIsGoneToo) {
+TEST_F(WatcherTest, ReportsAWindowThatIsClosed) {
   const auto server = startServer("server");
   const auto peer = open("server");
   News news;
@@ -90,7 +90,7 @@ TEST_F(WatcherTest, AWindowThatIsClosedInOrderIsGoneToo) {
   EXPECT_TRUE(peer->isClosed());
 }
 
-TEST_F(WatcherTest, OneThatWasDeadAlreadyIsReported) {
+TEST_F(WatcherTest, ReportsAPeerThatWasDeadAlready) {
   const auto server = startServer("server");
   const auto peer = open("server");
   server->end(SIGKILL);
@@ -101,7 +101,7 @@ TEST_F(WatcherTest, OneThatWasDeadAlreadyIsReported) {
   news.wait();
 }
 
-TEST_F(WatcherTest, EveryWatchOfAPeerIsReported) {
+TEST_F(WatcherTest, ReportsToEveryWatchOfAPeer) {
   const auto server = startServer("server");
   News first;
   News second;
@@ -114,7 +114,7 @@ TEST_F(WatcherTest, EveryWatchOfAPeerIsReported) {
   second.wait();
 }
 
-TEST_F(WatcherTest, ManyDeathsAtOnceAreReportedOnceEach) {
+TEST_F(WatcherTest, ReportsEachOfManyDeathsOnce) {
   constexpr int kServers = 20;
   std::vector<std::unique_ptr<Child>> servers;
   std::vector<News> news(kServers);
@@ -129,7 +129,7 @@ TEST_F(WatcherTest, ManyDeathsAtOnceAreReportedOnceEach) {
   for (const auto& one : news) EXPECT_EQ(one.count(), 1);
 }
 
-TEST_F(WatcherTest, WhatIsForgottenIsNotReported) {
+TEST_F(WatcherTest, DoesNotReportAForgottenPeer) {
   const auto server = startServer("server");
   const auto peer = open("server");
   News news;
@@ -145,7 +145,7 @@ TEST_F(WatcherTest, WhatIsForgottenIsNotReported) {
 }
 
 // forget() may come while the callback runs: when it returns the callback has ended.
-TEST_F(WatcherTest, NoCallbackRunsAfterItWasForgotten) {
+TEST_F(WatcherTest, RunsNoCallbackAfterForget) {
   for (int round = 0; round < 50; ++round) {
     const auto server = startServer("server" + std::to_string(round));
     auto alive = std::make_unique<std::atomic<int>>(0);
@@ -161,7 +161,7 @@ TEST_F(WatcherTest, NoCallbackRunsAfterItWasForgotten) {
   }
 }
 
-TEST_F(WatcherTest, ACallbackMayForgetAndWatchOthers) {
+TEST_F(WatcherTest, ACallbackMayEndAndStartOtherWatches) {
   const auto first = startServer("first");
   const auto second = startServer("second");
   News news;
@@ -204,7 +204,7 @@ class HiddenOwners : public WatcherTest,
                      public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
 // Where the header names no process that can be looked for, the lock alone tells.
-TEST_P(HiddenOwners, AreWatchedByTheirLocks) {
+TEST_P(HiddenOwners, AreWatchedThroughTheirLocks) {
   const auto server = startServer("server", GetParam());
   const auto peer = open("server");
   News news;
@@ -225,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(
                     [](layout::SegmentHeader& header) { header.ownerPid = INT32_MIN; }));
 
 // A process that the owner forked has none of its locks.
-TEST_F(WatcherTest, AnOwnersForkDoesNotKeepItAlive) {
+TEST_F(WatcherTest, AChildDoesNotKeepItsDeadParentAlive) {
   const auto server = std::make_unique<Child>([&](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
@@ -250,7 +250,7 @@ TEST_F(WatcherTest, AnOwnersForkDoesNotKeepItAlive) {
   EXPECT_TRUE(peer->isDead());
 }
 
-TEST_F(WatcherTest, AServersBirthIsNews) {
+TEST_F(WatcherTest, ReportsANewServer) {
   News news;
   const auto token = watcher_.watchNames(NameKind::serverWindow, news.callback());
 
@@ -261,7 +261,7 @@ TEST_F(WatcherTest, AServersBirthIsNews) {
   watcher_.forget(token);
 }
 
-TEST_F(WatcherTest, EveryoneWhoWaitsForABirthHearsOfIt) {
+TEST_F(WatcherTest, ReportsANewServerToEveryWatch) {
   News first;
   News second;
   News third;
