@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all programs do alike with their arguments: what is said, where, and with which exit status.
+// The command line of all programs: messages, where they are printed, and exit statuses.
 #include "base/command_line.h"
 
 #include <CLI/CLI.hpp>

@@ -28,7 +28,7 @@ TEST(LatencyRecorder, IsExactBelow256Nanoseconds) {
   EXPECT_EQ(recorder.meanNs(), 100.5);
 }
 
-// One slow message in a thousand shows in p99.9's successor, the maximum, and nowhere below.
+// One slow message in a thousand is visible in the maximum, and not in p99.9 or below.
 TEST(LatencyRecorder, ShowsASingleOutlierOnlyInTheMaximum) {
   LatencyRecorder recorder;
 
@@ -45,7 +45,7 @@ TEST(LatencyRecorder, HasAnErrorBelowOnePercentForAllDurations) {
   for (std::uint64_t ns = 1; ns < 100'000'000'000; ns = ns * 9 / 8 + 1) {
     LatencyRecorder recorder;
     recorder.add(ns);
-    recorder.add(ns * 10);  // so that the maximum does not cap the answer
+    recorder.add(ns * 10);  // so that the maximum does not limit the result
 
     const auto told = recorder.percentileNs(50);
 

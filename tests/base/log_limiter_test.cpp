@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Storms of log lines: which lines are written, and that the counts add up. The test is the clock.
+// Repeated log lines: which lines are written, and that the counts add up. The tests set the time.
 #include "base/log_limiter.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ class LogLimiterTest : public testing::Test {
   bool admit(const std::string& text, const LogLimiter::Kind& kind = kKind, int level = 1) {
     return limiter_.admit(kind, level, text, nowNs_);
   }
-  // Uses up the lines of one kind that are written at once.
+  // Admits as many lines of one kind as are written at once.
   void useUp(const LogLimiter::Kind& kind = kKind) {
     for (auto i = LogLimiter::kAtOnce; i != 0; --i) EXPECT_TRUE(admit("first", kind)) << i;
   }
@@ -94,7 +94,7 @@ TEST_F(LogLimiterTest, LimitsEachKindSeparately) {
   useUp({"file.cpp", 10, 1});
 }
 
-// A line never overtakes those of its kind that are held.
+// A line is never written before held lines of its kind.
 TEST_F(LogLimiterTest, HoldsALineWhileEarlierLinesOfItsKindAreHeld) {
   useUp();
   EXPECT_FALSE(admit("second"));
@@ -117,7 +117,7 @@ TEST_F(LogLimiterTest, LetsAKindWriteAgainAfterSomeTime) {
   useUp();
 }
 
-// A storm of a day, with pauses: few lines, and no line is missing from the counts.
+// A day of repeated lines, with pauses: few lines are written, and the counts include all lines.
 TEST_F(LogLimiterTest, WritesFewOfManyLinesAndCountsAll) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE(seed);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files in which no failed write goes unnoticed.
+// OutputFile: its contents, and its errors.
 #include "base/output_file.h"
 
 #include <filesystem>
@@ -20,7 +20,7 @@ std::string textOf(const std::string& path) {
   return text.str();
 }
 
-// What a call says that throws std::system_error; empty when it does not.
+// The text of the std::system_error that a call throws; empty if it throws none.
 template <class Call>
 std::string errorOf(Call call) try {
   call();

@@ -16,7 +16,7 @@ TEST(Printable, EscapesControlCharacters) {
   EXPECT_EQ(printable("a\x1b[2Jb"), "a\\x1b[2Jb");
   EXPECT_EQ(printable("a\r\n\tb\x7f"), "a\\r\\n\\tb\\x7f");
   EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a\\x00b");
-  EXPECT_EQ(printable("a\u009bb"), "a\\u009bb");  // some terminals take it for ESC [
+  EXPECT_EQ(printable("a\u009bb"), "a\\u009bb");  // some terminals interpret it as ESC [
 }
 
 TEST(Printable, EscapesBidirectionalAndInvisibleCharacters) {

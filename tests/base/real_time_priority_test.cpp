@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// These tests need a user who may have real-time priority; others skip them.
+// RealTimePriority and InheritingMutex. Most tests need the permission for real-time priority, and
+// are skipped without it.
 #include <mpf/real_time_priority.h>
 
 #include <sched.h>
@@ -47,7 +48,7 @@ TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadUnchanged) {
   }).join();
 }
 
-// Or it would starve the machine.
+// Otherwise this thread would starve all other threads.
 TEST_F(RealTimePriorityTest, IsRemovedFromAThreadThatNeverSleepsAndRestored) {
   std::thread([] {
     RealTimePriority priority(kPriority);

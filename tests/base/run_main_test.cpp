@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every main() does around its work, in a child process whose descriptors are closed or full.
+// runMain(), in a child process whose standard descriptors are closed or full.
 #include "base/run_main.h"
 
 #include <fcntl.h>
@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kGood = 42;
 
-// How a child ends that does `act`: its exit status, minus the signal that ended it.
+// Runs `act` in a child. Returns its exit status, or minus the signal that killed it.
 int endOf(const std::function<int()>& act) {
   std::fflush(nullptr);
   const auto child = checkCall(::fork(), "fork");
@@ -49,7 +49,7 @@ void closeAll(unsigned subset) {
 
 void redirect(int descriptor, const char* path) { ::dup2(::open(path, O_WRONLY), descriptor); }
 
-// What is written to stderr.
+// Captures stderr.
 class Errors {
  public:
   Errors() : file_(::memfd_create("stderr", MFD_CLOEXEC)) {}

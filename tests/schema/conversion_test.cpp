@@ -137,8 +137,8 @@ TEST(Conversion, KeepsExtremeValuesOfAnInt32Array) {
 }
 
 TEST(Conversion, KeepsArraysOf64MiB) {
-  if (mpf::test::kIsSanitized) GTEST_SKIP() << "smaller ones show a sanitizer as much";
-  if (std::endian::native == std::endian::big) GTEST_SKIP() << "minutes under emulation";
+  if (mpf::test::kIsSanitized) GTEST_SKIP() << "for a sanitizer, smaller arrays are sufficient";
+  if (std::endian::native == std::endian::big) GTEST_SKIP() << "takes minutes under emulation";
   constexpr std::size_t kBytes = std::size_t{64} << 20;
   expectSame(filled<Float64Array>(kBytes / 8));
   expectSame(filled<Int32Array>(kBytes / 4));
@@ -240,7 +240,7 @@ TEST(Conversion, ReadsAMissingStructAsZeros) {
   EXPECT_EQ(message->getType(), MessageType::connect);
 }
 
-// A frame with flipped bits gives a message, or an error with a text.
+// A frame with flipped bits becomes a message, or an error with a text.
 TEST(Conversion, SurvivesAnyDamage) {
   const auto seed = std::random_device()();
   SCOPED_TRACE("seed " + std::to_string(seed));

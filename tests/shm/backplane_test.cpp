@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The meeting place: its name, what is on it, and what is removed from it.
+// Backplane: its name, its segments, and which of them are removed.
 #include <stdlib.h>
 #include <sys/stat.h>
 
@@ -23,8 +23,8 @@ using testing::UnorderedElementsAreArray;
 
 class BackplaneTest : public ShmTest {
  protected:
-  // What a program with a server, a client and a link in between has on the backplane. Threads do
-  // not cross a fork: no Endpoint.
+  // The segments of a program with a server, a client and a link between them. Without an Endpoint,
+  // because threads do not exist in the child of a fork.
   void occupy(Child::Self& self) const {
     OwnWindow server(name(), SegmentKind::serverWindow, serverName(), {},
                      [](layout::SegmentHeader& header) {
@@ -56,7 +56,8 @@ class BackplaneTest : public ShmTest {
   }
 };
 
-// Up to 4096 files it looks at all; beyond that, other users' names must not keep it waiting.
+// attach() examines up to 4096 files. With more files, it must not wait for the names that other
+// users created.
 TEST_F(BackplaneTest, AttachExaminesOnlySomeOfVeryManyFiles) {
   for (std::uint64_t number = 1; number <= 5000; ++number) {
     std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::pendingBind, number))};
@@ -132,7 +133,7 @@ TEST_F(BackplaneTest, RemovesAndReportsTheFilesOfAKilledProcess) {
   Child child([&](Child::Self& self) { occupy(self); });
   const auto left = backplane_.segmentNames();
   EXPECT_EQ(left.size(), kOccupied);
-  EXPECT_THAT(backplane_.removeDead(), IsEmpty()) << "it lives";
+  EXPECT_THAT(backplane_.removeDead(), IsEmpty()) << "it is alive";
   child.stop();
   EXPECT_THAT(backplane_.removeDead(), IsEmpty()) << "it is stopped";
 
@@ -163,7 +164,7 @@ TEST_F(BackplaneTest, KeepsTheFilesOfLivingProcesses) {
   EXPECT_EQ(backplane_.segmentNames().size(), 6u);
 }
 
-// The server of the link dies, then its client: the link is the client's.
+// The server of the link dies, then its client. The client owns the link.
 TEST_F(BackplaneTest, KeepsALinkUntilItsClientDies) {
   Child server([&](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
@@ -200,8 +201,8 @@ TEST_F(BackplaneTest, RemovesAnUnreadableLinkWhenItsClientDies) {
   EXPECT_EQ(backplane_.removeDead().size(), kOccupied);
 }
 
-// A program of the next major version on the same backplane: its names and locks are as ours, the
-// rest is not ours to judge.
+// A program of the next major version on the same backplane: its names and locks have the same
+// meaning; its other bytes are unknown to us.
 TEST_F(BackplaneTest, KeepsTheFilesOfLivingProgramsOfOtherVersions) {
   const auto server = makeServer(layout::kMajor + 1);
   auto link = createPage(SegmentKind::link);

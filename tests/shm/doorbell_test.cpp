@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sleep and wake.
+// Doorbell: sleep and wake, on the futex and on the FIFO.
 #include "shm/doorbell.h"
 
 #include <poll.h>
@@ -77,7 +77,8 @@ TEST_F(DoorbellTest, APassedDeadlineDoesNotSleep) {
 
 class Signals : public DoorbellTest {
  protected:
-  // Runs `handler` for SIGUSR1 in `sleep`'s thread again and again until that returns.
+  // Calls `sleep` in a thread, and sends SIGUSR1 to that thread, which runs `handler`, until
+  // `sleep` returns.
   template <class Sleep>
   static void interrupt(void (*handler)(int), int flags, Sleep sleep) {
     struct sigaction action{};
@@ -111,7 +112,7 @@ TEST_F(Signals, EndASleepWithADeadline) {
 TEST_F(Signals, EndEverySleepIfTheHandlerRings) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP()
-      << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
+      << "ThreadSanitizer delays signal handlers until the sleep that they must end has ended";
 #endif
   rungBySignal = &bell_;
 
@@ -124,7 +125,7 @@ TEST_F(DoorbellTest, OneProcessWakesAnother) {
   ASSERT_TRUE(segment.tryPublish(SegmentName::keyed(name(), NameKind::pendingBind, 1)));
   auto& bell = segment.at<layout::Word32>(1024);
   Child ringer([&](Child::Self& self) {
-    // A child's copies of its parent's segments are memory of its own.
+    // The child must open the segment again: its copies of the parent's mappings are private.
     const auto opened =
         Segment::tryOpen(SegmentName::keyed(name(), NameKind::pendingBind, 1),
                          layout::SegmentKind::pendingBind, Segment::Access::readWrite);

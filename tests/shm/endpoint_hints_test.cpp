@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Hints that got lost and hints that nobody gave: they cost time, never a message and never the
-// rest.
+// Lost hints, and hints without a message: they cost time, but no message is lost and no other link
+// is affected.
 #include <poll.h>
 
 #include <atomic>
@@ -14,12 +14,12 @@
 namespace mpf::test {
 namespace {
 
-constexpr std::uint32_t kNobodysBit = 9999;
-constexpr int kUntilCool = 5000;  // looks in vain after which no link is polled
+constexpr std::uint32_t kUnusedBit = 9999;
+constexpr int kUntilCool = 5000;  // after so many polls without a message, no link is polled
 
 class HintsTest : public ShmTest {
  protected:
-  // Until the server finds links by their hints alone.
+  // Lets the server poll until it finds links only by their hints.
   static void coolDown(End& end) {
     for (int i = 0; i < kUntilCool; ++i) static_cast<void>(end.endpoint.next());
   }
@@ -77,7 +77,7 @@ TEST_P(LostHints, LostDuringAWaitLoseNoMessage) {
   End client(backplane_, "");
   for (int i = 1; i < links; ++i) connect(client, server);
   const auto link = connect(client, server);
-  link.client.setPeerIndex(kNobodysBit);  // the bell rings, the bit is another's
+  link.client.setPeerIndex(kUnusedBit);  // rings the bell, but sets the bit of another link
   coolDown(server);
   std::atomic<std::uint32_t> taken{0};
 
@@ -99,7 +99,7 @@ TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutAHint) {
   End client(backplane_, "");
   const auto flood = connect(client, server);
   const auto quiet = connect(client, server);
-  quiet.client.setPeerIndex(kNobodysBit);
+  quiet.client.setPeerIndex(kUnusedBit);
   coolDown(server);
   ASSERT_EQ(send(quiet.client, 7), LinkSend::sent);
 
@@ -144,7 +144,7 @@ TEST_F(HintsTest, HintsWithoutAMessageDoNoHarm) {
   EXPECT_EQ(knocks, layout::kKnocks);
   EXPECT_TRUE(server.endpoint.takeRescan());
   EXPECT_FALSE(server.endpoint.hasSideNews());
-  EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms))) << "and then it is quiet";
+  EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms))) << "no event is left";
 }
 
 TEST_F(HintsTest, APeerThatOverwritesHintsStopsNoOtherPeer) {

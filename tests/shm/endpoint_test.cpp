@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A window with its links, and the wait for the next message of any of them.
+// Endpoint: a window with its links, and the wait for the next message of any of them.
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
@@ -17,8 +17,8 @@ namespace {
 
 class EndpointTest : public ShmTest {
  protected:
-  // Messages taken from each of `links` when `messages` are taken from `end`; all links are kept
-  // full.
+  // Takes `messages` messages from `end` while all links are kept full. Returns how many came from
+  // each of `links`.
   static std::vector<int> shares(End& end, const std::vector<Connected>& links, int messages) {
     std::vector<int> taken(links.size());
     for (int i = 0; i < messages; ++i) {
@@ -83,7 +83,7 @@ TEST_P(WaitModes, AnInterruptFromASignalHandlerEndsAWait) {
 #ifdef __SANITIZE_THREAD__
   if (GetParam() != WaitMode::spin)
     GTEST_SKIP()
-        << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
+        << "ThreadSanitizer delays signal handlers until the sleep that they must end has ended";
 #endif
   End server(backplane_, "server", GetParam());
   static Endpoint* interrupted = nullptr;
@@ -143,7 +143,7 @@ TEST_F(EndpointTest, LinksTakeTurns) {
   for (const auto share : taken) EXPECT_NEAR(share, 1000, 50);
 }
 
-// More busy links than are polled directly.
+// With more busy links than the endpoint polls.
 TEST_F(EndpointTest, MoreBusyLinksThanArePolledTakeTurns) {
   constexpr int kLinks = 20;
   constexpr int kEach = 2000;
@@ -159,8 +159,8 @@ TEST_F(EndpointTest, MoreBusyLinksThanArePolledTakeTurns) {
   EXPECT_LE(*most, kEach * 2);
 }
 
-// Whoever asks "is there news?" before each message gets all of them, also of a link that is not
-// polled because others are.
+// A caller that waits before each message gets all messages, also those of a link that is not
+// polled because other links are.
 TEST_F(EndpointTest, AWaitBeforeEachMessageReturnsForEveryMessage) {
   constexpr std::uint32_t kLinks = 9;
   End server(backplane_, "server");
@@ -217,7 +217,7 @@ TEST_F(EndpointTest, ReusesTheBitOfADetachedLink) {
   ASSERT_EQ(send(first.client, 1), LinkSend::sent);
 
   server.drop(first.serverIndex);
-  EXPECT_FALSE(server.endpoint.next()) << "what it had left is gone with it";
+  EXPECT_FALSE(server.endpoint.next()) << "the messages of the detached link are gone";
   const auto second = connect(client, server);
 
   EXPECT_EQ(second.serverIndex, first.serverIndex);
@@ -248,7 +248,7 @@ TEST_F(EndpointTest, TakesEachKnockOnce) {
 
   EXPECT_TRUE(server.endpoint.wait(Deadline::never()));
   EXPECT_EQ(server.endpoint.takeKnock(), 5u);
-  EXPECT_TRUE(server.endpoint.hasSideNews()) << "until nothing was taken";
+  EXPECT_TRUE(server.endpoint.hasSideNews()) << "true until takeKnock() has returned none";
   EXPECT_EQ(server.endpoint.takeKnock(), 6u);
   EXPECT_FALSE(server.endpoint.takeKnock());
   EXPECT_FALSE(server.endpoint.hasSideNews());
@@ -275,10 +275,10 @@ TEST_F(EndpointTest, ReportsAPeersDeathAsALocalEvent) {
   EXPECT_TRUE(client.endpoint.takeLocalNews());
   EXPECT_TRUE(peer->isDead());
   EXPECT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr);
-  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "what the dead one left is removed";
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "the files of the dead peer are removed";
 }
 
-// A server that is killed while it ends has closed its window, but not yet its links.
+// A server that is killed while it shuts down has closed its window, but not yet its links.
 TEST_F(EndpointTest, WatchesThePeerOfAClosedWindowUntilItDies) {
   Child child([&](Child::Self& self) {
     const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
@@ -292,7 +292,7 @@ TEST_F(EndpointTest, WatchesThePeerOfAClosedWindowUntilItDies) {
   child.go();
   ASSERT_TRUE(child.waitUntilReady());
   ASSERT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr)
-      << "for a second client, which looks for it";
+      << "a second client does not find it";
 
   child.end(SIGKILL);
 
@@ -316,7 +316,7 @@ TEST_F(EndpointTest, DescriptorIsReadableWhenAMessageArrives) {
   ASSERT_EQ(send(link.client, 7), LinkSend::sent);
 
   EXPECT_TRUE(isReadable());
-  EXPECT_FALSE(server.endpoint.arm()) << "there is news already";
+  EXPECT_FALSE(server.endpoint.arm()) << "there is a message already";
   ASSERT_EQ(server.endpoint.next(), link.serverIndex);
   EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
   while (server.endpoint.next()) {

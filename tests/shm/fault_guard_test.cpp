@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A peer cuts a file that others have mapped: they go on, with zeroes or with a file that is grown
-// again.
+// A peer truncates a file that other processes have mapped. They continue to run, with zeroes or
+// with a file that is grown again.
 #include "shm/fault_guard.h"
 
 #include <pthread.h>
@@ -25,7 +25,7 @@ namespace {
 using layout::SegmentKind;
 using testing::HasSubstr;
 
-// What the program had installed for SIGBUS before it used MPF: it makes pages of its own.
+// The SIGBUS handler that the program installed before it used MPF: it maps pages of its own.
 std::atomic<int> faultsOfTheProgram{0};
 void* const kWholePage = reinterpret_cast<void*>(~std::uintptr_t{layout::kPageBytes - 1});
 
@@ -55,7 +55,7 @@ class FaultGuard : public ShmTest {
     EXPECT_EQ(faultsOfTheProgram.exchange(0), expectedFaultsOfTheProgram_);
     ShmTest::TearDown();
   }
-  // A segment of four pages under file_, with something on each.
+  // Creates a segment of four pages with the name file_, with data on each page.
   Segment publish() const {
     auto segment = Segment::create(4 * layout::kPageBytes, SegmentKind::bulk, name(), {});
     for (std::size_t page = 0; page < 4; ++page)
@@ -90,11 +90,11 @@ TEST_F(FaultGuard, ATruncatedSegmentReadsAsZeroesAndIsLost) {
 
   cut(file_, 2 * layout::kPageBytes);
   EXPECT_EQ(segment.at<std::uint64_t>(1000), 7u);
-  EXPECT_FALSE(segment.isLost()) << "nobody met it yet";
+  EXPECT_FALSE(segment.isLost()) << "no access has faulted yet";
 
   EXPECT_EQ(segment.at<std::uint64_t>(2 * layout::kPageBytes + 1000), 0u);
   EXPECT_TRUE(segment.isLost());
-  EXPECT_EQ(segment.at<std::uint64_t>(1000), 0u) << "all of it, at once";
+  EXPECT_EQ(segment.at<std::uint64_t>(1000), 0u) << "all pages, at once";
   EXPECT_EQ(peers->at<std::uint64_t>(3 * layout::kPageBytes + 1000), 0u) << "mapped for reading";
   EXPECT_TRUE(peers->isLost());
 }
@@ -153,7 +153,7 @@ TEST_F(FaultGuard, NewPeersCanOpenTruncatedOrOverwrittenHints) {
   cut(hints);
   server->ring();
   EXPECT_TRUE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
-  cut(hints, 600);  // within a page: nobody meets it
+  cut(hints, 600);  // within a page: no access faults
   EXPECT_TRUE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
   EXPECT_EQ(fileBytes(hints), sizeof(layout::WindowHints));
 
@@ -189,7 +189,7 @@ TEST_F(FaultGuard, ATruncatedLinkAndTruncatedChunksAreLost) {
   cut(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0));
 
   EXPECT_EQ(chunk->data[0], std::byte{0});
-  EXPECT_FALSE(link.server.tryChunk(envelope)) << "nothing more comes out of it";
+  EXPECT_FALSE(link.server.tryChunk(envelope)) << "its chunks can no longer be read";
   link.server.release(chunk->data);
   link.server.end();
 
@@ -251,7 +251,7 @@ TEST_F(FaultGuard, OverwrittenHintsAreRemovedWhenTheirOwnerIsDead) {
   EXPECT_EQ(backplane_.removeDead().size(), 3u) << "window, hints, pipe";
 }
 
-// A program whose handler comes later asks us first.
+// A program that installs its handler later calls tryRepair() first.
 TEST_F(FaultGuard, ReportsToALaterHandlerWhatItRepaired) {
   const auto segment = publish();
   cut(file_);

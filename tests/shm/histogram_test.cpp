@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a duration goes in a histogram, and what the buckets say.
+// Histograms: the bucket of a duration, and the ends of the buckets.
 #include "shm/histogram.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ TEST(Histogram, CountsEachDurationOnceAndKeepsTheLongest) {
   };
   EXPECT_EQ(at(100), 2u);
   EXPECT_EQ(at(5'000'000), 1u);
-  EXPECT_EQ(at(0), 1u) << "a clock that seems to go back";
+  EXPECT_EQ(at(0), 1u) << "a negative duration counts as 0";
   EXPECT_EQ(at(UINT64_MAX), 1u);
   EXPECT_EQ(histogram->maxNs.load(std::memory_order_relaxed),
             static_cast<std::uint64_t>(INT64_MAX));

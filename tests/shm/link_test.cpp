@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two rings and two pools between a client and a server.
+// Link: two rings and two pools between a client and a server.
 #include <cstring>
 #include <map>
 
@@ -13,7 +13,7 @@ namespace {
 using layout::LinkState;
 using testing::HasSubstr;
 
-constexpr std::size_t kLarge = layout::kInlineBodyBytes + 1;  // does not fit a ring
+constexpr std::size_t kLarge = layout::kInlineBodyBytes + 1;  // does not fit into the ring
 
 class LinkTest : public ShmTest {
  protected:
@@ -39,7 +39,7 @@ class LinkTest : public ShmTest {
     Envelope envelope{.requestId = 1};
     return link.trySend(envelope, body, limits);
   }
-  // The whole body of the next message; chunks are given back.
+  // Takes the next message and returns its whole body. Returns its chunk to the peer.
   static std::vector<std::byte> take(Link& link) {
     EXPECT_TRUE(link.hasMessage());
     const auto envelope = link.begin();
@@ -55,7 +55,7 @@ class LinkTest : public ShmTest {
     link.end();
     return body;
   }
-  // Why the server does not take a link of which `change` was made by its client.
+  // The error with which the server refuses a link after its client has made this change.
   std::string refusal(const std::function<void(layout::SegmentHeader&)>& change) {
     const auto link = makeLink();
     change(
@@ -145,7 +145,7 @@ TEST_F(LinkTest, AcceptsMessagesUpToTheLimitOfTheQueue) {
   EXPECT_EQ(sendBody(link.client, filled(8), {.waiting = 4}), LinkSend::sent);
 }
 
-// Long messages in line must not take the slots of short ones that the queue may still take.
+// Long messages in the ring must not use the slots of short ones that the queue may still accept.
 TEST_F(LinkTest, AQueueHasItsFullLengthWithBodiesOfAnySize) {
   for (const std::uint32_t queue : {1u, 2u, 14u, 100u}) {
     const auto link = makeLink({.queueSize = queue});
@@ -234,7 +234,7 @@ using Header = layout::SegmentHeader;
 class Geometries : public LinkTest, public testing::WithParamInterface<void (*)(Header&)> {};
 
 TEST_P(Geometries, AreRefusedIfTheServerDidNotOfferThem) { EXPECT_NE(refusal(GetParam()), ""); }
-INSTANTIATE_TEST_SUITE_P(Nonsense, Geometries,
+INSTANTIATE_TEST_SUITE_P(Invalid, Geometries,
                          testing::Values([](Header& header) { header.queueSize = 0; },
                                          [](Header& header) { header.queueSize = 16385; },
                                          [](Header& header) { header.queueSize = 1u << 30; },
@@ -263,15 +263,16 @@ TEST_F(LinkTest, RefusesALinkFileThatIsTooShortForItsRings) {
               HasSubstr(segments::path(link.client.name())));
 }
 
-// None of a peer that has scribbled an end over its state, either.
+// The chunk of a message; nullopt also if it is unavailable because the peer has overwritten its
+// state with "closed".
 std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try {
   return link.tryChunk(envelope);
 } catch (const ChunkUnavailable&) {
   return std::nullopt;
 }
 
-// The client may write every byte of the link and of its own pool, at any time. The server goes on:
-// each of its calls ends, stays inside the memory it mapped, and gives memory to one holder only.
+// The client may write every byte of the link and of its own pool at any time. Each call of the
+// server must return, stay inside the memory that it mapped, and give memory to one holder only.
 TEST_F(LinkTest, APeerThatWritesInvalidDataDoesNotCrashOrBlockTheOtherSide) {
   Random random;
   const auto link = makeLink({.maxPoolBytes = 4 << 20});
@@ -299,7 +300,7 @@ TEST_F(LinkTest, APeerThatWritesInvalidDataDoesNotCrashOrBlockTheOtherSide) {
       case 2:
         scribbled.at<std::uint64_t>(random.below(scribbled.bytes() / 8) * 8) = random.nasty();
         break;
-      case 3: {  // the next message, of a chunk that might exist
+      case 3: {  // the next message, with a chunk that may exist
         auto& slot = nextSlot();
         slot.flags = static_cast<std::uint8_t>(random.below(4));
         slot.bodyBytes =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Memory for messages that do not fit a ring: lent, given back, sent back, refused.
+// Pool: chunks that are lent, returned, sent back and refused.
 #include "shm/pool.h"
 
 #include <cstring>
@@ -25,7 +25,7 @@ class PoolTest : public ShmTest {
     ShmTest::TearDown();
   }
   void makeOwner(std::uint64_t maxBytes) {
-    owner_.reset();  // its segments' names are free again
+    owner_.reset();  // removes the names of its segments
     owner_.emplace(place_, Rights{}, maxBytes, returns_);
   }
   ChunkRef lendOne(std::size_t bytes = 1000) {
@@ -34,7 +34,7 @@ class PoolTest : public ShmTest {
     owner_->lend(chunk->ref);
     return chunk->ref;
   }
-  // The header of the owner's bulk segment `number`, writable.
+  // The writable header of the owner's bulk segment `number`.
   Segment openBulk(std::uint32_t number = 0) const {
     return std::move(*Segment::tryOpen(SegmentName::bulk(name(), kLink, kSide, number),
                                        layout::SegmentKind::bulk, Segment::Access::readWrite));
@@ -110,7 +110,7 @@ TEST_F(PoolTest, HoldsAChunkThatThePeerSendsBack) {
   ASSERT_TRUE(back);
   EXPECT_EQ(back->data, chunk->data);
   EXPECT_EQ(back->capacity, chunk->capacity);
-  EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "the second time";
+  EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "already received back";
   owner_->free(back->ref);
   EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "after it was freed";
 }
@@ -156,7 +156,7 @@ TEST_P(BulkHeaders, AreRefusedByTheBorrowerIfInvalid) {
   EXPECT_FALSE(borrower_.tryBorrow(ref));
 }
 INSTANTIATE_TEST_SUITE_P(
-    Nonsense, BulkHeaders,
+    Invalid, BulkHeaders,
     testing::Values([](layout::SegmentHeader& header) { header.chunkBytes = 0; },
                     [](layout::SegmentHeader& header) { header.chunkBytes = UINT64_MAX; },
                     [](layout::SegmentHeader& header) { header.chunkBytes += 64; },
@@ -229,7 +229,7 @@ TEST_F(PoolTest, LendsNoMoreChunksThanTheReturnRingHolds) {
 
   for (const auto& ref : lent) borrower_.giveBack(ref);
   for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i)
-    ASSERT_TRUE(owner_->tryAlloc(100)) << "all came back: " << i;
+    ASSERT_TRUE(owner_->tryAlloc(100)) << "all chunks were returned: " << i;
 }
 
 TEST_F(PoolTest, RecognizesPointersIntoItself) {
@@ -276,7 +276,7 @@ TEST_F(PoolTest, RemovesAllBulkSegmentsOfALink) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-// The borrower writes anything into the return ring at any time; no chunk is ever given to two
+// The borrower writes random data into the return ring. The owner never gives a chunk to two
 // holders.
 TEST_F(PoolTest, NoChunkHasTwoHoldersIfTheBorrowerWritesInvalidData) {
   makeOwner(4 << 20);

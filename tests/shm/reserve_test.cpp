@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Memory is reserved when a segment is made. This file stands between the program and the kernel's
-// answer.
+// The memory of a segment is reserved when the segment is created. This file replaces
+// posix_fallocate(), so that a test chooses the kernel's answer.
 #include <fcntl.h>
 
 #include <cerrno>
@@ -11,7 +11,7 @@
 
 namespace {
 
-// What the kernel answers instead of reserving; nullopt-like 0: let it reserve.
+// The error that replaces the kernel's answer; 0: the kernel reserves the memory.
 std::function<int(off_t bytes)> answer = [](off_t) { return 0; };
 
 }  // namespace
@@ -43,7 +43,7 @@ TEST_F(Reserve, AShortageIsAnErrorThatNamesTheRequestedSize) {
                                   testing::HasSubstr("No space left")));
 }
 
-// As kernels do that undo a long reservation at each tick of a timer.
+// Some kernels undo a long reservation at each tick of a timer.
 TEST_F(Reserve, RetriesAfterSignals) {
   int calls = 0;
   answer = [&](off_t bytes) { return bytes > 1 << 20 || ++calls % 2 == 1 ? EINTR : 0; };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Slots from one producer to one consumer.
+// Ring: slots from one producer to one consumer.
 #include <deque>
 #include <thread>
 
@@ -104,7 +104,7 @@ TEST(RingSlots, MatchTheSizeOfTheBody) {
   EXPECT_GT(slotsFor(layout::kInlineBodyBytes + 1), layout::kMaxMessageSlots);
 }
 
-// The consumer hands slots back in batches: the ring must be larger than the queue by one batch.
+// The consumer frees slots in batches, so the ring must be larger than the queue by one batch.
 TEST(RingSlots, AlwaysHaveRoomForTheWholeQueue) {
   for (std::uint32_t queue = 1; queue <= 16384; queue += 1 + queue / 7) {
     const auto capacity = ringSlotsFor(queue);
@@ -123,8 +123,8 @@ TEST_F(RingTest, TheSenderSeesHowManyMessagesWaitAndAreTaken) {
 
   static_cast<void>(consumer_.begin());
 
-  EXPECT_EQ(producer_.waitingAtMost(), 2u) << "the last look";
-  EXPECT_TRUE(producer_.isTaken(1)) << "counted before it is looked at";
+  EXPECT_EQ(producer_.waitingAtMost(), 2u) << "the last value that was read";
+  EXPECT_TRUE(producer_.isTaken(1)) << "counted before the consumer looks at it";
   EXPECT_FALSE(producer_.isTaken(2));
   EXPECT_EQ(producer_.waiting(), 1u);
   consumer_.end();
@@ -143,11 +143,11 @@ TEST_F(RingTest, AMessageWithoutItsSequenceIsNotVisible) {
   slot.bodyBytes = 8;
 
   EXPECT_FALSE(consumer_.hasMessage());
-  ASSERT_TRUE(push(2)) << "a producer that starts again writes over it";
+  ASSERT_TRUE(push(2)) << "the producer overwrites it";
   EXPECT_EQ(take(), pattern(2, 8));
 }
 
-// A message is shown by its first slot, which is written last.
+// The first slot makes a message visible, and is written last.
 TEST_F(RingTest, ALongMessageWithoutItsFirstSequenceIsNotVisible) {
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(push(1));
@@ -160,8 +160,8 @@ TEST_F(RingTest, ALongMessageWithoutItsFirstSequenceIsNotVisible) {
   EXPECT_FALSE(consumer_.hasMessage());
 }
 
-// Slots behind the first hold data where others hold envelopes; their data says what the consumer
-// will wait for one lap later.
+// Slots after the first contain body bytes where first slots contain envelopes. In this test, these
+// bytes are the sequence that the consumer waits for one lap later.
 TEST_F(RingTest, BodyBytesOfAnEarlierLapAreNotReadAsAMessage) {
   constexpr std::uint32_t kSlots = 3;
   Bytes body(layout::kFirstSlotBodyBytes + (kSlots - 1) * sizeof(layout::MoreSlot::body));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A ring whose other end writes nonsense: it costs messages of this ring and nothing else.
+// A ring in which the other end writes invalid data: this costs only messages of this ring.
 #include "tests/shm/ring_fixture.h"
 #include "tests/support/random.h"
 
@@ -19,12 +19,12 @@ TEST_P(SlotCounts, OfInvalidValuesHaveNoBodyAndCountAsOneSlot) {
   consumer_.end();
 
   EXPECT_EQ(envelope.bodyBytes, UINT32_MAX)
-      << "the envelope says what was written; the reader compares";
+      << "the envelope is copied unchanged; the reader checks it";
   EXPECT_EQ(capacity, 0u);
   ASSERT_TRUE(consumer_.hasMessage());
   EXPECT_EQ(take(), pattern(2, 8));
 }
-INSTANTIATE_TEST_SUITE_P(Nonsense, SlotCounts, testing::Values(0, 5, 127, 200, 255));
+INSTANTIATE_TEST_SUITE_P(Invalid, SlotCounts, testing::Values(0, 5, 127, 200, 255));
 
 TEST_F(RingTest, ReadsTheSlotCountOnce) {
   ASSERT_TRUE(push(1));
@@ -75,12 +75,12 @@ TEST_F(RingTest, LimitsTheCountOfTakenMessagesToThoseSent) {
   EXPECT_EQ(producer_.waiting(), 0u);
   EXPECT_FALSE(producer_.isTaken(3));
   control_.taken.store(0, std::memory_order_relaxed);
-  EXPECT_EQ(producer_.waiting(), 0u) << "what was taken stays taken";
+  EXPECT_EQ(producer_.waiting(), 0u) << "taken messages stay taken";
   EXPECT_TRUE(producer_.isTaken(2));
 }
 
-// Each step is bounded and stays inside the ring (the fixture looks at the guards), whatever the
-// other side writes where.
+// Each step ends and stays inside the ring (the fixture checks the guard slots), for all data that
+// the other side writes.
 TEST_F(RingTest, InvalidDataAnywhereCrashesAndBlocksNoEnd) {
   Random random;
   Bytes body(layout::kInlineBodyBytes);
@@ -92,7 +92,7 @@ TEST_F(RingTest, InvalidDataAnywhereCrashesAndBlocksNoEnd) {
       case 0:
         ringBytes()[random.below(kRingBytes)] = static_cast<std::byte>(random.bits());
         break;
-      case 1:  // likely to be believed: the sequences of the next positions
+      case 1:  // values that are probably accepted: the sequences of the next positions
         ring_[random.below(kCapacity)].sequence.store(taken + random.below(2 * kCapacity),
                                                       std::memory_order_relaxed);
         break;

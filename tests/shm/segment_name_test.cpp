@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Names in /dev/shm: built, taken apart, refused.
+// SegmentName: builds, parses and refuses names in /dev/shm.
 #include <set>
 
 #include "tests/shm/shm_fixture.h"
@@ -22,7 +22,7 @@ TEST(SegmentName, ParsesEachKindOfNameThatItBuilds) {
   EXPECT_EQ(link->serverWindow, kWindow);
   EXPECT_EQ(link->incarnation, kKey);
   EXPECT_EQ(bulk->kind, NameKind::bulk);
-  EXPECT_EQ(bulk->incarnation, kKey) << "a bulk segment is filed under its link";
+  EXPECT_EQ(bulk->incarnation, kKey) << "a bulk segment has the incarnation of its link";
   for (const auto kind :
        {NameKind::clientWindow, NameKind::hints, NameKind::pendingBind, NameKind::fifo}) {
     const auto keyed = SegmentName::tryParse(SegmentName::keyed("crate-1", kind, kWindow));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files under a segment's name that are not what they should be: each is refused with a text that
-// names it and says why.
+// Files that have the name of a segment but are not usable: each is refused with a message that
+// names the file and the reason.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -25,7 +25,7 @@ class SegmentRefusal : public ShmTest {
     ::unlink(path_.c_str());
     ShmTest::TearDown();
   }
-  // Why the segment cannot be opened; empty when it can.
+  // The error with which the segment is refused; empty if it can be opened.
   [[nodiscard]] std::string refusal(SegmentKind kind = SegmentKind::pendingBind) const {
     return whatOf<SegmentError>(
         [&] { static_cast<void>(Segment::tryOpen(file_, kind, Access::readOnly)); });
@@ -108,7 +108,7 @@ TEST_F(SegmentRefusal, DoesNotFollowASymbolicLink) {
   EXPECT_FALSE(segments::removeIfOwnerless(file_));
 }
 
-// Anybody may create files in /dev/shm; opening a pipe for reading would wait for a writer.
+// Any user may create files in /dev/shm. Opening a FIFO for reading would wait for a writer.
 TEST_F(SegmentRefusal, DoesNotBlockOnAFifo) {
   ASSERT_EQ(::unlink(path_.c_str()), 0);
   ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
@@ -134,7 +134,7 @@ TEST_F(SegmentRefusal, NamesAFileWithoutPermission) {
     const auto why = whatOf<std::system_error>([&] {
       static_cast<void>(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
     });
-    // What we may not look at is not ours to declare dead.
+    // A file that we may not open must not be declared dead.
     const bool isLeftAlone = segments::probeOwner(file_) == segments::Owner::alive &&
                              !segments::removeIfOwnerless(file_);
     ::_exit(why.starts_with("open " + path_) && isLeftAlone ? 0 : 1);

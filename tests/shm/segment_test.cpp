@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One file in /dev/shm: created, locked, named, mapped, removed.
+// Segment: one file in /dev/shm: created, locked, named, mapped, removed.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -92,7 +92,7 @@ TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItHasItsName) {
     ++seen;
     EXPECT_EQ(segment->header().location, 7);
     EXPECT_EQ(segment->bytes(), layout::kPageBytes);
-    // Its maker takes the name away before it lets go of the lock.
+    // The creator removes the name before it releases the lock.
     EXPECT_TRUE(segment->hasOwner() || segments::probeOwner(file_, segment->header().incarnation) ==
                                            segments::Owner::absent);
   }
@@ -174,7 +174,7 @@ TEST_F(SegmentTest, HasAnOwnerOnlyWhileItIsLocked) {
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::dead);
   EXPECT_EQ(segments::probeOwner(file_, incarnation), segments::Owner::dead);
   EXPECT_EQ(segments::probeOwner(file_, incarnation + 1), segments::Owner::absent)
-      << "another one's name now";
+      << "another segment has the name now";
 }
 
 TEST_F(SegmentTest, TheLockOfAKilledProcessIsReleased) {
@@ -195,8 +195,8 @@ TEST_F(SegmentTest, TheLockOfAKilledProcessIsReleased) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-// Reapers and successors at the same name: whoever holds the lock of a published segment finds it
-// under its name until it lets go.
+// Reapers and successors work on the same name. A process that holds the lock of a published
+// segment finds the segment under its name until it releases the lock.
 TEST_F(SegmentTest, ReapersNeverRemoveTheNameOfALivingOwner) {
   std::atomic<bool> end{false};
   std::vector<std::thread> reapers;
@@ -209,7 +209,7 @@ TEST_F(SegmentTest, ReapersNeverRemoveTheNameOfALivingOwner) {
   for (int round = 0; round < 2000; ++round) {
     auto segment = createPage();
     segment.lockForLife();
-    // until the last round's is reaped
+    // until the segment of the last round is removed
     while (!segment.tryPublish(file_)) std::this_thread::yield();
     ASSERT_EQ(segments::probeOwner(file_, segment.header().incarnation), segments::Owner::alive);
     ASSERT_FALSE(segments::removeIfOwnerless(file_));

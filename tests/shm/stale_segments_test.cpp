@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is dead, what is not, and what nobody can tell; and the reason for each.
+// The verdicts about files of dead and living processes and about unknown files, and their reasons.
 #include "shm/stale_segments.h"
 
 #include <sys/stat.h>
@@ -35,7 +35,7 @@ class StaleSegmentsTest : public ShmTest {
   OwnWindow makeClient() const {
     return {name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {}};
   }
-  // A segment of one page under that name, of a window that has this incarnation.
+  // Creates a segment of one page with this name that belongs to the window of this incarnation.
   void leave(const std::string& file, SegmentKind kind, std::uint64_t ownerWindow,
              std::uint16_t layoutMajor = layout::kMajor) const {
     auto page = createPage(kind);
@@ -58,12 +58,12 @@ TEST_F(StaleSegmentsTest, NamesTheHeldLockForFilesOfLivingProcesses) {
   for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::alive) << file;
   EXPECT_EQ(all.at(keyed(NameKind::clientWindow, incarnation)).reason,
             lock + keyed(NameKind::clientWindow, incarnation));
-  // Every peer may write over the header of hints: it names nobody.
+  // Every peer may overwrite the header of hints, so it is not used to name the owner.
   const auto held = "the lock of " + keyed(NameKind::hints, incarnation) + " is held";
   EXPECT_EQ(all.at(keyed(NameKind::hints, incarnation)).reason, held);
   EXPECT_EQ(all.at(keyed(NameKind::fifo, incarnation)).reason, held);
   EXPECT_EQ(all.at(pendingBind).reason, lock + keyed(NameKind::clientWindow, incarnation));
-  EXPECT_FALSE(stale_segments::tryRemove(all.at(pendingBind))) << "it lives";
+  EXPECT_FALSE(stale_segments::tryRemove(all.at(pendingBind))) << "its owner is alive";
   segments::remove(pendingBind);
 }
 
@@ -104,7 +104,7 @@ TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
   for (const auto& [file, judged] : judge()) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
 
-// Somebody removed the name of a window whose owner lives on.
+// Another process removed the name of a window whose owner is alive.
 TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsItsOtherFiles) {
   const auto client = makeClient();
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
@@ -138,7 +138,7 @@ TEST_F(StaleSegmentsTest, DoesNotJudgeUnknownFiles) {
   EXPECT_THAT(all.at(serverName("newer")).reason, HasSubstr("layout 2, this program speaks 1-1"));
 }
 
-// Judged dead, and then the name is a successor's: the removal asks the lock once more.
+// A successor gets the name after the file was judged dead. The removal checks the lock again.
 TEST_F(StaleSegmentsTest, DoesNotRemoveASuccessorOfTheSameName) {
   leave(serverName(), SegmentKind::serverWindow, 0);
   const auto judged = judgementOf(serverName());
@@ -162,7 +162,7 @@ TEST_F(StaleSegmentsTest, JudgesTheRequestedNumberOfManyFiles) {
   EXPECT_EQ(backplane_.removeDead().size(), 200U);
 }
 
-// A pool hangs on its link: when that was not looked at, nothing is known of the pool.
+// The verdict about a pool is that of its link. If the link was not judged, the pool is not either.
 TEST_F(StaleSegmentsTest, DoesNotJudgeAPoolWithoutItsLink) {
   const auto client = makeClient();
   const auto link = SegmentName::link(name(), 1, 2);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// News of deaths and births of peers.
+// Watcher: reports the death of peers and new names.
 #include "shm/watcher.h"
 
 #include <atomic>
@@ -46,7 +46,8 @@ class WatcherTest : public ShmTest {
   std::shared_ptr<PeerWindow> open(const std::string& server) const {
     return PeerWindow::tryOpen(serverName(server), SegmentKind::serverWindow);
   }
-  // Returns when the watcher has seen a death that happened after all that the test did before.
+  // Returns when the watcher has reported a death that happens after this call: it has then handled
+  // all earlier events.
   void waitForAnotherDeath() {
     auto other = startServer("other");
     News news;
@@ -144,7 +145,7 @@ TEST_F(WatcherTest, DoesNotReportAForgottenPeer) {
   watcher_.forget(token);
 }
 
-// forget() may come while the callback runs: when it returns the callback has ended.
+// forget() may be called while the callback runs. When it returns, the callback has ended.
 TEST_F(WatcherTest, RunsNoCallbackAfterForget) {
   for (int round = 0; round < 50; ++round) {
     const auto server = startServer("server" + std::to_string(round));
@@ -156,7 +157,7 @@ TEST_F(WatcherTest, RunsNoCallbackAfterForget) {
     watcher_.forget(token);
 
     EXPECT_LE(alive->load(), 1);
-    alive.reset();  // AddressSanitizer tells if the callback comes now
+    alive.reset();  // AddressSanitizer reports a callback that runs after this
     static_cast<void>(backplane_.removeDead());
   }
 }
@@ -203,14 +204,14 @@ TEST_F(WatcherTest, AStoppedProcessIsNotDead) {
 class HiddenOwners : public WatcherTest,
                      public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
-// Where the header names no process that can be looked for, the lock alone tells.
+// If the header names no process that this process can find, only the lock decides.
 TEST_P(HiddenOwners, AreWatchedThroughTheirLocks) {
   const auto server = startServer("server", GetParam());
   const auto peer = open("server");
   News news;
   watcher_.watchPeer(peer, news.callback());
   waitForAnotherDeath();
-  EXPECT_EQ(news.count(), 0) << "it lives";
+  EXPECT_EQ(news.count(), 0) << "it is alive";
 
   server->end(SIGKILL);
 
@@ -224,14 +225,14 @@ INSTANTIATE_TEST_SUITE_P(
                     [](layout::SegmentHeader& header) { header.ownerPid = 0; },
                     [](layout::SegmentHeader& header) { header.ownerPid = INT32_MIN; }));
 
-// A process that the owner forked has none of its locks.
+// A child of the owner has none of the owner's locks.
 TEST_F(WatcherTest, AChildDoesNotKeepItsDeadParentAlive) {
   const auto server = std::make_unique<Child>([&](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
     if (::fork() == 0) {
       ::prctl(PR_SET_PDEATHSIG, 0);
-      self.ready();  // the heir lives until it is told to go on
+      self.ready();  // the grandchild runs until the test calls go()
       ::_exit(0);
     }
     ::pause();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a process exposes on the backplane, and what its peers see of it.
+// OwnWindow and PeerWindow: what a process exposes, and what its peers see.
 #include "shm/window.h"
 
 #include <sys/stat.h>
@@ -92,7 +92,7 @@ TEST_F(WindowTest, RefusesANameInUseAndNamesTheOwner) {
 
   EXPECT_THAT(why, AllOf(HasSubstr(segments::path(serverName())), HasSubstr("shm_test"),
                          HasSubstr(std::to_string(::getpid()))));
-  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "nothing is left of the second";
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "the second window left no files";
   EXPECT_TRUE(openServer()->hasOwner());
 }
 
@@ -138,7 +138,7 @@ TEST_F(WindowTest, AReaperIsNotMistakenForTheOwner) {
   static_cast<void>(backplane_.removeDead());
 }
 
-// It has the lock, and no processor.
+// The reaper holds the lock but gets no processor.
 TEST_F(WindowTest, WaitsForASlowReaper) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
@@ -188,7 +188,8 @@ TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerGetsTheName) {
   }
 }
 
-// A file that is nobody's and cannot be removed: another user's, say.
+// A file without an owner that this process cannot remove, for example because it is another
+// user's.
 TEST_F(WindowTest, ADeadWindowThatCannotBeRemovedIsAnError) {
   const auto path = segments::path(serverName());
   ASSERT_EQ(::mkdir(path.c_str(), 0700), 0);
@@ -293,7 +294,7 @@ TEST_F(WindowTest, RingsOnlyASleepingOwner) {
 
   EXPECT_EQ(rung(), 1u);
   char byte = 0;
-  EXPECT_EQ(::read(server->fifo().get(), &byte, 1), 1) << "through the pipe instead";
+  EXPECT_EQ(::read(server->fifo().get(), &byte, 1), 1) << "rung through the FIFO";
   server->control().sleeping.store(static_cast<layout::SleepState>(77), std::memory_order_relaxed);
   peer->notify(0);
 }
