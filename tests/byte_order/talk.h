@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The protocol between mpf_test_ask and mpf_test_echo: Int32 messages that are commands to the echo,
-// and lines that both print for the test.
+// The protocol between mpf_test_ask and mpf_test_echo: Int32 messages that are commands to the
+// echo, and lines that both print for the test.
 #pragma once
 
 #include <cstdint>

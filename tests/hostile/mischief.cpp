@@ -94,7 +94,7 @@ void Mischief::writeSlot(Link& link) {
   link.notifyPeer();
 }
 
-// Sets ready bits and knocks of all links.
+// Sets and clears ready bits at random, and writes invalid knocks.
 void Mischief::writeHints() {
   for (const auto& file : files_) {
     if (file.path.find(".h.") == std::string::npos) continue;
@@ -123,7 +123,7 @@ void Mischief::cut() {
   [[maybe_unused]] const int result = ::truncate(file.path.c_str(), static_cast<off_t>(bytes));
 }
 
-// Decreases counters, frees slots that were never filled, returns chunks that were never lent.
+// Writes wrong positions and counts, and returns chunks that were never lent.
 void Mischief::goBack(Link& link) {
   const bool isClient = link.side() == LinkSide::client;
   auto& control = link.control();
