@@ -51,7 +51,7 @@ TEST_F(OutputTest, ReturnsEachLineOnce) {
   EXPECT_EQ(program.line(), "");
 }
 
-// More than a pipe holds.
+// The program writes more than a pipe can hold.
 TEST_F(OutputTest, DoesNotBlockTheProgram) {
   auto program = run("head --bytes=1000000 /dev/zero | tr '\\0' x >&2");
 
