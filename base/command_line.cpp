@@ -22,7 +22,7 @@ std::string subcommandsOf(const CLI::App& app) {
   return names;
 }
 
-// "mpf call" of `mpf call echo`: the program and the subcommands that were chosen.
+// The program and the chosen subcommands: "mpf call" for `mpf call echo`.
 std::string chosenCommand(const CLI::App& app) {
   std::string name = app.get_name();
   for (const auto* command = &app; !command->get_subcommands().empty();) {
@@ -32,7 +32,8 @@ std::string chosenCommand(const CLI::App& app) {
   return name;
 }
 
-// Says in --help, from which the man pages are made, how the program or subcommand ends.
+// Adds the exit statuses to the --help text of `app` and its subcommands. The man pages are
+// generated from that text.
 void addExitStatus(CLI::App& app) {
   auto footer = app.get_footer();
   if (footer.find("Exit status") == std::string::npos) {
@@ -57,7 +58,7 @@ int explain(const CLI::App& app, const CLI::ParseError& error) {
   return kExitUsage;
 }
 
-// Whether all of `text` is a number, which is then in `value`.
+// Returns true and sets `value` if all of `text` is one number.
 template <class Number>
 bool isNumber(const std::string& text, Number& value) {
   const auto* const end = text.data() + text.size();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Durations as a person reads them: "87.3 ns", "4120 ns", "26.0 us", "1.5 s", "3 h 12 min".
+// durationText(): a duration as text for people: "87.3 ns", "4120 ns", "26.0 us", "1.5 s",
+// "3 h 12 min".
 #pragma once
 
 #include <fmt/format.h>
@@ -7,7 +8,7 @@
 
 namespace mpf {
 
-// Three or four digits, ASCII; from two minutes on whole units.
+// Returns three or four digits with a unit, in ASCII; whole units from 100 seconds on.
 [[nodiscard]] inline std::string durationText(double ns) {
   if (ns < 100) return fmt::format("{:.1f} ns", ns);
   if (ns < 10'000) return fmt::format("{:.0f} ns", ns);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// InheritingMutex: a mutex whose owner runs at the priority of the most urgent thread that waits
-// for it.
+// InheritingMutex: a mutex with priority inheritance. Its owner runs at the highest priority of
+// the threads that wait for it.
 //
-// With std::mutex an ordinary thread that holds the lock and gets no processor keeps a real-time
-// thread waiting just as long.
+// With std::mutex, an ordinary thread that holds the lock but does not get a processor delays a
+// real-time thread that waits for the lock by the same time.
 //
-// Threads  any; of one process.
+// Threads  any thread of one process.
 #pragma once
 
 #include <pthread.h>
@@ -14,10 +14,10 @@
 
 namespace mpf {
 
-// What std::lock_guard wants of a mutex.
+// Meets the requirements of std::lock_guard.
 class InheritingMutex {
  public:
-  // Throws std::system_error where the kernel has no such mutexes.
+  // Throws std::system_error if the kernel does not support priority inheritance.
   InheritingMutex() {
     pthread_mutexattr_t attributes;
     ::pthread_mutexattr_init(&attributes);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// LatencyRecorder: counts durations in log-linear buckets, as HdrHistogram does, and tells
+// LatencyRecorder: counts durations in log-linear buckets, as HdrHistogram does, and returns
 // percentiles.
 //
-//   0 ... 255 ns exact, then 128 buckets per power of two: an error below 0.8 %. The maximum is
-//   exact.
+//   0 to 255 ns   exact
+//   above         128 buckets per power of two: an error below 0.8 %
+//   maximum       exact
 //
-// A plain struct without pointers: it can lie in memory that processes share.
+// It contains no pointers, so it can be placed in memory that processes share.
 //
-// Threads  one.
+// Threads  one thread.
 #pragma once
 
 #include <algorithm>
@@ -41,11 +42,11 @@ class LatencyRecorder {
     return count_ == 0 ? 0.0 : static_cast<double>(sum_) / static_cast<double>(count_);
   }
 
-  // The smallest duration that at least `percent` of a hundred samples do not exceed; 0 without
-  // samples.
+  // The smallest duration that at least `percent` percent of the samples do not exceed. Returns 0
+  // if there are no samples.
   [[nodiscard]] std::uint64_t percentileNs(double percent) const noexcept {
-    // In thousandths of a percent: 99.9 is no number that a double holds, and one sample too many
-    // would be the outlier itself.
+    // In thousandths of a percent, because a double cannot represent 99.9 exactly: a rank that is
+    // too high by one sample could return the outlier itself.
     const auto thousandths = static_cast<std::uint64_t>(std::llround(percent * 1000));
     const auto rank = std::max<std::uint64_t>(1, (count_ * thousandths + 99'999) / 100'000);
     std::uint64_t seen = 0;
@@ -59,7 +60,7 @@ class LatencyRecorder {
  private:
   static constexpr std::uint32_t kBits = 7;  // 128 buckets per power of two
   static constexpr std::uint64_t kExact = std::uint64_t{2} << kBits;
-  static constexpr std::uint32_t kPowers = 32;  // above `kExact`: up to a quarter of an hour
+  static constexpr std::uint32_t kPowers = 32;  // powers of two above `kExact`: up to 18 minutes
 
   static std::size_t indexOf(std::uint64_t ns) noexcept {
     if (ns < kExact) return ns;

@@ -7,7 +7,7 @@
 
 namespace mpf {
 
-// A line that comes while others of its kind are held is held behind them.
+// While lines of a kind are held, each further line of this kind is held too.
 bool LogLimiter::admit(const Kind& kind, int level, std::string_view text, std::int64_t nowNs) {
   constexpr auto kFullNs = kAtOnce * kEveryNs;
   auto& state =
@@ -42,7 +42,7 @@ LogLimiter::Line LogLimiter::summary(State& state, std::int64_t nowNs) {
   return {state.level, std::move(text)};
 }
 
-// Also forgets kinds that have all their lines again.
+// Also erases each kind that may write its full number of lines again.
 std::vector<LogLimiter::Line> LogLimiter::take(std::int64_t nowNs, bool all) {
   constexpr auto kFullNs = kAtOnce * kEveryNs;
   std::vector<Line> lines;

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// LogLimiter: decides which lines of a log are written now, so that a storm of lines fills no disk.
+// LogLimiter: decides which log lines are written now, so that repeated lines cannot fill a disk.
 //
-//   line ─► admit() ─ true ──► written now            the first kAtOnce lines of a kind
+//   line ─► admit() ─ true ──► written now       the first kAtOnce lines of a kind
 //                   └ false ─► held: counted, and the last one is kept
-//   held lines ─► takeDue() ─► "TEXT (repeated 9968 times in 10.0 s)"    one line of a kind each kEveryNs
+//   held lines ─► takeDue() ─► "TEXT (repeated 9968 times in 10.0 s)"
+//                              one line of each kind every kEveryNs
 //
-// Lines of one kind come from one statement of the program, about one object. A kind regains the
-// right to one more line each kEveryNs, up to kAtOnce of them. The first line of a storm is written
-// at once, the last one with the count of those before it: the written lines and the counts add up
-// to all lines.
+// A kind is one log statement of the program about one object. Every kEveryNs a kind may write one
+// more line, up to kAtOnce lines. The first lines of a series are written at once; the last line
+// is written with the number of held lines. The written lines and these numbers add up to all
+// lines.
 //
-// Threads  one.
+// Threads  one thread.
 // Trust    memory grows with the number of kinds, not with the number or the contents of lines.
 #pragma once
 
@@ -28,7 +29,7 @@ class LogLimiter {
   struct Kind {
     std::string_view file;  // with static lifetime
     std::uint64_t line = 0;  // of the statement in that file
-    std::uint64_t object = 0;  // what the statement speaks of; 0: there is only one
+    std::uint64_t object = 0;  // the object that the line is about; 0: there is only one
     auto operator<=>(const Kind&) const = default;
   };
   struct Line {
@@ -39,23 +40,25 @@ class LogLimiter {
   static constexpr std::int64_t kAtOnce = 32;
   static constexpr std::int64_t kEveryNs = 10'000'000'000;
 
-  // True: write the line now. False: it is held, and takeDue() returns it or its count.
+  // Returns true if the line must be written now. Otherwise the line is held: takeDue() later
+  // returns it or includes it in a count.
   [[nodiscard]] bool admit(const Kind& kind, int level, std::string_view text, std::int64_t nowNs);
-  // When takeDue() has something to return; INT64_MAX: nothing is held.
+  // The time at which takeDue() next returns a line; INT64_MAX if no line is held.
   [[nodiscard]] std::int64_t dueNs() const noexcept { return dueNs_; }
-  // A line for each kind whose held lines are due.
+  // Returns a line for each kind whose held lines are due.
   [[nodiscard]] std::vector<Line> takeDue(std::int64_t nowNs) { return take(nowNs, false); }
-  // A line for each kind that has held lines: before the program ends.
+  // Returns a line for each kind that has held lines. For the end of the program.
   [[nodiscard]] std::vector<Line> takeAll(std::int64_t nowNs) { return take(nowNs, true); }
 
  private:
   struct State {
-    // kAtOnce lines are allowed once this lies kAtOnce * kEveryNs back
+    // Each written line adds kEveryNs. When this time is kAtOnce * kEveryNs ago, kAtOnce lines are
+    // allowed at once.
     std::int64_t usedUntilNs = 0;
-    std::uint64_t held = 0;
-    bool areAlike = true;  // the texts that are held
-    int level = 0;  // the highest of them
-    std::string last;
+    std::uint64_t held = 0;  // number of held lines
+    bool areAlike = true;  // all held lines have the same text
+    int level = 0;  // the highest level of the held lines
+    std::string last;  // text of the last held line
     std::int64_t heldSinceNs = 0;
     [[nodiscard]] std::int64_t nextNs() const noexcept { return usedUntilNs + kEveryNs; }
   };

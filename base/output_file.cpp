@@ -14,7 +14,7 @@ namespace mpf {
 OutputFile::OutputFile(std::string path, mode_t mode)
     : path_(std::move(path)),
       file_(checkCall(::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, mode), "open", path_)) {
-  // A device that takes nothing, such as /dev/full, refuses even no bytes.
+  // A device that accepts no data, such as /dev/full, also refuses a write of zero bytes.
   checkCall(::write(file_.get(), "", 0), "write", path_);
 }
 
@@ -32,9 +32,9 @@ void OutputFile::write(std::string_view bytes) {
 }
 
 void OutputFile::close() {
-  write({});                                                  // a file without content is empty
-  checkCall(::close(file_.release()), "write",
-            path_);  // some file systems tell only now that a disk is full
+  write({});  // truncates the file if nothing has been written
+  // Some file systems report a full disk only at close().
+  checkCall(::close(file_.release()), "write", path_);
 }
 
 }  // namespace mpf

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// OutputFile: a file that a program writes, in which no failed write goes unnoticed.
+// OutputFile: a file that a program writes. Every failed write throws.
 //
-//   OutputFile file(path);      // before the work: throws when nothing can be written there
+//   OutputFile file(path);      // before the work: throws if the file cannot be written
 //   ...                         // the work, which may take hours
 //   file.write(text);
 //   file.close();
 //
-// Threads  one.
-// Crash    a call of write() is one call of the system, as far as the system takes it at once.
+// Threads  one thread.
+// Crash    a call of write() is one system call, unless the system accepts only a part at once.
 #pragma once
 
 #include <sys/types.h>
@@ -21,12 +21,14 @@ namespace mpf {
 
 class OutputFile {
  public:
-  // Creates the file with these rights, or opens it; what it holds goes with the first write().
-  //   throws  std::system_error that names the file: it cannot be created, opened or written, such
-  //           as /dev/full
+  // Creates the file with this mode, or opens an existing file, whose contents the first write()
+  // or close() removes.
+  //   throws  std::system_error, with the name of the file, if it cannot be created, opened or
+  //           written (/dev/full, for example)
   explicit OutputFile(std::string path, mode_t mode = 0666);
 
-  // Both throw std::system_error that names the file, when the disk is full, say.
+  // Both throw std::system_error, with the name of the file, if a write fails: for example because
+  // the disk is full.
   void write(std::string_view bytes);
   void close();
 

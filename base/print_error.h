@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// printError(): a message on stderr that never fails the program that prints it.
+// printError(): prints a message to stderr and never throws.
 //
 //   printError("mpf-x: {}: {}\n", path, reason);
 //
 // Threads  any; a message is one call of write(), so messages do not mix.
-// Crash    what cannot be written (stderr is closed, full, or a pipe without reader) is lost.
-// Trust    the message may contain text of other processes: it goes through printableLines().
+// Crash    a message that cannot be written (stderr is closed, full, or a pipe without a reader) is
+//          lost.
+// Trust    the message may contain text of other processes, so printableLines() escapes it.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,7 +16,7 @@
 
 namespace mpf {
 
-// Writes bytes to stderr as they are: for terminal control such as "\r". Ignores errors.
+// Writes bytes to stderr unchanged, for terminal control such as "\r". Ignores errors.
 void writeError(std::string_view bytes) noexcept;
 
 template <class... Arguments>

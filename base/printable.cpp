@@ -22,7 +22,7 @@ constexpr std::array<Range, 20> kUnprintable{
      {0xfeff, 0xfeff},   {0xfff9, 0xfffb},   {0x110bd, 0x110bd}, {0x110cd, 0x110cd},
      {0x13430, 0x1343f}, {0x1bca0, 0x1bca3}, {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}}};
 
-// One character of a text, or one byte that is no part of any.
+// One character of a text, or one byte that is not part of a valid character.
 struct Character {
   char32_t code = 0;
   std::size_t bytes = 1;

@@ -17,7 +17,7 @@ constexpr std::int64_t kPauseNs = 1'000'000'000;
 
 bool trySchedule(int policy, int priority) noexcept {
   const sched_param parameter{.sched_priority = priority};
-  // 0: this thread alone
+  // pid 0: only the calling thread
   return ::sched_setscheduler(0, policy | SCHED_RESET_ON_FORK, &parameter) == 0;
 }
 

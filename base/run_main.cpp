@@ -14,7 +14,7 @@
 namespace mpf {
 namespace {
 
-// Writes what is left in the buffer: a full disk shows only now. Returns the exit status.
+// Flushes stdout: only this reports a full disk. Returns the exit status.
 int flushOutput(std::string_view program, int status) noexcept {
   const bool hadFailed = std::ferror(stdout) != 0;
   errno = 0;
@@ -24,7 +24,8 @@ int flushOutput(std::string_view program, int status) noexcept {
   return status == 0 ? kExitFailed : status;
 }
 
-// An exception of fmt::print() or of a stream does not name what it could not write.
+// Returns the prefix for an exception of fmt::print() or of a stream, whose text does not name the
+// file that could not be written.
 const char* placeOf(const std::exception& error) noexcept {
   const bool isOfOutput =
       std::ferror(stdout) != 0 && dynamic_cast<const std::system_error*>(&error) != nullptr;
@@ -43,7 +44,7 @@ int runMain(std::string_view program, const std::function<int()>& work) noexcept
   } catch (const std::exception& error) {
     printError("{}: {}{}\n", program, placeOf(error), error.what());
   } catch (...) {
-    printError("{}: failed for a reason that is not known\n", program);
+    printError("{}: failed with an unknown exception\n", program);
   }
   return kExitFailed;
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
-// SignalsBlocked: while it lives, the calling thread gets no signals, and neither do threads that
-// it starts: signals belong to the program's own threads. Those of a thread's own faults stay: to
-// block them is to be killed by them.
+// SignalsBlocked: blocks signals in the calling thread, and in threads that it starts, while the
+// object exists: signals are for the program's own threads, not for those of this library. The
+// signals of a thread's own faults (SIGSEGV, SIGBUS, SIGFPE, SIGILL) stay unblocked, because the
+// kernel kills a process when a thread causes such a fault while the signal is blocked.
+//
+// Threads  one thread constructs and destroys it.
 #pragma once
 
 #include <pthread.h>

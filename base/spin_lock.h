@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SpinLock: a lock between threads of one process around some tens of instructions. Never in shared
-// memory.
+// SpinLock: a lock between threads of one process, held for a few tens of instructions. It must
+// not be placed in shared memory: a killed holder would block the other processes forever.
 #pragma once
 
 #include <sched.h>
@@ -12,11 +12,11 @@ namespace mpf {
 class SpinLock {
  public:
   void lock() noexcept {
-    // PAIR(spin-lock): what the last holder did.
+    // PAIR(spin-lock): sees the writes of the previous holder.
     while (locked_.test_and_set(std::memory_order_acquire)) ::sched_yield();
   }
   void unlock() noexcept {
-    // PAIR(spin-lock): what was done under the lock.
+    // PAIR(spin-lock): publishes the writes made under the lock.
     locked_.clear(std::memory_order_release);
   }
 

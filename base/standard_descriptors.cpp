@@ -19,8 +19,8 @@ int openNothing(int flags) noexcept {
 void openStandardDescriptors() noexcept {
   for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
     if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
-    const int file = openNothing(0);  // the lowest number that is free: this one
-    if (file < 0) return;  // no file can be opened, so no other file gets the number either
+    const int file = openNothing(0);  // gets the lowest free number, which is `descriptor`
+    if (file < 0) return;  // no file can be opened, so no other file can get this number either
   }
 }
 

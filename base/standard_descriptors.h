@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Standard descriptors: makes sure that 0, 1 and 2 are open.
+// Standard descriptors: ensures that the descriptors 0, 1 and 2 are open.
 //
-// A program that starts with one of them closed would get its number for the next file that it
-// opens: a serial line, a segment of shared memory, a socket. What the program then prints, such as
-// its log, would go there.
+// If a program starts with one of them closed, the next file that it opens gets this number: a
+// serial line, a segment of shared memory, a socket. The program's output, such as its log, would
+// be written to that file.
 //
 // Threads  call it first in main(), before there are other threads and before any file is opened.
 #pragma once
 
 namespace mpf {
 
-// Opens each of the descriptors 0 to 2 that is closed on /dev/null; where there is no /dev/null, on
-// the root folder, which can be neither read nor written.
+// Opens /dev/null on each of the descriptors 0 to 2 that is closed; if /dev/null is missing, the
+// root folder, which can be neither read nor written.
 void openStandardDescriptors() noexcept;
 
-// Closes `descriptor`; of 0 to 2 the number stays in use, for /dev/null.
+// Closes `descriptor`. If it is 0, 1 or 2, its number is then open on /dev/null.
 void closeDescriptor(int descriptor) noexcept;
 
 }  // namespace mpf

@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Steps: names for places in the code, at which a program can be stopped, killed or counted from
-// outside.
+// Steps: named places in the code at which a tool can stop, kill or count the program from outside.
 //
 //   MPF_STEP(slot_published);
 //
-// A step is one `nop` and a note beside the program: a USDT probe (provider "mpf"). It runs no
-// other instruction, and it needs no library.
-//   bpftrace -e 'usdt:./program:mpf:slot_published { @ = count(); }'       perf, gdb and SystemTap
-//   know them, too
-// `mpf torture` kills programs at them; docs/torture.md lists all.
+// A step is one `nop` and an ELF note: a USDT probe (provider "mpf"). It executes no other
+// instruction and needs no library. bpftrace, perf, gdb and SystemTap support these probes:
+//
+//   bpftrace -e 'usdt:./program:mpf:slot_published { @ = count(); }'
+//
+// `mpf torture` kills programs at the steps; docs/torture.md lists them all.
 //
 // Threads  any.
-// Crash    what they are for. The compiler may move plain stores past a step: who needs each state
-//          in between walks by instructions.
-// Trust    -
+// Crash    steps exist to test crashes. The compiler may move plain stores past a step; a test that
+//          needs every intermediate state steps through single instructions instead.
 #pragma once
 
-// The note as <sys/sdt.h> writes it (type 3 of owner "stapsdt"). `inline`: else g++ takes it for
-// some sixty instructions, and stops inlining the functions around it
-// (docs/decisions/0010-steps.md).
+// The note has the format that <sys/sdt.h> writes (type 3 of owner "stapsdt"). Without `inline`,
+// g++ estimates the statement as some sixty instructions and stops inlining the functions around
+// it (docs/decisions/0010-steps.md).
 #define MPF_STEP(name)                                                        \
   __asm__ __inline__ __volatile__(                                            \
       "990: nop\n"                                                            \

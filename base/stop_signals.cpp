@@ -20,28 +20,29 @@ struct Slot {
   std::atomic<void*> argument{nullptr};
 };
 
-// A signal handler reaches nothing but what is static.
+// Static, because a signal handler cannot reach other objects.
 std::array<Slot, 64> slots;
-std::atomic<unsigned> handling{0};  // threads that are in stop()
+std::atomic<unsigned> handling{0};  // number of threads that execute stop()
 std::mutex installMutex;
 unsigned users = 0;
 std::array<struct sigaction, 2> before;
 
 void stop(int) {
   const int savedErrno = errno;
-  // PAIR(stop-handling): either this finds no callback, or who took that away finds this.
+  // PAIR(stop-handling): either this handler finds no callback, or the destructor that removes the
+  // callback sees that a handler is running.
   handling.fetch_add(1, std::memory_order_seq_cst);
   for (auto& slot : slots) {
-    // PAIR(stop-slot): the argument that was stored before the callback.
+    // PAIR(stop-slot): also sees the argument, which was stored before the callback.
     if (const auto callback = slot.callback.load(std::memory_order_seq_cst))
       callback(slot.argument.load(std::memory_order_relaxed));
   }
-  // PAIR(stop-handled): after the last use of what the callbacks' owners may destroy then.
+  // PAIR(stop-handled): after the last use of the arguments, which their owners may then destroy.
   handling.fetch_sub(1, std::memory_order_release);
   errno = savedErrno;
 }
 
-// Those threads are not in a child of a fork.
+// The child of a fork does not have the parent's other threads, so none of them executes stop().
 void forgetOthers() noexcept { handling.store(0, std::memory_order_relaxed); }
 
 void install() {
@@ -65,9 +66,10 @@ StopSignals::StopSignals(Callback callback, void* argument) : slot_(0) {
   while (slot_ < slots.size() && slots[slot_].used.exchange(true, std::memory_order_relaxed))
     ++slot_;
   if (slot_ == slots.size())
-    throw std::runtime_error("more than 64 wait for signals in one process");
+    throw std::runtime_error(
+        "StopSignals: this process already has 64; destroy one before creating another");
   slots[slot_].argument.store(argument, std::memory_order_relaxed);
-  // PAIR(stop-slot): after its argument.
+  // PAIR(stop-slot): the argument is stored before the callback.
   slots[slot_].callback.store(callback, std::memory_order_release);
   if (users++ == 0) install();
 }
@@ -75,9 +77,9 @@ StopSignals::StopSignals(Callback callback, void* argument) : slot_(0) {
 StopSignals::~StopSignals() {
   const std::lock_guard lock(installMutex);
   if (--users == 0) uninstall();
-  // PAIR(stop-handling): the callback is gone for each handler that is not seen below.
+  // PAIR(stop-handling): a handler that the loop below does not see finds no callback.
   slots[slot_].callback.store(nullptr, std::memory_order_seq_cst);
-  // PAIR(stop-handled): what the handlers did, in other threads, is over.
+  // PAIR(stop-handled): the handlers in other threads have finished.
   while (handling.load(std::memory_order_seq_cst) != 0) ::sched_yield();
   slots[slot_].used.store(false, std::memory_order_relaxed);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// StopSignals: while it lives, SIGINT and SIGTERM call back. Several may live at once, in any
-// threads.
+// StopSignals: calls a callback at each SIGINT and SIGTERM while the object exists. Several objects
+// may exist at once, in any threads.
 //
-// Threads  the callback runs in whatever thread the kernel chose for the signal. The destructor
-//          waits until it runs in none.
+// Threads  the callback runs in the thread that the kernel chooses for the signal. The destructor
+//          waits until no thread executes the callback.
 #pragma once
 
 namespace mpf {
@@ -12,7 +12,7 @@ class StopSignals {
  public:
   using Callback = void (*)(void* argument) noexcept;  // async-signal-safe
 
-  // Throws std::runtime_error when 64 live already.
+  // Throws std::runtime_error if the process already has 64 of these objects.
   StopSignals(Callback callback, void* argument);
   ~StopSignals();
   StopSignals(const StopSignals&) = delete;

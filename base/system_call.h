@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// System calls: what to do with their return values.
+// System calls: turns their return values into exceptions, and repeats interrupted calls.
 #pragma once
 
 #include <cerrno>
@@ -17,15 +17,15 @@ namespace mpf {
   throw std::system_error(code, std::generic_category(), what);
 }
 
-// Returns `result`, or throws when the call answered with a negative one. For the environment at
-// start, not for the message path.
+// Returns `result`, or throws std::system_error with errno if `result` is negative. For calls at
+// the start of a program, not for the message path.
 template <class Result>
 Result checkCall(Result result, std::string_view call, std::string_view object = {}) {
   if (result < 0) throwSystemError(errno, call, object);
   return result;
 }
 
-// Repeats `call` while a signal handler interrupted it.
+// Repeats `call` as long as signal handlers interrupt it (EINTR).
 template <class Call>
 auto retryInterrupted(Call&& call) noexcept(noexcept(call())) {
   for (;;) {

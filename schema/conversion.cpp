@@ -56,7 +56,8 @@ void put(Building& to, std::size_t at, const Body& body, const Field<Body, Value
   if constexpr (std::is_enum_v<Value>) {
     const auto number = static_cast<std::int64_t>(value);
     if (number < 0 || number > UINT16_MAX)
-      throw Refusal{ConversionFault::unsound, std::to_string(number) + " is no such value"};
+      throw Refusal{ConversionFault::unsound,
+                    std::to_string(number) + " is not a value of this type"};
   }
   storeLittle(to.data, at, static_cast<typename Travels<Value>::As>(value));
 }
@@ -196,9 +197,10 @@ Message fromWire(capnp::AnyStruct::Reader envelope, const ConversionLimits& limi
   }
 }
 
-// Runs `convert` and reports an error that ended it.
+// Runs `convert`. Returns false with `error` set if it throws; onKjException is the fault of a
+// kj::Exception.
 template <class Convert>
-bool guarded(std::string_view type, const std::string_view& at, ConversionFault onNonsense,
+bool guarded(std::string_view type, const std::string_view& at, ConversionFault onKjException,
              ConversionError& error, Convert&& convert) {
   const auto fail = [&](ConversionFault fault, std::string_view why) {
     error.fault = fault;
@@ -212,7 +214,7 @@ bool guarded(std::string_view type, const std::string_view& at, ConversionFault 
     return fail(refusal.fault, refusal.text);
   } catch (const kj::Exception& exception) {
     const auto why = exception.getDescription();
-    return fail(onNonsense, {why.begin(), why.size()});
+    return fail(onKjException, {why.begin(), why.size()});
   }
 }
 

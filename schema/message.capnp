@@ -28,13 +28,13 @@ struct Envelope {
 enum ConnectStatus {
   connectNo @0;         # no server, or the server is gone
   connectYes @1;
-  connectQueueFull @2;  # the server's queue was full: a message was refused, the client stays connected
+  connectQueueFull @2;  # the server's queue was full: a message was refused; still connected
   connectRefused @3;    # the server does not accept this client
 }
 
 struct Connect {
   status @0 :ConnectStatus;
-  incarnation @1 :UInt64;  # identifies one life of the server; another number means that it was restarted
+  incarnation @1 :UInt64;  # identifies one run of the server; it changes when the server restarts
 }
 
 # timeout, cmd, status, address and extra are the standard fields: client and server agree on their
@@ -118,5 +118,6 @@ struct RequestFate {
 }
 
 struct User {
-  value @0 :Data;  # a complete Cap'n Proto message of the user's own schema, in standard segment framing
+  value @0 :Data;
+  # A complete Cap'n Proto message of the user's own schema, in standard segment framing.
 }

@@ -13,7 +13,7 @@ namespace {
 class HeapLender final : public BodyLender {
  public:
   void takeBack(std::byte* data, std::size_t) noexcept override {
-    // NOLINTNEXTLINE(cppcoreguidelines-no-malloc): this lender owns what allocateHeapBody() returns
+    // NOLINTNEXTLINE(cppcoreguidelines-no-malloc): owner of the memory of allocateHeapBody()
     std::free(data);
   }
 };
@@ -43,7 +43,7 @@ Message Message::copyOf(MessageType type, std::span<const std::byte> bytes) {
 Message Message::duplicate() const {
   Message copy = copyOf(getType(), body());
   const BodyLayout layout = layoutOf(getType());
-  // the checked length; a peer may have changed the one in the body
+  // The checked length: a peer may have changed the length in the body.
   if (isSound() && layout.elementBytes != 0) {
     std::memcpy(copy.data() + layout.lengthOffset, &state_.length, sizeof state_.length);
     copy.check();

@@ -20,13 +20,13 @@ struct Record {
       server @2 :Text;
       location @3 :Int32;
       client @4 :Text;      # label or program
-      clientPid @5 :Int32;  # 0: the client was gone already
+      clientPid @5 :Int32;  # 0: the client had exited already
     }
     message :group {
       direction @6 :Direction;
       requestId @7 :UInt32;
       isFirstReply @8 :Bool;     # the reply ends its request
-      mayHaveChanged @9 :Bool;   # read after its receiver, which may write to it, had taken it
+      mayHaveChanged @9 :Bool;   # read after the receiver, which may write to it, had taken it
       envelope @10 :Message.Envelope;
     }
     unreadable :group {     # a message that could not be decoded

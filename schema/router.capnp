@@ -35,12 +35,14 @@ struct Item {
 
     open @8 :Open;          # client router: opens a client of a binding
     close @9 :UInt32;       # client router: closes a client (its number)
-    refuse @10 :Refusal;    # server router: the server does not accept the client; all its requests end as refused
+    refuse @10 :Refusal;
+    # server router: the server does not accept the client; all its requests end as refused
 
     request @11 :Request;   # client router
     reply @12 :Reply;       # server router
     fate @13 :RequestEnd;   # server router: ends a request that gets no reply
-    queueFull @14 :UInt32;  # server router: a request of this client was refused, since the server's queue was full
+    queueFull @14 :UInt32;
+    # server router: a request of this client was refused, because the server's queue was full
     credit @15 :Credit;     # client router: bytes of replies that the client has taken
   }
 }
@@ -50,7 +52,7 @@ struct Greeting {
   protocolMinor @1 :UInt16;
   router @2 :Text;            # the name of the sender, for people
   program @3 :Text;           # "mpf-router 0.1.0"
-  incarnation @4 :UInt64;     # identifies one life of the sender
+  incarnation @4 :UInt64;     # identifies one run of the sender
   locations @5 :List(Int32);  # server router: the locations that it serves
   maxFrameBytes @6 :UInt64;   # the longest frame that the sender reads, segment table included
   maxMessageBytes @7 :UInt64; # the largest body of a message that the sender accepts
@@ -62,7 +64,7 @@ struct Farewell {
   reason @0 :Text;  # for people
   code @1 :Code;
   enum Code {
-    stopping @0;     # the router ends, or its configuration no longer names the peer
+    stopping @0;     # the router exits, or its configuration no longer names the peer
     version @1;      # another major version
     protocol @2;     # the peer sent invalid data
     limit @3;        # the peer sent more than the greeting allows
@@ -84,11 +86,11 @@ struct Bind {
 struct Server {
   binding @0 :UInt32;
   state @1 :State;
-  incarnation @2 :UInt64;      # there: identifies one life of the server
-  queueSize @3 :UInt32;        # there: requests of one client that the server has not taken, at most
+  incarnation @2 :UInt64;      # there: identifies one run of the server
+  queueSize @3 :UInt32;        # there: most requests of one client that wait to be taken
   maxMessageBytes @4 :UInt64;  # there: limit of a request or a reply
   reason @5 :Text;             # absent, refused: the reason, for people
-  maxOutstanding @6 :UInt32;   # there: unanswered requests of one client, at most
+  maxOutstanding @6 :UInt32;   # there: most unanswered requests of one client
   enum State {
     absent @0;   # closes all clients of the binding; `server` follows again when the state changes
     there @1;
@@ -99,7 +101,8 @@ struct Server {
 struct Open {
   client @0 :UInt32;   # a new number, chosen by the client router
   binding @1 :UInt32;
-  incarnation @2 :UInt64;  # of the server; if another one is there by now, each request ends as neverTaken
+  incarnation @2 :UInt64;
+  # of the server; if another one is running by now, each request ends as neverTaken
   window @3 :UInt32;       # bytes of replies that may be under way; see Credit
 }
 
@@ -111,7 +114,8 @@ struct Refusal {
 struct Request {
   client @0 :UInt32;
   requestId @1 :UInt32;       # not 0; docs/wire-format.md says which ids are valid together
-  takeWithinNs @2 :UInt64;    # not 0: a request that the server has not taken by then ends as expired
+  takeWithinNs @2 :UInt64;
+  # not 0: a request that the server has not taken within this time ends as expired
   message @3 :Message.Envelope;
 }
 

@@ -2,8 +2,8 @@
 // WirePlaces: the places of the fields of a message type in its Cap'n Proto struct; looked up in
 // the schema by name, once.
 //
-//   struct = | data section: numbers at multiples of their size | pointers |          a union
-//   member: a number and a pointer
+//   struct = | data section: numbers at multiples of their size | pointers |
+//   union member = a number in the data section and a pointer
 //
 // Setting a field by its place costs a store; looking it up by name costs a microsecond for each
 // message.

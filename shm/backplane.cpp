@@ -19,7 +19,8 @@ namespace mpf {
 
 struct Backplane::State {
   explicit State(std::string itsName) : name(std::move(itsName)) {}
-  // A handle crosses a fork; the parent's watcher does not, and stays where it is.
+  // After a fork the child uses this handle with a new watcher. The parent's watcher has no thread
+  // in the child; its copy is released, not destroyed.
   Watcher& itsWatcher() {
     const std::lock_guard lock(mutex);
     // NOLINTNEXTLINE(bugprone-unused-return-value)
@@ -39,9 +40,10 @@ std::string environmentOr(const char* variable, const char* otherwise) {
   return value != nullptr && *value != '\0' ? value : otherwise;
 }
 
-// Files of a backplane that a process looks at when it attaches. Up to so many it removes all that
-// is dead; `mpf clean` always does.
-constexpr std::size_t kLooksOfWhoAttaches = 4096;
+// Number of files that attach() examines. If a backplane has no more files than this, attach()
+// removes all files of dead processes; otherwise it examines a random choice. `mpf clean` always
+// examines all files.
+constexpr std::size_t kMaxFilesPerAttach = 4096;
 
 std::vector<std::string> removeAll(std::vector<stale_segments::Judged> judged) {
   MPF_STEP(survey_begun);
@@ -64,7 +66,7 @@ Backplane Backplane::named(const std::string& name) {
 
 Backplane Backplane::attach(const std::string& name) {
   auto backplane = named(name);
-  static_cast<void>(removeAll(stale_segments::judgeSome(backplane.name(), kLooksOfWhoAttaches)));
+  static_cast<void>(removeAll(stale_segments::judgeSome(backplane.name(), kMaxFilesPerAttach)));
   return backplane;
 }
 

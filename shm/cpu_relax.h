@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// cpuRelax: what a spinning loop does between two looks.
+// cpuRelax: the processor's pause instruction, for a loop that polls shared memory.
 #pragma once
 
 namespace mpf {

@@ -25,7 +25,7 @@ void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) no
 }
 
 void ring(layout::Word32& bell) noexcept {
-  // PAIR(bell): who has seen this ring before it slept has seen what it was rung for.
+  // PAIR(bell): an owner that saw this ring before it slept has also seen the message behind it.
   bell.fetch_add(1, std::memory_order_release);
   MPF_STEP(bell_changed);
   ::syscall(SYS_futex, &bell, FUTEX_WAKE, 1, nullptr, nullptr, 0);
@@ -34,7 +34,7 @@ void ring(layout::Word32& bell) noexcept {
 FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t group) {
   const auto path = segments::path(name);
   checkCall(::mkfifo(path.c_str(), 0600), "create", path);
-  // Open for both directions: the read end never sees an end of file while peers come and go.
+  // Open for both directions: the read end never sees an end of file when a peer closes the FIFO.
   FileDescriptor fifo(
       checkCall(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC), "open", path));
   if (group != ~std::uint32_t{0})
@@ -48,7 +48,7 @@ FileDescriptor tryOpenFifo(const std::string& name) noexcept {
   FileDescriptor fifo(
       ::open(segments::path(name).c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));
   struct stat status{};
-  // anybody may put anything there
+  // Any process may have created a file of another kind under this name.
   if (fifo && (::fstat(fifo.get(), &status) != 0 || !S_ISFIFO(status.st_mode))) fifo.reset();
   return fifo;
 }
@@ -60,7 +60,8 @@ bool tryRingFifo(const FileDescriptor& fifo) noexcept {
 
 void drainFifo(const FileDescriptor& fifo) noexcept {
   std::array<char, 256> discarded;
-  // Less than there was room for: it is empty now, and what comes from now on is news again.
+  // A read that does not fill the buffer has emptied the FIFO. A byte that is written later makes
+  // the FIFO readable again.
   while (::read(fifo.get(), discarded.data(), discarded.size()) ==
          static_cast<ssize_t>(discarded.size())) {
   }

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Doorbell: how a window's owner sleeps and how its peers wake it.
 //
-//   owner   announce (sleeping = 1) ─ fence ─ look again ─ sleep on the bell ─ withdraw (sleeping = 0)
-//   peer    publish a message       ─ fence ─ sleeping? ─ change the bell, wake
+//   owner   sleeping = 1       ─ fence ─ look again ─ sleep on the bell ─ sleeping = 0
+//   peer    publish a message  ─ fence ─ sleeping? ─ change the bell, wake
 //
-// Of the two fences at least one side sees the other: either the owner finds the message or the
-// peer finds the sleeper.
+// The two fences ensure that at least one side sees the other: either the owner finds the message,
+// or the peer sees that the owner sleeps.
 //
-// Threads  one owner thread; any number of ringers in any process.
-// Crash    a ringer killed between message and wake leaves a message that its death notice makes
-//          the owner look for.
-// Trust    the bell may be rung for nothing; it cannot be kept from ringing by anyone but the one
-//          who rings.
+// Threads  one owner thread; any number of threads of any process ring.
+// Crash    a peer that is killed between publishing and waking leaves a message without a wake-up.
+//          The owner is notified of the peer's death and then finds the message.
+// Trust    a peer may ring without a message. No process can prevent another one from ringing.
 #pragma once
 
 #include <atomic>
@@ -24,32 +23,36 @@
 
 namespace mpf::doorbell {
 
-// Orders our stores before it with our loads after it. One half of PAIR(sleep-fence) and
-// PAIR(watch-fence).
+// Orders the caller's stores before the fence with its loads after the fence. One half of
+// PAIR(sleep-fence) and PAIR(watch-fence).
 inline void fence() noexcept {
 #ifdef __SANITIZE_THREAD__
-  // ThreadSanitizer does not know fences; a locked instruction is one on the hosts that it runs on.
+  // ThreadSanitizer does not model fences. A locked instruction is a full fence on the hosts that
+  // ThreadSanitizer supports.
   static std::atomic<std::uint32_t> anywhere{0};
-  // PAIR(sleep-fence), PAIR(watch-fence): as the callers say.
+  // PAIR(sleep-fence), PAIR(watch-fence): see the comments of the callers.
   anywhere.fetch_add(1, std::memory_order_seq_cst);
 #else
-  // PAIR(sleep-fence), PAIR(watch-fence): as the callers say.
+  // PAIR(sleep-fence), PAIR(watch-fence): see the comments of the callers.
   std::atomic_thread_fence(std::memory_order_seq_cst);
 #endif
 }
 
-// Sleeps while `bell` still has the value `seen`, until rung or until `deadline`. May return early,
-// when a signal handler ran that was installed without SA_RESTART for example; a handler that must
-// end the sleep rings.
+// Sleeps while `bell` has the value `seen`, until a ring or until `deadline`. May return earlier:
+// for example when a signal handler ran that was installed without SA_RESTART. A handler that must
+// end the sleep rings the bell.
 void sleep(const layout::Word32& bell, std::uint32_t seen, Deadline deadline) noexcept;
 
-// Changes the bell and wakes who sleeps on it.
+// Changes the bell and wakes the thread that sleeps on it.
 void ring(layout::Word32& bell) noexcept;
 
-// The descriptor form: a FIFO in /dev/shm, readable when it was rung.
+// The doorbell of an event loop: a FIFO in /dev/shm that is readable after a ring.
+//   group   ~0: the group of the process
+//   throws  std::system_error
 FileDescriptor createFifo(const std::string& name, mode_t mode, std::uint32_t group);
+// Returns an empty descriptor if there is no FIFO of this name or it cannot be opened.
 FileDescriptor tryOpenFifo(const std::string& name) noexcept;
-// False: nobody was rung, for there is no FIFO.
+// Returns false if `fifo` is empty or cannot be written: nothing was rung.
 bool tryRingFifo(const FileDescriptor& fifo) noexcept;
 void drainFifo(const FileDescriptor& fifo) noexcept;
 

@@ -12,17 +12,17 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kCoolAfter = 4096;  // looks in vain before a link is no longer polled
-// looks in vain before a busier link may take its place
+constexpr std::uint32_t kCoolAfter = 4096;  // polls without a message before polling of a link ends
+// polls without a message before a busier link may replace a polled one
 constexpr std::uint32_t kReplaceAfter = 64;
 constexpr std::uint32_t kHintsEvery = 16;  // messages of polled links between looks at the hints
-constexpr std::uint32_t kClockEvery = 64;  // spins between looks at the clock
-// spins between offers of the CPU, for peers that share it
+constexpr std::uint32_t kClockEvery = 64;  // spins between readings of the clock
+// spins between calls of sched_yield(), for peers that share the processor
 constexpr std::uint32_t kYieldEvery = 1u << 14;
-constexpr std::uint32_t kLookAtAllEvery = 1024;  // looks at the hints between looks at all links
-// cost nothing to look at; of more links a look takes its time
+constexpr std::uint32_t kScanAllEvery = 1024;  // looks at the hints between scans of all links
+// with at most this number of links, a scan of all links costs next to nothing
 constexpr std::size_t kFewLinks = 64;
-constexpr std::int64_t kLookAtAllNs = 100'000'000;
+constexpr std::int64_t kScanAllNs = 100'000'000;  // shortest time between scans of more links
 
 }  // namespace
 
@@ -86,8 +86,8 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
   const auto [first, last] = peers_.equal_range(name);
   for (auto peer = first; peer != last; ++peer) {
     auto window = peer->second.window.lock();
-    // Links may still use a window that is closed or lost, so it stays watched: its owner may die
-    // before it has closed them.
+    // Links may still use a window that is closed or lost. It stays watched, because its owner may
+    // die before it has closed these links.
     if (window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
   }
   auto window = PeerWindow::tryOpen(name, kind);
@@ -104,7 +104,7 @@ std::shared_ptr<PeerWindow> Endpoint::peer(const std::string& name, layout::Segm
 
 void Endpoint::dropPeers() noexcept {
   for (auto peer = peers_.begin(); peer != peers_.end();) {
-    if (peer->second.window.use_count() > 1) {  // the watcher's is one
+    if (peer->second.window.use_count() > 1) {  // the watcher holds one reference
       ++peer;
       continue;
     }
@@ -115,8 +115,8 @@ void Endpoint::dropPeers() noexcept {
 
 std::optional<std::uint32_t> Endpoint::next() noexcept {
   if (armed_) disarm();
-  // Polled links have had their turn each: now the others, which have none while all that may be
-  // polled are busy.
+  // The polled links have had their turns. The next turn goes to another link: while all polled
+  // links are busy, the other links would never be reached below.
   if (sinceHints_ >= (hotCount_ == kHotLinks ? kHotLinks : kHintsEvery)) {
     if (const auto index = nextCold()) return index;
   }
@@ -138,7 +138,7 @@ std::optional<std::uint32_t> Endpoint::next() noexcept {
   return nextReady();
 }
 
-// One message of each: the round ends when their numbers begin again.
+// Takes one message of each ready link. The round ends when the index wraps around.
 std::optional<std::uint32_t> Endpoint::nextCold() noexcept {
   const auto from = readyCursor_;
   const auto index = nextReady();
@@ -151,13 +151,13 @@ std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
     if (isRevisitDue()) setReadyBit(*revisit_);
     revisit_.reset();
   }
-  if (++sinceLook_ >= kLookAtAllEvery) {
-    sinceLook_ = 0;
-    tryLookAtAll();
+  if (++sinceScan_ >= kScanAllEvery) {
+    sinceScan_ = 0;
+    tryScanAllLinks();
   }
   if (!hasReadyWords()) return std::nullopt;
   constexpr auto kWords = layout::kMaxLinks / 64;
-  // Start behind the last one, so that low numbers do not starve high ones.
+  // Start after the last index, so that links with low indices do not starve those with high ones.
   for (std::size_t looked = 0; looked < kWords; ++looked) {
     const auto word = (readyCursor_ / 64 + looked) % kWords;
     if (const auto index = takeReadyBit(word)) return index;
@@ -170,8 +170,8 @@ std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
   const auto wordBit = std::uint64_t{1} << (word % 64);
   if ((hints.readyWords[word / 64].load(std::memory_order_relaxed) & wordBit) == 0)
     return std::nullopt;
-  // PAIR(ready-word): withdrawn before the bits are read; a peer that sets a bit later sets this
-  // one again.
+  // PAIR(ready-word): cleared before the ready bits are read. A peer that sets a ready bit later
+  // sets this bit again.
   hints.readyWords[word / 64].fetch_and(~wordBit, std::memory_order_acq_rel);
   MPF_STEP(ready_word_taken);
   const auto bits = hints.readyBits[word].load(std::memory_order_relaxed);
@@ -179,12 +179,12 @@ std::optional<std::uint32_t> Endpoint::takeReadyBit(std::size_t word) noexcept {
   const auto start = readyCursor_ / 64 == word ? readyCursor_ % 64 : 0;
   const auto rotated = std::rotr(bits, static_cast<int>(start));
   const auto bit = (static_cast<std::uint32_t>(std::countr_zero(rotated)) + start) % 64;
-  // PAIR(ready-bit): withdrawn before the link is looked at.
+  // PAIR(ready-bit): cleared before the caller looks at the link.
   const auto left =
       hints.readyBits[word].fetch_and(~(std::uint64_t{1} << bit), std::memory_order_acq_rel) &
       ~(std::uint64_t{1} << bit);
   MPF_STEP(ready_bit_taken);
-  // PAIR(ready-word): the others are still to come.
+  // PAIR(ready-word): set again, because other bits of this word are still set.
   if (left != 0) hints.readyWords[word / 64].fetch_or(wordBit, std::memory_order_release);
   const auto index = static_cast<std::uint32_t>(word * 64 + bit);
   readyCursor_ = (index + 1) % layout::kMaxLinks;
@@ -229,13 +229,13 @@ void Endpoint::setReadyBit(std::uint32_t index) noexcept {
   auto& hints = window_.hints();
   const auto word = index / 64;
   hints.readyBits[word].fetch_or(std::uint64_t{1} << (index % 64), std::memory_order_relaxed);
-  // PAIR(ready-word): after its bit.
+  // PAIR(ready-word): set after the ready bit.
   hints.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
 }
 
 std::optional<std::uint64_t> Endpoint::takeKnock() noexcept {
   auto& hints = window_.hints();
-  // PAIR(knocked): after it, the knocks that it counts.
+  // PAIR(knocked): read before the knocks that it counts.
   const auto knocked = hints.knocked.load(std::memory_order_acquire);
   if (knocked != knockedSeen_) {
     knockedSeen_ = knocked;
@@ -244,7 +244,7 @@ std::optional<std::uint64_t> Endpoint::takeKnock() noexcept {
   for (; knockCursor_ < layout::kKnocks; ++knockCursor_) {
     auto& knock = hints.knocks[knockCursor_];
     if (knock.load(std::memory_order_relaxed) == 0) continue;
-    // PAIR(knock): the link has its name by now.
+    // PAIR(knock): the link already has its name.
     if (const auto incarnation = knock.exchange(0, std::memory_order_acq_rel); incarnation != 0) {
       MPF_STEP(knock_taken);
       return incarnation;
@@ -261,12 +261,12 @@ bool Endpoint::takeRescan() noexcept {
 
 bool Endpoint::takeLocalNews() noexcept {
   if (localNews_.load(std::memory_order_relaxed) == 0) return false;
-  // PAIR(local-news): what happened before it was told.
+  // PAIR(local-news): sees everything that happened before interrupt().
   return localNews_.exchange(0, std::memory_order_acquire) != 0;
 }
 
 void Endpoint::interrupt() noexcept {
-  // PAIR(local-news): after what happened.
+  // PAIR(local-news): stored after the event.
   localNews_.store(1, std::memory_order_release);
   window_.ring();
 }
@@ -313,7 +313,7 @@ bool Endpoint::spin(Deadline deadline) noexcept {
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
     if (spins % kYieldEvery != 0) continue;
-    tryLookAtAll();
+    tryScanAllLinks();
     ::sched_yield();
   }
 }
@@ -321,21 +321,21 @@ bool Endpoint::spin(Deadline deadline) noexcept {
 void Endpoint::announce(layout::SleepState how) noexcept {
   coolAll();
   control().sleeping.store(how, std::memory_order_relaxed);
-  // PAIR(sleep-number): who sees the number rings as this sleep, or a later one, wants it.
+  // PAIR(sleep-number): a peer that sees this number also sees how this or a later sleep wakes up.
   control().sleepNumber.store(++sleepNumber_, std::memory_order_release);
   MPF_STEP(sleep_announced);
-  // PAIR(sleep-fence): our announcement before, the last look after.
+  // PAIR(sleep-fence): our announcement is before the fence, our last look for messages after it.
   // PAIR(bell): sleep() has read the bell before this fence.
   doorbell::fence();
 }
 
 void Endpoint::sleep(Deadline deadline) noexcept {
   auto& bell = window_.hints().bell;
-  // PAIR(bell): its acquire side is the fence in announce().
+  // PAIR(bell): the fence in announce() is the acquire side of this load.
   const auto seen = bell.load(std::memory_order_relaxed);
   announce(layout::SleepState::onFutex);
   const auto until =
-      tryLookAtAll() ? deadline : std::min(deadline, Deadline::atNs(lookedAtAllNs_ + kLookAtAllNs));
+      tryScanAllLinks() ? deadline : std::min(deadline, Deadline::atNs(scannedAllNs_ + kScanAllNs));
   if (!hasNews()) {
     const auto sleptFrom = mode_ == WaitMode::adaptive ? Clock::nowNs() : 0;
     MPF_STEP(falling_asleep);
@@ -351,14 +351,14 @@ void Endpoint::sleep(Deadline deadline) noexcept {
   control().sleeping.store(layout::SleepState::awake, std::memory_order_relaxed);
 }
 
-// A peer that scribbles may have lost another one's ready bit. Who is about to sleep looks at every
-// link; with many links, not more often than kLookAtAllNs allows. False when that is to be made up
-// for.
-bool Endpoint::tryLookAtAll() noexcept {
+// Looks at every link, because a faulty peer may have cleared the ready bit of another peer. Called
+// before each sleep. With many links, it scans at most once in kScanAllNs; otherwise it returns
+// false, and the caller must scan later.
+bool Endpoint::tryScanAllLinks() noexcept {
   if (links_.size() > kFewLinks) {
     const auto nowNs = Clock::nowNs();
-    if (nowNs - lookedAtAllNs_ < kLookAtAllNs) return false;
-    lookedAtAllNs_ = nowNs;
+    if (nowNs - scannedAllNs_ < kScanAllNs) return false;
+    scannedAllNs_ = nowNs;
   }
   for (std::uint32_t index = 0; index < links_.size(); ++index) {
     if (links_[index] != nullptr && links_[index]->hasNews()) setReadyBit(index);
@@ -369,7 +369,7 @@ bool Endpoint::tryLookAtAll() noexcept {
 bool Endpoint::arm() noexcept {
   doorbell::drainFifo(window_.fifo());
   announce(layout::SleepState::onDescriptor);
-  tryLookAtAll();
+  tryScanAllLinks();
   armed_ = true;
   if (!hasNews()) return true;
   disarm();

@@ -2,14 +2,16 @@
 // Endpoint: a window with the links that end at it, and the wait for the next message of any of
 // them.
 //
-//   busy links are polled directly ─► then ready bits ─► nothing: spin for a while ─► announce, look again, sleep
+//   poll the busy links ─► read the ready bits ─► no message: spin for a while
+//                                                 ─► announce the sleep, look again, sleep
 //
-// A thousand idle links cost nothing: they are looked at when their ready bit is set. Links take
-// turns, one message each.
+// Idle links cost nothing, however many there are: the endpoint looks at a link that it does not
+// poll only when its ready bit is set. Links take turns, one message each.
 //
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
-// Crash    a peer's death comes through the watcher as local news.
-// Trust    hints may be wrong in either way: who is about to sleep looks at every link.
+// Crash    the watcher reports a peer's death as a local event: takeLocalNews(), takePeerDeath().
+// Trust    a ready bit may be missing or set without reason: before a sleep the endpoint looks at
+//          every link.
 #pragma once
 
 #include <array>
@@ -29,7 +31,7 @@ namespace mpf {
 
 class Endpoint {
  public:
-  // As OwnWindow. `mode` is what wait() does.
+  // The parameters of OwnWindow, and how wait() waits.
   Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
            WaitMode mode, const std::function<void(layout::SegmentHeader&)>& describe);
   ~Endpoint();
@@ -42,51 +44,56 @@ class Endpoint {
   [[nodiscard]] layout::WindowControl& control() const noexcept { return window_.control(); }
 
   // --- links ---
-  // A free bit for a new link; nullopt when all are taken.
+  // Reserves an index (the bit of a new link); nullopt if all are in use.
   std::optional<std::uint32_t> tryReserve() noexcept;
+  // Adds the link of a reserved index. The endpoint does not own it.
   void attach(std::uint32_t index, Link& link);
+  // Removes the link and frees its index.
   void detach(std::uint32_t index) noexcept;
-  // What comes of a held link is no news until it is released.
+  // Ignores messages of this link until release(). The index stays reserved.
   void hold(std::uint32_t index) noexcept;
   void release(std::uint32_t index, Link& link) noexcept;
-  // A peer's window, mapped once and watched: its death comes as local news, with peer()->isDead()
-  // on the links.
+  // Returns the window of a peer, mapped once and watched; nullptr if there is no open window of
+  // this name whose owner is alive. The owner's death is reported as a local event; then
+  // peer()->isDead() of its links is true.
+  //   throws  as PeerWindow::tryOpen()
   std::shared_ptr<PeerWindow> peer(const std::string& name, layout::SegmentKind kind);
 
-  // --- what is new ---
-  // Index of a link that may have a message or a change of state; nullopt when there is none now.
-  // Take one message of it.
+  // --- events ---
+  // Index of a link that may have a message or a change of state; nullopt if there is none now. The
+  // caller takes one message of this link.
   std::optional<std::uint32_t> next() noexcept;
-  // Whether one of the next three may have something. Cheap: three loads.
+  // Whether takeKnock(), takeRescan() or takeLocalNews() may return something. Cheap: three loads.
   [[nodiscard]] bool hasSideNews() const noexcept {
     const auto& hints = window_.hints();
     return hints.knocked.load(std::memory_order_relaxed) != knockedSeen_ ||
            hints.rescan.load(std::memory_order_relaxed) != 0 ||
            localNews_.load(std::memory_order_relaxed) != 0 || knockCursor_ != layout::kKnocks;
   }
-  // A link that wants to be accepted.
+  // The incarnation of a link whose client asks the owner to accept it.
   std::optional<std::uint64_t> takeKnock() noexcept;
-  // Knocks were lost: look for links by name.
+  // True if knocks were overwritten: the caller must search for new links by name.
   bool takeRescan() noexcept;
-  // Something happened in this process: a peer died, a server appeared, interrupt() was called.
+  // True after an event in this process: a peer died, a server appeared, interrupt() was called.
   bool takeLocalNews() noexcept;
-  // After local news: a peer died, some links' peer()->isDead().
+  // After takeLocalNews() returned true: whether a peer died. peer()->isDead() tells which links.
   bool takePeerDeath() noexcept { return peerDied_.exchange(false, std::memory_order_relaxed); }
 
-  // Waits until one of the four above may have something. False when `deadline` passed first.
+  // Waits until next() or one of the three above may return something. Returns false if `deadline`
+  // passed first.
   bool wait(Deadline deadline) noexcept;
   // Ends the current or the next wait().
   void interrupt() noexcept;
 
-  // For event loops: a descriptor that is readable when there is news. arm() it before each wait in
-  // poll(); when it returns false there is news already.
+  // For event loops: a descriptor that is readable after an event. Call arm() before each poll() of
+  // it. If arm() returns false, there is an event already: do not wait.
   [[nodiscard]] int descriptor() const noexcept { return window_.fifo().get(); }
   bool arm() noexcept;
   void disarm() noexcept;
-  // Leaves the descriptor readable: not all that is new was looked at.
+  // Makes the descriptor readable again: the caller has not handled all events.
   void callAgain() noexcept { window_.ring(); }
 
-  // What a wake-up costs, as seen from a message that ended a sleep.
+  // Updates the estimated duration of a wake-up with a measured one.
   void noteWake(std::int64_t ns) noexcept {
     wakeNs_ += (std::min<std::int64_t>(ns, 1'000'000) - wakeNs_) / 8;
   }
@@ -94,9 +101,10 @@ class Endpoint {
   [[nodiscard]] bool slept() const noexcept { return slept_; }
 
  private:
+  // A link that is polled.
   struct Hot {
     std::uint32_t index;
-    std::uint32_t misses;
+    std::uint32_t misses;  // consecutive polls without a message
     Link* link;
   };
   static constexpr std::size_t kHotLinks = 8;
@@ -116,7 +124,7 @@ class Endpoint {
   bool spin(Deadline deadline) noexcept;
   void announce(layout::SleepState how) noexcept;
   void sleep(Deadline deadline) noexcept;
-  bool tryLookAtAll() noexcept;
+  bool tryScanAllLinks() noexcept;
   void dropPeers() noexcept;
 
   Backplane backplane_;
@@ -127,27 +135,27 @@ class Endpoint {
   std::array<Hot, kHotLinks> hot_{};
   std::size_t hotCount_ = 0;
   std::size_t cursor_ = 0;
-  std::uint32_t sinceHints_ = 0;  // messages of polled links
-  std::uint32_t sinceLook_ = 0;  // looks at the hints
+  std::uint32_t sinceHints_ = 0;  // messages of polled links since the last look at the hints
+  std::uint32_t sinceScan_ = 0;  // looks at the hints since the last scan of all links
   std::uint32_t readyCursor_ = 0;
-  // a cold link that may have more than the one message taken
+  // A link that is not polled and may have further messages after the one that was taken.
   std::optional<std::uint32_t> revisit_;
   std::uint32_t knockedSeen_ = 0;
   std::uint32_t knockCursor_ = layout::kKnocks;
   std::atomic<std::uint32_t> localNews_{0};
   std::atomic<bool> peerDied_{false};
   bool armed_ = false;
-  std::uint64_t sleepNumber_ = 0;  // of the last sleep that was announced
+  std::uint64_t sleepNumber_ = 0;  // number of the last sleep that was announced
   bool slept_ = false;
-  std::int64_t wakeNs_ = 10'000;
-  std::uint32_t spinShift_ = 0;  // spinning that did not pay is tried shorter
-  std::int64_t lookedAtAllNs_ = 0;
+  std::int64_t wakeNs_ = 10'000;  // estimated duration of a wake-up
+  std::uint32_t spinShift_ = 0;  // halves the time of spinning after spins without a message
+  std::int64_t scannedAllNs_ = 0;  // time of the last scan of all links
 
   struct Peer {
     std::weak_ptr<PeerWindow> window;
     Watcher::Token token;
   };
-  // of one name: a new window, and those before it whose links have not ended yet
+  // By name: the current window, and older windows of the name whose links have not ended yet.
   std::multimap<std::string, Peer> peers_;
 };
 

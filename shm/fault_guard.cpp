@@ -30,31 +30,31 @@ struct Range {
   std::atomic<std::size_t> bytes{0};
   std::atomic<bool> writable{false};
   std::atomic<bool> lost{false};
-  std::atomic<int> file{-1};       // to grow it by; -1: none
-  std::atomic<ino_t> inode{0};     // 0: no path
-  std::array<char, 128> path{};    // to grow it at
-  Range* nextFree = nullptr;       // under tableMutex
+  std::atomic<int> file{-1};     // descriptor that grows the file; -1: none
+  std::atomic<ino_t> inode{0};   // inode of the file at `path`; 0: `path` is not set
+  std::array<char, 128> path{};  // path at which the file is opened and grown
+  Range* nextFree = nullptr;     // under tableMutex
 };
 
 namespace {
 
-// Ranges lie in blocks that are never freed, so that a handler can walk them at any time.
+// Blocks are never freed, so that a signal handler can walk their ranges at any time.
 struct Block {
   std::array<Range, 256> ranges;
   Block* next = nullptr;
 };
 
-std::mutex tableMutex;  // held by who changes the table, never by a handler
+std::mutex tableMutex;  // protects changes of the table; signal handlers never lock it
 std::atomic<Block*> blocks{nullptr};
 Range* freeRanges = nullptr;  // under tableMutex
 struct sigaction previousAction{};
 
 Range* findFaulty(std::uintptr_t address) noexcept {
-  // PAIR(guard-block): its ranges, and the blocks before it.
+  // PAIR(guard-block): also sees the ranges of the block, and the older blocks.
   for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr;
        block = block->next) {
     for (auto& range : block->ranges) {
-      // PAIR(guarded-range): its length and kind.
+      // PAIR(guarded-range): also sees the length and the kind of the range.
       const auto begin = range.begin.load(std::memory_order_acquire);
       if (begin != 0 && address >= begin &&
           address - begin < range.bytes.load(std::memory_order_relaxed))
@@ -68,7 +68,7 @@ bool tryGrow(const Range& range) noexcept {
   const auto bytes = static_cast<off_t>(range.bytes.load(std::memory_order_relaxed));
   if (const int file = range.file.load(std::memory_order_relaxed); file >= 0)
     return ::fallocate(file, 0, 0, bytes) == 0;
-  // PAIR(guard-path): the path.
+  // PAIR(guard-path): also sees the path.
   const auto inode = range.inode.load(std::memory_order_acquire);
   if (inode == 0) return false;
   const int file = ::open(range.path.data(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
@@ -80,8 +80,8 @@ bool tryGrow(const Range& range) noexcept {
   return grown;
 }
 
-// As mmap() does it. For ThreadSanitizer mmap() writes to the whole range, which would race with
-// those who read there; they see zeroes, or what was.
+// Calls mmap() without the check of ThreadSanitizer, for which mmap() writes to the whole range and
+// races with the threads that read it. Those threads see the old contents or zeroes.
 void* mapZeroes(void* data, std::size_t bytes, int protection) noexcept {
 #ifdef __SANITIZE_THREAD__
   AnnotateIgnoreWritesBegin(__FILE__, __LINE__);
@@ -94,7 +94,7 @@ void* mapZeroes(void* data, std::size_t bytes, int protection) noexcept {
   return mapped;
 }
 
-// Zeroes in place of a file, at once for all threads.
+// Replaces the mapping of a file by zeroes, atomically for all threads.
 bool tryReplace(Range& range) noexcept {
   const int protection =
       PROT_READ | (range.writable.load(std::memory_order_relaxed) ? PROT_WRITE : 0);
@@ -106,27 +106,27 @@ bool tryReplace(Range& range) noexcept {
   return true;
 }
 
-// As the kernel would have done without us.
+// Does what would happen without our handler: calls the previous handler or the default action.
 void passOn(int signal, siginfo_t* fault, void* context) {
   if ((previousAction.sa_flags & SA_SIGINFO) != 0)
     return previousAction.sa_sigaction(signal, fault, context);
-  const bool isSent = fault->si_code <= 0;  // by a process, not by an access
+  const bool isSent = fault->si_code <= 0;  // sent by a process, not caused by an access
   if (previousAction.sa_handler == SIG_IGN && isSent) return;
   if (previousAction.sa_handler != SIG_DFL && previousAction.sa_handler != SIG_IGN)
     return previousAction.sa_handler(signal);
   ::signal(signal, SIG_DFL);
-  if (isSent) ::raise(signal);  // a faulty access comes again by itself
+  if (isSent) ::raise(signal);  // a faulty access is repeated, and raises the signal again
 }
 
 void onFault(int signal, siginfo_t* fault, void* context) {
   if (!tryRepair(*fault)) passOn(signal, fault, context);
 }
 
-// The child of a fork: what it has of its parent's mappings becomes memory of its own, and its
-// copies of the parent's locks go.
+// Runs in the child of a fork. Replaces the child's copies of the parent's mappings by private
+// memory, and gives up its copies of the parent's locks.
 void leaveToParent() noexcept {
   const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-  // PAIR(guard-block): its ranges, and the blocks before it.
+  // PAIR(guard-block): also sees the ranges of the block, and the older blocks.
   for (auto* block = blocks.load(std::memory_order_acquire); block != nullptr;
        block = block->next) {
     for (auto& range : block->ranges) {
@@ -168,7 +168,7 @@ Range& takeFree() {
     auto* const block = new Block;
     block->next = blocks.load(std::memory_order_relaxed);
     for (auto& range : block->ranges) range.nextFree = std::exchange(freeRanges, &range);
-    // PAIR(guard-block): complete.
+    // PAIR(guard-block): the block is complete.
     blocks.store(block, std::memory_order_release);
   }
   return *std::exchange(freeRanges, freeRanges->nextFree);
@@ -185,7 +185,7 @@ Range* add(void* data, std::size_t bytes, bool writable) {
   range.lost.store(false, std::memory_order_relaxed);
   range.file.store(-1, std::memory_order_relaxed);
   range.inode.store(0, std::memory_order_relaxed);
-  // PAIR(guarded-range): after what it says.
+  // PAIR(guarded-range): the length and the kind are stored before.
   range.begin.store(reinterpret_cast<std::uintptr_t>(data), std::memory_order_release);
   return &range;
 }
@@ -203,7 +203,7 @@ void growAt(Range& range, int file, const std::string& path) noexcept {
   if (path.size() >= range.path.size() || ::fstat(file, &status) != 0) return;
   path.copy(range.path.data(), path.size());
   range.path[path.size()] = '\0';
-  // PAIR(guard-path): after the path.
+  // PAIR(guard-path): the path is stored before.
   range.inode.store(status.st_ino, std::memory_order_release);
 }
 

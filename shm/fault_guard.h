@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Fault guard: what a process has mapped stays readable when a peer cuts the file under it. Without
-// it the kernel would send SIGBUS and the process would be dead.
+// Fault guard: keeps mapped memory readable when a peer truncates the file. Without it, the next
+// access would raise SIGBUS and the kernel would kill the process.
 //
-//   access behind the end of the file ─► SIGBUS ─► ours, and may be grown again: grow it, go on
-//                                                 ours: zeroes in place of the whole mapping, which
-//                                                 isLost() from now on not ours: the handler that
-//                                                 was there before
+//   access beyond the end of the file ─► SIGBUS ─► handler:
+//     in a guarded mapping whose file can be grown   grow the file, repeat the access
+//     in another guarded mapping                     map zeroes in its place; isLost() is now true
+//     elsewhere                                      call the handler that was installed before
 //
-// The child of a fork gets zeroes in place of everything that its parent has mapped, and none of
-// its parent's locks: see origin.h.
+// In the child of a fork, all guarded mappings are replaced by zeroes, and the child gives up its
+// copies of the parent's locks: see fork_guard.h.
 //
-// Threads  any; a fault is repaired in the thread that met it. A thread that blocks SIGBUS is
-//          killed by the kernel before we are asked.
-// Crash    nothing of this is shared.
-// Trust    a peer may cut a file at any time, as often as it likes.
+// Threads  any; the thread that causes a fault repairs it. If this thread blocks SIGBUS, the kernel
+//          kills the process without calling the handler.
+// Crash    uses no shared state.
+// Trust    a peer may truncate a file at any time and any number of times.
 #pragma once
 
 #include <signal.h>
@@ -28,18 +28,19 @@ struct Range;
 // Guards a mapping from now on. The first call installs the handler of SIGBUS.
 //   throws  std::bad_alloc, std::system_error
 Range* add(void* data, std::size_t bytes, bool writable);
-// Before the memory is unmapped.
+// Ends the guard. Call it before the memory is unmapped.
 void remove(Range* range) noexcept;
-// When the file is cut, it is grown again: by a descriptor that stays open as long as the range is
-// guarded, or by its name. For what more than two processes share; all that was in it is zero
-// afterwards.
+// Makes the guard grow a truncated file again: by a descriptor, which must stay open as long as the
+// range is guarded, or by the path of the file. For files that more than two processes share. The
+// part that was cut off contains zeroes afterwards.
 void growBy(Range& range, int file) noexcept;
 void growAt(Range& range, int file, const std::string& path) noexcept;
-// Whether its file was cut and could not be grown: the memory is ours alone.
+// Whether the file was truncated and could not be grown. The memory is then private to this
+// process.
 [[nodiscard]] bool isLost(const Range& range) noexcept;
 
-// For the SIGBUS handler of a program that installs one after its first MPF object. True: it was
-// ours, return from the handler. Async-signal-safe.
+// For a program that installs its own SIGBUS handler after its first MPF object. Returns true if
+// the fault was in a guarded range and is repaired: the handler returns. Async-signal-safe.
 bool tryRepair(const siginfo_t& fault) noexcept;
 
 }  // namespace mpf::fault_guard

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// ForkGuard: which process made an object. A child that forks without exec gets copies of its
-// parent's objects that must do nothing: it has none of their threads, and what they share is the
-// parent's.
+// ForkGuard: detects that a fork copied an object from the parent process. The child of a fork
+// without exec gets copies of all of its parent's objects. These copies must do nothing: the child
+// has none of their threads, and their segments belong to the parent.
 //
-//   fork() ─► in the child: the parent's locks are let go, its mappings become memory of the child's own ─► isInherited()
+//   fork() ─► child: closes its copies of the parent's locks, replaces the mappings by private
+//             memory (fault_guard.h) ─► isInherited() of the copied objects is true
 //
 // Threads  any.
-// Crash    the parent's death is seen although its child lives: the child holds none of its locks.
-// Trust    nothing is read from shared memory.
+// Crash    peers see the parent's death although its child is alive, because the child holds none
+//          of its locks.
+// Trust    reads nothing from shared memory.
 #pragma once
 
 #include <pthread.h>
@@ -30,15 +32,17 @@ class ForkGuard {
   [[nodiscard]] bool isInherited() const noexcept {
     return forks_ != forks().load(std::memory_order_relaxed);
   }
-  // Throws std::logic_error when `object` is not this process's own.
+  // Throws std::logic_error if this object was made before a fork, in the parent process. `object`
+  // names it in the message.
   void check(const char* object) const {
     if (isInherited()) throw std::logic_error(explain(object));
   }
   [[nodiscard]] static std::string explain(const char* object) {
     return std::string(object) +
-           ": made before a fork, and still its parent's: a child makes its own";
+           ": made before a fork, so it belongs to the parent process; make a new one in the child";
   }
-  // Of a thread that did not cross the fork: neither join nor detach would work.
+  // Releases a std::thread whose thread does not exist in the child: neither join() nor detach()
+  // would work.
   static void abandon(std::thread& thread) { new (&abandoned()) std::thread(std::move(thread)); }
 
  private:
@@ -51,7 +55,7 @@ class ForkGuard {
     static std::atomic<std::uint32_t> count{0};
     return count;
   }
-  // Never destroyed.
+  // Storage whose std::thread is never destroyed.
   static std::thread& abandoned() noexcept {
     alignas(std::thread) static std::byte place[sizeof(std::thread)];
     return *reinterpret_cast<std::thread*>(place);

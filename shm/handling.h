@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Handling: the request that a server works on, as one word of its window, so that others can say
-// why it does nothing else.
+// Handling: the request that a server works on, as one word of its window, so that tools can show
+// why the server does not take other requests.
 //
-//   bit 63: 1 | 48..62: 0 | 32..47: type of the message | 0..31: its cmd         the word 0: it
-//   works on none
+//   bit 63   1; the word 0 means that the server works on no request
+//   48..62   0
+//   32..47   type of the message
+//   0..31    cmd of the message
 //
-// Since when: WindowControl::progressAtNs, which is no later than the request was taken.
+// WindowControl::progressAtNs is a time not later than the start of this work.
 //
-// Threads  the server's stores it; any may read it.
-// Trust    a reader takes it for a text and nothing else.
+// Threads  the server's thread stores the word; any thread of any process may read it.
+// Trust    a reader uses it for texts only.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +24,7 @@ struct Handling {
   static constexpr std::uint16_t kSinceMinor = 1;
 
   std::uint16_t type = 0;
-  std::int32_t cmd = 0;  // 0 of types without one
+  std::int32_t cmd = 0;  // 0 for message types without a cmd field
 
   [[nodiscard]] constexpr std::uint64_t word() const noexcept {
     return kIsSet | std::uint64_t{type} << 32 | static_cast<std::uint32_t>(cmd);

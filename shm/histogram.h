@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Histograms in shared memory: where a duration goes, and what the buckets say.
+// Histograms in shared memory: counts durations in buckets.
 //
-// Threads  one thread adds; anybody reads.
+// Threads  one thread adds; any thread of any process reads.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +12,13 @@
 
 namespace mpf {
 
-// Adds one to a counter that only this thread writes: no locked instruction.
+// Adds to a counter that only this thread writes, without a locked instruction.
 inline void count(layout::Word64& counter, std::uint64_t by = 1) noexcept {
   counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
 }
 
 struct HistogramBuckets {
-  // bucket 0 starts at 0 and ends at 16 ns + a quarter
+  // Bucket 0 covers 0 to 20 ns: up to 16 ns and a quarter of 16 ns.
   static constexpr std::uint32_t kFirstPower = 4;
 
   [[nodiscard]] static std::uint32_t indexOf(std::uint64_t ns) noexcept {
@@ -27,7 +27,7 @@ struct HistogramBuckets {
     const auto quarter = static_cast<std::uint32_t>(ns >> (power - 2)) & 3u;
     return std::min((power - kFirstPower) * 4 + quarter, layout::kHistogramBuckets - 1);
   }
-  // Durations in the bucket are below this.
+  // The upper end of the bucket: its durations are shorter.
   [[nodiscard]] static std::uint64_t endNs(std::uint32_t index) noexcept {
     const auto power = index / 4 + kFirstPower;
     return (std::uint64_t{1} << power) + (std::uint64_t{index % 4 + 1} << (power - 2));

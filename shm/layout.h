@@ -1,26 +1,30 @@
 // SPDX-License-Identifier: MIT
-// Layout: every byte that processes share. docs/shm-layout.md tells the same to writers of a second
-// reader.
+// Layout: every byte that processes share. docs/shm-layout.md describes the same layout for
+// programs that read it without this header.
 //
-// Each kind of segment is a file in /dev/shm that starts with a SegmentHeader:
+// Each segment is a file in /dev/shm that starts with a SegmentHeader. The names:
 //
-//   mpf.<backplane>.s.<location>.<server>   server window   ┐ WindowControl: sleeping, state, counters, histograms.
-//   mpf.<backplane>.c.<incarnation>         client window   ┘ Written by the owner alone, mapped read-only by its peers.
-//   mpf.<backplane>.h.<incarnation>         hints           WindowHints of one window: bell,
-//   knocks, ready bits. Every peer writes. mpf.<backplane>.l.<server>.<link>       link
-//   two rings of one client-server pair, mapped by these two alone.
-//   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks for messages that do not fit a
-//   ring; `side` writes. mpf.<backplane>.w.<incarnation>         pending bind            a client
-//   that waits for a server: the header alone. mpf.<backplane>.r.<incarnation>         router
-//   a router's connections to others, for reports. Locked and written by the router.
+//   mpf.<backplane>.s.<location>.<server>   server window   WindowControl
+//   mpf.<backplane>.c.<incarnation>         client window   WindowControl
+//   mpf.<backplane>.h.<incarnation>         hints           WindowHints
+//   mpf.<backplane>.l.<server>.<link>       link            LinkControl, two rings of slots
+//   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks
+//   mpf.<backplane>.w.<incarnation>         pending bind    only the header
+//   mpf.<backplane>.r.<incarnation>         router          RouterLines
 //
-// Threads  each word has one writing process, named next to it; WindowHints are the exception and
-//          only hints.
-// Crash    segments appear under their name complete and locked (or not at all); messages appear
+//   window        state, counters and histograms of one process; its peers map it read-only
+//   hints         bell, knocks and ready bits of one window; every peer writes them
+//   link          mapped only by one client and one server
+//   bulk          bodies of messages that do not fit into a ring; written by `side` of the link
+//   pending bind  says that a client waits for a server
+//   router        the connections of a router, for reports; written and locked by the router
+//
+// Threads  each word has one writing process, which is named next to it. Only WindowHints have
+//          several writers; they are hints, and a lost one costs a wake-up, never a message.
+// Crash    a segment gets its name when it is complete and locked, or not at all; a message appears
 //          with one release store.
-// Trust    a reader checks or masks whatever it takes from here before use.
-// Version  a new minor version only fills reserved bytes; whatever else changes is a new major
-//          version.
+// Trust    a reader checks or masks each value from a segment before it uses it.
+// Version  a new minor version only uses reserved bytes; any other change is a new major version.
 #pragma once
 
 #include <array>
@@ -31,8 +35,8 @@
 
 namespace mpf::layout {
 
-inline constexpr std::uint64_t kMagic =
-    0x314e'4957'2d46'504d;  // "MPF-WIN1" as bytes on a little-endian host; another byte order mismatches
+// "MPF-WIN1" as bytes on a little-endian host; a host of another byte order reads another number
+inline constexpr std::uint64_t kMagic = 0x314e'4957'2d46'504d;
 inline constexpr std::uint16_t kMajor = 1;
 inline constexpr std::uint16_t kMinor = 1;
 inline constexpr std::uint16_t kOldestMajor = 1;  // oldest major version that this code reads
@@ -45,7 +49,8 @@ inline constexpr std::size_t kPageBytes = 4096;
 inline constexpr std::uint32_t kMaxLinks = 16384;  // links of one window
 inline constexpr std::uint32_t kMaxRingSlots = 1u << 16;  // slots of one ring
 inline constexpr std::uint32_t kKnocks = 64;
-inline constexpr std::size_t kBackplaneChars = 40;  // including the terminating zero, as below
+// sizes of texts, including the terminating zero
+inline constexpr std::size_t kBackplaneChars = 40;
 inline constexpr std::size_t kNameChars = 64;
 inline constexpr std::size_t kProgramChars = 32;
 
@@ -64,7 +69,7 @@ enum class SegmentKind : std::uint32_t {
   router = 7
 };
 
-// First 512 bytes of every segment. Written before the segment gets its name, constant afterwards.
+// First 512 bytes of every segment. Written before the segment gets its name; constant afterwards.
 struct SegmentHeader {
   std::uint64_t magic;
   std::uint16_t layoutMajor;
@@ -72,7 +77,7 @@ struct SegmentHeader {
   SegmentKind kind;
   std::uint64_t totalBytes;  // the file is at least this long
   std::uint64_t incarnation;  // unique on this host
-  // incarnation of the window whose lock tells whether the owner lives; a window names itself
+  // incarnation of the window whose lock proves that the owner is alive; for a window its own
   std::uint64_t ownerWindow;
   std::int32_t ownerPid;  // as seen in pidNamespace
   std::uint32_t ownerUid;
@@ -87,17 +92,17 @@ struct SegmentHeader {
   std::array<char, kNameChars> name;
   std::array<char, kProgramChars> program;
 
-  // Geometry of rings and pools. A link has all of it; of a server window, the limits and rights
-  // are what it offers.
+  // Geometry of rings and pools. A link has all of these values. In a server window, the limits and
+  // rights are the ones that the server offers.
   std::uint32_t queueSlots;  // slots of the request ring, a power of two
   std::uint32_t replySlots;  // slots of the reply ring, a power of two
   std::uint32_t queueSize;  // requests of one client that may wait
   std::uint32_t maxOutstanding;  // requests of one client that may be unanswered
   std::uint64_t maxMessageBytes;
   std::uint64_t maxPoolBytes;  // bulk memory that one side of a link may create
-  std::uint32_t linkMode;  // rights of links and hints, as in chmod
-  std::uint32_t linkGroup;  // their group, or ~0 for the creator's own
-  std::uint32_t waitMode;  // of the owner: 0 spin, 1 adaptive, 2 block
+  std::uint32_t linkMode;  // permission bits of links and hints, as for chmod
+  std::uint32_t linkGroup;  // group of links and hints, or ~0 for the group of their creator
+  std::uint32_t waitMode;  // wait mode of the owner: 0 spin, 1 adaptive, 2 block
 
   // Link only.
   std::uint32_t clientIndex;  // bit of this link in the client window's ready bits
@@ -117,8 +122,8 @@ static_assert(offsetof(SegmentHeader, backplane) == 88 && offsetof(SegmentHeader
 static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
               offsetof(SegmentHeader, chunkBytes) == 296);
 
-// Log-linear histogram of nanoseconds: bucket = 4 per power of two, from 16 ns to 2^40 ns. Written
-// by one thread.
+// Log-linear histogram of durations [ns]: 4 buckets for each power of two, from 16 ns to 2^40 ns.
+// Written by one thread.
 inline constexpr std::uint32_t kHistogramBuckets = 4 * 37;
 struct Histogram {
   std::array<Word64, kHistogramBuckets> buckets;
@@ -132,24 +137,25 @@ enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2
 // What a server lacks to accept another client. Since 1.1.
 enum class Shortage : std::uint32_t { none = 0, descriptors = 1, openFiles = 2, memory = 3 };
 
-// What a window's owner says of itself. At offset 512 of a server or client window. Every word is
-// written by the owner.
+// State, counters and histograms of a window's owner, at offset 512 of a server or client window.
+// Every word is written by the owner.
 struct WindowControl {
-  // announced before a sleep, withdrawn after it
+  // set before a sleep, `awake` after it
   alignas(kPairBytes) std::atomic<SleepState> sleeping;
-  // of the sleep that is announced: who has rung for it need not ring again; 0: nobody says
+  // number of the announced sleep; a peer that has rung for it need not ring again; 0: not provided
   Word64 sleepNumber;
   alignas(kPairBytes) std::atomic<WindowState> state;
   Word32 linkCount;
-  // requests of one client that may wait, for links made from now on (server windows)
+  // requests of one client that may wait, for links created from now on (server windows)
   Word32 queueSize;
-  std::atomic<Shortage> shortage;  // of a server that cannot accept a client; none once it can
+  std::atomic<Shortage> shortage;  // why the server cannot accept a client now
   Word64 progress;  // grows with every message handled
   Word64 progressAtNs;  // CLOCK_MONOTONIC when `progress` was last sampled
   alignas(kPairBytes) Word64 received;  // messages taken
   Word64 sent;  // messages pushed
   Word64 replyQueueFull;  // replies refused because the client did not take them
-  // sends refused because the server's queue was full or owed too many replies (client windows)
+  // sends refused because the server's queue was full or too many requests were unanswered (client
+  // windows)
   Word64 queueFull;
   Word64 expired;  // requests that were dropped because their deadline had passed
   Word64 refused;  // requests answered with the fate `refused`
@@ -157,8 +163,9 @@ struct WindowControl {
   Word64 linksOpened;
   Word64 linksClosed;
   Word64 peersDied;
-  Word64 protocolErrors;  // nonsense read from a peer; each costs that link
-  // server windows: faults of the hardware; client windows: exceptions that nobody could catch
+  Word64 protocolErrors;  // invalid data read from peers; each ends that link
+  // server windows: faults of the hardware; client windows: exceptions that callbacks threw on the
+  // thread of the shared dispatcher, where no caller can catch them
   Word64 alarms;
   Word64 handling;  // the request that a server works on, see Handling; 0: none. Since layout 1.1
   std::array<Word64, (kHistogramBuckets / 4) - 2> reserved;
@@ -168,23 +175,24 @@ struct WindowControl {
 inline constexpr std::size_t kWindowControlOffset = 512;
 inline constexpr std::size_t kWindowBytes = kWindowControlOffset + sizeof(WindowControl);
 
-// Hints of a window, written by every peer and by the owner. Losing or inventing one costs a
-// wake-up, never a message.
+// Hints of a window, written by every peer and by the owner. A hint that is lost or set without
+// reason costs a wake-up, never a message.
 struct WindowHints {
   SegmentHeader header;
   alignas(kPairBytes) Word32 bell;  // changes with every ring; the futex that the owner sleeps on
   alignas(kPairBytes) Word32 knocked;  // changes with every knock
-  Word32 rescan;  // not 0: a knock was overwritten, look for new links by name
+  Word32 rescan;  // not 0: a knock was overwritten; the owner must search for new links by name
   // incarnations of links that wait to be accepted
   alignas(kPairBytes) std::array<Word64, kKnocks> knocks;
   // bit w: readyBits[w] is not zero
   alignas(kPairBytes) std::array<Word64, kMaxLinks / 64 / 64> readyWords;
-  alignas(kPairBytes) std::array<Word64, kMaxLinks / 64> readyBits;  // bit i: link i has news
+  // bit i: link i has a message or a change of state
+  alignas(kPairBytes) std::array<Word64, kMaxLinks / 64> readyBits;
 };
 static_assert(offsetof(WindowHints, bell) == 512);
 
-// One 64-byte slot. A message is one first slot and up to three more; only the first one's sequence
-// says that it is there.
+// One 64-byte slot. A message is one first slot and up to three more. Only the sequence of the
+// first slot says that the message is there.
 struct alignas(kCacheLineBytes) Slot {
   // written by the producer, last: position + 1 once the message that starts here is complete
   Word64 sequence;
@@ -195,13 +203,13 @@ struct alignas(kCacheLineBytes) Slot {
   std::uint32_t requestId;
   std::int32_t clientType;
   std::int32_t clientExtra;
-  std::uint32_t sentTick;  // CLOCK_MONOTONIC / 16 ns, low 32 bits, of sampled messages; else 0
-  std::int64_t deadlineNs;  // CLOCK_MONOTONIC; 0 none
+  std::uint32_t sentTick;  // sampled messages: CLOCK_MONOTONIC / 16 ns, low 32 bits; others: 0
+  std::int64_t deadlineNs;  // CLOCK_MONOTONIC; 0: no deadline
   std::array<std::byte, 24> body;
 };
 static_assert(sizeof(Slot) == kCacheLineBytes && offsetof(Slot, body) == 40);
 
-// Slots after the first: 56 bytes of body behind a sequence word that stays as it was.
+// Slots after the first: 56 bytes of body behind a sequence word that the producer does not change.
 struct alignas(kCacheLineBytes) MoreSlot {
   Word64 sequence;
   std::array<std::byte, 56> body;
@@ -221,22 +229,24 @@ inline constexpr std::uint8_t kSlotFirstReply = 2;  // ends the request that it 
 struct ChunkRef {
   std::uint32_t segment;  // n of mpf.<backplane>.b.<link>.<side>.<n>
   std::uint32_t chunk;
-  std::uint32_t side;  // whose pool: 0 the client's, 1 the server's
+  std::uint32_t side;  // owner of the pool: 0 the client, 1 the server
   std::uint32_t reserved;
 };
 static_assert(sizeof(ChunkRef) == 16);
 
-// What the consumer of a ring says. Written by the consumer alone.
+// The state of a ring's consumer. Written only by the consumer.
 struct RingControl {
-  alignas(kPairBytes) Word32 unwatched;  // 1: not polled directly, set the ready bit; 0: polled
+  // 1: the consumer does not poll this ring; the producer sets the ready bit. 0: it polls the ring
+  alignas(kPairBytes) Word32 unwatched;
   alignas(kPairBytes) Word64 freed;  // slots before this position may be overwritten
-  Word64 taken;  // messages taken so far; one that is not counted here has not been looked at
+  // messages taken so far; the consumer has not looked at a message that is not counted here
+  Word64 taken;
 };
 
-// Chunks on their way home. Written by the borrower, read by the pool's owner.
+// Chunks that the borrower returns to the pool's owner. Written by the borrower, read by the owner.
 inline constexpr std::uint32_t kReturnSlots = 256;
 struct ReturnRing {
-  alignas(kPairBytes) Word64 returned;  // borrower
+  alignas(kPairBytes) Word64 returned;  // chunks returned so far
   // segment << 32 | chunk; a pool never lends more than kReturnSlots
   std::array<Word64, kReturnSlots> chunks;
 };
@@ -244,11 +254,11 @@ struct ReturnRing {
 enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused = 3 };
 
 struct LinkControl {
-  alignas(kPairBytes) std::atomic<LinkState> clientState;  // client
+  alignas(kPairBytes) std::atomic<LinkState> clientState;  // this to clientUnanswered: client
   Word64 clientSent;
   Word64 clientRefused;  // sends refused: queue full, too many unanswered, too large, no memory
   Word64 clientUnanswered;  // requests without a reply or fate
-  alignas(kPairBytes) std::atomic<LinkState> serverState;  // server
+  alignas(kPairBytes) std::atomic<LinkState> serverState;  // this to serverSent: server
   Word32 serverIndex;  // bit of this link in the server window's ready bits
   Word32 reserved0;
   Word64 serverSent;
@@ -268,7 +278,8 @@ static_assert(kLinkRingsOffset % kPairBytes == 0);
 // Chunks of a bulk segment start here, each chunkBytes long.
 inline constexpr std::size_t kBulkChunksOffset = kPageBytes;
 
-// One connection of a router, or one remote that it is to be connected to. Written by the router.
+// One connection of a router, or one remote router to which it tries to connect. Written by the
+// router.
 enum class RouterLineState : std::uint32_t { none = 0, waiting = 1, connecting = 2, connected = 3 };
 enum class RouterRole : std::uint32_t { none = 0, client = 1, server = 2 };
 struct RouterLine {
@@ -276,11 +287,12 @@ struct RouterLine {
   std::atomic<RouterRole> role;
   Word32 isTls;
   Word32 texts;  // changes of the texts; odd while they change
-  Word64 sinceNs;  // CLOCK_MONOTONIC since when it is connected, or is not
-  Word64 connects;  // times that it was connected
+  Word64 sinceNs;  // CLOCK_MONOTONIC of the last change between connected and not connected
+  Word64 connects;  // number of connections made so far
   Word64 queueSize;  // messages that may wait for the line
-  Word64 inQueue;  // and that do
-  // requests that found a far server's queue full (client), or a server's here (server)
+  Word64 inQueue;  // messages that wait for the line
+  // requests refused because a server's queue was full: on the other host (role client) or on this
+  // host (role server)
   Word64 queueFull;
   Word64 messagesSent;
   Word64 messagesReceived;
@@ -290,12 +302,12 @@ struct RouterLine {
   Word64 bytesReceived;
   Word64 roundTripNs;  // of the last ping
   Word64 clients;
-  Word64 bindings;  // servers that somebody wanted
+  Word64 bindings;  // servers to which clients have bound
   std::array<char, 80> address;
-  std::array<char, kNameChars> peer;  // what it calls itself
-  std::array<char, kProgramChars> program;  // its program and version
+  std::array<char, kNameChars> peer;  // the name that the other router gives itself
+  std::array<char, kProgramChars> program;  // program and version of the other router
   std::array<char, kNameChars> locations;  // "1, 2"
-  std::array<char, 144> problem;  // why it is not connected
+  std::array<char, 144> problem;  // why the line is not connected
 };
 static_assert(sizeof(RouterLine) == 512);
 
@@ -303,7 +315,8 @@ inline constexpr std::uint32_t kRouterLines = 256;
 inline constexpr std::size_t kRouterLinesOffset = 512;
 inline constexpr std::size_t kRouterBytes = kRouterLinesOffset + kRouterLines * sizeof(RouterLine);
 
-// Nothing above has a constructor that does work, a pointer, a bool or a size_t.
+// The structures above have no pointers, bools, size_t, virtual functions or constructors that do
+// work.
 static_assert(std::is_standard_layout_v<SegmentHeader> &&
               std::is_trivially_copyable_v<SegmentHeader>);
 static_assert(std::is_standard_layout_v<WindowControl> && std::is_standard_layout_v<WindowHints>);

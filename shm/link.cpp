@@ -14,8 +14,8 @@
 namespace mpf {
 namespace {
 
-// Of messages to a peer that polls, one of so many is timed: a clock call costs as much as a
-// quarter of a round trip. Messages to a peer that must be woken are all timed.
+// Of the messages to a peer that polls, one in kSampleEvery is timed, because reading the clock
+// costs a quarter of a round trip. All messages to a peer that does not poll are timed.
 constexpr std::uint64_t kSampleEvery = 64;
 
 layout::Slot* slotsOf(const Segment& segment, LinkSide producer) {
@@ -53,7 +53,7 @@ void checkGeometry(const layout::SegmentHeader& header, const std::string& name)
   if (header.queueSize != queueSize || header.queueSlots != expected.queueSlots ||
       header.replySlots != expected.replySlots ||
       header.maxOutstanding != expected.maxOutstanding) {
-    throw SegmentError(fmt::format("{}: rings of {} and {} slots for a queue of {} make no sense",
+    throw SegmentError(fmt::format("{}: rings of {} and {} slots do not fit a queue of {} messages",
                                    segments::path(name), header.queueSlots, header.replySlots,
                                    header.queueSize));
   }
@@ -69,7 +69,7 @@ LinkGeometry LinkGeometry::forQueue(std::uint32_t queueSize) noexcept {
 
 Rights Link::rightsAt(const PeerWindow& server) {
   Rights rights{server.header().linkMode & 0666, server.header().linkGroup};
-  // Root opens anybody's window, but the server could not open root's link.
+  // Root may open the window of any user, but the server could not open a link that root owns.
   if (::geteuid() == 0 && (rights.mode & 0006u) != 0006u) rights.user = server.user();
   return rights;
 }
@@ -103,9 +103,9 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   control.clientState.store(layout::LinkState::open, std::memory_order_relaxed);
   control.requests.unwatched.store(1, std::memory_order_relaxed);
   control.replies.unwatched.store(1, std::memory_order_relaxed);
-  if (!segment.tryPublish(SegmentName::link(backplane, offer.incarnation, header.incarnation))) {
-    throw SegmentError("an incarnation number came twice");
-  }
+  const auto name = SegmentName::link(backplane, offer.incarnation, header.incarnation);
+  if (!segment.tryPublish(name))
+    throw SegmentError(fmt::format("{}: duplicate incarnation number", segments::path(name)));
   MPF_STEP(link_named);
   segment.closeFile();
   auto link =
@@ -123,7 +123,9 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   checkGeometry(header, name);
   if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes ||
       segment->bytes() != layout::linkBytes(header.queueSlots, header.replySlots)) {
-    throw SegmentError(fmt::format("{}: not a link that this server offers", segments::path(name)));
+    throw SegmentError(fmt::format(
+        "{}: a link whose server, pool limit or length differs from what this server offers",
+        segments::path(name)));
   }
   MPF_STEP(link_mapped);
   segment->closeFile();
@@ -146,8 +148,8 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
 
 Link::~Link() {
   if (side_ == LinkSide::client && !forkGuard_.isInherited()) segments::remove(segment_.name());
-  // A client that has ended the link may have removed what there was before our last: then it is
-  // for us to remove.
+  // The pool keeps its names only if the client will still remove them. A client that has ended the
+  // link may already have done so, before our last segment existed: then we remove the names.
   if (leavesPool_ && peerState() == layout::LinkState::open && peer_->hasOwner())
     pool_.leaveNames();
 }
@@ -159,14 +161,14 @@ void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex)
 
 void Link::setState(layout::LinkState state) noexcept {
   auto& own = side_ == LinkSide::client ? control().clientState : control().serverState;
-  // PAIR(link-state): what was prepared before the state.
+  // PAIR(link-state): everything that was prepared is stored before the state.
   own.store(state, std::memory_order_release);
   MPF_STEP(link_state_set);
 }
 
 layout::LinkState Link::peerState() const noexcept {
   const auto& peers = side_ == LinkSide::client ? control().serverState : control().clientState;
-  // PAIR(link-state): what the peer prepared.
+  // PAIR(link-state): also sees everything that the peer prepared.
   return peers.load(std::memory_order_acquire);
 }
 
@@ -199,8 +201,8 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body,
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
 
   const auto slots = slotsFor(body.size());
-  // Every message that the queue may still take needs one slot; only what is left over may be spent
-  // on longer ones.
+  // Each message that the queue may still accept needs one slot. A message of several slots may use
+  // only the slots beyond these.
   const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
   const auto queueLeft = limits.waiting > queued + 1 ? limits.waiting - queued - 1 : 0;
   const auto needed = slots == 1 ? limits.reserve : std::max(limits.longReserve, queueLeft);
@@ -224,7 +226,7 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body,
   MPF_STEP(chunk_lent);
   envelope.flags |= layout::kSlotChunk;
   const auto ref = own ? *own : *foreign;
-  // hasFree() said that it fits
+  // hasFree() above has checked that it fits.
   if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve))
     return LinkSend::full;
   afterPush();
@@ -232,7 +234,7 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body,
 }
 
 void Link::afterPush() noexcept {
-  // PAIR(watch-fence): our message before, the peer's word on whether it polls after.
+  // PAIR(watch-fence): our message is before the fence, our load of `unwatched` after it.
   doorbell::fence();
   MPF_STEP(peer_checked);
   if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
@@ -264,9 +266,8 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
   try {
     auto chunk = borrowed_.tryBorrow(ref);
     if (chunk || !hasPeerEnded()) return chunk;
-  } catch (
-      const std::
-          exception&) {  // NOLINT(bugprone-empty-catch): no descriptor, no memory: so it is unavailable
+    // NOLINTNEXTLINE(bugprone-empty-catch): no descriptor or no memory: the chunk is unavailable
+  } catch (const std::exception&) {
   }
   borrowed_.giveBack(ref);
   throw ChunkUnavailable();
@@ -274,7 +275,8 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
 
 void Link::setWatched(bool watched) noexcept {
   in_.control().unwatched.store(watched ? 0 : 1, std::memory_order_relaxed);
-  // PAIR(watch-fence): our word before, the look for messages that the caller does next after.
+  // PAIR(watch-fence): our `unwatched` is stored before the fence; after it, the caller looks for
+  // messages.
   doorbell::fence();
 }
 

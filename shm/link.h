@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Link: the private segment of one client-server pair, from one side: a ring out, a ring in, a pool
-// of our own, the peer's.
+// Link: one side of the segment that one client and one server share: an outgoing ring, an incoming
+// ring, our own pool and the peer's pool.
 //
 //   client side ── requests ring, client's pool ──► server side
 //               ◄── replies ring, server's pool ──
 //
-// Threads  one thread receives (hasMessage, begin, copyBody, end). Everything else that is not
-//          const is serialised by the caller.
-// Crash    the client owns the segment; a server removes it once the client's window is ownerless.
-// Trust    the peer may write every byte; geometry was copied and checked at the start, the rest is
-//          checked at use.
+// Threads  one thread receives (hasMessage, begin, copyBody, end). The caller serialises all other
+//          non-const functions.
+// Crash    the client owns the segment. If the owner of the client's window dies, the server
+//          removes the segment.
+// Trust    the peer may write every byte. The geometry is copied and checked when the link is
+//          opened; every other value is checked when it is used.
 #pragma once
 
 #include <algorithm>
@@ -27,12 +28,12 @@ namespace mpf {
 
 enum class LinkSide : std::uint32_t { client = 0, server = 1 };
 
-// Whether a message was sent. `sentInPlace`: the chunk that held the body is the peer's now; after
-// all others the caller keeps it.
+// The result of a send. After `sentInPlace` the peer owns the chunk that contains the body; after
+// all other results the caller still owns it.
 enum class LinkSend { sent, sentInPlace, full, tooLarge, noMemory };
 
-// Memory that a peer lent us went with the peer, or we lack the descriptors or the memory to look
-// at it.
+// A chunk cannot be read: its peer has ended and removed it, or this process has no free descriptor
+// or memory to map it.
 class ChunkUnavailable final : public std::exception {};
 
 // Sizes of a link that follow from the length of its queue.
@@ -46,15 +47,16 @@ struct LinkGeometry {
 
 class Link {
  public:
-  // A new link of ours to `server`, not yet accepted. `index` is its bit in our own window.
-  //   throws  std::system_error (no memory, no right), SegmentError (the server's window offers
-  //           nonsense)
+  // Creates a link from our window to `server`, which has not accepted it yet. `index` is the
+  // link's bit in our own window.
+  //   throws  std::system_error (no memory, no permission), SegmentError (the server's window
+  //           contains invalid data)
   static std::unique_ptr<Link> create(const std::string& backplane, const OwnWindow& own,
                                       std::uint32_t index, std::shared_ptr<PeerWindow> server);
-  // Rights of a link to `server`: what its processes need to open it.
+  // The rights that the server's process needs to open a link to `server`.
   [[nodiscard]] static Rights rightsAt(const PeerWindow& server);
-  // Maps a link that a client made for us; nullptr when it is gone.
-  //   throws  SegmentError, std::system_error: the link is not usable, ignore it
+  // Maps a link that a client created to our window; nullptr if it no longer exists.
+  //   throws  SegmentError, std::system_error: the link is unusable; the caller ignores it
   static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name,
                                        const OwnWindow& own);
   ~Link();
@@ -70,69 +72,74 @@ class Link {
   void attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept;
   void setPeerIndex(std::uint32_t peerIndex) noexcept { peerIndex_ = peerIndex; }
 
-  // Whether somebody cut its file: all that it holds is gone.
+  // Whether the file of the link was truncated: its contents are lost.
   [[nodiscard]] bool isLost() const noexcept { return segment_.isLost(); }
-  // Our half of the state, and the peer's as it says.
+  // Sets our half of the link's state; reads the peer's half.
   void setState(layout::LinkState state) noexcept;
   [[nodiscard]] layout::LinkState peerState() const noexcept;
-  // The peer has ended the link, or itself: what it left in the rings may speak of memory that is
-  // gone.
+  // Whether the peer has ended the link or has exited. Messages that it left in the rings may refer
+  // to chunks that no longer exist.
   [[nodiscard]] bool hasPeerEnded() const noexcept;
-  // For a server that ends: its client finds the memory of what it has yet to take, and removes it.
-  // False: that of this user may not.
+  // For a server that exits: keeps the names of its pool, so that the client can read the replies
+  // that it has not taken yet. The client removes the names. Returns false if the client's user has
+  // no right to remove them.
   [[nodiscard]] bool tryLeavePoolToClient() noexcept;
-  // Tells the peer to look at this link, whether it polls it or not.
+  // Notifies the peer that it must look at this link, even if it polls the link.
   void notifyPeer() noexcept;
 
   // --- sending ---
-  // handed on by reference: packed into registers, they would be read before they are stored
+  // Passed by reference: to pass it in registers, the compiler would load the fields, packed,
+  // before their stores have completed.
   struct Limits {
-    // longest queue of messages that the peer has not taken; 0: what the ring holds
+    // longest queue of messages that the peer has not taken; 0: as many as fit into the ring
     std::uint32_t waiting = 0;
     std::uint32_t reserve = 0;  // slots to leave free
-    // slots that a message of several slots leaves free; if it cannot, it goes into a chunk
+    // slots that a message of several slots must leave free; otherwise its body goes into a chunk
     std::uint32_t longReserve = 0;
   };
-  // Sends a body (its length and flags are added to `envelope`): in line, or as the chunk that it
-  // lies in (ours or borrowed; then the chunk is the peer's), or as a copy in a chunk.
+  // Sends a body, and sets its length and flags in `envelope`. A short body is copied into slots of
+  // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets this
+  // chunk; otherwise the body is copied into a new chunk.
   LinkSend trySend(Envelope& envelope, std::span<const std::byte> body,
                    const Limits& limits) noexcept;
-  // Whether the next message is one of those that carry their time (Envelope::sentTick).
+  // Whether the caller must set the time of the next message (Envelope::sentTick).
   [[nodiscard]] bool shouldSampleTime() const noexcept;
-  // Number of the last message sent, from 1.
+  // Ordinal of the last message sent; the first one has 1.
   [[nodiscard]] std::uint64_t sentMessages() const noexcept { return out_.messages(); }
-  // Whether the peer has taken message number `ordinal`.
+  // Whether the peer has taken the message with this ordinal.
   [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept;
 
-  // A chunk to build a body in; nullopt when there is no memory for it.
+  // Allocates a chunk for a body; nullopt if there is no memory for it.
   std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
-  // Frees a chunk of ours or gives back a borrowed one; `data` points to its start.
+  // Frees one of our chunks or returns a borrowed one; `data` points to the start of the chunk.
   void release(const std::byte* data) noexcept;
 
   // --- receiving ---
   [[nodiscard]] bool hasMessage() const noexcept { return in_.hasMessage(); }
-  // The same, or the peer has ended the link: one hint may have told of both, and only the first
-  // was looked at.
+  // Whether there is a message or the peer has ended the link. One hint may stand for both, and the
+  // owner may have handled only the message.
   [[nodiscard]] bool hasNews() const noexcept {
     return hasMessage() || peerState() >= layout::LinkState::closed;
   }
   [[nodiscard]] Envelope begin() noexcept { return in_.begin(); }
   [[nodiscard]] std::size_t inlineCapacity() const noexcept { return in_.inlineCapacity(); }
   void copyBody(std::span<std::byte> body) const noexcept { in_.copyBody(body); }
-  // All that the first slot of the message begun may hold.
+  // Copies all body bytes of the first slot of the message begun.
   void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
     in_.copyFirst(body);
   }
-  // The chunk of a kSlotChunk message begun: borrowed, or our own come back. nullopt: nonsense.
-  //   throws  ChunkUnavailable: its memory cannot be had, and the chunk has been given back
+  // The chunk of the kSlotChunk message begun: borrowed from the peer, or one of ours that the peer
+  // returns in a message. nullopt if the reference is invalid.
+  //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
   std::optional<Chunk> tryChunk(const Envelope& envelope);
   void end() noexcept { in_.end(); }
   [[nodiscard]] std::uint64_t receivedMessages() const noexcept { return in_.messages(); }
 
-  // While not watched, the peer sets our ready bit with each message.
+  // Announces whether we poll this link. If not, the peer sets our ready bit with each message.
   void setWatched(bool watched) noexcept;
 
-  // Largest body that may be sent: what the peer offers and an envelope can say.
+  // Largest body that may be sent: the limit of the link, and at most what an envelope can
+  // represent.
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
     return std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX);
   }

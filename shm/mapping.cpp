@@ -12,7 +12,7 @@ namespace {
 
 namespace ipc = boost::interprocess;
 
-// Lets Boost.Interprocess map a file that we opened ourselves.
+// Adapts an open file to Boost.Interprocess, which can then map it.
 class OpenFile {
  public:
   explicit OpenFile(int fd) { handle_.handle = fd; }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Mapping: a shared file in our memory, guarded against a peer that cuts it.
+// Mapping: a shared file mapped into this process, guarded against peers that truncate it.
 //
-// Threads  one thread makes and destroys it; any uses the memory.
-// Crash    the kernel unmaps.
-// Trust    whoever may write the file may cut it: then it is grown again, or isLost() and holds
-//          zeroes.
+// Threads  one thread constructs and destroys it; any thread may use the memory.
+// Crash    the kernel unmaps the memory.
+// Trust    a peer that may write the file may truncate it. The guard then grows the file again, or
+//          replaces the memory by zeroes and isLost() is true (fault_guard.h).
 #pragma once
 
 #include <boost/interprocess/mapped_region.hpp>
@@ -20,7 +20,7 @@ class Mapping {
   enum class Access { readOnly, readWrite };
 
   Mapping() noexcept = default;
-  // The first `bytes` of `file`, which may be closed afterwards.
+  // Maps the first `bytes` of `file`, which may be closed afterwards.
   //   throws  std::system_error
   Mapping(int file, std::size_t bytes, Access access);
   ~Mapping() { unguard(); }
@@ -37,7 +37,7 @@ class Mapping {
     return range_ != nullptr && fault_guard::isLost(*range_);
   }
 
-  // As fault_guard says.
+  // See fault_guard.h.
   void growBy(int file) noexcept { fault_guard::growBy(*range_, file); }
   void growAt(int file, const std::string& path) noexcept {
     fault_guard::growAt(*range_, file, path);

@@ -30,15 +30,16 @@ bool tryLock(int fd, short type, off_t from, off_t bytes) noexcept {
   return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
 }
 
-// Another process's write lock on that byte; nullopt on an error. Asking for a read lock finds
-// write locks only.
+// Finds a write lock of another open file on this byte; nullopt on an error. The query for a read
+// lock reports only write locks. `l_type` is F_UNLCK if there is no such lock.
 std::optional<struct flock64> findWriteLock(int fd, off_t byte) noexcept {
   auto lock = lockOf(F_RDLCK, byte, 1);
   if (::fcntl(fd, F_OFD_GETLK, &lock) != 0) return std::nullopt;
   return lock;
 }
 
-// Opens a reaper's file and locks it. Empty: another reaper has it, or it cannot be had.
+// Opens a reaper file and locks it. Returns an empty descriptor if another reaper holds the lock or
+// the file cannot be opened.
 FileDescriptor lockReaperFile(const std::string& name, int flags) {
   const auto path = segments::path(name);
   constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
@@ -46,7 +47,8 @@ FileDescriptor lockReaperFile(const std::string& name, int flags) {
   struct stat opened{};
   struct stat named{};
   if (!file || !tryLock(file.get(), F_WRLCK, 0, 0)) return {};
-  // The reaper that had it before may have removed its name: then others lock another file.
+  // The previous reaper may have removed the name after we opened the file. Other reapers would
+  // then lock another file of this name, so the lock on this one is worthless.
   if (::fstat(file.get(), &opened) != 0 || ::lstat(path.c_str(), &named) != 0) return {};
   if (!S_ISREG(opened.st_mode) || opened.st_ino != named.st_ino) return {};
   return file;
@@ -60,12 +62,14 @@ bool isReaperFileLocked(const std::string& name) {
 
 }  // namespace
 
-bool trySet(int fd) noexcept { return tryLock(fd, F_WRLCK, 0, 0); }  // to the end, wherever it is
+// Length 0: to the end of the file, however long it becomes.
+bool trySet(int fd) noexcept { return tryLock(fd, F_WRLCK, 0, 0); }
 
 bool isHeld(int fd) noexcept {
   const auto lock = findWriteLock(fd, kOwnersByte);
   if (!lock) return true;
-  // Locks of open files have no pid. One that has a pid is no owner's.
+  // The kernel reports pid -1 for open file description locks, which owners use. A lock with a pid
+  // is a traditional lock of a process, so it is not an owner's lock.
   return lock->l_type == F_WRLCK && lock->l_pid == -1;
 }
 
@@ -90,16 +94,17 @@ Reaper::~Reaper() {
 bool Reaper::tryBesideStrangers(int fd) {
   ownLock_ = lockReaperFile(reaperFile_, O_CREAT);
   if (!ownLock_) return false;
-  // Root works for the window's user, who must be able to open the file if root's process is
-  // killed.
+  // A process of root gives the file to the window's user, so that processes of that user can open
+  // it if the process of root is killed.
   struct stat window{};
   if (::fstat(fd, &window) == 0 && ::geteuid() == 0)
     static_cast<void>(::fchown(ownLock_.get(), window.st_uid, window.st_gid) == 0);
   const auto writer = findWriteLock(fd, kReapersByte);
   if (!writer) return false;
-  // Readers alone: with a read lock beside theirs no other process gets the write lock.
+  // Strangers hold only read locks: our own read lock keeps other reapers from the write lock.
   if (writer->l_type == F_UNLCK) return tryLock(fd, F_RDLCK, kReapersByte, 1);
-  return writer->l_start != kReapersByte || writer->l_len != 1;  // else another reaper is at work
+  // A write lock on exactly this byte belongs to another reaper, which is removing the name.
+  return writer->l_start != kReapersByte || writer->l_len != 1;
 }
 
 bool removeReaperFile(const std::string& name) {

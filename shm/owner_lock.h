@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// OwnerLock: the kernel's lock on a segment's file that says whether its owner lives.
+// OwnerLock: the kernel's lock on a segment's file that proves that the owner is alive. A reaper is
+// a process that removes the name of a window whose owner is dead.
 //
 //   byte     0                1                2 ...
 //   owner    ├──────────── write lock on the whole file ──────────►
-//   reaper                    ├ write lock ┤                        it removes the name of a dead owner
+//   reaper                    ├ write lock ┤
 //
-// Only a write lock says anything: whoever may read the file may place a read lock on it, and keep
-// it for as long as it likes.
+// Only a write lock is evidence: every process that may read the file may place a read lock on it
+// and hold it for any time. A stranger is a process that holds such a lock.
 //
 // Threads  any.
-// Crash    the kernel drops the locks of a process that ends.
-// Trust    a read lock of a stranger keeps neither the dead alive nor a reaper from its work.
+// Crash    the kernel releases the locks of a process that ends.
+// Trust    a stranger's read lock neither makes a dead owner look alive nor stops a reaper.
 #pragma once
 
 #include <string>
@@ -24,24 +25,24 @@ namespace mpf::owner_lock {
 // Places the owner's lock. The kernel keeps it until the last descriptor of this open file is
 // closed.
 [[nodiscard]] bool trySet(int fd) noexcept;
-// Whether somebody holds a write lock where an owner has one. An error counts as held: it proves
-// nothing.
+// Whether any process holds a write lock on the byte of the owner's lock. Returns true also on an
+// error, because an error does not prove that the owner is dead.
 [[nodiscard]] bool isHeld(int fd) noexcept;
-// The same, by a process that may be the owner: the one that `header` names has not ended.
+// As isHeld(), and the process that `header` names has not ended, so it may be the owner.
 [[nodiscard]] bool isHeldByOwner(int fd, const layout::SegmentHeader& header) noexcept;
 
-// The right to remove the name of a dead window. Of all processes of this host only one has it at a
-// time.
+// The right to remove the name of a dead window. Only one process of the host has it at a time.
 //
-//   write lock on byte 1 granted ──────────────────────────────► ours, unless a reaper's file is locked
-//   refused: strangers hold locks ─► lock on a reaper's file ──► ours, unless another reaper has byte 1
+//   write lock on byte 1 granted ─────► has the right, unless the reaper file is locked
+//   write lock refused (strangers) ─► lock on the reaper file
+//                                     ─► has the right, unless another reaper has locked byte 1
 //
-// A reaper's file is open to its creator alone, so that no stranger can lock it. It exists only
+// Only the creator's user may open a reaper file, so no stranger can lock it. The file exists only
 // while it is needed.
 class Reaper {
  public:
-  //   file         the window's, open for writing
-  //   reaperFile   name of the reaper's file; empty: there is none for this window
+  //   file         the window's file, open for writing
+  //   reaperFile   name of the reaper file; empty: there is none for this window
   Reaper(const FileDescriptor& file, std::string reaperFile);
   ~Reaper();
   Reaper(const Reaper&) = delete;
@@ -56,8 +57,8 @@ class Reaper {
   bool mayRemove_ = false;
 };
 
-// Removes a reaper's file that a killed reaper left. False: another process uses it, or this user
-// may not.
+// Removes a reaper file that a killed reaper left. Returns false if another process uses it or this
+// user may not remove it.
 bool removeReaperFile(const std::string& name);
 
 }  // namespace mpf::owner_lock

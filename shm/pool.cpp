@@ -13,10 +13,10 @@ namespace mpf {
 namespace {
 
 constexpr std::uint32_t kMaxBulks = 256;  // bulk segments of one side of a link
-constexpr std::size_t kMaxChunkBytes = UINT32_MAX;  // as Slot::bodyBytes can say
+constexpr std::size_t kMaxChunkBytes = UINT32_MAX;  // the largest value of Slot::bodyBytes
 
-// A power of two of elements plus room for the header of a message, so that 1 MiB of data does not
-// need 2 MiB.
+// A power of two for the elements, plus room for the header of a message: 1 MiB of data then does
+// not need a chunk of 2 MiB.
 std::size_t chunkBytesFor(std::size_t bytes) {
   constexpr std::size_t kHeaderRoom = 128;
   const auto power = std::bit_ceil(std::max<std::size_t>(bytes, 512 + kHeaderRoom) - kHeaderRoom);
@@ -62,7 +62,7 @@ std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
 }
 
 bool PoolOwner::addBulk(std::size_t chunkBytes) try {
-  const auto room = maxBytes_ - bytes_;  // the last segment of a pool may be a small one
+  const auto room = maxBytes_ - bytes_;  // the last segment of a pool may be smaller
   if (bulks_.size() >= kMaxBulks || room < layout::kBulkChunksOffset + chunkBytes) return false;
   const auto fitting = (room - layout::kBulkChunksOffset) / chunkBytes;
   const auto count =
@@ -86,7 +86,7 @@ bool PoolOwner::addBulk(std::size_t chunkBytes) try {
   bulks_.push_back(std::move(bulk));
   return true;
 } catch (const std::exception&) {
-  return false;  // no memory left in /dev/shm: the caller refuses the message
+  return false;  // /dev/shm is full: the caller refuses the message
 }
 
 bool PoolOwner::isState(const layout::ChunkRef& ref, ChunkState state) const noexcept {
@@ -117,7 +117,8 @@ void PoolOwner::free(const layout::ChunkRef& ref) noexcept {
 void PoolOwner::collectReturned() noexcept {
   // PAIR(chunk-returned): the borrower has finished with the chunk.
   const auto returned = returns_->returned.load(std::memory_order_acquire);
-  const auto end = std::min(returned, collected_ + layout::kReturnSlots);  // more is nonsense
+  // A larger value is invalid: the borrower never has more chunks than this.
+  const auto end = std::min(returned, collected_ + layout::kReturnSlots);
   for (; collected_ < end; ++collected_) {
     const auto packed =
         returns_->chunks[collected_ % layout::kReturnSlots].load(std::memory_order_relaxed);

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Pool: memory for messages that do not fit a ring. Each side of a link owns one pool and borrows
-// from the other's.
+// Pool: memory for messages that do not fit into a ring. Each side of a link owns one pool and
+// borrows from the pool of the other side.
 //
-//   owner  alloc ─► build in place ─► ChunkRef through the ring ─► borrower reads in place ─► give back (ReturnRing)
-//                                                              └► or sends it back in a reply
+//   owner     allocate ─► build the body in place ─► send a ChunkRef through the ring
+//   borrower  read in place ─► return the chunk (ReturnRing), or send it back in a reply
 //
-// Bulk segments hold chunks of one size, a power of two and a bit for headers; they are created
-// when first needed, so a link that sends small messages costs nothing here.
+// A bulk segment contains chunks of one size: a power of two plus room for a header. It is created
+// when it is first needed, so a link that sends only small messages uses no memory here.
 //
-// Threads  callers serialise; Link does.
-// Crash    bulk segments belong to their link and go with it.
-// Trust    a ChunkRef from a peer is checked against what was mapped or lent; nonsense is refused.
+// Threads  the caller serialises all functions; Link does.
+// Crash    bulk segments belong to their link, and are removed with it.
+// Trust    a ChunkRef from a peer is checked against the chunks that were mapped or lent; an
+//          invalid one is refused.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +31,7 @@ struct Chunk {
   layout::ChunkRef ref{};
 };
 
-// Names a link's pool on either side.
+// Identifies the pool of one side of a link.
 struct PoolPlace {
   std::string backplane;
   std::uint64_t link{};
@@ -44,18 +45,20 @@ class PoolOwner {
   ~PoolOwner();
   PoolOwner(PoolOwner&&) = default;
 
-  // nullopt when the limit of the link or /dev/shm is exhausted, or the peer holds too many chunks.
+  // Returns nullopt if the limit of the link is reached, /dev/shm is full, or the peer holds too
+  // many chunks.
   std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
-  // The chunk is the peer's now, until it returns.
+  // Gives the chunk to the peer, until the peer returns it.
   void lend(const layout::ChunkRef& ref) noexcept;
-  // The peer sent the chunk back in a message: nullopt when we had not lent it.
+  // Takes back a chunk that the peer sent in a message; nullopt if we had not lent it.
   std::optional<Chunk> tryReceiveBack(const layout::ChunkRef& ref) noexcept;
-  // Frees a chunk that we hold.
+  // Frees a chunk that is not lent.
   void free(const layout::ChunkRef& ref) noexcept;
-  // Where a pointer into this pool belongs to; nullopt when it is not ours.
+  // The chunk of a pointer; nullopt if the pointer is not into this pool.
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
+  // Memory of all segments of this pool.
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
-  // Its segments keep their names, which somebody else will remove.
+  // Makes the destructor keep the names of the segments: the peer removes them.
   void leaveNames() noexcept { leavesNames_ = true; }
 
  private:
@@ -90,10 +93,10 @@ class PoolBorrower {
   PoolBorrower(PoolPlace place, std::uint64_t maxBytes, layout::ReturnRing& returns)
       : place_(std::move(place)), maxBytes_(maxBytes), returns_(&returns) {}
 
-  // The memory of a chunk that the peer sent; nullopt when there is no such chunk.
-  //   throws  std::system_error, std::bad_alloc: it cannot be looked at, for lack of descriptors or
-  //           memory
+  // Maps a chunk that the peer sent; nullopt if there is no such chunk.
+  //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
+  // Returns a chunk to the peer.
   void giveBack(const layout::ChunkRef& ref) noexcept;
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
 
@@ -105,15 +108,16 @@ class PoolBorrower {
   };
   bool tryMap(std::uint32_t number);
   PoolPlace place_;
-  std::uint64_t maxBytes_;  // that the peer may have us map
+  std::uint64_t maxBytes_;  // most memory that the peer can make us map
   std::uint64_t bytes_ = 0;
   layout::ReturnRing* returns_;
   std::uint64_t returned_ = 0;
   std::vector<Bulk> bulks_;  // index = segment number; empty where not mapped
 };
 
-// Removes the bulk segments of a link, of both sides; the last ones first, as their owner does:
-// whoever is killed meanwhile leaves no gap in their numbers, behind which nobody would look.
+// Removes the bulk segments of both sides of a link. Removes the last ones first, as their owner
+// does: a process that is killed in between leaves no gap in the numbers. Segments after a gap
+// would not be found.
 void removeBulk(const std::string& backplane, std::uint64_t link);
 
 }  // namespace mpf

@@ -18,8 +18,8 @@
 namespace mpf {
 namespace {
 
-// Field 22 of /proc/<pid>/stat; the program name before it may hold blanks and brackets. 0 when it
-// cannot be read.
+// Field 22 of /proc/<pid>/stat. The program name in field 2 may contain blanks and brackets.
+// Returns 0 if the file cannot be read.
 std::uint64_t startTicksIn(const char* path) {
   const FileDescriptor file(::open(path, O_RDONLY | O_CLOEXEC));
   std::array<char, 1024> text;
@@ -34,7 +34,8 @@ std::uint64_t startTicksIn(const char* path) {
   return ticks;
 }
 
-// 0 also when /proc shows the pids of another namespace than this process's.
+// Start time of a process. Returns 0 if it cannot be read, or if /proc shows the pids of another
+// namespace.
 std::uint64_t startTicksOf(std::int32_t pid) {
   std::array<char, 32> text{};
   std::int32_t self = 0;
@@ -50,7 +51,7 @@ std::uint64_t ownPidNamespace() {
   return ::stat("/proc/self/ns/pid", &status) == 0 ? status.st_ino : 0;
 }
 
-// Whether a header names a process that can be looked for from here.
+// Whether a header names a process of our pid namespace.
 bool isNamed(const layout::SegmentHeader& header) {
   return header.ownerPid > 0 && header.ownerStartTicks != 0 &&
          header.pidNamespace == ownPidNamespace();
@@ -58,8 +59,8 @@ bool isNamed(const layout::SegmentHeader& header) {
 
 constexpr std::uint64_t kEmulatorTicks = 100;  // one second
 
-// Whether a process is known to have this process's time namespace: in another one its start time
-// is another number.
+// Whether a process is known to be in our time namespace. In another time namespace, its start time
+// is a different number.
 bool sharesOurClock(std::int32_t pid) noexcept {
   std::array<char, 32> path{};
   std::snprintf(path.data(), path.size(), "/proc/%d/ns/time", pid);
@@ -99,7 +100,7 @@ void Process::describe(layout::SegmentHeader& header) const {
 FileDescriptor Process::openOwner(const layout::SegmentHeader& header) {
   if (!isNamed(header)) return {};
   auto descriptor = openProcess(header.ownerPid);
-  // Looked at after the open: if the start time is right now, the descriptor is that process's.
+  // Checked after the open: if the start time matches now, the descriptor refers to the owner.
   if (descriptor && startTicksOf(header.ownerPid) != header.ownerStartTicks) descriptor.reset();
   return descriptor;
 }
@@ -108,12 +109,12 @@ bool Process::hasEnded(const layout::SegmentHeader& header) noexcept {
   if (!isNamed(header)) return false;
   const auto descriptor = openProcess(header.ownerPid);
   if (!descriptor) return errno == ESRCH;
-  // A process that has ended and was not waited for still has its pid and its start time.
+  // A zombie (it has ended, but its parent has not waited for it) still has its pid and start time.
   pollfd ended{descriptor.get(), POLLIN, 0};
   if (::poll(&ended, 1, 0) == 1) return true;
   const auto ticks = startTicksOf(header.ownerPid);
-  // A pid is taken over later. An emulator such as qemu shows its program another start time than
-  // /proc shows.
+  // A process that reuses the pid has a later start time. The tolerance is for emulators: qemu
+  // shows its program a start time that differs from the one in /proc.
   return ticks > header.ownerStartTicks + kEmulatorTicks && sharesOurClock(header.ownerPid);
 }
 

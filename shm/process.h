@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Process: who this process is and whether another one is still the one it was.
+// Process: identifies this process in segment headers, and finds out whether the process that a
+// header names has ended.
+//
+// Threads  any.
+// Trust    another process may write the header; the answers are about the process that it names.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +18,21 @@ namespace mpf {
 struct Process {
   std::int32_t pid{};
   std::uint32_t uid{};
-  std::uint64_t startTicks{};    // since boot; with the pid it names a process for good
+  std::uint64_t startTicks{};    // start time since boot; with the pid it identifies a process
   std::uint64_t pidNamespace{};  // inode
   std::string program;
 
-  // Read once, and again after a fork.
+  // This process. Read once, and again after a fork.
   static Process self();
+  // Writes this process into the header as the owner.
   void describe(layout::SegmentHeader& header) const;
 
-  // A descriptor that becomes readable when the owner in `header` ends; empty when it cannot be
-  // told from here (gone already, another pid namespace, a pid that somebody else has now).
+  // A descriptor that becomes readable when the owner in `header` ends. Empty if the owner has
+  // ended already, is in another pid namespace, or another process has its pid now.
   static FileDescriptor openOwner(const layout::SegmentHeader& header);
-  // Whether the owner in `header` is known to have ended. False also when this process cannot
-  // tell: the header names no process, or one of another pid namespace, or /proc does not show it.
+  // Whether it is proven that the owner in `header` has ended. Also false if this process cannot
+  // find out: the header names no process, the process is in another pid namespace, or /proc does
+  // not show it.
   static bool hasEnded(const layout::SegmentHeader& header) noexcept;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RightsText: who may open what a process creates, as people write it in options and
-// configurations.
+// RightsText: parses file modes and group names from options and configuration files (see
+// <mpf/rights.h>).
 #pragma once
 
 #include <sys/types.h>
@@ -10,12 +10,12 @@
 
 namespace mpf {
 
-// "0660": the owner reads and writes, others may.
-//   throws  std::invalid_argument that names it and says what would be right
+// Parses an octal mode from "0600" to "0666". The owner must have read and write permission.
+//   throws  std::invalid_argument that names the text and the valid values
 [[nodiscard]] mode_t parseMode(const std::string& text);
 
-// The number of the group `name`.
-//   throws  std::invalid_argument that names it
+// Returns the number of the group `name`.
+//   throws  std::invalid_argument that names the group if it does not exist
 [[nodiscard]] std::uint32_t parseGroup(const std::string& name);
 
 }  // namespace mpf

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Ring: hands messages of 1 to 4 slots from one producer process to one consumer process.
 //
-//   | slot 0 | slot 1 | ... | slot capacity-1 |     first slot = sequence + envelope + 24 bytes, further ones 56 bytes each
+//   | slot 0 | slot 1 | ... | slot capacity-1 |
+//
+//   first slot of a message   sequence, envelope, 24 bytes of the body
+//   further slots             56 bytes of the body each
 //
 // Threads  one thread pushes, one thread takes.
-// Crash    a producer killed before its release store has pushed nothing; a consumer killed after
-//          it counted a message as taken may or may not have acted on it.
-// Trust    both ends keep positions of their own; what the other side writes is range-checked and
-//          costs messages at most.
+// Crash    a producer that is killed before its release store has pushed nothing. A consumer that
+//          is killed after it counted a message as taken may or may not have acted on it.
+// Trust    each end keeps its own positions. Values that the other side writes are range-checked;
+//          wrong ones cost messages, never memory safety.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +25,7 @@
 
 namespace mpf {
 
-// CLOCK_MONOTONIC in units of 16 ns, low 32 bits, never 0: fits a slot and spans a minute.
+// CLOCK_MONOTONIC in units of 16 ns, low 32 bits, never 0: fits into a slot and spans a minute.
 struct Tick {
   [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept {
     return static_cast<std::uint32_t>(ns >> 4) | 1u;
@@ -32,7 +35,8 @@ struct Tick {
   }
 };
 
-// What travels with a body. `type`, `clientType` and `clientExtra` mean nothing here.
+// The fields that are sent with a body. The ring does not interpret `type`, `clientType` and
+// `clientExtra`.
 struct Envelope {
   std::uint16_t type{};
   std::uint8_t flags{};  // layout::kSlot...
@@ -51,10 +55,10 @@ struct Envelope {
                                         sizeof(layout::MoreSlot::body));
 }
 
-// The consumer hands slots back when it has this part of the ring, or all there is.
+// The consumer frees slots when it has taken 1/kFreeFraction of the ring or the ring is empty.
 inline constexpr std::uint32_t kFreeFraction = 8;
 
-// Slots of a ring in which `messages` one-slot messages always find room.
+// Number of slots of a ring in which `messages` messages of one slot always fit.
 [[nodiscard]] constexpr std::uint32_t ringSlotsFor(std::uint32_t messages) noexcept {
   return std::bit_ceil(std::max(16u, messages + messages / (kFreeFraction - 1) + 1));
 }
@@ -65,8 +69,8 @@ class RingProducer {
                const layout::RingControl& consumer) noexcept
       : slots_(slots), capacity_(capacity), consumer_(consumer) {}
 
-  // Pushes `body` (at most layout::kInlineBodyBytes) and returns true, or changes nothing and
-  // returns false when it does not fit beside `reserve` free slots.
+  // Pushes `body` (at most layout::kInlineBodyBytes) and returns true. If fewer than `reserve` free
+  // slots would remain, changes nothing and returns false.
   [[nodiscard]] bool tryPush(const Envelope& envelope, std::span<const std::byte> body,
                              std::uint32_t reserve = 0) noexcept {
     const auto count = slotsFor(body.size());
@@ -86,7 +90,7 @@ class RingProducer {
     const auto sequence = pushed_ + 1;
     pushed_ += count;
     ++messages_;
-    // PAIR(slot-filled): who sees this sequence sees the message.
+    // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
     first.sequence.store(sequence, std::memory_order_release);
     MPF_STEP(slot_published);
     return true;
@@ -99,9 +103,9 @@ class RingProducer {
     takenSeen_ = std::clamp(consumer_.taken.load(std::memory_order_acquire), takenSeen_, messages_);
     return messages_ - takenSeen_;
   }
-  // As waiting(), from the last look: too many, never too few.
+  // An upper bound of waiting(), from the last value that was read from the consumer.
   [[nodiscard]] std::uint64_t waitingAtMost() const noexcept { return messages_ - takenSeen_; }
-  // Whether message number `ordinal` (the first is 1) has been taken.
+  // Whether the consumer has taken the message with this ordinal; the first message has 1.
   [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept {
     return messages_ - waiting() >= ordinal;
   }
@@ -151,11 +155,11 @@ class RingConsumer {
     return slot(taken_).sequence.load(std::memory_order_acquire) == taken_ + 1;
   }
 
-  // Counts the next message as taken and copies its envelope; call only after hasMessage(). From
-  // here on the sender knows that we may have acted on it.
+  // Counts the next message as taken and copies its envelope. Call it only after hasMessage()
+  // returned true. From now on the sender sees that we may have acted on the message.
   [[nodiscard]] Envelope begin() noexcept {
     ++messages_;
-    // PAIR(message-taken): before we look at the message.
+    // PAIR(message-taken): stored before we look at the message.
     own_.taken.store(messages_, std::memory_order_release);
     MPF_STEP(message_counted);
     const auto& first = slot(taken_);
@@ -164,7 +168,7 @@ class RingConsumer {
             first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
   }
 
-  // Bytes that the message begun can hold in line; 0 when its slot count is nonsense.
+  // Body bytes in the slots of the message begun; 0 if its number of slots is invalid.
   [[nodiscard]] std::size_t inlineCapacity() const noexcept {
     if (slotsNow_ < 1 || slotsNow_ > layout::kMaxMessageSlots) return 0;
     return layout::kFirstSlotBodyBytes + (slotsNow_ - 1u) * sizeof(layout::MoreSlot::body);
@@ -173,7 +177,7 @@ class RingConsumer {
   void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
     copyWords<layout::kFirstSlotBodyBytes>(body.data(), slot(taken_).body.data());
   }
-  // Copies the body of the message begun; `body` is at most inlineCapacity() long.
+  // Copies the body of the message begun. `body` must not be longer than inlineCapacity().
   void copyBody(std::span<std::byte> body) const noexcept {
     const auto& first = slot(taken_);
     const auto head = std::min(body.size(), first.body.size());
@@ -187,7 +191,7 @@ class RingConsumer {
     }
   }
 
-  // Done with the message begun. Slots go back in batches, or when the ring is empty.
+  // Ends the message begun. Slots are freed in batches, and when the ring is empty.
   void end() noexcept {
     taken_ += slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u;
     if (taken_ - freed_ >= capacity_ / kFreeFraction || !hasMessage()) {

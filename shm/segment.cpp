@@ -27,8 +27,8 @@ namespace ipc = boost::interprocess;
 
 constexpr const char* kDirectory = "/dev/shm";
 
-// Older kernels end a long reservation at any signal and undo it; small pieces get done between two
-// ticks of a timer.
+// Older kernels abort and undo a long reservation when a signal arrives. Small pieces complete
+// between two ticks of a timer.
 int reserve(int fd, std::size_t bytes) {
   constexpr std::size_t kPiece = std::size_t{1} << 20;
   int shortage = ::posix_fallocate(fd, 0, static_cast<off_t>(bytes));
@@ -42,14 +42,15 @@ int reserve(int fd, std::size_t bytes) {
   return 0;
 }
 
-// Anybody may put anything under a name in /dev/shm: O_NONBLOCK, so that a pipe does not keep us
-// waiting.
+// Any user may create any kind of file in /dev/shm. O_NONBLOCK, so that the open of a FIFO does not
+// block.
 FileDescriptor openByName(const std::string& name, int flags) {
   return FileDescriptor(
       ::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
 }
 
-// " (mode 0600, user 0, group 0)": what somebody lacks who may not open it.
+// The rights of a file, for the message of a process that may not open it:
+// " (mode 0600, user 0, group 0)".
 std::string rightsInWords(const std::string& name) {
   struct stat status{};
   if (::lstat(segments::path(name).c_str(), &status) != 0) return {};
@@ -57,7 +58,7 @@ std::string rightsInWords(const std::string& name) {
                      status.st_gid);
 }
 
-// Opens a regular file; empty when there is none of that name. Throws as Segment::tryOpen.
+// Opens a regular file; empty if no file has this name. Throws as Segment::tryOpen.
 FileDescriptor openRegular(const std::string& name, int flags, std::size_t& fileBytes) {
   const auto path = segments::path(name);
   auto file = openByName(name, flags);
@@ -67,14 +68,14 @@ FileDescriptor openRegular(const std::string& name, int flags, std::size_t& file
     throwSystemError(reason, "open", path + (reason == EACCES ? rightsInWords(name) : ""));
   }
   struct stat status{};
-  checkCall(::fstat(file.get(), &status), "look at", path);
+  checkCall(::fstat(file.get(), &status), "read the status of", path);
   if (!S_ISREG(status.st_mode))
     throw SegmentError(fmt::format("{}: not a segment of MPF (no regular file)", path));
   fileBytes = static_cast<std::size_t>(status.st_size);
   return file;
 }
 
-// Opens a segment and copies its header; empty when there is none of that name. Throws as
+// Opens a segment and copies its header; empty if no file has this name. Throws as
 // Segment::tryOpen.
 FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags,
                            layout::SegmentHeader& header) {
@@ -90,8 +91,8 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
   return file;
 }
 
-// The header that says whose a file is. Empty when it cannot say: every peer may write over the
-// header of hints, and other files may be anything.
+// Reads the header that names a file's owner. Returns an empty header if it cannot be trusted:
+// every peer may overwrite the header of hints, and a file without our magic may be anything.
 layout::SegmentHeader ownersHeader(int fd, const std::string& name) {
   layout::SegmentHeader header{};
   const auto parsed = SegmentName::tryParse(name);
@@ -104,7 +105,7 @@ bool isOwned(int fd, const std::string& name) {
   return owner_lock::isHeldByOwner(fd, ownersHeader(fd, name));
 }
 
-// Whether the name still leads to this regular file.
+// Whether the name still refers to this regular file.
 bool isNameOf(int fd, const std::string& name) {
   struct stat opened{};
   struct stat named{};
@@ -112,7 +113,7 @@ bool isNameOf(int fd, const std::string& name) {
   return ::stat(segments::path(name).c_str(), &named) == 0 && opened.st_ino == named.st_ino;
 }
 
-// Of the reaper that removes what is under this name now.
+// Name of the reaper file for the segment that has this name now; empty if there is none.
 std::string reaperFileOf(int fd, const std::string& name) {
   const auto parsed = SegmentName::tryParse(name);
   const auto header = ownersHeader(fd, name);
@@ -120,7 +121,7 @@ std::string reaperFileOf(int fd, const std::string& name) {
   return SegmentName::keyed(parsed->backplane, NameKind::reaper, header.incarnation);
 }
 
-// Whether a file is a segment of some kind that this program can use.
+// Whether a file is a segment, of any kind, that this program can use.
 bool isKnown(int fd, const std::string& name) try {
   layout::SegmentHeader header{};
   struct stat status{};
@@ -144,7 +145,7 @@ void setRights(int fd, const Rights& rights) {
   if (rights.user != kOwn)
     checkCall(::fchown(fd, rights.user, kOwn), "give a segment to user",
               std::to_string(rights.user));
-  checkCall(::fchmod(fd, rights.mode), "set the rights of a segment");
+  checkCall(::fchmod(fd, rights.mode), "set the mode of a segment");
 }
 
 Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
@@ -183,7 +184,7 @@ void Segment::lockForLife() {
 }
 
 bool Segment::tryPublish(const std::string& name) {
-  header_ = sharedHeader();  // before a peer can write to it
+  header_ = sharedHeader();  // copied before a peer can write to it
   MPF_STEP(segment_complete);
   const auto self = fmt::format("/proc/self/fd/{}", file_.get());
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, segments::path(name).c_str(), AT_SYMLINK_FOLLOW) ==
@@ -198,7 +199,7 @@ bool Segment::tryPublish(const std::string& name) {
 
 std::uint32_t Segment::fileUser() const {
   struct stat status{};
-  checkCall(::fstat(file_.get(), &status), "look at", segments::path(name_));
+  checkCall(::fstat(file_.get(), &status), "read the status of", segments::path(name_));
   return status.st_uid;
 }
 
@@ -270,7 +271,7 @@ std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name,
 
 Owner probeOwner(const std::string& name, std::uint64_t incarnation) {
   const auto file = openByName(name, O_RDONLY);
-  // not ours to judge: it may be somebody's
+  // A file that we cannot open may have a living owner.
   if (!file) return errno == ENOENT ? Owner::absent : Owner::alive;
   if (incarnation != 0) {
     std::uint64_t found = 0;
@@ -299,16 +300,16 @@ bool removeIfOwnerless(const std::string& name) {
   const owner_lock::Reaper reaper(file, reaperFileOf(file.get(), name));
   if (!reaper.mayRemove()) return false;
   MPF_STEP(reclaim_locked);
-  // No other process takes away the name of this very file now: check that the name is still this
-  // file's.
+  // From here on no other process removes the name of this file. Check that the name still refers
+  // to this file.
   if (!isNameOf(file.get(), name)) return false;
-  // Of anything but a segment that we know, a free lock proves nothing.
+  // A free lock proves nothing unless the file is a segment of a known version.
   if (!isKnown(file.get(), name)) return false;
   MPF_STEP(reclaim_proved);
   return remove(name);
 }
 
-// No lock is needed: nothing else will ever have this name, and a second removal finds nothing.
+// Needs no lock: no other file will ever have this name, and a second removal finds no file.
 bool removeKeyedIfOwnerless(const std::string& name) {
   const auto file = openByName(name, O_RDONLY);
   if (!file || isOwned(file.get(), name) || !isNameOf(file.get(), name)) return false;

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Segment: one file in /dev/shm, created, locked, named, mapped, refused and removed.
+// Segment: one file in /dev/shm: creates, locks, publishes, opens, maps and checks it.
 //
-//   create ─► (invisible, memory reserved) ─► fill in ─► lockForLife ─► publish under its name
+//   create() ─► no name yet, memory reserved ─► fill in the header ─► lockForLife() ─► tryPublish()
 //
-// A segment gets its name last and at once, so nobody ever sees half of one, and a process killed
-// before that leaves nothing.
+// A segment gets its name in the last step. Therefore no process sees an incomplete segment, and a
+// process that is killed before this step leaves nothing.
 //
-// Threads  one thread creates or opens; the mapping may then be used by any.
-// Crash    the kernel drops the lock of a dead owner; removeIfOwnerless() then removes the file,
-//          and only then.
-// Trust    the header is copied and checked before anything else is believed.
+// Threads  one thread creates or opens a segment; then any thread may use the mapping.
+// Crash    the kernel releases the lock of a dead owner. Only then does removeIfOwnerless() remove
+//          the file.
+// Trust    the header is copied and checked before any other byte is used.
 #pragma once
 
 #include <sys/types.h>
@@ -33,8 +33,9 @@
 
 namespace mpf {
 
-// Gives an open file these rights.
-//   throws  std::system_error: only root gives files away, and to a group only its members do
+// Sets the mode, group and user of an open file.
+//   throws  std::system_error: only root may change the user, and only members of a group may give
+//           a file to it
 void setRights(int fd, const Rights& rights);
 
 class Segment {
@@ -43,28 +44,28 @@ class Segment {
 
   Segment() = default;
 
-  // A zeroed segment of `bytes`, with header fields that are the same for all filled in.
-  //   throws  std::system_error; ENOSPC when /dev/shm has not that much left
+  // Creates a segment of `bytes` zeroes and fills in the header fields that all kinds share.
+  //   throws  std::system_error; ENOSPC if /dev/shm does not have enough free memory
   static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
                         Rights rights);
 
-  // Holds the owner's lock until this Segment dies or the process does. A peer that cuts the file
-  // finds it grown again.
+  // Holds the owner's lock until this object is destroyed or the process ends. If a peer truncates
+  // the file, the guard grows it again.
   void lockForLife();
-  // False when another segment has the name.
+  // Gives the file its name. Returns false if another file has this name.
   [[nodiscard]] bool tryPublish(const std::string& name);
 
-  // Maps an existing segment. nullopt when there is none of that name, or its last link is gone.
-  //   throws  SegmentError when it is not what it should be, std::system_error when it may not be
-  //           opened
+  // Maps an existing segment; nullopt if no file has this name.
+  //   throws  SegmentError if the file is not a usable segment of this kind, std::system_error if
+  //           it cannot be opened
   static std::optional<Segment> tryOpen(const std::string& name, layout::SegmentKind kind,
                                         Access access);
 
-  // The first `bytes` of a segment that every peer may write: its header may be nonsense by now,
-  // and is not looked at. When a peer cuts the file, before or after, it is grown again. nullopt
-  // when there is none of that name.
-  //   throws  SegmentError when it is too short and nobody's, or no file, std::system_error when it
-  //           may not be opened
+  // Maps the first `bytes` of a segment that every peer may write. Ignores its header, which a peer
+  // may have overwritten. If a peer truncates the file, before or after the call, it is grown
+  // again. nullopt if no file has this name.
+  //   throws  SegmentError if the file is too short and has no owner, or is not a regular file;
+  //           std::system_error if it cannot be opened
   static std::optional<Segment> tryOpenShared(const std::string& name, std::size_t bytes);
 
   // A private copy, taken and checked when the segment was opened.
@@ -76,7 +77,7 @@ class Segment {
   [[nodiscard]] std::size_t bytes() const { return mapping_.bytes(); }
   [[nodiscard]] const std::string& name() const { return name_; }
   explicit operator bool() const { return data() != nullptr; }
-  // Whether somebody cut the file: what is left is zeroes of our own.
+  // Whether the file was truncated and could not be grown: the memory is now private zeroes.
   [[nodiscard]] bool isLost() const noexcept { return mapping_.isLost(); }
 
   template <class T>
@@ -84,13 +85,13 @@ class Segment {
     return *reinterpret_cast<T*>(data() + offset);
   }
 
-  // Whose file it is. Needs the file.
+  // The next three must be called before closeFile().
+  // Number of the user that owns the file.
   [[nodiscard]] std::uint32_t fileUser() const;
-  // Whether the owner lives, as probeOwner() says, whatever became of the name. Needs the file.
+  // Whether the owner is alive, as probeOwner() finds out, even if the file has lost its name.
   [[nodiscard]] bool hasOwner() const noexcept;
-  // Needs the file.
   void setRights(const Rights& rights) const { mpf::setRights(file_.get(), rights); }
-  // Lets go of the file, not of the mapping. A segment without lock needs it no longer.
+  // Closes the file and keeps the mapping. For segments without a lock.
   void closeFile() { file_.reset(); }
 
  private:
@@ -102,31 +103,31 @@ class Segment {
 
 namespace segments {
 
-// Removes the name. False when there was none.
+// Removes the name. Returns false if there was no such name, or this user may not remove it.
 bool remove(const std::string& name);
 [[nodiscard]] bool exists(const std::string& name);
 
-// A copy of the header, checked as when the segment is opened; nothing is mapped. nullopt when
-// there is none of that name.
+// Copies the header and checks it as Segment::tryOpen does, without mapping the file; nullopt if no
+// file has this name.
 //   throws  as Segment::tryOpen
 std::optional<layout::SegmentHeader> tryReadHeader(const std::string& name,
                                                    layout::SegmentKind kind);
 
 enum class Owner { alive, dead, absent };
-// Asks the kernel whether the owner of a window lives: a process holds the owner's lock, and the
-// process that the header names has not ended, as far as this process can tell. With an
-// incarnation: `absent` when the name has another one's window now.
+// Asks the kernel whether the owner of a window is alive: a process holds the owner's lock, and the
+// process that the header names has not ended, as far as this process can find out. With an
+// incarnation: `absent` also if a window of another incarnation has the name now.
 [[nodiscard]] Owner probeOwner(const std::string& name, std::uint64_t incarnation = 0);
-// Whether two files are there and belong to the same user.
+// Whether both files exist and belong to the same user.
 [[nodiscard]] bool haveSameUser(const std::string& one, const std::string& other);
-// Whether any process holds a write lock where an owner has one.
+// Whether any process holds a write lock on the byte of the owner's lock.
 [[nodiscard]] bool isLocked(const std::string& name);
-// Removes a window whose owner is proven dead. Two processes may try at once; a window that was
-// replaced meanwhile stays, and so does what is no window of a version that we know: its lock may
-// mean something else.
+// Removes a window whose owner is proven dead. Two processes may try at once. Does not remove a
+// window that has replaced the dead one, nor a file that is not a window of a known version,
+// because its lock may have another meaning.
 bool removeIfOwnerless(const std::string& name);
-// The same of client windows and hints, whatever is written there by now: a name with an
-// incarnation and its lock mean the same in all versions.
+// As removeIfOwnerless(), for client windows and hints, whatever their contents: a name with an
+// incarnation and the lock of such a file have the same meaning in all versions.
 bool removeKeyedIfOwnerless(const std::string& name);
 
 // Names in /dev/shm that start with `prefix`.
@@ -135,13 +136,13 @@ std::vector<std::string> list(const std::string& prefix);
 // Path of a segment's file.
 std::string path(const std::string& name);
 
-// A text in a header as it is, for comparisons and for other programs.
+// A text of a header, unchanged, for comparisons and for other programs.
 template <std::size_t n>
 std::string rawText(const std::array<char, n>& chars) {
   return {chars.begin(), std::find(chars.begin(), chars.end(), '\0')};
 }
 
-// The same for people: any process that may write to /dev/shm chooses these characters.
+// A text of a header, escaped, for people: any process that may write to /dev/shm chooses it.
 template <std::size_t n>
 std::string text(const std::array<char, n>& chars) {
   return printable(rawText(chars));
@@ -150,8 +151,8 @@ std::string text(const std::array<char, n>& chars) {
 // 64 random bits, never 0.
 std::uint64_t newIncarnation();
 
-// Throws SegmentError, naming `path`, when `header` (of a file of `fileBytes`) is not a usable one
-// of `kind`.
+// Throws SegmentError, which names `path`, unless `header` is the header of a usable segment of
+// this kind in a file of `fileBytes`.
 void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::SegmentKind kind,
            const std::string& path);
 

@@ -17,8 +17,8 @@ bool isPlain(char c) {
          c == '-';
 }
 
-// Server names hold brackets, slashes and dots ("serial[0]", "AIM1/1"); file names of this grammar
-// do not.
+// Server names may contain slashes and dots ("AIM1/1"), which the names of segments must not
+// contain: each such character becomes a percent sign and two hexadecimal digits.
 std::string encode(std::string_view name) {
   std::string encoded;
   for (const char c : name) {
@@ -58,7 +58,7 @@ bool isBackplane(std::string_view name) {
          std::all_of(name.begin(), name.end(), isPlain);
 }
 
-// Whether encode() could have made it.
+// Whether `name` is a possible result of encode().
 bool isEncoded(std::string_view name) {
   const auto isUpperHex = [](char c) { return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'F'); };
   for (std::size_t at = 0; at < name.size(); ++at) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SegmentName: the names of segments in /dev/shm, built and taken apart. The grammar is in
-// layout.h.
+// SegmentName: builds and parses the names of segments in /dev/shm. layout.h lists them.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +9,7 @@
 
 namespace mpf {
 
-// Name of a segment whose key is an incarnation number.
+// The letter of each kind of name.
 enum class NameKind : char {
   serverWindow = 's',
   clientWindow = 'c',
@@ -24,11 +23,11 @@ enum class NameKind : char {
 };
 
 struct SegmentName {
-  // Throws std::invalid_argument, naming it, when a backplane name is empty, too long or has other
-  // characters than [A-Za-z0-9_-].
+  // Throws std::invalid_argument, which names the backplane, if a backplane name is empty, too long
+  // or has other characters than [A-Za-z0-9_-].
   static void checkBackplane(std::string_view backplane);
-  // Throws std::invalid_argument, naming it, when a server name is empty, longer than 63 bytes or
-  // holds control characters.
+  // Throws std::invalid_argument, which names the server, if a server name is empty, longer than 63
+  // bytes or contains control characters.
   static void checkServer(std::string_view server);
 
   static std::string serverWindow(std::string_view backplane, std::int32_t location,
@@ -39,18 +38,18 @@ struct SegmentName {
   static std::string bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side,
                           std::uint32_t segment);
 
-  // Everything of one backplane, or of all when `backplane` is empty, starts so.
+  // The prefix of all names of one backplane; of all backplanes if `backplane` is empty.
   static std::string prefix(std::string_view backplane);
   static std::string linkPrefix(std::string_view backplane, std::uint64_t serverWindow);
 
-  // What a name in /dev/shm says; nullopt when it is not ours.
   struct Parsed {
     std::string backplane;
     NameKind kind{};
-    // of the segment itself; 0 for a server window, whose name is the server's
+    // incarnation in the name; 0 for a server window, whose name contains none
     std::uint64_t incarnation{};
     std::uint64_t serverWindow{};  // link only
   };
+  // Parses a name in /dev/shm; nullopt if it is not a name that MPF gives.
   static std::optional<Parsed> tryParse(std::string_view name);
 };
 

@@ -15,7 +15,8 @@
 namespace mpf::stale_segments {
 namespace {
 
-// What is known of one file; of a window it is what is known of all that hang on it.
+// The verdict about one file. The verdict about a window also applies to the files that belong to
+// it.
 struct Finding {
   Verdict verdict{};
   std::string reason;
@@ -25,7 +26,8 @@ std::string ownerText(const layout::SegmentHeader& header) {
   return fmt::format("pid {} ({})", header.ownerPid, segments::text(header.program));
 }
 
-// A file with a lock of its own and a name that nobody else will ever have: the lock alone tells.
+// For a file that has its own lock and a name that no other file will ever have: only the lock
+// decides.
 Finding judgeKeyed(const std::string& name) {
   switch (segments::probeOwner(name)) {
     case segments::Owner::alive:
@@ -34,18 +36,18 @@ Finding judgeKeyed(const std::string& name) {
       if (segments::isLocked(name))
         return {Verdict::dead,
                 fmt::format("its owner has ended; another process holds a lock on {}", name)};
-      return {Verdict::dead, fmt::format("nobody holds the lock of {}", name)};
+      return {Verdict::dead, fmt::format("no process holds the lock of {}", name)};
     case segments::Owner::absent:
       break;
   }
-  return {Verdict::dead, "its name is gone"};
+  return {Verdict::dead, "its name no longer exists"};
 }
 
-// A window. Of anything but a segment that we know, a free lock proves nothing, unless its name
-// does.
+// For a window. A free lock proves nothing unless the file is a segment of a known version, or its
+// name contains an incarnation.
 Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
   const auto header = segments::tryReadHeader(name, kind);
-  if (!header) return {Verdict::dead, "its name is gone"};
+  if (!header) return {Verdict::dead, "its name no longer exists"};
   switch (segments::probeOwner(name, header->incarnation)) {
     case segments::Owner::alive:
       return {Verdict::alive, fmt::format("{} holds the lock of {}", ownerText(*header), name)};
@@ -54,23 +56,23 @@ Finding judgeWindow(const std::string& name, layout::SegmentKind kind) try {
         return {Verdict::dead, fmt::format("{} has ended; another process holds a lock on {}",
                                            ownerText(*header), name)};
       return {Verdict::dead,
-              fmt::format("nobody holds the lock of {}; {} did", name, ownerText(*header))};
+              fmt::format("no process holds the lock of {}; {} did", name, ownerText(*header))};
     case segments::Owner::absent:
       break;
   }
-  return {Verdict::unknown, "it was replaced just now"};
+  return {Verdict::unknown, "another segment has just replaced it"};
 } catch (const VersionError& error) {
-  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
 } catch (const SegmentError& error) {
   if (kind == layout::SegmentKind::clientWindow) return judgeKeyed(name);
-  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
 } catch (const std::exception& error) {
-  return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+  return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
 }
 
 class Judge {
  public:
-  // With a `choice`, the names are not all that there are.
+  //   isChoice  `names` are only some of the names of the backplane
   Judge(std::string backplane, std::vector<std::string> names, bool isChoice)
       : backplane_(std::move(backplane)), names_(std::move(names)), isChoice_(isChoice) {}
 
@@ -111,9 +113,8 @@ class Judge {
   void noteDead(const std::string& name, layout::SegmentKind kind) try {
     if (const auto header = segments::tryReadHeader(name, kind))
       deadWindows_.emplace(header->incarnation, name);
-  } catch (
-      const std::
-          exception&) {  // NOLINT(bugprone-empty-catch): it went away or was replaced: then it says nothing of hints
+    // NOLINTNEXTLINE(bugprone-empty-catch): removed or replaced: it says nothing about the hints
+  } catch (const std::exception&) {
   }
 
   void hints(const std::string& name, const Parsed& parsed) {
@@ -121,9 +122,9 @@ class Judge {
       add(name, hints_[parsed.incarnation] = judgeHints(name, parsed.incarnation));
   }
 
-  // Hints are as dead as their window: every peer may write over their header and lock them. A
-  // window says nothing of another user's hints: anybody may make a file that claims their
-  // incarnation.
+  // Hints are dead if their window is dead, because every peer may overwrite the header of hints
+  // and lock them. A window of another user is no evidence: any user may create a window with the
+  // incarnation of these hints.
   Finding judgeHints(const std::string& name, std::uint64_t incarnation) const {
     const auto [first, last] = deadWindows_.equal_range(incarnation);
     const auto isTheirs = [&](const auto& window) {
@@ -141,20 +142,20 @@ class Judge {
       add(name, links_[parsed.incarnation] = judgeOwned(name, layout::SegmentKind::link));
   }
 
-  // A link, a pending bind: it lives as long as its client's window.
+  // For a link or a pending bind: it is dead if the window of its client is dead.
   Finding judgeOwned(const std::string& name, layout::SegmentKind kind) try {
     const auto header = segments::tryReadHeader(name, kind);
-    if (!header) return {Verdict::dead, "its name is gone"};
+    if (!header) return {Verdict::dead, "its name no longer exists"};
     return ownerOf(clients_, NameKind::clientWindow, header->ownerWindow);
   } catch (const VersionError& error) {
-    return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+    return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
   } catch (const SegmentError& error) {
-    return {Verdict::dead, fmt::format("nobody can use it: {}", error.what())};
+    return {Verdict::dead, fmt::format("no program can use it: {}", error.what())};
   } catch (const std::exception& error) {
-    return {Verdict::unknown, fmt::format("not ours to judge: {}", error.what())};
+    return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
   }
 
-  // Pools hang on links, pipes on hints.
+  // A pool belongs to its link, a FIFO to its hints.
   void last(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::bulk) {
       const auto link = links_.find(parsed.incarnation);
@@ -167,8 +168,8 @@ class Judge {
     }
   }
 
-  // What is known of an owner. One that was not listed may have come since: its lock tells, under
-  // either of its names.
+  // The verdict about an owner. An owner that was not listed may have started after the listing.
+  // Then the lock of its window or of its hints decides.
   const Finding& ownerOf(std::map<std::uint64_t, Finding>& known, NameKind kind,
                          std::uint64_t incarnation) const {
     const auto [found, isNew] = known.try_emplace(incarnation);
@@ -185,8 +186,9 @@ class Judge {
   std::string backplane_;
   std::vector<std::string> names_;
   bool isChoice_;
-  std::map<std::uint64_t, Finding> clients_;  // by incarnation of the window, as the next
-  std::multimap<std::uint64_t, std::string> deadWindows_;  // their names
+  std::map<std::uint64_t, Finding> clients_;  // by the incarnation of the window
+  // names of dead windows, by the incarnation of the window
+  std::multimap<std::uint64_t, std::string> deadWindows_;
   std::map<std::uint64_t, Finding> hints_;
   std::map<std::uint64_t, Finding> links_;
   std::vector<Judged> judged_;
@@ -212,8 +214,8 @@ bool tryRemove(const Judged& file) {
   if (file.verdict != Verdict::dead || !parsed) return false;
   switch (parsed->kind) {
     case NameKind::serverWindow:
-      // Its name may be a successor's by now: the lock is asked again, and held until the name is
-      // gone.
+      // A new server may use this name now: this checks the lock again, and removes the name only
+      // while it holds the reaper's lock.
       return segments::removeIfOwnerless(file.name);
     case NameKind::clientWindow:
     case NameKind::router:
@@ -236,7 +238,7 @@ void removeDeadWindow(const std::string& backplane, const std::string& name,
     segments::removeIfOwnerless(name);
   }
   MPF_STEP(dead_window_removed);
-  // Every peer may lock the hints: their lock tells only when there is no window to ask.
+  // Every peer may lock the hints. Their lock decides only if there is no window to ask.
   if (ownsHints ? segments::remove(hints) : segments::removeKeyedIfOwnerless(hints)) {
     segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
   }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Remains: what dead processes left on a backplane, file by file, and how that is known. Who
-// removes it and who only wants to know what would be removed ask the same judge.
+// Stale segments: finds the files that dead processes left on a backplane, and removes them.
+// Reports and removals use the same verdicts.
 //
-//   names ─► windows, hints: is their lock free? ─► links, pending binds: does their window live? ─► pools: their link? pipes: their hints?
+//   1. windows, hints         dead if their lock is free
+//   2. links, pending binds   dead if the window of their client is dead
+//   3. pools, FIFOs           dead if their link or their hints are dead
 //
 // Threads  any.
-// Crash    death is for good: what was found dead stays so until it is removed, by whomever, and
-//          however many try at once.
-// Trust    what may not be opened or is of another version is not judged, and stays.
+// Crash    a dead file stays dead, so any number of processes may remove it at the same time.
+// Trust    a file that cannot be opened, or has another layout version, is not judged and stays.
 #pragma once
 
 #include <cstdint>
@@ -21,19 +22,20 @@ enum class Verdict { alive, dead, unknown };
 struct Judged {
   std::string name;
   Verdict verdict{};
-  std::string reason;  // how that is known
+  std::string reason;  // the evidence for the verdict
 };
 
-// Every file of a backplane: windows and hints first, then what hangs on them. One that goes away
-// meanwhile may be missing.
+// Judges every file of a backplane: windows and hints first, then the files that belong to them. A
+// file that is removed during the call may be missing.
 std::vector<Judged> judge(const std::string& backplane);
 
-// The same of `most` files, chosen at random, when there are more. Any user may fill /dev/shm with
-// names, and whoever begins work here must not wait for all of them. Names that MPF does not give
-// are left out, and pools whose link was not chosen.
+// As judge(), but if there are more than `most` files, judges `most` of them, chosen at random. Any
+// user may fill /dev/shm with names, and a process that attaches must not wait for all of them. The
+// choice omits names that MPF does not give, and pools whose link was not chosen.
 std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most);
 
-// Removes a file that was found dead. False: somebody was quicker, or this user may not.
+// Removes a file that was found dead. Returns false if another process has removed it or this user
+// may not.
 bool tryRemove(const Judged& file);
 
 // Removes the window `name` with this incarnation, its hints and its pipe, if its owner is proven

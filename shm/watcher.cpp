@@ -28,13 +28,13 @@ constexpr Watcher::Token kTimer = 2;
 constexpr Watcher::Token kNames = 3;
 constexpr long kPollNs = 100'000'000;
 
-// The kernel takes some 15 ms to close an inotify instance, and the watcher's thread has deaths to
-// tell.
+// Closes an inotify instance in a thread of its own: this takes the kernel some 15 ms, in which the
+// watcher's thread could not report a death.
 void closeElsewhere(FileDescriptor names) noexcept try {
   const SignalsBlocked blocked;
   std::thread([closing = std::move(names)] {}).detach();
-} catch (const std::
-             system_error&) {  // NOLINT(bugprone-empty-catch): no thread left: closed here, by then
+  // NOLINTNEXTLINE(bugprone-empty-catch): no thread could be started: closed here
+} catch (const std::system_error&) {
 }
 
 void add(int epoll, int fd, Watcher::Token token) {
@@ -44,8 +44,8 @@ void add(int epoll, int fd, Watcher::Token token) {
   checkCall(::epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event), "epoll_ctl");
 }
 
-// The kinds of the backplane's new names that an inotify buffer tells of; of so many that some were
-// lost, `*`.
+// The letters of the kinds of new names of the backplane in an inotify buffer; "*" if the queue
+// overflowed and names were lost.
 std::string kindsIn(const char* events, std::size_t bytes, const std::string& backplane) {
   std::string kinds;
   for (std::size_t at = 0; at < bytes;) {
@@ -99,7 +99,7 @@ Watcher::Token Watcher::watchPeer(std::shared_ptr<PeerWindow> peer, Callback cal
   if (process) add(epoll_.get(), process.get(), token);
   peers_.emplace(token, Peer{std::move(peer), std::move(callback), std::move(process)});
   updateTimer();
-  if (isPolled) pollAtOnce();  // it may have died just now
+  if (isPolled) pollAtOnce();  // the peer may have died before it was watched
   return token;
 }
 
@@ -113,8 +113,8 @@ Watcher::Token Watcher::watchNames(NameKind kind, Callback callback) {
   return token;
 }
 
-// A user has few inotify instances (128 by default), so we hold one only while somebody waits, and
-// do without when there is none left.
+// A user has few inotify instances (128 by default). Therefore the watcher has one only while a
+// caller waits for names, and polls if no instance is free.
 void Watcher::openNames() {
   names_.reset(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
   if (!names_) return;
@@ -124,7 +124,7 @@ void Watcher::openNames() {
 }
 
 void Watcher::forget(Token token) {
-  if (isInherited()) return;  // its descriptors are the parent's, too
+  if (isInherited()) return;  // the epoll instance is shared with the parent
   const std::lock_guard lock(mutex_);
   peers_.erase(token);
   if (nameCallbacks_.erase(token) != 0 && nameCallbacks_.empty() && names_) {
@@ -155,8 +155,8 @@ void Watcher::handle(Token token) {
     readNames();
   } else if (const auto found = peers_.find(token); found != peers_.end()) {
     if (isGone(found->second)) return report(token);
-    // The process ended, yet the lock is held: a child inherited it. The lock decides, so go on
-    // asking for it.
+    // The process has ended, but the lock is still held: a child inherited it. The lock decides, so
+    // poll it from now on.
     found->second.process.reset();
     updateTimer();
   }
@@ -176,21 +176,21 @@ void Watcher::report(Token token) {
   peer.callback();
 }
 
-// A buffer of them a turn: who fills /dev/shm with names, as every user may, keeps nobody from the
-// lock.
+// Reads at most one buffer, then returns and releases the mutex: a user that floods /dev/shm with
+// names cannot keep other threads from it.
 void Watcher::readNames() {
   alignas(inotify_event) std::array<char, 4096> events;
   const auto got = ::read(names_.get(), events.data(), events.size());
   if (got <= 0) return;
   const auto kinds = kindsIn(events.data(), static_cast<std::size_t>(got), backplane_);
   const bool someLost = kinds.find('*') != std::string::npos;
-  tellOfNames([&](NameKind kind) {
+  notifyNames([&](NameKind kind) {
     return someLost || kinds.find(static_cast<char>(kind)) != std::string::npos;
   });
 }
 
-void Watcher::tellOfNames(const std::function<bool(NameKind)>& isNew) {
-  auto callbacks = nameCallbacks_;  // a callback may forget
+void Watcher::notifyNames(const std::function<bool(NameKind)>& isNew) {
+  auto callbacks = nameCallbacks_;  // a copy, because a callback may call forget()
   for (const auto& [token, names] : callbacks) {
     if (isNew(names.kind) && nameCallbacks_.contains(token)) names.callback();
   }
@@ -206,7 +206,7 @@ void Watcher::poll() {
   for (const auto token : gone) {
     if (peers_.contains(token)) report(token);
   }
-  if (!names_) tellOfNames([](NameKind) { return true; });
+  if (!names_) notifyNames([](NameKind) { return true; });
 }
 
 void Watcher::pollAtOnce() {
@@ -215,7 +215,7 @@ void Watcher::pollAtOnce() {
   polls_ = true;
 }
 
-// A timer that runs goes on as it is: changes that come often must not put it off.
+// Does not restart a running timer: frequent changes must not delay it.
 void Watcher::updateTimer() {
   bool needed = !names_ && !nameCallbacks_.empty();
   for (const auto& [token, peer] : peers_) needed = needed || !peer.process;

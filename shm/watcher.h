@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Watcher: one thread of a process that tells when a peer has died and when a server or a pending
-// bind has appeared. It sleeps all the time, and begins when there is somebody to watch.
+// Watcher: one thread of a process that reports the death of peers, and new servers and pending
+// binds. The thread starts at the first watch and sleeps until an event.
 //
-//   pidfd readable ─► lock of the peer's window free? ─► dead: callback, once
-//   /dev/shm gets a new name ─► callback for those who wait for its kind: clients for a server, routers for a pending bind
+//   pidfd is readable ─► is the lock of the peer's window free? ─► dead: callback, once
+//   new name in /dev/shm ─► callbacks for its kind (clients: servers; routers: pending binds)
 //
-// Threads  any thread may call; callbacks run on the watcher's thread and must not wait.
-// Crash    what it cannot see by a pidfd (another pid namespace, a pid taken over) it sees by
-//          asking for the lock every 100 ms. So it does with names when the kernel has no inotify
-//          instance left for this user.
-// Trust    a peer's pid is only a hint where to look; the kernel's lock is the proof.
+// Threads  any thread may call; callbacks run on the watcher's thread and must not block.
+// Crash    if a peer has no pidfd here (another pid namespace, a reused pid), the watcher checks
+//          its lock every 100 ms. Likewise, it calls the callbacks for names every 100 ms if the
+//          user has no free inotify instance.
+// Trust    a peer's pid is only a hint; the kernel's lock is the proof.
 #pragma once
 
 #include <functional>
@@ -32,16 +32,16 @@ class Watcher {
   using Callback = std::function<void()>;
   using Token = std::uint64_t;
 
-  // Of the names in /dev/shm, those of this backplane are news.
+  // Reports only names of this backplane.
   explicit Watcher(std::string backplane);
   ~Watcher();
 
-  // Calls back once when the owner of `peer` is proven dead (then peer->isDead()) or its window is
-  // gone.
+  // Calls `callback` once, after the owner of `peer` has died or closed its window. Then
+  // peer->isDead() is true.
   Token watchPeer(std::shared_ptr<PeerWindow> peer, Callback callback);
-  // Calls back whenever a segment of this kind may have appeared.
+  // Calls `callback` each time a segment of this kind may have appeared.
   Token watchNames(NameKind kind, Callback callback);
-  // After return the callback does not run and will not run again.
+  // Ends a watch. After the return the callback does not run and will not run again.
   void forget(Token token);
   [[nodiscard]] bool isInherited() const noexcept { return forkGuard_.isInherited(); }
 
@@ -62,7 +62,7 @@ class Watcher {
     NameKind kind;
     Callback callback;
   };
-  void tellOfNames(const std::function<bool(NameKind)>& isNew);
+  void notifyNames(const std::function<bool(NameKind)>& isNew);
   void poll();
   void pollAtOnce();
   void updateTimer();
@@ -72,12 +72,12 @@ class Watcher {
   FileDescriptor epoll_;
   FileDescriptor stop_;
   FileDescriptor timer_;
-  FileDescriptor names_;  // inotify, while somebody waits for names; empty: polled
-  std::recursive_mutex mutex_;  // callbacks run under it, so that forget() can promise what it does
-  Token next_ = 16;  // below: our own descriptors
+  FileDescriptor names_;  // inotify, while a caller waits for names; empty: polled
+  std::recursive_mutex mutex_;  // callbacks run under it, which makes the promise of forget() true
+  Token next_ = 16;  // lower tokens: the watcher's own descriptors
   std::map<Token, Peer> peers_;
   std::map<Token, Names> nameCallbacks_;
-  bool polls_ = false;  // the timer runs
+  bool polls_ = false;  // whether the timer runs
   std::thread thread_;
 };
 

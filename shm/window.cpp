@@ -17,9 +17,9 @@
 namespace mpf {
 namespace {
 
-// What stands under a name that we want; nullopt when nothing does. Throws what to do about
-// anything that is no window.
-std::optional<Segment> openInTheWay(const std::string& name, layout::SegmentKind kind) try {
+// Opens the window that has the name that we want; nullopt if no file has this name. For any other
+// file throws an exception that says what to do.
+std::optional<Segment> openConflicting(const std::string& name, layout::SegmentKind kind) try {
   return Segment::tryOpen(name, kind, Segment::Access::readOnly);
 } catch (const std::system_error& error) {
   if (error.code().value() == EACCES)
@@ -32,10 +32,11 @@ std::optional<Segment> openInTheWay(const std::string& name, layout::SegmentKind
   throw SegmentError(fmt::format("{}: remove it if no program uses it", error.what()));
 }
 
-// Throws what keeps this process from a name; returns when that has gone or is about to go.
-//   reaperIsLate  until then, another process that removes a dead window is waited for
-void checkInTheWay(const std::string& name, layout::SegmentKind kind, Deadline reaperIsLate) {
-  const auto window = openInTheWay(name, kind);
+// Returns if the conflicting window of a name has disappeared or is about to be removed. Otherwise
+// throws an exception that says which process has the name.
+//   reaperIsLate  how long to wait for another process that removes a dead window
+void checkConflict(const std::string& name, layout::SegmentKind kind, Deadline reaperIsLate) {
+  const auto window = openConflicting(name, kind);
   if (!window) return;
   const auto& header = window->header();
   switch (segments::probeOwner(name, header.incarnation)) {
@@ -53,18 +54,19 @@ void checkInTheWay(const std::string& name, layout::SegmentKind kind, Deadline r
           ::faccessat(AT_FDCWD, segments::path(name).c_str(), W_OK, AT_EACCESS) == 0)
         return;
       throw SegmentError(
-          fmt::format("{}: left by a dead process of user {}, who must remove it; if somebody is "
-                      "about to, that process does not go on",
+          fmt::format("{}: left by a dead process of user {}; remove it as this user with "
+                      "`mpf clean`, or end the process that is stuck while it removes it",
                       segments::path(name), header.ownerUid));
   }
 }
 
-// Of a pipe: whoever may only read the hints must not take rings out of the pipe.
+// The mode of a FIFO. A process that may only read the hints must not read the FIFO: it would
+// consume rings.
 mode_t pipeMode(mode_t hints) {
   return 0600 | ((hints & 0020) != 0 ? 0060u : 0u) | ((hints & 0002) != 0 ? 0006u : 0u);
 }
 
-// The least rights that include both.
+// The smallest rights that include both.
 Rights joined(const Rights& now, Rights added) {
   constexpr auto kOwn = ~std::uint32_t{0};
   if (added.user == ::geteuid()) added.user = kOwn;
@@ -98,8 +100,9 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
       Segment::create(sizeof(layout::WindowHints), layout::SegmentKind::hints, backplane, rights);
   hints_.lockForLife();
   hints_.sharedHeader().ownerWindow = incarnation;
-  if (!hints_.tryPublish(SegmentName::keyed(backplane, NameKind::hints, incarnation)))
-    throw NameInUse("an incarnation number came twice");
+  const auto hintsName = SegmentName::keyed(backplane, NameKind::hints, incarnation);
+  if (!hints_.tryPublish(hintsName))
+    throw NameInUse(fmt::format("{}: duplicate incarnation number", segments::path(hintsName)));
   const auto fifo = SegmentName::keyed(backplane, NameKind::fifo, incarnation);
   try {
     fifo_ = doorbell::createFifo(fifo, pipeMode(rights.mode), rights.group);
@@ -114,14 +117,14 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
 }
 
 void OwnWindow::publish(const std::string& name) {
-  // Its owner may be dying, or another process may remove what it left. Both take microseconds,
-  // once they have a processor: on a busy host, a process that removes a window was without one for
-  // more than 50 ms.
+  // If the name is in use, its owner may be ending, or another process may be removing the window
+  // of a dead owner. Both need microseconds of processor time. On a busy host, though, a process
+  // that removed a window was seen to get no processor for more than 50 ms.
   const auto patience = Deadline::after(std::chrono::milliseconds(50));
   const auto reaperIsLate = Deadline::after(std::chrono::seconds(2));
   while (!window_.tryPublish(name)) {
     if (segments::removeIfOwnerless(name)) continue;
-    if (patience.hasPassed()) checkInTheWay(name, header().kind, reaperIsLate);
+    if (patience.hasPassed()) checkConflict(name, header().kind, reaperIsLate);
     ::sched_yield();
   }
 }
@@ -156,12 +159,13 @@ std::shared_ptr<PeerWindow> PeerWindow::tryOpen(const std::string& name, layout:
   if (window->bytes() < layout::kWindowBytes)
     throw SegmentError(fmt::format("{}: truncated", segments::path(name)));
   if (window->bytes() > layout::kWindowBytes)
-    throw SegmentError(
-        fmt::format("{}: {} bytes are no window", segments::path(name), window->bytes()));
+    throw SegmentError(fmt::format("{}: has {} bytes, but a window has {}", segments::path(name),
+                                   window->bytes(), layout::kWindowBytes));
   const auto parsed = SegmentName::tryParse(name);
-  if (!parsed) throw SegmentError(fmt::format("{}: no name of a window", segments::path(name)));
-  // Any peer may have written nonsense over their header; the window's, which it cannot write, is
-  // enough.
+  if (!parsed)
+    throw SegmentError(fmt::format("{}: not the name of a window", segments::path(name)));
+  // Any peer may have overwritten the header of the hints, so it is not checked. The header of the
+  // window, which peers cannot write, is sufficient.
   auto hints = Segment::tryOpenShared(
       SegmentName::keyed(parsed->backplane, NameKind::hints, window->header().incarnation),
       sizeof(layout::WindowHints));
@@ -180,23 +184,23 @@ void PeerWindow::notify(std::uint32_t index) noexcept {
   auto& hint = hints();
   index %= layout::kMaxLinks;
   const auto word = index / 64;
-  // PAIR(ready-bit): who sees the bit sees the news.
+  // PAIR(ready-bit): an owner that sees the bit sees the message or the change of state.
   hint.readyBits[word].fetch_or(std::uint64_t{1} << (index % 64), std::memory_order_release);
   MPF_STEP(ready_bit_set);
-  // PAIR(ready-word): who sees the word's bit sees the bit.
+  // PAIR(ready-word): an owner that sees the word's bit sees the ready bit.
   hint.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
   wakeIfAsleep();
 }
 
 void PeerWindow::knock(std::uint64_t incarnation) noexcept {
   auto& hint = hints();
-  // PAIR(knock): who sees the incarnation finds the link under its name.
+  // PAIR(knock): an owner that sees the incarnation finds the link under its name.
   const auto overwritten =
       hint.knocks[incarnation % layout::kKnocks].exchange(incarnation, std::memory_order_acq_rel);
   if (overwritten != 0 && overwritten != incarnation)
     hint.rescan.store(1, std::memory_order_relaxed);
   MPF_STEP(knock_placed);
-  // PAIR(knocked): who sees the new count finds the knock.
+  // PAIR(knocked): an owner that sees the new count finds the knock.
   hint.knocked.fetch_add(1, std::memory_order_release);
   MPF_STEP(knock_counted);
   wakeIfAsleep();
@@ -204,21 +208,21 @@ void PeerWindow::knock(std::uint64_t incarnation) noexcept {
 
 void PeerWindow::wakeIfAsleep() noexcept {
   MPF_STEP(peer_told);
-  // PAIR(sleep-fence): our news before, the owner's announcement after.
+  // PAIR(sleep-fence): our message is before the fence, our load of the owner's state after it.
   doorbell::fence();
-  // PAIR(sleep-number): before how it sleeps.
+  // PAIR(sleep-number): loaded before the owner's state.
   const auto number = control().sleepNumber.load(std::memory_order_acquire);
   const auto sleeping = control().sleeping.load(std::memory_order_relaxed);
   if (sleeping == layout::SleepState::awake) return;
-  // Who has been woken and has not run yet still looks asleep: one ring for each sleep is enough.
-  // It must be one of our own, which is complete; another process may be stopped in the middle of
-  // its. An owner that has gone to sleep anew meanwhile, and whose number we do not see yet, will
-  // see our news: its fence comes after ours.
+  // An owner that was woken but has not run yet still looks asleep. One ring for each sleep is
+  // enough. Only a ring of this process counts, because it is complete; another process may have
+  // been stopped in the middle of its ring. If the owner has announced another sleep, whose number
+  // we do not see yet, its fence comes after ours, so it sees our message before it sleeps.
   if (number != 0 && rungFor_.load(std::memory_order_relaxed) == number) return;
   if (tryRing(sleeping)) rungFor_.store(number, std::memory_order_relaxed);
 }
 
-// False: it was not rung, for lack of descriptors, say.
+// Returns false if the owner was not rung: for example because no descriptor is free.
 bool PeerWindow::tryRing(layout::SleepState sleeping) noexcept {
   if (sleeping == layout::SleepState::onFutex) {
     doorbell::ring(hints().bell);

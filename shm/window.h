@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Window: what a process exposes on the backplane, as a VME board exposed its dual-ported memory.
+// Window: the memory that a process exposes on the backplane, as a VME board exposed its
+// dual-ported memory.
 //
-//   OwnWindow    window segment (ours to write, locked for life) + hints segment + FIFO for event
-//                loops
-//   PeerWindow   the same of another process: window read-only, hints read-write
+//   OwnWindow    our window segment (written only by us, locked while we run), our hints segment
+//                and a FIFO for event loops
+//   PeerWindow   the window of another process, mapped read-only, and its hints, mapped read-write
 //
 // Threads  OwnWindow: one owner thread, but ring() may be called by any thread and by a signal
 //          handler. PeerWindow: any thread.
-// Crash    the kernel drops the lock; whoever needs the name removes what is left.
-// Trust    a peer can write hints only.
+// Crash    the kernel releases the lock. A process that needs the name, or attaches to the
+//          backplane, removes the files.
+// Trust    a peer can write only the hints.
 #pragma once
 
 #include <atomic>
@@ -27,9 +29,9 @@ namespace mpf {
 
 class OwnWindow {
  public:
-  // `describe` fills in name, location and geometry before anybody can see the window.
+  // `describe` fills in name, location and geometry before the window gets its name.
   //   name    file name of a server window; empty: a client window, named by its incarnation
-  //   throws  NameInUse, SegmentError when something that is no window has the name,
+  //   throws  NameInUse, SegmentError if a file that is not a usable window has the name,
   //           std::system_error
   OwnWindow(const std::string& backplane, layout::SegmentKind kind, const std::string& name,
             Rights rights, const std::function<void(layout::SegmentHeader&)>& describe);
@@ -48,14 +50,13 @@ class OwnWindow {
   [[nodiscard]] const FileDescriptor& fifo() const noexcept { return fifo_; }
   [[nodiscard]] const ForkGuard& forkGuard() const noexcept { return forkGuard_; }
 
-  // Whether somebody took its name away: who comes now does not find it.
+  // Whether another process has removed the name, so that new peers cannot find the window.
   [[nodiscard]] bool isNameless() const {
     return segments::probeOwner(window_.name(), header().incarnation) == segments::Owner::absent;
   }
 
-  // Lets the processes of a server write the hints and the pipe: those that have these rights to
-  // the link. Rights are only added; when no single user or group has them all, everybody gets
-  // them.
+  // Lets a server write the hints and the FIFO. `peers` are the rights of the link to this server.
+  // Rights are only added. If no single user or group covers all of them, every user gets them.
   //   throws  std::system_error when this process may not give a file to that group or user
   void admit(const Rights& peers);
 
@@ -75,7 +76,7 @@ class OwnWindow {
 
 class PeerWindow {
  public:
-  // nullptr when there is no such window (any more).
+  // Maps a window and its hints; nullptr if one of them does not exist (any more).
   //   throws  SegmentError, std::system_error
   static std::shared_ptr<PeerWindow> tryOpen(const std::string& name, layout::SegmentKind kind);
 
@@ -85,21 +86,21 @@ class PeerWindow {
   }
   [[nodiscard]] const std::string& name() const noexcept { return window_.name(); }
 
-  // Tells the owner that link `index` has news, and wakes it if it sleeps. The news must have been
-  // stored before.
+  // Notifies the owner that link `index` has a message or a change of state, and wakes it if it
+  // sleeps. The message or the change must have been stored before.
   void notify(std::uint32_t index) noexcept;
   // Asks the owner to accept link `incarnation`.
   void knock(std::uint64_t incarnation) noexcept;
-  // The next news rings, whatever was rung before: for who waits for long, and whose ring may have
-  // been taken by somebody else.
+  // Makes the next notification ring even if we have rung for this sleep already. For a caller that
+  // has waited long: another process may have consumed its ring.
   void forceNextRing() noexcept { rungFor_.store(0, std::memory_order_relaxed); }
 
-  // Set by the watcher once the owner is proven dead; stays.
+  // Set by the watcher when the owner is proven dead, and never reset.
   [[nodiscard]] bool isDead() const noexcept { return dead_.load(std::memory_order_relaxed); }
   void setDead() noexcept { dead_.store(true, std::memory_order_relaxed); }
-  // Whether somebody cut its files: what we see of it means nothing any more.
+  // Whether one of its files was truncated. Its contents are then meaningless.
   [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
-  // Asks the kernel: whether the owner is alive.
+  // Asks the kernel whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept { return window_.hasOwner(); }
   [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept {
@@ -117,7 +118,7 @@ class PeerWindow {
   std::string fifoName_;
   std::mutex fifoMutex_;
   FileDescriptor fifo_;  // opened when the owner first sleeps on its descriptor
-  // the number of the owner's sleep for which this process has rung last
+  // number of the owner's last sleep for which this process has rung
   std::atomic<std::uint64_t> rungFor_{0};
   std::atomic<bool> dead_{false};
 };

@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Backplane: the named meeting place of a set of processes on one host. A cheap handle; copies
-// share one watcher thread.
+// Backplane: the name by which processes on one host find each other. Clients find the servers of
+// their own backplane only.
 //
-// Threads  any.
-// Crash    attaching removes what dead processes left, after proof by their locks.
+//   auto backplane = mpf::Backplane::attach();  // MPF_BACKPLANE, or "default"
+//   mpf::MessageServer server(backplane, "echo");
+//
+// A backplane has no process and no file of its own: it consists of the segments in /dev/shm whose
+// names begin with "mpf.<backplane>.".
+//
+// A Backplane object is a handle: copies are cheap and share one watcher thread, which detects the
+// death of peers and starts when the first client or server needs it.
+//
+// Threads  any thread may use any copy.
+// Crash    attach() removes segments of dead processes. The kernel's locks prove that their owners
+//          are dead.
 #pragma once
 
 #include <cstdint>
@@ -17,28 +27,36 @@ class Watcher;  // internal
 
 class Backplane {
  public:
-  // The backplane `name`; empty: that of the environment variable MPF_BACKPLANE, or "default". It
-  // need not exist: a backplane is no more than the processes that use its name.
-  //   throws  std::invalid_argument for a name that cannot be one
+  // Attaches to the backplane `name`, and removes segments of dead processes. No other process
+  // needs to use this backplane yet.
+  //   name    1 to 39 of the characters A-Z a-z 0-9 _ -; empty: the environment variable
+  //           MPF_BACKPLANE, or "default" if that is not set
+  //   throws  std::invalid_argument if the name is invalid, std::system_error if /dev/shm cannot be
+  //           read or no file descriptor is free
   static Backplane attach(const std::string& name = {});
-  // The same, and removes nothing: for who wants to know what was left.
+  // As attach(), but removes nothing: for callers that only report.
   static Backplane named(const std::string& name);
-  // One with a name of its own, for tests.
+  // A backplane with a new, random name. For tests that must not meet other processes.
   static Backplane isolated();
 
   [[nodiscard]] const std::string& name() const noexcept;
+  // Internal: the watcher that all copies share.
   [[nodiscard]] Watcher& watcher() const noexcept;
 
-  // The location of servers that say nothing else: the environment variable MPF_LOCATION, or 0.
-  //   throws  std::invalid_argument when that is no integer
+  // The location of servers and clients that do not set one: the environment variable MPF_LOCATION,
+  // or 0 if that is not set.
+  //   throws  std::invalid_argument if MPF_LOCATION is not a 32-bit integer
   static std::int32_t defaultLocation();
 
-  // Removes every segment of this backplane whose owner is proven dead (shm/stale_segments.h).
-  // Returns their names.
+  // Removes every segment of this backplane whose owner is proven dead.
+  //   returns  the names of the removed files, without folder
+  //   throws   std::system_error if /dev/shm cannot be read
   std::vector<std::string> removeDead() const;
-  // Names of all segments of this backplane.
+  // Lists the files of this backplane, in no particular order and without folder.
+  //   throws  std::system_error if /dev/shm cannot be read
   [[nodiscard]] std::vector<std::string> segmentNames() const;
-  // Names of all backplanes that have segments on this host.
+  // Lists, sorted, the backplanes that have segments on this host.
+  //   throws  std::system_error if /dev/shm cannot be read
   static std::vector<std::string> names();
 
  private:

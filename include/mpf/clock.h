@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Clock: the host's monotonic time, the same in every process, unmoved by changes of the wall
-// clock.
+// Clock and Deadline: the host's monotonic time, and a point of it at which a wait ends.
+//
+//   const auto deadline = Deadline::after(std::chrono::milliseconds(100));
+//   while (!hasReply() && !deadline.hasPassed()) wait(deadline.left());
+//
+// The monotonic time is the same in all processes of one host. Changes of the wall clock do not
+// move it. It does not count the time while the host is suspended.
+//
+// Threads  any. All functions are noexcept and do not allocate.
 #pragma once
 
 #include <time.h>
@@ -11,10 +18,12 @@
 
 namespace mpf {
 
+// The unit of all durations of the public API; other units of std::chrono convert implicitly.
 using Nanoseconds = std::chrono::nanoseconds;
 
+// The source of all times that processes exchange: deadlines of requests, times of progress.
 struct Clock {
-  // CLOCK_MONOTONIC in nanoseconds; about 20 ns a call.
+  // The current CLOCK_MONOTONIC [ns]. A call takes about 20 ns.
   [[nodiscard]] static std::int64_t nowNs() noexcept {
     timespec now{};
     ::clock_gettime(CLOCK_MONOTONIC, &now);
@@ -22,28 +31,37 @@ struct Clock {
   }
 };
 
-// A point in time after which a wait gives up. `never()` waits for ever, `at once` is a deadline
-// that has passed.
+// The time at which a wait ends without a result. A small value: copy it freely. A deadline that
+// has passed already makes a wait look once and return. Deadlines compare by time; never() is later
+// than all others.
 class Deadline {
  public:
+  // A deadline that never passes.
   [[nodiscard]] static Deadline never() noexcept { return Deadline(kNever); }
+  // A deadline `wait` from now; never() if that time cannot be represented. If `wait` is zero or
+  // negative, the deadline has passed already.
   [[nodiscard]] static Deadline after(Nanoseconds wait) noexcept {
     const auto now = Clock::nowNs();
     return wait.count() >= kNever - now ? never() : Deadline(now + wait.count());
   }
+  // A deadline at this CLOCK_MONOTONIC [ns]. Processes of one host may exchange such times.
   [[nodiscard]] static Deadline atNs(std::int64_t monotonicNs) noexcept {
     return Deadline(monotonicNs);
   }
 
+  // Whether it was made by never(), or by after() with a wait that cannot be represented.
   [[nodiscard]] bool isNever() const noexcept { return ns_ == kNever; }
+  // Reads the clock, unless this is never().
   [[nodiscard]] bool hasPassed() const noexcept { return !isNever() && Clock::nowNs() >= ns_; }
+  // CLOCK_MONOTONIC [ns] of the deadline; INT64_MAX for never().
   [[nodiscard]] std::int64_t ns() const noexcept { return ns_; }
-  // What is left, never negative.
+  // The remaining time: zero if the deadline has passed, Nanoseconds::max() for never().
   [[nodiscard]] Nanoseconds left() const noexcept {
     if (isNever()) return Nanoseconds::max();
     const auto left = ns_ - Clock::nowNs();
     return Nanoseconds(left > 0 ? left : 0);
   }
+  // The earlier deadline is the smaller one: std::min(a, b) passes first.
   friend auto operator<=>(const Deadline&, const Deadline&) = default;
 
  private:

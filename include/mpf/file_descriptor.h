@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: MIT
-// FileDescriptor: owns one open file and closes it.
+// FileDescriptor: owns one open file and closes it. Movable, not copyable.
+//
+//   mpf::FileDescriptor file(::open(path, O_RDONLY | O_CLOEXEC));
+//   if (!file) ...  // errno says why
+//
+// Threads  one at a time.
 #pragma once
 
 #include <unistd.h>
@@ -10,8 +15,12 @@ namespace mpf {
 
 class FileDescriptor {
  public:
+  // Owns no file.
   FileDescriptor() noexcept = default;
+  // Becomes the owner of `fd`. A negative value, such as the result of a failed open(2), means no
+  // file.
   explicit FileDescriptor(int fd) noexcept : fd_(fd) {}
+  // After a move, `other` owns no file.
   FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   FileDescriptor& operator=(FileDescriptor&& other) noexcept {
     if (this != &other) reset(std::exchange(other.fd_, -1));
@@ -19,9 +28,13 @@ class FileDescriptor {
   }
   ~FileDescriptor() { reset(); }
 
+  // The number of the file, which this object still owns; negative if it owns none.
   [[nodiscard]] int get() const noexcept { return fd_; }
+  // Whether it owns a file.
   explicit operator bool() const noexcept { return fd_ >= 0; }
+  // Returns the number of the file without closing it: the caller is now its owner.
   [[nodiscard]] int release() noexcept { return std::exchange(fd_, -1); }
+  // Closes the file, if there is one, and becomes the owner of `fd`. Ignores errors of close(2).
   void reset(int fd = -1) noexcept {
     if (fd_ >= 0) ::close(fd_);
     fd_ = fd;

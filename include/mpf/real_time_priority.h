@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RealTimePriority: lets the calling thread run before all ordinary threads (SCHED_FIFO), while it
-// sleeps most of the time.
+// RealTimePriority: lets the calling thread run before all ordinary threads (SCHED_FIFO), as long
+// as it sleeps most of the time.
 //
 //   RealTimePriority priority(kInterruptPriority);
 //   while (...) {
@@ -9,11 +9,13 @@
 //     priority.check();
 //   }
 //
-//   ordinary ──► real time ── more than half of the last 50 ms on a processor ──► ordinary for 1 s ──► real time
+//   ordinary ──► real time ── more than half of the last 50 ms on a processor ──┐
+//                    ▲                                                          ▼
+//                    └──────────────────────────────────────────────── ordinary for 1 s
 //
-// A real-time thread that never sleeps would starve the machine, above all when the thing that it
-// waits for needs the same processor. check() therefore takes the priority away from a thread that
-// uses too much time, and gives it back later.
+// A real-time thread that never sleeps would starve all other threads, even the one whose result
+// it waits for, if both need the same processor. Therefore check() removes the priority of a thread
+// that uses too much processor time, and restores it one second later.
 //
 // Threads  one: the thread that constructs the object.
 // Crash    the kernel ends the priority with the thread. Threads and processes that the thread
@@ -24,25 +26,29 @@
 
 namespace mpf {
 
-// For threads that serve interrupts: above ordinary threads, below the kernel's interrupt threads,
-// which have 50.
+// The priority of threads that serve interrupts: above all ordinary threads, below the kernel's
+// interrupt threads, which have priority 50.
 inline constexpr int kInterruptPriority = 20;
 
 class RealTimePriority {
  public:
-  // Takes the priority if this process may have it (CAP_SYS_NICE or RLIMIT_RTPRIO); otherwise
-  // nothing changes.
-  //   priority  1 to 99; 0: leave the thread as it is
+  // Sets the priority of the calling thread, if this process has the permission (CAP_SYS_NICE or
+  // RLIMIT_RTPRIO). Otherwise the thread stays ordinary; isHeld() reports which. The thread keeps
+  // the priority when the object is destroyed.
+  //   priority  SCHED_FIFO priority, 1 to 99; 0 leaves the thread unchanged
   explicit RealTimePriority(int priority) noexcept;
   RealTimePriority(const RealTimePriority&) = delete;
   RealTimePriority& operator=(const RealTimePriority&) = delete;
 
-  // Call it at least once between two waits. Takes some ten nanoseconds.
+  // Measures the thread's processor time, and removes or restores the priority. Call it at least
+  // once between two waits, in the thread that constructed the object. A call takes some tens of
+  // nanoseconds.
   void check() noexcept;
+  // Whether the thread has the priority now.
   [[nodiscard]] bool isHeld() const noexcept { return isHeld_; }
 
-  // Whether a thread of this process may have that priority now. Starts a thread and waits for its
-  // end.
+  // Whether this process has the permission for this priority (1 to 99). Starts a thread, which
+  // tries it, and waits until that thread has ended; false also if no thread can be started.
   [[nodiscard]] static bool isAllowed(int priority);
 
  private:
@@ -51,9 +57,9 @@ class RealTimePriority {
 
   int priority_;
   bool isHeld_ = false;
-  std::int64_t windowBeginNs_ = 0;  // of the time in which the use of the processor is measured
-  std::int64_t usedBeforeNs_ = 0;  // processor time of this thread at the beginning of the window
-  std::int64_t takeAgainNs_ = 0;  // when it is not held
+  std::int64_t windowBeginNs_ = 0;  // start of the current measurement
+  std::int64_t usedBeforeNs_ = 0;  // processor time of this thread at that start
+  std::int64_t takeAgainNs_ = 0;  // while the priority is not held: when check() restores it
 };
 
 }  // namespace mpf

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Rights: which users may open what a process creates in shared memory.
+// Rights: which users may open the segments that a process creates in shared memory.
+//
+//   {}                            the user of this process
+//   {.mode = 0660, .group = gid}  and all members of the group `gid`
+//   {.mode = 0666}                every user of the host
+//
+// A peer needs read and write permission. Without it, the peer cannot connect.
 #pragma once
 
 #include <sys/types.h>
@@ -8,11 +14,10 @@
 
 namespace mpf {
 
-// The default is the creator alone. Mode 0660 with a group admits the members of the group.
-//
-//   mode   as of chmod(2); a peer needs read and write permission
-//   group  ~0: the group of the process
-//   user   ~0: the user of the process; only root may name another one
+//   mode   permission bits, as for chmod(2): the read and write bits of user, group and others
+//   group  number of the group that gets the segments; ~0: the group of the process
+//   user   number of the user that gets them; ~0: the user of the process. Only root may give a
+//          segment to another user
 struct Rights {
   mode_t mode = 0600;
   std::uint32_t group = ~std::uint32_t{0};

@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: MIT
-// WaitMode: how a process waits for the next message.
+// WaitMode: how a client or a server waits for the next message. Each process chooses for itself;
+// its peers wake it in the way that it needs.
 #pragma once
 
 #include <cstdint>
 
 namespace mpf {
 
-// The numbers are those of the shared memory.
+// The numbers are part of the layout of the shared memory.
 enum class WaitMode : std::uint32_t {
-  spin = 0,      // polls: the shortest latency, and one CPU is always busy
-  adaptive = 1,  // polls for a few microseconds, then sleeps: the default
-  block = 2,     // sleeps at once: no CPU time while idle, some tens of microseconds to wake up
+  // Polls until a message is there: the shortest latency; one processor is always busy.
+  spin = 0,
+  // The default. Polls for about twice as long as a wake-up has cost lately, then sleeps.
+  adaptive = 1,
+  // Sleeps at once: uses no processor time while idle; a wake-up takes some tens of microseconds.
+  block = 2,
 };
 
 }  // namespace mpf

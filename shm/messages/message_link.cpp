@@ -36,8 +36,8 @@ void MessageLink::discard(const Envelope& envelope) noexcept {
       const std::lock_guard guard(*lock_);
       if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
     }
-  } catch (
-      const ChunkUnavailable&) {  // NOLINT(bugprone-empty-catch): and so it has been given back
+    // NOLINTNEXTLINE(bugprone-empty-catch): tryChunk() has returned the chunk to the peer
+  } catch (const ChunkUnavailable&) {
   }
   link_->end();
 }
@@ -50,8 +50,8 @@ LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message,
     static_cast<void>(message.releaseBody());
     if (ours) endLending();
   } else if (result == LinkSend::sent && ours) {
-    // Copied into the ring: the chunk is free again. Here, because takeBack() would want the lock
-    // that the caller holds.
+    // The body was copied into the ring, so the chunk is free. Released here, because takeBack()
+    // would lock the lock that the caller holds already.
     const auto body = message.releaseBody();
     link_->release(body.data);
     endLending();
@@ -73,7 +73,7 @@ BodyBytes MessageLink::allocate(std::size_t bytes) {
 }
 
 void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {
-  std::shared_ptr<MessageLink> last;  // dies after the guard, and may take this object along
+  std::shared_ptr<MessageLink> last;  // destroyed after the guard; may destroy this object
   const auto lock = lock_;
   const std::lock_guard guard(*lock);
   link_->release(data);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// MessageLink: messages over a link. What both ends share: taking a Message out of the ring,
-// putting one in, lending pool memory.
+// MessageLink: messages over a link, for client and server: takes a Message out of the ring, sends
+// one, and lends pool memory to bodies.
 //
-// Threads  one thread takes. trySend, alloc and the return of bodies: any thread, under a lock that
-//          the owner gives.
-// Crash    a body stays readable for as long as its handle lives, whatever became of the peer.
-// Trust    a body that does not fit its envelope is nonsense; the owner then closes the link.
+// Threads  one thread takes messages. Sending, allocation and the return of bodies: any thread,
+//          under the lock that the owner provides.
+// Crash    a body stays readable as long as its handle exists, even if the peer has ended.
+// Trust    a body that does not fit its envelope is invalid data; the owner then closes the link.
 #pragma once
 
 #include <memory>
@@ -27,8 +27,8 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] SpinLock& lock() noexcept { return *lock_; }
 
   enum class Take { nothing, message, invalid };
-  // Begins the next message: its envelope is copied and it counts as taken. `nothing` changes
-  // nothing.
+  // Begins the next message: copies its envelope and counts it as taken. Returns `nothing`, and
+  // changes nothing, if there is no message; `invalid` if the envelope is invalid.
   Take tryBegin(Envelope& envelope) noexcept {
     if (!link_->hasMessage()) return Take::nothing;
     envelope = link_->begin();
@@ -38,11 +38,11 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
                ? Take::message
                : Take::invalid;
   }
-  // `unavailable`: the memory of the body went with its owner, or cannot be had now. The message is
-  // lost, and the link is sound.
+  // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
+  // has ended or memory is short; the message is lost, but the link is sound.
   enum class Finish { message, invalid, unavailable };
-  // The body of the message begun into `message`, then done with its slots. `message` is empty when
-  // there is none.
+  // Moves the body of the message begun into `message`, and frees the slots. `message` is empty
+  // unless the result is `message`.
   [[nodiscard]] Finish tryFinish(const Envelope& envelope, Message& message) noexcept {
     auto finish = Finish::message;
     if ((envelope.flags & layout::kSlotChunk) == 0 &&
@@ -59,29 +59,30 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
     message.setClientExtra(envelope.clientExtra);
     return finish;
   }
-  // Done with the message begun without looking at its body; a chunk goes back.
+  // Ends the message begun without reading its body; returns its chunk, if it has one.
   void discard(const Envelope& envelope) noexcept;
 
-  // Sends. Afterwards `message` has no body of this link any more; what is left of it the caller
-  // destroys without the lock, which the return of a body would want. When it was not sent,
-  // `message` is as it was. The caller holds lock().
+  // Sends `message`. The caller holds lock(). After a successful send, `message` has no body of
+  // this link; the caller destroys it after it has released the lock, because the return of a body
+  // of another link may need that lock. If the message was not sent, `message` is unchanged.
   LinkSend trySendLocked(Envelope& envelope, Message& message, const Link::Limits& limits) noexcept;
 
-  // Memory of this link to build a body in; the heap's when the link has none for it.
+  // Allocates a body in the pool of this link, or on the heap if the body is short or the pool has
+  // no chunk for it.
   //   throws  std::bad_alloc
   BodyBytes allocate(std::size_t bytes);
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
-  // Of a message that is more than one slot can hold.
+  // For a message that does not fit into one slot.
   Finish readBody(const Envelope& envelope, Message& message) noexcept;
   void lendOne() noexcept;
   void endLending() noexcept;
 
   std::unique_ptr<Link> link_;
   std::shared_ptr<SpinLock> lock_;
-  std::uint32_t lent_ = 0;  // bodies out; under lock_
-  std::shared_ptr<MessageLink> self_;  // while bodies are out; under lock_
+  std::uint32_t lent_ = 0;  // bodies that have not been returned; under lock_
+  std::shared_ptr<MessageLink> self_;  // set while lent_ is not 0; under lock_
 };
 
 }  // namespace mpf

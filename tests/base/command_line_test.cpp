@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all programs do alike with their arguments: what is said, where, and with which exit status.
+// The command line of all programs: messages, where they are printed, and exit statuses.
 #include "base/command_line.h"
 
 #include <CLI/CLI.hpp>
@@ -46,7 +46,7 @@ class CommandLine : public testing::Test {
   double speed_ = 0;
 };
 
-TEST_F(CommandLine, ThatIsRightIsTakenInSilence) {
+TEST_F(CommandLine, AcceptsValidArgumentsWithoutOutput) {
   const auto outcome =
       parse({"--count", "10", "--more", "18446744073709551615", "--speed", "1e-3"});
 
@@ -57,7 +57,7 @@ TEST_F(CommandLine, ThatIsRightIsTakenInSilence) {
   EXPECT_THAT(outcome.out + outcome.err, IsEmpty());
 }
 
-TEST_F(CommandLine, HelpAndVersionGoToStdout) {
+TEST_F(CommandLine, PrintsHelpAndVersionToStdout) {
   const auto help = parse({"--help"});
   EXPECT_EQ(help.status, 0);
   EXPECT_THAT(help.out, StartsWith("mpf-x - what it is for"));
@@ -70,7 +70,7 @@ TEST_F(CommandLine, HelpAndVersionGoToStdout) {
   EXPECT_THAT(version.err, IsEmpty());
 }
 
-TEST_F(CommandLine, ThatIsWrongIsNamedOnStderrAndEndsWith2) {
+TEST_F(CommandLine, ReportsInvalidArgumentsOnStderrWithStatus2) {
   const std::vector<std::pair<std::vector<const char*>, std::string>> wrong{
       {{"--count", "0"}, "--count: 0 is out of range: use 1 to 10"},
       {{"--count", "-1"}, "--count: -1 is out of range: use 1 to 10"},
@@ -93,7 +93,7 @@ TEST_F(CommandLine, ThatIsWrongIsNamedOnStderrAndEndsWith2) {
   }
 }
 
-TEST_F(CommandLine, OfASubcommandNamesIt) {
+TEST_F(CommandLine, NamesTheSubcommandInItsMessages) {
   CLI::App app("mpf-y - what it is for", "mpf-y");
   auto* const one = app.add_subcommand("one", "The first");
   one->add_option("--count", count_, "How many")->check(wholeNumber(1, 10));

@@ -6,7 +6,7 @@
 namespace mpf {
 namespace {
 
-TEST(LatencyRecorder, TellsNothingOfNothing) {
+TEST(LatencyRecorder, ReturnsZerosWithoutSamples) {
   const LatencyRecorder recorder;
 
   EXPECT_EQ(recorder.count(), 0u);
@@ -28,8 +28,8 @@ TEST(LatencyRecorder, IsExactBelow256Nanoseconds) {
   EXPECT_EQ(recorder.meanNs(), 100.5);
 }
 
-// One slow message in a thousand shows in p99.9's successor, the maximum, and nowhere below.
-TEST(LatencyRecorder, KeepsTheOutlierApart) {
+// One slow message in a thousand is visible in the maximum, and not in p99.9 or below.
+TEST(LatencyRecorder, ShowsASingleOutlierOnlyInTheMaximum) {
   LatencyRecorder recorder;
 
   for (int i = 0; i < 999; ++i) recorder.add(70);
@@ -41,11 +41,11 @@ TEST(LatencyRecorder, KeepsTheOutlierApart) {
   EXPECT_EQ(recorder.maxNs(), 12'345'678u);
 }
 
-TEST(LatencyRecorder, ErrsByLessThanAHundredthAtAnySize) {
+TEST(LatencyRecorder, HasAnErrorBelowOnePercentForAllDurations) {
   for (std::uint64_t ns = 1; ns < 100'000'000'000; ns = ns * 9 / 8 + 1) {
     LatencyRecorder recorder;
     recorder.add(ns);
-    recorder.add(ns * 10);  // so that the maximum does not cap the answer
+    recorder.add(ns * 10);  // so that the maximum does not limit the result
 
     const auto told = recorder.percentileNs(50);
 
@@ -54,7 +54,7 @@ TEST(LatencyRecorder, ErrsByLessThanAHundredthAtAnySize) {
   }
 }
 
-TEST(LatencyRecorder, TakesWhatIsLongerThanItsLastBucket) {
+TEST(LatencyRecorder, CountsDurationsBeyondTheLastBucket) {
   LatencyRecorder recorder;
 
   recorder.add(UINT64_MAX / 2);
@@ -63,7 +63,7 @@ TEST(LatencyRecorder, TakesWhatIsLongerThanItsLastBucket) {
   EXPECT_GT(recorder.percentileNs(50), 1'000'000'000'000u / 2);
 }
 
-TEST(LatencyRecorder, AddsAnother) {
+TEST(LatencyRecorder, AddsAnotherRecorder) {
   LatencyRecorder one;
   LatencyRecorder other;
   one.add(10);

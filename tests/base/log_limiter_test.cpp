@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Storms of log lines: which lines are written, and that the counts add up. The test is the clock.
+// Repeated log lines: which lines are written, and that the counts add up. The tests set the time.
 #include "base/log_limiter.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ class LogLimiterTest : public testing::Test {
   bool admit(const std::string& text, const LogLimiter::Kind& kind = kKind, int level = 1) {
     return limiter_.admit(kind, level, text, nowNs_);
   }
-  // Uses up the lines of one kind that are written at once.
+  // Admits as many lines of one kind as are written at once.
   void useUp(const LogLimiter::Kind& kind = kKind) {
     for (auto i = LogLimiter::kAtOnce; i != 0; --i) EXPECT_TRUE(admit("first", kind)) << i;
   }
@@ -35,7 +35,7 @@ class LogLimiterTest : public testing::Test {
   std::int64_t nowNs_ = 1'000'000'000'000;
 };
 
-TEST_F(LogLimiterTest, WritesSomeLinesAtOnceAndHoldsTheRest) {
+TEST_F(LogLimiterTest, WritesTheFirstLinesAtOnceAndHoldsTheRest) {
   useUp();
 
   EXPECT_FALSE(admit("one more"));
@@ -45,7 +45,7 @@ TEST_F(LogLimiterTest, WritesSomeLinesAtOnceAndHoldsTheRest) {
   EXPECT_LE(limiter_.dueNs(), nowNs_ + kEveryNs);
 }
 
-TEST_F(LogLimiterTest, CountsLinesThatAreAlike) {
+TEST_F(LogLimiterTest, CountsHeldLinesWithTheSameText) {
   useUp();
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("status -1"));
   nowNs_ += kEveryNs;
@@ -55,7 +55,7 @@ TEST_F(LogLimiterTest, CountsLinesThatAreAlike) {
   EXPECT_EQ(limiter_.dueNs(), INT64_MAX);
 }
 
-TEST_F(LogLimiterTest, KeepsTheLastOfLinesThatDiffer) {
+TEST_F(LogLimiterTest, KeepsTheLastOfHeldLinesThatDiffer) {
   useUp();
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(admit("request " + std::to_string(i)));
   nowNs_ += kEveryNs;
@@ -64,7 +64,7 @@ TEST_F(LogLimiterTest, KeepsTheLastOfLinesThatDiffer) {
               ElementsAre("request 999 (the last of 1000 such lines in 10.0 s)"));
 }
 
-TEST_F(LogLimiterTest, WritesASingleHeldLineAsItIs) {
+TEST_F(LogLimiterTest, WritesASingleHeldLineUnchanged) {
   useUp();
   EXPECT_FALSE(admit("late", kKind, 3));
   nowNs_ += kEveryNs;
@@ -76,7 +76,7 @@ TEST_F(LogLimiterTest, WritesASingleHeldLineAsItIs) {
   EXPECT_EQ(due[0].level, 3);
 }
 
-TEST_F(LogLimiterTest, HoldsNothingBackAtTheEnd) {
+TEST_F(LogLimiterTest, ReturnsAllHeldLinesAtTheEnd) {
   useUp();
   EXPECT_FALSE(admit("last words"));
 
@@ -85,7 +85,7 @@ TEST_F(LogLimiterTest, HoldsNothingBackAtTheEnd) {
   EXPECT_THAT(texts(limiter_.takeAll(nowNs_)), IsEmpty());
 }
 
-TEST_F(LogLimiterTest, LimitsEachKindByItself) {
+TEST_F(LogLimiterTest, LimitsEachKindSeparately) {
   useUp();
   EXPECT_FALSE(admit("one more"));
 
@@ -94,8 +94,8 @@ TEST_F(LogLimiterTest, LimitsEachKindByItself) {
   useUp({"file.cpp", 10, 1});
 }
 
-// A line never overtakes those of its kind that are held.
-TEST_F(LogLimiterTest, HoldsALineBehindHeldOnes) {
+// A line is never written before held lines of its kind.
+TEST_F(LogLimiterTest, HoldsALineWhileEarlierLinesOfItsKindAreHeld) {
   useUp();
   EXPECT_FALSE(admit("second"));
   nowNs_ += kEveryNs;
@@ -106,7 +106,7 @@ TEST_F(LogLimiterTest, HoldsALineBehindHeldOnes) {
               ElementsAre("third (the last of 2 such lines in 10.0 s)"));
 }
 
-TEST_F(LogLimiterTest, GivesAKindItsLinesBackWithTime) {
+TEST_F(LogLimiterTest, LetsAKindWriteAgainAfterSomeTime) {
   useUp();
   nowNs_ += 3 * kEveryNs;
 
@@ -117,8 +117,8 @@ TEST_F(LogLimiterTest, GivesAKindItsLinesBackWithTime) {
   useUp();
 }
 
-// A storm of a day, with pauses: few lines, and no line is missing from the counts.
-TEST_F(LogLimiterTest, WritesFewLinesOfALongStormAndLosesNone) {
+// A day of repeated lines, with pauses: few lines are written, and the counts include all lines.
+TEST_F(LogLimiterTest, WritesFewOfManyLinesAndCountsAll) {
   const auto seed = std::random_device{}();
   SCOPED_TRACE(seed);
   std::minstd_rand random(seed);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files in which no failed write goes unnoticed.
+// OutputFile: its contents, and its errors.
 #include "base/output_file.h"
 
 #include <filesystem>
@@ -20,7 +20,7 @@ std::string textOf(const std::string& path) {
   return text.str();
 }
 
-// What a call says that throws std::system_error; empty when it does not.
+// The text of the std::system_error that a call throws; empty if it throws none.
 template <class Call>
 std::string errorOf(Call call) try {
   call();
@@ -29,7 +29,7 @@ std::string errorOf(Call call) try {
   return error.what();
 }
 
-TEST(OutputFile, ReplacesWhatTheFileHeldWithTheFirstWrite) {
+TEST(OutputFile, ReplacesTheOldContentsAtTheFirstWrite) {
   const test::TemporaryFolder folder;
   const auto path = folder.write("x", "old and longer");
 
@@ -42,7 +42,7 @@ TEST(OutputFile, ReplacesWhatTheFileHeldWithTheFirstWrite) {
   EXPECT_EQ(textOf(path), "new text");
 }
 
-TEST(OutputFile, WithoutAWriteIsEmptyOnceItIsClosed) {
+TEST(OutputFile, IsEmptyAfterCloseWithoutAWrite) {
   const test::TemporaryFolder folder;
   const auto path = folder.write("x", "old");
 
@@ -51,7 +51,7 @@ TEST(OutputFile, WithoutAWriteIsEmptyOnceItIsClosed) {
   EXPECT_EQ(textOf(path), "");
 }
 
-TEST(OutputFile, SaysBeforeTheWorkThatItCannotBeWritten) {
+TEST(OutputFile, ThrowsAtConstructionIfItCannotBeWritten) {
   const test::TemporaryFolder folder;
 
   EXPECT_EQ(errorOf([] { OutputFile("/dev/full"); }), "write /dev/full: No space left on device");

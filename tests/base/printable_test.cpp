@@ -7,7 +7,7 @@
 namespace mpf {
 namespace {
 
-TEST(Printable, LeavesTextAsItIs) {
+TEST(Printable, LeavesPrintableTextUnchanged) {
   for (const std::string text : {"", "dac", "Ofen-Süd °C", "電圧", "\U0001F525", "a\\b \"c\" ~"})
     EXPECT_EQ(printable(text), text);
 }
@@ -16,7 +16,7 @@ TEST(Printable, EscapesControlCharacters) {
   EXPECT_EQ(printable("a\x1b[2Jb"), "a\\x1b[2Jb");
   EXPECT_EQ(printable("a\r\n\tb\x7f"), "a\\r\\n\\tb\\x7f");
   EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a\\x00b");
-  EXPECT_EQ(printable("a\u009bb"), "a\\u009bb");  // some terminals take it for ESC [
+  EXPECT_EQ(printable("a\u009bb"), "a\\u009bb");  // some terminals interpret it as ESC [
 }
 
 TEST(Printable, EscapesBidirectionalAndInvisibleCharacters) {
@@ -39,9 +39,11 @@ TEST(Printable, EscapesEachByteThatIsNotUtf8) {
   EXPECT_EQ(printable("\x80\xff"), "\\x80\\xff");
 }
 
-TEST(Printable, OfLinesKeepsTheirEnds) { EXPECT_EQ(printableLines("a\r\nb\n"), "a\\r\nb\n"); }
+TEST(Printable, KeepsLineEndsInPrintableLines) {
+  EXPECT_EQ(printableLines("a\r\nb\n"), "a\\r\nb\n");
+}
 
-TEST(Printable, OfADocumentIsWhatItWasToAProgram) {
+TEST(Printable, KeepsTheMeaningOfAJsonDocument) {
   EXPECT_EQ(printableJson("{\n \"a\": \"b\u202e\x7f\u00fc\"\n}"),
             "{\n \"a\": \"b\\u202e\\u007f\u00fc\"\n}");
   EXPECT_EQ(printableJson("\"\U000e0041\""), "\"\\udb40\\udc41\"");

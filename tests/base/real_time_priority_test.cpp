@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// These tests need a user who may have real-time priority; others skip them.
+// RealTimePriority and InheritingMutex. Most tests need the permission for real-time priority, and
+// are skipped without it.
 #include <mpf/real_time_priority.h>
 
 #include <sched.h>
@@ -25,7 +26,7 @@ class RealTimePriorityTest : public testing::Test {
   }
 };
 
-TEST_F(RealTimePriorityTest, IsThatOfTheThreadAlone) {
+TEST_F(RealTimePriorityTest, AppliesOnlyToTheThreadItself) {
   std::thread([] {
     const RealTimePriority priority(kPriority);
     EXPECT_TRUE(priority.isHeld());
@@ -38,7 +39,7 @@ TEST_F(RealTimePriorityTest, IsThatOfTheThreadAlone) {
   EXPECT_EQ(policyOfThisThread(), SCHED_OTHER);
 }
 
-TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadAsItIs) {
+TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadUnchanged) {
   std::thread([] {
     RealTimePriority priority(0);
     priority.check();
@@ -47,8 +48,8 @@ TEST_F(RealTimePriorityTest, ZeroLeavesTheThreadAsItIs) {
   }).join();
 }
 
-// Or it would starve the machine.
-TEST_F(RealTimePriorityTest, IsTakenFromAThreadThatNeverSleepsAndGivenBack) {
+// Otherwise this thread would starve all other threads.
+TEST_F(RealTimePriorityTest, IsRemovedFromAThreadThatNeverSleepsAndRestored) {
   std::thread([] {
     RealTimePriority priority(kPriority);
     while (priority.isHeld()) priority.check();
@@ -59,7 +60,7 @@ TEST_F(RealTimePriorityTest, IsTakenFromAThreadThatNeverSleepsAndGivenBack) {
   }).join();
 }
 
-TEST(InheritingMutexTest, LetsOneInAtATime) {
+TEST(InheritingMutexTest, AdmitsOneThreadAtATime) {
   InheritingMutex mutex;
   int count = 0;
   const auto work = [&] {

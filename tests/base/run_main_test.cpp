@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every main() does around its work, in a child process whose descriptors are closed or full.
+// runMain(), in a child process whose standard descriptors are closed or full.
 #include "base/run_main.h"
 
 #include <fcntl.h>
@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kGood = 42;
 
-// How a child ends that does `act`: its exit status, minus the signal that ended it.
+// Runs `act` in a child. Returns its exit status, or minus the signal that killed it.
 int endOf(const std::function<int()>& act) {
   std::fflush(nullptr);
   const auto child = checkCall(::fork(), "fork");
@@ -49,7 +49,7 @@ void closeAll(unsigned subset) {
 
 void redirect(int descriptor, const char* path) { ::dup2(::open(path, O_WRONLY), descriptor); }
 
-// What is written to stderr.
+// Captures stderr.
 class Errors {
  public:
   Errors() : file_(::memfd_create("stderr", MFD_CLOEXEC)) {}
@@ -64,7 +64,7 @@ class Errors {
   FileDescriptor file_;
 };
 
-TEST(RunMain, OpensWhichEverStandardDescriptorsAreClosed) {
+TEST(RunMain, OpensTheStandardDescriptorsThatAreClosed) {
   for (unsigned subset = 0; subset < 8; ++subset) {
     const auto end = endOf([&] {
       closeAll(subset);
@@ -80,7 +80,7 @@ TEST(RunMain, OpensWhichEverStandardDescriptorsAreClosed) {
   }
 }
 
-TEST(RunMain, LeavesOpenDescriptorsAlone) {
+TEST(RunMain, LeavesOpenDescriptorsUnchanged) {
   const auto end = endOf([] {
     redirect(STDOUT_FILENO, "/dev/zero");
     return runMain("x", [] { return isNull(STDOUT_FILENO) ? 1 : kGood; });
@@ -89,7 +89,7 @@ TEST(RunMain, LeavesOpenDescriptorsAlone) {
   EXPECT_EQ(end, kGood);
 }
 
-TEST(RunMain, AnExceptionIsALineAndAStatus) {
+TEST(RunMain, ReportsAnExceptionAsOneLineAndAStatus) {
   const Errors errors;
 
   const auto failed = endOf([&] {
@@ -103,10 +103,10 @@ TEST(RunMain, AnExceptionIsALineAndAStatus) {
   EXPECT_EQ(failed, kExitFailed);
   EXPECT_EQ(wrong, kExitUsage);
   EXPECT_EQ(unknown, kExitFailed);
-  EXPECT_EQ(errors.text(), "x: bad \\x1b[2J\nx: odd\nx: failed for a reason that is not known\n");
+  EXPECT_EQ(errors.text(), "x: bad \\x1b[2J\nx: odd\nx: failed with an unknown exception\n");
 }
 
-TEST(RunMain, ToReportAnErrorNeverFails) {
+TEST(RunMain, ReturnsTheStatusEvenIfStderrCannotBeWritten) {
   const auto fail = [] {
     return runMain("x", []() -> int { throw std::invalid_argument("odd"); });
   };
@@ -116,7 +116,7 @@ TEST(RunMain, ToReportAnErrorNeverFails) {
   EXPECT_EQ(endOf([&] { return redirect(STDERR_FILENO, "/dev/null"), fail(); }), kExitUsage);
 }
 
-TEST(RunMain, OutputThatCannotBeWrittenIsAFailure) {
+TEST(RunMain, FailsIfOutputCannotBeWritten) {
   const Errors errors;
 
   const auto end = endOf([&] {
@@ -131,7 +131,7 @@ TEST(RunMain, OutputThatCannotBeWrittenIsAFailure) {
             "x: standard output: not everything could be written: No space left on device\n");
 }
 
-TEST(CloseDescriptor, KeepsAStandardNumberInUse) {
+TEST(CloseDescriptor, KeepsAStandardDescriptorNumberInUse) {
   const auto end = endOf([] {
     closeDescriptor(STDERR_FILENO);
     if (!isNull(STDERR_FILENO)) return 1;

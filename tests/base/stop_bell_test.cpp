@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(StopBell, HearsASignalThatCameBeforeItWaits) {
+TEST(StopBell, ReturnsForASignalReceivedBeforeTheWait) {
   const Watchdog watchdog("stop bell test");
   for (const int signal : {SIGINT, SIGTERM}) {
     StopBell bell;
@@ -24,7 +24,7 @@ TEST(StopBell, HearsASignalThatCameBeforeItWaits) {
   }
 }
 
-TEST(StopBell, HearsASignalWhileItWaits) {
+TEST(StopBell, ReturnsForASignalReceivedDuringTheWait) {
   const Watchdog watchdog("stop bell test");
   StopBell bell;
   std::thread stopping([] { ::kill(::getpid(), SIGTERM); });
@@ -32,7 +32,7 @@ TEST(StopBell, HearsASignalWhileItWaits) {
   stopping.join();
 }
 
-TEST(StopBell, RingsForAllThatWait) {
+TEST(StopBell, WakesAllObjectsThatWait) {
   StopBell one;
   StopBell other;
   ::raise(SIGTERM);

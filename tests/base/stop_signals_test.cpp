@@ -18,13 +18,13 @@
 namespace mpf::test {
 namespace {
 
-// Another thread, which the signal interrupts.
+// Sends a signal to another thread, which executes the callback.
 class StopSignalsTest : public testing::Test {
  public:  // for callbacks
   void TearDown() override {
     if (other.joinable()) other.join();
   }
-  // Returns once the other thread is in `callback`.
+  // Returns when the other thread executes `callback`.
   void interruptOther(StopSignals::Callback callback) {
     signals.emplace(callback, this);
     ::pthread_kill(other.native_handle(),
@@ -43,12 +43,12 @@ class StopSignalsTest : public testing::Test {
   }};
 };
 
-// What the callback uses may be destroyed right after.
-TEST_F(StopSignalsTest, EndOnceNoThreadIsInTheCallback) {
+// The program may destroy the callback's argument after the destructor.
+TEST_F(StopSignalsTest, DestructorWaitsUntilNoThreadExecutesTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
     self.entered = true;
-    // for an end that does not wait to come first
+    // so that a destructor that does not wait returns first
     const timespec aWhile{.tv_sec = 0, .tv_nsec = 20'000'000};
     ::nanosleep(&aWhile, nullptr);
     self.wasGone = self.isGone;
@@ -59,7 +59,7 @@ TEST_F(StopSignalsTest, EndOnceNoThreadIsInTheCallback) {
   EXPECT_FALSE(wasGone);
 }
 
-TEST_F(StopSignalsTest, EndInAChildThatWasForkedBesideTheCallback) {
+TEST_F(StopSignalsTest, DestructorReturnsInAChildForkedDuringTheCallback) {
   interruptOther([](void* test) noexcept {
     auto& self = *static_cast<StopSignalsTest*>(test);
     self.entered = true;
@@ -67,7 +67,7 @@ TEST_F(StopSignalsTest, EndInAChildThatWasForkedBesideTheCallback) {
   });
   const auto child = checkCall(::fork(), "fork");
   if (child == 0) {
-    ::alarm(60);  // the other thread is not here: to wait for it is to wait for ever
+    ::alarm(60);  // the child does not have the other thread: a wait for it would never end
     signals.reset();
     ::_exit(0);
   }

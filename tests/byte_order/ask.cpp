@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// mpf_test_ask BACKPLANE SERVER LOCATION: sends every message to an echo, has it refuse, stall and
-// die, and says what comes of each. mpf_test_ask BACKPLANE SERVER LOCATION why: says why it is not
-// connected, each time that this is something else.
+// mpf_test_ask BACKPLANE SERVER LOCATION: sends every message to mpf_test_echo, makes it refuse,
+// stall and die, and prints the result of each request.
+// mpf_test_ask BACKPLANE SERVER LOCATION why: prints why it is not connected, each time that the
+// reason changes.
 #include <cstddef>
 #include <deque>
 #include <string>
@@ -41,7 +42,7 @@ class Asker {
   }
 
  private:
-  // What comes next: a reply, a fate, news.
+  // The next message: a reply, a fate or a ConnectMessage.
   Message next() {
     while (got_.empty()) dispatcher_.runOnce();
     auto message = std::move(got_.front());
@@ -49,7 +50,7 @@ class Asker {
     return message;
   }
   void sayNext() { say("{}", describe(next())); }
-  // Without the numbers that differ each time.
+  // The text without the numbers that differ each time.
   static std::string describe(const Message& message) {
     if (const auto* fate = message.tryAs<RequestFate>())
       return fmt::format("fate {}", toString(fate->fate));
@@ -60,7 +61,7 @@ class Asker {
     if (const auto result = client_.send(std::move(message)); result != SendResult::sent)
       say("not sent: {}", toString(result));
   }
-  // Returns which life of the server it is.
+  // Returns the incarnation of the server.
   std::uint64_t sayConnected() {
     const auto message = next();
     say("{}", describe(message));

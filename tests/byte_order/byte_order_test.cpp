@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Every message there and back unchanged: on hosts of each byte order, and between them. `make
+// Every message is echoed unchanged: on hosts of each byte order, and between them. `make
 // test-big-endian` sets MPF_TEST_BIG_ENDIAN to a build for the other byte order; without it, only
-// what takes hosts like this one runs.
+// the tests for hosts of this byte order run.
 #include <cstdlib>
 #include <gmock/gmock.h>
 #include <memory>
@@ -25,7 +25,7 @@ using testing::UnorderedElementsAre;
 
 enum class Order { ours, other };
 
-// Programs on one backplane, of this build or of the one for the other byte order.
+// Programs on one backplane, of this build or of the build for the other byte order.
 class Host {
  public:
   Host(Order order, const Backplane& backplane) : order_(order), backplane_(backplane.name()) {}
@@ -57,12 +57,12 @@ class Host {
   std::string backplane_;
 };
 
-// What a line of `program` that holds `text` says behind it.
+// The rest of the line of `program` after `text`; waits for a line that contains it.
 std::string after(const Program& program, const std::string& text) {
   const auto line = program.waitForLine(text);
   if (const auto at = line.find(text); at != std::string::npos)
     return line.substr(at + text.size());
-  ADD_FAILURE() << "it ended without saying: " << text;
+  ADD_FAILURE() << "the program exited without printing: " << text;
   return {};
 }
 
@@ -78,7 +78,7 @@ std::vector<std::string> allRight() {
   return lines;
 }
 
-// An asker on one host, an echo on the other or on the same one.
+// mpf_test_ask on one host, mpf_test_echo on the other or on the same host.
 void expectEverythingThereAndBack(const Host& near, const Host& far) {
   const auto right = allRight();
   const auto asker = near.startAsker();
@@ -115,8 +115,8 @@ class ByteOrder : public testing::TestWithParam<Hosts> {
     if (needsOther() && std::getenv("MPF_TEST_BIG_ENDIAN") == nullptr)
       GTEST_SKIP() << "no build for the other byte order: make test-big-endian";
   }
-  // What a program of the other byte order left as it was killed, only one of its kind can judge;
-  // it does as it attaches.
+  // Only a program of the same byte order can judge the files of a killed program. It does so when
+  // it attaches.
   void TearDown() override {
     if (!needsOther() || IsSkipped()) return;
     for (const auto* backplane : {&nearBackplane_, &farBackplane_}) {
@@ -158,8 +158,8 @@ TEST_P(TwoHosts, EchoEveryMessageUnchanged) {
   expectEverythingThereAndBack(near, far);
 }
 
-// Memory of a host of the other byte order, as an emulator has it, is refused by name and left
-// alone.
+// Segments of the other byte order, which a program under an emulator creates, are refused by name
+// and not changed.
 TEST_P(ForeignWindow, IsRefusedByName) {
   const Host one(GetParam().near, nearBackplane_);
   const Host other(GetParam().far, nearBackplane_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf_test_echo BACKPLANE SERVER LOCATION: sends back whatever it gets, unchanged, and says whether
-// it is what an asker sends.
+// mpf_test_echo BACKPLANE SERVER LOCATION: sends back each message unchanged, and prints whether it
+// is a message that mpf_test_ask sends.
 #include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
@@ -22,7 +22,7 @@
 namespace mpf::test {
 namespace {
 
-// A byte for each SIGUSR1. Not sigwait(): under qemu it does not see a signal that came before.
+// A byte for each SIGUSR1. Not sigwait(), which under qemu misses a signal that was sent before.
 std::array<int, 2> signals{};
 void catchSignals() {
   checkCall(::pipe2(signals.data(), O_CLOEXEC), "pipe2");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What mpf_test_ask and mpf_test_echo agree on: Int32 messages that are not echoed but obeyed, and
-// a way to tell the test.
+// The protocol between mpf_test_ask and mpf_test_echo: Int32 messages that are commands to the
+// echo, and lines that both print for the test.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace mpf::test {
 enum class Command : std::int32_t {
   sendOutOfBand = 0x01020301,  // an OutOfBand message before the reply
   refuse,
-  stall,  // replies, and then takes nothing until SIGUSR1
+  stall,  // replies, and then takes no messages until SIGUSR1
   die,
 };
 inline constexpr std::int32_t kQueueSize = 4;
@@ -30,7 +30,7 @@ inline std::optional<Command> toCommand(const Message& message) {
   return static_cast<Command>(body->cmd);
 }
 
-// A line for the test.
+// Prints a line for the test.
 template <class... Arguments>
 void say(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
   fmt::print(stderr, "{}\n", fmt::format(text, std::forward<Arguments>(arguments)...));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A client goes mad. Its server loses that link and nothing else: an honest client beside it gets
-// right answers all the while.
+// A hostile client writes invalid data. Its server loses only that link: an honest client gets
+// right answers at the same time.
 #include <algorithm>
 #include <array>
 
@@ -13,9 +13,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class MadClient : public MischiefTest {
+class HostileClient : public MischiefTest {
  protected:
-  // Asks for what can be checked.
+  // Sends requests whose answers can be checked.
   static void ask(SyncClient& client, int number) {
     auto answer = client.call(Float64Message({.value = number + 0.5}), 60s);
     ASSERT_TRUE(answer) << answer.why();
@@ -32,7 +32,7 @@ class MadClient : public MischiefTest {
   }
 };
 
-TEST_P(MadClient, CostsItsServerThatLinkAlone) {
+TEST_P(HostileClient, CostsItsServerOnlyThatLink) {
   Victim server("serve", backplane_.name());
   SyncClient honest(backplane_, "echo");
   int asked = 0;
@@ -58,7 +58,7 @@ TEST_P(MadClient, CostsItsServerThatLinkAlone) {
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
-INSTANTIATE_TEST_SUITE_P(OfEachKind, MadClient, testing::ValuesIn(kMischief),
+INSTANTIATE_TEST_SUITE_P(OfEachKind, HostileClient, testing::ValuesIn(kMischief),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A peer that is legal at first: mpf_test_hostile client|server BACKPLANE KIND. Says "hostile" when
-// it has done many deeds, and goes on for ever, with a new window and link now and then. Beside the
-// kinds of Mischief: flood (sends as fast as it can, takes nothing), slow (one message at a time,
-// taken and never freed).
+// A peer that is valid at first: mpf_test_hostile client|server BACKPLANE KIND. Prints "hostile"
+// after many attacks, and then continues until it is killed; sometimes it creates a new window and
+// link. Kinds in addition to those of Mischief: flood (sends as fast as possible, takes nothing),
+// slow (takes one message at a time and frees none).
 #include <sys/prctl.h>
 
 #include <csignal>
@@ -65,7 +65,7 @@ class Peer {
                               layout::SegmentKind::serverWindow);
     auto link = Link::create(backplane(), endpoint_.window(), index, server);
     endpoint_.attach(index, *link);
-    // The server may be busy with what we did to it before.
+    // The server may still be busy with earlier attacks.
     while (link->peerState() != layout::LinkState::open) {
       server->knock(link->header().incarnation);
       endpoint_.wait(Deadline::after(5ms));
@@ -100,9 +100,9 @@ class Peer {
     link->notifyPeer();
     return link;
   } catch (const std::exception&) {
-    return nullptr;  // cut
+    return nullptr;  // the file is truncated
   }
-  // Some messages that are right, so that there are pools.
+  // First some valid messages, so that pools exist.
   void beLegal() {
     for (std::uint32_t id = 1; id < 5; ++id) send(id, id % 2 == 0 ? 3000 : sizeof(Int32));
     for (int turn = 0; turn < 4; ++turn) takeOne(true);

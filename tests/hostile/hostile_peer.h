@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// HostilePeer: a hostile process, from its start to its end. MischiefTest: one kind of it.
+// HostilePeer: a hostile process. MischiefTest: a test with one kind of hostile process.
 #pragma once
 
 #include <atomic>
@@ -28,9 +28,9 @@ class HostilePeer {
   HostilePeer(const HostilePeer&) = delete;
   HostilePeer& operator=(const HostilePeer&) = delete;
 
-  // Whether it has done enough.
+  // Whether it has performed enough attacks.
   [[nodiscard]] bool hasActed() const noexcept { return hasActed_; }
-  // Whether it ended by itself, before it had.
+  // Whether it exited before that.
   [[nodiscard]] bool hasFailed() const noexcept { return hasFailed_; }
 
  private:

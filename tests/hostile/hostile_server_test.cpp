@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A server goes mad. A client of it and of an honest server loses that link and nothing else.
+// A hostile server writes invalid data. Its client, which is also a client of an honest server,
+// loses only that link.
 #include <optional>
 
 #include <mpf/message_client.h>
@@ -11,9 +12,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class MadServer : public MischiefTest {
+class HostileServer : public MischiefTest {
  protected:
-  // Sends to the honest server one by one, and checks each reply.
+  // Sends requests to the honest server one by one, and checks each reply.
   void take(const Message& message) {
     if (message.getType() == MessageType::connect) return;
     const auto* reply = message.tryAs<Float64>();
@@ -42,7 +43,8 @@ class MadServer : public MischiefTest {
                                        [this](const Message& message) { take(message); }};
 };
 
-// A client of the mad one. No request ends more often than once, whatever the server sends.
+// A client of the hostile server. Each request ends at most once, for all data that the server
+// sends.
 class Unlucky {
  public:
   explicit Unlucky(Dispatcher& dispatcher)
@@ -64,7 +66,7 @@ class Unlucky {
   MessageClient client_;
 };
 
-TEST_P(MadServer, CostsItsClientThatLinkAlone) {
+TEST_P(HostileServer, CostsItsClientOnlyThatLink) {
   Victim server("serve", backplane_.name());
   honest_->bind("echo");
   ASSERT_TRUE(honest_->connectWait(60s));
@@ -76,7 +78,7 @@ TEST_P(MadServer, CostsItsClientThatLinkAlone) {
       const HostilePeer mad("server", backplane_.name(), GetParam());
       while (!mad.hasActed()) {
         ASSERT_FALSE(mad.hasFailed());
-        // a new one each time: it would wait a second after nonsense
+        // a new client each time: after invalid data, a client waits a second before it reconnects
         Unlucky unlucky(*dispatcher_);
         for (int i = 0; i < 20; ++i) {
           ASSERT_NO_FATAL_FAILURE(ask());
@@ -94,7 +96,7 @@ TEST_P(MadServer, CostsItsClientThatLinkAlone) {
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
-INSTANTIATE_TEST_SUITE_P(OfEachKind, MadServer, testing::ValuesIn(kMischief),
+INSTANTIATE_TEST_SUITE_P(OfEachKind, HostileServer, testing::ValuesIn(kMischief),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace

@@ -64,7 +64,7 @@ void Mischief::writeWord() {
   std::memcpy(memory.data() + at, &word, sizeof word);
 }
 
-// A next message that looks right and says anything.
+// Writes a next message that looks valid and has random contents.
 void Mischief::writeSlot(Link& link) {
   const bool isClient = link.side() == LinkSide::client;
   const auto slots = isClient ? link.header().queueSlots : link.header().replySlots;
@@ -94,7 +94,7 @@ void Mischief::writeSlot(Link& link) {
   link.notifyPeer();
 }
 
-// News of everybody, all the time.
+// Sets and clears ready bits at random, and writes invalid knocks.
 void Mischief::writeHints() {
   for (const auto& file : files_) {
     if (file.path.find(".h.") == std::string::npos) continue;
@@ -123,7 +123,7 @@ void Mischief::cut() {
   [[maybe_unused]] const int result = ::truncate(file.path.c_str(), static_cast<off_t>(bytes));
 }
 
-// Counters that go back, slots freed that were never filled, chunks returned that were never lent.
+// Writes wrong positions and counts, and returns chunks that were never lent.
 void Mischief::goBack(Link& link) {
   const bool isClient = link.side() == LinkSide::client;
   auto& control = link.control();

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Mischief: what a peer gone mad does to all that it may write: its link, the pools of the link,
-// its own window, the other's hints.
+// Mischief: writes invalid data to everything that a peer may write: its link, the pools of the
+// link, its own window and the hints of the other side.
 //
-// Threads  one.
-// Crash    it is killed in the end.
-// Trust    none.
+// Threads  one thread.
+// Crash    the test kills the process at the end.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +17,13 @@ namespace mpf::test {
 
 class Mischief {
  public:
-  // `kind`: bytes, words, slots, hints, headers, cut, backwards.
+  // `kind` is bytes, words, slots, hints, headers, cut or backwards.
   Mischief(const std::string& kind, OwnWindow& own, Random& random)
       : random_(random), kind_(kind), own_(own) {}
 
-  // One deed, at `link`.
+  // Performs one attack on `link`.
   void act(Link& link);
-  // Looks for the files of `link` and of both ends again. Some have come, some were cut.
+  // Maps the files of `link` and of both ends again: files may be new, or may have been truncated.
   void reach(const Link& link);
 
  private:
@@ -46,7 +45,7 @@ class Mischief {
   std::string kind_;
   OwnWindow& own_;
   std::vector<File> files_;
-  std::uint64_t position_ = 0;  // where the other end reads, or near
+  std::uint64_t position_ = 0;  // near the position at which the other end reads
 };
 
 }  // namespace mpf::test

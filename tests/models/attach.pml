@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Attach: processes that attach remove what a dead client left, while the client may be starting,
-// alive, leaving or dying.
+// Attach: processes that attach remove the files of a dead client, while the client may be
+// starting, running, leaving or dying.
 //
-//   client    window: locked, named ─ link: named ─ bulk segment: named ─ ... ─ bulk, link, window: names removed ─ lock free
-//   attacher  list all names ─ which windows live? ─ remove links of the others ─ remove bulk without a link
+//   client    window: locked, named ─ link: named ─ bulk segment: named ─ ...
+//             ─ bulk, link, window: names removed ─ lock free
+//   attacher  list all names ─ which windows have a living owner? ─ remove links of the others
+//             ─ remove bulk segments without a link
 //
 //   MODELS  shm/stale_segments.cpp: judge tryRemove judgeWindow judgeOwned ownerOf
 //   MODELS  shm/segment.cpp: list removeIfOwnerless
@@ -11,13 +13,14 @@
 //   HOLDS   no name of a dead client is left once a process has attached after its death and after
 //           all other attachers
 //   ASSUMES a listing that shows a name shows every older name that still exists (true for tmpfs)
-//   ASSUMES one client with one link, which may be killed before any step; two attachers at any time, one at the end
-//   BREAK   LIST_LATE    an attacher lists the names of links after it has looked which windows live
+//   ASSUMES one client with one link, which may be killed before any step; two attachers at any
+//           time, one at the end
+//   BREAK   LIST_LATE    an attacher lists the names of links after it has checked the windows
 //   BREAK   LOCK_LATE    a client locks its window after the window has its name
 //   BREAK   WINDOWS_ONLY an attacher does not remove links
 bool windowNamed, linkNamed, bulkNamed;
 bool locked;  // the client has locked its window
-bool isDead;  // the client is dead; the kernel may not have dropped the lock yet
+bool isDead;  // the client is dead; the kernel may not have released the lock yet
 bool hasLeft;
 
 #define lives (!isDead && !hasLeft)
@@ -49,7 +52,7 @@ inline removeDead() {
   windowLives = false;
   if
   :: d_step { windowListed && windowNamed && !locked -> assert(!lives); windowNamed = false }
-  // a window that is gone counts as living
+  // a window that no longer exists counts as alive
   :: windowListed && (!windowNamed || locked) -> windowLives = true
   :: !windowListed
   fi;
@@ -60,7 +63,7 @@ inline removeDead() {
 #ifndef WINDOWS_ONLY
   if
   :: linkListed && linkNamed && !windowLives -> d_step { assert(!linkNamed || !lives); linkNamed = false }
-  // a link that is gone need not be removed
+  // a link that no longer exists need not be removed
   :: linkListed && (!linkNamed || windowLives) -> linkLives = true
   :: !linkListed
   fi;

@@ -2,34 +2,36 @@
 // Connect: a client finds a server, creates a link and knocks; the server accepts; the client sends
 // a request. Either process may be killed before any step.
 //
-//   client  look up name ─ link: created, open, named ─ knock ─ (nudge) ─ connected ─ request ─ reply or fate ─ link closed, name removed
-//   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply        a second life follows the first
+//   client  look up name ─ link: created, open, named ─ knock ─ (nudge) ─ connected ─ request
+//           ─ reply or fate ─ link closed, name removed
+//   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply
+//           a second run of the server follows the first
 //
-//   MODELS  client/connect.cpp: tryConnect wish
+//   MODELS  client/connect.cpp: tryConnect pendingBind
 //   MODELS  client/binding.cpp: onLinkState disconnect nudge leave
 //   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer
-//   HOLDS   a living client connects to a living server, whichever hints are lost
+//   HOLDS   a running client connects to a running server, even if any hints are lost
 //   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never
 //           taken"; a reply that was sent is not lost
 //   HOLDS   a server accepts a link once, and releases it when the client has ended
 //   ASSUMES sequentially consistent memory: link states use release and acquire, names are system
-//   calls (ring.pml and
-//           doorbell.pml have weak memory)
-//   ASSUMES a timer expires when nothing else can happen; one client, two lives of a server, one
-//   request for each connection ASSUMES another process clears each hint once
+//           calls (ring.pml and doorbell.pml have weak memory)
+//   ASSUMES a timer expires when no other step is possible; one client, two runs of a server, one
+//           request for each connection
+//   ASSUMES another process clears each hint once
 //   BREAK   NO_NUDGE        the client knocks once
 //   BREAK   NUDGE_BLIND     the client knocks again without checking whether it has been accepted
 //   BREAK   ACCEPT_TWICE    a server does not remember which links it has accepted
 //   BREAK   NO_WATCH        a server does not watch the clients of its links
-//   BREAK   NO_DRAIN        a client ends its request without looking for the reply of the dead server
+//   BREAK   NO_DRAIN        a client ends its request without taking the reply of the dead server
 //   BREAK   TAKEN_LATE      a server counts a request as taken after it has acted
-//   BREAK   NO_DEATH_NEWS   a client is not told of the death of its server
+//   BREAK   NO_DEATH_NEWS   a client is not notified of the death of its server
 #define SERVERS 2
 #define CLIENT 2
 #define PROCESSES 3
-#define LINKS SERVERS  // the client creates one for each life of the server
+#define LINKS SERVERS  // the client creates one for each run of the server
 #define NONE 255
 #define STRANGER 9     // a link of another client
 #define NUDGES 3
@@ -39,13 +41,13 @@ typedef Link {
   bool named;
   bool clientOpen;
   bool serverOpen;
-  bool accepted;  // in the memory of its server
+  bool accepted;  // remembered by its server
   bool sent;      // a request was sent
   bool taken;     // the request counts as taken
   bool acted;     // the server has acted on the request
   bool replied;
 }
-Link links[LINKS];  // index: life of the server
+Link links[LINKS];  // index: run of the server
 
 typedef Hints {
   byte knock;     // number of a link + 1
@@ -55,7 +57,7 @@ typedef Hints {
 }
 Hints hints[SERVERS];
 
-byte serverName = NONE;  // the life of the server that has the name
+byte serverName = NONE;  // the run of the server that has the name
 bool dead[PROCESSES];
 bool clientLeft;
 bool news;               // the ready bit of the client
@@ -212,7 +214,7 @@ over:
   } unless { dead[me] }
 }
 
-// Clears hints, and overwrites a knock with its own.
+// Another peer: clears hints, and overwrites a knock with its own.
 active proctype Stranger() {
   if
   :: hints[0].knock = 0

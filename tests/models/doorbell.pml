@@ -2,18 +2,20 @@
 // Doorbell: an owner that announces its sleep, two peers that send and wake, a watcher that reports
 // deaths; with weak memory.
 //
-//   owner  announce ─ fence ─ look again ─ sleep                peer  message ─ fence ─ announced? ─ bell, wake
+//   owner  announce ─ fence ─ look again ─ sleep
+//   peer   message ─ fence ─ announced? ─ bell, wake
 //
 //   MODELS  shm/endpoint.cpp: sleep announce hasNews interrupt takeLocalNews arm disarm
 //   MODELS  shm/window.cpp: wakeIfAsleep ring
 //   MODELS  shm/doorbell.cpp: sleep ring tryRingFifo drainFifo
-//   HOLDS   no wake-up is lost: the owner does not sleep for ever while a message or a reported
+//   HOLDS   no wake-up is lost: the owner does not sleep forever while a message or a reported
 //           death is pending
-//   HOLDS   the same on the futex and on the descriptor, also when a peer is killed between message
-//           and ring
+//   HOLDS   this is true on the futex and on the descriptor, and also if a peer is killed between
+//           message and ring
 //   ASSUMES FUTEX_WAIT compares the bell and sleeps in one step; FUTEX_WAKE is a fence for its
-//   caller ASSUMES two messages of one peer and one of the other; an owner without a deadline that
-//   polls no link
+//           caller
+//   ASSUMES two messages of one peer and one of the other; an owner without a deadline that polls
+//           no link
 //   BREAK   NO_PEER_FENCE    the peer reads the announcement before its message is visible
 //   BREAK   NO_OWNER_FENCE   the owner looks again before its announcement is visible
 //   BREAK   NO_LOOK          the owner does not look again
@@ -24,7 +26,7 @@
 //   BREAK   NO_DEATH_NEWS    no process reports a death
 //   BREAK   NUMBER_KEPT      a sleep has the number of the previous one, for which a peer has rung
 //   BREAK   NUMBER_LATE      the number of a sleep is stored after the last look
-//   BREAK   STATE_EARLY      a peer reads how the owner sleeps before it reads the number: it may ring the wrong bell
+//   BREAK   STATE_EARLY      a peer reads how the owner sleeps before the number: wrong bell
 #define PEERS 2
 #define OWNER 2
 #define WATCHER 3
@@ -43,7 +45,7 @@
 #define ON_DESCRIPTOR 2
 
 bool changed;   // the bell has changed since the owner read it
-bool asleep;    // the owner sleeps in the kernel, on the bell
+bool asleep;    // the owner sleeps in the kernel on the bell
 bool readable;  // the FIFO is readable
 byte sent[PEERS];
 bool senderEnded[PEERS];
@@ -60,7 +62,7 @@ byte rungFor;         // the number for which peer 0 has rung
 #define allTaken (taken[0] == memory[SENT(0)] && taken[1] == memory[SENT(1)])
 #define allSeen (allTaken && senderEnded[0] && senderEnded[1] && isVisible(0) && isVisible(1) && deathSeen == (dead[0] || dead[1]))
 
-// The comparison in FUTEX_WAIT.
+// The comparison that FUTEX_WAIT makes.
 inline futexWait() {
   if
   :: atomic { !changed -> asleep = true }; !asleep || allSeen
@@ -79,8 +81,8 @@ inline ringBell(process) {
   asleep = false
 }
 
-// Only peer 0 sends twice and so may have rung before; its values after the last message are not
-// used.
+// Only peer 0 sends two messages, so only it may have rung before. Its values after the last
+// message are not used.
 inline forget(process) {
   d_step {
     state = AWAKE;

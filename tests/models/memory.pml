@@ -3,7 +3,8 @@
 //
 //   store ─► pending (only its writer sees it) ─ any time later ─► memory (all see it)
 //
-//   store         visible after any time, before or after stores to other words: weaker than x86, as on ARM
+//   store         visible after any time, before or after stores to other words: weaker than x86,
+//                 as on ARM
 //   storeRelease  visible after all earlier stores of its process
 //   fence         waits until all earlier stores of its process are visible
 //   load          the newest value that this process can see
@@ -14,7 +15,8 @@
 // with release semantics first wait for isVisible(). A killed process stores nothing more, but its
 // earlier stores become visible.
 //
-// The model defines WORDS (at most 16), PROCESSES and FLUSH_ALL, one FLUSH(process, word) for each word.
+// The model defines WORDS (at most 16), PROCESSES and FLUSH_ALL, which is one FLUSH(process, word)
+// for each word.
 byte memory[WORDS];
 byte pending[WORDS];       // the pending value, or 0
 short before[WORDS];       // for a release store: words that must become visible first
@@ -23,7 +25,8 @@ bool dead[PROCESSES];
 
 #define BIT(word) (1 << (word))
 #define isVisible(process) (unseen[process] == 0)
-#define isGone(process) (dead[process] && isVisible(process))  // the kernel reports a death after all stores of the process are visible
+// The kernel reports a death after all stores of the process are visible.
+#define isGone(process) (dead[process] && isVisible(process))
 #define load(process, word) ((unseen[process] & BIT(word)) -> pending[word] : memory[word])
 
 inline storeAfter(process, word, value, others) {

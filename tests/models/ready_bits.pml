@@ -3,23 +3,24 @@
 // polls instead; with weak memory.
 //
 //   peer    message ─ fence ─ unwatched? ─ bit of the link ─ bit of its word
-//   owner   clear bit of the word ─ read bits ─ clear bit of the link ─ more left? set bit of the word ─ poll or revisit link
+//   owner   clear bit of the word ─ read bits ─ clear bit of the link
+//           ─ more left? set bit of the word ─ poll or revisit link
 //
 //   MODELS  shm/link.cpp: afterPush setWatched
 //   MODELS  shm/window.cpp: notify
 //   MODELS  shm/endpoint.cpp: nextReady takeReadyBit heat cool setReadyBit hasNews isRevisitDue
 //   HOLDS   for each link with a message, a hint is set, the link is polled, or it is due for a
 //           revisit; this does not need the scan of all links that an owner makes before it sleeps
-//   HOLDS   no link is forgotten, in whatever order links begin and cease to be polled
+//   HOLDS   no link is forgotten, for every order in which links begin and cease to be polled
 //   ASSUMES two links of one word, two messages each; one link at a time may be polled
 //   ASSUMES no process overwrites the hints; the scan of all links repairs that
-//   (tests/shm/endpoint_hints_test.cpp)
-//   BREAK   NO_WATCH_FENCE   the peer looks whether the link is polled before its message is visible
-//   BREAK   NO_COOL_FENCE    the owner looks for messages before its "not polled any more" is visible
+//           (tests/shm/endpoint_hints_test.cpp)
+//   BREAK   NO_WATCH_FENCE   the peer reads `unwatched` before its message is visible
+//   BREAK   NO_COOL_FENCE    the owner looks for messages before its "not polled" is visible
 //   BREAK   NO_COOL_LOOK     the owner does not look when it stops polling
 //   BREAK   WORD_FIRST       the peer sets the bit of the word before the bit of the link
 //   BREAK   WORD_OFF_LATE    the owner clears the bit of the word after it has read the bits
-//   BREAK   LEFT_FORGOTTEN   the owner does not set the bit of the word again when more bits are set
+//   BREAK   LEFT_FORGOTTEN   the owner does not set the bit of the word again for further bits
 //   BREAK   NO_REVISIT       a link that is not added to the polled links is looked at once only
 #define LINKS 2
 #define OWNER 2
@@ -146,7 +147,7 @@ active proctype Owner() {
   byte seen, link = NONE, was = NONE;
   do
   :: isHotReady -> takeOne(hot)
-  :: hot != NONE && !allTaken -> cool()  // no message at too many looks
+  :: hot != NONE && !allTaken -> cool()  // too many polls without a message
   :: isRevisitDue || word ->
     if
     :: isRevisitDue -> setBits(OWNER, revisit)

@@ -1,33 +1,40 @@
 // SPDX-License-Identifier: MIT
-// Reclaim: starters, which take the name of a server, and reapers, which remove the window that a
-// dead owner left under it. Each may be killed before any step.
+// Reclaim: starters, which want the name of a server, and reapers, which remove the window of a
+// dead owner that has this name. Each process may be killed before any step.
 //
-//   file made ─ locked for life ─ linked to the name ─ ... ─ name removed ─ unlocked          a dead owner: unlocked by the kernel
-//   reaper: open by name ─ lock byte 1 of that file, or a reaper's file of its own beside the locks of strangers ─ does the name still lead to
-//   it? ─ remove the name ─ unlock
+//   owner   create file ─ lock it ─ link it to the name ─ ... ─ remove the name ─ unlock
+//           (the kernel unlocks the file of a dead owner)
+//   reaper  open by name ─ lock byte 1 of that file, or lock a reaper file if strangers hold locks
+//           ─ does the name still refer to the file? ─ remove the name ─ unlock
 //
 //   MODELS  shm/segment.cpp: lockForLife tryPublish removeIfOwnerless isOwned isNameOf probeOwner
-//   MODELS  shm/owner_lock.cpp: trySet isHeld isHeldByOwner Reaper tryBesideStrangers lockReaperFile isReaperFileLocked findWriteLock
-//   MODELS  shm/window.cpp: publish checkInTheWay ~OwnWindow
-//   HOLDS   the name of a living window is removed by nobody but its owner
-//   HOLDS   never do two that live own the name
-//   HOLDS   whoever wants the name gets it, or is refused because somebody who lives has it: no death leaves it blocked, and no stranger
-//           who locks the file of a dead owner and keeps the lock
-//   ASSUMES link, unlink and the lock of a file are single steps; the kernel drops a lock some time after its holder died
-//   ASSUMES to lock a reaper's file and to see that it still has its name is one step: lockReaperFile() gives up when it has not
-//   ASSUMES a starter outwaits a reaper that removes a dead window, and the kernel (it waits 50 ms for some microseconds)
-//   ASSUMES three starters, each also a reaper, and one of layout 1.0 that only reaps, and knows of no reaper's file; two of them are killed;
-//           nobody else removes names
-//   ASSUMES a stranger places read locks, and write locks only while the reaper of layout 1.0 is not at work
-//   BREAK   NO_COMPARE    a reaper does not look whether the name still leads to the file that it locked
-//   BREAK   NO_LOCK       a reaper asks for the lock and does not take it
+//   MODELS  shm/owner_lock.cpp: trySet isHeld isHeldByOwner Reaper tryBesideStrangers
+//   MODELS  shm/owner_lock.cpp: lockReaperFile isReaperFileLocked findWriteLock
+//   MODELS  shm/window.cpp: publish checkConflict ~OwnWindow
+//   HOLDS   only its owner removes the name of a living window
+//   HOLDS   two living processes never own the name at the same time
+//   HOLDS   a process that wants the name gets it, or is refused because a living process has it.
+//           No death leaves the name blocked; a stranger that locks the file of a dead owner, and
+//           keeps the lock, does not block it either
+//   ASSUMES link, unlink and the lock of a file are single steps; the kernel releases a lock some
+//           time after the death of its holder
+//   ASSUMES locking a reaper file and checking that it still has its name is one step:
+//           lockReaperFile() gives up if it has lost its name
+//   ASSUMES a starter waits longer than a reaper that removes a dead window, and longer than the
+//           kernel (it waits 50 ms for some microseconds)
+//   ASSUMES three starters, each also a reaper, and one process of layout 1.0 that only reaps and
+//           does not use reaper files; two of them are killed; no other process removes names
+//   ASSUMES a stranger places read locks, and write locks only while the reaper of layout 1.0 does
+//           not reap
+//   BREAK   NO_COMPARE    a reaper does not check that the name still refers to the locked file
+//   BREAK   NO_LOCK       a reaper tests the lock but does not place it
 //   BREAK   ONE_LOCK      a reaper locks the file as an owner does
-//   BREAK   UNLOCK_EARLY  a reaper lets go of the lock before it removes the name
-//   BREAK   LOCK_LATE     a starter locks its window after it got its name
-//   BREAK   LEAVE_LATE    who leaves lets go of the lock before it removes its name
-//   BREAK   NO_REAPING    a starter waits for others to remove what is dead
-//   BREAK   NO_BESIDE     there is no reaper's file: a reaper needs byte 1
-//   BREAK   NO_SHARED     a reaper beside readers takes no read lock
+//   BREAK   UNLOCK_EARLY  a reaper releases the lock before it removes the name
+//   BREAK   LOCK_LATE     a starter locks its window after the window has its name
+//   BREAK   LEAVE_LATE    an owner that leaves releases the lock before it removes its name
+//   BREAK   NO_REAPING    a starter waits for others to remove dead windows
+//   BREAK   NO_BESIDE     there is no reaper file: a reaper needs byte 1
+//   BREAK   NO_SHARED     a reaper that works beside readers places no read lock
 #define STARTERS 3
 #define REAPER 3
 #define PROCESSES 4
@@ -35,13 +42,13 @@
 #define FREE 255
 #define fileOf(starter) ((starter) + 1)
 
-byte name = NO_FILE;       // the file that the name leads to
-byte lock[STARTERS + 1];   // of each file: its owner
-byte reaper[STARTERS + 1]; // of each file: who is about to remove its name
-byte beside[STARTERS + 1]; // of each file: who has its reaper's file
+byte name = NO_FILE;       // the file that the name refers to
+byte lock[STARTERS + 1];   // of each file: the process that holds the owner's lock
+byte reaper[STARTERS + 1]; // of each file: the process that holds the lock on byte 1
+byte beside[STARTERS + 1]; // of each file: the process that has locked its reaper file
 byte shared[STARTERS + 1]; // of each file: the reaper that has a read lock on byte 1
 mtype = { nothing, reads, writes };
-mtype stranger[STARTERS + 1]; // of each file: what lock a stranger has on all of it
+mtype stranger[STARTERS + 1]; // of each file: the lock that a stranger has on the whole file
 bool oldReaperEnded;
 bool left[STARTERS];
 bool dead[PROCESSES];
@@ -64,7 +71,7 @@ inline removeName(mayBe) {
 
 #define isByteFree(file) (lock[file] == FREE && reaperOf[file] == FREE && shared[file] == FREE && stranger[file] == nothing)
 
-// Byte 1, or the reaper's file. Sets `mine`.
+// Locks byte 1 or the reaper file. Sets `mine`.
 inline becomeReaper(me) {
   if
 #ifdef NO_LOCK
@@ -139,7 +146,7 @@ inline removeIfOwnerless(me) {
   file = NO_FILE
 }
 
-// As layout 1.0 has it.
+// A reaper of layout 1.0.
 inline removeAsOfOld(me) {
   file = name;  // open
   if
@@ -158,7 +165,7 @@ inline removeAsOfOld(me) {
   file = NO_FILE
 }
 
-// Whether a reaper may go on: what another reaper has it lets go of, or the kernel does.
+// Whether a reaper can continue: another reaper, or the kernel, releases that reaper's locks.
 #ifdef NO_BESIDE
 #define isReapable(file) (lock[file] == FREE && stranger[file] == nothing)
 #else
@@ -183,7 +190,7 @@ owner:
 #ifdef LOCK_LATE
     lock[fileOf(me)] = me;
 #endif
-    // Two owners would be two living processes that got the name.
+    // Two owners would be two living processes that have the name.
     assert(name == fileOf(me));
     if
     :: skip  // may leave at any time
@@ -210,7 +217,8 @@ active proctype Reaper() {
   } unless { dead[REAPER] }
 }
 
-// Whoever may read the first starter's file, or write it, locks it once and lets go, or never does.
+// A process that may read or write the first starter's file locks it once, and releases the lock or
+// keeps it.
 #define LOCKED 1
 active proctype Stranger() {
   if

@@ -4,20 +4,20 @@
 //
 //   MODELS  shm/ring.h: RingProducer tryPush hasFree waiting isTaken
 //   MODELS  shm/ring.h: RingConsumer hasMessage begin copyBody end
-//   HOLDS   each message arrives once, whole and in order, as long as both live; no message waits
-//           for ever for slots
+//   HOLDS   each message arrives once, whole and in order, while both processes run; no message
+//           waits forever for slots
 //   HOLDS   after the death of a producer, exactly the messages with a completed release store
 //           arrive
 //   HOLDS   a killed consumer has not looked at any message that is not counted as taken ("never
 //           taken" is true)
-//   ASSUMES a ring of 4 slots, handed back two at a time, and 4 messages: positions wrap around
-//   twice, messages cross the end of the ring ASSUMES both ends follow the protocol
-//   (tests/shm/ring_trust_test.cpp tests invalid data)
+//   ASSUMES a ring of 4 slots, freed two at a time, and 4 messages: positions wrap around twice,
+//           messages cross the end of the ring
+//   ASSUMES both ends follow the protocol (tests/shm/ring_trust_test.cpp tests invalid data)
 //   BREAK   SEQUENCE_RELAXED   the sequence is stored without release
 //   BREAK   SEQUENCE_FIRST     the sequence is stored before the body
 //   BREAK   NO_ACQUIRE         the body is loaded before the sequence
-//   BREAK   FREED_EARLY        slots are handed back before they are read
-//   BREAK   ONE_SLOT_TOO_MANY  the producer takes one slot that is not free
+//   BREAK   FREED_EARLY        slots are freed before they are read
+//   BREAK   ONE_SLOT_TOO_MANY  the producer uses one slot that is not free
 //   BREAK   TAKEN_LATE         a message is counted as taken after the consumer has looked at it
 #define CAPACITY 4
 #define BATCH 2

@@ -75,7 +75,7 @@ TEST(Conversion, KeepsEveryFieldOfEveryScalar) {
   }
 }
 
-TEST(Conversion, KeepsTheClientsMarks) {
+TEST(Conversion, KeepsClientTypeAndClientExtra) {
   auto message = MessageOf(Int32{});
   message.setClientType(kMin);
   message.setClientExtra(kMax);
@@ -131,7 +131,7 @@ TEST(Conversion, KeepsArraysOfAnyLength) {
   expectSame(message);
 }
 
-TEST(Conversion, KeepsAnInt32ArrayOfExtremes) {
+TEST(Conversion, KeepsExtremeValuesOfAnInt32Array) {
   auto message = Int32ArrayMessage::allocValue(4);
   std::ranges::copy(std::array{kMin, kMax, 0, -1}, message.value().begin());
 
@@ -139,8 +139,8 @@ TEST(Conversion, KeepsAnInt32ArrayOfExtremes) {
 }
 
 TEST(Conversion, KeepsArraysOf64MiB) {
-  if (mpf::test::kIsSanitized) GTEST_SKIP() << "smaller ones show a sanitizer as much";
-  if (std::endian::native == std::endian::big) GTEST_SKIP() << "minutes under emulation";
+  if (mpf::test::kIsSanitized) GTEST_SKIP() << "for a sanitizer, smaller arrays are sufficient";
+  if (std::endian::native == std::endian::big) GTEST_SKIP() << "takes minutes under emulation";
   constexpr std::size_t kBytes = std::size_t{64} << 20;
   expectSame(filled<Float64Array>(kBytes / 8));
   expectSame(filled<Int32Array>(kBytes / 4));
@@ -198,7 +198,7 @@ TEST(Conversion, NamesATypeFromANewerPeer) {
   EXPECT_EQ(error.fault, ConversionFault::unknownType);
 }
 
-TEST(Conversion, RefusesWhatIsNoMessageHere) {
+TEST(Conversion, RefusesUnknownTypesAndInvalidBodies) {
   capnp::MallocMessageBuilder builder;
   ConversionError error;
   const auto envelope = builder.initRoot<wire::Envelope>();
@@ -212,10 +212,10 @@ TEST(Conversion, RefusesWhatIsNoMessageHere) {
   EXPECT_EQ(error.fault, ConversionFault::unsound);
   EXPECT_EQ(error.text, "int32: a body of 10 bytes is invalid");
   EXPECT_FALSE(tryToWire(MessageOf(RequestFate{.fate = Fate{-3}}), envelope, {}, error));
-  EXPECT_EQ(error.text, "requestFate.fate: -3 is no such value");
+  EXPECT_EQ(error.text, "requestFate.fate: -3 is not a value of this type");
 }
 
-TEST(Conversion, CarriesAStatusThatOnlyANewerPeerKnows) {
+TEST(Conversion, KeepsAnUnknownStatusOfANewerPeer) {
   expectSame(MessageOf(Connect{.status = ConnectStatus{4000}}));
 }
 
@@ -231,7 +231,7 @@ TEST(Conversion, RefusesAnEndOfMessageStringThatDoesNotFit) {
   EXPECT_EQ(error.text, "char8Array.eomString: 8 bytes, there is room for 4");
 }
 
-TEST(Conversion, TakesAMissingStructForZeros) {
+TEST(Conversion, ReadsAMissingStructAsZeros) {
   capnp::MallocMessageBuilder builder;
   builder.initRoot<wire::Envelope>();
   ConversionError error;
@@ -242,7 +242,7 @@ TEST(Conversion, TakesAMissingStructForZeros) {
   EXPECT_EQ(message->getType(), MessageType::connect);
 }
 
-// A frame with flipped bits gives a message, or an error with a text.
+// A frame with flipped bits becomes a message, or an error with a text.
 TEST(Conversion, SurvivesAnyDamage) {
   const auto seed = std::random_device()();
   SCOPED_TRACE("seed " + std::to_string(seed));

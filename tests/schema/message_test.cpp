@@ -122,7 +122,7 @@ TEST(Message, ShortensAndLengthensArraysWithinTheirRoom) {
   EXPECT_EQ(message.getMaxLength(), 100U);
 }
 
-TEST(Message, RefusesALengthAboveItsRoomWithASentence) {
+TEST(Message, RefusesALengthAboveItsRoomAndNamesBoth) {
   auto message = Int32ArrayMessage::allocValue(100);
 
   try {
@@ -148,7 +148,7 @@ TEST(Message, CountsBytesOfChar8ArraysAsSize) {
   EXPECT_EQ(Char8ArrayMessage::allocValue(0).value().size(), 0U);
 }
 
-TEST(Message, RefusesLengthsOnceItsBodyIsGone) {
+TEST(Message, RefusesLengthsAfterItsBodyWasMoved) {
   auto message = Char8ArrayMessage::allocValue(10);
   const Message taken = std::move(message);
 
@@ -159,7 +159,7 @@ TEST(Message, RefusesLengthsOnceItsBodyIsGone) {
 
 // ---- lenders
 
-TEST(Message, GivesItsBodyBackOnce) {
+TEST(Message, ReturnsItsBodyOnce) {
   Pool pool;
   {
     auto message = Int32ArrayMessage::inBuffer(pool.lend(0, 256), 10);
@@ -175,7 +175,7 @@ TEST(Message, GivesItsBodyBackOnce) {
   EXPECT_EQ(pool.lastCapacity, 256U);
 }
 
-TEST(Message, GivesItsBodyBackWhenAnotherIsMovedIn) {
+TEST(Message, ReturnsItsBodyWhenAnotherIsMovedIn) {
   Pool pool;
   Message message = Int32ArrayMessage::inBuffer(pool.lend(0), 10);
 
@@ -185,7 +185,7 @@ TEST(Message, GivesItsBodyBackWhenAnotherIsMovedIn) {
   EXPECT_EQ(message.tryAs<Int32>()->value, 5);
 }
 
-TEST(Message, HandsItsBodyOverWithoutTellingTheLender) {
+TEST(Message, ReleasesItsBodyWithoutACallOfTheLender) {
   Pool pool;
   Message message = Int32ArrayMessage::inBuffer(pool.lend(0, 128), 10);
 
@@ -212,7 +212,7 @@ TEST(Message, RefusesABufferThatIsTooSmallAndReturnsIt) {
 
 // ---- bodies from a peer
 
-TEST(Message, KeepsTheLengthThatItCheckedWhateverThePeerWritesLater) {
+TEST(Message, KeepsTheCheckedLengthWhenThePeerChangesIt) {
   Pool pool;
   pool.write(Int32Array{.address = 3, .length = 5});
   auto message =
@@ -260,7 +260,7 @@ TEST(Message, RefusesMisalignedAndMissingBodies) {
   EXPECT_TRUE(Message::adopt(MessageType::int32, pool.lend(24)).isSound());
 }
 
-TEST(Message, CarriesATypeThatItDoesNotKnow) {
+TEST(Message, KeepsABodyOfAnUnknownType) {
   const std::array<std::byte, 40> bytes{std::byte{1}};
 
   const auto message = Message::copyOf(MessageType{77}, bytes);
@@ -289,7 +289,7 @@ TEST(Message, CopiesSmallBodiesIntoTheHandleAndLargeOnesOntoTheHeap) {
   EXPECT_EQ(typed.body().size(), 28U);
 }
 
-TEST(Message, DuplicatesItsMarksAndRoute) {
+TEST(Message, DuplicatesItsClientFieldsAndRoute) {
   auto message = MessageOf(Int32{.value = 5});
   message.setClientType(1);
   message.setClientExtra(2);

@@ -28,7 +28,7 @@ std::vector<std::string> describedFields() {
 }
 
 // The union of Envelope has exactly the types of MessageTypes, in the order of their numbers.
-TEST(MessageTypes, StandInTheEnvelopeInTheirOrder) {
+TEST(MessageTypes, HaveTheOrderOfTheEnvelope) {
   const auto members = capnp::Schema::from<wire::Envelope>().getUnionFields();
 
   ASSERT_EQ(members.size(), std::tuple_size_v<MessageTypes>);

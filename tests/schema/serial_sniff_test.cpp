@@ -44,20 +44,20 @@ TEST(SniffRecord, ReadsWhatItWrote) {
   }
 }
 
-TEST(SniffRecord, OfAnUnknownKindIsNone) {
+TEST(SniffRecord, RefusesAnUnknownKind) {
   const Bytes bytes{8, 7, 6, 5, 4, 3, 2, 1, 'x', 0};
 
   EXPECT_THAT(SniffRecord::tryRead(bytes), Eq(std::nullopt));
 }
 
-TEST(SniffReply, GivesItsRecordsInOrder) {
+TEST(SniffReply, ReturnsItsRecordsInOrder) {
   const std::array records{SniffRecord{1, SniffKind::sent, 'a'},
                            SniffRecord{2, SniffKind::damaged, 'b'}};
 
   EXPECT_THAT(tryReadRecords(replyOf(records)), Optional(ElementsAre(records[0], records[1])));
 }
 
-TEST(SniffReply, WithAnotherCountThanRecordsIsNone) {
+TEST(SniffReply, RefusesACountThatDiffersFromItsRecords) {
   const std::array records{SniffRecord{1, SniffKind::sent, 'a'},
                            SniffRecord{2, SniffKind::sent, 'b'}};
   for (const auto count : {-1, 1, 3}) {
@@ -69,7 +69,7 @@ TEST(SniffReply, WithAnotherCountThanRecordsIsNone) {
   }
 }
 
-TEST(SniffReply, WithHalfARecordIsNone) {
+TEST(SniffReply, RefusesAnIncompleteRecord) {
   const std::array records{SniffRecord{1, SniffKind::sent, 'a'},
                            SniffRecord{2, SniffKind::sent, 'b'}};
   auto reply = replyOf(records);
@@ -80,7 +80,7 @@ TEST(SniffReply, WithHalfARecordIsNone) {
   EXPECT_THAT(tryReadRecords(reply), Eq(std::nullopt));
 }
 
-TEST(SniffReply, WithAnUnknownKindIsNone) {
+TEST(SniffReply, RefusesARecordOfAnUnknownKind) {
   const std::array records{SniffRecord{1, SniffKind::sent, 'a'}};
   auto reply = replyOf(records);
 

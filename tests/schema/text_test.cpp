@@ -28,7 +28,7 @@ std::string refusal(MessageType type, const OptionFields& words) {
   return error;
 }
 
-TEST(Text, PrintsOneLineAMessage) {
+TEST(Text, PrintsEachMessageAsOneLine) {
   auto message = MessageOf(Int32{.timeout = 1, .address = 3, .value = -5});
   EXPECT_EQ(print(message), "int32 timeout=1 cmd=0 status=0 address=3 extra=0 value=-5");
 
@@ -60,7 +60,7 @@ TEST(Text, ShortensLongArrays) {
               testing::EndsWith(R"( value="ab"... (3))"));
 }
 
-TEST(Text, SaysThatABodyIsNone) {
+TEST(Text, ReportsAnInvalidBody) {
   EXPECT_EQ(print(Message()), "none");
   EXPECT_EQ(print(Message::copyOf(MessageType{77}, {})),
             "type 77: not one of ours, a body of 0 bytes");
@@ -80,7 +80,7 @@ TEST(Text, ParsesTheWordsOfAShell) {
 }
 
 // A hexadecimal number gives all bits of a field, the sign bit included.
-TEST(Text, TakesHexadecimalAsBits) {
+TEST(Text, ParsesHexadecimalNumbersAsBitPatterns) {
   EXPECT_EQ(parsed<Int32>({"address=0xffffffff"})->address, -1);
   EXPECT_EQ(parsed<Int32>({"address=0x80000000"})->address, INT32_MIN);
   EXPECT_EQ(parsed<Int32>({"address=-0x1"})->address, -1);
@@ -103,7 +103,7 @@ TEST(Text, ParsesArrays) {
               testing::ElementsAre('a', '=', 'b', ',', 'c'));
 }
 
-TEST(Text, TakesTheEndOfMessageLengthFromItsString) {
+TEST(Text, SetsTheEndOfMessageLengthFromItsString) {
   const auto message = parsed<Char8Array>({R"(eomString=\r\n)"});
 
   EXPECT_EQ(message->eomLen, 2);
@@ -111,7 +111,7 @@ TEST(Text, TakesTheEndOfMessageLengthFromItsString) {
   EXPECT_EQ(parsed<Char8Array>({R"(eomString=\r\n)", "eomLen=1"})->eom(), "\r");
 }
 
-TEST(Text, NamesTheBadFieldAndTheAllowedOnes) {
+TEST(Text, NamesTheInvalidFieldAndTheValidOnes) {
   EXPECT_EQ(refusal(MessageType::int32, {"adress=3"}),
             "int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, "
             "clientType, clientExtra");
@@ -131,7 +131,7 @@ TEST(Text, NamesTheBadFieldAndTheAllowedOnes) {
   EXPECT_EQ(refusal(MessageType{77}, {}), "type 77 is unknown");
 }
 
-TEST(Text, RefusesWordsThatAreNotQuiteNumbers) {
+TEST(Text, RefusesWordsThatAreAlmostNumbers) {
   for (const auto* const bad :
        {"value=", "value=1x", "value= 1", "value=-", "value=0x", "value=--1", "value=1.5",
         "value=-2147483649", "value=0x100000000", "value=-0x80000001", "value=4294967295"}) {
@@ -158,7 +158,7 @@ TEST(Text, FindsTypesByName) {
 }
 
 // tryParse() reads what print() has written, for each type with unusual values in its fields.
-TEST(Text, ReadsBackWhatItPrinted) {
+TEST(Text, ParsesWhatItPrinted) {
   const std::vector<std::pair<MessageType, OptionFields>> messages{
       {MessageType::connect, {"status=connectQueueFull", "incarnation=18446744073709551615"}},
       {MessageType::int32,
@@ -206,7 +206,7 @@ TEST(Json, HasEveryField) {
                                                        "address":3,"extra":0,"value":[1.5,"nan","-inf"]})"));
 }
 
-TEST(Json, WritesBytesOneCharacterEach) {
+TEST(Json, WritesOneCharacterForEachByte) {
   const auto json = toJson(parsed<Char8Array>({R"(value=a\x00\xff)", R"(eomString=\r)"}));
 
   EXPECT_EQ(json["value"], std::string("a\0\xc3\xbf", 4));
@@ -215,7 +215,7 @@ TEST(Json, WritesBytesOneCharacterEach) {
   EXPECT_EQ(toJson(parsed<User>({"value=00fe"}))["value"], "00fe");
 }
 
-TEST(Json, SaysTheSizeOfABodyThatIsNone) {
+TEST(Json, ReportsTheSizeOfAnInvalidBody) {
   EXPECT_EQ(
       toJson(Message::copyOf(MessageType{77}, {})),
       nlohmann::json::parse(R"({"type":"unknown","clientType":0,"clientExtra":0,"bytes":0})"));

@@ -32,7 +32,7 @@ TEST(User, IsBuiltAndReadInPlace) {
             message.body().data() + message.body().size());
 }
 
-TEST(User, RefusesMoreThanThereIsRoomFor) {
+TEST(User, RefusesAStructThatDoesNotFit) {
   UserBuilder builder(UserMessage::allocValue(64));
   auto fields = builder.initRoot<Struct>();
 
@@ -50,7 +50,7 @@ TEST(User, IsCopiedFromAnyBuilder) {
   EXPECT_EQ(UserReader(message).getRoot<Struct>().getValue()[99], 5);
 }
 
-TEST(User, RefusesBytesThatAreNoCapnProtoMessage) {
+TEST(User, RefusesBytesThatAreNotACapnProtoMessage) {
   auto message = UserMessage::allocValue(16);
   std::memset(message.value().data(), 0xff, message.getSize());
 

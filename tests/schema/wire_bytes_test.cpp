@@ -73,7 +73,7 @@ TEST_F(WireBytes, AreReadAsTheSameMessageOnEveryHost) {
 }
 
 // A user's own struct is read with the values that were written.
-TEST_F(WireBytes, OfAUsersStructHoldWhatWasWrittenIntoIt) {
+TEST_F(WireBytes, OfAUsersStructContainTheWrittenValues) {
   const auto message = test::userStruct();
 
   UserReader reader(message);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The meeting place: its name, what is on it, and what is removed from it.
+// Backplane: its name, its segments, and which of them are removed.
 #include <stdlib.h>
 #include <sys/stat.h>
 
@@ -24,8 +24,8 @@ using testing::UnorderedElementsAreArray;
 
 class BackplaneTest : public ShmTest {
  protected:
-  // What a program with a server, a client and a link in between has on the backplane. Threads do
-  // not cross a fork: no Endpoint.
+  // The segments of a program with a server, a client and a link between them. Without an Endpoint,
+  // because threads do not exist in the child of a fork.
   void occupy(Child::Self& self) const {
     OwnWindow server(name(), SegmentKind::serverWindow, serverName(), {},
                      [](layout::SegmentHeader& header) {
@@ -57,8 +57,9 @@ class BackplaneTest : public ShmTest {
   }
 };
 
-// Up to 4096 files it looks at all; beyond that, other users' names must not keep it waiting.
-TEST_F(BackplaneTest, WhoeverAttachesToACrowdOfNamesLooksAtSome) {
+// attach() examines up to 4096 files. With more files, it must not wait for the names that other
+// users created.
+TEST_F(BackplaneTest, AttachExaminesOnlySomeOfVeryManyFiles) {
   for (std::uint64_t number = 1; number <= 5000; ++number) {
     std::ofstream{segments::path(SegmentName::keyed(name(), NameKind::pendingBind, number))};
   }
@@ -69,7 +70,7 @@ TEST_F(BackplaneTest, WhoeverAttachesToACrowdOfNamesLooksAtSome) {
   EXPECT_EQ(backplane_.removeDead().size(), 5000U - 4096U);
 }
 
-TEST_F(BackplaneTest, IsNamedByItsUserByTheEnvironmentOrDefault) {
+TEST_F(BackplaneTest, TakesItsNameFromTheCallerTheEnvironmentOrTheDefault) {
   ::setenv("MPF_BACKPLANE", name().c_str(), 1);
   EXPECT_EQ(Backplane::attach().name(), name());
   EXPECT_EQ(Backplane::attach(name() + "x").name(), name() + "x");
@@ -79,7 +80,7 @@ TEST_F(BackplaneTest, IsNamedByItsUserByTheEnvironmentOrDefault) {
   EXPECT_EQ(Backplane::attach().name(), "default");
 }
 
-TEST_F(BackplaneTest, ANameThatCannotBeOneIsRefusedByName) {
+TEST_F(BackplaneTest, RefusesAnInvalidNameAndNamesIt) {
   EXPECT_THAT(whatOf<std::invalid_argument>([] { Backplane::attach("a.b"); }),
               HasSubstr("\"a.b\""));
   ::setenv("MPF_BACKPLANE", "a/b", 1);
@@ -87,7 +88,7 @@ TEST_F(BackplaneTest, ANameThatCannotBeOneIsRefusedByName) {
   ::unsetenv("MPF_BACKPLANE");
 }
 
-TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
+TEST_F(BackplaneTest, TakesTheDefaultLocationFromTheEnvironmentOrZero) {
   ::unsetenv("MPF_LOCATION");
   EXPECT_EQ(Backplane::defaultLocation(), 0);
   ::setenv("MPF_LOCATION", "7", 1);
@@ -99,17 +100,17 @@ TEST_F(BackplaneTest, TheDefaultLocationIsTheEnvironmentsOrZero) {
   ::unsetenv("MPF_LOCATION");
 }
 
-TEST_F(BackplaneTest, IsolatedOnesDiffer) {
+TEST_F(BackplaneTest, IsolatedBackplanesHaveDifferentNames) {
   EXPECT_NE(Backplane::isolated().name(), Backplane::isolated().name());
 }
 
-TEST_F(BackplaneTest, CopiesShareTheirWatcher) {
+TEST_F(BackplaneTest, CopiesShareOneWatcher) {
   const Backplane copy = backplane_;
 
   EXPECT_EQ(&copy.watcher(), &backplane_.watcher());
 }
 
-TEST_F(BackplaneTest, KnowsItsOwnSegmentsAndNoOthers) {
+TEST_F(BackplaneTest, ListsOnlyItsOwnSegments) {
   const auto longer = Backplane::attach(name() + "-x");
   auto ours = createPage();
   auto theirs = createPage();
@@ -129,11 +130,11 @@ TEST_F(BackplaneTest, KnowsItsOwnSegmentsAndNoOthers) {
   EXPECT_THAT(Backplane::names(), Not(Contains(longer.name())));
 }
 
-TEST_F(BackplaneTest, WhatAKilledProcessLeftIsRemovedAndNamed) {
+TEST_F(BackplaneTest, RemovesAndReportsTheFilesOfAKilledProcess) {
   Child child([&](Child::Self& self) { occupy(self); });
   const auto left = backplane_.segmentNames();
   EXPECT_EQ(left.size(), kOccupied);
-  EXPECT_THAT(backplane_.removeDead(), IsEmpty()) << "it lives";
+  EXPECT_THAT(backplane_.removeDead(), IsEmpty()) << "it is alive";
   child.stop();
   EXPECT_THAT(backplane_.removeDead(), IsEmpty()) << "it is stopped";
 
@@ -144,7 +145,7 @@ TEST_F(BackplaneTest, WhatAKilledProcessLeftIsRemovedAndNamed) {
   EXPECT_THAT(backplane_.removeDead(), IsEmpty());
 }
 
-TEST_F(BackplaneTest, AttachingRemovesWhatTheDeadLeft) {
+TEST_F(BackplaneTest, AttachRemovesTheFilesOfDeadProcesses) {
   Child child([&](Child::Self& self) { occupy(self); });
   child.end(SIGKILL);
 
@@ -153,7 +154,7 @@ TEST_F(BackplaneTest, AttachingRemovesWhatTheDeadLeft) {
   EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
 }
 
-TEST_F(BackplaneTest, WhatTheLivingOwnStaysWhenOthersDie) {
+TEST_F(BackplaneTest, KeepsTheFilesOfLivingProcesses) {
   Child dying([&](Child::Self& self) { occupy(self); });
   const auto server = makeServer();
   const OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
@@ -164,8 +165,8 @@ TEST_F(BackplaneTest, WhatTheLivingOwnStaysWhenOthersDie) {
   EXPECT_EQ(backplane_.segmentNames().size(), 6u);
 }
 
-// The server of the link dies, then its client: the link is the client's.
-TEST_F(BackplaneTest, ALinkStaysAsLongAsItsClientLives) {
+// The server of the link dies, then its client. The client owns the link.
+TEST_F(BackplaneTest, KeepsALinkUntilItsClientDies) {
   Child server([&](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader& header) {
@@ -190,7 +191,7 @@ TEST_F(BackplaneTest, ALinkStaysAsLongAsItsClientLives) {
   EXPECT_EQ(backplane_.removeDead().size(), 5u);
 }
 
-TEST_F(BackplaneTest, ALinkThatNobodyCanReadGoesWithItsClient) {
+TEST_F(BackplaneTest, RemovesAnUnreadableLinkWhenItsClientDies) {
   Child child([&](Child::Self& self) { occupy(self); });
   child.end(SIGKILL);
   for (const auto& file : backplane_.segmentNames()) {
@@ -201,9 +202,9 @@ TEST_F(BackplaneTest, ALinkThatNobodyCanReadGoesWithItsClient) {
   EXPECT_EQ(backplane_.removeDead().size(), kOccupied);
 }
 
-// A program of the next major version on the same backplane: its names and locks are as ours, the
-// rest is not ours to judge.
-TEST_F(BackplaneTest, LivingProgramsOfOtherVersionsKeepWhatIsTheirs) {
+// A program of the next major version on the same backplane: its names and locks have the same
+// meaning; its other bytes are unknown to us.
+TEST_F(BackplaneTest, KeepsTheFilesOfLivingProgramsOfOtherVersions) {
   const auto server = makeServer(layout::kMajor + 1);
   auto link = createPage(SegmentKind::link);
   link.sharedHeader().layoutMajor = layout::kMajor + 1;
@@ -217,7 +218,7 @@ TEST_F(BackplaneTest, LivingProgramsOfOtherVersionsKeepWhatIsTheirs) {
   segments::remove(bulk.name());
 }
 
-TEST_F(BackplaneTest, FilesWithOtherNamesAreLeftAlone) {
+TEST_F(BackplaneTest, LeavesFilesWithOtherNamesUnchanged) {
   const auto file = segments::path(SegmentName::prefix(name()) + "notes");
   std::ofstream{file} << "mine";
 
@@ -226,7 +227,7 @@ TEST_F(BackplaneTest, FilesWithOtherNamesAreLeftAlone) {
   EXPECT_EQ(::unlink(file.c_str()), 0);
 }
 
-TEST_F(BackplaneTest, ManyMayRemoveAtOnce) {
+TEST_F(BackplaneTest, ManyProcessesMayRemoveAtOnce) {
   constexpr int kReapers = 3;
   for (int round = 0; round < 30; ++round) {
     Child victim([&](Child::Self& self) { occupy(self); });

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Child: a forked process that takes part in a test and may be killed at any point. It ends with
-// the test.
+// Child: a forked process that takes part in a test and may be killed at any point. It is killed at
+// the end of the test.
 //
 //   Child child([&](Child::Self& self) {
 //     auto segment = ...;
-//     self.stay();          // tells the parent that it is ready; never returns
+//     self.stay();          // notifies the parent that it is ready; never returns
 //   });
 //
-// A child has nothing of what the test opened before: see shm/fork_guard.h.
+// A child cannot use the MPF objects that the test made before: see shm/fork_guard.h.
 #pragma once
 
 #include <fcntl.h>
@@ -36,7 +36,7 @@ class Child {
    public:
     Self(FileDescriptor toParent, FileDescriptor fromParent)
         : toParent_(std::move(toParent)), fromParent_(std::move(fromParent)) {}
-    // Tells the parent, and goes on when the parent says go().
+    // Notifies the parent, and continues when the parent calls go().
     void ready() {
       const char one = 1;
       if (::write(toParent_.get(), &one, 1) != 1) ::_exit(3);
@@ -53,7 +53,7 @@ class Child {
   };
 
   // Returns when the child is ready for the first time.
-  //   throws  std::runtime_error when it ended before
+  //   throws  std::runtime_error if it ended before
   explicit Child(const std::function<void(Self&)>& run) {
     auto [fromChild, toParent] = pipe();
     auto [fromParent, toChild] = pipe();
@@ -81,12 +81,12 @@ class Child {
   Child& operator=(const Child&) = delete;
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
-  // Lets a ready child go on.
+  // Lets a ready child continue.
   void go() const {
     const char one = 1;
     checkCall(::write(toChild_.get(), &one, 1), "write");
   }
-  // False when the child ended instead.
+  // Returns false if the child ended instead.
   [[nodiscard]] bool waitUntilReady() const {
     char ready = 0;
     return retryInterrupted([&] { return ::read(fromChild_.get(), &ready, 1); }) == 1;

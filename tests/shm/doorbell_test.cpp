@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sleep and wake.
+// Doorbell: sleep and wake, on the futex and on the FIFO.
 #include "shm/doorbell.h"
 
 #include <poll.h>
@@ -38,7 +38,7 @@ TEST_F(DoorbellTest, ARingBeforeTheSleepIsNotLost) {
   doorbell::sleep(bell_, seen, Deadline::never());
 }
 
-TEST_F(DoorbellTest, SleepersWakeEachOtherWithoutLosingATurn) {
+TEST_F(DoorbellTest, ThreadsThatWakeEachOtherLoseNoTurn) {
   constexpr int kTurns = 20'000;
   layout::Word32 bells[2]{};
   std::atomic<int> turn{0};
@@ -69,7 +69,7 @@ TEST_F(DoorbellTest, ASleepEndsAtItsDeadline) {
   while (!deadline.hasPassed()) doorbell::sleep(bell_, 0, deadline);
 }
 
-TEST_F(DoorbellTest, ADeadlineThatHasPassedIsNoSleep) {
+TEST_F(DoorbellTest, APassedDeadlineDoesNotSleep) {
   doorbell::sleep(bell_, 0, Deadline::after(-1h));
   doorbell::sleep(bell_, 0, Deadline::atNs(0));
   doorbell::sleep(bell_, 0, Deadline::atNs(-1));
@@ -77,7 +77,8 @@ TEST_F(DoorbellTest, ADeadlineThatHasPassedIsNoSleep) {
 
 class Signals : public DoorbellTest {
  protected:
-  // Runs `handler` for SIGUSR1 in `sleep`'s thread again and again until that returns.
+  // Calls `sleep` in a thread, and sends SIGUSR1 to that thread, which runs `handler`, until
+  // `sleep` returns.
   template <class Sleep>
   static void interrupt(void (*handler)(int), int flags, Sleep sleep) {
     struct sigaction action{};
@@ -100,7 +101,7 @@ class Signals : public DoorbellTest {
   static inline layout::Word32* rungBySignal = nullptr;
 };
 
-TEST_F(Signals, EndASleepWhenTheirHandlerRestartsNoCalls) {
+TEST_F(Signals, EndASleepIfTheHandlerIsInstalledWithoutRestart) {
   interrupt([](int) {}, 0, [&] { doorbell::sleep(bell_, 0, Deadline::never()); });
 }
 
@@ -108,10 +109,10 @@ TEST_F(Signals, EndASleepWithADeadline) {
   interrupt([](int) {}, SA_RESTART, [&] { doorbell::sleep(bell_, 0, Deadline::after(1h)); });
 }
 
-TEST_F(Signals, EndAnySleepWhenTheirHandlerRings) {
+TEST_F(Signals, EndEverySleepIfTheHandlerRings) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP()
-      << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
+      << "ThreadSanitizer delays signal handlers until the sleep that they must end has ended";
 #endif
   rungBySignal = &bell_;
 
@@ -119,12 +120,12 @@ TEST_F(Signals, EndAnySleepWhenTheirHandlerRings) {
             [&] { doorbell::sleep(bell_, 0, Deadline::never()); });
 }
 
-TEST_F(DoorbellTest, AProcessWakesAnother) {
+TEST_F(DoorbellTest, OneProcessWakesAnother) {
   auto segment = createPage();
   ASSERT_TRUE(segment.tryPublish(SegmentName::keyed(name(), NameKind::pendingBind, 1)));
   auto& bell = segment.at<layout::Word32>(1024);
   Child ringer([&](Child::Self& self) {
-    // A child's copies of its parent's segments are memory of its own.
+    // The child must open the segment again: its copies of the parent's mappings are private.
     const auto opened =
         Segment::tryOpen(SegmentName::keyed(name(), NameKind::pendingBind, 1),
                          layout::SegmentKind::pendingBind, Segment::Access::readWrite);
@@ -140,7 +141,7 @@ TEST_F(DoorbellTest, AProcessWakesAnother) {
   segments::remove(segment.name());
 }
 
-TEST_F(DoorbellTest, APipeIsReadableOnceRungAndNotOnceDrained) {
+TEST_F(DoorbellTest, AFifoIsReadableAfterARingUntilItIsDrained) {
   const auto own = doorbell::createFifo(fifoName_, 0600, ~0u);
   const auto peers = doorbell::tryOpenFifo(fifoName_);
   ASSERT_TRUE(peers);
@@ -154,7 +155,7 @@ TEST_F(DoorbellTest, APipeIsReadableOnceRungAndNotOnceDrained) {
   doorbell::drainFifo(own);
 }
 
-TEST_F(DoorbellTest, AFullPipeTakesRingsWithoutWaiting) {
+TEST_F(DoorbellTest, RingingAFullFifoDoesNotBlock) {
   const auto own = doorbell::createFifo(fifoName_, 0600, ~0u);
 
   for (int i = 0; i < 100'000; ++i) EXPECT_TRUE(doorbell::tryRingFifo(own));
@@ -164,7 +165,7 @@ TEST_F(DoorbellTest, AFullPipeTakesRingsWithoutWaiting) {
   EXPECT_FALSE(isReadable(own));
 }
 
-TEST_F(DoorbellTest, APipeHasTheRightsAskedForWhateverTheUmask) {
+TEST_F(DoorbellTest, AFifoHasTheRequestedModeForEveryUmask) {
   const auto before = ::umask(0777);
 
   const auto fifo = doorbell::createFifo(fifoName_, 0660, ::getgid());
@@ -176,7 +177,7 @@ TEST_F(DoorbellTest, APipeHasTheRightsAskedForWhateverTheUmask) {
   EXPECT_TRUE(S_ISFIFO(status.st_mode));
 }
 
-TEST_F(DoorbellTest, RingingAtADeadOwnersPipeKillsNobody) {
+TEST_F(DoorbellTest, RingingTheFifoOfADeadOwnerDoesNotRaiseSigpipe) {
   Child owner([&](Child::Self& self) {
     const auto fifo = doorbell::createFifo(fifoName_, 0600, ~0u);
     self.stay();
@@ -196,7 +197,7 @@ TEST_F(DoorbellTest, RingingAtADeadOwnersPipeKillsNobody) {
   EXPECT_EQ(ringer.end(0), 0);
 }
 
-TEST_F(DoorbellTest, APipeThatIsNotThereIsNotRung) {
+TEST_F(DoorbellTest, AMissingFifoIsNotRung) {
   const auto none = doorbell::tryOpenFifo(fifoName_);
 
   EXPECT_FALSE(none);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Hints that got lost and hints that nobody gave: they cost time, never a message and never the
-// rest.
+// Lost hints, and hints without a message: they cost time, but no message is lost and no other link
+// is affected.
 #include <poll.h>
 
 #include <atomic>
@@ -14,12 +14,12 @@
 namespace mpf::test {
 namespace {
 
-constexpr std::uint32_t kNobodysBit = 9999;
-constexpr int kUntilCool = 5000;  // looks in vain after which no link is polled
+constexpr std::uint32_t kUnusedBit = 9999;
+constexpr int kUntilCool = 5000;  // after so many polls without a message, no link is polled
 
 class HintsTest : public ShmTest {
  protected:
-  // Until the server finds links by their hints alone.
+  // Lets the server poll until it finds links only by their hints.
   static void coolDown(End& end) {
     for (int i = 0; i < kUntilCool; ++i) static_cast<void>(end.endpoint.next());
   }
@@ -56,7 +56,7 @@ class LostHints : public HintsTest,
 INSTANTIATE_TEST_SUITE_P(FewAndManyLinks, LostHints,
                          testing::Combine(kWaitModes, testing::Values(1, 100)));
 
-TEST_P(LostHints, BeforeAWaitLoseNoMessage) {
+TEST_P(LostHints, LostBeforeAWaitLoseNoMessage) {
   const auto [mode, links] = GetParam();
   End server(backplane_, "server", mode);
   End client(backplane_, "");
@@ -71,13 +71,13 @@ TEST_P(LostHints, BeforeAWaitLoseNoMessage) {
   }
 }
 
-TEST_P(LostHints, DuringAWaitLoseNoMessage) {
+TEST_P(LostHints, LostDuringAWaitLoseNoMessage) {
   const auto [mode, links] = GetParam();
   End server(backplane_, "server", mode);
   End client(backplane_, "");
   for (int i = 1; i < links; ++i) connect(client, server);
   const auto link = connect(client, server);
-  link.client.setPeerIndex(kNobodysBit);  // the bell rings, the bit is another's
+  link.client.setPeerIndex(kUnusedBit);  // rings the bell, but sets the bit of another link
   coolDown(server);
   std::atomic<std::uint32_t> taken{0};
 
@@ -94,12 +94,12 @@ TEST_P(LostHints, DuringAWaitLoseNoMessage) {
   sender.join();
 }
 
-TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutItsHint) {
+TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutAHint) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto flood = connect(client, server);
   const auto quiet = connect(client, server);
-  quiet.client.setPeerIndex(kNobodysBit);
+  quiet.client.setPeerIndex(kUnusedBit);
   coolDown(server);
   ASSERT_EQ(send(quiet.client, 7), LinkSend::sent);
 
@@ -110,7 +110,7 @@ TEST_F(HintsTest, AFloodDoesNotHideAMessageWithoutItsHint) {
   }
 }
 
-TEST_F(HintsTest, AnEventLoopIsToldOfAMessageWithoutItsHint) {
+TEST_F(HintsTest, AnEventLoopIsNotifiedOfAMessageWithoutAHint) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto link = connect(client, server);
@@ -124,7 +124,7 @@ TEST_F(HintsTest, AnEventLoopIsToldOfAMessageWithoutItsHint) {
   EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
 }
 
-TEST_F(HintsTest, InventedOnesDoNoHarm) {
+TEST_F(HintsTest, HintsWithoutAMessageDoNoHarm) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto first = connect(client, server);
@@ -144,10 +144,10 @@ TEST_F(HintsTest, InventedOnesDoNoHarm) {
   EXPECT_EQ(knocks, layout::kKnocks);
   EXPECT_TRUE(server.endpoint.takeRescan());
   EXPECT_FALSE(server.endpoint.hasSideNews());
-  EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms))) << "and then it is quiet";
+  EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms))) << "no event is left";
 }
 
-TEST_F(HintsTest, ABusyScribblerStopsNobody) {
+TEST_F(HintsTest, APeerThatOverwritesHintsStopsNoOtherPeer) {
   constexpr std::uint32_t kTurns = 1000;
   End server(backplane_, "server", WaitMode::block);
   End client(backplane_, "", WaitMode::block);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// End: an endpoint with the links that end at it. connect() makes a link from a client's end to a
-// server's, both sides at once.
+// End: an endpoint with its links. connect() creates a link from a client's End to a server's End,
+// both sides at once.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,7 @@ struct Offer {
 };
 
 struct End {
-  // `server` empty: a client.
+  // If `server` is empty, this is a client.
   End(const Backplane& backplane, const std::string& server, WaitMode mode = WaitMode::adaptive,
       Offer offer = {})
       : endpoint(
@@ -54,7 +54,7 @@ struct End {
     endpoint.attach(index, *links[index]);
     return *links[index];
   }
-  // As an Envelope carries it, for tests that look at one word only.
+  // A value for Envelope, for tests that check only one word.
   std::optional<std::uint32_t> tryTake(std::uint32_t index) {
     auto& link = *links[index];
     if (!link.hasMessage()) return std::nullopt;
@@ -63,7 +63,7 @@ struct End {
     return id;
   }
 
-  // by their bits; before the endpoint, which needs them to the last
+  // By their bits. Declared before the endpoint, whose destructor uses them.
   std::vector<std::unique_ptr<Link>> links;
   Endpoint endpoint;
 };

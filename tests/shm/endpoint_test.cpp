@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A window with its links, and the wait for the next message of any of them.
+// Endpoint: a window with its links, and the wait for the next message of any of them.
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
@@ -17,8 +17,8 @@ namespace {
 
 class EndpointTest : public ShmTest {
  protected:
-  // Messages taken from each of `links` when `messages` are taken from `end`; all links are kept
-  // full.
+  // Takes `messages` messages from `end` while all links are kept full. Returns how many came from
+  // each of `links`.
   static std::vector<int> shares(End& end, const std::vector<Connected>& links, int messages) {
     std::vector<int> taken(links.size());
     for (int i = 0; i < messages; ++i) {
@@ -50,7 +50,7 @@ TEST_P(WaitModes, AWaitEndsWithAMessage) {
   EXPECT_EQ(server.tryTake(*index), 7u);
 }
 
-TEST_P(WaitModes, AWaitWithoutNewsEndsAtItsDeadline) {
+TEST_P(WaitModes, AWaitWithoutAMessageEndsAtItsDeadline) {
   End server(backplane_, "server", GetParam());
 
   for (const auto patience : {-1ms, 0ms, 3ms}) {
@@ -83,7 +83,7 @@ TEST_P(WaitModes, AnInterruptFromASignalHandlerEndsAWait) {
 #ifdef __SANITIZE_THREAD__
   if (GetParam() != WaitMode::spin)
     GTEST_SKIP()
-        << "ThreadSanitizer holds handlers back until the sleep that they are to end is over";
+        << "ThreadSanitizer delays signal handlers until the sleep that they must end has ended";
 #endif
   End server(backplane_, "server", GetParam());
   static Endpoint* interrupted = nullptr;
@@ -143,8 +143,8 @@ TEST_F(EndpointTest, LinksTakeTurns) {
   for (const auto share : taken) EXPECT_NEAR(share, 1000, 50);
 }
 
-// More busy links than are polled directly.
-TEST_F(EndpointTest, ManyBusyLinksTakeTurnsToo) {
+// With more busy links than the endpoint polls.
+TEST_F(EndpointTest, MoreBusyLinksThanArePolledTakeTurns) {
   constexpr int kLinks = 20;
   constexpr int kEach = 2000;
   End server(backplane_, "server");
@@ -159,9 +159,9 @@ TEST_F(EndpointTest, ManyBusyLinksTakeTurnsToo) {
   EXPECT_LE(*most, kEach * 2);
 }
 
-// Whoever asks "is there news?" before each message gets all of them, also of a link that is not
-// polled because others are.
-TEST_F(EndpointTest, AWaitBeforeEachMessageForgetsNone) {
+// A caller that waits before each message gets all messages, also those of a link that is not
+// polled because other links are.
+TEST_F(EndpointTest, AWaitBeforeEachMessageReturnsForEveryMessage) {
   constexpr std::uint32_t kLinks = 9;
   End server(backplane_, "server");
   End client(backplane_, "");
@@ -177,7 +177,7 @@ TEST_F(EndpointTest, AWaitBeforeEachMessageForgetsNone) {
   }
 }
 
-TEST_F(EndpointTest, AFloodLeavesOthersTheirTurn) {
+TEST_F(EndpointTest, AFloodOnOneLinkDoesNotStarveOthers) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto flood = connect(client, server);
@@ -198,7 +198,7 @@ TEST_F(EndpointTest, AFloodLeavesOthersTheirTurn) {
   EXPECT_LE(others, 20);
 }
 
-TEST_F(EndpointTest, IdleLinksAreNotLookedAt) {
+TEST_F(EndpointTest, DoesNotLookAtIdleLinks) {
   End server(backplane_, "server");
   End client(backplane_, "");
   for (int i = 0; i < 100; ++i) connect(client, server);
@@ -210,14 +210,14 @@ TEST_F(EndpointTest, IdleLinksAreNotLookedAt) {
   EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 100u);
 }
 
-TEST_F(EndpointTest, ABitIsUsedAgainAfterItsLinkIsGone) {
+TEST_F(EndpointTest, ReusesTheBitOfADetachedLink) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto first = connect(client, server);
   ASSERT_EQ(send(first.client, 1), LinkSend::sent);
 
   server.drop(first.serverIndex);
-  EXPECT_FALSE(server.endpoint.next()) << "what it had left is gone with it";
+  EXPECT_FALSE(server.endpoint.next()) << "the messages of the detached link are gone";
   const auto second = connect(client, server);
 
   EXPECT_EQ(second.serverIndex, first.serverIndex);
@@ -227,7 +227,7 @@ TEST_F(EndpointTest, ABitIsUsedAgainAfterItsLinkIsGone) {
   EXPECT_EQ(server.endpoint.control().linkCount.load(std::memory_order_relaxed), 1u);
 }
 
-TEST_F(EndpointTest, ThereAreNoMoreBitsThanTheLayoutHas) {
+TEST_F(EndpointTest, ReservesNoMoreBitsThanTheLayoutHas) {
   End server(backplane_, "server");
 
   for (std::uint32_t i = 0; i < layout::kMaxLinks; ++i) ASSERT_EQ(server.endpoint.tryReserve(), i);
@@ -237,7 +237,7 @@ TEST_F(EndpointTest, ThereAreNoMoreBitsThanTheLayoutHas) {
   EXPECT_EQ(server.endpoint.tryReserve(), 7u);
 }
 
-TEST_F(EndpointTest, KnocksAreTakenOnce) {
+TEST_F(EndpointTest, TakesEachKnockOnce) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto peer = client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow);
@@ -248,7 +248,7 @@ TEST_F(EndpointTest, KnocksAreTakenOnce) {
 
   EXPECT_TRUE(server.endpoint.wait(Deadline::never()));
   EXPECT_EQ(server.endpoint.takeKnock(), 5u);
-  EXPECT_TRUE(server.endpoint.hasSideNews()) << "until nothing was taken";
+  EXPECT_TRUE(server.endpoint.hasSideNews()) << "true until takeKnock() has returned none";
   EXPECT_EQ(server.endpoint.takeKnock(), 6u);
   EXPECT_FALSE(server.endpoint.takeKnock());
   EXPECT_FALSE(server.endpoint.hasSideNews());
@@ -258,7 +258,7 @@ TEST_F(EndpointTest, KnocksAreTakenOnce) {
   EXPECT_FALSE(server.endpoint.takeRescan());
 }
 
-TEST_F(EndpointTest, APeersDeathIsLocalNews) {
+TEST_F(EndpointTest, ReportsAPeersDeathAsALocalEvent) {
   Child child([&](Child::Self& self) {
     const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
@@ -275,11 +275,11 @@ TEST_F(EndpointTest, APeersDeathIsLocalNews) {
   EXPECT_TRUE(client.endpoint.takeLocalNews());
   EXPECT_TRUE(peer->isDead());
   EXPECT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr);
-  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "what the dead one left is removed";
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "the files of the dead peer are removed";
 }
 
-// A server that is killed while it ends has closed its window, but not yet its links.
-TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
+// A server that is killed while it shuts down has closed its window, but not yet its links.
+TEST_F(EndpointTest, WatchesThePeerOfAClosedWindowUntilItDies) {
   Child child([&](Child::Self& self) {
     const OwnWindow window(name(), layout::SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
@@ -292,7 +292,7 @@ TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
   child.go();
   ASSERT_TRUE(child.waitUntilReady());
   ASSERT_EQ(client.endpoint.peer(serverName(), layout::SegmentKind::serverWindow), nullptr)
-      << "for a second client, which looks for it";
+      << "a second client does not find it";
 
   child.end(SIGKILL);
 
@@ -300,7 +300,7 @@ TEST_F(EndpointTest, ThePeerOfAClosedWindowIsWatchedUntilItDies) {
   EXPECT_TRUE(peer->isDead());
 }
 
-TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
+TEST_F(EndpointTest, DescriptorIsReadableWhenAMessageArrives) {
   End server(backplane_, "server");
   End client(backplane_, "");
   const auto link = connect(client, server);
@@ -316,7 +316,7 @@ TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
   ASSERT_EQ(send(link.client, 7), LinkSend::sent);
 
   EXPECT_TRUE(isReadable());
-  EXPECT_FALSE(server.endpoint.arm()) << "there is news already";
+  EXPECT_FALSE(server.endpoint.arm()) << "there is a message already";
   ASSERT_EQ(server.endpoint.next(), link.serverIndex);
   EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
   while (server.endpoint.next()) {
@@ -328,7 +328,7 @@ TEST_F(EndpointTest, ADescriptorIsReadableWhenAMessageComes) {
   server.endpoint.disarm();
 }
 
-TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUp) {
+TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUps) {
   constexpr std::uint32_t kTurns = 5000;
   End server(backplane_, "server");
   End client(backplane_, "");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A peer cuts a file that others have mapped: they go on, with zeroes or with a file that is grown
-// again.
+// A peer truncates a file that other processes have mapped. They continue to run, with zeroes or
+// with a file that is grown again.
 #include "shm/fault_guard.h"
 
 #include <pthread.h>
@@ -25,7 +25,7 @@ namespace {
 using layout::SegmentKind;
 using testing::HasSubstr;
 
-// What the program had installed for SIGBUS before it used MPF: it makes pages of its own.
+// The SIGBUS handler that the program installed before it used MPF: it maps pages of its own.
 std::atomic<int> faultsOfTheProgram{0};
 void* const kWholePage = reinterpret_cast<void*>(~std::uintptr_t{layout::kPageBytes - 1});
 
@@ -55,7 +55,7 @@ class FaultGuard : public ShmTest {
     EXPECT_EQ(faultsOfTheProgram.exchange(0), expectedFaultsOfTheProgram_);
     ShmTest::TearDown();
   }
-  // A segment of four pages under file_, with something on each.
+  // Creates a segment of four pages with the name file_, with data on each page.
   Segment publish() const {
     auto segment = Segment::create(4 * layout::kPageBytes, SegmentKind::bulk, name(), {});
     for (std::size_t page = 0; page < 4; ++page)
@@ -84,22 +84,22 @@ class FaultGuard : public ShmTest {
   int expectedFaultsOfTheProgram_ = 0;
 };
 
-TEST_F(FaultGuard, ASegmentThatIsCutReadsAsZeroesAndIsLost) {
+TEST_F(FaultGuard, ATruncatedSegmentReadsAsZeroesAndIsLost) {
   const auto segment = publish();
   const auto peers = Segment::tryOpen(file_, SegmentKind::bulk, Segment::Access::readOnly);
 
   cut(file_, 2 * layout::kPageBytes);
   EXPECT_EQ(segment.at<std::uint64_t>(1000), 7u);
-  EXPECT_FALSE(segment.isLost()) << "nobody met it yet";
+  EXPECT_FALSE(segment.isLost()) << "no access has faulted yet";
 
   EXPECT_EQ(segment.at<std::uint64_t>(2 * layout::kPageBytes + 1000), 0u);
   EXPECT_TRUE(segment.isLost());
-  EXPECT_EQ(segment.at<std::uint64_t>(1000), 0u) << "all of it, at once";
+  EXPECT_EQ(segment.at<std::uint64_t>(1000), 0u) << "all pages, at once";
   EXPECT_EQ(peers->at<std::uint64_t>(3 * layout::kPageBytes + 1000), 0u) << "mapped for reading";
   EXPECT_TRUE(peers->isLost());
 }
 
-TEST_F(FaultGuard, WhatIsWrittenToALostSegmentStaysHere) {
+TEST_F(FaultGuard, WritesToALostSegmentStayInThisProcess) {
   const auto segment = publish();
   cut(file_);
 
@@ -109,7 +109,7 @@ TEST_F(FaultGuard, WhatIsWrittenToALostSegmentStaysHere) {
   EXPECT_EQ(fileBytes(file_), 0u);
 }
 
-TEST_F(FaultGuard, TheOtherSegmentsAreNotTouched) {
+TEST_F(FaultGuard, LeavesOtherSegmentsUnchanged) {
   const auto segment = publish();
   segments::remove(file_);
   const auto other = publish();
@@ -121,7 +121,7 @@ TEST_F(FaultGuard, TheOtherSegmentsAreNotTouched) {
   EXPECT_FALSE(segment.isLost());
 }
 
-TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByTheirOwner) {
+TEST_F(FaultGuard, TheOwnerGrowsTruncatedHintsAgain) {
   const auto server = makeServer();
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   cut(hintsOf(*server));
@@ -134,7 +134,7 @@ TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByTheirOwner) {
   EXPECT_FALSE(peer->isLost());
 }
 
-TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByAPeer) {
+TEST_F(FaultGuard, APeerGrowsTruncatedHintsAgain) {
   const auto server = makeServer();
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   const auto other = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
@@ -147,13 +147,13 @@ TEST_F(FaultGuard, HintsThatAreCutAreGrownAgainByAPeer) {
   EXPECT_FALSE(peer->isLost());
 }
 
-TEST_F(FaultGuard, HintsThatWereCutOrScribbledOverDoNotKeepNewPeersAway) {
+TEST_F(FaultGuard, NewPeersCanOpenTruncatedOrOverwrittenHints) {
   const auto server = makeServer();
   const auto hints = hintsOf(*server);
   cut(hints);
   server->ring();
   EXPECT_TRUE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
-  cut(hints, 600);  // within a page: nobody meets it
+  cut(hints, 600);  // within a page: no access faults
   EXPECT_TRUE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow));
   EXPECT_EQ(fileBytes(hints), sizeof(layout::WindowHints));
 
@@ -166,7 +166,7 @@ TEST_F(FaultGuard, HintsThatWereCutOrScribbledOverDoNotKeepNewPeersAway) {
   EXPECT_EQ(server->hints().readyBits[0].load(std::memory_order_relaxed), 1u << 5);
 }
 
-TEST_F(FaultGuard, AWindowThatIsCutIsLostToItsPeers) {
+TEST_F(FaultGuard, ATruncatedWindowIsLostToItsPeers) {
   const auto server = makeServer();
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   cut(serverName());
@@ -177,7 +177,7 @@ TEST_F(FaultGuard, AWindowThatIsCutIsLostToItsPeers) {
   EXPECT_TRUE(peer->hasOwner());
 }
 
-TEST_F(FaultGuard, ALinkThatIsCutIsLostAndItsChunksWithTheirSegment) {
+TEST_F(FaultGuard, ATruncatedLinkAndTruncatedChunksAreLost) {
   End server(backplane_, "server", WaitMode::block);
   End client(backplane_, "", WaitMode::block);
   const auto link = connect(client, server);
@@ -189,7 +189,7 @@ TEST_F(FaultGuard, ALinkThatIsCutIsLostAndItsChunksWithTheirSegment) {
   cut(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0));
 
   EXPECT_EQ(chunk->data[0], std::byte{0});
-  EXPECT_FALSE(link.server.tryChunk(envelope)) << "nothing more comes out of it";
+  EXPECT_FALSE(link.server.tryChunk(envelope)) << "its chunks can no longer be read";
   link.server.release(chunk->data);
   link.server.end();
 
@@ -199,7 +199,7 @@ TEST_F(FaultGuard, ALinkThatIsCutIsLostAndItsChunksWithTheirSegment) {
   EXPECT_TRUE(link.server.isLost());
 }
 
-TEST_F(FaultGuard, AThreadOfOursCanMeetACutFile) {
+TEST_F(FaultGuard, RepairsAFaultInAnInternalThread) {
   const auto segment = publish();
   cut(file_);
   const SignalsBlocked blocked;
@@ -209,7 +209,7 @@ TEST_F(FaultGuard, AThreadOfOursCanMeetACutFile) {
   EXPECT_TRUE(segment.isLost());
 }
 
-TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
+TEST_F(FaultGuard, RepairsFaultsOfManyThreadsAtOnce) {
   for (int round = 0; round < 50; ++round) {
     const auto segment = publish();
     cut(file_);
@@ -223,7 +223,7 @@ TEST_F(FaultGuard, ManyThreadsMayMeetItAtOnce) {
   }
 }
 
-TEST_F(FaultGuard, AFaultThatIsNotOursGoesToTheHandlerThatWasThereBefore) {
+TEST_F(FaultGuard, PassesOtherFaultsToThePreviousHandler) {
   const auto segment = publish();
   const FileDescriptor file(checkCall(::memfd_create("not ours", MFD_CLOEXEC), "memfd_create"));
   auto* const page = static_cast<volatile char*>(
@@ -237,7 +237,7 @@ TEST_F(FaultGuard, AFaultThatIsNotOursGoesToTheHandlerThatWasThereBefore) {
   expectedFaultsOfTheProgram_ = 2;
 }
 
-TEST_F(FaultGuard, HintsThatWereScribbledOverAreRemovedWithTheirDeadOwner) {
+TEST_F(FaultGuard, OverwrittenHintsAreRemovedWhenTheirOwnerIsDead) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
     std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header),
@@ -251,8 +251,8 @@ TEST_F(FaultGuard, HintsThatWereScribbledOverAreRemovedWithTheirDeadOwner) {
   EXPECT_EQ(backplane_.removeDead().size(), 3u) << "window, hints, pipe";
 }
 
-// A program whose handler comes later asks us first.
-TEST_F(FaultGuard, TellsAHandlerThatCameLaterWhatItRepaired) {
+// A program that installs its handler later calls tryRepair() first.
+TEST_F(FaultGuard, ReportsToALaterHandlerWhatItRepaired) {
   const auto segment = publish();
   cut(file_);
   siginfo_t fault{};

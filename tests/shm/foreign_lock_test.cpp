@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Locks of processes that own nothing: they neither keep the dead alive nor block what the dead
-// left.
+// Locks of strangers, which are processes that do not own the segment: they neither make a dead
+// owner look alive nor prevent the removal of its files.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -22,7 +22,7 @@ using layout::SegmentKind;
 using segments::Owner;
 using stale_segments::Verdict;
 
-// How a stranger locks a whole file.
+// The lock that a stranger places on a whole file.
 struct Grip {
   const char* name;
   int access;
@@ -47,7 +47,8 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
       self.stay();
     });
   }
-  // A process that waits for a lock on the file. It says once more that it is ready when it has it.
+  // A process that waits for a lock on the file. It reports a second time that it is ready when it
+  // holds the lock.
   void startStranger(const std::string& file, const Grip& grip = GetParam()) {
     stranger_ = std::make_unique<Child>([path = segments::path(file), grip](Child::Self& self) {
       const FileDescriptor opened(checkCall(::open(path.c_str(), grip.access | O_CLOEXEC), "open"));
@@ -62,9 +63,9 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
   }
   void killOwner(const std::unique_ptr<Child>& owner) {
     owner->end(SIGKILL);
-    ASSERT_TRUE(stranger_->waitUntilReady()) << "it has the lock now";
+    ASSERT_TRUE(stranger_->waitUntilReady()) << "the stranger holds the lock now";
   }
-  // The only name of that kind.
+  // The only name of this kind.
   [[nodiscard]] std::string nameOf(NameKind kind) const {
     const auto names = backplane_.segmentNames();
     const auto found = std::ranges::find_if(
@@ -78,7 +79,7 @@ class ForeignLock : public ShmTest, public testing::WithParamInterface<Grip> {
   std::unique_ptr<Child> stranger_;
 };
 
-TEST_P(ForeignLock, OnAServersWindowLeavesItsNameToASuccessor) {
+TEST_P(ForeignLock, OnADeadServersWindowDoesNotBlockASuccessor) {
   const auto owner = startOwner(SegmentKind::serverWindow);
   const auto old = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   startStranger(serverName());
@@ -91,10 +92,10 @@ TEST_P(ForeignLock, OnAServersWindowLeavesItsNameToASuccessor) {
   const auto server = makeServer();
   EXPECT_NE(PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation,
             old->header().incarnation);
-  EXPECT_EQ(nameOf(NameKind::reaper), "") << "a reaper's file goes with its reaper";
+  EXPECT_EQ(nameOf(NameKind::reaper), "") << "the reaper removes its reaper file";
 }
 
-TEST_P(ForeignLock, OnAnyFileOfTheDeadLeavesItToWhoeverCleans) {
+TEST_P(ForeignLock, OnAFileOfADeadProcessDoesNotPreventItsRemoval) {
   for (const auto kind : {SegmentKind::serverWindow, SegmentKind::clientWindow}) {
     for (const auto locked :
          {kind == SegmentKind::serverWindow ? NameKind::serverWindow : NameKind::clientWindow,
@@ -114,7 +115,7 @@ TEST_P(ForeignLock, OnAnyFileOfTheDeadLeavesItToWhoeverCleans) {
   }
 }
 
-TEST_P(ForeignLock, OnAWindowHidesNoDeathFromAWatcher) {
+TEST_P(ForeignLock, OnAWindowDoesNotHideADeathFromTheWatcher) {
   const auto owner = startOwner(SegmentKind::serverWindow);
   const auto peer = PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow);
   std::binary_semaphore died{0};
@@ -128,8 +129,9 @@ TEST_P(ForeignLock, OnAWindowHidesNoDeathFromAWatcher) {
   backplane_.watcher().forget(token);
 }
 
-// In another pid namespace only the lock tells, and a read lock is no owner's.
-TEST_P(ForeignLock, OfAReaderCountsNowhere) {
+// If the owner is in another pid namespace, only the lock is evidence. An owner never has a read
+// lock.
+TEST_P(ForeignLock, ForReadingIsNoEvidenceOfAnOwner) {
   if (GetParam().type != F_RDLCK) GTEST_SKIP() << "a write lock looks like the owner's there";
   const auto owner = std::make_unique<Child>([this](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
@@ -145,7 +147,7 @@ TEST_P(ForeignLock, OfAReaderCountsNowhere) {
   EXPECT_TRUE(makeServer());
 }
 
-TEST_P(ForeignLock, OnALivingWindowTakesNothingFromItsOwner) {
+TEST_P(ForeignLock, OnALivingWindowDoesNotHarmItsOwner) {
   const auto server = makeServer();
   startStranger(serverName());
 
@@ -158,9 +160,9 @@ TEST_P(ForeignLock, OnALivingWindowTakesNothingFromItsOwner) {
 INSTANTIATE_TEST_SUITE_P(Whole, ForeignLock, testing::Values(kReads, kWrites),
                          testing::PrintToStringParamName());
 
-// A reaper that was killed beside strangers leaves a file of its own. The next one uses it, and
-// takes it away.
-TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
+// A reaper that is killed while strangers hold locks leaves its reaper file. The next reaper uses
+// this file and removes it.
+TEST_F(ForeignLock, AKilledReaperDoesNotBlockTheNextReaper) {
   const auto owner = startOwner(SegmentKind::serverWindow);
   const auto incarnation =
       PeerWindow::tryOpen(serverName(), SegmentKind::serverWindow)->header().incarnation;
@@ -174,7 +176,7 @@ TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
     if (!reaper.mayRemove()) ::_exit(4);
     self.stay();
   });
-  EXPECT_FALSE(segments::removeIfOwnerless(serverName())) << "another reaper is at work";
+  EXPECT_FALSE(segments::removeIfOwnerless(serverName())) << "another reaper is removing it";
   EXPECT_FALSE(owner_lock::removeReaperFile(reaperFile));
 
   killed.end(SIGKILL);
@@ -184,7 +186,7 @@ TEST_F(ForeignLock, AKilledReaperBlocksNobody) {
   EXPECT_EQ(nameOf(NameKind::reaper), "");
 }
 
-TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
+TEST_F(ForeignLock, RemovalOfStaleFilesIncludesReaperFiles) {
   const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, 7);
   const FileDescriptor made(checkCall(
       ::open(segments::path(reaperFile).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "create"));
@@ -192,9 +194,10 @@ TEST_F(ForeignLock, WhoeverCleansTakesAwayAReapersFile) {
   EXPECT_THAT(backplane_.removeDead(), testing::ElementsAre(reaperFile));
 }
 
-// A stranger's file that claims to be the dead window of living hints proves nothing.
-TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+// Another user may create a file that looks like a dead window and has the incarnation of hints
+// whose owner is alive.
+TEST_F(ForeignLock, AWindowOfAnotherUserIsNoEvidenceAboutHints) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can act as two users";
   const OwnWindow client(name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {});
   auto fake = Segment::create(layout::kWindowBytes, SegmentKind::serverWindow, name(),
                               {.mode = 0644, .user = 65534});
@@ -207,9 +210,9 @@ TEST_F(ForeignLock, AWindowOfAnotherUserSaysNothingOfHints) {
   EXPECT_EQ(backplane_.segmentNames().size(), 3U);
 }
 
-// A start time tells a later process with the same pid from the owner. This header's owner started
-// as the host booted.
-TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessIsOfTheDead) {
+// The start time distinguishes the owner from a later process with the same pid. The header in this
+// test names a process that started when the host booted.
+TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessProvesDeath) {
   const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                          [](layout::SegmentHeader& header) { header.ownerStartTicks = 1; });
 
@@ -235,19 +238,19 @@ class AdmittedPeers : public ShmTest {
       name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
 };
 
-TEST_F(AdmittedPeers, AreNobodyAtFirst) {
+TEST_F(AdmittedPeers, IncludeOnlyTheOwnerAtFirst) {
   EXPECT_THAT(rightsOf(NameKind::clientWindow), testing::StartsWith("0644"));
   EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
   EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0600"));
 }
 
-TEST_F(AdmittedPeers, OfTheSameUserNeedNoMore) {
+TEST_F(AdmittedPeers, OfTheSameUserChangeNoRights) {
   client_.admit({.mode = 0600});
 
   EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
 }
 
-TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndPipe) {
+TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndFifo) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
   client_.admit({.mode = 0660, .group = kOperators});
 
@@ -255,7 +258,7 @@ TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndPipe) {
   EXPECT_EQ(rightsOf(NameKind::fifo), "0660 54321");
 }
 
-TEST_F(AdmittedPeers, OfTwoGroupsAreEverybody) {
+TEST_F(AdmittedPeers, OfTwoGroupsOpenTheHintsToEveryUser) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
   client_.admit({.mode = 0660, .group = kOperators});
   client_.admit({.mode = 0660, .group = kOperators + 1});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a duration goes in a histogram, and what the buckets say.
+// Histograms: the bucket of a duration, and the ends of the buckets.
 #include "shm/histogram.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr auto kLast = layout::kHistogramBuckets - 1;
 
-TEST(Histogram, EachBucketHoldsWhatLiesBetweenItsEndAndTheOneBefore) {
+TEST(Histogram, EachBucketCoversTheDurationsUpToItsEnd) {
   for (std::uint32_t index = 0; index < kLast; ++index) {
     const auto end = HistogramBuckets::endNs(index);
 
@@ -22,7 +22,7 @@ TEST(Histogram, EachBucketHoldsWhatLiesBetweenItsEndAndTheOneBefore) {
   }
 }
 
-TEST(Histogram, ADurationIsBelowTheEndOfItsBucketAndWithinAQuarterOfIt) {
+TEST(Histogram, ADurationIsAtMostAQuarterBelowTheEndOfItsBucket) {
   Random random;
 
   for (int i = 0; i < 100'000; ++i) {
@@ -33,7 +33,7 @@ TEST(Histogram, ADurationIsBelowTheEndOfItsBucketAndWithinAQuarterOfIt) {
   }
 }
 
-TEST(Histogram, TheExtremesHaveABucket) {
+TEST(Histogram, ExtremeDurationsHaveABucket) {
   EXPECT_EQ(HistogramBuckets::indexOf(0), 0u);
   EXPECT_EQ(HistogramBuckets::indexOf(15), 0u);
   EXPECT_EQ(HistogramBuckets::indexOf(16), 0u);
@@ -44,7 +44,7 @@ TEST(Histogram, TheExtremesHaveABucket) {
   EXPECT_EQ(HistogramBuckets::indexOf(UINT64_MAX), kLast);
 }
 
-TEST(Histogram, RecordsEachDurationOnceAndKeepsTheLongest) {
+TEST(Histogram, CountsEachDurationOnceAndKeepsTheLongest) {
   const auto histogram = std::make_unique<layout::Histogram>();
 
   record(*histogram, 100);
@@ -58,7 +58,7 @@ TEST(Histogram, RecordsEachDurationOnceAndKeepsTheLongest) {
   };
   EXPECT_EQ(at(100), 2u);
   EXPECT_EQ(at(5'000'000), 1u);
-  EXPECT_EQ(at(0), 1u) << "a clock that seems to go back";
+  EXPECT_EQ(at(0), 1u) << "a negative duration counts as 0";
   EXPECT_EQ(at(UINT64_MAX), 1u);
   EXPECT_EQ(histogram->maxNs.load(std::memory_order_relaxed),
             static_cast<std::uint64_t>(INT64_MAX));

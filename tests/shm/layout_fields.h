@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every field of layout.h with its place, as JSON: what the tables of docs/shm-layout.md are
-// compared with.
+// Every field of layout.h with its offset, as JSON. A test compares it with the tables of
+// docs/shm-layout.md.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two rings and two pools between a client and a server.
+// Link: two rings and two pools between a client and a server.
 #include <cstring>
 #include <map>
 
@@ -13,7 +13,7 @@ namespace {
 using layout::LinkState;
 using testing::HasSubstr;
 
-constexpr std::size_t kLarge = layout::kInlineBodyBytes + 1;  // does not fit a ring
+constexpr std::size_t kLarge = layout::kInlineBodyBytes + 1;  // does not fit into the ring
 
 class LinkTest : public ShmTest {
  protected:
@@ -39,7 +39,7 @@ class LinkTest : public ShmTest {
     Envelope envelope{.requestId = 1};
     return link.trySend(envelope, body, limits);
   }
-  // The whole body of the next message; chunks are given back.
+  // Takes the next message and returns its whole body. Returns its chunk to the peer.
   static std::vector<std::byte> take(Link& link) {
     EXPECT_TRUE(link.hasMessage());
     const auto envelope = link.begin();
@@ -55,7 +55,7 @@ class LinkTest : public ShmTest {
     link.end();
     return body;
   }
-  // Why the server does not take a link of which `change` was made by its client.
+  // The error with which the server refuses a link after its client has made this change.
   std::string refusal(const std::function<void(layout::SegmentHeader&)>& change) {
     const auto link = makeLink();
     change(
@@ -84,7 +84,7 @@ TEST_P(BodySizes, CrossInBothDirections) {
 INSTANTIATE_TEST_SUITE_P(InLineAndInChunks, BodySizes,
                          testing::Values(0, 1, 24, 25, 80, 192, 193, 4096, 100'000, 8 << 20));
 
-TEST_F(LinkTest, AChunkIsReadWhereItWasBuiltAndSentBackAsItIs) {
+TEST_F(LinkTest, AChunkIsReadInPlaceAndSentBackUnchanged) {
   const auto link = makeLink();
   const auto built = *link.client.tryAlloc(5000);
   built.data[4999] = std::byte{7};
@@ -103,7 +103,7 @@ TEST_F(LinkTest, AChunkIsReadWhereItWasBuiltAndSentBackAsItIs) {
   link.client.release(back->data);
 }
 
-TEST_F(LinkTest, WhatIsTooLargeForTheServerIsNotSent) {
+TEST_F(LinkTest, RefusesABodyAboveTheServersLimit) {
   const auto link = makeLink({.maxMessageBytes = 1000});
 
   EXPECT_EQ(sendBody(link.client, filled(1001)), LinkSend::tooLarge);
@@ -113,14 +113,14 @@ TEST_F(LinkTest, WhatIsTooLargeForTheServerIsNotSent) {
   EXPECT_FALSE(link.server.hasMessage());
 }
 
-TEST_F(LinkTest, NoMessageIsLongerThanAnEnvelopeCanSay) {
+TEST_F(LinkTest, RefusesABodyLongerThanAnEnvelopeCanRepresent) {
   const auto link = makeLink({.maxMessageBytes = UINT64_MAX});
 
   EXPECT_EQ(link.client.maxMessageBytes(), UINT32_MAX);
   EXPECT_EQ(link.server.maxMessageBytes(), UINT32_MAX);
 }
 
-TEST_F(LinkTest, WithoutMemoryNothingIsSentAndNothingIsLost) {
+TEST_F(LinkTest, SendsAndLosesNothingWithoutMemory) {
   const auto link = makeLink({.maxPoolBytes = 64 << 10});
   std::vector<Chunk> held;
   while (const auto chunk = link.client.tryAlloc(10'000)) held.push_back(*chunk);
@@ -134,7 +134,7 @@ TEST_F(LinkTest, WithoutMemoryNothingIsSentAndNothingIsLost) {
   EXPECT_EQ(take(link.server), filled(10'000));
 }
 
-TEST_F(LinkTest, AQueueTakesWhatItMayAndNoMore) {
+TEST_F(LinkTest, AcceptsMessagesUpToTheLimitOfTheQueue) {
   const auto link = makeLink({.queueSize = 4});
   for (int i = 0; i < 4; ++i)
     ASSERT_EQ(sendBody(link.client, filled(kLarge), {.waiting = 4}), LinkSend::sent);
@@ -145,8 +145,8 @@ TEST_F(LinkTest, AQueueTakesWhatItMayAndNoMore) {
   EXPECT_EQ(sendBody(link.client, filled(8), {.waiting = 4}), LinkSend::sent);
 }
 
-// Long messages in line must not take the slots of short ones that the queue may still take.
-TEST_F(LinkTest, AQueueOfAnyBodiesHasItsFullLength) {
+// Long messages in the ring must not use the slots of short ones that the queue may still accept.
+TEST_F(LinkTest, AQueueHasItsFullLengthWithBodiesOfAnySize) {
   for (const std::uint32_t queue : {1u, 2u, 14u, 100u}) {
     const auto link = makeLink({.queueSize = queue});
     Random random;
@@ -164,7 +164,7 @@ TEST_F(LinkTest, AQueueOfAnyBodiesHasItsFullLength) {
   }
 }
 
-TEST_F(LinkTest, EachSideSaysItsStateAndSeesTheOthers) {
+TEST_F(LinkTest, EachSideSetsItsStateAndSeesThePeersState) {
   const auto link = makeLink();
   EXPECT_EQ(link.server.peerState(), LinkState::open) << "a client that knocks is open";
   EXPECT_EQ(link.client.peerState(), LinkState::none);
@@ -177,7 +177,7 @@ TEST_F(LinkTest, EachSideSaysItsStateAndSeesTheOthers) {
   EXPECT_EQ(link.client.peerState(), LinkState::open);
 }
 
-TEST_F(LinkTest, TheReadyBitIsSetWhileTheReceiverDoesNotWatch) {
+TEST_F(LinkTest, SetsTheReadyBitWhileTheReceiverDoesNotPoll) {
   const auto link = makeLink();
   auto& hints = server_->endpoint.window().hints();
   const auto takeBits = [&] { return hints.readyBits[0].exchange(0, std::memory_order_relaxed); };
@@ -194,7 +194,7 @@ TEST_F(LinkTest, TheReadyBitIsSetWhileTheReceiverDoesNotWatch) {
   take(link.server);
 }
 
-TEST_F(LinkTest, EveryMessageToASleeperIsTimedAndOneIn64ToWhoPolls) {
+TEST_F(LinkTest, TimesEveryMessageToASleepingPeerAndOneIn64ToAPollingOne) {
   const auto link = makeLink();
   link.server.setWatched(false);
   EXPECT_TRUE(link.client.shouldSampleTime());
@@ -210,7 +210,7 @@ TEST_F(LinkTest, EveryMessageToASleeperIsTimedAndOneIn64ToWhoPolls) {
   EXPECT_EQ(timed, 4);
 }
 
-TEST_F(LinkTest, GoesWithItsClientsSideAndItsPools) {
+TEST_F(LinkTest, EachSideRemovesItsFilesAtDestruction) {
   const auto link = makeLink();
   const auto before = backplane_.segmentNames().size();
   ASSERT_TRUE(link.client.tryAlloc(1000) && link.server.tryAlloc(1000));
@@ -223,7 +223,7 @@ TEST_F(LinkTest, GoesWithItsClientsSideAndItsPools) {
   EXPECT_EQ(backplane_.segmentNames().size(), before - 1);
 }
 
-TEST_F(LinkTest, OneThatIsGoneIsNotOpened) {
+TEST_F(LinkTest, DoesNotOpenALinkThatDoesNotExist) {
   makeEnds();
 
   EXPECT_EQ(Link::tryOpen(name(), SegmentName::link(name(), 1, 2), server_->endpoint.window()),
@@ -233,8 +233,8 @@ TEST_F(LinkTest, OneThatIsGoneIsNotOpened) {
 using Header = layout::SegmentHeader;
 class Geometries : public LinkTest, public testing::WithParamInterface<void (*)(Header&)> {};
 
-TEST_P(Geometries, ThatTheServerDidNotOfferAreRefused) { EXPECT_NE(refusal(GetParam()), ""); }
-INSTANTIATE_TEST_SUITE_P(Nonsense, Geometries,
+TEST_P(Geometries, AreRefusedIfTheServerDidNotOfferThem) { EXPECT_NE(refusal(GetParam()), ""); }
+INSTANTIATE_TEST_SUITE_P(Invalid, Geometries,
                          testing::Values([](Header& header) { header.queueSize = 0; },
                                          [](Header& header) { header.queueSize = 16385; },
                                          [](Header& header) { header.queueSize = 1u << 30; },
@@ -249,7 +249,7 @@ INSTANTIATE_TEST_SUITE_P(Nonsense, Geometries,
                                          [](Header& header) { ++header.maxPoolBytes; },
                                          [](Header& header) { header.totalBytes = UINT64_MAX; }));
 
-TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
+TEST_F(LinkTest, RefusesALinkFileThatIsTooShortForItsRings) {
   const auto link = makeLink();
   const auto bytes =
       layout::linkBytes(link.client.header().queueSlots, link.client.header().replySlots) - 1;
@@ -263,16 +263,17 @@ TEST_F(LinkTest, OneWhoseRingsDoNotFitItsFileIsRefusedByName) {
               HasSubstr(segments::path(link.client.name())));
 }
 
-// None of a peer that has scribbled an end over its state, either.
+// The chunk of a message; nullopt also if it is unavailable because the peer has overwritten its
+// state with "closed".
 std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try {
   return link.tryChunk(envelope);
 } catch (const ChunkUnavailable&) {
   return std::nullopt;
 }
 
-// The client may write every byte of the link and of its own pool, at any time. The server goes on:
-// each of its calls ends, stays inside the memory it mapped, and gives memory to one holder only.
-TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
+// The client may write every byte of the link and of its own pool at any time. Each call of the
+// server must return, stay inside the memory that it mapped, and give memory to one holder only.
+TEST_F(LinkTest, APeerThatWritesInvalidDataDoesNotCrashOrBlockTheOtherSide) {
   Random random;
   const auto link = makeLink({.maxPoolBytes = 4 << 20});
   auto scribbled =
@@ -299,7 +300,7 @@ TEST_F(LinkTest, AScribblingPeerNeitherCrashesNorBlocksTheOther) {
       case 2:
         scribbled.at<std::uint64_t>(random.below(scribbled.bytes() / 8) * 8) = random.nasty();
         break;
-      case 3: {  // the next message, of a chunk that might exist
+      case 3: {  // the next message, with a chunk that may exist
         auto& slot = nextSlot();
         slot.flags = static_cast<std::uint8_t>(random.below(4));
         slot.bodyBytes =

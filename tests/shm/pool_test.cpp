@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Memory for messages that do not fit a ring: lent, given back, sent back, refused.
+// Pool: chunks that are lent, returned, sent back and refused.
 #include "shm/pool.h"
 
 #include <cstring>
@@ -25,7 +25,7 @@ class PoolTest : public ShmTest {
     ShmTest::TearDown();
   }
   void makeOwner(std::uint64_t maxBytes) {
-    owner_.reset();  // its segments' names are free again
+    owner_.reset();  // removes the names of its segments
     owner_.emplace(place_, Rights{}, maxBytes, returns_);
   }
   ChunkRef lendOne(std::size_t bytes = 1000) {
@@ -34,7 +34,7 @@ class PoolTest : public ShmTest {
     owner_->lend(chunk->ref);
     return chunk->ref;
   }
-  // The header of the owner's bulk segment `number`, writable.
+  // The writable header of the owner's bulk segment `number`.
   Segment openBulk(std::uint32_t number = 0) const {
     return std::move(*Segment::tryOpen(SegmentName::bulk(name(), kLink, kSide, number),
                                        layout::SegmentKind::bulk, Segment::Access::readWrite));
@@ -49,7 +49,7 @@ class PoolTest : public ShmTest {
 
 class ChunkSizes : public PoolTest, public testing::WithParamInterface<std::size_t> {};
 
-TEST_P(ChunkSizes, AreAtLeastWhatWasAskedForAndReachTheBorrowerWhole) {
+TEST_P(ChunkSizes, AreAtLeastTheRequestedSizeAndTheBorrowerSeesAllBytes) {
   const auto bytes = GetParam();
 
   const auto chunk = owner_->tryAlloc(bytes);
@@ -69,11 +69,11 @@ INSTANTIATE_TEST_SUITE_P(SmallAndLarge, ChunkSizes,
                          testing::Values(0, 1, 193, 512, 640, 641, 1 << 20, (1 << 20) + 128,
                                          (1 << 20) + 129, std::size_t{64} << 20));
 
-TEST_F(PoolTest, APowerOfTwoAndAHeaderCostNoSecondPowerOfTwo) {
+TEST_F(PoolTest, APowerOfTwoPlusAHeaderDoesNotDoubleTheChunk) {
   EXPECT_LT(owner_->tryAlloc((1 << 20) + 128)->capacity, (1u << 20) + 4096);
 }
 
-TEST_F(PoolTest, CreatesNothingBeforeItIsNeeded) {
+TEST_F(PoolTest, CreatesNoSegmentBeforeItIsNeeded) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
   EXPECT_EQ(owner_->bytes(), 0u);
 
@@ -87,7 +87,7 @@ TEST_F(PoolTest, CreatesNothingBeforeItIsNeeded) {
   EXPECT_EQ(header.totalBytes, owner_->bytes());
 }
 
-TEST_F(PoolTest, WhatIsGivenBackIsUsedAgain) {
+TEST_F(PoolTest, ReusesAReturnedChunk) {
   lendOne();
   const auto bytes = owner_->bytes();
 
@@ -100,7 +100,7 @@ TEST_F(PoolTest, WhatIsGivenBackIsUsedAgain) {
   EXPECT_EQ(owner_->bytes(), bytes);
 }
 
-TEST_F(PoolTest, WhatIsSentBackIsHeldAgain) {
+TEST_F(PoolTest, HoldsAChunkThatThePeerSendsBack) {
   const auto chunk = owner_->tryAlloc(1000);
   ASSERT_TRUE(chunk);
   owner_->lend(chunk->ref);
@@ -110,12 +110,12 @@ TEST_F(PoolTest, WhatIsSentBackIsHeldAgain) {
   ASSERT_TRUE(back);
   EXPECT_EQ(back->data, chunk->data);
   EXPECT_EQ(back->capacity, chunk->capacity);
-  EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "the second time";
+  EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "already received back";
   owner_->free(back->ref);
   EXPECT_FALSE(owner_->tryReceiveBack(chunk->ref)) << "after it was freed";
 }
 
-TEST_F(PoolTest, AForeignReferenceIsRefusedByItsOwner) {
+TEST_F(PoolTest, TheOwnerRefusesAnInvalidReference) {
   const auto lent = lendOne();
   const auto held = owner_->tryAlloc(1000)->ref;
   ASSERT_FALSE(owner_->tryReceiveBack(held)) << "not lent";
@@ -131,7 +131,7 @@ TEST_F(PoolTest, AForeignReferenceIsRefusedByItsOwner) {
   EXPECT_TRUE(owner_->tryReceiveBack(lent));
 }
 
-TEST_F(PoolTest, AForeignReferenceIsRefusedByTheBorrower) {
+TEST_F(PoolTest, TheBorrowerRefusesAnInvalidReference) {
   const auto ref = lendOne();
   const auto count = openBulk().header().chunkCount;
 
@@ -148,7 +148,7 @@ TEST_F(PoolTest, AForeignReferenceIsRefusedByTheBorrower) {
 class BulkHeaders : public PoolTest,
                     public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
-TEST_P(BulkHeaders, ThatMakeNoSenseAreRefusedByTheBorrower) {
+TEST_P(BulkHeaders, AreRefusedByTheBorrowerIfInvalid) {
   const auto ref = lendOne();
 
   GetParam()(openBulk().sharedHeader());
@@ -156,7 +156,7 @@ TEST_P(BulkHeaders, ThatMakeNoSenseAreRefusedByTheBorrower) {
   EXPECT_FALSE(borrower_.tryBorrow(ref));
 }
 INSTANTIATE_TEST_SUITE_P(
-    Nonsense, BulkHeaders,
+    Invalid, BulkHeaders,
     testing::Values([](layout::SegmentHeader& header) { header.chunkBytes = 0; },
                     [](layout::SegmentHeader& header) { header.chunkBytes = UINT64_MAX; },
                     [](layout::SegmentHeader& header) { header.chunkBytes += 64; },
@@ -169,7 +169,7 @@ INSTANTIATE_TEST_SUITE_P(
                     [](layout::SegmentHeader& header) { header.magic = 0; },
                     [](layout::SegmentHeader& header) { header.totalBytes = UINT64_MAX; }));
 
-TEST_F(PoolTest, AChunkThatIsGivenBackTwiceIsFreedOnce) {
+TEST_F(PoolTest, FreesAChunkOnceIfItIsReturnedTwice) {
   const auto ref = lendOne();
   borrower_.giveBack(ref);
   borrower_.giveBack(ref);
@@ -180,14 +180,14 @@ TEST_F(PoolTest, AChunkThatIsGivenBackTwiceIsFreedOnce) {
   EXPECT_EQ(chunks.size(), 100u);
 }
 
-TEST_F(PoolTest, GivingBackWhatTheOwnerHoldsFreesNothing) {
+TEST_F(PoolTest, ReturningAChunkThatIsNotLentFreesNothing) {
   const auto held = owner_->tryAlloc(1000);
   borrower_.giveBack(held->ref);
 
   EXPECT_NE(owner_->tryAlloc(1000)->data, held->data);
 }
 
-TEST_F(PoolTest, NothingIsLeftWhenTheLimitIsExhausted) {
+TEST_F(PoolTest, RefusesAChunkAboveItsLimitUntilAnotherIsFreed) {
   constexpr std::uint64_t kLimit = 1 << 20;
   makeOwner(kLimit);
   std::vector<Chunk> chunks;
@@ -201,7 +201,7 @@ TEST_F(PoolTest, NothingIsLeftWhenTheLimitIsExhausted) {
   EXPECT_EQ(owner_->tryAlloc(50'000)->data, chunks.back().data);
 }
 
-TEST_F(PoolTest, ALimitIsUsedToItsEnd) {
+TEST_F(PoolTest, UsesItsLimitCompletely) {
   for (const std::uint64_t limit : {20'000u, 70'000u, 300'000u, 1'000'000u}) {
     makeOwner(limit);
     std::uint64_t chunks = 0;
@@ -213,7 +213,7 @@ TEST_F(PoolTest, ALimitIsUsedToItsEnd) {
   }
 }
 
-TEST_F(PoolTest, SizesThatNobodyHasAreRefused) {
+TEST_F(PoolTest, RefusesSizesAboveAnyLimit) {
   for (const auto bytes : {(std::size_t{256} << 20) + 1, std::size_t{1} << 40,
                            (std::size_t{1} << 63) + 1, SIZE_MAX - 127, SIZE_MAX}) {
     EXPECT_FALSE(owner_->tryAlloc(bytes)) << bytes;
@@ -221,7 +221,7 @@ TEST_F(PoolTest, SizesThatNobodyHasAreRefused) {
   EXPECT_EQ(owner_->bytes(), 0u);
 }
 
-TEST_F(PoolTest, NoMoreChunksAreOutThanTheReturnRingHolds) {
+TEST_F(PoolTest, LendsNoMoreChunksThanTheReturnRingHolds) {
   std::vector<ChunkRef> lent;
   for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i) lent.push_back(lendOne(100));
 
@@ -229,10 +229,10 @@ TEST_F(PoolTest, NoMoreChunksAreOutThanTheReturnRingHolds) {
 
   for (const auto& ref : lent) borrower_.giveBack(ref);
   for (std::uint32_t i = 0; i < layout::kReturnSlots; ++i)
-    ASSERT_TRUE(owner_->tryAlloc(100)) << "all came back: " << i;
+    ASSERT_TRUE(owner_->tryAlloc(100)) << "all chunks were returned: " << i;
 }
 
-TEST_F(PoolTest, KnowsWhichPointersAreItsOwn) {
+TEST_F(PoolTest, RecognizesPointersIntoItself) {
   const auto chunk = *owner_->tryAlloc(1000);
   owner_->lend(chunk.ref);
   const auto borrowed = *borrower_.tryBorrow(chunk.ref);
@@ -251,7 +251,7 @@ TEST_F(PoolTest, KnowsWhichPointersAreItsOwn) {
   EXPECT_FALSE(owner_->tryFind(nullptr));
 }
 
-TEST_F(PoolTest, BorrowedMemoryOutlivesTheOwner) {
+TEST_F(PoolTest, BorrowedMemoryStaysReadableAfterTheOwnerIsDestroyed) {
   const auto chunk = *owner_->tryAlloc(1000);
   chunk.data[999] = std::byte{7};
   owner_->lend(chunk.ref);
@@ -263,7 +263,7 @@ TEST_F(PoolTest, BorrowedMemoryOutlivesTheOwner) {
   EXPECT_EQ(borrowed.data[999], std::byte{7});
 }
 
-TEST_F(PoolTest, ALinksBulkSegmentsAreRemovedTogether) {
+TEST_F(PoolTest, RemovesAllBulkSegmentsOfALink) {
   ASSERT_TRUE(owner_->tryAlloc(1000));
   ASSERT_TRUE(owner_->tryAlloc(100'000));
   layout::ReturnRing otherReturns{};
@@ -276,9 +276,9 @@ TEST_F(PoolTest, ALinksBulkSegmentsAreRemovedTogether) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-// The borrower writes anything into the return ring at any time; no chunk is ever given to two
+// The borrower writes random data into the return ring. The owner never gives a chunk to two
 // holders.
-TEST_F(PoolTest, NoChunkHasTwoHoldersWhateverTheBorrowerWrites) {
+TEST_F(PoolTest, NoChunkHasTwoHoldersIfTheBorrowerWritesInvalidData) {
   makeOwner(4 << 20);
   Random random;
   std::map<std::byte*, Chunk> held;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Memory is reserved when a segment is made. This file stands between the program and the kernel's
-// answer.
+// The memory of a segment is reserved when the segment is created. This file replaces
+// posix_fallocate(), so that a test chooses the kernel's answer.
 #include <fcntl.h>
 
 #include <cerrno>
@@ -11,7 +11,7 @@
 
 namespace {
 
-// What the kernel answers instead of reserving; nullopt-like 0: let it reserve.
+// The error that replaces the kernel's answer; 0: the kernel reserves the memory.
 std::function<int(off_t bytes)> answer = [](off_t) { return 0; };
 
 }  // namespace
@@ -34,7 +34,7 @@ class Reserve : public ShmTest {
   }
 };
 
-TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
+TEST_F(Reserve, AShortageIsAnErrorThatNamesTheRequestedSize) {
   answer = [](off_t) { return ENOSPC; };
 
   const auto why = whatOf<std::system_error>([&] { static_cast<void>(create(4096)); });
@@ -43,8 +43,8 @@ TEST_F(Reserve, AShortageIsAnErrorThatSaysHowMuchWasAskedFor) {
                                   testing::HasSubstr("No space left")));
 }
 
-// As kernels do that undo a long reservation at each tick of a timer.
-TEST_F(Reserve, SignalsAreNoShortage) {
+// Some kernels undo a long reservation at each tick of a timer.
+TEST_F(Reserve, RetriesAfterSignals) {
   int calls = 0;
   answer = [&](off_t bytes) { return bytes > 1 << 20 || ++calls % 2 == 1 ? EINTR : 0; };
   constexpr std::size_t kBytes = (std::size_t{5} << 20) + 4096;
@@ -55,14 +55,14 @@ TEST_F(Reserve, SignalsAreNoShortage) {
   EXPECT_EQ(calls, 12);
 }
 
-TEST_F(Reserve, AShortageBetweenSignalsIsAnError) {
+TEST_F(Reserve, ReportsAShortageAfterSignals) {
   int calls = 0;
   answer = [&](off_t) { return ++calls < 5 ? EINTR : ENOSPC; };
 
   EXPECT_THROW(static_cast<void>(create(std::size_t{5} << 20)), std::system_error);
 }
 
-TEST_F(Reserve, AShortageIsNoChunkAndPasses) {
+TEST_F(Reserve, AllocatesNoChunkDuringAShortageAndOneAfterIt) {
   layout::ReturnRing returns{};
   PoolOwner pool({name(), 1, 0, 0}, Rights{}, 1 << 20, returns);
   answer = [](off_t) { return ENOSPC; };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// RingTest: a ring in plain memory, between guard slots that nobody may touch.
+// RingTest: a ring in plain memory, between guard slots that must not change.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace mpf::test {
 
 using Bytes = std::vector<std::byte>;
 
-// `size` bytes that follow from `ordinal`.
+// `size` bytes with values computed from `ordinal`.
 inline Bytes pattern(std::uint64_t ordinal, std::size_t size) {
   Bytes bytes(size);
   for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(ordinal * 31 + i);
@@ -33,10 +33,10 @@ class RingTest : public testing::Test {
   ~RingTest() override {
     for (const auto* guard : guards()) {
       EXPECT_TRUE(std::all_of(guard, guard + kGuardBytes, [](auto byte) { return byte == kGuard; }))
-          << "somebody wrote outside the ring";
+          << "a write outside the ring";
     }
   }
-  // Raw memory of the ring's slots.
+  // The memory of the ring's slots.
   std::byte* ringBytes() { return bytes(kGuards); }
 
   bool push(std::uint64_t ordinal, std::size_t bodyBytes = 8) {
@@ -44,7 +44,7 @@ class RingTest : public testing::Test {
                             .requestId = static_cast<std::uint32_t>(ordinal)};
     return producer_.tryPush(envelope, pattern(ordinal, bodyBytes));
   }
-  // The next message's body.
+  // Takes the next message and returns its body.
   Bytes take() {
     const auto envelope = consumer_.begin();
     Bytes body(std::min<std::size_t>(envelope.bodyBytes, consumer_.inlineCapacity()));

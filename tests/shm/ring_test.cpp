@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Slots from one producer to one consumer.
+// Ring: slots from one producer to one consumer.
 #include <deque>
 #include <thread>
 
@@ -12,7 +12,7 @@ namespace {
 
 TEST_F(RingTest, AnEmptyRingHasNoMessage) { EXPECT_FALSE(consumer_.hasMessage()); }
 
-TEST_F(RingTest, MessagesComeInOrderWithTheirEnvelopes) {
+TEST_F(RingTest, DeliversMessagesInOrderWithTheirEnvelopes) {
   const Envelope sent{.type = 1,
                       .flags = 2,
                       .bodyBytes = 3,
@@ -44,7 +44,7 @@ TEST_F(RingTest, MessagesComeInOrderWithTheirEnvelopes) {
   EXPECT_FALSE(consumer_.hasMessage());
 }
 
-TEST_F(RingTest, AFullRingRefusesTheNextMessageAndKeepsWhatItHolds) {
+TEST_F(RingTest, RefusesAMessageWhenFullAndKeepsTheOthers) {
   for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(push(i));
 
   EXPECT_FALSE(push(99));
@@ -58,7 +58,7 @@ TEST_F(RingTest, AFullRingRefusesTheNextMessageAndKeepsWhatItHolds) {
   EXPECT_EQ(take(), pattern(100, 8));
 }
 
-TEST_F(RingTest, AMessageThatNeedsMoreSlotsThanAreFreeChangesNothing) {
+TEST_F(RingTest, RefusesAMessageThatNeedsMoreSlotsThanAreFree) {
   for (std::uint32_t i = 0; i < kCapacity - 3; ++i) ASSERT_TRUE(push(i));
 
   EXPECT_FALSE(push(99, layout::kInlineBodyBytes));
@@ -71,7 +71,7 @@ TEST_F(RingTest, AMessageThatNeedsMoreSlotsThanAreFreeChangesNothing) {
   EXPECT_EQ(take(), pattern(50, layout::kInlineBodyBytes - 56));
 }
 
-TEST_F(RingTest, AReserveStaysFree) {
+TEST_F(RingTest, KeepsTheReservedSlotsFree) {
   for (std::uint32_t i = 0; i < kCapacity - 2; ++i) ASSERT_TRUE(producer_.tryPush({}, {}, 2));
 
   EXPECT_FALSE(producer_.tryPush({}, {}, 2));
@@ -81,7 +81,7 @@ TEST_F(RingTest, AReserveStaysFree) {
 
 class InlineSizes : public RingTest, public testing::WithParamInterface<std::size_t> {};
 
-TEST_P(InlineSizes, TravelWholeAtEveryPositionOfTheRing) {
+TEST_P(InlineSizes, AreDeliveredWholeAtEveryPositionOfTheRing) {
   for (std::uint64_t i = 0; i < 3 * kCapacity; ++i) {
     ASSERT_TRUE(push(i, GetParam()));
     ASSERT_TRUE(consumer_.hasMessage());
@@ -92,7 +92,7 @@ TEST_P(InlineSizes, TravelWholeAtEveryPositionOfTheRing) {
 INSTANTIATE_TEST_SUITE_P(AroundEachSlotsEnd, InlineSizes,
                          testing::Values(0, 1, 23, 24, 25, 79, 80, 81, 135, 136, 137, 191, 192));
 
-TEST(RingSlots, AreAsManyAsABodyNeeds) {
+TEST(RingSlots, MatchTheSizeOfTheBody) {
   EXPECT_EQ(slotsFor(0), 1u);
   EXPECT_EQ(slotsFor(24), 1u);
   EXPECT_EQ(slotsFor(25), 2u);
@@ -104,8 +104,8 @@ TEST(RingSlots, AreAsManyAsABodyNeeds) {
   EXPECT_GT(slotsFor(layout::kInlineBodyBytes + 1), layout::kMaxMessageSlots);
 }
 
-// The consumer hands slots back in batches: the ring must be larger than the queue by one batch.
-TEST(RingSlots, OfAQueueAlwaysHaveRoomForIt) {
+// The consumer frees slots in batches, so the ring must be larger than the queue by one batch.
+TEST(RingSlots, AlwaysHaveRoomForTheWholeQueue) {
   for (std::uint32_t queue = 1; queue <= 16384; queue += 1 + queue / 7) {
     const auto capacity = ringSlotsFor(queue);
 
@@ -115,7 +115,7 @@ TEST(RingSlots, OfAQueueAlwaysHaveRoomForIt) {
   }
 }
 
-TEST_F(RingTest, TheSenderKnowsWhatIsWaitingAndWhatIsTaken) {
+TEST_F(RingTest, TheSenderSeesHowManyMessagesWaitAndAreTaken) {
   ASSERT_TRUE(push(1));
   ASSERT_TRUE(push(2, 100));
   EXPECT_EQ(producer_.waiting(), 2u);
@@ -123,8 +123,8 @@ TEST_F(RingTest, TheSenderKnowsWhatIsWaitingAndWhatIsTaken) {
 
   static_cast<void>(consumer_.begin());
 
-  EXPECT_EQ(producer_.waitingAtMost(), 2u) << "the last look";
-  EXPECT_TRUE(producer_.isTaken(1)) << "counted before it is looked at";
+  EXPECT_EQ(producer_.waitingAtMost(), 2u) << "the last value that was read";
+  EXPECT_TRUE(producer_.isTaken(1)) << "counted before the consumer looks at it";
   EXPECT_FALSE(producer_.isTaken(2));
   EXPECT_EQ(producer_.waiting(), 1u);
   consumer_.end();
@@ -134,7 +134,7 @@ TEST_F(RingTest, TheSenderKnowsWhatIsWaitingAndWhatIsTaken) {
   EXPECT_EQ(producer_.waiting(), 0u);
 }
 
-TEST_F(RingTest, AMessageWithoutItsSequenceIsNotThere) {
+TEST_F(RingTest, AMessageWithoutItsSequenceIsNotVisible) {
   ASSERT_TRUE(push(1));
   take();
   auto& slot = ring_[1];
@@ -143,12 +143,12 @@ TEST_F(RingTest, AMessageWithoutItsSequenceIsNotThere) {
   slot.bodyBytes = 8;
 
   EXPECT_FALSE(consumer_.hasMessage());
-  ASSERT_TRUE(push(2)) << "a producer that starts again writes over it";
+  ASSERT_TRUE(push(2)) << "the producer overwrites it";
   EXPECT_EQ(take(), pattern(2, 8));
 }
 
-// A message is shown by its first slot, which is written last.
-TEST_F(RingTest, ALongMessageWithoutItsFirstSequenceIsNotThere) {
+// The first slot makes a message visible, and is written last.
+TEST_F(RingTest, ALongMessageWithoutItsFirstSequenceIsNotVisible) {
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(push(1));
     take();
@@ -160,9 +160,9 @@ TEST_F(RingTest, ALongMessageWithoutItsFirstSequenceIsNotThere) {
   EXPECT_FALSE(consumer_.hasMessage());
 }
 
-// Slots behind the first hold data where others hold envelopes; their data says what the consumer
-// will wait for one lap later.
-TEST_F(RingTest, BodyBytesOfAnEarlierLapAreNeverTakenForAMessage) {
+// Slots after the first contain body bytes where first slots contain envelopes. In this test, these
+// bytes are the sequence that the consumer waits for one lap later.
+TEST_F(RingTest, BodyBytesOfAnEarlierLapAreNotReadAsAMessage) {
   constexpr std::uint32_t kSlots = 3;
   Bytes body(layout::kFirstSlotBodyBytes + (kSlots - 1) * sizeof(layout::MoreSlot::body));
   for (std::uint64_t position = 0; position < 16 * kCapacity; position += kSlots) {
@@ -179,7 +179,7 @@ TEST_F(RingTest, BodyBytesOfAnEarlierLapAreNeverTakenForAMessage) {
   }
 }
 
-TEST_F(RingTest, BehavesAsAQueueWhateverTheOrderOfPushesAndTakes) {
+TEST_F(RingTest, BehavesAsAQueueForEveryOrderOfPushesAndTakes) {
   Random random;
   std::deque<Bytes> model;
   std::uint64_t ordinal = 0;
@@ -201,7 +201,7 @@ TEST_F(RingTest, BehavesAsAQueueWhateverTheOrderOfPushesAndTakes) {
   EXPECT_EQ(consumer_.messages() + model.size(), producer_.messages());
 }
 
-TEST_F(RingTest, ManyMessagesCrossFromThreadToThreadWhole) {
+TEST_F(RingTest, DeliversMessagesWholeBetweenThreads) {
   constexpr std::uint64_t kMessages = 100'000;
   const Watchdog watchdog("a ring between two threads");
   const auto sizeOf = [](std::uint64_t ordinal) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A ring whose other end writes nonsense: it costs messages of this ring and nothing else.
+// A ring in which the other end writes invalid data: this costs only messages of this ring.
 #include "tests/shm/ring_fixture.h"
 #include "tests/support/random.h"
 
@@ -8,7 +8,7 @@ namespace {
 
 class SlotCounts : public RingTest, public testing::WithParamInterface<int> {};
 
-TEST_P(SlotCounts, ThatCannotBeHoldNoBodyAndEndInOneStep) {
+TEST_P(SlotCounts, OfInvalidValuesHaveNoBodyAndCountAsOneSlot) {
   ASSERT_TRUE(push(1));
   ASSERT_TRUE(push(2));
   ring_[0].slots = static_cast<std::uint8_t>(GetParam());
@@ -19,14 +19,14 @@ TEST_P(SlotCounts, ThatCannotBeHoldNoBodyAndEndInOneStep) {
   consumer_.end();
 
   EXPECT_EQ(envelope.bodyBytes, UINT32_MAX)
-      << "the envelope says what was written; the reader compares";
+      << "the envelope is copied unchanged; the reader checks it";
   EXPECT_EQ(capacity, 0u);
   ASSERT_TRUE(consumer_.hasMessage());
   EXPECT_EQ(take(), pattern(2, 8));
 }
-INSTANTIATE_TEST_SUITE_P(Nonsense, SlotCounts, testing::Values(0, 5, 127, 200, 255));
+INSTANTIATE_TEST_SUITE_P(Invalid, SlotCounts, testing::Values(0, 5, 127, 200, 255));
 
-TEST_F(RingTest, TheSlotCountIsReadOnce) {
+TEST_F(RingTest, ReadsTheSlotCountOnce) {
   ASSERT_TRUE(push(1));
 
   static_cast<void>(consumer_.begin());
@@ -39,7 +39,7 @@ TEST_F(RingTest, TheSlotCountIsReadOnce) {
   EXPECT_TRUE(consumer_.hasMessage());
 }
 
-TEST_F(RingTest, ASequenceFromThePastOrTheFutureIsNoMessage) {
+TEST_F(RingTest, IgnoresASequenceOfAnotherPosition) {
   for (const std::uint64_t sequence :
        {std::uint64_t{0}, std::uint64_t{2}, std::uint64_t{kCapacity + 1}, UINT64_MAX}) {
     ring_[0].sequence.store(sequence, std::memory_order_relaxed);
@@ -47,7 +47,7 @@ TEST_F(RingTest, ASequenceFromThePastOrTheFutureIsNoMessage) {
   }
 }
 
-TEST_F(RingTest, FreedSlotsThatWereNeverUsedMakeNoMoreRoomThanTheRingHas) {
+TEST_F(RingTest, FreedSlotsThatWereNeverUsedAddNoRoom) {
   for (std::uint32_t i = 0; i < kCapacity; ++i) ASSERT_TRUE(push(i));
 
   control_.freed.store(UINT64_MAX, std::memory_order_relaxed);
@@ -56,7 +56,7 @@ TEST_F(RingTest, FreedSlotsThatWereNeverUsedMakeNoMoreRoomThanTheRingHas) {
   EXPECT_FALSE(producer_.hasFree(kCapacity + 1));
 }
 
-TEST_F(RingTest, FreedSlotsThatGoBackTakeNothingAway) {
+TEST_F(RingTest, AFreedPositionThatDecreasesRemovesNoRoom) {
   ASSERT_TRUE(push(1));
   take();
   ASSERT_TRUE(producer_.hasFree(kCapacity));
@@ -67,7 +67,7 @@ TEST_F(RingTest, FreedSlotsThatGoBackTakeNothingAway) {
   EXPECT_FALSE(push(99));
 }
 
-TEST_F(RingTest, ACountOfTakenMessagesIsHeldToWhatWasSent) {
+TEST_F(RingTest, LimitsTheCountOfTakenMessagesToThoseSent) {
   ASSERT_TRUE(push(1));
   ASSERT_TRUE(push(2));
 
@@ -75,13 +75,13 @@ TEST_F(RingTest, ACountOfTakenMessagesIsHeldToWhatWasSent) {
   EXPECT_EQ(producer_.waiting(), 0u);
   EXPECT_FALSE(producer_.isTaken(3));
   control_.taken.store(0, std::memory_order_relaxed);
-  EXPECT_EQ(producer_.waiting(), 0u) << "what was taken stays taken";
+  EXPECT_EQ(producer_.waiting(), 0u) << "taken messages stay taken";
   EXPECT_TRUE(producer_.isTaken(2));
 }
 
-// Each step is bounded and stays inside the ring (the fixture looks at the guards), whatever the
-// other side writes where.
-TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
+// Each step ends and stays inside the ring (the fixture checks the guard slots), for all data that
+// the other side writes.
+TEST_F(RingTest, InvalidDataAnywhereCrashesAndBlocksNoEnd) {
   Random random;
   Bytes body(layout::kInlineBodyBytes);
   constexpr auto kRingBytes = sizeof(layout::Slot) * kCapacity;
@@ -92,7 +92,7 @@ TEST_F(RingTest, ScribblingAllOverItCrashesAndBlocksNobody) {
       case 0:
         ringBytes()[random.below(kRingBytes)] = static_cast<std::byte>(random.bits());
         break;
-      case 1:  // likely to be believed: the sequences of the next positions
+      case 1:  // values that are probably accepted: the sequences of the next positions
         ring_[random.below(kCapacity)].sequence.store(taken + random.below(2 * kCapacity),
                                                       std::memory_order_relaxed);
         break;

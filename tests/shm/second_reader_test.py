@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""second_reader_test DOCUMENT TRAFFIC: the document says what the code does, and a reader written from it sees what TRAFFIC did."""
+"""second_reader_test DOCUMENT TRAFFIC: compares the document with the code, and checks what a reader written from the document reads of TRAFFIC."""
 import json
 import os
 import signal
@@ -30,7 +30,7 @@ def look(backplane):
 
 
 class Document(unittest.TestCase):
-    """Every table of the document against the code."""
+    """Compares every table of the document with the code."""
 
     @classmethod
     def setUpClass(cls):
@@ -72,17 +72,17 @@ class Document(unittest.TestCase):
 
 
 class Names(unittest.TestCase):
-    def test_of_other_programs_are_refused(self):
+    def test_names_of_other_programs_are_refused(self):
         for name in ("mpf.default", "mpf.default.c.", "mpf.default.c.X", "mpf.default.s.0", "mpf.default.l.1", "mpf.a.b.c.1", "mpf..c.1", "notes"):
             self.assertIsNone(reader.parse_name(name), name)
 
-    def test_of_servers_are_decoded(self):
+    def test_names_of_servers_are_decoded(self):
         letter, parts = reader.parse_name("mpf.default.s.-1.AIM1%2F1%2Ea%20b%25[0]")
         self.assertEqual((letter, parts[0], reader.decode_server(parts[1])), ("s", "-1", "AIM1/1.a b%[0]"))
 
 
 class Reader(unittest.TestCase):
-    """What the reader sees of a server and a client with known traffic."""
+    """Reads a server and a client with known traffic."""
 
     def setUp(self):
         self.process = subprocess.Popen([TRAFFIC, "run"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -113,12 +113,12 @@ class Reader(unittest.TestCase):
     def check_fields(self, seen, **expected):
         self.assertEqual({key: seen[key] for key in expected}, expected)
 
-    def test_who_is_there(self):
+    def test_windows_pending_binds_hints_and_fifos(self):
         seen, expected = self.look(), self.expected
         server, client = seen["servers"][0], seen["clients"][0]
-        whose = {"ownerPid": expected["pid"], "ownerUid": expected["uid"], "program": expected["program"], "alive": True, "state": 1}
-        self.check_fields(server, name=expected["server"], nameOfFile=expected["server"], location=expected["location"], waitMode=2, **whose)
-        self.check_fields(client, name=expected["label"], **whose)
+        owner = {"ownerPid": expected["pid"], "ownerUid": expected["uid"], "program": expected["program"], "alive": True, "state": 1}
+        self.check_fields(server, name=expected["server"], nameOfFile=expected["server"], location=expected["location"], waitMode=2, **owner)
+        self.check_fields(client, name=expected["label"], **owner)
         self.check_fields(seen["wishes"][0], name=expected["wish"], location=expected["wishLocation"], alive=True)
         self.assertEqual([hint["locked"] for hint in seen["hints"]], [True, True])
         self.assertEqual(sorted(pipe.split(".")[3] for pipe in seen["pipes"]), sorted([server["incarnation"], client["incarnation"]]))
@@ -160,7 +160,7 @@ class Reader(unittest.TestCase):
             self.assertGreater(seen["maxNs"] * 5 // 4 + 20, seen["highestBucketEndNs"], name)
             self.assertLessEqual(seen["medianNs"], seen["p99Ns"], name)
 
-    def test_traffic_that_goes_on(self):
+    def test_traffic_after_the_first_look(self):
         before = self.look()
         self.serve()
         after = self.look()
@@ -177,7 +177,7 @@ class Reader(unittest.TestCase):
         os.waitpid(self.process.pid, os.WUNTRACED)
         self.assertEqual(self.look(), running)
 
-    def test_a_killed_process_is_dead_at_once_and_what_it_left_can_be_read(self):
+    def test_a_killed_process_is_dead_at_once_and_its_files_can_be_read(self):
         running = self.look()
         self.process.kill()
         self.process.wait()
@@ -186,7 +186,7 @@ class Reader(unittest.TestCase):
         self.check_fields(dead["links"][0], clientAlive=False, serverAlive=False)
         self.assertEqual(dead["links"][0]["requests"], running["links"][0]["requests"])
 
-    def test_other_versions_are_refused_by_both_numbers(self):
+    def test_other_versions_are_refused_and_both_versions_named(self):
         file = self.look()["links"][0]["file"]
         with open(os.path.join(reader.DIRECTORY, file), "r+b") as link:
             link.seek(8)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Names in /dev/shm: built, taken apart, refused.
+// SegmentName: builds, parses and refuses names in /dev/shm.
 #include <set>
 
 #include "tests/shm/shm_fixture.h"
@@ -7,7 +7,7 @@
 namespace mpf::test {
 namespace {
 
-TEST(SegmentName, OfEachKindIsTakenApartAsItWasBuilt) {
+TEST(SegmentName, ParsesEachKindOfNameThatItBuilds) {
   constexpr std::uint64_t kWindow = 0xfedc'ba98'7654'3210;
   constexpr std::uint64_t kKey = 0x12;
 
@@ -22,7 +22,7 @@ TEST(SegmentName, OfEachKindIsTakenApartAsItWasBuilt) {
   EXPECT_EQ(link->serverWindow, kWindow);
   EXPECT_EQ(link->incarnation, kKey);
   EXPECT_EQ(bulk->kind, NameKind::bulk);
-  EXPECT_EQ(bulk->incarnation, kKey) << "a bulk segment is filed under its link";
+  EXPECT_EQ(bulk->incarnation, kKey) << "a bulk segment has the incarnation of its link";
   for (const auto kind :
        {NameKind::clientWindow, NameKind::hints, NameKind::pendingBind, NameKind::fifo}) {
     const auto keyed = SegmentName::tryParse(SegmentName::keyed("crate-1", kind, kWindow));
@@ -33,7 +33,7 @@ TEST(SegmentName, OfEachKindIsTakenApartAsItWasBuilt) {
   }
 }
 
-TEST(SegmentName, ReadsAsTheGrammarSays) {
+TEST(SegmentName, HasTheDocumentedFormat) {
   EXPECT_EQ(SegmentName::serverWindow("default", 0, "serial[0]"), "mpf.default.s.0.serial[0]");
   EXPECT_EQ(SegmentName::serverWindow("default", -1, "AIM1/1.a b%"),
             "mpf.default.s.-1.AIM1%2F1%2Ea%20b%25");
@@ -45,7 +45,7 @@ TEST(SegmentName, ReadsAsTheGrammarSays) {
   EXPECT_EQ(SegmentName::prefix(""), "mpf.");
 }
 
-TEST(SegmentName, DifferentServersHaveDifferentFiles) {
+TEST(SegmentName, DifferentServersHaveDifferentNames) {
   std::set<std::string> files;
   const std::vector<std::string> servers{"a.b",      "a%2Eb", "a%b", "a/b", "a b", "A.b", "a..b",
                                          "\xc3\xa9", "[",     "%",   "%%",  "..",  "."};
@@ -60,7 +60,7 @@ TEST(SegmentName, DifferentServersHaveDifferentFiles) {
   EXPECT_EQ(files.size(), servers.size());
 }
 
-TEST(SegmentName, TheLongestOnesFitAFileName) {
+TEST(SegmentName, TheLongestNamesFitAFileName) {
   const std::string backplane(layout::kBackplaneChars - 1, 'b');
   const std::string server(layout::kNameChars - 1, '.');
   SegmentName::checkBackplane(backplane);
@@ -71,7 +71,7 @@ TEST(SegmentName, TheLongestOnesFitAFileName) {
   EXPECT_LE(SegmentName::link(backplane, UINT64_MAX, UINT64_MAX).size(), 255u);
 }
 
-TEST(SegmentName, ABackplaneThatCannotBeAFileNameIsRefusedByName) {
+TEST(SegmentName, RefusesAnInvalidBackplaneNameAndNamesIt) {
   for (const std::string wrong : {"a.b", "a/b", "../x", "a b", "\xc3\xa9", "a\n", "[0]",
                                   "012345678901234567890123456789012345678-"}) {
     const auto why = whatOf<std::invalid_argument>([&] { SegmentName::checkBackplane(wrong); });
@@ -81,7 +81,7 @@ TEST(SegmentName, ABackplaneThatCannotBeAFileNameIsRefusedByName) {
   EXPECT_NO_THROW(SegmentName::checkBackplane("A-z_09"));
 }
 
-TEST(SegmentName, AServerThatNobodyCouldTypeIsRefusedByName) {
+TEST(SegmentName, RefusesAnInvalidServerNameAndNamesIt) {
   for (const std::string wrong : {"a\nb", "\x7f", "\t", "a\x01"}) {
     EXPECT_THAT(whatOf<std::invalid_argument>([&] { SegmentName::checkServer(wrong); }),
                 testing::HasSubstr("\"" + wrong + "\""));
@@ -95,7 +95,7 @@ TEST(SegmentName, AServerThatNobodyCouldTypeIsRefusedByName) {
 
 class ForeignNames : public testing::TestWithParam<const char*> {};
 
-TEST_P(ForeignNames, AreNotTakenForOurs) {
+TEST_P(ForeignNames, AreNotParsed) {
   EXPECT_FALSE(SegmentName::tryParse(GetParam())) << GetParam();
 }
 INSTANTIATE_TEST_SUITE_P(OfOtherPrograms, ForeignNames,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files under a segment's name that are not what they should be: each is refused with a text that
-// names it and says why.
+// Files that have the name of a segment but are not usable: each is refused with a message that
+// names the file and the reason.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -25,7 +25,7 @@ class SegmentRefusal : public ShmTest {
     ::unlink(path_.c_str());
     ShmTest::TearDown();
   }
-  // Why the segment cannot be opened; empty when it can.
+  // The error with which the segment is refused; empty if it can be opened.
   [[nodiscard]] std::string refusal(SegmentKind kind = SegmentKind::pendingBind) const {
     return whatOf<SegmentError>(
         [&] { static_cast<void>(Segment::tryOpen(file_, kind, Access::readOnly)); });
@@ -38,7 +38,7 @@ class SegmentRefusal : public ShmTest {
   Segment segment_ = createPage();
 };
 
-TEST_F(SegmentRefusal, DoesNotMeetAGoodSegment) { EXPECT_EQ(refusal(), ""); }
+TEST_F(SegmentRefusal, AcceptsAGoodSegment) { EXPECT_EQ(refusal(), ""); }
 
 TEST_F(SegmentRefusal, NamesAForeignFile) {
   header().magic ^= 1;
@@ -46,7 +46,7 @@ TEST_F(SegmentRefusal, NamesAForeignFile) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("foreign magic")));
 }
 
-TEST_F(SegmentRefusal, NamesOneOfTheOtherByteOrder) {
+TEST_F(SegmentRefusal, NamesASegmentOfTheOtherByteOrder) {
   header().magic = __builtin_bswap64(header().magic);
 
   EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("foreign magic")));
@@ -60,7 +60,7 @@ TEST_F(SegmentRefusal, NamesBothVersions) {
   EXPECT_THAT(refusal(), HasSubstr("layout 0, this program speaks"));
 }
 
-TEST_F(SegmentRefusal, DoesNotMeetANewerMinorVersion) {
+TEST_F(SegmentRefusal, AcceptsANewerMinorVersion) {
   header().layoutMinor = layout::kMinor + 1;
 
   EXPECT_EQ(refusal(), "");
@@ -82,7 +82,7 @@ TEST_F(SegmentRefusal, NamesBothLengthsOfATruncatedFile) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("0 bytes are too few")));
 }
 
-TEST_F(SegmentRefusal, MeetsALengthThatCannotBe) {
+TEST_F(SegmentRefusal, RefusesAnImpossibleLength) {
   header().totalBytes = sizeof(SegmentHeader) - 1;
   EXPECT_THAT(refusal(), HasSubstr("truncated, 4096 bytes of 511"));
 
@@ -90,7 +90,7 @@ TEST_F(SegmentRefusal, MeetsALengthThatCannotBe) {
   EXPECT_THAT(refusal(), HasSubstr("truncated"));
 }
 
-TEST_F(SegmentRefusal, DoesNotMeetAFileThatIsLongerThanItSays) {
+TEST_F(SegmentRefusal, AcceptsAFileThatIsLongerThanItsHeaderSays) {
   ASSERT_EQ(::truncate(path_.c_str(), 8192), 0);
 
   EXPECT_EQ(refusal(), "");
@@ -108,8 +108,8 @@ TEST_F(SegmentRefusal, DoesNotFollowASymbolicLink) {
   EXPECT_FALSE(segments::removeIfOwnerless(file_));
 }
 
-// Anybody may create files in /dev/shm; opening a pipe for reading would wait for a writer.
-TEST_F(SegmentRefusal, DoesNotWaitAtAPipe) {
+// Any user may create files in /dev/shm. Opening a FIFO for reading would wait for a writer.
+TEST_F(SegmentRefusal, DoesNotBlockOnAFifo) {
   ASSERT_EQ(::unlink(path_.c_str()), 0);
   ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
 
@@ -126,7 +126,7 @@ TEST_F(SegmentRefusal, NamesADirectory) {
   ASSERT_EQ(::rmdir(path_.c_str()), 0);
 }
 
-TEST_F(SegmentRefusal, NamesTheFileThatMayNotBeOpened) {
+TEST_F(SegmentRefusal, NamesAFileWithoutPermission) {
   ASSERT_EQ(::chmod(path_.c_str(), 0), 0);
   Child stranger([&](Child::Self& self) {
     if (::getuid() == 0) checkCall(::setuid(kNobody), "setuid");
@@ -134,7 +134,7 @@ TEST_F(SegmentRefusal, NamesTheFileThatMayNotBeOpened) {
     const auto why = whatOf<std::system_error>([&] {
       static_cast<void>(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
     });
-    // What we may not look at is not ours to declare dead.
+    // A file that we may not open must not be declared dead.
     const bool isLeftAlone = segments::probeOwner(file_) == segments::Owner::alive &&
                              !segments::removeIfOwnerless(file_);
     ::_exit(why.starts_with("open " + path_) && isLeftAlone ? 0 : 1);
@@ -145,7 +145,7 @@ TEST_F(SegmentRefusal, NamesTheFileThatMayNotBeOpened) {
   EXPECT_EQ(stranger.end(0), 0);
 }
 
-TEST_F(SegmentRefusal, MeetsAnyOtherHeaderOrItIsUsable) {
+TEST_F(SegmentRefusal, RefusesARandomHeaderOrCanUseIt) {
   Random random;
   const auto good = header();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One file in /dev/shm: created, locked, named, mapped, removed.
+// Segment: one file in /dev/shm: created, locked, named, mapped, removed.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -34,7 +34,7 @@ class SegmentTest : public ShmTest {
   std::string file_ = SegmentName::keyed(name(), NameKind::pendingBind, 1);
 };
 
-TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
+TEST_F(SegmentTest, IsZeroedAndItsHeaderNamesItsCreatorTimeAndKind) {
   const auto before = Clock::nowNs();
 
   const auto segment = createPage(SegmentKind::bulk);
@@ -62,7 +62,7 @@ TEST_F(SegmentTest, BeginsZeroedAndSaysWhoMadeItWhenAndForWhat) {
                           [](std::byte byte) { return byte == std::byte{0}; }));
 }
 
-TEST_F(SegmentTest, IsSeenUnderItsNameOnlyWhenItIsPublished) {
+TEST_F(SegmentTest, HasItsNameOnlyAfterItIsPublished) {
   auto segment = createPage();
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
   segment.sharedHeader().location = 7;
@@ -74,7 +74,7 @@ TEST_F(SegmentTest, IsSeenUnderItsNameOnlyWhenItIsPublished) {
             7);
 }
 
-TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItIsSeen) {
+TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItHasItsName) {
   std::atomic<int> seen{0};
   std::thread maker([&] {
     while (seen < 500) {
@@ -92,14 +92,14 @@ TEST_F(SegmentTest, IsCompleteAndLockedAsSoonAsItIsSeen) {
     ++seen;
     EXPECT_EQ(segment->header().location, 7);
     EXPECT_EQ(segment->bytes(), layout::kPageBytes);
-    // Its maker takes the name away before it lets go of the lock.
+    // The creator removes the name before it releases the lock.
     EXPECT_TRUE(segment->hasOwner() || segments::probeOwner(file_, segment->header().incarnation) ==
                                            segments::Owner::absent);
   }
   maker.join();
 }
 
-TEST_F(SegmentTest, ACreatorKilledBeforeItPublishedLeavesNothing) {
+TEST_F(SegmentTest, ACreatorKilledBeforePublishingLeavesNothing) {
   Child child([&](Child::Self& self) {
     auto segment = createPage();
     segment.lockForLife();
@@ -111,7 +111,7 @@ TEST_F(SegmentTest, ACreatorKilledBeforeItPublishedLeavesNothing) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-TEST_F(SegmentTest, TheSecondOfANameIsNotPublishedAndTheFirstStays) {
+TEST_F(SegmentTest, DoesNotPublishASecondSegmentOfTheSameName) {
   auto first = createPage();
   auto second = createPage();
   ASSERT_TRUE(first.tryPublish(file_));
@@ -123,7 +123,7 @@ TEST_F(SegmentTest, TheSecondOfANameIsNotPublishedAndTheFirstStays) {
       first.header().incarnation);
 }
 
-TEST_F(SegmentTest, OneOfManyCreatorsWins) {
+TEST_F(SegmentTest, OneOfManyCreatorsGetsTheName) {
   for (int round = 0; round < 200; ++round) {
     std::atomic<int> wins{0};
     std::vector<std::thread> creators;
@@ -140,7 +140,7 @@ TEST_F(SegmentTest, OneOfManyCreatorsWins) {
   }
 }
 
-TEST_F(SegmentTest, WhatOneWritesAnotherReads) {
+TEST_F(SegmentTest, ProcessesShareItsContents) {
   auto segment = createPage();
   ASSERT_TRUE(segment.tryPublish(file_));
   auto opened = Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readWrite);
@@ -152,14 +152,14 @@ TEST_F(SegmentTest, WhatOneWritesAnotherReads) {
   EXPECT_EQ(segment.at<std::uint32_t>(1000), 7u);
 }
 
-TEST_F(SegmentTest, ThereIsNoneUnderAnUnusedName) {
+TEST_F(SegmentTest, DoesNotOpenAnUnusedName) {
   EXPECT_FALSE(Segment::tryOpen(file_, SegmentKind::pendingBind, Access::readOnly));
   EXPECT_FALSE(segments::remove(file_));
   EXPECT_FALSE(segments::removeIfOwnerless(file_));
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::absent);
 }
 
-TEST_F(SegmentTest, HasAnOwnerWhileItIsLockedAndNotAfterwards) {
+TEST_F(SegmentTest, HasAnOwnerOnlyWhileItIsLocked) {
   auto segment = createPage();
   segment.lockForLife();
   ASSERT_TRUE(segment.tryPublish(file_));
@@ -174,10 +174,10 @@ TEST_F(SegmentTest, HasAnOwnerWhileItIsLockedAndNotAfterwards) {
   EXPECT_EQ(segments::probeOwner(file_), segments::Owner::dead);
   EXPECT_EQ(segments::probeOwner(file_, incarnation), segments::Owner::dead);
   EXPECT_EQ(segments::probeOwner(file_, incarnation + 1), segments::Owner::absent)
-      << "another one's name now";
+      << "another segment has the name now";
 }
 
-TEST_F(SegmentTest, TheLockGoesWithTheProcessThatIsKilled) {
+TEST_F(SegmentTest, TheLockOfAKilledProcessIsReleased) {
   Child child([&](Child::Self& self) {
     auto segment = createPage();
     segment.lockForLife();
@@ -195,9 +195,9 @@ TEST_F(SegmentTest, TheLockGoesWithTheProcessThatIsKilled) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-// Reapers and successors at the same name: whoever holds the lock of a published segment finds it
-// under its name until it lets go.
-TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
+// Reapers and successors work on the same name. A process that holds the lock of a published
+// segment finds the segment under its name until it releases the lock.
+TEST_F(SegmentTest, ReapersNeverRemoveTheNameOfALivingOwner) {
   std::atomic<bool> end{false};
   std::vector<std::thread> reapers;
   for (int i = 0; i < 2; ++i) {
@@ -209,7 +209,7 @@ TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
   for (int round = 0; round < 2000; ++round) {
     auto segment = createPage();
     segment.lockForLife();
-    // until the last round's is reaped
+    // until the segment of the last round is removed
     while (!segment.tryPublish(file_)) std::this_thread::yield();
     ASSERT_EQ(segments::probeOwner(file_, segment.header().incarnation), segments::Owner::alive);
     ASSERT_FALSE(segments::removeIfOwnerless(file_));
@@ -218,7 +218,7 @@ TEST_F(SegmentTest, ALivingOwnersNameIsNeverRemovedByReapers) {
   for (auto& reaper : reapers) reaper.join();
 }
 
-TEST_F(SegmentTest, IsItsCreatorsAloneUnlessRightsSayOtherwise) {
+TEST_F(SegmentTest, IsOnlyForItsCreatorUnlessRightsSayOtherwise) {
   auto mine = createPage();
   ASSERT_TRUE(mine.tryPublish(file_));
   EXPECT_EQ(status().st_mode & 07777, 0600u);
@@ -235,7 +235,7 @@ TEST_F(SegmentTest, IsItsCreatorsAloneUnlessRightsSayOtherwise) {
   EXPECT_EQ(status().st_gid, group);
 }
 
-TEST_F(SegmentTest, MoreMemoryThanThereIsIsAnErrorAtCreation) {
+TEST_F(SegmentTest, CreationFailsWithoutEnoughMemory) {
   for (const auto bytes : {std::size_t{1} << 50, std::size_t{1} << 62, SIZE_MAX}) {
     const auto why = whatOf<std::system_error>(
         [&] { static_cast<void>(Segment::create(bytes, SegmentKind::bulk, name(), {})); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ShmTest: a backplane of its own, on which nothing may be left.
+// ShmTest: a backplane of its own. A test fails if it leaves segments on it.
 #pragma once
 
 #include <chrono>
@@ -16,7 +16,7 @@ namespace mpf::test {
 
 using namespace std::chrono_literals;
 
-// What `act` throws, as a text; empty when it throws nothing.
+// The text of the exception that `act` throws; empty if it throws none.
 template <class Exception, class Act>
 std::string whatOf(Act act) {
   try {
@@ -37,7 +37,7 @@ class ShmTest : public testing::Test {
   [[nodiscard]] std::string serverName(const std::string& server = "server") const {
     return SegmentName::serverWindow(name(), 0, server);
   }
-  // A segment of one page, not named yet.
+  // A segment of one page without a name.
   [[nodiscard]] Segment createPage(layout::SegmentKind kind = layout::SegmentKind::pendingBind,
                                    Rights rights = {}) const {
     return Segment::create(layout::kPageBytes, kind, name(), rights);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is dead, what is not, and what nobody can tell; and the reason for each.
+// The verdicts about files of dead and living processes and about unknown files, and their reasons.
 #include "shm/stale_segments.h"
 
 #include <sys/stat.h>
@@ -35,7 +35,7 @@ class StaleSegmentsTest : public ShmTest {
   OwnWindow makeClient() const {
     return {name(), SegmentKind::clientWindow, "", {}, [](layout::SegmentHeader&) {}};
   }
-  // A segment of one page under that name, of a window that has this incarnation.
+  // Creates a segment of one page with this name that belongs to the window of this incarnation.
   void leave(const std::string& file, SegmentKind kind, std::uint64_t ownerWindow,
              std::uint16_t layoutMajor = layout::kMajor) const {
     auto page = createPage(kind);
@@ -45,7 +45,7 @@ class StaleSegmentsTest : public ShmTest {
   }
 };
 
-TEST_F(StaleSegmentsTest, OfTheLivingTheLockIsTheReason) {
+TEST_F(StaleSegmentsTest, NamesTheHeldLockForFilesOfLivingProcesses) {
   const auto client = makeClient();
   const auto incarnation = client.header().incarnation;
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
@@ -58,16 +58,16 @@ TEST_F(StaleSegmentsTest, OfTheLivingTheLockIsTheReason) {
   for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::alive) << file;
   EXPECT_EQ(all.at(keyed(NameKind::clientWindow, incarnation)).reason,
             lock + keyed(NameKind::clientWindow, incarnation));
-  // Every peer may write over the header of hints: it names nobody.
+  // Every peer may overwrite the header of hints, so it is not used to name the owner.
   const auto held = "the lock of " + keyed(NameKind::hints, incarnation) + " is held";
   EXPECT_EQ(all.at(keyed(NameKind::hints, incarnation)).reason, held);
   EXPECT_EQ(all.at(keyed(NameKind::fifo, incarnation)).reason, held);
   EXPECT_EQ(all.at(pendingBind).reason, lock + keyed(NameKind::clientWindow, incarnation));
-  EXPECT_FALSE(stale_segments::tryRemove(all.at(pendingBind))) << "it lives";
+  EXPECT_FALSE(stale_segments::tryRemove(all.at(pendingBind))) << "its owner is alive";
   segments::remove(pendingBind);
 }
 
-TEST_F(StaleSegmentsTest, OfTheDeadTheFreeLockIsTheReason) {
+TEST_F(StaleSegmentsTest, NamesTheFreeLockForFilesOfDeadProcesses) {
   std::uint64_t incarnation = 0;
   Child child([&](Child::Self& self) {
     const auto client = makeClient();
@@ -84,12 +84,12 @@ TEST_F(StaleSegmentsTest, OfTheDeadTheFreeLockIsTheReason) {
   for (const auto& [file, judged] : all) EXPECT_EQ(judged.verdict, Verdict::dead) << file;
   EXPECT_THAT(
       all.at(pendingBind).reason,
-      AllOf(HasSubstr("nobody holds the lock of " + keyed(NameKind::clientWindow, incarnation)),
+      AllOf(HasSubstr("no process holds the lock of " + keyed(NameKind::clientWindow, incarnation)),
             HasSubstr("pid ")));
   for (const auto& [file, judged] : all) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
 
-TEST_F(StaleSegmentsTest, WhatNobodyOwnsIsDead) {
+TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
   leave(pendingBind, SegmentKind::pendingBind, 0x99);
   const auto bulk = SegmentName::bulk(name(), 0x55, 1, 0);
@@ -100,12 +100,12 @@ TEST_F(StaleSegmentsTest, WhatNobodyOwnsIsDead) {
   EXPECT_EQ(judgementOf(pendingBind).reason,
             "its owner's " + keyed(NameKind::clientWindow, 0x99) + " is gone");
   EXPECT_EQ(judgementOf(bulk).reason, "its link 55 is gone");
-  EXPECT_THAT(judgementOf(link).reason, HasSubstr("nobody can use it: "));
+  EXPECT_THAT(judgementOf(link).reason, HasSubstr("no program can use it: "));
   for (const auto& [file, judged] : judge()) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
 
-// Somebody removed the name of a window whose owner lives on.
-TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsWhatIsItsOwn) {
+// Another process removed the name of a window whose owner is alive.
+TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsItsOtherFiles) {
   const auto client = makeClient();
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
   leave(pendingBind, SegmentKind::pendingBind, client.header().incarnation);
@@ -118,7 +118,7 @@ TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsWhatIsItsOwn) {
   segments::remove(pendingBind);
 }
 
-TEST_F(StaleSegmentsTest, WhatCannotBeUnderstoodIsNotJudged) {
+TEST_F(StaleSegmentsTest, DoesNotJudgeUnknownFiles) {
   const auto notes = SegmentName::prefix(name()) + "notes";
   std::ofstream(segments::path(notes)) << "mine";
   leave(serverName("newer"), SegmentKind::serverWindow, 0, layout::kMajor + 1);
@@ -138,8 +138,8 @@ TEST_F(StaleSegmentsTest, WhatCannotBeUnderstoodIsNotJudged) {
   EXPECT_THAT(all.at(serverName("newer")).reason, HasSubstr("layout 2, this program speaks 1-1"));
 }
 
-// Judged dead, and then the name is a successor's: the removal asks the lock once more.
-TEST_F(StaleSegmentsTest, ASuccessorThatTookTheNameStays) {
+// A successor gets the name after the file was judged dead. The removal checks the lock again.
+TEST_F(StaleSegmentsTest, DoesNotRemoveASuccessorOfTheSameName) {
   leave(serverName(), SegmentKind::serverWindow, 0);
   const auto judged = judgementOf(serverName());
   ASSERT_EQ(judged.verdict, Verdict::dead);
@@ -153,7 +153,7 @@ TEST_F(StaleSegmentsTest, ASuccessorThatTookTheNameStays) {
 }
 
 // Any user may fill /dev/shm with names.
-TEST_F(StaleSegmentsTest, OfManyNamesAsManyAreJudgedAsWasAskedFor) {
+TEST_F(StaleSegmentsTest, JudgesTheRequestedNumberOfManyFiles) {
   for (std::uint64_t number = 1; number <= 200; ++number)
     std::ofstream(segments::path(keyed(NameKind::pendingBind, number)));
 
@@ -162,8 +162,8 @@ TEST_F(StaleSegmentsTest, OfManyNamesAsManyAreJudgedAsWasAskedFor) {
   EXPECT_EQ(backplane_.removeDead().size(), 200U);
 }
 
-// A pool hangs on its link: when that was not looked at, nothing is known of the pool.
-TEST_F(StaleSegmentsTest, APoolWhoseLinkWasNotLookedAtIsNotJudged) {
+// The verdict about a pool is that of its link. If the link was not judged, the pool is not either.
+TEST_F(StaleSegmentsTest, DoesNotJudgeAPoolWithoutItsLink) {
   const auto client = makeClient();
   const auto link = SegmentName::link(name(), 1, 2);
   leave(link, SegmentKind::link, client.header().incarnation);

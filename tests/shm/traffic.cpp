@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What second_reader_test.py looks at: a server and a client with known traffic on a backplane of
-// their own.
+// The programs that second_reader_test.py reads: a server and a client with known traffic on a
+// backplane of their own.
 //
-//   traffic layout            prints where the code has every field
-//   traffic run               prints what there is to see; one more time for each line "serve" on
-//   stdin; ends when stdin does traffic clean BACKPLANE   removes what the dead left
+//   traffic layout            prints the offset of every field in the code
+//   traffic run               prints the expected values, and again for each line "serve" on stdin;
+//                             exits at the end of stdin
+//   traffic clean BACKPLANE   removes the files of dead processes
 #include <iostream>
 #include <string>
 
@@ -64,7 +65,7 @@ class Traffic {
     server_.handleOne();
     dispatcher_.runOnce(Deadline::after(100us));
   }
-  // A long text in a chunk, a text of several slots, numbers; then one too many.
+  // A long text in a chunk, a text of several slots, numbers; then one message too many.
   void fillQueue() {
     for (int i = 0; i < kQueueSize; ++i) {
       std::uint32_t id = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// News of deaths and births of peers.
+// Watcher: reports the death of peers and new names.
 #include "shm/watcher.h"
 
 #include <atomic>
@@ -46,7 +46,8 @@ class WatcherTest : public ShmTest {
   std::shared_ptr<PeerWindow> open(const std::string& server) const {
     return PeerWindow::tryOpen(serverName(server), SegmentKind::serverWindow);
   }
-  // Returns when the watcher has seen a death that happened after all that the test did before.
+  // Returns when the watcher has reported a death that happens after this call: it has then handled
+  // all earlier events.
   void waitForAnotherDeath() {
     auto other = startServer("other");
     News news;
@@ -62,7 +63,7 @@ class WatcherTest : public ShmTest {
   Watcher& watcher_ = backplane_.watcher();
 };
 
-TEST_F(WatcherTest, ADeathIsReportedOnce) {
+TEST_F(WatcherTest, ReportsADeathOnce) {
   const auto server = startServer("server");
   const auto peer = open("server");
   News news;
@@ -77,7 +78,7 @@ TEST_F(WatcherTest, ADeathIsReportedOnce) {
   EXPECT_EQ(news.count(), 1);
 }
 
-TEST_F(WatcherTest, AWindowThatIsClosedInOrderIsGoneToo) {
+TEST_F(WatcherTest, ReportsAWindowThatIsClosed) {
   const auto server = startServer("server");
   const auto peer = open("server");
   News news;
@@ -90,7 +91,7 @@ TEST_F(WatcherTest, AWindowThatIsClosedInOrderIsGoneToo) {
   EXPECT_TRUE(peer->isClosed());
 }
 
-TEST_F(WatcherTest, OneThatWasDeadAlreadyIsReported) {
+TEST_F(WatcherTest, ReportsAPeerThatWasDeadAlready) {
   const auto server = startServer("server");
   const auto peer = open("server");
   server->end(SIGKILL);
@@ -101,7 +102,7 @@ TEST_F(WatcherTest, OneThatWasDeadAlreadyIsReported) {
   news.wait();
 }
 
-TEST_F(WatcherTest, EveryWatchOfAPeerIsReported) {
+TEST_F(WatcherTest, ReportsToEveryWatchOfAPeer) {
   const auto server = startServer("server");
   News first;
   News second;
@@ -114,7 +115,7 @@ TEST_F(WatcherTest, EveryWatchOfAPeerIsReported) {
   second.wait();
 }
 
-TEST_F(WatcherTest, ManyDeathsAtOnceAreReportedOnceEach) {
+TEST_F(WatcherTest, ReportsEachOfManyDeathsOnce) {
   constexpr int kServers = 20;
   std::vector<std::unique_ptr<Child>> servers;
   std::vector<News> news(kServers);
@@ -129,7 +130,7 @@ TEST_F(WatcherTest, ManyDeathsAtOnceAreReportedOnceEach) {
   for (const auto& one : news) EXPECT_EQ(one.count(), 1);
 }
 
-TEST_F(WatcherTest, WhatIsForgottenIsNotReported) {
+TEST_F(WatcherTest, DoesNotReportAForgottenPeer) {
   const auto server = startServer("server");
   const auto peer = open("server");
   News news;
@@ -144,8 +145,8 @@ TEST_F(WatcherTest, WhatIsForgottenIsNotReported) {
   watcher_.forget(token);
 }
 
-// forget() may come while the callback runs: when it returns the callback has ended.
-TEST_F(WatcherTest, NoCallbackRunsAfterItWasForgotten) {
+// forget() may be called while the callback runs. When it returns, the callback has ended.
+TEST_F(WatcherTest, RunsNoCallbackAfterForget) {
   for (int round = 0; round < 50; ++round) {
     const auto server = startServer("server" + std::to_string(round));
     auto alive = std::make_unique<std::atomic<int>>(0);
@@ -156,12 +157,12 @@ TEST_F(WatcherTest, NoCallbackRunsAfterItWasForgotten) {
     watcher_.forget(token);
 
     EXPECT_LE(alive->load(), 1);
-    alive.reset();  // AddressSanitizer tells if the callback comes now
+    alive.reset();  // AddressSanitizer reports a callback that runs after this
     static_cast<void>(backplane_.removeDead());
   }
 }
 
-TEST_F(WatcherTest, ACallbackMayForgetAndWatchOthers) {
+TEST_F(WatcherTest, ACallbackMayEndAndStartOtherWatches) {
   const auto first = startServer("first");
   const auto second = startServer("second");
   News news;
@@ -203,14 +204,14 @@ TEST_F(WatcherTest, AStoppedProcessIsNotDead) {
 class HiddenOwners : public WatcherTest,
                      public testing::WithParamInterface<void (*)(layout::SegmentHeader&)> {};
 
-// Where the header names no process that can be looked for, the lock alone tells.
-TEST_P(HiddenOwners, AreWatchedByTheirLocks) {
+// If the header names no process that this process can find, only the lock decides.
+TEST_P(HiddenOwners, AreWatchedThroughTheirLocks) {
   const auto server = startServer("server", GetParam());
   const auto peer = open("server");
   News news;
   watcher_.watchPeer(peer, news.callback());
   waitForAnotherDeath();
-  EXPECT_EQ(news.count(), 0) << "it lives";
+  EXPECT_EQ(news.count(), 0) << "it is alive";
 
   server->end(SIGKILL);
 
@@ -224,14 +225,14 @@ INSTANTIATE_TEST_SUITE_P(
                     [](layout::SegmentHeader& header) { header.ownerPid = 0; },
                     [](layout::SegmentHeader& header) { header.ownerPid = INT32_MIN; }));
 
-// A process that the owner forked has none of its locks.
-TEST_F(WatcherTest, AnOwnersForkDoesNotKeepItAlive) {
+// A child of the owner has none of the owner's locks.
+TEST_F(WatcherTest, AChildDoesNotKeepItsDeadParentAlive) {
   const auto server = std::make_unique<Child>([&](Child::Self& self) {
     const OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
                            [](layout::SegmentHeader&) {});
     if (::fork() == 0) {
       ::prctl(PR_SET_PDEATHSIG, 0);
-      self.ready();  // the heir lives until it is told to go on
+      self.ready();  // the grandchild runs until the test calls go()
       ::_exit(0);
     }
     ::pause();
@@ -250,7 +251,7 @@ TEST_F(WatcherTest, AnOwnersForkDoesNotKeepItAlive) {
   EXPECT_TRUE(peer->isDead());
 }
 
-TEST_F(WatcherTest, AServersBirthIsNews) {
+TEST_F(WatcherTest, ReportsANewServer) {
   News news;
   const auto token = watcher_.watchNames(NameKind::serverWindow, news.callback());
 
@@ -261,7 +262,7 @@ TEST_F(WatcherTest, AServersBirthIsNews) {
   watcher_.forget(token);
 }
 
-TEST_F(WatcherTest, EveryoneWhoWaitsForABirthHearsOfIt) {
+TEST_F(WatcherTest, ReportsANewServerToEveryWatch) {
   News first;
   News second;
   News third;

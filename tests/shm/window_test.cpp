@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a process exposes on the backplane, and what its peers see of it.
+// OwnWindow and PeerWindow: what a process exposes, and what its peers see.
 #include "shm/window.h"
 
 #include <sys/stat.h>
@@ -40,7 +40,7 @@ class WindowTest : public ShmTest {
   }
 };
 
-TEST_F(WindowTest, StandsBesideItsHintsAndItsPipeAndGoesWithThem) {
+TEST_F(WindowTest, CreatesAndRemovesItsHintsAndFifo) {
   auto server = makeServer();
   auto client = makeClient();
 
@@ -56,7 +56,7 @@ TEST_F(WindowTest, StandsBesideItsHintsAndItsPipeAndGoesWithThem) {
   EXPECT_EQ(backplane_.segmentNames().size(), 3u);
 }
 
-TEST_F(WindowTest, IsDescribedBeforeAnybodySeesIt) {
+TEST_F(WindowTest, IsDescribedBeforeItHasItsName) {
   std::vector<std::string> seen{"not called"};
 
   OwnWindow window(name(), SegmentKind::serverWindow, serverName(), {},
@@ -79,24 +79,24 @@ TEST_F(WindowTest, PeersMayWriteTheHintsAndReadTheRest) {
   EXPECT_EQ(modeOf(SegmentName::keyed(name(), NameKind::fifo, key)), 0666u);
 }
 
-TEST_F(WindowTest, IsItsOwnersAloneUnlessRightsSayOtherwise) {
+TEST_F(WindowTest, IsOnlyForItsOwnersUserUnlessRightsSayOtherwise) {
   const auto server = makeServer();
 
   for (const auto& file : backplane_.segmentNames()) EXPECT_EQ(modeOf(file), 0600u) << file;
 }
 
-TEST_F(WindowTest, ANameInUseIsRefusedWithItsOwnersNameAndPid) {
+TEST_F(WindowTest, RefusesANameInUseAndNamesTheOwner) {
   const auto first = makeServer();
 
   const auto why = whatOf<NameInUse>([&] { static_cast<void>(makeServer()); });
 
   EXPECT_THAT(why, AllOf(HasSubstr(segments::path(serverName())), HasSubstr("shm_test"),
                          HasSubstr(std::to_string(::getpid()))));
-  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "nothing is left of the second";
+  EXPECT_EQ(backplane_.segmentNames().size(), 3u) << "the second window left no files";
   EXPECT_TRUE(openServer()->hasOwner());
 }
 
-TEST_F(WindowTest, TheNameOfAKilledOwnerCanBeUsedAtOnce) {
+TEST_F(WindowTest, ReplacesTheWindowOfAKilledOwnerAtOnce) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
     self.stay();
@@ -112,7 +112,7 @@ TEST_F(WindowTest, TheNameOfAKilledOwnerCanBeUsedAtOnce) {
   static_cast<void>(backplane_.removeDead());
 }
 
-TEST_F(WindowTest, WhoeverRemovesADeadOneIsNotTakenForItsOwner) {
+TEST_F(WindowTest, AReaperIsNotMistakenForTheOwner) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
     self.stay();
@@ -138,8 +138,8 @@ TEST_F(WindowTest, WhoeverRemovesADeadOneIsNotTakenForItsOwner) {
   static_cast<void>(backplane_.removeDead());
 }
 
-// It has the lock, and no processor.
-TEST_F(WindowTest, ASuccessorWaitsForAProcessThatIsSlowToRemoveADeadOne) {
+// The reaper holds the lock but gets no processor.
+TEST_F(WindowTest, WaitsForASlowReaper) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
     self.stay();
@@ -164,7 +164,7 @@ TEST_F(WindowTest, ASuccessorWaitsForAProcessThatIsSlowToRemoveADeadOne) {
   static_cast<void>(backplane_.removeDead());
 }
 
-TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerWins) {
+TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerGetsTheName) {
   for (int round = 0; round < 20; ++round) {
     Child child([&](Child::Self& self) {
       const auto server = makeServer();
@@ -188,8 +188,9 @@ TEST_F(WindowTest, OneOfManySuccessorsOfAKilledOwnerWins) {
   }
 }
 
-// A file that is nobody's and cannot be removed: another user's, say.
-TEST_F(WindowTest, ANameThatNobodyHasAndNobodyMayRemoveIsAnError) {
+// A file without an owner that this process cannot remove, for example because it is another
+// user's.
+TEST_F(WindowTest, ADeadWindowThatCannotBeRemovedIsAnError) {
   const auto path = segments::path(serverName());
   ASSERT_EQ(::mkdir(path.c_str(), 0700), 0);
 
@@ -199,7 +200,7 @@ TEST_F(WindowTest, ANameThatNobodyHasAndNobodyMayRemoveIsAnError) {
   ASSERT_EQ(::rmdir(path.c_str()), 0);
 }
 
-TEST_F(WindowTest, OneThatCannotBeCompletedLeavesNothing) {
+TEST_F(WindowTest, AFailedConstructionLeavesNothing) {
   std::string pipe;
 
   const auto why = whatOf<std::system_error>([&] {
@@ -215,7 +216,7 @@ TEST_F(WindowTest, OneThatCannotBeCompletedLeavesNothing) {
   EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty());
 }
 
-TEST_F(WindowTest, APeersViewOutlivesItAndSaysThatItIsClosed) {
+TEST_F(WindowTest, APeerWindowStaysValidAndSeesThatTheWindowIsClosed) {
   auto server = makeServer();
   const auto peer = openServer();
   EXPECT_FALSE(peer->isClosed());
@@ -229,7 +230,7 @@ TEST_F(WindowTest, APeersViewOutlivesItAndSaysThatItIsClosed) {
   peer->knock(1);
 }
 
-TEST_F(WindowTest, ThereIsNoneWithoutItsNameOrItsHints) {
+TEST_F(WindowTest, IsNotOpenedWithoutItsNameOrItsHints) {
   EXPECT_EQ(openServer(), nullptr);
   const auto server = makeServer();
   segments::remove(SegmentName::keyed(name(), NameKind::hints, server->header().incarnation));
@@ -237,7 +238,7 @@ TEST_F(WindowTest, ThereIsNoneWithoutItsNameOrItsHints) {
   EXPECT_EQ(openServer(), nullptr);
 }
 
-TEST_F(WindowTest, OneThatIsTooShortIsRefusedByName) {
+TEST_F(WindowTest, RefusesAWindowThatIsTooShortAndNamesIt) {
   const auto server = makeServer();
   constexpr auto kBytes = layout::kWindowBytes - 1;
   Segment::tryOpen(serverName(), SegmentKind::serverWindow, Segment::Access::readWrite)
@@ -249,7 +250,7 @@ TEST_F(WindowTest, OneThatIsTooShortIsRefusedByName) {
               AllOf(HasSubstr(segments::path(serverName())), HasSubstr("truncated")));
 }
 
-TEST_F(WindowTest, ANotedLinkHasItsReadyBitWhateverItsNumber) {
+TEST_F(WindowTest, NotifySetsTheReadyBitForEveryIndex) {
   const auto server = makeServer();
   const auto peer = openServer();
   const auto& hints = server->hints();
@@ -263,7 +264,7 @@ TEST_F(WindowTest, ANotedLinkHasItsReadyBitWhateverItsNumber) {
             std::uint64_t{1} << 63);
 }
 
-TEST_F(WindowTest, AKnockThatOverwritesAnotherAsksForALookByName) {
+TEST_F(WindowTest, AKnockThatOverwritesAnotherRequestsARescan) {
   const auto server = makeServer();
   const auto peer = openServer();
   const auto& hints = server->hints();
@@ -277,7 +278,7 @@ TEST_F(WindowTest, AKnockThatOverwritesAnotherAsksForALookByName) {
   EXPECT_EQ(hints.rescan.load(std::memory_order_relaxed), 1u);
 }
 
-TEST_F(WindowTest, OnlyASleeperIsRung) {
+TEST_F(WindowTest, RingsOnlyASleepingOwner) {
   const auto server = makeServer();
   const auto peer = openServer();
   auto& bell = server->hints().bell;
@@ -293,7 +294,7 @@ TEST_F(WindowTest, OnlyASleeperIsRung) {
 
   EXPECT_EQ(rung(), 1u);
   char byte = 0;
-  EXPECT_EQ(::read(server->fifo().get(), &byte, 1), 1) << "through the pipe instead";
+  EXPECT_EQ(::read(server->fifo().get(), &byte, 1), 1) << "rung through the FIFO";
   server->control().sleeping.store(static_cast<layout::SleepState>(77), std::memory_order_relaxed);
   peer->notify(0);
 }

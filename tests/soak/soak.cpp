@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// soak DURATION: a server, a crowd of clients, and clients that flood and are killed, for as long
-// as is wanted ("30s", "10m", "2h"). What each process has is printed over time; at the end it must
-// be what it was after the first quarter. Exit status: 0 flat, 1 grown or a wrong answer.
+// soak DURATION: runs a server, many clients, and clients that flood the server and are killed, for
+// this time ("30s", "10m", "2h"). Prints the memory and the files of each process over time; at the
+// end they must be the same as after the first quarter. Exit status: 0 no growth; 1 growth or a
+// wrong answer.
 #include <chrono>
 #include <cstdio>
 #include <fmt/format.h>
@@ -22,7 +23,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kSlackKb = 4096;  // that allocators keep
+constexpr std::size_t kSlackKb = 4096;  // memory that allocators may keep
 constexpr int kSamples = 20;
 
 std::chrono::seconds parse(const std::string& text) {
@@ -39,7 +40,7 @@ class Soak {
  public:
   explicit Soak(std::chrono::seconds duration) : duration_(duration) {
     static_cast<void>(server_.line());
-    // all are connected: what comes later is growth
+    // All clients are connected: a later increase is growth.
     while (!crowd_.line().starts_with("answered ")) continue;
     pids_ = {{"server", server_.pid()}, {"crowd", crowd_.pid()}, {"this", ::getpid()}};
   }
@@ -51,7 +52,7 @@ class Soak {
       print(sample);
       if (sample == kSamples / 4) before_ = usage_;
     }
-    // the last death is seen
+    // The server has noticed the last death.
     for (int i = 0; i < 1000; ++i)
       static_cast<void>(client_->call(Float64Message({.value = 0}), 60s));
     print(kSamples);
@@ -75,7 +76,7 @@ class Soak {
     for (const auto& name : backplane_.segmentNames()) fmt::print("left behind: {}\n", name);
     return backplane_.segmentNames().empty();
   }
-  // Some requests, answered rightly while a client floods the server and is killed.
+  // Some requests, which must be answered correctly while a client floods the server and is killed.
   void visit() {
     Victim flood("flood", backplane_.name());
     for (int i = 0; i < 200; ++i) {

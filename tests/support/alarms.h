@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How many alarms a server has counted, read from its window as `mpf msr` does.
+// Reads from the window of a server how many alarms it has counted, as `mpf msr` does.
 #pragma once
 
 #include <fcntl.h>
@@ -17,7 +17,7 @@
 
 namespace mpf::test {
 
-// Of `server` at location 0; its name must be one that file names can have.
+// The alarm count of `server` at location 0. The name must not need an escape in a file name.
 inline std::uint64_t alarmsOf(const Backplane& backplane, const std::string& server) {
   const auto path = "/dev/shm/mpf." + backplane.name() + ".s.0." + server;
   const FileDescriptor window(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Caller: a client, and all that it was told, in order. That each request has one end, before the
-// disconnect, is seen to here.
+// Caller: a client that records all messages that it receives, in order. Checks that each request
+// ends exactly once, before the disconnect.
 //
-// Threads  one, its dispatcher's.
+// Threads  one: the thread of its dispatcher.
 #pragma once
 
 #include <deque>
@@ -27,16 +27,16 @@ class Caller {
       : client(dispatcher, [this](Message&& message) { note(std::move(message)); }) {
     client.bind(server, location);
   }
-  // Returns the id of the request; 0 when it was not sent.
+  // Returns the id of the request; 0 if it was not sent.
   std::uint32_t send(Message&& message, Deadline takeBefore = Deadline::never()) {
     std::uint32_t id = 0;
     EXPECT_EQ(client.send(std::move(message), takeBefore, &id), SendResult::sent);
     const bool isNew = id == 0 || open.insert(id).second;
-    EXPECT_TRUE(isNew) << "an id that is still open was given again";
+    EXPECT_TRUE(isNew) << "the id of an open request was used again";
     return id;
   }
   [[nodiscard]] bool isConnected() const { return client.isConnected(); }
-  // The next message that is no news; empty when there is none.
+  // The next message that is not a ConnectMessage; empty if there is no such message.
   Message take() {
     if (messages.empty()) return {};
     auto message = std::move(messages.front());
@@ -46,7 +46,7 @@ class Caller {
 
   std::vector<ConnectStatus> news;
   std::deque<Message> messages;
-  std::set<std::uint32_t> open;  // requests without an end
+  std::set<std::uint32_t> open;  // requests that have not ended
   MessageClient client;
 
  private:
@@ -54,12 +54,12 @@ class Caller {
     if (const auto* connect = message.tryAs<Connect>()) {
       news.push_back(connect->status);
       EXPECT_TRUE(connect->status != ConnectStatus::connectNo || open.empty())
-          << "a disconnect before the ends of requests";
+          << "a disconnect before the end of all requests";
       return;
     }
     const bool isSound =
         !RelayClient::endsRequest(message) || open.erase(message.route().requestId) == 1;
-    EXPECT_TRUE(isSound) << "an end of a request that is not open";
+    EXPECT_TRUE(isSound) << "a request that is not open has ended";
     messages.push_back(std::move(message));
   }
 };

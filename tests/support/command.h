@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// runCommand(): what a shell command writes to stdout, and how it ends. For tests that look at a
-// program from outside; one that shall live on beside the test, or be signalled, is a Program.
+// runCommand(): the stdout and the status of a shell command. For a program that must run beside the
+// test, or that gets signals, use Program.
 //
 //   EXPECT_THAT(runCommand(program + " --help").output, StartsWith("mpf-x - "));
 //
@@ -17,10 +17,10 @@ namespace mpf::test {
 
 struct EndedCommand {
   std::string output;
-  int status = 0;  // as waitpid() has it; 0: it ended well
+  int status = 0;  // status of waitpid(); 0: success
 };
 
-// Waits for its end.
+// Runs the command and waits for its end.
 [[nodiscard]] inline EndedCommand runCommand(const std::string& command) {
   std::FILE* const pipe =
       ::popen(command.c_str(), "r");  // NOLINT(cert-env33-c): a test's own programs

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tests that die, one way each: guard_test.cpp runs them. Each writes what it had, a word and a
-// value to a line.
+// Tests that die, each in another way. guard_test.cpp runs them. Each prints the names of its
+// resources, on each line a word and a value.
 #include <signal.h>
 #include <unistd.h>
 
@@ -19,8 +19,8 @@
 namespace mpf::test {
 namespace {
 
-// A segment, a window on another backplane of which the guard does not know, a folder, and a child
-// that does not die with its parent.
+// Creates a segment, a window on a backplane that is not registered with the guard, a folder, and a
+// child that does not die with its parent.
 class DyingTest : public testing::Test {
  protected:
   DyingTest() {

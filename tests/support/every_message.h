@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every message: one of each type at least, with values that another byte order would change. The
-// same on every host.
+// Messages of every type, with values that another byte order would change. The same on every host.
 #pragma once
 
 #include <algorithm>
@@ -55,7 +54,7 @@ MessageOf<Body> arrayOf(const auto& elements) {
   return message;
 }
 
-// A struct of a user's own; message.capnp stands for his schema.
+// A user's own struct; message.capnp is used in place of the user's schema.
 inline UserMessage userStruct() {
   UserBuilder builder(UserMessage::allocValue(512));
   auto spectrum = builder.initRoot<wire::Float64Array>();
@@ -75,7 +74,7 @@ inline Char8ArrayMessage everyByte() {
   return message;
 }
 
-// What a client may send.
+// The messages that a client may send.
 inline std::vector<Message> everyRequest() {
   std::vector<Message> messages;
   messages.reserve(32);
@@ -99,7 +98,7 @@ inline std::vector<Message> everyRequest() {
   return messages;
 }
 
-// And what MPF itself tells him.
+// The messages that MPF itself sends to a client.
 inline std::vector<Message> everyMessage() {
   auto messages = everyRequest();
   messages.emplace_back(MessageOf(
@@ -108,7 +107,7 @@ inline std::vector<Message> everyMessage() {
   return messages;
 }
 
-// The same type, marks and bytes.
+// Whether both have the same type, client fields and bytes.
 inline bool isSame(const Message& one, const Message& other) {
   return one.getType() == other.getType() && one.getClientType() == other.getClientType() &&
          one.getClientExtra() == other.getClientExtra() &&

@@ -41,8 +41,8 @@ struct Registry {
   std::atomic<std::size_t> count{0};
   std::array<std::array<char, kChars>, kNames> names{};
 };
-Registry* registry = nullptr;         // null in a process without a guard
-std::atomic<pid_t> testProcess = 0;  // for the handler of signals
+Registry* registry = nullptr;        // null in a process without a guard
+std::atomic<pid_t> testProcess = 0;  // used by the signal handler
 
 Registry* makeRegistry() {
   auto* const memory =
@@ -51,8 +51,8 @@ Registry* makeRegistry() {
   return new (memory) Registry;
 }
 
-// A test that only lists its cases needs no guard, and a debugger wants to see the tests
-// themselves.
+// A program that only lists its tests needs no guard. Under a debugger, the tests must run in the
+// first process.
 bool isGuardNeeded(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     if (std::string_view(argv[i]).starts_with("--gtest_list_tests")) return false;
@@ -66,7 +66,7 @@ bool isGuardNeeded(int argc, char** argv) {
 
 // ---- the guard
 
-// Signals for the guard are meant for the tests. A terminal sends SIGINT and SIGQUIT to both.
+// Forwards signals for the guard to the tests. A terminal sends SIGINT and SIGQUIT to both.
 void forwardSignals() {
   struct sigaction action{};
   action.sa_handler = [](int signal) { ::kill(testProcess, signal); };
@@ -77,8 +77,8 @@ void forwardSignals() {
 
 using Pids = std::set<pid_t>;
 
-// Returns the status of the tests. Reaps their orphans meanwhile: they are children of the guard.
-// Adds all of them to `dead`.
+// Waits for the tests and returns their status. Also reaps their orphans, which are children of the
+// guard. Adds the pids of all of them to `dead`.
 int waitForTests(pid_t tests, Pids& dead) {
   for (int status = 0;;) {
     const auto ended =
@@ -93,7 +93,7 @@ int waitForTests(pid_t tests, Pids& dead) {
 void killOrphans(Pids& dead) {
   for (;;) {
     std::ifstream children("/proc/self/task/" + std::to_string(::getpid()) + "/children");
-    // a kernel without this list: children die with their parents, by PR_SET_PDEATHSIG
+    // A kernel without this list: the children died with their parents (PR_SET_PDEATHSIG).
     if (!children) return;
     for (pid_t child = 0; children >> child;) ::kill(child, SIGKILL);
     const auto ended = ::waitpid(-1, nullptr, 0);
@@ -102,7 +102,7 @@ void killOrphans(Pids& dead) {
   }
 }
 
-// Removes all files of the registered backplanes: none of the processes that used them lives.
+// Removes all files of the registered backplanes. All processes that used them are dead.
 void removeSegments() {
   std::error_code ignored;
   for (std::size_t i = 0;
@@ -115,8 +115,8 @@ void removeSegments() {
   }
 }
 
-// Programs such as `mpf torture` and the demo choose backplanes of their own. Removes what the dead
-// left on the backplanes of `dead`.
+// Removes the files of dead processes from all backplanes that processes of `dead` used. Programs
+// such as `mpf torture` and the demo use backplanes that are not registered.
 void removeSegmentsOf(const Pids& dead) {
   for (const auto& backplane : Backplane::names()) {
     const auto names = segments::list(SegmentName::prefix(backplane));
@@ -134,7 +134,7 @@ void removeSegmentsOf(const Pids& dead) {
   }
 }
 
-// A folder for temporary files of the tests; any user may use it, as /tmp.
+// Creates a folder for temporary files of the tests. Any user may use it, like /tmp.
 std::string makeTemporaryFolder() {
   std::string name = testing::TempDir() + "mpf-tests-" + std::string(6, 'X');
   if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
@@ -144,11 +144,11 @@ std::string makeTemporaryFolder() {
   return name;
 }
 
-// Ends as the tests did: ctest then reports their signal.
+// Ends in the same way as the tests, so that ctest reports their signal.
 int endAs(int status) {
   if (!WIFSIGNALED(status)) return WEXITSTATUS(status);
   const rlimit none{0, 0};
-  ::setrlimit(RLIMIT_CORE, &none);  // the tests have left their own
+  ::setrlimit(RLIMIT_CORE, &none);  // the tests have written a core file already
   ::signal(WTERMSIG(status), SIG_DFL);
   ::raise(WTERMSIG(status));
   return 128 + WTERMSIG(status);
@@ -167,7 +167,7 @@ int runGuarded(int argc, char** argv) {
   const auto tests = checkCall(::fork(), "fork");
   if (tests == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != guard) return 1;  // the guard was killed before
+    if (::getppid() != guard) return 1;  // the guard was killed before prctl()
     return runTests(argc, argv);
   }
   testProcess = tests;

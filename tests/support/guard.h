@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Guard: main() of the test executables runs the tests in a child process and removes what the
-// child leaves when it dies, be it killed by its watchdog, a sanitizer or a signal: processes,
-// segments of its backplanes, temporary files.
+// Guard: main() of the test executables runs the tests in a child process. If the child dies (by
+// its watchdog, a sanitizer or a signal), the guard removes its processes, the segments of its
+// backplanes and its temporary files.
 //
 //   main(): guard ─fork─► tests ─fork─► servers, clients, tools
-//             └─ waits for the tests, kills what is left of their children, removes their segments, ends as the tests did
+//             └─ waits for the tests, kills their remaining children, removes their segments,
+//                ends in the same way as the tests
 //
 // Threads  any.
 #pragma once

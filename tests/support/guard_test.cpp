@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A test that dies leaves nothing. The tests that die are those of dying.cpp.
+// A test that dies leaves nothing. dying.cpp contains the tests that die.
 #include "tests/support/guard.h"
 
 #include <signal.h>
@@ -23,7 +23,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// What a dying test had: said on one line each, "word value".
+// The value that a dying test printed after `word`, on a line of its own.
 std::string valueOf(const std::string& word, const std::string& said) {
   std::istringstream lines(said);
   for (std::string first, value; lines >> first;) {
@@ -35,7 +35,7 @@ std::string valueOf(const std::string& word, const std::string& said) {
 
 struct Death {
   std::string name;
-  int status;  // of the process
+  int status;  // expected status of the process
 };
 std::ostream& operator<<(std::ostream& out, const Death& death) { return out << death.name; }
 

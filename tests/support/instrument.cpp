@@ -78,7 +78,7 @@ void Instrument::hangUp() {
   line_.reset();
   command_.clear();
   outputs_.clear();
-  wake();  // the thread's poll() holds the line open as long as it lasts
+  wake();  // the line stays open until the thread's poll() returns
 }
 
 void Instrument::wake() const noexcept {
@@ -116,7 +116,7 @@ int Instrument::msToNextOutput() const {
 
 void Instrument::receive() {
   pollfd ready{descriptor(), POLLIN, 0};
-  if (::poll(&ready, 1, 0) <= 0) return;  // another line has this number by now
+  if (::poll(&ready, 1, 0) <= 0) return;  // another line has this descriptor number now
   std::array<char, 4096> bytes{};
   const auto length = ::read(descriptor(), bytes.data(), bytes.size());
   if (length <= 0) return hangUp();
@@ -167,7 +167,7 @@ void Instrument::send(std::string_view text) {
   while (!text.empty()) {
     const auto length =
         retryInterrupted([&] { return ::write(descriptor(), text.data(), text.size()); });
-    if (length <= 0) return;  // hung up: lost, as on any line
+    if (length <= 0) return;  // hung up: the bytes are lost, as on any line
     text.remove_prefix(static_cast<std::size_t>(length));
   }
 }

@@ -4,13 +4,14 @@
 //   *IDN?         MPF,INSTRUMENT,0,1.0
 //   MEAS:VOLT?    1.234
 //   ECHO <text>   <text>
-//   anything else: no answer                        commands end with \n or \r\n, answers with
-//   answerEnd
+//   other text    no answer
+//
+// Commands end with \n or \r\n, answers end with answerEnd.
 //
 //   Instrument instrument("/tmp/test/ttyA");        // on a pseudo-terminal, or connect() a socket
 //   instrument.behave({.delay = 20ms, .noise = "\x07"});
 //
-// Threads  all members from any thread; the instrument has its own.
+// Threads  any thread may call; the instrument has a thread of its own.
 #pragma once
 
 #include <chrono>
@@ -29,10 +30,10 @@
 
 namespace mpf::test {
 
-// From a command to its answer.
+// How the instrument answers a command.
 struct Behaviour {
   std::chrono::milliseconds delay{0};  // before the answer
-  // set: the answer goes out byte by byte, with this between bytes
+  // If set, the answer is sent byte by byte, with this pause between bytes.
   std::optional<std::chrono::milliseconds> gap = std::nullopt;
   std::string noise =
       {};  // bytes before the answer; NOLINT(readability-redundant-member-init): g++ wants it
@@ -42,33 +43,33 @@ struct Behaviour {
 
 class Instrument {
  public:
-  // Not connected to anything yet.
+  // An instrument that is not connected to a line.
   Instrument();
-  // On a pseudo-terminal that a port finds at `linkPath`.
+  // An instrument on a pseudo-terminal that a port opens at `linkPath`.
   explicit Instrument(std::string linkPath);
   ~Instrument();
   Instrument(const Instrument&) = delete;
   Instrument& operator=(const Instrument&) = delete;
 
-  // How commands that come from now on are answered.
+  // Sets how later commands are answered.
   void behave(Behaviour behaviour);
-  // Sends `text` now, as it is.
+  // Sends `text` at once, unchanged.
   void say(std::string_view text);
 
   // Serves `line`, a socket for example, until unplug().
   void connect(FileDescriptor line);
-  // Hangs up; what was still to be sent is lost.
+  // Hangs up. Bytes that have not been sent are lost.
   void unplug();
   // A new pseudo-terminal at the same path.
   void plugIn();
 
-  // Waits until `text` has arrived, in whatever pieces, since the beginning. Returns false when the
-  // watchdog barks.
+  // Waits until all bytes received since the start contain `text`. Returns false if the watchdog
+  // expires.
   [[nodiscard]] bool waitForReceived(std::string_view text) const;
   [[nodiscard]] std::string received() const;
   // The settings of the pseudo-terminal.
   [[nodiscard]] termios settings() const;
-  // Stops reading (a device that holds its flow control line), or reads on.
+  // Stops reading, as a device that uses its flow control line, or continues to read.
   void setReading(bool isReading);
 
  private:
@@ -78,7 +79,7 @@ class Instrument {
     std::string text;
   };
   void run(const std::stop_token& stop);
-  [[nodiscard]] int descriptor() const;  // with mutex_, as the ones below
+  [[nodiscard]] int descriptor() const;  // this and the next: called with mutex_ locked
   [[nodiscard]] int msToNextOutput() const;
   void receive();
   void execute(std::string_view command);
@@ -97,7 +98,7 @@ class Instrument {
   Behaviour behaviour_;
   bool isReading_ = true;
   std::string received_;
-  std::string command_;  // begun
+  std::string command_;  // the part of the next command that has been received
   std::vector<Output> outputs_;
   std::jthread thread_;
 };

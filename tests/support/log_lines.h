@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a log with a limit on storms has written: how many lines, and for how many lines they stand.
+// Counts the lines that a log with a LogLimiter has written, and the lines that they stand for.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace mpf::test {
 
-// For how many lines a written line stands: the count of "(repeated 12 times in 1.0 s)" or "(the
-// last of 12 such lines in 1.0 s)"; 1 without one.
+// The number of lines that a written line stands for: the count in "(repeated 12 times in 1.0 s)"
+// or "(the last of 12 such lines in 1.0 s)"; 1 without a count.
 inline std::uint64_t timesOf(const std::string& line) {
   for (const std::string_view mark : {" (repeated ", " (the last of "}) {
     const auto at = line.rfind(mark);
@@ -21,8 +21,8 @@ inline std::uint64_t timesOf(const std::string& line) {
 }
 
 struct LogCount {
-  std::uint64_t written = 0;  // lines in which `text` stands
-  std::uint64_t meant = 0;  // lines that they stand for
+  std::uint64_t written = 0;  // written lines that contain `text`
+  std::uint64_t meant = 0;  // lines that these stand for
   std::uint64_t all = 0;  // written lines of any kind
 };
 

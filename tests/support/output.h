@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Output: everything that a process writes to a pipe. A thread reads it at once, so the process
-// never waits for its reader, and waitForLine() finds a line whether it came before the call or
-// comes after it.
+// never blocks on the pipe. waitForLine() finds a line that was written before or after the call,
+// so the order of lines of different threads does not matter.
 //
 //   Output output(std::move(readEnd));
-//   output.waitForLine("waiting for the line");   // the order of lines of different threads
-//   does not matter
+//   output.waitForLine("listening on");
 //
 // Threads  any.
 #pragma once
@@ -39,8 +38,8 @@ class Output {
   Output(const Output&) = delete;
   Output& operator=(const Output&) = delete;
 
-  // Returns the first line that holds `text`, without its end, among all lines since the start of
-  // the process; waits until there is one. Empty when the output ends without one.
+  // Returns the first line that contains `text`, without its line end, of all lines since the start
+  // of the process. Waits for such a line. Empty if the output ends without one.
   std::string waitForLine(std::string_view text) {
     std::unique_lock lock(mutex_);
     for (std::size_t begin = 0;;) {
@@ -49,16 +48,15 @@ class Output {
       begin += line->size() + 1;
     }
   }
-  // Returns the next line that nextLine() has not returned yet; waits for it. Empty when the output
-  // ends. For programs that write a line for each step of one thread: only there the order of lines
-  // is certain.
+  // Returns the next line that nextLine() has not returned yet. Waits for it. Empty if the output
+  // ends. For programs that write all lines in one thread: only then is their order certain.
   std::string nextLine() {
     std::unique_lock lock(mutex_);
     const auto line = waitForLineAt(taken_, lock);
     taken_ = std::min(taken_ + (line ? line->size() + 1 : 0), text_.size());
     return line.value_or("");
   }
-  // Waits for the end. Returns what nextLine() has not returned.
+  // Waits for the end of the output. Returns all that nextLine() has not returned.
   std::string rest() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return hasEnded_; });
@@ -66,7 +64,7 @@ class Output {
   }
 
  private:
-  // What is left without a line end at the end of the output is a line, too.
+  // Text without a line end at the end of the output is also a line.
   std::optional<std::string> waitForLineAt(std::size_t begin, std::unique_lock<std::mutex>& lock) {
     changed_.wait(lock, [&] { return hasEnded_ || text_.find('\n', begin) != std::string::npos; });
     if (begin >= text_.size()) return std::nullopt;
@@ -99,7 +97,7 @@ class Output {
   std::string text_;  // all below under mutex_
   std::size_t taken_ = 0;  // by nextLine()
   bool hasEnded_ = false;
-  std::jthread thread_;  // last: ends before what it uses
+  std::jthread thread_;  // last member: it ends before the members that it uses are destroyed
 };
 
 }  // namespace mpf::test

@@ -33,7 +33,7 @@ TEST_F(OutputTest, WaitsForALineThatIsNotThereYet) {
   EXPECT_EQ(program.waitForLine("late"), "late");
 }
 
-TEST_F(OutputTest, SaysThatALineNeverCame) {
+TEST_F(OutputTest, ReturnsAnEmptyLineIfTheProgramEnds) {
   const auto program = run("echo one >&2; printf two >&2");
 
   EXPECT_EQ(program.waitForLine("three"), "");
@@ -51,8 +51,8 @@ TEST_F(OutputTest, ReturnsEachLineOnce) {
   EXPECT_EQ(program.line(), "");
 }
 
-// More than a pipe holds.
-TEST_F(OutputTest, KeepsNoProgramWaiting) {
+// The program writes more than a pipe can hold.
+TEST_F(OutputTest, DoesNotBlockTheProgram) {
   auto program = run("head --bytes=1000000 /dev/zero | tr '\\0' x >&2");
 
   EXPECT_EQ(program.wait(), 0);

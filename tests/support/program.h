@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Program: a program of the project as a process of its own, with what it wrote to stderr. It dies
-// with the test.
+// Program: a program of the project as a process of its own, and its stderr. It is killed at the
+// end of the test.
 #pragma once
 
 #include <fcntl.h>
@@ -34,7 +34,7 @@ class Program {
   Program& operator=(const Program&) = delete;
 
   void signal(int number) const { ::kill(pid_, number); }
-  // Waits for its end. Returns the status of waitpid().
+  // Waits until the process has ended. Returns the status of waitpid().
   int wait() {
     int status = 0;
     checkCall(::waitpid(std::exchange(pid_, 0), &status, 0), "waitpid");
@@ -44,16 +44,16 @@ class Program {
     signal(number);
     return wait();
   }
-  // Waits for a line on stderr that holds `text`, and returns it without its end. A line that came
-  // before the call counts: which of the lines of two threads comes first is not certain. Empty
-  // when the program ends without such a line.
+  // Waits for a line on stderr that contains `text`, and returns it without its line end. The line
+  // may have been written before the call, because the order of lines of two threads is not
+  // certain. Empty if the program ends without such a line.
   [[nodiscard]] std::string waitForLine(std::string_view text) const {
     return errors_->waitForLine(text);
   }
-  // Waits for the next line on stderr; empty when the program has ended. Only for programs that
-  // write all lines with one thread.
+  // Waits for the next line on stderr; empty if the program has ended. Only for programs that write
+  // all lines in one thread.
   [[nodiscard]] std::string line() const { return errors_->nextLine(); }
-  // Waits for the end of stderr. Returns what line() has not returned.
+  // Waits for the end of stderr. Returns all that line() has not returned.
   [[nodiscard]] std::string errors() const { return errors_->rest(); }
 
  private:

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Pty: a pair of pseudo-terminals under a name of the test's choice. The far end (an instrument)
-// holds the master; a port opens the name.
+// Pty: a pair of pseudo-terminals under a name that the test chooses. The instrument uses the
+// master; a port opens the name.
 //
 //   instrument ── master ══ kernel ══ slave /dev/pts/N ◄── linkPath ── port
 //
-// Destroying it hangs the line up, as unplugging an adapter does. It keeps the slave open itself,
-// so that the master does not see a hang-up whenever the port closes its end, and so that tests can
-// ask which settings the line has.
+// The destructor hangs the line up, as if an adapter were unplugged. The object keeps the slave
+// open, so that the master does not see a hang-up each time the port closes it, and so that tests
+// can read the settings of the line.
 #pragma once
 
 #include <fcntl.h>
@@ -49,7 +49,7 @@ class Pty {
   Pty& operator=(const Pty&) = delete;
 
   [[nodiscard]] const FileDescriptor& master() const noexcept { return master_; }
-  // The line's settings, as any program sees them.
+  // The settings of the line.
   [[nodiscard]] termios settings() const {
     termios now{};
     checkCall(::tcgetattr(slave_.get(), &now), "tcgetattr", linkPath_);

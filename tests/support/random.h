@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Random: numbers that differ in each run, and can be had again. MPF_TEST_SEED repeats a run from
-// the seed that it printed.
+// Random: numbers that differ in each run. A run prints its seed, and the environment variable
+// MPF_TEST_SEED repeats the run.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class Random {
   std::uint64_t below(std::uint64_t end) { return engine_() % end; }
   bool oneIn(std::uint64_t n) { return below(n) == 0; }
   std::uint64_t bits() { return engine_(); }
-  // Numbers of all magnitudes, with those at the ends of types more often than chance has it.
+  // Numbers of all magnitudes; the limits of integer types are more frequent than others.
   std::uint64_t nasty() {
     const auto power = std::uint64_t{1} << below(64);
     return oneIn(3) ? power - 1 + below(3) : engine_() >> below(64);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RequestLog: how often servers have seen each request of a test, in a file that they share and
-// that outlives them when they are killed.
+// RequestLog: counts how often servers have received each request of a test, in a file that they
+// share. The counts stay when the servers are killed.
 //
 // Threads  any number of processes count; the test reads.
 #pragma once
@@ -22,10 +22,10 @@ namespace mpf::test {
 class RequestLog {
  public:
   static constexpr std::uint32_t kRequests = 1u << 20;
-  // in `cmd` of a request whose number, its `value`, shall be counted
+  // cmd of a request that must be counted; its number is its `value`
   static constexpr std::int32_t kCounted = 4711;
 
-  // The file is made when it is not there.
+  // Creates the file if it does not exist.
   explicit RequestLog(const std::string& file) {
     const FileDescriptor log(
         checkCall(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600), "open", file));

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-// RouterPair: two backplanes, as two hosts have them, and a router on each. Clients on the near one
+// RouterPair: two backplanes with a router on each, as on two hosts. Clients on the near backplane
 // reach servers on the far one.
 //
 //   near: client ─► mpf-router ══ TCP ══ mpf-router ─► server :far
 //
 //   RouterPair routers;
-//   routers.start();                            // or startFar() and startNear(), in any order,
-//   again MessageServer server(routers.far(), "echo", {.location = RouterPair::kLocation});
-//   MessageClient client(routers.near(), ...); client.bind("echo", RouterPair::kLocation); ...
-//   routers.expectGoodEnd();                    // once servers and clients are gone
+//   routers.start();                            // or startFar() and startNear(), in any order
+//   MessageServer server(routers.far(), "echo", {.location = RouterPair::kLocation});
+//   MessageClient client(routers.near(), ...);
+//   client.bind("echo", RouterPair::kLocation);
+//   routers.expectGoodEnd();                    // after servers and clients are destroyed
 //
 // Link mpf_test_routers. The routers die with the test.
 //
@@ -36,12 +37,12 @@
 
 namespace mpf::test {
 
-// A port of this host that is nobody's, and stays free for routers that listen on it, one after the
-// other.
+// A free TCP port of this host. No other program gets it while the object exists; routers may
+// listen on it, one after the other.
 class FreePort {
  public:
   FreePort() : socket_(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket")) {
-    const int on = 1;  // as listeners have it: bound by two, listening one
+    const int on = 1;  // with this option, as routers set it, a router can bind the same port
     checkCall(::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on),
               "SO_REUSEADDR");
     sockaddr_in address{};
@@ -61,16 +62,17 @@ class FreePort {
   std::string address_;
 };
 
-// Where routers are, when that is not simply here.
+// Network namespaces and address of the routers, if they do not run in those of the test.
 struct RouterPlace {
-  std::string address;  // of the far one, HOST:PORT; empty: a free port of this host
+  std::string address;  // address of the far router, HOST:PORT; empty: a free port of this host
   RouterProcess::Enter enterNear{};
   RouterProcess::Enter enterFar{};
 };
 
 class RouterPair {
  public:
-  // Where the servers of the far backplane are: there itself, and as the near one calls it.
+  // Location of the servers on the far backplane, and of the same servers as seen from the near
+  // one.
   static constexpr std::int32_t kLocation = 1;
   using Options = std::vector<std::string>;
 
@@ -78,7 +80,7 @@ class RouterPair {
 
   [[nodiscard]] const Backplane& near() const noexcept { return near_; }
   [[nodiscard]] const Backplane& far() const noexcept { return far_; }
-  // Where the far one listens, and the near one calls.
+  // Address at which the far router listens and to which the near router connects.
   [[nodiscard]] const std::string& address() const noexcept {
     return place_.address.empty() ? port_.address() : place_.address;
   }
@@ -87,7 +89,7 @@ class RouterPair {
     startFar(more);
     startNear(more);
   }
-  // One that runs is killed first. `more`: further options.
+  // Starts the far router; kills a running one first. `more` are further options.
   void startFar(const Options& more = {}) {
     farRouter_.reset();
     farRouter_ = started({"--backplane", far_.name(), "--serve", std::to_string(kLocation),
@@ -100,11 +102,11 @@ class RouterPair {
                            std::to_string(kLocation) + "=" + address(), "--plain"},
                           more, place_.enterNear);
   }
-  // Once started.
+  // Only after the start.
   [[nodiscard]] RouterProcess& nearRouter() { return *nearRouter_; }
   [[nodiscard]] RouterProcess& farRouter() { return *farRouter_; }
 
-  // Ends both as a service manager does.
+  // Stops both routers as a service manager does, with SIGTERM, and checks their exit statuses.
   void expectGoodEnd() {
     for (auto* router : {&nearRouter_, &farRouter_}) {
       if (!*router) continue;
@@ -117,8 +119,8 @@ class RouterPair {
   static std::unique_ptr<RouterProcess> started(Options options, const Options& more,
                                                 const RouterProcess::Enter& enter) {
     options.insert(options.end(), more.begin(), more.end());
-    // Where many want the processors, a router may not run for seconds: that is for those tests to
-    // count that mean it.
+    // On a busy host, a router may get no processor for seconds. Only tests that set these times
+    // themselves check them.
     if (std::ranges::find(more, "--dead-time") == more.end())
       options.insert(options.end(), {"--dead-time", "60s"});
     if (std::ranges::find(more, "--handshake-time") == more.end())

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// RouterProcess: mpf-router as a process of its own, with what it says. It dies with the test, and
-// says it all when that has failed.
+// RouterProcess: mpf-router as a process of its own, and its stderr. It is killed at the end of the
+// test. If the test has failed, its whole stderr is printed.
 //
-// Threads  one.
+// Threads  one thread.
 #pragma once
 
 #include <fcntl.h>
@@ -30,10 +30,11 @@ namespace mpf::test {
 
 class RouterProcess {
  public:
-  // What the process does before it is a router: limits, namespaces.
+  // Runs in the new process before it executes mpf-router: sets limits, enters namespaces.
   using Enter = std::function<void()>;
 
-  // Starts it with these options, and waits until it is ready. Where it listens is listening().
+  // Starts the router with these options, and waits until it is ready. listening() returns the
+  // addresses at which it listens.
   explicit RouterProcess(const std::vector<std::string>& options, const Enter& enter = {})
       : said_(checkCall(::memfd_create("stderr", MFD_CLOEXEC), "memfd_create")) {
     std::array<int, 2> pipe{};
@@ -49,8 +50,8 @@ class RouterProcess {
     pid_ = checkCall(::fork(), "fork");
     if (pid_ == 0) {
       ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-      if (enter) enter();  // while all descriptors that it may know of are what they were
-      // dup2() of a descriptor to itself would leave it one that execv() closes.
+      if (enter) enter();  // first, while its descriptors are still open under their numbers
+      // dup2() of a descriptor to itself would keep its close-on-exec flag.
       const int told2 = ::fcntl(told.get(), F_DUPFD, kReadyFd + 1);
       ::dup2(said_.get(), STDERR_FILENO);
       ::dup2(told2, kReadyFd);
@@ -67,9 +68,9 @@ class RouterProcess {
   RouterProcess& operator=(const RouterProcess&) = delete;
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
-  // A line for each address.
+  // The addresses at which the router listens, a line for each.
   [[nodiscard]] const std::string& listening() const noexcept { return listening_; }
-  // What it has written to stderr until now.
+  // All that it has written to stderr so far.
   [[nodiscard]] std::string said() const {
     std::string text(
         static_cast<std::size_t>(checkCall(::lseek(said_.get(), 0, SEEK_END), "lseek")), '\0');
@@ -83,14 +84,14 @@ class RouterProcess {
   }
 
   void signal(int number) const { ::kill(pid_, number); }
-  // Afterwards it stands still.
+  // Stops the process (SIGSTOP). After the return it does not run.
   void stop() {
     signal(SIGSTOP);
     ::waitpid(pid_, nullptr, WUNTRACED);
     stands_ = true;
   }
-  // For nobody else: a SIGCONT takes back the stop by which LeakSanitizer begins to look at a
-  // process that ends.
+  // Continues the process, only if stop() has stopped it: LeakSanitizer stops a process at its exit
+  // to examine it, and a SIGCONT would end that stop.
   void resume() {
     if (std::exchange(stands_, false)) signal(SIGCONT);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whether this build has a sanitizer, with which everything takes ten times as long: tests that
-// count do less of the same then.
+// Whether this build has a sanitizer. Everything then takes ten times as long, so tests with many
+// repetitions do fewer of them.
 #pragma once
 
 namespace mpf::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// TemporaryFolder: a folder of the test's own, removed with all that is in it.
+// TemporaryFolder: a folder of the test, which the destructor removes with all its files.
 #pragma once
 
 #include <cstdlib>
@@ -15,7 +15,7 @@ namespace mpf::test {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    // as mkdtemp() wants it
+    // mkdtemp() replaces the last six characters.
     std::string name = testing::TempDir() + "mpf-test-" + std::string(6, 'X');
     if (::mkdtemp(name.data()) == nullptr) throwSystemError(errno, "mkdtemp", name);
     path_ = name;
@@ -30,7 +30,7 @@ class TemporaryFolder {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   // The path of the file `name` in it.
   [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
-  // Makes that file, with this text in it.
+  // Creates the file `name` with this text.
   std::string write(const std::string& name, const std::string& text) const {
     std::ofstream(file(name)) << text;
     return file(name);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Terminal: a program on a pseudo-terminal, and the screen that its user would see (libvterm). It
-// dies with the test.
+// Terminal: a program on a pseudo-terminal, and the screen that a user would see (libvterm). The
+// program is killed at the end of the test.
 //
 //   Terminal top({MPF_TEST_TOOL, "top"}, 24, 80);
 //   ASSERT_TRUE(top.waitFor("SERVER"));
 //   top.type("q");
 //   EXPECT_EQ(top.wait(), 0);
 //
-// Threads  one.
+// Threads  one thread.
 #pragma once
 
 #include <fcntl.h>
@@ -65,28 +65,28 @@ class Terminal {
     vterm_set_size(terminal_.get(), rows, columns);
     setSize();  // the kernel sends SIGWINCH
   }
-  // Waits until `text` is on the screen. False when the program ends first.
+  // Waits until `text` is on the screen. Returns false if the program ends first.
   bool waitFor(std::string_view text) {
     while (screen().find(text) == std::string::npos) {
       if (!readMore()) return screen().find(text) != std::string::npos;
     }
     return true;
   }
-  // Waits until it is not.
+  // Waits until `text` is not on the screen.
   bool waitUntilGone(std::string_view text) {
     while (screen().find(text) != std::string::npos) {
       if (!readMore()) return screen().find(text) == std::string::npos;
     }
     return true;
   }
-  // Waits for the end. Returns the exit status, or minus the signal that killed it.
+  // Waits until the program has ended. Returns its exit status, or minus the signal that killed it.
   int wait() {
     while (readMore()) continue;
     int status = 0;
     ::waitpid(std::exchange(pid_, 0), &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
-  // Whether a shell would find the terminal as it was: normal screen, lines, echo.
+  // Whether the program has restored the terminal: normal screen, line mode, echo.
   [[nodiscard]] bool isRestored() const {
     termios now{};
     checkCall(::tcgetattr(slave_.get(), &now), "tcgetattr", "the terminal");
@@ -98,7 +98,7 @@ class Terminal {
                                       {number, number + 1, 0, columns_}));
     return text;
   }
-  // How the first character of a row looks.
+  // The attributes of the first character of a row.
   struct SnapshotDelta {
     bool isRed = false;
     bool isReversed = false;
@@ -107,7 +107,7 @@ class Terminal {
     constexpr std::uint8_t kRed = 1;
     VTermScreenCell cell{};
     vterm_screen_get_cell(screen_, {number, 0}, &cell);
-    // bold may make it bright
+    // A terminal may show bold text in the bright color.
     return {VTERM_COLOR_IS_INDEXED(&cell.fg) && cell.fg.indexed.idx % 8 == kRed,
             cell.attrs.reverse != 0};
   }
@@ -158,7 +158,7 @@ class Terminal {
     }
     process_.reset(checkCall(static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)), "pidfd_open"));
   }
-  // Draws what comes next. False when the program has ended and all is drawn.
+  // Draws the next output. Returns false if the program has ended and all its output is drawn.
   bool readMore() {
     std::array<pollfd, 2> ready{{{master_.get(), POLLIN, 0}, {process_.get(), POLLIN, 0}}};
     checkCall(retryInterrupted([&] { return ::poll(ready.data(), ready.size(), -1); }), "poll");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// TestBackplane: an isolated backplane that ends with its test. What users of it that were killed
-// left behind is removed; anything else that is left fails the test. When the test dies, its guard
-// removes all segments. Declare it before whatever uses it.
+// TestBackplane: an isolated backplane for one test. The destructor removes the segments of killed
+// processes; any other segment that is left fails the test. If the test dies, its guard removes all
+// segments. Declare it before the objects that use it.
 #pragma once
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Usage: what a process has of the things that leak: memory, open files, mapped segments.
+// Usage: memory, open files and mapped segments of a process, to detect leaks.
 #pragma once
 
 #include <sys/types.h>
@@ -34,9 +34,9 @@ struct Usage {
       usage.segments += line.find("/dev/shm/mpf") != std::string::npos ? 1 : 0;
     return usage;
   }
-  // No more than `before`, give or take what an allocator keeps.
+  // Whether it is at most `before`, apart from memory that an allocator keeps.
   [[nodiscard]] bool isWithin(const Usage& before, std::size_t slackKb) const {
-    if (kIsSanitized) slackKb = std::size_t{1} << 20;  // sanitizers keep what was freed
+    if (kIsSanitized) slackKb = std::size_t{1} << 20;  // sanitizers keep freed memory
     return files <= before.files && segments <= before.segments &&
            residentKb <= before.residentKb + slackKb;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The program behind Victim: an echo server, one that counts what it sees, a client that sends as
-// fast as it can, a crowd of clients, or a client that listens to a serial line or to another
-// server, or one that asks an instrument.
+// The program behind Victim. Its roles: an echo server, a server that counts requests, a client
+// that sends as fast as it can, many clients, a client that listens to a serial line or to another
+// server, a client that sends commands to an instrument.
 #include <signal.h>
 #include <sys/inotify.h>
 #include <sys/prctl.h>
@@ -30,15 +30,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The test waits for these.
+// Prints a line for which the test waits.
 template <class... Values>
 void say(fmt::format_string<Values...> format, Values&&... values) {
   fmt::print("{}\n", fmt::format(format, std::forward<Values>(values)...));
   std::fflush(stdout);
 }
 
-// Echoes; keeps each seventh Int32 (and so drops the one kept before), and answers some arrays with
-// new ones.
+// Echoes. Keeps every seventh Int32, which drops the one kept before, and answers some arrays with
+// new arrays.
 int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
   options.queueSize = 32;
   mpf::MessageServer server(backplane, "echo", options);
@@ -61,7 +61,7 @@ int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
   return server.runUntilSignal();
 }
 
-// Echoes, and counts each request in the log before it does.
+// Counts each request in the log, and then echoes it.
 int count(const mpf::Backplane& backplane, const std::string& file, mpf::ServerOptions options) {
   mpf::test::RequestLog log(file);
   mpf::MessageServer server(backplane, "echo", options);
@@ -92,7 +92,7 @@ int flood(const mpf::Backplane& backplane) {
   }
 }
 
-// One of a crowd: in each life of the server, it has some requests answered, a few at a time.
+// One of many clients: sends some requests to each incarnation of the server, a few at a time.
 class Visitor {
  public:
   static constexpr int kRequests = 50;
@@ -131,7 +131,7 @@ class Visitor {
     mpf::Float64Message request({.value = sent_ + 0.0});
     request.setClientExtra(sent_);
     const auto result = client_.send(std::move(request));
-    if (result == mpf::SendResult::notConnected) return;  // the server ends: its fates come now
+    if (result == mpf::SendResult::notConnected) return;  // the server has ended; fates follow
     if (result != mpf::SendResult::sent)
       return say("a send was refused: {}", mpf::toString(result));
     ++sent_;
@@ -148,8 +148,8 @@ class Visitor {
   mpf::MessageClient client_;
 };
 
-// Says "waiting: <reason>", or nothing when the server is there; then "answered <incarnation>" for
-// each life of the server that has answered every client; whatever else it says went wrong.
+// Prints "waiting: <reason>" unless the server is running; then "answered <incarnation>" for each
+// incarnation of the server that has answered every client. Any other line is an error.
 int crowd(const mpf::Backplane& backplane, int clients) {
   mpf::Dispatcher dispatcher(backplane);
   std::map<std::uint64_t, int> done;
@@ -161,15 +161,15 @@ int crowd(const mpf::Backplane& backplane, int clients) {
   return 0;
 }
 
-// The rest of the process's life belongs to that user.
+// Changes the user of the process permanently.
 void become(const std::string& user, const std::string& group) {
   mpf::checkCall(::setgroups(0, nullptr), "setgroups");
   mpf::checkCall(::setgid(static_cast<gid_t>(std::stoul(group))), "setgid", group);
   mpf::checkCall(::setuid(static_cast<uid_t>(std::stoul(user))), "setuid", user);
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // forgotten with the old user
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a change of the user resets this
 }
 
-// The kernel has nothing left with which it could tell this user of new names.
+// Uses all inotify instances of this user, so that MPF gets no notification of new names.
 std::vector<mpf::FileDescriptor> takeAllInotify() {
   std::vector<mpf::FileDescriptor> taken;
   do taken.emplace_back(::inotify_init1(IN_CLOEXEC));
@@ -183,7 +183,7 @@ int listen(const mpf::Backplane& backplane, const std::string& server, std::int3
   for (;;) static_cast<void>(client.receive(24h));
 }
 
-// Asks an instrument that need not answer, and waits for as long as a client can say.
+// Sends a command to an instrument that may not answer, and waits as long as a client can specify.
 int ask(const mpf::Backplane& backplane, const std::string& server, const std::string& text) {
   mpf::SyncClient client(backplane, server);
   auto message = mpf::Char8ArrayMessage::allocValue(text.size());
@@ -193,7 +193,7 @@ int ask(const mpf::Backplane& backplane, const std::string& server, const std::s
   return client.call(std::move(message), 24h) ? 0 : 1;
 }
 
-// role, backplane, what the role wants; then "as USER GROUP", "without-inotify".
+// Arguments: role, backplane, arguments of the role; then "as USER GROUP", "without-inotify".
 int play(const std::vector<std::string>& arguments) {
   const auto argument = [&](std::size_t index) {
     return index < arguments.size() ? arguments[index] : std::string();

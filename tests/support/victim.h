@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Victim: a process with a role, to be killed, stopped and started by a test. It dies with the
+// Victim: a process with a role that a test kills, stops and starts. It is killed at the end of the
 // test.
 //
 //   Victim server("serve", backplane.name());
-//   server.line();                            // "open": what the role writes to stdout, line by
-//   line
+//   server.line();                            // "open": the next line that the role prints
 #pragma once
 
 #include <fcntl.h>
@@ -67,7 +66,7 @@ class Victim {
   ~Victim() { end(SIGKILL); }
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
-  // Waits for the next line that it writes; empty when it has ended.
+  // Waits for the next line that it prints; empty if it has ended.
   std::string line() {
     for (;;) {
       if (const auto end = read_.find('\n'); end != std::string::npos) {
@@ -84,8 +83,8 @@ class Victim {
   }
 
   void signal(int number) const { ::kill(pid_, number); }
-  // Returns when it stands still: a signal alone may find it in the middle of something, on another
-  // processor.
+  // Stops the process, and returns when it has stopped: after the signal alone it may still run, on
+  // another processor.
   void stop() const {
     signal(SIGSTOP);
     checkCall(::waitpid(pid_, nullptr, WUNTRACED), "waitpid");

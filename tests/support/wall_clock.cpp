@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A library to preload: programs see a wall clock that is behind by as many seconds as the file
-// $MPF_TEST_WALL_CLOCK says at that moment. All other clocks are the host's. (libfaketime leaves
-// files in /dev/shm when its program is killed.)
+// A library to preload: the wall clock of the program is behind by the number of seconds in the
+// file $MPF_TEST_WALL_CLOCK, which is read at each call. The other clocks are unchanged.
+// (libfaketime is not used because it leaves files in /dev/shm when its program is killed.)
 #include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>

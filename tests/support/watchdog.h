@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Watchdog: a test that hangs ends with a sentence instead of silence, and its guard removes what
-// it leaves. Not an upper time limit: what takes a second alone takes half a minute beside fifty
-// other processes on two processors, so a quarter of an hour is a hang. A timer and not a thread: a
-// test that forks a child should have one thread, since what the others were doing is lost in the
-// child.
+// Watchdog: ends a test that hangs, with a message; the guard then cleans up. It is not an upper
+// time limit: a test that takes a second alone takes half a minute beside fifty other processes on
+// two processors, so only a quarter of an hour counts as a hang. It is a timer and not a thread,
+// because a test that forks should have one thread: the other threads do not exist in the child.
 #pragma once
 
 #include <signal.h>
@@ -26,7 +25,9 @@ class Watchdog {
 
   explicit Watchdog(const std::string& what, std::chrono::seconds patience = kPatience) {
     ("watchdog: " + what + " hangs\n").copy(text().data(), text().size() - 1);
-#ifndef __SANITIZE_THREAD__  // it holds handlers back, maybe for ever; the signal ends the process all the same
+// ThreadSanitizer may delay signal handlers forever. There, the signal without a handler ends the
+// process.
+#ifndef __SANITIZE_THREAD__
     struct sigaction action{};
     action.sa_handler = [](int) {
       [[maybe_unused]] const auto written =
@@ -46,7 +47,7 @@ class Watchdog {
   Watchdog& operator=(const Watchdog&) = delete;
 
  private:
-  // One test at a time.
+  // Static: only one test runs at a time.
   static std::array<char, 256>& text() {
     static std::array<char, 256> theText{};
     return theText;

@@ -56,7 +56,8 @@ Wire::~Wire() {
   static_cast<void>(::eventfd_write(bell_.get(), 1));
 }
 
-// By a thread: a network namespace is a thread's, and ours stays where it is.
+// In a thread of its own, because a network namespace belongs to a thread and the test's own thread
+// must stay in its namespace.
 Wire::Host Wire::makeHost(const char* address) {
   Host host;
   std::exception_ptr failure;

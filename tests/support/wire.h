@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Wire: two hosts in network namespaces of their own, and the line between them, which delays,
-// loses, reorders and cuts on demand.
+// Wire: two hosts in network namespaces of their own, and the line between them, which can delay,
+// lose and reorder packets, and can be cut.
 //
 //   10.77.0.1 ── tun ◄═ this process: Weather, cut() ═► tun ── 10.77.0.2
 //
-// Packets pass through here, so no queueing discipline of the kernel is needed. Their fate is
-// random: the seed is printed (random.h).
+// This process forwards the packets, so no queueing discipline of the kernel is needed. Losses and
+// delays are random; the seed is printed (random.h).
 //
-// Threads  one of its own carries packets; the rest by the test's.
+// Threads  a thread of its own forwards packets; only the test's thread calls the functions.
 #pragma once
 
 #include <chrono>
@@ -25,7 +25,7 @@
 
 namespace mpf::test {
 
-// What becomes of packets, either way. Those that overtake others skip the delay.
+// How packets are treated, in both directions. A packet that overtakes others skips the delay.
 struct Weather {
   std::chrono::milliseconds delay{0};
   int lostPerThousand = 0;
@@ -39,23 +39,24 @@ class Wire {
   static constexpr const char* kNear = "10.77.0.1";
   static constexpr const char* kFar = "10.77.0.2";
 
-  //   throws  std::system_error: this host does not allow it (namespaces and tun devices are
-  //           root's)
+  //   throws  std::system_error if this host does not permit it: namespaces and tun devices need
+  //           root
   Wire();
   ~Wire();
   Wire(const Wire&) = delete;
   Wire& operator=(const Wire&) = delete;
 
-  // For a child that is to be on one of the hosts.
+  // Moves a child process to one of the hosts; to be called in the child.
   void enterNear() const { enter(near_); }
   void enterFar() const { enter(far_); }
 
   void behave(const Weather& weather);
-  // From now on nothing passes, and nobody is told. What is on its way is lost, too.
+  // Cuts the line: from now on all packets are lost, also those on their way. Neither side is
+  // notified.
   void cut();
   void cut(Direction direction);
   void mend();
-  // Packets that were let through.
+  // Number of packets forwarded.
   [[nodiscard]] std::uint64_t passed() const;
 
  private:

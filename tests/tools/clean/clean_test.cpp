@@ -115,7 +115,7 @@ TEST_F(CleanTest, ADryRunSaysWhatWouldBeRemovedAndHowItKnows) {
 
   EXPECT_EQ(rehearsal.status, 0);
   EXPECT_TRUE(files() == before);
-  EXPECT_THAT(rehearsal.out, HasSubstr("s.0.echo:\n  nobody holds the lock of"));
+  EXPECT_THAT(rehearsal.out, HasSubstr("s.0.echo:\n  no process holds the lock of"));
   for (const auto& line : linesOf(rehearsal.out)) EXPECT_LE(line.size(), 80U) << line;
   EXPECT_THAT(rehearsal.out, testing::EndsWith("\n3 files stay: their processes live\n"));
   auto expected =
@@ -166,7 +166,7 @@ TEST_F(CleanTest, WhatAnotherUserLeftIsNamed) {
             "mpf clean: " + segments::path(name) +
                 " belongs to user 0, whose process is dead; that user or root may remove it\n");
   EXPECT_THAT(run({"clean"}).out,
-              StartsWith("removed " + segments::path(name) + ":\n  nobody holds the lock of"));
+              StartsWith("removed " + segments::path(name) + ":\n  no process holds the lock of"));
 }
 
 // Nothing that lies there keeps it waiting or ends it.
