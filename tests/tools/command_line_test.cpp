@@ -21,7 +21,7 @@ TEST_F(CommandLineTest, WithoutAnythingItShowsHowToUseIt) {
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
-  EXPECT_THAT(ended.err, StartsWith("mpf - looks at backplanes, servers and clients"));
+  EXPECT_THAT(ended.err, StartsWith("mpf - shows backplanes, servers and clients"));
   for (const auto* name : kSubcommands)
     EXPECT_THAT(ended.err, HasSubstr(std::string("\n  ") + name + " "));
 }
@@ -34,7 +34,7 @@ TEST_F(CommandLineTest, HelpGoesToStdout) {
   for (const auto* name : kSubcommands)
     EXPECT_THAT(ended.out, HasSubstr(std::string("\n  ") + name + " "));
   EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF_BACKPLANE"), HasSubstr("MPF_LOCATION"),
-                               HasSubstr("Exit status: 0 done")));
+                               HasSubstr("Exit status: 0 success")));
 }
 
 TEST_F(CommandLineTest, EachSubcommandHasItsHelp) {
@@ -82,11 +82,11 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
       {{"call", "echo", "int32", "--count", "0"},
        "mpf call: --count: 0 is out of range: use 1 to 9007199254740992;"},
       {{"call", "echo", "int32", "--timeout", "0"},
-       "mpf call: --timeout: 0 is no time: use a number of seconds above 0 to 1e9"},
-      {{"call", "echo", "int32", "--timeout", "nan"}, "mpf call: --timeout: nan is no time"},
+       "mpf call: --timeout: 0 is not a time: use a number of seconds above 0 to 1e9"},
+      {{"call", "echo", "int32", "--timeout", "nan"}, "mpf call: --timeout: nan is not a time"},
       {{"call", "echo", "int32", "--interval", "-1"},
-       "mpf call: --interval: -1 is no time: use a number of seconds from 0 to 1e9"},
-      {{"call", "echo", "int32", "--follow", "1e300"}, "mpf call: --follow: 1e300 is no time"},
+       "mpf call: --interval: -1 is not a time: use a number of seconds from 0 to 1e9"},
+      {{"call", "echo", "int32", "--follow", "1e300"}, "mpf call: --follow: 1e300 is not a time"},
       {{"call", "echo", "int32", "--location", "here"},
        "mpf call: Could not convert: --location = here"},
       {{"replay", "/dev/null", "--speed", "-1"},
@@ -102,7 +102,7 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
       {{"torture", "--role", "router"}, "mpf torture: --role: router not in {client,server};"},
       {{"torture", "--mode", "0"}, "mpf torture: --mode: 0 not in {kill,stop};"},
       {{"sniff"}, "mpf sniff: server is required; `mpf sniff --help`"},
-      {{"sniff", "serial[0]", "soon"}, "mpf sniff: seconds: soon is no time"},
+      {{"sniff", "serial[0]", "soon"}, "mpf sniff: seconds: soon is not a time"},
       {{"sniff", "serial[0]", "--format", "hex"}, "mpf sniff: --format: hex not in {lines,manual}"},
   };
   for (const auto& [words, text] : wrong) {

@@ -151,7 +151,7 @@ TEST_F(CallTest, ATypeThatDoesNotExistIsNamedAndTheOthersToo) {
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_EQ(ended.err,
-            "mpf call: int64 is no message type; use one of int32, int32Array, float64, "
+            "mpf call: int64 is not a message type; use one of int32, int32Array, float64, "
             "float64Array, char8Array, serialConfig, "
             "outOfBand, user\n");
 }
@@ -161,8 +161,9 @@ TEST_F(CallTest, WhatOnlyMpfItselfSaysCannotBeSent) {
     const auto ended = call({"echo", type});
 
     EXPECT_EQ(ended.status, 2);
-    EXPECT_THAT(ended.err, StartsWith("mpf call: " + type +
-                                      " is what MPF itself says to clients; use one of int32, "));
+    EXPECT_THAT(ended.err,
+                StartsWith("mpf call: " + type +
+                           " is a message type that only MPF itself sends; use one of int32, "));
   }
 }
 
@@ -231,8 +232,8 @@ TEST_F(CallTest, ATypeThatTheServerDoesNotTakeIsRefused) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err,
-            "mpf call: no reply: refused (the server does not take float64 messages, or let this "
-            "one go without a reply)\n");
+            "mpf call: no reply: refused (the server does not accept float64 messages, or released "
+            "this one without a reply)\n");
 }
 
 // Whether the server has taken it by then is up to the machine.
@@ -247,9 +248,9 @@ TEST_F(CallTest, ARequestThatIsNotAnsweredInTimeHasAFate) {
   EXPECT_THAT(
       ended.err,
       testing::AnyOf(
-          StartsWith("mpf call: no reply: outcomeUnknown (the server took the request and did not "
-                     "reply in time"),
-          StartsWith("mpf call: no reply: expired (the server did not take the request in time"),
+          StartsWith("mpf call: no reply: outcomeUnknown (the server received the request, but did "
+                     "not reply in time"),
+          StartsWith("mpf call: no reply: expired (the server did not receive the request in time"),
           StartsWith("mpf call: not sent: not connected: ")));
 }
 

@@ -117,7 +117,7 @@ TEST_F(CleanTest, ADryRunSaysWhatWouldBeRemovedAndHowItKnows) {
   EXPECT_TRUE(files() == before);
   EXPECT_THAT(rehearsal.out, HasSubstr("s.0.echo:\n  nobody holds the lock of"));
   for (const auto& line : linesOf(rehearsal.out)) EXPECT_LE(line.size(), 80U) << line;
-  EXPECT_THAT(rehearsal.out, testing::EndsWith("\n3 files stay: their processes live\n"));
+  EXPECT_THAT(rehearsal.out, testing::EndsWith("\n3 files stay: their processes are alive\n"));
   auto expected =
       inOneLine(rehearsal.out.substr(0, rehearsal.out.rfind('\n', rehearsal.out.size() - 2) + 1));
   for (std::size_t at = 0; (at = expected.find("would remove ", at)) != std::string::npos;)

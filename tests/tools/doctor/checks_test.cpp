@@ -143,14 +143,15 @@ TEST_F(CheckUp, AMountThatIsReadOnlyIsAProblem) {
 
 TEST_F(CheckUp, AMountOfAnotherKindOrNoneIsAWarning) {
   write("proc/self/mounts", "overlay /dev/shm overlay rw 0 0\n");
-  expect(checkMount(host_), Health::warning, "a overlay, not a tmpfs", "mount -t tmpfs");
+  expect(checkMount(host_), Health::warning, "overlay, not tmpfs", "mount -t tmpfs");
   write("proc/self/mounts", "proc /proc proc rw 0 0\n");
-  expect(checkMount(host_), Health::warning, "no file system of its own", "mount -t tmpfs");
+  expect(checkMount(host_), Health::warning, "not a file system of its own", "mount -t tmpfs");
 }
 
 TEST_F(CheckUp, LittleSpaceIsAWarningNoneIsAProblem) {
   host_.sharedMemory = [] { return Host::Space{64 << 20, 60 << 20, 1'000'000, 2'000'000}; };
-  expect(checkSpace(host_), Health::warning, "60.0 MiB of 64.0 MiB free: little", "--shm-size");
+  expect(checkSpace(host_), Health::warning, "60.0 MiB of 64.0 MiB free: the small default",
+         "--shm-size");
   host_.sharedMemory = [] { return Host::Space{8 * kGiB, 5 << 20, 1'000'000, 2'000'000}; };
   expect(checkSpace(host_), Health::warning, "5.0 MiB of 8.0 GiB free: large messages",
          "mpf clean");
@@ -169,7 +170,7 @@ TEST_F(CheckUp, RightsOfSharedMemoryAreOpenAndSticky) {
   chmod("dev/shm", 0755);
   expect(checkRights(host_), Health::problem, "mode 0755: not every user may create", "chmod 1777");
   remove("dev/shm");
-  expect(checkRights(host_), Health::problem, "there is no /dev/shm", "mkdir");
+  expect(checkRights(host_), Health::problem, "/dev/shm does not exist", "mkdir");
 }
 
 TEST_F(CheckUp, SegmentsThatMayNotBeReadAreCounted) {
@@ -178,7 +179,7 @@ TEST_F(CheckUp, SegmentsThatMayNotBeReadAreCounted) {
   leave("notes", 0600);
   if (::geteuid() == 4711) GTEST_SKIP() << "the files are this user's";
 
-  expect(checkSegments(host_), Health::warning, "1 of 2 files may not be read", "--group");
+  expect(checkSegments(host_), Health::warning, "this user may not read 1 of 2 files", "--group");
 
   write("proc/self/status", "Uid:\t0 0 0 0\nGid:\t0 0 0 0\nGroups:\t\n");
   expect(checkSegments(host_), Health::ok, "2 files");
@@ -227,20 +228,20 @@ TEST_F(RemoveIpc, IsWhatTheLastFileSays) {
 
 TEST_F(RemoveIpc, SparesSystemUsers) {
   write("proc/self/status", "Uid:\t0 100 0 0\n");
-  expect(checkRemoveIpc(host_), Health::ok, "spares users below 1000");
+  expect(checkRemoveIpc(host_), Health::ok, "excepts users below 1000");
 }
 
 TEST_F(CheckUp, AHiddenProcIsAWarning) {
   write("proc/self/mounts", "proc /proc proc rw,hidepid=invisible 0 0\n");
   expect(checkHidepid(host_), Health::warning, "hidepid=invisible", "hidepid=0");
   write("proc/self/mounts", "proc /proc proc rw,hidepid=0 0 0\n");
-  expect(checkHidepid(host_), Health::ok, "all is shown");
+  expect(checkHidepid(host_), Health::ok, "all users");
 }
 
 TEST_F(CheckUp, AKernelWithoutPidfdIsAWarning) {
   host_.hasPidfd = [] { return false; };
   write("proc/sys/kernel/osrelease", "4.19.0\n");
-  expect(checkPidfd(host_), Health::warning, "kernel 4.19.0 has none", "5.3");
+  expect(checkPidfd(host_), Health::warning, "kernel 4.19.0 has no pidfd_open", "5.3");
 }
 
 TEST_F(CheckUp, TightLimitsAreWarnings) {
@@ -249,7 +250,7 @@ TEST_F(CheckUp, TightLimitsAreWarnings) {
         "Max address space         1073741824           unlimited            bytes     \n");
   write("proc/sys/vm/max_map_count", "1000\n");
   write("proc/sys/fs/inotify/max_user_instances", "8\n");
-  expect(checkOpenFiles(host_), Health::warning, "256: each process", "ulimit -n");
+  expect(checkOpenFiles(host_), Health::warning, "256: a program needs", "ulimit -n");
   expect(checkAddressSpace(host_), Health::warning, "1073741824", "ulimit -v");
   expect(checkMaps(host_), Health::warning, "1000", "vm.max_map_count");
   expect(checkInotify(host_), Health::warning, "8", "max_user_instances");
@@ -259,11 +260,12 @@ TEST_F(CheckUp, RealTimePriorityNeedsALimitOrACapability) {
   expect(checkRealTime(host_), Health::ok, "up to 20 by RLIMIT_RTPRIO");
   write("proc/self/limits",
         "Max realtime priority     0                    0                    \n");
-  expect(checkRealTime(host_), Health::warning, "may have 0, of 20", "LimitRTPRIO=20");
+  expect(checkRealTime(host_), Health::warning, "may have priority 0, device servers request 20",
+         "LimitRTPRIO=20");
   append("proc/self/status", "CapEff:\t0000000000800000\n");
   expect(checkRealTime(host_), Health::ok, "CAP_SYS_NICE");
   write("proc/sys/kernel/sched_rt_runtime_us", "0\n");
-  expect(checkRealTime(host_), Health::warning, "no time at all", "sched_rt_runtime_us=950000");
+  expect(checkRealTime(host_), Health::warning, "no processor time", "sched_rt_runtime_us=950000");
 }
 
 TEST_F(CheckUp, LimitsThatAreNoNumbersAreUnknown) {
@@ -300,7 +302,7 @@ TEST_F(CheckUp, ASlowClockIsAWarning) {
   write(folder + "current_clocksource", "hpet\n");
   expect(checkClock(host_), Health::warning, "hpet: reading", "clocksource=tsc");
   write(folder + "available_clocksource", "hpet acpi_pm\n");
-  expect(checkClock(host_), Health::warning, "hpet", "other clocks here: hpet acpi_pm");
+  expect(checkClock(host_), Health::warning, "hpet", "clocks available here: hpet acpi_pm");
   write(folder + "current_clocksource", "kvm-clock\n");
   expect(checkClock(host_), Health::ok, "kvm-clock");
 }

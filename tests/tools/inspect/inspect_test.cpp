@@ -202,7 +202,7 @@ TEST_F(InspectTest, ALargeBodyIsReadFromItsChunkAndMissedWhenThatIsGone) {
   const auto without =
       report({"inspect", "--file", file}).at(0).at("requests").at("messages").at(0);
   EXPECT_THAT(without.at("problem").get<std::string>(),
-              testing::EndsWith(".0.0: not there any more"));
+              testing::EndsWith(".0.0: the file does not exist"));
   expectNarrow(run({"inspect", "--file", file}).out);
 }
 
@@ -217,7 +217,7 @@ TEST_F(InspectTest, FilesThatAreNoneOrCutAreNamed) {
       run({"inspect", "--file", folder_ / "notes"}).err,
       "mpf inspect: " + (folder_ / "notes").string() + ": not a segment of MPF (foreign magic)\n");
   EXPECT_EQ(run({"inspect", "--file", folder_ / "none"}).err,
-            "mpf inspect: " + (folder_ / "none").string() + ": not there\n");
+            "mpf inspect: " + (folder_ / "none").string() + ": the file does not exist\n");
   for (const auto bytes : {0, 100, 511, 512, 3000, 6000}) {
     std::filesystem::resize_file(file, static_cast<std::uintmax_t>(std::max(bytes, 0)));
     const auto ended = run({"inspect", "--file", file});

@@ -84,9 +84,9 @@ TEST_F(SegmentImageTest, FilesThatAreNoSegmentsAreNamed) {
 
 TEST_F(SegmentImageTest, WhatIsNoFileIsNamedAndKeepsNobodyWaiting) {
   ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
-  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (no plain file)");
+  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (not a regular file)");
   std::filesystem::create_directory(path());
-  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (no plain file)");
+  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (not a regular file)");
   std::filesystem::create_symlink("/dev/zero", path());
   EXPECT_THAT(refusal(), testing::StartsWith("open " + path()));
 }

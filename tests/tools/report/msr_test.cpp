@@ -55,7 +55,7 @@ TEST_F(ReportTest, MsrOfAServerThatIsNotThereNamesIt) {
   const auto ended = run({"msr", "serial[7]"});
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_EQ(ended.err, "mpf msr: no server \"serial[7]\"; `mpf ls` shows those that there are\n");
+  EXPECT_EQ(ended.err, "mpf msr: no server \"serial[7]\"; `mpf ls` lists the servers\n");
 }
 
 TEST_F(ReportTest, MsrTakesTheServerOfALocation) {
@@ -66,7 +66,7 @@ TEST_F(ReportTest, MsrTakesTheServerOfALocation) {
   ASSERT_THAT(named, SizeIs(1));
   EXPECT_EQ(named.at(0).at("location"), 2);
   EXPECT_EQ(run({"msr", "dac", "--location", "3"}).err,
-            "mpf msr: no server \"dac\" at location 3; `mpf ls` shows those that there are\n");
+            "mpf msr: no server \"dac\" at location 3; `mpf ls` lists the servers\n");
 }
 
 // That something is there which cannot be read is not that nothing is there.
@@ -84,10 +84,11 @@ TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
   EXPECT_EQ(all.status, 1);
   EXPECT_THAT(all.err,
               HasSubstr("mpf msr: " + file + ": truncated, 1 bytes are too few for a header\n"));
-  EXPECT_EQ(all.out, "no server, unless it is among what could not be read\n");
+  EXPECT_EQ(all.out, "no server, unless it is in a file that could not be read\n");
   EXPECT_EQ(named.status, 1);
-  EXPECT_THAT(named.err, HasSubstr("no server \"dac\", unless it is among what could not be read; "
-                                   "`mpf ls` shows those that there are\n"));
+  EXPECT_THAT(named.err,
+              HasSubstr("no server \"dac\", unless it is in a file that could not be read; "
+                        "`mpf ls` lists the servers\n"));
   EXPECT_EQ(some.status, 0);
   EXPECT_THAT(inOneLine(some.out),
               HasSubstr("1 file could not be read: servers may be missing here problem: " + file +

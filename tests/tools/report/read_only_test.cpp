@@ -133,8 +133,10 @@ TEST_F(ReadOnlyTest, JunkUnderOurNamesIsNamedAndHidesNothing) {
     EXPECT_THAT(said, HasSubstr("echo"));
     EXPECT_THAT(said,
                 HasSubstr("problem: " + file + ": truncated, 4 bytes are too few for a header"));
-    EXPECT_THAT(said, HasSubstr("problem: " + fifo + ": not a segment of MPF (no plain file)"));
-    EXPECT_THAT(said, HasSubstr("problem: " + folder + ": not a segment of MPF (no plain file)"));
+    EXPECT_THAT(said,
+                HasSubstr("problem: " + fifo + ": not a segment of MPF (not a regular file)"));
+    EXPECT_THAT(said,
+                HasSubstr("problem: " + folder + ": not a segment of MPF (not a regular file)"));
     EXPECT_THAT(said, HasSubstr("problem: open " + loop + ": "));
     EXPECT_THAT(said, HasSubstr("problem: " + stray + ": not a name that MPF gives"));
   }

@@ -308,7 +308,7 @@ TEST_F(ReportTest, NoNameReachesTheTerminalAsItIsAndEachIsFoundAsItIsShown) {
     EXPECT_EQ(run({"inspect", given}).status, 0);
   }
   EXPECT_EQ(run({"msr", "x\u202ey"}).err,
-            "mpf msr: no server \"x\\u202ey\"; `mpf ls` shows those that there are\n");
+            "mpf msr: no server \"x\\u202ey\"; `mpf ls` lists the servers\n");
 }
 
 TEST_F(ReportTest, ServersOfOneNameAtTwoLocationsAreToldApart) {

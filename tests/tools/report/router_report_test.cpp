@@ -245,8 +245,8 @@ TEST_F(RouterReportTest, InspectsSummaryHasRoutersAndWhoWaits) {
   const auto text = run({"inspect"}).out;
 
   EXPECT_THAT(text, HasSubstr("  router lab1" + us() + ", alive: 2 connections, 1 of them cut\n"));
-  EXPECT_THAT(text, HasSubstr("  us" + us() +
-                              " waits for the server dac@8, which is not there, 2 times\n"));
+  EXPECT_THAT(text,
+              HasSubstr("  us" + us() + " waits for the server dac@8, which is absent, 2 times\n"));
   const auto json = report({"inspect"}).at(0);
   EXPECT_EQ(json.at("routers").at(0).at("cut"), 1);
   EXPECT_EQ(entryOf(json.at("windows"), "name", "us").at("waits_for").at(0),

@@ -165,7 +165,8 @@ TEST_F(SniffToolTest, AServerThatLetsNobodyListenIsNamed) {
   const auto ended = runTool({"sniff", "closed"}, backplane_.name());
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_THAT(ended.err, HasSubstr("mpf sniff: \"closed.sniff\" lets nobody listen: status 3\n"));
+  EXPECT_THAT(ended.err,
+              HasSubstr("mpf sniff: \"closed.sniff\" refused to start sniffing: status 3\n"));
   server.interrupt();
   thread.join();
 }

@@ -208,7 +208,7 @@ TEST_F(TapTest, OneLinkCanBeChosen) {
     const auto wrong = run({"tap", "echo", "--link", word});
     EXPECT_EQ(wrong.status, 2);
     EXPECT_THAT(wrong.err, HasSubstr(std::string("\"") + word +
-                                     "\" is no link: use its 16 hexadecimal digits"));
+                                     "\" is not a link: use the 16 hexadecimal digits"));
   }
 }
 
@@ -262,7 +262,7 @@ TEST_F(TapTest, WhatIsNoRecordingIsNamed) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err, "mpf replay: " + file_ +
-                           ": record 1, at byte 0 of 67: this is no recording of `mpf tap "
+                           ": record 1, at byte 0 of 67: not a recording of `mpf tap "
                            "--write`, or one that was cut off within its "
                            "first record\n");
   EXPECT_EQ(ended.out, "") << "nothing was sent, to nobody";
@@ -307,7 +307,7 @@ TEST_F(TapTest, AServerThatIsNotThereIsNamed) {
   const auto ended = run({"tap", "echo", "0.01"});
   EXPECT_EQ(ended.status, 0);
   EXPECT_EQ(ended.err,
-            "mpf tap: server \"echo\" at location 0 is not there; waiting for it\nmpf tap: 0 "
+            "mpf tap: server \"echo\" at location 0 is absent; waiting for it\nmpf tap: 0 "
             "messages seen, 0 missed\n");
 }
 
