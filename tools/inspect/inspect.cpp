@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf inspect: shows windows, hints, links, rings and pools in shared memory, decoded and raw. Works
-// on a running system, on one whose processes hang or are dead, and on copies of its files.
+// mpf inspect: shows windows, hints, links, rings and pools in shared memory, decoded and raw.
+// Works on a running system, on one whose processes hang or are dead, and on copies of its files.
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <memory>

@@ -17,7 +17,8 @@ namespace mpf::tools {
 
 namespace {
 
-// The largest segment of any kind, not counting the chunks of a pool: a link with the longest rings.
+// The largest segment of any kind, not counting the chunks of a pool: a link with the longest
+// rings.
 constexpr std::size_t kMostBytes = layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots);
 
 // The kind that a header contains, unchecked; 0 when the file is too short.

@@ -20,8 +20,8 @@ namespace mpf::tools {
 
 class SegmentImage {
  public:
-  // Up to `bytes` of the segment; bytes behind the end of the file are zero. nullopt when no segment
-  // of that name exists (any more).
+  // Up to `bytes` of the segment; bytes behind the end of the file are zero. nullopt when no
+  // segment of that name exists (any more).
   //   throws  SegmentError when the file is not a segment of this kind, std::system_error when it
   //           may not be read
   static std::optional<SegmentImage> tryRead(const std::string& name, layout::SegmentKind kind,
@@ -54,7 +54,8 @@ class SegmentImage {
   [[nodiscard]] std::uint64_t fileBytes() const noexcept { return fileBytes_; }
 
  private:
-  // Reads up to `bytes` of a file; nullopt when it does not exist. Without `kind`, any kind will do.
+  // Reads up to `bytes` of a file; nullopt when it does not exist. Without `kind`, any kind will
+  // do.
   static std::optional<SegmentImage> tryLoad(const std::string& path,
                                              std::optional<layout::SegmentKind> kind,
                                              std::size_t bytes);

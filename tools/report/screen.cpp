@@ -85,8 +85,8 @@ void Screen::draw(const std::vector<TopLine>& lines) {
   erase();
   int row = 0;
   for (const auto& line : lines) {
-    // A line that is too long would continue in the next row: it is cut here, and clrtoeol() removes
-    // the remains of wide characters.
+    // A line that is too long would continue in the next row: it is cut here, and clrtoeol()
+    // removes the remains of wide characters.
     const bool isSelected =
         line.style == TopLine::Style::selected || line.style == TopLine::Style::selectedAlarm;
     const auto text = fmt::format("{:<{}.{}}", line.text, isSelected ? COLS : 0, COLS);

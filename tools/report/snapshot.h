@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Snapshot: the contents of the segments of a backplane at one moment. Every report of `mpf` is made
-// from snapshots.
+// Snapshot: the contents of the segments of a backplane at one moment. Every report of `mpf` is
+// made from snapshots.
 //
 //   /dev/shm/mpf.<backplane>.* ─ pread ─► Snapshot ─► ls, mrr, msr, top, inspect
 //

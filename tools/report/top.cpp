@@ -55,8 +55,8 @@ class SnapshotSeries {
   Snapshot last_;
 };
 
-// Applies the options, after the view has its first table. False when the column for --sort does not
-// exist.
+// Applies the options, after the view has its first table. False when the column for --sort does
+// not exist.
 bool prepare(TopView& view, const TopArguments& arguments) {
   if (arguments.clients) view.showClients();
   if (arguments.routers) view.showRouters();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// LinkFollower: reads the messages that the client and the server of a link exchange, without taking
-// part.
+// LinkFollower: reads the messages that the client and the server of a link exchange, without
+// taking part.
 //
 //   request ring ─ RingFollower ─┐
 //                                ├─► take(): TappedMessages, a reply never before its request

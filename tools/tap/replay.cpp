@@ -113,8 +113,8 @@ class Replayer {
     late_->add(static_cast<std::uint64_t>(std::max<std::int64_t>(0, Clock::nowNs() - dueNs)));
   }
 
-  // Waits while the queue is full: a recording may contain as many unanswered requests as its server
-  // had room for, and this server may have less.
+  // Waits while the queue is full: a recording may contain as many unanswered requests as its
+  // server had room for, and this server may have less.
   void send(MessageClient& client, Message&& message) {
     ++requests_;
     const auto limit = Deadline::after(ofSeconds(arguments_.timeout));

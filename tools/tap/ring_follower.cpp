@@ -37,8 +37,9 @@ void RingFollower::goBehindNewest() noexcept {
       newest == 0 ? 0 : newest - 1 + std::clamp<std::uint32_t>(slots, 1, layout::kMaxMessageSlots);
 }
 
-// Whether the producer is more than half a ring ahead. Of any kMaxMessageSlots successive slots that
-// the producer has passed, at least one is the first slot of a message and has its sequence number.
+// Whether the producer is more than half a ring ahead. Of any kMaxMessageSlots successive slots
+// that the producer has passed, at least one is the first slot of a message and has its sequence
+// number.
 bool RingFollower::isOverrun() const noexcept {
   for (std::uint32_t i = 0; i < layout::kMaxMessageSlots; ++i) {
     const auto ahead = position_ + capacity_ / 2 + i;

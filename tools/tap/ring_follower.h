@@ -11,8 +11,8 @@
 // Threads  one.
 // Crash    the producer may die at any time; the messages that it published are read.
 // Trust    a producer that writes invalid data costs messages, never memory safety.
-// Order    the copy is consistent only if no store is delayed past half a ring of later stores. This
-//          holds for all known CPUs.
+// Order    the copy is consistent only if no store is delayed past half a ring of later stores.
+//          This holds for all known CPUs.
 #pragma once
 
 #include <array>

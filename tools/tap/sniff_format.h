@@ -2,7 +2,8 @@
 // SniffFormat: formats the bytes of a serial line.
 //
 //   lines    14:03:27.120   0.0 ms  T  *IDN?\n
-//            One direction in each line, which ends at '\n', at a pause, or when the direction turns.
+//            One direction in each line, which ends at '\n', at a pause, or when the direction
+//            turns.
 //   manual   T31 T34 R31 T35 R34 T00 R35 R00 T31 T34 14154.5.14
 //            Ten bytes in each line (manual, "serialPortSniff").
 //   json     {"at_ns": 81234000000, "kind": "T", "value": 49}

@@ -54,8 +54,8 @@ bool TapSession::isWanted(const std::string& name) const {
          (selection_.link == 0 || parsed->incarnation == selection_.link);
 }
 
-// Looks at all names: at the start, when the server has appeared, and every kLookEvery to find links
-// that were removed.
+// Looks at all names: at the start, when the server has appeared, and every kLookEvery to find
+// links that were removed.
 void TapSession::lookAtNames(FollowFrom from) {
   lookAgain_ = Deadline::after(kLookEvery);
   const auto image = SegmentImage::tryRead(window_, layout::SegmentKind::serverWindow,
@@ -133,8 +133,8 @@ bool TapSession::take(Followed& followed) {
   return some;
 }
 
-// A message that is just being sent counts as missed for a moment. So a number of missed messages is
-// reported only if two successive calls find the same number.
+// A message that is just being sent counts as missed for a moment. So a number of missed messages
+// is reported only if two successive calls find the same number.
 void TapSession::reportMissed(Followed& followed) {
   const auto missed = followed.follower->missed();
   if (missed != std::exchange(followed.missedSeen, missed) || missed == followed.missedReported)

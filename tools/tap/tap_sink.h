@@ -17,8 +17,8 @@
 
 namespace mpf::tools {
 
-// A link and its two processes. The names are untrusted: printable() must clean them before they are
-// shown.
+// A link and its two processes. The names are untrusted: printable() must clean them before they
+// are shown.
 struct TappedLink {
   std::uint64_t incarnation = 0;
   std::string server;
