@@ -38,7 +38,7 @@ class HardwareServersTest : public testing::Test {
 TEST_F(HardwareServersTest, SayWhichProgramIsMissing) {
   const HardwareServers servers({"mpf-bench-test", {}, Mode::block}, {"mpf-no-such-server"});
 
-  EXPECT_THAT(servers.missing(), HasSubstr("is not there"));
+  EXPECT_THAT(servers.missing(), HasSubstr("does not exist"));
 }
 
 TEST_F(HardwareServersTest, SayOfARowThatFailsWhatTheProgramSaid) {
@@ -49,7 +49,8 @@ TEST_F(HardwareServersTest, SayOfARowThatFailsWhatTheProgramSaid) {
   // It says so at some time or other.
   while (servers->said().empty()) ::sched_yield();
 
-  EXPECT_EQ(servers->run(failing).error, "no end; " + program_ + " said last: the board is hot");
+  EXPECT_EQ(servers->run(failing).error,
+            "no end; last output of " + program_ + ": the board is hot");
 }
 
 TEST_F(HardwareServersTest, RunNoRowOnceTheProgramHasEnded) {
