@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Usage, errors and exit statuses of `mpf`.
+// Usage, errors and exit status of `mpf`.
 #include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {
@@ -16,7 +16,7 @@ constexpr std::array<const char*, 13> kSubcommands{"ls",     "mrr",     "msr",  
 
 class CommandLineTest : public ToolsTest {};
 
-TEST_F(CommandLineTest, WithoutAnythingItShowsHowToUseIt) {
+TEST_F(CommandLineTest, PrintsUsageWithoutArguments) {
   const auto ended = run({});
 
   EXPECT_EQ(ended.status, 2);
@@ -37,28 +37,28 @@ TEST_F(CommandLineTest, HelpGoesToStdout) {
                                HasSubstr("Exit status: 0 success")));
 }
 
-TEST_F(CommandLineTest, EachSubcommandHasItsHelp) {
+TEST_F(CommandLineTest, EachSubcommandHasHelp) {
   for (const std::string name : kSubcommands) {
-    if (name == "bench") continue;  // another program's
+    if (name == "bench") continue;  // a program of its own
 
     const auto ended = run({name, "--help"});
 
     EXPECT_EQ(ended.status, 0) << name;
     EXPECT_THAT(ended.out, HasSubstr("Usage: mpf " + name)) << name;
-    // these look at the host, or have one of their own
+    // doctor looks at the host, torture has a backplane of its own.
     const bool hasBackplane = name != "doctor" && name != "torture";
     EXPECT_EQ(ended.out.find("--backplane") != std::string::npos, hasBackplane) << name;
     EXPECT_THAT(ended.err, IsEmpty()) << name;
   }
 }
 
-TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
-  const auto ended = run({"nonsense", "--json"});
+TEST_F(CommandLineTest, AnUnknownSubcommandIsAnErrorThatListsAll) {
+  const auto ended = run({"unknown", "--json"});
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, "
+            "mpf: no subcommand or option \"unknown\"; there are ls, mrr, msr, top, inspect, "
             "call, sniff, tap, replay, clean, doctor, torture, "
             "bench; "
             "`mpf --help` shows what they do\n");
@@ -69,8 +69,8 @@ struct Wrong {
   std::string text;
 };
 
-// Each says what is wrong and where it is said how it is right.
-TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
+// Each error names the wrong argument and the help.
+TEST_F(CommandLineTest, RefusesWrongArguments) {
   const std::vector<Wrong> wrong{
       {{"ls", "--jason"},
        "mpf ls: The following argument was not expected: --jason; `mpf ls --help`"},
@@ -114,7 +114,7 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
   }
 }
 
-TEST_F(CommandLineTest, NamesThatCannotBeAreNamed) {
+TEST_F(CommandLineTest, RefusesInvalidNames) {
   for (const std::string name : {"ls", "mrr", "msr", "top", "inspect", "clean"}) {
     const auto ended = run({name, "--backplane", "a.b"});
     EXPECT_EQ(ended.status, 2);
