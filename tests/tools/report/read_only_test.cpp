@@ -117,8 +117,8 @@ TEST_F(ReadOnlyTest, ReportsForeignFilesAsProblems) {
   const auto folder = pathOf("c.1");
   const auto loop = pathOf("l.1.2");
   const auto stray = pathOf("what is this");
-  std::ofstream(file) << "not a segment";
-  std::ofstream(stray) << "not a segment";
+  std::ofstream(file) << "junk";
+  std::ofstream(stray) << "junk";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
   std::filesystem::create_directory(folder);
   std::filesystem::create_symlink(loop, loop);
@@ -147,7 +147,7 @@ TEST_F(ReadOnlyTest, ReportsForeignFilesAsProblems) {
 // File names are untrusted, too.
 TEST_F(ReadOnlyTest, EscapesControlCharactersInFileNames) {
   const auto path = segments::path(SegmentName::prefix(backplane_.name()) + "\x1b[2J\xc2\x9b");
-  std::ofstream(path) << "not a segment";
+  std::ofstream(path) << "junk";
 
   for (const auto& arguments : std::vector<std::vector<std::string>>{{"ls"},
                                                                      {"mrr", "--interval", "1"},
