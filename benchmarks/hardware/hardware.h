@@ -75,7 +75,7 @@ class HardwareServers {
 [[nodiscard]] std::vector<Measurement> scanRows(const Bench& bench);
 [[nodiscard]] std::vector<Measurement> serialRows(const Bench& bench);
 
-// A row whose environment are these servers. Rows that share them have the same `environment`.
+// A row that runs with these servers. Rows that share them have the same `environment`.
 [[nodiscard]] Measurement rowOf(const std::shared_ptr<HardwareServers>& servers,
                                 const std::string& environment, const std::string& question,
                                 const std::string& name);

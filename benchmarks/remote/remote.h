@@ -51,7 +51,7 @@ struct Place {
 [[nodiscard]] std::vector<Measurement> crowdRows(const Place& place);
 [[nodiscard]] std::vector<Measurement> idleRows(const Place& place);
 
-// A row of this place. The environment of a `routed` row are the routers of the place.
+// A row of this place. A `routed` row runs with the routers of the place.
 [[nodiscard]] Measurement rowAt(const Place& place, const std::string& question,
                                 const std::string& name, bool routed);
 

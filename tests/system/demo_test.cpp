@@ -78,7 +78,7 @@ TEST_F(Demo, DrawsOnATerminalUntilQ) {
 }
 
 // Also before all parts have answered: the voltmeter needs more than a millisecond.
-TEST_F(Demo, ExitsOnASignal) {
+TEST_F(Demo, ExitsOnQAndCtrlC) {
   constexpr auto* kQuit = "q";
   constexpr auto* kInterrupt = "\x03";
   for (const auto* const key : {kQuit, kInterrupt}) {

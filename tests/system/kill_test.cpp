@@ -117,8 +117,8 @@ TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
   EXPECT_GT(ledger.replies, 0u);
 }
 
-// runOnce() handles the death by itself, not together with a later event.
-TEST_F(KillTest, RunOnceHandlesADeathByItself) {
+// runOnce() handles the death as an event of its own, and returns true for it.
+TEST_F(KillTest, RunOnceHandlesADeathAsAnEvent) {
   Victim server("serve", backplaneName());
   Dispatcher dispatcher(backplane_);
   bool isGone = false;

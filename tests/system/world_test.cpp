@@ -173,8 +173,8 @@ TEST_F(WorldTest, TwoPidNamespacesShareABackplane) {
 
 TEST_F(WorldTest, TheDeathOfAServerIsNoticedFromAnotherPidNamespace) {
   inChild([&] {
-    SyncClient client(backplane_,
-                      "echo");  // before the namespace changes, which forbids new threads
+    // Before the change of the namespace, after which no thread can start.
+    SyncClient client(backplane_, "echo");
     static_cast<void>(client.connectWait(1ms));
     enter(CLONE_NEWPID);
     Victim server("serve", backplane_.name());  // pid 1 there

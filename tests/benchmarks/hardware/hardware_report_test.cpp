@@ -33,7 +33,7 @@ TEST(HardwareTable, ShowsTheRatioToTheEcho) {
   EXPECT_THAT(text, HasSubstr(" 0.500  40.0 k/s: mpf-int32-server, the echo\n"));
 }
 
-TEST(HardwareTable, SaysHowManyTimesTheManualAndThatItIsNotMeasured) {
+TEST(HardwareTable, ShowsTheRatioToTheManualAndThatThatIsNotMeasured) {
   Result manual;
   manual.measurement.question = kSerial;
   manual.measurement.name = kManualLocal;
@@ -51,7 +51,7 @@ TEST(HardwareTable, SaysHowManyTimesTheManualAndThatItIsNotMeasured) {
   EXPECT_THAT(text, HasSubstr(" 2.000  159 /s: the manual's, local\n"));
 }
 
-TEST(HardwareTable, HasAHeadingOnceAndValuesWithTheirUnit) {
+TEST(HardwareTable, HasOneHeadingAndValuesWithTheirUnit) {
   Result share;
   share.measurement.question = kScanning;
   share.measurement.name = "the driver's thread";
@@ -65,8 +65,8 @@ TEST(HardwareTable, HasAHeadingOnceAndValuesWithTheirUnit) {
   EXPECT_THAT(text, Not(HasSubstr("p99")));
 }
 
-// A row about lost characters says which faults the server has seen.
-TEST(HardwareTable, SaysWhyCharactersWereLost) {
+// A row about lost characters shows the faults that the server reported.
+TEST(HardwareTable, ShowsTheFaultsOfLostCharacters) {
   Result lost;
   lost.measurement.question = kSerial;
   lost.measurement.name = "written, echo read: characters were lost";

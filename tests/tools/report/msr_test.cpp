@@ -39,7 +39,7 @@ TEST_F(ReportTest, MsrBeginsWithTheLinesOfTheManual) {
                   "  tools_test\\[[0-9]+\\]\n? +[a-z]+ +2 +3 +3 +1 +1 +1 +[0-9]+\n"));
 }
 
-TEST_F(ReportTest, MsrReportsAllServersOrTheOneThatIsNamed) {
+TEST_F(ReportTest, MsrReportsAllServersOrANamedOne) {
   openServer("one");
   const MessageServer two(backplane_, "two");
 

@@ -154,7 +154,7 @@ TEST_F(SniffToolTest, NamesAnAbsentServer) {
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.err, ContainsRegex("^mpf sniff: server \"nobody.sniff\" at location 0 is not "
-                                       "there.*; is it a serial server"));
+                                       "there.*; check with `mpf ls` that it is a serial server"));
 }
 
 TEST_F(SniffToolTest, ReportsAServerThatRefusesToSniff) {
