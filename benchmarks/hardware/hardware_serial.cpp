@@ -151,7 +151,7 @@ std::vector<std::string> eightPorts(bool takesTime) {
                  {"--octal-port", fmt::format("UART{},UART,{},{},N,1,8,N", port, port, kBaud),
                   "--server", fmt::format("port{},UART{},1000,20,\\r,1", port, port)});
   }
-  // No settling time, to measure what server and lines can do: the model sends no late answers.
+  // No settling time, to measure what server and lines can do: the model repeats no answers.
   words.insert(words.end(), {"--settle-time", "0"});
   if (takesTime) words.emplace_back("--octal-timing");
   return words;

@@ -83,8 +83,8 @@ Marks Marks::ofThisProgram() {
   }
   if (marks.byName_.empty())
     throw std::runtime_error(
-        "this program has no steps: they were stripped from it, or it was built for another "
-        "processor than x86-64");
+        "this program has no steps (section .note.stapsdt): they were stripped from it; use the "
+        "program as it was built");
   return marks;
 }
 
