@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf-bench: what `mpf bench` starts.
+// mpf-bench: the program that `mpf bench` executes.
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
@@ -12,9 +12,8 @@
 namespace {
 
 int bench(int argc, char** argv) {
-  CLI::App app(
-      "mpf bench - how fast messages are, beside the physical floors and other message systems",
-      "mpf bench");
+  CLI::App app("mpf bench - measures messages beside the physical floors and other message systems",
+               "mpf bench");
   auto& local = *app.add_subcommand("local", mpf::bench::kLocalHelp);
   auto& remote = *app.add_subcommand("remote", mpf::bench::kRemoteHelp);
   auto& hardware = *app.add_subcommand("hardware", mpf::bench::kHardwareHelp);

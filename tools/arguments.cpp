@@ -20,7 +20,9 @@ void addServer(CLI::App& app, ServerArguments& arguments) {
   app.add_option("server", arguments.server, "Name of the server")->required();
 }
 
-void addJson(CLI::App& app, bool& json) { app.add_flag("--json", json, "For programs: JSON"); }
+void addJson(CLI::App& app, bool& json) {
+  app.add_flag("--json", json, "Print JSON, for programs");
+}
 
 void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text,
                 bool mayBeZero) {
@@ -30,7 +32,7 @@ void addSeconds(CLI::App& app, const std::string& name, double& seconds, const s
     const bool good = CLI::detail::lexical_cast(word, value) && value <= kMost &&
                       (mayBeZero ? value >= 0 : value > 0);
     return good ? std::string()
-                : fmt::format("{} is no time: use a number of seconds {} to 1e9", word,
+                : fmt::format("{} is not a time: use a number of seconds {} to 1e9", word,
                               mayBeZero ? "from 0" : "above 0");
   };
   app.add_option(name, seconds, text)->capture_default_str()->type_name("SECONDS")->check(check);

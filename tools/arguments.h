@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Arguments that several subcommands have, under the same names and with the same texts.
+// Command-line arguments that several subcommands share, with the same names and help texts.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,17 +9,18 @@
 
 namespace mpf::tools {
 
-// Where the server of a subcommand is.
+// Names the server that a subcommand uses.
 struct ServerArguments {
   std::string backplane;
   std::int32_t location = 0;
   std::string server;
 };
 void addServer(CLI::App& app, ServerArguments& arguments);
-// --backplane; empty: none was named.
+// --backplane; `backplane` stays empty when the user named none. `otherwise` is the default as the
+// help text shows it.
 void addBackplane(CLI::App& app, std::string& backplane, const std::string& otherwise);
 void addJson(CLI::App& app, bool& json);
-// A time in seconds that is shown with its default; 0 only if that means something.
+// An option for a time in seconds; its help text shows the default. Accepts 0 if `mayBeZero`.
 void addSeconds(CLI::App& app, const std::string& name, double& seconds, const std::string& text,
                 bool mayBeZero);
 [[nodiscard]] Nanoseconds ofSeconds(double seconds);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf bench: hands over to mpf-bench, a program of its own so that `mpf` needs none of the
-// libraries that it compares us with.
+// mpf bench: executes mpf-bench. That is a program of its own, so that `mpf` does not depend on the
+// libraries that MPF is compared with.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -27,8 +27,8 @@ int bench(std::vector<std::string> words) {
   arguments.push_back(nullptr);
   ::execv(program.c_str(), arguments.data());
   printError(
-      "mpf bench: cannot start {}: {}; it is there when MPF was built with "
-      "MPF_BUILD_BENCHMARKS=ON\n",
+      "mpf bench: cannot start {}: {}; build MPF with MPF_BUILD_BENCHMARKS=ON to get this "
+      "program\n",
       program, std::strerror(errno));
   return 1;
 }
@@ -37,7 +37,7 @@ int bench(std::vector<std::string> words) {
 
 void addBench(CLI::App& app, Run& run) {
   auto& command =
-      *app.add_subcommand("bench", "How fast messages are; `mpf bench --help` says more");
+      *app.add_subcommand("bench", "Measures the speed of messages; see `mpf bench --help`");
   command.prefix_command();
   command.set_help_flag();
   command.callback(

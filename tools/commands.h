@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Commands: the subcommands of `mpf`. Each adds itself to the command line; the one that was called
-// sets `run`.
+// The subcommands of `mpf`. Each function adds its subcommand to the command line; the subcommand
+// that the user names sets `run`.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@ class App;
 
 namespace mpf::tools {
 
-// Does the work after parsing. Returns the exit status: 0 done, 1 not, 2 asked for what cannot be.
+// Does the work after parsing. Returns the exit status: 0 success, 1 failure, 2 usage error.
 using Run = std::function<int()>;
 
 void addLs(CLI::App& app, Run& run);

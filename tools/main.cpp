@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf: looks at backplanes, servers and clients, and talks to them from the shell.
+// mpf: shows backplanes, servers and clients, and exchanges messages with them from the shell.
 #include <CLI/CLI.hpp>
 
 #include "base/command_line.h"
@@ -10,14 +10,16 @@
 namespace {
 
 constexpr const char* kFooter =
-    "Reports (ls, mrr, msr, top, inspect) only read: they disturb nobody, remove nothing, and work "
-    "when a process is stopped or dead.\n"
+    "Reports (ls, mrr, msr, top, inspect) only read: they disturb no process, remove nothing, and "
+    "work when processes are stopped or dead.\n"
     "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
-    "Exit status: 0 done; 1 failed, the text on stderr says why; 2 usage error.";
+    "Exit status: 0 success; 1 failure, the text on stderr says why; 2 usage error.";
 
 int runSubcommand(int argc, char** argv) {
-  CLI::App app("mpf - looks at backplanes, servers and clients, and talks to them from the shell",
-               "mpf");
+  CLI::App app(
+      "mpf - shows backplanes, servers and clients, and exchanges messages with them from the "
+      "shell",
+      "mpf");
   mpf::tools::Run run;
   mpf::tools::addLs(app, run);
   mpf::tools::addMrr(app, run);

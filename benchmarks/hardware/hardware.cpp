@@ -16,10 +16,9 @@ namespace {
 
 const std::vector<std::string> kEchoWords{"mpf-int32-server", "echo"};
 constexpr const char* kWhyNotSpin =
-    "spin would measure the scheduler: the echo and the measured server share the server's CPU, "
-    "and one would poll in the time of the "
-    "other; "
-    "use adaptive or block";
+    "spin would measure the scheduler: the echo server and the measured server share a CPU, and "
+    "one "
+    "would poll in the time of the other; use adaptive or block";
 
 std::vector<Measurement> allRows(const Bench& bench) {
   auto all = roundTripRows(bench);
@@ -60,7 +59,7 @@ std::string HardwareServers::missing() const {
   for (const auto* words : {&kEchoWords, &words_}) {
     if (words->empty()) continue;
     if (const auto program = programBeside(words->front()); !std::filesystem::exists(program))
-      return program + " is not there";
+      return program + " does not exist";
   }
   return {};
 }
@@ -77,7 +76,7 @@ Outcome HardwareServers::run(const std::function<Outcome()>& row) {
   if (outcome.error.empty()) return outcome;
   const auto why = ended();
   outcome.error +=
-      why.empty() ? "; " + words_.front() + " said last: " + measured_.lastLine() : "; " + why;
+      why.empty() ? "; last output of " + words_.front() + ": " + measured_.lastLine() : "; " + why;
   return outcome;
 }
 

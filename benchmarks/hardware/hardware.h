@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // `mpf bench hardware`: measures servers over models of Industry Pack modules beside the echo
-// server, what scanning costs, and eight serial ports beside the manual's table ("octalSerialPort
+// server, the cost of scanning, and eight serial ports beside the manual's table ("octalSerialPort
 // performance").
 //
 //   mpf-dac128v-server --carrier ipac=model ...  ─┐
 //   mpf-int32-server, the echo                   ─┴─ backplane ─ client
 //   server's CPUs                                              requester's CPUs
 //
-// Threads  as Session.
+// Threads  as in session.h.
 #pragma once
 
 #include <memory>
@@ -20,8 +20,8 @@
 namespace mpf::bench {
 
 inline constexpr const char* kHardwareHelp =
-    "How fast servers over Industry Pack modules are, on models: beside the echo server, and "
-    "beside the manual's table of serial ports";
+    "Measures servers over models of Industry Pack modules, beside the echo server and beside the "
+    "manual's table of serial ports";
 
 struct HardwareOptions : Options {
   Mode wait = Mode::adaptive;  // of servers and clients
@@ -30,11 +30,11 @@ struct HardwareOptions : Options {
 // Adds --wait to the usual ones; spin is refused.
 void addOptions(CLI::App& app, HardwareOptions& options);
 
-// Returns the exit status of a program: 0 all was measured or left out by name, 1 something failed,
-// 2 the options cannot be met.
+// Returns the exit status of the program: 0 all rows were measured or left out with a reason, 1 a
+// row failed, 2 usage error.
 [[nodiscard]] int runHardware(const HardwareOptions& options);
 
-// Where rows are taken.
+// The backplane and the CPUs of the rows.
 struct Bench {
   std::string backplane;  // unique on this host
   Placement placement;
@@ -45,7 +45,7 @@ struct Bench {
 // them, so that it can be measured right before each row.
 class HardwareServers {
  public:
-  //   words  of the program that is measured: its name, and arguments; empty: only the echo server
+  //   words  name and arguments of the measured program; empty: only the echo server runs
   HardwareServers(Bench bench, std::vector<std::string> words);
   ~HardwareServers() { stop(); }
   HardwareServers(const HardwareServers&) = delete;
@@ -56,11 +56,11 @@ class HardwareServers {
   [[nodiscard]] const Bench& bench() const noexcept { return bench_; }
   // Empty, or which program is missing.
   [[nodiscard]] std::string missing() const;
-  // Of the program that is measured.
+  // Of the measured program.
   [[nodiscard]] int pid() const noexcept { return measured_.pid(); }
   [[nodiscard]] std::string said() const { return measured_.said(); }
-  // Runs `row`, and says of a failure what that program said last. When it has ended, the row is
-  // not run at all.
+  // Runs `row`. Adds the last output of the measured program to an error. When that program has
+  // ended before, `row` is not run.
   [[nodiscard]] Outcome run(const std::function<Outcome()>& row);
 
  private:
@@ -75,13 +75,13 @@ class HardwareServers {
 [[nodiscard]] std::vector<Measurement> scanRows(const Bench& bench);
 [[nodiscard]] std::vector<Measurement> serialRows(const Bench& bench);
 
-// A row with these servers around it; the same `environment` for rows that share them.
+// A row that runs with these servers. Rows that share them have the same `environment`.
 [[nodiscard]] Measurement rowOf(const std::shared_ptr<HardwareServers>& servers,
                                 const std::string& environment, const std::string& question,
                                 const std::string& name);
 
 // The arguments of an mpf-serial-server with eight ports of a model, served as "port0" to "port7".
-//   takesTime  bytes take as long as on a line
+//   takesTime  characters take as long as on a real line
 [[nodiscard]] std::vector<std::string> eightPorts(bool takesTime);
 
 [[nodiscard]] std::string hardwareTable(const std::vector<Result>& results);
@@ -94,12 +94,12 @@ inline constexpr const char* kScanning =
 inline constexpr const char* kSerial =
     "100 characters to each of eight serial ports at 38400 baud (manual, \"octalSerialPort "
     "performance\")";
-// unit of a row about answers that were not whole
+// Unit of a row about incomplete answers.
 inline constexpr const char* kShortAnswers = "answers";
 inline constexpr const char* kEcho = "mpf-int32-server, the echo";
 inline constexpr const char* kManualLocal = "the manual's, local";
 inline constexpr const char* kManualRemote = "the manual's, remote";
-// Measurement::detail of a number to compare with
+// Measurement::detail of a number that is only for comparison.
 inline constexpr const char* kNotMeasured = "not measured here";
 
 }  // namespace mpf::bench

@@ -12,13 +12,13 @@ namespace {
 constexpr const char* kHardwareLine = "  {:<54} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}  {}\n";
 constexpr const char* kOne = "  {:<54} {}\n";
 
-// What the replies said of answers that were not whole.
+// The faults that the replies reported for incomplete answers.
 std::string faultsText(const LineFaultFigures& faults) {
   const auto unnamed = faults.overruns + faults.parity + faults.framing + faults.breaks == 0 &&
                        faults.shortAnswers > 0;
   return fmt::format("; with overruns {}, parity errors {}, framing errors {}, breaks {}{}",
                      faults.overruns, faults.parity, faults.framing, faults.breaks,
-                     unnamed ? ": the server saw no fault of the line" : "");
+                     unnamed ? ": the server reported no line fault" : "");
 }
 
 std::string hardwareLineOf(const Result& result) {
@@ -46,7 +46,7 @@ std::string hardwareLineOf(const Result& result) {
 }
 
 std::string hardwareHeader(const Measurement& first) {
-  if (!first.unit.empty()) return {};  // the line says what its figure is
+  if (!first.unit.empty()) return {};  // each line shows its unit
   const bool isServers = first.question == kServers;
   return fmt::format(kHardwareLine, "", "messages", "p50", "p99", "p99.9", "max",
                      isServers ? "x echo" : "x manual", isServers ? "the echo was" : "");

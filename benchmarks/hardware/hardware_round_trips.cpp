@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The rows of `mpf bench hardware` in which one client asks a server, again and again, beside the
-// echo server.
+// The rows of `mpf bench hardware` about round trips of one client, beside the echo server.
 #include <stdexcept>
 
 #include <mpf/digital_io_commands.h>
@@ -17,7 +16,7 @@ namespace {
 constexpr std::size_t kInt32Bytes = 4;
 constexpr std::int32_t kMeanMs = 10;  // of the 1 kHz at which a model scans
 
-// Asks one server one thing.
+// Sends the same request to one server repeatedly.
 class Asker {
  public:
   Asker(const Bench& bench, const std::string& server, const Int32& request)
@@ -31,7 +30,7 @@ class Asker {
   void roundTrip() {
     const auto wanted = received_ + 1;
     if (client_.send(Int32Message(request_)) != SendResult::sent)
-      throw std::runtime_error("a request was not sent");
+      throw std::runtime_error("a request could not be sent");
     while (received_ < wanted) dispatcher_.runOnce();
   }
 
@@ -40,7 +39,7 @@ class Asker {
     if (message.getType() == MessageType::connect) return;
     const auto* const reply = message.tryAs<Int32>();
     if (reply == nullptr || reply->status != 0)
-      throw std::runtime_error("a reply with a status, or none");
+      throw std::runtime_error("the reply is not an Int32 message with status 0");
     ++received_;
   }
 
@@ -61,7 +60,7 @@ Outcome askAgainAndAgain(const Stage& stage, HardwareServers& servers, const std
   return servers.run([&] { return stage.run(act); });
 }
 
-// One port, one request at a time.
+// Measures one port, with one request at a time.
 Outcome askPort(const Stage& stage, HardwareServers& servers, bool awaitsEcho) {
   Act act;
   act.server = playInstruments(stage, servers, awaitsEcho);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The rows of `mpf bench hardware` about what scanning costs: all that mpf-ip330-server has in its
-// process, in one of the bench's own, which can look into it.
+// The rows of `mpf bench hardware` about the cost of scanning. They run the parts of
+// mpf-ip330-server in a process of the benchmark, which can read the CPU time of the driver's
+// thread.
 #include <pthread.h>
 #include <time.h>
 #include <unistd.h>
@@ -23,8 +24,7 @@ namespace {
 constexpr auto kFirstScan = std::chrono::seconds(10);
 constexpr auto kScanAtLeast = std::chrono::seconds(1);
 
-// What one look finds out, in Figures::more.
-// the last two: percent of one CPU
+// The results of the measurement, in Figures::more. The last two are percent of one CPU.
 enum ScanFound : std::size_t { scansPerSecond, scansMissed, driversThread, wholeProcess };
 
 double nsOf(clockid_t clock) {
@@ -33,7 +33,7 @@ double nsOf(clockid_t clock) {
   return static_cast<double>(used.tv_sec) * 1e9 + static_cast<double>(used.tv_nsec);
 }
 
-// The CPU clock of the thread that reads the mailboxes and tells subscribers.
+// The CPU clock of the thread that reads the mailboxes and calls subscribers.
 clockid_t clockOfDriver(Ip330& board) {
   std::atomic<clockid_t> clock{0};
   std::atomic<bool> isKnown{false};
@@ -41,12 +41,12 @@ clockid_t clockOfDriver(Ip330& board) {
     clockid_t mine{};
     if (::pthread_getcpuclockid(::pthread_self(), &mine) != 0) return;
     clock.store(mine, std::memory_order_relaxed);
-    // PAIR(bench-clock): who sees that it is known sees which.
+    // PAIR(bench-clock): once isKnown is visible, the clock is.
     isKnown.store(true, std::memory_order_release);
   });
-  // PAIR(bench-clock): the clock is there.
+  // PAIR(bench-clock): see above.
   if (!waitUntil([&] { return isKnown.load(std::memory_order_acquire); }, kFirstScan))
-    throw std::runtime_error("no scan comes");
+    throw std::runtime_error("the model of the IP330 delivered no scan in time");
   return clock.load(std::memory_order_relaxed);
 }
 
@@ -96,7 +96,7 @@ Outcome runScanning(const Stage& stage, const Bench& bench) {
 }  // namespace
 
 std::vector<Measurement> scanRows(const Bench& bench) {
-  // One look is enough: its rows tell of the same one.
+  // All rows show results of the same measurement.
   const auto seen = std::make_shared<std::optional<Outcome>>();
   const auto row = [&](const std::string& name, const std::string& unit, std::size_t what) {
     Measurement made;

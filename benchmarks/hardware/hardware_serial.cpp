@@ -14,16 +14,16 @@ namespace {
 constexpr std::size_t kCharacters = 100;
 constexpr int kBaud = 38400;
 constexpr int kBitsOfACharacter = 10;
-// messages/s
+// Messages per second that the lines can carry.
 constexpr double kLineLimit =
     static_cast<double>(kPorts) * kBaud / kBitsOfACharacter / static_cast<double>(kCharacters);
 constexpr auto kTrafficAtLeast = std::chrono::seconds(1);
 constexpr const char* kPercentOfCpu = "% of one CPU";
 
-// What one look finds out, in Figures::more.
+// Index of the server's CPU time in Figures::more.
 constexpr std::size_t kServerCpu = 0;  // percent of one CPU
 
-// One request on its way at each port.
+// Measures all ports at once, with one outstanding request at each.
 void measurePorts(const Scene& scene, const HardwareServers& servers, bool awaitsEcho) {
   const Stopwatch watch;
   std::array<std::uint64_t, kPorts> sentAt{};
@@ -67,7 +67,7 @@ Outcome runPorts(const Stage& stage, HardwareServers& servers, bool awaitsEcho) 
   return servers.run([&] { return stage.run(act); });
 }
 
-// Not measured: a number to compare with.
+// A row for comparison whose number is not measured.
 Measurement known(const Bench& bench, const std::string& name, const Figures& figures) {
   Measurement row;
   row.question = kSerial;
@@ -99,7 +99,8 @@ Measurement knownCpu(const Bench& bench, const std::string& name, double percent
   return row;
 }
 
-// Messages a second, what they cost the server, what was lost; all rows tell of one look.
+// Rows for the message rate, the CPU time of the server and the incomplete answers, all from the
+// same measurement.
 std::vector<Measurement> rowsAbout(const Bench& bench, const std::string& name, bool takesTime,
                                    bool awaitsEcho) {
   const auto servers = std::make_shared<HardwareServers>(bench, eightPorts(takesTime));
@@ -150,7 +151,7 @@ std::vector<std::string> eightPorts(bool takesTime) {
                  {"--octal-port", fmt::format("UART{},UART,{},{},N,1,8,N", port, port, kBaud),
                   "--server", fmt::format("port{},UART{},1000,20,\\r,1", port, port)});
   }
-  // what the server and the lines can do: the model repeats no answer
+  // No settling time, to measure what server and lines can do: the model repeats no answers.
   words.insert(words.end(), {"--settle-time", "0"});
   if (takesTime) words.emplace_back("--octal-timing");
   return words;

@@ -20,18 +20,18 @@
 namespace mpf::bench {
 namespace {
 
-constexpr auto kTellLimit = std::chrono::seconds(10);
+constexpr auto kTerminalsLimit = std::chrono::seconds(10);
 constexpr int kAnswerMs = 10'000;
 constexpr int kSettleMs = 100;
 
-// What follows these words, in each line that has them.
+// The paths of terminals in the server's output: what follows kWords in a line.
 std::vector<std::string> terminalsIn(const std::string& said) {
   constexpr std::string_view kWords = "its instrument may open ";
   std::vector<std::string> terminals;
   for (auto at = said.find(kWords); at != std::string::npos; at = said.find(kWords, at)) {
     at += kWords.size();
     const auto end = said.find('\n', at);
-    if (end == std::string::npos) break;  // not said in full yet
+    if (end == std::string::npos) break;  // the line is not complete yet
     terminals.push_back(said.substr(at, end - at));
   }
   return terminals;
@@ -53,15 +53,15 @@ void writeAllTo(const FileDescriptor& terminal, const char* from, ssize_t count)
 
 Instruments::Instruments(const HardwareServers& servers) {
   std::vector<std::string> paths;
-  const auto areTold = [&] {
+  const auto areKnown = [&] {
     return (paths = terminalsIn(servers.said())).size() == static_cast<std::size_t>(kPorts);
   };
-  if (!waitUntil(areTold, kTellLimit))
-    throw std::runtime_error("the serial server names no terminals");
+  if (!waitUntil(areKnown, kTerminalsLimit))
+    throw std::runtime_error("the serial server did not print the terminals of its ports in time");
   for (const auto& path : paths) {
     terminals_.emplace_back(
         checkCall(::open(path.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC), "open", path));
-    ::tcflush(terminals_.back().get(), TCIFLUSH);  // what the row before left
+    ::tcflush(terminals_.back().get(), TCIFLUSH);  // discards input that the previous row left
   }
 }
 
@@ -122,21 +122,22 @@ void PortClients::ask(std::size_t port, std::int32_t command, std::size_t charac
   request->cmd = command | serial::cmdTimeoutMilliseconds;
   request->timeout = timeoutMs;
   if (clients_[port].send(std::move(request)) != SendResult::sent)
-    throw std::runtime_error("a request was not sent");
+    throw std::runtime_error("a request could not be sent");
 }
 
 void PortClients::take(std::size_t port, const Message& message) {
   if (message.getType() == MessageType::connect) return;
   const auto* const reply = message.tryAs<Char8Array>();
-  if (reply == nullptr) throw std::runtime_error(fmt::format("port {}: no reply", port));
+  if (reply == nullptr)
+    throw std::runtime_error(fmt::format("port {}: the reply is not a Char8Array message", port));
   if (std::exchange(settles_.at(port), false)) return onReply_(port, false);
   const auto read = message.valueAs<Char8Array>().size();
   if (reply->status == serial::serialServerStatusOK && (!awaitsEcho_ || read == characters_))
     return onReply_(port, true);
   if (!awaitsEcho_)
-    throw std::runtime_error(fmt::format("port {}: status {}", port, reply->status));
+    throw std::runtime_error(fmt::format("port {}: reply with status {}", port, reply->status));
   countFaults(*reply);
-  // The rest of this echo is not the beginning of the next one.
+  // Reads the rest of this echo, so that it is not taken for the beginning of the next one.
   settles_.at(port) = true;
   ask(port, serial::cmdRead, 0, kSettleMs);
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// SerialEnds: both ends of modelled serial ports: the instruments at their pseudo-terminals, and
-// the client of their servers.
+// Both ends of modelled serial ports: the clients of their servers, and the instruments at their
+// pseudo-terminals.
 //
-//   PortClients ─ "port0" ... ─ mpf-serial-server ─ model of an octal UART ─ pseudo-terminals ─ Instruments
+//   PortClients ─ mpf-serial-server ─ model of an octal UART ─ pseudo-terminals ─ Instruments
 //
-// Threads  each the only one of its process.
+// Threads  one; each end runs in a process of its own.
 #pragma once
 
 #include <array>
@@ -26,37 +26,38 @@ inline constexpr int kPorts = 8;
 
 class Instruments {
  public:
-  // Waits until the server has said which terminals its ports have.
+  // Waits until the server has printed the terminals of its ports.
   //   throws  std::runtime_error when it does not, std::system_error
   explicit Instruments(const HardwareServers& servers);
-  // Reads what comes, for ever, and sends it back if it is to echo.
+  // Reads all input, without end, and sends it back if `echoes`.
   [[noreturn]] void play(bool echoes);
 
  private:
   std::vector<FileDescriptor> terminals_;
 };
 
-// They play as what a row calls its server, on the requester's CPU: they are the far end.
+// The Act::server of a row: runs the instruments, on the requester's CPU, because they are the
+// remote ends of the lines.
 [[nodiscard]] std::function<void(const Scene&)> playInstruments(const Stage& stage,
                                                                 const HardwareServers& servers,
                                                                 bool echoes);
 
-// A client of each of the first `ports` ports, with one request on its way.
+// A client of each of the first `ports` ports, with one outstanding request.
 class PortClients {
  public:
-  // Called when a port's reply is there, and it may be asked again.
+  // Called when a reply has arrived and the next request may be sent to the port.
   //   isWhole  false: characters of the echo were lost
   using OnReply = std::function<void(std::size_t port, bool isWhole)>;
 
   //   characters  of a request, and of the answer that `awaitsEcho` asks for
-  //   throws      std::runtime_error when a server does not come
+  //   throws      std::runtime_error when a server is not connected in time
   PortClients(const Bench& bench, int ports, std::size_t characters, bool awaitsEcho,
               OnReply onReply);
   void send(std::size_t port);
-  // Throws std::runtime_error when a reply is not what it should be.
+  // Throws std::runtime_error for an unexpected reply.
   void runOnce() { dispatcher_.runOnce(); }
   [[nodiscard]] std::size_t size() const noexcept { return clients_.size(); }
-  // Of the answers since the last call.
+  // Faults of the answers since the last call.
   [[nodiscard]] LineFaultFigures takeFaults() noexcept;
 
  private:
@@ -67,7 +68,7 @@ class PortClients {
   const std::size_t characters_;
   const bool awaitsEcho_;
   OnReply onReply_;
-  std::array<bool, kPorts> settles_{};  // what comes late after a loss is waited for
+  std::array<bool, kPorts> settles_{};  // after a loss: late characters are being read
   LineFaultFigures faults_{.shortAnswers = 0};
   Dispatcher dispatcher_;
   std::deque<MessageClient> clients_;

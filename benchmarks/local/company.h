@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Company: what runs beside a round trip of ours while it is timed.
+// Company: processes that run beside an MPF round trip while it is timed.
 #pragma once
 
 #include <functional>
@@ -10,11 +10,11 @@
 
 namespace mpf::bench {
 
-// Starts it, once the server is there, in the requester's process; it ends with the handle.
-// nullptr: nobody.
+// Starts the company from the requester's process after the server is ready; the company ends with
+// the handle. Empty: nothing runs beside.
 using Company = std::function<std::shared_ptr<void>()>;
 
-// The round trip of an Int32 beside it. The backplane is a new one, and removed.
+// Measures the round trip of an Int32 beside `company`. Creates the backplane and removes it.
 [[nodiscard]] Outcome roundTripBeside(const Stage& stage, const std::string& backplane, Mode mode,
                                       const Company& company);
 

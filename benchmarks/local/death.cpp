@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How long after a process was killed its peer has the news: a client the fate of its request, a
-// server that the client is gone. Beside it: the time until waitpid() returns in the parent, before
-// which the kernel itself has not finished with the process.
+// The time from the kill of a process until its peer is notified: a client gets the fate of its
+// request, a server is told that the client is gone. The floor is the time until waitpid() returns
+// in the parent: before that the kernel has not finished with the process.
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -30,12 +30,12 @@
 namespace mpf::bench {
 namespace {
 
-constexpr Nanoseconds kNewsLimit = std::chrono::seconds(10);
-constexpr const char* kQuestion = "Death to fate: from kill -9 until the peer has the news";
+constexpr Nanoseconds kNotifyLimit = std::chrono::seconds(10);
+constexpr const char* kQuestion = "Death to fate: from kill -9 until the peer is notified";
 
 enum class Victim { server, client };
 
-// How long a pair has been connected when one of it is killed.
+// How long a client and a server have been connected when one of them is killed.
 struct Age {
   const char* name;
   Nanoseconds least, most;
@@ -44,10 +44,10 @@ constexpr std::array kAges{
     Age{"0-5 ms", Nanoseconds(0), std::chrono::milliseconds(5)},
     Age{"20 ms", std::chrono::milliseconds(20), std::chrono::milliseconds(20)}};
 
-// Words that the killer and its victims share. Times in ns of CLOCK_MONOTONIC; 0: not yet.
+// Times that the killer and its victims share, in ns of CLOCK_MONOTONIC; 0: not yet.
 struct Board {
   std::atomic<std::int64_t> connectedNs{0};
-  std::atomic<std::int64_t> newsNs{0};
+  std::atomic<std::int64_t> notifiedNs{0};
 };
 
 class SharedBoard {
@@ -55,7 +55,7 @@ class SharedBoard {
   SharedBoard()
       : memory_(::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
                        -1, 0)) {
-    if (memory_ == MAP_FAILED) throwSystemError(errno, "mmap", "the board of a measurement");
+    if (memory_ == MAP_FAILED) throwSystemError(errno, "mmap", "memory shared by a measurement");
     new (memory_) Board;
   }
   ~SharedBoard() { ::munmap(memory_, sizeof(Board)); }
@@ -67,11 +67,11 @@ class SharedBoard {
   void* memory_;
 };
 
-// Takes requests and keeps them, so that a client's request is open when its server dies.
+// Receives requests and keeps them, so that a client's request is open when its server dies.
 void serve(const std::string& backplane, Board& board) {
   RelayServer server(Backplane::attach(backplane), kServer);
   server.onClient([&](std::uint64_t, bool isThere) {
-    if (!isThere) board.newsNs.store(Clock::nowNs(), std::memory_order_relaxed);
+    if (!isThere) board.notifiedNs.store(Clock::nowNs(), std::memory_order_relaxed);
   });
   std::vector<Message> kept;
   while (server.waitForMessage()) {
@@ -82,18 +82,18 @@ void serve(const std::string& backplane, Board& board) {
 void ask(const std::string& backplane, Board& board) {
   MessageClient client(Backplane::attach(backplane), [&](Message&& message) {
     if (message.getType() == MessageType::requestFate)
-      board.newsNs.store(Clock::nowNs(), std::memory_order_relaxed);
+      board.notifiedNs.store(Clock::nowNs(), std::memory_order_relaxed);
   });
   client.bind(kServer);
   if (!client.connectWait(kConnectLimit))
     throw std::runtime_error("not connected: " + client.notConnectedBecause());
   if (client.send(Int32Message({.value = 1})) != SendResult::sent)
-    throw std::runtime_error("send failed");
+    throw std::runtime_error("the request could not be sent");
   board.connectedNs.store(Clock::nowNs(), std::memory_order_relaxed);
   for (;;) ::pause();
 }
 
-// A process of a measurement, which says on stderr why it fails.
+// A process of a measurement, which prints the reason on stderr when it fails.
 class Process {
  public:
   template <class Body>
@@ -109,7 +109,7 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // Kills it. Returns how long waitpid() takes from then on.
+  // Kills the process. Returns the time from the kill until waitpid() has returned.
   std::int64_t reapNs(std::int64_t& killedNs) {
     killedNs = Clock::nowNs();
     ::kill(pid_, SIGKILL);
@@ -122,7 +122,7 @@ class Process {
 };
 
 struct Durations {
-  std::int64_t newsNs, reapNs;
+  std::int64_t notifyNs, reapNs;
 };
 
 void sleepUntil(std::int64_t ns) {
@@ -131,7 +131,7 @@ void sleepUntil(std::int64_t ns) {
   }
 }
 
-// The client waits for its server before that is there, as after a restart of it.
+// Where the server is killed, the client waits for it before it starts, as after a restart.
 Durations killOnce(const std::string& backplane, Victim victim, Nanoseconds age) {
   const SharedBoard shared;
   auto& board = *shared;
@@ -142,17 +142,17 @@ Durations killOnce(const std::string& backplane, Victim victim, Nanoseconds age)
   server.emplace([&] { serve(backplane, board); });
   if (victim == Victim::client) sleepFor(std::chrono::milliseconds(5));
   if (victim == Victim::client) client.emplace([&] { ask(backplane, board); });
-  const auto isIn = [](const std::atomic<std::int64_t>& word) {
+  const auto isSet = [](const std::atomic<std::int64_t>& word) {
     return word.load(std::memory_order_relaxed) != 0;
   };
-  if (!waitUntil([&] { return isIn(board.connectedNs); }, kConnectLimit))
-    throw std::runtime_error("the client does not connect");
+  if (!waitUntil([&] { return isSet(board.connectedNs); }, kConnectLimit))
+    throw std::runtime_error("the client did not connect in time");
   sleepUntil(board.connectedNs.load(std::memory_order_relaxed) + age.count());
   std::int64_t killedNs = 0;
   const auto reapNs = (victim == Victim::server ? *server : *client).reapNs(killedNs);
-  if (!waitUntil([&] { return isIn(board.newsNs); }, kNewsLimit))
-    throw std::runtime_error("the peer has no news");
-  return {board.newsNs.load(std::memory_order_relaxed) - killedNs, reapNs};
+  if (!waitUntil([&] { return isSet(board.notifiedNs); }, kNotifyLimit))
+    throw std::runtime_error("the peer was not notified of the death in time");
+  return {board.notifiedNs.load(std::memory_order_relaxed) - killedNs, reapNs};
 }
 
 Outcome deaths(const Stage& stage, const std::string& backplane, Victim victim, const Age& age,
@@ -168,7 +168,7 @@ Outcome deaths(const Stage& stage, const std::string& backplane, Victim victim, 
     const auto end = Deadline::after(scene.budget().measure);
     do {
       const auto took = killOnce(backplane, victim, Nanoseconds(ageNs(random)));
-      recorder.add(static_cast<std::uint64_t>(isFloor ? took.reapNs : took.newsNs));
+      recorder.add(static_cast<std::uint64_t>(isFloor ? took.reapNs : took.notifyNs));
     } while (!end.hasPassed());
     scene.figures().latency = recorder;
   };
@@ -185,7 +185,7 @@ std::vector<Measurement> deathMeasurements(const std::string& runName) {
   for (const auto victim : {Victim::server, Victim::client}) {
     for (const auto& age : kAges) {
       const auto* const who = victim == Victim::server ? "server" : "client";
-      const auto* const told = victim == Victim::server ? "client" : "server";
+      const auto* const notified = victim == Victim::server ? "client" : "server";
       Measurement floor;
       floor.question = kQuestion;
       floor.name = fmt::format("waitpid, {} of {}", who, age.name);
@@ -194,7 +194,7 @@ std::vector<Measurement> deathMeasurements(const std::string& runName) {
       floor.isSlow = true;
       floor.detail = fmt::format("{} killed {} after the client connected", who, age.name);
       auto ours = floor;
-      ours.name = fmt::format("{}, {}'s news, {}", kMpf, told, age.name);
+      ours.name = fmt::format("{}, {} notified, {}", kMpf, notified, age.name);
       ours.floorName = floor.name;
       const auto backplane = fmt::format("{}-death-{}{}", runName, who[0], age.least.count());
       floor.run = [=](const Stage& stage) { return deaths(stage, backplane, victim, age, true); };

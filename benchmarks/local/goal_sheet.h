@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// GoalSheet: goals that the project has set itself beside what a run reached; only those whose rows
-// were taken.
+// GoalSheet: compares the goals of the project with the results of a run. Goals without a result
+// are left out.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ class GoalSheet {
  public:
   explicit GoalSheet(const std::vector<Result>& results) : results_(results) {}
 
-  // The good row with these marks, or nullptr. `question` is how its heading begins; any mode will
-  // do when none is given.
+  // The successful row of this name, or nullptr. Its heading begins with `question`. Without
+  // `mode`, any mode matches.
   [[nodiscard]] const Result* find(std::string_view question, std::string_view name,
                                    std::optional<Mode> mode = {}) const {
     const auto found = std::find_if(results_.begin(), results_.end(), [&](const Result& result) {
@@ -33,8 +33,8 @@ class GoalSheet {
     return row != nullptr && row->ratioToFloor > 0 ? std::optional(row->ratioToFloor)
                                                    : std::nullopt;
   }
-  // How much more one costs than the other; both were measured beside the same floor, each in its
-  // own minute.
+  // The ratio of the costs of two rows. Each is divided by the same floor as it was measured right
+  // before that row, since the two rows were taken at different times.
   [[nodiscard]] std::optional<double> costRatio(const Result* row, const Result* to) const {
     const bool known =
         row != nullptr && to != nullptr && row->ratioToFloor > 0 && to->ratioToFloor > 0;
@@ -47,7 +47,7 @@ class GoalSheet {
   void atLeast(std::string_view goal, std::optional<double> reached, double limit) {
     add(goal, reached, limit, reached && *reached >= limit);
   }
-  // Empty when nothing of it was taken.
+  // Empty when no goal has a result.
   [[nodiscard]] std::string text() const {
     return text_.empty()
                ? ""

@@ -9,7 +9,7 @@
 namespace mpf::bench {
 namespace {
 
-// Every row of a full run has a floor beside it; of a quick one ours have.
+// In a full run every row is taken beside its floor; in a quick run only the MPF rows are.
 int roundsOf(const Measurement& row, bool quick) {
   if (row.floorName.empty()) return 0;
   if (quick) return row.name.starts_with(kMpf) ? 1 : 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf bench local`: measures ours beside the physical floors and beside other message systems, in
+// `mpf bench local`: measures MPF beside the physical floors and beside other message systems, in
 // one run on two CPUs.
 //
 //   mpf::bench::Options options;
@@ -12,10 +12,10 @@
 namespace mpf::bench {
 
 inline constexpr const char* kLocalHelp =
-    "How fast messages are on this host, beside the physical floors and other message systems";
+    "Measures messages on this host, beside the physical floors and other message systems";
 
-// Returns the exit status of a program: 0 all was measured or left out by name, 1 something failed,
-// 2 the options cannot be met.
+// Returns the exit status of the program: 0 all rows were measured or left out with a reason, 1 a
+// row failed, 2 usage error.
 [[nodiscard]] int runLocal(const Options& options);
 
 }  // namespace mpf::bench

@@ -20,7 +20,7 @@ std::string heading(const Measurement&) {
                      "floor");
 }
 
-// Floors stand for several sizes under one heading.
+// The name of a row. Floors of several sizes are under one heading, so their names have the size.
 std::string nameOf(const Measurement& what) {
   return what.question.starts_with("Floors") && what.bytes > 4
              ? fmt::format("{} {} KiB", what.name, what.bytes / 1024)

@@ -7,7 +7,7 @@
 namespace mpf::bench {
 namespace {
 
-// 0 for none.
+// 0 without values.
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   std::sort(values.begin(), values.end());
@@ -15,7 +15,7 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
 }
 
-// What several rounds say together.
+// Combines the results of several rounds.
 class Rounds {
  public:
   void add(const Figures& figures, double floorNs) {
@@ -49,7 +49,7 @@ class Rounds {
  private:
   LatencyRecorder latency_;
   std::uint64_t count_ = 0;
-  LineFaultFigures lineFaults_;  // of the last round: rows of serial lines have one
+  LineFaultFigures lineFaults_;  // of the last round; rows of serial lines have only one
   std::vector<double> typical_, perSecond_, values_, writes_, idleServer_, idleRequester_, floors_,
       ratios_;
 };
@@ -74,7 +74,7 @@ Result Runner::run(Measurement row, Budget budget, int rounds) {
   return result;
 }
 
-// Empty, or why this row's environment is not to be had; then it is not tried again.
+// Starts the environment of this row. Empty, or why it cannot be started; it is not tried again.
 std::string Runner::enter(const Measurement& row) try {
   if (row.environmentName == current_) return {};
   environment_.reset();
@@ -89,7 +89,7 @@ std::string Runner::enter(const Measurement& row) try {
   return missing_[row.environmentName] = exception.what();
 }
 
-// 0: there is none.
+// 0 when the row has no floor.
 double Runner::measureFloor(const Measurement& row, Budget budget, int rounds) {
   if (row.floorName.empty()) return 0;
   auto& known = lastFloor_[{row.setting, row.floorName, row.floorBytes}];

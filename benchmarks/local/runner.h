@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Runner: takes rows one after another, each beside its floor.
+// Runner: measures rows one after another, each beside its floor.
 //
 //   floor, row, floor, row, floor, row ...     ratio = median of the rounds' ratios
 //
-// The same two CPUs may be near or far from each other from one moment to the next: a host moves
-// the processors of a virtual machine about, and a cache line then takes 70 or 500 ns. So a floor
-// that was measured a minute ago says nothing, and every round has its own.
+// A host may move the processors of a virtual machine at any time, and a cache line then needs
+// 70 ns or 500 ns between the same two CPUs. A floor that was measured a minute ago cannot be
+// compared, and so every round measures its floor again.
 //
 // Threads  the runner's only one.
 #pragma once
@@ -23,11 +23,11 @@ namespace mpf::bench {
 
 class Runner {
  public:
-  // `all` outlives the runner; floors are found there.
+  // `all` must outlive the runner; it contains the floors.
   Runner(Placement placement, const std::vector<Measurement>& all) noexcept
       : placement_(std::move(placement)), all_(all) {}
 
-  //   rounds  0: measure the row once, and divide it by its floor as that was last measured
+  //   rounds  0: measure the row once, and divide it by the last measurement of its floor
   [[nodiscard]] Result run(Measurement row, Budget budget, int rounds);
 
  private:
@@ -36,10 +36,10 @@ class Runner {
 
   Placement placement_;
   const std::vector<Measurement>& all_;
-  std::unique_ptr<Environment> environment_;  // of the last row, for the next
+  std::unique_ptr<Environment> environment_;  // of the last row; the next row may use it again
   std::string current_;
   std::map<std::string, std::string> missing_;
-  // by setting, name and bytes [ns]
+  // By setting, name and bytes [ns].
   std::map<std::tuple<std::string, std::string, std::size_t>, double> lastFloor_;
 };
 

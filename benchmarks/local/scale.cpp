@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What many clients, and clients that come and go, cost; ours only: no peer has anything to set
-// beside it but the socket's connect.
+// The cost of many clients and of connecting, for MPF only: of the peers, only the socket has a
+// connect to compare with.
 #include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -33,7 +33,7 @@ void connectOrThrow(MessageClient& client) {
     throw std::runtime_error("not connected: " + client.notConnectedBecause());
 }
 
-// Answers everything until killed.
+// Answers all requests until the process is killed.
 void serveForEver(const Scene& scene, const std::string& backplane, Mode mode) {
   raiseDescriptorLimit();
   MessageServer server(Backplane::attach(backplane), kServer, serverOptions(mode));
@@ -57,7 +57,7 @@ class Crowd {
     write.reset();
     char connected = 0;
     if (retryInterrupted([&] { return ::read(read.get(), &connected, 1); }) != 1)
-      throw std::runtime_error("the idle clients do not connect");
+      throw std::runtime_error("the idle clients did not connect");
   }
   ~Crowd() { killProcess(pid_); }
   Crowd(const Crowd&) = delete;
@@ -83,7 +83,8 @@ Outcome runAndClean(const Stage& stage, const std::string& backplane, const Act&
   return outcome;
 }
 
-// A client of a process that has a dispatcher already, until it is connected; its end is not timed.
+// Times a client from its construction until it is connected, in a process that already has a
+// dispatcher. The destructor is not timed.
 Outcome connectTime(const Stage& stage, const std::string& backplane, Mode mode) {
   Act act;
   act.server = [=](const Scene& scene) { serveForEver(scene, backplane, mode); };
@@ -137,8 +138,7 @@ Outcome memoryPerLink(const Stage& stage, const std::string& backplane) {
   Act act;
   act.server = [=](const Scene& scene) {
     raiseDescriptorLimit();
-    MessageServer server(Backplane::attach(backplane),
-                         kServer);  // the options that a program gets that asks for none
+    MessageServer server(Backplane::attach(backplane), kServer);  // with the default options
     scene.ready();
     while (server.waitForMessage()) {
       while (auto request = server.receive()) server.reply(std::move(request));
@@ -156,8 +156,8 @@ Outcome memoryPerLink(const Stage& stage, const std::string& backplane) {
   return runAndClean(stage, backplane, act);
 }
 
-// 50 servers and 50 clients with a link each, and nothing to do. They live until killed; each
-// client says when it is connected.
+// 50 servers and 50 clients with one link each, which do nothing until they are killed. Each client
+// reports when it is connected.
 class IdlePairs {
  public:
   explicit IdlePairs(const std::string& backplane) {
@@ -175,7 +175,7 @@ class IdlePairs {
     for (int i = 0; i < kPairs; ++i) {
       char connected{};
       if (retryInterrupted([&] { return ::read(read.get(), &connected, 1); }) != 1)
-        throw std::runtime_error("a client does not connect");
+        throw std::runtime_error("a client did not connect");
     }
   }
   ~IdlePairs() {
@@ -184,7 +184,7 @@ class IdlePairs {
   IdlePairs(const IdlePairs&) = delete;
   IdlePairs& operator=(const IdlePairs&) = delete;
 
-  // Time on a CPU so far, of all threads of all processes [ns].
+  // CPU time so far of all threads of all processes [ns].
   [[nodiscard]] double cpuNs() const {
     double sum = 0;
     for (const auto pid : pids_) sum += cpuNsOf(pid);
@@ -207,7 +207,7 @@ Outcome idleCpu(const Stage& stage, const std::string& backplane) {
   Act act;
   act.requester = [=](const Scene& scene) {
     const IdlePairs pairs(backplane);
-    sleepFor(std::chrono::seconds(1));  // what follows connecting has been done
+    sleepFor(std::chrono::seconds(1));  // until the work that follows connecting is done
     const auto before = pairs.cpuNs();
     const auto fromNs = Clock::nowNs();
     sleepFor(std::max<Nanoseconds>(scene.budget().measure, std::chrono::seconds(1)));
@@ -244,7 +244,7 @@ Outcome roundTripBeside(const Stage& stage, const std::string& backplane, Mode m
     timeEach(scene, [&] {
       const auto wanted = received + 1;
       if (client.send(Int32Message({.value = 1})) != SendResult::sent)
-        throw std::runtime_error("send failed");
+        throw std::runtime_error("a request could not be sent");
       while (received < wanted) dispatcher.runOnce();
     });
   };

@@ -43,7 +43,7 @@ Budget budgetOf(const Measurement& row, const std::vector<Measurement>& rows, co
   return {mine / 5, mine - mine / 5};
 }
 
-// "0+2"; empty when that is not what it says.
+// Parses "0+2"; empty when the text is something else.
 Cpus parseCpus(const std::string& text) {
   Cpus cpus;
   std::istringstream words(text);
@@ -56,7 +56,7 @@ Cpus parseCpus(const std::string& text) {
   return cpus;
 }
 
-// Before the work, which takes minutes: empty without a name.
+// Opens the JSON file before the work, which takes minutes; nullopt without a file name.
 std::optional<OutputFile> openJson(const Options& options) {
   if (options.jsonFile.empty() || options.jsonFile == "-") return std::nullopt;
   return OutputFile(options.jsonFile);
@@ -90,13 +90,13 @@ int show(const std::vector<Result>& results, const Machine& machine, const Place
 
 void addOptions(CLI::App& app, Options& options) {
   app.add_flag("--quick", options.quick, "End within 40 s: shorter, and so noisier, measurements");
-  app.add_flag("--list", options.list, "Only name what would be measured");
+  app.add_flag("--list", options.list, "Only list the rows that would be measured");
   app.add_option(
       "--json", options.jsonFile,
-      "Write the results there, as a list of objects; - for stdout in place of the table");
+      "Write the results to this file, as a list of objects; -: to stdout instead of the table");
   app.add_option("--cpus", options.cpus,
-                 "CPUs of the server's side and of the requester's, as 0,1 or 0+2,1+3; default: "
-                 "the first two")
+                 "CPUs of the server and of the requester, as 0,1 or 0+2,1+3; default: the first "
+                 "two")
       ->delimiter(',')
       ->expected(2);
   app.add_option(
@@ -108,8 +108,8 @@ void addWaitOption(CLI::App& app, Mode& wait) {
   const std::map<std::string, Mode> modes{
       {"adaptive", Mode::adaptive}, {"block", Mode::block}, {"spin", Mode::spin}};
   app.add_option("--wait", wait,
-                 "How servers and clients of ours wait: adaptive (default), block or, but not in "
-                 "hardware, spin")
+                 "How MPF servers and clients wait: adaptive (default), block, or spin (not for "
+                 "hardware)")
       ->transform(CLI::Transformer(modes))
       ->type_name("MODE");
 }
@@ -134,7 +134,7 @@ std::optional<Placement> place(const Options& options, bool mayShare) {
     placement = {parseCpus(options.cpus.front()), parseCpus(options.cpus.back())};
   for (const auto& side : {placement.server, placement.requester}) {
     if (side.empty()) {
-      printError("bench: --cpus: a side is a number, or several as 0+2\n");
+      printError("bench: --cpus: use a CPU number for each side, or several as 0+2\n");
       return std::nullopt;
     }
     for (const auto cpu : side) {
@@ -144,7 +144,9 @@ std::optional<Placement> place(const Options& options, bool mayShare) {
     }
   }
   if (placement.server == placement.requester && !mayShare) {
-    printError("bench: two CPUs are needed, this process may use {}\n", allowed.size());
+    printError(
+        "bench: server and requester need different CPUs, this process may use {}; see --cpus\n",
+        allowed.size());
     return std::nullopt;
   }
   return placement;
@@ -171,7 +173,7 @@ int run(std::vector<Measurement> all, const std::optional<Placement>& placement,
   }
   if (!placement) return 2;
   if (rows.empty()) {
-    printError("bench: nothing has such a name; --list shows the names\n");
+    printError("bench: --only: no row has such a name; --list shows all names\n");
     return 2;
   }
   const auto machine = Machine::look(*placement);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Session: what `mpf bench local`, `remote` and `hardware` have in common: which rows, on which
-// CPUs, one after another, and what to show.
+// What `mpf bench local`, `remote` and `hardware` have in common: the choice of rows and CPUs, the
+// measurements one after another, and the output.
 //
 // Progress goes to stderr, the table to stdout, JSON to a file.
 //
-// Threads  call it from a process that has no other thread: it forks.
+// Threads  the calling process must have no other thread, because these functions fork.
 #pragma once
 
 #include <functional>
@@ -22,14 +22,14 @@ class App;
 namespace mpf::bench {
 
 struct Options {
-  bool quick = false;  // within 40 s
-  bool list = false;  // only name what would be measured
+  bool quick = false;    // ends within 40 s
+  bool list = false;     // only lists the rows that would be measured
   std::string jsonFile;  // empty: none; "-": stdout instead of the table
-  std::vector<std::string>
-      cpus;  // server's and requester's: "0", or several as "0+2"; empty: the first two allowed
-  // rows whose full name contains one of these, and the floors that they need
+  // Of server and requester: "0", or several as "0+2"; empty: the first two allowed.
+  std::vector<std::string> cpus;
+  // Measures only rows whose full name contains one of these, and the floors that they need.
   std::vector<std::string> only;
-  std::string commandLine;  // for the table's head
+  std::string commandLine;  // for the head of the table
 };
 
 // Adds --quick, --list, --json, --cpus and --only.
@@ -37,30 +37,30 @@ void addOptions(CLI::App& app, Options& options);
 // Adds --wait.
 void addWaitOption(CLI::App& app, Mode& wait);
 
-// How long rows take, and how often each is taken beside its floor.
+// The duration of the rows, and the number of rounds of each row.
 struct Pace {
   Nanoseconds fullRow{};
-  Nanoseconds quickRun{};  // all rows together, in a quick run; setting up comes on top
+  Nanoseconds quickRun{};  // of all rows together in a quick run, without the time to set up
   std::function<int(const Measurement&)> rounds;
 };
 
-// What was asked for, and the floors that it is divided by.
+// The rows that the user asked for, and their floors.
 [[nodiscard]] std::vector<Measurement> choose(std::vector<Measurement> all, const Options& options);
 
-// Where both sides run. nullopt, and says why, when the options cannot be met; nowhere when there
-// is only a list to print.
+// The CPUs of both sides. nullopt, after it has printed the reason, when the options cannot be met.
+// With --list, the CPUs are not checked.
 //   mayShare  both sides may be on one CPU
 [[nodiscard]] std::optional<Placement> place(const Options& options, bool mayShare);
 
-// Takes all rows, in order.
+// Measures all rows, in order.
 [[nodiscard]] std::vector<Result> takeAll(const std::vector<Measurement>& rows,
                                           const Placement& placement, const Options& options,
                                           const Pace& pace);
 
-// A whole run: lists the rows that are asked for, or takes them and shows `tableOf` them.
-//   placement  as place() says
-//   returns    the exit status of a program: 0 all was measured or left out by name, 1 something
-//              failed, 2 the options cannot be met
+// A whole run: lists the chosen rows, or measures them and prints `tableOf` of the results.
+//   placement  the result of place()
+//   returns    the exit status of the program: 0 all rows were measured or left out with a reason,
+//              1 a row failed, 2 usage error
 [[nodiscard]] int run(std::vector<Measurement> all, const std::optional<Placement>& placement,
                       const Options& options, const Pace& pace,
                       const std::function<std::string(const std::vector<Result>&)>& tableOf);

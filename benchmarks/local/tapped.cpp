@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What it costs two processes that `mpf tap` reads along. The tap runs wherever the kernel puts it:
-// with two CPUs, beside one of the two.
+// The cost for two processes when `mpf tap` reads their messages. The kernel chooses the CPU of the
+// tap: on a host with two CPUs, it shares one with a measured process.
 #include <fcntl.h>
 #include <sched.h>
 #include <unistd.h>
@@ -22,8 +22,8 @@ std::string tool() {
   return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mpf").string();
 }
 
-// `mpf tap`, the program beside this one, once it follows the server; what it reads goes to a file
-// that nobody keeps.
+// Runs `mpf tap` from the folder of this program. The constructor returns when it follows the
+// server. The tap writes the messages to /dev/null.
 class Tap {
  public:
   explicit Tap(const std::string& backplane) {
@@ -41,7 +41,7 @@ class Tap {
     says.reset();
     char first{};
     if (retryInterrupted([&] { return ::read(said.get(), &first, 1); }) != 1)
-      throw std::runtime_error("mpf tap does not start");
+      throw std::runtime_error(tool() + " tap could not be started");
   }
   ~Tap() { killProcess(pid_); }
   Tap(const Tap&) = delete;
@@ -64,7 +64,7 @@ std::vector<Measurement> tappedMeasurements(const std::string& runName) {
       row.bytes = 4;
       row.floorName = mode == Mode::block ? kFutexBounce : kBounce;
       row.floorBytes = 4;
-      if (tapped && !std::filesystem::exists(tool())) row.skipped = tool() + " is not there";
+      if (tapped && !std::filesystem::exists(tool())) row.skipped = tool() + " does not exist";
       const auto backplane = runName + "-tap" + (tapped ? "1" : "0") + toString(mode)[0];
       row.run = [=](const Stage& stage) {
         return roundTripBeside(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Boost.Interprocess message_queue: one queue a direction, each message copied in and out under a
-// shared mutex. Polling tries.
+// Boost.Interprocess message_queue: one queue for each direction; each message is copied in and out
+// under a shared mutex. In spin mode it polls with try_send() and try_receive().
 #include <boost/interprocess/ipc/message_queue.hpp>
 #include <optional>
 #include <vector>

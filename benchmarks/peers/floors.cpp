@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Floors: what the machine itself needs. No message system that uses the same means can be faster.
+// Floors: the time that the machine itself needs. No message system that uses the same means can be
+// faster.
 #include <fcntl.h>
 #include <linux/futex.h>
 #include <sys/mman.h>
@@ -27,7 +28,7 @@ struct alignas(kLineBytes) Line {
   Word word{0};
 };
 
-// Two lines, one a direction; what the sender wrote before a post is seen after the wait.
+// Two lines, one for each direction. What the sender wrote before post() is visible after wait().
 struct Bounce {
   Line request;
   Line reply;
@@ -35,7 +36,7 @@ struct Bounce {
 
 struct Spinning {
   static void post(Word& word, std::uint32_t value) noexcept {
-    // PAIR(bench-bounce): what was written before is seen by who sees the value.
+    // PAIR(bench-bounce): a process that sees the value sees everything written before it.
     word.store(value, std::memory_order_release);
   }
   static void wait(const Word& word, std::uint32_t value) noexcept {
@@ -56,13 +57,13 @@ struct Asleep {
   }
 };
 
-// A bounce, with work of the server and of the requester while they have the word.
+// A bounce in which the server and the requester each call `work` before they post.
 template <class Wait>
 Act bounce(std::size_t bytes, std::function<void(std::byte*, std::byte*)> work) {
   Act act;
   act.scratchBytes = 4096 + 2 * bytes;
   act.stopsByItself = true;
-  // work(from, to): nothing to do for the bare bounce.
+  // work(from, to) is empty for the bare bounce.
   const auto buffers = [bytes](const Scene& scene) {
     return std::pair(scene.scratch().data() + 4096, scene.scratch().data() + 4096 + bytes);
   };
@@ -86,15 +87,15 @@ Act bounce(std::size_t bytes, std::function<void(std::byte*, std::byte*)> work) 
       Wait::post(lines.request.word, turn);
       Wait::wait(lines.reply.word, turn);
     });
-    // The server looks at stopping() after its post: one more turn is needed, and it may come too
-    // late.
+    // The server checks stopping() after its post, so it needs one more turn to end. It may also
+    // have ended already.
     scene.stop();
     Wait::post(lines.request.word, ++turn);
   };
   return act;
 }
 
-// Slots that publish themselves, one line each; the consumer hands them back in batches.
+// Slots of one line each, published by their sequence number; the consumer frees them in batches.
 struct Slot {
   alignas(kLineBytes) std::atomic<std::uint64_t> sequence{0};
   std::uint64_t payload = 0;
@@ -119,7 +120,7 @@ Act ring(std::uint64_t capacity, std::uint64_t freeEvery) {
     scene.ready();
     for (std::uint64_t taken = 0;;) {
       auto& slot = slots[taken & (capacity - 1)];
-      // PAIR(bench-slot-filled): who sees the sequence sees the payload.
+      // PAIR(bench-slot-filled): once the sequence is visible, the payload is.
       while (slot.sequence.load(std::memory_order_acquire) != taken + 1) cpuRelax();
       sum += slot.payload;
       asm volatile("" : : "r"(sum));
@@ -138,13 +139,13 @@ Act ring(std::uint64_t capacity, std::uint64_t freeEvery) {
       while (resume()) {
         for (int i = 0; i < 4096; ++i) {
           while (pushed - freedSeen >= capacity) {
-            // PAIR(bench-slot-freed): the consumer is done with what we are about to overwrite.
+            // PAIR(bench-slot-freed): the consumer has read the slots that are overwritten next.
             freedSeen = freed.load(std::memory_order_acquire);
             if (pushed - freedSeen >= capacity) cpuRelax();
           }
           auto& slot = slots[pushed & (capacity - 1)];
           slot.payload = pushed;
-          // PAIR(bench-slot-filled): the payload is there.
+          // PAIR(bench-slot-filled): the payload is written.
           slot.sequence.store(++pushed, std::memory_order_release);
         }
       }
@@ -153,8 +154,8 @@ Act ring(std::uint64_t capacity, std::uint64_t freeEvery) {
   return act;
 }
 
-// memcpy in one process between buffers of its own: `spread` bytes are gone through before the same
-// ones come again.
+// memcpy in one process between its own buffers. It copies `spread` bytes before it uses the same
+// buffer again.
 Act copyAlone(std::size_t bytes, std::size_t spread) {
   Act act;
   act.requester = [=](const Scene& scene) {
@@ -171,7 +172,7 @@ Act copyAlone(std::size_t bytes, std::size_t spread) {
   return act;
 }
 
-// A link is at least one segment; nobody gets one for less.
+// The floor of connecting: a link consists of at least one segment.
 Act makeSegment() {
   Act act;
   act.requester = [](const Scene& scene) {
@@ -221,7 +222,7 @@ std::vector<Measurement> floorMeasurements() {
     rows.push_back(floor(question, "memcpy, cached", Mode::spin, bytes, copyAlone(bytes, 0)));
     rows.push_back(floor(question, "memcpy, cold", Mode::spin, bytes,
                          copyAlone(bytes, std::size_t{256} << 20)));
-    // Only shows what the peers' own touching costs beside a memcpy.
+    // Only shows the cost of the peers' reading and writing compared with a memcpy.
     const auto touch = [bytes](std::byte* from, std::byte* to) {
       readAll(from, bytes);
       writeAll(to, bytes);

@@ -19,7 +19,7 @@
 namespace mpf::bench {
 namespace {
 
-constexpr const char* kTemporary = "/tmp";  // where iceoryx has its files, whatever $TMPDIR says
+constexpr const char* kTemporary = "/tmp";  // iceoryx uses this folder even if $TMPDIR is another
 
 // As little shared memory as the measurements need.
 constexpr std::string_view kPools = R"([general]
@@ -52,7 +52,7 @@ std::string writeConfig() {
   return path;
 }
 
-// Reads what the daemon says until it says that it is ready.
+// Reads the daemon's output until it reports that it is ready.
 bool isReady(int pipe) {
   std::string said;
   const auto deadline = Deadline::after(std::chrono::seconds(10));
@@ -90,7 +90,8 @@ IceoryxDaemon::IceoryxDaemon() : config_(writeConfig()) {
   if (ended) pid_ = 0;
   stop();
   throw std::runtime_error(
-      ended ? "iox-roudi ended at once: not installed (package iceoryx), or another one runs"
+      ended ? "iox-roudi ended at once: it is not installed (package iceoryx), or another one is "
+              "running"
             : "iox-roudi is not ready after 10 s");
 }
 

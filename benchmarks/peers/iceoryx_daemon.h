@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// IceoryxDaemon: RouDi, without which nothing of iceoryx works, for the time of its measurements.
+// IceoryxDaemon: runs RouDi, the daemon that iceoryx needs, during the measurements of iceoryx.
 #pragma once
 
 #include <string>
@@ -10,8 +10,9 @@ namespace mpf::bench {
 
 class IceoryxDaemon final : public Environment {
  public:
-  // Returns when it is ready for clients.
-  //   throws  std::runtime_error: not installed, another one runs already, not ready within 10 s
+  // Returns when the daemon is ready for clients.
+  //   throws  std::runtime_error when it is not installed, another one is running, or it is not
+  //           ready within 10 s
   IceoryxDaemon();
   ~IceoryxDaemon() override;
   IceoryxDaemon(const IceoryxDaemon&) = delete;

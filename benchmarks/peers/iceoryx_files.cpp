@@ -30,7 +30,7 @@ std::vector<fs::path> locksIn(const fs::path& folder) {
   return locks;
 }
 
-// The lock of a process that is gone; none when somebody holds it, or there is no such file.
+// Takes the lock of a dead process. Empty when a process holds it, or the file does not exist.
 FileDescriptor tryLock(const fs::path& path) {
   FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
   if (file && ::flock(file.get(), LOCK_EX | LOCK_NB) != 0) file.reset();
@@ -59,7 +59,7 @@ void removeIceoryxFiles(const fs::path& folder) {
 }
 
 void removeRouDiFiles(const fs::path& folder, const fs::path& sharedMemory) {
-  // another RouDi cannot start meanwhile
+  // No other RouDi can start while this process holds the lock.
   const auto held = tryLock(folder / "iox-unique-roudi.lock");
   if (!held) return;
   removeFile(sharedMemory / "iceoryx_mgmt");

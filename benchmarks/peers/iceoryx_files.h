@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Files that iceoryx leaves: of each process of a measurement, which is killed, and of its daemon
-// RouDi, which ends without removing them when its clients were killed. Each process has a lock
-// NAME.lock and a socket NAME in the temporary folder, the daemon segments, too.
+// Removes files that iceoryx leaves: those of killed processes of a measurement, and those of its
+// daemon RouDi, which does not remove them when its clients were killed. Each process has a lock
+// NAME.lock and a socket NAME in the temporary folder; the daemon also has segments.
 #pragma once
 
 #include <filesystem>
 
 namespace mpf::bench {
 
-// Removes those of processes that are gone, of this run and of earlier ones: their names begin with
-// kRunPrefix, and nobody holds the lock.
+// Removes the files of dead processes of this run and of earlier runs: their names begin with
+// kRunPrefix, and no process holds their lock.
 void removeIceoryxFiles(const std::filesystem::path& folder);
 
-// Removes those of a RouDi that ran as this user and is gone, which nobody holds the lock of.
+// Removes the files of a dead RouDi of this user, if no process holds its lock.
 void removeRouDiFiles(const std::filesystem::path& folder,
                       const std::filesystem::path& sharedMemory);
 

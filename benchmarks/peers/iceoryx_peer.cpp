@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// iceoryx 2.0: its request-response of untyped payloads, built and read in place; publish-subscribe
-// for one way. Polling takes; asleep both sides wait at a WaitSet.
+// iceoryx 2.0: request-response with untyped payloads that are built and read in place, and
+// publish-subscribe for one-way traffic. In spin mode it polls with take(); in block mode both
+// sides wait at a WaitSet.
 #include <iceoryx_hoofs/log/logmanager.hpp>
 #include <iceoryx_posh/popo/untyped_client.hpp>
 #include <iceoryx_posh/popo/untyped_publisher.hpp>
@@ -142,7 +143,7 @@ class IceoryxPeer final : public Peer {
 
   PeerOptions options_;
   std::optional<popo::UntypedClient> client_;
-  std::optional<popo::WaitSet<1>> waitSet_;  // made late: it asks for the daemon
+  std::optional<popo::WaitSet<1>> waitSet_;  // created in connect(), because it needs the daemon
 };
 
 }  // namespace

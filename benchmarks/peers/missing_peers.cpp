@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Peers that were not installed when this was built: named, and left out.
+// Peers whose libraries were not installed at build time: their rows are left out with this reason.
 #include "benchmarks/peers/peer.h"
 
 namespace mpf::bench {
@@ -8,7 +8,7 @@ namespace {
 [[maybe_unused]] PeerFamily missing(const char* name, const char* package) {
   PeerFamily family;
   family.name = name;
-  family.skipped = std::string("not installed when this was built (") + package + ")";
+  family.skipped = std::string("not installed at build time (") + package + ")";
   family.modes = {Mode::block};
   return family;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ours, through the public API: MessageServer, and MessageClient with its callback, on a dispatcher
+// MPF through its public API: MessageServer, and MessageClient with its callback, on a dispatcher
 // that the requester runs itself.
 #include "benchmarks/peers/mpf_peer.h"
 
@@ -37,7 +37,7 @@ class MpfPeer final : public Peer {
           writeAll(value.data(), value.size_bytes());
         }
         if (server.reply(std::move(request)) != ReplyResult::sent)
-          throw std::runtime_error("a reply was not sent");
+          throw std::runtime_error("a reply could not be sent");
       }
     }
   }
@@ -72,8 +72,8 @@ class MpfPeer final : public Peer {
     MpfPeer::receive();
   }
 
-  // One way, the server sends: to one request any number of replies may be sent, and the client
-  // takes them in its callback.
+  // One way: the server sends any number of replies to one request, and the client receives them in
+  // its callback.
   void sink(const Scene& scene) override {
     scene.ready();
     connect(scene);
@@ -120,10 +120,12 @@ class MpfPeer final : public Peer {
   void take(Message& message) {
     if (message.getType() == MessageType::connect) return;
     if (options_.bytes == 4) {
-      if (message.tryAs<Int32>() == nullptr) throw std::runtime_error("a reply that is none");
+      if (message.tryAs<Int32>() == nullptr)
+        throw std::runtime_error("the reply is not an Int32 message");
     } else {
       const auto value = message.template valueAs<Array>();
-      if (value.size_bytes() != options_.bytes) throw std::runtime_error("a reply of another size");
+      if (value.size_bytes() != options_.bytes)
+        throw std::runtime_error("the size of the reply differs from that of the request");
       if (options_.touch) readAll(value.data(), value.size_bytes());
     }
     ++received_;
@@ -177,7 +179,7 @@ double occupiedBytes(const Backplane& backplane) {
   return bytes;
 }
 
-// In a process of its own: attaching starts a thread, and the runner has to stay without.
+// In a process of its own, because attaching starts a thread, and the runner must not have one.
 void removeBackplanes(const std::string& prefix) noexcept try {
   const auto pid = forkProcess([&] {
     for (const auto& name : Backplane::names()) {

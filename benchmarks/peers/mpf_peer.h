@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the measurements of ours have in common.
+// Functions that all measurements of MPF share.
 #pragma once
 
 #include <chrono>
@@ -16,30 +16,32 @@ inline constexpr const char* kMpf = "MPF";
 inline constexpr const char* kServer = "bench";
 inline constexpr auto kConnectLimit = std::chrono::seconds(10);
 
-// Where server and client of ours meet.
+// The backplanes and the location of an MPF server and its client.
 struct MpfPlaces {
   std::string serverBackplane;
-  std::string clientBackplane;  // another one: a pair of routers joins both
+  std::string clientBackplane;  // if it differs, a pair of routers joins both
   std::int32_t location = 0;
   int queueSize = 256;
 };
 
-// Ours: 4 bytes are an Int32 message; more an array of type Array, which the client makes in shared
-// memory and the server replies with. Instances: Char8Array, Int32Array, Float64Array.
+// The MPF peer. 4 bytes are an Int32 message; more bytes are an array of type Array, which the
+// client allocates in shared memory and the server sends back. Instances: Char8Array, Int32Array,
+// Float64Array.
 template <ArrayBody Array>
 [[nodiscard]] std::unique_ptr<Peer> makeMpfPeer(const PeerOptions& options,
                                                 const MpfPlaces& places);
 
 [[nodiscard]] WaitMode waitMode(Mode mode) noexcept;
 [[nodiscard]] ServerOptions serverOptions(Mode mode);
-// Begins the name of every backplane, queue and socket of a run; its pid follows.
+// The names of all backplanes, queues and sockets of a run begin with this prefix and its pid.
 inline constexpr const char* kRunPrefix = "mpf-bench-";
-// Each link takes descriptors: lets this process, and what it starts, have as many as it may.
+// Raises the soft limit of descriptors of this process to its hard limit, since each link needs
+// descriptors. Processes that it starts inherit the limit.
 void raiseDescriptorLimit() noexcept;
-// Pages of shared memory that the segments of a backplane occupy.
+// Bytes of shared memory that the segments of a backplane occupy.
 [[nodiscard]] double occupiedBytes(const Backplane& backplane);
-// Removes what killed processes left on backplanes whose names begin so. What belongs to a living
-// process stays.
+// Removes what dead processes left on backplanes whose names begin with `prefix`. The segments of
+// living processes stay.
 void removeBackplanes(const std::string& prefix) noexcept;
 
 }  // namespace mpf::bench

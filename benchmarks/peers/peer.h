@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Peer: a way to get messages from one process to another and back. Ours is one of them.
+// Peer: a system that carries messages from one process to another and back. MPF is one of them.
 //
-// An object is made in the runner, before the processes are; it may hold names, no resource. Then
-// serve() or sink() runs in the server's process, and connect() with all that follows in the
-// requester's. Waits need no deadline: the Stage has one.
+// The runner creates the object before it forks, so it may hold names but no resources. Then
+// serve() or sink() runs in the server's process, and connect() and the other functions in the
+// requester's process. Waits need no deadline, because the Stage has one.
 //
-// `touch`: send() writes every byte before it hands the request over, the server reads them all and
-// writes all of the reply, receive() reads them all (touch.h). Without it each side does the least
-// that the transport needs.
+// `touch`: send() writes every byte before it sends the request, the server reads all of them and
+// writes all bytes of the reply, receive() reads all of them (touch.h). Without it each side does
+// only what the transport needs.
 #pragma once
 
 #include <functional>
@@ -35,7 +35,7 @@ class Peer {
   virtual void serve(const Scene& scene) = 0;
 
   virtual void connect(const Scene& scene) = 0;
-  // Sends one request; waits while there is no room.
+  // Sends one request; waits while the queue is full.
   virtual void send() = 0;
   // Waits for the next reply.
   virtual void receive() = 0;
@@ -44,23 +44,24 @@ class Peer {
     receive();
   }
 
-  // One way: the server's process takes messages and counts them with scene.consumed(), now and
-  // then at least; flood() sends until the deadline. Ours may swap the roles: what counts is that
-  // one process sends and another takes.
+  // One-way traffic: sink() runs in the server's process, receives messages, and reports their
+  // number with scene.consumed() from time to time. flood() runs in the requester's process and
+  // sends until `resume` returns false. The MPF peer connects as a client in sink() and is the
+  // server in flood().
   virtual void sink(const Scene&) {}
   virtual void flood(const Scene&, const std::function<bool()>&) {}
 
-  // Runner: removes what killed processes left.
+  // Called by the runner: removes what killed processes left.
   virtual void removeTraces() noexcept {}
 };
 
-// A daemon that a peer needs. Stopped by its destructor.
+// Processes that a peer needs. The destructor stops them.
 class Environment {
  public:
   virtual ~Environment() = default;
 };
 
-// What has start() and stop(): it runs while this lives.
+// Runs an object with start() and stop() for the lifetime of this one.
 template <class Started>
 class Running final : public Environment {
  public:
@@ -83,7 +84,7 @@ struct PeerFamily {
   std::function<std::unique_ptr<Peer>(const PeerOptions&)> make;
   bool oneWay = false;
   int maxOutstanding = 100;
-  // empty: needs nothing. Throws std::runtime_error with the reason
+  // Starts what the peer needs; empty: nothing. Throws std::runtime_error with the reason.
   std::function<std::unique_ptr<Environment>()> start;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The questions that are put to every peer, ours first.
+// The measurements that are made with every peer.
 #include <algorithm>
 
 #include "benchmarks/stage/measurement.h"
@@ -62,7 +62,7 @@ std::string sizeText(std::size_t bytes) {
   return std::to_string(bytes) + " B";
 }
 
-// One row for a family; the rest is filled in by who asks.
+// Creates the rows of a run; the caller fills in what is special to a row.
 class Asker {
  public:
   explicit Asker(std::string runName) : runName_(std::move(runName)) {}
@@ -84,7 +84,7 @@ class Asker {
     row.floorBytes = copies ? bytes : 4;
     return row;
   }
-  // Makes the peer of a row, in the runner.
+  // A function with which the runner creates the peer of a row.
   std::function<std::shared_ptr<Peer>()> maker(const PeerFamily& family, const Measurement& row) {
     if (!family.make) return {};
     PeerOptions options{row.mode, row.bytes, row.touched, runName_ + "-" + std::to_string(++made_)};
@@ -100,7 +100,7 @@ std::vector<PeerFamily> families() {
   return {mpfPeer(), boostPeer(), socketPeer(), zeromqPeer(), iceoryxPeer()};
 }
 
-// A family that is not there is named once per question.
+// A family that is not installed has only one row for each question.
 std::vector<Mode> modesOf(const PeerFamily& family) {
   return family.skipped.empty() ? family.modes : std::vector{family.modes.front()};
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Unix domain socket, stream: what a program uses that wants no library. Polling looks with
-// MSG_DONTWAIT.
+// Unix domain stream socket: what a program uses without a message library. In spin mode it polls
+// with MSG_DONTWAIT.
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -65,7 +65,7 @@ class SocketPeer final : public Peer {
   }
 
  private:
-  // In the abstract namespace: nothing to remove.
+  // In the abstract namespace, so that no file has to be removed.
   [[nodiscard]] sockaddr_un addressOf() const {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;

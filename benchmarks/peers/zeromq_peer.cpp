@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // ZeroMQ: a pair of PAIR sockets over ipc://, its fastest pattern between two processes. Each
-// message passes an I/O thread on either side, on the same CPU here: that is why it is not measured
-// polling, where a caller would only keep its own I/O thread from running.
+// message passes an I/O thread on each side, which shares the CPU with the caller. Therefore it has
+// no spin mode: a caller that polls would keep its own I/O thread from running.
 #include <cstring>
 #include <stdexcept>
 #include <zmq.h>
@@ -34,7 +34,7 @@ class ZeromqPeer final : public Peer {
       last = scene.stopping();
       put();
     }
-    // The last reply must leave before the process does.
+    // Sends the last reply before the process exits.
     close();
   }
   void connect(const Scene&) override {

@@ -32,7 +32,7 @@ Place makePlace(const std::string& setting, const std::string& title, Surroundin
     return place;
   }
   if (!std::filesystem::exists(routerProgram()))
-    place.skippedRouters = routerProgram() + " is not there";
+    place.skippedRouters = routerProgram() + " does not exist";
   place.routers =
       std::make_shared<RouterPair>(routerProgram(), place.runName, placement, place.between);
   return place;
@@ -50,9 +50,8 @@ std::vector<Measurement> rowsOf(const std::vector<Place>& places) {
 
 std::string placementText(const Placement& at, Mode wait) {
   return fmt::format(
-      "CPU {}: server and its router. CPU {}: client and its router. Servers and clients of ours "
-      "wait in mode {}; sockets of raw TCP "
-      "block.\n",
+      "CPU {}: server and its router. CPU {}: client and its router. MPF servers and clients wait "
+      "in mode {}; sockets of raw TCP block.\n",
       toString(at.server), toString(at.requester), toString(wait));
 }
 
@@ -63,7 +62,7 @@ void addOptions(CLI::App& app, RemoteOptions& options) {
   addWaitOption(app, options.wait);
   app.add_option(
          "--clients", options.clients,
-         "How many clients go through one pair of routers, in the rows about that; default 10000")
+         "Number of clients in the rows about many clients of one pair of routers; default 10000")
       ->check(CLI::Range(2, 16'000));
 }
 

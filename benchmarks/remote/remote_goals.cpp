@@ -16,7 +16,7 @@ std::optional<double> timesTcp(const GoalSheet& goals, const Result* row) {
   return ratio ? std::optional(1 / *ratio) : std::nullopt;
 }
 
-// A GiB/s each way will do, or 80 % of what raw TCP did.
+// The goal is 1 GiB/s in each direction, or 80 % of the rate of raw TCP if that is less.
 void arraysAtLeast(GoalSheet& goals, const std::string& place, const std::string& name) {
   const auto* row = goals.find(place + kArrays, "MPF remote, " + name);
   if (row == nullptr) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The table of `mpf bench remote`: the columns of the manual's ("Performance"), and what latencies
-// were.
+// The table of `mpf bench remote`: the columns of the manual's table ("Performance"), and
+// latencies.
 #include <array>
 #include <fmt/format.h>
 
@@ -13,9 +13,10 @@ namespace {
 
 constexpr const char* kLine =
     "  {:<40} {:>11} {:>10} {:>7} {:>7} {:>9} {:>9} {:>9} {:>9} {:>7}  {}\n";
-constexpr std::size_t kLarge = 1u << 16;  // from here on it is bytes that count
+constexpr std::size_t kLarge = 1u << 16;  // for messages of this size the rate is in bytes
 
-// "12.3 k/s", or "1.23 GiB/s" of large messages: of what goes one way; as much comes back.
+// "12.3 k/s", or "1.23 GiB/s" for large messages: the rate in one direction, which equals that in
+// the other one.
 std::string speedText(double perSecond, std::size_t bytes) {
   if (bytes < kLarge) return rateText(perSecond);
   return fmt::format("{:.2f} GiB/s",
@@ -47,7 +48,7 @@ std::string lineOf(const Result& result) {
 }
 
 std::string header(const Measurement& first) {
-  if (!first.unit.empty()) return {};  // the line says what its figure is
+  if (!first.unit.empty()) return {};  // each line shows its unit
   return fmt::format(kLine, "", first.bytes >= kLarge ? "each way" : "messages", "writes",
                      "idle cl", "idle sv", "p50", "p99", "p99.9", "max", "x TCP", "raw TCP was");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The rows of `mpf bench remote` about many clients, and about routers with nothing to do.
+// The rows of `mpf bench remote` about many clients, and about idle routers.
 #include <deque>
 #include <memory>
 #include <optional>
@@ -18,8 +18,7 @@ namespace {
 constexpr auto kAllConnected = std::chrono::seconds(120);
 constexpr auto kGrace = std::chrono::seconds(180);
 
-// What a crowd finds out beside its round trips, in Figures::more.
-// the last three: bytes a client
+// Results besides the round trips, in Figures::more. The last three are bytes per client.
 enum Found : std::size_t { connectSeconds, clientsRouter, serversRouter, sharedMemory };
 constexpr std::size_t kRoundTrips = 4;
 
@@ -47,7 +46,7 @@ class Clients {
   Clients(const std::string& backplane, Mode mode)
       : dispatcher_(Backplane::attach(backplane), {waitMode(mode), {}}) {}
 
-  // All are bound before the first is waited for.
+  // Binds all clients before it waits for the first one.
   void growTo(int count) {
     const auto had = clients_.size();
     while (clients_.size() < static_cast<std::size_t>(count)) {
@@ -66,7 +65,7 @@ class Clients {
   void roundTrip(std::size_t client) {
     const auto wanted = received_ + 1;
     if (clients_[client].send(Int32Message({.value = 1})) != SendResult::sent)
-      throw std::runtime_error("a request was not sent");
+      throw std::runtime_error("a request could not be sent");
     while (received_ < wanted) dispatcher_.runOnce();
   }
   [[nodiscard]] std::size_t size() const noexcept { return clients_.size(); }
@@ -90,7 +89,7 @@ void measureCrowd(const Scene& scene, const RouterPair& routers, Mode mode, int 
   const auto fromNs = Clock::nowNs();
   crowd.growTo(clients);
   figures.more[connectSeconds] = static_cast<double>(Clock::nowNs() - fromNs) / 1e9;
-  // whatever is made at the first use
+  // One round trip of each client, because some memory is allocated at the first one.
   for (std::size_t i = 0; i < crowd.size(); ++i) crowd.roundTrip(i);
   const auto after = memoryOf(routers, crowd.backplane(), servers);
   for (const auto what : {clientsRouter, serversRouter, sharedMemory})
@@ -116,14 +115,14 @@ Outcome runCrowd(const Stage& stage, RouterPair& routers, Mode mode, int clients
   return routers.run([&] { return stage.run(act); });
 }
 
-// Both routers, beside one client that is connected and does nothing.
+// The CPU time of both routers while one client is connected and does nothing.
 Outcome runIdle(const Stage& stage, RouterPair& routers, Mode mode) {
   Act act;
   act.server = [&](const Scene& scene) { answerForEver(scene, routers.serverBackplane(), mode); };
   act.requester = [&](const Scene& scene) {
     Clients one(routers.clientBackplane(), mode);
     one.growTo(1);
-    sleepFor(std::chrono::seconds(1));  // what follows connecting has been done
+    sleepFor(std::chrono::seconds(1));  // until the work that follows connecting is done
     const auto used = [&] { return cpuNsOf(routers.serverPid()) + cpuNsOf(routers.clientPid()); };
     const auto before = used();
     const auto fromNs = Clock::nowNs();
@@ -137,7 +136,7 @@ Outcome runIdle(const Stage& stage, RouterPair& routers, Mode mode) {
 }  // namespace
 
 std::vector<Measurement> crowdRows(const Place& place) {
-  // One crowd is enough: its rows tell of the same one.
+  // All rows show results of the same measurement.
   const auto seen = std::make_shared<std::optional<Outcome>>();
   const auto row = [&](const std::string& name, const std::string& unit, std::size_t what) {
     auto made =

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The rows of `mpf bench remote` in which messages go there and back: the manual's table, and
-// arrays of 1 MiB.
+// The rows of `mpf bench remote` about round trips: the manual's table, and arrays of 1 MiB.
 #include "benchmarks/peers/mpf_peer.h"
 #include "benchmarks/remote/remote.h"
 #include "benchmarks/remote/routers.h"
@@ -15,14 +14,14 @@ constexpr std::size_t kArray = 1u << 20;
 
 using PeerMaker = std::function<std::shared_ptr<Peer>()>;
 
-// What goes from client to server and back, over and over.
+// The messages of an exchange, which is repeated.
 struct Traffic {
-  int sends = 1;  // one after another, then the replies to all of them
-  int messages = 1;  // in all of them together
-  std::size_t window = 0;  // not 0: instead so many are always on their way
+  int sends = 1;           // sends in a row, before all their replies are received
+  int messages = 1;        // messages in all sends of an exchange together
+  std::size_t window = 0;  // not 0: instead of exchanges, this number of messages is outstanding
 };
 
-// `writer`, asked once the row begins, has the client's socket.
+// `writer` is the pid of the process that has the client's socket.
 Outcome goThereAndBack(const Stage& stage, const std::shared_ptr<Peer>& peer,
                        const Traffic& traffic, int writer) {
   Act act;

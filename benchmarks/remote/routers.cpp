@@ -48,7 +48,7 @@ void RouterPair::start() try {
   tells.reset();
   auto address = readToEnd(ready);
   if (address.find('\n') == std::string::npos)
-    throw std::runtime_error("the server's router does not listen: " + server_.program.lastLine());
+    throw std::runtime_error("the server's router did not start: " + server_.program.lastLine());
   address.resize(address.find('\n'));
   client_.program.start(
       {program_, "--backplane", clientBackplane(), "--remote", location + "=" + address, "--plain"},
@@ -72,12 +72,12 @@ Outcome RouterPair::run(const std::function<Outcome()>& row) {
   if (const auto ended = complaint(); !ended.empty()) {
     outcome.error += "; " + ended;
   } else if (const auto said = client_.program.lastLine(); !said.empty()) {
-    outcome.error += "; the client's router said last: " + said;
+    outcome.error += "; last output of the client's router: " + said;
   }
   return outcome;
 }
 
-// Empty when both run.
+// Which router has ended; empty when both are running.
 std::string RouterPair::complaint() {
   for (auto* router : {&server_, &client_}) {
     if (router->program.hasEnded())

@@ -4,11 +4,11 @@
 //   server ─ backplane NAME-s ─ router ═══ TCP ═══ router ─ backplane NAME-c ─ client
 //            server's CPUs and namespace           requester's CPUs and namespace
 //
-// Started when the first row needs them, and stopped after the last one that does (Runner). What
-// they say on stderr is kept, and told when a row fails.
+// The Runner starts them before the first row that needs them and stops them after the last one.
+// Their output is kept and shown when a row fails.
 //
-// Threads  the runner's only one.
-// Crash    the routers die with the runner, by the kernel.
+// Threads  the runner's only thread.
+// Crash    the kernel kills the routers when the runner dies.
 #pragma once
 
 #include <memory>
@@ -26,13 +26,13 @@ inline constexpr int kRemoteLocation = 1;
 class RouterPair {
  public:
   //   program  path of mpf-router
-  //   name     begins the names of both backplanes
+  //   name     the names of both backplanes begin with it
   RouterPair(std::string program, std::string name, Placement placement, Surroundings between);
   ~RouterPair() { stop(); }
   RouterPair(const RouterPair&) = delete;
   RouterPair& operator=(const RouterPair&) = delete;
 
-  // Throws std::runtime_error with what a router said, when it does not come up.
+  // Throws std::runtime_error with the last output of a router that does not start.
   void start();
   void stop() noexcept;
 
@@ -41,8 +41,8 @@ class RouterPair {
   [[nodiscard]] std::string serverBackplane() const { return name_ + "-s"; }
   [[nodiscard]] std::string clientBackplane() const { return name_ + "-c"; }
 
-  // Runs `row`, and says of a failure what the routers have to do with it. When one of them has
-  // ended, it is not run at all.
+  // Runs `row`. Adds to an error whether a router has ended, or the last output of the client's
+  // router. When a router has ended before, `row` is not run.
   [[nodiscard]] Outcome run(const std::function<Outcome()>& row);
 
  private:
@@ -59,7 +59,7 @@ class RouterPair {
   Router client_{"the client's router", {}};
 };
 
-// mpf-router, beside this program.
+// The path of mpf-router, in the folder of this program.
 [[nodiscard]] std::string routerProgram();
 
 }  // namespace mpf::bench

@@ -22,17 +22,17 @@ FileDescriptor openNet() {
   return FileDescriptor(checkCall(::open(kOwnNet, O_RDONLY | O_CLOEXEC), "open", kOwnNet));
 }
 
-// A new namespace; this process is where it was afterwards.
+// Creates a network namespace. This process stays in its own.
 std::shared_ptr<FileDescriptor> newNet() {
   const auto mine = openNet();
   checkCall(::unshare(CLONE_NEWNET), "unshare", "a network namespace");
   auto made = std::make_shared<FileDescriptor>(openNet());
   checkCall(::setns(mine.get(), CLONE_NEWNET), "setns",
-            "the network namespace that this process was in");
+            "the previous network namespace of this process");
   return made;
 }
 
-// Runs `ip` with these words in a namespace. Throws with what it said.
+// Runs `ip` with these arguments in a namespace. Throws with its output if it fails.
 void ip(const FileDescriptor& net, std::vector<std::string> words) {
   std::array<int, 2> ends{};
   checkCall(::pipe2(ends.data(), O_CLOEXEC), "pipe2");
@@ -53,7 +53,7 @@ void ip(const FileDescriptor& net, std::vector<std::string> words) {
   retryInterrupted([&] { return ::waitpid(pid, &status, 0); });
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
   if (WIFEXITED(status) && WEXITSTATUS(status) == kNoSuchProgram)
-    throw std::runtime_error("ip(8) of iproute2 is not there");
+    throw std::runtime_error("ip(8) is not installed (package iproute2)");
   throw std::runtime_error("ip: " + text.substr(0, text.find('\n')));
 }
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Surroundings: what lies between the two sides of a remote row: this host's loopback, or two
-// network namespaces joined by a veth pair.
+// Surroundings: the network between the two sides of a remote row: the loopback of this host, or
+// two network namespaces joined by a veth pair.
 //
 //   ┌ namespace ────────────┐                      ┌ namespace ────────────┐
 //   │ server's side         │   veth       veth    │ requester's side      │
 //   │ 10.0.0.1/30       mpf0├──────────────────────┤mpf0       10.0.0.2/30 │
 //   └───────────────────────┘                      └───────────────────────┘
 //
-// The namespaces have no name: they live as long as a descriptor or a process of the run does, and
-// go with the last one, veth pair included. A run that is killed leaves nothing behind.
+// The namespaces have no name: the kernel removes them, and the veth pair, with the last descriptor
+// or process of the run. A run that is killed leaves nothing behind.
 //
-// Threads  made by a process that has no other thread.
+// Threads  the process that creates them must have no other thread.
 #pragma once
 
 #include <memory>
@@ -23,14 +23,14 @@ namespace mpf::bench {
 
 class Surroundings {
  public:
-  // Both sides in the network namespace that this process is in.
+  // Both sides are in the network namespace of this process.
   static Surroundings loopback();
-  // Makes two namespaces, with ip(8). Throws std::runtime_error with the reason when that is not
-  // possible here.
+  // Creates two namespaces, with ip(8). Throws std::runtime_error, or std::system_error without the
+  // right to create them.
   static Surroundings namespaces();
 
   [[nodiscard]] const std::string& serverAddress() const noexcept { return serverAddress_; }
-  // Puts the calling process, which must have one thread only, into a side's namespace.
+  // Moves the calling process, which must have one thread only, into the namespace of a side.
   void enterServer() const { enter(server_); }
   void enterRequester() const { enter(requester_); }
 
@@ -38,8 +38,8 @@ class Surroundings {
   static void enter(const std::shared_ptr<FileDescriptor>& net);
 
   std::string serverAddress_;
-  std::shared_ptr<FileDescriptor> server_,
-      requester_;  // of the namespaces; nullptr: the one that everybody is in
+  // The namespaces; nullptr: that of this process.
+  std::shared_ptr<FileDescriptor> server_, requester_;
 };
 
 }  // namespace mpf::bench

@@ -58,7 +58,7 @@ class TcpPeer final : public Peer {
     return address;
   }
   void accept(const Scene& scene) {
-    // the client does: that is enough for neither to wait for the other for ever
+    // Only the client reads while it waits to write. That suffices to prevent a deadlock.
     options_.reads = false;
     const FileDescriptor listener(
         checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
@@ -82,7 +82,7 @@ class TcpPeer final : public Peer {
     in_.assign(options_.unitBytes, std::byte{0});
   }
 
-  // write() and read(), not send() and recv(): these are what the kernel counts.
+  // Uses write() and read() instead of send() and recv(), because the kernel counts only those.
   void put(const std::vector<std::byte>& unit) {
     for (std::size_t done = 0; done < unit.size();) {
       const auto wrote = ::write(fd_.get(), unit.data() + done, unit.size() - done);
@@ -96,8 +96,8 @@ class TcpPeer final : public Peer {
     }
     --units_;
   }
-  // Reads to where the bytes belong in their unit, into one buffer for all. False: nothing is
-  // there.
+  // Reads into the one buffer for all units, at the position of the next byte in its unit. False
+  // when nothing can be read.
   bool take() {
     const auto got = ::read(fd_.get(), in_.data() + at_, in_.size() - at_);
     if (got == 0) throwSystemError(ECONNRESET, "read", "a TCP connection");
@@ -106,10 +106,10 @@ class TcpPeer final : public Peer {
     if (at_ != 0) return true;
     ++units_;
     if (sent_ != 0 && in_.back() != static_cast<std::byte>(++echoed_))
-      throw std::runtime_error("an echo of something else");
+      throw std::runtime_error("the echo differs from what was sent");
     return true;
   }
-  // A blocking socket never comes here but with an error.
+  // Handles a failed call. For a blocking socket that is always an error.
   void awaitAfter(const char* call, short events) {
     if (errno == EINTR) return;
     if (errno != EAGAIN) throwSystemError(errno, call, "a TCP connection");
@@ -121,9 +121,9 @@ class TcpPeer final : public Peer {
   TcpOptions options_;
   FileDescriptor fd_;
   std::vector<std::byte> out_, in_;
-  std::size_t at_ = 0;  // in in_: where the next byte goes
-  std::size_t units_ = 0;  // that are there and that nobody took
-  unsigned sent_ = 0;  // by the client: the last byte of each unit counts them
+  std::size_t at_ = 0;  // position of the next byte in in_
+  std::size_t units_ = 0;  // units that have been read, but not taken by receive()
+  unsigned sent_ = 0;  // units sent by the client; the last byte of each unit is its number
   unsigned echoed_ = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Raw TCP: what two programs reach that need no message system: plain sockets with TCP_NODELAY, and
-// a server that echoes.
+// Raw TCP: two programs without a message system: plain sockets with TCP_NODELAY, and a server that
+// echoes.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +13,10 @@ namespace mpf::bench {
 
 struct TcpOptions {
   Surroundings between;
-  // of one write, and of what the server reads before it writes the same back
+  // Bytes of one write, and bytes that the server reads before it writes them back.
   std::size_t unitBytes = 4;
-  // while the client waits for room to write, it reads: for as many units on their way as one likes
+  // The client reads while it waits for room to write, so that any number of units may be
+  // outstanding.
   bool reads = false;
 };
 

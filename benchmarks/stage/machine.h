@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Machine: where a run took place; figures mean nothing without it.
+// Machine: the computer and the CPUs of a run, without which its figures mean nothing.
 #pragma once
 
 #include <string>

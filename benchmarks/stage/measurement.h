@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Measurement: one row of the table, before and after it was taken.
+// Measurement: one row of the table. Result: the same row after it was measured.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 namespace mpf::bench {
 
 struct Measurement {
-  std::string setting;   // the surroundings that it is taken in; its floor is of the same
+  std::string setting;   // the surroundings of the row and of its floor
   std::string question;  // the heading in the table
   std::string name;
   Mode mode = Mode::spin;
@@ -23,25 +23,25 @@ struct Measurement {
   std::string floorName;   // the row that this one is divided by; empty: none
   std::size_t floorBytes = 0;
   std::string unit;        // of Figures::value; empty when the row is a latency or a rate
-  std::string skipped;     // why it is not taken
-  double share = 1.0;      // of the time that a row gets
-  bool isSlow = false;     // takes seconds to set up: once is enough
-  // rows one after another that name the same one share it
+  std::string skipped;     // why the row is left out
+  double share = 1.0;      // duration, relative to that of a normal row
+  bool isSlow = false;     // needs seconds to set up, and is measured in one round only
+  // Successive rows with the same environmentName share the environment.
   std::function<std::unique_ptr<Environment>()> environment;
   std::string environmentName;
   std::function<Outcome(const Stage&)> run;
 };
 
-// Nanoseconds per message: from a rate, or typical, or p50 where groups make no sense; 0 for
-// neither.
+// Nanoseconds per message: from a rate, or the typical time, or p50 where no groups were timed; 0
+// without any of them.
 [[nodiscard]] double costNs(const Figures& figures) noexcept;
 
 struct Result {
   Measurement measurement;
   Figures figures;
   std::string error;
-  double floorNs = 0;  // a message of the floor, in the same minute
-  double ratioToFloor = 0;  // above 1: slower than the floor. 0: there is none
+  double floorNs = 0;       // a message of the floor, measured right before the row
+  double ratioToFloor = 0;  // above 1: slower than the floor; 0: the row has no floor
 
   [[nodiscard]] bool isGood() const noexcept {
     return measurement.skipped.empty() && error.empty();
@@ -49,7 +49,7 @@ struct Result {
   [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
 };
 
-// Everything that `mpf bench local` takes, in order, floors first.
+// All rows of `mpf bench local`, in order, floors first.
 //   runName  unique on this host: part of the names of sockets and segments
 [[nodiscard]] std::vector<Measurement> catalogue(const std::string& runName);
 

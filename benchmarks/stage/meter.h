@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Meter: what the host did while a row was measured: how idle the CPUs of both sides were, and how
-// often a process called to write.
+// Meter: measures the host while a row is taken: how idle the CPUs of both sides are, and how many
+// write system calls a process makes.
 //
-// Idle is what /proc/stat says, in steps of 10 ms: a second is good for one percent. Writes are
-// `syscw` of /proc/PID/io: each write() and writev() of all its threads, to whatever descriptor.
+// Idle time is from /proc/stat, in steps of 10 ms: one second gives a resolution of one percent.
+// Writes are `syscw` of /proc/PID/io: each write() and writev() of all threads, to any descriptor.
 //
 // Threads  one.
 #pragma once
@@ -24,13 +24,13 @@ class Meter {
   Meter(const Placement& placement, int writer) : placement_(placement), writer_(writer) {}
 
   void start();
-  // Fills in what is known of the time since start(), and leaves the rest as it is.
+  // Fills in the figures of the time since start(). Figures that are not known are not changed.
   void stop(Figures& figures) const;
 
  private:
   struct Reading {
     std::int64_t atNs = 0;
-    double idleServer = 0;  // CPU time that nobody used so far, of all CPUs of the side [s]
+    double idleServer = 0;  // idle time so far, of all CPUs of the side [s]
     double idleRequester = 0;
     std::optional<std::uint64_t> writes;
   };
@@ -41,11 +41,11 @@ class Meter {
   Reading from_;
 };
 
-// CPU time that a process has used so far, of all its threads [ns]. Throws std::system_error when
-// it is gone.
+// CPU time that all threads of a process have used so far [ns]. Throws std::system_error when the
+// process does not exist.
 [[nodiscard]] double cpuNsOf(int pid);
-// Memory of a process that is resident, shared memory that it has touched included [bytes]; 0 when
-// it is gone.
+// Resident memory of a process, including shared memory that it has touched [bytes]; 0 when the
+// process does not exist.
 [[nodiscard]] double residentBytesOf(int pid);
 
 }  // namespace mpf::bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Mode: how both sides wait.
+// Mode: how both sides of a measurement wait.
 #pragma once
 
 #include <cstdint>

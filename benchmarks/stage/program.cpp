@@ -23,7 +23,7 @@ void Program::start(std::vector<std::string> words, const Cpus& cpus,
                     const std::function<void()>& enter) {
   stop();
   said_ =
-      FileDescriptor(checkCall(::memfd_create("what a program says", MFD_CLOEXEC), "memfd_create"));
+      FileDescriptor(checkCall(::memfd_create("output of a program", MFD_CLOEXEC), "memfd_create"));
   pid_ = startProgram(std::move(words), [&] {
     ::dup2(said_.get(), STDERR_FILENO);
     ::dup2(said_.get(), STDOUT_FILENO);
@@ -48,7 +48,7 @@ bool Program::hasEnded() noexcept {
   return pid_ == 0;
 }
 
-// The file's position is the program's: it is left alone.
+// Reads with pread(), because the program shares the position of the file.
 std::string Program::said() const {
   std::string text(static_cast<std::size_t>(std::max<off_t>(0, ::lseek(said_.get(), 0, SEEK_CUR))),
                    '\0');

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Program: a program of ours that runs while rows are taken, pinned to its CPUs, and what it says.
+// Program: an MPF program that runs while rows are measured, pinned to its CPUs, and its output.
 //
-// Threads  the runner's only one.
-// Crash    it dies with the runner, by the kernel.
+// Threads  the runner's only thread.
+// Crash    the kernel kills the program when the runner dies.
 #pragma once
 
 #include <functional>
@@ -22,26 +22,26 @@ class Program {
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
-  //   words  its path, then its arguments
-  //   enter  called in its process, before it begins; may be empty
+  //   words  path of the program, and its arguments
+  //   enter  called in the new process before the program is executed; may be empty
   void start(std::vector<std::string> words, const Cpus& cpus, const std::function<void()>& enter);
-  // With time to take its leave: what it does not remove, others have to.
+  // Stops the program with SIGTERM, so that it can remove its segments, and kills it after 5 s.
   void stop() noexcept;
 
-  // 0: it does not run.
+  // 0 when the program is not running.
   [[nodiscard]] int pid() const noexcept { return pid_; }
-  // True also when it was never started.
+  // True also when the program was never started.
   [[nodiscard]] bool hasEnded() noexcept;
-  // All that it has said so far, on stdout and stderr, and the last line of it.
+  // The output so far, stdout and stderr, and its last line.
   [[nodiscard]] std::string said() const;
   [[nodiscard]] std::string lastLine() const;
 
  private:
   int pid_ = 0;
-  FileDescriptor said_;  // a file in memory
+  FileDescriptor said_;  // an in-memory file that receives the output
 };
 
-// The path of a program of ours: beside this one.
+// The path of an MPF program in the folder of this program.
 [[nodiscard]] std::string programBeside(const std::string& name);
 
 }  // namespace mpf::bench

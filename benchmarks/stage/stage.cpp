@@ -20,7 +20,7 @@
 namespace mpf::bench {
 namespace {
 
-constexpr auto kStopGrace = std::chrono::milliseconds(500);  // for a server that leaves by itself
+constexpr auto kStopGrace = std::chrono::milliseconds(500);  // for a server that ends by itself
 enum Role : std::size_t { server = 0, requester = 1 };
 
 // Shared anonymous memory, populated.
@@ -66,14 +66,14 @@ class Child {
   ~Child() { killProcess(pid_); }
   [[nodiscard]] const FileDescriptor& fd() const noexcept { return fd_; }
 
-  // Waits for its end; empty when it ended well.
+  // Waits for the end of the process. Returns what went wrong; empty after success.
   [[nodiscard]] std::string ending(const char* who, const std::array<char, 240>& error) {
     int status = 0;
     if (retryInterrupted([&] { return ::waitpid(pid_, &status, 0); }) == pid_) pid_ = 0;
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
     if (error[0] != '\0') return std::string(who) + ": " + error.data();
     return std::string(who) + (WIFSIGNALED(status)
-                                   ? " died of signal " + std::to_string(WTERMSIG(status))
+                                   ? " was killed by signal " + std::to_string(WTERMSIG(status))
                                    : " failed");
   }
 
@@ -82,7 +82,8 @@ class Child {
   FileDescriptor fd_;
 };
 
-// Waits until one of both ends. Which one; nullopt: neither in time.
+// Waits until one of the two processes ends and returns its role; nullopt when neither ends in
+// time.
 std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterChild,
                                Deadline deadline) {
   for (;;) {
@@ -102,7 +103,7 @@ std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterC
 
 void Scene::ready(std::uint16_t port) const noexcept {
   control_.port.store(port, std::memory_order_relaxed);
-  // PAIR(bench-ready): the requester starts after everything that the server did before.
+  // PAIR(bench-ready): the requester sees everything that the server did before.
   control_.ready.store(1, std::memory_order_release);
 }
 
@@ -120,17 +121,17 @@ Outcome Stage::run(const Act& act) const {
     serverChild =
         std::make_unique<Child>(server, placement_.server, control, [&] { act.server(scene); });
   Child requesterChild(requester, placement_.requester, control, [&] {
-    // PAIR(bench-ready): what the server did before is done.
+    // PAIR(bench-ready): see Scene::ready().
     const auto isReady = [&] { return control.ready.load(std::memory_order_acquire) != 0; };
     if (act.server && !waitUntil(isReady, act.grace))
-      throw std::runtime_error("the server is not ready in time");
+      throw std::runtime_error("the server was not ready in time");
     act.requester(scene);
   });
 
   Outcome outcome;
   const auto first = waitForEnd(serverChild.get(), requesterChild, Deadline::after(limit));
   if (!first) {
-    outcome.error = "no end within the time limit";
+    outcome.error = "neither process ended within the time limit";
   } else if (*first == requester) {
     outcome.error = requesterChild.ending("requester", control.errors[requester]);
     if (serverChild && act.stopsByItself && outcome.error.empty()) {
@@ -139,10 +140,10 @@ Outcome Stage::run(const Act& act) const {
     }
   } else if (outcome.error = serverChild->ending("server", control.errors[server]);
              outcome.error.empty()) {
-    // It answered the last request and left first.
+    // The server answered the last request and ended before the requester.
     const auto second = waitForEnd(nullptr, requesterChild, Deadline::after(act.grace));
     outcome.error = second ? requesterChild.ending("requester", control.errors[requester])
-                           : "the requester does not end";
+                           : "the requester did not end in time";
   }
   outcome.figures = control.figures;
   return outcome;

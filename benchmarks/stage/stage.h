@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Stage: runs one measurement in two processes of its own, each pinned to a CPU, and brings the
-// figures back.
+// Stage: runs one measurement in two processes, each pinned to its CPUs, and returns the figures.
 //
-//   runner ── fork ──► server     serve, say ready() when requests may come, go on until killed or stopping()
+//   runner ── fork ──► server     calls ready(), serves until it is killed or stopping() is true
 //      └───── fork ──► requester  measures, fills the Figures
 //
-// The runner starts no thread and maps nothing of what it measures: a peer that crashes, hangs or
-// leaks does so in its two processes.
+// The runner starts no thread and maps nothing of the measured system: a peer that crashes, hangs
+// or leaks does so in these two processes.
 //
-// Threads  the runner's only one.
-// Crash    either process that dies or overruns the time limit ends the measurement with an error;
-//          both are killed by pid.
+// Threads  the runner's only thread.
+// Crash    if a process dies or exceeds the time limit, the measurement ends with an error, and
+//          both processes are killed.
 #pragma once
 
 #include <array>
@@ -37,7 +36,7 @@ struct Placement {
   Cpus requester{1};
 };
 
-// How long a measurement takes.
+// The duration of a measurement.
 struct Budget {
   Nanoseconds warmUp{};
   Nanoseconds measure{};
@@ -45,8 +44,8 @@ struct Budget {
 
 inline constexpr double kNotLookedAt = -1;
 
-// Answers over serial lines that were not whole, and how many of them had which fault, as their
-// replies say; one may have several.
+// The number of incomplete answers over serial lines, and how many of them had each fault according
+// to their replies. One answer may have several faults.
 struct LineFaultFigures {
   double shortAnswers = kNotLookedAt;
   double overruns = 0;
@@ -55,35 +54,34 @@ struct LineFaultFigures {
   double breaks = 0;
 };
 
-// What the requester found out. Plain data in shared memory.
+// The results of the requester. Plain data in shared memory.
 struct Figures {
-  LatencyRecorder latency;  // each message timed by itself
-  double typicalNs = 0;  // a message, in the middle one of many groups that were timed as a whole
-  std::uint64_t count = 0;  // of what `perSecond` counts
+  LatencyRecorder latency;  // of single messages
+  double typicalNs = 0;  // per message: median of groups timed as a whole
+  std::uint64_t count = 0;  // number of messages for perSecond
   double perSecond = 0;  // 0: not a rate
-  double value = 0;  // in the measurement's own unit
-  double writesPerSecond = kNotLookedAt;  // system calls that write; see Meter
-  // share of time that the server's CPUs had nothing to do, 0 to 1
-  double idleServer = kNotLookedAt;
-  double idleRequester = kNotLookedAt;  // the same of the requester's
+  double value = 0;  // in the unit of the measurement
+  double writesPerSecond = kNotLookedAt;  // write system calls; see Meter
+  double idleServer = kNotLookedAt;  // idle share of the server's CPUs, 0 to 1
+  double idleRequester = kNotLookedAt;  // idle share of the requester's CPUs, 0 to 1
   LineFaultFigures lineFaults{};  // of serial lines
-  // what else a row finds out that several rows tell of; from its last round
+  // Further values of one measurement that several rows show; from the last round.
   std::array<double, 4> more{};
 };
 
 // Shared by the processes of one measurement.
-struct
-    Control {  // NOLINT(clang-analyzer-optin.performance.Padding): each word on a line of its own
+// NOLINTNEXTLINE(clang-analyzer-optin.performance.Padding): each word is on a line of its own
+struct Control {
   alignas(kLineBytes) std::atomic<std::uint32_t> ready{0};  // written by the server
   std::atomic<std::uint32_t> port{0};  // written by the server, before `ready`
   alignas(kLineBytes) std::atomic<std::uint32_t> stopping{0};  // written by the requester
-  // written by the server: one-way messages taken
+  // Written by the server: number of one-way messages received.
   alignas(kLineBytes) std::atomic<std::uint64_t> consumed{0};
   alignas(kLineBytes) Figures figures;  // written by the requester
-  std::array<std::array<char, 240>, 2> errors{};  // of server and requester, each written by itself
+  std::array<std::array<char, 240>, 2> errors{};  // each process writes its own
 };
 
-// What a process of a measurement sees of it.
+// The interface between a process of a measurement and the Stage.
 class Scene {
  public:
   Scene(Control& control, Budget budget, std::span<std::byte> scratch) noexcept
@@ -91,24 +89,24 @@ class Scene {
 
   [[nodiscard]] Budget budget() const noexcept { return budget_; }
   [[nodiscard]] Figures& figures() const noexcept { return control_.figures; }
-  // Shared zeroed memory, page-aligned, as large as was asked for.
+  // Shared zeroed memory, page-aligned, of Act::scratchBytes.
   [[nodiscard]] std::span<std::byte> scratch() const noexcept { return scratch_; }
 
-  // Server: requests may come; at this port, if it has one.
+  // Called by the server when it accepts requests, with its port, if it has one.
   void ready(std::uint16_t port = 0) const noexcept;
-  // Requester: the server's port.
+  // For the requester: the server's port.
   [[nodiscard]] std::uint16_t port() const noexcept {
     return static_cast<std::uint16_t>(control_.port.load(std::memory_order_relaxed));
   }
-  // Server: look after a request is there and before the reply leaves. True: this reply is the
-  // last.
+  // Called by the server after it has received a request and before it replies. True: this reply is
+  // the last one.
   [[nodiscard]] bool stopping() const noexcept {
     return control_.stopping.load(std::memory_order_relaxed) != 0;
   }
-  // Requester: the next request is the last.
+  // Called by the requester: the next request is the last one.
   void stop() const noexcept { control_.stopping.store(1, std::memory_order_relaxed); }
 
-  // Server: `count` one-way messages have been taken so far.
+  // Called by the server: it has received `count` one-way messages so far.
   void consumed(std::uint64_t count) const noexcept {
     control_.consumed.store(count, std::memory_order_relaxed);
   }
@@ -126,13 +124,13 @@ struct Act {
   std::function<void(const Scene&)> server;  // may be empty
   std::function<void(const Scene&)> requester;  // starts when the server is ready
   std::size_t scratchBytes = 0;
-  bool stopsByItself = false;  // the server leaves after stop(), and gets a moment to do so
-  Nanoseconds grace = std::chrono::seconds(15);  // beyond the budget: connecting, tearing down
+  bool stopsByItself = false;  // the server ends by itself soon after stop()
+  Nanoseconds grace = std::chrono::seconds(15);  // beyond the budget, to connect and to end
 };
 
 struct Outcome {
   Figures figures;
-  std::string error;  // empty: all went well
+  std::string error;  // empty after success
 };
 
 class Stage {
@@ -140,7 +138,8 @@ class Stage {
   Stage(Placement placement, Budget budget) noexcept
       : placement_(std::move(placement)), budget_(budget) {}
 
-  // Returns in less than the budget, twice the act's grace and a second, whatever the processes do.
+  // Returns within the budget plus twice the act's grace plus one second, even if the processes
+  // hang.
   [[nodiscard]] Outcome run(const Act& act) const;
 
   [[nodiscard]] Budget budget() const noexcept { return budget_; }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Stopwatch: time between two points of one thread, with a resolution below a nanosecond where the
-// processor has such a counter.
+// Stopwatch: the time between two points of one thread, with a resolution below a nanosecond on
+// processors with such a counter.
 //
-// The counter is read behind fences, so that nothing which is measured slips out of the interval;
-// what a pair of readings costs by itself is measured once and taken off every duration.
+// Fences around the reading of the counter keep the measured instructions inside the interval. The
+// cost of the readings is measured once and subtracted from every duration.
 //
-// Threads  one; pin it.
+// Threads  one, which must be pinned to a CPU.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +20,8 @@ class Stopwatch {
  public:
   Stopwatch() noexcept {
     calibrate();
-    // Many in a row, because of the counter's steps; the quickest of some rows, because of
-    // interruptions.
+    // Many readings in a row, because the counter moves in steps; the fastest of several rows,
+    // because of interruptions.
     constexpr int kReadings = 1000;
     double least = 1e9;
     for (int row = 0; row < 8; ++row) {
@@ -32,7 +32,7 @@ class Stopwatch {
       }
       least = std::min(least, toNs(stop() - from) / kReadings);
     }
-    // Half of it lies inside an interval.
+    // Half of the cost is inside an interval.
     costNs_ = least / 2;
   }
 
@@ -55,7 +55,7 @@ class Stopwatch {
 #endif
   }
 
-  // Between a start() and a stop(), less what reading costs [ns].
+  // The time between a start() and a stop(), without the cost of reading [ns].
   [[nodiscard]] double elapsed(std::uint64_t from, std::uint64_t to) const noexcept {
     return std::max(0.0, toNs(to - from) - costNs_);
   }
@@ -72,7 +72,7 @@ class Stopwatch {
     return static_cast<double>(ticks) * nsPerTick_;
   }
 
-  // Over 5 ms: 20 ns of the clock's own error are 4 in a million.
+  // Calibrates over 5 ms: the clock's error of 20 ns is then 4 parts in a million.
   void calibrate() noexcept {
     const auto fromNs = Clock::nowNs();
     const auto from = start();

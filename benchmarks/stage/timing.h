@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Timing: the loops that the requester runs, the same for floors, peers and ours.
+// The timing loops of the requester, which are the same for the floors and for all peers.
 #pragma once
 
 #include <algorithm>
@@ -11,9 +11,9 @@
 
 namespace mpf::bench {
 
-// The median duration of groups of calls, divided by the calls in a group. The counter of some
-// processors moves in steps of 10 ns, and reading it takes as long: single durations show the
-// spread, groups tell what a call costs.
+// The median duration of groups of calls, divided by the number of calls in a group. The counter of
+// some processors moves in steps of 10 ns, and reading it takes about as long: single durations
+// show the distribution, groups show the cost of a call.
 template <class RoundTrip>
 double typicalNs(const Stopwatch& watch, Nanoseconds budget, double aboutNs,
                  RoundTrip&& roundTrip) {
@@ -33,7 +33,8 @@ double typicalNs(const Stopwatch& watch, Nanoseconds budget, double aboutNs,
   return *middle;
 }
 
-// Calls `roundTrip` over and over: for half of the time one by one, for the other half in groups.
+// Calls `roundTrip` repeatedly. Half of the time it is timed for each call, the other half in
+// groups.
 template <class RoundTrip>
 void timeEach(const Scene& scene, RoundTrip&& roundTrip) {
   const Stopwatch watch;
@@ -55,7 +56,7 @@ void timeEach(const Scene& scene, RoundTrip&& roundTrip) {
   scene.figures().latency = recorder;
 }
 
-// Calls `step`, which finishes `perStep` messages, over and over; the result is messages a second.
+// Calls `step`, which completes `perStep` messages, repeatedly. The result is messages per second.
 template <class Step>
 void timeRate(const Scene& scene, std::uint64_t perStep, Step&& step) {
   const auto warm = Deadline::after(scene.budget().warmUp);
@@ -75,8 +76,8 @@ void timeRate(const Scene& scene, std::uint64_t perStep, Step&& step) {
       static_cast<double>(steps * perStep) * 1e9 / static_cast<double>(elapsedNs);
 }
 
-// Calls `exchange`, which sends `perExchange` messages and takes their replies, over and over. Each
-// exchange is timed by itself; the rate is that of the messages.
+// Calls `exchange`, which sends `perExchange` messages and receives their replies, repeatedly. The
+// latency is that of an exchange; the rate is that of the messages.
 template <class Exchange>
 void timeExchanges(const Scene& scene, Meter& meter, std::uint64_t perExchange,
                    Exchange&& exchange) {
@@ -103,8 +104,8 @@ void timeExchanges(const Scene& scene, Meter& meter, std::uint64_t perExchange,
       static_cast<double>(scene.figures().count) * 1e9 / watch.elapsed(begin, now);
 }
 
-// Keeps `window` messages on their way: `receive` takes the oldest reply, then `send` sends one
-// more. Each is timed from its send to its reply.
+// Keeps `window` messages outstanding: `receive` receives the oldest reply, then `send` sends
+// another message. Each message is timed from its send to its reply.
 template <class Send, class Receive>
 void timeWindow(const Scene& scene, Meter& meter, std::size_t window, Send&& send,
                 Receive&& receive) {
@@ -140,8 +141,8 @@ void timeWindow(const Scene& scene, Meter& meter, std::size_t window, Send&& sen
   scene.figures().perSecond = static_cast<double>(recorder.count()) * 1e9 / elapsed;
 }
 
-// For one-way traffic: `flood(resume)` sends while resume(); what counts is what the other process
-// has taken.
+// For one-way traffic: `flood(resume)` sends while resume() returns true. The rate is that of the
+// messages that the other process has received.
 template <class Flood>
 void timeOneWay(const Scene& scene, Flood&& flood) {
   std::int64_t fromNs = 0;

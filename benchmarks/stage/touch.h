@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// touch: what "every byte written and read" means, for ours, for the peers and for the floors
-// alike.
+// Defines "every byte written and read", for all peers and for the floors.
 #pragma once
 
 #include <array>
@@ -10,14 +9,14 @@
 
 namespace mpf::bench {
 
-// Writes every byte. Nothing may have no address.
+// Writes every byte. `to` may be null if `bytes` is 0.
 inline void writeAll(void* to, std::size_t bytes) noexcept {
   if (bytes == 0) return;
   static std::uint8_t value = 0;
   std::memset(to, ++value, bytes);
 }
 
-// Reads every byte, with nothing to wait for but the memory.
+// Reads every byte. Independent sums avoid waits for anything but the memory.
 inline std::uint64_t readAll(const void* from, std::size_t bytes) noexcept {
   constexpr std::size_t kLanes = 8;
   const auto* at = static_cast<const std::byte*>(from);
@@ -30,7 +29,7 @@ inline std::uint64_t readAll(const void* from, std::size_t bytes) noexcept {
   std::uint64_t sum = 0;
   for (; bytes > 0; --bytes, ++at) sum += static_cast<std::uint64_t>(*at);
   for (const auto lane : sums) sum += lane;
-  asm volatile("" : : "r"(sum));  // somebody wants it
+  asm volatile("" : : "r"(sum));  // keeps the compiler from removing the reads
   return sum;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf bench`, as one calls it. How fast anything is, is no test's business.
+// The program `mpf bench`. These tests check no speed.
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -58,8 +58,8 @@ TEST(BenchCommand, MeasuresOnLoopback) {
   EXPECT_GT(rows[2].at("ratio_to_floor").get<double>(), 0);
 }
 
-TEST(BenchCommand, LeavesOutNamespacesByNameForWhoMayNotMakeThem) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+TEST(BenchCommand, LeavesOutNamespacesForAUserWhoMayNotCreateThem) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   constexpr uid_t kNobody = 65534;
 
   const auto ended =
@@ -82,12 +82,12 @@ TEST(BenchCommand, ListsEachServerOverHardware) {
   EXPECT_THAT(ended.out, AllOf(HasSubstr("the driver's thread"), HasSubstr("the manual's, local")));
 }
 
-TEST(BenchCommand, ListsWhateverTheProcessorsAre) {
+TEST(BenchCommand, ListsRowsWithoutCheckingTheCpus) {
   for (const auto* const which : {"local", "remote", "hardware"})
     EXPECT_EQ(bench({which, "--list", "--cpus", "0,9999"}).status, 0) << which;
 }
 
-TEST(BenchCommand, HasTheManualsFiguresAsNotMeasured) {
+TEST(BenchCommand, MarksTheManualsFiguresAsNotMeasured) {
   const auto ended = bench({"hardware", "--json", "-", "--only", "the manual's, remote"});
 
   EXPECT_EQ(ended.status, 0) << ended.err;
@@ -126,7 +126,7 @@ TEST(BenchCommand, MeasuresEightSerialPortsBesideTheManual) {
   EXPECT_EQ(rows[3].at("unit"), "answers");
 }
 
-TEST(BenchCommand, LooksAtAModelThatScans) {
+TEST(BenchCommand, MeasuresAModelThatScans) {
   const auto ended = bench(
       {"hardware", "--quick", "--json", "-", "--only", "scans read", "--only", "driver's thread"});
 
@@ -136,13 +136,13 @@ TEST(BenchCommand, LooksAtAModelThatScans) {
   for (const auto& row : rows) EXPECT_GT(row.at("value").get<double>(), 0) << row.at("name");
 }
 
-TEST(BenchCommand, SaysWhatIsWrongWithTheCommandLine) {
+TEST(BenchCommand, RefusesWrongArguments) {
   EXPECT_EQ(bench({"remote", "--only", "no such row"}).status, 2);
   EXPECT_EQ(bench({"remote", "--cpus", "0,none"}).status, 2);
   EXPECT_THAT(bench({"remote", "--wait", "long"}).err, HasSubstr("--wait"));
   const auto spinning = bench({"hardware", "--list", "--wait", "spin"});
   EXPECT_EQ(spinning.status, 2);
-  EXPECT_THAT(spinning.err, HasSubstr("share the server's CPU"));
+  EXPECT_THAT(spinning.err, HasSubstr("share a CPU"));
 }
 
 }  // namespace

@@ -99,11 +99,11 @@ class Terminal {
     return text;
   }
   // The attributes of the first character of a row.
-  struct SnapshotDelta {
+  struct Look {
     bool isRed = false;
     bool isReversed = false;
   };
-  [[nodiscard]] SnapshotDelta look(int number) const {
+  [[nodiscard]] Look look(int number) const {
     constexpr std::uint8_t kRed = 1;
     VTermScreenCell cell{};
     vterm_screen_get_cell(screen_, {number, 0}, &cell);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Three hundred clients at once, in many processes: all get in, all find the next server.
+// Three hundred clients at once, in many processes: all connect, and all find the next server.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ class CrowdTest : public testing::Test {
     server_ = Victim("serve", backplane_.name());
     EXPECT_EQ(server_.line(), "open");
   }
-  // Waits until every client had all its requests answered by the server that runs now.
+  // Waits until the current server has answered all requests of every client.
   void waitUntilAnswered() {
     const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"),
                                             layout::SegmentKind::serverWindow);
@@ -39,7 +39,7 @@ class CrowdTest : public testing::Test {
     const auto all = fmt::format("answered {:x}", window->header().incarnation);
     for (auto& process : crowd_) {
       auto line = process.line();
-      // of a server before
+      // Answered by an earlier server.
       while (line != all && (line.starts_with("answered ") || line.starts_with("waiting: ")))
         line = process.line();
       ASSERT_EQ(line, all);
@@ -54,7 +54,7 @@ class CrowdTest : public testing::Test {
   std::vector<Victim> crowd_;
 };
 
-TEST_F(CrowdTest, ThreeHundredClientsThatWaitAllGetInAndAreAnswered) {
+TEST_F(CrowdTest, ThreeHundredWaitingClientsConnectAndGetReplies) {
   startCrowd();
   waitUntilBound();
 
@@ -63,7 +63,7 @@ TEST_F(CrowdTest, ThreeHundredClientsThatWaitAllGetInAndAreAnswered) {
   waitUntilAnswered();
 }
 
-TEST_F(CrowdTest, ThreeHundredClientsThatStartAtOnceAllGetInAndAreAnswered) {
+TEST_F(CrowdTest, ThreeHundredClientsThatStartAtOnceGetReplies) {
   startServer();
 
   startCrowd();
@@ -71,7 +71,7 @@ TEST_F(CrowdTest, ThreeHundredClientsThatStartAtOnceAllGetInAndAreAnswered) {
   waitUntilAnswered();
 }
 
-TEST_F(CrowdTest, AllFindTheSuccessorOfAServerThatEndsInTheMiddle) {
+TEST_F(CrowdTest, AllFindTheSuccessorOfAServerThatEndsUnderLoad) {
   for (const int signal : {SIGKILL, SIGTERM}) {
     startServer();
     crowd_.clear();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The second half of `make demo`: models wired to each other, their servers, the voltmeter, and the
-// client that draws their values.
+// The second half of `make demo`: models that are wired to each other, their servers, the
+// voltmeter, and the client that draws their values.
 #include <filesystem>
 #include <gmock/gmock.h>
 #include <string>
@@ -16,14 +16,14 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-// Without a terminal. What waits for an answer waits for as long as the test does.
+// Runs the demo without a terminal, with waits that only the watchdog limits.
 EndedCommand runDemo(const std::string& build) {
   return runCommand(MPF_TEST_DEMO " " + build + " --seconds 0.1 --patience 1000 </dev/null 2>&1");
 }
 
 class Demo : public testing::Test {
  protected:
-  // The programs of the build, but for an ADC's server that is this script.
+  // Uses the programs of the build, except that the server of the ADC is this script.
   [[nodiscard]] std::string buildWithAdc(const std::string& script) const {
     const auto programs = folder_.file("bin");
     std::filesystem::create_directory(programs);
@@ -40,7 +40,7 @@ class Demo : public testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(Demo, PrintsWhatComesBackWithoutATerminal) {
+TEST_F(Demo, PrintsValuesWithoutATerminal) {
   const auto demo = runDemo(MPF_TEST_BUILD);
 
   EXPECT_EQ(demo.status, 0) << demo.output;
@@ -50,14 +50,14 @@ TEST_F(Demo, PrintsWhatComesBackWithoutATerminal) {
                     HasSubstr("the ADC measured the output of the DAC in"), HasSubstr("dioOut")));
 }
 
-TEST_F(Demo, ShowsWhatAServerSaidThatDoesNotStart) {
+TEST_F(Demo, PrintsTheOutputOfAServerThatDoesNotStart) {
   const auto demo = runDemo(buildWithAdc("echo this host has no analog inputs >&2; exit 3\n"));
 
   EXPECT_NE(demo.status, 0);
   EXPECT_THAT(demo.output, HasSubstr("this host has no analog inputs"));
 }
 
-TEST_F(Demo, FailsWhenNothingComesOverAWire) {
+TEST_F(Demo, FailsWhenAWireCarriesNothing) {
   const auto demo = runDemo(
       buildWithAdc("exec " MPF_TEST_BUILD "/bin/mpf-ip330-server \"${@/0=wire:dac.0/0=dc:0}\"\n"));
 
@@ -77,8 +77,8 @@ TEST_F(Demo, DrawsOnATerminalUntilQ) {
   EXPECT_TRUE(demo.isRestored());
 }
 
-// Also when not all was seen to work: the voltmeter needs more than a millisecond.
-TEST_F(Demo, EndsWellWhenItIsEnded) {
+// Also before all parts have answered: the voltmeter needs more than a millisecond.
+TEST_F(Demo, ExitsOnQAndCtrlC) {
   constexpr auto* kQuit = "q";
   constexpr auto* kInterrupt = "\x03";
   for (const auto* const key : {kQuit, kInterrupt}) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Every program, started with some of its standard descriptors closed or full: it ends as its
-// documents say, opens /dev/null in their place, and never writes its log to an instrument.
+// Every program, started with some standard descriptors closed or full: it exits with the
+// documented status, opens /dev/null in place of closed descriptors, and never writes its log to an
+// instrument.
 #include <fcntl.h>
 #include <poll.h>
 #include <sched.h>
@@ -37,14 +38,12 @@ namespace {
 
 constexpr unsigned kSubsets = 8;  // of the descriptors 0 to 2: bit n stands for descriptor n
 
-// A program with some of its standard descriptors closed and others on files. It dies with the
-// test.
+// A program with some standard descriptors closed and others on files. It dies with the test.
 class Bare {
  public:
-  using Files =
-      std::map<int,
-               // descriptor -> what it is; others are /dev/zero, so that /dev/null means something
-               const char*>;
+  using Files = std::map<int,
+                         // The file for each open descriptor; closed ones are missing.
+                         const char*>;
 
   Bare(std::vector<std::string> command, unsigned closed, const Files& files = {}) {
     std::vector<char*> arguments;
@@ -58,7 +57,7 @@ class Bare {
     if (pid_ != 0) {
       writeEnd.reset();
       char none = 0;
-      // ends when the program has been started
+      // Closed when the program has been executed.
       [[maybe_unused]] const auto nothing = ::read(started.get(), &none, 1);
       return;
     }
@@ -83,19 +82,19 @@ class Bare {
   Bare& operator=(const Bare&) = delete;
 
   void signal(int number) const { ::kill(pid_, number); }
-  // Waits for its end. Returns the exit status; minus the signal that ended it.
+  // Waits for the end. Returns the exit status, or minus the number of the signal.
   int wait() {
     int status = 0;
     checkCall(::waitpid(std::exchange(pid_, 0), &status, 0), "waitpid");
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
-  // Where a descriptor leads to; empty while it is closed.
+  // The file of a descriptor; empty while it is closed.
   [[nodiscard]] std::string placeOf(int descriptor) const {
     std::error_code none;
     return std::filesystem::read_symlink(fmt::format("/proc/{}/fd/{}", pid_, descriptor), none)
         .string();
   }
-  // Waits until each of these descriptors leads to /dev/null. False when the program ends first.
+  // Waits until each of these descriptors is /dev/null. False when the program ends first.
   [[nodiscard]] bool waitForNull(unsigned descriptors) const {
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
       while ((descriptors >> descriptor & 1u) != 0 && placeOf(descriptor) != "/dev/null") {
@@ -126,7 +125,7 @@ std::string fileName(const std::string& program) {
 
 class EveryProgramStarted : public testing::TestWithParam<std::string> {
  protected:
-  // Arguments with which it runs until a signal ends it.
+  // Arguments with which the program runs until a signal ends it.
   [[nodiscard]] std::vector<std::string> longRun() const {
     const std::map<std::string, std::vector<std::string>> arguments{
         {"mpf", {"tap", "nobody", "--backplane", backplane_.name()}},
@@ -169,25 +168,25 @@ class EveryProgramStarted : public testing::TestWithParam<std::string> {
   }();
 };
 
-TEST_P(EveryProgramStarted, EndsAsItShouldWhicheverDescriptorsAreClosed) {
+TEST_P(EveryProgramStarted, ExitsAsDocumentedWithClosedDescriptors) {
   for (unsigned closed = 0; closed < kSubsets; ++closed) {
     EXPECT_EQ(Bare({GetParam(), "--version"}, closed).wait(), 0) << closed;
     EXPECT_EQ(Bare({GetParam(), "--no-such-option"}, closed).wait(), 2) << closed;
   }
 }
 
-TEST_P(EveryProgramStarted, EndsAsItShouldWhenNothingCanBeWritten) {
+TEST_P(EveryProgramStarted, ExitsAsDocumentedWhenOutputCannotBeWritten) {
   EXPECT_EQ(Bare({GetParam(), "--version"}, 0, {{2, "/dev/full"}}).wait(), 0);
   EXPECT_EQ(Bare({GetParam(), "--no-such-option"}, 0, {{2, "/dev/full"}}).wait(), 2);
   EXPECT_EQ(Bare({GetParam(), "--version"}, 0, {{1, "/dev/full"}}).wait(), 1);
   EXPECT_EQ(Bare({GetParam(), "--version"}, 0, {{1, "/dev/full"}, {2, "/dev/full"}}).wait(), 1);
 }
 
-TEST_P(EveryProgramStarted, HasNullInPlaceOfWhatIsClosed) {
+TEST_P(EveryProgramStarted, OpensDevNullForClosedDescriptors) {
   for (unsigned closed = 1; closed < kSubsets; ++closed) {
     Bare program(longRun(), closed);
 
-    // a file of the program's own would stay there
+    // A file that the program opened itself would stay.
     ASSERT_TRUE(program.waitForNull(closed)) << closed;
 
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
@@ -205,7 +204,7 @@ INSTANTIATE_TEST_SUITE_P(Programs, EveryProgramStarted, testing::ValuesIn(progra
                            return name;
                          });
 
-// What an instrument at the far end of a line receives until the server is over.
+// Reads what an instrument at the remote end of a line receives until the server has ended.
 class SerialServerWithout : public testing::TestWithParam<unsigned> {
  protected:
   Watchdog watchdog_{"a serial server"};
@@ -215,7 +214,7 @@ class SerialServerWithout : public testing::TestWithParam<unsigned> {
   Pty line_{linkPath_};
 };
 
-TEST_P(SerialServerWithout, TheInstrumentGetsNoLineOfTheLog) {
+TEST_P(SerialServerWithout, SendsNoLineOfItsLogToTheInstrument) {
   Bare server({MPF_TEST_SERIAL_SERVER, "line", linkPath_, "1000", "20", "--log-level", "trace",
                "--backplane", backplane_.name()},
               GetParam());
@@ -237,7 +236,7 @@ TEST_P(SerialServerWithout, TheInstrumentGetsNoLineOfTheLog) {
   EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(received)), "*IDN?");
 }
 
-TEST(LogOfAProgram, HasTheTextOfOthersEscaped) {
+TEST(LogOfAProgram, EscapesUntrustedText) {
   const Watchdog watchdog("a program");
   const TestBackplane backplane;
   const Program server({MPF_TEST_INT32_SERVER, "a\u202eb", "--backplane", backplane.name()});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A stranger's lock on a killed server's files keeps no client from the fate of its request, nor
-// from the next server.
+// If another process locks the files of a killed server, clients still get the fates of their
+// requests and find the next server.
 #include <fcntl.h>
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@
 namespace mpf::test {
 namespace {
 
-// The files to be locked, and how.
+// The files to lock, and the kind of lock.
 struct Stranger {
   NameKind file;
   int access;
@@ -29,8 +29,8 @@ struct Stranger {
 
 class ForeignLockFate : public testing::TestWithParam<Stranger> {
  protected:
-  // Waits in a thread for a lock on the file, and keeps it. Locks of open files are those of no
-  // process: this one is a stranger's.
+  // Waits in a thread for a lock on the file, and keeps it. A lock of an open file belongs to no
+  // process, so this one counts as that of another process.
   void waitForLock(const std::string& name) {
     file_.reset(checkCall(::open(segments::path(name).c_str(), GetParam().access | O_CLOEXEC),
                           "open", name));
@@ -62,7 +62,7 @@ class ForeignLockFate : public testing::TestWithParam<Stranger> {
   Dispatcher dispatcher_{backplane_};
 };
 
-TEST_P(ForeignLockFate, ComesAndTheNextServerTakesTheName) {
+TEST_P(ForeignLockFate, ArrivesAndTheNextServerUsesTheName) {
   Victim server("serve", backplane_.name());
   ASSERT_EQ(server.line(), "open");
   int fates = 0;

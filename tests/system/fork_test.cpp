@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A program forks without exec: its child keeps nobody alive, does nothing to what its parent has,
-// and may have objects of its own.
+// A program forks without exec: the child keeps no dead owner alive, does not change the objects of
+// its parent, and may create its own.
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -30,8 +30,8 @@ using namespace std::chrono_literals;
 
 class ForkTest : public testing::Test {
  protected:
-  // An echo server with a thread, a client of it with the process's dispatcher thread, and one
-  // without a thread.
+  // An echo server with a thread, a client of it on the dispatcher thread of the process, and a
+  // client without a thread.
   void SetUp() override {
     server_->on<Float64>([](Float64& request) { request.value += 1; });
     thread_ = std::thread([this] { server_->run(); });
@@ -53,7 +53,7 @@ class ForkTest : public testing::Test {
     ASSERT_TRUE(answer) << answer.why();
     EXPECT_EQ(answer.message().tryAs<Float64>()->value, 2);
   }
-  // Runs `act` in a child; returns its exit status, 0 when it has no failure.
+  // Runs `act` in a child; returns its exit status, 0 without failures.
   static int inChild(const std::function<void()>& act) {
     const auto pid = checkCall(::fork(), "fork");
     if (pid == 0) {
@@ -74,7 +74,7 @@ class ForkTest : public testing::Test {
   std::optional<SyncClient> sync_;
 };
 
-TEST_F(ForkTest, WhatAChildInheritedRefusesAndSaysWhy) {
+TEST_F(ForkTest, InheritedObjectsRefuseUseInAChild) {
   const auto status = inChild([&] {
     EXPECT_FALSE(client_->isConnected());
     EXPECT_EQ(client_->send(Float64Message({.value = 1})), SendResult::notConnected);
@@ -89,7 +89,7 @@ TEST_F(ForkTest, WhatAChildInheritedRefusesAndSaysWhy) {
   expectAnswer(*sync_);
 }
 
-TEST_F(ForkTest, WhatAChildDestroysStaysItsParents) {
+TEST_F(ForkTest, AChildThatDestroysObjectsDoesNotChangeTheParents) {
   const auto names = backplane_.segmentNames();
 
   const auto status = inChild([&] {
@@ -104,7 +104,7 @@ TEST_F(ForkTest, WhatAChildDestroysStaysItsParents) {
   expectAnswer(*sync_);
 }
 
-TEST_F(ForkTest, AChildMayHaveObjectsOfItsOwn) {
+TEST_F(ForkTest, AChildMayCreateItsOwnObjects) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "ThreadSanitizer allows no threads in the child of a process that has some";
 #endif
@@ -121,12 +121,12 @@ TEST_F(ForkTest, AChildMayHaveObjectsOfItsOwn) {
   expectAnswer(*sync_);
 }
 
-TEST_F(ForkTest, AServerIsSeenToDieThoughItsChildLives) {
+TEST_F(ForkTest, TheDeathOfAServerIsNoticedWhileItsChildIsAlive) {
   const auto mortal = std::make_unique<Child>([&](Child::Self& self) {
     const MessageServer server(Backplane::named(backplane_.name()), "mortal");
     if (::fork() == 0) {
       ::prctl(PR_SET_PDEATHSIG, 0);
-      self.ready();  // lives until it is told to go on
+      self.ready();  // runs until the test lets it continue
       ::_exit(0);
     }
     ::pause();

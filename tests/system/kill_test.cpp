@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Processes are killed under load at random times. MPF_TEST_KILLS sets how many times per test; the
-// seed is printed.
+// Kills processes under load at random times. MPF_TEST_KILLS sets the number of kills in each test;
+// the seed is printed.
 #include <array>
 #include <cstdlib>
 #include <gmock/gmock.h>
@@ -58,10 +58,10 @@ struct Ledger {
       if (news->status == ConnectStatus::connectYes) ++connects;
       if (news->status != ConnectStatus::connectNo) return;
       ++disconnects;
-      EXPECT_TRUE(open.empty()) << "a disconnect comes after the fates of all requests";
+      EXPECT_TRUE(open.empty()) << "the disconnect must follow the fates of all requests";
       return;
     }
-    EXPECT_EQ(open.erase(message.route().requestId), 1u) << "an end of a request that is not open";
+    EXPECT_EQ(open.erase(message.route().requestId), 1u) << "a request ended that is not open";
     if (const auto* fate = message.tryAs<RequestFate>()) {
       ++fates.at(static_cast<std::size_t>(fate->fate));
     } else {
@@ -70,7 +70,7 @@ struct Ledger {
   }
 };
 
-// One random request: small, large, or with a deadline that may pass.
+// Sends a random request: small, large, or with a deadline that may pass.
 void sendOne(MessageClient& client, Ledger& ledger, std::mt19937& random) {
   std::uint32_t id = 0;
   SendResult result{};
@@ -84,7 +84,7 @@ void sendOne(MessageClient& client, Ledger& ledger, std::mt19937& random) {
   }
   if (result != SendResult::sent) return;
   ++ledger.accepted;
-  EXPECT_TRUE(ledger.open.insert(id).second) << "an id that is still open was given again";
+  EXPECT_TRUE(ledger.open.insert(id).second) << "the id of an open request was used again";
 }
 
 TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
@@ -117,8 +117,8 @@ TEST_F(KillTest, EveryRequestEndsOnceWhenServersAreKilled) {
   EXPECT_GT(ledger.replies, 0u);
 }
 
-// Who runs one thing at a time has the death as one of them, and not with whatever comes next.
-TEST_F(KillTest, ADeathIsAThingThatRuns) {
+// runOnce() handles the death as an event of its own, and returns true for it.
+TEST_F(KillTest, RunOnceHandlesADeathAsAnEvent) {
   Victim server("serve", backplaneName());
   Dispatcher dispatcher(backplane_);
   bool isGone = false;
@@ -128,16 +128,16 @@ TEST_F(KillTest, ADeathIsAThingThatRuns) {
   });
   client.bind("echo");
   ASSERT_TRUE(client.connectWait(60s));
-  // then the death is all that comes
+  // From now on the death is the only event.
   while (!dispatcher.nextDeadline().isNever()) dispatcher.runOnce();
 
   server.end(SIGKILL);
-  static_cast<void>(backplane_.removeDead());  // there is no window any more, either
+  static_cast<void>(backplane_.removeDead());  // removes the window, too
 
   while (!isGone) EXPECT_TRUE(dispatcher.runOnce());
 }
 
-TEST_F(KillTest, AServerGoesOnWhenClientsAreKilled) {
+TEST_F(KillTest, AServerContinuesWhenClientsAreKilled) {
   Victim server("serve", backplaneName());
 
   for (int round = 0; round < kills(); ++round) {
@@ -156,9 +156,9 @@ TEST_F(KillTest, AServerGoesOnWhenClientsAreKilled) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-// The server ends before it hears of the death, or before it looks: nobody else is there who could
-// remove what is left.
-TEST_F(KillTest, AServerThatEndsTakesItsDeadClientsAlong) {
+// The server ends before it notices or handles the death of its clients, and no other process could
+// remove their segments.
+TEST_F(KillTest, AServerThatEndsRemovesItsDeadClients) {
   auto server = std::make_unique<MessageServer>(backplane_, "echo");
   Victim client("flood", backplaneName());
   while (!server->receive()) server->waitForMessage(Deadline::after(60s));
@@ -180,14 +180,15 @@ TEST_F(KillTest, AKilledServersNameCanBeUsedAtOnce) {
     ASSERT_EQ(successor.line(), "open");
 
     Answer answer = client.call(Float64Message({.value = 2}), 60s);
-    // the fate of a call that met the death
+    // The fate of a call that was open when the server died.
     while (!answer) answer = client.call(Float64Message({.value = 2}), 60s);
     EXPECT_EQ(answer.message().tryAs<Float64>()->value, 3);
   }
 }
 
-// It pauses once more while it is given what its server had sent: that holds for nothing any more.
-TEST_F(KillTest, AClientThatPausesAtItsServersEndMayGoOn) {
+// The client pauses again while it receives the last messages of its server; that pause ends with
+// the server.
+TEST_F(KillTest, AClientThatPausesAtItsServersEndMayContinue) {
   Victim server("serve", backplaneName());
   ASSERT_EQ(server.line(), "open");
   int replies = 0;
@@ -208,7 +209,7 @@ TEST_F(KillTest, AClientThatPausesAtItsServersEndMayGoOn) {
   ASSERT_EQ(client->send(Float64Message()), SendResult::sent);
   ASSERT_EQ(client->send(Float64Message()), SendResult::sent);
   SyncClient other(backplane_, "echo");
-  ASSERT_TRUE(other.call(Float64Message(), 60s)) << "and so did the two before it";
+  ASSERT_TRUE(other.call(Float64Message(), 60s)) << "as the two calls before it";
 
   server.end(SIGKILL);
   while (news != ConnectStatus::connectNo) dispatcher.runOnce(Deadline::after(1ms));
@@ -231,7 +232,7 @@ TEST_F(KillTest, AStoppedServerIsNotDead) {
   auto answer = client.call(Float64Message({.value = 3}), 60s);
   ASSERT_TRUE(answer) << answer.why();
   EXPECT_EQ(answer.message().tryAs<Float64>()->value, 4)
-      << "a late reply must not be taken for this one's";
+      << "a late reply must not be taken for the reply to this request";
 }
 
 }  // namespace

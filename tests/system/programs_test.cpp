@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What holds for every program that is installed: how it says what it is, and what is wrong with
-// its arguments.
+// Every installed program: --version, --help, and errors about its arguments.
 #include <sys/wait.h>
 
 #include <filesystem>
@@ -27,13 +26,13 @@ std::vector<std::string> programs() {
   return {std::istream_iterator<std::string>(list), {}};
 }
 
-// What people call it: mpf-bench is what `mpf bench` starts.
+// The name by which users call a program: mpf-bench is executed by `mpf bench`.
 std::string nameOf(const std::string& program) {
   const auto name = std::filesystem::path(program).filename().string();
   return name == "mpf-bench" ? "mpf bench" : name;
 }
 
-// What a command writes to stdout; empty unless it ends well.
+// The output of a command; empty unless it succeeds.
 std::string outputOf(const std::string& command) {
   const auto ended = runCommand(command);
   return ended.status == 0 ? ended.output : std::string();
@@ -44,17 +43,17 @@ class EveryProgram : public testing::TestWithParam<std::string> {
   Watchdog watchdog_{"a program"};
 };
 
-TEST_P(EveryProgram, SaysItsVersion) {
+TEST_P(EveryProgram, PrintsItsVersion) {
   EXPECT_EQ(outputOf(GetParam() + " --version"),
             nameOf(GetParam()) + " " + MPF_TEST_VERSION + "\n");
 }
 
-// The man pages are made of it.
-TEST_P(EveryProgram, SaysInItsFirstLineWhatItIsFor) {
+// The man pages are generated from this line.
+TEST_P(EveryProgram, DescribesItselfInTheFirstLine) {
   EXPECT_THAT(outputOf(GetParam() + " --help"), StartsWith(nameOf(GetParam()) + " - "));
 }
 
-TEST_P(EveryProgram, NamesItselfAndWhatIsWrongAndEndsWith2) {
+TEST_P(EveryProgram, NamesItselfAndTheWrongArgumentAndExitsWith2) {
   Program program({GetParam(), "--no-such-option"});
 
   const auto said = program.errors();

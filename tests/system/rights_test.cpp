@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Who may be a client: the owner alone, or a group, as the server says. Root plays several users;
-// others see the files' rights only.
+// Which users may be clients: only the owner, or a group, as the server's options say. Root runs
+// processes as several users; other users check the rights of the files only.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@ constexpr std::uint32_t kOperators = 54321;
 
 class RightsTest : public testing::Test {
  protected:
-  // An echo server, with a thread of its own.
+  // An echo server with its own thread.
   class Server {
    public:
     Server(const Backplane& backplane, Rights rights)
@@ -50,18 +50,18 @@ class RightsTest : public testing::Test {
     MessageServer server_;
     std::thread thread_;
   };
-  // A client of another user in another process. What it says first is why it is not connected, if
-  // it is not.
+  // A client of another user in another process. Its first line says why it is not connected, if it
+  // is not.
   Victim startClientAs(std::uint32_t user, std::uint32_t group) const {
     return {"crowd", backplane_.name(), {"1", "as", std::to_string(user), std::to_string(group)}};
   }
-  // What a client is told that may not open the server's window.
+  // The reason that a client gets when it may not open the server's window.
   std::string refusal(const std::string& mode, std::uint32_t group) const {
     return fmt::format("open {} (mode {}, user {}, group {}): Permission denied",
                        segments::path(SegmentName::serverWindow(backplane_.name(), 0, "echo")),
                        mode, ::geteuid(), group);
   }
-  // Rights and group of each segment that has `mark` in its name, as "0600 0".
+  // Rights and group of each segment with `mark` in its name, as "0600 0".
   std::vector<std::string> rightsOf(const std::string& mark) const {
     std::vector<std::string> found;
     for (const auto& name : backplane_.segmentNames()) {
@@ -77,14 +77,14 @@ class RightsTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-// Makes a link with memory for large messages both ways.
+// Creates a link with pools in both directions.
 void useLargeMessages(SyncClient& client) {
   ASSERT_TRUE(client.connectWait(60s));
   auto answer = client.call(client.client().alloc<Float64Array>(5000), 60s);
   ASSERT_TRUE(answer) << answer.why();
 }
 
-TEST_F(RightsTest, AServerIsItsOwnersAloneUnlessItSaysOtherwise) {
+TEST_F(RightsTest, OnlyTheOwnerMayUseAServerByDefault) {
   const Server server(backplane_, {});
   const auto own = fmt::format("{}", ::getegid());
 
@@ -99,7 +99,7 @@ TEST_F(RightsTest, AServerIsItsOwnersAloneUnlessItSaysOtherwise) {
 }
 
 TEST_F(RightsTest, AServersGroupMayReadItsWindowAndWriteItsHintsAndLinks) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may change the group of files";
   const Server server(backplane_, {.mode = 0660, .group = kOperators});
   const auto group = fmt::format("{}", kOperators);
 
@@ -113,19 +113,19 @@ TEST_F(RightsTest, AServersGroupMayReadItsWindowAndWriteItsHintsAndLinks) {
   EXPECT_THAT(rightsOf(".b."), testing::Each("0660 " + group));
 }
 
-TEST_F(RightsTest, AStrangerIsToldWhichRightItLacks) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+TEST_F(RightsTest, AnotherUserIsToldWhichRightItLacks) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   const Server server(backplane_, {});
 
   auto stranger = startClientAs(kNobody, kNobody);
 
   EXPECT_EQ(stranger.line(), "waiting: " + refusal("0600", ::getegid()));
   SyncClient client(backplane_, "echo", 0);
-  EXPECT_TRUE(client.call(Float64Message(), 60s)) << "the owner is served all the same";
+  EXPECT_TRUE(client.call(Float64Message(), 60s)) << "the owner is still served";
 }
 
-TEST_F(RightsTest, AStrangerOfTheGroupIsServed) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+TEST_F(RightsTest, AnotherUserOfTheGroupIsServed) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   const Server server(backplane_, {.mode = 0660, .group = kOperators});
 
   auto member = startClientAs(kNobody, kOperators);
@@ -137,8 +137,8 @@ TEST_F(RightsTest, AStrangerOfTheGroupIsServed) {
   EXPECT_THAT(rightsOf(".l."), testing::ElementsAre(fmt::format("0660 {}", kOperators)));
 }
 
-TEST_F(RightsTest, EverybodyIsServedWhenTheServerSaysSo) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+TEST_F(RightsTest, EveryUserIsServedIfTheServerAllowsIt) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   const Server server(backplane_, {.mode = 0666});
 
   auto stranger = startClientAs(kNobody, kNobody);
@@ -147,8 +147,8 @@ TEST_F(RightsTest, EverybodyIsServedWhenTheServerSaysSo) {
   EXPECT_THAT(stranger.line(), testing::StartsWith("answered "));
 }
 
-TEST_F(RightsTest, RootIsServedByAnybodysServer) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+TEST_F(RightsTest, RootIsServedByEveryServer) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   Victim server("serve", backplane_.name(),
                 {"as", std::to_string(kNobody), std::to_string(kNobody)});
   EXPECT_EQ(server.line(), "open");
@@ -159,8 +159,8 @@ TEST_F(RightsTest, RootIsServedByAnybodysServer) {
   EXPECT_EQ(server.end(SIGTERM), 0);
 }
 
-TEST_F(RightsTest, AStrangerIsServedOnceTheServerAdmitsIt) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can play two users";
+TEST_F(RightsTest, AnotherUserIsServedOnceTheServerAllowsIt) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   auto server = std::make_unique<Server>(backplane_, Rights{});
   auto stranger = startClientAs(kNobody, kOperators);
   EXPECT_THAT(stranger.line(), testing::EndsWith("Permission denied"));

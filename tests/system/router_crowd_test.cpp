@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Many clients through one pair of routers: each gets its own replies, and all find the next life
-// of their server.
+// Many clients through one pair of routers: each gets its own replies, and all find the restarted
+// server.
 #include "tests/support/sanitized.h"
 #include "tests/system/router_fixture.h"
 
@@ -45,7 +45,7 @@ TEST_F(RouterCrowdTest, AHundredClientsThatStartAtOnceEachGetTheirOwnReplies) {
   waitUntilAllAreAnswered();
 }
 
-TEST_F(RouterCrowdTest, AllAreAnsweredByEachLifeOfTheServer) {
+TEST_F(RouterCrowdTest, AllGetRepliesAfterEachRestartOfTheServer) {
   routers_.start();
   startServer();
   startCrowd();
@@ -58,9 +58,9 @@ TEST_F(RouterCrowdTest, AllAreAnsweredByEachLifeOfTheServer) {
   }
 }
 
-// The far router finds, all at once, that one life has ended and the next one is there: who has
-// heard of the end connects again before others have heard.
-TEST_F(RouterCrowdTest, AllFindTheServerThatCameWhileTheRouterStoodStill) {
+// The remote router notices at the same moment that a server has ended and that its successor is
+// running: some clients connect again before others are notified of the end.
+TEST_F(RouterCrowdTest, AllFindAServerThatStartedWhileTheRouterWasStopped) {
   routers_.start();
   startServer();
   startCrowd();

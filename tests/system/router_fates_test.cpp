@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Requests that get no reply through two routers: each has one fate, and news stands where it
-// belongs.
+// Requests without a reply through two routers: each has one fate, and connects and disconnects are
+// in order with them.
 #include "tests/system/router_fixture.h"
 
 namespace mpf::test {
@@ -13,7 +13,7 @@ class RouterFatesTest : public RouterTest {
     const auto message = next();
     EXPECT_TRUE(RelayClient::endsRequest(message));
     EXPECT_EQ(message.route().requestId, id);
-    EXPECT_EQ(message.getClientExtra(), 12) << "a fate carries the marks of its request";
+    EXPECT_EQ(message.getClientExtra(), 12) << "a fate carries the client fields of its request";
     return fateOf(message).value();
   }
   std::uint32_t send(Deadline takeBefore = Deadline::never()) {
@@ -29,13 +29,13 @@ TEST_F(RouterFatesTest, ARequestThatTheServerRefusesIsRefused) {
   EXPECT_EQ(nextFate(send()), Fate::refused);
 }
 
-TEST_F(RouterFatesTest, ARequestWhoseHandleDiesIsRefused) {
+TEST_F(RouterFatesTest, ARequestThatTheServerReleasesIsRefused) {
   serve_ = [](Message&&) {};
 
   EXPECT_EQ(nextFate(send()), Fate::refused);
 }
 
-TEST_F(RouterFatesTest, ARequestExpiresWhenItsServerDoesNotTakeIt) {
+TEST_F(RouterFatesTest, ARequestExpiresWhenItsServerDoesNotReceiveIt) {
   serverRuns_ = false;
 
   EXPECT_EQ(nextFate(send(Deadline::after(20ms))), Fate::expired);
@@ -48,14 +48,15 @@ TEST_F(RouterFatesTest, ARequestExpiresWhenItsServerDoesNotTakeIt) {
   };
   caller_->send(Int32Message({.value = 2}), Deadline::after(100s));
   EXPECT_EQ(next().tryAs<Int32>()->value, 2);
-  EXPECT_EQ(seen, 1) << "the one that expired was never seen";
+  EXPECT_EQ(seen, 1) << "the expired request must not reach the server";
 }
 
-// A deadline is for the time until it is taken; a server may work for as long as it likes.
-TEST_F(RouterFatesTest, ARequestThatWasTakenInTimeIsAnsweredAfterIt) {
+// A deadline limits the time until the server receives the request, not the time of its work.
+TEST_F(RouterFatesTest, ARequestReceivedInTimeMayBeAnsweredAfterItsDeadline) {
   auto deadline = Deadline::never();
   Message request;
-  for (auto time = 100ms; !request; time *= 2) {  // longer, until it was taken in time
+  for (auto time = 100ms; !request;
+       time *= 2) {  // doubled until the server receives the request in time
     deadline = Deadline::after(time);
     caller_->send(Int32Message({.value = 1}), deadline);
     while (!request && caller_->messages.empty()) {
@@ -81,20 +82,19 @@ TEST_F(RouterFatesTest, ACancelledRequestHasNoOtherEnd) {
   EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
 
   caller_->send(Int32Message({.value = 2}));
-  EXPECT_EQ(next().tryAs<Int32>()->value, 2) << "the late reply is nobody's";
+  EXPECT_EQ(next().tryAs<Int32>()->value, 2) << "the late reply must be dropped";
 }
 
-// What the server has seen may have been done; the rest was not. Then the disconnect, and a new
-// life.
-TEST_F(RouterFatesTest, WhenAServerEndsWhatItHasSeenIsUnknownAndTheRestWasNeverTaken) {
+// Requests that the server has received may have been carried out, the others were not. Then the
+// disconnect follows, and a connect to the next server.
+TEST_F(RouterFatesTest, WhenAServerEndsReceivedRequestsAreUnknownAndOthersNeverTaken) {
   std::vector<std::pair<std::uint32_t, Fate>> expected{{send(), Fate::outcomeUnknown},
                                                        {send(), Fate::outcomeUnknown}};
   const auto first = nextRequest();
   const auto second = nextRequest();
   serverRuns_ = false;
   for (int i = 0; i < 5; ++i) expected.emplace_back(send(), Fate::neverTaken);
-  EXPECT_EQ(nextFate(send(Deadline::after(1ms))), Fate::expired)
-      << "now the others have arrived, too";
+  EXPECT_EQ(nextFate(send(Deadline::after(1ms))), Fate::expired) << "the others have arrived, too";
 
   server_.reset();
 
@@ -110,8 +110,8 @@ TEST_F(RouterFatesTest, WhenAServerEndsWhatItHasSeenIsUnknownAndTheRestWasNeverT
   EXPECT_EQ(next().tryAs<Int32>()->value, 9);
 }
 
-// The far router has it to itself then: no client of it had been accepted, and no process ended.
-TEST_F(RouterFatesTest, AServerThatEndsBeforeItAcceptsAFarClientTakesNothing) {
+// The server has accepted no client of the remote router yet.
+TEST_F(RouterFatesTest, AServerThatEndsBeforeItAcceptsAClientReceivesNothing) {
   serverRuns_ = false;
   Caller late(*dispatcher_);
   runUntil([&] { return late.isConnected(); });
@@ -126,9 +126,9 @@ TEST_F(RouterFatesTest, AServerThatEndsBeforeItAcceptsAFarClientTakesNothing) {
   EXPECT_EQ(fateOf(late.take()), Fate::neverTaken);
 }
 
-// The queue is the server's, with its size; the client hears of the refusals and, once, that the
-// queue is full.
-TEST_F(RouterFatesTest, AQueueThatIsFullRefusesAndIsToldOnceInItsPlace) {
+// The queue has the size of the server's queue. The client gets the refusals and is notified once
+// that the queue is full.
+TEST_F(RouterFatesTest, AFullQueueRefusesAndIsReportedOnceInOrder) {
   constexpr int kQueueSize = 10;
   restartServer({.queueSize = kQueueSize});
   serverRuns_ = false;
@@ -143,12 +143,12 @@ TEST_F(RouterFatesTest, AQueueThatIsFullRefusesAndIsToldOnceInItsPlace) {
   for (int i = 0; i < kQueueSize; ++i) EXPECT_EQ(next().tryAs<Int32>()->value, 1);
   caller_->send(Int32Message({.value = 9}));
   EXPECT_EQ(next().tryAs<Int32>()->value, 9);
-  EXPECT_EQ(caller_->news.size(), 1u) << "no news since";
+  EXPECT_EQ(caller_->news.size(), 1u) << "no notification since";
 }
 
-// Through any number of lives, each begins with a connect and ends with a disconnect; the fixture
-// sees to the ends of requests.
-TEST_F(RouterFatesTest, EachLifeOfAServerBeginsAndEndsWithNews) {
+// Each server begins with a connect and ends with a disconnect; the fixture checks the ends of
+// requests.
+TEST_F(RouterFatesTest, EachServerBeginsWithAConnectAndEndsWithADisconnect) {
   constexpr int kLives = 20;
   std::vector<ConnectStatus> expected{ConnectStatus::connectYes};
   for (int life = 0; life < kLives; ++life) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RouterTest: two routers, a client near and a server far, which take turns in the test's own
-// thread; only the routers are processes.
+// RouterTest: two routers, a client on the local side and a server on the remote side. Client and
+// server take turns in the test's own thread; only the routers are processes.
 #pragma once
 
 #include <chrono>
@@ -30,20 +30,20 @@ class RouterTest : public testing::Test {
  protected:
   explicit RouterTest(RouterPlace place = {}) : routers_(std::move(place)) {}
 
-  // The server; `serve` is called for each request that it has received. Default: it sends the
+  // Opens the server. serve_ is called for each request that it receives; by default it sends the
   // request back.
   void openServer(ServerOptions options = {}) {
     options.location = RouterPair::kLocation;
     server_ = std::make_unique<MessageServer>(routers_.far(), "echo", options);
   }
-  // Both routers, the server and a client that is connected to it.
+  // Starts both routers, the server and a client, and waits until the client is connected.
   void startAll(const RouterPair::Options& more = {}) {
     routers_.start(more);
     openServer();
     caller_.emplace(*dispatcher_);
     runUntil([&] { return caller_->isConnected(); });
   }
-  // Another life of the server, and the client is connected to that; its news begin there.
+  // Restarts the server, waits until the client is connected to it, and clears the notifications.
   void restartServer(const ServerOptions& options = {}) {
     server_.reset();
     runUntil([&] { return caller_->news.back() == ConnectStatus::connectNo; });
@@ -58,13 +58,13 @@ class RouterTest : public testing::Test {
       dispatcher_->runOnce(Deadline::after(200us));
     }
   }
-  // One round trip.
+  // Makes one round trip.
   void expectAnswer() {
     runUntil([&] { return caller_->isConnected(); });
     caller_->send(Int32Message({.value = ++value_}));
     EXPECT_EQ(next().tryAs<Int32>()->value, value_);
   }
-  // The server sends each request back, and remembers its number (numberOf): nothing is to be
+  // The server sends each request back and records its number (numberOf), so that nothing is
   // delivered twice.
   void serveOnceEach() {
     serve_ = [this](Message&& request) {
@@ -73,7 +73,7 @@ class RouterTest : public testing::Test {
       static_cast<void>(server_->reply(std::move(request)));
     };
   }
-  // Of an Int32, its value; of an Int32Array, its first.
+  // The value of an Int32, or the first value of an Int32Array.
   static std::int32_t numberOf(const Message& message) {
     const auto* int32 = message.tryAs<Int32>();
     return int32 != nullptr ? int32->value : message.valueAs<Int32Array>()[0];
@@ -84,28 +84,28 @@ class RouterTest : public testing::Test {
   void runFor(Nanoseconds time) {
     runUntil([until = Deadline::after(time)] { return until.hasPassed(); });
   }
-  // The next message of the client that is no news.
+  // The next reply or fate that the client receives.
   Message next() {
     runUntil([&] { return !caller_->messages.empty(); });
     return caller_->take();
   }
-  // The next request that reaches the server.
+  // The next request that the server receives.
   Message nextRequest() {
     for (;;) {
       if (auto request = server_->receive()) return request;
       dispatcher_->runOnce(Deadline::after(200us));
     }
   }
-  // Until the near router has taken so many requests for the server that is there now: none waits
-  // for it then.
+  // Waits until the local router has received this number of requests for the current server, so
+  // that none waits for the router.
   void waitUntilTaken(const std::string& server, std::uint64_t requests) {
     const auto window =
         SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, server);
     const auto proxy = PeerWindow::tryOpen(window, layout::SegmentKind::serverWindow);
     runUntil([&] { return proxy->control().received.load(std::memory_order_relaxed) >= requests; });
   }
-  // Until each client of a crowd (victim.cpp) had all its requests answered, with its own answers,
-  // in the life of the server that is there now.
+  // Waits until the current server has answered all requests of each client of a crowd
+  // (victim.cpp), each with its own replies.
   void waitUntilAnswered(Victim& crowd) const {
     const auto window =
         SegmentName::serverWindow(routers_.near().name(), RouterPair::kLocation, "echo");
@@ -118,7 +118,7 @@ class RouterTest : public testing::Test {
   }
   void runServer() {
     if (!server_ || !serverRuns_) return;
-    // Not for longer than there are some: the client has its turn.
+    // At most 100 requests, so that the client has its turn.
     for (int left = 100; left > 0; --left) {
       auto request = server_->receive();
       if (!request) return;
@@ -144,7 +144,7 @@ class RouterTest : public testing::Test {
   std::function<void(Message&&)> serve_;
   std::optional<Dispatcher> dispatcher_{routers_.near()};
   std::optional<Caller> caller_;
-  std::int32_t value_ = 0;  // of expectAnswer(), the last
+  std::int32_t value_ = 0;  // the last one of expectAnswer()
   std::set<std::int32_t> delivered_;  // numbers, by serveOnceEach()
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Routers, servers and clients are killed under load at random times and started again: each
-// request has one end, and it is true. MPF_TEST_KILLS sets how many die per test; the seed is
-// printed.
+// Kills and restarts routers, servers and clients under load at random times: each request has one
+// end, which is true. MPF_TEST_KILLS sets the number of kills in each test; the seed is printed.
 #include <cstdlib>
 #include <map>
 
@@ -31,7 +30,7 @@ class RouterKillTest : public RouterTest {
   }
   void startFlood() { flood_ = Victim("flood", routers_.near().name()); }
 
-  // One random request: small, large, or with a deadline that may pass.
+  // Sends a random request: small, large, or with a deadline that may pass.
   void sendOne() {
     if (!caller_->isConnected() || caller_->open.size() >= 150) return;
     const auto number = ++lastNumber_;
@@ -55,18 +54,18 @@ class RouterKillTest : public RouterTest {
                                        SendResult::tooManyOutstanding, SendResult::notConnected));
     if (result == SendResult::sent) caller_->open.insert(id);
   }
-  // What has come: the answer to the request whose mark it carries, or its fate.
+  // Handles all received messages: a reply or a fate for the request whose number it carries.
   void takeAll() {
     for (auto message = caller_->take(); message; message = caller_->take()) {
       const auto number = message.getClientExtra();
       EXPECT_TRUE(ends_.emplace(number, fateOf(message)).second)
-          << "request " << number << " has had its end";
+          << "request " << number << " has already ended";
       if (fateOf(message)) continue;
       ++replies_;
       const auto* int32 = message.tryAs<Int32>();
       EXPECT_EQ(int32 != nullptr ? int32->value : message.valueAs<Int32Array>()[0], number)
-          << "a reply to something else";
-      EXPECT_GT(number, lastReplied_) << "replies are in the order of requests";
+          << "a reply to another request";
+      EXPECT_GT(number, lastReplied_) << "replies must be in the order of requests";
       lastReplied_ = number;
     }
   }
@@ -96,7 +95,7 @@ class RouterKillTest : public RouterTest {
       takeAll();
     }
   }
-  // Until all requests have ended, and one after the last kill with a reply.
+  // Waits until all requests have ended, and one after the last kill has a reply.
   void waitUntilServed() {
     waitUntilConnected();
     for (const auto before = replies_; replies_ == before || !caller_->open.empty();) {
@@ -105,7 +104,7 @@ class RouterKillTest : public RouterTest {
       takeAll();
     }
   }
-  // What each end says is what the servers saw.
+  // Compares the end of each request with the requests that the servers received.
   void expectTrueEnds() const {
     for (const auto& [number, fate] : ends_) {
       const auto seen = log_.timesSeen(number);
@@ -133,7 +132,7 @@ class RouterKillTest : public RouterTest {
   int replies_ = 0;
 };
 
-TEST_F(RouterKillTest, EachRequestHasOneTrueEndWhoeverIsKilled) {
+TEST_F(RouterKillTest, EachRequestHasOneTrueEndWhenProcessesAreKilled) {
   routers_.start();
   startServer();
   startFlood();

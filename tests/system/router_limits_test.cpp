@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a router has not enough of: who comes too late is told so, who is there goes on, and when
-// there is room again, others get in.
+// Limits of a router: it refuses clients, callers and servers beyond a limit, serves the existing
+// ones, and accepts others when there is room again.
 #include <arpa/inet.h>
 #include <sys/resource.h>
 
@@ -13,7 +13,7 @@
 namespace mpf::test {
 namespace {
 
-// What calls somewhere and says nothing.
+// Connects to an address and sends nothing.
 FileDescriptor callTo(const std::string& address) {
   FileDescriptor socket(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
   sockaddr_in to{};
@@ -30,7 +30,7 @@ void limitDescriptors(rlim_t most) {
   if (::setrlimit(RLIMIT_NOFILE, &limit) != 0) ::_exit(126);
 }
 
-// Another near router, with a backplane of its own.
+// Another local router, with its own backplane.
 struct Neighbour {
   explicit Neighbour(const std::string& address)
       : router(std::vector<std::string>{"--backplane", backplane.name(), "--remote",
@@ -43,7 +43,7 @@ struct Neighbour {
 class RouterLimitsTest : public RouterTest {
  protected:
   explicit RouterLimitsTest(RouterPlace place = {}) : RouterTest(std::move(place)) {}
-  // A client of a neighbour is answered, too.
+  // Expects that a client of the neighbour gets a reply.
   void expectAnswerFor(const Neighbour& neighbour) {
     Dispatcher dispatcher(neighbour.backplane);
     Caller caller(dispatcher);
@@ -79,7 +79,8 @@ TEST_F(RouterLimitsTest, ClientsBeyondTheLimitAreRefusedUntilOthersLeave) {
   expectAnswer();
 
   second.reset();
-  for (auto refused = true; refused;) {  // the near router may not have heard yet that one has left
+  for (auto refused = true;
+       refused;) {  // the local router may not have noticed yet that a client has left
     third.send(Int32Message());
     runUntil([&] { return !third.messages.empty(); });
     refused = fateOf(third.take()) == Fate::refused;
@@ -87,7 +88,7 @@ TEST_F(RouterLimitsTest, ClientsBeyondTheLimitAreRefusedUntilOthersLeave) {
   EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-TEST_F(RouterLimitsTest, ConnectionsBeyondTheLimitAreTurnedAwayUntilOthersEnd) {
+TEST_F(RouterLimitsTest, ConnectionsBeyondTheLimitAreRefusedUntilOthersEnd) {
   routers_.startFar({"--max-connections", "1"});
   routers_.startNear();
   openServer();
@@ -102,7 +103,7 @@ TEST_F(RouterLimitsTest, ConnectionsBeyondTheLimitAreTurnedAwayUntilOthersEnd) {
   expectAnswerFor(neighbour);
 }
 
-// A connection that is reset before the router looks at it.
+// Makes a connection and resets it before the router accepts it.
 void callAndReset(const std::string& address) {
   const auto socket = callTo(address);
   const linger atOnce{.l_onoff = 1, .l_linger = 0};
@@ -110,7 +111,7 @@ void callAndReset(const std::string& address) {
             "setsockopt");
 }
 
-TEST_F(RouterLimitsTest, ConnectionsThatAreResetAtOnceTakeNoPlace) {
+TEST_F(RouterLimitsTest, ConnectionsThatAreResetAtOnceDoNotCount) {
   routers_.startFar({"--max-connections", "1"});
   routers_.farRouter().stop();
   for (int i = 0; i < 10; ++i) callAndReset(routers_.address());
@@ -126,13 +127,12 @@ class RouterWithoutDescriptorsTest : public RouterLimitsTest {
   using RouterLimitsTest::RouterLimitsTest;
   void SetUp() override {
     if (kIsSanitized)
-      GTEST_SKIP() << "the sanitizer makes descriptors to look at memory, and takes their lack for "
+      GTEST_SKIP() << "the sanitizer needs descriptors to read memory, and takes their lack for "
                       "a fault of the router";
   }
 };
 
-// With one number of files it is this descriptor that is not to be had first, with another one
-// that.
+// The number of files decides which descriptor the router cannot get.
 class RouterFewDescriptorsTest : public RouterWithoutDescriptorsTest,
                                  public testing::WithParamInterface<rlim_t> {
  protected:
@@ -144,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(Of, RouterFewDescriptorsTest, testing::Values(48, 49));
 
 TEST_P(RouterFewDescriptorsTest, CallersBeyondTheLimitOfFilesWaitUntilOthersHangUp) {
   startAll({"--dead-time", "60s"});
-  expectAnswer();  // both routers have all that they need for it
+  expectAnswer();  // both routers now have all descriptors that this needs
   std::vector<FileDescriptor> callers;
   routers_.farRouter().stop();
   for (int i = 0; i < 60; ++i) callers.push_back(callTo(routers_.address()));
@@ -160,14 +160,14 @@ TEST_P(RouterFewDescriptorsTest, CallersBeyondTheLimitOfFilesWaitUntilOthersHang
   EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// Each server that is wished for takes some files of both routers.
+// Each server that clients wait for needs some files of both routers.
 class RouterFewFilesTest : public RouterWithoutDescriptorsTest {
  protected:
   using RouterWithoutDescriptorsTest::RouterWithoutDescriptorsTest;
-  // `limited`: the router that says so.
+  // `limited`: the router that reports the limit.
   void expectThatOthersGoOnAndAllGetInLater(RouterProcess& (RouterPair::*limited)()) {
     startAll({"--dead-time", "60s"});
-    expectAnswer();  // both routers have all that they need for it
+    expectAnswer();  // both routers now have all descriptors that this needs
     for (int i = 0; i < kServers; ++i) {
       const auto name = "server" + std::to_string(100 + i);
       servers_.push_back(std::make_unique<MessageServer>(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Messages through two routers: each type there and back as it was, replies in any number, fates,
-// news in order.
+// Messages through two routers: every type unchanged in both directions, any number of replies,
+// fates and notifications in order.
 #include <bit>
 #include <capnp/message.h>
 #include <capnp/serialize.h>
@@ -17,7 +17,7 @@ class RouterMessagesTest : public RouterTest {
  protected:
   void SetUp() override { startAll(); }
 
-  // Sends a message and expects it back as it went, every byte of it.
+  // Sends a message and expects its echo, with every byte unchanged.
   void expectEcho(Message message) {
     message.setClientType(-77);
     message.setClientExtra(std::numeric_limits<std::int32_t>::min());
@@ -52,7 +52,7 @@ class RouterMessagesTest : public RouterTest {
 constexpr auto kLeast = std::numeric_limits<std::int32_t>::min();
 constexpr auto kMost = std::numeric_limits<std::int32_t>::max();
 
-TEST_F(RouterMessagesTest, IntegersComeBackAsTheyWent) {
+TEST_F(RouterMessagesTest, IntegersAreUnchanged) {
   expectEcho(Int32Message(
       {.timeout = kLeast, .cmd = kMost, .status = -1, .address = 1, .extra = 0, .value = kLeast}));
   expectEcho(OutOfBandMessage(
@@ -61,8 +61,8 @@ TEST_F(RouterMessagesTest, IntegersComeBackAsTheyWent) {
       {.baud = 115'200, .stopBits = 2, .bitsPerChar = 7, .parity = 'E', .flowControl = 'H'}));
 }
 
-// Not by value: by bits.
-TEST_F(RouterMessagesTest, FloatsComeBackBitForBit) {
+// Compares bits, not values.
+TEST_F(RouterMessagesTest, FloatsAreUnchangedInEveryBit) {
   using Limits = std::numeric_limits<double>;
   const std::vector<double> all{0.0, -0.0, 1.0 / 3, Limits::infinity(), -Limits::infinity(),
                                 Limits::denorm_min(), Limits::max(),
@@ -76,7 +76,7 @@ TEST_F(RouterMessagesTest, FloatsComeBackBitForBit) {
   expectEcho(array<Float64Array>(all.size(), [&](std::size_t at) { return all[at]; }));
 }
 
-TEST_F(RouterMessagesTest, ArraysOfAnyLengthComeBack) {
+TEST_F(RouterMessagesTest, ArraysOfAnyLengthAreUnchanged) {
   for (const std::size_t length : {0u, 1u, 2u, 7u, 1000u, 300'000u}) {
     expectEcho(array<Int32Array>(
         length, [](std::size_t at) { return static_cast<std::int32_t>(at * 2'654'435'761u); }));
@@ -99,8 +99,9 @@ TEST_F(RouterMessagesTest, BytesKeepTheirEndOfMessageAndTheirCounts) {
   }
 }
 
-// Its words are the user's: not even their order in the segment changes.
-TEST_F(RouterMessagesTest, AUsersOwnStructComesBackUnread) {
+// The router does not interpret the struct: even the order of its words in the segment is
+// unchanged.
+TEST_F(RouterMessagesTest, AUserDefinedStructIsUnchanged) {
   for (const std::size_t words : {1u, 2u, 1000u}) {
     expectEcho(
         array<User>(8 * words, [&](std::size_t at) { return static_cast<std::byte>(at * 97); }));
@@ -146,9 +147,9 @@ TEST_F(RouterMessagesTest, OneRequestMayHaveManyRepliesOfAnyType) {
   for (const auto* reply : {&first, &second, &third}) EXPECT_EQ(reply->route().requestId, id);
 }
 
-// A subscription: long after its end, a request's client gets more, between the answers to other
-// requests.
-TEST_F(RouterMessagesTest, AServerMaySpeakLongAfterItHasAnswered) {
+// A subscription: after a request has ended, its client gets further messages between the replies
+// to other requests.
+TEST_F(RouterMessagesTest, AServerMaySendFurtherMessagesAfterItsReply) {
   caller_->send(Int32Message({.value = 1}));
   auto subscription = nextRequest();
   const auto kept = subscription.duplicate();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Two hosts and the line between them: slow, lossy, out of order, cut without a word. Network
-// namespaces and tun devices: skipped where those are not allowed.
+// Two hosts and the line between them: slow, lossy, out of order, or cut without notice. Uses
+// network namespaces and tun devices; skipped where these are not allowed.
 #include <sched.h>
 #include <sys/mount.h>
 
@@ -24,7 +24,7 @@ constexpr std::int64_t kDefaultDeadTimeNs = 2'000'000'000;
 const RouterPair::Options kSoonDead{"--dead-time", "1s"};
 const RouterPair::Options kPatient{"--dead-time", "60s"};
 
-// The wire stands before the routers do.
+// Creates the line before the routers start.
 struct WiredHosts {
   WiredHosts() {
     try {
@@ -44,16 +44,16 @@ class RouterNetworkTest : public WiredHosts, public RouterTest {
                     .enterNear = [this] { wire->enterNear(); },
                     .enterFar = [this] { wire->enterFar(); }}) {}
   void SetUp() override {
-    if (!wire) GTEST_SKIP() << "no hosts of our own here: " << whyNot;
+    if (!wire) GTEST_SKIP() << "no network namespaces here: " << whyNot;
   }
-  // After the dead time; the kernel, which would miss the other one too, waits longer.
+  // Both routers notice this after the dead time. The kernel would notice it later.
   void expectBothMissedTheOther() {
     for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()})
       router->waitUntilSaid("received nothing from the peer");
   }
 };
 
-// A name with more than one address, all but the last of which swallow what is sent there.
+// A name with several addresses, of which all but the last one do not answer.
 class RouterManyAddressesTest : public WiredHosts, public RouterTest {
  protected:
   RouterManyAddressesTest()
@@ -65,9 +65,9 @@ class RouterManyAddressesTest : public WiredHosts, public RouterTest {
     folder_.write("hosts-far", std::string(Wire::kFar) + " far.test\n");
   }
   void SetUp() override {
-    if (!wire) GTEST_SKIP() << "no hosts of our own here: " << whyNot;
+    if (!wire) GTEST_SKIP() << "no network namespaces here: " << whyNot;
   }
-  // In the router's process.
+  // Runs in the router's process.
   void readHosts(const std::string& file) const {
     checkCall(::unshare(CLONE_NEWNS), "unshare");
     checkCall(::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr), "mount", "/");
@@ -85,13 +85,13 @@ class RouterManyAddressesTest : public WiredHosts, public RouterTest {
   TemporaryFolder folder_;
 };
 
-TEST_F(RouterManyAddressesTest, EachHasItsTime) {
+TEST_F(RouterManyAddressesTest, EachAddressIsTriedWithItsOwnTimeout) {
   startAll(kSoonDead);
 
   expectAnswer();
 }
 
-// ---- weather: nothing is cut, so all is answered
+// ---- bad lines that are not cut: every request gets its reply
 
 class RouterWeatherTest : public RouterNetworkTest,
                           public testing::WithParamInterface<std::pair<const char*, Weather>> {};
@@ -143,13 +143,13 @@ INSTANTIATE_TEST_SUITE_P(
 
 // ---- cuts
 
-TEST_F(RouterNetworkTest, ACutIsNoticedAfterTheDeadTimeAndEachRequestHasItsFate) {
+TEST_F(RouterNetworkTest, ACutIsNoticedAfterTheDeadTimeAndEachRequestGetsItsFate) {
   startAll({"--dead-time", "2s"});
   caller_->send(Int32Message({.value = 1000}));
   const auto kept = nextRequest();
   serveOnceEach();
   const auto beforeNs = Clock::nowNs();
-  expectAnswer();  // both routers have heard of each other since then
+  expectAnswer();  // both routers have received messages of each other since then
 
   wire->cut();
   for (int i = 1; i <= 5; ++i) caller_->send(Int32Message({.value = 1000 + i}));
@@ -168,7 +168,7 @@ TEST_F(RouterNetworkTest, ACutIsNoticedAfterTheDeadTimeAndEachRequestHasItsFate)
                                    ConnectStatus::connectYes));
 }
 
-TEST_F(RouterNetworkTest, AnIdleLineThatIsCutIsMissedByBothSides) {
+TEST_F(RouterNetworkTest, BothSidesNoticeACutOfAnIdleLine) {
   startAll(kSoonDead);
   for (int round = 0; round < 2; ++round) {
     caller_->send(Int32Message());
@@ -187,7 +187,7 @@ TEST_F(RouterNetworkTest, AnIdleLineThatIsCutIsMissedByBothSides) {
   }
 }
 
-TEST_F(RouterNetworkTest, ALineThatIsCutInOneDirectionIsCut) {
+TEST_F(RouterNetworkTest, ACutInOneDirectionClosesTheConnection) {
   startAll(kSoonDead);
   serveOnceEach();
   for (const auto direction : {Direction::toFar, Direction::toNear}) {
@@ -220,9 +220,9 @@ TEST_F(RouterNetworkTest, ACutShorterThanTheDeadTimeLosesNothing) {
   EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// Those that the line had no room for were not done, and that is said.
-TEST_F(RouterNetworkTest, WhatNeverReachedTheLineWasNeverTaken) {
-  // more than the kernel takes of a line that stands still
+// Requests that did not fit into the line were not carried out, and their fates say so.
+TEST_F(RouterNetworkTest, RequestsThatNeverReachedTheLineAreNeverTaken) {
+  // More than the kernel buffers for a line that is cut.
   constexpr std::size_t kElements = 1 << 18;
   startAll(kSoonDead);
   serveOnceEach();
@@ -246,9 +246,9 @@ TEST_F(RouterNetworkTest, WhatNeverReachedTheLineWasNeverTaken) {
   expectAnswer();
 }
 
-// ---- hosts that go and come while nobody can see it
+// ---- hosts that restart while the line is cut
 
-TEST_F(RouterNetworkTest, AHostThatFallsSilentAndComesBackIsFoundAgain) {
+TEST_F(RouterNetworkTest, AHostThatIsSilentForAWhileIsConnectedAgain) {
   startAll(kSoonDead);
   for (const bool isMissed : {true, false}) {
     const auto news = caller_->news.size();
@@ -267,7 +267,7 @@ TEST_F(RouterNetworkTest, AHostThatFallsSilentAndComesBackIsFoundAgain) {
   }
 }
 
-TEST_F(RouterNetworkTest, TheClientsOfAHostThatFellSilentAreGone) {
+TEST_F(RouterNetworkTest, TheClientsOfASilentHostAreDisconnected) {
   startAll(kSoonDead);
   caller_->send(Int32Message());
   const auto kept = nextRequest();
@@ -283,7 +283,7 @@ TEST_F(RouterNetworkTest, TheClientsOfAHostThatFellSilentAreGone) {
   expectAnswer();
 }
 
-TEST_F(RouterNetworkTest, ARouterThatNobodyAnswersGoesOnAsking) {
+TEST_F(RouterNetworkTest, ARouterWithoutAnAnswerKeepsTrying) {
   wire->cut();
   routers_.start(kSoonDead);
   openServer();
@@ -295,11 +295,11 @@ TEST_F(RouterNetworkTest, ARouterThatNobodyAnswersGoesOnAsking) {
   expectAnswer();
 }
 
-// ---- all of it, again and again
+// ---- all of this repeatedly
 
 class RouterStormTest : public RouterNetworkTest {
  protected:
-  // Notes how requests ended, and keeps some open.
+  // Records how requests ended, and keeps some requests open.
   void exchange() {
     take();
     while (caller_->isConnected() && caller_->open.size() < 20) {
@@ -338,7 +338,7 @@ class RouterStormTest : public RouterNetworkTest {
 
   Random random_;
   std::int32_t sent_ = 0;
-  std::map<std::uint32_t, std::int32_t> numbers_;  // of open requests, by their ids
+  std::map<std::uint32_t, std::int32_t> numbers_;  // numbers of open requests, by their ids
   std::set<std::int32_t> answered_;
   std::map<std::int32_t, Fate> fates_;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Routers that stand still for a while (SIGSTOP): the others miss them after the dead time, all
-// meet again, and nothing is delivered twice.
+// Routers that are stopped for a while (SIGSTOP): the others close the connection after the dead
+// time, all connect again, and nothing is delivered twice.
 #include "tests/system/router_fixture.h"
 
 namespace mpf::test {
@@ -11,7 +11,7 @@ const RouterPair::Options kPatient{"--dead-time", "60s"};
 
 class RouterPauseTest : public RouterTest {
  protected:
-  // So many, with numbers that no other request has.
+  // Sends this number of requests, with unique values.
   void send(int requests) {
     for (int i = 0; i < requests; ++i) caller_->send(Int32Message({.value = --numbered_}));
   }
@@ -20,7 +20,7 @@ class RouterPauseTest : public RouterTest {
   std::int32_t numbered_ = 0;
 };
 
-TEST_F(RouterPauseTest, AFarRouterThatStandsStillIsMissedAndFoundAgain) {
+TEST_F(RouterPauseTest, AStoppedRemoteRouterIsDisconnectedAndConnectedAgain) {
   startAll(kSoonDead);
   serveOnceEach();
   for (int round = 0; round < 2; ++round) {
@@ -40,8 +40,8 @@ TEST_F(RouterPauseTest, AFarRouterThatStandsStillIsMissedAndFoundAgain) {
   }
 }
 
-// Its clients see that it lives; when it goes on it finds its line cut.
-TEST_F(RouterPauseTest, ANearRouterThatStoodStillConnectsAgain) {
+// Its clients see that it is alive. When it continues, its connection has been closed.
+TEST_F(RouterPauseTest, AStoppedLocalRouterConnectsAgain) {
   startAll(kSoonDead);
   send(1);
   const auto kept = nextRequest();
@@ -64,7 +64,7 @@ TEST_F(RouterPauseTest, ANearRouterThatStoodStillConnectsAgain) {
   expectAnswer();
 }
 
-TEST_F(RouterPauseTest, RoutersThatStandStillForLessThanTheDeadTimeLoseNothing) {
+TEST_F(RouterPauseTest, RoutersStoppedForLessThanTheDeadTimeLoseNothing) {
   startAll(kPatient);
   serveOnceEach();
   int answered = 0;
@@ -77,8 +77,9 @@ TEST_F(RouterPauseTest, RoutersThatStandStillForLessThanTheDeadTimeLoseNothing) 
   EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-// As when a laptop sleeps: they may have missed each other or not, and go on in any case.
-TEST_F(RouterPauseTest, RoutersThatBothStoodStillForLongGoOn) {
+// As when a computer sleeps: whether or not the routers have closed their connection, they work
+// again.
+TEST_F(RouterPauseTest, RoutersThatWereBothStoppedForLongWorkAgain) {
   startAll({"--dead-time", "300ms"});
   serveOnceEach();
   for (auto* const router : {&routers_.nearRouter(), &routers_.farRouter()}) router->stop();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Slow and stopped ends: each fills its own queue, up to its own limit, and delays nobody else.
+// Slow and stopped clients and servers: each fills its own queue up to its limit, and delays no
+// other process.
 #include <sys/wait.h>
 
 #include <ctime>
@@ -13,15 +14,15 @@ namespace {
 
 class RouterPressureTest : public RouterTest {
  protected:
-  // A server that is a process: mpf-int32-server.
+  // Starts mpf-int32-server.
   Victim startServer(const std::string& name, const std::string& queueSize) const {
     return {MPF_TEST_INT32_SERVER,
             std::vector<std::string>{
                 name, "--queue-size", queueSize, "--backplane", routers_.far().name(), "--location",
                 std::to_string(RouterPair::kLocation), "--log-level", "warning"}};
   }
-  // Starts both routers, with small windows, and the server, which gets a request (-1) of `slow`;
-  // `its` runs no more from then on.
+  // Starts both routers, with small windows, and the server, which receives a request (-1) of
+  // `slow`. The dispatcher `its` does not run after that.
   Message subscribe(Dispatcher& its, Caller& slow) {
     routers_.start({"--window-size", "64KiB", "--dead-time", "2s"});
     openServer();
@@ -42,7 +43,7 @@ class RouterPressureTest : public RouterTest {
   }
 };
 
-TEST_F(RouterPressureTest, AStoppedServerFillsItsOwnQueueAndNobodyElseWaits) {
+TEST_F(RouterPressureTest, AStoppedServerFillsItsOwnQueueAndDelaysNoOther) {
   constexpr int kQueueSize = 20;
   routers_.start();
   const auto other = startServer("other", "100");
@@ -72,9 +73,9 @@ TEST_F(RouterPressureTest, AStoppedServerFillsItsOwnQueueAndNobodyElseWaits) {
   }
 }
 
-// Its server is told that it does not take them, the others are answered, and when it goes on it
-// gets all that was sent.
-TEST_F(RouterPressureTest, AClientThatDoesNotTakeItsRepliesDelaysNobodyElse) {
+// The server is notified that the client does not receive its replies, other clients get theirs,
+// and when the client continues, it gets everything that was sent.
+TEST_F(RouterPressureTest, AClientThatDoesNotReceiveItsRepliesDelaysNoOther) {
   Dispatcher idle(routers_.near());
   Caller slow(idle, "echo");
   const auto subscription = subscribe(idle, slow);
@@ -94,7 +95,7 @@ TEST_F(RouterPressureTest, AClientThatDoesNotTakeItsRepliesDelaysNobodyElse) {
       EXPECT_EQ(next().tryAs<Int32>()->value, refused);
     }
   }
-  EXPECT_GT(sent, 64 << 10 >> 7) << "the window was of use";
+  EXPECT_GT(sent, 64 << 10 >> 7) << "the window was used";
 
   for (int expected = -1; expected < sent; ++expected) {
     while (slow.messages.empty()) idle.runOnce();
@@ -123,8 +124,8 @@ TEST_F(RouterPressureTest, AFloodOfOneClientDoesNotStarveAnother) {
   }
 }
 
-// Bound, and not there: more of them than a router looks at in one turn of its loop.
-TEST_F(RouterPressureTest, ManyServersThatNobodyAsksLetTheRouterSleep) {
+// Clients are bound to more absent servers than a router handles in one turn of its loop.
+TEST_F(RouterPressureTest, TheRouterSleepsWhileManyServersAreIdle) {
   constexpr int kServers = 300;
   std::vector<std::unique_ptr<Caller>> waiting;
   for (int i = 0; i < kServers; ++i)
@@ -139,13 +140,13 @@ TEST_F(RouterPressureTest, ManyServersThatNobodyAsksLetTheRouterSleep) {
     return std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec);
   };
 
-  for (auto before = used();; before = used()) {  // until it has slept for most of a while
+  for (auto before = used();; before = used()) {  // until the router sleeps most of the time
     runFor(200ms);
     if (used() - before < 20ms) break;
   }
 }
 
-// Their requests fill the line as soon as it has room.
+// The requests to the first server fill the line as soon as it has room.
 TEST_F(RouterPressureTest, AFloodOfOneServerDoesNotStarveAnother) {
   startAll({"--queue-size", "10"});
   const auto last = startServer("zebra", "100");
@@ -162,8 +163,8 @@ TEST_F(RouterPressureTest, AFloodOfOneServerDoesNotStarveAnother) {
   }
 }
 
-// Its far client stands still, its window being used up, and yet hears of the end.
-TEST_F(RouterPressureTest, AServersEndReachesAllItsClientsThoughOneTakesNothing) {
+// A client on the other host is stopped and its window is full; it is still notified of the end.
+TEST_F(RouterPressureTest, TheEndOfAServerReachesAllClientsAlthoughOneIsStopped) {
   Dispatcher idle(routers_.near());
   Caller slow(idle, "echo");
   auto subscription = subscribe(idle, slow);
@@ -184,13 +185,13 @@ TEST_F(RouterPressureTest, AServersEndReachesAllItsClientsThoughOneTakesNothing)
   expectAnswer();
 }
 
-// Messages of a megabyte on the same line.
+// The large messages have one megabyte and use the same line.
 TEST_F(RouterPressureTest, LargeMessagesOfOneClientDoNotKeepSmallOnesWaiting) {
   constexpr std::size_t kElements = 1 << 17;
   startAll();
   Caller large(*dispatcher_, "echo");
   runUntil([&] { return large.isConnected(); });
-  // from then on the far server has it for a client, and nothing is held for it on the way
+  // After this reply the server has accepted the client, and no router holds messages for it.
   large.send(Int32Message());
   runUntil([&] { return !large.messages.empty(); });
   static_cast<void>(large.take());
@@ -212,7 +213,7 @@ TEST_F(RouterPressureTest, LargeMessagesOfOneClientDoNotKeepSmallOnesWaiting) {
       return !caller_->messages.empty();
     });
     EXPECT_EQ(caller_->take().tryAs<Int32>()->value, i);
-    EXPECT_LE(larges - before, 32) << "those that were on the line already, both ways";
+    EXPECT_LE(larges - before, 32) << "those that were already on the line, in both directions";
   }
   runUntil([&] { return large.open.empty(); });
 }

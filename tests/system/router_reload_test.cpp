@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SIGHUP: a router reads its file again. What stays the same notices nothing.
+// SIGHUP: a router reads its file again. What did not change is not disturbed.
 #include <fmt/format.h>
 #include <fstream>
 
@@ -11,8 +11,8 @@
 namespace mpf::test {
 namespace {
 
-// Routers with files. "echo" is at location 1 of the far host, in this process; "other" at location
-// 2, a process.
+// Routers with files. On the remote side, "echo" is at location 1, in this process, and "other" is
+// a process at location 2.
 class RouterReloadTest : public RouterTest {
  protected:
   void SetUp() override {
@@ -31,7 +31,7 @@ class RouterReloadTest : public RouterTest {
     text += fmt::format("[[listen]]\naddress = \"{}\"\nsecurity = \"plain\"\n", routers_.address());
     folder_.write("far.toml", text + more);
   }
-  // A remote for each location.
+  // Writes the file of the local router, with a remote for each location.
   void writeNear(const std::vector<int>& locations, const std::string& more = {}) const {
     auto text = fmt::format("backplane = \"{}\"\n", routers_.near().name());
     for (const auto location : locations) {
@@ -56,7 +56,7 @@ class RouterReloadTest : public RouterTest {
     EXPECT_THAT(caller_->news, testing::ElementsAre(ConnectStatus::connectYes));
     EXPECT_EQ(connectsToFirst(), 1u);
   }
-  // How often the near router was connected to who has location 1, as it says itself.
+  // How often the local router has connected to the remote of location 1, from its segment.
   [[nodiscard]] std::uint64_t connectsToFirst() const {
     std::uint64_t connects = 0;
     for (const auto& name : segments::list(SegmentName::prefix(routers_.near().name()) +
@@ -87,7 +87,7 @@ class RouterReloadTest : public RouterTest {
   std::optional<Caller> other_;
 };
 
-TEST_F(RouterReloadTest, ALocationThatIsServedNoMoreEndsAndMayComeBack) {
+TEST_F(RouterReloadTest, ALocationMayBeRemovedAndAddedAgain) {
   bindToOther();
   expectAnswerOfOther();
 
@@ -103,7 +103,7 @@ TEST_F(RouterReloadTest, ALocationThatIsServedNoMoreEndsAndMayComeBack) {
   expectThatTheFirstNoticedNothing();
 }
 
-TEST_F(RouterReloadTest, ARemoteThatIsGoneEndsAndMayComeBack) {
+TEST_F(RouterReloadTest, ARemoteMayBeRemovedAndAddedAgain) {
   bindToOther();
   expectAnswerOfOther();
 
@@ -118,7 +118,7 @@ TEST_F(RouterReloadTest, ARemoteThatIsGoneEndsAndMayComeBack) {
   expectThatTheFirstNoticedNothing();
 }
 
-TEST_F(RouterReloadTest, AMistakeInTheFileChangesNothing) {
+TEST_F(RouterReloadTest, AnErrorInTheFileChangesNothing) {
   bindToOther();
   expectAnswerOfOther();
 
@@ -132,7 +132,7 @@ TEST_F(RouterReloadTest, AMistakeInTheFileChangesNothing) {
   EXPECT_THAT(other_->news, testing::ElementsAre(ConnectStatus::connectYes));
 }
 
-TEST_F(RouterReloadTest, OtherLimitsAreForOthers) {
+TEST_F(RouterReloadTest, NewLimitsApplyToNewConnections) {
   writeFar({1, 2}, "[limits]\nmax-clients = 1\nqueue-size = 7\n");
   reload(*farRouter_);
   writeNear({1, 2}, "[limits]\ndead-time = \"60s\"\n");
@@ -143,7 +143,7 @@ TEST_F(RouterReloadTest, OtherLimitsAreForOthers) {
   expectAnswerOfOther();
 }
 
-TEST_F(RouterReloadTest, ALocationThatIsAnotherOneHereIsServedThere) {
+TEST_F(RouterReloadTest, AMappedLocationIsServed) {
   bindToOther();
   expectAnswerOfOther();
   const Victim elsewhere{MPF_TEST_INT32_SERVER,
@@ -162,8 +162,8 @@ TEST_F(RouterReloadTest, ALocationThatIsAnotherOneHereIsServedThere) {
   expectThatTheFirstNoticedNothing();
 }
 
-// While it waits for somebody to say farewell, who says nothing.
-TEST_F(RouterReloadTest, WhoEndsReloadsNoMore) {
+// The signal arrives while the router waits for the farewell of a stopped peer.
+TEST_F(RouterReloadTest, ARouterThatIsEndingDoesNotReload) {
   farRouter_->stop();
   writeNear(
       {1},
@@ -178,7 +178,7 @@ TEST_F(RouterReloadTest, WhoEndsReloadsNoMore) {
   farRouter_->resume();
 }
 
-// Under load, again and again: nothing is lost, nothing comes twice.
+// Repeated reloads under load: no message is lost or delivered twice.
 TEST_F(RouterReloadTest, ReloadsUnderLoadLoseNothing) {
   int sent = 0;
   int answered = 0;

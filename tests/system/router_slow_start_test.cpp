@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A router that has yet to start, because a name is still looked up.
+// A router whose start waits for the look-up of a name.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -9,8 +9,8 @@
 namespace mpf::test {
 namespace {
 
-// While the name where it shall listen is looked up: that may take minutes where no name server
-// answers.
+// The router looks up the name on which it listens. Without an answer of a name server this may
+// take minutes.
 class RouterSlowStartTest : public testing::TestWithParam<int> {
  protected:
   RouterSlowStartTest() {
@@ -30,12 +30,12 @@ class RouterSlowStartTest : public testing::TestWithParam<int> {
 };
 INSTANTIATE_TEST_SUITE_P(At, RouterSlowStartTest, testing::Values(SIGTERM, SIGINT));
 
-TEST_P(RouterSlowStartTest, EndsWhenItIsToldTo) {
+TEST_P(RouterSlowStartTest, EndsOnASignal) {
   const std::vector<std::string> words{
       "--backplane", backplane_.name(), "--listen", "name.held:0", "--serve", "1", "--plain"};
   Victim router(MPF_TEST_ROUTER, words);
   const FileDescriptor lookup(checkCall(::open(fifo_.c_str(), O_WRONLY | O_CLOEXEC), "open",
-                                        fifo_));  // returns once it is asked for
+                                        fifo_));  // returns when the router opens it
 
   EXPECT_EQ(router.end(GetParam()), 0);
 }

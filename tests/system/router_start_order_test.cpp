@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Client, routers and server may start in any order; each may end and come back.
+// Client, routers and server may start in any order; each may end and restart.
 #include <algorithm>
 #include <array>
 #include <csignal>
@@ -51,14 +51,14 @@ class RouterStartOrderTest : public RouterTest {
 
 class RouterAnyOrderTest : public RouterStartOrderTest, public testing::WithParamInterface<Part> {};
 
-// Six orders of the others behind each that may be first.
+// For each program that starts first, all six orders of the others.
 TEST_P(RouterAnyOrderTest, AllMeet) {
   Order order{Part::client, Part::nearRouter, Part::farRouter, Part::server};
   do {
     if (order.front() != GetParam()) continue;
     for (const auto part : order) {
       startPart(part);
-      // What is there so far gets as far as it can.
+      // The programs that are running connect as far as they can.
       for (int i = 0; i < 50; ++i) dispatcher_->runOnce(Deadline::after(100us));
     }
     expectAnswer();
@@ -76,7 +76,7 @@ class RouterComesBackTest : public RouterStartOrderTest, public testing::WithPar
   void SetUp() override { startAll(); }
 };
 
-TEST_P(RouterComesBackTest, TheClientIsConnectedAgainByItself) {
+TEST_P(RouterComesBackTest, TheClientConnectsAgainByItself) {
   for (const int signal : {SIGTERM, SIGKILL}) {
     expectAnswer();
     caller_->news.clear();
@@ -92,8 +92,8 @@ TEST_P(RouterComesBackTest, TheClientIsConnectedAgainByItself) {
   expectAnswer();
 }
 
-// It meets what the others have not yet missed.
-TEST_P(RouterComesBackTest, OneThatComesBackAtOnceMeetsWhoHasNotMissedIt) {
+// It restarts before the others have noticed its end.
+TEST_P(RouterComesBackTest, AProgramMayRestartBeforeTheOthersNoticeItsEnd) {
   std::vector<ConnectStatus> expected{ConnectStatus::connectYes};
   for (const int signal : {SIGTERM, SIGKILL, SIGTERM, SIGKILL}) {
     endPart(GetParam(), signal);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Routers and peers that they cannot use: the wrong security, callers that idle, storms of what is
-// refused.
+// Routers and unusable peers: the wrong security, idle callers, floods of refused requests.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -27,7 +26,7 @@ class RouterStrangersTest : public testing::Test {
     return {"--tls-certificate", files.certificate,   "--tls-key",
             files.key,           "--tls-authorities", files.authorities};
   }
-  // A router on the far backplane, listening with this security.
+  // Starts a router on the remote backplane that listens with this security.
   std::unique_ptr<RouterProcess> listen(const RouterPair::Options& security) {
     RouterPair::Options options{"--backplane", far_.name(), "--serve",
                                 "1",           "--listen",  port_.address()};
@@ -48,7 +47,7 @@ class RouterStrangersTest : public testing::Test {
   const FreePort port_;
 };
 
-TEST_F(RouterStrangersTest, ACallerInPlainTcpReadsThatThePortExpectsTls) {
+TEST_F(RouterStrangersTest, ACallerInPlainTcpIsToldThatThePortExpectsTls) {
   const auto far = listen(tls("far"));
 
   const auto near = call({"--plain"});
@@ -57,7 +56,7 @@ TEST_F(RouterStrangersTest, ACallerInPlainTcpReadsThatThePortExpectsTls) {
   far->waitUntilSaid("the caller uses plain TCP, and this port expects TLS");
 }
 
-TEST_F(RouterStrangersTest, ACallerWithTlsReadsThatThePortIsPlain) {
+TEST_F(RouterStrangersTest, ACallerWithTlsIsToldThatThePortIsPlain) {
   const auto far = listen({"--plain"});
   auto security = tls("near");
   security.insert(security.end(), {"--tls-name", "far"});
@@ -70,7 +69,7 @@ TEST_F(RouterStrangersTest, ACallerWithTlsReadsThatThePortIsPlain) {
       "the peer uses TLS, this side of the connection plain TCP: set the same security");
 }
 
-// As many as there may be connections, from the same host, and more.
+// More callers than the limit of connections, from the same host.
 TEST_F(RouterStrangersTest, CallersThatDoNotGreetMakeRoomForAPeer) {
   const auto far = listen(
       {"--plain", "--max-connections", "10", "--dead-time", "60s", "--handshake-time", "60s"});
@@ -83,7 +82,7 @@ TEST_F(RouterStrangersTest, CallersThatDoNotGreetMakeRoomForAPeer) {
   far->waitUntilSaid("without a greeting: closing the oldest of these");
 }
 
-TEST_F(RouterStrangersTest, ACallerThatIsTurnedAwayReadsWhy) {
+TEST_F(RouterStrangersTest, ARefusedCallerIsToldWhy) {
   const auto far = listen({"--plain", "--max-connections", "1"});
   const auto near = call({"--plain"});
   far->waitUntilSaid(" is connected");
@@ -94,8 +93,8 @@ TEST_F(RouterStrangersTest, ACallerThatIsTurnedAwayReadsWhy) {
               HasSubstr("this router has 1 connections, its limit (max-connections)"));
 }
 
-// Ten thousand refused requests for servers: the log stays short, and counts them all.
-TEST_F(RouterStrangersTest, AStormOfRefusedRequestsMakesAShortLog) {
+// For ten thousand refused requests for servers, the log has few lines, which count all of them.
+TEST_F(RouterStrangersTest, AFloodOfRefusedRequestsMakesAShortLog) {
   constexpr std::uint64_t kRequests = 10'000;
   constexpr std::uint32_t kAtOnce = 100;
   const auto far = listen({"--plain"});
@@ -139,8 +138,8 @@ class RouterSlowNameTest : public RouterStrangersTest {
   const std::string fifo_ = folder_.file("lookup");
 };
 
-// The look-up goes on in its thread, and nobody reads what comes of it.
-TEST_F(RouterSlowNameTest, ALookUpThatTakesTooLongIsGivenUpInSilence) {
+// The look-up continues in its thread, and its result is ignored.
+TEST_F(RouterSlowNameTest, ALookUpThatTakesTooLongIsAbandonedSilently) {
   const RouterProcess router({"--backplane", near_.name(), "--remote", "1=localhost.held:9",
                               "--plain", "--allow-public-plain", "--dead-time", "100ms",
                               "--log-level", "debug"});

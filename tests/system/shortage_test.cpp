@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A server out of file descriptors says so: to its clients, in its window, to its log.
+// A server without file descriptors reports it to its clients, in its window and in its log.
 #include <sys/resource.h>
 
 #include <functional>
@@ -20,7 +20,7 @@ namespace {
 
 class ShortageTest : public testing::Test {
  protected:
-  // The soft limit of open files of the server. Descriptors above it that are open stay so.
+  // Sets the soft limit of open files of the server. Open descriptors above it stay open.
   void limitFiles(rlim_t files) const {
     const rlimit limit{files, before_.rlim_max};
     checkCall(::prlimit(server_.pid(), RLIMIT_NOFILE, &limit, nullptr), "prlimit");
@@ -52,7 +52,7 @@ class ShortageTest : public testing::Test {
   MessageClient client_{dispatcher_, [](const Message&) {}};
 };
 
-TEST_F(ShortageTest, OfDescriptorsIsToldToTheClientAndCountedOnce) {
+TEST_F(ShortageTest, OfDescriptorsIsReportedToTheClientAndCountedOnce) {
   limitFiles(0);
 
   client_.bind("echo", 0);
@@ -63,7 +63,7 @@ TEST_F(ShortageTest, OfDescriptorsIsToldToTheClientAndCountedOnce) {
   EXPECT_THAT(client_.notConnectedBecause(),
               testing::AllOf(testing::HasSubstr("\"echo\""), testing::HasSubstr("ulimit -n")));
   EXPECT_EQ(shortage(), layout::Shortage::descriptors);
-  EXPECT_EQ(alarms(), 1U) << "one shortage, however often the client knocks";
+  EXPECT_EQ(alarms(), 1U) << "one shortage, even if the client knocks several times";
 
   limitFiles(before_.rlim_cur);
   run([&] { return client_.isConnected(); });

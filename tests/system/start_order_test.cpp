@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who starts first does not matter; a name is served by one process at a time.
+// Client and server may start in any order; one process at a time serves a name.
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -76,10 +76,10 @@ TEST_F(StartOrderTest, AServerThatRestartsIsFoundUnderItsNewPid) {
   EXPECT_NE(server.pid(), pidBefore);
   const auto after = client.line();
   EXPECT_THAT(after, testing::StartsWith("answered "));
-  EXPECT_NE(after, before) << "the incarnation tells one life from the next";
+  EXPECT_NE(after, before) << "each server has its own incarnation";
 }
 
-TEST_F(StartOrderTest, ASecondServerOfANameIsToldWhoServesIt) {
+TEST_F(StartOrderTest, ASecondServerOfANameIsToldWhichProcessServesIt) {
   auto first = startServer();
   EXPECT_EQ(first.line(), "open");
 
@@ -91,7 +91,7 @@ TEST_F(StartOrderTest, ASecondServerOfANameIsToldWhoServesIt) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1);
   auto client = startClient();
   EXPECT_THAT(client.line(), testing::StartsWith("waiting: "));
-  EXPECT_THAT(client.line(), testing::StartsWith("answered ")) << "the first one goes on";
+  EXPECT_THAT(client.line(), testing::StartsWith("answered ")) << "the first server continues";
 }
 
 TEST_F(StartOrderTest, ASuccessorOfAKilledServerOpensAtOnce) {
@@ -106,13 +106,13 @@ TEST_F(StartOrderTest, ASuccessorOfAKilledServerOpensAtOnce) {
   }
 }
 
-// By default a user has 128 inotify instances, and other programs want some, too.
-TEST_F(StartOrderTest, AClientFindsItsServerWhenTheKernelCannotTellItOfNewNames) {
+// By default a user has 128 inotify instances, which other programs may use up.
+TEST_F(StartOrderTest, AClientFindsItsServerWithoutInotify) {
   constexpr int kMostToTake = 900;  // a process may have 1024 files
   int limit = 0;
   std::ifstream("/proc/sys/fs/inotify/max_user_instances") >> limit;
   if (::geteuid() != 0 || limit > kMostToTake)
-    GTEST_SKIP() << "only root can take all instances of a user who has nothing else running";
+    GTEST_SKIP() << "only root can use up the instances of a user without other programs";
   Victim client("crowd", backplane_.name(), {"1", "as", "65533", "65533", "without-inotify"});
   EXPECT_EQ(client.line(), "waiting: server \"echo\" at location 0 is not there");
 
@@ -125,7 +125,7 @@ TEST_F(StartOrderTest, AClientFindsItsServerWhenTheKernelCannotTellItOfNewNames)
   serving.join();
 }
 
-TEST_F(StartOrderTest, OfManyThatStartAtOnceOneServes) {
+TEST_F(StartOrderTest, OneOfManyServersThatStartAtOnceServes) {
   std::vector<Victim> servers;
   for (int i = 0; i < 10; ++i) servers.push_back(startServer());
 

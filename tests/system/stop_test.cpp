@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// SIGINT and SIGTERM end a server in order: its names go, its clients hear of it.
+// SIGINT and SIGTERM end a server in order: it removes its names and notifies its clients.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <set>
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 class StopTest : public testing::TestWithParam<int> {
  protected:
-  // Waits until runUntilSignal() runs: a signal before that is none of its business.
+  // Waits until runUntilSignal() runs; an earlier signal would kill the process.
   Victim startServer() const {
     Victim server("serve", backplane_.name());
     SyncClient client(backplane_, "echo", 0);
@@ -32,7 +32,7 @@ class StopTest : public testing::TestWithParam<int> {
     return segments::probeOwner(SegmentName::serverWindow(backplane_.name(), 0, "echo")) !=
            segments::Owner::absent;
   }
-  // Nobody is dead, so nothing is left.
+  // No process has died, so no segment may be left.
   void TearDown() override { EXPECT_THAT(backplane_.segmentNames(), testing::IsEmpty()); }
 
   Watchdog watchdog_{"stop test"};
@@ -44,7 +44,7 @@ void expectEndedInOrder(int status) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
-TEST_P(StopTest, AServerEndsAndTakesItsNamesAlong) {
+TEST_P(StopTest, AServerEndsAndRemovesItsNames) {
   auto server = startServer();
   EXPECT_TRUE(hasWindow());
 
@@ -62,7 +62,7 @@ TEST_P(StopTest, EachRequestOfItsClientsEndsOnce) {
     if (const auto* connect = message.tryAs<Connect>()) {
       news.push_back(connect->status);
     } else {
-      EXPECT_EQ(news.size(), 1u) << "a disconnect comes after the ends of all requests";
+      EXPECT_EQ(news.size(), 1u) << "the disconnect must follow the ends of all requests";
       ended.insert(message.route().requestId);
     }
   });
@@ -80,7 +80,7 @@ TEST_P(StopTest, EachRequestOfItsClientsEndsOnce) {
   ASSERT_TRUE(witness.call(Float64Message(), 60s));
 
   server.signal(SIGSTOP);
-  send(8);  // these it may take or not
+  send(8);  // the server may receive these or not
   server.signal(GetParam());
   expectEndedInOrder(server.end(SIGCONT));
   while (client.isConnected()) dispatcher.runOnce();
@@ -99,7 +99,7 @@ TEST_P(StopTest, AServerEndsWhileClientsSendAsFastAsTheyCan) {
 
   EXPECT_FALSE(hasWindow());
   clients.clear();
-  static_cast<void>(backplane_.removeDead());  // those are dead
+  static_cast<void>(backplane_.removeDead());  // the clients were killed
 }
 
 TEST_P(StopTest, ASecondSignalDoesNoHarm) {
@@ -110,7 +110,7 @@ TEST_P(StopTest, ASecondSignalDoesNoHarm) {
 
     const auto status = server.end(SIGTERM);
 
-    // One that comes after runUntilSignal() ends the process at once, as it does any.
+    // A signal after runUntilSignal() has returned ends the process at once.
     EXPECT_TRUE(WIFEXITED(status) || WTERMSIG(status) == GetParam() || WTERMSIG(status) == SIGTERM);
     static_cast<void>(backplane_.removeDead());
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The rest of the world: little shared memory, other namespaces, clocks that differ, limits that
-// are reached, names that somebody takes away. Each test plays in a child of its own; what this
-// host does not allow is skipped by name.
+// The environment of MPF: little shared memory, other namespaces, clocks that differ, limits that
+// are reached, names that another program removes. Each test runs in its own child; tests that this
+// host does not allow are skipped.
 #include <fcntl.h>
 #include <sched.h>
 #include <signal.h>
@@ -37,7 +37,7 @@ using namespace std::chrono_literals;
 
 constexpr int kNotAllowed = 77;
 
-// While it lives, programs that are started have a wall clock that can be set back
+// During its lifetime, started programs have a wall clock that can be set back
 // (tests/support/wall_clock.cpp).
 class WallClock {
  public:
@@ -53,7 +53,7 @@ class WallClock {
   WallClock(const WallClock&) = delete;
   WallClock& operator=(const WallClock&) = delete;
 
-  // At once, for all programs.
+  // Sets the clock of all these programs at once.
   void setBack(long seconds) const {
     std::ofstream(file_ + ".new") << seconds << '\n';
     checkCall(::rename((file_ + ".new").c_str(), file_.c_str()), "rename", file_);
@@ -90,11 +90,11 @@ class WorldTest : public testing::Test {
     }
     int status = 0;
     ::waitpid(pid, &status, 0);
-    ASSERT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+    ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
     if (WEXITSTATUS(status) == kNotAllowed) GTEST_SKIP() << "this host does not allow it";
     EXPECT_EQ(WEXITSTATUS(status), 0);
   }
-  // In the child: needs root, or a host that allows user namespaces.
+  // Called in the child: needs root, or a host that allows user namespaces.
   static void enter(int namespaces) {
     if (::geteuid() != 0) namespaces |= CLONE_NEWUSER;
     if (::unshare(namespaces) != 0) ::_exit(kNotAllowed);
@@ -102,7 +102,7 @@ class WorldTest : public testing::Test {
   static void allow(bool success) {
     if (!success) ::_exit(kNotAllowed);
   }
-  // 0: there is none.
+  // 0 when it does not exist.
   static int errorOf(const std::exception_ptr& why) try {
     if (why) std::rethrow_exception(why);
     return 0;
@@ -119,7 +119,7 @@ class WorldTest : public testing::Test {
   TestBackplane backplane_;
 };
 
-TEST_F(WorldTest, SharedMemoryThatIsFullIsAClearErrorAndServesOn) {
+TEST_F(WorldTest, FullSharedMemoryIsAClearErrorAndLinksStillWork) {
   inChild([] {
     enter(CLONE_NEWNS);
     ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr);
@@ -130,18 +130,18 @@ TEST_F(WorldTest, SharedMemoryThatIsFullIsAClearErrorAndServesOn) {
     SyncClient client(backplane, "echo");
     expectAnswer(client);
 
-    // Large messages want more than there is: the sender is told, and the link stands.
+    // Large messages need more memory than is free: the sender gets an error, and the link stays.
     auto array = client.client().alloc<Float64Array>(100'000);
     EXPECT_EQ(client.call(std::move(array), 60s).refusal(), SendResult::noMemory);
     expectAnswer(client);
 
-    // No byte is left: a new server says what it could not have, whoever is there goes on.
+    // No byte is left: a new server reports what it could not allocate, and the others continue.
     const FileDescriptor rest(::open("/dev/shm/rest", O_RDWR | O_CREAT | O_CLOEXEC, 0600));
     while (::posix_fallocate(rest.get(), ::lseek(rest.get(), 0, SEEK_END), 4096) == 0) {
     }
     try {
       const MessageServer another(backplane, "another");
-      ADD_FAILURE() << "there was room";
+      ADD_FAILURE() << "the server could start";
     } catch (const std::system_error& error) {
       EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("bytes in /dev/shm"),
                                                testing::HasSubstr("No space left")));
@@ -163,7 +163,7 @@ TEST_F(WorldTest, TwoPidNamespacesShareABackplane) {
     stranger.end(SIGKILL);
   });
 
-  // The stranger's death is seen, too: its links are closed.
+  // The server also notices the death of the process in the other namespace, and closes its links.
   const auto window = PeerWindow::tryOpen(SegmentName::serverWindow(backplane_.name(), 0, "echo"),
                                           layout::SegmentKind::serverWindow);
   while (window->control().linkCount.load(std::memory_order_relaxed) != 0)
@@ -172,9 +172,10 @@ TEST_F(WorldTest, TwoPidNamespacesShareABackplane) {
   expectAnswer(client);
 }
 
-TEST_F(WorldTest, AServersDeathIsSeenFromAnotherPidNamespace) {
+TEST_F(WorldTest, TheDeathOfAServerIsNoticedFromAnotherPidNamespace) {
   inChild([&] {
-    SyncClient client(backplane_, "echo");  // its thread first: there are no new ones afterwards
+    // Before the change of the namespace, after which no thread can start.
+    SyncClient client(backplane_, "echo");
     static_cast<void>(client.connectWait(1ms));
     enter(CLONE_NEWPID);
     Victim server("serve", backplane_.name());  // pid 1 there
@@ -188,8 +189,8 @@ TEST_F(WorldTest, AServersDeathIsSeenFromAnotherPidNamespace) {
   });
 }
 
-// A monotonic clock that is an hour ahead, as in a container that was moved: nothing hangs, and
-// what is alive stays alive.
+// A monotonic clock that is an hour ahead, as in a container that was moved: nothing hangs, and no
+// living process is taken for dead.
 TEST_F(WorldTest, AClientWhoseClockIsAheadIsServed) {
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
@@ -207,7 +208,7 @@ TEST_F(WorldTest, AClientWhoseClockIsAheadIsServed) {
   expectAnswer(client);
 }
 
-// Of all that the programs read, only the wall clock goes back a day, in the middle of their talk.
+// The wall clock of the programs is set back by a day while they exchange messages.
 TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer must be the first library of a program";
@@ -236,9 +237,9 @@ TEST_F(WorldTest, AWallClockThatIsSetBackChangesNothing) {
   expectAnswer(client);
 }
 
-// As when the host sleeps, but that the clocks went on: all stand still in the middle of what they
-// do, and nobody takes anybody for dead.
-TEST_F(WorldTest, ProcessesThatAllStoodStillGoOn) {
+// As when the host sleeps, except that the clocks continue: all processes are stopped at a random
+// moment, and none is taken for dead.
+TEST_F(WorldTest, ProcessesThatWereAllStoppedContinue) {
   Victim crowd("crowd", backplane_.name(), {"20"});
   EXPECT_THAT(crowd.line(), testing::StartsWith("waiting: "));
   Victim server("serve", backplane_.name());
@@ -252,7 +253,7 @@ TEST_F(WorldTest, ProcessesThatAllStoodStillGoOn) {
   expectAnswer(client);
 }
 
-TEST_F(WorldTest, AProcessWithoutDescriptorsLeftIsToldSoAndRecovers) {
+TEST_F(WorldTest, AProcessWithoutDescriptorsGetsAnErrorAndRecovers) {
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
   inChild([&] {
@@ -266,7 +267,7 @@ TEST_F(WorldTest, AProcessWithoutDescriptorsLeftIsToldSoAndRecovers) {
     do all.emplace_back(::open("/dev/null", O_RDONLY | O_CLOEXEC));
     while (all.back());
 
-    // UndefinedBehaviorSanitizer needs descriptors to look at it: later.
+    // Checked later, because UndefinedBehaviorSanitizer needs descriptors.
     std::exception_ptr why;
     try {
       const MessageServer another(backplane_, "another");
@@ -283,7 +284,7 @@ TEST_F(WorldTest, AProcessWithoutDescriptorsLeftIsToldSoAndRecovers) {
   });
 }
 
-TEST_F(WorldTest, AProcessWithoutMappingsLeftIsToldSoAndRecovers) {
+TEST_F(WorldTest, AProcessWithoutMappingsGetsAnErrorAndRecovers) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer needs mappings itself";
 #endif
@@ -294,17 +295,17 @@ TEST_F(WorldTest, AProcessWithoutMappingsLeftIsToldSoAndRecovers) {
     expectAnswer(before);
     std::vector<void*> all;
     all.reserve(100'000);
-    for (;;) {  // kinds that alternate are not merged
+    for (;;) {  // the kernel does not merge mappings of alternating kinds
       auto* const page = ::mmap(nullptr, 4096, all.size() % 2 == 0 ? PROT_READ : PROT_NONE,
                                 MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
       if (page == MAP_FAILED) break;
       all.push_back(page);
-      allow(all.size() < 99'000);  // a host whose limit is beyond a test
+      allow(all.size() < 99'000);  // the limit of this host is too high for a test
     }
 
     try {
       const MessageServer another(backplane_, "another");
-      ADD_FAILURE() << "there were mappings";
+      ADD_FAILURE() << "mappings were left";
     } catch (const std::system_error& error) {
       EXPECT_EQ(error.code().value(), ENOMEM) << error.what();
     }
@@ -315,9 +316,9 @@ TEST_F(WorldTest, AProcessWithoutMappingsLeftIsToldSoAndRecovers) {
   });
 }
 
-// As RemoveIPC does at a user's logout: names go, processes stay. Links that stand are not touched,
-// a successor can take the name, and a process that nobody finds any more says so.
-TEST_F(WorldTest, ASuccessorServesWhoComesAfterTheNamesWereTakenAway) {
+// As RemoveIPC does at a user's logout: the names are removed, the processes continue. Existing
+// links work, a successor can use the name, and a process without its names reports it.
+TEST_F(WorldTest, ASuccessorServesNewClientsAfterTheNamesWereRemoved) {
   Victim server("serve", backplane_.name());
   EXPECT_EQ(server.line(), "open");
   SyncClient client(backplane_, "echo");

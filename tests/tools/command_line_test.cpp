@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Usage, errors and exit statuses of `mpf`.
+// Usage, errors and exit status of `mpf`.
 #include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {
@@ -16,12 +16,12 @@ constexpr std::array<const char*, 13> kSubcommands{"ls",     "mrr",     "msr",  
 
 class CommandLineTest : public ToolsTest {};
 
-TEST_F(CommandLineTest, WithoutAnythingItShowsHowToUseIt) {
+TEST_F(CommandLineTest, PrintsUsageWithoutArguments) {
   const auto ended = run({});
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
-  EXPECT_THAT(ended.err, StartsWith("mpf - looks at backplanes, servers and clients"));
+  EXPECT_THAT(ended.err, StartsWith("mpf - shows backplanes, servers and clients"));
   for (const auto* name : kSubcommands)
     EXPECT_THAT(ended.err, HasSubstr(std::string("\n  ") + name + " "));
 }
@@ -34,31 +34,31 @@ TEST_F(CommandLineTest, HelpGoesToStdout) {
   for (const auto* name : kSubcommands)
     EXPECT_THAT(ended.out, HasSubstr(std::string("\n  ") + name + " "));
   EXPECT_THAT(ended.out, AllOf(HasSubstr("MPF_BACKPLANE"), HasSubstr("MPF_LOCATION"),
-                               HasSubstr("Exit status: 0 done")));
+                               HasSubstr("Exit status: 0 success")));
 }
 
-TEST_F(CommandLineTest, EachSubcommandHasItsHelp) {
+TEST_F(CommandLineTest, EachSubcommandHasHelp) {
   for (const std::string name : kSubcommands) {
-    if (name == "bench") continue;  // another program's
+    if (name == "bench") continue;  // a program of its own
 
     const auto ended = run({name, "--help"});
 
     EXPECT_EQ(ended.status, 0) << name;
     EXPECT_THAT(ended.out, HasSubstr("Usage: mpf " + name)) << name;
-    // these look at the host, or have one of their own
+    // doctor looks at the host, torture has a backplane of its own.
     const bool hasBackplane = name != "doctor" && name != "torture";
     EXPECT_EQ(ended.out.find("--backplane") != std::string::npos, hasBackplane) << name;
     EXPECT_THAT(ended.err, IsEmpty()) << name;
   }
 }
 
-TEST_F(CommandLineTest, AnUnknownSubcommandIsNamedAndTheOthersToo) {
-  const auto ended = run({"nonsense", "--json"});
+TEST_F(CommandLineTest, AnUnknownSubcommandIsAnErrorThatListsAll) {
+  const auto ended = run({"unknown", "--json"});
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"nonsense\"; there are ls, mrr, msr, top, inspect, "
+            "mpf: no subcommand or option \"unknown\"; there are ls, mrr, msr, top, inspect, "
             "call, sniff, tap, replay, clean, doctor, torture, "
             "bench; "
             "`mpf --help` shows what they do\n");
@@ -69,8 +69,8 @@ struct Wrong {
   std::string text;
 };
 
-// Each says what is wrong and where it is said how it is right.
-TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
+// Each error names the wrong argument and the help.
+TEST_F(CommandLineTest, RefusesWrongArguments) {
   const std::vector<Wrong> wrong{
       {{"ls", "--jason"},
        "mpf ls: The following argument was not expected: --jason; `mpf ls --help`"},
@@ -82,11 +82,11 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
       {{"call", "echo", "int32", "--count", "0"},
        "mpf call: --count: 0 is out of range: use 1 to 9007199254740992;"},
       {{"call", "echo", "int32", "--timeout", "0"},
-       "mpf call: --timeout: 0 is no time: use a number of seconds above 0 to 1e9"},
-      {{"call", "echo", "int32", "--timeout", "nan"}, "mpf call: --timeout: nan is no time"},
+       "mpf call: --timeout: 0 is not a time: use a number of seconds above 0 to 1e9"},
+      {{"call", "echo", "int32", "--timeout", "nan"}, "mpf call: --timeout: nan is not a time"},
       {{"call", "echo", "int32", "--interval", "-1"},
-       "mpf call: --interval: -1 is no time: use a number of seconds from 0 to 1e9"},
-      {{"call", "echo", "int32", "--follow", "1e300"}, "mpf call: --follow: 1e300 is no time"},
+       "mpf call: --interval: -1 is not a time: use a number of seconds from 0 to 1e9"},
+      {{"call", "echo", "int32", "--follow", "1e300"}, "mpf call: --follow: 1e300 is not a time"},
       {{"call", "echo", "int32", "--location", "here"},
        "mpf call: Could not convert: --location = here"},
       {{"replay", "/dev/null", "--speed", "-1"},
@@ -102,7 +102,7 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
       {{"torture", "--role", "router"}, "mpf torture: --role: router not in {client,server};"},
       {{"torture", "--mode", "0"}, "mpf torture: --mode: 0 not in {kill,stop};"},
       {{"sniff"}, "mpf sniff: server is required; `mpf sniff --help`"},
-      {{"sniff", "serial[0]", "soon"}, "mpf sniff: seconds: soon is no time"},
+      {{"sniff", "serial[0]", "soon"}, "mpf sniff: seconds: soon is not a time"},
       {{"sniff", "serial[0]", "--format", "hex"}, "mpf sniff: --format: hex not in {lines,manual}"},
   };
   for (const auto& [words, text] : wrong) {
@@ -114,7 +114,7 @@ TEST_F(CommandLineTest, WrongArgumentsAreNamed) {
   }
 }
 
-TEST_F(CommandLineTest, NamesThatCannotBeAreNamed) {
+TEST_F(CommandLineTest, RefusesInvalidNames) {
   for (const std::string name : {"ls", "mrr", "msr", "top", "inspect", "clean"}) {
     const auto ended = run({name, "--backplane", "a.b"});
     EXPECT_EQ(ended.status, 2);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two real routers on two backplanes: servers elsewhere are there for every tool.
+// Two real routers on two backplanes: every tool works with servers on the other side.
 #include "tests/support/router_pair.h"
 #include "tests/tools/tools_fixture.h"
 
@@ -53,8 +53,8 @@ TEST_F(RemoteTest, CallReachesAServerOnAnotherHost) {
             0);
 }
 
-// Whichever router has the limit, or the server itself.
-TEST_F(RemoteTest, AMessageThatIsTooLargeIsRefusedWithTheLimit) {
+// The limit of either router or of the server applies.
+TEST_F(RemoteTest, ATooLargeMessageIsRefusedWithTheLimit) {
   const RouterPair::Options small{"--max-message-size", "1000"};
   struct Limited {
     RouterPair::Options near, far;
@@ -81,7 +81,7 @@ TEST_F(RemoteTest, AMessageThatIsTooLargeIsRefusedWithTheLimit) {
   }
 }
 
-TEST_F(RemoteTest, ReportsShowWhatIsElsewhere) {
+TEST_F(RemoteTest, ReportsShowServersOnOtherHosts) {
   routers_.start();
   const EchoThread echo(routers_.far(), "echo", {.location = RouterPair::kLocation});
   SyncClient client(routers_.near(), "echo", RouterPair::kLocation);
@@ -116,7 +116,7 @@ TEST_F(RemoteTest, ReportsShowWhatIsElsewhere) {
   EXPECT_EQ(line(routers_.far()).at("role"), "server");
 }
 
-TEST_F(RemoteTest, APeerThatIsGoneIsCutAndComesBack) {
+TEST_F(RemoteTest, ReportsShowALostConnectionAndItsReturn) {
   routers_.start();
   awaitState("connected");
 
@@ -125,7 +125,7 @@ TEST_F(RemoteTest, APeerThatIsGoneIsCutAndComesBack) {
 
   const auto gone = line(routers_.near());
   EXPECT_THAT(gone.at("problem").get<std::string>(), testing::Not(IsEmpty()));
-  EXPECT_EQ(gone.at("round_trip_ns"), 0) << "of a connection that is no more";
+  EXPECT_EQ(gone.at("round_trip_ns"), 0) << "the connection has ended";
   EXPECT_EQ(gone.at("in_queue"), 0);
   EXPECT_EQ(gone.at("queue_size"), 100);
   EXPECT_THAT(near({"mrr", "--interval", "1"}).out, HasSubstr("   problem "));
@@ -139,7 +139,7 @@ TEST_F(RemoteTest, APeerThatIsGoneIsCutAndComesBack) {
   EXPECT_EQ(line(routers_.near()).at("problem"), "");
 }
 
-TEST_F(RemoteTest, AClientWhoseServerIsNotThereWaitsAtTheRouter) {
+TEST_F(RemoteTest, AClientOfAnAbsentServerWaitsAtTheRouter) {
   routers_.start();
   awaitState("connected");
   Tool call({"call", "later", "int32", "value=3", "--location", "1", "--timeout", "1000"},

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Tool: `mpf`, the real program, in a process of its own. It dies with the test.
+// Tool: runs the program `mpf` in a process of its own, which dies with the test.
 //
 //   Tool sniff({"sniff", "serial[0]"}, backplane.name());
-//   sniff.line();                       // what it writes to stdout, line by line
+//   sniff.line();                       // reads stdout line by line
 //   const auto end = sniff.end();       // waits: exit status, the rest of stdout, all of stderr
 //
 // Threads  one.
@@ -27,9 +27,9 @@
 
 namespace mpf::test {
 
-// How a program ended and what it said.
+// How a program ended, and its output.
 struct Ended {
-  int status = 0;  // exit status; minus the signal that killed it
+  int status = 0;  // exit status, or minus the number of the signal that killed it
   std::string out;
   std::string err;
 };
@@ -37,7 +37,7 @@ struct Ended {
 class Tool {
  public:
   // Runs `mpf` with these arguments and $MPF_BACKPLANE = backplane; empty: without the variable.
-  // `user`: as whom, for a test that is root.
+  // `user`: the user to run as, for tests that run as root.
   Tool(std::vector<std::string> arguments, const std::string& backplane, uid_t user = ::geteuid())
       : err_(::memfd_create("stderr", MFD_CLOEXEC)) {
     checkCall(err_.get(), "memfd_create");
@@ -75,7 +75,7 @@ class Tool {
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   void signal(int number) const { ::kill(pid_, number); }
-  // Waits for the next line on stdout, without its end; empty when there is none any more.
+  // Waits for the next line on stdout, without its newline; empty after the end of the output.
   std::string line() {
     for (;;) {
       if (const auto end = read_.find('\n'); end != std::string::npos) {
@@ -86,7 +86,7 @@ class Tool {
       if (!readMore()) return {};
     }
   }
-  // Waits for a line that holds `text`, and returns it; empty when none comes.
+  // Waits for a line that contains `text`, and returns it; empty when the output ends before.
   std::string lineWith(const std::string& text) {
     for (auto next = line(); !next.empty() || !isOver_; next = line()) {
       if (next.find(text) != std::string::npos) return next;
@@ -101,7 +101,7 @@ class Tool {
         checkCall(::pread(err_.get(), text.data(), text.size(), 0), "pread")));
     return text;
   }
-  // Waits for the end.
+  // Waits until the program has ended.
   Ended end() {
     while (readMore()) continue;
     Ended ended;
@@ -144,7 +144,7 @@ class Tool {
   bool isOver_ = false;
 };
 
-// Runs `mpf` until it ends.
+// Runs `mpf` and waits for its end.
 inline Ended runTool(std::vector<std::string> arguments, const std::string& backplane) {
   return Tool(std::move(arguments), backplane).end();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // ToolsTest: `mpf` on a backplane of its own, with an echo server that a thread of the test runs.
-// Nothing may be left at the end.
+// At its end, no segment may be left.
 #pragma once
 
 #include <chrono>
@@ -59,7 +59,7 @@ class ToolsTest : public testing::Test {
   Ended run(std::vector<std::string> arguments) const {
     return runTool(std::move(arguments), backplane_.name());
   }
-  // The only backplane of a report.
+  // Runs a subcommand with --json and returns its output.
   nlohmann::json report(std::vector<std::string> arguments) const {
     arguments.emplace_back("--json");
     const auto ended = run(std::move(arguments));
@@ -68,8 +68,7 @@ class ToolsTest : public testing::Test {
   }
   [[nodiscard]] nlohmann::json ls() const { return report({"ls"}).at(0); }
 
-  // All that there is to know of the backplane's files: their names, and of each its inode, times,
-  // size and bytes.
+  // The files of the backplane: for each name its inode, times, size and bytes.
   [[nodiscard]] std::map<std::string, std::string> files() const {
     std::map<std::string, std::string> all;
     for (const auto& name : backplane_.segmentNames()) {
@@ -97,7 +96,7 @@ inline std::vector<std::string> linesOf(const std::string& text) {
   return lines;
 }
 
-// A text without its line ends and indents, for words that may stand in two lines.
+// A text without its line breaks and indents, to find words that may be on two lines.
 inline std::string inOneLine(const std::string& text) {
   std::string line;
   std::istringstream words(text);
@@ -105,7 +104,7 @@ inline std::string inOneLine(const std::string& text) {
   return line;
 }
 
-// The entry of `list` whose `key` is `value`; null when there is none.
+// The entry of `list` whose `key` is `value`; null without such an entry.
 inline nlohmann::json entryOf(const nlohmann::json& list, const std::string& key,
                               const nlohmann::json& value) {
   for (const auto& entry : list) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf call: sends a message of any type and prints the reply; or many, and prints how long they
-// took.
+// mpf call: sends a message of any type and prints the reply; or sends many and prints statistics
+// of the round-trip times.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -33,15 +33,15 @@ struct CallArguments : ServerArguments {
   std::string type;
   std::vector<std::string> fields;
   std::uint64_t count = 1;
-  double timeout = 1;  // [s]
+  double timeout = 1;   // [s]
   double interval = 0;  // [s]
-  double follow = 0;  // [s]
+  double follow = 0;    // [s]
   bool json = false;
   bool printAll = false;
 };
 
-// What only MPF itself says is nothing to call with: no server waits for it, and its reply would
-// pass for a fate.
+// Whether a user may send messages of this type. MPF itself sends the others to clients: no server
+// has a handler for them, and a reply of such a type would look like the fate of a request.
 bool isForCalls(MessageType type) {
   return type != MessageType::connect && type != MessageType::requestFate;
 }
@@ -56,24 +56,25 @@ std::string typesForCalls() {
   return names;
 }
 
-// What the end of a request means for who sent it.
+// What the fate of a request means for its sender.
 std::string meaning(Fate fate, MessageType type) {
   switch (fate) {
     case Fate::refused:
-      return fmt::format("the server does not take {} messages, or let this one go without a reply",
-                         toString(type));
+      return fmt::format(
+          "the server does not accept {} messages, or released this one without a "
+          "reply",
+          toString(type));
     case Fate::neverTaken:
-      return "the server went away before it took the request: nothing was done";
+      return "the server ended before it received the request: nothing was done";
     case Fate::outcomeUnknown:
-      return "the server took the request and did not reply in time, went away, or its reply was "
-             "larger than a router lets through: it may "
-             "have been done";
+      return "the server received the request, but did not reply in time, ended, or sent a reply "
+             "larger than the limit of a router: the request may have been carried out";
     case Fate::expired:
-      return "the server did not take the request in time: nothing was done";
+      return "the server did not receive the request in time: nothing was done";
     case Fate::cancelled:
-      return "the request was taken back";
+      return "the client cancelled the request";
   }
-  return "this program does not know that fate";
+  return "unknown fate";
 }
 
 class Caller {
@@ -82,8 +83,8 @@ class Caller {
       : arguments_(arguments),
         type_(type),
         client_(Backplane::attach(arguments.backplane), arguments.server, arguments.location) {
-    // What comes at the end is worth something: then a signal ends the loop, after the call that is
-    // under way. Else it ends the program.
+    // A loop prints statistics at its end, and so a signal only ends the loop, after the call that
+    // is in progress. For a single call a signal ends the program.
     if (isLoop() || arguments_.follow > 0) {
       stop_.emplace(
           [](void* stopped) noexcept { static_cast<std::atomic<bool>*>(stopped)->store(true); },
@@ -104,8 +105,8 @@ class Caller {
   }
 
  private:
-  // how often waits look whether they shall end
-  static constexpr Nanoseconds kGlance = std::chrono::milliseconds(100);
+  // How often a wait checks whether a signal has stopped the program.
+  static constexpr Nanoseconds kStopCheckInterval = std::chrono::milliseconds(100);
 
   [[nodiscard]] bool isLoop() const noexcept { return arguments_.count > 1; }
   [[nodiscard]] bool showsEach() const noexcept { return !isLoop() || arguments_.printAll; }
@@ -113,13 +114,13 @@ class Caller {
   void pause() const {
     const auto until = Deadline::after(ofSeconds(arguments_.interval));
     while (!stopped_ && !until.hasPassed())
-      std::this_thread::sleep_for(std::min(kGlance, until.left()));
+      std::this_thread::sleep_for(std::min(kStopCheckInterval, until.left()));
   }
 
   void callOnce() {
     std::string error;
     auto message = tryParse(type_, arguments_.fields, error);
-    if (!message) throw std::logic_error(error);  // parsed before: nothing is wrong with it
+    if (!message) throw std::logic_error(error);  // cannot happen: call() has parsed it before
     const auto sentNs = Clock::nowNs();
     auto answer = client_.call(std::move(*message), ofSeconds(arguments_.timeout));
     if (answer) {
@@ -138,7 +139,7 @@ class Caller {
       return fmt::format("{} ({})", answer.why(), meaning(*fate, type_));
     const auto because = client_.client().notConnectedBecause();
     return answer.why() +
-           (because.empty() ? "" : fmt::format(": {}; `mpf ls` shows what there is", because));
+           (because.empty() ? "" : fmt::format(": {}; `mpf ls` shows all servers", because));
   }
 
   void show(const Message& message) {
@@ -149,11 +150,12 @@ class Caller {
           "\n");
   }
 
-  // Messages of the server that come after the reply.
+  // Prints the messages that the server sends after the reply.
   void follow() {
     const auto until = Deadline::after(ofSeconds(arguments_.follow));
     while (arguments_.follow > 0 && !stopped_ && !until.hasPassed()) {
-      if (const auto message = client_.receive(std::min(kGlance, until.left()))) show(message);
+      const auto wait = std::min(kStopCheckInterval, until.left());
+      if (const auto message = client_.receive(wait)) show(message);
     }
   }
 
@@ -209,7 +211,8 @@ class Caller {
 int call(const CallArguments& arguments) {
   const auto type = tryParseType(arguments.type);
   if (!type || !isForCalls(*type)) {
-    const auto what = type ? "is what MPF itself says to clients" : "is no message type";
+    const auto what =
+        type ? "is a message type that only MPF itself sends" : "is not a message type";
     printError("mpf call: {} {}; use one of {}\n", arguments.type, what, typesForCalls());
     return 2;
   }
@@ -225,7 +228,7 @@ int call(const CallArguments& arguments) {
 
 void addCall(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "call", "Sends a message to a server and prints the reply; or many, and how long they took");
+      "call", "Sends a message to a server and prints the reply; or sends many and prints times");
   auto arguments = std::make_shared<CallArguments>();
   addServer(command, *arguments);
   command.add_option("type", arguments->type, "Type of the message: " + typesForCalls())
@@ -239,17 +242,17 @@ void addCall(CLI::App& app, Run& run) {
       ->check(wholeNumber(1, std::uint64_t{1} << 53));
   addSeconds(command, "--interval", arguments->interval, "Pause between them", true);
   addSeconds(command, "--follow", arguments->follow,
-             "Go on for so long to print what the server sends after the reply", true);
+             "Time to print further messages that the server sends after the reply", true);
   command.add_flag("--print", arguments->printAll,
                    "Print each reply of a loop, and arrays in full");
   addJson(command, arguments->json);
   command.footer(
-      "Fields that are not named are 0; a wrong one gets you the list of all.\n"
+      "Fields that are not named are 0. The message about an unknown field lists all fields.\n"
       "Example: mpf call Int32 int32 value=3\n"
       "Example: mpf call voltmeter char8Array cmd=3 timeout=1 value='*IDN?\\n'    (a serial "
       "server: write, then read; 1 s at most)\n"
-      "Exit status: 0 every message got a reply, whatever the reply says; 1 not so; 2 there is no "
-      "such type or field.");
+      "Exit status: 0 every message got a reply (even one that reports an error); 1 a message got "
+      "no reply; 2 usage error, unknown type or field.");
   command.callback([arguments, &run] { run = [arguments] { return call(*arguments); }; });
 }
 

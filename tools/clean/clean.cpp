@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// mpf clean: removes what dead processes left, and says how it knows. Every program does so for its
-// own backplane when it attaches; this is for backplanes that no program uses any more.
+// mpf clean: removes the files that dead processes left, and reports how it knows that they are
+// dead. Every program does so for its own backplane when it attaches; this subcommand is for
+// backplanes that no program uses any more.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -33,7 +34,7 @@ struct CleanArguments {
   bool json = false;
 };
 
-// Whose file it is, if another user's who alone may remove it.
+// The owner of a file that this user may not remove because another user owns it.
 std::optional<uid_t> otherUser(const Judged& file) {
   struct stat status{};
   const auto self = ::geteuid();
@@ -65,8 +66,8 @@ class Cleaner {
       const bool removed = !arguments_.dryRun && stale_segments::tryRemove(file);
       if (stranger && !removed) ++left_;
       if (arguments_.json) collect(file, removed);
-      else if (file.verdict == Verdict::dead) tellDead(file, removed, stranger);
-      else tellStays(file);
+      else if (file.verdict == Verdict::dead) reportDead(file, removed, stranger);
+      else reportKept(file);
     }
   }
   // Returns the exit status.
@@ -78,7 +79,7 @@ class Cleaner {
                  counted(unknown_, "file"));
     if (arguments_.dryRun && !arguments_.json && alive_ != 0)
       fmt::print("{}: {}\n", counted(alive_, "file stays", "files stay"),
-                 alive_ == 1 ? "its process lives" : "their processes live");
+                 alive_ == 1 ? "its process is alive" : "their processes are alive");
     return left_ == 0 ? 0 : 1;
   }
 
@@ -89,33 +90,33 @@ class Cleaner {
                       {"reason", file.reason},
                       {"removed", removed}});
   }
-  void tellDead(const Judged& file, bool removed, std::optional<uid_t> stranger) {
+  void reportDead(const Judged& file, bool removed, std::optional<uid_t> stranger) {
     const auto path = segments::path(file.name);
     isAnythingDead_ = isAnythingDead_ || removed || arguments_.dryRun || stranger;
     if (removed) {
-      tell("removed " + path, file.reason);
+      print("removed " + path, file.reason);
     } else if (stranger) {
       printError(
           "mpf clean: {} belongs to user {}, whose process is dead; that user or root may remove "
           "it\n",
           path, *stranger);
     } else if (arguments_.dryRun) {
-      tell("would remove " + path, file.reason);
+      print("would remove " + path, file.reason);
     }
   }
-  void tellStays(const Judged& file) {
+  void reportKept(const Judged& file) {
     if (file.verdict == Verdict::alive) ++alive_;
     else ++unknown_;
     if (file.verdict == Verdict::unknown && arguments_.dryRun)
-      tell(segments::path(file.name) + " stays", file.reason);
+      print(segments::path(file.name) + " stays", file.reason);
   }
-  static void tell(const std::string& what, const std::string& reason) {
+  static void print(const std::string& what, const std::string& reason) {
     fmt::print("{}{}", wrap("", printable(what) + ":", 4), wrap("  ", printable(reason), 2));
   }
 
   const CleanArguments& arguments_;
   nlohmann::json files_ = nlohmann::json::array();
-  std::size_t left_ = 0;  // dead, and another user's
+  std::size_t left_ = 0;  // files of dead processes that only another user may remove
   std::size_t alive_ = 0;
   std::size_t unknown_ = 0;
   bool isAnythingDead_ = false;
@@ -135,12 +136,12 @@ int clean(const CleanArguments& arguments) {
 
 void addClean(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("clean",
-                                      "Removes what dead processes left in shared memory, and says "
-                                      "how it knows that they are dead");
+                                      "Removes the files that dead processes left in shared "
+                                      "memory, and reports why they count as dead");
   auto arguments = std::make_shared<CleanArguments>();
-  addBackplane(command, arguments->backplane, "all that there are");
+  addBackplane(command, arguments->backplane, "all backplanes");
   command.add_flag("--dry-run", arguments->dryRun,
-                   "Remove nothing: say what would be removed, and why");
+                   "Remove nothing; print what would be removed, and why");
   addJson(command, arguments->json);
   command.callback([arguments, &run] { run = [arguments] { return clean(*arguments); }; });
 }

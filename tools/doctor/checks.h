@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Check-up: what on a host would hurt MPF, and what helps. Each check is a function of its own that
-// looks and says.
+// The checks of `mpf doctor`: each function examines one property of the host that MPF depends on
+// and returns what it found and how to remedy a fault.
 //
 // Threads  one.
-// Trust    what a host does not tell is `unknown`, never guessed.
+// Trust    a property that the host does not show is `unknown`; no check guesses.
 #pragma once
 
 #include <string>
@@ -13,8 +13,8 @@
 
 namespace mpf::tools {
 
-// `warning`: slower or less comfortable than it could be. `problem`: programs fail, or lose what
-// they have.
+// `warning`: MPF works, but is slower or less convenient than it could be. `problem`: programs fail
+// or lose their segments.
 enum class Health { ok, warning, problem, unknown };
 [[nodiscard]] const char* toString(Health health) noexcept;
 
@@ -25,14 +25,14 @@ struct Finding {
   std::string remedy;  // empty when there is nothing to do
 };
 
-// Shared memory (check_up_memory.cpp).
+// Shared memory (memory_checks.cpp).
 [[nodiscard]] Finding checkMount(const Host& host);
 [[nodiscard]] Finding checkSpace(const Host& host);
 [[nodiscard]] Finding checkRights(const Host& host);
 [[nodiscard]] Finding checkSegments(const Host& host);
 [[nodiscard]] Finding checkNamespaces(const Host& host);
 [[nodiscard]] Finding checkRemoveIpc(const Host& host);
-// Processes and limits (check_up_process.cpp).
+// Processes and limits (process_checks.cpp).
 [[nodiscard]] Finding checkHidepid(const Host& host);
 [[nodiscard]] Finding checkPidfd(const Host& host);
 [[nodiscard]] Finding checkOpenFiles(const Host& host);
@@ -40,16 +40,16 @@ struct Finding {
 [[nodiscard]] Finding checkAddressSpace(const Host& host);
 [[nodiscard]] Finding checkInotify(const Host& host);
 [[nodiscard]] Finding checkRealTime(const Host& host);
-// Servers that run (check_up_server.cpp).
+// Running servers (server_checks.cpp).
 [[nodiscard]] Finding checkServers(const Host& host);
-// Other hosts (check_up_router.cpp).
+// Connections to other hosts (router_checks.cpp).
 [[nodiscard]] Finding checkRouters(const Host& host);
-// Processors and clocks (check_up_machine.cpp).
+// Processors and clocks (machine_checks.cpp).
 [[nodiscard]] Finding checkCpus(const Host& host);
 [[nodiscard]] Finding checkClock(const Host& host);
 [[nodiscard]] Finding checkGovernor(const Host& host);
 
-// All of them, in this order.
+// Runs all checks: shared memory, processes and limits, processors and clocks, servers, routers.
 [[nodiscard]] std::vector<Finding> runDoctorChecks(const Host& host);
 
 }  // namespace mpf::tools

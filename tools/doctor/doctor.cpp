@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf doctor: what on this host would hurt, and what helps.
+// mpf doctor: finds settings of this host that make MPF fail or slow, and names the remedy of each.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fmt/format.h>
@@ -48,10 +48,11 @@ int examine(bool json) {
 }  // namespace
 
 void addDoctor(CLI::App& app, Run& run) {
-  auto& command = *app.add_subcommand("doctor", "What on this host would hurt, and what helps");
+  auto& command = *app.add_subcommand(
+      "doctor", "Finds settings of this host that make MPF fail or slow, and names the remedy");
   auto json = std::make_shared<bool>(false);
   addJson(command, *json);
-  command.footer("Exit status: 0 no problem, though maybe warnings; 1 a problem.");
+  command.footer("Exit status: 0 no problem (there may be warnings); 1 at least one problem.");
   command.callback([json, &run] { run = [json] { return examine(*json); }; });
 }
 

@@ -103,7 +103,7 @@ std::optional<std::uint64_t> Host::number(const std::string& path) const {
 std::optional<Host::Space> Host::spaceOfSharedMemory() {
   struct statvfs status{};
   if (::statvfs("/dev/shm", &status) != 0) return std::nullopt;
-  // A file system without a limit on files says that it has none at all.
+  // A file system without a limit on the number of files reports a total of 0.
   const bool isLimited = status.f_files != 0;
   return Space{.totalBytes = status.f_blocks * status.f_frsize,
                .freeBytes = status.f_bavail * status.f_frsize,

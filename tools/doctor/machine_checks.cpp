@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Check-up of processors and clocks, and all checks in their order.
+// Checks of processors and clocks, and runDoctorChecks().
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 namespace mpf::tools {
 namespace {
 
-// How many numbers a list like "0-3,8" names; 0 for what is no such list.
+// How many numbers a list like "0-3,8" names; 0 when the text is not such a list.
 std::size_t countOf(const std::string& list) {
   std::size_t count = 0;
   std::istringstream ranges(list);
@@ -27,7 +27,7 @@ std::size_t countOf(const std::string& list) {
   return count;
 }
 
-// Processors' worth of time that a cgroup file grants, "200000 100000"; nullopt when it grants all.
+// How many processors' time a cgroup file grants: 2 for "200000 100000"; nullopt for no limit.
 std::optional<double> quotaOf(const std::optional<std::string>& text) {
   std::istringstream words(text.value_or(""));
   double quota = 0;
@@ -36,8 +36,8 @@ std::optional<double> quotaOf(const std::optional<std::string>& text) {
   return quota / period;
 }
 
-// The tightest quota of the process's cgroup and those around it; of version 1, that of the
-// container.
+// The lowest quota of the cgroup of this process and of the cgroups that contain it. For cgroup
+// version 1, the quota of the container.
 std::optional<double> cpuQuota(const Host& host) {
   std::optional<double> least;
   const auto narrow = [&](std::optional<double> quota) {
@@ -80,7 +80,8 @@ Finding checkCpus(const Host& host) {
   const auto seen =
       fmt::format("{} allowed{}", allowed, quota ? fmt::format(", time of {:.3g}", *quota) : "");
   if (allowed > 1 && (!quota || *quota >= 2)) return {kName, Health::ok, seen, {}};
-  return {kName, Health::warning, seen + ": who spins keeps the one from running for whom it waits",
+  return {kName, Health::warning,
+          seen + ": a process that spins takes the processor from the process that it waits for",
           "allow two (taskset, AllowedCPUs=, CPUQuota=, --cpus); or --wait-mode block for servers, "
           "WaitMode::block for clients"};
 }
@@ -89,16 +90,20 @@ Finding checkClock(const Host& host) {
   constexpr const char* kName = "clock";
   const std::string folder = "sys/devices/system/clocksource/clocksource0/";
   const auto current = host.tryRead(folder + "current_clocksource");
-  if (!current) return {kName, Health::unknown, "the kernel does not tell its clock source", {}};
+  if (!current) return {kName, Health::unknown, "the kernel does not show its clock source", {}};
   static const std::set<std::string> kSlow{"hpet", "acpi_pm",         "jiffies",
                                            "pit",  "refined-jiffies", "xen"};
   if (!kSlow.contains(*current)) return {kName, Health::ok, *current, {}};
   const auto others = host.tryRead(folder + "available_clocksource").value_or("");
   return {kName, Health::warning,
-          *current + ": reading the time is a system call, a microsecond with each timed message",
+          *current +
+              ": reading the time is a system call, which adds about 1 us to each timed "
+              "message",
           others.find("tsc") != std::string::npos
               ? "echo tsc > /" + folder + "current_clocksource; kernel parameter clocksource=tsc"
-              : "kernel parameter tsc=reliable if the hardware's is; other clocks here: " + others};
+              : "kernel parameter tsc=reliable, if the TSC of this hardware is reliable; clocks "
+                "available here: " +
+                    others};
 }
 
 Finding checkGovernor(const Host& host) {
@@ -118,7 +123,9 @@ Finding checkGovernor(const Host& host) {
   for (const auto& governor : governors) seen += (seen.empty() ? "" : ", ") + governor;
   if (governors == std::set<std::string>{"performance"}) return {kName, Health::ok, seen, {}};
   return {kName, Health::warning,
-          seen + ": a processor that wakes is slow at first, and so are replies to rare requests",
+          seen +
+              ": a processor that wakes up runs slowly at first, which delays replies to rare "
+              "requests",
           "cpupower frequency-set --governor performance"};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Check-up of shared memory: its file system, who may use it, and who would take it away.
+// Checks of shared memory: its file system, its space, its access rights, and what may remove it.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -19,10 +19,10 @@ namespace mpf::tools {
 namespace {
 
 constexpr std::uint64_t kMiB = 1024 * 1024UL;
-// what logind takes for a person: SYS_UID_MAX and above
+// The first user id that logind regards as a person: SYS_UID_MAX + 1 on Debian.
 constexpr std::uint32_t kFirstLoginUser = 1000;
 
-// Files of any backplane that this program can look at, with their status.
+// The files of all backplanes, with their status.
 std::vector<std::pair<std::filesystem::path, struct stat>> segmentsOf(const Host& host) {
   std::vector<std::pair<std::filesystem::path, struct stat>> segments;
   for (const auto& name : host.list("dev/shm")) {
@@ -50,10 +50,10 @@ std::optional<std::uint32_t> userOf(const Host& host) {
   return effective;
 }
 
-// The last word on a key in logind's configuration: the main file, then what is dropped beside it,
-// in the order in which logind reads.
+// The value of a key in the configuration of logind: the last assignment in the main file and then
+// in the drop-in files, in the order in which logind reads them; `otherwise` without an assignment.
 std::string logindSetting(const Host& host, const std::string& key, const std::string& otherwise) {
-  // by file name: one in /etc hides one of that name in /usr
+  // By file name: a file in /etc hides the file of the same name in /usr.
   std::map<std::string, std::string> dropIns;
   for (const std::string folder : {"usr/lib/systemd", "run/systemd", "etc/systemd"}) {
     for (const auto& name : host.list(folder + "/logind.conf.d")) {
@@ -85,7 +85,8 @@ Finding checkMount(const Host& host) {
     return {kName, Health::unknown, "/proc/self/mounts cannot be read", {}};
   if (!mount) {
     return {kName, Health::warning,
-            "no file system of its own: segments lie on a disk, or count as somebody else's memory",
+            "not a file system of its own: segments are on a disk, or in the memory of another "
+            "file system",
             "mount -t tmpfs tmpfs /dev/shm"};
   }
   if (mount->options.contains("ro"))
@@ -94,7 +95,7 @@ Finding checkMount(const Host& host) {
   if (mount->type != "tmpfs") {
     return {
         kName, Health::warning,
-        fmt::format("a {}, not a tmpfs: segments may be slow, or more than memory", mount->type),
+        fmt::format("{}, not tmpfs: segments may be slow, or larger than the memory", mount->type),
         "mount -t tmpfs tmpfs /dev/shm"};
   }
   return {kName, Health::ok, "tmpfs, writable", {}};
@@ -106,7 +107,7 @@ Finding checkSpace(const Host& host) {
   constexpr std::uint64_t kFewFiles = 1000;
   constexpr std::uint64_t kFilesOfALink = 10;
   const auto space = host.sharedMemory();
-  if (!space) return {kName, Health::unknown, "its size cannot be told", {}};
+  if (!space) return {kName, Health::unknown, "its size cannot be read", {}};
   const auto seen =
       fmt::format("{} of {} free", bytesText(space->freeBytes), bytesText(space->totalBytes));
   const auto files = fmt::format("{} of {} inodes free, and each window, link and pool is a file",
@@ -115,11 +116,11 @@ Finding checkSpace(const Host& host) {
   const std::string more = "mount -o remount,size=1G /dev/shm; containers: --shm-size=1g";
   if (space->freeFiles < kFilesOfALink) {
     return {kName, Health::problem, files + ": links and servers are refused",
-            "mpf clean; remove what others left; " + moreFiles};
+            "mpf clean; remove unused files of other programs; " + moreFiles};
   }
   if (space->freeBytes < kMiB) {
     return {kName, Health::problem, seen + ": links and servers are refused",
-            "mpf clean; remove what others left; " + more};
+            "mpf clean; remove unused files of other programs; " + more};
   }
   if (space->freeFiles < kFewFiles) {
     return {kName, Health::warning, files, "mpf clean; " + moreFiles};
@@ -129,7 +130,7 @@ Finding checkSpace(const Host& host) {
             "mpf clean; " + more};
   if (space->totalBytes <= 64 * kMiB) {
     return {kName, Health::warning,
-            seen + ": little, as containers have it; large messages and many clients need more",
+            seen + ": the small default of containers; large messages and many clients need more",
             more};
   }
   return {kName, Health::ok, seen, {}};
@@ -139,7 +140,7 @@ Finding checkRights(const Host& host) {
   constexpr const char* kName = "rights of /dev/shm";
   struct stat status{};
   if (::stat((host.root / "dev/shm").c_str(), &status) != 0) {
-    return {kName, Health::problem, "there is no /dev/shm",
+    return {kName, Health::problem, "/dev/shm does not exist",
             "mkdir -m 1777 /dev/shm; mount -t tmpfs tmpfs /dev/shm"};
   }
   const auto seen = fmt::format("mode {:04o}", status.st_mode & 07777u);
@@ -171,12 +172,12 @@ Finding checkSegments(const Host& host) {
   }
   if (closed == 0)
     return {
-        kName, Health::ok, fmt::format("{} files, this user may read each", segments.size()), {}};
+        kName, Health::ok, fmt::format("{} files, this user may read all", segments.size()), {}};
   return {
       kName, Health::warning,
-      fmt::format("{} of {} files may not be read by this user; user {} owns one", closed,
+      fmt::format("this user may not read {} of {} files; user {} owns one of them", closed,
                   segments.size(), *owners.begin()),
-      "start these servers with --group GROUP --mode 0660, or look at them as their user or root"};
+      "start these servers with --group GROUP --mode 0660, or run mpf as their user or as root"};
 }
 
 Finding checkNamespaces(const Host& host) {
@@ -202,21 +203,20 @@ Finding checkNamespaces(const Host& host) {
   if (foreign == 0)
     return {kName,
             Health::ok,
-            fmt::format("{} windows, each of a process of this namespace", windows),
+            fmt::format("{} windows, all of processes of this namespace", windows),
             {}};
   return {kName, Health::warning,
-          fmt::format("{} of {} windows are of processes of another namespace: their death is "
-                      "noticed up to 0.1 s later, and whether they "
-                      "are stopped cannot be seen from here",
+          fmt::format("{} of {} windows belong to processes of another namespace: their death is "
+                      "noticed up to 0.1 s later, and reports cannot show whether they are stopped",
                       foreign, windows),
-          "run them in one pid namespace; containers: --pid=host, or --pid=container:NAME"};
+          "run all in one pid namespace; containers: --pid=host, or --pid=container:NAME"};
 }
 
 Finding checkRemoveIpc(const Host& host) {
   constexpr const char* kName = "RemoveIPC of logind";
   struct stat systemd{};
   if (::stat((host.root / "run/systemd/system").c_str(), &systemd) != 0)
-    return {kName, Health::ok, "systemd does not run here", {}};
+    return {kName, Health::ok, "systemd is not running here", {}};
   const auto self = userOf(host);
   if (!self) return {kName, Health::unknown, "/proc/self/status cannot be read", {}};
   auto users = std::set{*self};
@@ -227,16 +227,16 @@ Finding checkRemoveIpc(const Host& host) {
   if (login == users.end())
     return {kName,
             Health::ok,
-            fmt::format("RemoveIPC={}, which spares users below {}", value, kFirstLoginUser),
+            fmt::format("RemoveIPC={}, which excepts users below {}", value, kFirstLoginUser),
             {}};
   return {
       kName, Health::problem,
       fmt::format(
-          "RemoveIPC={}: when user {} logs out, logind removes the segments under running programs",
+          "RemoveIPC={}: when user {} logs out, logind removes the segments of running programs",
           value, *login),
       fmt::format("RemoveIPC=no under [Login] in /etc/systemd/logind.conf.d/mpf.conf, then "
-                  "systemctl restart systemd-logind; or run "
-                  "servers as a system user; or loginctl enable-linger {}",
+                  "systemctl restart systemd-logind; or run servers as a system user; or loginctl "
+                  "enable-linger {}",
                   *login)};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Check-up of what the kernel lets processes see and have.
+// Checks of what the kernel shows and grants to processes.
 #include <cstdlib>
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 namespace mpf::tools {
 namespace {
 
-// A limit that should be at least `enough`; `purpose` says for what.
+// A warning when `value` is below `enough`; `purpose` says what the limit is needed for.
 Finding checkAtLeast(const char* name, std::optional<std::uint64_t> value, std::uint64_t enough,
                      const std::string& purpose, const std::string& remedy) {
-  if (!value) return {name, Health::unknown, "it cannot be read", {}};
+  if (!value) return {name, Health::unknown, "the limit cannot be read", {}};
   if (*value == UINT64_MAX) return {name, Health::ok, "no limit", {}};
   if (*value >= enough) return {name, Health::ok, fmt::to_string(*value), {}};
   return {name, Health::warning, fmt::format("{}: {}", *value, purpose), remedy};
@@ -30,51 +30,52 @@ bool hasCapability(const Host& host, unsigned number) {
 Finding checkHidepid(const Host& host) {
   constexpr const char* kName = "mount of /proc";
   const auto mount = host.mountAt("/proc");
-  if (!mount) return {kName, Health::unknown, "/proc is not among the mounts", {}};
+  if (!mount) return {kName, Health::unknown, "/proc is not mounted", {}};
   const auto hidepid = mount->options.find("hidepid");
   if (hidepid == mount->options.end() || hidepid->second == "0" || hidepid->second == "off")
-    return {kName, Health::ok, "all is shown", {}};
+    return {kName, Health::ok, "shows the processes of all users", {}};
   return {kName, Health::warning,
           fmt::format("hidepid={}: the death of another user's process is noticed up to 0.1 s "
-                      "later, and whether it is stopped cannot be seen",
+                      "later, and reports cannot show whether it is stopped",
                       hidepid->second),
-          "mount -o remount,hidepid=0 /proc, or gid=GROUP with the group of those who run MPF"};
+          "mount -o remount,hidepid=0 /proc, or gid=GROUP with the group of the users of MPF"};
 }
 
 Finding checkPidfd(const Host& host) {
   constexpr const char* kName = "pidfd";
   const auto kernel = host.tryRead("proc/sys/kernel/osrelease").value_or("unknown");
   if (host.hasPidfd()) return {kName, Health::ok, "kernel " + kernel, {}};
-  return {kName, Health::warning,
-          fmt::format(
-              "kernel {} has none, or a sandbox forbids it: a death is noticed up to 0.1 s later",
-              kernel),
-          "a kernel from 5.3 on; containers: a seccomp profile that allows pidfd_open"};
+  return {
+      kName, Health::warning,
+      fmt::format("kernel {} has no pidfd_open, or a sandbox forbids it: the death of a process is "
+                  "noticed up to 0.1 s later",
+                  kernel),
+      "use kernel 5.3 or newer; containers: a seccomp profile that allows pidfd_open"};
 }
 
 Finding checkOpenFiles(const Host& host) {
   return checkAtLeast(
       "limit of open files", host.limit("Max open files"), 1024,
-      "each process that a program talks to takes two or three descriptors",
+      "a program needs two or three descriptors for each process that it communicates with",
       "ulimit -n 4096; LimitNOFILE=4096 in the systemd unit; nofile in /etc/security/limits.conf");
 }
 
 Finding checkMaps(const Host& host) {
   return checkAtLeast("limit of mappings", host.number("proc/sys/vm/max_map_count"), 65530,
-                      "each link takes one mapping, each of its pools another",
+                      "each link needs one mapping, and each of its pools another",
                       "sysctl vm.max_map_count=262144");
 }
 
 Finding checkAddressSpace(const Host& host) {
   return checkAtLeast("limit of address space", host.limit("Max address space"),
-                      std::uint64_t{4} << 30, "bytes, and every mapped segment counts",
+                      std::uint64_t{4} << 30, "bytes, and every mapped segment counts towards it",
                       "ulimit -v unlimited");
 }
 
 Finding checkInotify(const Host& host) {
   return checkAtLeast(
       "inotify instances", host.number("proc/sys/fs/inotify/max_user_instances"), 128,
-      "each process of a user whose servers are not there takes one; others look every 0.1 s",
+      "each process that waits for an absent server needs one; without one it looks every 0.1 s",
       "sysctl fs.inotify.max_user_instances=512");
 }
 
@@ -84,22 +85,22 @@ Finding checkRealTime(const Host& host) {
   const auto limit = host.limit("Max realtime priority");
   if (host.tryRead("proc/sys/kernel/sched_rt_runtime_us") == "0") {
     return {kName, Health::warning,
-            "the kernel gives real-time threads no time at all: programs of hardware use ordinary "
+            "the kernel gives real-time threads no processor time: device servers use ordinary "
             "threads",
             "sysctl kernel.sched_rt_runtime_us=950000"};
   }
   if (hasCapability(host, kSysNice)) return {kName, Health::ok, "allowed by CAP_SYS_NICE", {}};
-  if (!limit) return {kName, Health::unknown, "it cannot be read", {}};
+  if (!limit) return {kName, Health::unknown, "the limit cannot be read", {}};
   if (*limit >= kInterruptPriority)
     return {kName, Health::ok, fmt::format("allowed up to {} by RLIMIT_RTPRIO", *limit), {}};
   return {kName, Health::warning,
-          fmt::format("this user may have {}, of {} that programs of hardware ask for: interrupts "
-                      "wait for busy processors, and an octal "
-                      "UART loses characters when one waits for a millisecond",
+          fmt::format("this user may have priority {}, device servers request {}: on busy "
+                      "processors interrupts wait, and an octal UART loses characters when an "
+                      "interrupt waits for a millisecond",
                       *limit, kInterruptPriority),
           fmt::format("LimitRTPRIO={0} or AmbientCapabilities=CAP_SYS_NICE in the systemd unit; "
-                      "\"USER - rtprio {0}\" in a file of "
-                      "/etc/security/limits.d, then log in again",
+                      "\"USER - rtprio {0}\" in a file of /etc/security/limits.d, then log in "
+                      "again",
                       kInterruptPriority)};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Check-up of connections to other hosts.
+// Check of the connections to other hosts.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -18,7 +18,7 @@
 namespace mpf::tools {
 namespace {
 
-// a restart, a cable that was pulled and plugged in again take less
+// Longer than the restart of a router or a short network failure.
 constexpr std::int64_t kLongNs = 60'000'000'000;
 
 bool hasOwner(const std::filesystem::path& path, const SegmentImage& image) {
@@ -31,7 +31,7 @@ std::vector<RouterLineView> linesOf(const std::filesystem::path& path) try {
   return image && hasOwner(path, *image) ? routerLines(*image, path.string())
                                          : std::vector<RouterLineView>();
 } catch (const std::exception&) {
-  return {};  // not ours to read; `rights of segments` says so
+  return {};  // this user may not read the file; checkSegments() reports it
 }
 
 }  // namespace
@@ -55,7 +55,7 @@ Finding checkRouters(const Host& host) {
       longestNs = sinceNs;
       longest =
           fmt::format("{}, for {}: {}", line.address, durationText(static_cast<double>(sinceNs)),
-                      line.problem.empty() ? "no reason is known" : line.problem);
+                      line.problem.empty() ? "the reason is not known" : line.problem);
     }
   }
   if (remotes + callers == 0) return {kName, Health::ok, "none", {}};
@@ -66,8 +66,8 @@ Finding checkRouters(const Host& host) {
             {}};
   return {kName, Health::warning,
           fmt::format("{} of {} cannot be reached: {}", cut, counted(remotes, "remote"), longest),
-          "look whether mpf-router runs there and listens on that address, and what is between; "
-          "`mpf mrr` shows each connection"};
+          "check that mpf-router runs there and listens on that address, and that the network and "
+          "firewalls let connections through; `mpf mrr` shows each connection"};
 }
 
 }  // namespace mpf::tools

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Check-up of servers that run: whether they can accept more clients.
+// Check of running servers: whether they can accept more clients.
 #include <fcntl.h>
 
 #include <charconv>
@@ -19,13 +19,13 @@ namespace {
 
 struct OpenFiles {
   std::uint64_t used = 0, limit = 0;
-  // Another two or three clients are the last.
+  // At least 95 % of the limit is in use.
   [[nodiscard]] bool isNearlyFull() const noexcept {
     return limit != 0 && used + limit / 20 >= limit;
   }
 };
 
-// Of a process; nothing where /proc does not show it to this user.
+// The open files of a process; zeros where /proc does not show them to this user.
 OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
   OpenFiles files;
   files.used = host.list(fmt::format("proc/{}/fd", pid)).size();
@@ -39,7 +39,7 @@ OpenFiles openFilesOf(const Host& host, std::int32_t pid) {
   return files;
 }
 
-// What hinders a server; empty when nothing does.
+// Why a server cannot accept more clients, or soon cannot; empty when it can.
 std::string troubleOf(const Host& host, const layout::SegmentHeader& header,
                       const layout::WindowControl& control) {
   const auto server = fmt::format("\"{}\" (pid {})", segments::text(header.name), header.ownerPid);
@@ -58,7 +58,8 @@ std::string troubleOf(const Host& host, const layout::SegmentHeader& header,
   return fmt::format("{} has {} of {} files open", server, files.used, files.limit);
 }
 
-// A server window whose owner lives; nullopt: something else, or not for this user to read.
+// A server window whose owner is alive; nullopt when the file is something else or this user may
+// not read it.
 std::optional<SegmentImage> livingServer(const std::filesystem::path& path) try {
   auto image = SegmentImage::tryReadFile(path.string());
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
@@ -85,12 +86,13 @@ Finding checkServers(const Host& host) {
     if (auto trouble = troubleOf(host, image->header(), image->window()); !trouble.empty())
       troubles.push_back(std::move(trouble));
   }
-  if (servers == 0) return {kName, Health::ok, "no server runs", {}};
+  if (servers == 0) return {kName, Health::ok, "no server is running", {}};
   if (troubles.empty()) return {kName, Health::ok, counted(servers, "server"), {}};
   auto seen = troubles.front();
   if (troubles.size() > 1) seen += fmt::format("; and {} more", troubles.size() - 1);
   return {kName, Health::problem, seen,
-          "start it with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd unit"};
+          "start the server with a higher limit: ulimit -n 4096; LimitNOFILE=4096 in the systemd "
+          "unit"};
 }
 
 }  // namespace mpf::tools

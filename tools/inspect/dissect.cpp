@@ -109,13 +109,13 @@ void dissectHints(Tree& tree, const layout::WindowHints& hints) {
   }
 }
 
-// The hints of a window lie beside it, under a name made of what it says of itself.
+// The hints of a window, from the file in the same folder whose name the window's header implies.
 Tree hintsBeside(const std::string& path, const SegmentHeader& header) try {
   const auto backplane = segments::text(header.backplane);
   SegmentName::checkBackplane(backplane);
   const auto name = SegmentName::keyed(backplane, NameKind::hints, header.incarnation);
   const auto beside = std::filesystem::path(path).replace_filename(name).string();
-  return tryDissect(beside, {}).value_or(Tree{{"problem", beside + ": not there"}});
+  return tryDissect(beside, {}).value_or(Tree{{"problem", beside + ": the file does not exist"}});
 } catch (const std::exception& error) {
   return {{"problem", error.what()}};
 }
@@ -175,11 +175,11 @@ std::optional<Tree> tryDissect(const std::string& path, const DissectOptions& op
       dissectRouter(tree, *image, path);
       break;
     default:
-      tree["problem"] = fmt::format("kind {} is none that this program knows",
+      tree["problem"] = fmt::format("kind {} is unknown to this program",
                                     static_cast<std::uint32_t>(header.kind));
   }
   if (options.raw) {
-    // The slots of a link stand with their messages.
+    // The bytes of a link's slots are shown with the messages.
     const auto shown = header.kind == SegmentKind::link
                            ? std::min(image->bytes().size(), layout::kLinkRingsOffset)
                            : image->bytes().size();

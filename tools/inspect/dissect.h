@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Dissection: everything that a segment says, as a tree with the names of docs/shm-layout.md. Of a
-// running system, or of a copy of its files made after the accident: what belongs together is
-// looked for in the same folder.
+// Dissection: the whole content of a segment as a tree, with the names of docs/shm-layout.md. The
+// files may be those of a running system or copies. Files that belong together are expected in the
+// same folder.
 //
-//   link ─► header, states, two rings with their last messages ─► bodies in the bulk segments beside it
-//   window ─► header, counters ─► its hints beside it
+//   link ─► header, states, two rings with their last messages ─► bodies in its bulk segments
+//   window ─► header, counters ─► its hints
 //
 // Threads  one.
-// Crash    reads only (SegmentImage); the segment's processes may be running, stopped, dead.
-// Trust    files may hold anything: what makes no sense is said so in the tree, in the member
-//          "problem".
+// Crash    reads only (SegmentImage); the segment's processes may be running, stopped or dead.
+// Trust    files are untrusted: the member "problem" of the tree describes invalid contents.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -21,17 +20,17 @@ namespace mpf::tools {
 using Tree = nlohmann::ordered_json;
 
 struct DissectOptions {
-  std::size_t last = 8;  // messages of each ring
-  bool raw = false;  // bytes, too, as hexadecimal digits in members "raw"
+  std::size_t last = 8;  // number of messages to show of each ring
+  bool raw = false;      // adds the bytes, as hexadecimal digits in members "raw"
 };
 
-// nullopt when there is no such file.
-//   throws  SegmentError when it is no segment of a version that this program speaks,
+// nullopt when the file does not exist.
+//   throws  SegmentError when it is not a segment, or one of an unsupported version,
 //           std::system_error when it may not be read
 [[nodiscard]] std::optional<Tree> tryDissect(const std::string& path,
                                              const DissectOptions& options);
 
-// An incarnation as it stands in names.
+// An incarnation as the names of segments contain it.
 [[nodiscard]] std::string hex(std::uint64_t incarnation);
 
 }  // namespace mpf::tools

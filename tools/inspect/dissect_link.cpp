@@ -24,14 +24,14 @@ namespace {
 using layout::SegmentHeader;
 
 constexpr std::uint32_t kMostBulks = 256;  // of one side; a pool never has more
-constexpr std::size_t kMostBody = std::size_t{16} << 20;  // larger ones are not read to be shown
+constexpr std::size_t kMostBody = std::size_t{16} << 20;  // larger bodies are not shown
 
 template <class Word>
 auto said(const Word& word) noexcept {
   return word.load(std::memory_order_relaxed);
 }
 
-// The folder in which a link's bulk segments lie, and how they are called.
+// The paths of the bulk segments of a link.
 struct Beside {
   std::filesystem::path link;
   std::string backplane;
@@ -43,21 +43,22 @@ struct Beside {
   }
 };
 
-// Reads the body of a message from its chunk. Throws with the reason why it cannot.
+// Reads the body of a message from its chunk. Throws SegmentError with the reason when it cannot.
 std::vector<std::byte> readChunk(const Beside& beside, const layout::ChunkRef& ref,
                                  std::size_t bodyBytes) {
   if (ref.side > 1)
-    throw SegmentError(fmt::format("a chunk of side {}, which no link has", ref.side));
+    throw SegmentError(
+        fmt::format("a chunk of side {}; the sides of a link are 0 and 1", ref.side));
   const auto path = beside.bulk(ref.side, ref.segment);
   const auto image = SegmentImage::tryReadFile(path);
-  if (!image) throw SegmentError(path + ": not there any more");
+  if (!image) throw SegmentError(path + ": the file does not exist");
   const auto& header = image->header();
   if (header.kind != layout::SegmentKind::bulk || ref.chunk >= header.chunkCount ||
       bodyBytes > header.chunkBytes) {
     throw SegmentError(fmt::format("{}: has no chunk {} of {} bytes", path, ref.chunk, bodyBytes));
   }
   if (bodyBytes > kMostBody)
-    throw SegmentError(fmt::format("{} bytes are too many to show", bodyBytes));
+    throw SegmentError(fmt::format("a body of {} bytes is too large to show", bodyBytes));
   std::vector<std::byte> body(bodyBytes);
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   const auto offset = layout::kBulkChunksOffset + ref.chunk * header.chunkBytes;
@@ -185,7 +186,7 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
   const Beside beside{path, segments::text(header.backplane), header.incarnation};
   if (!isRing(header.queueSlots) || !isRing(header.replySlots)) {
     tree["problem"] =
-        fmt::format("rings of {} and {} slots make no sense", header.queueSlots, header.replySlots);
+        fmt::format("rings of {} and {} slots are invalid", header.queueSlots, header.replySlots);
     return;
   }
   if (image.bytes().size() < layout::linkBytes(header.queueSlots, header.replySlots)) {
@@ -199,7 +200,7 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
     tree["problem"] = error.what();
     return;
   }
-  // What the first copy caught half-way the second one tells.
+  // A second copy shows which messages were overwritten while the first copy was made.
   auto again = SegmentImage::tryReadFile(path);
   const auto& later = again && again->bytes().size() == image.bytes().size() ? *again : image;
   const auto replies = layout::kLinkRingsOffset + header.queueSlots * sizeof(layout::Slot);

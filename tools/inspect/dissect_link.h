@@ -7,8 +7,8 @@
 
 namespace mpf::tools {
 
-// Adds what a link has beyond a header. `path` is where `image` was read: a second look goes there,
-// and to the pools beside it.
+// Adds the states, rings, messages and pools of a link. `path` is the file that `image` was read
+// from: it is read a second time, and the pools are read from the same folder.
 void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
                  const DissectOptions& options);
 

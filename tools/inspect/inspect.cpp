@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf inspect: windows, hints, links, rings and pools as they lie in shared memory, decoded and
-// raw; of a system that runs, is wedged or half dead, or of copies of its files.
+// mpf inspect: shows windows, hints, links, rings and pools in shared memory, decoded and raw.
+// Works on a running system, on one whose processes hang or are dead, and on copies of its files.
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <memory>
@@ -28,7 +28,7 @@ struct InspectArguments : ReportArguments {
   bool raw = false;
 };
 
-// What the command line names, and whether it was found.
+// The names of the command line, and which of them were found.
 class Selection {
  public:
   explicit Selection(const std::vector<std::string>& names)
@@ -66,7 +66,7 @@ class Selection {
   static bool isFile(const std::string& name, const std::string& file) {
     return name == file || name == segments::path(file);
   }
-  // An incarnation, or so much of it that nobody means anything else.
+  // An incarnation, or at least its first kLeast digits.
   static bool isNumber(const std::string& name, std::uint64_t incarnation) {
     constexpr std::size_t kLeast = 6;
     return name.size() >= kLeast && hex(incarnation).starts_with(name);
@@ -75,7 +75,8 @@ class Selection {
   const std::vector<std::string>& names_;
 };
 
-// What is found goes out, as text at once or as JSON at the end.
+// Dissects what the command line names and hands each tree to `give`, which prints it or collects
+// it for JSON.
 class Inspector {
  public:
   explicit Inspector(const InspectArguments& arguments) : arguments_(arguments) {}
@@ -115,14 +116,14 @@ class Inspector {
 
  private:
   static constexpr std::size_t kMostLinks = 100;
-  // Servers that are not there.
+  // The absent servers that a client waits for.
   static Tree waitsFor(const WindowView& window) {
     Tree pendingBinds = Tree::array();
     for (const auto& pendingBind : window.pendingBinds)
       pendingBinds.push_back({{"server", pendingBind.server}, {"location", pendingBind.location}});
     return pendingBinds;
   }
-  // nullopt: it has gone since it was listed, or cannot be read, which is said.
+  // nullopt when the file no longer exists, or cannot be read, which this prints.
   [[nodiscard]] std::optional<Tree> dissect(const std::string& file) const try {
     return tryDissect(segments::path(file),
                       {arguments_.last.value_or(DissectOptions().last), arguments_.raw});
@@ -133,7 +134,7 @@ class Inspector {
   const InspectArguments& arguments_;
 };
 
-// "link 3f6c01ac6b1a424f: idle", and then the rest.
+// Prints a heading such as "link 3f6c01ac6b1a424f: idle", and then the tree.
 void printTree(const Tree& tree) {
   auto rest = tree;
   std::string now;
@@ -175,8 +176,7 @@ int inspectNamed(const InspectArguments& arguments) {
       });
   for (const auto& name : selection.missing()) {
     printError(
-        "mpf inspect: no server, client, link or router \"{}\"; `mpf inspect` shows those that "
-        "there are\n",
+        "mpf inspect: no server, client, link or router \"{}\"; `mpf inspect` lists all of them\n",
         name);
   }
   return selection.missing().empty() ? 0 : 1;
@@ -199,7 +199,7 @@ int inspectFiles(const InspectArguments& arguments) {
     try {
       const auto tree =
           tryDissect(file, {arguments.last.value_or(DissectOptions().last), arguments.raw});
-      if (!tree) throw SegmentError(file + ": not there");
+      if (!tree) throw SegmentError(file + ": the file does not exist");
       if (arguments.json) all.push_back(nlohmann::json(*tree));
       else printTree(*tree);
     } catch (const std::exception& error) {
@@ -220,23 +220,24 @@ int inspect(const InspectArguments& arguments) {
 
 void addInspect(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("inspect",
-                                      "Windows, hints, links, rings and pools in shared memory, "
-                                      "decoded and raw, and who waits where");
+                                      "Shows windows, hints, links, rings and pools in shared "
+                                      "memory, decoded and raw, and who waits for whom");
   auto arguments = std::make_shared<InspectArguments>();
   auto* names = command.add_option("name", arguments->names,
                                    "Servers, clients, routers, links (incarnation or its first 6 "
                                    "digits) or files of these; default: a summary");
   command
       .add_option("--file", arguments->files,
-                  "Files anywhere, copied after an accident for example; what belongs to them is "
-                  "looked for beside them")
+                  "Segment files in any folder, for example copies made after a failure; files "
+                  "that belong to them are expected in the same folder")
       ->excludes(names);
   command
       .add_option(
           "--last", arguments->last,
-          "Messages of each ring; default: 8. With a server or client: of all of its links, too")
+          "Messages to show of each ring; default: 8. With a server or client: shows the rings of "
+          "all of its links")
       ->check(wholeNumber(0, layout::kMaxRingSlots));
-  command.add_flag("--raw", arguments->raw, "The bytes, too");
+  command.add_flag("--raw", arguments->raw, "Show the bytes, too");
   addReport(command, *arguments);
   command.callback([arguments, &run] { run = [arguments] { return inspect(*arguments); }; });
 }

@@ -72,11 +72,11 @@ std::string windowTable(const SnapshotDelta& delta) {
     }
   }
   auto text = table.isEmpty() ? "  no window\n" : table.fitted("  ");
-  if (left != 0) text += fmt::format("  and {} more; --json has all\n", counted(left, "window"));
+  if (left != 0) text += fmt::format("  and {} more; --json shows all\n", counted(left, "window"));
   return text;
 }
 
-// Who waits for a server that is not there, each server once a client.
+// The clients that wait for an absent server; one line for each client and server.
 std::string pendingBindText(const SnapshotDelta& delta) {
   std::map<std::pair<std::string, std::string>, std::size_t> waiting;
   for (const auto& client : delta.now().clients) {
@@ -88,12 +88,12 @@ std::string pendingBindText(const SnapshotDelta& delta) {
   for (const auto& [who, times] : waiting) {
     if (++shown > kMostRows) break;
     text += wrap("  ",
-                 fmt::format("{} waits for the server {}, which is not there{}", who.first,
-                             who.second, times == 1 ? "" : fmt::format(", {} times", times)),
+                 fmt::format("{} waits for the server {}, which is absent{}", who.first, who.second,
+                             times == 1 ? "" : fmt::format(", {} times", times)),
                  4);
   }
   if (waiting.size() > kMostRows)
-    text += fmt::format("  and {} more that wait; --json has all\n", waiting.size() - kMostRows);
+    text += fmt::format("  and {} more that wait; --json shows all\n", waiting.size() - kMostRows);
   return text;
 }
 
@@ -167,7 +167,7 @@ std::string linkTable(const SnapshotDelta& delta, const std::vector<const LinkVi
     text += wrap("    ", waitsOf(delta, *link), 6);
   }
   if (links.size() > most)
-    text += fmt::format("  and {} more; --json has all\n", counted(links.size() - most, "link"));
+    text += fmt::format("  and {} more; --json shows all\n", counted(links.size() - most, "link"));
   return text;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Summary of a backplane for `mpf inspect`: its windows, and of its links those on which somebody
-// waits. However many there are, it stays a page.
+// Summary of a backplane for `mpf inspect`: its windows, and those links on which a process waits.
+// The text is limited to about a page.
 //
 // Threads  one.
 #pragma once
@@ -13,17 +13,17 @@
 
 namespace mpf::tools {
 
-// All of it, for programs: {"backplane", "files", "bytes", "windows": [...], "links": [...],
-// "problems"}.
+// The complete summary, for programs: {"backplane", "files", "bytes", "windows": [...],
+// "routers": [...], "links": [...], "problems"}.
 [[nodiscard]] Tree summaryTree(const SnapshotDelta& delta);
-// What a person wants to see first.
+// The summary as text, with a limited number of rows.
 [[nodiscard]] std::string summaryText(const SnapshotDelta& delta);
 
-// Every link of which a window is left, once.
+// Each link that has at least one window, once.
 [[nodiscard]] std::vector<const LinkView*> linksOf(const Snapshot& snapshot);
 // One link in a list: {"link", "server", "client", ..., "waits"}.
 [[nodiscard]] Tree linkRow(const SnapshotDelta& delta, const LinkView& link);
-// Links as a table of at most so many rows; says how many more there are.
+// Links as a list of at most `most` entries, with the number of the links that are left out.
 [[nodiscard]] std::string linkTable(const SnapshotDelta& delta,
                                     const std::vector<const LinkView*>& links, std::size_t most);
 

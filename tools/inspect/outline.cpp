@@ -57,7 +57,7 @@ std::string messageText(const Tree& message, std::size_t indent) {
 }  // namespace
 
 std::string hexDump(const std::string& digits, std::size_t indent) {
-  constexpr std::size_t kDigits = 32;  // of a line
+  constexpr std::size_t kDigits = 32;  // digits in a line
   std::string text;
   std::string before;
   bool isSkipping = false;

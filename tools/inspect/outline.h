@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Outline: a tree of a dissection as text of 80 columns.
+// Outline: the tree of a dissection as text that fits the terminal.
 //
-//   owner: pid 13514, program mpf-serial-server, user 0          an object of plain values is one
-//   line requests:                                                    one that holds more is
-//   indented
+//   owner: pid 13514, program mpf-serial-server, user 0    an object of plain values is one line
+//   requests:                                              other objects are indented
 //     messages:
-//       1748 freed   #1748 int32 timeout=0 ...                   messages are lines, bytes a
-//       hexadecimal dump
+//       1748 freed   #1748 int32 timeout=0 ...             messages are lines, bytes a hex dump
 //
 // Threads  one.
 #pragma once

@@ -16,8 +16,8 @@ std::uint64_t sequenceOf(const layout::Slot& slot) noexcept {
   return slot.sequence.load(std::memory_order_relaxed);
 }
 
-// First slots of messages, the newest first, without those of which a newer message has taken a
-// slot. Only positions from `low` to before `high` are believed.
+// First slots of messages, the newest first, without messages of which a newer message has reused a
+// slot. Positions outside of [low, high) are invalid data and are left out.
 std::vector<Head> headsOf(std::span<const layout::Slot> slots, std::uint64_t low,
                           std::uint64_t high) {
   const std::uint64_t capacity = slots.size();
@@ -54,8 +54,8 @@ RingMessage messageAt(std::span<const layout::Slot> slots, const Head& head, Mes
   return message;
 }
 
-// In the first lap a slot that nobody has published is zero, unless somebody has begun to write.
-// Later nothing tells.
+// Whether the producer has begun to write the message at `end`. This is visible in the first lap
+// only, in which slots that have not been written are zero.
 bool isBegun(std::span<const layout::Slot> slots, std::uint64_t end) {
   const layout::Slot empty{};
   const auto& slot = slots[end % slots.size()];
@@ -92,7 +92,7 @@ std::vector<std::byte> RingMessage::inlineBody() const {
 
 RingView RingView::of(std::span<const layout::Slot> slots, const RingWords& words,
                       std::span<const layout::Slot> later, std::uint64_t laterFreed) {
-  constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring has come that far
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring can reach this position
   const std::uint64_t capacity = slots.size();
   RingView view;
   view.end = words.freed;
@@ -101,8 +101,8 @@ RingView RingView::of(std::span<const layout::Slot> slots, const RingWords& word
   const auto low = words.freed - std::min(words.freed, capacity);
   const auto heads = headsOf(slots, low, laterFreed + capacity);
   view.end = endOf(heads, words.freed);
-  // While `later` was copied the producer had published up to here, and may have been writing one
-  // more message.
+  // The end of what the producer may have written when `later` was copied: all published messages,
+  // and one more that it may have been writing.
   const bool isStill = later.data() == slots.data();
   const auto reached = isStill ? view.end
                                : endOf(headsOf(later, low, laterFreed + 4 * capacity), view.end) +

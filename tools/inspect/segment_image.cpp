@@ -17,10 +17,11 @@ namespace mpf::tools {
 
 namespace {
 
-// As long as a segment of any kind can be without its chunks: a link with the longest rings.
+// The largest segment of any kind, not counting the chunks of a pool: a link with the longest
+// rings.
 constexpr std::size_t kMostBytes = layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots);
 
-// What a header says, unchecked; no kind at all when there is none.
+// The kind that a header contains, unchecked; 0 when the file is too short.
 layout::SegmentKind kindOf(int file) noexcept {
   layout::SegmentKind kind{};
   static_cast<void>(::pread(file, &kind, sizeof kind, offsetof(layout::SegmentHeader, kind)));
@@ -49,11 +50,11 @@ std::optional<SegmentImage> SegmentImage::tryLoad(const std::string& path,
   struct stat status{};
   checkCall(::fstat(file.get(), &status), "look at", path);
   if (!S_ISREG(status.st_mode))
-    throw SegmentError(fmt::format("{}: not a segment of MPF (no plain file)", path));
+    throw SegmentError(fmt::format("{}: not a segment of MPF (not a regular file)", path));
 
   SegmentImage image;
   image.fileBytes_ = static_cast<std::uint64_t>(status.st_size);
-  // What the accessors reach is there, whatever the file has.
+  // The memory is large enough for all accessors, even if the file is shorter.
   constexpr auto kLeast =
       std::max({layout::kWindowBytes, layout::kLinkRingsOffset, sizeof(layout::WindowHints)});
   const auto most = kind || kindOf(file.get()) != layout::SegmentKind::bulk

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// SegmentImage: a private copy of the beginning of a segment. Read with pread(): nothing is mapped,
-// locked or written, so that looking disturbs nobody, and a segment that shrinks meanwhile is no
-// signal.
+// SegmentImage: a private copy of the beginning of a segment. It is read with pread(): nothing is
+// mapped, locked or written, so that reading disturbs no process, and a segment that shrinks causes
+// no SIGBUS.
 //
 // Threads  one.
 // Crash    the owner may die at any time; the copy stays.
-// Trust    header() has been checked; all else is what its writers say.
+// Trust    header() has been checked; everything else is untrusted.
 #pragma once
 
 #include <cstddef>
@@ -20,14 +20,14 @@ namespace mpf::tools {
 
 class SegmentImage {
  public:
-  // Up to `bytes` of the segment; what the file does not have is zero. nullopt when there is no
-  // segment of that name (any more).
-  //   throws  SegmentError when it is not what it should be, std::system_error when it may not be
-  //           read
+  // Up to `bytes` of the segment; bytes behind the end of the file are zero. nullopt when no
+  // segment of that name exists (any more).
+  //   throws  SegmentError when the file is not a segment of this kind, std::system_error when it
+  //           may not be read
   static std::optional<SegmentImage> tryRead(const std::string& name, layout::SegmentKind kind,
                                              std::size_t bytes);
-  // The same of a file anywhere, a copy for example, and of any kind: all of it, but of a bulk
-  // segment the header alone.
+  // The same for a file of any kind in any folder, for example a copy. Reads the whole segment, but
+  // only the header of a bulk segment.
   static std::optional<SegmentImage> tryReadFile(const std::string& path);
 
   [[nodiscard]] const layout::SegmentHeader& header() const noexcept {
@@ -42,19 +42,20 @@ class SegmentImage {
   [[nodiscard]] const layout::WindowHints& hints() const noexcept {
     return at<layout::WindowHints>(0);
   }
-  // Of a router; those that the copy has not are left out.
+  // The rows of a router, as far as the copy contains them.
   [[nodiscard]] std::span<const layout::RouterLine> routerLines() const noexcept;
-  // The slots of a link that begin at `offset`; those that the copy has not are left out.
+  // The slots of a link that begin at `offset`, as far as the copy contains them.
   [[nodiscard]] std::span<const layout::Slot> slots(std::size_t offset,
                                                     std::size_t count) const noexcept;
-  // What was read.
+  // The bytes that were read.
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
     return {reinterpret_cast<const std::byte*>(blocks_.get()), bytesRead_};
   }
   [[nodiscard]] std::uint64_t fileBytes() const noexcept { return fileBytes_; }
 
  private:
-  // Opens a file and makes room for `bytes` of it; empty when there is none.
+  // Reads up to `bytes` of a file; nullopt when it does not exist. Without `kind`, any kind will
+  // do.
   static std::optional<SegmentImage> tryLoad(const std::string& path,
                                              std::optional<layout::SegmentKind> kind,
                                              std::size_t bytes);
@@ -70,7 +71,7 @@ class SegmentImage {
   std::uint64_t fileBytes_ = 0;
 };
 
-// A word of an image, which nobody writes any more.
+// The value of a word in an image. Relaxed, because no process writes to the copy.
 template <class Word>
 [[nodiscard]] auto value(const Word& word) noexcept {
   return word.load(std::memory_order_relaxed);

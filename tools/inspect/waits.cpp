@@ -8,7 +8,7 @@
 namespace mpf::tools {
 namespace {
 
-// What the one that messages wait for does, and whether it has been told of them.
+// The state of the process that messages wait for, and whether it has been notified of them.
 std::string posture(const SnapshotDelta& delta, const WindowView& window, std::uint32_t index,
                     bool isPolled) {
   const auto state = delta.stateOf(window);
@@ -19,7 +19,7 @@ std::string posture(const SnapshotDelta& delta, const WindowView& window, std::u
                      told);
 }
 
-// What ended a link, whatever waits on it; empty when nothing did.
+// Why a link is over; empty when it is not.
 std::string endOf(const SnapshotDelta& delta, const LinkView& link, const WindowView* server,
                   const WindowView* client) {
   if (client == nullptr) return "over: the client is gone";
@@ -40,7 +40,8 @@ std::string waitsOf(const SnapshotDelta& delta, const LinkView& link) {
   auto text = endOf(delta, link, server, client);
   if (!text.empty()) return text;
   if (link.serverState == layout::LinkState::none) {
-    const auto* told = server->hints.hasKnocked(link.incarnation) ? "its knock stands" : "no knock";
+    const auto* told =
+        server->hints.hasKnocked(link.incarnation) ? "knock pending" : "no knock pending";
     return fmt::format("the client waits to be accepted ({}, {})", toString(server->sleeping),
                        told);
   }

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Waits: who waits for whom on a link, in words, from a look at both of its windows.
+// Waits: which process waits for which on a link, as text, from snapshots of its two windows.
 //
-//   "3 requests wait for the server (asleep on its futex, ready bit set)"     "the client waits for
-//   1 reply"     "idle"
+//   "3 requests wait for the server (asleep on its futex, ready bit set)"
+//   "the client waits for 1 reply"
+//   "idle"
 //
 // Threads  one.
-// Trust    words of two processes are not one moment: a system that runs may be a step further than
-//          they say.
+// Trust    the windows of two processes are not read at the same moment: a running system may
+//          already be in a later state.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf ls: backplanes, servers, clients, and how they are.
+// mpf ls: lists backplanes, servers, clients and connections to other hosts, with their states.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fmt/format.h>
@@ -21,7 +21,7 @@ std::string age(const WindowView& window) {
   return durationText(static_cast<double>(window.ageNs));
 }
 
-// Of a server elsewhere, whom it is reached by: "→ ioc1".
+// The program of a server; for a server on another host, the router that leads to it: "→ ioc1".
 std::string programOf(const SnapshotDelta& delta, const WindowView& server) {
   const auto at = delta.routerOf(server);
   return at ? "→ " + at.line->peerText() : server.program;
@@ -47,8 +47,8 @@ std::string servers(const SnapshotDelta& delta) {
   return text;
 }
 
-// "dac x 3, gpib@2 (waiting), serial (connecting)": each once, however many clients the process has
-// of it; `mpf mrr` has them all.
+// "dac x 3, gpib@2 (waiting), serial (connecting)": each server once, with the number of clients
+// that the process has for it. Shows at most kMost names; `mpf mrr` shows all.
 std::string serversOf(const WindowView& client) {
   constexpr std::size_t kMost = 6;
   std::map<std::string, int> names;
@@ -65,8 +65,8 @@ std::string serversOf(const WindowView& client) {
   return text;
 }
 
-// A client's label, and its program if that is another word. A router's has the name of whom it is
-// for.
+// The label of a client, with its program if that differs. The label of a client that a router has
+// for another host names that host, and its program is left out.
 std::string nameOf(const WindowView& client) {
   return client.name == client.program || client.router != 0
              ? client.name
@@ -82,7 +82,7 @@ std::string clients(const SnapshotDelta& delta) {
   return table.isEmpty() ? "  no client\n" : table.fitted("  ");
 }
 
-// Connections to other hosts, in brief; `mpf mrr` has all of it.
+// The connections to other hosts, in brief; `mpf mrr` shows all details.
 std::string routers(const SnapshotDelta& delta) {
   Table table({"ROUTER", "STATE", ">CLIENTS", ">RTT", ">SINCE", "PEER"});
   for (const auto& router : delta.now().routers) {
@@ -123,7 +123,7 @@ int list(const ReportArguments& arguments) {
 
 void addLs(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "ls", "Backplanes, servers, clients and connections to other hosts, and how they are");
+      "ls", "Lists backplanes, servers, clients and connections to other hosts, with their states");
   auto arguments = std::make_shared<ReportArguments>();
   addReport(command, *arguments);
   command.callback([arguments, &run] { run = [arguments] { return list(*arguments); }; });

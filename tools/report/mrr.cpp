@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // mrr: message router report (manual, "Diagnostic Aids"). On one host each process that has clients
-// is a client router, each server a server router; what they have in their queues, whom they reach,
-// how much goes through. Behind them the connections of routers to other hosts: RMRClient,
-// RMRServer.
+// is listed as a client router, and each server as a server router, with their queues, their
+// connections and their message rates. The connections of routers to other hosts follow them, as
+// RMRClient and RMRServer.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fmt/format.h>
@@ -18,7 +18,8 @@
 namespace mpf::tools {
 namespace {
 
-// The manual's word, and ours for what it could not tell.
+// "stateConnected", as in the manual, for a process that is alive. The manual has no names for the
+// other states.
 std::string routerState(const std::string& state) {
   if (state == "alive") return "stateConnected";
   return state + (state == "dead" ? " (removed by the next program that attaches)" : "");
@@ -91,7 +92,7 @@ void printServer(std::size_t number, const SnapshotDelta& delta, const WindowVie
 
 using Router = SnapshotDelta::RouterLineOf;
 
-// "stateConnected", "stateConnecting", "stateWaiting"; of a router that does not live, how it is.
+// "stateConnected", "stateConnecting", "stateWaiting"; the state of the router if it is not alive.
 std::string lineState(const SnapshotDelta& delta, const Router& at) {
   if (delta.stateOf(*at.router) != "alive") return delta.stateOf(*at.router);
   auto state = delta.stateOf(*at.router, *at.line);
@@ -99,8 +100,8 @@ std::string lineState(const SnapshotDelta& delta, const Router& at) {
   return "state" + state;
 }
 
-// Of each connection: the servers elsewhere that clients here have or wait for; the servers here
-// that the clients of a caller have.
+// The servers of each connection. For a connection to a remote: servers on other hosts that local
+// clients use or wait for. For a caller: local servers that its clients use.
 class LineBindings {
  public:
   explicit LineBindings(const SnapshotDelta& delta) : delta_(delta) {
@@ -144,7 +145,7 @@ class LineBindings {
   std::map<std::int32_t, std::vector<const RouterLineView*>> linesTo_;
 };
 
-// The manual's line; in two when the numbers are too long for one.
+// The rates as one line, as in the manual, or as two lines when one would be too long.
 void printLineRates(const LineRates& rates) {
   const auto messages = fmt::format("   sendPerSec {:.0f} receivePerSec {:.0f}",
                                     rates.messages.sentPerSecond, rates.messages.receivedPerSecond);
@@ -199,7 +200,8 @@ void printLines(std::size_t number, const SnapshotDelta& delta, bool areClients,
   }
 }
 
-// What a router has here for those elsewhere stands with its connection.
+// Windows that a router has for programs on other hosts are not listed by themselves; they are part
+// of the router's connection.
 void printRouters(const SnapshotDelta& delta) {
   const LineBindings bindings(delta);
   std::size_t number = 0;
@@ -229,7 +231,7 @@ int report(const ReportArguments& arguments) {
 
 void addMrr(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "mrr", "Message router report: who talks to whom, how much waits, how much goes through");
+      "mrr", "Message router report: connections, queues and message rates of clients and servers");
   auto arguments = std::make_shared<ReportArguments>();
   arguments->intervalMs = 1000;
   addReport(command, *arguments);

@@ -20,7 +20,7 @@ namespace mpf::tools {
 namespace {
 
 struct MsrArguments : ReportArguments {
-  std::string server;  // empty: all
+  std::string server;                    // empty: all
   std::optional<std::int32_t> location;  // nullopt: any
 };
 
@@ -61,7 +61,7 @@ void printClients(const SnapshotDelta& delta, const WindowView& server) {
   if (!table.isEmpty()) fmt::print("{}", table.fitted("  "));
 }
 
-// Of a server elsewhere: whom it is reached by.
+// For a server on another host: the router connection that leads to it.
 void printVia(const SnapshotDelta& delta, const SnapshotDelta::RouterLineOf& at) {
   const auto& line = *at.line;
   const auto peer = line.peer.empty() ? std::string() : line.peer + " at ";
@@ -73,7 +73,7 @@ void printVia(const SnapshotDelta& delta, const SnapshotDelta::RouterLineOf& at)
                                 at.router->owner.pid));
 }
 
-// The manual's five lines first, as they were.
+// The first five lines are those of the manual.
 void print(const SnapshotDelta& delta, const WindowView& server) {
   const auto totals = Totals::of(server);
   fmt::print("{}", wrap("", server.name, 2));
@@ -99,24 +99,25 @@ void print(const SnapshotDelta& delta, const WindowView& server) {
   printClients(delta, server);
 }
 
-// What could not be read may be what was asked for.
+// Prints that no server was found. The server may be in a segment that could not be read, so this
+// prints those as well. Returns the exit status.
 int explainNothing(const MsrArguments& arguments, const std::vector<std::string>& problems) {
   for (const auto& problem : problems) printError("mpf msr: {}\n", problem);
-  const auto unless = problems.empty() ? "" : ", unless it is among what could not be read";
+  const auto unless = problems.empty() ? "" : ", unless it is in a file that could not be read";
   if (!arguments.server.empty() || arguments.location) {
     const auto where =
         arguments.location ? fmt::format(" at location {}", *arguments.location) : "";
     const auto what =
         arguments.server.empty() ? "no server" : fmt::format("no server \"{}\"", arguments.server);
-    printError("mpf msr: {}{}{}; `mpf ls` shows those that there are\n", what, where, unless);
+    printError("mpf msr: {}{}{}; `mpf ls` lists the servers\n", what, where, unless);
     return 1;
   }
   if (!arguments.json) fmt::print("no server{}\n", unless);
   return problems.empty() ? 0 : 1;
 }
 
-// Servers among what could not be read are missing in the report.
-void tellProblems(const MsrArguments& arguments, const std::vector<std::string>& problems) {
+// Prints which segments could not be read: their servers are missing in the report.
+void printProblems(const MsrArguments& arguments, const std::vector<std::string>& problems) {
   if (problems.empty()) return;
   const auto count =
       counted(problems.size(), "file") + " could not be read: servers may be missing here";
@@ -153,7 +154,7 @@ int report(const MsrArguments& arguments) {
         });
       });
   if (!found) return explainNothing(arguments, problems);
-  if (arguments.server.empty()) tellProblems(arguments, problems);
+  if (arguments.server.empty()) printProblems(arguments, problems);
   return 0;
 }
 

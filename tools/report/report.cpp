@@ -12,9 +12,9 @@
 namespace mpf::tools {
 
 void addReport(CLI::App& app, ReportArguments& arguments) {
-  addBackplane(app, arguments.backplane, "all that there are");
+  addBackplane(app, arguments.backplane, "all backplanes");
   app.add_option("--interval", arguments.intervalMs,
-                 "Time between the two looks that give rates and show who is stalled [ms]")
+                 "Time between the two snapshots from which rates and stalls are found [ms]")
       ->capture_default_str()
       ->check(wholeNumber(1, 3'600'000));
   addJson(app, arguments.json);

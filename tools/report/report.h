@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Report: what ls, mrr and msr have in common: which backplanes, between which two looks, for
-// people or for programs.
+// What ls, mrr and msr have in common: the choice of backplanes, two snapshots of each, and output
+// as text or as JSON.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -25,10 +25,11 @@ inline constexpr const char* kNoBackplane = "no backplane: no program uses MPF o
 // The name of a server, and its location unless that is 0: "dac", "dac@2".
 std::string serverText(const std::string& server, std::int32_t location);
 
-// Looks at the backplane named, by argument or by MPF_BACKPLANE, or else at each that there is, and
-// prints each look, or all as one JSON list.
-//   collect   adds to the list
-//   returns   how many backplanes there were
+// Takes two snapshots of the backplane that the argument or MPF_BACKPLANE names, or of each
+// backplane of the host, and prints each as text, or all as one JSON list.
+//   print     prints one backplane as text
+//   collect   adds one backplane to the JSON list
+//   returns   number of backplanes
 int reportEach(const ReportArguments& arguments,
                const std::function<void(const SnapshotDelta&)>& print,
                const std::function<void(const SnapshotDelta&, nlohmann::json& list)>& collect);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reports as JSON, for `--json`. docs/tools.md says what each field means.
+// Reports as JSON, for `--json`. docs/tools.md describes each field.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,8 +8,8 @@
 
 namespace mpf::tools {
 
-// {"backplane", "servers": [window...], "clients": [window...], "routers": [{..., "lines":
-// [line...]}...],
+// {"backplane", "servers": [window...], "clients": [window...],
+//  "routers": [{..., "lines": [line...]}...],
 //  "waiting": [{"pid", "server", "location"}...], "problems": [text...]}
 [[nodiscard]] nlohmann::json toJson(const SnapshotDelta& delta);
 // One server or client window with its links.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What reports and `mpf inspect` both say of a router's connection, as JSON. docs/tools.md says
-// what each field means.
+// The JSON fields of a router's connection that reports and `mpf inspect` have in common.
+// docs/tools.md describes each field.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,7 +10,7 @@
 
 namespace mpf::tools {
 
-// Adds to `entry`, which may be one that keeps its order.
+// Adds the fields to `entry`, an nlohmann::json or an nlohmann::ordered_json.
 template <typename Json>
 void addFacts(Json& entry, const RouterLineView& line, const std::string& state) {
   entry["role"] = line.isClient() ? "client" : "server";

@@ -20,7 +20,7 @@
 namespace mpf::tools {
 namespace {
 
-constexpr std::size_t kMostLooks = 1000;  // at a row whose texts change
+constexpr std::size_t kMaxReads = 1000;  // of a row whose texts keep changing
 
 bool isUsed(const layout::RouterLine& line) noexcept {
   const auto role = value(line.role);
@@ -32,7 +32,7 @@ bool sameTexts(const layout::RouterLine& a, const layout::RouterLine& b) noexcep
          a.locations == b.locations && a.problem == b.problem;
 }
 
-// Whether nobody wrote texts from before `was` was copied until after `is` was.
+// Whether the router wrote no text of the row between the copy `was` and the copy `is`.
 bool isWhole(const layout::RouterLine& was, const layout::RouterLine& is) noexcept {
   const auto texts = value(was.texts);
   return texts % 2 == 0 && texts == value(is.texts) && sameTexts(was, is);
@@ -66,16 +66,16 @@ RouterLineView viewOf(const layout::RouterLine& line, std::size_t row) {
   return view;
 }
 
-// Copies until one has the texts of that before it: then nobody wrote them in between. At the end
-// as the last one has it. nullopt: the row is used no more.
+// Copies the row until two successive copies have the same texts: then the router wrote no text in
+// between. After kMaxReads copies it uses the last one. nullopt: the row is no longer in use.
 std::optional<RouterLineView> readRow(int file, std::size_t row, const layout::RouterLine& first) {
   std::array<layout::RouterLine, 2> copies{};
   const auto* was = &first;
-  for (std::size_t looks = 0; looks < kMostLooks; ++looks) {
-    // PAIR(router-texts): what this copy has of a text was there when the one before had its
-    // number, or they differ.
+  for (std::size_t reads = 0; reads < kMaxReads; ++reads) {
+    // PAIR(router-texts): if this copy contains a part of a text that was written after the
+    // previous copy read the counter, the counters of the two copies differ.
     std::atomic_thread_fence(std::memory_order_acquire);
-    auto& is = copies.at(looks % copies.size());
+    auto& is = copies.at(reads % copies.size());
     const auto offset = layout::kRouterLinesOffset + row * sizeof is;
     if (::pread(file, &is, sizeof is, static_cast<off_t>(offset)) !=
         static_cast<ssize_t>(sizeof is))
@@ -89,7 +89,7 @@ std::optional<RouterLineView> readRow(int file, std::size_t row, const layout::R
 
 }  // namespace
 
-// It follows the program's name in brackets.
+// The letter follows the name of the program, which stands in brackets and may contain brackets.
 char processState(const Owner& owner) {
   if (owner.pidNamespace != Process::self().pidNamespace) return '?';
   std::ifstream file("/proc/" + std::to_string(owner.pid) + "/stat");
@@ -127,8 +127,8 @@ std::vector<std::int32_t> RouterLineView::locationList() const {
   return list;
 }
 
-// A list of locations that is longer than its place is cut off there: then the only remote is whom
-// all others are reached by.
+// A list of locations that fills its field may have been cut off. If there is only one remote, it
+// must be the one for the locations that are missing in the list.
 const RouterLineView* RouterView::lineTo(std::int32_t location) const {
   const auto reaches = [&](const RouterLineView& line) {
     const auto list = line.locationList();
@@ -145,7 +145,7 @@ const RouterLineView* RouterView::lineFrom(const std::string& label) const {
   const RouterLineView* found = nullptr;
   for (const auto& line : lines) {
     if (line.isClient() || line.peer.empty()) continue;
-    // may be cut within a character
+    // The label may be cut inside a UTF-8 character; printable() treats both texts alike.
     if (printable(("router " + line.peer).substr(0, layout::kNameChars - 1)) != label) continue;
     if (found != nullptr) return nullptr;
     found = &line;

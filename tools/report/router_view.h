@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// RouterView: what a router says of its connections, copied from its segment. Part of snapshot.h.
+// RouterView: the connections of a router, copied from its segment. Part of a Snapshot.
 //
-//   mpf.<backplane>.r.<incarnation> ─ pread, and each row again until two copies have the same texts ─► RouterView
+//   mpf.<backplane>.r.<incarnation> ─ pread ─► RouterView
+//
+// Each row is read again until two copies have the same texts.
 //
 // Threads  one.
-// Crash    a router that died or was stopped while it changed a text leaves that text half changed:
-//          it is shown as it is.
-// Trust    texts come from anywhere, a peer's name from another host: no control character is left
-//          in them.
+// Crash    a router that died or was stopped while it changed a text leaves that text half changed;
+//          it is shown half changed.
+// Trust    texts are untrusted, and the name of a peer is sent by another host: control characters
+//          are removed from them.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +23,7 @@ namespace mpf::tools {
 
 enum class Life { alive, closed, dead };
 
-// Whose a segment is. A pid alone may be somebody else's by now.
+// The process that owns a segment. A pid alone does not identify it: the kernel reuses pids.
 struct Owner {
   std::int32_t pid = 0;
   std::uint64_t startTicks = 0;
@@ -31,19 +33,19 @@ struct Owner {
   }
   auto operator<=>(const Owner&) const = default;
 };
-// The letter of field 3 of /proc/<pid>/stat; '?' when it cannot be told.
+// The letter of field 3 of /proc/<pid>/stat; '?' when it is unknown.
 [[nodiscard]] char processState(const Owner& owner);
 
-// "waiting" (to try again), "connecting", "connected".
+// "waiting" (for the next attempt), "connecting", "connected".
 [[nodiscard]] const char* toString(layout::RouterLineState state) noexcept;
 
-// One connection, or one remote that is to be connected to.
+// One connection, or one remote that the router tries to connect to.
 struct RouterLineView {
   std::size_t row = 0;
   layout::RouterRole role{};
   layout::RouterLineState state{};
   bool isTls = false;
-  std::int64_t sinceNs = 0;  // CLOCK_MONOTONIC: since when it is connected, or is not
+  std::int64_t sinceNs = 0;  // CLOCK_MONOTONIC: when it was last connected or disconnected
   std::uint64_t connects = 0;
   std::uint64_t queueSize = 0, inQueue = 0, queueFull = 0;
   std::uint64_t messagesSent = 0, messagesReceived = 0;
@@ -62,7 +64,7 @@ struct RouterLineView {
     return connects > 1 ? connects - 1 : 0;
   }
   [[nodiscard]] std::vector<std::int32_t> locationList() const;
-  // Whom it leads to: the peer's name, or its address while that is not known.
+  // The name of the peer, or its address while the name is not known.
   [[nodiscard]] const std::string& peerText() const noexcept {
     return peer.empty() ? address : peer;
   }
@@ -71,7 +73,7 @@ struct RouterLineView {
 struct RouterView {
   std::string file;  // name of the segment
   std::uint64_t incarnation = 0;
-  std::string name;  // what it calls itself
+  std::string name;  // of the router, from its configuration
   std::string program;
   Owner owner;
   Life life{};
@@ -80,18 +82,18 @@ struct RouterView {
   std::uint64_t bytes = 0;
   std::vector<RouterLineView> lines;  // clients first, then by row
 
-  // The connection by which clients here reach that location; null when there is none.
+  // The connection over which local clients reach that location; null without such a connection.
   [[nodiscard]] const RouterLineView* lineTo(std::int32_t location) const;
-  // The connection whose far clients have a window of this label here; null when that is not
-  // certain.
+  // The connection whose remote clients have a local window with this label; null when no
+  // connection fits, or several do.
   [[nodiscard]] const RouterLineView* lineFrom(const std::string& label) const;
 };
 
-// nullopt when there is no segment of that name (any more).
+// nullopt when no segment of that name exists (any more).
 //   throws  as SegmentImage::tryRead
 [[nodiscard]] std::optional<RouterView> tryReadRouter(const std::string& name);
-// The rows in use of a router's segment, of which `image` is a copy; the file is read again, for
-// the texts.
+// The rows in use of a router's segment, of which `image` is a copy. Reads the file at `path` again
+// until the texts of each row are consistent.
 [[nodiscard]] std::vector<RouterLineView> routerLines(const SegmentImage& image,
                                                       const std::string& path);
 

@@ -56,12 +56,12 @@ int keyOf(int code) {
 Screen::Screen() {
   if (::isatty(STDIN_FILENO) == 0 || ::isatty(STDOUT_FILENO) == 0) {
     throw std::runtime_error(
-        "top: stdin or stdout is no terminal; `mpf top --batch 1` prints the tables once");
+        "top: stdin or stdout is not a terminal; `mpf top --batch 1` prints the tables once");
   }
   std::setlocale(LC_CTYPE, "");
   if (newterm(nullptr, stdout, stdin) == nullptr) {
     throw std::runtime_error(
-        "top: nothing is known of this terminal ($TERM); `mpf top --batch 1` prints the tables "
+        "top: the type of this terminal ($TERM) is unknown; `mpf top --batch 1` prints the tables "
         "once");
   }
   cbreak();
@@ -85,8 +85,8 @@ void Screen::draw(const std::vector<TopLine>& lines) {
   erase();
   int row = 0;
   for (const auto& line : lines) {
-    // What is too long would go on in the next row: cut here, and what is left of wide characters
-    // is overwritten.
+    // A line that is too long would continue in the next row: it is cut here, and clrtoeol()
+    // removes the remains of wide characters.
     const bool isSelected =
         line.style == TopLine::Style::selected || line.style == TopLine::Style::selectedAlarm;
     const auto text = fmt::format("{:<{}.{}}", line.text, isSelected ? COLS : 0, COLS);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Screen: the terminal that `mpf top` draws on, by ncurses. Its end restores the terminal.
+// Screen: the terminal that `mpf top` draws on, by ncurses. The destructor restores the terminal.
 //
-// Threads  one, and one Screen a process.
-// Crash    an exception restores it, too; SIGKILL does not (`reset` does).
+// Threads  one, and one Screen in a process.
+// Crash    an exception restores the terminal, too; after SIGKILL the user needs `reset`.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ namespace mpf::tools {
 
 class Screen {
  public:
-  // Throws std::runtime_error when stdin or stdout is no terminal, or one that nothing is known of.
+  // Throws std::runtime_error when stdin or stdout is not a terminal, or its type is unknown.
   Screen();
   ~Screen();
   Screen(const Screen&) = delete;
@@ -22,8 +22,8 @@ class Screen {
 
   [[nodiscard]] int rows() const noexcept;
   void draw(const std::vector<TopLine>& lines);
-  // The next key that was pressed (TopKey), or a change of size (0); nullopt when there is none
-  // now.
+  // The next key that was pressed (TopKey), or 0 after a change of size; nullopt without a key.
+  // Does not wait.
   std::optional<int> tryKey();
 };
 

@@ -77,17 +77,17 @@ void copyCounters(const layout::WindowControl& from, WindowView& to) {
 // Reads the segments of one backplane, one by one, into a Snapshot.
 class SnapshotReader {
  public:
-  explicit SnapshotReader(Snapshot& snapshot) : survey_(snapshot) {}
+  explicit SnapshotReader(Snapshot& snapshot) : snapshot_(snapshot) {}
 
   void run() {
-    for (const auto& name : segments::list(SegmentName::prefix(survey_.backplane))) {
-      ++survey_.files;
+    for (const auto& name : segments::list(SegmentName::prefix(snapshot_.backplane))) {
+      ++snapshot_.files;
       try {
         const auto parsed = SegmentName::tryParse(name);
         if (!parsed) throw SegmentError(segments::path(name) + ": not a name that MPF gives");
         look(name, *parsed);
       } catch (const std::exception& error) {
-        survey_.problems.push_back(printable(error.what()));
+        snapshot_.problems.push_back(printable(error.what()));
       }
     }
     join();
@@ -123,7 +123,7 @@ class SnapshotReader {
         return;
       case NameKind::router:
         return router(name);
-      case NameKind::reaper:  // of a moment, and without content
+      case NameKind::reaper:  // exists for a moment only, and has no content
         return;
     }
   }
@@ -131,7 +131,7 @@ class SnapshotReader {
   std::optional<SegmentImage> read(const std::string& name, layout::SegmentKind kind,
                                    std::size_t bytes) {
     auto image = SegmentImage::tryRead(name, kind, bytes);
-    if (image) survey_.bytes += image->fileBytes();
+    if (image) snapshot_.bytes += image->fileBytes();
     return image;
   }
 
@@ -153,14 +153,14 @@ class SnapshotReader {
     view.life = lifeOf(name, *image);
     view.sleeping = value(image->window().sleeping);
     if (view.life != Life::dead) view.processState = processState(view.owner);
-    view.ageNs = survey_.atNs - header.createdMonotonicNs;
+    view.ageNs = snapshot_.atNs - header.createdMonotonicNs;
     view.queueSize = view.isServer ? value(image->window().queueSize) : header.queueSize;
     view.maxMessageBytes = header.maxMessageBytes;
     copyCounters(image->window(), view);
     if (header.layoutMinor >= Handling::kSinceMinor)
       view.handling = Handling::of(value(image->window().handling));
     view.progressAtNs = static_cast<std::int64_t>(value(image->window().progressAtNs));
-    (view.isServer ? survey_.servers : survey_.clients).push_back(std::move(view));
+    (view.isServer ? snapshot_.servers : snapshot_.clients).push_back(std::move(view));
   }
 
   void link(const std::string& name) {
@@ -193,24 +193,24 @@ class SnapshotReader {
   void pendingBind(const std::string& name) {
     const auto image = read(name, layout::SegmentKind::pendingBind, sizeof(layout::SegmentHeader));
     if (!image) return;
-    survey_.pendingBinds.push_back({image->header().ownerWindow,
-                                    segments::text(image->header().name),
-                                    image->header().location});
+    snapshot_.pendingBinds.push_back({image->header().ownerWindow,
+                                      segments::text(image->header().name),
+                                      image->header().location});
   }
 
   void router(const std::string& name) {
     auto view = tryReadRouter(name);
     if (!view) return;
-    survey_.bytes += view->bytes;
-    survey_.routers.push_back(std::move(*view));
+    snapshot_.bytes += view->bytes;
+    snapshot_.routers.push_back(std::move(*view));
   }
 
-  // Servers and clients that a router has here for those elsewhere.
+  // Marks the windows that a router has here for servers and clients on other hosts.
   void joinRouters() {
     std::map<Owner, const RouterView*> routers;
-    for (const auto& router : survey_.routers) routers.emplace(router.owner, &router);
+    for (const auto& router : snapshot_.routers) routers.emplace(router.owner, &router);
     if (routers.empty()) return;
-    for (auto* windows : {&survey_.servers, &survey_.clients}) {
+    for (auto* windows : {&snapshot_.servers, &snapshot_.clients}) {
       for (auto& window : *windows) {
         const auto router = routers.find(window.owner);
         if (router == routers.end()) continue;
@@ -223,13 +223,13 @@ class SnapshotReader {
     }
   }
 
-  // A link belongs to both of its windows, a pending bind to its client's. One whose windows are
-  // gone is about to be removed: not shown.
+  // Adds each link to both of its windows, and each pending bind to the window of its client. Links
+  // whose windows no longer exist are about to be removed and are not shown.
   void join() {
     std::unordered_map<std::uint64_t, WindowView*> servers;
     std::unordered_map<std::uint64_t, WindowView*> clients;
-    for (auto& server : survey_.servers) servers.emplace(server.incarnation, &server);
-    for (auto& client : survey_.clients) clients.emplace(client.incarnation, &client);
+    for (auto& server : snapshot_.servers) servers.emplace(server.incarnation, &server);
+    for (auto& client : snapshot_.clients) clients.emplace(client.incarnation, &client);
     for (auto* windows : {&servers, &clients}) {
       for (auto& [incarnation, window] : *windows) {
         if (const auto hints = hints_.find(incarnation); hints != hints_.end())
@@ -244,33 +244,33 @@ class SnapshotReader {
       if (const auto client = clients.find(link.clientWindow); client != clients.end())
         client->second->links.push_back(link);
     }
-    std::ranges::sort(survey_.pendingBinds, {}, [](const PendingBindView& view) {
+    std::ranges::sort(snapshot_.pendingBinds, {}, [](const PendingBindView& view) {
       return std::pair(view.location, view.server);
     });
-    for (const auto& pendingBind : survey_.pendingBinds) {
+    for (const auto& pendingBind : snapshot_.pendingBinds) {
       if (const auto client = clients.find(pendingBind.clientWindow); client != clients.end())
         client->second->pendingBinds.push_back(pendingBind);
     }
   }
 
   void sort() {
-    std::ranges::sort(survey_.servers, {},
+    std::ranges::sort(snapshot_.servers, {},
                       [](const WindowView& view) { return std::pair(view.location, view.name); });
-    std::ranges::sort(survey_.clients, {}, [](const WindowView& view) {
+    std::ranges::sort(snapshot_.clients, {}, [](const WindowView& view) {
       return std::pair(-view.ageNs, view.incarnation);
     });
-    std::ranges::sort(survey_.routers, {}, [](const RouterView& view) {
+    std::ranges::sort(snapshot_.routers, {}, [](const RouterView& view) {
       return std::pair(view.name, view.incarnation);
     });
     const auto byServer = [](const LinkView& view) {
       return std::tuple(view.location, view.server, view.incarnation);
     };
-    for (auto* windows : {&survey_.servers, &survey_.clients}) {
+    for (auto* windows : {&snapshot_.servers, &snapshot_.clients}) {
       for (auto& window : *windows) std::ranges::sort(window.links, {}, byServer);
     }
   }
 
-  Snapshot& survey_;
+  Snapshot& snapshot_;
   std::vector<LinkView> links_;
   std::unordered_map<std::uint64_t, std::uint64_t> bulkBytes_;  // by link
   std::unordered_map<std::uint64_t, HintsView> hints_;  // by window
@@ -322,7 +322,7 @@ std::uint64_t Latencies::percentileNs(double percent) const noexcept {
   std::uint64_t seen = 0;
   for (std::uint32_t i = 0; i < layout::kHistogramBuckets; ++i) {
     seen += buckets[i];
-    if (i + 1 == layout::kHistogramBuckets) break;  // it has no end
+    if (i + 1 == layout::kHistogramBuckets) break;  // the last bucket has no upper end
     if (seen != 0 && static_cast<double>(seen) >= wanted)
       return std::min(HistogramBuckets::endNs(i), maxNs);
   }

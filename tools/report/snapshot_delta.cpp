@@ -22,8 +22,8 @@ std::uint64_t grown(std::uint64_t was, std::uint64_t is) noexcept {
   return is > was ? is - was : 0;
 }
 
-// A client's window does not count what it sends, its links do. A link that came between the
-// snapshots started with nothing.
+// The window of a client does not count the messages that it sends, but its links do. A link that
+// was created between the snapshots started at 0.
 std::uint64_t sentBetween(const WindowView& was, const WindowView& is) {
   std::unordered_map<std::uint64_t, std::uint64_t> before;
   for (const auto& link : was.links) before.emplace(link.incarnation, link.requests.sent);
@@ -41,7 +41,8 @@ Rates ratesBetween(std::uint64_t sentBefore, std::uint64_t sent, std::uint64_t r
   return {perSecond(grown(sentBefore, sent), ns), perSecond(grown(receivedBefore, received), ns)};
 }
 
-// A row is given to the next connection when one has ended.
+// The row of the same connection in an older snapshot. A row is reused when its connection has
+// ended, so role and address must agree.
 const RouterLineView* findLine(const Snapshot& snapshot, std::uint64_t router,
                                const RouterLineView& line) {
   const auto found = std::ranges::find(snapshot.routers, router, &RouterView::incarnation);
@@ -76,8 +77,8 @@ Totals Totals::of(const WindowView& window) noexcept {
 }
 
 SnapshotDelta::SnapshotDelta(const std::string& backplane, std::chrono::milliseconds interval)
-    : SnapshotDelta{Snapshot::take(backplane), snapshotAfter(backplane, interval)} {
-}  // braces: in this order
+    // Braces, so that the arguments are evaluated from left to right.
+    : SnapshotDelta{Snapshot::take(backplane), snapshotAfter(backplane, interval)} {}
 
 SnapshotDelta::SnapshotDelta(Snapshot before, Snapshot now)
     : before_(std::move(before)),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SnapshotDelta: two snapshots with some time between them, which tell what one cannot: rates, and
-// who has stopped moving.
+// SnapshotDelta: two snapshots taken one after the other. Their differences show message rates, and
+// processes that make no progress.
 //
 // Threads  one.
 #pragma once
@@ -18,10 +18,10 @@ struct Rates {
   double receivedPerSecond = 0;
 };
 
-// Of a router's connection.
+// The rates of a router's connection.
 struct LineRates {
   Rates messages;
-  Rates frames;  // each one sent is one write
+  Rates frames;  // each frame that is sent is one write
   Rates bytes;
 };
 
@@ -34,18 +34,18 @@ class SnapshotDelta {
   SnapshotDelta& operator=(const SnapshotDelta&) = delete;
 
   [[nodiscard]] const Snapshot& now() const noexcept { return now_; }
-  // A window as it is now; null when there is none.
+  // A window in the second snapshot; null when it is not there.
   [[nodiscard]] const WindowView* find(std::uint64_t incarnation) const;
-  // Messages of a window in either direction. Client windows: requests sent, replies received.
+  // Message rates of a window. For client windows: requests sent, replies received.
   [[nodiscard]] Rates ratesOf(const WindowView& window) const;
-  // The same of a link, as its client sees it.
+  // Message rates of a link: requests sent by its client, replies sent by its server.
   [[nodiscard]] Rates ratesOf(const LinkView& link) const;
   [[nodiscard]] LineRates ratesOf(const RouterView& router, const RouterLineView& line) const;
-  // The window as it was at the first look; null when it was not there.
+  // The window in the first snapshot; null when it was not there.
   [[nodiscard]] const WindowView* before(const WindowView& window) const;
-  // "alive", "closed", "dead"; of the living "busy" when it worked on one request all the time
-  // between the snapshots, "stalled" when messages wait for it and it took none, and "stopped" when
-  // its process is, by a signal or a debugger.
+  // "dead"; "stopped" when a signal or a debugger has stopped the process; "closed"; "busy" when it
+  // worked on one request during the whole time between the snapshots; "stalled" when messages wait
+  // for it and it received none in that time; otherwise "alive".
   [[nodiscard]] std::string stateOf(const WindowView& window) const;
   // What a busy server works on, and for how long: "char8Array cmd=3 for 35.2 s". Empty when it is
   // not busy.
@@ -53,11 +53,11 @@ class SnapshotDelta {
   [[nodiscard]] bool isBusy(const WindowView& window) const;
   // "alive", "stopped", "dead".
   [[nodiscard]] std::string stateOf(const RouterView& router) const;
-  // The same of a router that does not live; else "connected", "connecting", "waiting" (to try
-  // again).
+  // The state of the router if it is not alive; otherwise "connected", "connecting", "waiting" (for
+  // the next attempt).
   [[nodiscard]] std::string stateOf(const RouterView& router, const RouterLineView& line) const;
 
-  // The connection that a window of a router is for (WindowView::router); null when there is none.
+  // The connection that a window of a router is for (WindowView::router); null for other windows.
   struct RouterLineOf {
     const RouterView* router = nullptr;
     const RouterLineView* line = nullptr;
@@ -76,10 +76,11 @@ class SnapshotDelta {
   std::unordered_map<std::uint64_t, const LinkView*> linksBefore_;  // by incarnation
 };
 
-// What was sampled between two looks at a histogram. Its longest is that of all times.
+// The samples that a histogram gained between two snapshots. The maximum is that of `is`, because
+// the maximum of the new samples alone is not known.
 [[nodiscard]] Latencies between(const Latencies& was, const Latencies& is) noexcept;
 
-// What goes into a window and what comes out of it, over all of its links.
+// The sums over all links of a window.
 struct Totals {
   Traffic incoming;  // a server's requests, a client's replies
   Traffic outgoing;

@@ -12,9 +12,9 @@ namespace mpf::tools {
 
 namespace {
 
-constexpr std::size_t kEnds = 22;  // columns of both times
+constexpr std::size_t kEnds = 22;  // columns of the times at both ends
 
-// Counts of so many buckets each, and where they lie.
+// Each count is the sum of one or more buckets.
 struct Blocks {
   std::vector<std::uint64_t> counts;
   std::uint32_t first = 0;  // bucket

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sparkline: a histogram as one line of blocks, from the first bucket that holds anything to the
-// last.
+// Sparkline: a histogram as one line of blocks, from the first bucket with samples to the last.
 #pragma once
 
 #include <string>
@@ -9,8 +8,9 @@
 
 namespace mpf::tools {
 
-// "512 ns ▁▂█▅▁▁ 5120 ns": four blocks per power of two, or two or one when there is no room for
-// more in so many columns, as high as the count's share of the fullest; empty without samples.
+// "512 ns ▁▂█▅▁▁ 5120 ns": four blocks for each power of two, or two or one when four do not fit
+// into `columns`. The height of a block is its count relative to the largest count. Empty without
+// samples.
 [[nodiscard]] std::string sparkline(const Latencies& latencies, std::size_t columns);
 
 }  // namespace mpf::tools

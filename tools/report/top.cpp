@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf top: servers, clients, links and connections to other hosts of a backplane, live on a
-// terminal, or printed some times.
+// mpf top: shows servers, clients, links and connections to other hosts of a backplane, live on a
+// terminal, or prints them a number of times.
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -25,7 +25,8 @@
 namespace mpf::tools {
 namespace {
 
-constexpr auto kFirstLook = std::chrono::milliseconds(200);  // rates of less say nothing
+// The longest wait for the first rates. Rates of a shorter interval would mean little.
+constexpr auto kFirstInterval = std::chrono::milliseconds(200);
 
 struct TopArguments {
   std::string backplane;
@@ -37,10 +38,10 @@ struct TopArguments {
   std::string filter;
 };
 
-// Looks again each time, with the look before as the first of the two.
-class Looks {
+// Takes a snapshot each time; the previous snapshot is the first one of the delta.
+class SnapshotSeries {
  public:
-  explicit Looks(std::string backplane)
+  explicit SnapshotSeries(std::string backplane)
       : backplane_(std::move(backplane)), last_(Snapshot::take(backplane_)) {}
   std::shared_ptr<const SnapshotDelta> next() {
     auto now = Snapshot::take(backplane_);
@@ -54,23 +55,24 @@ class Looks {
   Snapshot last_;
 };
 
-// Applies the options that need a table to look at. False when there is no such column.
+// Applies the options, after the view has its first table. False when the column for --sort does
+// not exist.
 bool prepare(TopView& view, const TopArguments& arguments) {
   if (arguments.clients) view.showClients();
   if (arguments.routers) view.showRouters();
   view.setFilter(arguments.filter);
   if (arguments.sort.empty() || view.trySortBy(arguments.sort)) return true;
-  printError("mpf top: no column \"{}\"; they are in the heading of `mpf top --batch 1`\n",
+  printError("mpf top: no column \"{}\"; the heading of `mpf top --batch 1` shows all columns\n",
              arguments.sort);
   return false;
 }
 
 int printBatch(const TopArguments& arguments) {
-  Looks looks(arguments.backplane);
+  SnapshotSeries series(arguments.backplane);
   TopView view;
   for (int i = 0; i < arguments.batch; ++i) {
     std::this_thread::sleep_for(ofSeconds(arguments.seconds));
-    view.show(looks.next());
+    view.show(series.next());
     if (i == 0 && !prepare(view, arguments)) return 2;
     if (i != 0) fmt::print("\n");
     for (const auto& line : view.lines(0)) fmt::print("{}\n", line.text);
@@ -79,7 +81,7 @@ int printBatch(const TopArguments& arguments) {
   return 0;
 }
 
-// Readable once SIGINT or SIGTERM came.
+// A descriptor that becomes readable on SIGINT or SIGTERM.
 class StopEvent {
  public:
   [[nodiscard]] int descriptor() const noexcept { return event_.get(); }
@@ -92,11 +94,11 @@ class StopEvent {
 };
 
 int showLive(const TopArguments& arguments) {
-  const StopEvent stop;  // before ncurses, which leaves signals alone that somebody handles
+  const StopEvent stop;  // before ncurses, which does not replace handlers that already exist
   TopView view;
-  Looks looks(arguments.backplane);
-  std::this_thread::sleep_for(std::min<Nanoseconds>(ofSeconds(arguments.seconds), kFirstLook));
-  view.show(looks.next());
+  SnapshotSeries series(arguments.backplane);
+  std::this_thread::sleep_for(std::min<Nanoseconds>(ofSeconds(arguments.seconds), kFirstInterval));
+  view.show(series.next());
   if (!prepare(view, arguments)) return 2;
   Screen screen;
   auto due = Deadline::after(ofSeconds(arguments.seconds));
@@ -110,7 +112,7 @@ int showLive(const TopArguments& arguments) {
       if (!view.handle(*key)) return 0;
     }
     if (!due.hasPassed()) continue;
-    view.show(looks.next());
+    view.show(series.next());
     due = Deadline::after(ofSeconds(arguments.seconds));
   }
 }
@@ -119,18 +121,20 @@ int showLive(const TopArguments& arguments) {
 
 void addTop(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("top",
-                                      "Servers, clients, links and connections to other hosts, "
-                                      "live: rates, queues, latencies, who is stalled");
+                                      "Shows servers, clients, links and connections to other "
+                                      "hosts live: rates, queues, latencies, stalls");
   auto arguments = std::make_shared<TopArguments>();
   addBackplane(command, arguments->backplane, "\"default\"");
-  addSeconds(command, "--interval", arguments->seconds, "Time between two looks", false);
-  command.add_option("--batch", arguments->batch, "No terminal: print the table so many times")
+  addSeconds(command, "--interval", arguments->seconds, "Time between two snapshots", false);
+  command
+      .add_option("--batch", arguments->batch,
+                  "Print the table this number of times, without a live screen")
       ->check(wholeNumber(1, 1'000'000'000));
   auto* clients = command.add_flag("--clients", arguments->clients, "Begin with the clients");
   command.add_flag("--routers", arguments->routers, "Begin with the connections to other hosts")
       ->excludes(clients);
-  command.add_option("--sort", arguments->sort, "Column to sort by, as its heading says");
-  command.add_option("--filter", arguments->filter, "Only rows that hold this text");
+  command.add_option("--sort", arguments->sort, "Heading of the column to sort by");
+  command.add_option("--filter", arguments->filter, "Show only rows that contain this text");
   command.footer(std::string("Keys: ") + TopView::kKeys + "; arrows, j, k, PgUp, PgDn select.");
   command.callback([arguments, &run] {
     run = [arguments] {

@@ -53,12 +53,12 @@ std::string linkState(const LinkView& link) {
   return link.isOpen() ? "open" : "connecting";
 }
 
-// Whom a router's connection is with, and who called: "→ ioc1", "← ioc2".
+// The peer of a router's connection and the direction of the call: "→ ioc1", "← ioc2".
 std::string lineName(const RouterLineView& line) {
   return (line.isClient() ? "→ " : "← ") + line.peerText();
 }
 
-// A text in rows that fit beside what they are called.
+// The lines of a text that fit beside the column of names.
 std::vector<std::string> partsOf(const std::string& text) {
   constexpr std::size_t kBeside = 20;
   std::vector<std::string> parts;
@@ -247,20 +247,20 @@ TopTable topHelp() {
   };
   add("Tab", "servers, clients, connections to other hosts, in turn");
   add("arrows j k", "select a row; PgUp and PgDn by ten");
-  add("Enter", "opens it: links of a server or client; all about a link");
+  add("Enter", "opens it: links of a server or client; details of a link");
   add("Esc", "back");
   add("s", "sorts by the next column, which has a *");
   add("r", "reverses; numbers begin with the largest");
-  add("/", "filter: only rows that hold a text; Enter keeps it, Esc drops it");
+  add("/", "filter: only rows that contain a text; Enter keeps it, Esc removes it");
   add("q", "quits");
   add("red", "stalled, busy (requests wait), stopped, dead, refused, not connected");
   add("CONN", "connections; of a router, clients");
   add("QUEUED", "requests that wait; of a router, messages");
   add("OPEN REQ", "requests without reply or fate");
   add("REFUSED", "sends that were refused");
-  add("QUEUE99", "99 % of the requests waited no longer for the server");
-  add("SERVE50 99", "from take to first reply: median, and 99 %");
-  add("REPLY50 99", "from send to reply, as the client sees it");
+  add("QUEUE99", "time from send to receipt by the server: 99th percentile");
+  add("SERVE50 99", "time from receipt to first reply: median, 99th percentile");
+  add("REPLY50 99", "time from send to reply, measured by the client");
   add("WRITES/s", "frames sent; many messages may share one");
   add("RTT", "round trip to the other router");
   return table;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// TopRows: the tables of `mpf top`, made from a look: servers, clients, the links of one of them,
-// all about one link; connections of routers, all about one.
+// The tables of `mpf top`, made from a SnapshotDelta: servers, clients, the links of one of them,
+// the details of one link, the connections of routers, the details of one connection.
 //
 // Threads  one.
 #pragma once
@@ -15,12 +15,12 @@ namespace mpf::tools {
 
 struct TopCell {
   std::string text;
-  double number = 0;  // what a column of numbers is sorted by
+  double number = 0;  // the value by which a column of numbers is sorted
 };
 
 struct TopRow {
   std::uint64_t id = 0;  // incarnation of the window or link; topId() of a router's connection
-  // somebody should look at it: stalled, stopped, dead, refused, not connected
+  // The row needs attention: stalled, stopped, dead, refused, not connected.
   bool isAlarm = false;
   std::vector<TopCell> cells;
 };
@@ -30,10 +30,10 @@ struct TopTable {
   std::vector<TopRow> rows;
 };
 
-// Fit into 80 columns as long as names do.
+// These fit into 80 columns unless names are long.
 [[nodiscard]] TopTable topServers(const SnapshotDelta& delta);
 [[nodiscard]] TopTable topClients(const SnapshotDelta& delta);
-// Of a server or a client.
+// The links of a server or a client.
 [[nodiscard]] TopTable topLinks(const SnapshotDelta& delta, const WindowView& window);
 // One row for each fact.
 [[nodiscard]] TopTable topLink(const SnapshotDelta& delta, const LinkView& link);
@@ -47,8 +47,8 @@ struct TopTable {
 // Keys and columns.
 [[nodiscard]] TopTable topHelp();
 
-// What was opened, in a few words: "server dac@2, alive", "client mpf[123], stopped", "dac <-
-// mpf[123]", "router → ioc1, connected".
+// The title of an opened row: "server dac@2, alive", "client mpf[123], stopped",
+// "dac <- mpf[123]", "router → ioc1, connected".
 [[nodiscard]] std::string topTitle(const SnapshotDelta& delta, const WindowView& window);
 [[nodiscard]] std::string topTitle(const SnapshotDelta& delta, const LinkView& link);
 [[nodiscard]] std::string topTitle(const SnapshotDelta& delta, const RouterView& router,

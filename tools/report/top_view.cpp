@@ -92,7 +92,7 @@ TopTable TopView::table() {
   return {{"GONE: " + place.title + "; Esc goes back"}, {}};
 }
 
-// Facts and keys stay in the order that they have.
+// Lists of details and of keys are not sorted.
 bool TopView::isSorted() const noexcept {
   const auto page = places_.back().page;
   return page != Page::link && page != Page::line && page != Page::help;
@@ -109,7 +109,7 @@ void TopView::refresh() {
     });
     sort(table_);
   }
-  // A row that has gone hands the selection to the one in its place.
+  // If the selected row no longer exists, the row in its place becomes the selected one.
   auto& place = places_.back();
   const auto found = std::ranges::find(table_.rows, place.selected, &TopRow::id);
   if (found != table_.rows.end()) {
@@ -120,7 +120,7 @@ void TopView::refresh() {
   }
 }
 
-// Numbers from the largest, texts from A.
+// Sorts numbers from the largest down, and texts from A to Z.
 void TopView::sort(TopTable& table) const {
   const auto& place = places_.back();
   if (place.sortColumn >= table.headings.size()) return;
@@ -245,7 +245,7 @@ void TopView::open() {
   index_ = 0;
 }
 
-// Where one is, and how it is there.
+// What the screen shows, and its state.
 std::string TopView::title() const {
   const auto& place = places_.back();
   const auto what = place.page == Page::help ? "keys and columns"

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// TopView: what `mpf top` shows and how keys change it: which table, sorted, filtered, which row is
-// selected. Knows no terminal.
+// TopView: the tables that `mpf top` shows, with sorting, filter and selection, and the effect of
+// each key. Independent of the terminal.
 //
-//   servers ─Tab─► clients ─Tab─► routers ─Tab─► servers     Enter: its links ─ Enter: one link     ?: help     Esc: back
+//   servers ─Tab─► clients ─Tab─► routers ─Tab─► servers
+//   Enter: its links ─ Enter: one link     ?: help     Esc: back
 //
 // Threads  one.
 #pragma once
@@ -23,7 +24,7 @@ struct TopLine {
   Style style = Style::plain;
 };
 
-// Characters are themselves.
+// Codes of keys that are not characters. The code of a character is the character.
 enum TopKey : int {
   kTopUp = 0x110000,
   kTopDown,
@@ -40,29 +41,30 @@ class TopView {
   static constexpr const char* kKeys =
       "q quit  ? help  Tab next  Enter open  Esc back  s sort  r reverse  / filter";
 
-  // A newer look; selection and order stay.
+  // Shows a newer delta; selection and order stay.
   void show(std::shared_ptr<const SnapshotDelta> delta);
   // False when the key ends the program.
   [[nodiscard]] bool handle(int key);
   void setFilter(std::string filter);
-  // Sorts by the column of this heading. False when no such column is there.
+  // Sorts by the column with this heading. False when no such column exists.
   [[nodiscard]] bool trySortBy(const std::string& heading);
   void showClients();
   void showRouters();
 
-  // All lines, for a screen of `rows`; 0 for as many as it takes, without keys and selection.
+  // The lines for a screen of `rows`. For 0, all lines, without keys and selection.
   [[nodiscard]] std::vector<TopLine> lines(int rows) const;
 
  private:
   enum class Page { servers, clients, routers, links, link, line, help };
   struct Place {
     Page page = Page::servers;
-    std::uint64_t of = 0;  // what was opened: id of its row
-    std::string title =
-        {};  // of that, when it was last seen; NOLINT(readability-redundant-member-init): g++ wants it
+    std::uint64_t of = 0;  // id of the row that was opened
+    // Title of that row when it was last seen.
+    // NOLINTNEXTLINE(readability-redundant-member-init): g++ warns without an initializer
+    std::string title = {};
     std::size_t sortColumn = 0;
     bool isReversed = false;
-    std::uint64_t selected = 0;  // id
+    std::uint64_t selected = 0;  // id of the selected row
   };
   [[nodiscard]] static Page afterTab(Page page) noexcept;
   [[nodiscard]] TopTable table();
@@ -78,9 +80,9 @@ class TopView {
   std::shared_ptr<const SnapshotDelta> delta_;
   std::vector<Place> places_{Place{}};  // the last one is shown
   std::string filter_;
-  bool isTyping_ = false;  // the filter
-  bool isGone_ = false;  // what was opened
-  TopTable table_;  // of the last place: filtered, sorted
+  bool isTyping_ = false;  // the user is typing a filter
+  bool isGone_ = false;    // the opened row no longer exists
+  TopTable table_;         // of the last place: filtered, sorted
   std::size_t index_ = 0;  // of the selected row, when it was last seen
 };
 

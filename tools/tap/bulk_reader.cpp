@@ -13,14 +13,16 @@ const Segment& BulkReader::open(const layout::ChunkRef& ref) {
   if (const auto known = segments_.find(key); known != segments_.end()) return known->second;
   const auto name = SegmentName::bulk(backplane_, link_, ref.side, ref.segment);
   auto segment = Segment::tryOpen(name, layout::SegmentKind::bulk, Segment::Access::readOnly);
-  if (!segment) throw SegmentError(fmt::format("{}: gone", segments::path(name)));
+  if (!segment)
+    throw SegmentError(fmt::format("{}: the pool no longer exists", segments::path(name)));
   segment->closeFile();
   return segments_.emplace(key, std::move(*segment)).first->second;
 }
 
 std::vector<std::byte> BulkReader::read(const layout::ChunkRef& ref, std::size_t bytes) {
   if (ref.side > 1)
-    throw SegmentError(fmt::format("a chunk of side {}, a link has 0 and 1", ref.side));
+    throw SegmentError(
+        fmt::format("a chunk of side {}; the sides of a link are 0 and 1", ref.side));
   const auto& segment = open(ref);
   const auto& header = segment.header();
   const auto room =

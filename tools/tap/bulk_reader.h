@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// BulkReader: copies bodies out of the pool of one side of a link, beside the two that own and
-// borrow it.
+// BulkReader: copies bodies out of the pools of a link, without the help of its two processes.
 //
 // Threads  one.
-// Crash    a pool whose link is gone stays readable for as long as its segments are mapped here.
-// Trust    a ChunkRef that does not fit its segment is refused in words.
+// Crash    the pool of a removed link stays readable as long as its segments are mapped here.
+// Trust    a ChunkRef that does not fit its segment is refused with a SegmentError.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +21,7 @@ class BulkReader {
   BulkReader(std::string backplane, std::uint64_t link)
       : backplane_(std::move(backplane)), link_(link) {}
 
-  // The beginning of the chunk, `bytes` long.
+  // The first `bytes` bytes of the chunk.
   //   throws  SegmentError, std::system_error, std::bad_alloc
   [[nodiscard]] std::vector<std::byte> read(const layout::ChunkRef& ref, std::size_t bytes);
 

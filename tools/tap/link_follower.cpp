@@ -9,14 +9,14 @@
 namespace mpf::tools {
 namespace {
 
-// Most that is read of one direction before the other one has its turn.
+// The largest number of messages that is read of one direction before the other one is read.
 constexpr std::size_t kBatch = 256;
 
 const layout::LinkControl& controlOf(const Segment& segment) {
   return segment.at<layout::LinkControl>(layout::kLinkControlOffset);
 }
 
-// Moves a reply's request, and those before it, in front of it.
+// Merges both directions so that the request of a reply, and the requests before it, precede it.
 void interleave(std::vector<TappedMessage>& requests, std::vector<TappedMessage>& replies,
                 std::vector<TappedMessage>& merged) {
   auto next = requests.begin();
@@ -45,7 +45,7 @@ std::unique_ptr<LinkFollower> LinkFollower::tryOpen(const std::string& backplane
   };
   if (!isRing(header.queueSlots) || !isRing(header.replySlots) ||
       segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
-    throw SegmentError(segments::path(name) + ": no link, its rings do not fit its file");
+    throw SegmentError(segments::path(name) + ": not a link: its rings do not fit its file");
   }
   return std::unique_ptr<LinkFollower>(new LinkFollower(backplane, std::move(*segment), from));
 }
@@ -68,7 +68,8 @@ LinkFollower::Side LinkFollower::begin(Direction direction, FollowFrom from) con
                         ? RingFollower(slots, header().queueSlots, from)
                         : RingFollower(slots + header().queueSlots, header().replySlots, from),
                     sent, isRequest ? control.requests : control.replies, before};
-    // The number of messages sent belongs to the follower's place; under a flood, nearly.
+    // The counter and the position of the follower must belong together. If messages keep arriving,
+    // they agree only approximately.
     if (from == FollowFrom::first || sent.load(std::memory_order_relaxed) == before ||
         tries == kTries)
       return side;
@@ -78,7 +79,7 @@ LinkFollower::Side LinkFollower::begin(Direction direction, FollowFrom from) con
 bool LinkFollower::take(std::vector<TappedMessage>& messages) {
   newRequests_.clear();
   newReplies_.clear();
-  // Replies first: whoever has a reply finds its request then.
+  // Replies first: the request of each reply that is read now is in the other ring by then.
   const bool some = drain(replies_, Direction::reply, newReplies_);
   const bool more = drain(requests_, Direction::request, newRequests_);
   interleave(newRequests_, newReplies_, messages);
@@ -92,7 +93,7 @@ bool LinkFollower::drain(Side& side, Direction direction, std::vector<TappedMess
     const auto next = side.follower.tryNext(copy);
     some = some || next != RingFollower::Next::nothing;
     if (next != RingFollower::Next::message) {
-      // We stand behind the newest message: what was sent is what we saw and what we missed.
+      // The follower is behind the newest message: every message sent has been seen or missed.
       const auto sent = side.sent.load(std::memory_order_relaxed) - side.sentBefore;
       side.missed = sent > side.seen ? sent - side.seen : 0;
       break;
@@ -124,7 +125,7 @@ void LinkFollower::readBody(const RingCopy& copy, const Side& side, TappedMessag
     layout::ChunkRef ref{};
     std::memcpy(&ref, copy.bytes.data(), sizeof ref);
     tapped.message = Message::copyOf(type, bulk_.read(ref, copy.envelope.bodyBytes));
-    // PAIR(message-taken): the body before, whether its receiver had it after.
+    // PAIR(message-taken): the body is read first, and then whether the receiver had taken it.
     tapped.mayHaveChanged = side.consumer.taken.load(std::memory_order_acquire) >=
                             side.sentBefore + side.seen + side.missed;
   }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// LinkFollower: what client and server of one link say to each other, read beside them.
+// LinkFollower: reads the messages that the client and the server of a link exchange, without
+// taking part.
 //
 //   request ring ─ RingFollower ─┐
 //                                ├─► take(): TappedMessages, a reply never before its request
 //   reply ring ─── RingFollower ─┘
 //
 // Threads  one.
-// Crash    what was said is read to the end when a side dies.
-// Trust    both sides may write nonsense: it is told, or counted as missed.
+// Crash    after a side has died, the messages that it sent are read to the end.
+// Trust    both sides may write invalid data: it is reported, or counted as missed.
 #pragma once
 
 #include <cstdint>
@@ -28,23 +29,25 @@ enum class Direction { request, reply };
 struct TappedMessage {
   Direction direction{};
   std::uint32_t requestId = 0;
-  bool isFirstReply = false;    // of a reply: it ends its request
-  // its body lies in a pool and was read when its receiver, who may write there, had it already
+  bool isFirstReply = false;  // a reply that ends its request
+  // The body is in a pool and was read after the receiver, which may write there, had taken it.
   bool mayHaveChanged = false;
-  Message message;  // unsound when the body is none of its type; empty when it could not be read
+  Message message;  // unsound if the body does not fit the type; empty if it could not be read
   std::string problem;  // why it could not be read
 };
 
 class LinkFollower {
  public:
-  // nullptr when the link is gone.
+  // nullptr when the link no longer exists.
   //   throws  SegmentError, std::system_error when it may not be read
   static std::unique_ptr<LinkFollower> tryOpen(const std::string& backplane,
                                                const std::string& name, FollowFrom from);
 
-  // Appends what was said since the last call. True when that was something, seen or missed.
+  // Appends the messages that were sent since the last call. True when there was any, seen or
+  // missed.
   bool take(std::vector<TappedMessage>& messages);
-  // Messages that were sent since then and not seen. Exact when both sides are at rest.
+  // Number of messages that were sent since the follower began and not seen. Exact while neither
+  // side sends.
   [[nodiscard]] std::uint64_t missed() const noexcept { return requests_.missed + replies_.missed; }
   // A side has closed the link.
   [[nodiscard]] bool isOver() const;
@@ -56,7 +59,7 @@ class LinkFollower {
     RingFollower follower;
     const layout::Word64& sent;
     const layout::RingControl& consumer;
-    std::uint64_t sentBefore = 0;  // messages sent when we began
+    std::uint64_t sentBefore = 0;  // messages sent before the follower began
     std::uint64_t seen = 0;
     std::uint64_t missed = 0;
   };

@@ -22,8 +22,8 @@ std::optional<std::vector<std::string>> NameWatch::take() {
   if (!inotify_) return std::nullopt;
   std::vector<std::string> names;
   bool lost = false;
-  alignas(inotify_event) std::array<char, 4096>
-      events;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills it
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): read() fills it
+  alignas(inotify_event) std::array<char, 4096> events;
   for (ssize_t got = 0; (got = ::read(inotify_.get(), events.data(), events.size())) > 0;) {
     for (std::size_t at = 0; at < static_cast<std::size_t>(got);) {
       inotify_event event{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// NameWatch: tells which names appeared in /dev/shm since it was asked last.
+// NameWatch: reports which names have appeared in /dev/shm, by inotify.
 //
 // Threads  one.
 #pragma once
@@ -15,13 +15,14 @@ namespace mpf::tools {
 
 class NameWatch {
  public:
-  // A user has few inotify instances (128 by default): without one it tells nothing, and waits all
-  // the same.
+  // A user has few inotify instances (128 by default). Without one, take() always returns nullopt,
+  // and wait() waits for its limit.
   NameWatch();
 
-  // Names since the last call. nullopt: some were lost, or it cannot tell: look at them all.
+  // Names that appeared since the last call. nullopt when some may be missing: the caller must then
+  // look at all names.
   [[nodiscard]] std::optional<std::vector<std::string>> take();
-  // Returns when there are new names, or after `limit`; a signal ends it, too.
+  // Returns when there are new names, after `limit`, or on a signal.
   void wait(Nanoseconds limit) const noexcept;
 
  private:

@@ -43,11 +43,11 @@ bool RecordingReader::tryNext(const std::function<void(wire::Record::Reader)>& t
   capnp::InputStreamMessageReader message(buffered_, limits_);
   take(message.getRoot<wire::Record>());
   return true;
-} catch (const kj::Exception&) {  // its words are of frames and pointers
+} catch (const kj::Exception&) {  // its text describes Cap'n Proto's internals, not the file
   if (number_ == 1) {
     throw std::runtime_error(
-        fmt::format("{}: this is no recording of `mpf tap --write`, or one that was cut off within "
-                    "its first record",
+        fmt::format("{}: not a recording of `mpf tap --write`, or one that was cut off within its "
+                    "first record",
                     place()));
   }
   throw std::runtime_error(

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Recording: a file of what a tap saw. Its format is schema/recording.capnp.
+// Recording: a file of the messages that `mpf tap` saw. Its format is schema/recording.capnp.
 //
 // Threads  one.
-// Crash    a record is written with one call: a file that ends within a record was cut there, and
-//          is readable up to it.
-// Trust    a file may hold anything: what is no record is an error that names file and place.
+// Crash    each record is written with one call. A file that ends within a record is readable up to
+//          that record.
+// Trust    a file is untrusted: invalid data is an error that names the file and the position.
 #pragma once
 
 #include <capnp/serialize.h>
@@ -25,9 +25,9 @@ class RecordingWriter {
   // Creates the file, or opens it, and checks that it can be written. Throws std::system_error.
   explicit RecordingWriter(std::string path);
 
-  // Throws std::system_error when the disk is full, say.
+  // Throws std::system_error, for example when the disk is full.
   void write(capnp::MessageBuilder& record);
-  // Throws std::system_error when what was written is not kept.
+  // Throws std::system_error when the file system could not store what was written.
   void close() { file_.close(); }
 
  private:
@@ -40,11 +40,10 @@ class RecordingReader {
   explicit RecordingReader(std::string path);
 
   // Hands over the next record. False at the end.
-  //   throws  std::runtime_error for what is no record: "x.mpf: record 12, at byte 3456 of 5000:
-  //           ..."
+  //   throws  std::runtime_error for invalid data: "x.mpf: record 12, at byte 3456 of 5000: ..."
   bool tryNext(const std::function<void(wire::Record::Reader)>& take);
 
-  // The record that was handed over last: "x.mpf: record 12, at byte 3456 of 5000".
+  // The position of the last record: "x.mpf: record 12, at byte 3456 of 5000".
   [[nodiscard]] std::string place() const;
 
  private:
@@ -52,10 +51,10 @@ class RecordingReader {
   FileDescriptor file_;
   kj::FdInputStream stream_;
   kj::BufferedInputStreamWrapper buffered_;
-  capnp::ReaderOptions limits_;  // no message is longer than the file
+  capnp::ReaderOptions limits_;  // a message cannot be larger than the file
   std::uint64_t number_ = 0;
-  std::uint64_t bytes_ = 0;  // of the file
-  std::uint64_t begin_ = 0;  // of the record, in the file
+  std::uint64_t bytes_ = 0;  // size of the file
+  std::uint64_t begin_ = 0;  // offset of the record in the file
 };
 
 }  // namespace mpf::tools

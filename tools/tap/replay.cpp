@@ -31,7 +31,7 @@ struct ReplayArguments {
   std::string backplane;
   std::string server;
   std::int32_t location = 0;
-  double speed = 1;    // 0: as fast as the server takes them
+  double speed = 1;     // 0: as fast as the server accepts them
   double timeout = 10;  // [s]
   bool json = false;
 };
@@ -55,7 +55,8 @@ class Replayer {
  private:
   static constexpr Nanoseconds kRetry = std::chrono::microseconds(50);
 
-  // What is sent before the file turns out to be none has been sent: it is awaited and reported.
+  // If the file turns out to be damaged, the requests before the damage have been sent; run() still
+  // waits for their replies and reports them.
   void send() try {
     RecordingReader reader(arguments_.file);
     while (!stopped_ && problem_.empty() &&
@@ -94,11 +95,11 @@ class Replayer {
         std::make_unique<MessageClient>(dispatcher_, [this](Message&& message) { count(message); });
     client->bind(server_, arguments_.location);
     if (client->connectWait(ofSeconds(arguments_.timeout))) return client.get();
-    problem_ = client->notConnectedBecause() + "; `mpf ls` shows what there is";
+    problem_ = client->notConnectedBecause() + "; `mpf ls` shows all servers";
     return nullptr;
   }
 
-  // The recording's clock runs from its first request on.
+  // Times are relative to the first request of the recording.
   void waitFor(std::int64_t atNs) {
     const auto nowNs = Clock::nowNs();
     if (requests_ == 0) {
@@ -112,15 +113,14 @@ class Replayer {
     late_->add(static_cast<std::uint64_t>(std::max<std::int64_t>(0, Clock::nowNs() - dueNs)));
   }
 
-  // A full queue is waited for: a recording has as many requests under way as its server could
-  // take.
+  // Waits while the queue is full: a recording may contain as many unanswered requests as its
+  // server had room for, and this server may have less.
   void send(MessageClient& client, Message&& message) {
     ++requests_;
     const auto limit = Deadline::after(ofSeconds(arguments_.timeout));
     for (;;) {
-      const auto result =
-          client.send(std::move(message),
-                      limit);  // NOLINT(bugprone-use-after-move): what was not sent is as it was
+      // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
+      const auto result = client.send(std::move(message), limit);
       if (result == SendResult::sent) {
         ++open_;
         break;
@@ -173,7 +173,7 @@ class Replayer {
                                   {"late_max_ns", late_->maxNs()}};
       return fmt::print("{}\n", jsonText(report));
     }
-    if (requests_ == 0) return;  // why is said
+    if (requests_ == 0) return;  // problem_ has been printed
     fmt::print("{} of {} to \"{}\": {} replied", counted(requests_, "request"),
                counted(clients_.size(), "client"), server_, replied_);
     for (const auto& [end, times] : ends_) fmt::print(", {} {}", times, end);
@@ -214,19 +214,20 @@ void addReplay(CLI::App& app, Run& run) {
   arguments->location = Backplane::defaultLocation();
   command.add_option("--location", arguments->location,
                      "Location of the server; default: $MPF_LOCATION, or 0");
-  command.add_option("file", arguments->file, "What `mpf tap --write` wrote")
+  command.add_option("file", arguments->file, "Recording that `mpf tap --write` wrote")
       ->required()
       ->check(CLI::ExistingFile);
   command.add_option("--server", arguments->server, "Name of the server; default: the recording's");
   command
       .add_option("--speed", arguments->speed,
-                  "2: twice as fast as recorded; 0: as fast as the server takes them")
+                  "2: twice as fast as recorded; 0: as fast as the server accepts them")
       ->capture_default_str()
       ->check(number(0, 1e6));
   addSeconds(command, "--timeout", arguments->timeout,
-             "Longest wait for the server, for room in its queue, for the last reply", false);
+             "Longest wait for the server, for room in its queue, and for the last reply", false);
   addJson(command, arguments->json);
-  command.footer("Exit status: 0 every request got a reply; 1 not so; 2 usage error.");
+  command.footer(
+      "Exit status: 0 every request got a reply; 1 a request got no reply; 2 usage error.");
   command.callback([arguments, &run] { run = [arguments] { return Replayer(*arguments).run(); }; });
 }
 

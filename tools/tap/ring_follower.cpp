@@ -6,7 +6,7 @@
 namespace mpf::tools {
 namespace {
 
-constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring has come that far
+constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring can reach this position
 
 }  // namespace
 
@@ -16,12 +16,13 @@ RingFollower::RingFollower(const layout::Slot* slots, std::uint32_t capacity,
   if (from == FollowFrom::newest) goBehindNewest();
 }
 
-// A sequence that is none of its slot's is nonsense, and no reason to look for anything newer.
+// Whether a sequence number can belong to the slot of `position`. Others are invalid data, and must
+// not make the follower look for newer messages.
 bool RingFollower::isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept {
   return sequence <= kMost && ((sequence - 1 - position) & (capacity_ - 1)) == 0;
 }
 
-// What lies in a slot is the newest message if no slot has a higher sequence.
+// The newest message is the one in the slot with the highest sequence number.
 void RingFollower::goBehindNewest() noexcept {
   std::uint64_t newest = 0;
   std::uint8_t slots = 1;
@@ -36,8 +37,9 @@ void RingFollower::goBehindNewest() noexcept {
       newest == 0 ? 0 : newest - 1 + std::clamp<std::uint32_t>(slots, 1, layout::kMaxMessageSlots);
 }
 
-// Of any kMaxMessageSlots slots in a row that the producer has passed, one is the first of a
-// message and says so.
+// Whether the producer is more than half a ring ahead. Of any kMaxMessageSlots successive slots
+// that the producer has passed, at least one is the first slot of a message and has its sequence
+// number.
 bool RingFollower::isOverrun() const noexcept {
   for (std::uint32_t i = 0; i < layout::kMaxMessageSlots; ++i) {
     const auto ahead = position_ + capacity_ / 2 + i;
@@ -52,7 +54,7 @@ RingFollower::Next RingFollower::tryNext(RingCopy& copy) noexcept {
   const bool filled = slot(position_).sequence.load(std::memory_order_acquire) == position_ + 1;
   const auto slots = slot(position_).slots;
   const bool whole = filled && tryCopy(slots, copy);
-  // PAIR(slot-filled): the copy before, the place of the producer after.
+  // PAIR(slot-filled): the message is copied first, and then the producer's position is read.
   std::atomic_thread_fence(std::memory_order_acquire);
   if (isOverrun() || (filled && !whole)) {
     goBehindNewest();
@@ -63,7 +65,7 @@ RingFollower::Next RingFollower::tryNext(RingCopy& copy) noexcept {
   return Next::message;
 }
 
-// False when the slots say what cannot be.
+// False when the slots contain invalid data.
 bool RingFollower::tryCopy(std::uint32_t slots, RingCopy& copy) const noexcept {
   const auto& first = slot(position_);
   if (slots < 1 || slots > layout::kMaxMessageSlots) return false;

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// RingFollower: reads the messages of a ring beside its consumer, without taking part: it writes
-// nothing, and nobody waits for it.
+// RingFollower: reads the messages of a ring in addition to its consumer. It writes nothing, and
+// neither producer nor consumer waits for it.
 //
-//   | half of the ring: what a follower may still read | half: what the producer may be overwriting |
+//   | half of the ring: safe to read | half: the producer may be overwriting it |
 //
-// A message lies in the ring until the producer comes round to it. The follower copies it and then
-// looks where the producer is: less than half a ring ahead, and the copy is whole. Else the
-// follower goes on behind the newest message, and says that it missed some.
+// A message stays in the ring until the producer reuses its slots. The follower copies it and then
+// reads the position of the producer: if that is less than half a ring ahead, the copy is
+// consistent. Otherwise the follower continues behind the newest message and reports an overrun.
 //
 // Threads  one.
-// Crash    the producer may die at any time; what it published is read.
-// Trust    a producer that writes nonsense costs messages, never memory safety.
-// Order    that the copy is whole rests on a store not being delayed past half a ring of later
-//          ones: true of every CPU we know of.
+// Crash    the producer may die at any time; the messages that it published are read.
+// Trust    a producer that writes invalid data costs messages, never memory safety.
+// Order    the copy is consistent only if no store is delayed past half a ring of later stores.
+//          This holds for all known CPUs.
 #pragma once
 
 #include <array>
@@ -24,17 +24,17 @@
 
 namespace mpf::tools {
 
-// A message as it lay in the ring.
+// A copy of a message in the ring.
 struct RingCopy {
   Envelope envelope;
   std::array<std::byte, layout::kInlineBodyBytes> bytes{};
-  std::size_t size = 0;  // of the body in line; of a kSlotChunk message, of its ChunkRef
+  std::size_t size = 0;  // of an inline body; of the ChunkRef of a kSlotChunk message
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {bytes.data(), size}; }
 };
 
 enum class FollowFrom {
-  first,  // the first message that was ever sent
-  newest,  // behind the newest
+  first,  // with the first message that was ever sent
+  newest,  // behind the newest message
 };
 
 class RingFollower {
@@ -43,7 +43,7 @@ class RingFollower {
   RingFollower(const layout::Slot* slots, std::uint32_t capacity, FollowFrom from) noexcept;
 
   enum class Next { nothing, message, overrun };
-  // `overrun`: the producer was too fast; go on behind the newest message.
+  // `overrun`: the producer was too fast; the next call continues behind the newest message.
   Next tryNext(RingCopy& copy) noexcept;
 
  private:

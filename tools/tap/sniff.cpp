@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf sniff: every byte that a serial server sends and receives, live (manual, "serialPortSniff").
-// The line does not notice.
+// mpf sniff: shows every byte that a serial server sends and receives, live (manual,
+// "serialPortSniff"), without disturbing the line.
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <cstdio>
@@ -52,15 +52,15 @@ class Sniffer {
     while (!client_.isConnected() && !isOver(limit)) dispatcher_.runOnce(limit);
     const auto end = seconds_ > 0 ? Deadline::after(ofSeconds(seconds_)) : Deadline::never();
     if (!client_.isConnected()) {
-      printError("mpf sniff: {}; is it a serial server, and does it run? `mpf ls` shows\n",
+      printError("mpf sniff: {}; check with `mpf ls` that it is a serial server and running\n",
                  client_.notConnectedBecause());
       return 1;
     }
     while (!isOver(end)) {
-      // What was begun is shown when the line has been quiet for a while.
+      // Shows an incomplete line when the serial line has been quiet for a while.
       if (!dispatcher_.runOnce(std::min(end, Deadline::after(kQuiet)))) show(format_->flush());
     }
-    takeTheRest();
+    drain();
     show(format_->flush());
     printError("mpf sniff: {} seen, {} missing\n", counted(seen_, "byte"), missing_);
     return wasRefused_ ? 1 : 0;
@@ -81,16 +81,16 @@ class Sniffer {
   }
 
   void take(Message&& message) {
-    if (const auto* news = message.tryAs<Connect>()) return takeNews(*news);
+    if (const auto* connect = message.tryAs<Connect>()) return takeConnect(*connect);
     if (const auto* reply = message.tryAs<Int32>()) return takeReply(*reply);
     if (const auto records = Char8ArrayMessage::tryFrom(std::move(message))) takeRecords(*records);
   }
 
-  // A server that comes back is listened to again.
-  void takeNews(const Connect& news) {
-    if (news.status == ConnectStatus::connectYes) {
+  // Starts to listen again when the server has restarted.
+  void takeConnect(const Connect& connect) {
+    if (connect.status == ConnectStatus::connectYes) {
       static_cast<void>(client_.send(Int32Message({.cmd = serial::cmdSniffStart})));
-    } else if (news.status == ConnectStatus::connectNo) {
+    } else if (connect.status == ConnectStatus::connectNo) {
       isListening_ = false;
       show(format_->flush());
       printError("mpf sniff: {}\n", client_.notConnectedBecause());
@@ -106,12 +106,13 @@ class Sniffer {
       takeMissing(static_cast<std::uint64_t>(reply.address));
     } else {
       wasRefused_ = true;
-      printError("mpf sniff: \"{}\" lets nobody listen: status {}\n", service_, reply.status);
+      printError("mpf sniff: \"{}\" refused to start sniffing: status {}\n", service_,
+                 reply.status);
     }
   }
 
-  // The server still has what the line said in the last few milliseconds.
-  void takeTheRest() {
+  // Stops sniffing and receives the bytes of the last few milliseconds, which the server still has.
+  void drain() {
     if (!isListening_ ||
         client_.send(Int32Message({.cmd = serial::cmdSniffStop})) != SendResult::sent)
       return;
@@ -127,7 +128,7 @@ class Sniffer {
   void takeRecords(const Char8ArrayMessage& message) {
     takeMissing(static_cast<std::uint64_t>(message->address));
     const auto records = serial::tryReadRecords(message);
-    if (!records) return printError("mpf sniff: \"{}\" sent what is no record\n", service_);
+    if (!records) return printError("mpf sniff: \"{}\" sent invalid sniff records\n", service_);
     std::string text;
     for (const auto& record : *records) text += format_->add(record);
     seen_ += records->size();
@@ -152,13 +153,14 @@ class Sniffer {
 
 void addSniff(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "sniff", "Every byte that a serial server sends (T) and receives (R), live");
+      "sniff", "Shows every byte that a serial server sends (T) and receives (R), live");
   auto arguments = std::make_shared<SniffArguments>();
   addServer(command, *arguments);
-  addSeconds(command, "seconds", arguments->seconds, "For how long; 0: until Ctrl-C", true);
+  addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
   command
       .add_option("--format", arguments->format,
-                  "lines: one direction a line, with times; manual: ten bytes a line, as of old")
+                  "lines: one direction in a line, with times; manual: ten bytes in a line, as in "
+                  "the manual of MPF")
       ->capture_default_str()
       ->check(CLI::IsMember({"lines", "manual"}));
   addJson(command, arguments->json);

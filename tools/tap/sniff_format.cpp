@@ -15,7 +15,7 @@ namespace {
 using serial::SniffKind;
 using serial::SniffRecord;
 
-// The manual's two letters; what it could not tell has one of its own.
+// T and R as in the manual; the kinds that the manual does not have use other letters.
 char letter(const SniffRecord& record) { return static_cast<char>(record.kind); }
 
 class Manual final : public SniffFormat {

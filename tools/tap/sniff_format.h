@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// SniffFormat: how the bytes of a line are shown.
+// SniffFormat: formats the bytes of a serial line.
 //
-//   lines    14:03:27.120   0.0 ms  T  *IDN?\n          one direction a line, until its end of
-//            line, a pause or a turn
-//   manual   T31 T34 R31 T35 R34 T00 R35 R00 T31 T34 14154.5.14        ten bytes a line (manual,
-//            "serialPortSniff")
-//   json     {"at_ns": 81234000000, "kind": "T", "value": 49}          one object a byte
+//   lines    14:03:27.120   0.0 ms  T  *IDN?\n
+//            One direction in each line, which ends at '\n', at a pause, or when the direction
+//            turns.
+//   manual   T31 T34 R31 T35 R34 T00 R35 R00 T31 T34 14154.5.14
+//            Ten bytes in each line (manual, "serialPortSniff").
+//   json     {"at_ns": 81234000000, "kind": "T", "value": 49}
+//            One object for each byte.
 //
 // Threads  one.
 #pragma once
@@ -21,10 +23,10 @@ namespace mpf::tools {
 class SniffFormat {
  public:
   virtual ~SniffFormat() = default;
-  // Text that can be shown now; what is begun stays for later.
+  // Adds a byte. Returns the complete lines; an incomplete line is kept.
   [[nodiscard]] virtual std::string add(const serial::SniffRecord& record) = 0;
   [[nodiscard]] virtual std::string missing(std::uint64_t bytes) = 0;
-  // What was begun: at a pause, and at the end.
+  // Returns the incomplete line: for pauses of the line, and the end.
   [[nodiscard]] virtual std::string flush() = 0;
 
   // `name` is lines, manual or json.

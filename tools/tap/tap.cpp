@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf tap: what the clients of a server and the server say to each other, live, without taking
-// part.
+// mpf tap: shows the messages between a server and its clients, live, without taking part.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
@@ -31,7 +30,7 @@ struct TapArguments : ServerArguments {
   bool printAll = false;
 };
 
-constexpr int kShortPauses = 32;  // the shortest pause is that part of the longest
+constexpr int kShortPauses = 32;  // ratio of the longest pause to the shortest
 
 std::uint64_t linkNumber(const std::string& digits) {
   std::uint64_t number = 0;
@@ -41,7 +40,7 @@ std::uint64_t linkNumber(const std::string& digits) {
       failure == std::errc{} && at == end && digits.size() == 16)
     return number;
   throw std::invalid_argument(fmt::format(
-      "tap: \"{}\" is no link: use its 16 hexadecimal digits, as tap and inspect show them",
+      "tap: \"{}\" is not a link: use the 16 hexadecimal digits that tap and inspect show",
       digits));
 }
 
@@ -63,7 +62,7 @@ int tap(const TapArguments& arguments) {
     printError("mpf tap: \"{}\" has {} link{} now\n", arguments.server, session.links(),
                session.links() == 1 ? "" : "s");
   } else {
-    printError("mpf tap: server \"{}\" at location {} is not there; waiting for it\n",
+    printError("mpf tap: server \"{}\" at location {} is absent; waiting for it\n",
                arguments.server, arguments.location);
   }
 
@@ -75,7 +74,7 @@ int tap(const TapArguments& arguments) {
   };
   auto pause = ofSeconds(arguments.poll);
   while (!isOver()) {
-    // Where messages come there are more to come: short pauses first, then longer ones.
+    // More messages are likely to follow soon: the first pauses are short, later ones are longer.
     if (session.runOnce()) pause = ofSeconds(arguments.poll) / kShortPauses;
     else session.pause(pause = std::min(2 * pause, ofSeconds(arguments.poll)));
   }
@@ -84,7 +83,7 @@ int tap(const TapArguments& arguments) {
   for (const auto& problem : session.problems()) printError("mpf tap: {}\n", problem);
   printError("mpf tap: {} seen, {} missed\n", counted(session.seen(), "message"), session.missed());
   if (session.goneLinks() != 0)
-    printError("mpf tap: {} links came and went unread\n", session.goneLinks());
+    printError("mpf tap: {} links were removed before tap could read them\n", session.goneLinks());
   return session.problems().empty() ? 0 : 1;
 }
 
@@ -92,27 +91,27 @@ int tap(const TapArguments& arguments) {
 
 void addTap(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "tap", "Every message between a server and its clients, live, without taking part");
+      "tap", "Shows every message between a server and its clients, live, without taking part");
   auto arguments = std::make_shared<TapArguments>();
   addServer(command, *arguments);
-  addSeconds(command, "seconds", arguments->seconds, "For how long; 0: until Ctrl-C", true);
-  command.add_option("--count", arguments->count, "End after so many messages; 0: do not")
+  addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
+  command.add_option("--count", arguments->count, "Number of messages after which to end; 0: any")
       ->capture_default_str()
       ->check(wholeNumber(0));
   command.add_option("--link", arguments->link, "Only this link: its 16 hexadecimal digits");
   command
       .add_option("--write", arguments->file,
-                  "Write to this file, for `mpf replay`, instead of to the screen")
+                  "Write to this file, for `mpf replay`, instead of to stdout")
       ->type_name("FILE");
   addSeconds(command, "--poll", arguments->poll,
-             "Pause between two looks at links that are at rest", false);
+             "Longest pause between two reads of links without new messages", false);
   command.add_flag("--print", arguments->printAll, "Print arrays in full");
   addJson(command, arguments->json);
   command.footer(
       "->: a request; <-: the reply that ends it; < : another message of the server. The number is "
       "the request's.\n"
-      "Messages that came faster than tap could read are counted as missed. Who may read a link: "
-      "its user and group, and root.");
+      "Messages that arrived faster than tap could read are counted as missed. The user and the "
+      "group of a link may read it, and root.");
   command.callback([arguments, &run] { run = [arguments] { return tap(*arguments); }; });
 }
 

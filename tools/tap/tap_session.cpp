@@ -54,7 +54,8 @@ bool TapSession::isWanted(const std::string& name) const {
          (selection_.link == 0 || parsed->incarnation == selection_.link);
 }
 
-// All names: at the start, when the server came, now and then to see what is gone.
+// Looks at all names: at the start, when the server has appeared, and every kLookEvery to find
+// links that were removed.
 void TapSession::lookAtNames(FollowFrom from) {
   lookAgain_ = Deadline::after(kLookEvery);
   const auto image = SegmentImage::tryRead(window_, layout::SegmentKind::serverWindow,
@@ -92,7 +93,7 @@ void TapSession::follow(const std::string& name, FollowFrom from) {
   if (followed_.contains(name) || notFollowed_.contains(name)) return;
   auto followed = tryOpen(name, from);
   if (!followed) return;
-  sink_.opened(realtimeNs(), followed->link);  // a sink that cannot write ends the session
+  sink_.opened(realtimeNs(), followed->link);  // throws, and ends the session, if it cannot write
   followed_.emplace(name, std::move(*followed));
 }
 
@@ -118,7 +119,7 @@ bool TapSession::runOnce() {
   bool some = false;
   for (auto& [name, followed] : followed_) {
     if (take(followed)) some = true;
-    else tellMissed(followed);
+    else reportMissed(followed);
   }
   return some;
 }
@@ -132,32 +133,35 @@ bool TapSession::take(Followed& followed) {
   return some;
 }
 
-// A message on its way counts as missed for a moment: what is told has been so at two looks.
-void TapSession::tellMissed(Followed& followed) {
+// A message that is just being sent counts as missed for a moment. So a number of missed messages
+// is reported only if two successive calls find the same number.
+void TapSession::reportMissed(Followed& followed) {
   const auto missed = followed.follower->missed();
-  if (missed != std::exchange(followed.missedSeen, missed) || missed == followed.missedTold) return;
-  followed.missedTold = missed;
+  if (missed != std::exchange(followed.missedSeen, missed) || missed == followed.missedReported)
+    return;
+  followed.missedReported = missed;
   sink_.missed(realtimeNs(), followed.link, missed);
 }
 
-void TapSession::takeTheRest(Followed& followed) {
-  // Whoever goes on sending is not waited for: what fits the rings is all that had been sent.
+void TapSession::drain(Followed& followed) {
+  // Reads at most as many messages as fit into the rings: more were sent after this call began, and
+  // a client that keeps sending must not delay the end.
   std::size_t left =
       followed.follower->header().queueSlots + std::size_t{followed.follower->header().replySlots};
   while (left != 0 && take(followed))
     left -= std::min(left, std::max<std::size_t>(batch_.size(), 1));
-  tellMissed(followed);
-  tellMissed(followed);
+  reportMissed(followed);
+  reportMissed(followed);
   missedBefore_ += followed.follower->missed();
 }
 
 void TapSession::close(Followed& followed) {
-  takeTheRest(followed);
+  drain(followed);
   sink_.closed(realtimeNs(), followed.link);
 }
 
 void TapSession::finish() {
-  for (auto& [name, followed] : followed_) takeTheRest(followed);
+  for (auto& [name, followed] : followed_) drain(followed);
   followed_.clear();
 }
 

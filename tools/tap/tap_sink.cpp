@@ -32,12 +32,12 @@ class LineSink final : public TapSink {
   explicit LineSink(std::size_t maxElements) : maxElements_(maxElements) {}
 
   void opened(std::int64_t atNs, const TappedLink& link) override {
-    const auto client = link.client.empty() ? "a client that is gone"
+    const auto client = link.client.empty() ? "a client that has ended"
                                             : fmt::format("{}[{}]", link.client, link.clientPid);
     show(fmt::format("{}  --   {} and {}: link {:016x}\n", begin(atNs, link), printable(client),
                      printable(link.server), link.incarnation));
   }
-  // A reply that ends no request is one more of a subscription, say: it has a smaller arrow.
+  // A reply that does not end a request, for example one of a subscription, has a shorter arrow.
   void message(std::int64_t atNs, const TappedLink& link, const TappedMessage& message) override {
     const char* arrow = message.direction == Direction::request ? "->"
                         : message.isFirstReply                  ? "<-"
@@ -48,7 +48,7 @@ class LineSink final : public TapSink {
                      message.mayHaveChanged ? "  (read late: may have changed)" : ""));
   }
   void missed(std::int64_t atNs, const TappedLink& link, std::uint64_t messages) override {
-    show(fmt::format("{}  --   {} missed so far: they came too fast\n", begin(atNs, link),
+    show(fmt::format("{}  --   {} missed so far: they arrived too fast\n", begin(atNs, link),
                      counted(messages, "message")));
   }
   void closed(std::int64_t atNs, const TappedLink& link) override {

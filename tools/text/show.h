@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// show(): text to stdout now, since a reader in a pipe wants it now. stdio would lose the line at
-// which a signal ends the program.
+// show(): writes text to stdout immediately, without the buffer of stdio: a reader of a pipe sees
+// each line at once, and no line is lost when a signal ends the program.
 #pragma once
 
 #include <unistd.h>
@@ -11,8 +11,8 @@
 
 namespace mpf::tools {
 
-// Waits for a reader that is slow.
-//   throws  std::system_error when it cannot be written
+// Blocks while the pipe is full.
+//   throws  std::system_error when stdout cannot be written
 inline void show(std::string_view text) {
   while (!text.empty()) {
     const auto written =

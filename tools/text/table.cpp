@@ -12,8 +12,8 @@ namespace mpf::tools {
 namespace {
 
 constexpr std::size_t kGap = 2;
-constexpr std::size_t kLeastCut = 8;    // columns that a cell keeps
-constexpr std::size_t kLeastText = 20;  // columns of a text that goes on in further lines
+constexpr std::size_t kLeastCut = 8;    // minimum columns of a cell that is cut
+constexpr std::size_t kLeastText = 20;  // minimum columns of a text that is wrapped
 
 std::size_t sumOf(const std::vector<std::size_t>& widths) {
   return std::accumulate(widths.begin(), widths.end(), kGap * (widths.size() - 1));
@@ -43,8 +43,8 @@ std::vector<std::size_t> Table::widths() const {
   return widths;
 }
 
-// The widths in so much room: first the last column gives, then those that may be cut, then the
-// first one.
+// The widths of the columns in `room` columns. Where they do not fit, the last column becomes
+// narrower first, then the columns that may be cut, then the first one.
 std::vector<std::size_t> Table::fit(std::size_t room) const {
   auto widths = this->widths();
   const auto narrow = [&](std::size_t column, std::size_t least) {
@@ -61,7 +61,7 @@ std::vector<std::size_t> Table::fit(std::size_t room) const {
   return widths;
 }
 
-// The first so many cells of a row.
+// The first `count` cells of a row.
 std::string Table::cells(const std::vector<std::string>& row,
                          const std::vector<std::size_t>& widths, std::size_t count) const {
   std::string line;

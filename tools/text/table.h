@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Table: rows of cells under a heading, in columns as wide as they must be, or in 80 columns.
+// Table: rows of cells under a heading. The columns are as wide as their widest cell, or fit the
+// terminal.
 //
 // Threads  one.
 #pragma once
@@ -11,15 +12,15 @@ namespace mpf::tools {
 
 class Table {
  public:
-  // Columns whose heading starts with '>' are aligned to the right; with '~', may be cut to fit
-  // into 80 columns.
+  // A heading that starts with '>' aligns its column to the right; a heading that starts with '~'
+  // allows fitted() to cut the cells of its column.
   explicit Table(std::vector<std::string> headings);
   void add(std::vector<std::string> cells);
   [[nodiscard]] bool isEmpty() const noexcept { return rows_.size() == 1; }
-  // One line a row, each after `indent`, no blanks at its end.
+  // One line for each row, with `indent` before it and no trailing blanks.
   [[nodiscard]] std::string text(const std::string& indent = {}) const;
-  // The same in 80 columns: the last column, if it is text, goes on in further lines; what may be
-  // cut ends in "~"; then a first cell that is too long stands in a line of its own.
+  // The same in lineColumns() columns: the last column, if it is aligned to the left, is wrapped;
+  // cells that may be cut end in "~"; a first cell that is still too long gets a line of its own.
   [[nodiscard]] std::string fitted(const std::string& indent = {}) const;
 
  private:

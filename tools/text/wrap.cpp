@@ -10,11 +10,12 @@
 namespace mpf::tools {
 namespace {
 
-// Of a character in UTF-8, a byte after the first.
+// Whether a byte is one after the first of a UTF-8 character.
 bool isContinuation(char c) noexcept { return (static_cast<unsigned char>(c) & 0xc0u) == 0x80u; }
 
-std::size_t columnsInUse =
-    kColumns;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables): of this process's one stdout
+// The width of stdout, of which a process has one.
+// NOLINTNEXTLINE(cppcoreguidelines-avoid-non-const-global-variables)
+std::size_t columnsInUse = kColumns;
 
 }  // namespace
 
@@ -27,7 +28,8 @@ void fitToTerminal() noexcept {
   columnsInUse = std::max<std::size_t>(size.ws_col, kLeast);
 }
 
-// fmt pads by columns, never more than a text's bytes: "°" is one of two bytes, "電" two of three.
+// fmt pads by columns, and a text never has more columns than bytes: "°" has one column and two
+// bytes, "電" has two columns and three bytes.
 std::size_t columnsOf(const std::string& text) {
   return 2 * text.size() - fmt::formatted_size("{:<{}}", text, text.size());
 }
@@ -35,7 +37,7 @@ std::size_t columnsOf(const std::string& text) {
 std::string wrap(const std::string& first, const std::string& text, std::size_t indent) {
   std::string lines;
   std::string line = first;
-  bool isFresh = true;  // nothing but the indent is in the line
+  bool isFresh = true;  // the line consists of its indent only
   const auto next = [&] {
     lines += line + '\n';
     line.assign(indent, ' ');
@@ -45,7 +47,7 @@ std::string wrap(const std::string& first, const std::string& text, std::size_t 
   for (std::size_t at = 0; at < text.size();) {
     const auto begin = std::min(text.find_first_not_of(kBlanks, at), text.size());
     if (begin == text.size()) break;
-    const auto blanks = begin - at;  // a name may have several
+    const auto blanks = begin - at;  // kept, because a name may contain several in a row
     at = std::min(text.find_first_of(kBlanks, begin), text.size());
     auto word = text.substr(begin, at - begin);
     if (!isFresh && columnsOf(line) + blanks + columnsOf(word) > lineColumns()) next();

@@ -14,10 +14,10 @@
 namespace mpf::torture {
 namespace {
 
-// between looks at the board, and between handfuls of requests
+// Time between two reads of the board, and between two batches of requests.
 constexpr auto kPace = std::chrono::microseconds(500);
-constexpr std::uint64_t kVisit = 40;  // replies after which a visitor has seen enough
-constexpr std::uint64_t kStay = 8;  // replies after which a guest dies
+constexpr std::uint64_t kVisit = 40;  // replies after which the visitor ends
+constexpr std::uint64_t kStay = 8;    // replies after which a guest kills itself
 
 WaitMode waitModeOf(std::uint32_t seed) {
   return seed % 2 == 0 ? WaitMode::adaptive : WaitMode::block;
@@ -28,7 +28,8 @@ void runUntil(Dispatcher& dispatcher, const std::function<bool()>& isDone) {
   while (!isDone()) dispatcher.runOnce(Deadline::after(kPace));
 }
 
-// One that removes nothing: what is left is for the tormented to find.
+// Unlike Backplane::attach(), this removes no stale segments: they are left for the process under
+// test.
 Backplane enter(const Cast& cast) { return Backplane::named(cast.backplane); }
 
 }  // namespace
@@ -45,11 +46,11 @@ int playSurvivor(const Cast& cast) {
       steady.sendSome();
       mortal.sendSome();
     }
-    const auto next = Deadline::after(kPace);  // leaves time to the tormented
+    const auto next = Deadline::after(kPace);  // leaves processor time to the process under test
     while (dispatcher.runOnce(next)) continue;
     board.open.store(steady.open() + mortal.open());
     board.isAtRest.store(rests && board.open.load() == 0 ? 1 : 0);
-    saboteur.meddle(mortal, rests);
+    saboteur.sabotage(mortal, rests);
   }
   return 0;
 }
@@ -99,7 +100,7 @@ int playVisitor(const Cast& cast) {
              ofFleeting.replies.load() >= kStay;
     });
     if (cast.sabotage == Sabotage::halfMessage) publishHalfMessage(cast.backplane);
-    fleeting.tellToDie();
+    fleeting.sendDie();
     runUntil(dispatcher, [&] {
       board.open.store(steady.open() + fleeting.open());
       return ofFleeting.disconnects.load() != 0 && board.open.load() == 0;
@@ -111,8 +112,8 @@ int playVisitor(const Cast& cast) {
 
 int playFleeting(const Cast& cast) {
   Echo echo(enter(cast), "fleeting", cast.world, WaitMode::adaptive);
-  const Board untilItDies;
-  echo.run(untilItDies, false);
+  const Board neverLeave;
+  echo.run(neverLeave, false);
   return 0;
 }
 

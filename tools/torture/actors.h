@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Actors: what each process of a torture does, from its fork to its exit status.
+// Actors: the processes of `mpf torture`. Each function runs from the fork of its process to its
+// exit status.
 //
-//   survivor ─┬─► steady      these two go on
-//             └─► mortal ◄─ guest      a server that is tormented, and a client of it that kills itself
-//   visitor ──┬─► steady      a client that is tormented
-//             ├─► fleeting    a server that kills itself when the visitor asks it to
-//             └─► absent      a server that never comes
-//   corpse                    left everything that a dead process can leave, for whoever attaches
-//                             next
+//   survivor ─┬─► steady           these two are never killed
+//             └─► mortal ◄─ guest  the server under test, and a client of it that kills itself
+//   visitor ──┬─► steady           the client under test
+//             ├─► fleeting         a server that kills itself when the visitor asks it to
+//             └─► absent           a server that is never started
+//   corpse                         dies and leaves everything that a dead process can leave; the
+//                                  next process that attaches removes it
 #pragma once
 
 #include <cstdint>
@@ -17,14 +18,14 @@
 
 namespace mpf::torture {
 
-// What goes wrong on purpose, so that one sees the referee notice it.
+// Mistakes that an actor makes on purpose, to show that the referee detects them.
 enum class Sabotage {
   none,
-  loseFate,  // the survivor forgets to count an end
-  halfMessage,  // the visitor makes a message visible that it has not written
-  keepName,  // the mortal server's lock outlives it
-  stale,  // the survivor leaves a file
-  leak,  // the survivor opens a descriptor more in each round
+  loseFate,     // the survivor ignores the fate of a request
+  halfMessage,  // the visitor publishes a message that it has not written
+  keepName,     // the lock of the mortal server outlives it
+  stale,        // the survivor leaves a stale link
+  leak,         // the survivor opens another descriptor in each round
 };
 
 struct Cast {

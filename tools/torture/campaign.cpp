@@ -12,8 +12,8 @@
 namespace mpf::torture {
 namespace {
 
-constexpr int kTries = 5;                  // for a step that is not reached in every life
-constexpr double kMaxInstructions = 5000;  // behind a mark
+constexpr int kTries = 5;  // for a step that a process does not reach in every run
+constexpr double kMaxInstructions = 5000;  // after a step
 
 std::atomic<bool>& interrupted() {
   static std::atomic<bool> interrupted{false};
@@ -72,7 +72,7 @@ void Campaign::reconnoitre(Referee& referee, Role role) {
     hits_[role][mark] = std::max(hits_[role][mark], hits);
 }
 
-// Whether somebody comes to each step that was asked for.
+// Whether a process reaches each step that the user asked for.
 bool Campaign::isAllFound() const {
   return std::ranges::all_of(tally_.marks, [&](const auto& mark) {
     return std::ranges::any_of(
@@ -104,7 +104,7 @@ void Campaign::playRandomly(Referee& referee) {
   while (!places_.empty() && !isOver()) tryRound(referee, randomPlan(), 0);
 }
 
-// Near the marks more often than far from them.
+// A random place; places near a step are more likely than places far from it.
 Plan Campaign::randomPlan() {
   auto plan = places_[random_() % places_.size()];
   if (!options_.hit) plan.place.hit = 1 + random_() % hits_[plan.role][plan.place.mark];
@@ -115,7 +115,7 @@ Plan Campaign::randomPlan() {
   return plan;
 }
 
-// False when the victim's life ended before it came to the place.
+// False when the process under test ended before it reached the place.
 bool Campaign::tryRound(Referee& referee, const Plan& plan, std::uint64_t planned) {
   playing_ = plan;
   progress_(plan, ++tally_.rounds, planned);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Campaign: which rounds are played: each step in each role killed and stopped once, then random
-// places for as long as was asked for.
+// Campaign: chooses the rounds of `mpf torture`. First it kills and stops each role once at each
+// step, then at random places until the time is over.
 //
-// Threads  one. SIGINT and SIGTERM end it after the round, with the verdict so far.
+// Threads  one. SIGINT and SIGTERM end it after the current round, with the verdict so far.
 #pragma once
 
 #include <chrono>
@@ -29,13 +29,13 @@ struct CampaignOptions {
 
 class Campaign {
  public:
-  // Called before each round: which, how many so far, and how many are planned (0: until the time
-  // is over).
+  // Called before each round, with its plan, its number and the number of planned rounds (0: until
+  // the time is over).
   using Progress =
       std::function<void(const Plan& plan, std::uint64_t round, std::uint64_t planned)>;
 
   Campaign(const Marks& marks, CampaignOptions options, Progress progress);
-  // Plays it all, or up to the first failure.
+  // Plays all rounds, or up to the first failure.
   Tally run();
 
  private:
@@ -57,8 +57,9 @@ class Campaign {
   Progress progress_;
   std::mt19937 random_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  std::map<Role, Hits> hits_;  // in a life without torment, of the steps asked for
-  std::vector<Plan> places_;  // each step in each role and mode that comes there
+  // How often an undisturbed process reaches each chosen step.
+  std::map<Role, Hits> hits_;
+  std::vector<Plan> places_;  // each chosen step, in each role that reaches it, in each mode
   std::optional<Plan> playing_;
   Outcome last_;
   Tally tally_;

@@ -19,7 +19,8 @@ struct Living {
   std::set<std::uint64_t> links;
 };
 
-// Incarnation of the window that owns a segment; 0 when it is gone or cannot be read.
+// Incarnation of the window that owns a segment; 0 when the segment no longer exists or cannot be
+// read.
 std::uint64_t ownerOf(const std::string& name, layout::SegmentKind kind) try {
   const auto segment = Segment::tryOpen(name, kind, Segment::Access::readOnly);
   return segment ? segment->header().ownerWindow : 0;
@@ -35,8 +36,8 @@ bool isLivingWindow(const std::string& name, NameKind kind, Living& living) {
   return true;
 }
 
-// Whether it belongs to the living; windows must have been looked at before links, and links before
-// bulk segments.
+// Whether a segment belongs to a living process. Called for windows before links, and for links
+// before bulk segments.
 bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living& living) {
   switch (parsed.kind) {
     case NameKind::serverWindow:
@@ -66,7 +67,7 @@ int rank(NameKind kind) {
   return kind == NameKind::bulk ? 2 : 1;
 }
 
-// The number behind a word in a file of /proc; 0 when it is not there.
+// The number after a word in a file of /proc; 0 when the word is missing.
 std::size_t numberIn(const std::string& path, const std::string& word) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
@@ -94,12 +95,12 @@ std::vector<std::string> staleSegments(const std::string& backplane, std::size_t
   return stale;
 }
 
-void checkNoNonsense(const std::string& backplane) {
+void checkNoProtocolErrors(const std::string& backplane) {
   const auto snapshot = tools::Snapshot::take(backplane);
   for (const auto* windows : {&snapshot.servers, &snapshot.clients}) {
     for (const auto& window : *windows) {
       if (window.protocolErrors != 0)
-        throw Broken(fmt::format("{} read nonsense from a peer", window.name));
+        throw Broken(fmt::format("{} received invalid data from a peer", window.name));
     }
   }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Checks: what must hold on a backplane when a process has died or stalled.
+// Checks of what must hold on a backplane after a process has died or stalled.
 //
 // Threads  one.
-// Trust    reads segments as every reader does; what cannot be read is a finding.
+// Trust    a segment that cannot be read counts as stale.
 #pragma once
 
 #include <sys/types.h>
@@ -14,27 +14,27 @@
 
 namespace mpf::torture {
 
-// An invariant that does not hold; the text says which and how that was seen.
+// An invariant does not hold. The text says which one, and how that was detected.
 class Broken : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Segments of a backplane that belong to nobody who lives, and links beyond those that `links`
-// clients have.
+// Segments of a backplane that belong to no living process. If more than `links` links exist, the
+// last entry says so.
 [[nodiscard]] std::vector<std::string> staleSegments(const std::string& backplane,
                                                      std::size_t links);
 
-// Throws Broken when a living process of the backplane has read nonsense from a peer.
-void checkNoNonsense(const std::string& backplane);
-// How often a server with this name saw clients die.
+// Throws Broken when a process of the backplane has counted protocol errors of a peer.
+void checkNoProtocolErrors(const std::string& backplane);
+// How many clients of the server with this name have died.
 [[nodiscard]] std::uint64_t clientsDied(const std::string& backplane, const std::string& server);
 
-// What a process holds.
+// The resources that a process holds.
 struct Holdings {
   std::size_t descriptors = 0;
   std::size_t mappings = 0;  // of shared memory
-  std::size_t heapKiB = 0;  // resident memory that is nobody else's
+  std::size_t heapKiB = 0;   // resident private memory
   static Holdings of(pid_t pid);
 };
 

@@ -14,8 +14,8 @@
 namespace mpf::torture {
 namespace {
 
-constexpr auto kBoardLook = std::chrono::milliseconds(2);  // between looks at the board
-constexpr std::uint32_t kNewEvery = 3;                // arrays that get a new message as reply
+constexpr auto kBoardInterval = std::chrono::milliseconds(2);  // between two reads of the board
+constexpr std::uint32_t kNewEvery = 3;  // every third array gets a new message as its reply
 
 }  // namespace
 
@@ -26,10 +26,11 @@ Echo::Echo(const Backplane& backplane, const std::string& name, World& world, Wa
 void Echo::run(const Board& board, bool byDescriptor) {
   pollfd descriptor{byDescriptor ? server_.descriptor() : -1, POLLIN, 0};
   while (board.leave.load() == 0) {
-    const bool news = byDescriptor
-                          ? ::poll(&descriptor, 1, static_cast<int>(kBoardLook.count())) > 0
-                          : server_.waitForMessage(Deadline::after(kBoardLook));
-    if (!news) kept_.reset();  // refused: nobody came after it
+    const bool isReady = byDescriptor
+                             ? ::poll(&descriptor, 1, static_cast<int>(kBoardInterval.count())) > 0
+                             : server_.waitForMessage(Deadline::after(kBoardInterval));
+    // Without a later request the kept one is never answered: dropping it refuses it.
+    if (!isReady) kept_.reset();
     handleAll();
   }
 }
@@ -40,15 +41,15 @@ void Echo::handleAll() {
 
 void Echo::handle(Message&& request) {
   if (auto number = Int32Message::tryFrom(std::move(request))) return answer(std::move(*number));
-  // NOLINTNEXTLINE(bugprone-use-after-move): one of another type is left as it was
+  // NOLINTNEXTLINE(bugprone-use-after-move): tryFrom() does not move a message of another type
   if (auto array = Float64ArrayMessage::tryFrom(std::move(request)))
     return answer(std::move(*array));
-  world_.complain("a server got a message of a type that nobody sends");
+  world_.complain("a server received a message of a type that no client sends");
 }
 
-// False when the request is not what was sent.
+// Records that a request was received. Returns false when it differs from what was sent.
 bool Echo::note(std::int32_t value, bool isSound) {
-  if (!isSound) world_.complain(fmt::format("request {} arrived damaged", value));
+  if (!isSound) world_.complain(fmt::format("request {} is damaged", value));
   world_.noteHandled(value);
   return isSound;
 }

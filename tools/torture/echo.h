@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Echo: the servers of a torture. It checks each request to the last byte, and answers in place,
+// Echo: the servers of `mpf torture`. It checks every byte of each request, and answers in place,
 // with a new message, or late.
 //
 // Threads  one.
@@ -17,9 +17,9 @@ class Echo {
  public:
   Echo(const Backplane& backplane, const std::string& name, World& world, WaitMode waitMode);
 
-  // Until the board says to leave.
+  // Runs until the board says to leave.
   void run(const Board& board, bool byDescriptor);
-  // What has come until now.
+  // Handles the requests that have arrived.
   void handleAll();
 
  private:

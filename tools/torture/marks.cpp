@@ -23,20 +23,20 @@ namespace {
 constexpr const char* kProgram = "/proc/self/exe";
 constexpr unsigned kProbe = 3;  // type of a note of owner "stapsdt"
 
-// How far the loader has moved this program.
+// The offset at which the loader has placed this program.
 Marks::Address loadedAt() {
   Marks::Address moved = 0;
   ::dl_iterate_phdr(
       [](dl_phdr_info* info, std::size_t, void* out) {
         *static_cast<Marks::Address*>(out) = info->dlpi_addr;
-        return 1;  // the program comes first
+        return 1;  // stop: the first entry is the program
       },
       &moved);
   return moved;
 }
 
-// Address and name of a probe of ours: three addresses, then provider, name and arguments, each
-// ended by a zero byte.
+// Address and name of a probe of provider "mpf". The note consists of three addresses, and then
+// provider, name and arguments, each ended by a zero byte.
 std::optional<std::pair<Marks::Address, std::string>> tryProbe(const char* note,
                                                                std::size_t bytes) {
   constexpr auto kAddresses = 3 * sizeof(std::uint64_t);
@@ -82,7 +82,9 @@ Marks Marks::ofThisProgram() {
     });
   }
   if (marks.byName_.empty())
-    throw std::runtime_error("this program was built without steps, or they were stripped from it");
+    throw std::runtime_error(
+        "this program has no steps (section .note.stapsdt): they were stripped from it; use the "
+        "program as it was built");
   return marks;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Marks: where the steps (base/step.h) of this program are, from the notes of its own file. Forked
-// children have them at the same addresses.
+// Marks: the addresses of the steps (base/step.h) of this program, from the notes of its own file.
+// Forked children have the steps at the same addresses.
 //
-// Threads  any, once made.
+// Threads  any, after construction.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ class Marks {
   //   throws  std::runtime_error when the program's file cannot be read or has no steps
   static Marks ofThisProgram();
 
-  // All, in alphabetical order. A step in an inline function is at several addresses.
+  // All steps, in alphabetical order. A step in an inline function has several addresses.
   [[nodiscard]] const std::map<std::string, std::vector<Address>>& byName() const noexcept {
     return byName_;
   }
   [[nodiscard]] bool contains(const std::string& name) const { return byName_.contains(name); }
-  // Name of the step at `address`; nullptr when there is none.
+  // Name of the step at `address`; nullptr when no step is there.
   [[nodiscard]] const std::string* find(Address address) const;
 
  private:

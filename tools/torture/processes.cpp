@@ -23,7 +23,7 @@ sigset_t childSignal() {
   return set;
 }
 
-// The life of a child. Ctrl-C is the referee's business.
+// Runs an actor in the child. Ctrl-C is ignored here, because the referee handles it.
 [[noreturn]] void live(const std::function<int()>& play, const sigset_t& signals) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::signal(SIGINT, SIG_IGN);
@@ -32,7 +32,7 @@ sigset_t childSignal() {
   try {
     ::_exit(play());
   } catch (const std::exception& error) {
-    printError("mpf torture: an actor ended: {}\n", error.what());
+    printError("mpf torture: a test process failed: {}\n", error.what());
     ::_exit(1);
   }
 }
@@ -71,7 +71,7 @@ pid_t Processes::startHeld(const std::function<int()>& play) {
   });
 }
 
-void Processes::letGo() { ::eventfd_write(gate_.get(), 1); }
+void Processes::openGate() { ::eventfd_write(gate_.get(), 1); }
 
 void Processes::handleEvents(Nanoseconds patience) {
   int status = 0;

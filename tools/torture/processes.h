@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Processes: the actors that are forked and the tracee among them; what the kernel tells about all
-// of them comes in here.
+// Processes: the forked actors, one of which is traced. Receives the kernel's notifications about
+// all of them.
 //
-// Threads  one, and the process has no other: it forks without exec.
+// Threads  one, and the process may have no other, because it forks without exec.
 // Crash    the actors die with this process.
 #pragma once
 
@@ -22,26 +22,26 @@ namespace mpf::torture {
 class Processes {
  public:
   Processes();
-  // Kills all.
+  // Kills all actors.
   ~Processes();
   Processes(const Processes&) = delete;
   Processes& operator=(const Processes&) = delete;
 
-  // Forks; the child plays and ends with what it returns.
+  // Forks; the child calls `play` and exits with the status that it returns.
   pid_t start(const std::function<int()>& play);
-  // The same, and the child waits at its beginning until it is let go.
+  // The same, but the child waits for openGate() before it calls `play`.
   pid_t startHeld(const std::function<int()>& play);
-  void letGo();
-  // Events of it go to `tracee` from now on; nullptr: there is none.
+  void openGate();
+  // Passes the events of its process to `tracee` from now on; nullptr: no process is traced.
   void setTracee(Tracee* tracee) noexcept { tracee_ = tracee; }
 
-  // Handles what has happened, or waits until something does.
+  // Handles the events that have happened. Without any, waits for one for at most `patience`.
   void handleEvents(Nanoseconds patience);
   [[nodiscard]] bool hasEnded(pid_t pid) const { return !running_.contains(pid); }
-  // Kills it, if it still runs, waits for its end and forgets it.
+  // Kills a process if it is running, waits for its end and discards its status.
   void kill(pid_t pid);
   void killAll();
-  // Of one that has ended, and is forgotten: as waitpid() tells it.
+  // Returns and discards the status, as from waitpid(), of a process that has ended.
   int takeStatus(pid_t pid);
 
  private:

@@ -13,13 +13,13 @@
 namespace mpf::torture {
 namespace {
 
-constexpr auto kLook = std::chrono::microseconds(500);  // between looks at what the actors report
-constexpr std::uint64_t kEnough = 12;  // replies that show that somebody goes on
-constexpr std::uint64_t kLife = 40;  // of a server: replies to the survivor
-constexpr std::size_t kLinksAtRest = 2;  // the survivor's, to both servers
+constexpr auto kPollInterval = std::chrono::microseconds(500);  // of the actors' reports
+constexpr std::uint64_t kEnough = 12;  // replies that show that a process continues
+constexpr std::uint64_t kLife = 40;  // replies to the survivor after which a server has run enough
+constexpr std::size_t kLinksAtRest = 2;  // of the survivor, to both servers
 
-// What a process may hold more than in its first rounds: a descriptor that is about to be closed, a
-// segment for a busier moment.
+// How much more a process may hold than in its first rounds: for example a descriptor that it is
+// about to close, or a segment for a moment of higher load.
 constexpr std::size_t kMoreDescriptors = 4;
 constexpr std::size_t kMoreMappings = 16;
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -29,9 +29,9 @@ constexpr std::size_t kMoreHeapKiB = 16 * 1024UL;
 #endif
 constexpr std::uint64_t kWarmUp = 20;  // rounds
 
-std::string inWords(int status) {
-  if (WIFSIGNALED(status)) return fmt::format("was ended by signal {}", WTERMSIG(status));
-  return fmt::format("ended with status {}", WEXITSTATUS(status));
+std::string statusText(int status) {
+  if (WIFSIGNALED(status)) return fmt::format("was killed by signal {}", WTERMSIG(status));
+  return fmt::format("exited with status {}", WEXITSTATUS(status));
 }
 
 bool isOrderly(int status) { return WIFEXITED(status) && WEXITSTATUS(status) == 0; }
@@ -49,14 +49,15 @@ Referee::Referee(const Marks& marks, const Options& options)
   steady_ = processes_.start([cast = cast()] { return playSteady(cast); });
   survivor_ = processes_.start([cast = cast()] { return playSurvivor(cast); });
   startMortal();
-  waitFor("the survivors talk with each other",
+  waitFor("the survivors exchange messages",
           [&] { return repliesOf(0) >= kEnough && repliesOf(1) >= kEnough; });
 }
 
 Referee::~Referee() {
   (*world_).isOver.store(1);
-  processes_.killAll();  // and none of them is left to leave something behind
-  // A child that somebody left behind, which is not ours to wait for, ends soon after.
+  processes_.killAll();
+  // A process that an actor left (Sabotage::keepName) ends soon after. It is not a child of this
+  // process, so this waits until its segments can be removed.
   const auto backplane = Backplane::named(backplane_);
   const auto patience = Deadline::after(std::chrono::seconds(5));
   do static_cast<void>(backplane.removeDead());
@@ -71,13 +72,14 @@ void Referee::waitFor(const std::string& what, const Condition& condition) {
   Nanoseconds waited{0};
   while (!condition()) {
     const auto sinceNs = Clock::nowNs();
-    processes_.handleEvents(kLook);
+    processes_.handleEvents(kPollInterval);
     checkAlive();
-    // Where so many wait for a processor that we do, too, the others are not what is slow.
-    waited += std::min<Nanoseconds>(Nanoseconds(Clock::nowNs() - sinceNs), kLook);
+    // Counts at most the requested interval: when the processors are so busy that this process
+    // waits for one, the actors are not to blame for the delay.
+    waited += std::min<Nanoseconds>(Nanoseconds(Clock::nowNs() - sinceNs), kPollInterval);
     if (waited >= options_.patience)
       throw Broken(
-          fmt::format("this did not come true in {} s: {}", options_.patience.count(), what));
+          fmt::format("this did not happen within {} s: {}", options_.patience.count(), what));
   }
 }
 
@@ -87,10 +89,11 @@ void Referee::checkAlive() const {
   if (processes_.hasEnded(steady_)) throw Broken("the surviving server has ended");
 }
 
-// A process that leaves all that a process can leave.
+// Runs a process that dies and leaves everything that a dead process can leave.
 void Referee::layOutCorpse() {
   const auto corpse = processes_.start([cast = cast()] { return playCorpse(cast); });
-  waitFor("a process talks with itself and dies", [&] { return processes_.hasEnded(corpse); });
+  waitFor("a process sends messages to itself and dies",
+          [&] { return processes_.hasEnded(corpse); });
   processes_.takeStatus(corpse);
 }
 
@@ -104,14 +107,14 @@ void Referee::endMortal() {
   const auto& disconnects = (*world_).survivor.talked[1].disconnects;
   const auto before = disconnects.load();
   (*world_).mortal.leave.store(1);
-  waitFor("the server ends in order",
+  waitFor("the server exits, and its client is disconnected",
           [&] { return processes_.hasEnded(mortal_) && disconnects.load() != before; });
   const auto status = processes_.takeStatus(std::exchange(mortal_, 0));
   if (!isOrderly(status))
-    throw Broken(fmt::format("the server that was to end in order {}", inWords(status)));
+    throw Broken(fmt::format("the server that was asked to exit {}", statusText(status)));
 }
 
-// Starts the one to be tormented and its companion, and lets them go.
+// Starts the process under test, under ptrace, and its companion.
 void Referee::live(Role role, const std::function<void(Tracee&)>& prepare) {
   boardOf(role).clear();
   pid_t pid = 0;
@@ -128,7 +131,7 @@ void Referee::live(Role role, const std::function<void(Tracee&)>& prepare) {
   tracee_ = std::make_unique<Tracee>(pid, marks_);
   processes_.setTracee(tracee_.get());
   prepare(*tracee_);
-  processes_.letGo();
+  processes_.openGate();
 }
 
 bool Referee::isLifeDone(Role role) const {
@@ -157,24 +160,23 @@ Outcome Referee::play(const Plan& plan) {
 void Referee::torment(const Plan& plan) {
   auto& victim = *tracee_;
   wasThere_ = false;
-  waitFor(fmt::format("the {} lives its life", toString(plan.role)),
+  waitFor(fmt::format("the {} reaches its place or exchanges enough messages", toString(plan.role)),
           [&] { return victim.isThere() || victim.isGone() || isLifeDone(plan.role); });
   if (!victim.isThere()) {
     boardOf(plan.role).leave.store(1);
-    waitFor(fmt::format("the {} ends in order", toString(plan.role)),
+    waitFor(fmt::format("the {} exits", toString(plan.role)),
             [&] { return victim.isThere() || victim.isGone(); });
   }
   wasThere_ = victim.isThere();
   if (wasThere_ && plan.mode == Mode::kill) {
     victim.kill();
-    waitFor("a killed process is gone", [&] { return victim.isGone(); });
+    waitFor("the killed process ends", [&] { return victim.isGone(); });
   } else {
     if (wasThere_) hold(plan.role);
-    waitFor(fmt::format("the {} lives on", toString(plan.role)),
+    waitFor(fmt::format("the {} continues after its stop", toString(plan.role)),
             [&] { return victim.isGone() || isLifeDone(plan.role); });
     boardOf(plan.role).leave.store(1);
-    waitFor(fmt::format("the {} ends in order", toString(plan.role)),
-            [&] { return victim.isGone(); });
+    waitFor(fmt::format("the {} exits", toString(plan.role)), [&] { return victim.isGone(); });
     checkOrderlyEnd(plan.role);
   }
   processes_.setTracee(nullptr);
@@ -185,36 +187,38 @@ void Referee::torment(const Plan& plan) {
 
 void Referee::checkOrderlyEnd(Role role) const {
   if (isOrderly(tracee_->status())) return;
-  throw Broken(fmt::format("the {} {}, and nobody had killed it", toString(role),
-                           inWords(tracee_->status())));
+  throw Broken(fmt::format("the {} {}, although the referee had not killed it", toString(role),
+                           statusText(tracee_->status())));
 }
 
-// The stopped one is slow, not dead.
+// Checks that the survivors continue while the process under test is stopped, and that they do not
+// take it for dead. Then resumes it.
 void Referee::hold(Role role) {
   auto& survivor = (*world_).survivor;
-  // Who was told to leave may do so with another thread than the one that is held.
+  // A server that was told to leave may disconnect its clients with another thread than the stopped
+  // one.
   const auto& board = boardOf(role);
   const bool leaving = board.leave.load() != 0 || board.isLeaving.load() != 0;
   const auto disconnects = survivor.talked[1].disconnects.load();
   const auto died = role == Role::client ? clientsDied(backplane_, "steady") : 0;
   const auto replies = repliesOf(0);
-  waitFor("the survivors go on beside a stopped process",
+  waitFor("the survivors continue while a process is stopped",
           [&] { return repliesOf(0) - replies >= kEnough; });
   if (!leaving && survivor.talked[1].disconnects.load() != disconnects)
-    throw Broken("a server that was only stopped was taken for dead");
+    throw Broken("a server that was only stopped was reported as dead");
   if (role == Role::client && clientsDied(backplane_, "steady") != died)
-    throw Broken("a client that was only stopped was taken for dead");
+    throw Broken("a client that was only stopped was reported as dead");
   tracee_->release();
 }
 
-// Everybody rests, and all must be as it was.
+// Lets all actors rest and checks that everything holds.
 void Referee::settle() {
   auto& survivor = (*world_).survivor;
   const auto steadyReplies = repliesOf(0);
-  waitFor("the survivors go on", [&] { return repliesOf(0) - steadyReplies >= kEnough; });
-  waitFor("the successor has its name, and its client", [&] {
+  waitFor("the survivors continue", [&] { return repliesOf(0) - steadyReplies >= kEnough; });
+  waitFor("the successor has the name of the dead server, and its client", [&] {
     if (processes_.hasEnded(mortal_))
-      throw Broken("the successor could not take the place of the one before");
+      throw Broken("the successor could not open the name of the dead server");
     return repliesOf(1) - mortalReplies_ >= kEnough;
   });
   survivor.rest.store(1);
@@ -226,12 +230,12 @@ void Referee::settle() {
       return (stale = staleSegments(backplane_, kLinksAtRest)).empty();
     });
   } catch (const Broken& broken) {
-    throw Broken(fmt::format("{}; there are {}", broken.what(), fmt::join(stale, ", ")));
+    throw Broken(fmt::format("{}; still there: {}", broken.what(), fmt::join(stale, ", ")));
   }
-  checkNoNonsense(backplane_);
+  checkNoProtocolErrors(backplane_);
   checkHoldings();
   survivor.rest.store(0);
-  waitFor("the survivors go on after a rest", [&] { return survivor.isAtRest.load() == 0; });
+  waitFor("the survivors continue after a rest", [&] { return survivor.isAtRest.load() == 0; });
 }
 
 void Referee::checkHoldings() {
@@ -245,7 +249,7 @@ void Referee::checkHoldings() {
              now.mappings <= first.mappings + kMoreMappings &&
              now.heapKiB <= first.heapKiB + kMoreHeapKiB;
     };
-    waitFor("the survivors hold no more than they did", isFlat);
+    waitFor("the survivors hold no more resources than in the first rounds", isFlat);
   }
 }
 

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Referee: plays rounds. In each, one process is stopped or killed at a chosen place, and
-// afterwards everything must hold.
+// Referee: plays rounds. In each round it stops or kills one process at a chosen place, and then
+// checks that everything holds.
 //
-//   before    a corpse is left for the tormented to find, and somebody who will die on it
-//   at the place, stopped   the survivors go on, and nobody takes it for dead; then it goes on, to
-//   an orderly end at the place, killed    a successor has its name at once and gets its client
-//   after     every request has had one end, nothing stale is left, the survivors hold what they
-//             held
+//   before   a corpse leaves stale segments, and a companion starts that will kill itself
+//   stop     the survivors continue, and no process takes the stopped one for dead; then it resumes
+//            and exits
+//   kill     a successor can use the dead server's name at once, and gets its client
+//   after    each request has ended once, nothing stale is left, the survivors hold no more
+//            resources than in the first rounds
 //
 // Threads  one.
 #pragma once
@@ -25,7 +26,7 @@
 
 namespace mpf::torture {
 
-enum class Role { client, server };  // of the tormented
+enum class Role { client, server };  // of the process under test
 enum class Mode { kill, stop };
 [[nodiscard]] const char* toString(Role role) noexcept;
 [[nodiscard]] const char* toString(Mode mode) noexcept;
@@ -37,31 +38,32 @@ struct Plan {
 };
 
 struct Outcome {
-  bool reached = false;  // else it ended before it came there
-  bool cameToNextMark = false;  // and not so far behind the mark as was asked for
+  bool reached = false;  // false: the process ended before it reached the place
+  bool cameToNextMark = false;  // stopped at the next step, before all instructions were executed
 };
 
 class Referee {
  public:
   struct Options {
     std::uint32_t seed = 0;
-    std::chrono::duration<double> patience{30};  // for anything that must happen
+    std::chrono::duration<double> patience{30};  // longest wait for anything that must happen
     Sabotage sabotage = Sabotage::none;
   };
-  // Starts the survivors on a backplane of its own.
+  // Starts the survivors on a new isolated backplane.
   Referee(const Marks& marks, const Options& options);
-  // Ends everybody and removes what they left.
+  // Kills all actors and removes the segments that they left.
   ~Referee();
   Referee(const Referee&) = delete;
   Referee& operator=(const Referee&) = delete;
 
-  // One round.
-  //   throws  Broken when something does not hold
+  // Plays one round.
+  //   throws  Broken when an invariant does not hold
   Outcome play(const Plan& plan);
-  // A round in which nobody is tormented: how often each of these steps is reached.
+  // Plays a round in which no process is stopped or killed. Returns how often each of these steps
+  // is reached.
   std::map<std::string, std::uint64_t> reconnoitre(Role role, const std::set<std::string>& marks);
   [[nodiscard]] std::uint64_t rounds() const noexcept { return rounds_; }
-  // What the survivors hold, in words.
+  // The resources that the survivors hold, as text.
   [[nodiscard]] std::string holdings() const;
 
  private:
@@ -98,7 +100,7 @@ class Referee {
   pid_t companion_ = 0;  // the guest or the fleeting server of this round
   std::unique_ptr<Tracee> tracee_;
   bool wasThere_ = false;
-  std::uint64_t mortalReplies_ = 0;  // when this life of the mortal server began
+  std::uint64_t mortalReplies_ = 0;  // replies of mortal servers before this one started
   std::uint64_t rounds_ = 0;
   std::map<pid_t, Holdings> heldAtStart_;
 };

@@ -19,7 +19,7 @@
 namespace mpf::torture {
 namespace {
 
-// Windows or links of this process.
+// Visits the windows or the links of this process.
 template <class Visit>
 void forEachOwn(layout::SegmentKind kind, NameKind nameKind, const std::string& backplane,
                 Visit&& visit) {
@@ -36,7 +36,7 @@ void forEachOwnLink(const std::string& backplane, Visit&& visit) {
   forEachOwn(layout::SegmentKind::link, NameKind::link, backplane, visit);
 }
 
-// A link to a server that never was, of a client that lives.
+// Leaves a link from a living client to a server that does not exist.
 void leaveLink(const std::string& backplane) {
   std::uint64_t owner = 0;
   forEachOwnLink(backplane, [&](const Segment& link) { owner = link.header().ownerWindow; });
@@ -48,7 +48,7 @@ void leaveLink(const std::string& backplane) {
 
 }  // namespace
 
-void Saboteur::meddle(Talk& mortal, bool rests) {
+void Saboteur::sabotage(Talk& mortal, bool rests) {
   const bool begins = rests && !std::exchange(rested_, rests);
   rested_ = rests;
   if (sabotage_ == Sabotage::loseFate && !rests) mortal.loseNextFate();
@@ -61,8 +61,8 @@ void leaveChildBehind(const World& world, const std::string& backplane) {
   // Without a pid in the header, the lock is the only evidence that the owner is alive.
   forEachOwn(layout::SegmentKind::serverWindow, NameKind::serverWindow, backplane,
              [](const Segment& window) { window.sharedHeader().ownerPid = 0; });
-  // Without fork(), so that no handler closes anything: the lock of the parent's window stays when
-  // the parent dies.
+  // Calls clone() directly instead of fork(), so that no atfork handler closes the window's file:
+  // the child then keeps the lock after the parent has died.
   if (checkCall(::syscall(SYS_clone, SIGCHLD, nullptr, nullptr, nullptr, nullptr), "clone") != 0)
     return;
   const auto referee = world.referee;

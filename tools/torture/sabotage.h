@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Sabotage: mistakes made on purpose, each of which breaks one invariant. `mpf torture --break`
-// with any of them must fail: a referee that never whistles proves nothing.
+// must fail with each of them, which shows that the referee detects defects.
 //
 // Threads  the actor's.
 #pragma once
@@ -17,13 +17,14 @@ namespace mpf::torture {
 
 class Talk;
 
-// The survivor's.
+// Makes the mistakes of the survivor.
 class Saboteur {
  public:
   Saboteur(Sabotage sabotage, std::string backplane)
       : sabotage_(sabotage), backplane_(std::move(backplane)) {}
-  // Once a look; `rests`: the referee is looking.
-  void meddle(Talk& mortal, bool rests);
+  // Called in each turn of the survivor's loop. `rests`: the referee has asked for a rest, in which
+  // it runs its checks.
+  void sabotage(Talk& mortal, bool rests);
 
  private:
   Sabotage sabotage_;
@@ -32,10 +33,10 @@ class Saboteur {
   std::vector<FileDescriptor> leaked_;
 };
 
-// Forks a child that keeps this process's open files, and with them its locks, until the torture
-// ends.
+// Forks a child that keeps the open files of this process, and with them its locks, until the
+// referee has finished.
 void leaveChildBehind(const World& world, const std::string& backplane);
-// On each link of this process's clients: the next slot counts as complete, whatever it holds.
+// On each link of this process's clients, marks the next slot as published without writing it.
 void publishHalfMessage(const std::string& backplane);
 
 }  // namespace mpf::torture

@@ -7,9 +7,9 @@
 namespace mpf::torture {
 namespace {
 
-constexpr std::size_t kOpen = 6;             // requests at a time
-constexpr std::size_t kSeveralSlots = 9;     // elements of an array that fits the ring
-constexpr std::size_t kLarge = 300;          // elements of one that needs a chunk
+constexpr std::size_t kOpen = 6;          // most requests without an end
+constexpr std::size_t kSeveralSlots = 9;  // elements of an array that needs several slots
+constexpr std::size_t kLarge = 300;       // elements of an array that needs a chunk
 constexpr unsigned kCancelEvery = 32;
 
 }  // namespace
@@ -74,12 +74,12 @@ bool Talk::sendOne() {
   std::uint32_t id = 0;
   if (client_.send(makeMessage(value), deadline, &id) != SendResult::sent) return false;
   if (!open_.emplace(id, value).second)
-    world_.complain("a request got the id of one that is still open");
+    world_.complain("a request got the id of another request that is still open");
   if (random_() % kCancelEvery == 0) client_.cancel(id);
   return true;
 }
 
-void Talk::tellToDie() {
+void Talk::sendDie() {
   std::uint32_t id = 0;
   const auto value = world_.nextValue();
   Int32Message request(
@@ -89,10 +89,11 @@ void Talk::tellToDie() {
 }
 
 void Talk::take(const Message& message) {
-  if (const auto* news = message.tryAs<Connect>()) return takeConnect(news->status);
+  if (const auto* connect = message.tryAs<Connect>()) return takeConnect(connect->status);
   const auto found = open_.find(message.route().requestId);
   if (found == open_.end())
-    return world_.complain("a request ended that had ended before, or was never sent");
+    return world_.complain(
+        "a reply or fate arrived for a request that had ended or was never sent");
   const auto* fate = message.tryAs<RequestFate>();
   if (fate != nullptr && std::exchange(losing_, false)) return;
   const auto value = found->second;
@@ -105,7 +106,8 @@ void Talk::takeConnect(ConnectStatus status) {
   if (status == ConnectStatus::connectYes) ++talked_.connects;
   if (status != ConnectStatus::connectNo) return;
   if (!open_.empty())
-    world_.complain(fmt::format("a disconnect came before the ends of {} requests", open_.size()));
+    world_.complain(
+        fmt::format("a disconnect was reported before the ends of {} requests", open_.size()));
   ++talked_.disconnects;
 }
 
@@ -120,7 +122,7 @@ void Talk::takeReply(std::int32_t value, const Message& reply) {
       world_.complain(fmt::format("the reply to {} is {}", value, number->value));
   } else if (const auto* array = reply.tryAs<Float64Array>();
              array == nullptr || array->extra != answerTo(value)) {
-    world_.complain(fmt::format("the reply to {} is not what its server sends", value));
+    world_.complain(fmt::format("the reply to {} is not a reply of its server", value));
   } else if (!holds(reply.valueAs<Float64Array>(), value)) {
     world_.complain(fmt::format("the reply to {} is damaged", value));
   }

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Talk: one client's conversation with one server: requests of all sizes, kept, late and cancelled
-// ones, and an account of their ends.
-//
-//   each request that is sent ends exactly once: with the reply that belongs to it, or with a fate
-//   that is true
+// Talk: the messages of one client to one server: requests of all sizes, some of them kept, expired
+// or cancelled. It checks that each request ends exactly once: with its own reply, or with a true
+// fate.
 //
 // Threads  the dispatcher's.
 #pragma once
@@ -19,25 +17,26 @@
 
 namespace mpf::torture {
 
-// What an Int32 asks of a server, in `cmd`.
+// What an Int32 message asks of the server, in `cmd`.
 enum class Request : std::int32_t {
   answer = 1,
-  keep = 2,  // answer when the next one comes, or drop it
+  keep = 2,  // answer when the next such request arrives, or drop it
   die = 3,  // the server kills itself
 };
 
 class Talk {
  public:
-  // Binds to `server`. `talked` takes the counts.
+  // Binds to `server`. Counts in `talked`.
   Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server,
        std::uint32_t seed);
 
-  // Sends until some requests are open, as far as it is possible now.
+  // Sends requests until some are open, or the queue is full.
   void sendSome();
-  void tellToDie();
+  // Asks the server to kill itself.
+  void sendDie();
   [[nodiscard]] bool isConnected() const noexcept { return client_.isConnected(); }
   [[nodiscard]] std::size_t open() const noexcept { return open_.size(); }
-  // For a look whether the referee finds it: the next fate is not told to anybody.
+  // Sabotage: the next fate is ignored.
   void loseNextFate() noexcept { losing_ = true; }
 
  private:
@@ -57,12 +56,12 @@ class Talk {
   MessageClient client_;  // last: its callback uses the rest
 };
 
-// What a server makes of a value, and what an array holds.
+// The value of the reply to a request, and the elements of an array.
 [[nodiscard]] constexpr std::int32_t answerTo(std::int32_t value) noexcept { return ~value; }
 [[nodiscard]] constexpr double elementOf(std::int32_t value, std::size_t index) noexcept {
   return value + 0.5 * static_cast<double>(index);
 }
-// Whether `array` is what was made from `value`.
+// Whether the elements of `array` are those for `value`.
 [[nodiscard]] bool holds(std::span<const double> array, std::int32_t value) noexcept;
 
 }  // namespace mpf::torture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tally: what was done at which step, and what is to be said about it.
+// Tally: how many rounds were played at each step, and the verdict.
 //
 // Threads  one.
 #pragma once
@@ -16,19 +16,19 @@
 
 namespace mpf::torture {
 
-// Rounds that were played at one step: [role][mode].
+// Number of rounds at one step: [role][mode].
 using Played = std::array<std::array<std::uint64_t, 2>, 2>;
 
 struct Failure {
   std::string what;
-  std::optional<Plan> plan;  // of the round; none: a round without a victim
+  std::optional<Plan> plan;  // of the round; nullopt: no process was stopped or killed in it
 };
 
 struct Tally {
   std::uint32_t seed = 0;
   double seconds = 0;
   std::uint64_t rounds = 0;
-  std::map<std::string, Played> marks;   // each that was asked for
+  std::map<std::string, Played> marks;  // each step that the user asked for
   std::optional<Failure> failure;
   std::string holdings;
 
@@ -39,13 +39,13 @@ struct Tally {
   [[nodiscard]] std::vector<std::string> neverReached() const;
   // "held", "incomplete" (a step was never reached), "failed".
   [[nodiscard]] std::string verdict() const;
-  // For people: a row for each step, what was never reached, the verdict, and how to repeat a
-  // failure.
+  // The report as text: a row for each step, the steps that were never reached, the verdict, and
+  // how to repeat a failure.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] nlohmann::json json() const;
 };
 
-// The command that plays a round again.
+// The command that repeats a round.
 [[nodiscard]] std::string commandOf(const Plan& plan);
 
 }  // namespace mpf::torture

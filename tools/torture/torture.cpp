@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf torture: stops and kills clients and servers at each step of their lives, and looks whether
-// everything that MPF promises holds.
+// mpf torture: stops and kills clients and servers at each step, and checks that everything that
+// MPF promises holds.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -42,7 +42,7 @@ const std::map<std::string, torture::Sabotage> kSabotages{
     {"stale", torture::Sabotage::stale},
     {"leak", torture::Sabotage::leak}};
 
-// An option whose value is one of the names.
+// An option whose value is one of the names in `choices`.
 template <class Value, class Choice>
 CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& value,
                        const std::map<std::string, Choice>& choices, const std::string& text) {
@@ -61,11 +61,11 @@ void checkSteps(const torture::Marks& marks, const std::vector<std::string>& ste
   for (const auto& step : steps) {
     if (!marks.contains(step))
       throw std::invalid_argument(
-          fmt::format("no step \"{}\"; `mpf torture --list` names all", step));
+          fmt::format("no step \"{}\"; `mpf torture --list` lists all", step));
   }
 }
 
-// A line that is written over, on a terminal.
+// Shows the current round on a terminal, in a line that each round overwrites.
 torture::Campaign::Progress progress() {
   if (::isatty(STDERR_FILENO) == 0) return [](const auto&...) {};
   return [](const torture::Plan& plan, std::uint64_t round, std::uint64_t planned) {
@@ -75,7 +75,7 @@ torture::Campaign::Progress progress() {
   };
 }
 
-// Before the work, which may take hours: empty without a name.
+// Opens the file for the verdict before the work, which may take hours; nullopt without a path.
 std::optional<OutputFile> openVerdict(const std::string& path) {
   if (path.empty()) return std::nullopt;
   return OutputFile(path);
@@ -106,29 +106,31 @@ int run(const Arguments& arguments) {
 void addTorture(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
       "torture",
-      "Kills clients and servers at each step of their lives, and looks whether all others go on");
+      "Kills clients and servers at each step, and checks that all other processes continue");
   auto arguments = std::make_shared<Arguments>();
   auto& options = arguments->campaign;
   options.referee.seed = std::random_device()();
   addSeconds(command, "--duration", arguments->seconds,
-             "Time for random places, after each step had its turn", true);
-  command.add_option("--seed", options.referee.seed, "Of what is random; it is printed at the end")
+             "Time for random places, after one round for each step", true);
+  command
+      .add_option("--seed", options.referee.seed,
+                  "Seed of the random numbers; it is printed at the end")
       ->check(wholeNumber(0));
-  command.add_flag("--list", arguments->list, "Names the steps, and does nothing");
+  command.add_flag("--list", arguments->list, "Lists the steps, and does nothing else");
   command.add_option("--step", options.steps, "Only this step; may be given several times");
   addChoice(command, "--role", options.role, kRoles, "Only clients, or only servers");
   addChoice(command, "--mode", options.mode, kModes, "Only kill, or only stop for a while");
-  command
-      .add_option("--hit", options.hit, "The how-many-th time that the process comes to the step")
+  command.add_option("--hit", options.hit, "Number of the visit to the step, from 1")
       ->check(wholeNumber(1));
   command
-      .add_option("--instructions", options.instructions, "So many instructions behind the step")
+      .add_option("--instructions", options.instructions,
+                  "Number of instructions to execute after the step")
       ->check(wholeNumber(0));
   command.add_option("--every-instruction", arguments->everyInstruction,
-                     "At each instruction from this step to the next one");
-  addSeconds(command, "--patience", arguments->patience, "Longest wait for what must come true",
-             false);
-  command.add_option("--json", arguments->json, "Writes the verdict into this file, too: JSON")
+                     "A round for each instruction from this step to the next one");
+  addSeconds(command, "--patience", arguments->patience,
+             "Longest wait for a condition that must become true", false);
+  command.add_option("--json", arguments->json, "Also writes the verdict to this file, as JSON")
       ->type_name("FILE");
   addChoice(command, "--break", options.referee.sabotage, kSabotages, "")->group("");
   command.callback([arguments, &run] { run = [arguments] { return tools::run(*arguments); }; });

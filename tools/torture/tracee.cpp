@@ -47,7 +47,8 @@ bool isBreakpoint(pid_t thread) {
 }  // namespace
 
 Tracee::Tracee(pid_t pid, const Marks& marks) : pid_(pid), marks_(marks) {
-  if (!kIsKnownProcessor) throw std::runtime_error("breakpoints are known for x86-64 only");
+  if (!kIsKnownProcessor)
+    throw std::runtime_error("mpf torture supports breakpoints on x86-64 processors only");
   checkCall(::ptrace(PTRACE_SEIZE, pid, nullptr, kOptions), "trace",
             fmt::format("process {}", pid));
   const auto memory = fmt::format("/proc/{}/mem", pid);
@@ -75,9 +76,8 @@ void Tracee::aim(Place place) {
 
 void Tracee::resume(pid_t thread, int signal) const noexcept {
   const auto request = thread == stepping_ ? PTRACE_SINGLESTEP : PTRACE_CONT;
-  ::ptrace(request, thread, nullptr,
-           // fails when the thread was killed: its end comes next
-           static_cast<std::uintptr_t>(signal));
+  // Fails when the thread was killed; then waitpid() reports its end next.
+  ::ptrace(request, thread, nullptr, static_cast<std::uintptr_t>(signal));
 }
 
 void Tracee::handle(pid_t thread, int status) {
@@ -85,11 +85,11 @@ void Tracee::handle(pid_t thread, int status) {
     if (thread == stepping_) stepping_ = 0;
     if (thread == stopped_) stopped_ = 0;
     if (thread != pid_) return;
-    isGone_ = true;  // the last one
+    isGone_ = true;  // the kernel reports the main thread last
     status_ = status;
     return;
   }
-  // a new thread, as seen by its maker or by itself
+  // A new thread was created; both threads report this.
   if (eventOf(status) != 0) return resume(thread);
   if (WSTOPSIG(status) != SIGTRAP) return resume(thread, WSTOPSIG(status));
   onTrap(thread);
@@ -99,7 +99,7 @@ void Tracee::onTrap(pid_t thread) {
   const auto* mark = isBreakpoint(thread) ? marks_.find(programCounter(thread) - 1) : nullptr;
   if (mark != nullptr) return onMark(thread, *mark);
   if (thread == stepping_) return onInstruction(thread);
-  resume(thread);  // a system call that it was stepped into returns
+  resume(thread);  // the return of a system call that was entered by a single step
 }
 
 void Tracee::onMark(pid_t thread, const std::string& mark) {

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Tracee: a child under ptrace that is stopped at the k-th time that it comes to a step, or n
-// instructions behind it.
+// Tracee: a child under ptrace that is stopped at its k-th visit to a step, or n instructions after
+// it.
 //
-//   Tracee victim(pid, marks);       stopped
+//   Tracee victim(pid, marks);
 //   victim.aim({"slot_written", 3, 17}); or victim.watch({"slot_written", "slot_published"});
 //   ... victim.handle(event) ... until victim.isThere()
 //   victim.kill() or victim.release()
 //
-// The child's nops become breakpoint instructions, in its own copy of the text. A breakpoint is
-// never lifted to step over it: what it replaced did nothing.
+// The nop instructions of the steps are replaced by breakpoint instructions in the child's own copy
+// of the code. A breakpoint need not be removed to step over it, because a nop does nothing.
 //
-// Threads  one: the kernel knows the tracing thread.
-// Crash    when the tracer dies, its tracee does (PTRACE_O_EXITKILL).
+// Threads  one: only the thread that attached may use ptrace.
+// Crash    when the tracer dies, the kernel kills the tracee (PTRACE_O_EXITKILL).
 #pragma once
 
 #include <sys/types.h>
@@ -31,39 +31,40 @@ namespace mpf::torture {
 // A place in a run of a program.
 struct Place {
   std::string mark;
-  std::uint64_t hit = 1;  // the how-many-th time it comes there
-  std::uint64_t instructions = 0;  // further, in the same thread
-  bool upToNextMark = false;  // and not past another step
+  std::uint64_t hit = 1;  // number of the visit to the step, from 1
+  std::uint64_t instructions = 0;  // to execute after the step, in the same thread
+  bool upToNextMark = false;  // stop at the next step if it is reached earlier
 };
 
 class Tracee {
  public:
-  // Takes hold of a child of ours, which waits for something.
-  //   throws  std::system_error when this is not allowed, std::runtime_error on a processor that it
-  //           does not know
+  // Attaches to a child of this process, which must be waiting.
+  //   throws  std::system_error when tracing is not permitted, std::runtime_error on a processor
+  //           other than x86-64
   Tracee(pid_t pid, const Marks& marks);
 
-  // Counts how often it comes to each of these steps.
+  // Counts the visits to each of these steps.
   void watch(const std::set<std::string>& marks);
-  // Stops it there.
+  // Chooses the place at which the process is stopped.
   void aim(Place place);
-  // What waitpid() told about a thread of it.
+  // Handles a status that waitpid() returned for one of its threads.
   void handle(pid_t thread, int status);
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
-  // Stopped at the place.
+  // Whether the process is stopped at the place.
   [[nodiscard]] bool isThere() const noexcept { return stopped_ != 0; }
-  // Ended, and so are all its threads.
+  // Whether the process and all its threads have ended.
   [[nodiscard]] bool isGone() const noexcept { return isGone_; }
-  // As waitpid() tells it, of a tracee that is gone.
+  // The status from waitpid(), after isGone().
   [[nodiscard]] int status() const noexcept { return status_; }
-  // It came to the next step before so many instructions were over, and was stopped there.
+  // Whether the process reached the next step before it had executed all instructions, and was
+  // stopped there.
   [[nodiscard]] bool cameToNextMark() const noexcept { return atNextMark_; }
-  // How often it came to each step that was watched.
+  // The number of visits to each watched step.
   [[nodiscard]] const std::map<std::string, std::uint64_t>& hits() const noexcept { return hits_; }
 
   void kill() const noexcept;
-  // Goes on from the place, to its end.
+  // Resumes the process and removes all breakpoints.
   void release();
 
  private:
@@ -77,12 +78,12 @@ class Tracee {
   pid_t pid_;
   const Marks& marks_;
   FileDescriptor memory_;
-  Place place_;  // without mark: nowhere
+  Place place_;  // no mark: the process is not stopped anywhere
   std::vector<Marks::Address> patched_;
   std::map<std::string, std::uint64_t> hits_;
-  pid_t stepping_ = 0;  // thread that walks from the mark to the place
-  std::uint64_t left_ = 0;
-  pid_t stopped_ = 0;  // thread that is there
+  pid_t stepping_ = 0;  // thread that executes single instructions from the mark to the place
+  std::uint64_t left_ = 0;  // number of them that remain
+  pid_t stopped_ = 0;  // thread that is stopped at the place
   bool released_ = false;
   bool atNextMark_ = false;
   bool isGone_ = false;

@@ -16,8 +16,8 @@ void Board::clear() noexcept {
 }
 
 void World::complain(std::string_view text) noexcept {
-  std::uint32_t nobody = 0;
-  if (!complained_.compare_exchange_strong(nobody, 1)) return;
+  std::uint32_t none = 0;
+  if (!complained_.compare_exchange_strong(none, 1)) return;
   text.copy(complaint_.data(), complaint_.size() - 1);
   complained_.store(2);
 }
@@ -30,24 +30,25 @@ std::atomic<std::int32_t>& World::at(Values& values, std::int32_t value) noexcep
   return values[static_cast<std::uint32_t>(value) % values.size()];
 }
 
-// Each notes first and then looks: whoever comes second sees the other.
+// Client and server each write their own entry first and then read the other one, so that the
+// second of them sees both.
 void World::noteHandled(std::int32_t value) noexcept {
-  if (at(handled_, value).exchange(value) == value)
-    complain("a server acted on a request for the second time");
+  if (at(handled_, value).exchange(value) == value) complain("a server acted twice on a request");
   if (at(neverTaken_, value).load() == value)
-    complain("a server acted on a request whose client had been told that nobody ever would");
+    complain("a server acted on a request that had been reported as never taken");
 }
 
 void World::noteNeverTaken(std::int32_t value) noexcept {
   at(neverTaken_, value).store(value);
   if (at(handled_, value).load() == value)
-    complain("a client was told that nobody took its request, and a server had acted on it");
+    complain("a request was reported as never taken, but a server had acted on it");
 }
 
 SharedWorld::SharedWorld() {
   void* memory =
       ::mmap(nullptr, sizeof(World), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) throwSystemError(errno, "mmap", "the world");
+  if (memory == MAP_FAILED)
+    throwSystemError(errno, "mmap", "memory shared with the test processes");
   world_ = new (memory) World;
 }
 

@@ -10,7 +10,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-// A row as a run leaves it: so many messages a second, and how many times the floor's.
+// The result of a row with a message rate, and the ratio of that rate to the floor's.
 Result askedRow(const std::string& question, const std::string& name, double perSecond,
                 double timesFloor) {
   Result result;
@@ -24,7 +24,7 @@ Result askedRow(const std::string& question, const std::string& name, double per
   return result;
 }
 
-TEST(HardwareTable, SaysHowManyTimesTheEcho) {
+TEST(HardwareTable, ShowsTheRatioToTheEcho) {
   const auto text =
       hardwareTable({askedRow(kServers, "mpf-dac128v-server, an output set", 20e3, 0.5)});
 
@@ -33,7 +33,7 @@ TEST(HardwareTable, SaysHowManyTimesTheEcho) {
   EXPECT_THAT(text, HasSubstr(" 0.500  40.0 k/s: mpf-int32-server, the echo\n"));
 }
 
-TEST(HardwareTable, SaysHowManyTimesTheManualAndThatItIsNotMeasured) {
+TEST(HardwareTable, ShowsTheRatioToTheManualAndThatThatIsNotMeasured) {
   Result manual;
   manual.measurement.question = kSerial;
   manual.measurement.name = kManualLocal;
@@ -51,7 +51,7 @@ TEST(HardwareTable, SaysHowManyTimesTheManualAndThatItIsNotMeasured) {
   EXPECT_THAT(text, HasSubstr(" 2.000  159 /s: the manual's, local\n"));
 }
 
-TEST(HardwareTable, HasAHeadingOnceAndValuesWithTheirUnit) {
+TEST(HardwareTable, HasOneHeadingAndValuesWithTheirUnit) {
   Result share;
   share.measurement.question = kScanning;
   share.measurement.name = "the driver's thread";
@@ -65,8 +65,8 @@ TEST(HardwareTable, HasAHeadingOnceAndValuesWithTheirUnit) {
   EXPECT_THAT(text, Not(HasSubstr("p99")));
 }
 
-// A row about lost characters says which faults the server has seen.
-TEST(HardwareTable, SaysWhyCharactersWereLost) {
+// A row about lost characters shows the faults that the server reported.
+TEST(HardwareTable, ShowsTheFaultsOfLostCharacters) {
   Result lost;
   lost.measurement.question = kSerial;
   lost.measurement.name = "written, echo read: characters were lost";
@@ -80,18 +80,18 @@ TEST(HardwareTable, SaysWhyCharactersWereLost) {
       hardwareTable({lost}),
       HasSubstr(" 3 answers; with overruns 2, parity errors 0, framing errors 1, breaks 0\n"));
   EXPECT_THAT(hardwareTable({unexplained}),
-              HasSubstr("breaks 0: the server saw no fault of the line\n"));
+              HasSubstr("breaks 0: the server reported no line fault\n"));
 }
 
 TEST(HardwareTable, NamesWhatWasLeftOutAndWhatFailed) {
   auto leftOut = askedRow(kServers, "one", 1, 1);
-  leftOut.measurement.skipped = "mpf-ip330-server is not there";
+  leftOut.measurement.skipped = "mpf-ip330-server does not exist";
   auto failed = askedRow(kServers, "other", 1, 1);
   failed.error = "mpf-dac128v-server has ended: bad luck";
 
   const auto text = hardwareTable({leftOut, failed});
 
-  EXPECT_THAT(text, HasSubstr("left out: mpf-ip330-server is not there"));
+  EXPECT_THAT(text, HasSubstr("left out: mpf-ip330-server does not exist"));
   EXPECT_THAT(text, HasSubstr("failed: mpf-dac128v-server has ended: bad luck"));
 }
 

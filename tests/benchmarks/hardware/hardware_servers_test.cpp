@@ -35,21 +35,22 @@ class HardwareServersTest : public testing::Test {
   std::string program_;
 };
 
-TEST_F(HardwareServersTest, SayWhichProgramIsMissing) {
+TEST_F(HardwareServersTest, NameAMissingProgram) {
   const HardwareServers servers({"mpf-bench-test", {}, Mode::block}, {"mpf-no-such-server"});
 
-  EXPECT_THAT(servers.missing(), HasSubstr("is not there"));
+  EXPECT_THAT(servers.missing(), HasSubstr("does not exist"));
 }
 
-TEST_F(HardwareServersTest, SayOfARowThatFailsWhatTheProgramSaid) {
+TEST_F(HardwareServersTest, AddTheOutputOfTheProgramToAnError) {
   const auto servers = serversWith("echo 'the board is hot' >&2; exec sleep 3600");
   servers->start();
-  const test::Watchdog watchdog("a server that says something");
+  const test::Watchdog watchdog("a server that prints a line");
 
-  // It says so at some time or other.
+  // The script prints the line at an unknown time.
   while (servers->said().empty()) ::sched_yield();
 
-  EXPECT_EQ(servers->run(failing).error, "no end; " + program_ + " said last: the board is hot");
+  EXPECT_EQ(servers->run(failing).error,
+            "no end; last output of " + program_ + ": the board is hot");
 }
 
 TEST_F(HardwareServersTest, RunNoRowOnceTheProgramHasEnded) {
@@ -57,14 +58,14 @@ TEST_F(HardwareServersTest, RunNoRowOnceTheProgramHasEnded) {
   servers->start();
   const test::Watchdog watchdog("a server that ends");
 
-  // It ends at some time or other.
+  // The script ends at an unknown time.
   std::string error;
   while (error.empty()) error = servers->run([] { return Outcome{}; }).error;
 
   EXPECT_EQ(error, program_ + " has ended: an accident");
 }
 
-TEST_F(HardwareServersTest, AreGoneAfterTheirStop) {
+TEST_F(HardwareServersTest, EndAtTheirStop) {
   const auto servers = serversWith("exec sleep 3600");
   servers->start();
   const int pid = servers->pid();

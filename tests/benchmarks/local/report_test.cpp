@@ -58,7 +58,7 @@ TEST(Json, HasWhatReadersCountOnForARate) {
   EXPECT_FALSE(row.contains("p50_ns"));
 }
 
-TEST(Json, NamesWhatWasLeftOutAndWhatFailed) {
+TEST(Json, ShowsWhyRowsWereLeftOutOrFailed) {
   Result leftOut;
   leftOut.measurement.skipped = "not installed";
   Result failed;
@@ -68,7 +68,7 @@ TEST(Json, NamesWhatWasLeftOutAndWhatFailed) {
   EXPECT_EQ(parsed(failed).at("error"), "server died");
 }
 
-TEST(Table, NamesWhatWasLeftOutAndWhatFailed) {
+TEST(Table, ShowsWhyRowsWereLeftOutOrFailed) {
   Result leftOut;
   leftOut.measurement.name = "ZeroMQ";
   leftOut.measurement.skipped = "not installed";

@@ -7,7 +7,7 @@
 namespace mpf::bench {
 namespace {
 
-// A row that takes no time and costs what it says, once after the other.
+// A row that takes no time and returns the given costs one after the other.
 Measurement costing(const std::string& name, std::vector<double> ns) {
   Measurement row;
   row.name = name;
@@ -31,7 +31,7 @@ TEST(Runner, DividesEachRoundByTheFloorOfThatRound) {
   EXPECT_DOUBLE_EQ(result.costNs(), 600);
 }
 
-TEST(Runner, DividesByTheLastFloorWhenNoneIsAskedFor) {
+TEST(Runner, DividesByTheLastFloorWithoutRounds) {
   const std::vector<Measurement> rows{costing("floor", {100, 999})};
   Runner runner({}, rows);
   auto row = costing("ours", {150});
@@ -43,7 +43,7 @@ TEST(Runner, DividesByTheLastFloorWhenNoneIsAskedFor) {
   EXPECT_DOUBLE_EQ(result.ratioToFloor, 1.5);
 }
 
-TEST(Runner, LeavesOutByNameWhatCannotBeMeasured) {
+TEST(Runner, LeavesOutARowWhoseEnvironmentCannotStart) {
   const std::vector<Measurement> rows;
   auto row = costing("peer", {1});
   row.environmentName = "daemon";

@@ -26,7 +26,7 @@ std::vector<std::string> fullNames(const std::vector<Measurement>& rows) {
   return names;
 }
 
-TEST(Session, ChoosesWhatWasAskedForAndItsFloorOfTheSameSetting) {
+TEST(Session, ChoosesTheNamedRowsAndTheirFloorsOfTheSameSetting) {
   Options options;
   options.only = {"near: ours"};
 
@@ -38,7 +38,7 @@ TEST(Session, ChoosesWhatWasAskedForAndItsFloorOfTheSameSetting) {
   EXPECT_THAT(fullNames(rows), ElementsAre("near/floor", "near/ours"));
 }
 
-TEST(Session, PlacesEachSideOnTheCpusThatItWasGiven) {
+TEST(Session, PlacesEachSideOnItsCpus) {
   const auto cpu = allowedCpus().front();
   Options options;
   options.cpus = {std::to_string(cpu), std::to_string(cpu) + "+" + std::to_string(cpu)};
@@ -50,7 +50,7 @@ TEST(Session, PlacesEachSideOnTheCpusThatItWasGiven) {
   EXPECT_THAT(placement->requester, ElementsAre(cpu, cpu));
 }
 
-TEST(Session, RefusesWhatIsNoCpu) {
+TEST(Session, RefusesInvalidCpus) {
   const auto cpu = std::to_string(allowedCpus().front());
   for (const std::string wrong : {"x", "", "-1", "0x", "9999", "+"}) {
     Options options;
@@ -60,7 +60,7 @@ TEST(Session, RefusesWhatIsNoCpu) {
   }
 }
 
-TEST(Session, RefusesOneCpuForBothWhereTheyMayNotShareIt) {
+TEST(Session, RefusesOneCpuForBothSidesUnlessTheyMayShareIt) {
   const auto cpu = std::to_string(allowedCpus().front());
   Options options;
   options.cpus = {cpu, cpu};
@@ -69,7 +69,7 @@ TEST(Session, RefusesOneCpuForBothWhereTheyMayNotShareIt) {
   EXPECT_TRUE(place(options, true));
 }
 
-TEST(Session, TakesAllRowsInOrder) {
+TEST(Session, MeasuresAllRowsInOrder) {
   std::vector<Measurement> rows{named("a", "first"), named("b", "second")};
   for (auto& row : rows) {
     row.run = [](const Stage& stage) {

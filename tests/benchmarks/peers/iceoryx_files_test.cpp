@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What killed processes of a measurement leave of iceoryx.
+// The files that killed processes of a measurement leave of iceoryx.
 #include "benchmarks/peers/iceoryx_files.h"
 
 #include <fcntl.h>
@@ -37,7 +37,7 @@ std::vector<std::string> namesIn(const std::filesystem::path& folder) {
   return names;
 }
 
-TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
+TEST(IceoryxFiles, RemovesOnlyThoseOfDeadProcesses) {
   const test::TemporaryFolder folder;
   folder.write("mpf-bench-1-server.lock", "");
   leaveSocket(folder.file("mpf-bench-1-server"));
@@ -57,7 +57,7 @@ TEST(IceoryxFiles, ThoseOfProcessesThatAreGoneAreRemovedAndNoOthers) {
                                             "mpf-bench-2-client"));
 }
 
-TEST(IceoryxFiles, ThoseOfADaemonThatIsGoneAreRemoved) {
+TEST(IceoryxFiles, RemovesThoseOfADeadDaemon) {
   const test::TemporaryFolder folder;
   const test::TemporaryFolder sharedMemory;
   for (const char* name : {"iox-unique-roudi.lock", "roudi.lock", "another.lock"})
@@ -71,7 +71,7 @@ TEST(IceoryxFiles, ThoseOfADaemonThatIsGoneAreRemoved) {
         ::open(folder.file("iox-unique-roudi.lock").c_str(), O_RDWR | O_CLOEXEC));
     checkCall(::flock(held.get(), LOCK_EX), "flock");
     removeRouDiFiles(folder.path(), sharedMemory.path());
-    EXPECT_EQ(namesIn(folder.path()).size(), 4U) << "of a daemon that runs";
+    EXPECT_EQ(namesIn(folder.path()).size(), 4U) << "the daemon is running";
   }
 
   removeRouDiFiles(folder.path(), sharedMemory.path());

@@ -10,7 +10,7 @@
 namespace mpf::bench {
 namespace {
 
-// Round trips, then several requests at a time.
+// Makes some round trips, then sends several requests before it receives their replies.
 void expectToAnswer(const PeerFamily& family, Mode mode, std::size_t bytes) {
   const std::shared_ptr<Peer> peer =
       family.make({mode, bytes, true, "mpf-bench-test-" + std::to_string(::getpid())});
@@ -42,11 +42,12 @@ void expectToAnswer(const PeerFamily& family) {
   }
 }
 
-TEST(Peers, OursAnswers) { expectToAnswer(mpfPeer()); }
+TEST(Peers, MpfAnswers) { expectToAnswer(mpfPeer()); }
 TEST(Peers, BoostAnswers) { expectToAnswer(boostPeer()); }
 TEST(Peers, SocketAnswers) { expectToAnswer(socketPeer()); }
 TEST(Peers, ZeromqAnswers) { expectToAnswer(zeromqPeer()); }
-// iceoryx takes a daemon that only one on a host can be: not in tests that run beside each other.
+// iceoryx is not tested: it needs a daemon of which a host can have only one, and tests run in
+// parallel.
 
 }  // namespace
 }  // namespace mpf::bench

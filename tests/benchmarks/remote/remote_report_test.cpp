@@ -12,7 +12,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-// A row as a run leaves it: so many messages a second, and so many of raw TCP's.
+// The result of a row with a message rate, and the ratio of that rate to raw TCP's.
 Result taken(const std::string& question, const std::string& name, std::size_t bytes,
              double perSecond, double timesTcp) {
   Result result;
@@ -36,7 +36,7 @@ Result arrays(double gibPerSecond, double timesTcp) {
                timesTcp);
 }
 
-TEST(RemoteTable, SaysHowManyTimesRawTcp) {
+TEST(RemoteTable, ShowsTheRatioToRawTcp) {
   auto row = messages("no buffer", 0.5);
   row.figures.writesPerSecond = 19.9e3;
   row.figures.idleRequester = 0.25;
@@ -49,22 +49,22 @@ TEST(RemoteTable, SaysHowManyTimesRawTcp) {
   EXPECT_THAT(text, HasSubstr(" 0.50  40.0 k/s: raw TCP, of a kind\n"));
 }
 
-TEST(RemoteTable, CountsBytesOfLargeMessagesOneWay) {
+TEST(RemoteTable, ShowsBytesPerSecondOfLargeMessages) {
   const auto text = remoteTable({arrays(1.5, 0.75)});
 
   EXPECT_THAT(text, HasSubstr(" 1.50 GiB/s "));
   EXPECT_THAT(text, HasSubstr(" 0.75  2.00 GiB/s: raw TCP, of a kind\n"));
 }
 
-TEST(RemoteTable, NamesWhatWasLeftOutAndWhatFailed) {
+TEST(RemoteTable, ShowsWhyRowsWereLeftOutOrFailed) {
   auto leftOut = messages("100 buffered", 1);
-  leftOut.measurement.skipped = "mpf-router is not there";
+  leftOut.measurement.skipped = "mpf-router does not exist";
   auto failed = messages("1000 buffered", 1);
   failed.error = "the client's router has ended: bad luck";
 
   const auto text = remoteTable({leftOut, failed});
 
-  EXPECT_THAT(text, HasSubstr("left out: mpf-router is not there"));
+  EXPECT_THAT(text, HasSubstr("left out: mpf-router does not exist"));
   EXPECT_THAT(text, HasSubstr("failed: the client's router has ended: bad luck"));
 }
 
@@ -73,22 +73,22 @@ TEST(RemoteGoals, AreShownOnlyForRowsThatWereTaken) {
   EXPECT_THAT(remoteGoals({messages("no buffer", 0.5)}), Not(HasSubstr("100 buffered")));
 }
 
-TEST(RemoteGoals, AreHalfOfRawTcpAndAllOfItWhenBuffered) {
+TEST(RemoteGoals, RequireHalfOfRawTcpAndAllOfItWhenBuffered) {
   EXPECT_THAT(remoteGoals({messages("no buffer", 0.51)}), HasSubstr("0.50      0.51  reached"));
   EXPECT_THAT(remoteGoals({messages("no buffer", 0.49)}), HasSubstr("0.50      0.49  MISSED"));
   EXPECT_THAT(remoteGoals({messages("100 buffered", 1.01)}), HasSubstr("1.00      1.01  reached"));
   EXPECT_THAT(remoteGoals({messages("100 buffered", 0.99)}), HasSubstr("1.00      0.99  MISSED"));
 }
 
-TEST(RemoteGoals, AreAGibibyteASecondOrFourFifthsOfRawTcp) {
+TEST(RemoteGoals, RequireAGibibytePerSecondOrFourFifthsOfRawTcp) {
   EXPECT_THAT(remoteGoals({arrays(1.1, 0.3)}), HasSubstr("1.00      1.10  reached"))
-      << "enough by itself";
+      << "1 GiB/s reaches the goal";
   EXPECT_THAT(remoteGoals({arrays(0.9, 0.9)}), HasSubstr("0.80      0.90  reached"))
-      << "as the line allows";
+      << "80 % of raw TCP reaches the goal";
   EXPECT_THAT(remoteGoals({arrays(0.9, 0.5)}), HasSubstr("1.00      0.90  MISSED"));
 }
 
-TEST(RemoteJson, HasWhatReadersCountOn) {
+TEST(RemoteJson, HasTheDocumentedFields) {
   auto row = messages("no buffer", 0.5);
   row.figures.writesPerSecond = 19.9e3;
   row.figures.idleRequester = 0.25;

@@ -29,7 +29,7 @@ ino_t netOf(const std::string& process) {
   return ::stat(("/proc/" + process + "/ns/net").c_str(), &file) == 0 ? file.st_ino : 0;
 }
 
-// Units there and back, `window` of them at a time.
+// Sends units and receives their echoes, `window` of them at a time.
 void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window) {
   const std::shared_ptr<Peer> peer = makeTcpPeer({between, unitBytes, window > 1});
   Act act;
@@ -53,12 +53,12 @@ TEST(TcpPeer, EchoesOnLoopback) {
   expectToEcho(Surroundings::loopback(), 4000, 1);
 }
 
-// More than all buffers between both hold: neither waits for the other for ever.
-TEST(TcpPeer, EchoesWhatTheBuffersDoNotHold) {
+// More data than the buffers between both sides hold causes no deadlock.
+TEST(TcpPeer, EchoesMoreThanTheBuffersHold) {
   expectToEcho(Surroundings::loopback(), 1u << 20, 40);
 }
 
-// Where one may make them.
+// Skipped where this user may not create namespaces.
 class NamespacesTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -77,20 +77,20 @@ TEST_F(NamespacesTest, JoinBothSides) {
   expectToEcho(between_, 1u << 20, 4);
 }
 
-TEST_F(NamespacesTest, LeaveTheirMakerWhereItWas) {
+TEST_F(NamespacesTest, LeaveTheCreatingProcessInItsOwn) {
   EXPECT_EQ(netOf("self"), before_);
   EXPECT_NE(between_.serverAddress(), Surroundings::loopback().serverAddress());
 }
 
-bool isSomebodyIn(ino_t net) {
+bool hasProcess(ino_t net) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
     if (netOf(entry.path().filename().string()) == net) return true;
   }
   return false;
 }
 
-// Killed, a runner takes both namespaces along: they live by its processes and descriptors alone.
-TEST_F(NamespacesTest, NobodyIsLeftInThemWhenTheirMakerIsKilled) {
+// Only the runner's processes and descriptors keep the namespaces: killing it removes both.
+TEST_F(NamespacesTest, ContainNoProcessAfterTheRunnerIsKilled) {
   const test::Watchdog watchdog("namespaces of a killed runner");
   std::array<int, 2> ends{};
   checkCall(::pipe2(ends.data(), O_CLOEXEC), "pipe2");
@@ -119,16 +119,16 @@ TEST_F(NamespacesTest, NobodyIsLeftInThemWhenTheirMakerIsKilled) {
   for (auto& net : nets)
     ASSERT_EQ(::read(told.get(), &net, sizeof net), static_cast<ssize_t>(sizeof net));
   ASSERT_NE(nets[0], nets[1]);
-  for (const auto net : nets) ASSERT_TRUE(net != netOf("self") && isSomebodyIn(net));
+  for (const auto net : nets) ASSERT_TRUE(net != netOf("self") && hasProcess(net));
 
   killProcess(runner);
 
   for (const auto net : nets) {
-    while (isSomebodyIn(net)) ::sched_yield();
+    while (hasProcess(net)) ::sched_yield();
   }
 }
 
-// A program in place of mpf-router: a shell script.
+// Uses a shell script in place of mpf-router.
 class RouterPairTest : public testing::Test {
  protected:
   std::unique_ptr<RouterPair> routers(const std::string& script) {
@@ -139,28 +139,28 @@ class RouterPairTest : public testing::Test {
                                         Placement{{cpus.front()}, {cpus.back()}},
                                         Surroundings::loopback());
   }
-  // Says where it listens as the server's router, then goes on as both.
-  static std::string listening(const std::string& goesOn) {
+  // As the server's router, prints an address first; then both routers run `rest`.
+  static std::string listening(const std::string& rest) {
     return "fd=; while [ $# -gt 0 ]; do [ $1 = --ready-fd ] && fd=$2; shift; done\n"
            "if [ -n \"$fd\" ]; then echo 127.0.0.1:7 >&$fd; exec {fd}>&-; fi\n" +
-           goesOn + "\n";
+           rest + "\n";
   }
   static Outcome well() { return {}; }
   test::TemporaryFolder folder_;
 };
 
-TEST_F(RouterPairTest, SaysWhyARouterDoesNotListen) {
+TEST_F(RouterPairTest, ReportsWhyARouterDidNotStart) {
   const auto pair = routers("echo 'no such place' >&2; exit 1\n");
 
   try {
     pair->start();
-    FAIL() << "it listens";
+    FAIL() << "start() did not throw";
   } catch (const std::exception& error) {
-    EXPECT_STREQ(error.what(), "the server's router does not listen: no such place");
+    EXPECT_STREQ(error.what(), "the server's router did not start: no such place");
   }
 }
 
-TEST_F(RouterPairTest, RunsRowsWhileBothRun) {
+TEST_F(RouterPairTest, RunsRowsWhileBothRoutersRun) {
   const auto pair = routers(listening("exec sleep 3600"));
 
   pair->start();
@@ -170,7 +170,7 @@ TEST_F(RouterPairTest, RunsRowsWhileBothRun) {
   EXPECT_NE(pair->serverPid(), pair->clientPid());
 }
 
-TEST_F(RouterPairTest, SaysOfARowThatFailsWhatTheClientsRouterSaid) {
+TEST_F(RouterPairTest, AddsTheOutputOfTheClientsRouterToAnError) {
   const auto pair = routers(
       listening("[ -n \"$fd\" ] && exec sleep 3600; echo 'the line is bad' >&2; exec sleep 3600"));
   pair->start();
@@ -179,16 +179,16 @@ TEST_F(RouterPairTest, SaysOfARowThatFailsWhatTheClientsRouterSaid) {
     outcome.error = "no end";
     return outcome;
   };
-  const test::Watchdog watchdog("a router that says something");
+  const test::Watchdog watchdog("a router that prints a line");
 
-  // It says so at some time or other.
+  // The script prints the line at an unknown time.
   std::string error;
   while (error.empty() || error == "no end") error = pair->run(failing).error;
 
-  EXPECT_EQ(error, "no end; the client's router said last: the line is bad");
+  EXPECT_EQ(error, "no end; last output of the client's router: the line is bad");
 }
 
-TEST_F(RouterPairTest, IsGoneAfterItsStop) {
+TEST_F(RouterPairTest, EndsBothRoutersAtItsStop) {
   const auto pair = routers(listening("exec sleep 3600"));
   pair->start();
   const int server = pair->serverPid();
@@ -200,20 +200,20 @@ TEST_F(RouterPairTest, IsGoneAfterItsStop) {
   EXPECT_NE(::kill(client, 0), 0);
 }
 
-TEST_F(RouterPairTest, SaysWhatARouterSaidThatHasEnded) {
+TEST_F(RouterPairTest, ReportsTheLastOutputOfARouterThatHasEnded) {
   const test::Watchdog watchdog("a router that ends");
   const auto pair =
       routers(listening("[ -n \"$fd\" ] && exec sleep 3600; echo 'an accident' >&2; exit 3"));
   pair->start();
 
-  // It ends at some time or other.
+  // The script ends at an unknown time.
   std::string error;
   while (error.empty()) error = pair->run(well).error;
 
   EXPECT_EQ(error, "the client's router has ended: an accident");
 }
 
-TEST_F(RouterPairTest, StartsAnew) {
+TEST_F(RouterPairTest, StartsAgainAfterItsStop) {
   const auto pair = routers(listening("exec sleep 3600"));
   pair->start();
   pair->stop();

@@ -10,13 +10,13 @@
 namespace mpf::bench {
 namespace {
 
-// Both on one CPU, so that a machine with a single one will do.
+// Both on one CPU, so that the tests run on a machine with a single CPU.
 Stage smallStage() {
   const auto cpu = allowedCpus().front();
   return Stage({{cpu}, {cpu}}, {std::chrono::milliseconds(1), std::chrono::milliseconds(2)});
 }
 
-TEST(Stage, BringsTheRequestersFiguresBack) {
+TEST(Stage, ReturnsTheFiguresOfTheRequester) {
   Act act;
   act.requester = [](const Scene& scene) { scene.figures().value = 42; };
 
@@ -44,11 +44,11 @@ TEST(Stage, StartsTheRequesterWhenTheServerIsReady) {
   EXPECT_EQ(outcome.figures.value, 7);
 }
 
-TEST(Stage, SaysWhatTheRequesterThrew) {
+TEST(Stage, ReportsWhatTheRequesterThrew) {
   Act act;
-  act.requester = [](const Scene&) { throw std::runtime_error("no such thing"); };
+  act.requester = [](const Scene&) { throw std::runtime_error("no such device"); };
 
-  EXPECT_EQ(smallStage().run(act).error, "requester: no such thing");
+  EXPECT_EQ(smallStage().run(act).error, "requester: no such device");
 }
 
 TEST(Stage, NamesTheSignalThatKilledTheServer) {
@@ -61,7 +61,7 @@ TEST(Stage, NamesTheSignalThatKilledTheServer) {
     for (;;) ::pause();
   };
 
-  EXPECT_EQ(smallStage().run(act).error, "server died of signal 9");
+  EXPECT_EQ(smallStage().run(act).error, "server was killed by signal 9");
 }
 
 TEST(Stage, LeavesNoProcessBehind) {

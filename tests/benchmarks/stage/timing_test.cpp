@@ -12,7 +12,7 @@ namespace {
 
 constexpr Budget kMoment{std::chrono::milliseconds(1), std::chrono::milliseconds(30)};
 
-// A scene of its own, without a stage.
+// A scene without a stage.
 struct Timed {
   Control control;
   Scene scene{control, kMoment, {}};
@@ -46,7 +46,7 @@ TEST(TimeWindow, TimesEachFromItsSendToItsReply) {
 
   const auto& figures = timed.control.figures;
   EXPECT_EQ(most, 4);
-  EXPECT_EQ(onTheirWay, 0) << "replies that nobody took";
+  EXPECT_EQ(onTheirWay, 0) << "unreceived replies";
   EXPECT_GE(figures.latency.percentileNs(50), 3'900'000u)
       << "four receives lie between a send and its reply";
   EXPECT_LE(figures.perSecond, 1000);
@@ -70,7 +70,7 @@ TEST(Meter, CountsWritesOfAProcess) {
   EXPECT_LE(timed.control.figures.idleServer, 1);
 }
 
-TEST(Meter, LeavesWritesOfNobodyUnknown) {
+TEST(Meter, LeavesWritesUnknownWithoutAProcess) {
   Timed timed;
 
   timed.nobody.start();
@@ -80,7 +80,7 @@ TEST(Meter, LeavesWritesOfNobodyUnknown) {
   EXPECT_EQ(timed.control.figures.writesPerSecond, kNotLookedAt);
 }
 
-TEST(Meter, KnowsWhatAProcessUses) {
+TEST(Meter, ReadsCpuTimeAndMemoryOfAProcess) {
   const auto before = cpuNsOf(::getpid());
   for (const auto end = Deadline::after(std::chrono::milliseconds(20)); !end.hasPassed();) {
   }

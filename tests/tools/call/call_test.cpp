@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf call`: messages of every type, statistics, and why there is no reply.
+// `mpf call`: messages of every type, statistics, and the reasons why there is no reply.
 #include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {
@@ -15,7 +15,7 @@ using testing::StartsWith;
 
 class CallTest : public ToolsTest {
  protected:
-  // mpf call, with the patience of the watchdog.
+  // Runs mpf call with a timeout that only the watchdog ends.
   [[nodiscard]] Ended call(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), "call");
     arguments.insert(arguments.end(), {"--timeout", "100"});
@@ -37,7 +37,7 @@ class CallTest : public ToolsTest {
     ToolsTest::TearDown();
   }
 
-  std::vector<Message> kept_;  // requests that the server answers never
+  std::vector<Message> kept_;  // requests that the server never answers
   std::unique_ptr<MessageServer> server_;
   std::thread thread_;
 };
@@ -47,7 +47,7 @@ struct Echoed {
   std::string reply;
 };
 
-TEST_F(CallTest, EveryTypeComesBackAsItWasSent) {
+TEST_F(CallTest, EchoesMessagesOfEveryType) {
   const EchoThread echo(backplane_, "echo");
   const std::vector<Echoed> all{
       {{"int32", "timeout=1", "cmd=-2", "status=3", "address=0x10", "extra=5", "value=-2147483648"},
@@ -80,7 +80,7 @@ TEST_F(CallTest, EveryTypeComesBackAsItWasSent) {
   }
 }
 
-TEST_F(CallTest, LongArraysAreShortenedUnlessAllIsAskedFor) {
+TEST_F(CallTest, ShortensLongArraysWithoutPrint) {
   const EchoThread echo(backplane_, "echo");
   std::string value = "0";
   for (int i = 1; i < 5000; ++i) value += "," + std::to_string(i);
@@ -92,7 +92,7 @@ TEST_F(CallTest, LongArraysAreShortenedUnlessAllIsAskedFor) {
   EXPECT_THAT(all.out, EndsWith(" value=" + value + "\n"));
 }
 
-TEST_F(CallTest, ProgramsGetJson) {
+TEST_F(CallTest, PrintsTheReplyAsJson) {
   const EchoThread echo(backplane_, "echo");
 
   const auto ended = call({"echo", "char8Array", "value=a\\x00\\xffb", "--json"});
@@ -110,7 +110,7 @@ TEST_F(CallTest, ProgramsGetJson) {
   EXPECT_GT(all.at("max_ns"), 0);
 }
 
-TEST_F(CallTest, ManyCallsEndInStatistics) {
+TEST_F(CallTest, PrintsStatisticsOfManyCalls) {
   const EchoThread echo(backplane_, "echo");
 
   const auto ended = call({"echo", "float64", "value=1", "--count", "200"});
@@ -121,7 +121,7 @@ TEST_F(CallTest, ManyCallsEndInStatistics) {
                              "p99\\.9 [0-9.]+ [mun]?s, max [0-9.]+ [mun]?s\n"));
 }
 
-TEST_F(CallTest, ManyCallsEndInStatisticsForPrograms) {
+TEST_F(CallTest, PrintsStatisticsOfManyCallsAsJson) {
   const EchoThread echo(backplane_, "echo");
 
   const auto brief = nlohmann::json::parse(call({"echo", "int32", "--count", "200", "--json"}).out);
@@ -146,27 +146,28 @@ TEST_F(CallTest, AReplyThatReportsAnErrorIsAReply) {
   EXPECT_THAT(ended.out, HasSubstr(" status=-1 "));
 }
 
-TEST_F(CallTest, ATypeThatDoesNotExistIsNamedAndTheOthersToo) {
+TEST_F(CallTest, AnUnknownTypeIsAnErrorThatListsAllTypes) {
   const auto ended = call({"echo", "int64"});
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_EQ(ended.err,
-            "mpf call: int64 is no message type; use one of int32, int32Array, float64, "
+            "mpf call: int64 is not a message type; use one of int32, int32Array, float64, "
             "float64Array, char8Array, serialConfig, "
             "outOfBand, user\n");
 }
 
-TEST_F(CallTest, WhatOnlyMpfItselfSaysCannotBeSent) {
+TEST_F(CallTest, RefusesTypesThatOnlyMpfItselfSends) {
   for (const std::string type : {"connect", "requestFate"}) {
     const auto ended = call({"echo", type});
 
     EXPECT_EQ(ended.status, 2);
-    EXPECT_THAT(ended.err, StartsWith("mpf call: " + type +
-                                      " is what MPF itself says to clients; use one of int32, "));
+    EXPECT_THAT(ended.err,
+                StartsWith("mpf call: " + type +
+                           " is a message type that only MPF itself sends; use one of int32, "));
   }
 }
 
-TEST_F(CallTest, AWrongFieldIsNamedAndTheOthersToo) {
+TEST_F(CallTest, AWrongFieldIsAnErrorThatListsAllFields) {
   const std::vector<Echoed> wrong{
       {{"int32", "adress=3"},
        "mpf call: int32: no field 'adress'; there are timeout, cmd, status, address, extra, value, "
@@ -188,7 +189,7 @@ TEST_F(CallTest, AWrongFieldIsNamedAndTheOthersToo) {
                                HasSubstr("an integer from -2147483648 to 2147483647")));
 }
 
-TEST_F(CallTest, AServerThatIsNotThereIsNamed) {
+TEST_F(CallTest, NamesAnAbsentServer) {
   const auto ended = run({"call", "nobody", "int32", "--timeout", "0.05"});
 
   EXPECT_EQ(ended.status, 1);
@@ -206,7 +207,7 @@ TEST_F(CallTest, TheServerMayStartWithinTheTimeout) {
   EXPECT_THAT(tool.end().out, EndsWith("value=3\n"));
 }
 
-TEST_F(CallTest, AMessageThatIsTooLargeIsRefusedWithTheLimit) {
+TEST_F(CallTest, ATooLargeMessageIsRefusedWithTheLimit) {
   const EchoThread echo(backplane_, "echo", {.maxMessageBytes = 1000});
 
   const auto ended = call({"echo", "char8Array", "value=" + std::string(1000, 'x')});
@@ -217,26 +218,26 @@ TEST_F(CallTest, AMessageThatIsTooLargeIsRefusedWithTheLimit) {
                            " bytes, the limit is 1000\n");
 }
 
-TEST_F(CallTest, AServerAtAnotherLocationIsFoundThere) {
+TEST_F(CallTest, FindsAServerAtAnotherLocation) {
   const EchoThread echo(backplane_, "echo", {.location = 5});
 
   EXPECT_EQ(call({"echo", "int32", "--location", "5"}).status, 0);
   EXPECT_THAT(run({"call", "echo", "int32", "--timeout", "0.05"}).err, HasSubstr("at location 0"));
 }
 
-TEST_F(CallTest, ATypeThatTheServerDoesNotTakeIsRefused) {
+TEST_F(CallTest, ATypeWithoutAHandlerIsRefused) {
   serve([](MessageServer& server) { server.on<Int32>([](Int32&) {}); });
 
   const auto ended = call({"special", "float64"});
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err,
-            "mpf call: no reply: refused (the server does not take float64 messages, or let this "
-            "one go without a reply)\n");
+            "mpf call: no reply: refused (the server does not accept float64 messages, or released "
+            "this one without a reply)\n");
 }
 
-// Whether the server has taken it by then is up to the machine.
-TEST_F(CallTest, ARequestThatIsNotAnsweredInTimeHasAFate) {
+// Whether the server has received the request by then depends on the speed of the machine.
+TEST_F(CallTest, ARequestWithoutAReplyInTimeHasAFate) {
   serve([&](MessageServer& server) {
     server.on<Int32>([&](Int32Message&& request) { kept_.push_back(std::move(request)); });
   });
@@ -247,13 +248,13 @@ TEST_F(CallTest, ARequestThatIsNotAnsweredInTimeHasAFate) {
   EXPECT_THAT(
       ended.err,
       testing::AnyOf(
-          StartsWith("mpf call: no reply: outcomeUnknown (the server took the request and did not "
-                     "reply in time"),
-          StartsWith("mpf call: no reply: expired (the server did not take the request in time"),
+          StartsWith("mpf call: no reply: outcomeUnknown (the server received the request, but did "
+                     "not reply in time"),
+          StartsWith("mpf call: no reply: expired (the server did not receive the request in time"),
           StartsWith("mpf call: not sent: not connected: ")));
 }
 
-TEST_F(CallTest, WhyCallsOfALoopFailedIsCounted) {
+TEST_F(CallTest, CountsTheReasonsOfFailedCalls) {
   serve([](MessageServer& server) {
     server.on<Int32>([count = 0, &server](Int32Message&& request) mutable {
       if (++count % 3 == 0) server.refuse(std::move(request));
@@ -275,8 +276,7 @@ TEST_F(CallTest, WhyCallsOfALoopFailedIsCounted) {
   EXPECT_EQ(all.at("why").begin().value(), 3);
 }
 
-// With what it has counted until then.
-TEST_F(CallTest, ALoopEndsOnASignal) {
+TEST_F(CallTest, ASignalEndsALoopWithItsStatistics) {
   const EchoThread echo(backplane_, "echo");
   for (const int signal : {SIGINT, SIGTERM}) {
     Tool tool({"call", "echo", "int32", "value=3", "--count", "1000000000", "--print", "--timeout",
@@ -292,7 +292,7 @@ TEST_F(CallTest, ALoopEndsOnASignal) {
   }
 }
 
-TEST_F(CallTest, ALoopInAPauseEndsOnASignal) {
+TEST_F(CallTest, ASignalEndsALoopDuringAPause) {
   const EchoThread echo(backplane_, "echo");
   Tool tool({"call", "echo", "int32", "--count", "2", "--interval", "1000000", "--print",
              "--timeout", "100"},
@@ -304,7 +304,7 @@ TEST_F(CallTest, ALoopInAPauseEndsOnASignal) {
   EXPECT_THAT(tool.end().out, StartsWith("1 replied, 0 did not; "));
 }
 
-TEST_F(CallTest, WhatComesAfterTheReplyCanBeFollowed) {
+TEST_F(CallTest, FollowPrintsMessagesAfterTheReply) {
   serve([](MessageServer& server) {
     server.on<Int32>([&](Int32Message&& request) {
       for (int i = 0; i < 3; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf clean`: removes what dead processes left, and nothing else.
+// `mpf clean`: removes files of dead processes, and nothing else.
 #include <sys/stat.h>
 
 #include <filesystem>
@@ -25,7 +25,7 @@ std::size_t timesOf(const std::string& word, const std::string& text) {
 
 class CleanTest : public ToolsTest {
  protected:
-  // A server and its client, both killed while messages are on their way.
+  // Leaves the segments of a server and its client, both killed while messages are outstanding.
   void leaveDeadPair() const {
     Victim server("serve", backplane_.name());
     ASSERT_EQ(server.line(), "open");
@@ -37,7 +37,7 @@ class CleanTest : public ToolsTest {
   }
 };
 
-TEST_F(CleanTest, WithoutAnythingDeadItSaysSo) {
+TEST_F(CleanTest, ReportsThatThereIsNothingToRemove) {
   const EchoThread echo(backplane_, "echo");
 
   const auto ended = run({"clean"});
@@ -47,7 +47,7 @@ TEST_F(CleanTest, WithoutAnythingDeadItSaysSo) {
   EXPECT_EQ(run({"call", "echo", "int32", "--timeout", "100"}).status, 0);
 }
 
-TEST_F(CleanTest, OutputThatCannotBeWrittenIsAnError) {
+TEST_F(CleanTest, FailsWhenOutputCannotBeWritten) {
   Victim shell("/bin/sh",
                std::vector<std::string>{"-c", std::string(MPF_TEST_TOOL) + " clean --backplane " +
                                                   backplane_.name() + " >/dev/full 2>/dev/null"});
@@ -55,7 +55,7 @@ TEST_F(CleanTest, OutputThatCannotBeWrittenIsAnError) {
   EXPECT_EQ(WEXITSTATUS(shell.wait()), 1);
 }
 
-TEST_F(CleanTest, WhatCannotBeJudgedIsCounted) {
+TEST_F(CleanTest, CountsFilesThatCannotBeJudged) {
   const auto stray = segments::path("mpf." + backplane_.name() + ".notes");
   std::ofstream(stray) << "x";
 
@@ -64,7 +64,7 @@ TEST_F(CleanTest, WhatCannotBeJudgedIsCounted) {
   EXPECT_TRUE(std::filesystem::remove(stray));
 }
 
-TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
+TEST_F(CleanTest, RemovesOnlyFilesOfDeadProcesses) {
   const EchoThread living(backplane_, "living");
   SyncClient client(backplane_, "living", 0);
   ASSERT_TRUE(client.call(Int32Message(), 60s));
@@ -88,8 +88,8 @@ TEST_F(CleanTest, RemovesWhatIsDeadAndOnlyThat) {
   EXPECT_EQ(run({"clean"}).out, "nothing to remove: no dead process left anything\n");
 }
 
-// Their server is stopped, and so cannot do it.
-TEST_F(CleanTest, AThousandLinksOfADeadClientAreRemoved) {
+// The server is stopped, so it cannot remove the links itself.
+TEST_F(CleanTest, RemovesAThousandLinksOfADeadClient) {
   Victim server("serve", backplane_.name());
   Victim crowd("crowd", backplane_.name(), {"1000"});
   while (!crowd.line().starts_with("answered ")) continue;
@@ -105,27 +105,27 @@ TEST_F(CleanTest, AThousandLinksOfADeadClientAreRemoved) {
   server.end(SIGTERM);
 }
 
-// A rehearsal finds what the removal then removes, and changes nothing.
-TEST_F(CleanTest, ADryRunSaysWhatWouldBeRemovedAndHowItKnows) {
+// A dry run lists exactly the files that are then removed, and changes nothing.
+TEST_F(CleanTest, ADryRunReportsWhatWouldBeRemovedAndWhy) {
   const EchoThread living(backplane_, "living");
   leaveDeadPair();
   const auto before = files();
 
-  const auto rehearsal = run({"clean", "--dry-run"});
+  const auto dryRun = run({"clean", "--dry-run"});
 
-  EXPECT_EQ(rehearsal.status, 0);
+  EXPECT_EQ(dryRun.status, 0);
   EXPECT_TRUE(files() == before);
-  EXPECT_THAT(rehearsal.out, HasSubstr("s.0.echo:\n  no process holds the lock of"));
-  for (const auto& line : linesOf(rehearsal.out)) EXPECT_LE(line.size(), 80U) << line;
-  EXPECT_THAT(rehearsal.out, testing::EndsWith("\n3 files stay: their processes live\n"));
+  EXPECT_THAT(dryRun.out, HasSubstr("s.0.echo:\n  no process holds the lock of"));
+  for (const auto& line : linesOf(dryRun.out)) EXPECT_LE(line.size(), 80U) << line;
+  EXPECT_THAT(dryRun.out, testing::EndsWith("\n3 files stay: their processes are alive\n"));
   auto expected =
-      inOneLine(rehearsal.out.substr(0, rehearsal.out.rfind('\n', rehearsal.out.size() - 2) + 1));
+      inOneLine(dryRun.out.substr(0, dryRun.out.rfind('\n', dryRun.out.size() - 2) + 1));
   for (std::size_t at = 0; (at = expected.find("would remove ", at)) != std::string::npos;)
     expected.replace(at, 13, "removed ");
   EXPECT_EQ(inOneLine(run({"clean"}).out), expected);
 }
 
-TEST_F(CleanTest, AsJsonEveryFileHasItsVerdictAndItsReason) {
+TEST_F(CleanTest, JsonHasVerdictAndReasonOfEachFile) {
   const EchoThread living(backplane_, "living");
   const auto stray = segments::path(SegmentName::prefix(backplane_.name()) + "notes");
   std::ofstream(stray) << "mine";
@@ -147,11 +147,11 @@ TEST_F(CleanTest, AsJsonEveryFileHasItsVerdictAndItsReason) {
   std::filesystem::remove(stray);
 }
 
-TEST_F(CleanTest, WhatAnotherUserLeftIsNamed) {
+TEST_F(CleanTest, NamesFilesThatAnotherUserOwns) {
   constexpr uid_t kNobody = 65534;
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can be two users";
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can run as another user";
   if (Tool({"--help"}, "", kNobody).end().status != 0)
-    GTEST_SKIP() << "nobody else can run " << MPF_TEST_TOOL;
+    GTEST_SKIP() << "other users cannot execute " << MPF_TEST_TOOL;
   const auto name = SegmentName::serverWindow(backplane_.name(), 0, "left");
   {
     auto window = Segment::create(layout::kWindowBytes, layout::SegmentKind::serverWindow,
@@ -169,8 +169,8 @@ TEST_F(CleanTest, WhatAnotherUserLeftIsNamed) {
               StartsWith("removed " + segments::path(name) + ":\n  no process holds the lock of"));
 }
 
-// Nothing that lies there keeps it waiting or ends it.
-TEST_F(CleanTest, JunkUnderOurNamesDoesNoHarm) {
+// Directories and pipes under names of MPF neither block nor end the program.
+TEST_F(CleanTest, SurvivesForeignFilesUnderItsNames) {
   const EchoThread echo(backplane_, "echo");
   const auto pathOf = [&](const std::string& rest) {
     return segments::path(SegmentName::prefix(backplane_.name()) + rest);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every verdict of every check, on a host made of files in a temporary folder.
+// Every result of every check of `mpf doctor`, on a host made of files in a temporary folder.
 #include "tools/doctor/checks.h"
 
 #include <fcntl.h>
@@ -33,10 +33,10 @@ using testing::Not;
 
 constexpr std::uint64_t kGiB = std::uint64_t{1} << 30;
 
-// A host on which all is well, until a test changes it.
-class CheckUp : public testing::Test {
+// A host without problems, until a test changes it.
+class DoctorChecks : public testing::Test {
  protected:
-  CheckUp() {
+  DoctorChecks() {
     host_.root = folder_.path();
     host_.sharedMemory = [] { return Host::Space{8 * kGiB, 7 * kGiB, 1'000'000, 2'000'000}; };
     host_.hasPidfd = [] { return true; };
@@ -75,13 +75,13 @@ class CheckUp : public testing::Test {
   void chmod(const std::string& path, mode_t mode) const {
     ASSERT_EQ(::chmod((host_.root / path).c_str(), mode), 0);
   }
-  // A file that belongs to the user of the test, as root of a host in which this program is user
-  // 4711.
+  // Creates a segment that belongs to the user of the test. According to the files of this host,
+  // the program runs as user 4711.
   void leave(const std::string& name, mode_t mode) const {
     write("dev/shm/" + name, "");
     chmod("dev/shm/" + name, mode);
   }
-  // A server window of a process of that pid namespace.
+  // Creates a server window of a process of that pid namespace.
   void leaveWindow(const std::string& server, std::uint64_t pidNamespace) const {
     layout::SegmentHeader header{};
     header.pidNamespace = pidNamespace;
@@ -108,7 +108,7 @@ class CheckUp : public testing::Test {
   Host host_;
 };
 
-TEST_F(CheckUp, OnAGoodHostAllIsWell) {
+TEST_F(DoctorChecks, FindsNoProblemOnAGoodHost) {
   const auto findings = runDoctorChecks(host_);
 
   EXPECT_EQ(findings.size(), 18U);
@@ -120,9 +120,8 @@ TEST_F(CheckUp, OnAGoodHostAllIsWell) {
   }
 }
 
-// What a host does not tell is not guessed: no check throws, none finds a problem but the one that
-// misses /dev/shm itself.
-TEST_F(CheckUp, OnAHostThatTellsNothingNothingIsGuessed) {
+// No check throws or guesses where the host shows nothing.
+TEST_F(DoctorChecks, ReportsUnknownWhereAHostShowsNothing) {
   remove("proc");
   remove("sys");
   host_.sharedMemory = [] { return std::nullopt; };
@@ -137,21 +136,22 @@ TEST_F(CheckUp, OnAHostThatTellsNothingNothingIsGuessed) {
   }
 }
 
-TEST_F(CheckUp, AMountThatIsReadOnlyIsAProblem) {
+TEST_F(DoctorChecks, AReadOnlyMountIsAProblem) {
   append("proc/self/mounts", "tmpfs /dev/shm tmpfs ro,nosuid 0 0\n");
   expect(checkMount(host_), Health::problem, "read-only", "remount,rw");
 }
 
-TEST_F(CheckUp, AMountOfAnotherKindOrNoneIsAWarning) {
+TEST_F(DoctorChecks, AMountOfAnotherTypeOrNoneIsAWarning) {
   write("proc/self/mounts", "overlay /dev/shm overlay rw 0 0\n");
-  expect(checkMount(host_), Health::warning, "a overlay, not a tmpfs", "mount -t tmpfs");
+  expect(checkMount(host_), Health::warning, "overlay, not tmpfs", "mount -t tmpfs");
   write("proc/self/mounts", "proc /proc proc rw 0 0\n");
-  expect(checkMount(host_), Health::warning, "no file system of its own", "mount -t tmpfs");
+  expect(checkMount(host_), Health::warning, "not a file system of its own", "mount -t tmpfs");
 }
 
-TEST_F(CheckUp, LittleSpaceIsAWarningNoneIsAProblem) {
+TEST_F(DoctorChecks, LittleSpaceIsAWarningAndNoSpaceAProblem) {
   host_.sharedMemory = [] { return Host::Space{64 << 20, 60 << 20, 1'000'000, 2'000'000}; };
-  expect(checkSpace(host_), Health::warning, "60.0 MiB of 64.0 MiB free: little", "--shm-size");
+  expect(checkSpace(host_), Health::warning, "60.0 MiB of 64.0 MiB free: the small default",
+         "--shm-size");
   host_.sharedMemory = [] { return Host::Space{8 * kGiB, 5 << 20, 1'000'000, 2'000'000}; };
   expect(checkSpace(host_), Health::warning, "5.0 MiB of 8.0 GiB free: large messages",
          "mpf clean");
@@ -164,28 +164,28 @@ TEST_F(CheckUp, LittleSpaceIsAWarningNoneIsAProblem) {
   expect(checkSpace(host_), Health::problem, "3 of 800 inodes free", "nr_inodes=");
 }
 
-TEST_F(CheckUp, RightsOfSharedMemoryAreOpenAndSticky) {
+TEST_F(DoctorChecks, SharedMemoryMustBeWritableByAllAndSticky) {
   chmod("dev/shm", 0777);
   expect(checkRights(host_), Health::warning, "mode 0777: any user may remove", "chmod 1777");
   chmod("dev/shm", 0755);
   expect(checkRights(host_), Health::problem, "mode 0755: not every user may create", "chmod 1777");
   remove("dev/shm");
-  expect(checkRights(host_), Health::problem, "there is no /dev/shm", "mkdir");
+  expect(checkRights(host_), Health::problem, "/dev/shm does not exist", "mkdir");
 }
 
-TEST_F(CheckUp, SegmentsThatMayNotBeReadAreCounted) {
+TEST_F(DoctorChecks, CountsSegmentsThatThisUserMayNotRead) {
   leave("mpf.lab.s.0.dac", 0644);
   leave("mpf.lab.h.1", 0600);
   leave("notes", 0600);
-  if (::geteuid() == 4711) GTEST_SKIP() << "the files are this user's";
+  if (::geteuid() == 4711) GTEST_SKIP() << "the files belong to this user";
 
-  expect(checkSegments(host_), Health::warning, "1 of 2 files may not be read", "--group");
+  expect(checkSegments(host_), Health::warning, "this user may not read 1 of 2 files", "--group");
 
   write("proc/self/status", "Uid:\t0 0 0 0\nGid:\t0 0 0 0\nGroups:\t\n");
   expect(checkSegments(host_), Health::ok, "2 files");
 }
 
-TEST_F(CheckUp, AGroupThatMayReadIsEnough) {
+TEST_F(DoctorChecks, AcceptsSegmentsThatTheGroupMayRead) {
   leave("mpf.lab.h.1", 0660);
   write("proc/self/status",
         "Uid:\t4711 4711 4711 4711\nGid:\t" + std::to_string(::getegid()) + " 1 1 1\n");
@@ -193,7 +193,7 @@ TEST_F(CheckUp, AGroupThatMayReadIsEnough) {
   expect(checkSegments(host_), Health::ok, "1 files");
 }
 
-TEST_F(CheckUp, WindowsOfAnotherPidNamespaceAreCounted) {
+TEST_F(DoctorChecks, CountsWindowsOfAnotherPidNamespace) {
   leaveWindow("here", ownNamespace());
   leaveWindow("there", ownNamespace() + 1);
   write("dev/shm/mpf.lab.c.1", "cut");
@@ -202,12 +202,12 @@ TEST_F(CheckUp, WindowsOfAnotherPidNamespaceAreCounted) {
   expect(checkNamespaces(host_), Health::ok, "1 windows");
 }
 
-class RemoveIpc : public CheckUp {
+class RemoveIpc : public DoctorChecks {
  protected:
   void SetUp() override { write("run/systemd/system/.keep", ""); }
 };
 
-TEST_F(RemoveIpc, IsAProblemForALoginUserUnlessItIsSwitchedOff) {
+TEST_F(RemoveIpc, IsAProblemForALoginUserUnlessSwitchedOff) {
   expect(checkRemoveIpc(host_), Health::problem, "RemoveIPC=yes: when user 4711 logs out",
          "enable-linger 4711");
   write("etc/systemd/logind.conf", "[Login]\n#RemoveIPC=no\n");
@@ -216,7 +216,7 @@ TEST_F(RemoveIpc, IsAProblemForALoginUserUnlessItIsSwitchedOff) {
   expect(checkRemoveIpc(host_), Health::ok, "RemoveIPC=no");
 }
 
-TEST_F(RemoveIpc, IsWhatTheLastFileSays) {
+TEST_F(RemoveIpc, IsTheValueOfTheLastFile) {
   write("etc/systemd/logind.conf", "[Login]\nRemoveIPC=yes\n");
   write("usr/lib/systemd/logind.conf.d/20-site.conf", "[Login]\nRemoveIPC=no\n");
   expect(checkRemoveIpc(host_), Health::ok, "RemoveIPC=no");
@@ -226,48 +226,49 @@ TEST_F(RemoveIpc, IsWhatTheLastFileSays) {
   expect(checkRemoveIpc(host_), Health::problem, "RemoveIPC=yes", "mpf.conf");
 }
 
-TEST_F(RemoveIpc, SparesSystemUsers) {
+TEST_F(RemoveIpc, DoesNotApplyToSystemUsers) {
   write("proc/self/status", "Uid:\t0 100 0 0\n");
-  expect(checkRemoveIpc(host_), Health::ok, "spares users below 1000");
+  expect(checkRemoveIpc(host_), Health::ok, "excepts users below 1000");
 }
 
-TEST_F(CheckUp, AHiddenProcIsAWarning) {
+TEST_F(DoctorChecks, AHiddenProcIsAWarning) {
   write("proc/self/mounts", "proc /proc proc rw,hidepid=invisible 0 0\n");
   expect(checkHidepid(host_), Health::warning, "hidepid=invisible", "hidepid=0");
   write("proc/self/mounts", "proc /proc proc rw,hidepid=0 0 0\n");
-  expect(checkHidepid(host_), Health::ok, "all is shown");
+  expect(checkHidepid(host_), Health::ok, "all users");
 }
 
-TEST_F(CheckUp, AKernelWithoutPidfdIsAWarning) {
+TEST_F(DoctorChecks, AKernelWithoutPidfdIsAWarning) {
   host_.hasPidfd = [] { return false; };
   write("proc/sys/kernel/osrelease", "4.19.0\n");
-  expect(checkPidfd(host_), Health::warning, "kernel 4.19.0 has none", "5.3");
+  expect(checkPidfd(host_), Health::warning, "kernel 4.19.0 has no pidfd_open", "5.3");
 }
 
-TEST_F(CheckUp, TightLimitsAreWarnings) {
+TEST_F(DoctorChecks, TightLimitsAreWarnings) {
   write("proc/self/limits",
         "Max open files            256                  524288               files     \n"
         "Max address space         1073741824           unlimited            bytes     \n");
   write("proc/sys/vm/max_map_count", "1000\n");
   write("proc/sys/fs/inotify/max_user_instances", "8\n");
-  expect(checkOpenFiles(host_), Health::warning, "256: each process", "ulimit -n");
+  expect(checkOpenFiles(host_), Health::warning, "256: a program needs", "ulimit -n");
   expect(checkAddressSpace(host_), Health::warning, "1073741824", "ulimit -v");
   expect(checkMaps(host_), Health::warning, "1000", "vm.max_map_count");
   expect(checkInotify(host_), Health::warning, "8", "max_user_instances");
 }
 
-TEST_F(CheckUp, RealTimePriorityNeedsALimitOrACapability) {
+TEST_F(DoctorChecks, RealTimePriorityNeedsALimitOrACapability) {
   expect(checkRealTime(host_), Health::ok, "up to 20 by RLIMIT_RTPRIO");
   write("proc/self/limits",
         "Max realtime priority     0                    0                    \n");
-  expect(checkRealTime(host_), Health::warning, "may have 0, of 20", "LimitRTPRIO=20");
+  expect(checkRealTime(host_), Health::warning, "may have priority 0, device servers request 20",
+         "LimitRTPRIO=20");
   append("proc/self/status", "CapEff:\t0000000000800000\n");
   expect(checkRealTime(host_), Health::ok, "CAP_SYS_NICE");
   write("proc/sys/kernel/sched_rt_runtime_us", "0\n");
-  expect(checkRealTime(host_), Health::warning, "no time at all", "sched_rt_runtime_us=950000");
+  expect(checkRealTime(host_), Health::warning, "no processor time", "sched_rt_runtime_us=950000");
 }
 
-TEST_F(CheckUp, LimitsThatAreNoNumbersAreUnknown) {
+TEST_F(DoctorChecks, LimitsThatAreNotNumbersAreUnknown) {
   write("proc/self/limits", "Max open files            many\n");
   write("proc/sys/vm/max_map_count", "-1\n");
   expect(checkOpenFiles(host_), Health::unknown, "cannot be read");
@@ -275,7 +276,7 @@ TEST_F(CheckUp, LimitsThatAreNoNumbersAreUnknown) {
   expect(checkMaps(host_), Health::unknown, "cannot be read");
 }
 
-TEST_F(CheckUp, OneProcessorIsAWarning) {
+TEST_F(DoctorChecks, OneProcessorIsAWarning) {
   expect(checkCpus(host_), Health::ok, "5 allowed");
   write("proc/self/status", "Cpus_allowed_list:\t7\n");
   expect(checkCpus(host_), Health::warning, "1 allowed", "--wait-mode block");
@@ -283,7 +284,7 @@ TEST_F(CheckUp, OneProcessorIsAWarning) {
   expect(checkCpus(host_), Health::unknown, "cannot be read");
 }
 
-TEST_F(CheckUp, TheTimeOfOneProcessorIsAWarning) {
+TEST_F(DoctorChecks, AQuotaBelowTwoProcessorsIsAWarning) {
   write("sys/fs/cgroup/user.slice/cpu.max", "150000 100000\n");
   write("sys/fs/cgroup/user.slice/lab.service/cpu.max", "max 100000\n");
   expect(checkCpus(host_), Health::warning, "5 allowed, time of 1.5", "CPUQuota");
@@ -296,24 +297,24 @@ TEST_F(CheckUp, TheTimeOfOneProcessorIsAWarning) {
   expect(checkCpus(host_), Health::ok, "time of 4");
 }
 
-TEST_F(CheckUp, ASlowClockIsAWarning) {
+TEST_F(DoctorChecks, ASlowClockIsAWarning) {
   const std::string folder = "sys/devices/system/clocksource/clocksource0/";
   write(folder + "current_clocksource", "hpet\n");
   expect(checkClock(host_), Health::warning, "hpet: reading", "clocksource=tsc");
   write(folder + "available_clocksource", "hpet acpi_pm\n");
-  expect(checkClock(host_), Health::warning, "hpet", "other clocks here: hpet acpi_pm");
+  expect(checkClock(host_), Health::warning, "hpet", "clocks available here: hpet acpi_pm");
   write(folder + "current_clocksource", "kvm-clock\n");
   expect(checkClock(host_), Health::ok, "kvm-clock");
 }
 
-TEST_F(CheckUp, AGovernorThatSavesPowerIsAWarning) {
+TEST_F(DoctorChecks, APowerSavingGovernorIsAWarning) {
   write("sys/devices/system/cpu/cpufreq/policy1/scaling_governor", "schedutil\n");
   expect(checkGovernor(host_), Health::warning, "performance, schedutil", "cpupower");
   remove("sys/devices/system/cpu/cpufreq");
   expect(checkGovernor(host_), Health::unknown, "virtual machines");
 }
 
-// A copy of what a router says, on that host; its lock is held while the result lives.
+// Copies the segment of a router to that host. The returned file holds its lock.
 FileDescriptor leaveRouter(const std::filesystem::path& folder, const Backplane& backplane) {
   const auto name = backplane.segmentNames().at(0);
   std::filesystem::copy_file(segments::path(name), folder / name,
@@ -325,7 +326,7 @@ FileDescriptor leaveRouter(const std::filesystem::path& folder, const Backplane&
   return file;
 }
 
-TEST_F(CheckUp, ARemoteThatCannotBeReachedForLongIsAWarning) {
+TEST_F(DoctorChecks, ARemoteThatIsUnreachableForLongIsAWarning) {
   const test::TestBackplane backplane;
   router::Statistics statistics(backplane, "lab1");
   const auto folder = host_.root / "dev/shm";
@@ -350,8 +351,8 @@ TEST_F(CheckUp, ARemoteThatCannotBeReachedForLongIsAWarning) {
   expect(checkRouters(host_), Health::ok, "none");
 }
 
-// The real host: whatever it is, each check has an answer.
-TEST(CheckUpHere, AnswersOnTheRealHost) {
+// On any real host, each check has a result, and a remedy exactly if it needs one.
+TEST(DoctorChecksHere, HaveResultsOnTheRealHost) {
   for (const auto& finding : runDoctorChecks(Host())) {
     EXPECT_THAT(finding, AllOf(Field(&Finding::check, Not(IsEmpty())),
                                Field(&Finding::seen, Not(IsEmpty()))));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf inspect`: into a system that runs, that does not, and into copies of its files.
+// `mpf inspect`: on running processes, on dead ones, and on copies of their files.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -22,7 +22,7 @@ using testing::SizeIs;
 
 class InspectTest : public ToolsTest {
  protected:
-  // Clients of this process, connected to a server that does nothing by itself.
+  // Clients of this process, connected to a server that handles requests only when a test asks.
   void connect(int clients, int queueSize = 20) {
     server_.emplace(backplane_, "dac", ServerOptions{.location = 0, .queueSize = queueSize});
     server_->on<Int32>([](Int32& request) { ++request.value; });
@@ -52,7 +52,7 @@ class InspectTest : public ToolsTest {
                                "--interval", "1"});
     return report(more).at(0);
   }
-  // Copies of all files, as somebody makes them after an accident.
+  // Copies all files of the backplane, as a user does after a failure.
   void copyAll() const {
     for (const auto& name : backplane_.segmentNames()) {
       if (std::filesystem::is_regular_file(segments::path(name)))
@@ -71,7 +71,7 @@ class InspectTest : public ToolsTest {
   std::vector<std::unique_ptr<MessageClient>> clients_;
 };
 
-TEST_F(InspectTest, TheSummarySaysWhoWaitsForWhom) {
+TEST_F(InspectTest, TheSummaryShowsWhichProcessWaitsForWhich) {
   connect(2);
   EXPECT_THAT(run({"inspect"}).out, HasSubstr("  2 of 2 links idle\n"));
   ASSERT_EQ(clients_.front()->send(Int32Message()), SendResult::sent);
@@ -107,7 +107,7 @@ TEST_F(InspectTest, AClientShowsTheServersThatItWaitsFor) {
   EXPECT_EQ(pendingBinds.at(0).at("location"), 3);
 }
 
-TEST_F(InspectTest, ALinkShowsItsLastMessagesAndWhatBecameOfThem) {
+TEST_F(InspectTest, ALinkShowsItsLastMessagesAndTheirStates) {
   connect(1);
   for (int i = 1; i <= 3; ++i)
     ASSERT_EQ(clients_.front()->send(Int32Message({.address = 7, .value = i})), SendResult::sent);
@@ -167,7 +167,7 @@ TEST_F(InspectTest, AWindowOrLinkIsFoundByItsFileToo) {
   }
 }
 
-TEST_F(InspectTest, WhatIsNotThereIsNamed) {
+TEST_F(InspectTest, NamesWhatWasNotFound) {
   connect(1);
 
   const auto ended = run({"inspect", "dac", "adc"});
@@ -175,11 +175,11 @@ TEST_F(InspectTest, WhatIsNotThereIsNamed) {
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.out, HasSubstr("server window"));
   EXPECT_EQ(ended.err,
-            "mpf inspect: no server, client, link or router \"adc\"; `mpf inspect` shows those "
-            "that there are\n");
+            "mpf inspect: no server, client, link or router \"adc\"; `mpf inspect` lists all of "
+            "them\n");
 }
 
-TEST_F(InspectTest, ALargeBodyIsReadFromItsChunkAndMissedWhenThatIsGone) {
+TEST_F(InspectTest, ReadsALargeBodyFromItsChunkAndReportsAMissingPool) {
   connect(1);
   auto large = clients_.front()->alloc<Float64Array>(1000);
   large.value()[0] = 1.5;
@@ -193,7 +193,7 @@ TEST_F(InspectTest, ALargeBodyIsReadFromItsChunkAndMissedWhenThatIsGone) {
   EXPECT_THAT(link.at("client_pool").at("segments"), SizeIs(1));
   const auto file = folder_ / std::filesystem::path(link.at("file").get<std::string>()).filename();
   EXPECT_EQ(report({"inspect", "--file", file}).at(0).at("requests"), link.at("requests"))
-      << "a copy tells the same";
+      << "a copy shows the same";
 
   for (const auto& bulk : link.at("client_pool").at("segments")) {
     std::filesystem::remove(folder_ /
@@ -202,11 +202,11 @@ TEST_F(InspectTest, ALargeBodyIsReadFromItsChunkAndMissedWhenThatIsGone) {
   const auto without =
       report({"inspect", "--file", file}).at(0).at("requests").at("messages").at(0);
   EXPECT_THAT(without.at("problem").get<std::string>(),
-              testing::EndsWith(".0.0: not there any more"));
+              testing::EndsWith(".0.0: the file does not exist"));
   expectNarrow(run({"inspect", "--file", file}).out);
 }
 
-TEST_F(InspectTest, FilesThatAreNoneOrCutAreNamed) {
+TEST_F(InspectTest, NamesMissingAndTruncatedFiles) {
   connect(1);
   copyAll();
   const auto file =
@@ -217,7 +217,7 @@ TEST_F(InspectTest, FilesThatAreNoneOrCutAreNamed) {
       run({"inspect", "--file", folder_ / "notes"}).err,
       "mpf inspect: " + (folder_ / "notes").string() + ": not a segment of MPF (foreign magic)\n");
   EXPECT_EQ(run({"inspect", "--file", folder_ / "none"}).err,
-            "mpf inspect: " + (folder_ / "none").string() + ": not there\n");
+            "mpf inspect: " + (folder_ / "none").string() + ": the file does not exist\n");
   for (const auto bytes : {0, 100, 511, 512, 3000, 6000}) {
     std::filesystem::resize_file(file, static_cast<std::uintmax_t>(std::max(bytes, 0)));
     const auto ended = run({"inspect", "--file", file});
@@ -229,8 +229,8 @@ TEST_F(InspectTest, FilesThatAreNoneOrCutAreNamed) {
   }
 }
 
-// Whatever stands in a file: an answer, never a signal.
-TEST_F(InspectTest, NonsenseInAFileEndsNobody) {
+// Any contents of a file give a result, never a signal.
+TEST_F(InspectTest, SurvivesInvalidDataInFiles) {
   connect(1);
   for (int i = 0; i < 5; ++i)
     ASSERT_EQ(clients_.front()->send(clients_.front()->alloc<Float64Array>(100)), SendResult::sent);
@@ -260,7 +260,7 @@ TEST_F(InspectTest, NonsenseInAFileEndsNobody) {
   }
 }
 
-TEST_F(InspectTest, WhatTwoDeadProcessesLeftCanBeLookedInto) {
+TEST_F(InspectTest, ShowsWhatTwoDeadProcessesLeft) {
   Victim server("serve", backplane_.name());
   ASSERT_EQ(server.line(), "open");
   Victim flood("flood", backplane_.name());
@@ -277,7 +277,7 @@ TEST_F(InspectTest, WhatTwoDeadProcessesLeftCanBeLookedInto) {
   static_cast<void>(backplane_.removeDead());
 }
 
-TEST_F(InspectTest, AThousandLinksAreAPageUnlessAskedFor) {
+TEST_F(InspectTest, LimitsAThousandLinksToAPageInText) {
   constexpr int kClients = 1000;
   connect(kClients, 1);
   for (int i = 0; i < 100; ++i)

@@ -39,11 +39,11 @@ class RingViewTest : public testing::Test {
   [[nodiscard]] RingWords words() const {
     return {control_.freed.load(), control_.taken.load(), producer_.messages()};
   }
-  // Of a ring in which nothing moves any more.
+  // The view of a ring in which no process writes any more.
   [[nodiscard]] RingView view() const {
     return RingView::of(slots_, words(), slots_, words().freed);
   }
-  // "17 waiting" of each message.
+  // Position and state of each message, as "17 waiting".
   [[nodiscard]] static std::vector<std::string> texts(const RingView& view) {
     std::vector<std::string> all;
     for (const auto& message : view.messages)
@@ -67,7 +67,7 @@ TEST_F(RingViewTest, AnEmptyRingHasNoMessage) {
 TEST_F(RingViewTest, AMessageIsWaitingThenTakenThenFreed) {
   for (std::uint32_t id = 1; id <= 6; ++id) push(id);
   take();
-  take();  // an eighth of the ring: both go back
+  take();  // an eighth of the ring: the consumer frees both
   take();
 
   EXPECT_THAT(texts(view()),
@@ -75,7 +75,7 @@ TEST_F(RingViewTest, AMessageIsWaitingThenTakenThenFreed) {
   EXPECT_EQ(view().end, 6U);
 }
 
-TEST_F(RingViewTest, ABodyOverSeveralSlotsIsWhole) {
+TEST_F(RingViewTest, JoinsABodyOfSeveralSlots) {
   push(7, 100);
   push(8);
 
@@ -87,8 +87,9 @@ TEST_F(RingViewTest, ABodyOverSeveralSlotsIsWhole) {
   EXPECT_EQ(std::vector(body.begin(), body.begin() + 100), std::vector(100, std::byte{7}));
 }
 
-// In every lap and with messages of every length: the last ones, each whole, the newest at the end.
-TEST_F(RingViewTest, AfterManyLapsTheLastMessagesAreThere) {
+// In every lap and with messages of every length, the view has the last messages in order, each
+// complete.
+TEST_F(RingViewTest, HasTheLastMessagesAfterManyLaps) {
   for (std::uint32_t id = 1; id <= 200; ++id) {
     push(id, id % 5 * 48);
     take();
@@ -108,16 +109,16 @@ TEST_F(RingViewTest, AfterManyLapsTheLastMessagesAreThere) {
   }
 }
 
-TEST_F(RingViewTest, AMessageThatWasBegunAndNotPublishedIsSaidSo) {
+TEST_F(RingViewTest, ReportsAMessageThatWasBegunButNotPublished) {
   push(1);
   slots_[1].requestId = 2;  // its sender died before the release store
 
   EXPECT_THAT(texts(view()), ElementsAre("1 waiting", "2 unpublished"));
 }
 
-// While the second copy was made, the sender had gone round: what it may have written over is left
-// out.
-TEST_F(RingViewTest, WhatMayHaveBeenOverwrittenMeanwhileIsLeftOut) {
+// When the second copy was made, the sender had reused slots: messages that it may have overwritten
+// are left out.
+TEST_F(RingViewTest, LeavesOutMessagesThatMayHaveBeenOverwritten) {
   for (std::uint32_t id = 1; id <= 14; ++id) {
     push(id);
     take();
@@ -138,7 +139,7 @@ TEST_F(RingViewTest, WhatMayHaveBeenOverwrittenMeanwhileIsLeftOut) {
   EXPECT_EQ(seen.overwritten, 8U);
 }
 
-TEST_F(RingViewTest, SequencesThatCannotBeAreNotBelieved) {
+TEST_F(RingViewTest, IgnoresImpossibleSequences) {
   for (std::uint32_t id = 1; id <= 3; ++id) push(id);
   slots_[5].sequence.store(6 + 1000 * kSlots);
   slots_[6].sequence.store(UINT64_MAX);
@@ -148,7 +149,7 @@ TEST_F(RingViewTest, SequencesThatCannotBeAreNotBelieved) {
   EXPECT_THAT(texts(view()), ElementsAre("1 waiting", "2 waiting", "3 waiting"));
 }
 
-TEST_F(RingViewTest, CountersThatCannotBeDoNoHarm) {
+TEST_F(RingViewTest, SurvivesImpossibleCounters) {
   push(1);
   for (const auto freed : {UINT64_MAX, UINT64_MAX - 3, std::uint64_t{1} << 62}) {
     const auto seen = RingView::of(slots_, {freed, UINT64_MAX, 0}, slots_, freed);

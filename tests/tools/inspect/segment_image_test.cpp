@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Copies of segments: read without taking part, and what is none is named.
+// SegmentImage: copies of segments, and errors for files that are not segments.
 #include "tools/inspect/segment_image.h"
 
 #include <sys/stat.h>
@@ -26,7 +26,7 @@ class SegmentImageTest : public test::ShmTest {
     return SegmentImage::tryRead(serverName(), layout::SegmentKind::serverWindow,
                                  layout::kWindowBytes);
   }
-  // Why it cannot be read; the file is gone afterwards.
+  // The error when the file is read; removes the file.
   [[nodiscard]] std::string refusal() const {
     const auto why = whatOf<std::exception>([&] { static_cast<void>(read()); });
     std::filesystem::remove(path());
@@ -34,9 +34,9 @@ class SegmentImageTest : public test::ShmTest {
   }
 };
 
-TEST_F(SegmentImageTest, WhatIsNotThereIsNoError) { EXPECT_FALSE(read()); }
+TEST_F(SegmentImageTest, AMissingSegmentIsNotAnError) { EXPECT_FALSE(read()); }
 
-TEST_F(SegmentImageTest, HoldsWhatTheOwnerWrote) {
+TEST_F(SegmentImageTest, ContainsWhatTheOwnerWrote) {
   const MessageServer server(backplane_, "server", {.location = 0, .queueSize = 7});
 
   const auto image = read();
@@ -48,8 +48,8 @@ TEST_F(SegmentImageTest, HoldsWhatTheOwnerWrote) {
   EXPECT_EQ(image->fileBytes(), std::filesystem::file_size(path()));
 }
 
-// A copy is a copy: it stays as it was when the segment changes or goes.
-TEST_F(SegmentImageTest, StaysWhenTheSegmentGoes) {
+// The copy does not change when the segment is changed or removed.
+TEST_F(SegmentImageTest, StaysWhenTheSegmentIsRemoved) {
   auto server = std::make_unique<MessageServer>(backplane_, "server",
                                                 ServerOptions{.location = 0, .queueSize = 7});
   const auto image = read();
@@ -60,8 +60,8 @@ TEST_F(SegmentImageTest, StaysWhenTheSegmentGoes) {
   EXPECT_FALSE(read());
 }
 
-// Other versions may have shorter windows: what the file does not have is zero.
-TEST_F(SegmentImageTest, WhatTheFileDoesNotHaveIsZero) {
+// Other versions may have shorter windows: the missing bytes are zero.
+TEST_F(SegmentImageTest, BytesBehindTheEndOfTheFileAreZero) {
   auto segment =
       Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::serverWindow, name(), {});
   ASSERT_TRUE(segment.tryPublish(serverName()));
@@ -73,7 +73,7 @@ TEST_F(SegmentImageTest, WhatTheFileDoesNotHaveIsZero) {
   segments::remove(serverName());
 }
 
-TEST_F(SegmentImageTest, FilesThatAreNoSegmentsAreNamed) {
+TEST_F(SegmentImageTest, RefusesFilesThatAreNotSegments) {
   write("");
   EXPECT_EQ(refusal(), path() + ": truncated, 0 bytes are too few for a header");
   write(std::string(511, 'x'));
@@ -82,23 +82,23 @@ TEST_F(SegmentImageTest, FilesThatAreNoSegmentsAreNamed) {
   EXPECT_EQ(refusal(), path() + ": not a segment of MPF (foreign magic)");
 }
 
-TEST_F(SegmentImageTest, WhatIsNoFileIsNamedAndKeepsNobodyWaiting) {
+TEST_F(SegmentImageTest, RefusesDirectoriesAndPipesWithoutWaiting) {
   ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
-  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (no plain file)");
+  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (not a regular file)");
   std::filesystem::create_directory(path());
-  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (no plain file)");
+  EXPECT_EQ(refusal(), path() + ": not a segment of MPF (not a regular file)");
   std::filesystem::create_symlink("/dev/zero", path());
   EXPECT_THAT(refusal(), testing::StartsWith("open " + path()));
 }
 
-TEST_F(SegmentImageTest, SegmentsOfAnotherKindAreNamed) {
+TEST_F(SegmentImageTest, RefusesSegmentsOfAnotherKind) {
   auto pendingBind = createPage(layout::SegmentKind::pendingBind);
   ASSERT_TRUE(pendingBind.tryPublish(serverName()));
 
   EXPECT_EQ(refusal(), path() + ": a segment of kind 6, expected kind 1");
 }
 
-TEST_F(SegmentImageTest, SegmentsThatWereCutShortAreNamed) {
+TEST_F(SegmentImageTest, RefusesTruncatedSegments) {
   auto window = createPage(layout::SegmentKind::serverWindow);
   ASSERT_TRUE(window.tryPublish(serverName()));
   ASSERT_EQ(::truncate(path().c_str(), 600), 0);

@@ -13,9 +13,8 @@ using testing::HasSubstr;
 using testing::SizeIs;
 using testing::StartsWith;
 
-// The example of the manual, "Diagnostic Aids": the same lines, with numbers that the test has
-// made.
-TEST_F(ReportTest, MsrBeginsWithTheManualsLines) {
+// The lines of the example in the manual, "Diagnostic Aids", with the numbers of this test.
+TEST_F(ReportTest, MsrBeginsWithTheLinesOfTheManual) {
   openServer("serial[7]", 2);
   connect();
   ASSERT_EQ(send(), SendResult::sent);
@@ -40,7 +39,7 @@ TEST_F(ReportTest, MsrBeginsWithTheManualsLines) {
                   "  tools_test\\[[0-9]+\\]\n? +[a-z]+ +2 +3 +3 +1 +1 +1 +[0-9]+\n"));
 }
 
-TEST_F(ReportTest, MsrReportsAllServersOrTheOneThatIsNamed) {
+TEST_F(ReportTest, MsrReportsAllServersOrANamedOne) {
   openServer("one");
   const MessageServer two(backplane_, "two");
 
@@ -51,14 +50,14 @@ TEST_F(ReportTest, MsrReportsAllServersOrTheOneThatIsNamed) {
   EXPECT_EQ(named.at(0).at("backplane"), backplane_.name());
 }
 
-TEST_F(ReportTest, MsrOfAServerThatIsNotThereNamesIt) {
+TEST_F(ReportTest, MsrNamesAnAbsentServer) {
   const auto ended = run({"msr", "serial[7]"});
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_EQ(ended.err, "mpf msr: no server \"serial[7]\"; `mpf ls` shows those that there are\n");
+  EXPECT_EQ(ended.err, "mpf msr: no server \"serial[7]\"; `mpf ls` lists the servers\n");
 }
 
-TEST_F(ReportTest, MsrTakesTheServerOfALocation) {
+TEST_F(ReportTest, MsrSelectsAServerByLocation) {
   const MessageServer here(backplane_, "dac", {.location = 0});
   const MessageServer there(backplane_, "dac", {.location = 2});
 
@@ -66,11 +65,11 @@ TEST_F(ReportTest, MsrTakesTheServerOfALocation) {
   ASSERT_THAT(named, SizeIs(1));
   EXPECT_EQ(named.at(0).at("location"), 2);
   EXPECT_EQ(run({"msr", "dac", "--location", "3"}).err,
-            "mpf msr: no server \"dac\" at location 3; `mpf ls` shows those that there are\n");
+            "mpf msr: no server \"dac\" at location 3; `mpf ls` lists the servers\n");
 }
 
-// That something is there which cannot be read is not that nothing is there.
-TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
+// A file that cannot be read is reported; it may be the server that was asked for.
+TEST_F(ReportTest, MsrReportsFilesThatItCannotRead) {
   const auto file = segments::path(SegmentName::serverWindow(backplane_.name(), 0, "dac"));
   std::ofstream(file) << "x";
 
@@ -84,10 +83,11 @@ TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
   EXPECT_EQ(all.status, 1);
   EXPECT_THAT(all.err,
               HasSubstr("mpf msr: " + file + ": truncated, 1 bytes are too few for a header\n"));
-  EXPECT_EQ(all.out, "no server, unless it is among what could not be read\n");
+  EXPECT_EQ(all.out, "no server, unless it is in a file that could not be read\n");
   EXPECT_EQ(named.status, 1);
-  EXPECT_THAT(named.err, HasSubstr("no server \"dac\", unless it is among what could not be read; "
-                                   "`mpf ls` shows those that there are\n"));
+  EXPECT_THAT(named.err,
+              HasSubstr("no server \"dac\", unless it is in a file that could not be read; "
+                        "`mpf ls` lists the servers\n"));
   EXPECT_EQ(some.status, 0);
   EXPECT_THAT(inOneLine(some.out),
               HasSubstr("1 file could not be read: servers may be missing here problem: " + file +
@@ -99,8 +99,8 @@ TEST_F(ReportTest, MsrTellsWhatItCannotRead) {
   EXPECT_EQ(nlohmann::json::parse(forPrograms.out).size(), 1U);
 }
 
-// What a server's histograms say: a distribution, its percentiles, and the same for programs.
-TEST_F(ReportTest, MsrShowsHowLongRequestsTake) {
+// Shows the histograms of a server as a sparkline and as percentiles, in text and in JSON.
+TEST_F(ReportTest, MsrShowsLatencies) {
   const EchoThread echo(backplane_, "echo");
   SyncClient client(backplane_, "echo", 0);
   const auto isSampled = [&] {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reports only read: they change nothing, remove nothing, and work on a system that does not.
+// Reports only read: they change nothing, remove nothing, and work when processes hang or are dead.
 #include <sys/stat.h>
 #include <sys/wait.h>
 
@@ -28,8 +28,7 @@ const std::vector<std::vector<std::string>> kReports{{"ls"},
 
 class ReadOnlyTest : public ToolsTest {
  protected:
-  // A client that sends as fast as it can to an echo server, both stopped, in the middle of
-  // whatever they do.
+  // A client that sends as fast as it can to an echo server; both are stopped at a random moment.
   void wedge() {
     server_ = Victim("serve", backplane_.name());
     EXPECT_EQ(server_.line(), "open");
@@ -49,14 +48,14 @@ class ReadOnlyTest : public ToolsTest {
     server_.end(SIGKILL);
     client_.end(SIGKILL);
     static_cast<void>(backplane_.removeDead());
-    ToolsTest::TearDown();  // nothing else is left
+    ToolsTest::TearDown();  // checks that nothing else is left
   }
 
   Victim server_;
   Victim client_;
 };
 
-TEST_F(ReadOnlyTest, NoByteChangesAndNothingDeadIsRemoved) {
+TEST_F(ReadOnlyTest, ReportsChangeNoByteAndRemoveNothing) {
   wedge();
   leaveDeadServer("dead");
   const auto before = files();
@@ -80,7 +79,7 @@ TEST_F(ReadOnlyTest, ATapChangesNoByte) {
   EXPECT_TRUE(files() == before);
 }
 
-TEST_F(ReadOnlyTest, AWedgedSystemCanBeLookedAt) {
+TEST_F(ReadOnlyTest, ReportsWorkWhenAllProcessesAreStopped) {
   wedge();
 
   const auto all = ls();
@@ -94,7 +93,7 @@ TEST_F(ReadOnlyTest, AWedgedSystemCanBeLookedAt) {
   EXPECT_EQ(client.at("links").at(0).at("peer_pid"), server_.pid());
 }
 
-TEST_F(ReadOnlyTest, WhatIsLeftOfBothSidesCanBeLookedAt) {
+TEST_F(ReadOnlyTest, ReportsWorkWhenBothSidesAreDead) {
   wedge();
   server_.end(SIGKILL);
   client_.end(SIGKILL);
@@ -107,8 +106,8 @@ TEST_F(ReadOnlyTest, WhatIsLeftOfBothSidesCanBeLookedAt) {
   EXPECT_TRUE(files() == before);
 }
 
-// Anybody may put anything into /dev/shm: it is named, and hides nothing else.
-TEST_F(ReadOnlyTest, JunkUnderOurNamesIsNamedAndHidesNothing) {
+// Any user may create files in /dev/shm: reports list them as problems and show everything else.
+TEST_F(ReadOnlyTest, ReportsForeignFilesAsProblems) {
   const EchoThread echo(backplane_, "echo");
   const auto pathOf = [&](const std::string& rest) {
     return segments::path(SegmentName::prefix(backplane_.name()) + rest);
@@ -133,8 +132,10 @@ TEST_F(ReadOnlyTest, JunkUnderOurNamesIsNamedAndHidesNothing) {
     EXPECT_THAT(said, HasSubstr("echo"));
     EXPECT_THAT(said,
                 HasSubstr("problem: " + file + ": truncated, 4 bytes are too few for a header"));
-    EXPECT_THAT(said, HasSubstr("problem: " + fifo + ": not a segment of MPF (no plain file)"));
-    EXPECT_THAT(said, HasSubstr("problem: " + folder + ": not a segment of MPF (no plain file)"));
+    EXPECT_THAT(said,
+                HasSubstr("problem: " + fifo + ": not a segment of MPF (not a regular file)"));
+    EXPECT_THAT(said,
+                HasSubstr("problem: " + folder + ": not a segment of MPF (not a regular file)"));
     EXPECT_THAT(said, HasSubstr("problem: open " + loop + ": "));
     EXPECT_THAT(said, HasSubstr("problem: " + stray + ": not a name that MPF gives"));
   }
@@ -143,8 +144,8 @@ TEST_F(ReadOnlyTest, JunkUnderOurNamesIsNamedAndHidesNothing) {
   for (const auto& path : {file, fifo, folder, loop, stray}) std::filesystem::remove(path);
 }
 
-// Anybody chooses the names of files, too.
-TEST_F(ReadOnlyTest, NoNameOfAFileCommandsATerminal) {
+// File names are untrusted, too.
+TEST_F(ReadOnlyTest, EscapesControlCharactersInFileNames) {
   const auto path = segments::path(SegmentName::prefix(backplane_.name()) + "\x1b[2J\xc2\x9b");
   std::ofstream(path) << "junk";
 

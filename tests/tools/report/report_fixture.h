@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ReportTest: a server and a client that take turns, so that what waits stays where it is.
+// ReportTest: a server and a client in one thread, so that messages wait until a test handles them.
 #pragma once
 
 #include "tests/tools/tools_fixture.h"

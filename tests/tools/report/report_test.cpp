@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// ls and mrr: what they say of servers and clients in every state.
+// ls and mrr: servers and clients in every state.
 #include <sys/wait.h>
 
-#include <algorithm>
 #include <fstream>
 #include <regex>
 #include <set>
@@ -22,7 +21,7 @@ using testing::MatchesRegex;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST_F(ReportTest, AnEmptyBackplaneIsSaidToBeEmpty) {
+TEST_F(ReportTest, ReportsAnEmptyBackplane) {
   EXPECT_EQ(run({"ls"}).out, "backplane " + backplane_.name() + "\n  no server\n  no client\n");
   EXPECT_EQ(run({"mrr", "--interval", "1"}).out,
             "backplane " + backplane_.name() + "\nclientRouterList\nserverRouterList\n");
@@ -30,7 +29,7 @@ TEST_F(ReportTest, AnEmptyBackplaneIsSaidToBeEmpty) {
   EXPECT_EQ(report({"msr"}), nlohmann::json::array());
 }
 
-TEST_F(ReportTest, ServersAndClientsAreListed) {
+TEST_F(ReportTest, ListsServersAndClients) {
   openServer("dac/1");
   connect();
   const auto pid = std::to_string(::getpid());
@@ -48,7 +47,7 @@ TEST_F(ReportTest, ServersAndClientsAreListed) {
                   MatchesRegex("  tools_test +alive +" + pid + " +0 +[0-9.]+ [mun]?s +dac/1")));
 }
 
-TEST_F(ReportTest, ProgramsLearnTheSame) {
+TEST_F(ReportTest, JsonHasTheSameContent) {
   openServer("dac/1", 7);
   connect();
   ASSERT_EQ(send(), SendResult::sent);
@@ -82,7 +81,7 @@ TEST_F(ReportTest, ProgramsLearnTheSame) {
   EXPECT_EQ(link.at("unanswered"), 2);
 }
 
-TEST_F(ReportTest, AClientThatWaitsForItsServerIsListed) {
+TEST_F(ReportTest, ListsAClientThatWaitsForItsServer) {
   dispatcher_ = std::make_unique<Dispatcher>(backplane_);
   MessageClient client(*dispatcher_, [](const Message&) {});
   client.bind("later", 3);
@@ -101,7 +100,7 @@ TEST_F(ReportTest, AClientThatWaitsForItsServerIsListed) {
               HasSubstr("   Server later@3 has 1 client. bindState waiting for the server\n"));
 }
 
-TEST_F(ReportTest, ADeadServerIsDead) {
+TEST_F(ReportTest, ReportsADeadServerAsDead) {
   Victim victim("serve", backplane_.name());
   ASSERT_EQ(victim.line(), "open");
   EXPECT_EQ(entryOf(ls().at("servers"), "name", "echo").at("state"), "alive");
@@ -115,7 +114,7 @@ TEST_F(ReportTest, ADeadServerIsDead) {
   static_cast<void>(backplane_.removeDead());
 }
 
-TEST_F(ReportTest, AStoppedProcessIsStopped) {
+TEST_F(ReportTest, ReportsAStoppedProcessAsStopped) {
   Victim victim("serve", backplane_.name());
   ASSERT_EQ(victim.line(), "open");
 
@@ -142,10 +141,11 @@ TEST_F(ReportTest, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
   handle(3);
   const auto now = ls();
   EXPECT_EQ(now.at("servers").at(0).at("state"), "alive");
-  EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it takes no replies";
+  EXPECT_EQ(now.at("clients").at(0).at("state"), "stalled") << "it receives no replies";
 }
 
-// A server whose one thread works on a request accepts nobody and takes nothing: all say why.
+// A server whose only thread works on a request accepts no client and receives nothing: reports and
+// clients show why.
 TEST_F(ReportTest, ABusyServerIsShownWithItsRequestAndTheTime) {
   openServer("dmm");
   connect();
@@ -185,7 +185,7 @@ TEST_F(ReportTest, ABusyServerIsShownWithItsRequestAndTheTime) {
   EXPECT_EQ(ls().at("servers").at(0).at("state"), "alive");
 }
 
-TEST_F(ReportTest, MrrHasTheManualsLines) {
+TEST_F(ReportTest, MrrPrintsTheLinesOfTheManual) {
   openServer("Int32");
   connect();
   MessageClient second(*dispatcher_, [](const Message&) {});
@@ -200,8 +200,8 @@ TEST_F(ReportTest, MrrHasTheManualsLines) {
   const auto ended = run({"mrr", "--interval", "100"});
 
   EXPECT_EQ(ended.status, 0);
-  const auto whole = std::regex_replace(ended.out, std::regex("\n     "),
-                                        " ");  // a line of more than 80 columns, for a long pid
+  // Joins a line of more than 80 columns, which a long pid may cause.
+  const auto whole = std::regex_replace(ended.out, std::regex("\n     "), " ");
   EXPECT_THAT(
       linesOf(whole),
       ElementsAre(
@@ -215,7 +215,7 @@ TEST_F(ReportTest, MrrHasTheManualsLines) {
           "   sendPerSec 0 receivePerSec 0"));
 }
 
-TEST_F(ReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
+TEST_F(ReportTest, RatesAreThoseBetweenTheSnapshots) {
   const EchoThread echo(backplane_, "echo");
   Tool load({"call", "echo", "int32", "--count", "1000000000", "--timeout", "100"},
             backplane_.name());
@@ -239,8 +239,8 @@ void addKeys(const nlohmann::json& json, std::set<std::string>& keys) {
   }
 }
 
-// Whoever reads the JSON can look each field up.
-TEST_F(ReportTest, EachFieldIsInTheDocument) {
+// docs/tools.md describes each JSON field.
+TEST_F(ReportTest, EachJsonFieldIsDocumented) {
   openServer("echo");
   connect();
   MessageClient second(*dispatcher_, [](const Message&) {});
@@ -261,145 +261,7 @@ TEST_F(ReportTest, EachFieldIsInTheDocument) {
   EXPECT_GT(keys.size(), 40U);
 }
 
-TEST_F(ReportTest, NamesInAnyLanguageAreAligned) {
-  const MessageServer oven(backplane_, "Ofen-Süd [°C]", {.location = 0});
-  const MessageServer plain(backplane_, "oven", {.location = 0});
-
-  const auto lines = linesOf(run({"ls"}).out);
-
-  ASSERT_THAT(lines, SizeIs(5));
-  EXPECT_THAT(lines[1], StartsWith("  SERVER         STATE"));
-  EXPECT_THAT(lines[2], StartsWith("  Ofen-Süd [°C]  alive"));
-  EXPECT_THAT(lines[3], StartsWith("  oven           alive"));
-}
-
-TEST_F(ReportTest, ANameThatIsNoTextIsReportedAllTheSame) {
-  const MessageServer server(backplane_, "a\xff", {.location = 0});
-
-  EXPECT_EQ(ls().at("servers").at(0).at("name"), R"(a\xff)");
-  EXPECT_THAT(run({"ls"}).out, HasSubstr(R"(  a\xff )"));
-}
-
-// Control characters are refused when a server starts; those that turn the direction of a text are
-// not.
-TEST_F(ReportTest, NoNameReachesTheTerminalAsItIsAndEachIsFoundAsItIsShown) {
-  const std::string name = "a\u202eb\u200b";
-  const std::string shown = R"(a\u202eb\u200b)";
-  openServer(name);
-  connect();
-
-  for (const std::vector<std::string>& report :
-       std::vector<std::vector<std::string>>{{"ls"},
-                                             {"mrr", "--interval", "1"},
-                                             {"msr"},
-                                             {"inspect"},
-                                             {"top", "--batch", "1"},
-                                             {"ls", "--json"},
-                                             {"inspect", "--json"}}) {
-    const auto ended = run(report);
-
-    EXPECT_THAT(ended.out,
-                AllOf(HasSubstr("a\\"), Not(HasSubstr("\u202e")), Not(HasSubstr("\u200b"))))
-        << report.front();
-    EXPECT_TRUE(report.back() != "--json" || nlohmann::json::accept(ended.out)) << ended.out;
-  }
-  for (const auto& given : {name, shown}) {
-    EXPECT_THAT(run({"msr", given}).out, StartsWith(shown + "\n"));
-    EXPECT_EQ(run({"inspect", given}).status, 0);
-  }
-  EXPECT_EQ(run({"msr", "x\u202ey"}).err,
-            "mpf msr: no server \"x\\u202ey\"; `mpf ls` shows those that there are\n");
-}
-
-TEST_F(ReportTest, ServersOfOneNameAtTwoLocationsAreToldApart) {
-  openServer("dac");
-  const EchoThread other(backplane_, "dac", {.location = 2});
-  connect();
-  MessageClient second(*dispatcher_, [](const Message&) {});
-  second.bind("dac", 2);
-  while (!second.isConnected()) dispatcher_->runOnce(Deadline::after(100us));
-
-  const auto text = run({"ls"}).out;
-  const auto routers = run({"mrr", "--interval", "1"}).out;
-
-  EXPECT_THAT(text, HasSubstr("dac, dac@2\n"));
-  EXPECT_THAT(routers, AllOf(HasSubstr("   Server dac has 1 client. bindState connected\n   Server "
-                                       "dac@2 has 1 client. bindState connected\n"),
-                             HasSubstr(" 2 dac@2[")));
-}
-
-TEST_F(ReportTest, AProcessWithThousandsOfClientsIsOneLine) {
-  const EchoThread echo(backplane_, "echo");
-  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
-  std::vector<std::unique_ptr<MessageClient>> clients;
-  for (int i = 0; i < 3000; ++i) {
-    clients.push_back(std::make_unique<MessageClient>(*dispatcher_, [](const Message&) {}));
-    clients.back()->bind("echo", 0);
-  }
-  for (const auto& client : clients) ASSERT_TRUE(client->connectWait(60s));
-
-  const auto text = run({"ls"}).out;
-
-  EXPECT_THAT(text, HasSubstr("  echo x 3000\n"));
-  EXPECT_THAT(run({"mrr", "--interval", "1"}).out,
-              HasSubstr("   Server echo has 3000 clients. bindState connected\n"));
-}
-
-TEST_F(ReportTest, AClientOfManyServersShowsSome) {
-  std::vector<std::unique_ptr<EchoThread>> servers;
-  std::vector<std::unique_ptr<MessageClient>> clients;
-  dispatcher_ = std::make_unique<Dispatcher>(backplane_);
-  for (char letter = 'a'; letter < 'j'; ++letter) {
-    servers.push_back(std::make_unique<EchoThread>(backplane_, std::string(1, letter)));
-    clients.push_back(std::make_unique<MessageClient>(*dispatcher_, [](const Message&) {}));
-    clients.back()->bind(std::string(1, letter));
-    ASSERT_TRUE(clients.back()->connectWait(60s));
-  }
-
-  const auto text = run({"ls"}).out;
-
-  EXPECT_THAT(inOneLine(text), HasSubstr(" a, b, c, d, e, f, 3 more"));
-  clients.clear();
-}
-
-std::size_t widestOf(const std::string& text) {
-  std::size_t widest = 0;
-  for (const auto& line : linesOf(text)) widest = std::max(widest, line.size());
-  return widest;
-}
-
-// Of names as long as they may be, nothing is lost.
-TEST_F(ReportTest, LongNamesFitIntoEightyColumns) {
-  const std::string name = "a-server-" + std::string(54, 'x');
-  openServer(name);
-  dispatcher_ = std::make_unique<Dispatcher>(
-      backplane_, DispatcherOptions{WaitMode::adaptive, "a-client-" + std::string(54, 'y')});
-  connect();
-  MessageClient second(*dispatcher_, [](const Message&) {});
-  second.bind("another-" + std::string(54, 'z'), -2'000'000'000);
-  while (ls().at("waiting").empty()) dispatcher_->runOnce(Deadline::after(100us));
-
-  const auto list = run({"ls"}).out;
-  const auto server = run({"msr", name}).out;
-  const auto routers = run({"mrr", "--interval", "1"}).out;
-  const auto summary = run({"inspect"}).out;
-
-  EXPECT_LE(widestOf(routers), 80U) << routers;
-  EXPECT_LE(widestOf(summary), 80U) << summary;
-  EXPECT_THAT(routers, AllOf(HasSubstr(name + "["), HasSubstr("Server " + name),
-                             HasSubstr("a-client-" + std::string(54, 'y') + "["),
-                             HasSubstr("another-" + std::string(54, 'z'))));
-  EXPECT_THAT(summary, AllOf(HasSubstr("server " + name + "\n"),
-                             HasSubstr("client a-client-" + std::string(54, 'y') + "\n")));
-  EXPECT_LE(widestOf(list), 80U) << list;
-  EXPECT_LE(widestOf(server), 80U) << server;
-  EXPECT_THAT(
-      list, AllOf(HasSubstr("  " + name + "\n"), HasSubstr("  a-client-" + std::string(54, 'y'))));
-  EXPECT_THAT(server, HasSubstr("\n  a-client-" + std::string(54, 'y') + "["));
-  dispatcher_->runOnce(Deadline::after(1us));
-}
-
-TEST_F(ReportTest, WithoutABackplaneAllAreReported) {
+TEST_F(ReportTest, ReportsAllBackplanesWithoutAName) {
   const MessageServer here(backplane_, "here");
   const TestBackplane elsewhere;
   const MessageServer there(elsewhere, "there");
@@ -412,7 +274,7 @@ TEST_F(ReportTest, WithoutABackplaneAllAreReported) {
   EXPECT_EQ(entryOf(all, "backplane", elsewhere.name()).at("name"), "there");
 }
 
-TEST_F(ReportTest, AnArgumentIsStrongerThanTheEnvironment) {
+TEST_F(ReportTest, AnArgumentOverridesTheEnvironment) {
   const MessageServer server(backplane_, "here");
 
   const auto ended = runTool({"msr", "--backplane", backplane_.name()}, "another");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ls, mrr, msr, inspect, clean: what they say of a router's connections. The test is the router.
+// ls, mrr, msr, inspect, clean: connections of a router. The test itself writes the router's rows.
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using testing::MatchesRegex;
 using testing::Not;
 using testing::SizeIs;
 
-// What a person sees: a character is one column here.
+// The columns of a text, in which each character has one column.
 std::size_t columnsOf(const std::string& line) {
   return static_cast<std::size_t>(std::ranges::count_if(
       line, [](char c) { return (static_cast<unsigned char>(c) & 0xc0u) != 0x80u; }));
@@ -31,7 +31,7 @@ auto fitsInto80Columns() { return testing::ResultOf("columns", columnsOf, testin
 
 class RouterReportTest : public ToolsTest {
  protected:
-  // Clients of this process that have this server, or wait for it.
+  // Clients of this process that are connected to this server or wait for it.
   void bind(const std::string& server, std::int32_t location, int times = 1) {
     for (int i = 0; i < times; ++i) {
       clients_.push_back(std::make_unique<MessageClient>(dispatcher_, [](const Message&) {}));
@@ -53,10 +53,10 @@ class RouterReportTest : public ToolsTest {
   std::vector<std::unique_ptr<MessageClient>> clients_;
   router::Statistics statistics_{backplane_, "lab1"};
 
-  void TearDown() override {}  // what is here is still there
+  void TearDown() override {}  // the segments of this test still exist
 };
 
-// The example of the manual, "Diagnostic Aids", with what is new below it.
+// The lines of the manual, "Diagnostic Aids", followed by new lines.
 TEST_F(RouterReportTest, MrrShowsAClientRouterAsTheManualDoes) {
   const auto remote = connectedRemote(statistics_, {1, 2});
   const EchoThread proxy(backplane_, "Int32", {.location = 1});
@@ -109,8 +109,8 @@ TEST_F(RouterReportTest, MrrShowsAServerRouterAsTheManualDoes) {
       << "shown with its connection";
 }
 
-// The rest is as it is without routers.
-TEST_F(RouterReportTest, WhatIsLocalStaysAsItWas) {
+// A router does not change the rows of local clients and servers.
+TEST_F(RouterReportTest, LocalRowsDoNotChange) {
   const EchoThread local(backplane_, "local");
   bind("local", 0);
   awaitConnected();
@@ -129,7 +129,7 @@ TEST_F(RouterReportTest, WhatIsLocalStaysAsItWas) {
   }
 }
 
-TEST_F(RouterReportTest, MrrSaysWhyThereIsNoConnection) {
+TEST_F(RouterReportTest, MrrShowsWhyThereIsNoConnection) {
   const auto lost = lostRemote(statistics_,
                                "no route to host, and so many other words that they do not fit "
                                "into a line of eighty columns");
@@ -150,7 +150,7 @@ TEST_F(RouterReportTest, MrrSaysWhyThereIsNoConnection) {
           "     line of eighty columns"));
 }
 
-TEST_F(RouterReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
+TEST_F(RouterReportTest, RatesAreThoseBetweenTheSnapshots) {
   const auto remote = connectedRemote(statistics_, {1});
   std::jthread traffic([&](const std::stop_token& stop) {
     for (std::uint64_t i = 1'000'000'000; !stop.stop_requested(); i += 1'000'000'000) {
@@ -169,11 +169,11 @@ TEST_F(RouterReportTest, RatesAreThoseOfTheTimeBetweenTheLooks) {
     while (line().at(rate) == 0) continue;
   }
 
-  // Numbers of any length stay within a line.
+  // Long numbers do not exceed the line.
   EXPECT_THAT(mrr(), Each(fitsInto80Columns()));
 }
 
-TEST_F(RouterReportTest, LsShowsWhichServersAreElsewhere) {
+TEST_F(RouterReportTest, LsShowsServersOnOtherHosts) {
   const auto remote = connectedRemote(statistics_, {1});
   const auto lost = lostRemote(statistics_);
   const auto caller = connectedCaller(statistics_);
@@ -199,7 +199,7 @@ TEST_F(RouterReportTest, LsShowsWhichServersAreElsewhere) {
   EXPECT_THAT(lines, Each(fitsInto80Columns()));
 }
 
-TEST_F(RouterReportTest, MsrSaysByWhomAServerElsewhereIsReached) {
+TEST_F(RouterReportTest, MsrShowsTheRouterOfAServerOnAnotherHost) {
   const auto remote = connectedRemote(statistics_, {1});
   const EchoThread local(backplane_, "Int32");
   const EchoThread proxy(backplane_, "Int32", {.location = 1});
@@ -236,7 +236,7 @@ TEST_F(RouterReportTest, InspectShowsEachRowOfARouter) {
   EXPECT_EQ(json.at(0).at("lines").at(1).at("problem"), R"(no \x1b[2J route)");
 }
 
-TEST_F(RouterReportTest, InspectsSummaryHasRoutersAndWhoWaits) {
+TEST_F(RouterReportTest, TheSummaryOfInspectHasRoutersAndPendingBinds) {
   const auto remote = connectedRemote(statistics_, {1});
   const auto lost = lostRemote(statistics_);
   bind("dac", 8, 2);
@@ -245,16 +245,16 @@ TEST_F(RouterReportTest, InspectsSummaryHasRoutersAndWhoWaits) {
   const auto text = run({"inspect"}).out;
 
   EXPECT_THAT(text, HasSubstr("  router lab1" + us() + ", alive: 2 connections, 1 of them cut\n"));
-  EXPECT_THAT(text, HasSubstr("  us" + us() +
-                              " waits for the server dac@8, which is not there, 2 times\n"));
+  EXPECT_THAT(text,
+              HasSubstr("  us" + us() + " waits for the server dac@8, which is absent, 2 times\n"));
   const auto json = report({"inspect"}).at(0);
   EXPECT_EQ(json.at("routers").at(0).at("cut"), 1);
   EXPECT_EQ(entryOf(json.at("windows"), "name", "us").at("waits_for").at(0),
             (nlohmann::json{{"server", "dac"}, {"location", 8}}));
 }
 
-// A process of its own, killed.
-TEST_F(RouterReportTest, ADeadRoutersSegmentIsSaidToBeDeadAndRemoved) {
+// The router is a process, which the test kills.
+TEST_F(RouterReportTest, ReportsADeadRouterAndCleanRemovesIt) {
   auto segment =
       Segment::create(layout::kRouterBytes, layout::SegmentKind::router, backplane_.name(), {});
   std::string("gone").copy(segment.sharedHeader().name.data(), 4);
@@ -271,11 +271,11 @@ TEST_F(RouterReportTest, ADeadRoutersSegmentIsSaidToBeDeadAndRemoved) {
               HasSubstr("would remove " + segments::path(name) + ":\n"));
   EXPECT_THAT(run({"clean"}).out, HasSubstr("removed " + segments::path(name) + ":\n"));
 
-  EXPECT_THAT(ls().at("routers"), SizeIs(1)) << "ours lives";
+  EXPECT_THAT(ls().at("routers"), SizeIs(1)) << "the router of the test is alive";
   EXPECT_THAT(backplane_.segmentNames(), Not(testing::Contains(name)));
 }
 
-TEST_F(RouterReportTest, EachFieldIsInTheDocument) {
+TEST_F(RouterReportTest, EachJsonFieldIsDocumented) {
   const auto remote = connectedRemote(statistics_, {1});
   const EchoThread proxy(backplane_, "Int32", {.location = 1});
   std::ostringstream document;
@@ -292,7 +292,7 @@ TEST_F(RouterReportTest, EachFieldIsInTheDocument) {
   }
 }
 
-TEST_F(RouterReportTest, AThousandClientsOfARouterAreALine) {
+TEST_F(RouterReportTest, ShowsAThousandClientsOfARouterInOneLine) {
   const auto remote = connectedRemote(statistics_, {1});
   const EchoThread proxy(backplane_, "echo", {.location = 1});
   bind("echo", 1, 1000);

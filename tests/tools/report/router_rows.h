@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rows of a router's segment, as a router writes them.
+// Writes rows of a router's segment as a router does.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ void set(Word& word, std::uint64_t value) {
   word.store(static_cast<typename Word::value_type>(value), std::memory_order_relaxed);
 }
 
-// Connected to "ioc1", for these locations.
+// A remote "ioc1" that is connected, with these locations.
 inline Row connectedRemote(router::Statistics& statistics,
                            const std::vector<std::int32_t>& locations) {
   auto row = statistics.add(layout::RouterRole::client);
@@ -35,7 +35,7 @@ inline Row connectedRemote(router::Statistics& statistics,
   return row;
 }
 
-// A remote that does not answer.
+// A remote that refuses the connection.
 inline Row lostRemote(router::Statistics& statistics,
                       const std::string& problem = "connect(): Connection refused") {
   auto row = statistics.add(layout::RouterRole::client);
@@ -46,7 +46,7 @@ inline Row lostRemote(router::Statistics& statistics,
   return row;
 }
 
-// Who called from "ioc2", over TLS.
+// A caller "ioc2", over TLS.
 inline Row connectedCaller(router::Statistics& statistics) {
   auto row = statistics.add(layout::RouterRole::server);
   row->setAddress("10.0.0.9:51234");

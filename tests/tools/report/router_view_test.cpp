@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a router says of its connections, as a snapshot has it.
+// The connections of a router in a snapshot.
 #include "tools/report/router_view.h"
 
 #include <sys/resource.h>
@@ -27,7 +27,7 @@ using testing::SizeIs;
 class RouterViewTest : public test::ShmTest {
  protected:
   [[nodiscard]] Snapshot take() const { return Snapshot::take(name()); }
-  // Of the only router.
+  // The rows of the only router.
   [[nodiscard]] RouterView router() const {
     const auto snapshot = take();
     EXPECT_THAT(snapshot.routers, SizeIs(1));
@@ -35,7 +35,7 @@ class RouterViewTest : public test::ShmTest {
   }
 };
 
-TEST_F(RouterViewTest, ARouterSaysWhoItIs) {
+TEST_F(RouterViewTest, HasNamePidAndProgramOfTheRouter) {
   const router::Statistics statistics(backplane_, "lab1");
 
   const auto seen = router();
@@ -50,7 +50,7 @@ TEST_F(RouterViewTest, ARouterSaysWhoItIs) {
   EXPECT_THAT(take().problems, IsEmpty());
 }
 
-TEST_F(RouterViewTest, ConnectionsAreRows) {
+TEST_F(RouterViewTest, HasARowForEachConnection) {
   router::Statistics statistics(backplane_, "lab1");
   const auto caller = test::connectedCaller(statistics);
   const auto remote = test::connectedRemote(statistics, {1, 2});
@@ -92,7 +92,7 @@ TEST_F(RouterViewTest, ConnectionsAreRows) {
   EXPECT_EQ(lines.back().peer, "ioc2");
 }
 
-TEST_F(RouterViewTest, AConnectionThatEndsLeavesNoRow) {
+TEST_F(RouterViewTest, DropsTheRowOfAnEndedConnection) {
   router::Statistics statistics(backplane_, "lab1");
   auto caller = test::connectedCaller(statistics);
   EXPECT_THAT(router().lines, SizeIs(1));
@@ -102,8 +102,8 @@ TEST_F(RouterViewTest, AConnectionThatEndsLeavesNoRow) {
   EXPECT_THAT(router().lines, IsEmpty());
 }
 
-// What a person wants to know is since when there is no connection, not when it was tried last.
-TEST_F(RouterViewTest, TryingAgainIsTheSameTimeWithoutAConnection) {
+// The time shown is that since the connection was lost, not since the last attempt.
+TEST_F(RouterViewTest, AnotherAttemptDoesNotResetTheTimeWithoutConnection) {
   router::Statistics statistics(backplane_, "lab1");
   const auto remote = test::lostRemote(statistics);
   const auto since = router().lines.front().sinceNs;
@@ -118,8 +118,8 @@ TEST_F(RouterViewTest, TryingAgainIsTheSameTimeWithoutAConnection) {
   EXPECT_GT(router().lines.front().sinceNs, connectedSince);
 }
 
-// A peer's name comes from another host.
-TEST_F(RouterViewTest, NoTextCommandsATerminal) {
+// The name of a peer is sent by another host and untrusted.
+TEST_F(RouterViewTest, RemovesControlCharactersFromTexts) {
   router::Statistics statistics(backplane_, "l\x1b[2Jab");
   const auto remote = test::lostRemote(statistics,
                                        "a\nb\x7f\xc2\x9b"
@@ -136,19 +136,19 @@ TEST_F(RouterViewTest, NoTextCommandsATerminal) {
   EXPECT_EQ(seen.lines.front().address, R"(\r)");
 }
 
-TEST_F(RouterViewTest, ATextIsNeverSeenHalfWritten) {
+TEST_F(RouterViewTest, NeverReturnsAHalfWrittenText) {
   router::Statistics statistics(backplane_, "lab1");
   const auto remote = test::lostRemote(statistics, "");
   const std::string as(143, 'a');
   const std::string bs(143, 'b');
   std::atomic<bool> done{false};
-  // times that the writer lost its processor, perhaps in the middle of a text
+  // Number of times that the writer was preempted, perhaps in the middle of a text.
   long standstills = 0;
   std::thread writer([&] {
     while (!done) {
       remote->setProblem(as);
       remote->setProblem(bs);
-      // a router changes its texts now and then, not all the time
+      // A router changes its texts rarely.
       std::this_thread::sleep_for(20us);
     }
     rusage usage{};
@@ -157,7 +157,8 @@ TEST_F(RouterViewTest, ATextIsNeverSeenHalfWritten) {
   });
   while (router().lines.front().problem.empty()) continue;
 
-  std::vector<std::string> halves;  // a text whose writer stands still for long is shown as it is
+  std::vector<std::string>
+      halves;  // a text is returned half written only if its writer is preempted for long
   for (int i = 0; i < 500; ++i) {
     const auto problem = router().lines.front().problem;
     if (problem != as && problem != bs) halves.push_back(problem);
@@ -168,8 +169,8 @@ TEST_F(RouterViewTest, ATextIsNeverSeenHalfWritten) {
   EXPECT_LE(static_cast<long>(halves.size()), standstills) << testing::PrintToString(halves);
 }
 
-// Its router was stopped or killed in the middle of it.
-TEST_F(RouterViewTest, ATextThatIsNeverFinishedIsShownAsItIs) {
+// The router was stopped or killed while it wrote the text.
+TEST_F(RouterViewTest, ReturnsATextThatIsNeverCompleted) {
   router::Statistics statistics(backplane_, "lab1");
   const auto remote = test::lostRemote(statistics, "half");
   test::set((*remote)->texts, 7);
@@ -186,7 +187,7 @@ TEST_F(RouterViewTest, ARouterWithoutItsLockIsDead) {
   EXPECT_THAT(backplane_.removeDead(), SizeIs(1));
 }
 
-// Rows beyond those that the file has are none.
+// A file that is too short for all rows has only those that fit.
 TEST_F(RouterViewTest, AShortFileHasFewerRows) {
   auto segment =
       Segment::create(layout::kRouterLinesOffset + 100, layout::SegmentKind::router, name(), {});
@@ -197,7 +198,7 @@ TEST_F(RouterViewTest, AShortFileHasFewerRows) {
   EXPECT_THAT(backplane_.removeDead(), SizeIs(1));
 }
 
-TEST_F(RouterViewTest, ManyConnectionsAreSeen) {
+TEST_F(RouterViewTest, ReadsManyConnections) {
   router::Statistics statistics(backplane_, "lab1");
   std::vector<test::Row> rows;
   for (std::uint32_t i = 0; i < layout::kRouterLines + 10; ++i)
@@ -218,8 +219,8 @@ TEST(RouterLineView, LocationsAreNumbersBetweenCommas) {
   EXPECT_THAT(listOf("x, 2y, 3,, ,"), ElementsAre(3));
 }
 
-// Long lists are cut where their place ends: the last number may be half of one.
-TEST_F(RouterViewTest, TheOnlyRemoteReachesWhatItsListHasNoRoomFor) {
+// A long list is cut at the end of its field, perhaps inside a number.
+TEST_F(RouterViewTest, TheOnlyRemoteReachesLocationsThatItsListOmits) {
   router::Statistics statistics(backplane_, "lab1");
   std::vector<std::int32_t> many;
   for (int location = 100; location < 140; ++location) many.push_back(location);
@@ -236,8 +237,8 @@ TEST_F(RouterViewTest, TheOnlyRemoteReachesWhatItsListHasNoRoomFor) {
   EXPECT_EQ(two.lineTo(8)->address, "10.0.0.8:9900");
 }
 
-// A server that a router has here, at a location that it reaches, is one elsewhere.
-TEST_F(RouterViewTest, ServersOfARouterAreThoseOfItsPeer) {
+// A server window of a router belongs to the connection that reaches its location.
+TEST_F(RouterViewTest, AssignsServersToTheConnectionOfTheirLocation) {
   router::Statistics statistics(backplane_, "lab1");
   const auto lost = test::lostRemote(statistics);
   const auto remote = test::connectedRemote(statistics, {1, 2});
@@ -252,8 +253,8 @@ TEST_F(RouterViewTest, ServersOfARouterAreThoseOfItsPeer) {
   EXPECT_EQ(snapshot.servers.back().router, 0U);
 }
 
-// Two callers of one name have windows that cannot be told apart.
-TEST_F(RouterViewTest, ClientsOfACallerAreKnownByItsName) {
+// The windows of two callers with the same name cannot be assigned.
+TEST_F(RouterViewTest, AssignsClientsToTheCallerOfTheirLabel) {
   router::Statistics statistics(backplane_, "lab1");
   const auto caller = test::connectedCaller(statistics);
 
@@ -265,7 +266,7 @@ TEST_F(RouterViewTest, ClientsOfACallerAreKnownByItsName) {
   EXPECT_EQ(router().lineFrom("router ioc2"), nullptr);
 }
 
-TEST_F(RouterViewTest, ANameThatIsCutIsFoundAllTheSame) {
+TEST_F(RouterViewTest, FindsALabelThatWasCut) {
   router::Statistics statistics(backplane_, "lab1");
   const auto caller = test::connectedCaller(statistics);
   caller->setPeer(std::string(63, 'p'), "");

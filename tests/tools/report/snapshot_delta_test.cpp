@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two snapshots: rates, and who has stopped moving. The snapshots are made by hand.
+// SnapshotDelta: rates and stalls, from hand-made snapshots.
 #include "tools/report/snapshot_delta.h"
 
 #include <gmock/gmock.h>
@@ -50,7 +50,7 @@ Snapshot snapshot(std::int64_t atNs, std::vector<WindowView> servers,
 
 constexpr std::int64_t kHalfASecond = 500'000'000;
 
-TEST(SnapshotDelta, AServersRatesAreWhatItTookAndSent) {
+TEST(SnapshotDelta, RatesOfAServerAreWhatItReceivedAndSent) {
   const SnapshotDelta delta(snapshot(0, {server(100, 50)}),
                            snapshot(kHalfASecond, {server(200, 80)}));
 
@@ -60,9 +60,9 @@ TEST(SnapshotDelta, AServersRatesAreWhatItTookAndSent) {
   EXPECT_DOUBLE_EQ(rates.sentPerSecond, 60);
 }
 
-// Clients that come, ask and go between two looks leave no link behind; their requests were handled
-// all the same.
-TEST(SnapshotDelta, AServersRatesDoNotDependOnItsClientsStaying) {
+// The links of clients that connect and leave between two snapshots are not in either of them, but
+// their requests count.
+TEST(SnapshotDelta, RatesOfAServerIncludeClientsThatLeft) {
   const SnapshotDelta delta(snapshot(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}),
                            snapshot(kHalfASecond, {server(130, 130)}));
 
@@ -72,24 +72,24 @@ TEST(SnapshotDelta, AServersRatesDoNotDependOnItsClientsStaying) {
   EXPECT_DOUBLE_EQ(rates.sentPerSecond, 60);
 }
 
-TEST(SnapshotDelta, AClientsRatesAreWhatItsLinksSentAndWhatItTook) {
+TEST(SnapshotDelta, RatesOfAClientAreWhatItsLinksSentAndItReceived) {
   const SnapshotDelta delta(
       snapshot(0, {}, {client(10, {link(7, {10, 10}), link(8, {1000, 1000})})}),
       snapshot(kHalfASecond, {}, {client(15, {link(7, {20, 20}), link(9, {5, 5})})}));
 
   const auto rates = delta.ratesOf(delta.now().clients.front());
 
-  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 30);  // 10 on an old link, 5 on a new one; one is gone
+  EXPECT_DOUBLE_EQ(rates.sentPerSecond, 30);  // 10 on an old link, 5 on a new one; one was removed
   EXPECT_DOUBLE_EQ(rates.receivedPerSecond, 10);
 }
 
-TEST(SnapshotDelta, WhatWasNotThereBeforeHasNoRatesYet) {
+TEST(SnapshotDelta, AWindowWithoutAnEarlierSnapshotHasNoRates) {
   const SnapshotDelta delta(snapshot(0, {}), snapshot(kHalfASecond, {server(100, 100)}));
 
   EXPECT_DOUBLE_EQ(delta.ratesOf(delta.now().servers.front()).receivedPerSecond, 0);
 }
 
-TEST(SnapshotDelta, CountersThatGoBackAndClocksThatStandGiveNoRates) {
+TEST(SnapshotDelta, DecreasingCountersAndEqualTimesGiveNoRates) {
   const SnapshotDelta back(snapshot(0, {server(100, 100)}),
                            snapshot(kHalfASecond, {server(10, 10)}));
   const SnapshotDelta standing(snapshot(5, {server(1, 1)}), snapshot(5, {server(2, 2)}));
@@ -98,7 +98,7 @@ TEST(SnapshotDelta, CountersThatGoBackAndClocksThatStandGiveNoRates) {
   EXPECT_DOUBLE_EQ(standing.ratesOf(standing.now().servers.front()).sentPerSecond, 0);
 }
 
-TEST(SnapshotDelta, WindowsAreFoundByTheirIncarnation) {
+TEST(SnapshotDelta, FindsWindowsByTheirIncarnation) {
   const SnapshotDelta delta(snapshot(0, {}), snapshot(1, {server(0, 0)}, {client(0)}));
 
   EXPECT_EQ(delta.find(kServer), &delta.now().servers.front());
@@ -111,7 +111,7 @@ std::string serverState(const WindowView& before, const WindowView& now) {
   return delta.stateOf(delta.now().servers.front());
 }
 
-TEST(SnapshotDelta, AServerWithNothingToDoIsAlive) {
+TEST(SnapshotDelta, AnIdleServerIsAlive) {
   EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {5, 5})})), "alive");
 }
 
@@ -120,17 +120,17 @@ TEST(SnapshotDelta, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
             "stalled");
 }
 
-TEST(SnapshotDelta, AServerThatTakesSomethingIsAliveHoweverMuchWaits) {
+TEST(SnapshotDelta, AServerThatReceivesIsAliveEvenIfMessagesWait) {
   EXPECT_EQ(serverState(server(5, 5, {link(7, {60, 5})}), server(6, 6, {link(7, {60, 6})})),
             "alive");
 }
 
-TEST(SnapshotDelta, ARequestThatCameJustNowStallsNobody) {
+TEST(SnapshotDelta, ARequestThatJustArrivedIsNotAStall) {
   EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {6, 5})})), "alive");
   EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {6, 6})})), "alive");
 }
 
-// Nor does it help that another client went away with what it had counted.
+// The sums of the links decrease when another client leaves; the server is still stalled.
 TEST(SnapshotDelta, AStalledServerStaysStalledWhenAClientLeaves) {
   EXPECT_EQ(serverState(server(9, 9, {link(7, {6, 5}), link(8, {4, 4})}),
                         server(9, 9, {link(7, {6, 5})})),
@@ -144,7 +144,7 @@ TEST(SnapshotDelta, AClientThatDoesNotTakeItsRepliesIsStalled) {
   EXPECT_EQ(delta.stateOf(delta.now().clients.front()), "stalled");
 }
 
-TEST(SnapshotDelta, WhatIsWorseIsSaidFirst) {
+TEST(SnapshotDelta, TheWorstStateIsReported) {
   const auto stuck = server(5, 5, {link(7, {6, 5})});
   auto stopped = stuck;
   stopped.processState = 'T';
@@ -161,7 +161,7 @@ TEST(SnapshotDelta, WhatIsWorseIsSaidFirst) {
   EXPECT_EQ(serverState(stuck, closed), "closed");
 }
 
-TEST(Totals, AServersIncomingAreRequestsAClientsAreReplies) {
+TEST(Totals, IncomingAreRequestsOfAServerAndRepliesOfAClient) {
   auto one = link(7, {10, 8}, {7, 6});
   one.refused = 1;
   one.unanswered = 2;
@@ -211,7 +211,7 @@ SnapshotDelta routersAt(const RouterView& before, const RouterView& now) {
   return {std::move(was), std::move(is)};
 }
 
-TEST(SnapshotDelta, AConnectionsRatesAreOfMessagesFramesAndBytes) {
+TEST(SnapshotDelta, RatesOfAConnectionAreMessagesFramesAndBytes) {
   const auto delta = routersAt(router({line("a", 100)}), router({line("a", 110)}));
   const auto& now = delta.now().routers.front();
 
@@ -225,15 +225,15 @@ TEST(SnapshotDelta, AConnectionsRatesAreOfMessagesFramesAndBytes) {
   EXPECT_DOUBLE_EQ(rates.bytes.receivedPerSecond, 120);
 }
 
-// A row is given on when its connection has ended.
-TEST(SnapshotDelta, AnotherConnectionInTheSameRowHasNoRatesYet) {
+// A row is reused when its connection has ended.
+TEST(SnapshotDelta, AnotherConnectionInTheSameRowHasNoRates) {
   const auto delta = routersAt(router({line("a", 100)}), router({line("b", 110)}));
   const auto& now = delta.now().routers.front();
 
   EXPECT_DOUBLE_EQ(delta.ratesOf(now, now.lines.front()).messages.sentPerSecond, 0);
 }
 
-TEST(SnapshotDelta, AConnectionIsAsItsRouterIs) {
+TEST(SnapshotDelta, AConnectionHasTheStateOfADeadRouter) {
   auto view = router({line("a", 0)});
   const auto stateOf = [](const RouterView& now) {
     const auto delta = routersAt(now, now);

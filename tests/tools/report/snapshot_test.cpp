@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the segments of a backplane say at one moment.
+// Snapshot: the contents of the segments of a backplane at one moment.
 #include "tools/report/snapshot.h"
 
 #include <unistd.h>
@@ -19,7 +19,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-class SurveyTest : public test::ShmTest {
+class SnapshotTest : public test::ShmTest {
  protected:
   [[nodiscard]] Snapshot take() const { return Snapshot::take(name()); }
 };
@@ -48,12 +48,12 @@ class Clients {
   std::vector<std::unique_ptr<MessageClient>> clients_;
 };
 
-TEST_F(SurveyTest, ANameThatNoBackplaneCanHaveIsNamed) {
+TEST_F(SnapshotTest, RefusesAnInvalidBackplaneName) {
   EXPECT_THAT(test::whatOf<std::invalid_argument>([] { static_cast<void>(Snapshot::take("a.b")); }),
               testing::HasSubstr("\"a.b\""));
 }
 
-TEST_F(SurveyTest, AServerSaysWhoItIs) {
+TEST_F(SnapshotTest, HasTheIdentityOfAServer) {
   const MessageServer server(
       backplane_, "dac",
       {.location = 3, .queueSize = 17, .maxMessageBytes = 12345, .waitMode = WaitMode::block});
@@ -77,7 +77,7 @@ TEST_F(SurveyTest, AServerSaysWhoItIs) {
   EXPECT_THAT(snapshot.problems, IsEmpty());
 }
 
-TEST_F(SurveyTest, ALinkIsSeenFromBothOfItsWindows) {
+TEST_F(SnapshotTest, AddsALinkToBothOfItsWindows) {
   MessageServer server(backplane_, "dac", {.location = 0, .queueSize = 17});
   server.on<Int32>([](Int32&) {});
   Clients clients(backplane_);
@@ -108,7 +108,7 @@ TEST_F(SurveyTest, ALinkIsSeenFromBothOfItsWindows) {
   EXPECT_EQ(snapshot.servers.front().sent, 2U);
 }
 
-TEST_F(SurveyTest, ALinkHasTheMemoryOfItsLargeMessages) {
+TEST_F(SnapshotTest, CountsThePoolsInTheMemoryOfALink) {
   MessageServer server(backplane_, "dac");
   Clients clients(backplane_);
   auto& client = clients.connect(server);
@@ -119,7 +119,7 @@ TEST_F(SurveyTest, ALinkHasTheMemoryOfItsLargeMessages) {
   EXPECT_GE(take().servers.front().links.front().bytes, before + 800'000);
 }
 
-TEST_F(SurveyTest, SeveralClientsOfAProcessAreLinksOfOneWindow) {
+TEST_F(SnapshotTest, SeveralClientsOfAProcessAreLinksOfOneWindow) {
   MessageServer dac(backplane_, "dac");
   MessageServer adc(backplane_, "adc");
   Clients clients(backplane_);
@@ -139,7 +139,7 @@ TEST_F(SurveyTest, SeveralClientsOfAProcessAreLinksOfOneWindow) {
   EXPECT_THAT(snapshot.servers[1].links, SizeIs(2));
 }
 
-TEST_F(SurveyTest, AClientThatWaitsForItsServerIsSeen) {
+TEST_F(SnapshotTest, HasThePendingBindOfAClient) {
   Clients clients(backplane_);
   clients.bind("later", 5);
   while (take().pendingBinds.empty()) clients.runOnce();
@@ -155,7 +155,7 @@ TEST_F(SurveyTest, AClientThatWaitsForItsServerIsSeen) {
   EXPECT_EQ(snapshot.clients.front().pendingBinds.front().server, "later");
 }
 
-TEST_F(SurveyTest, OfAnotherBackplaneNothingIsSeen) {
+TEST_F(SnapshotTest, IgnoresOtherBackplanes) {
   const auto other = Backplane::named(name() + "x");
   const MessageServer server(other, "dac");
 
@@ -165,8 +165,8 @@ TEST_F(SurveyTest, OfAnotherBackplaneNothingIsSeen) {
   EXPECT_THAT(snapshot.problems, IsEmpty());
 }
 
-// Whoever may write to /dev/shm chooses the names in headers.
-TEST_F(SurveyTest, ANameCannotCommandTheTerminal) {
+// The names in headers are untrusted.
+TEST_F(SnapshotTest, EscapesControlCharactersInNames) {
   auto window =
       Segment::create(layout::kWindowBytes, layout::SegmentKind::serverWindow, name(), {});
   const std::string evil = "a\x1b[2Jb\n\x7f";
@@ -182,7 +182,7 @@ TEST_F(SurveyTest, ANameCannotCommandTheTerminal) {
   segments::remove(serverName());
 }
 
-TEST_F(SurveyTest, AProblemHidesNothingElse) {
+TEST_F(SnapshotTest, ReportsAProblemBesideAllOthers) {
   const MessageServer server(backplane_, "dac");
   const auto junk = segments::path(serverName("junk"));
   std::ofstream(junk) << "junk";
@@ -195,7 +195,7 @@ TEST_F(SurveyTest, AProblemHidesNothingElse) {
   segments::remove(serverName("junk"));
 }
 
-TEST_F(SurveyTest, JunkUnderEveryKindOfNameIsAProblem) {
+TEST_F(SnapshotTest, AForeignFileUnderAnyNameIsAProblem) {
   std::vector<std::string> junk{serverName()};
   for (const char* rest :
        {"c.1", "h.1", "l.1.2", "b.1.0.0", "w.1", "f.1", "x.1", "s.0", "nothing"}) {

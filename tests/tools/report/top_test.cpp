@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// mpf top on a real terminal.
+// mpf top on a pseudo-terminal.
 #include <mpf/message_client.h>
 
 #include "tests/support/terminal.h"
@@ -45,7 +45,7 @@ TEST_F(TopTest, ShowsServersAndTheirClientsAndALinkOfOne) {
   EXPECT_TRUE(top->isRestored());
 }
 
-TEST_F(TopTest, FiltersAsOneTypes) {
+TEST_F(TopTest, FiltersWhileTheUserTypes) {
   const EchoThread alpha(backplane_, "alpha");
   const EchoThread beta(backplane_, "beta[jk]");
   const auto top = this->top();
@@ -74,7 +74,7 @@ TEST_F(TopTest, ShowsAServerThatHasStalled) {
   const auto top = this->top();
 
   EXPECT_TRUE(top->waitFor("stalled")) << top->screen();
-  EXPECT_TRUE(top->look(2).isRed && top->look(2).isReversed) << "selected, and to be looked at";
+  EXPECT_TRUE(top->look(2).isRed && top->look(2).isReversed) << "selected, and an alarm";
 }
 
 TEST_F(TopTest, ShowsConnectionsToOtherHosts) {
@@ -97,7 +97,7 @@ TEST_F(TopTest, ShowsConnectionsToOtherHosts) {
   EXPECT_EQ(top->wait(), 0);
 }
 
-TEST_F(TopTest, FitsTheTerminalThatItHas) {
+TEST_F(TopTest, FitsTheSizeOfTheTerminal) {
   const EchoThread server(backplane_, "echo");
   const auto top = this->top({}, 10, 40);
   ASSERT_TRUE(top->waitFor("q quit"));
@@ -109,7 +109,7 @@ TEST_F(TopTest, FitsTheTerminalThatItHas) {
   EXPECT_THAT(top->row(29), testing::HasSubstr("q quit"));
 }
 
-TEST_F(TopTest, GivesTheTerminalBackWhenASignalEndsIt) {
+TEST_F(TopTest, RestoresTheTerminalOnASignal) {
   for (const int number : {SIGTERM, SIGINT}) {
     const auto top = this->top();
     ASSERT_TRUE(top->waitFor("0 servers"));
@@ -122,7 +122,7 @@ TEST_F(TopTest, GivesTheTerminalBackWhenASignalEndsIt) {
   }
 }
 
-TEST_F(TopTest, WithoutATerminalItSaysSo) {
+TEST_F(TopTest, FailsWithoutATerminal) {
   const auto ended = run({"top"});
 
   EXPECT_EQ(ended.status, 1);
@@ -130,7 +130,7 @@ TEST_F(TopTest, WithoutATerminalItSaysSo) {
   EXPECT_THAT(ended.out, testing::IsEmpty());
 }
 
-TEST_F(TopTest, ABatchIsPrinted) {
+TEST_F(TopTest, PrintsABatch) {
   const EchoThread alpha(backplane_, "alpha");
   const EchoThread beta(backplane_, "beta");
 
@@ -167,8 +167,8 @@ TEST_F(TopTest, ShowsAThousandLinks) {
   EXPECT_EQ(top->wait(), 0);
 }
 
-// A line that the terminal itself breaks does not begin with the indent of mrr.
-TEST_F(TopTest, ReportsTakeTheWidthOfTheTerminal) {
+// If the terminal broke a line of mrr, the rest of it would have no indent.
+TEST_F(TopTest, ReportsUseTheWidthOfTheTerminal) {
   const std::string name(40, 'x');
   const EchoThread echo(backplane_, name);
   const std::vector<std::string> mrr{MPF_TEST_TOOL,     "mrr",        "--backplane",

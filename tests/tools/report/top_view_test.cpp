@@ -19,7 +19,7 @@ WindowView serverOf(std::uint64_t incarnation, const std::string& name, std::uin
   return server;
 }
 
-// Second by second: one takes 10 requests, the other 2000.
+// In each second, one server receives 10 requests and the other 2000.
 std::shared_ptr<const SnapshotDelta> lookAt(std::vector<std::string> names) {
   Snapshot was;
   Snapshot is;
@@ -70,7 +70,7 @@ TEST_F(TopViewTest, KeepsTheSelectionWhenTheOrderChanges) {
   EXPECT_THAT(row(0), StartsWith("beta"));
 }
 
-TEST_F(TopViewTest, HandsTheSelectionOnWhenItsRowHasGone) {
+TEST_F(TopViewTest, SelectsTheNextRowWhenTheSelectedOneDisappears) {
   press({'j'});
 
   Snapshot snapshot;
@@ -80,7 +80,7 @@ TEST_F(TopViewTest, HandsTheSelectionOnWhenItsRowHasGone) {
   EXPECT_THAT(selected(), StartsWith("alpha"));
 }
 
-TEST_F(TopViewTest, ShowsAsManyLinesAsThereIsRoomFor) {
+TEST_F(TopViewTest, ShowsOnlyLinesThatFit) {
   std::vector<std::string> names;
   for (int i = 100; i < 200; ++i) names.push_back("server" + std::to_string(i));
   view_.show(lookAt(names));
@@ -99,7 +99,7 @@ TEST_F(TopViewTest, FitsInto80ColumnsWithUsualNames) {
   EXPECT_THAT(row(0), HasSubstr("~"));
 }
 
-TEST_F(TopViewTest, SaysThatWhatWasOpenedHasGone) {
+TEST_F(TopViewTest, ReportsThatTheOpenedRowNoLongerExists) {
   press({kTopEnter});
 
   view_.show(lookAt({}));
@@ -108,7 +108,7 @@ TEST_F(TopViewTest, SaysThatWhatWasOpenedHasGone) {
   press({kTopBack, kTopEnter, 's'});
 }
 
-TEST_F(TopViewTest, SaysWhatWasOpened) {
+TEST_F(TopViewTest, ShowsTheTitleOfTheOpenedRow) {
   press({kTopEnter});
   EXPECT_EQ(view_.lines(24).at(0).text, "mpf top  : server alpha, alive");
 
@@ -117,7 +117,7 @@ TEST_F(TopViewTest, SaysWhatWasOpened) {
             "mpf top  : 2 servers, 0 clients, 0 links, 2010 requests/s");
 }
 
-TEST_F(TopViewTest, ARowToBeLookedAtStaysRedWhenItIsSelected) {
+TEST_F(TopViewTest, AnAlarmRowStaysRedWhenSelected) {
   auto dead = serverOf(2, "alpha", 0);
   dead.life = Life::dead;
   Snapshot snapshot;
@@ -131,7 +131,7 @@ TEST_F(TopViewTest, ARowToBeLookedAtStaysRedWhenItIsSelected) {
   EXPECT_EQ(view_.lines(24).at(3).style, TopLine::Style::selected);
 }
 
-TEST_F(TopViewTest, HelpsWithItsKeysAndColumns) {
+TEST_F(TopViewTest, HelpListsKeysAndColumns) {
   press({'j', '?'});
 
   std::string help;
@@ -145,7 +145,7 @@ TEST_F(TopViewTest, HelpsWithItsKeysAndColumns) {
   EXPECT_THAT(selected(), StartsWith("beta"));
 }
 
-// Connected to one peer, not to another one; the second was there before, too.
+// A router that is connected to one peer and not to another one.
 std::shared_ptr<const SnapshotDelta> lookAtRouter() {
   RouterLineView up;
   up.row = 1;
@@ -197,8 +197,8 @@ TEST_F(TopViewTest, ShowsConnectionsToOtherHosts) {
   EXPECT_THAT(lines.at(3).text,
               testing::MatchesRegex("→ ioc2.lab.exam~ +waiting +0 +0 +0 +0 +0 +-"));
   EXPECT_EQ(lines.at(2).style, TopLine::Style::selected);
-  EXPECT_EQ(lines.at(3).style, TopLine::Style::alarm) << "what is cut is red";
-  // an arrow is three bytes
+  EXPECT_EQ(lines.at(3).style, TopLine::Style::alarm) << "a lost connection is red";
+  // An arrow has three bytes.
   for (const auto& line : lines) EXPECT_LE(line.text.size(), 82U) << line.text;
   press({kTopTab});
   EXPECT_THAT(view_.lines(24).at(1).text, StartsWith("SERVER"));
@@ -228,7 +228,7 @@ TEST_F(TopViewTest, OpensAConnection) {
             "GONE: router → ioc2.lab.example:9900, waiting; Esc goes back");
 }
 
-TEST_F(TopViewTest, EndsWithQUnlessOneTypesAFilter) {
+TEST_F(TopViewTest, QEndsTheProgramExceptInAFilter) {
   press({'/', 'q', kTopErase, 'b', kTopEnter});
 
   EXPECT_THAT(row(0), StartsWith("beta"));

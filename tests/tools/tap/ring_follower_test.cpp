@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RingFollower: sees what crosses a ring, or says that it did not; and never a message that was not
-// sent.
+// RingFollower: reads every message of a ring or reports an overrun, and never returns a message
+// that was not sent.
 #include "tools/tap/ring_follower.h"
 
 #include "tests/shm/ring_fixture.h"
@@ -21,7 +21,7 @@ class RingFollowerTest : public RingTest {
     ASSERT_TRUE(push(ordinal, bodyBytes));
     EXPECT_EQ(take(), pattern(ordinal, bodyBytes));
   }
-  // That the follower's next message is `ordinal`.
+  // Expects that the follower's next message is `ordinal`.
   static void expectNext(RingFollower& follower, std::uint64_t ordinal, std::size_t bodyBytes = 8) {
     RingCopy copy;
     ASSERT_EQ(follower.tryNext(copy), Next::message);
@@ -34,7 +34,7 @@ class RingFollowerTest : public RingTest {
   }
 };
 
-TEST_F(RingFollowerTest, SeesMessagesOfEverySizeInTheirOrder) {
+TEST_F(RingFollowerTest, ReadsMessagesOfEverySizeInOrder) {
   auto follower = follow();
   std::uint64_t ordinal = 0;
   for (std::size_t bytes = 0; bytes <= layout::kInlineBodyBytes; ++bytes) {
@@ -44,7 +44,7 @@ TEST_F(RingFollowerTest, SeesMessagesOfEverySizeInTheirOrder) {
   }
 }
 
-TEST_F(RingFollowerTest, SeesWhatNobodyHasTakenAndWhatWasTaken) {
+TEST_F(RingFollowerTest, ReadsMessagesBeforeAndAfterTheyAreTaken) {
   auto follower = follow();
   ASSERT_TRUE(push(1));
 
@@ -54,7 +54,7 @@ TEST_F(RingFollowerTest, SeesWhatNobodyHasTakenAndWhatWasTaken) {
   expectNext(follower, 2);
 }
 
-TEST_F(RingFollowerTest, BeginsBehindTheNewestMessageWhereverThatIs) {
+TEST_F(RingFollowerTest, BeginsBehindTheNewestMessageAtAnyPosition) {
   for (std::uint64_t ordinal = 1; ordinal < 100; ++ordinal) {
     cross(ordinal, ordinal % layout::kInlineBodyBytes);
     auto follower = follow();
@@ -75,7 +75,7 @@ TEST_F(RingFollowerTest, BeginsWithTheFirstMessageWhenAsked) {
   expectNothing(follower);
 }
 
-TEST_F(RingFollowerTest, GoesOnBehindTheNewestWhenItWasTooSlow) {
+TEST_F(RingFollowerTest, ContinuesBehindTheNewestMessageAfterAnOverrun) {
   auto follower = follow();
   for (std::uint64_t ordinal = 1; ordinal <= 3 * kCapacity; ++ordinal) cross(ordinal);
 
@@ -86,9 +86,9 @@ TEST_F(RingFollowerTest, GoesOnBehindTheNewestWhenItWasTooSlow) {
   expectNext(follower, 1000);
 }
 
-// A message of several slots leaves the sequences of its later slots as they were: old ones, that
-// look like none.
-TEST_F(RingFollowerTest, NoticesThatItWasTooSlowWhenLongMessagesCame) {
+// A message of several slots does not change the sequences of its later slots, so those keep old
+// values.
+TEST_F(RingFollowerTest, DetectsAnOverrunByLongMessages) {
   for (std::uint64_t warmUp = 0; warmUp < 7; ++warmUp) {
     cross(warmUp);
     auto follower = follow();
@@ -100,7 +100,7 @@ TEST_F(RingFollowerTest, NoticesThatItWasTooSlowWhenLongMessagesCame) {
   }
 }
 
-TEST_F(RingFollowerTest, NonsenseIsPassedOver) {
+TEST_F(RingFollowerTest, SkipsInvalidData) {
   auto follower = follow();
   ASSERT_TRUE(push(1));
   ring_[0].slots = 99;
@@ -110,9 +110,9 @@ TEST_F(RingFollowerTest, NonsenseIsPassedOver) {
   EXPECT_NE(follower.tryNext(copy), Next::message);
 }
 
-// The producer may write any sequence into any slot. One that its slot cannot have must not look
-// like an overrun for ever.
-TEST_F(RingFollowerTest, ASequenceThatItsSlotCannotHaveIsNoNewerMessage) {
+// The producer may write any sequence into any slot. A sequence that does not fit its slot must not
+// cause endless overruns.
+TEST_F(RingFollowerTest, IgnoresASequenceThatDoesNotFitItsSlot) {
   auto follower = follow();
   for (const std::uint64_t sequence : {std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
     for (std::uint64_t slot = 0; slot < kCapacity; ++slot)
@@ -123,14 +123,14 @@ TEST_F(RingFollowerTest, ASequenceThatItsSlotCannotHaveIsNoNewerMessage) {
   }
 }
 
-TEST_F(RingFollowerTest, SurvivesARingOfNoise) {
+TEST_F(RingFollowerTest, SurvivesRandomBytes) {
   Random random;
   RingCopy copy;
   for (int round = 0; round < 2000; ++round) {
     auto follower = follow(round % 2 == 0 ? FollowFrom::first : FollowFrom::newest);
     for (std::size_t i = 0; i < kCapacity * sizeof(layout::Slot); ++i)
       ringBytes()[i] = static_cast<std::byte>(random.bits());
-    // Sequences that may be meant, too: noise alone is hardly ever one.
+    // Also writes sequences that fit their slots, which random bytes hardly ever do.
     for (std::uint32_t slot = 0; slot < kCapacity; ++slot)
       ring_[slot].sequence = slot + 1 + kCapacity * random.below(3);
     for (std::uint32_t i = 0; i < 2 * kCapacity; ++i) {
@@ -141,8 +141,8 @@ TEST_F(RingFollowerTest, SurvivesARingOfNoise) {
   }
 }
 
-// What the follower does not say it missed, it has seen, whole and in order.
-TEST_F(RingFollowerTest, MissesNothingUnsaidWhateverTheOrderOfPushesTakesAndLooks) {
+// The follower returns each message, complete and in order, unless it reports an overrun.
+TEST_F(RingFollowerTest, ReportsEveryMissedMessageInAnyOrderOfOperations) {
   Random random;
   auto follower = follow();
   std::uint64_t pushed = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How the bytes of a serial line are shown.
+// SniffFormat: the output formats of `mpf sniff`.
 #include "tools/tap/sniff_format.h"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ class SniffFormatTest : public testing::Test {
     ::setenv("TZ", "UTC", 1);
     ::tzset();
   }
-  // Each byte of `bytes` at `atNs`.
+  // Adds each byte of `bytes`, at `atNs`.
   static std::string add(SniffFormat& format, SniffKind kind, std::string_view bytes,
                          std::int64_t atNs = 0) {
     std::string text;
@@ -31,17 +31,17 @@ class SniffFormatTest : public testing::Test {
   }
 };
 
-TEST_F(SniffFormatTest, AFormatThatDoesNotExistIsNamed) {
+TEST_F(SniffFormatTest, RefusesAnUnknownFormat) {
   try {
     static_cast<void>(SniffFormat::make("hex", 0));
-    FAIL() << "made";
+    FAIL() << "make() did not throw";
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(), "no sniff format \"hex\"; there are lines, manual and json");
   }
 }
 
-// The example of the manual, "serialPortSniff": its bytes give its lines.
-TEST_F(SniffFormatTest, ManualIsTheManualsExample) {
+// The bytes of the example in the manual, "serialPortSniff", give its lines.
+TEST_F(SniffFormatTest, ManualPrintsTheExampleOfTheManual) {
   constexpr std::string_view kManual =
       "T31 T34 R31 T35 R34 T00 R35 R00 T31 T34 14154.5.14\n"
       "R31 T36 R34 T00 R36 R00 T34 T31 R34 T32 164.6.4142\n"
@@ -68,7 +68,7 @@ TEST_F(SniffFormatTest, ManualIsTheManualsExample) {
   EXPECT_EQ(text, kManual);
 }
 
-TEST_F(SniffFormatTest, ManualShowsATenthByteAtOnceAndTheRestWhenAsked) {
+TEST_F(SniffFormatTest, ManualPrintsALineOfTenBytesAndTheRestOnFlush) {
   const auto format = SniffFormat::make("manual", 0);
 
   EXPECT_EQ(add(*format, SniffKind::sent, "123456789"), "");
@@ -80,7 +80,7 @@ TEST_F(SniffFormatTest, ManualShowsATenthByteAtOnceAndTheRestWhenAsked) {
   EXPECT_EQ(format->flush(), "");
 }
 
-TEST_F(SniffFormatTest, ManualShowsWhatIsNoAsciiAsDots) {
+TEST_F(SniffFormatTest, ManualPrintsOtherBytesThanAsciiAsDots) {
   const auto format = SniffFormat::make("manual", 0);
 
   add(*format, SniffKind::received, "\x1f \x7e\x7f\xff");
@@ -90,17 +90,17 @@ TEST_F(SniffFormatTest, ManualShowsWhatIsNoAsciiAsDots) {
   EXPECT_EQ(format->flush(), "R1F R20 R7E R7F RFF r61 B00 . ~..a.\n");
 }
 
-TEST_F(SniffFormatTest, ManualSaysWhereBytesAreMissing) {
+TEST_F(SniffFormatTest, ManualMarksMissingBytes) {
   const auto format = SniffFormat::make("manual", 0);
   add(*format, SniffKind::sent, "ab");
 
   EXPECT_EQ(format->missing(7), "T61 T62 ab\n(7 bytes missing)\n");
 }
 
-// 10:20:30.400 in UTC on the wall; the monotonic clock starts at 0.
+// The wall clock shows 10:20:30.400 UTC when the monotonic clock is 0.
 constexpr std::int64_t kWallNs = ((10 * 60 + 20) * 60 + 30) * 1000 * kMs + 400 * kMs;
 
-TEST_F(SniffFormatTest, LinesEndAtAnEndOfLineATurnAndAPause) {
+TEST_F(SniffFormatTest, LinesEndAtANewlineATurnAndAPause) {
   const auto format = SniffFormat::make("lines", kWallNs);
 
   EXPECT_EQ(add(*format, SniffKind::sent, "*IDN?"), "");
@@ -124,7 +124,7 @@ TEST_F(SniffFormatTest, LinesShowControlCharactersDamageAndBreaks) {
   EXPECT_THAT(text, testing::HasSubstr("B  \\x00\n"));
 }
 
-TEST_F(SniffFormatTest, LinesWithoutEndAreShownInPieces) {
+TEST_F(SniffFormatTest, LinesWithoutNewlineAreSplit) {
   const auto format = SniffFormat::make("lines", 0);
 
   auto text = add(*format, SniffKind::received, std::string(200, 'x'));
@@ -134,14 +134,14 @@ TEST_F(SniffFormatTest, LinesWithoutEndAreShownInPieces) {
   EXPECT_EQ(std::ranges::count(text, 'x'), 200);
 }
 
-TEST_F(SniffFormatTest, LinesSayWhereBytesAreMissing) {
+TEST_F(SniffFormatTest, LinesMarkMissingBytes) {
   const auto format = SniffFormat::make("lines", kWallNs);
   add(*format, SniffKind::received, "1.2");
 
   EXPECT_EQ(format->missing(3), "10:20:30.400       +0.0 ms  R  1.2\n(3 bytes missing)\n");
 }
 
-TEST_F(SniffFormatTest, JsonIsAnObjectAByte) {
+TEST_F(SniffFormatTest, JsonIsAnObjectForEachByte) {
   const auto format = SniffFormat::make("json", kWallNs);
 
   EXPECT_EQ(format->add({5, SniffKind::sent, 0x22}),

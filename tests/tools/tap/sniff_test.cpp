@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `mpf sniff`: what an instrument on a pseudo-terminal and its serial server say to each other, in
-// each format.
+// `mpf sniff`: the bytes between an instrument on a pseudo-terminal and its serial server, in each
+// format.
 #include <regex>
 
 #include "server/programs/serial_server/sniff_server.h"
@@ -24,9 +24,9 @@ class SniffToolTest : public SerialServerTest {
   void listen(const SniffBatching& batching = {}) {
     sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_,
                                            batching);
-    sniff_->start([] { ADD_FAILURE() << "it cannot be served any more"; });
+    sniff_->start([] { ADD_FAILURE() << "the sniff server failed"; });
   }
-  // Returns when both the server and the tool know that it listens.
+  // Returns when the tool listens, and both it and the server have noticed.
   std::unique_ptr<Tool> sniff(std::vector<std::string> more = {}) {
     std::vector<std::string> arguments{"sniff", "serial[0]"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -38,7 +38,7 @@ class SniffToolTest : public SerialServerTest {
   void waitForListener() const {
     while (sniff_->listeners() == 0) std::this_thread::yield();
   }
-  // "ECHO <word>\n" goes to the instrument, "<word>\r\n" comes back.
+  // Sends "ECHO <word>\n" to the instrument, which answers "<word>\r\n".
   void talk(const std::string& word) {
     EXPECT_EQ(ask("ECHO " + word + "\n", fieldsOf(cmdWriteRead)).text, word + "\r\n");
   }
@@ -50,8 +50,8 @@ class SniffToolTest : public SerialServerTest {
   std::unique_ptr<SniffServer> sniff_;
 };
 
-// All bytes come at once, at the end: a slow machine makes no pauses between them.
-TEST_F(SniffToolTest, LinesAreTurnsOfTheConversation) {
+// All bytes are recorded before they are read, so that a slow machine adds no pauses.
+TEST_F(SniffToolTest, PrintsALineForEachTurn) {
   listen(kNever);
   const auto tool = sniff();
   talk("1.25");
@@ -69,7 +69,7 @@ TEST_F(SniffToolTest, LinesAreTurnsOfTheConversation) {
             "mpf sniff: listening to \"serial[0]\"\nmpf sniff: 26 bytes seen, 0 missing\n");
 }
 
-TEST_F(SniffToolTest, APauseShowsWhatWasBegun) {
+TEST_F(SniffToolTest, PrintsAnIncompleteLineAtAPause) {
   listen();
   const auto tool = sniff({"--format", "manual"});
 
@@ -86,7 +86,7 @@ TEST_F(SniffToolTest, APauseShowsWhatWasBegun) {
   EXPECT_EQ(hex, "T45 T43 T48 T4F T20 T31 T2E T32 T35 T0A R31 R2E R32 R35 R0D R0A ");
 }
 
-TEST_F(SniffToolTest, JsonIsAnObjectAByte) {
+TEST_F(SniffToolTest, JsonIsAnObjectForEachByte) {
   listen();
   const auto tool = sniff({"--json"});
   const auto before = Clock::nowNs();
@@ -115,8 +115,8 @@ TEST_F(SniffToolTest, EndsAfterTheGivenTime) {
             "mpf sniff: listening to \"serial[0]\"\nmpf sniff: 0 bytes seen, 0 missing\n");
 }
 
-// Whatever was on the line before the end is shown, though the server has not sent it yet.
-TEST_F(SniffToolTest, TheLastBytesAreShown) {
+// Bytes that the server has not sent at the end are still shown.
+TEST_F(SniffToolTest, PrintsTheLastBytesAtItsEnd) {
   listen(kNever);
   for (const int signal : {SIGINT, SIGTERM}) {
     const auto tool = sniff({"--format", "manual"});
@@ -132,7 +132,7 @@ TEST_F(SniffToolTest, TheLastBytesAreShown) {
   }
 }
 
-TEST_F(SniffToolTest, ListensAgainWhenTheServerIsBack) {
+TEST_F(SniffToolTest, ListensAgainAfterARestartOfTheServer) {
   listen();
   const auto tool = sniff();
   talk("before");
@@ -149,15 +149,15 @@ TEST_F(SniffToolTest, ListensAgainWhenTheServerIsBack) {
                                              "sniff: listening to \"serial\\[0\\]\"\n"));
 }
 
-TEST_F(SniffToolTest, AServerThatIsNotThereIsNamed) {
+TEST_F(SniffToolTest, NamesAnAbsentServer) {
   const auto ended = runTool({"sniff", "nobody", "0.1"}, backplane_.name());
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_THAT(ended.err, ContainsRegex("^mpf sniff: server \"nobody.sniff\" at location 0 is not "
-                                       "there.*; is it a serial server"));
+                                       "there.*; check with `mpf ls` that it is a serial server"));
 }
 
-TEST_F(SniffToolTest, AServerThatLetsNobodyListenIsNamed) {
+TEST_F(SniffToolTest, ReportsAServerThatRefusesToSniff) {
   MessageServer server(backplane_, "closed.sniff");
   server.on<Int32>([](Int32& request) { request.status = sniffStatusError; });
   std::thread thread([&] { server.run(); });
@@ -165,7 +165,8 @@ TEST_F(SniffToolTest, AServerThatLetsNobodyListenIsNamed) {
   const auto ended = runTool({"sniff", "closed"}, backplane_.name());
 
   EXPECT_EQ(ended.status, 1);
-  EXPECT_THAT(ended.err, HasSubstr("mpf sniff: \"closed.sniff\" lets nobody listen: status 3\n"));
+  EXPECT_THAT(ended.err,
+              HasSubstr("mpf sniff: \"closed.sniff\" refused to start sniffing: status 3\n"));
   server.interrupt();
   thread.join();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `mpf tap` and `mpf replay`: every message beside its two ends, and again.
+// `mpf tap` and `mpf replay`: read and record messages, and send them again.
 #include <filesystem>
 #include <regex>
 
@@ -23,7 +23,7 @@ class TapTest : public ToolsTest {
     std::filesystem::remove(file_);
     ToolsTest::TearDown();
   }
-  // Returns when the tap reads `links` links of the server.
+  // Returns when the tap follows `links` links of the server.
   std::unique_ptr<Tool> tap(std::vector<std::string> more, int links = 1) const {
     std::vector<std::string> arguments{"tap", "echo"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -44,7 +44,7 @@ class TapTest : public ToolsTest {
     for (std::string line; std::getline(stream, line);) all.push_back(nlohmann::json::parse(line));
     return all;
   }
-  // The messages that went in one direction.
+  // The messages of one direction.
   static std::vector<nlohmann::json> messages(const std::vector<nlohmann::json>& all,
                                               const std::string& direction) {
     std::vector<nlohmann::json> some;
@@ -77,7 +77,7 @@ TEST_F(TapTest, ShowsRequestsAndTheirReplies) {
                    begin + "-> 3   " + fields + "6\n" + begin + "<- 3   " + fields + "6\n"));
 }
 
-TEST_F(TapTest, AReplyNeverComesBeforeItsRequest) {
+TEST_F(TapTest, PrintsAReplyNeverBeforeItsRequest) {
   constexpr std::uint64_t kBatch = 20;  // fewer than half a ring: none is missed
   const EchoThread echo(backplane_, "echo");
   SyncClient client(backplane_, "echo");
@@ -98,8 +98,8 @@ TEST_F(TapTest, AReplyNeverComesBeforeItsRequest) {
   }
 }
 
-// Seen and missed together are all that there was.
-TEST_F(TapTest, WhatItIsTooSlowForIsCounted) {
+// The numbers of seen and missed messages add up to all messages.
+TEST_F(TapTest, CountsMissedMessages) {
   const EchoThread echo(backplane_, "echo");
   SyncClient client(backplane_, "echo");
   callMany(client, 0, 1);
@@ -119,7 +119,7 @@ TEST_F(TapTest, WhatItIsTooSlowForIsCounted) {
                                         messages(objects(ended.out), "reply").size());
 }
 
-TEST_F(TapTest, ReadsBodiesThatLieInThePool) {
+TEST_F(TapTest, ReadsBodiesInPools) {
   const EchoThread echo(backplane_, "echo");
   SyncClient client(backplane_, "echo");
   callMany(client, 0, 1);
@@ -139,7 +139,7 @@ TEST_F(TapTest, ReadsBodiesThatLieInThePool) {
   }
 }
 
-TEST_F(TapTest, FollowsClientsThatComeLaterFromTheirFirstMessage) {
+TEST_F(TapTest, FollowsLaterClientsFromTheirFirstMessage) {
   const EchoThread echo(backplane_, "echo");
   const auto tool = tap({"--json", "--count", "6"}, 0);
 
@@ -153,7 +153,7 @@ TEST_F(TapTest, FollowsClientsThatComeLaterFromTheirFirstMessage) {
   EXPECT_THAT(ended.err, EndsWith("mpf tap: 6 messages seen, 0 missed\n"));
 }
 
-TEST_F(TapTest, FollowsItsServerThroughItsLives) {
+TEST_F(TapTest, FollowsItsServerThroughRestarts) {
   auto echo = std::make_unique<EchoThread>(backplane_, "echo");
   SyncClient client(backplane_, "echo");
   callMany(client, 0, 1);
@@ -168,13 +168,13 @@ TEST_F(TapTest, FollowsItsServerThroughItsLives) {
 
   echo.reset();
   echo = std::make_unique<EchoThread>(backplane_, "echo");
-  // it may hear late that the server went
+  // The client may be notified late that the server has ended.
   while (!client.call(Int32Message({.value = 2}), 1h)) continue;
 
   EXPECT_EQ(nextReply(), 2);
 }
 
-TEST_F(TapTest, AThousandLinksAreFollowed) {
+TEST_F(TapTest, FollowsAThousandLinks) {
   Victim server("serve", backplane_.name());
   Victim crowd("crowd", backplane_.name(), {"1000"});
   while (!crowd.line().starts_with("answered ")) continue;
@@ -190,7 +190,7 @@ TEST_F(TapTest, AThousandLinksAreFollowed) {
   server.end(SIGTERM);
 }
 
-TEST_F(TapTest, OneLinkCanBeChosen) {
+TEST_F(TapTest, FollowsOneChosenLink) {
   const EchoThread echo(backplane_, "echo");
   SyncClient first(backplane_, "echo");
   callMany(first, 0, 1);
@@ -208,11 +208,11 @@ TEST_F(TapTest, OneLinkCanBeChosen) {
     const auto wrong = run({"tap", "echo", "--link", word});
     EXPECT_EQ(wrong.status, 2);
     EXPECT_THAT(wrong.err, HasSubstr(std::string("\"") + word +
-                                     "\" is no link: use its 16 hexadecimal digits"));
+                                     "\" is not a link: use the 16 hexadecimal digits"));
   }
 }
 
-TEST_F(TapTest, ARecordingIsSentAgainWithItsMessagesInTheirOrder) {
+TEST_F(TapTest, ReplaySendsARecordingInOrder) {
   {
     const EchoThread echo(backplane_, "echo");
     SyncClient one(backplane_, "echo");
@@ -255,21 +255,21 @@ TEST_F(TapTest, ARecordingIsSentAgainWithItsMessagesInTheirOrder) {
   EXPECT_EQ(elements, 1000u);
 }
 
-TEST_F(TapTest, WhatIsNoRecordingIsNamed) {
-  std::ofstream(file_) << "nothing of the kind, but long enough for a header or two of a frame";
+TEST_F(TapTest, ReplayRefusesAFileThatIsNotARecording) {
+  std::ofstream(file_) << "a text that is not a recording, but long enough for frame headers: ";
 
   const auto ended = run({"replay", file_});
 
   EXPECT_EQ(ended.status, 1);
   EXPECT_EQ(ended.err, "mpf replay: " + file_ +
-                           ": record 1, at byte 0 of 67: this is no recording of `mpf tap "
+                           ": record 1, at byte 0 of 67: not a recording of `mpf tap "
                            "--write`, or one that was cut off within its "
                            "first record\n");
-  EXPECT_EQ(ended.out, "") << "nothing was sent, to nobody";
+  EXPECT_EQ(ended.out, "") << "no request was sent";
   EXPECT_EQ(run({"replay", file_ + ".none"}).status, 2);
 }
 
-TEST_F(TapTest, ARecordingThatWasCutIsSentUpToThere) {
+TEST_F(TapTest, ReplaySendsATruncatedRecordingUpToItsEnd) {
   {
     const EchoThread echo(backplane_, "echo");
     SyncClient client(backplane_, "echo");
@@ -293,7 +293,7 @@ TEST_F(TapTest, ARecordingThatWasCutIsSentUpToThere) {
                                     "again\n"));
 }
 
-TEST_F(TapTest, AFileThatCannotBeWrittenIsAFailureAtOnce) {
+TEST_F(TapTest, FailsAtOnceWhenTheFileCannotBeWritten) {
   const auto full = run({"tap", "nobody", "--write", "/dev/full"});
   const auto nowhere = run({"tap", "nobody", "--write", file_ + ".none/x"});
 
@@ -303,11 +303,11 @@ TEST_F(TapTest, AFileThatCannotBeWrittenIsAFailureAtOnce) {
   EXPECT_EQ(nowhere.err, "mpf: open " + file_ + ".none/x: No such file or directory\n");
 }
 
-TEST_F(TapTest, AServerThatIsNotThereIsNamed) {
+TEST_F(TapTest, NamesAnAbsentServer) {
   const auto ended = run({"tap", "echo", "0.01"});
   EXPECT_EQ(ended.status, 0);
   EXPECT_EQ(ended.err,
-            "mpf tap: server \"echo\" at location 0 is not there; waiting for it\nmpf tap: 0 "
+            "mpf tap: server \"echo\" at location 0 is absent; waiting for it\nmpf tap: 0 "
             "messages seen, 0 missed\n");
 }
 

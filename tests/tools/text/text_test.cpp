@@ -10,7 +10,7 @@
 namespace mpf::tools {
 namespace {
 
-TEST(Table, ColumnsAreAsWideAsTheyMustBe) {
+TEST(Table, ColumnsAreAsWideAsTheirWidestCell) {
   Table table({"NAME", ">COUNT", "WORD"});
   table.add({"a", "1", "x"});
   table.add({"longer", "12345678", "y"});
@@ -21,7 +21,7 @@ TEST(Table, ColumnsAreAsWideAsTheyMustBe) {
             "longer  12345678  y\n");
 }
 
-TEST(Table, RowsAreIndentedAndHaveNoBlanksAtTheirEnds) {
+TEST(Table, IndentsRowsAndHasNoTrailingBlanks) {
   Table table({"A", "B"});
   table.add({"1", ""});
 
@@ -37,8 +37,8 @@ TEST(Table, IsEmptyUntilSomethingIsAdded) {
   EXPECT_FALSE(table.isEmpty());
 }
 
-// What counts is how wide a name is to see, not how many bytes it has.
-TEST(Table, NamesOfManyBytesDoNotShiftTheirNeighbours) {
+// Columns are aligned by the visible width of a name, not by its number of bytes.
+TEST(Table, AlignsNamesByColumnsNotBytes) {
   Table table({"NAME", ">UNIT", "WORD"});
   table.add({"Ofen-Süd", "°C", "x"});
   table.add({"電圧", "V", "y"});
@@ -49,7 +49,7 @@ TEST(Table, NamesOfManyBytesDoNotShiftTheirNeighbours) {
             "電圧         V  y\n");
 }
 
-TEST(Table, BytesThatAreNoTextAreAColumnEach) {
+TEST(Table, CountsInvalidUtf8AsOneColumnForEachByte) {
   Table table({"A", "B"});
   table.add({"\xff\xfe", "x"});
   table.add({"123", "y"});
@@ -69,7 +69,7 @@ Latencies latencies(std::initializer_list<std::pair<std::uint64_t, std::uint64_t
 
 TEST(Sparkline, IsEmptyWithoutSamples) { EXPECT_EQ(sparkline({}, 80), ""); }
 
-TEST(Sparkline, GoesFromTheFirstBucketThatHoldsAnythingToTheLast) {
+TEST(Sparkline, ShowsTheBucketsFromTheFirstSampleToTheLast) {
   EXPECT_EQ(sparkline(latencies({{512, 1}, {1000, 8}}), 80), "512 ns ▁  █ 1024 ns");
 }
 
@@ -78,7 +78,7 @@ TEST(Sparkline, BlocksAreAsHighAsTheirShareOfTheFullestBucket) {
             "1024 ns █▄▁▁ 2048 ns");
 }
 
-// 2^64 - 1 of a hostile segment is not to overflow what is multiplied.
+// A count of 2^64 - 1 in a hostile segment causes no overflow.
 TEST(Sparkline, TheLargestCountIsTheHighestBlock) {
   Latencies all;
   all.count = 2;
@@ -106,15 +106,15 @@ TEST(Latencies, APercentileIsTheEndOfItsBucket) {
   EXPECT_EQ(some.percentileNs(99.9), 100'000U);
 }
 
-// One sample in a thousand is not in the lower 99.9 %, whatever a double makes of 99.9.
-TEST(Latencies, TheOutlierIsNoPercentileOfTheRest) {
+// One sample in a thousand is not within the lower 99.9 %, in spite of rounding errors of 99.9.
+TEST(Latencies, AnOutlierDoesNotChangeLowerPercentiles) {
   const auto some = latencies({{1024, 999}, {1'000'000, 1}});
 
   EXPECT_EQ(some.percentileNs(99.9), 1280U);
   EXPECT_EQ(some.percentileNs(100), 1'000'000U);
 }
 
-TEST(Latencies, WhatIsLongerThanTheLastBucketIsTheMaximum) {
+TEST(Latencies, SamplesBeyondTheLastBucketAreTheMaximum) {
   const auto some = latencies({{std::uint64_t{1} << 45, 1}});
 
   EXPECT_EQ(some.percentileNs(50), std::uint64_t{1} << 45);

@@ -17,7 +17,7 @@ std::vector<std::string> wrapped(const std::string& first, const std::string& te
   return lines;
 }
 
-TEST(Wrap, WhatFitsIsOneLine) {
+TEST(Wrap, KeepsATextThatFitsInOneLine) {
   EXPECT_EQ(wrap("  a ", "b c", 4), "  a b c\n");
   EXPECT_EQ(wrap("", std::string(80, 'x'), 4), std::string(80, 'x') + "\n");
 }
@@ -36,9 +36,9 @@ TEST(Wrap, BreaksAWordThatIsLongerThanALine) {
                                           "    " + std::string(24, 'x') + " b"));
 }
 
-TEST(Wrap, KeepsTheBlanksOfAName) { EXPECT_EQ(wrap("", "a  b   c", 4), "a  b   c\n"); }
+TEST(Wrap, KeepsSeveralBlanksInAName) { EXPECT_EQ(wrap("", "a  b   c", 4), "a  b   c\n"); }
 
-TEST(Wrap, NeverBreaksACharacter) {
+TEST(Wrap, NeverBreaksInsideACharacter) {
   std::string text;
   for (int i = 0; i < 100; ++i) text += "°";
 
@@ -48,9 +48,9 @@ TEST(Wrap, NeverBreaksACharacter) {
   }
 }
 
-TEST(Cut, WhatFitsStays) { EXPECT_EQ(cut("Ofen °C", 7), "Ofen °C"); }
+TEST(Cut, KeepsATextThatFits) { EXPECT_EQ(cut("Ofen °C", 7), "Ofen °C"); }
 
-TEST(Cut, WhatDoesNotFitSaysSo) {
+TEST(Cut, MarksATextThatDoesNotFit) {
   EXPECT_EQ(cut("voltmeter", 5), "volt~");
   EXPECT_EQ(cut("°°°°", 3), "°°~");
 }

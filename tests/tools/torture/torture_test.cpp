@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `mpf torture`: that everything holds when processes are stopped and killed at each step, and that
-// it would say so if something did not.
+// `mpf torture`: everything holds when processes are stopped and killed at each step, and the
+// program detects mistakes.
 #include <sys/ptrace.h>
 
 #include <fstream>
@@ -61,15 +61,15 @@ TEST_F(TortureTest, EverythingHoldsWhenProcessesAreStoppedAtEachStep) {
   EXPECT_THAT(ended.out, AllOf(HasSubstr("\nheld: "), Not(HasSubstr("never reached"))));
 }
 
-TEST_F(TortureTest, EveryInstructionUpToTheNextStepIsTried) {
+TEST_F(TortureTest, TriesEveryInstructionUpToTheNextStep) {
 #ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "AddressSanitizer makes many instructions of one";
+  GTEST_SKIP() << "AddressSanitizer turns one instruction into many";
 #endif
   const auto ended =
       torture({"--every-instruction", "chunk_noted", "--role", "client", "--mode", "kill"});
 
   EXPECT_EQ(ended.status, 0) << ended.out << ended.err;
-  EXPECT_THAT(ended.out, HasSubstr("\nheld: ")) << "each behind the one before";
+  EXPECT_THAT(ended.out, HasSubstr("\nheld: ")) << ended.out;
   std::istringstream row(ended.out.substr(ended.out.find("\nchunk_noted")));
   std::string name;
   int killed = 0;
@@ -77,7 +77,7 @@ TEST_F(TortureTest, EveryInstructionUpToTheNextStepIsTried) {
   EXPECT_GT(killed, 3);
 }
 
-TEST_F(TortureTest, TheVerdictIsThereForProgramsToo) {
+TEST_F(TortureTest, WritesTheVerdictAsJson) {
   const auto path = testing::TempDir() + "mpf-torture-" + std::to_string(::getpid()) + ".json";
 
   const auto ended =
@@ -91,7 +91,7 @@ TEST_F(TortureTest, TheVerdictIsThereForProgramsToo) {
   EXPECT_EQ(json.at("never_reached"), nlohmann::json::array());
   EXPECT_EQ(json.at("steps").at(0).at("step"), "link_created");
   EXPECT_EQ(json.at("steps").at(0).at("client").at("killed"), 1);
-  EXPECT_EQ(json.at("steps").at(0).at("server").at("killed"), 0) << "no server comes there";
+  EXPECT_EQ(json.at("steps").at(0).at("server").at("killed"), 0) << "no server reaches it";
 }
 
 TEST_F(TortureTest, AStepThatIsNeverReachedMakesTheVerdictIncomplete) {
@@ -102,7 +102,7 @@ TEST_F(TortureTest, AStepThatIsNeverReachedMakesTheVerdictIncomplete) {
               AllOf(HasSubstr("never reached: link_created\n"), HasSubstr("\nincomplete: ")));
 }
 
-// Each mistake breaks what it should break.
+// A mistake that a test process makes on purpose, and the complaint that must follow.
 struct Mistake {
   std::string name, patience, complaint;
 };
@@ -112,8 +112,7 @@ class MistakeTest : public TortureTest, public testing::WithParamInterface<Mista
 
 TEST_P(MistakeTest, IsFound) {
 #ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "how patient a referee must be is tried without AddressSanitizer, with which "
-                  "every step takes longer";
+  GTEST_SKIP() << "AddressSanitizer makes every step slower than the patience of this test allows";
 #endif
   const auto ended = torture({"--break", GetParam().name, "--patience", GetParam().patience,
                               "--step", "window_closed", "--duration", "200"});
@@ -125,18 +124,19 @@ TEST_P(MistakeTest, IsFound) {
 INSTANTIATE_TEST_SUITE_P(
     Each, MistakeTest,
     testing::Values(Mistake{"lose-fate", "8", "each request has an end"},
-                    // nonsense, or an old request once more
+                    // The slot contains invalid data or an old request; the complaint depends on
+                    // which.
                     Mistake{"half-message", "30", ""},
-                    Mistake{"keep-name", "30", "the successor could not take the place"},
-                    Mistake{"stale", "8", "nothing stale is left; there are mpf."},
-                    Mistake{"leak", "8", "the survivors hold no more than they did"}),
+                    Mistake{"keep-name", "30", "the successor could not open the name"},
+                    Mistake{"stale", "8", "nothing stale is left; still there: mpf."},
+                    Mistake{"leak", "8", "the survivors hold no more resources"}),
     [](const auto& mistake) {
       auto name = mistake.param.name;
       name.erase(name.find('-') == std::string::npos ? name.size() : name.find('-'), 1);
       return name;
     });
 
-TEST(TortureStepsTest, AreExplainedInTheManual) {
+TEST(TortureStepsTest, AreAllDocumented) {
   std::set<std::string> explained;
   std::ifstream manual(MPF_TEST_TORTURE_MD);
   std::string line;
@@ -150,15 +150,15 @@ TEST(TortureStepsTest, AreExplainedInTheManual) {
   EXPECT_EQ(explained, steps);
 }
 
-TEST(TortureStepsTest, AnUnknownOneIsNamed) {
-  const auto ended = runTool({"torture", "--step", "nonsense"}, "");
+TEST(TortureStepsTest, RefusesAnUnknownStepByName) {
+  const auto ended = runTool({"torture", "--step", "unknown_step"}, "");
 
   EXPECT_EQ(ended.status, 2);
-  EXPECT_THAT(ended.err, HasSubstr("no step \"nonsense\"; `mpf torture --list` names all"));
+  EXPECT_THAT(ended.err, HasSubstr("no step \"unknown_step\"; `mpf torture --list` lists all"));
 }
 
-// Before hours of work, not after them.
-TEST_F(TortureTest, AVerdictThatCannotBeWrittenEndsItAtOnce) {
+// The file is opened before the work, which may take hours.
+TEST_F(TortureTest, FailsAtOnceWhenTheVerdictCannotBeWritten) {
   const auto ended =
       runTool({"torture", "--json", "/nowhere/verdict.json", "--duration", "1000000"}, "");
 
