@@ -52,7 +52,7 @@ constexpr std::int64_t kHalfASecond = 500'000'000;
 
 TEST(SnapshotDelta, RatesOfAServerAreWhatItReceivedAndSent) {
   const SnapshotDelta delta(snapshot(0, {server(100, 50)}),
-                           snapshot(kHalfASecond, {server(200, 80)}));
+                            snapshot(kHalfASecond, {server(200, 80)}));
 
   const auto rates = delta.ratesOf(delta.now().servers.front());
 
@@ -64,7 +64,7 @@ TEST(SnapshotDelta, RatesOfAServerAreWhatItReceivedAndSent) {
 // their requests count.
 TEST(SnapshotDelta, RatesOfAServerIncludeClientsThatLeft) {
   const SnapshotDelta delta(snapshot(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}),
-                           snapshot(kHalfASecond, {server(130, 130)}));
+                            snapshot(kHalfASecond, {server(130, 130)}));
 
   const auto rates = delta.ratesOf(delta.now().servers.front());
 
