@@ -60,8 +60,8 @@ class Endpoint {
   std::shared_ptr<PeerWindow> peer(const std::string& name, layout::SegmentKind kind);
 
   // --- events ---
-  // Index of a link that may have a message or a change of state; nullopt if there is none now. The
-  // caller takes one message of this link.
+  // Index of a link that may have a message or a change of state; nullopt if there is no such link
+  // now. The caller takes one message of this link.
   std::optional<std::uint32_t> next() noexcept;
   // Whether takeKnock(), takeRescan() or takeLocalNews() may return something. Cheap: three loads.
   [[nodiscard]] bool hasSideNews() const noexcept {

@@ -98,8 +98,8 @@ class Link {
     std::uint32_t longReserve = 0;
   };
   // Sends a body, and sets its length and flags in `envelope`. A short body is copied into slots of
-  // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets this
-  // chunk; otherwise the body is copied into a new chunk.
+  // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets
+  // this chunk; otherwise the body is copied into a new chunk.
   LinkSend trySend(Envelope& envelope, std::span<const std::byte> body,
                    const Limits& limits) noexcept;
   // Whether the caller must set the time of the next message (Envelope::sentTick).

@@ -42,7 +42,7 @@ namespace mpf::owner_lock {
 class Reaper {
  public:
   //   file         the window's file, open for writing
-  //   reaperFile   name of the reaper file; empty: there is none for this window
+  //   reaperFile   name of the reaper file; empty: this window has no reaper file
   Reaper(const FileDescriptor& file, std::string reaperFile);
   ~Reaper();
   Reaper(const Reaper&) = delete;

@@ -113,7 +113,7 @@ bool isNameOf(int fd, const std::string& name) {
   return ::stat(segments::path(name).c_str(), &named) == 0 && opened.st_ino == named.st_ino;
 }
 
-// Name of the reaper file for the segment that has this name now; empty if there is none.
+// Name of the reaper file for the segment that has this name now; empty if it has no reaper file.
 std::string reaperFileOf(int fd, const std::string& name) {
   const auto parsed = SegmentName::tryParse(name);
   const auto header = ownersHeader(fd, name);

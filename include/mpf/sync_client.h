@@ -22,7 +22,7 @@
 
 namespace mpf {
 
-// The reply to a request, or the reason why there is none: exactly one of message(), fate() and
+// The reply to a request, or the reason why it is missing: exactly one of message(), fate() and
 // refusal() has a value, until as() moves the reply out.
 class Answer {
  public:
@@ -34,9 +34,9 @@ class Answer {
 
   // True when there is a reply.
   explicit operator bool() const noexcept { return static_cast<bool>(reply_); }
-  // The reply, owned by the answer; empty when there is none.
+  // The reply, owned by the answer; empty without a reply.
   [[nodiscard]] Message& message() noexcept { return reply_; }
-  // Moves the reply out. Returns nullopt, and leaves the reply here, when there is none or its type
+  // Moves the reply out. Returns nullopt, and leaves the reply here, when it is missing or its type
   // is not T.
   template <MessageBody T>
   [[nodiscard]] std::optional<MessageOf<T>> as() {
@@ -59,7 +59,7 @@ class Answer {
 class SyncClient {
  public:
   // Creates a client window in shared memory and binds to the server. call() and connectWait() make
-  // the connection; client().notConnectedBecause() returns why there is none.
+  // the connection; client().notConnectedBecause() returns why it is missing.
   //   throws  std::system_error, for example ENOSPC when /dev/shm is full, EMFILE when the process
   //           has no file descriptor left; std::invalid_argument when `server` is not a valid name
   SyncClient(const Backplane& backplane, const std::string& server,

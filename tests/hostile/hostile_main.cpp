@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kDeedsOfALink = 500;
+constexpr int kStepsOfALink = 500;
 constexpr int kLinks = 12;
 constexpr const char* kServer = "echo";
 
@@ -51,7 +51,7 @@ class Peer {
     link_ = side_ == LinkSide::client ? connect(index) : accept(index);
     beLegal();
     mischief_.reach(*link_);
-    for (int deed = 0; deed < kDeedsOfALink; ++deed) act(deed);
+    for (int step = 0; step < kStepsOfALink; ++step) act(step);
     endpoint_.detach(index);
     link_->setState(layout::LinkState::closed);
     link_->notifyPeer();
@@ -126,15 +126,15 @@ class Peer {
     }
     link_->end();
   }
-  void act(int deed) {
+  void act(int step) {
     if (kind_ == "flood")
-      return send(static_cast<std::uint32_t>(deed + 5), deed % 8 == 0 ? 3000 : sizeof(Int32));
+      return send(static_cast<std::uint32_t>(step + 5), step % 8 == 0 ? 3000 : sizeof(Int32));
     if (kind_ == "slow") {
-      if (deed % 100 == 0) send(static_cast<std::uint32_t>(deed + 5), sizeof(Int32));
+      if (step % 100 == 0) send(static_cast<std::uint32_t>(step + 5), sizeof(Int32));
       return takeOne(false);
     }
     mischief_.act(*link_);
-    if (deed % 16 == 0) link_->notifyPeer();
+    if (step % 16 == 0) link_->notifyPeer();
   }
   [[nodiscard]] const std::string& backplane() const { return endpoint_.backplane().name(); }
 

@@ -203,7 +203,7 @@ TEST(Json, HasEveryField) {
       toJson(message),
       nlohmann::json::parse(
           R"({"type":"float64Array","clientType":0,"clientExtra":2,"timeout":0,"cmd":0,"status":0,
-                                                       "address":3,"extra":0,"value":[1.5,"nan","-inf"]})"));
+              "address":3,"extra":0,"value":[1.5,"nan","-inf"]})"));
 }
 
 TEST(Json, WritesOneCharacterForEachByte) {

@@ -26,7 +26,7 @@ class HardwareAsker {
   HardwareAsker(const Backplane& backplane, const std::string& server)
       : client_(backplane, server) {}
 
-  // The reply; status -99 when there is none.
+  // The reply; status -99 without a reply.
   Int32 ask(Int32 fields) {
     auto answer = client_.call(Int32Message(fields), 60s);
     EXPECT_TRUE(answer) << answer.why();

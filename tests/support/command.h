@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// runCommand(): the stdout and the status of a shell command. For a program that must run beside the
-// test, or that gets signals, use Program.
+// runCommand(): the stdout and the status of a shell command. For a program that must run beside
+// the test, or that gets signals, use Program.
 //
 //   EXPECT_THAT(runCommand(program + " --help").output, StartsWith("mpf-x - "));
 //

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A library to preload: the look-up of a name that ends with ".held" waits until a process opens the
-// FIFO $MPF_TEST_HELD_LOOKUP for writing and closes it or writes a byte. Then it looks up the name
-// without ".held".
+// A library to preload: the look-up of a name that ends with ".held" waits until a process opens
+// the FIFO $MPF_TEST_HELD_LOOKUP for writing and closes it or writes a byte. Then it looks up the
+// name without ".held".
 #include <fcntl.h>
 #include <netdb.h>
 #include <unistd.h>

@@ -14,6 +14,7 @@
 #include <mpf/message_server.h>
 #include <mpf/sync_client.h>
 
+#include "client/relay_client.h"
 #include "shm/segment_name.h"
 #include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
@@ -194,8 +195,8 @@ TEST_F(KillTest, AClientThatPausesAtItsServersEndMayContinue) {
   int replies = 0;
   std::optional<ConnectStatus> news;
   Dispatcher dispatcher(backplane_);
-  std::unique_ptr<MessageClient> client;
-  client = std::make_unique<MessageClient>(dispatcher, [&](const Message& message) {
+  std::unique_ptr<RelayClient> client;
+  client = std::make_unique<RelayClient>(dispatcher, [&](const Message& message) {
     if (const auto* connect = message.tryAs<Connect>()) {
       news = connect->status;
     } else {

@@ -42,6 +42,8 @@ PUBLIC_HEADERS = {
 }
 
 MAX_LINES = 400
+MAX_COLUMNS = 100
+MAY_BE_LONG = re.compile(r'[│┌┐└┘├─►◄]|NOLINT|R"|https?://')
 PAIR_REACH = 3  # the PAIR line is within so many lines above an ordered access
 
 ORDERED = re.compile(r"\bmemory_order(_|::)(acquire|release|acq_rel|seq_cst|consume)\b|\.load\(\)")
@@ -165,6 +167,34 @@ def unfinished(files):
                 yield path, number, f"{match[0]}: finish it, or open an issue"
 
 
+# Words and patterns of the former style. A word that is right in its place: PLACES_OF_WORDS.
+OLD_WORDS = re.compile(
+    r"\b(shall|anew|nonsense|deeds?|hears of|in vain|whoever|whosoever)\b"
+    r"|\b(?:is|are) none\b"
+    r"|(?:^|[.;:(]|\b(?:for|of|by|than)) [Ww]ho(?:se)? (?!.*\?)")
+PLACES_OF_WORDS = {"LICENSE", "tests/tidy/check_sources.py", "tests/tidy/self_test.py"}
+
+
+def plain_language(files):
+    """Sources and documents use plain technical English: STYLE, "Language"."""
+    for path, text in files.items():
+        if path in PLACES_OF_WORDS or path.startswith("tests/layout/v1_"):
+            continue
+        for number, line in lines(text):
+            if match := OLD_WORDS.search(line):
+                yield path, number, f'"{match[0].strip()}": use plain technical English'
+
+
+def line_lengths(files):
+    """C++ has at most 100 columns, pictures and raw strings excepted."""
+    for path, text in files.items():
+        if not is_cpp(path):
+            continue
+        for number, line in lines(text):
+            if len(line) > MAX_COLUMNS and not MAY_BE_LONG.search(line):
+                yield path, number, f"{len(line)} columns: more than {MAX_COLUMNS}"
+
+
 def shown_code(files):
     """A block after the name of a file (`drivers/x.h`:) in a document shows lines of that file."""
     block = re.compile(r"^`([\w./-]+)`:\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -207,7 +237,7 @@ def errors_never_throw(files):
                 yield path, number, "main() without runMain()"
 
 
-RULES = (include_directions, pairs, ordered_accesses, licences, sizes, unfinished, shown_code, named_functions, machine_paths, errors_never_throw)
+RULES = (include_directions, pairs, ordered_accesses, licences, sizes, line_lengths, unfinished, plain_language, shown_code, named_functions, machine_paths, errors_never_throw)
 
 
 def read_tree(top):

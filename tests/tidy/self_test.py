@@ -60,6 +60,16 @@ class Rules(unittest.TestCase):
         self.refuses(check.licences, {"examples/demo/run": "#!/bin/sh\ntrue\n"}, ("examples/demo/run", 1))
         self.passes(check.licences, {"shm/a.h": SPDX, "examples/demo/run": "#!/bin/sh\n# SPDX-License-Identifier: MIT\n", "README.md": "# MPF\n"})
 
+    def test_plain_language(self):
+        rule = check.plain_language
+        for line in ("// It shall end.", "fails in vain", "a reply that is none", "// for who waits", "the server sent nonsense"):
+            self.refuses(rule, {"shm/a.h": line + "\n"}, ("shm/a.h", 1))
+        self.passes(rule, {"shm/a.h": "// The process whose window it is, and who writes it: its owner.\n"})
+
+    def test_line_lengths(self):
+        self.refuses(check.line_lengths, {"shm/a.h": "a" * 101 + "\n"}, ("shm/a.h", 1))
+        self.passes(check.line_lengths, {"shm/a.h": "a" * 100 + "\n// " + "─" * 98 + "\n", "docs/a.md": "a" * 200})
+
     def test_shown_code(self):
         shown = "Look:\n\n`shm/a.h`:\n```cpp\nint a;\nint b;\n```\n"
         self.refuses(check.shown_code, {"docs/a.md": shown, "shm/a.h": SPDX + "int a;\n"}, ("docs/a.md", 6))

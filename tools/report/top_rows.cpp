@@ -251,7 +251,7 @@ TopTable topHelp() {
   add("Esc", "back");
   add("s", "sorts by the next column, which has a *");
   add("r", "reverses; numbers begin with the largest");
-  add("/", "filter: only rows that contain a text; Enter keeps it, Esc removes it");
+  add("/", "filter: rows that contain a text; Enter keeps it, Esc removes it");
   add("q", "quits");
   add("red", "stalled, busy (requests wait), stopped, dead, refused, not connected");
   add("CONN", "connections; of a router, clients");
