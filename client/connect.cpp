@@ -173,7 +173,7 @@ void Binding::pendingBind() {
   server_.copy(header.name.data(), header.name.size() - 1);
   static_cast<void>(pendingBind.tryPublish(
       SegmentName::keyed(endpoint.backplane().name(), NameKind::pendingBind, header.incarnation)));
-  MPF_STEP(wish_named);
+  MPF_STEP(pending_bind_named);
   pendingBind.closeFile();
   pendingBind_ = std::move(pendingBind);
 }

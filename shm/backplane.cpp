@@ -46,7 +46,7 @@ std::string environmentOr(const char* variable, const char* otherwise) {
 constexpr std::size_t kMaxFilesPerAttach = 4096;
 
 std::vector<std::string> removeAll(std::vector<stale_segments::Judged> judged) {
-  MPF_STEP(survey_begun);
+  MPF_STEP(stale_scan_begun);
   std::vector<std::string> removed;
   for (auto& file : judged) {
     if (stale_segments::tryRemove(file)) removed.push_back(std::move(file.name));

@@ -122,7 +122,7 @@ TEST_F(StaleSegmentsTest, DoesNotJudgeUnknownFiles) {
   const auto notes = SegmentName::prefix(name()) + "notes";
   std::ofstream(segments::path(notes)) << "mine";
   leave(serverName("newer"), SegmentKind::serverWindow, 0, layout::kMajor + 1);
-  leave(serverName("wish"), SegmentKind::pendingBind, 0);
+  leave(serverName("pendingBind"), SegmentKind::pendingBind, 0);
   leave(keyed(NameKind::pendingBind, 7), SegmentKind::pendingBind, 0, layout::kMajor + 1);
   ASSERT_EQ(::mkfifo(segments::path(serverName("pipe")).c_str(), 0600), 0);
 

@@ -26,8 +26,9 @@ auto now(const Word& word) noexcept {
 }
 
 const char* kindName(SegmentKind kind) noexcept {
-  constexpr std::array<const char*, 8> kNames{
-      "unknown", "server window", "client window", "hints", "link", "bulk", "wish", "router"};
+  constexpr std::array<const char*, 8> kNames{"unknown",      "server window", "client window",
+                                              "hints",        "link",          "bulk",
+                                              "pending bind", "router"};
   const auto number = static_cast<std::size_t>(kind);
   return number < kNames.size() ? kNames[number] : kNames[0];
 }
