@@ -180,8 +180,7 @@ void ServerRouter::lookAtDoubtful() {
 
 void ServerRouter::lookSoon() { looks_.setAt(Deadline::after(kLookEvery)); }
 
-// Sends "absent" once all requests to the server have ended, which is when all of its clients are
-// disconnected.
+// Sends "absent" when all clients of the server are disconnected: all their requests have ended.
 void ServerRouter::endIfDone(std::uint32_t number, Binding& binding) {
   if (binding.connected != 0) return;
   for (auto each = clients_.begin(); each != clients_.end();) {
@@ -252,7 +251,7 @@ void ServerRouter::onOpen(wire::Open::Reader open) {
   }
   lastClient_ = number;
   const auto binding = bindings_.find(open.getBinding());
-  // If the server ended while this item was on its way, the requests of this client end as
+  // If the server ended while this item was on its way, no client is created: its requests end as
   // neverTaken.
   const bool isCurrent = binding != bindings_.end() && binding->second.announced != 0 &&
                          binding->second.announced == open.getIncarnation();
