@@ -4,8 +4,8 @@
 //
 // Threads  as ServerCore; any thread may call take() and GiveBack.
 // Lifetime a handle of a request refers to its connection by address and may outlive its server:
-//          connections are never freed, and the servers of a process share them. Their number is the
-//          highest number of clients that the process has had at one time.
+//          connections are never freed, and the servers of a process share them. There are as many
+//          connections as the process has had clients at one time.
 #pragma once
 
 #include <atomic>

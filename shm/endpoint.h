@@ -147,7 +147,8 @@ class Endpoint {
   std::uint64_t sleepNumber_ = 0;  // number of the last sleep that was announced
   bool slept_ = false;
   std::int64_t wakeNs_ = 10'000;  // estimated duration of a wake-up
-  std::uint32_t spinShift_ = 0;  // halves the time of spinning after spins without a message
+  // How often the spinning time is halved: once more after each long sleep, 0 after a short one.
+  std::uint32_t spinShift_ = 0;
   std::int64_t scannedAllNs_ = 0;  // time of the last scan of all links
 
   struct Peer {

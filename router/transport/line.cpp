@@ -265,7 +265,7 @@ std::int64_t Line::nextCheckNs(std::int64_t nowNs) {
                                   std::exchange(checkAfterNs_, halfDeadNs()));
 }
 
-// Which deadline the peer has missed; empty: none.
+// Which deadline the peer has missed; an empty text when it has missed no deadline.
 std::string Line::silenceReason(std::int64_t nowNs) const {
   if (nowNs - lastReceiveNs_ >= std::chrono::nanoseconds(limits_.deadTime).count()) {
     return fmt::format("received nothing from the peer for {} ms (dead-time)",
