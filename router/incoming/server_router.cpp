@@ -169,8 +169,9 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
   if (isThere) sendThere(number, binding);
 }
 
-// Looks again at servers that may have changed without a notification: one to which no client is
-// connected, and one at which the last look failed.
+// Looks again at servers that may have changed without a notification: the last look failed, or the
+// server has closed its window while its process continues. The connected clients of a server would
+// notice that it has closed; while it has none, this check is repeated.
 void ServerRouter::lookAtDoubtful() {
   for (auto& [number, binding] : bindings_) {
     if (binding.presence->isDoubtful()) look(number, binding);
