@@ -304,7 +304,7 @@ void Binding::onTime(std::int64_t nowNs) {
     expire(nowNs);
     if (channel_) nudge(nowNs);
   } catch (...) {
-    wakeAt(nowNs);  // for the other requests
+    wakeAt(nowNs);  // the next call handles the other requests
     throw;
   }
 }

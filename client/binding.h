@@ -3,8 +3,8 @@
 //
 //   unbound ─bind─► waiting ─server found─► connecting ─accepted─► connected ─server gone─► waiting
 //
-// Threads  any thread calls send(), allocate(), setServer(), waitConnected() and the getters above
-//          them; the thread that runs the dispatcher calls the rest.
+// Threads  the two sections of the public functions name the thread that may call them: any thread,
+//          or the thread that runs the dispatcher.
 // Crash    after the death of the server, the binding delivers the messages that the server had
 //          sent, then a fate for each remaining request, then the disconnect.
 // Trust    invalid data from the server ends the connection.
@@ -50,9 +50,11 @@ class Binding : public std::enable_shared_from_this<Binding> {
   // Handles one message or one change of state of the link. Returns false when there was none.
   bool takeOne();
   enum class Ending {
-    serverGone,  // dead, or it closed the link: it will not receive the remaining requests
-    refused,  // the server refused the link: try again later
-    // The client ends the connection: the server may receive requests for a while.
+    // The server is dead or has closed the link: it will not receive the remaining requests.
+    serverGone,
+    // The server refused the link: the client tries again later.
+    refused,
+    // The client ends the connection: the server may still receive requests for a while.
     protocolError,
   };
   void disconnect(const std::string& reason, Ending ending);

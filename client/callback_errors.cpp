@@ -33,8 +33,7 @@ void CallbackErrors::report() noexcept try {
   const auto client = std::exchange(client_, {});
   const auto text = fmt::format(
       "mpf: the callback{} threw an exception: {}. The dispatcher continues; catch the exception "
-      "in the "
-      "callback.",
+      "in the callback.",
       client, textOfException());
   if (limiter_.admit({}, 0, text, Clock::nowNs())) write({{0, text}});
 } catch (const std::exception&) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// CallbackErrors: writes to stderr what callbacks throw on a thread on which no caller can catch
-// it.
+// CallbackErrors: writes exceptions of callbacks to stderr when no caller can catch them. Each
+// report is one line (wrapped here):
 //
-//   mpf: the callback of the client of server "dac" at location 0 threw an exception: no such
-//   record. The dispatcher continues; catch the exception in the callback. (repeated 41 times in
-//   10.0 s)
+//   mpf: the callback of the client of server "dac" at location 0 threw an exception:
+//   no such record. The dispatcher continues; catch the exception in the callback.
+//   (repeated 41 times in 10.0 s)
 //
 // A LogLimiter holds back the reports of a callback that throws again and again.
 //
@@ -25,10 +25,10 @@ class CallbackErrors {
   void note(const std::string& server, std::int32_t location) noexcept;
   // Reports the exception that is being handled: now, or from dueNs() on.
   void report() noexcept;
-  // When writeDue() has something to write; INT64_MAX: nothing is held.
+  // When writeDue() has something to write; INT64_MAX: no line is held.
   [[nodiscard]] std::int64_t dueNs() const noexcept { return limiter_.dueNs(); }
   void writeDue() noexcept;
-  // Writes all that is held: before the thread ends.
+  // Writes all held lines. Call it before the thread ends.
   void writeHeld() noexcept;
 
  private:

@@ -19,7 +19,8 @@ namespace mpf {
 
 namespace {
 
-constexpr std::int64_t kBusyNs = 20'000'000;  // of one request, after which a server counts as busy
+// A server counts as busy when it has worked on one request for at least this long.
+constexpr std::int64_t kBusyNs = 20'000'000;
 
 // The local time `agoNs` ago.
 std::string timeText(std::int64_t agoNs) {

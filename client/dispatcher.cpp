@@ -153,7 +153,8 @@ void Dispatcher::Impl::dropKnocks() noexcept {
   static_cast<void>(endpoint_.takeRescan());
 }
 
-// When a callback throws, the interrupt() makes the next wait return immediately, for the rest.
+// When a callback throws, the interrupt() makes the next wait return immediately, so that the next
+// step handles the remaining work.
 bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
   endpoint_.interrupt();
   throw;
@@ -358,7 +359,7 @@ void Dispatcher::Impl::handleDue() {
       return true;
     });
   } catch (...) {
-    noteDue(nowNs);  // for the other bindings, and for the rest of this one
+    noteDue(nowNs);  // the next step handles the other bindings, and the rest of this one
     throw;
   }
   if (!due_.isOver()) return noteDue(nowNs);  // the next step continues the round

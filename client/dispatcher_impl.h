@@ -37,8 +37,8 @@ class Dispatcher::Impl {
   void endThread();
 
   // --- any thread, as long as no other thread runs the dispatcher ---
-  // Makes the calling thread the runner until the guard ends; changes nothing when it has the lock
-  // already.
+  // Makes the calling thread the runner until the guard ends. Changes nothing when the thread
+  // already has the lock.
   //   throws  std::logic_error when another thread runs the dispatcher
   [[nodiscard]] RunnerGuard becomeRunner();
   bool runOnce(Deadline deadline);

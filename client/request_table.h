@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// RequestTable: the outstanding requests of one client. A request that was given up (cancelled,
-// expired) has had its fate, and keeps its entry until the server replies to it or refuses it: the
-// server identifies it by the place of that entry, so no other request may use the place before.
+// RequestTable: the outstanding requests of one client.
+//
+// A request that was given up (cancelled, expired) has had its fate, but keeps its entry until the
+// server replies to it or refuses it. The server identifies the request by the place of the entry,
+// so no other request may use this place until then.
 //
 // Threads  tryReserve(), add() and takeBack(): one thread at a time, under the client's lock. The
 //          rest: the dispatcher's thread.

@@ -50,12 +50,11 @@ class RunnerLock {
 
   // True when a temporary owner must release the lock.
   [[nodiscard]] bool isRunnerWaiting() const noexcept {
-    // PAIR(runner-waiting): seen false, the waiting thread wakes this one after it.
+    // PAIR(runner-waiting): a thread that this load does not see calls wakeOwner() after it.
     return waitingRunners_.load(std::memory_order_seq_cst) != 0;
   }
 
-  // True when the last runner is another thread that has not ended: callbacks belong on that
-  // thread.
+  // True when the last runner is another thread and has not ended: callbacks belong on it.
   [[nodiscard]] bool hasOtherRunner();
 
  private:
@@ -72,7 +71,7 @@ class RunnerLock {
     std::atomic<int>& number_;
   };
 
-  // A number that no other thread of the process has or had; even.
+  // An even number that no other thread of the process has or had.
   static std::uint64_t thisThread() noexcept {
     static std::atomic<std::uint64_t> last{0};
     thread_local const std::uint64_t number = last.fetch_add(2, std::memory_order_relaxed) + 2;

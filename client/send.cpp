@@ -37,8 +37,8 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
     request->deadlineNs = envelope.deadlineNs;
     request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
     if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
-    // Before the message is sent: the dispatcher may receive the reply before trySendLocked()
-    // returns.
+    // Added before the message is sent, because the dispatcher may receive the reply before
+    // trySendLocked() returns.
     requests_->add(*request, id);
     MPF_STEP(request_added);
     sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0, 0});

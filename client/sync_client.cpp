@@ -61,8 +61,8 @@ Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
   }
   while (!answer_ && !deadline.hasPassed()) dispatcher_.runOnce(deadline);
   if (!answer_) {
-    // Delivers `expired` if the server had not received the request. Otherwise it may still act on
-    // it.
+    // Delivers `expired` if the server has not received the request. Otherwise the server may still
+    // act on the request.
     dispatcher_.runOnce(Deadline::atNs(0));
     if (!answer_) {
       client_.cancel(awaited_);

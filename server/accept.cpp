@@ -142,8 +142,8 @@ void ServerCore::closeDead() {
     MPF_STEP(client_died);
     removeLinkOfDead(*connection);
     MPF_STEP(client_removed);
-    // The client closed the link before it died: take() closes the connection after the remaining
-    // requests.
+    // If the client closed the link before it died, take() closes the connection after the requests
+    // that remain.
     const auto& link = connection->channel->link();
     if (link.peerState() == layout::LinkState::closed && link.hasMessage()) continue;
     count(endpoint_.control().peersDied);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Connection: the server's end of one client's connection. Connections are reused; `generation`
-// distinguishes the clients that used one.
+// Connection: the server's end of one client's connection. Connection objects are reused;
+// `generation` distinguishes the clients that have used the same object.
 //
 // Threads  as ServerCore; any thread may call take() and GiveBack.
 // Lifetime a handle of a request refers to its connection by address and may outlive its server:
 //          connections are never freed, and the servers of a process share them. There are as many
-//          as the process had clients at the same time.
+//          connections as the process has had clients at one time.
 #pragma once
 
 #include <atomic>
@@ -22,7 +22,7 @@ struct Connection {
     void operator()(Connection* connection) const noexcept;
   };
   using Pointer = std::unique_ptr<Connection, GiveBack>;
-  // Returns a free connection.
+  // Returns a free connection; creates one when there is no free one.
   static Pointer take();
 
   std::shared_ptr<SpinLock> lock = std::make_shared<SpinLock>();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // RelayServer: a server that answers on behalf of another server. Routers use it.
 //
-//   client   a number of clientOf()
+//   client   a number that clientOf() has returned
 //
 // Threads  as MessageServer.
 #pragma once
@@ -20,8 +20,8 @@ class RelayServer : public MessageServer {
   void onClient(std::function<void(std::uint64_t client, bool isConnected)> callback);
   // The deadline that the client gave to the request that receive() returned last.
   [[nodiscard]] Deadline takeBefore() const noexcept;
-  // As reply(), to a request whose handle no longer exists: its clientOf(request) and
-  // request.route().requestId.
+  // As reply(), to a request whose handle no longer exists. The caller has kept the results of
+  // clientOf(request) and request.route().requestId.
   ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
   // Whether that request still has no reply.
   [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;

@@ -215,8 +215,8 @@ void ServerCore::reportClient(std::uint64_t client, bool isConnected) noexcept t
 void ServerCore::throwNext() {
   const auto first = std::move(thrown_.front());
   thrown_.pop_front();
-  endpoint_
-      .interrupt();  // more exceptions or requests may wait: the next wait() returns immediately
+  // More exceptions or requests may wait: the next wait() returns immediately.
+  endpoint_.interrupt();
   std::rethrow_exception(first);
 }
 

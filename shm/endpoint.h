@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Endpoint: a window with the links that end at it, and the wait for the next message of any of
-// them.
+// Endpoint: a window and the links that end at it; waits for the next message of any of the links.
 //
 //   poll the busy links ─► read the ready bits ─► no message: spin for a while
 //                                                 ─► announce the sleep, look again, sleep
@@ -76,11 +75,11 @@ class Endpoint {
   bool takeRescan() noexcept;
   // True after an event in this process: a peer died, a server appeared, interrupt() was called.
   bool takeLocalNews() noexcept;
-  // After takeLocalNews() returned true: whether a peer died. peer()->isDead() tells which links.
+  // After takeLocalNews() returned true: whether a peer died. Its links have peer()->isDead().
   bool takePeerDeath() noexcept { return peerDied_.exchange(false, std::memory_order_relaxed); }
 
-  // Waits until next() or one of the three above may return something. Returns false if `deadline`
-  // passed first.
+  // Waits until next(), takeKnock(), takeRescan() or takeLocalNews() may return something. Returns
+  // false if `deadline` passed first.
   bool wait(Deadline deadline) noexcept;
   // Ends the current or the next wait().
   void interrupt() noexcept;
@@ -148,7 +147,8 @@ class Endpoint {
   std::uint64_t sleepNumber_ = 0;  // number of the last sleep that was announced
   bool slept_ = false;
   std::int64_t wakeNs_ = 10'000;  // estimated duration of a wake-up
-  std::uint32_t spinShift_ = 0;  // halves the time of spinning after spins without a message
+  // How often the spinning time is halved: once more after each long sleep, 0 after a short one.
+  std::uint32_t spinShift_ = 0;
   std::int64_t scannedAllNs_ = 0;  // time of the last scan of all links
 
   struct Peer {

@@ -35,8 +35,7 @@ void remove(Range* range) noexcept;
 // part that was cut off contains zeroes afterwards.
 void growBy(Range& range, int file) noexcept;
 void growAt(Range& range, int file, const std::string& path) noexcept;
-// Whether the file was truncated and could not be grown. The memory is then private to this
-// process.
+// Whether the file was truncated and could not be grown: the memory is now private zeroes.
 [[nodiscard]] bool isLost(const Range& range) noexcept;
 
 // For a program that installs its own SIGBUS handler after its first MPF object. Returns true if

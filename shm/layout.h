@@ -42,7 +42,7 @@ inline constexpr std::uint16_t kMinor = 1;
 inline constexpr std::uint16_t kOldestMajor = 1;  // oldest major version that this code reads
 
 inline constexpr std::size_t kCacheLineBytes = 64;
-// two lines: the adjacent-line prefetcher pulls both
+// two cache lines: the adjacent-line prefetcher loads both
 inline constexpr std::size_t kPairBytes = 128;
 inline constexpr std::size_t kPageBytes = 4096;
 
@@ -154,8 +154,8 @@ struct WindowControl {
   alignas(kPairBytes) Word64 received;  // messages taken
   Word64 sent;  // messages pushed
   Word64 replyQueueFull;  // replies refused because the client did not take them
-  // sends refused because the server's queue was full or too many requests were unanswered (client
-  // windows)
+  // client windows: sends refused because the server's queue was full or too many requests were
+  // unanswered
   Word64 queueFull;
   Word64 expired;  // requests that were dropped because their deadline had passed
   Word64 refused;  // requests answered with the fate `refused`
@@ -218,7 +218,7 @@ static_assert(sizeof(MoreSlot) == sizeof(Slot));
 
 inline constexpr std::uint32_t kMaxMessageSlots = 4;
 inline constexpr std::size_t kFirstSlotBodyBytes = sizeof(Slot::body);
-// 192
+// longest body in slots: 24 + 3 * 56 = 192
 inline constexpr std::size_t kInlineBodyBytes =
     kFirstSlotBodyBytes + (kMaxMessageSlots - 1) * sizeof(MoreSlot::body);
 
@@ -278,8 +278,8 @@ static_assert(kLinkRingsOffset % kPairBytes == 0);
 // Chunks of a bulk segment start here, each chunkBytes long.
 inline constexpr std::size_t kBulkChunksOffset = kPageBytes;
 
-// One connection of a router, or one remote router to which it tries to connect. Written by the
-// router.
+// One connection of a router, or one remote router to which it tries to connect.
+// Written by the router.
 enum class RouterLineState : std::uint32_t { none = 0, waiting = 1, connecting = 2, connected = 3 };
 enum class RouterRole : std::uint32_t { none = 0, client = 1, server = 2 };
 struct RouterLine {
@@ -315,8 +315,8 @@ inline constexpr std::uint32_t kRouterLines = 256;
 inline constexpr std::size_t kRouterLinesOffset = 512;
 inline constexpr std::size_t kRouterBytes = kRouterLinesOffset + kRouterLines * sizeof(RouterLine);
 
-// The structures above have no pointers, bools, size_t, virtual functions or constructors that do
-// work.
+// The structures above have no pointers, bool, size_t or virtual functions, and their constructors
+// do nothing.
 static_assert(std::is_standard_layout_v<SegmentHeader> &&
               std::is_trivially_copyable_v<SegmentHeader>);
 static_assert(std::is_standard_layout_v<WindowControl> && std::is_standard_layout_v<WindowHints>);

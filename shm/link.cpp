@@ -275,8 +275,8 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
 
 void Link::setWatched(bool watched) noexcept {
   in_.control().unwatched.store(watched ? 0 : 1, std::memory_order_relaxed);
-  // PAIR(watch-fence): our `unwatched` is stored before the fence; after it, the caller looks for
-  // messages.
+  // PAIR(watch-fence): our `unwatched` is stored before the fence; the caller looks for messages
+  // after the fence.
   doorbell::fence();
 }
 

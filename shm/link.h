@@ -88,12 +88,13 @@ class Link {
   void notifyPeer() noexcept;
 
   // --- sending ---
-  // Passed by reference: to pass it in registers, the compiler would load the fields, packed,
-  // before their stores have completed.
+  // Always pass it by reference. To pass it in registers, the compiler would load several fields
+  // with one instruction while their separate stores are still in progress, which stalls.
   struct Limits {
-    // longest queue of messages that the peer has not taken; 0: as many as fit into the ring
+    // highest number of messages that the peer has not taken; 0: as many as fit into the ring
     std::uint32_t waiting = 0;
-    std::uint32_t reserve = 0;  // slots to leave free
+    // slots to leave free
+    std::uint32_t reserve = 0;
     // slots that a message of several slots must leave free; otherwise its body goes into a chunk
     std::uint32_t longReserve = 0;
   };
@@ -138,8 +139,8 @@ class Link {
   // Announces whether we poll this link. If not, the peer sets our ready bit with each message.
   void setWatched(bool watched) noexcept;
 
-  // Largest body that may be sent: the limit of the link, and at most what an envelope can
-  // represent.
+  // Largest body that may be sent: the limit of the link, or the largest length that an envelope
+  // can represent, if that is smaller.
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
     return std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX);
   }

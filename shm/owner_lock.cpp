@@ -62,7 +62,7 @@ bool isReaperFileLocked(const std::string& name) {
 
 }  // namespace
 
-// Length 0: to the end of the file, however long it becomes.
+// Length 0 locks up to the end of the file, even if the file becomes longer.
 bool trySet(int fd) noexcept { return tryLock(fd, F_WRLCK, 0, 0); }
 
 bool isHeld(int fd) noexcept {

@@ -22,8 +22,7 @@
 
 namespace mpf::owner_lock {
 
-// Places the owner's lock. The kernel keeps it until the last descriptor of this open file is
-// closed.
+// Places the owner's lock. The kernel keeps it until all descriptors of this open file are closed.
 [[nodiscard]] bool trySet(int fd) noexcept;
 // Whether any process holds a write lock on the byte of the owner's lock. Returns true also on an
 // error, because an error does not prove that the owner is dead.

@@ -34,7 +34,7 @@ std::uint64_t startTicksIn(const char* path) {
   return ticks;
 }
 
-// Start time of a process. Returns 0 if it cannot be read, or if /proc shows the pids of another
+// Start time of a process. Returns 0 if it cannot be read, or if /proc belongs to another pid
 // namespace.
 std::uint64_t startTicksOf(std::int32_t pid) {
   std::array<char, 32> text{};

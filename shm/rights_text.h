@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// RightsText: parses file modes and group names from options and configuration files (see
-// <mpf/rights.h>).
+// RightsText: parses file modes and group names from options and configuration files, for Rights
+// (<mpf/rights.h>).
 #pragma once
 
 #include <sys/types.h>

@@ -35,7 +35,7 @@ struct Tick {
   }
 };
 
-// The fields that are sent with a body. The ring does not interpret `type`, `clientType` and
+// The fields that are sent with a body. The ring does not interpret `type`, `clientType` or
 // `clientExtra`.
 struct Envelope {
   std::uint16_t type{};

@@ -42,8 +42,8 @@ int reserve(int fd, std::size_t bytes) {
   return 0;
 }
 
-// Any user may create any kind of file in /dev/shm. O_NONBLOCK, so that the open of a FIFO does not
-// block.
+// Any user may create any kind of file in /dev/shm. With O_NONBLOCK, open() does not wait if the
+// file is a FIFO.
 FileDescriptor openByName(const std::string& name, int flags) {
   return FileDescriptor(
       ::open(segments::path(name).c_str(), flags | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
@@ -75,8 +75,8 @@ FileDescriptor openRegular(const std::string& name, int flags, std::size_t& file
   return file;
 }
 
-// Opens a segment and copies its header; empty if no file has this name. Throws as
-// Segment::tryOpen.
+// Opens a segment and copies its header; empty if no file has this name.
+// Throws as Segment::tryOpen.
 FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, int flags,
                            layout::SegmentHeader& header) {
   std::size_t fileBytes = 0;

@@ -15,8 +15,7 @@
 namespace mpf::stale_segments {
 namespace {
 
-// The verdict about one file. The verdict about a window also applies to the files that belong to
-// it.
+// The verdict about one file. The verdict about a window also applies to the files of the window.
 struct Finding {
   Verdict verdict{};
   std::string reason;
@@ -26,7 +25,7 @@ std::string ownerText(const layout::SegmentHeader& header) {
   return fmt::format("pid {} ({})", header.ownerPid, segments::text(header.program));
 }
 
-// For a file that has its own lock and a name that no other file will ever have: only the lock
+// For a file that has its own lock, and a name that no other file will ever have: the lock alone
 // decides.
 Finding judgeKeyed(const std::string& name) {
   switch (segments::probeOwner(name)) {

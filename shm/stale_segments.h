@@ -38,8 +38,8 @@ std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most);
 // may not.
 bool tryRemove(const Judged& file);
 
-// Removes the window `name` with this incarnation, its hints and its pipe, if its owner is proven
-// dead.
+// If the owner of the window `name` with this incarnation is proven dead, removes the window, its
+// hints and its FIFO.
 void removeDeadWindow(const std::string& backplane, const std::string& name,
                       std::uint64_t incarnation);
 

@@ -4,11 +4,12 @@
 //
 //   | 0x00 count 0, high | 0x02 count 0, low | ... | 0x1e count 7, low | 0x20 clear: one bit each |
 //
-// Reading the high half of a count latches the low half, so that the two belong together.
+// Reading the high half of a count latches the low half, so that both halves are of one count.
 //
 // Threads  any number of callers at a time.
-// Crash    the counters go on in the module; nothing is lost.
-// Trust    a count may be any number. An absent module reads as all ones: then the ID PROM is read.
+// Crash    the module continues to count; nothing is lost.
+// Trust    a count may be any number. An absent module reads as all ones, so the driver checks the
+//          ID PROM when a count is all ones.
 #pragma once
 
 #include <cstdint>
@@ -36,12 +37,12 @@ class PulseCounter {
   //   returns   pulses since the channel was cleared, modulo 2^32; nullopt for another channel, and
   //             when the module is absent or replaced
   [[nodiscard]] std::optional<std::uint32_t> tryRead(int channel);
-  //   returns   false as tryRead() returns nullopt
+  //   returns   false in the cases in which tryRead() returns nullopt
   [[nodiscard]] bool tryClear(int channel);
 
  private:
   [[nodiscard]] static bool isChannel(int channel) { return channel >= 0 && channel < kChannels; }
 
   mpf::IndustryPackModule& module_;
-  std::mutex mutex_;  // between the two halves of a count no other may be read
+  std::mutex mutex_;  // held while the two halves of a count are read
 };

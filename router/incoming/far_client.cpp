@@ -129,8 +129,7 @@ void FarClient::onMessage(Message&& message) {
   const bool isFirst = RelayClient::endsRequest(message);
   const auto requestId = message.route().requestId;
   if (const auto* fate = message.tryAs<RequestFate>()) return endRequest(requestId, fate->fate, {});
-  // The server is gone, and its remaining replies are received at once. Those that exceed the
-  // window are dropped.
+  // Replies arrive while the window is used up only when the server is gone. They are dropped.
   if (window_ <= 0)
     return isFirst ? endRequest(requestId, Fate::outcomeUnknown,
                                 "the server ended before its replies were received")

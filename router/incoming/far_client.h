@@ -59,8 +59,8 @@ class FarClient {
   void bind(const std::string& server, std::int32_t location) { client_->bind(server, location); }
   void request(wire::Request::Reader request);
   void credit(std::uint32_t bytes);
-  // The server is gone: receives what it had sent, regardless of the window, and then the
-  // disconnection.
+  // The server is gone: receives the messages that it had sent, regardless of the window, and then
+  // the disconnect.
   void onServerGone();
   // Ends all held requests, and those that arrive later, with `fate`.
   void giveUp(Fate fate, const std::string& why);

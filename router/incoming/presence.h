@@ -19,10 +19,12 @@ namespace mpf::router {
 
 class Presence {
  public:
-  // Calls `onChange` when the process of the server that look() found exits, and when look() finds
-  // that a known server has changed or, after a failure, that it is running: the other users of
-  // this object have not called look(). When the server ends but its process continues, only
-  // isDoubtful() shows it.
+  // Calls `onChange` in two cases:
+  // - The process of the server that look() found exits.
+  // - look() finds a change: a known server has ended or was replaced, or a server is running after
+  //   a look() that failed. The other users of this object must then call look(), too.
+  // `onChange` is not called when the server ends but its process continues; isDoubtful() is then
+  // true.
   Presence(Backplane backplane, ServerName name, std::function<void()> onChange);
   ~Presence();
   Presence(const Presence&) = delete;

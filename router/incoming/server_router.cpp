@@ -169,8 +169,9 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
   if (isThere) sendThere(number, binding);
 }
 
-// Looks again at servers that may have changed without a notification: one to which no client is
-// connected, and one at which the last look failed.
+// Looks again at servers that may have changed without a notification: the last look failed, or the
+// server has closed its window while its process continues. The connected clients of a server would
+// notice that it has closed; while it has none, this check is repeated.
 void ServerRouter::lookAtDoubtful() {
   for (auto& [number, binding] : bindings_) {
     if (binding.presence->isDoubtful()) look(number, binding);
@@ -180,8 +181,7 @@ void ServerRouter::lookAtDoubtful() {
 
 void ServerRouter::lookSoon() { looks_.setAt(Deadline::after(kLookEvery)); }
 
-// Sends "absent" once all requests to the server have ended, which is when all of its clients are
-// disconnected.
+// Sends "absent" when all clients of the server are disconnected: all their requests have ended.
 void ServerRouter::endIfDone(std::uint32_t number, Binding& binding) {
   if (binding.connected != 0) return;
   for (auto each = clients_.begin(); each != clients_.end();) {
@@ -252,7 +252,7 @@ void ServerRouter::onOpen(wire::Open::Reader open) {
   }
   lastClient_ = number;
   const auto binding = bindings_.find(open.getBinding());
-  // If the server ended while this item was on its way, the requests of this client end as
+  // If the server ended while this item was on its way, no client is created: its requests end as
   // neverTaken.
   const bool isCurrent = binding != bindings_.end() && binding->second.announced != 0 &&
                          binding->second.announced == open.getIncarnation();

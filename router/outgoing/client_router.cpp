@@ -194,7 +194,7 @@ void ClientRouter::onServer(wire::Server::Reader server) {
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::outcomeUnknown);
       break;
-    case wire::Server::State::ABSENT:  // requests that are still open had not arrived there
+    case wire::Server::State::ABSENT:  // no request without an end was taken there
       wanted.offer.reset();
       if (wanted.proxy) wanted.proxy->drain(Fate::neverTaken);
       break;
@@ -257,7 +257,7 @@ void ClientRouter::sweep() {
     sweepSoon();
 }
 
-// Whether a later sweep may change something although nothing else happens.
+// Whether a later sweep may have something to do even if no event occurs before it.
 bool ClientRouter::isPending(const Wanted& wanted) const {
   return wanted.idleSinceNs != 0 || (wanted.binding == 0 && connected_) ||
          (wanted.offer && !wanted.proxy) || (wanted.proxy && wanted.proxy->isDraining());
@@ -300,7 +300,7 @@ std::optional<std::uint32_t> ClientRouter::tryNewClient(Proxy& proxy) {
 
 void ClientRouter::dropClient(std::uint32_t number) {
   clients_.erase(number);
-  sweepSoon();  // it may have been the last one of its proxy
+  sweepSoon();  // this may have been the last client of its proxy
   (*record_)->clients.store(clients_.size(), std::memory_order_relaxed);
 }
 
@@ -343,8 +343,8 @@ void ClientRouter::onItem(wire::Item::Reader item) {
   }
 }
 
-// Takes up to kTurn requests of each server in turn, beginning after the server that was last: a
-// flood of requests to one server does not delay requests to the others.
+// Takes up to kTurn requests of each server in turn, beginning after pumped_, so that a flood of
+// requests to one server does not delay requests to the others.
 void ClientRouter::onRoom() {
   auto next = wanted_.upper_bound(pumped_);
   const ServerName* pumped = nullptr;

@@ -160,7 +160,8 @@ void Proxy::ended(Client& client) noexcept {
 
 void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
   const auto found = clients_.find(number);
-  if (found == clients_.end() || isDraining()) return;  // the client has disconnected
+  // The client has disconnected, or drain() has ended its requests.
+  if (found == clients_.end() || isDraining()) return;
   auto& client = found->second;
   const bool isOwed = awaits(client, reply.getRequestId());
   if (reply.getIsFirst() != isOwed) {

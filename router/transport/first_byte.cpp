@@ -8,7 +8,7 @@ namespace {
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // kj::Own destroys the dynamic type
-// A stream of which the first byte has been read already; it is read once more.
+// A stream whose first byte has already been read. The first read returns this byte again.
 class WithFirstByte final : public kj::AsyncIoStream {
  public:
   WithFirstByte(kj::byte first, kj::Own<kj::AsyncIoStream> stream)

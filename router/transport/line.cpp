@@ -12,8 +12,8 @@ namespace {
 
 // This many bytes of a frame that is still arriving are a sign of life.
 constexpr std::size_t kProgressBytes = std::size_t{64} << 10;
-// Interval of pings that measure the round trip, when the peer's pings make other pings
-// unnecessary.
+// While the peer's pings make pings of this side unnecessary, this side sends a ping at this
+// interval all the same, to measure the round trip.
 constexpr std::int64_t kMeasureEveryNs = 10'000'000'000;
 constexpr std::int64_t kTurnNs = 2'000'000;  // longest turn with the items of one peer
 // The frame size that each side must accept, and the largest size of a greeting.
@@ -148,8 +148,8 @@ kj::Promise<void> Line::handleReceived() {
   } catch (const kj::Exception& error) {  // an invalid pointer in the frame
     end(FarewellCode::PROTOCOL, fmt::format("the peer sent a frame that cannot be read: {}",
                                             toStd(error.getDescription())));
-  } catch (
-      const std::exception& error) {  // not caused by the peer: no memory or no descriptor is left
+  } catch (const std::exception& error) {
+    // Not caused by the peer: no memory or no descriptor is left.
     end(FarewellCode::STOPPING, error.what());
   }
   if (discardsInput()) return readAndDiscard();
@@ -170,7 +170,7 @@ kj::Promise<void> Line::whenAnswersAreSent() {
 bool Line::handleSome() {
   constexpr unsigned kItemsPerCheck = 16;  // between two looks at the clock
   const auto endNs = Clock::nowNs() + kTurnNs;
-  if (items_) lastReceiveNs_ = Clock::nowNs();  // the peer is not late: its items wait here
+  if (items_) lastReceiveNs_ = Clock::nowNs();  // the peer is not late: its items were waiting
   handling_ = true;
   KJ_DEFER(handling_ = false);
   for (unsigned handled = 1; answers_ < kMaxNotes; ++handled) {
@@ -265,7 +265,7 @@ std::int64_t Line::nextCheckNs(std::int64_t nowNs) {
                                   std::exchange(checkAfterNs_, halfDeadNs()));
 }
 
-// Which deadline the peer has missed; empty: none.
+// Which deadline the peer has missed; an empty text when it has missed no deadline.
 std::string Line::silenceReason(std::int64_t nowNs) const {
   if (nowNs - lastReceiveNs_ >= std::chrono::nanoseconds(limits_.deadTime).count()) {
     return fmt::format("received nothing from the peer for {} ms (dead-time)",

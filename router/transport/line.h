@@ -118,7 +118,8 @@ class Line {
   }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
   [[nodiscard]] bool hasGreeted() const noexcept { return greeted_; }
-  // The limits at the start of the line, as in its greeting.
+  // The limits of the configuration when the line started. Only bufferBytes may be smaller: a frame
+  // must fit into what the peer accepts.
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
   // The largest body that may be sent.
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;

@@ -11,8 +11,8 @@ namespace mpf::router {
 namespace {
 
 constexpr std::size_t kItemBytes = 256;  // upper estimate for an item without its body
-constexpr std::size_t kKeptScratch = std::size_t{4}
-                                     << 20;  // memory that is kept for the next frame
+// Memory that is kept for the next frame.
+constexpr std::size_t kKeptScratch = std::size_t{4} << 20;
 
 }  // namespace
 
