@@ -6,8 +6,8 @@
 //   carrier.unplug("IP_a");                                    // all bits read as ones from now on
 //   carrier.setFault("IP_a", ModelFault::interruptStorm);
 //
-// Drivers use it as any carrier. createCarrier() of kind "model" creates one with four sites. An empty site
-// reads as ones and ignores writes, as on a real carrier.
+// Drivers use it as any carrier. createCarrier() of kind "model" creates one with four sites. An
+// empty site reads as ones and ignores writes, as on a real carrier.
 //
 // Threads  plug() and unplug() one at a time; bus cycles and setFault() by any thread. A model that
 //          was unplugged exists until the carrier is destroyed, because a bus cycle may be in
