@@ -8,8 +8,8 @@
 // move it. It does not count the time while the host is suspended, and starts again near 0 at each
 // boot: do not store such times, and do not send them to another host. Send left() instead.
 //
-// Threads  any number of callers at a time; a Deadline is a plain value, as safe as an int.
-//          All functions are noexcept and do not allocate.
+// Threads  any number of callers at a time; a Deadline is a plain value: share it as you share
+//          an int. All functions are noexcept and do not allocate.
 // Source   clock_gettime(2); the manual has timeouts in whole seconds ("StandardFieldsMessage").
 #pragma once
 

@@ -14,8 +14,7 @@
 // not act on fields of messages between client and server; reports show the `cmd` that a server is
 // busy with.
 //
-// An array may have 0 elements. Its body, fields included, may have at most
-// ServerOptions::maxMessageBytes.
+// An array has 0 or more elements; ServerOptions::maxMessageBytes limits the body, fields included.
 //
 // CONTRIBUTING.md describes how to add a type. schema_test compares the structs with message.capnp.
 //
@@ -38,9 +37,8 @@
 
 namespace mpf {
 
-// The number of a type, in shared memory; between hosts, the place in the union of message.capnp.
-// Numbers are never reused. A newer peer may send a number that is not listed here: toString() and
-// layoutOf() accept every number.
+// The number of a type, in shared memory. Numbers are never reused. A newer peer may send a number
+// that is not listed here: toString() and layoutOf() accept every number.
 enum class MessageType : std::uint16_t {
   none = 0,  // of an empty handle; never sent
   connect = 1,
@@ -154,8 +152,7 @@ struct Connect {
   }
 };
 
-// One 32-bit integer, any value; the server defines its unit, for example counts of a DAC (manual,
-// "Int32Message").
+// One 32-bit integer; the server defines its unit, for example counts (manual, "Int32Message").
 struct Int32 {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{}, value{};
 
@@ -166,8 +163,7 @@ struct Int32 {
   }
 };
 
-// An array of 32-bit integers, which follow the fields: see MessageOf::value() (manual,
-// "Int32ArrayMessage").
+// 32-bit integers, which follow the fields: MessageOf::value() (manual, "Int32ArrayMessage").
 struct Int32Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t length{};  // number of elements that follow; written by setLength() only
@@ -178,8 +174,7 @@ struct Int32Array {
   static constexpr auto fields() { return standardFields<Int32Array>(); }
 };
 
-// One double, any value including NaN and infinities; the server defines its unit (manual,
-// "Float64Message").
+// One double, NaN and infinities included, in a unit of the server (manual, "Float64Message").
 struct Float64 {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t reserved{};
@@ -193,8 +188,7 @@ struct Float64 {
   }
 };
 
-// An array of doubles, for example a waveform, which follow the fields: see MessageOf::value()
-// (manual, "Float64ArrayMessage").
+// Doubles, which follow the fields: MessageOf::value() (manual, "Float64ArrayMessage").
 struct alignas(8) Float64Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t length{};  // number of elements that follow; written by setLength() only
@@ -293,8 +287,7 @@ struct RequestFate {
 };
 
 // A Cap'n Proto message of the user's own schema, in standard segment framing, readable in place:
-// see <mpf/user_message.h>. MPF forwards it and does not interpret it: the receiver checks it. It
-// has no standard fields.
+// see <mpf/user_message.h>. MPF forwards it and does not interpret it. It has no standard fields.
 struct alignas(8) User {
   std::uint32_t length{};  // number of bytes that follow; written by setSize() only
   std::uint32_t reserved{};
@@ -374,7 +367,6 @@ inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
 }  // namespace detail
 
 // The layout of a type; one with sizes 0 and the name "unknown" for a number that has no type.
-// Valid until the process exits.
 [[nodiscard]] constexpr const BodyLayout& layoutOf(MessageType type) noexcept {
   const auto at = static_cast<std::size_t>(type);
   return at < detail::kLayouts.size() ? detail::kLayouts[at] : detail::kUnknownLayout;

@@ -11,7 +11,8 @@
 // uses loads that are as wide as the processor has; such a load cannot be served from several
 // narrower stores that are still in the store buffer, so it waits for them: about 5 ns a message.
 //
-// Threads  as memcpy: one thread writes to `to`, and no other thread writes to `from`.
+// Threads  as memcpy: `to` belongs to the caller.
+// Trust    `from` may be shared memory that a peer overwrites: the copy then has any contents.
 // Throws   nothing; allocates nothing.
 #pragma once
 

@@ -19,8 +19,8 @@ namespace mpf {
 class MemoryRegisters final : public Registers {
  public:
   //   window  the first byte of the mapping, aligned to 4 bytes; not owned, and must stay mapped
-  //           as long as this object exists. The hardware must present the bytes at their addresses
-  //           on the bus: a bridge that swaps 16-bit words must be set up before.
+  //           as long as this object exists. Each byte must be at the address that it has on the
+  //           bus of the modules: set up the byte order of a bridge before.
   //   bytes   size of the window: an access beyond it throws std::out_of_range
   MemoryRegisters(volatile void* window, std::size_t bytes) noexcept
       : window_(static_cast<volatile std::byte*>(window)), bytes_(bytes) {}
