@@ -5,9 +5,12 @@
 //   while (!hasReply() && !deadline.hasPassed()) wait(deadline.left());
 //
 // The monotonic time is the same in all processes of one host. Changes of the wall clock do not
-// move it. It does not count the time while the host is suspended.
+// move it. It does not count the time while the host is suspended, and starts again near 0 at each
+// boot: do not store such times, and do not send them to another host. Send left() instead.
 //
-// Threads  any. All functions are noexcept and do not allocate.
+// Threads  any number of callers at a time; a Deadline is a plain value: share it as you share
+//          an int. All functions are noexcept and do not allocate.
+// Source   clock_gettime(2); the manual has timeouts in whole seconds ("StandardFieldsMessage").
 #pragma once
 
 #include <time.h>
@@ -23,7 +26,8 @@ using Nanoseconds = std::chrono::nanoseconds;
 
 // The source of all times that processes exchange: deadlines of requests, times of progress.
 struct Clock {
-  // The current CLOCK_MONOTONIC [ns]. A call takes about 20 ns.
+  // The current CLOCK_MONOTONIC [ns], never negative. It does not fail, and is usually no system
+  // call: about 20 ns.
   [[nodiscard]] static std::int64_t nowNs() noexcept {
     timespec now{};
     ::clock_gettime(CLOCK_MONOTONIC, &now);
@@ -39,23 +43,26 @@ class Deadline {
   // A deadline that never passes.
   [[nodiscard]] static Deadline never() noexcept { return Deadline(kNever); }
   // A deadline `wait` from now; never() if that time cannot be represented. If `wait` is zero or
-  // negative, the deadline has passed already.
+  // negative, the deadline has passed already. Reads the clock.
   [[nodiscard]] static Deadline after(Nanoseconds wait) noexcept {
     const auto now = Clock::nowNs();
     return wait.count() >= kNever - now ? never() : Deadline(now + wait.count());
   }
-  // A deadline at this CLOCK_MONOTONIC [ns]. Processes of one host may exchange such times.
+  // A deadline at this CLOCK_MONOTONIC [ns]; INT64_MAX means never(). Processes of one host may
+  // exchange such times.
   [[nodiscard]] static Deadline atNs(std::int64_t monotonicNs) noexcept {
     return Deadline(monotonicNs);
   }
 
-  // Whether it was made by never(), or by after() with a wait that cannot be represented.
+  // Whether it never passes: made by never(), by after() with a wait that cannot be represented, or
+  // by atNs(INT64_MAX).
   [[nodiscard]] bool isNever() const noexcept { return ns_ == kNever; }
-  // Reads the clock, unless this is never().
+  // Whether the time has been reached; always false for never(), which does not read the clock.
   [[nodiscard]] bool hasPassed() const noexcept { return !isNever() && Clock::nowNs() >= ns_; }
   // CLOCK_MONOTONIC [ns] of the deadline; INT64_MAX for never().
   [[nodiscard]] std::int64_t ns() const noexcept { return ns_; }
-  // The remaining time: zero if the deadline has passed, Nanoseconds::max() for never().
+  // The remaining time, never negative: zero if the deadline has passed, Nanoseconds::max() for
+  // never(). Adding to Nanoseconds::max() overflows: test isNever() before.
   [[nodiscard]] Nanoseconds left() const noexcept {
     if (isNever()) return Nanoseconds::max();
     const auto left = ns_ - Clock::nowNs();

@@ -8,8 +8,25 @@
 // request and reply with it, or allocate another message. Handles cannot be copied; duplicate()
 // copies a message.
 //
-// Threads  one thread at a time uses a handle. The thread that destroys a handle calls the lender
-//          of its body.
+//   void onMessage(mpf::Message&& message) {                    // the callback of a client
+//     if (const auto* reply = message.tryAs<mpf::Int32>()) use(reply->status, reply->value);
+//     for (const double sample : message.valueAs<mpf::Float64Array>()) use(sample);
+//   }                                                           // the handle frees the body
+//
+//   size of the body   where it is                              how it is sent
+//   up to 32 bytes     inside the handle                        copied
+//   larger             on the heap                              copied
+//                      in the memory that client and server     in place: nothing is copied
+//                      share for this connection
+//
+// A received large body occupies the shared memory of its sender until the handle is destroyed or
+// sent: a program that keeps many such handles makes the sender run out of memory. The body stays
+// readable when the sender disconnects or dies.
+//
+// Threads  one thread at a time uses a handle; it may move to another thread. The thread that
+//          destroys a handle calls the lender of its body.
+// Throws   duplicate() and copyOf(), which allocate; all other public functions are noexcept.
+// Crash    <mpf/message_client.h> and <mpf/message_server.h> describe what the peer sees.
 // Trust    a peer may write anything to a body in shared memory, at any time. adopt(), copyOf() and
 //          copyInline() check the body once and store its array length; tryAs(), valueAs() and
 //          MessageOf::setLength() use only the stored length.
@@ -32,10 +49,12 @@ namespace mpf {
 
 struct Route;
 // Receives a call when the handle of a request is destroyed without a reply. It must outlive every
-// handle whose route names it.
+// handle whose route names it. MessageServer has one, which ends the request as `refused`; programs
+// need none of their own.
 class RouteKeeper {
  public:
-  // Runs on the thread that destroys the handle.
+  // Runs on the thread that destroys the handle, so calls may run at the same time. `route` is
+  // valid during the call.
   virtual void abandoned(const Route& route) noexcept = 0;
 
  protected:
@@ -43,14 +62,16 @@ class RouteKeeper {
 };
 
 // A value of Route::flags, in messages that a client received: the message ended its request.
+// Further replies, and messages that belong to no request, have flags 0.
 inline constexpr std::uint32_t kEndsRequest = 1;
 
-// Where a reply to this message goes. Transports write and read it; servers copy it into their
-// replies and do not interpret it.
+// Where a reply to this message goes. Transports write and read it; servers do not interpret it,
+// and MessageServer::allocReplyMessage() copies it into a reply. It is valid in this process only,
+// and is not sent to the peer.
 struct Route {
   std::uint64_t link{};  // the connection of the client; 0 in messages that a client received
-  std::uint32_t requestId{};  // the client's number of the request
-  std::uint32_t flags{};
+  std::uint32_t requestId{};  // the client's number of the request; 0: of no request
+  std::uint32_t flags{};  // at a client: kEndsRequest or 0; at a server: for the transport only
   RouteKeeper* keeper = nullptr;  // of requests that have had no reply; not owned
 };
 
@@ -60,7 +81,10 @@ class Message {
   // the handle moves such a body, and pointers to its fields become invalid.
   static constexpr std::size_t kInlineBytes = 32;
 
+  // An empty handle: type none, everything else 0.
   Message() noexcept = default;
+  // Moves the message with its route: of a request, only the last handle reports to the
+  // RouteKeeper. `other` is empty then.
   // NOLINTNEXTLINE(performance-move-constructor-init): the state is plain data
   Message(Message&& other) noexcept : state_(other.state_) { other.forget(); }
   Message& operator=(Message&& other) noexcept {
@@ -73,14 +97,20 @@ class Message {
   }
   Message(const Message&) = delete;
   Message& operator=(const Message&) = delete;
+  // Assignment and destruction end the former message as reset() does: a request that has had no
+  // reply is refused.
   ~Message() { giveBack(); }
 
   // False for an empty handle: default constructed, moved from, sent, or reset().
   explicit operator bool() const noexcept { return state_.type != MessageType::none; }
+  // MessageType::none for an empty handle. A received message may have a number that this program
+  // does not have; then isSound() is false.
   [[nodiscard]] MessageType getType() const noexcept { return state_.type; }
 
-  // Two numbers of the client's own choice, which every reply returns unchanged (manual, "Message",
-  // "Overview"). Servers should not use them. DevMpf uses clientType for itself.
+  // Two numbers of the client's own choice, any value, 0 by default. The client sets them before
+  // it sends the request; every reply and fate has the same numbers (manual, "Message",
+  // "Overview"). Servers should not use them. DevMpf uses clientType for itself; classes derived
+  // from it may use clientExtra.
   [[nodiscard]] std::int32_t getClientType() const noexcept { return state_.clientType; }
   void setClientType(std::int32_t type) noexcept { state_.clientType = type; }
   [[nodiscard]] std::int32_t getClientExtra() const noexcept { return state_.clientExtra; }
@@ -88,7 +118,8 @@ class Message {
 
   // The fields, in place: valid until the handle is moved, sent or destroyed. Returns nullptr when
   // the message has another type than T or its body is invalid. A peer may change T::length at any
-  // time: use arrayLength() or valueAs().
+  // time: use arrayLength() or valueAs(). It may change all other fields as well, if the body is in
+  // shared memory: copy a field before you check it.
   template <MessageBody T>
   [[nodiscard]] T* tryAs() noexcept {
     return isA<T>() ? reinterpret_cast<T*>(data()) : nullptr;
@@ -115,22 +146,29 @@ class Message {
   [[nodiscard]] bool isSound() const noexcept { return state_.sound; }
   // Number of elements of an array, as it was checked; 0 for scalars and invalid bodies.
   [[nodiscard]] std::uint32_t arrayLength() const noexcept { return state_.length; }
-  // All bytes of the body, fields and elements, even when the body is invalid.
+  // All bytes of the body, fields and elements, even when the body is invalid; valid as long as the
+  // fields, empty for an empty handle.
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {data(), size()}; }
 
   // Copies type, clientType, clientExtra, route and body; a large body is copied to the heap. The
-  // array length of the copy is the checked one. Only the original reports to the RouteKeeper.
+  // array length of the copy is the checked one. Only the original reports to the RouteKeeper: a
+  // request is not refused when only its copy is destroyed. A server may reply with the copy.
   //   throws  std::bad_alloc
   [[nodiscard]] Message duplicate() const;
 
   // ---- for transports
 
+  // Programs do not need these functions; a transport is code that moves messages between
+  // processes, such as links and routers.
+
   // The route is not owned: setRoute() drops the former one without a call of its keeper.
   [[nodiscard]] const Route& route() const noexcept { return state_.route; }
   void setRoute(const Route& route) noexcept { state_.route = route; }
 
-  // Takes ownership of a body and checks it: isSound() is the result. The lender gets the body back
-  // when the handle is destroyed or reset.
+  // Becomes the owner of a body and checks it: isSound() is the result. The lender gets the body
+  // back when the handle is destroyed or reset, also when the body is invalid.
+  //   body  invalid unless it has all fields and elements of the type and is aligned to 8 bytes.
+  //         Without a lender, its memory must outlive the handle.
   [[nodiscard]] static Message adopt(MessageType type, BodyBytes body) noexcept {
     Message message;
     message.state_.type = type;
@@ -140,7 +178,8 @@ class Message {
     return message;
   }
   // Copies `bytes` into the handle, or to the heap when they are more than kInlineBytes, and checks
-  // the copy.
+  // the copy: isSound() is the result. `bytes` may have any alignment, and any contents. The
+  // message has no route, and its clientType and clientExtra are 0.
   //   throws  std::bad_alloc
   [[nodiscard]] static Message copyOf(MessageType type, std::span<const std::byte> bytes);
   // As copyOf(), for at most kInlineBytes bytes; further bytes are dropped.
@@ -154,7 +193,8 @@ class Message {
     return message;
   }
   // As copyInline(), without a copy: resets this handle, then `fill` receives a span of its
-  // kInlineBytes bytes and writes the first `size` of them. `fill` must not throw.
+  // kInlineBytes bytes and writes the first `size` of them. `fill` must not throw. `size` must be
+  // at most kInlineBytes, which is not checked.
   template <class Fill>
   void assignInline(MessageType type, std::size_t size, Fill&& fill) noexcept {
     reset();
@@ -164,7 +204,7 @@ class Message {
     check();
   }
   // Empties the handle: returns the body to its lender, and reports a request that has had no reply
-  // to its RouteKeeper.
+  // to its RouteKeeper. Keeps clientType, clientExtra and the route, without its keeper.
   void reset() noexcept {
     giveBack();
     forget();
@@ -173,15 +213,18 @@ class Message {
   [[nodiscard]] BodyLender* lender() const noexcept {
     return state_.isOutside() ? state_.at.body.lender : nullptr;
   }
+  // Whether the body is inside the handle; true for an empty handle.
   [[nodiscard]] bool isInline() const noexcept { return !state_.isOutside(); }
-  // [bytes] The body could have this size in its present memory.
+  // [bytes] The body could have this size in its present memory; kInlineBytes for an inline body
+  // and for an empty handle.
   // The analyzer does not follow the copy of the body word by word.
   // NOLINTNEXTLINE(clang-analyzer-core.uninitialized.UndefReturn)
   [[nodiscard]] std::size_t capacity() const noexcept {
     return state_.isOutside() ? state_.at.body.capacity : kInlineBytes;
   }
-  // Empties the handle and passes ownership of its out-of-line body to the caller. Drops an inline
-  // body: `data` of the result is nullptr. Does not call the RouteKeeper.
+  // Empties the handle and passes ownership of its out-of-line body to the caller, who passes it to
+  // adopt() or to its lender. Drops an inline body: `data` of the result is nullptr. Does not call
+  // the RouteKeeper.
   [[nodiscard]] BodyBytes releaseBody() noexcept {
     const BodyBytes body = state_.isOutside() ? state_.at.body : BodyBytes{};
     forget();
@@ -189,11 +232,12 @@ class Message {
   }
 
  protected:
-  // True when the type is T and the body is valid.
+  // True when the type is T and the body is valid; false for an empty handle.
   template <class T>
   [[nodiscard]] bool isA() const noexcept {
     return state_.type == T::kType && state_.sound;
   }
+  // The body and its size in bytes, wherever it is.
   // NOLINTBEGIN(clang-analyzer-core.uninitialized.UndefReturn): as above
   [[nodiscard]] std::byte* data() noexcept {
     return state_.isOutside() ? state_.at.body.data : state_.at.inside.data();
@@ -230,6 +274,7 @@ class Message {
 
  private:
   static constexpr std::uint8_t kOutside = 0xff;
+  // The bytes of an inline body, or the description of an out-of-line body: see inlineSize.
   union Where {
     alignas(8) std::array<std::byte, kInlineBytes> inside;
     BodyBytes body;
@@ -245,12 +290,13 @@ class Message {
   struct State {
     Where at;
     Route route{};
-    std::uint32_t length = 0;  // of an array; checked, and out of reach of the peer
+    // Of an array: the checked number of elements. A peer cannot write here.
+    std::uint32_t length = 0;
     std::int32_t clientType = 0;
     std::int32_t clientExtra = 0;
     MessageType type = MessageType::none;
     std::uint8_t inlineSize = 0;  // kOutside: the body is out of line
-    bool sound = false;
+    bool sound = false;  // the result of check()
 
     [[nodiscard]] bool isOutside() const noexcept { return inlineSize == kOutside; }
     State() noexcept = default;
@@ -273,6 +319,7 @@ class Message {
     }
   };
 
+  // Sets `sound`, and `length` of a valid array.
   void check() noexcept {
     const auto& layout = layoutOf(state_.type);
     const std::byte* const bytes = data();
@@ -285,6 +332,7 @@ class Message {
     state_.sound = length <= (size() - layout.headerBytes) / layout.elementBytes;
     if (state_.sound) state_.length = length;
   }
+  // Makes the handle empty: neither the body nor the request is given back.
   void forget() noexcept {
     state_.type = MessageType::none;
     state_.route.keeper = nullptr;
@@ -292,6 +340,7 @@ class Message {
     state_.length = 0;
     state_.sound = false;
   }
+  // Reports a request that has had no reply, and returns an out-of-line body to its lender.
   void giveBack() noexcept {
     if (state_.route.keeper != nullptr) state_.route.keeper->abandoned(state_.route);
     // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): as above
@@ -301,6 +350,7 @@ class Message {
 
   State state_;
 };
+// Each move copies the whole handle, so it stays small.
 static_assert(sizeof(Message) <= 72);
 
 }  // namespace mpf

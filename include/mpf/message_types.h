@@ -8,9 +8,18 @@
 // The structs have fixed widths and the byte order of the host: client and server share memory.
 // Routers send the structs of message.capnp to other hosts instead.
 //
+// All fields are 0 by default. A client writes the fields of a request. A server changes the
+// request and replies with it, so that the other fields return unchanged, or fills in a new reply,
+// whose fields are 0. `reserved` fields are padding: they are 0, and readers ignore them. MPF does
+// not act on fields of messages between client and server; reports show the `cmd` that a server is
+// busy with.
+//
+// An array has 0 or more elements; ServerOptions::maxMessageBytes limits the body, fields included.
+//
 // CONTRIBUTING.md describes how to add a type. schema_test compares the structs with message.capnp.
 //
 // Threads  plain data; the owner of the message handle is the only user of a body in this process.
+// Throws   nothing in this header throws or allocates.
 // Trust    a peer may write to a body while it is read: never use the field `length` as the length
 //          of an array. MessageOf::value() uses the length that was checked.
 // Source   manual, "Message", "StandardFieldsMessage" and the section of each type; types and
@@ -28,7 +37,8 @@
 
 namespace mpf {
 
-// The number of a type, in shared memory and on the wire. Numbers are never reused.
+// The number of a type, in shared memory. Numbers are never reused. A newer peer may send a number
+// that is not listed here: toString() and layoutOf() accept every number.
 enum class MessageType : std::uint16_t {
   none = 0,  // of an empty handle; never sent
   connect = 1,
@@ -46,22 +56,35 @@ enum class MessageType : std::uint16_t {
 // The status of a ConnectMessage (manual, "ConnectMessage"). Old clients treat every value other
 // than connectYes as a disconnect.
 enum class ConnectStatus : std::int32_t {
-  connectNo = 0,  // disconnected; the client connects again by itself
+  // Disconnected, after a connectYes. All requests have ended before, each with its reply or fate.
+  // The client connects again by itself.
+  connectNo = 0,
   connectYes = 1,  // connected: messages reach the server
-  connectQueueFull = 2,  // a queue was full and refused a message; the client stays connected
-  connectRefused = 3,  // the server does not accept another client; the client tries again
+  // A queue was full and refused a message, here or on the host of the server. The client stays
+  // connected; a run of refusals is reported once.
+  connectQueueFull = 2,
+  // The server has its maximum number of clients; the client tries again every second.
+  connectRefused = 3,
 };
 // Indexed by the value of the status.
 inline constexpr std::array<std::string_view, 4> kConnectStatusNames{
     "connectNo", "connectYes", "connectQueueFull", "connectRefused"};
 
-// How a request without a reply ended. Each request ends in one reply or in one fate.
+// How a request without a reply ended. Each request that was sent ends in one reply or in one fate.
+// Only after neverTaken and expired is it certain that the server has done nothing, so that the
+// request can be repeated.
 enum class Fate : std::int32_t {
-  refused = 0,  // the server did not accept it (full queue, size, type) or dropped it
+  // The server did not accept it (full queue, size, type), or destroyed it without a reply, for
+  // example because its handler threw an exception.
+  refused = 0,
   neverTaken = 1,  // the connection ended before the server received it: nothing was done
-  outcomeUnknown = 2,  // the server received it and did not reply: it may have been done
+  // The server received it, or may have received it, and no reply followed: the connection ended,
+  // the timeout of SyncClient::call() passed, or the client had no memory to receive the reply. It
+  // may have been done.
+  outcomeUnknown = 2,
   expired = 3,  // its deadline passed before the server received it: nothing was done
-  cancelled = 4,  // the client cancelled it; the server may act on it all the same
+  // The client called cancel(); the server may act on it all the same. A late reply is dropped.
+  cancelled = 4,
 };
 // Indexed by the value of the fate.
 inline constexpr std::array<std::string_view, 5> kFateNames{
@@ -78,8 +101,8 @@ struct Field {
 template <class Body, class Value>
 Field(std::string_view, Value Body::*) -> Field<Body, Value>;
 
-// A short byte string inside the struct; the member `used` is the number of bytes in use, which
-// readers limit to 0 to `room`.
+// A short byte string inside the struct, without a terminator; the member `used` is the number of
+// bytes in use, which readers limit to 0 to `room`.
 template <class Body, std::size_t room>
 struct BytesField {
   std::string_view name;
@@ -91,12 +114,14 @@ BytesField(std::string_view, std::array<char, room> Body::*, std::int32_t Body::
     -> BytesField<Body, room>;
 
 // The five fields that most types have; client and server agree on their meaning (manual,
-// "StandardFieldsMessage"):
-//   timeout   how long the server may wait for its device, in seconds by convention
-//   cmd       a command; servers declare theirs in a header such as <mpf/serial_commands.h>
-//   status    of a reply, 0 by convention when the request succeeded
-//   address   for example the channel
-//   extra     anything else
+// "StandardFieldsMessage"). MPF does not act on them: a `timeout` does not end a request, only the
+// deadline of MessageClient::send() does. Each field, and the end that writes it:
+//   timeout   client  how long the server may wait for its device, in seconds by convention
+//   cmd       client  a command; servers declare theirs in a header such as <mpf/serial_commands.h>
+//   status    server  of a reply, 0 by convention when the request succeeded; the servers of MPF
+//                     reply -1 to a request of a type that they do not handle
+//   address   client  for example the channel
+//   extra     both    anything else
 template <class Body>
 constexpr auto standardFields() {
   return std::tuple{Field{"timeout", &Body::timeout}, Field{"cmd", &Body::cmd},
@@ -110,11 +135,14 @@ inline constexpr std::string_view kValueName = "value";
 // ---- the types
 
 // MPF sends it to a client when the connection is made or broken, or when a queue was full (manual,
-// "ConnectMessage").
+// "ConnectMessage"). Programs do not send it: a client disconnects from a server that sends it as a
+// reply.
 struct Connect {
   ConnectStatus status{};
   std::uint32_t reserved{};
-  std::uint64_t incarnation{};  // of the server; another number means that it was restarted
+  // Of the server, written by the client library; another number than before means that the server
+  // was restarted.
+  std::uint64_t incarnation{};
 
   static constexpr auto kType = MessageType::connect;
   static constexpr std::string_view kName = "connect";
@@ -124,7 +152,7 @@ struct Connect {
   }
 };
 
-// One 32-bit integer (manual, "Int32Message").
+// One 32-bit integer; the server defines its unit, for example counts (manual, "Int32Message").
 struct Int32 {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{}, value{};
 
@@ -135,7 +163,7 @@ struct Int32 {
   }
 };
 
-// An array of 32-bit integers (manual, "Int32ArrayMessage").
+// 32-bit integers, which follow the fields: MessageOf::value() (manual, "Int32ArrayMessage").
 struct Int32Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t length{};  // number of elements that follow; written by setLength() only
@@ -146,7 +174,7 @@ struct Int32Array {
   static constexpr auto fields() { return standardFields<Int32Array>(); }
 };
 
-// One double (manual, "Float64Message").
+// One double, NaN and infinities included, in a unit of the server (manual, "Float64Message").
 struct Float64 {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t reserved{};
@@ -160,7 +188,7 @@ struct Float64 {
   }
 };
 
-// An array of doubles (manual, "Float64ArrayMessage").
+// Doubles, which follow the fields: MessageOf::value() (manual, "Float64ArrayMessage").
 struct alignas(8) Float64Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t length{};  // number of elements that follow; written by setLength() only
@@ -171,13 +199,19 @@ struct alignas(8) Float64Array {
   static constexpr auto fields() { return standardFields<Float64Array>(); }
 };
 
-// Bytes or text, which MPF does not interpret (manual, "Char8ArrayMessage").
+// Bytes or text, which MPF does not interpret (manual, "Char8ArrayMessage"). A text has no
+// terminating zero unless the sender counts one. <mpf/serial_commands.h> describes what serial
+// servers read and write.
 struct Char8Array {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{};
   std::uint32_t length{};  // number of bytes that follow; written by setSize() only
-  std::int32_t numberRetrys{};  // how often the server repeats a command that failed
+  // How often the server repeats a command that failed; a negative number counts as 0. Written by
+  // the client; serial servers limit it (--max-retries).
+  std::int32_t numberRetrys{};
   std::int32_t eomLen{};  // [bytes] length of the end-of-message string, 0 to 4
-  std::array<char, 4> eomString{};  // the end-of-message string, without a terminator
+  // The end-of-message string, without a terminator. Serial servers use it only in a request with
+  // cmdSetEom, and only its first two bytes.
+  std::array<char, 4> eomString{};
   std::uint32_t reserved{};
 
   // The end-of-message string, valid as long as this struct. Limits eomLen, which a peer may have
@@ -202,9 +236,11 @@ struct Char8Array {
 };
 
 // Settings of a serial line; 0 in a field keeps the present setting (manual,
-// "SerialConfigMessage"). The reply is an Int32 message with a status.
+// "SerialConfigMessage"). The client writes all fields. The reply is an Int32 message with a
+// status: 0, or serialServerStatusError when the line does not accept one of the values or is
+// unplugged; then no setting has changed.
 struct SerialConfig {
-  std::int32_t baud{};  // [bit/s]
+  std::int32_t baud{};  // [bit/s] positive; each kind of line has its own limits
   std::int32_t stopBits{};  // 1 or 2
   std::int32_t bitsPerChar{};  // 5 to 8
   char parity{};  // 'E' even, 'O' odd, 'N' none
@@ -222,7 +258,9 @@ struct SerialConfig {
 };
 
 // Like Int32; a server sends it to a client as a message that answers no request (manual,
-// "OutOfBandMessage").
+// "OutOfBandMessage"). It needs the route of a request of that client, so the server allocates it
+// with allocReplyMessage(), and sends it after the reply. If it is sent before, it is the reply,
+// and ends the request.
 struct OutOfBand {
   std::int32_t timeout{}, cmd{}, status{}, address{}, extra{}, value{};
 
@@ -235,7 +273,7 @@ struct OutOfBand {
 };
 
 // MPF sends it to a client: how a request without a reply ended. The message has the clientType and
-// the clientExtra of the request.
+// the clientExtra of the request. Programs do not send it; a server calls MessageServer::refuse().
 struct RequestFate {
   Fate fate{};
   std::uint32_t requestId{};  // the number that MessageClient::send() gave to the request
@@ -334,7 +372,8 @@ inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
   return at < detail::kLayouts.size() ? detail::kLayouts[at] : detail::kUnknownLayout;
 }
 
-// The name of a type, a status or a fate; "unknown" for a value that only newer programs have.
+// The name of a type, a status or a fate, as in texts and JSON; "unknown" for a value that only
+// newer programs have. Valid until the process exits.
 [[nodiscard]] constexpr std::string_view toString(MessageType type) noexcept {
   return layoutOf(type).name;
 }
