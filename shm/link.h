@@ -134,7 +134,6 @@ class Link {
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
   std::optional<Chunk> tryChunk(const Envelope& envelope);
   void end() noexcept { in_.end(); }
-  [[nodiscard]] std::uint64_t receivedMessages() const noexcept { return in_.messages(); }
 
   // Announces whether we poll this link. If not, the peer sets our ready bit with each message.
   void setWatched(bool watched) noexcept;
