@@ -196,6 +196,7 @@ TEST_P(LateAnswerTest, NothingIsSentWithoutSilence) {
       std::this_thread::sleep_for(1ms);
     }
   });
+  while (port_.counters().bytesIn == 0) std::this_thread::yield();  // until then the line is silent
 
   EXPECT_EQ(ask("ECHO unsent\n", fieldsOf(cmdWriteRead)).status, serialServerStatusError);
 
