@@ -157,8 +157,8 @@ TEST_F(RouterViewTest, NeverReturnsAHalfWrittenText) {
   });
   while (router().lines.front().problem.empty()) continue;
 
-  std::vector<std::string>
-      halves;  // a text is returned half written only if its writer is preempted for long
+  // A text is returned half written only if its writer is preempted for long.
+  std::vector<std::string> halves;
   for (int i = 0; i < 500; ++i) {
     const auto problem = router().lines.front().problem;
     if (problem != as && problem != bs) halves.push_back(problem);
