@@ -119,9 +119,10 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
 void OwnWindow::publish(const std::string& name) {
   // If the name is in use, its owner may be ending, or another process may be removing the window
   // of a dead owner. Both need microseconds of processor time. On a busy host, though, a process
-  // that removed a window was seen to get no processor for more than 50 ms.
+  // that removed a window was seen to get no processor for more than 50 ms, and on a host with 60
+  // busy processes on 2 processors for more than 2 s.
   const auto patience = Deadline::after(std::chrono::milliseconds(50));
-  const auto reaperIsLate = Deadline::after(std::chrono::seconds(2));
+  const auto reaperIsLate = Deadline::after(std::chrono::seconds(10));
   while (!window_.tryPublish(name)) {
     if (segments::removeIfOwnerless(name)) continue;
     if (patience.hasPassed()) checkConflict(name, header().kind, reaperIsLate);

@@ -202,8 +202,9 @@ TEST_F(SerialProgramTest, LogsSurplusInputWithEachAlarm) {
   const auto server = start({"--quiet-time", "1", "--resync-limit", "60000"});
   Asker asker(backplane_);
   for (int i = 0; i < 3; ++i) {
-    instrument_.behave({.delay = 300ms});
-    asker.send("ECHO late\n", {.timeout = 20, .cmd = cmdWriteRead | cmdTimeoutMilliseconds});
+    instrument_.behave({.delay = 1500ms});
+    // Long enough to send the question on a busy host: an incomplete question has no answer.
+    asker.send("ECHO late\n", {.timeout = 1000, .cmd = cmdWriteRead | cmdTimeoutMilliseconds});
     const auto late = asker.next();
     ASSERT_NE(late.tryAs<Char8Array>(), nullptr);
     ASSERT_EQ(late.tryAs<Char8Array>()->status, serialServerStatusTimeout);

@@ -293,6 +293,7 @@ TEST_F(LineTest, StopsReadingFromAPeerThatDoesNotRead) {
   for (std::uint64_t stamp = 0; stamp < kPings;) {
     for (const auto& item : receive()) {
       if (stamp == kPings) break;  // a farewell: the zeros are not a valid frame
+      if (item.starts_with("(ping")) continue;  // the line has been silent for a while
       ASSERT_EQ(item, "(pong = (stamp = " + std::to_string(stamp++) + "))");
     }
   }
