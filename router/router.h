@@ -55,8 +55,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   };
 
   Statistics statistics_;
-  Surroundings here_;
-  Presences presences_;
+  RouterContext context_;
+  ServerMonitors monitors_;
   PendingBinds pendingBinds_;
   Bell bell_;
   Watcher::Token names_;
@@ -65,7 +65,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   std::list<Session> sessions_;
   Alarm pendingBindsDue_;
   std::string pendingBindProblem_;  // last problem that was logged
-  TurnedAway turnedAway_;
+  RefusedPeers refusedPeers_;
   kj::TaskSet tasks_;
 };
 

@@ -18,13 +18,14 @@ constexpr std::size_t kMaxHeldOfAll = std::size_t{64} << 20;  // for a connectio
 
 }  // namespace
 
-FarClient::FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, const Terms& terms)
-    : here_(here),
+FarClient::FarClient(RouterContext& context, Owner& owner, Dispatcher& dispatcher,
+                     const Terms& terms)
+    : context_(context),
       owner_(owner),
       terms_(terms),
       window_(std::max<std::int64_t>(terms.window, 1)),
       fullWindow_(window_),
-      expiry_(here.timer, [this] { expire(); }),
+      expiry_(context.timer, [this] { expire(); }),
       client_(std::make_unique<RelayClient>(
           dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
 

@@ -19,7 +19,7 @@
 
 #include "client/relay_client.h"
 #include "router/alarm.h"
-#include "router/surroundings.h"
+#include "router/router_context.h"
 #include "router/transport/line.h"
 
 namespace mpf::router {
@@ -51,7 +51,7 @@ class FarClient {
     std::uint32_t queueSize = 0;  // of the server
     std::uint32_t window = 0;  // bytes of replies that may be on their way
   };
-  FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, const Terms& terms);
+  FarClient(RouterContext& context, Owner& owner, Dispatcher& dispatcher, const Terms& terms);
   ~FarClient();
   FarClient(const FarClient&) = delete;
   FarClient& operator=(const FarClient&) = delete;
@@ -86,7 +86,7 @@ class FarClient {
   void sendQueueFull();
   void endRequest(std::uint32_t requestId, Fate fate, const std::string& why);
 
-  Surroundings& here_;
+  RouterContext& context_;
   Owner& owner_;
   Terms terms_;
   std::int64_t window_;  // bytes of replies that may be sent before the next credit

@@ -27,42 +27,43 @@ bool isServerName(kj::StringPtr text) try {
 
 }  // namespace
 
-ServerRouter::ServerRouter(Surroundings& here, kj::Own<kj::AsyncIoStream> stream, std::string peer,
-                           const std::string& address, bool isTls)
-    : here_(here),
+ServerRouter::ServerRouter(RouterContext& context, kj::Own<kj::AsyncIoStream> stream,
+                           std::string peer, const std::string& address, bool isTls)
+    : context_(context),
       peer_(std::move(peer)),
       address_(address),
-      record_(here.statistics.add(layout::RouterRole::server)),
-      timer_(here.timer, [this] { runDispatcher(); }),
-      looks_(here.timer, [this] { lookAtDoubtful(); }) {
+      record_(context.statistics.add(layout::RouterRole::server)),
+      timer_(context.timer, [this] { runDispatcher(); }),
+      looks_(context.timer, [this] { lookAtDoubtful(); }) {
   record_->setAddress(address);
   record_->setState(layout::RouterLineState::connecting);
   (*record_)->isTls.store(isTls ? 1 : 0, std::memory_order_relaxed);
   noteLocations();
-  line_ = std::make_unique<Line>(kj::mv(stream), here.timer, here.config.limits, *record_, *this);
+  line_ =
+      std::make_unique<Line>(kj::mv(stream), context.timer, context.config.limits, *record_, *this);
 }
 
 kj::Promise<void> ServerRouter::run() {
   return line_
       ->run([this](wire::Item::Builder item) {
         auto greeting = item.initGreeting();
-        fillGreeting(greeting, here_);
-        const auto& serve = here_.config.serve;
+        fillGreeting(greeting, context_);
+        const auto& serve = context_.config.serve;
         auto locations = greeting.initLocations(static_cast<capnp::uint>(serve.size()));
         for (capnp::uint at = 0; at < locations.size(); ++at) locations.set(at, serve[at].location);
         greeting.setMaxClients(line_->limits().maxClients);
       })
       .then([this](const LineEnd& end) {
-        here_.log.info("{} at {} disconnected: {}",
-                       line_->peer().router.empty() ? "a peer" : line_->peer().router, address_,
-                       end.text);
+        context_.log.info("{} at {} disconnected: {}",
+                          line_->peer().router.empty() ? "a peer" : line_->peer().router, address_,
+                          end.text);
       });
 }
 
 void ServerRouter::noteLocations() {
   std::vector<std::int32_t> locations;
-  locations.reserve(here_.config.serve.size());
-  for (const auto& serve : here_.config.serve) locations.push_back(serve.location);
+  locations.reserve(context_.config.serve.size());
+  for (const auto& serve : context_.config.serve) locations.push_back(serve.location);
   record_->setLocations(locations);
 }
 
@@ -71,14 +72,14 @@ void ServerRouter::stop() { line_->end(FarewellCode::STOPPING, "the router is st
 void ServerRouter::onGreeting(const PeerGreeting& greeting) {
   count((*record_)->connects);
   record_->setState(layout::RouterLineState::connected);
-  here_.log.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program,
-                 peer_.empty() ? "" : ", certificate of ", peer_);
+  context_.log.info("{} at {} is connected ({}{}{})", greeting.router, address_, greeting.program,
+                    peer_.empty() ? "" : ", certificate of ", peer_);
 }
 
 // ---- servers
 
 const Serve* ServerRouter::served(const ServerName& name) const {
-  const auto& config = here_.config;
+  const auto& config = context_.config;
   const auto serve = std::ranges::find(config.serve, name.location, &Serve::location);
   if (serve == config.serve.end()) return nullptr;
   const auto allows = [&](const Allow& allow) {
@@ -107,7 +108,8 @@ void ServerRouter::onBind(wire::Bind::Reader bind) {
   if (serve == nullptr)
     return refuse(number, fmt::format("server {} at location {} is not allowed for this peer",
                                       name.server, name.location));
-  auto& binding = bindings_.try_emplace(number, name, here_.presences, serve->local).first->second;
+  auto& binding =
+      bindings_.try_emplace(number, name, context_.monitors, serve->local).first->second;
   countAll();
   look(number, binding);
   if (binding.announced == 0) sendAbsent(number, binding);
@@ -125,7 +127,7 @@ void ServerRouter::countAll() {
 }
 
 void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
-  here_.log.warn("{}: {}", address_, why);
+  context_.log.warn("{}: {}", address_, why);
   line_->send([number, why](wire::Item::Builder item) {
     auto server = item.initServer();
     server.setBinding(number);
@@ -135,7 +137,7 @@ void ServerRouter::refuse(std::uint32_t number, const std::string& why) {
 }
 
 void ServerRouter::refuseClient(std::uint32_t number, const std::string& why) {
-  here_.log.warn("{}: a client is refused: {}", address_, why);
+  context_.log.warn("{}: a client is refused: {}", address_, why);
   line_->send([number, why](wire::Item::Builder item) {
     auto refusal = item.initRefuse();
     refusal.setClient(number);
@@ -149,14 +151,14 @@ void ServerRouter::lookAtAll() {
 
 void ServerRouter::look(std::uint32_t number, Binding& binding) {
   lookSoon();
-  const bool isThere = binding.presence->look();
-  const bool hasFailed = !isThere && binding.presence->isDoubtful();
+  const bool isThere = binding.monitor->look();
+  const bool hasFailed = !isThere && binding.monitor->isDoubtful();
   if (hasFailed && !binding.failureLogged) {
-    here_.log.warn("{} at location {} cannot be offered to {}: {}", binding.name.server,
-                   binding.name.location, address_, binding.presence->problem());
+    context_.log.warn("{} at location {} cannot be offered to {}: {}", binding.name.server,
+                      binding.name.location, address_, binding.monitor->problem());
   }
   binding.failureLogged = hasFailed;
-  if (isThere && binding.announced == binding.presence->incarnation()) return;
+  if (isThere && binding.announced == binding.monitor->incarnation()) return;
   if (binding.announced != 0 && !binding.isEnding) {
     binding.isEnding = true;
     for (auto& [clientNumber, client] : clients_) {
@@ -174,7 +176,7 @@ void ServerRouter::look(std::uint32_t number, Binding& binding) {
 // notice that it has closed; while it has none, this check is repeated.
 void ServerRouter::lookAtDoubtful() {
   for (auto& [number, binding] : bindings_) {
-    if (binding.presence->isDoubtful()) look(number, binding);
+    if (binding.monitor->isDoubtful()) look(number, binding);
     else if (binding.announced != 0 && binding.connected == 0) lookSoon();
   }
 }
@@ -196,13 +198,13 @@ void ServerRouter::endIfDone(std::uint32_t number, Binding& binding) {
   binding.isEnding = false;
   binding.announced = 0;
   sendAbsent(number, binding);
-  if (binding.presence->look()) sendThere(number, binding);
+  if (binding.monitor->look()) sendThere(number, binding);
 }
 
 void ServerRouter::sendThere(std::uint32_t number, Binding& binding) {
-  binding.announced = binding.presence->incarnation();
-  const auto queueSize = binding.queueSize = binding.presence->queueSize();
-  const auto maxBodyBytes = std::max(binding.presence->maxMessageBytes(), kMostBesideElements);
+  binding.announced = binding.monitor->incarnation();
+  const auto queueSize = binding.queueSize = binding.monitor->queueSize();
+  const auto maxBodyBytes = std::max(binding.monitor->maxMessageBytes(), kMostBesideElements);
   line_->send([number, queueSize, incarnation = binding.announced,
                maxMessageBytes = std::min(maxBodyBytes - kMostBesideElements,
                                           line_->maxMessageBytes())](wire::Item::Builder item) {
@@ -217,7 +219,7 @@ void ServerRouter::sendThere(std::uint32_t number, Binding& binding) {
 }
 
 void ServerRouter::sendAbsent(std::uint32_t number, Binding& binding) {
-  line_->send([number, why = binding.presence->problem()](wire::Item::Builder item) {
+  line_->send([number, why = binding.monitor->problem()](wire::Item::Builder item) {
     auto server = item.initServer();
     server.setBinding(number);
     server.setState(wire::Server::State::ABSENT);
@@ -268,12 +270,12 @@ void ServerRouter::addClient(wire::Open::Reader open, Binding& binding) {
   const auto number = open.getClient();
   if (!dispatcher_) {
     dispatcher_ = std::make_unique<Dispatcher>(
-        here_.backplane, DispatcherOptions{WaitMode::block, "router " + line_->peer().router});
-    readable_ = std::make_unique<Readable>(here_.port, dispatcher_->descriptor(),
+        context_.backplane, DispatcherOptions{WaitMode::block, "router " + line_->peer().router});
+    readable_ = std::make_unique<Readable>(context_.port, dispatcher_->descriptor(),
                                            [this] { runDispatcher(); });
   }
   auto client =
-      std::make_unique<FarClient>(here_, *this, *dispatcher_,
+      std::make_unique<FarClient>(context_, *this, *dispatcher_,
                                   FarClient::Terms{number, open.getBinding(), open.getIncarnation(),
                                                    binding.queueSize, open.getWindow()});
   client->bind(binding.name.server, binding.local);
@@ -380,7 +382,7 @@ void ServerRouter::onRoom() {
 // The server has handled the request, but its reply cannot be sent.
 void ServerRouter::onUnsendable(const Carried& carried, const std::string& why,
                                 wire::Item::Builder instead) {
-  here_.log.warn("a reply to {} cannot be sent and is lost: {}", address_, why);
+  context_.log.warn("a reply to {} cannot be sent and is lost: {}", address_, why);
   // The peer gives no credit for a reply that it does not receive.
   if (const auto client = clients_.find(carried.client); client != clients_.end())
     client->second->credit(windowBytesOf(carried.message));

@@ -2,7 +2,7 @@
 // ServerRouter: one accepted connection from the client router of another host, and the servers of
 // this host that its clients use ("RMRServer" in the manual's report).
 //
-//   bind ─► Presence, shared by all connections ─► "there" / "absent"
+//   bind ─► ServerMonitor, shared by all connections ─► "there" / "absent"
 //   open ─► FarClient ─► server
 //
 // Each connection has its own dispatcher, which does not run while the line has no room. The queues
@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "router/incoming/far_client.h"
-#include "router/incoming/presences.h"
+#include "router/incoming/server_monitors.h"
 #include "router/readable.h"
 
 namespace mpf::router {
@@ -30,7 +30,7 @@ class ServerRouter final : public Line::Owner, public FarClient::Owner {
  public:
   //   peer     the common name of the peer's certificate; empty: plain TCP
   //   address  the address from which the peer has connected
-  ServerRouter(Surroundings& here, kj::Own<kj::AsyncIoStream> stream, std::string peer,
+  ServerRouter(RouterContext& context, kj::Own<kj::AsyncIoStream> stream, std::string peer,
                const std::string& address, bool isTls);
 
   // Resolves when the line has ended.
@@ -44,17 +44,17 @@ class ServerRouter final : public Line::Owner, public FarClient::Owner {
 
  private:
   struct Binding {
-    Binding(const ServerName& asCalled, Presences& presences, std::int32_t where)
-        : name(asCalled), local(where), presence(presences.of({local, asCalled.server})) {}
+    Binding(const ServerName& asCalled, ServerMonitors& monitors, std::int32_t where)
+        : name(asCalled), local(where), monitor(monitors.of({local, asCalled.server})) {}
     ServerName name;  // with the location that the peer uses
     std::int32_t local;  // the location on this host
     // Shared: it may already describe a later incarnation than `announced`.
-    std::shared_ptr<Presence> presence;
+    std::shared_ptr<ServerMonitor> monitor;
     std::uint32_t queueSize = 0;  // as announced to the peer
     std::uint64_t announced = 0;  // incarnation announced to the peer; 0: absent
     bool isEnding = false;  // that server is gone, and some clients are still connected to it
     std::size_t connected = 0;  // clients that have connected and have not been disconnected
-    bool failureLogged = false;  // that `presence` cannot look at the server
+    bool failureLogged = false;  // that `monitor` cannot look at the server
   };
   void onBind(wire::Bind::Reader bind);
   void onUnbind(std::uint32_t number);
@@ -88,7 +88,7 @@ class ServerRouter final : public Line::Owner, public FarClient::Owner {
   void onConnected(FarClient& client) override;
   void onDisconnected(FarClient& client) override;
 
-  Surroundings& here_;
+  RouterContext& context_;
   std::string peer_;
   std::string address_;
   std::shared_ptr<PeerRecord> record_;

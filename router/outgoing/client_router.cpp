@@ -32,22 +32,22 @@ std::uint32_t queueSizeOf(wire::Server::Reader server) {
 
 }  // namespace
 
-ClientRouter::ClientRouter(Surroundings& here, const Remote& remote)
-    : here_(here),
+ClientRouter::ClientRouter(RouterContext& context, const Remote& remote)
+    : context_(context),
       remote_(remote),
-      record_(here.statistics.add(layout::RouterRole::client)),
-      log_(here.log.forObject()),
-      connector_(here, remote_),
-      retryDelay_(here.config.limits.firstRetry),
-      pumpAgain_(here.timer,
+      record_(context.statistics.add(layout::RouterRole::client)),
+      log_(context.log.forObject()),
+      connector_(context, remote_),
+      retryDelay_(context.config.limits.firstRetry),
+      pumpAgain_(context.timer,
                  [this] {
                    if (line_) onRoom();
                  }),
-      sweeps_(here.timer, [this] { sweep(); }) {
+      sweeps_(context.timer, [this] { sweep(); }) {
   record_->setAddress(remote.address.text());
   record_->setLocations(remote.locations);
   (*record_)->isTls.store(remote.security == Security::tls ? 1 : 0, std::memory_order_relaxed);
-  (*record_)->queueSize.store(here.config.limits.queueSize, std::memory_order_relaxed);
+  (*record_)->queueSize.store(context.config.limits.queueSize, std::memory_order_relaxed);
   loop_ = connectLoop().fork();
   tasks_.add(loop_.addBranch());
 }
@@ -72,7 +72,7 @@ kj::Promise<void> ClientRouter::connectLoop() {
             [this](kj::Exception&& error) { onLineEnd(toStd(error.getDescription())); })
       .then([this]() -> kj::Promise<void> {
         if (stopping_) return kj::READY_NOW;
-        return here_.timer.afterDelay(nextDelay()).then([this] { return connectLoop(); });
+        return context_.timer.afterDelay(nextDelay()).then([this] { return connectLoop(); });
       });
 }
 
@@ -80,7 +80,7 @@ kj::Promise<void> ClientRouter::connectLoop() {
 // same peer at the same moment do not reconnect at the same moment.
 kj::Duration ClientRouter::nextDelay() {
   const auto halfMs = retryDelay_.count() / 2;
-  retryDelay_ = std::min(2 * retryDelay_, here_.config.limits.lastRetry);
+  retryDelay_ = std::min(2 * retryDelay_, context_.config.limits.lastRetry);
   return (halfMs + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(halfMs + 1))) *
          kj::MILLISECONDS;
 }
@@ -88,10 +88,10 @@ kj::Duration ClientRouter::nextDelay() {
 kj::Promise<LineEnd> ClientRouter::runOnce() {
   record_->setState(layout::RouterLineState::connecting);
   return connector_.connect().then([this](kj::Own<kj::AsyncIoStream> stream) {
-    line_ =
-        std::make_unique<Line>(kj::mv(stream), here_.timer, here_.config.limits, *record_, *this);
+    line_ = std::make_unique<Line>(kj::mv(stream), context_.timer, context_.config.limits, *record_,
+                                   *this);
     return line_->run(
-        [this](wire::Item::Builder item) { fillGreeting(item.initGreeting(), here_); });
+        [this](wire::Item::Builder item) { fillGreeting(item.initGreeting(), context_); });
   });
 }
 
@@ -118,8 +118,8 @@ void ClientRouter::onLineEnd(const std::string& why) {
   // The delay grows also when a peer greets and closes the connection soon afterwards.
   const bool lasted =
       connected_ && Clock::nowNs() - connectedNs_ >=
-                        std::chrono::nanoseconds(here_.config.limits.deadTime).count();
-  if (lasted) retryDelay_ = here_.config.limits.firstRetry;
+                        std::chrono::nanoseconds(context_.config.limits.deadTime).count();
+  if (lasted) retryDelay_ = context_.config.limits.firstRetry;
   connected_ = false;
   record_->setState(layout::RouterLineState::waiting);
   record_->setProblem(why);
@@ -218,7 +218,7 @@ void ClientRouter::onRefusal(const ServerName& name, Wanted& wanted, const std::
 
 void ClientRouter::makeProxy(const ServerName& name, Wanted& wanted) try {
   if (!wanted.offer) return;
-  wanted.proxy = std::make_unique<Proxy>(here_, *this, name, *wanted.offer);
+  wanted.proxy = std::make_unique<Proxy>(context_, *this, name, *wanted.offer);
   wanted.offer.reset();
   wanted.problem.clear();
   log_.info("{} at location {} is available", name.server, name.location);

@@ -27,7 +27,7 @@ namespace mpf::router {
 
 class ClientRouter final : public Line::Owner, public Proxy::Owner {
  public:
-  ClientRouter(Surroundings& here, const Remote& remote);
+  ClientRouter(RouterContext& context, const Remote& remote);
   ~ClientRouter();
 
   [[nodiscard]] const Remote& remote() const noexcept { return remote_; }
@@ -74,7 +74,7 @@ class ClientRouter final : public Line::Owner, public Proxy::Owner {
   Proxy* proxyOf(std::uint32_t client);
   Proxy* openedProxyOf(std::uint32_t client);
 
-  Surroundings& here_;
+  RouterContext& context_;
   Remote remote_;
   std::shared_ptr<PeerRecord> record_;
   std::unique_ptr<Line> line_;

@@ -16,7 +16,7 @@ constexpr int kAtOnce = 1024;  // requests before the event loop runs its other 
 constexpr std::chrono::seconds kOpenAgain{1};  // pause after a refusal
 constexpr std::uint32_t kCreditShare = 4;      // credit is sent for a quarter of the window
 
-ServerOptions optionsFor(const Surroundings& here, const ServerName& name,
+ServerOptions optionsFor(const RouterContext& context, const ServerName& name,
                          const Proxy::Offer& offer, std::uint64_t maxMessageBytes) {
   ServerOptions options;
   options.location = name.location;
@@ -25,24 +25,25 @@ ServerOptions optionsFor(const Surroundings& here, const ServerName& name,
   options.maxMessageBytes =
       std::min(maxOffered + kMostBesideElements, std::max(maxMessageBytes, kMostBesideElements));
   options.waitMode = WaitMode::block;
-  options.rights = here.config.rights;
+  options.rights = context.config.rights;
   return options;
 }
 
 }  // namespace
 
-Proxy::Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Offer& offer)
-    : here_(here),
+Proxy::Proxy(RouterContext& context, Owner& owner, const ServerName& name, const Offer& offer)
+    : context_(context),
       owner_(owner),
       name_(name),
       offer_(offer),
       log_(owner.log()),
-      retry_(here.timer, [this] { retryHeld(); }),
-      server_(here.backplane, name.server,
-              optionsFor(here, name, offer, owner.line().maxMessageBytes())),
-      again_(here.timer, [this] { onReadable(); }) {
+      retry_(context.timer, [this] { retryHeld(); }),
+      server_(context.backplane, name.server,
+              optionsFor(context, name, offer, owner.line().maxMessageBytes())),
+      again_(context.timer, [this] { onReadable(); }) {
   server_.onClient([this](std::uint64_t client, bool isThere) { onClient(client, isThere); });
-  readable_ = std::make_unique<Readable>(here.port, server_.descriptor(), [this] { onReadable(); });
+  readable_ =
+      std::make_unique<Readable>(context.port, server_.descriptor(), [this] { onReadable(); });
 }
 
 Proxy::~Proxy() {
@@ -64,7 +65,7 @@ bool Proxy::tryOpen(std::uint64_t local) {
   if (!number) return false;
   auto& client = clients_[*number];
   client.local = local;
-  client.window = here_.config.limits.windowBytes;
+  client.window = context_.config.limits.windowBytes;
   owner_.line().send([number = *number, binding = offer_.binding, incarnation = offer_.incarnation,
                       window = client.window](wire::Item::Builder item) {
     auto open = item.initOpen();
@@ -130,7 +131,7 @@ void Proxy::forward(Message request) {
 
 void Proxy::drain(Fate fate) {
   if (isDraining()) return;
-  drainUntil_ = Deadline::after(here_.config.limits.deadTime);
+  drainUntil_ = Deadline::after(context_.config.limits.deadTime);
   for (const auto& [number, client] : clients_) {
     for (const auto requestId : server_.owed(client.local)) end(number, requestId, fate);
   }

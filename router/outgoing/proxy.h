@@ -24,7 +24,7 @@
 #include "router/alarm.h"
 #include "router/outgoing/pending_binds.h"
 #include "router/readable.h"
-#include "router/surroundings.h"
+#include "router/router_context.h"
 #include "router/transport/line.h"
 #include "server/relay_server.h"
 
@@ -55,7 +55,7 @@ class Proxy {
   };
 
   //   throws  as the constructor of MessageServer, for example NameInUse
-  Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Offer& offer);
+  Proxy(RouterContext& context, Owner& owner, const ServerName& name, const Offer& offer);
   ~Proxy();
 
   // Takes requests while the line has room, at most `most`. Returns false when no request is left.
@@ -104,7 +104,7 @@ class Proxy {
   void ended(Client& client) noexcept;
   void retryHeld();
 
-  Surroundings& here_;
+  RouterContext& context_;
   Owner& owner_;
   ServerName name_;
   Offer offer_;

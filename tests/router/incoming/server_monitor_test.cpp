@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Presence: a server that cannot be watched for lack of memory, and one Presence for several users.
+// ServerMonitor: a server that cannot be watched for lack of memory, and one ServerMonitor for
+// several users.
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -12,7 +13,7 @@
 
 #include <mpf/message_server.h>
 
-#include "router/incoming/presences.h"
+#include "router/incoming/server_monitors.h"
 #include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/watchdog.h"
@@ -49,59 +50,59 @@ class NoMoreThreads {
 };
 
 // The end of the server would not be noticed. A later look() finds the server.
-TEST(Presence, IsDoubtfulWhenTheServerCannotBeWatched) {
+TEST(ServerMonitor, IsDoubtfulWhenTheServerCannotBeWatched) {
   if (mpf::test::kIsSanitized) GTEST_SKIP() << "the sanitizer reserves the address space";
   const mpf::test::TestBackplane servers;
   const MessageServer server(servers, "echo", {});
   // With a backplane of its own, whose watcher thread has not started.
-  Presence presence(Backplane::attach(servers.name()), {0, "echo"}, [] {});
+  ServerMonitor monitor(Backplane::attach(servers.name()), {0, "echo"}, [] {});
 
   {
     const NoMoreThreads none;
-    EXPECT_FALSE(presence.look());
+    EXPECT_FALSE(monitor.look());
   }
-  EXPECT_TRUE(presence.isDoubtful()) << presence.problem();
-  EXPECT_EQ(presence.incarnation(), 0u);
+  EXPECT_TRUE(monitor.isDoubtful()) << monitor.problem();
+  EXPECT_EQ(monitor.incarnation(), 0u);
 
-  EXPECT_TRUE(presence.look());
-  EXPECT_EQ(presence.problem(), "");
+  EXPECT_TRUE(monitor.look());
+  EXPECT_EQ(monitor.problem(), "");
 }
 
-// All users of a server share one Presence, which is destroyed with the last of them.
-TEST(Presences, HaveOnePresenceForEachServer) {
+// All users of a server share one ServerMonitor, which is destroyed with the last of them.
+TEST(ServerMonitors, HaveOneMonitorForEachServer) {
   const mpf::test::TestBackplane servers;
   auto io = kj::setupAsyncIo();
-  Presences presences(servers, io.unixEventPort, [] {});
-  auto first = presences.of({0, "echo"});
-  auto second = presences.of({0, "echo"});
-  const auto elsewhere = presences.of({1, "echo"});
+  ServerMonitors monitors(servers, io.unixEventPort, [] {});
+  auto first = monitors.of({0, "echo"});
+  auto second = monitors.of({0, "echo"});
+  const auto elsewhere = monitors.of({1, "echo"});
   EXPECT_EQ(first, second);
   EXPECT_NE(first, elsewhere);
-  const std::weak_ptr<Presence> gone = first;
+  const std::weak_ptr<ServerMonitor> gone = first;
 
   first.reset();
-  EXPECT_EQ(presences.of({0, "echo"}), second);
+  EXPECT_EQ(monitors.of({0, "echo"}), second);
   second.reset();
   EXPECT_TRUE(gone.expired());
 }
 
 // A look() that finds a change notifies the users that did not call it.
-TEST(Presences, NotifyAllUsersOfAChange) {
-  const mpf::test::Watchdog watchdog("presences");
+TEST(ServerMonitors, NotifyAllUsersOfAChange) {
+  const mpf::test::Watchdog watchdog("monitors");
   const mpf::test::TestBackplane servers;
   auto io = kj::setupAsyncIo();
   int changes = 0;
-  Presences presences(servers, io.unixEventPort, [&] { ++changes; });
-  const auto presence = presences.of({0, "echo"});
+  ServerMonitors monitors(servers, io.unixEventPort, [&] { ++changes; });
+  const auto monitor = monitors.of({0, "echo"});
   io.waitScope.poll();
   std::optional<MessageServer> server(std::in_place, servers, "echo", ServerOptions{});
-  ASSERT_TRUE(presence->look());
+  ASSERT_TRUE(monitor->look());
   while (changes == 0) io.waitScope.poll();  // the name of the server has appeared
 
   server.reset();
   changes = 0;
-  EXPECT_FALSE(presence->look());
-  EXPECT_FALSE(presence->isDoubtful());
+  EXPECT_FALSE(monitor->look());
+  EXPECT_FALSE(monitor->isDoubtful());
   io.waitScope.poll();
   EXPECT_GT(changes, 0);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/surroundings.h"
+#include "router/router_context.h"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -40,11 +40,11 @@ void checkPlain(kj::NetworkAddress& address, const RouterConfig& config) {
   }
 }
 
-void fillGreeting(wire::Greeting::Builder greeting, const Surroundings& here) {
-  Line::describe(greeting, here.config.limits);
-  greeting.setRouter(here.config.name);
+void fillGreeting(wire::Greeting::Builder greeting, const RouterContext& context) {
+  Line::describe(greeting, context.config.limits);
+  greeting.setRouter(context.config.name);
   greeting.setProgram(fmt::format("mpf-router {}", kVersion));
-  greeting.setIncarnation(here.incarnation);
+  greeting.setIncarnation(context.incarnation);
 }
 
 }  // namespace mpf::router
