@@ -130,7 +130,7 @@ bool Router::tryMakeRoom() {
 }
 
 void Router::lookAtServers() {
-  for (const auto& session : sessions_) session.router->lookAtAll();
+  for (const auto& session : sessions_) session.router->lookAtServers();
 }
 
 void Router::lookAtPendingBinds() { pendingBindsDue_.setAt(Deadline::after(kPendingBindsAfter)); }

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "base/version.h"
-#include "router/transport/line.h"
+#include "router/transport/peer_greeting.h"
 
 namespace mpf::router {
 
@@ -41,7 +41,7 @@ void checkPlain(kj::NetworkAddress& address, const RouterConfig& config) {
 }
 
 void fillGreeting(wire::Greeting::Builder greeting, const RouterContext& context) {
-  Line::describe(greeting, context.config.limits);
+  fillLimits(greeting, context.config.limits);
   greeting.setRouter(context.config.name);
   greeting.setProgram(fmt::format("mpf-router {}", kVersion));
   greeting.setIncarnation(context.incarnation);

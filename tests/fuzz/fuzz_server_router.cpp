@@ -22,7 +22,7 @@ class Play {
                                                        "", "fuzz", false)),
         run_(router_->run().then([this] { over_ = true; }).eagerlyEvaluate(nullptr)) {
     openServer();
-    scene_.onServers = [this] { router_->lookAtAll(); };
+    scene_.onServers = [this] { router_->lookAtServers(); };
   }
   ~Play() {
     scene_.onServers = [] {};
