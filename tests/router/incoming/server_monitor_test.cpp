@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: MIT
-// ServerMonitor: a server that cannot be watched for lack of memory, and one ServerMonitor for
-// several users.
+// ServerMonitor: a server that cannot be watched for lack of memory.
+#include "router/incoming/server_monitor.h"
+
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <gtest/gtest.h>
-#include <kj/async-io.h>
-#include <memory>
-#include <optional>
 
 #include <mpf/message_server.h>
 
-#include "router/incoming/server_monitors.h"
 #include "tests/support/sanitized.h"
 #include "tests/support/test_backplane.h"
-#include "tests/support/watchdog.h"
 
 namespace mpf::router::test {
 namespace {
@@ -66,45 +62,6 @@ TEST(ServerMonitor, IsDoubtfulWhenTheServerCannotBeWatched) {
 
   EXPECT_TRUE(monitor.look());
   EXPECT_EQ(monitor.problem(), "");
-}
-
-// All users of a server share one ServerMonitor, which is destroyed with the last of them.
-TEST(ServerMonitors, HaveOneMonitorForEachServer) {
-  const mpf::test::TestBackplane servers;
-  auto io = kj::setupAsyncIo();
-  ServerMonitors monitors(servers, io.unixEventPort, [] {});
-  auto first = monitors.of({0, "echo"});
-  auto second = monitors.of({0, "echo"});
-  const auto elsewhere = monitors.of({1, "echo"});
-  EXPECT_EQ(first, second);
-  EXPECT_NE(first, elsewhere);
-  const std::weak_ptr<ServerMonitor> gone = first;
-
-  first.reset();
-  EXPECT_EQ(monitors.of({0, "echo"}), second);
-  second.reset();
-  EXPECT_TRUE(gone.expired());
-}
-
-// A look() that finds a change notifies the users that did not call it.
-TEST(ServerMonitors, NotifyAllUsersOfAChange) {
-  const mpf::test::Watchdog watchdog("monitors");
-  const mpf::test::TestBackplane servers;
-  auto io = kj::setupAsyncIo();
-  int changes = 0;
-  ServerMonitors monitors(servers, io.unixEventPort, [&] { ++changes; });
-  const auto monitor = monitors.of({0, "echo"});
-  io.waitScope.poll();
-  std::optional<MessageServer> server(std::in_place, servers, "echo", ServerOptions{});
-  ASSERT_TRUE(monitor->look());
-  while (changes == 0) io.waitScope.poll();  // the name of the server has appeared
-
-  server.reset();
-  changes = 0;
-  EXPECT_FALSE(monitor->look());
-  EXPECT_FALSE(monitor->isDoubtful());
-  io.waitScope.poll();
-  EXPECT_GT(changes, 0);
 }
 
 }  // namespace
