@@ -30,12 +30,9 @@ ClientRouter::~ClientRouter() {
 }
 
 kj::Promise<void> ClientRouter::stop() {
-  if (!line_) {
-    state_ = State::stopping;
-    return kj::READY_NOW;
-  }
-  line_->end(FarewellCode::STOPPING, "the router is stopping");
   state_ = State::stopping;
+  if (!line_) return kj::READY_NOW;
+  line_->end(FarewellCode::STOPPING, "the router is stopping");
   return loop_.addBranch();
 }
 

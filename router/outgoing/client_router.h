@@ -3,9 +3,10 @@
 // in the manual's report).
 //
 // States:
-//   waiting ─ time ─► connecting ─ greeted ─► connected ─ the line ends ─► waiting (longer each
-//      ▲                  │ fails                                                       time)
-//      └──────────────────┘                         any ─ stop() ─► stopping
+//   waiting ─ time ─► connecting ─ greeted ─► connected
+//      ▲                  │ failed                │ the line has ended
+//      └──────────────────┴───────────────────────┘      waits longer each time
+//   any ─ stop() ─► stopping
 //
 //   ClientRouter ─► Connector      opens a connection
 //                ├► Line           sends and receives its frames
