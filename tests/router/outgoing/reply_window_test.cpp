@@ -34,6 +34,7 @@ TEST(ReplyWindow, CreditBeyondWhatWasReceivedDoesNotEnlargeIt) {
   window.received(100);
 
   EXPECT_EQ(window.taken(1000), 1000u);
+  EXPECT_FALSE(window.isUsedUp());
   window.received(400);
 
   EXPECT_TRUE(window.isUsedUp());
