@@ -68,7 +68,7 @@ class LocalServers {
   void onUnbind(std::uint32_t number);
   void onOpen(wire::Open::Reader open);
   void onRequest(wire::Request::Reader request);
-  void onClose(std::uint32_t client);
+  void onClose(std::uint32_t number);
   void refuseBind(std::uint32_t number, const std::string& why);
   void refuseClient(std::uint32_t number, const std::string& why);
   void look(Binding& binding);

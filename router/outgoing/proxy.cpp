@@ -64,7 +64,9 @@ bool Proxy::tryOpen(std::uint64_t local) {
   numbers_[local] = number.value_or(0);
   if (!number) return false;
   const auto window = context_.config.limits.windowBytes;
-  clients_.try_emplace(*number, Client{.local = local, .window = ReplyWindow(window)});
+  auto& client = clients_[*number];
+  client.local = local;
+  client.window = ReplyWindow(window);
   connection_.line().send([number = *number, binding = offer_.binding,
                            incarnation = offer_.incarnation, window](wire::Item::Builder item) {
     auto open = item.initOpen();

@@ -78,10 +78,10 @@ class Proxy {
   struct Client {
     std::uint64_t local = 0;  // its number in MessageServer
     std::uint32_t owed = 0;  // requests that have not ended
-    ReplyWindow window;  // as sent in `open`
+    ReplyWindow window{0};  // as sent in `open`
     bool heldQueueFull = false;  // `held` contains a connectQueueFull
-    std::deque<Held> held{};  // replies for which the client has no room
-    std::optional<std::string> refusal{};  // why the far server does not accept it
+    std::deque<Held> held;  // replies for which the client has no room
+    std::optional<std::string> refusal;  // why the far server does not accept it
     Deadline openAgain = Deadline::never();  // after a refusal: when it may be opened again
   };
   void onReadable();
