@@ -22,38 +22,38 @@ constexpr auto kPendingBindsAgain = std::chrono::seconds(1);  // when not all co
 
 Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log)
     : statistics_(Backplane::attach(config.backplane), config.name),
-      here_{.port = io.unixEventPort,
-            .network = io.provider->getNetwork(),
-            .timer = io.provider->getTimer(),
-            .backplane = Backplane::attach(config.backplane),
-            .log = log,
-            .statistics = statistics_,
-            .presences = presences_,
-            .config = config,
-            .tls = nullptr,
-            .incarnation = segments::newIncarnation()},
-      presences_(here_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
-      pendingBinds_(here_.backplane),
+      context_{.port = io.unixEventPort,
+               .network = io.provider->getNetwork(),
+               .timer = io.provider->getTimer(),
+               .backplane = Backplane::attach(config.backplane),
+               .log = log,
+               .statistics = statistics_,
+               .monitors = monitors_,
+               .config = config,
+               .tls = nullptr,
+               .incarnation = segments::newIncarnation()},
+      monitors_(context_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
+      pendingBinds_(context_.backplane),
       bell_(io.unixEventPort, [this] { lookAtPendingBinds(); }),
-      pendingBindsDue_(here_.timer, [this] { readPendingBinds(); }),
-      turnedAway_(here_.timer),
+      pendingBindsDue_(context_.timer, [this] { readPendingBinds(); }),
+      refusedPeers_(context_.timer),
       tasks_(*this) {
   openTls(config);
-  names_ = here_.backplane.watcher().watchNames(NameKind::pendingBind, [this] { bell_.ring(); });
+  names_ = context_.backplane.watcher().watchNames(NameKind::pendingBind, [this] { bell_.ring(); });
 }
 
-Router::~Router() { here_.backplane.watcher().forget(names_); }
+Router::~Router() { context_.backplane.watcher().forget(names_); }
 
 void Router::openTls(const RouterConfig& config) {
   if (!config.tls.certificate.empty())
-    here_.tls = std::make_shared<Tls>(config.tls, here_.timer, config.limits.handshakeTime);
+    context_.tls = std::make_shared<Tls>(config.tls, context_.timer, config.limits.handshakeTime);
 }
 
 kj::Promise<void> Router::start() {
   auto starts = kj::Vector<kj::Promise<void>>();
-  for (const auto& each : here_.config.listen) starts.add(listen(each).start());
-  for (const auto& remote : here_.config.remotes)
-    remotes_.push_back(std::make_unique<ClientRouter>(here_, remote));
+  for (const auto& each : context_.config.listen) starts.add(listen(each).start());
+  for (const auto& remote : context_.config.remotes)
+    remotes_.push_back(std::make_unique<ClientRouter>(context_, remote));
   lookAtPendingBinds();
   return kj::joinPromises(starts.releaseAsArray());
 }
@@ -62,7 +62,8 @@ Listener& Router::listen(const Listen& listen) {
   auto onCaller = [this, listen](Listener::Caller caller) {
     this->onCaller(listen, std::move(caller));
   };
-  return *listeners_.emplace_back(std::make_shared<Listener>(here_, listen, std::move(onCaller)));
+  return *listeners_.emplace_back(
+      std::make_shared<Listener>(context_, listen, std::move(onCaller)));
 }
 
 // Removes a listener that cannot listen; the next reload tries it again. A reload may have removed
@@ -72,7 +73,7 @@ void Router::listenLate(const Listen& listen) {
   tasks_.add(started.catch_([this, late = std::weak_ptr(listeners_.back())](kj::Exception&& error) {
     const auto listener = late.lock();
     if (!listener) return;
-    here_.log.error("{}", toStd(error.getDescription()));
+    context_.log.error("{}", toStd(error.getDescription()));
     listeners_.remove(listener);
   }));
 }
@@ -84,17 +85,17 @@ std::vector<Address> Router::listening() {
 }
 
 void Router::onCaller(const Listen& listen, Listener::Caller caller) {
-  if (sessions_.size() >= here_.config.limits.maxConnections && !tryMakeRoom()) {
-    here_.log.warn("{}: rejected: there are already {} connections (max-connections)",
-                   caller.address, sessions_.size());
-    return turnedAway_.add(
+  if (sessions_.size() >= context_.config.limits.maxConnections && !tryMakeRoom()) {
+    context_.log.warn("{}: rejected: there are already {} connections (max-connections)",
+                      caller.address, sessions_.size());
+    return refusedPeers_.add(
         kj::mv(caller.stream), FarewellCode::LIMIT,
         fmt::format("this router has {} connections, its limit (max-connections)",
                     sessions_.size()));
   }
   auto end = kj::newPromiseAndFulfiller<void>();
   sessions_.push_back({listen,
-                       std::make_unique<ServerRouter>(here_, kj::mv(caller.stream), caller.name,
+                       std::make_unique<ServerRouter>(context_, kj::mv(caller.stream), caller.name,
                                                       caller.address, caller.isTls),
                        hostOf(caller.address), kj::mv(end.fulfiller)});
   const auto session = std::prev(sessions_.end());
@@ -119,7 +120,7 @@ bool Router::tryMakeRoom() {
   const auto victim = std::ranges::find_if(sessions_, [&](const Session& session) {
     return isIdle(session) && counts[session.host] == most;
   });
-  here_.log.warn(
+  context_.log.warn(
       "{} connections (max-connections), {} of them from {} without a greeting: closing the oldest "
       "of "
       "these",
@@ -129,7 +130,7 @@ bool Router::tryMakeRoom() {
 }
 
 void Router::lookAtServers() {
-  for (const auto& session : sessions_) session.router->lookAtAll();
+  for (const auto& session : sessions_) session.router->lookAtServers();
 }
 
 void Router::lookAtPendingBinds() { pendingBindsDue_.setAt(Deadline::after(kPendingBindsAfter)); }
@@ -145,8 +146,8 @@ void Router::readPendingBinds() {
   }
   if (!problem.empty()) {
     if (pendingBindProblem_.empty())
-      here_.log.warn("cannot read all pending binds of clients of this host, trying again: {}",
-                     problem);
+      context_.log.warn("cannot read all pending binds of clients of this host, trying again: {}",
+                        problem);
     pendingBindsDue_.setAt(Deadline::after(kPendingBindsAgain));
   }
   pendingBindProblem_ = std::move(problem);
@@ -154,12 +155,12 @@ void Router::readPendingBinds() {
 
 void Router::reload(const RouterConfig& config) {
   openTls(config);
-  if (config.backplane != here_.config.backplane || config.name != here_.config.name)
-    here_.log.warn(
+  if (config.backplane != context_.config.backplane || config.name != context_.config.name)
+    context_.log.warn(
         "a new name or backplane takes effect when the router is restarted; the name is still {}",
-        here_.config.name);
-  here_.log.setLevel(config.logLevel);
-  here_.config = config;
+        context_.config.name);
+  context_.log.setLevel(config.logLevel);
+  context_.config = config;
   std::erase_if(listeners_, [&](const auto& listener) {
     return std::ranges::find(config.listen, listener->listen()) == config.listen.end();
   });
@@ -187,7 +188,7 @@ void Router::reload(const RouterConfig& config) {
   for (const auto& each : config.remotes) {
     if (std::ranges::any_of(remotes_, [&](const auto& remote) { return remote->remote() == each; }))
       continue;
-    remotes_.push_back(std::make_unique<ClientRouter>(here_, each));
+    remotes_.push_back(std::make_unique<ClientRouter>(context_, each));
   }
   lookAtPendingBinds();
 }
@@ -202,7 +203,7 @@ kj::Promise<void> Router::stop() {
 }
 
 void Router::taskFailed(kj::Exception&& error) {
-  here_.log.error("{}", toStd(error.getDescription()));
+  context_.log.error("{}", toStd(error.getDescription()));
 }
 
 }  // namespace mpf::router

@@ -5,6 +5,15 @@
 //   pending binds here ─► ClientRouter ══ TCP ══ ServerRouter on another host
 //   servers here ◄── ServerRouter ══ TCP ══ ClientRouter on another host
 //
+// Read downwards: an object makes the parts below it, hands them what they use, and calls them. A
+// part that has something to report has a struct Events of named functions; the object that makes
+// the part fills them in there (Line::Events, FarClient::Events). The way of a message:
+//
+//   request  local client ─► RemoteServers::pump ─► Proxy::pump ─► Line::send ═► Line::handle ─►
+//            LocalServers::handle ─► FarClient::request ─► server
+//   reply    server ─► FarClient::onMessage ─► Line::send ═► Line::handle ─►
+//            RemoteServers::handle ─► Proxy::reply ─► local client
+//
 // Threads  that of the event loop.
 // Crash    an error on one connection ends that connection only.
 #pragma once
@@ -55,8 +64,8 @@ class Router final : private kj::TaskSet::ErrorHandler {
   };
 
   Statistics statistics_;
-  Surroundings here_;
-  Presences presences_;
+  RouterContext context_;
+  ServerMonitors monitors_;
   PendingBinds pendingBinds_;
   Bell bell_;
   Watcher::Token names_;
@@ -65,7 +74,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   std::list<Session> sessions_;
   Alarm pendingBindsDue_;
   std::string pendingBindProblem_;  // last problem that was logged
-  TurnedAway turnedAway_;
+  RefusedPeers refusedPeers_;
   kj::TaskSet tasks_;
 };
 

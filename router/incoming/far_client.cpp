@@ -9,36 +9,26 @@
 
 namespace mpf::router {
 
-namespace {
-
-// Bytes of requests that are held until the server accepts the client, for example while the server
-// is stopped. A connection that holds none may always hold one request of any size.
-constexpr std::size_t kMaxHeld = std::size_t{4} << 20;  // for a client
-constexpr std::size_t kMaxHeldOfAll = std::size_t{64} << 20;  // for a connection
-
-}  // namespace
-
-FarClient::FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, const Terms& terms)
-    : here_(here),
-      owner_(owner),
+FarClient::FarClient(const Shared& shared, const Terms& terms, Events events)
+    : shared_(shared),
       terms_(terms),
+      events_(std::move(events)),
       window_(std::max<std::int64_t>(terms.window, 1)),
       fullWindow_(window_),
-      expiry_(here.timer, [this] { expire(); }),
+      held_(terms.queueSize, shared.heldBytes),
+      expiry_(shared.timer, [this] { expire(); }),
       client_(std::make_unique<RelayClient>(
-          dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
-
-FarClient::~FarClient() { owner_.heldBytes() -= waitingBytes_; }
+          shared.dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
 
 // ---- to the server
 
 void FarClient::request(wire::Request::Reader request) {
   const auto id = request.getRequestId();
   if (id == 0) throw ProtocolError(FarewellCode::PROTOCOL, "requestId 0");
-  if (gaveUp_) return endRequest(id, *gaveUp_, giveUpReason_);
+  if (state_ == State::gaveUp) return endRequest(id, fateAfterGiveUp_, giveUpReason_);
   ConversionError error;
   auto message = tryFromWire(
-      request.getMessage(), {static_cast<std::size_t>(owner_.line().limits().maxMessageBytes)},
+      request.getMessage(), {static_cast<std::size_t>(shared_.line.limits().maxMessageBytes)},
       error, [&](std::size_t bytes) { return client_->allocateBody(bytes); });
   if (!message) {
     if (error.fault == ConversionFault::malformed)
@@ -54,71 +44,50 @@ void FarClient::request(wire::Request::Reader request) {
   send({id, takeBefore, std::move(*message)});
 }
 
-void FarClient::send(Waiting waiting) {
-  if (!connected_) return hold(std::move(waiting));
-  const auto id = waiting.requestId;
-  const auto result = client_->sendAs(id, std::move(waiting.message), waiting.takeBefore);
+void FarClient::send(HeldRequest request) {
+  if (!isConnected()) return hold(std::move(request));
+  const auto id = request.requestId;
+  const auto result = client_->sendAs(id, std::move(request.message), request.takeBefore);
   if (result == SendResult::sent) return;
   std::string why = toString(result);
   if (result == SendResult::tooLarge) {
     // A message that was not sent is unchanged.
-    const auto bytes = waiting.message.body().size();  // NOLINT(bugprone-use-after-move)
+    const auto bytes = request.message.body().size();  // NOLINT(bugprone-use-after-move)
     why += fmt::format(": {} bytes, the limit is {}", bytes, client_->maxMessageBytes());
   }
   endRequest(id, Fate::refused, why);
 }
 
-// Holds a request until the server accepts this client, with the limits of the server's own queue.
-void FarClient::hold(Waiting waiting) {
-  auto& all = owner_.heldBytes();
-  const auto bytes = waiting.bytes();
-  const bool exceedsLimit = waiting_.size() >= terms_.queueSize ||
-                            waitingBytes_ + bytes > kMaxHeld || all + bytes > kMaxHeldOfAll;
-  if (exceedsLimit && all != 0) {
-    endRequest(waiting.requestId, Fate::refused, toString(SendResult::queueFull));
+// Holds a request until the server accepts this client.
+void FarClient::hold(HeldRequest request) {
+  const auto takeBefore = request.takeBefore;
+  const auto id = request.requestId;
+  if (!held_.tryHold(std::move(request))) {
+    endRequest(id, Fate::refused, toString(SendResult::queueFull));
     if (!std::exchange(queueFullSent_, true)) sendQueueFull();
     return;
   }
   queueFullSent_ = false;
-  waitingBytes_ += bytes;
-  all += bytes;
-  const auto takeBefore = waiting.takeBefore;
-  waiting_.push_back(std::move(waiting));
   expiry_.setAt(takeBefore);
-}
-
-void FarClient::releaseHeld(std::size_t bytes) noexcept {
-  waitingBytes_ -= bytes;
-  owner_.heldBytes() -= bytes;
 }
 
 // Ends the held requests whose deadline has passed, and sets the timer for the next deadline.
 void FarClient::expire() {
-  auto next = Deadline::never();
-  std::erase_if(waiting_, [&](const Waiting& waiting) {
-    if (!waiting.takeBefore.hasPassed()) {
-      next = std::min(next, waiting.takeBefore);
-      return false;
-    }
-    endRequest(waiting.requestId, Fate::expired, {});
-    releaseHeld(waiting.bytes());
-    return true;
-  });
-  expiry_.setAt(next);
+  for (const auto& request : held_.takeExpired()) endRequest(request.requestId, Fate::expired, {});
+  expiry_.setAt(held_.nextDeadline());
 }
 
 // The client may be paused because its window is used up.
 void FarClient::onServerGone() {
-  serverGone_ = true;
+  state_ = State::draining;
   client_->resume();
 }
 
 void FarClient::giveUp(Fate fate, const std::string& why) {
-  gaveUp_ = fate;
+  state_ = State::gaveUp;
+  fateAfterGiveUp_ = fate;
   giveUpReason_ = why;
-  for (const auto& waiting : waiting_) endRequest(waiting.requestId, fate, why);
-  waiting_.clear();
-  releaseHeld(waitingBytes_);
+  for (const auto& request : held_.takeAll()) endRequest(request.requestId, fate, why);
   client_.reset();  // it would try to connect repeatedly
 }
 
@@ -135,11 +104,11 @@ void FarClient::onMessage(Message&& message) {
                                 "the server ended before its replies were received")
                    : void();
   window_ -= windowBytesOf(message);
-  if (window_ <= 0 && !serverGone_) client_->pause();
-  owner_.line().send(Carried{.isFirst = isFirst,
-                             .client = terms_.number,
-                             .requestId = requestId,
-                             .message = std::move(message)});
+  if (window_ <= 0 && state_ != State::draining) client_->pause();
+  shared_.line.send(Carried{.isFirst = isFirst,
+                            .client = terms_.number,
+                            .requestId = requestId,
+                            .message = std::move(message)});
 }
 
 void FarClient::onConnect(const Connect& connect) {
@@ -147,33 +116,36 @@ void FarClient::onConnect(const Connect& connect) {
     case ConnectStatus::connectYes:
       if (connect.incarnation != terms_.incarnation)
         return giveUp(Fate::neverTaken, "the server is gone");
-      connected_ = true;
-      owner_.onConnected(*this);
-      releaseHeld(waitingBytes_);
-      for (auto waiting = std::exchange(waiting_, {}); !waiting.empty(); waiting.pop_front())
-        send(std::move(waiting.front()));
-      return;
+      return accept();
     case ConnectStatus::connectQueueFull:
       return sendQueueFull();
     case ConnectStatus::connectRefused: {
       const auto why = client_->notConnectedBecause();
       giveUp(Fate::refused, why);
-      return owner_.refuseClient(terms_.number, why);
+      return events_.onRefused(*this, why);
     }
     case ConnectStatus::connectNo:
-      if (std::exchange(connected_, false)) owner_.onDisconnected(*this);
-      return;
+      if (!isConnected()) return;
+      state_ = State::waiting;
+      return events_.onDisconnected(*this);
   }
 }
 
+// The server has accepted the client: sends what was held.
+void FarClient::accept() {
+  state_ = State::connected;
+  events_.onConnected(*this);
+  for (auto& request : held_.takeAll()) send(std::move(request));
+}
+
 void FarClient::sendQueueFull() {
-  count(owner_.record()->queueFull);
-  owner_.line().send(
+  count(shared_.record->queueFull);
+  shared_.line.send(
       [number = terms_.number](wire::Item::Builder item) { item.setQueueFull(number); });
 }
 
 void FarClient::endRequest(std::uint32_t requestId, Fate fate, const std::string& why) {
-  owner_.line().send([number = terms_.number, requestId, fate, why](wire::Item::Builder item) {
+  shared_.line.send([number = terms_.number, requestId, fate, why](wire::Item::Builder item) {
     auto end = item.initFate();
     end.setClient(number);
     end.setRequestId(requestId);

@@ -4,14 +4,18 @@
 //   Line ─► held until the server accepts the client ─► MessageClient
 //   Line ◄── as long as the window has room ◄── MessageClient
 //
+// States:
+//   waiting ─ the server accepts it ─► connected ─ onServerGone() ─► draining
+//   connected, draining ─ disconnected ─► waiting
+//   waiting ─ refused, or giveUp() ─► gaveUp
+//
 // Threads  that of the event loop, which also runs the Dispatcher.
 // Crash    when the server exits, the fates that MessageClient delivers are sent to the far client.
-// Trust    until the server accepts the client, at most as many requests are held as the server's
-//          queue would hold, and at most kMaxHeld bytes for a client and kMaxHeldOfAll for all
-//          clients of a connection. Replies that wait for credit stay in the link.
+// Trust    requests that wait for the server are limited by HeldRequests. Replies that wait for
+//          credit stay in the link.
 #pragma once
 
-#include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -19,31 +23,32 @@
 
 #include "client/relay_client.h"
 #include "router/alarm.h"
-#include "router/surroundings.h"
+#include "router/incoming/held_requests.h"
+#include "router/statistics.h"
 #include "router/transport/line.h"
 
 namespace mpf::router {
 
 class FarClient {
  public:
-  class Owner {
-   public:
-    virtual Line& line() = 0;
-    virtual PeerRecord& record() = 0;
-    // Bytes of the requests that all clients of this connection hold.
-    virtual std::size_t& heldBytes() = 0;
-    // Reports to the peer that the server does not accept this client, and why.
-    virtual void refuseClient(std::uint32_t number, const std::string& why) = 0;
+  // The objects that the clients of a connection share. They outlive the clients.
+  struct Shared {
+    kj::Timer& timer;
+    Dispatcher& dispatcher;
+    Line& line;
+    PeerRecord& record;
+    std::size_t& heldBytes;  // of the requests that all clients hold
+  };
+  // What a client reports to the object that made it.
+  struct Events {
     // The server has accepted it.
-    virtual void onConnected(FarClient& client) = 0;
+    std::function<void(FarClient& client)> onConnected;
     // The server is gone, or it has closed this client's link; all requests have ended. Called from
     // the client's callback: do not destroy the client.
-    virtual void onDisconnected(FarClient& client) = 0;
-
-   protected:
-    ~Owner() = default;
+    std::function<void(FarClient& client)> onDisconnected;
+    // The server does not accept it, for the reason `why`. As for onDisconnected.
+    std::function<void(FarClient& client, const std::string& why)> onRefused;
   };
-
   struct Terms {
     std::uint32_t number = 0;
     std::uint32_t binding = 0;
@@ -51,8 +56,7 @@ class FarClient {
     std::uint32_t queueSize = 0;  // of the server
     std::uint32_t window = 0;  // bytes of replies that may be on their way
   };
-  FarClient(Surroundings& here, Owner& owner, Dispatcher& dispatcher, const Terms& terms);
-  ~FarClient();
+  FarClient(const Shared& shared, const Terms& terms, Events events);
   FarClient(const FarClient&) = delete;
   FarClient& operator=(const FarClient&) = delete;
 
@@ -65,38 +69,37 @@ class FarClient {
   // Ends all held requests, and those that arrive later, with `fate`.
   void giveUp(Fate fate, const std::string& why);
 
+  [[nodiscard]] std::uint32_t number() const noexcept { return terms_.number; }
   [[nodiscard]] std::uint32_t binding() const noexcept { return terms_.binding; }
-  [[nodiscard]] bool isConnected() const noexcept { return connected_; }
+  [[nodiscard]] bool isConnected() const noexcept {
+    return state_ == State::connected || state_ == State::draining;
+  }
 
  private:
-  struct Waiting {
-    std::uint32_t requestId;
-    Deadline takeBefore;
-    Message message;
-    [[nodiscard]] std::size_t bytes() const noexcept {
-      return sizeof(Waiting) + message.body().size();
-    }
+  enum class State {
+    waiting,  // requests are held
+    connected,  // requests go to the server
+    draining,  // the server is gone: the messages that it had sent are received
+    gaveUp,  // requests end with fateAfterGiveUp_
   };
   void onMessage(Message&& message);
   void onConnect(const Connect& connect);
-  void send(Waiting waiting);
-  void hold(Waiting waiting);
-  void releaseHeld(std::size_t bytes) noexcept;
+  void accept();
+  void send(HeldRequest request);
+  void hold(HeldRequest request);
   void expire();
   void sendQueueFull();
   void endRequest(std::uint32_t requestId, Fate fate, const std::string& why);
 
-  Surroundings& here_;
-  Owner& owner_;
+  Shared shared_;
   Terms terms_;
+  Events events_;
+  State state_ = State::waiting;
   std::int64_t window_;  // bytes of replies that may be sent before the next credit
   std::int64_t fullWindow_;
-  bool connected_ = false;
-  bool serverGone_ = false;  // its remaining messages are received regardless of the window
-  std::optional<Fate> gaveUp_;  // set by giveUp()
+  Fate fateAfterGiveUp_{};
   std::string giveUpReason_;
-  std::deque<Waiting> waiting_;
-  std::size_t waitingBytes_ = 0;
+  HeldRequests held_;
   bool queueFullSent_ = false;  // in this run of refused requests
   Alarm expiry_;
   std::unique_ptr<RelayClient> client_;  // nullptr after giveUp()

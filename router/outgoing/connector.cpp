@@ -13,10 +13,10 @@ namespace mpf::router {
 kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connect() {
   const auto& address = remote_.address;
   auto lookUp =
-      kj::evalNow([&] { return here_.network.parseAddress(hostForKj(address), address.port); });
+      kj::evalNow([&] { return context_.network.parseAddress(hostForKj(address), address.port); });
   return withTimeout(fmt::format("the look-up of {}", address.host), kj::mv(lookUp))
       .then([this](kj::Own<kj::NetworkAddress> parsed) {
-        if (remote_.security == Security::plain) checkPlain(*parsed, here_.config);
+        if (remote_.security == Security::plain) checkPlain(*parsed, context_.config);
         std::vector<std::string> addresses;
         std::istringstream all(toStd(parsed->toString()));
         for (std::string one; std::getline(all, one, ',');) addresses.push_back(one);
@@ -25,7 +25,7 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connect() {
 }
 
 kj::Exception Connector::stepFailed(const std::string& step, const kj::Exception& error) const {
-  const auto deadTime = limitText(here_.config.limits, "dead-time");
+  const auto deadTime = limitText(context_.config.limits, "dead-time");
   const auto why = reasonOf(error);
   const auto text = why == kTimeout
                         ? fmt::format("{} took longer than {} (dead-time)", step, deadTime)
@@ -46,13 +46,13 @@ kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectToOne(
 }
 
 kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectTo(const std::string& address) {
-  return here_.network.parseAddress(address).then([this](kj::Own<kj::NetworkAddress> parsed) {
+  return context_.network.parseAddress(address).then([this](kj::Own<kj::NetworkAddress> parsed) {
     auto connected = parsed->connectAuthenticated();
     return connected.attach(kj::mv(parsed))
         .then([this](kj::AuthenticatedStream peer) -> kj::Promise<kj::Own<kj::AsyncIoStream>> {
-          setSocketOptions(*peer.stream, here_.config.limits);
+          setSocketOptions(*peer.stream, context_.config.limits);
           if (remote_.security == Security::plain) return kj::mv(peer.stream);
-          return here_.tls
+          return context_.tls
               ->connect(kj::mv(peer),
                         remote_.tlsName.empty() ? remote_.address.host : remote_.tlsName)
               .then(

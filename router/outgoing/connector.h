@@ -12,15 +12,15 @@
 #include <string>
 #include <vector>
 
-#include "router/surroundings.h"
+#include "router/router_context.h"
 #include "router/transport/kj_text.h"
 
 namespace mpf::router {
 
 class Connector {
  public:
-  // `here` and `remote` outlive this object.
-  Connector(Surroundings& here, const Remote& remote) : here_(here), remote_(remote) {}
+  // `context` and `remote` outlive this object.
+  Connector(RouterContext& context, const Remote& remote) : context_(context), remote_(remote) {}
 
   // Resolves with a connection that is ready for the greeting. This object outlives the promise.
   // Each step may take Limits::deadTime.
@@ -32,14 +32,14 @@ class Connector {
   kj::Promise<kj::Own<kj::AsyncIoStream>> connectTo(const std::string& address);
   template <class T>
   kj::Promise<T> withTimeout(const std::string& step, kj::Promise<T> promise) {
-    return here_.timer.timeoutAfter(toKj(here_.config.limits.deadTime), kj::mv(promise))
+    return context_.timer.timeoutAfter(toKj(context_.config.limits.deadTime), kj::mv(promise))
         .catch_([this, step](kj::Exception&& error) -> kj::Promise<T> {
           return stepFailed(step, error);
         });
   }
   [[nodiscard]] kj::Exception stepFailed(const std::string& step, const kj::Exception& error) const;
 
-  Surroundings& here_;
+  RouterContext& context_;
   const Remote& remote_;
 };
 

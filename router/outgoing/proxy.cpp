@@ -14,9 +14,8 @@ constexpr std::chrono::milliseconds kFirstRetry{1};
 constexpr std::chrono::milliseconds kLastRetry{50};
 constexpr int kAtOnce = 1024;  // requests before the event loop runs its other tasks
 constexpr std::chrono::seconds kOpenAgain{1};  // pause after a refusal
-constexpr std::uint32_t kCreditShare = 4;      // credit is sent for a quarter of the window
 
-ServerOptions optionsFor(const Surroundings& here, const ServerName& name,
+ServerOptions optionsFor(const RouterContext& context, const ServerName& name,
                          const Proxy::Offer& offer, std::uint64_t maxMessageBytes) {
   ServerOptions options;
   options.location = name.location;
@@ -25,28 +24,30 @@ ServerOptions optionsFor(const Surroundings& here, const ServerName& name,
   options.maxMessageBytes =
       std::min(maxOffered + kMostBesideElements, std::max(maxMessageBytes, kMostBesideElements));
   options.waitMode = WaitMode::block;
-  options.rights = here.config.rights;
+  options.rights = context.config.rights;
   return options;
 }
 
 }  // namespace
 
-Proxy::Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Offer& offer)
-    : here_(here),
-      owner_(owner),
+Proxy::Proxy(RouterContext& context, RemoteConnection& connection, const ServerName& name,
+             const Offer& offer)
+    : context_(context),
+      connection_(connection),
       name_(name),
       offer_(offer),
-      log_(owner.log()),
-      retry_(here.timer, [this] { retryHeld(); }),
-      server_(here.backplane, name.server,
-              optionsFor(here, name, offer, owner.line().maxMessageBytes())),
-      again_(here.timer, [this] { onReadable(); }) {
+      log_(connection.log()),
+      retry_(context.timer, [this] { retryHeld(); }),
+      server_(context.backplane, name.server,
+              optionsFor(context, name, offer, connection.line().maxMessageBytes())),
+      again_(context.timer, [this] { onReadable(); }) {
   server_.onClient([this](std::uint64_t client, bool isThere) { onClient(client, isThere); });
-  readable_ = std::make_unique<Readable>(here.port, server_.descriptor(), [this] { onReadable(); });
+  readable_ =
+      std::make_unique<Readable>(context.port, server_.descriptor(), [this] { onReadable(); });
 }
 
 Proxy::~Proxy() {
-  for (const auto& [number, client] : clients_) owner_.dropClient(number);
+  for (const auto& [number, client] : clients_) connection_.removeClient(number);
 }
 
 // ---- to the far server
@@ -54,19 +55,20 @@ Proxy::~Proxy() {
 // Requests that are refused at once take no room in the line. Their number is not bounded, so the
 // rest waits for the next turn of the event loop.
 void Proxy::onReadable() {
-  if (pump(kAtOnce) && owner_.line().hasRoom()) again_.setAt(Deadline::after(Nanoseconds(0)));
+  if (pump(kAtOnce) && connection_.line().hasRoom()) again_.setAt(Deadline::after(Nanoseconds(0)));
 }
 
 // Returns false when the peer accepts no more clients now.
 bool Proxy::tryOpen(std::uint64_t local) {
-  const auto number = owner_.tryNewClient(*this);
+  const auto number = connection_.tryAddClient(*this);
   numbers_[local] = number.value_or(0);
   if (!number) return false;
+  const auto window = context_.config.limits.windowBytes;
   auto& client = clients_[*number];
   client.local = local;
-  client.window = here_.config.limits.windowBytes;
-  owner_.line().send([number = *number, binding = offer_.binding, incarnation = offer_.incarnation,
-                      window = client.window](wire::Item::Builder item) {
+  client.window = ReplyWindow(window);
+  connection_.line().send([number = *number, binding = offer_.binding,
+                           incarnation = offer_.incarnation, window](wire::Item::Builder item) {
     auto open = item.initOpen();
     open.setClient(number);
     open.setBinding(binding);
@@ -77,10 +79,10 @@ bool Proxy::tryOpen(std::uint64_t local) {
 }
 
 void Proxy::close(std::uint32_t number) {
-  owed_ -= clients_[number].owed;
+  owed_ -= clients_.at(number).owed;
   clients_.erase(number);
-  owner_.dropClient(number);
-  owner_.line().send([number](wire::Item::Builder item) { item.setClose(number); });
+  connection_.removeClient(number);
+  connection_.line().send([number](wire::Item::Builder item) { item.setClose(number); });
 }
 
 void Proxy::onClient(std::uint64_t local, bool isThere) {
@@ -93,13 +95,17 @@ void Proxy::onClient(std::uint64_t local, bool isThere) {
 }
 
 bool Proxy::pump(int most) {
-  if (isDraining()) return hasMore_ = false;
-  for (; most != 0 && owner_.line().hasRoom(); --most) {
+  if (isDraining()) return false;
+  for (; most != 0 && connection_.line().hasRoom(); --most) {
     auto request = server_.receive();
-    if (!request) return hasMore_ = false;
+    if (!request) {
+      state_ = State::idle;
+      return false;
+    }
     forward(std::move(request));
   }
-  return hasMore_ = true;
+  state_ = State::ready;
+  return true;
 }
 
 void Proxy::forward(Message request) {
@@ -116,21 +122,22 @@ void Proxy::forward(Message request) {
   auto route = request.route();
   route.keeper = nullptr;
   request.setRoute(route);
-  auto& client = clients_[found->second];
+  auto& client = clients_.at(found->second);
   ++client.owed;
   ++owed_;
   if (client.refusal)
     return endRequest(found->second, route.requestId, Fate::refused, *client.refusal);
-  owner_.line().send(Carried{.isRequest = true,
-                             .client = found->second,
-                             .requestId = route.requestId,
-                             .takeBefore = server_.takeBefore(),
-                             .message = std::move(request)});
+  connection_.line().send(Carried{.isRequest = true,
+                                  .client = found->second,
+                                  .requestId = route.requestId,
+                                  .takeBefore = server_.takeBefore(),
+                                  .message = std::move(request)});
 }
 
 void Proxy::drain(Fate fate) {
   if (isDraining()) return;
-  drainUntil_ = Deadline::after(here_.config.limits.deadTime);
+  state_ = State::draining;
+  drainUntil_ = Deadline::after(context_.config.limits.deadTime);
   for (const auto& [number, client] : clients_) {
     for (const auto requestId : server_.owed(client.local)) end(number, requestId, fate);
   }
@@ -170,14 +177,14 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
                                     reply.getIsFirst() ? "first" : "later", reply.getRequestId(),
                                     number, isOwed ? "has had no first reply" : "is not pending"));
   }
-  if (client.unpaid >= client.window)
-    throw ProtocolError(
-        FarewellCode::LIMIT,
-        fmt::format("a reply to client {} beyond its window of {} bytes", number, client.window));
+  if (client.window.isUsedUp())
+    throw ProtocolError(FarewellCode::LIMIT,
+                        fmt::format("a reply to client {} beyond its window of {} bytes", number,
+                                    client.window.bytes()));
   ConversionError error;
   auto message = tryFromWire(
-      reply.getMessage(), {static_cast<std::size_t>(owner_.line().limits().maxMessageBytes)}, error,
-      [&](std::size_t bytes) { return server_.allocateBody(client.local, bytes); });
+      reply.getMessage(), {static_cast<std::size_t>(connection_.line().limits().maxMessageBytes)},
+      error, [&](std::size_t bytes) { return server_.allocateBody(client.local, bytes); });
   if (!message || message->getType() == MessageType::connect ||
       message->getType() == MessageType::requestFate) {
     if (error.fault != ConversionFault::unknownType && error.fault != ConversionFault::tooLarge) {
@@ -186,7 +193,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
     }
     return loseReply(number, reply, error.text);
   }
-  client.unpaid += windowBytesOf(*message);
+  client.window.received(windowBytesOf(*message));
   deliver(number, client, reply.getRequestId(), std::move(*message));
 }
 
@@ -214,7 +221,7 @@ void Proxy::end(std::uint32_t number, std::uint32_t requestId, Fate fate) {
 }
 
 void Proxy::queueFull(std::uint32_t number) {
-  count(owner_.record()->queueFull);
+  count(connection_.record()->queueFull);
   const auto found = clients_.find(number);
   if (found == clients_.end() || found->second.heldQueueFull) return;
   found->second.heldQueueFull = true;
@@ -268,16 +275,14 @@ bool Proxy::tryDeliver(std::uint32_t number, Client& client, std::uint32_t reque
   return true;
 }
 
-void Proxy::giveCredit(std::uint32_t number, Client& client, std::size_t bytes) {
-  client.taken += static_cast<std::uint32_t>(bytes);
-  if (client.taken < client.window / kCreditShare) return;
-  client.unpaid -= std::min<std::uint64_t>(client.taken, client.unpaid);
-  owner_.line().send([number, taken = client.taken](wire::Item::Builder item) {
-    auto credit = item.initCredit();
-    credit.setClient(number);
-    credit.setBytes(taken);
+void Proxy::giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes) {
+  const auto credit = client.window.taken(bytes);
+  if (credit == 0) return;
+  connection_.line().send([number, credit](wire::Item::Builder item) {
+    auto to = item.initCredit();
+    to.setClient(number);
+    to.setBytes(credit);
   });
-  client.taken = 0;
 }
 
 void Proxy::retryHeld() {

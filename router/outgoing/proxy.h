@@ -4,6 +4,10 @@
 //   local client ─► MessageServer(name, location) ─► Line     one far client for each local client
 //   local client ◄── held while the client's queue is full ◄── Line
 //
+// States:
+//   ready ─ no request is left ─► idle ─ the next one arrives ─► ready
+//   ready, idle ─ the far server is gone: drain() ─► draining
+//
 // Threads  that of the event loop.
 // Crash    when the far server exits, the peer sends the fate of each request that it received; the
 //          others end as neverTaken. When the line ends, requests that were never written to it end
@@ -23,8 +27,10 @@
 
 #include "router/alarm.h"
 #include "router/outgoing/pending_binds.h"
+#include "router/outgoing/remote_connection.h"
+#include "router/outgoing/reply_window.h"
 #include "router/readable.h"
-#include "router/surroundings.h"
+#include "router/router_context.h"
 #include "router/transport/line.h"
 #include "server/relay_server.h"
 
@@ -32,20 +38,6 @@ namespace mpf::router {
 
 class Proxy {
  public:
-  // The connection that a proxy belongs to.
-  class Owner {
-   public:
-    virtual Line& line() = 0;
-    // Returns the number of a new client; nullopt: the peer accepts no more clients.
-    virtual std::optional<std::uint32_t> tryNewClient(Proxy& proxy) = 0;
-    virtual void dropClient(std::uint32_t number) = 0;
-    virtual PeerRecord& record() = 0;
-    virtual const Log& log() = 0;
-
-   protected:
-    ~Owner() = default;
-  };
-
   // The far server, as the peer describes it.
   struct Offer {
     std::uint32_t binding = 0;
@@ -54,13 +46,16 @@ class Proxy {
     std::uint64_t maxMessageBytes = 0;
   };
 
+  // `context` and `connection` outlive this object.
   //   throws  as the constructor of MessageServer, for example NameInUse
-  Proxy(Surroundings& here, Owner& owner, const ServerName& name, const Offer& offer);
+  Proxy(RouterContext& context, RemoteConnection& connection, const ServerName& name,
+        const Offer& offer);
   ~Proxy();
 
   // Takes requests while the line has room, at most `most`. Returns false when no request is left.
   bool pump(int most);
-  [[nodiscard]] bool hasMore() const noexcept { return hasMore_; }
+  // Whether requests may be waiting.
+  [[nodiscard]] bool hasMore() const noexcept { return state_ == State::ready; }
   // Hand an item of the far server to client `number`.
   void reply(std::uint32_t number, wire::Reply::Reader reply);
   void endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why);
@@ -70,11 +65,12 @@ class Proxy {
   // The far server is gone: takes no more requests and ends all pending ones with `fate`. isDone()
   // becomes true when all replies and fates are delivered, at the latest after Limits::deadTime.
   void drain(Fate fate);
-  [[nodiscard]] bool isDraining() const noexcept { return !drainUntil_.isNever(); }
+  [[nodiscard]] bool isDraining() const noexcept { return state_ == State::draining; }
   [[nodiscard]] bool isDone() const noexcept;
   [[nodiscard]] bool hasClients() const noexcept { return !clients_.empty(); }
 
  private:
+  enum class State { idle, ready, draining };
   struct Held {
     std::uint32_t requestId;
     Message message;
@@ -82,9 +78,7 @@ class Proxy {
   struct Client {
     std::uint64_t local = 0;  // its number in MessageServer
     std::uint32_t owed = 0;  // requests that have not ended
-    std::uint32_t window = 0;  // as sent in `open`
-    std::uint64_t unpaid = 0;  // bytes of replies for which no credit has been sent
-    std::uint32_t taken = 0;  // of these, bytes that the client has received
+    ReplyWindow window{0};  // as sent in `open`
     bool heldQueueFull = false;  // `held` contains a connectQueueFull
     std::deque<Held> held;  // replies for which the client has no room
     std::optional<std::string> refusal;  // why the far server does not accept it
@@ -98,14 +92,14 @@ class Proxy {
   void forward(Message request);
   void deliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message&& message);
   bool tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message& message);
-  void giveCredit(std::uint32_t number, Client& client, std::size_t bytes);
+  void giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes);
   [[nodiscard]] bool awaits(const Client& client, std::uint32_t requestId) const noexcept;
   void end(std::uint32_t number, std::uint32_t requestId, Fate fate);
   void ended(Client& client) noexcept;
   void retryHeld();
 
-  Surroundings& here_;
-  Owner& owner_;
+  RouterContext& context_;
+  RemoteConnection& connection_;
   ServerName name_;
   Offer offer_;
   std::unordered_map<std::uint32_t, Client> clients_;  // by number
@@ -113,8 +107,7 @@ class Proxy {
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
   Log log_;
   std::uint64_t owed_ = 0;
-  // False: no request waits, and readable_ calls back when the next one arrives.
-  bool hasMore_ = true;
+  State state_ = State::ready;
   Deadline drainUntil_ = Deadline::never();  // set by drain()
   std::chrono::milliseconds retryAfter_{};
   Alarm retry_;

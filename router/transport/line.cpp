@@ -1,63 +1,46 @@
 // SPDX-License-Identifier: MIT
 #include "router/transport/line.h"
 
+#include <algorithm>
 #include <capnp/serialize-async.h>
 #include <fmt/format.h>
+#include <utility>
+
+#include <mpf/clock.h>
 
 #include "router/transport/kj_text.h"
 #include "router/transport/tls.h"
+#include "shm/histogram.h"
 
 namespace mpf::router {
 namespace {
 
-// This many bytes of a frame that is still arriving are a sign of life.
-constexpr std::size_t kProgressBytes = std::size_t{64} << 10;
-// While the peer's pings make pings of this side unnecessary, this side sends a ping at this
-// interval all the same, to measure the round trip.
-constexpr std::int64_t kMeasureEveryNs = 10'000'000'000;
 constexpr std::int64_t kTurnNs = 2'000'000;  // longest turn with the items of one peer
-// The frame size that each side must accept, and the largest size of a greeting.
-constexpr std::uint64_t kLeastFrame = std::uint64_t{64} << 10;
 
 constexpr const char* kTlsOnPlain =
     "the peer uses TLS, this side of the connection plain TCP: set the same security, \"tls\" or "
     "\"plain\", at both routers";
 
-std::uint64_t maxFrameBytes(const Limits& limits) {
-  constexpr std::uint64_t kFields = std::uint64_t{1} << 20;  // for everything but the bodies
-  return std::max<std::uint64_t>(limits.maxMessageBytes, limits.bufferBytes) + kFields;
-}
-
 }  // namespace
 
 Line::Line(kj::Own<kj::AsyncIoStream> stream, kj::Timer& timer, const Limits& limits,
-           PeerRecord& record, Owner& owner)
+           PeerRecord& record, Events events)
     : stream_(kj::mv(stream)),
       timer_(timer),
       limits_(limits),
       record_(record),
-      owner_(owner),
-      reader_(kLeastFrame),
-      checkAfterNs_(halfDeadNs()) {
-  record_->queueSize.store(limits.queueSize, std::memory_order_relaxed);
-}
+      events_(std::move(events)),
+      reader_(kLeastFrameBytes),
+      queue_(limits.queueSize, record),
+      keepAlive_(limits) {}
 
-Line::~Line() = default;
-
-void Line::describe(wire::Greeting::Builder greeting, const Limits& limits) {
-  greeting.setProtocolMajor(wire::PROTOCOL_MAJOR);
-  greeting.setProtocolMinor(wire::PROTOCOL_MINOR);
-  greeting.setMaxFrameBytes(maxFrameBytes(limits));
-  greeting.setMaxMessageBytes(limits.maxMessageBytes);
-  greeting.setDeadTimeMs(static_cast<std::uint32_t>(limits.deadTime.count()));
-}
+// ---- start and end
 
 kj::Promise<LineEnd> Line::run(Note greeting) {
   auto paf = kj::newPromiseAndFulfiller<LineEnd>();
   ended_ = kj::mv(paf.fulfiller);
-  lastReceiveNs_ = Clock::nowNs();
-  greetingDueNs_ = lastReceiveNs_ + std::chrono::nanoseconds(limits_.handshakeTime).count();
-  send([greeting = std::move(greeting)](wire::Item::Builder item) { greeting(item); });
+  keepAlive_.start(Clock::nowNs());
+  send(std::move(greeting));
   reads_ = watched(&Line::readLoop);
   liveness_ = watched(&Line::livenessLoop);
   return kj::mv(paf.promise);
@@ -72,34 +55,30 @@ kj::Promise<void> Line::watched(kj::Promise<void> (Line::*loop)()) {
       });
 }
 
-void Line::finish(LineEnd end) {
-  if (std::exchange(phase_, Phase::finished) == Phase::finished) return;
-  ended_->fulfill(std::move(end));
-}
-
-std::uint64_t Line::maxMessageBytes() const noexcept {
-  constexpr std::uint64_t kFrameOverhead = 1024;
-  return std::min(
-      {limits_.maxMessageBytes, peer_.maxMessageBytes, peer_.maxFrameBytes - kFrameOverhead});
-}
-
 void Line::end(FarewellCode code, const std::string& why) {
   if (isEnding()) return;
-  const auto text = displayText(why);
-  send([code, text](wire::Item::Builder item) {
+  farewell_ = displayText(why);
+  send([code, text = farewell_](wire::Item::Builder item) {
     auto farewell = item.initFarewell();
     farewell.setCode(code);
     farewell.setReason(text);
   });
-  phase_ = Phase::leaving;
-  farewell_ = text;
-  drains_ = code != FarewellCode::SILENCE;
+  state_ = code == FarewellCode::SILENCE ? State::dropping : State::leaving;
+  finishLater(farewell_);
+}
+
+void Line::finishLater(const std::string& why) {
   farewellTimer_ = timer_.afterDelay(kFarewellTime)
-                       .then([this, text] { finish({text}); })
+                       .then([this, why] { finish({why}); })
                        .eagerlyEvaluate(nullptr);
 }
 
-// ---- in
+void Line::finish(LineEnd end) {
+  if (std::exchange(state_, State::finished) == State::finished) return;
+  ended_->fulfill(std::move(end));
+}
+
+// ---- reading
 
 kj::Promise<void> Line::readLoop() {
   auto room = reader_.room();
@@ -111,20 +90,20 @@ kj::Promise<void> Line::readLoop() {
         }
         if (discardsInput()) return readAndDiscard();
         count(record_->bytesReceived, bytes);
-        partialBytes_ += bytes;
-        hasMore_ = bytes == most;
+        keepAlive_.bytesReceived(bytes);
         reader_.filled(bytes);
-        return handleReceived();
+        return handleReceived(bytes == most);
       });
 }
 
 std::string Line::closedReason() const {
-  if (greeted_) return "the peer closed the connection";
+  if (hasGreeted()) return "the peer closed the connection";
   return "the peer closed the connection before its greeting: is it a router, and does it have the "
          "same security, \"tls\" or \"plain\"?";
 }
 
-// After our own farewell, only the end of the peer's data matters.
+// After our own farewell, only the end of the peer's data matters. With unread data, the kernel
+// would reset the connection, and the peer might not receive the farewell.
 kj::Promise<void> Line::readAndDiscard() {
   constexpr std::size_t kReadBytes = std::size_t{64} << 10;
   auto room = kj::heapArray<kj::byte>(kReadBytes);
@@ -138,7 +117,8 @@ kj::Promise<void> Line::readAndDiscard() {
 
 // Handles the received items, in turns of at most kTurnNs. Continues with the next turn when the
 // peer has read enough of the answers.
-kj::Promise<void> Line::handleReceived() {
+//   hasMore  the last read filled its buffer: more bytes may be waiting
+kj::Promise<void> Line::handleReceived(bool hasMore) {
   if (discardsInput()) return readAndDiscard();
   bool isDone = false;
   try {
@@ -153,14 +133,14 @@ kj::Promise<void> Line::handleReceived() {
     end(FarewellCode::STOPPING, error.what());
   }
   if (discardsInput()) return readAndDiscard();
-  if (isDone && !hasMore_) return readLoop();
+  if (isDone && !hasMore) return readLoop();
   return whenAnswersAreSent().then(
-      [this, isDone] { return isDone ? readLoop() : handleReceived(); });
+      [this, isDone, hasMore] { return isDone ? readLoop() : handleReceived(hasMore); });
 }
 
 kj::Promise<void> Line::whenAnswersAreSent() {
   // Let the other tasks of the event loop run.
-  if (answers_ < kMaxNotes) return timer_.afterDelay(0 * kj::NANOSECONDS);
+  if (!queue_.hasMaxAnswers()) return timer_.afterDelay(0 * kj::NANOSECONDS);
   auto paf = kj::newPromiseAndFulfiller<void>();
   resumeReading_ = kj::mv(paf.fulfiller);
   return kj::mv(paf.promise);
@@ -170,10 +150,10 @@ kj::Promise<void> Line::whenAnswersAreSent() {
 bool Line::handleSome() {
   constexpr unsigned kItemsPerCheck = 16;  // between two looks at the clock
   const auto endNs = Clock::nowNs() + kTurnNs;
-  if (items_) lastReceiveNs_ = Clock::nowNs();  // the peer is not late: its items were waiting
-  handling_ = true;
-  KJ_DEFER(handling_ = false);
-  for (unsigned handled = 1; answers_ < kMaxNotes; ++handled) {
+  if (items_) keepAlive_.received(Clock::nowNs());  // the peer is not late: its items were waiting
+  noteKind_ = SendQueue::NoteKind::answer;
+  KJ_DEFER(noteKind_ = SendQueue::NoteKind::own);
+  for (unsigned handled = 1; !queue_.hasMaxAnswers(); ++handled) {
     if (handled % kItemsPerCheck == 0 && Clock::nowNs() >= endNs) return false;
     if (!items_ && !tryNextFrame()) return true;
     if (!items_ || nextItem_ == items_->size()) {
@@ -187,11 +167,11 @@ bool Line::handleSome() {
 }
 
 bool Line::tryNextFrame() {
-  if (!greeted_ && reader_.beginsAsTls()) throw ProtocolError(FarewellCode::PROTOCOL, kTlsOnPlain);
+  if (!hasGreeted() && reader_.beginsAsTls())
+    throw ProtocolError(FarewellCode::PROTOCOL, kTlsOnPlain);
   auto* frame = reader_.tryNext();
   if (frame == nullptr) return false;
-  lastReceiveNs_ = Clock::nowNs();
-  partialBytes_ = 0;
+  keepAlive_.frameReceived(Clock::nowNs());
   count(record_->framesReceived);
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
@@ -199,8 +179,8 @@ bool Line::tryNextFrame() {
 }
 
 void Line::handle(wire::Item::Reader item) {
-  if (phase_ == Phase::broken && !item.isFarewell()) return;
-  if (!greeted_) {
+  if (state_ == State::broken && !item.isFarewell()) return;
+  if (state_ == State::greeting) {
     if (item.isGreeting()) return takeGreeting(item.getGreeting());
     if (!item.isFarewell())
       throw ProtocolError(FarewellCode::PROTOCOL, "the first item is not a greeting");
@@ -221,108 +201,104 @@ void Line::handle(wire::Item::Reader item) {
     case wire::Item::REQUEST:
     case wire::Item::REPLY:
       count(record_->messagesReceived);
-      return owner_.onItem(item);
+      return events_.onItem(item);
     default:
-      return owner_.onItem(item);
+      return events_.onItem(item);
   }
 }
 
 void Line::takeGreeting(wire::Greeting::Reader greeting) {
-  if (greeting.getProtocolMajor() != wire::PROTOCOL_MAJOR) {
-    throw ProtocolError(FarewellCode::VERSION,
-                        fmt::format("the peer has protocol {}.{}, this router {}.x: install the "
-                                    "same release of mpf-router on both hosts",
-                                    greeting.getProtocolMajor(), greeting.getProtocolMinor(),
-                                    wire::PROTOCOL_MAJOR));
-  }
-  peer_.router = displayText(greeting.getRouter());
-  peer_.program = displayText(greeting.getProgram());
-  peer_.maxFrameBytes = greeting.getMaxFrameBytes();
-  peer_.maxMessageBytes = greeting.getMaxMessageBytes();
-  peer_.maxClients = greeting.getMaxClients();
-  if (peer_.maxFrameBytes < kLeastFrame) {
-    throw ProtocolError(FarewellCode::PROTOCOL,
-                        fmt::format("maxFrameBytes is {}; at least {} are required",
-                                    peer_.maxFrameBytes, kLeastFrame));
-  }
+  peer_ = PeerGreeting::read(greeting);
+  state_ = State::open;
   reader_.setMaxFrameBytes(maxFrameBytes(limits_));
   limits_.bufferBytes = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(limits_.bufferBytes, peer_.maxFrameBytes / 2));
-  greeted_ = true;
+  keepAlive_.greetingReceived();
   record_.setPeer(peer_.router, peer_.program);
   ping();
-  owner_.onGreeting(peer_);
-  owner_.onRoom();
+  events_.onGreeting(peer_);
+  events_.onRoom();
+}
+
+// ---- writing
+
+void Line::send(Note note) {
+  if (!isEnding()) enqueue(std::move(note), noteKind_);
+}
+
+void Line::send(Carried carried) {
+  if (isEnding()) queue_.reject(std::move(carried));
+  else enqueue(std::move(carried));
+}
+
+// Writes after all tasks that are ready now, so that what they send shares the frame.
+template <class... Outgoing>
+void Line::enqueue(Outgoing&&... outgoing) {
+  const bool wasIdle = queue_.isIdle();
+  queue_.push(std::forward<Outgoing>(outgoing)...);
+  if (!wasIdle) return;
+  writes_ =
+      kj::evalLast([this] { return writeAll(); }).eagerlyEvaluate([this](kj::Exception&& error) {
+        onWriteFailure(tlsProblem(error));
+      });
+}
+
+kj::Promise<void> Line::writeAll() {
+  if (queue_.isEmpty()) {
+    if (state_ == State::leaving) stream_->shutdownWrite();
+    else if (state_ == State::dropping) finish({farewell_});
+    return kj::READY_NOW;
+  }
+  const SendQueue::FrameLimits limits{.items = hasGreeted() ? SIZE_MAX : 1,  // the greeting, alone
+                                      .bytes = limits_.bufferBytes,
+                                      .messageBytes = maxMessageBytes()};
+  return capnp::writeMessage(*stream_, queue_.buildFrame(limits, events_.onUnsendable))
+      .then([this] {
+        if (resumeReading_) {
+          // The peer is alive: it reads, while its own items are not read here.
+          keepAlive_.received(Clock::nowNs());
+          if (!queue_.hasMaxAnswers()) std::exchange(resumeReading_, nullptr)->fulfill();
+        }
+        if (!isEnding()) events_.onRoom();
+        queue_.frameWritten();  // now the queue may be idle, and the next item starts a write
+        return writeAll();
+      });
+}
+
+// Keeps reading for a while: the peer may have sent a farewell with the reason.
+void Line::onWriteFailure(const std::string& why) {
+  if (isEnding()) return finish({farewell_.empty() ? why : farewell_});
+  state_ = State::broken;
+  finishLater(why);
 }
 
 // ---- signs of life
 
-// Time until the next check: at most checkAfterNs_, and no later than the peer's deadline.
-std::int64_t Line::nextCheckNs(std::int64_t nowNs) {
-  auto dueNs = lastReceiveNs_ + std::chrono::nanoseconds(limits_.deadTime).count();
-  if (!greeted_) dueNs = std::min(dueNs, greetingDueNs_);
-  return std::clamp<std::int64_t>(dueNs - nowNs, 1'000'000,
-                                  std::exchange(checkAfterNs_, halfDeadNs()));
-}
-
-// Which deadline the peer has missed; an empty text when it has missed no deadline.
-std::string Line::silenceReason(std::int64_t nowNs) const {
-  if (nowNs - lastReceiveNs_ >= std::chrono::nanoseconds(limits_.deadTime).count()) {
-    return fmt::format("received nothing from the peer for {} ms (dead-time)",
-                       (nowNs - lastReceiveNs_) / 1'000'000);
-  }
-  if (greeted_ || nowNs < greetingDueNs_) return {};
-  return fmt::format("the peer sent no greeting within {} ms (handshake-time)",
-                     limits_.handshakeTime.count());
-}
-
 kj::Promise<void> Line::livenessLoop() {
-  const auto checkNs = nextCheckNs(Clock::nowNs());
-  return timer_.afterDelay(checkNs * kj::NANOSECONDS)
-      .then([this, dueNs = Clock::nowNs() + checkNs]() -> kj::Promise<void> {
-        const auto nowNs = Clock::nowNs();
-        // Time during which this process did not run does not count against the peer.
-        const auto lateNs = std::max<std::int64_t>(nowNs - dueNs, 0);
-        lastReceiveNs_ = std::min(lastReceiveNs_ + lateNs, nowNs);
-        greetingDueNs_ += lateNs;
-        if (partialBytes_ >= kProgressBytes) {
-          lastReceiveNs_ = nowNs;
-          partialBytes_ = 0;
-        }
-        // Only the second check in a row counts: if this process did not run for a while, data of
-        // the peer may not have been read yet.
-        if (const auto text = silenceReason(nowNs); text.empty()) {
-          overdue_ = false;
-        } else if (std::exchange(overdue_, true)) {
-          if (writing_) finish({text});  // the peer would not read a farewell, either
-          else end(FarewellCode::SILENCE, text);
-          return kj::NEVER_DONE;
-        }
-        if (greeted_ && !isEnding()) ping();
-        return livenessLoop();
-      });
+  const auto afterNs = keepAlive_.beginCheck(Clock::nowNs());
+  return timer_.afterDelay(afterNs * kj::NANOSECONDS).then([this]() -> kj::Promise<void> {
+    if (const auto why = keepAlive_.check(Clock::nowNs()); !why.empty()) {
+      if (queue_.isIdle()) end(FarewellCode::SILENCE, why);
+      else finish({why});  // the peer would not read a farewell, either
+      return kj::NEVER_DONE;
+    }
+    if (state_ == State::open) ping();
+    return livenessLoop();
+  });
 }
 
 void Line::ping() {
-  lastPingNs_ = Clock::nowNs();
+  keepAlive_.pingSent(Clock::nowNs());
   send([](wire::Item::Builder item) {
     item.initPing().setStamp(static_cast<std::uint64_t>(Clock::nowNs()));
   });
 }
 
-// A ping of the peer is a sign of life, so this side postpones its own ping. On an idle connection
-// only one side sends pings, which halves the number of frames. The delay is random, because
-// otherwise both sides might send their pings at the same time again and again.
 void Line::onPing(std::uint64_t stamp) {
   send([stamp](wire::Item::Builder pong) { pong.initPong().setStamp(stamp); });
   const auto nowNs = Clock::nowNs();
-  if (nowNs - lastPingNs_ >= kMeasureEveryNs) ping();
-  const auto quarter = halfDeadNs() / 4;
-  if (nowNs - lastPostponeNs_ < quarter) return;
-  lastPostponeNs_ = nowNs;
-  checkAfterNs_ = halfDeadNs() + quarter +
-                  static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(quarter + 1));
-  liveness_ = watched(&Line::livenessLoop);
+  if (keepAlive_.shouldMeasure(nowNs)) ping();
+  if (keepAlive_.tryPostpone(nowNs)) liveness_ = watched(&Line::livenessLoop);
 }
 
 }  // namespace mpf::router

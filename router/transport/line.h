@@ -1,74 +1,43 @@
 // SPDX-License-Identifier: MIT
-// Line: one connection to another router: receives and sends frames, queues items, checks signs of
-// life, and ends the connection with a farewell.
+// Line: one connection to another router. It reads the peer's frames and hands on their items,
+// writes the frames of its SendQueue, and ends the connection with a farewell.
 //
-//   send() ─► queue ─► a frame of all that waits, up to Limits::bufferBytes ─► stream
-//   stream ─► frames ─► Owner::onItem
+//   stream ─► FrameReader ─► items ─► Events::onItem
+//   send() ─► SendQueue ─► a frame of all that waits, up to Limits::bufferBytes ─► stream
 //
-// While a frame is being written, items for the next one gather in the queue. A waiting message
-// stays in the shared memory of its sender, and is converted when its frame is built. When a peer
-// does not read the answers to its items, its items are not read, either. A long frame is handled
-// in turns with the other tasks of the event loop.
+// States:
+//   greeting ─ the peer's greeting ─► open
+//
+//   greeting, open ─ end() ──────────────► leaving   the farewell is queued or sent; waits until
+//                  │                                 the peer has also closed the connection
+//                  ├ the peer is silent ─► dropping  the farewell is queued; ends once it is sent
+//                  └ a write fails ──────► broken    still reads: the peer may have sent a farewell
+//
+//   any ─ the peer closes, its farewell, kFarewellTime is over ─► finished
+//
+// When a peer does not read the answers to its items, its items are not read, either. A long frame
+// is handled in turns with the other tasks of the event loop.
 //
 // Threads  that of the event loop.
 // Crash    the line ends when a peer has crashed, is stopped or unreachable for Limits::deadTime.
 // Trust    a protocol error ends the line with a farewell that names it.
 #pragma once
 
-#include <algorithm>
-#include <capnp/message.h>
-#include <deque>
 #include <functional>
 #include <kj/async-io.h>
-#include <memory>
-#include <random>
+#include <optional>
 #include <string>
-#include <variant>
-
-#include <mpf/clock.h>
+#include <vector>
 
 #include "router/config/router_config.h"
+#include "router/protocol_error.h"
 #include "router/statistics.h"
 #include "router/transport/frame_reader.h"
-#include "schema/conversion.h"
+#include "router/transport/keep_alive.h"
+#include "router/transport/peer_greeting.h"
+#include "router/transport/send_queue.h"
 
 namespace mpf::router {
-
-// A message that is sent as an item of a frame.
-struct Carried {
-  bool isRequest = false;
-  bool isFirst = false;  // of a reply: it ends the request
-  std::uint32_t client = 0;
-  std::uint32_t requestId = 0;
-  Deadline takeBefore = Deadline::never();  // of a request
-  Message message;
-};
-
-// The bytes that a reply takes from its client's window (router.capnp, Credit): those of its
-// elements, and a fixed number for the rest.
-inline constexpr std::uint32_t kWindowBytesBeside = 64;
-[[nodiscard]] inline std::uint32_t windowBytesOf(const Message& reply) noexcept {
-  return kWindowBytesBeside + reply.arrayLength() * layoutOf(reply.getType()).elementBytes;
-}
-
-// The largest size of a body without its elements. Limits on the wire count elements, those in
-// shared memory count whole bodies.
-inline constexpr std::uint64_t kMostBesideElements = [] {
-  std::uint64_t most = 0;
-  for (std::uint16_t type = 1; layoutOf(static_cast<MessageType>(type)).headerBytes != 0; ++type) {
-    most = std::max<std::uint64_t>(most, layoutOf(static_cast<MessageType>(type)).headerBytes);
-  }
-  return most;
-}();
-
-// The fields of a peer's greeting.
-struct PeerGreeting {
-  std::string router;
-  std::string program;
-  std::uint64_t maxFrameBytes = 0;
-  std::uint64_t maxMessageBytes = 0;
-  std::uint32_t maxClients = 0;
-};
 
 // Why a line ended, as text for logs and tools.
 struct LineEnd {
@@ -77,28 +46,22 @@ struct LineEnd {
 
 class Line {
  public:
-  using Note = std::function<void(wire::Item::Builder)>;
+  using Note = SendQueue::Note;
 
-  class Owner {
-   public:
+  // What the line reports to the object that made it.
+  struct Events {
     // A valid greeting of the peer has arrived.
-    virtual void onGreeting(const PeerGreeting& greeting) = 0;
+    std::function<void(const PeerGreeting& greeting)> onGreeting;
     // A later item that is not a ping, pong or farewell has arrived. May throw ProtocolError.
-    virtual void onItem(wire::Item::Reader item) = 0;
+    std::function<void(wire::Item::Reader item)> onItem;
     // hasRoom() may have become true.
-    virtual void onRoom() = 0;
-    // A message cannot be sent, for the reason `why`. If it is a request, it has not been handled.
-    // `instead` is sent in its place; it is empty unless this function fills it.
-    virtual void onUnsendable(const Carried& carried, const std::string& why,
-                              wire::Item::Builder instead) = 0;
-
-   protected:
-    ~Owner() = default;
+    std::function<void()> onRoom;
+    // A message cannot be sent. If it is a request, it has not been handled.
+    SendQueue::OnUnsendable onUnsendable;
   };
 
   Line(kj::Own<kj::AsyncIoStream> stream, kj::Timer& timer, const Limits& limits,
-       PeerRecord& record, Owner& owner);
-  ~Line();
+       PeerRecord& record, Events events);
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
@@ -113,106 +76,69 @@ class Line {
   void send(Note note);
   // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
-  [[nodiscard]] bool hasRoom() const noexcept {
-    return greeted_ && !isEnding() && waiting_ < limits_.queueSize && notes() < kMaxNotes;
-  }
+  [[nodiscard]] bool hasRoom() const noexcept { return state_ == State::open && queue_.hasRoom(); }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
-  [[nodiscard]] bool hasGreeted() const noexcept { return greeted_; }
+  [[nodiscard]] bool hasGreeted() const noexcept { return peer_.hasArrived(); }
   // The limits of the configuration when the line started. Only bufferBytes may be smaller: a frame
   // must fit into what the peer accepts.
   [[nodiscard]] const Limits& limits() const noexcept { return limits_; }
   // The largest body that may be sent.
-  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
+    return peer_.maxMessageBytesWith(limits_);
+  }
 
   // After the end of the line: returns the requests that were never written to the stream.
-  [[nodiscard]] std::vector<Carried> takeUnsentRequests();
-
-  // Fills in the fields of a greeting that follow from the limits.
-  static void describe(wire::Greeting::Builder greeting, const Limits& limits);
+  [[nodiscard]] std::vector<Carried> takeUnsentRequests() { return queue_.takeUnsentRequests(); }
 
  private:
-  struct Answer {  // a note that answers an item of the peer
-    Note note;
-  };
-  enum class Phase {
-    running,
-    leaving,  // our farewell is queued or sent
-    broken,  // writing has failed; still reads, because the peer may have sent a farewell
-    finished,  // the promise of run() is fulfilled
-  };
-  [[nodiscard]] bool isEnding() const noexcept { return phase_ != Phase::running; }
+  enum class State { greeting, open, leaving, dropping, broken, finished };
+  static constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
+
+  [[nodiscard]] bool isEnding() const noexcept {
+    return state_ != State::greeting && state_ != State::open;
+  }
   // Whether items of the peer are no longer handled.
   [[nodiscard]] bool discardsInput() const noexcept {
-    return phase_ == Phase::leaving || phase_ == Phase::finished;
+    return isEnding() && state_ != State::broken;
   }
-  using Outgoing = std::variant<Note, Answer, Carried>;
-  static constexpr std::size_t kMaxNotes = 4096;
-  static constexpr auto kFarewellTime = 500 * kj::MILLISECONDS;
-  kj::Promise<void> readLoop();
-  kj::Promise<void> livenessLoop();
-  [[nodiscard]] std::int64_t nextCheckNs(std::int64_t nowNs);
-  [[nodiscard]] std::string silenceReason(std::int64_t nowNs) const;
-  void onPing(std::uint64_t stamp);
-  void ping();
   kj::Promise<void> watched(kj::Promise<void> (Line::*loop)());
-  kj::Promise<void> handleReceived();
-  [[nodiscard]] std::string closedReason() const;
+  void finish(LineEnd end);
+  void finishLater(const std::string& why);
+
+  kj::Promise<void> readLoop();
   kj::Promise<void> readAndDiscard();
+  kj::Promise<void> handleReceived(bool hasMore);
   kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
   void handle(wire::Item::Reader item);
   void takeGreeting(wire::Greeting::Reader greeting);
-  void scheduleWrite();
+  [[nodiscard]] std::string closedReason() const;
+
+  template <class... Outgoing>
+  void enqueue(Outgoing&&... outgoing);
   kj::Promise<void> writeAll();
-  void buildFrame();
-  void build(wire::Item::Builder item, Carried& carried);
   void onWriteFailure(const std::string& why);
-  struct FrameSize {
-    std::size_t items;
-    std::size_t bytes;  // an estimate
-  };
-  [[nodiscard]] FrameSize sizeOfNextFrame() const;
-  void noteQueue() noexcept;
-  [[nodiscard]] std::size_t notes() const noexcept { return queue_.size() - waiting_; }
-  void makeScratch(std::size_t bytes);
-  void finish(LineEnd end);
-  [[nodiscard]] std::int64_t halfDeadNs() const noexcept {
-    return std::chrono::nanoseconds(limits_.deadTime).count() / 2;
-  }
+
+  kj::Promise<void> livenessLoop();
+  void ping();
+  void onPing(std::uint64_t stamp);
 
   kj::Own<kj::AsyncIoStream> stream_;
   kj::Timer& timer_;
   Limits limits_;
   PeerRecord& record_;
-  Owner& owner_;
+  Events events_;
+  State state_ = State::greeting;
+  PeerGreeting peer_;
   FrameReader reader_;
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled
   capnp::uint nextItem_ = 0;
-  bool handling_ = false;
-  bool hasMore_ = false;  // the last read filled its buffer: more bytes may be waiting
-  PeerGreeting peer_;
-  bool greeted_ = false;
-  std::deque<Outgoing> queue_;
-  std::size_t waiting_ = 0;  // messages in queue_
-  std::size_t answers_ = 0;  // answers in queue_
-  bool writing_ = false;
-  Phase phase_ = Phase::running;
-  std::vector<Carried> lateRequests_;  // requests that were sent after our farewell
+  SendQueue queue_;
+  // Notes that are sent while items of the peer are handled are answers.
+  SendQueue::NoteKind noteKind_ = SendQueue::NoteKind::own;
+  KeepAlive keepAlive_;
   std::string farewell_;  // the text of our farewell
-  // After our farewell, read until the peer closes: with unread data the kernel would reset the
-  // connection, and the peer might not receive the farewell.
-  bool drains_ = false;
-  std::int64_t lastReceiveNs_ = 0;  // time of the last sign of life
-  std::size_t partialBytes_ = 0;  // received since then, of a frame that is still arriving
-  bool overdue_ = false;  // the last check has found the peer overdue
-  std::int64_t greetingDueNs_ = 0;  // deadline of the peer's greeting
-  std::int64_t checkAfterNs_;  // longest time until the next check
-  std::int64_t lastPingNs_ = 0;  // when the last ping was sent
-  std::int64_t lastPostponeNs_ = 0;  // when the own ping was postponed last
-  std::minstd_rand random_{std::random_device{}()};
-  kj::Array<capnp::word> scratch_;
-  kj::Own<capnp::MallocMessageBuilder> frame_;
   kj::Own<kj::PromiseFulfiller<LineEnd>> ended_;
   kj::Own<kj::PromiseFulfiller<void>> resumeReading_;  // nullptr: reading is not suspended
   kj::Promise<void> writes_ = nullptr;

@@ -28,11 +28,11 @@ std::string addressOf(kj::PeerIdentity& identity) {
 
 }  // namespace
 
-Listener::Listener(Surroundings& here, const Listen& listen, OnCaller onCaller)
-    : here_(here),
+Listener::Listener(RouterContext& context, const Listen& listen, OnCaller onCaller)
+    : context_(context),
       listen_(listen),
       onCaller_(std::move(onCaller)),
-      turnedAway_(here.timer),
+      refusedPeers_(context.timer),
       tasks_(*this) {}
 
 kj::Promise<void> Listener::start() {
@@ -52,10 +52,10 @@ kj::Promise<void> Listener::start() {
 
 kj::Promise<void> Listener::open() {
   return kj::evalNow([this] {
-           return here_.network.parseAddress(hostForKj(listen_.address), listen_.address.port);
+           return context_.network.parseAddress(hostForKj(listen_.address), listen_.address.port);
          })
       .then([this](kj::Own<kj::NetworkAddress> address) {
-        if (listen_.security == Security::plain) checkPlain(*address, here_.config);
+        if (listen_.security == Security::plain) checkPlain(*address, context_.config);
         receivers_.push_back(address->listen());
         tasks_.add(acceptLoop());
       });
@@ -79,17 +79,17 @@ kj::Promise<void> Listener::acceptLoop() {
             [this](kj::Exception&& error) -> kj::Promise<void> {
               const auto why = toStd(error.getDescription());
               if (problem_ != why)
-                here_.log.warn("{}: cannot accept a connection, trying again: {}",
-                               listen_.address.text(), why);
+                context_.log.warn("{}: cannot accept a connection, trying again: {}",
+                                  listen_.address.text(), why);
               problem_ = why;
-              return here_.timer.afterDelay(kAfterFailure);
+              return context_.timer.afterDelay(kAfterFailure);
             })
       .then([this] { return acceptLoop(); });
 }
 
 void Listener::admit(kj::AuthenticatedStream caller) {
   auto address = addressOf(*caller.peerIdentity);
-  setSocketOptions(*caller.stream, here_.config.limits);
+  setSocketOptions(*caller.stream, context_.config.limits);
   if (listen_.security == Security::plain)
     return onCaller_({kj::mv(caller.stream), {}, std::move(address), false});
   startHandshake(kj::mv(caller), address);
@@ -100,13 +100,13 @@ void Listener::startHandshake(kj::AuthenticatedStream caller, const std::string&
   auto end = kj::newPromiseAndFulfiller<void>();
   const auto number = ++lastHandshake_;
   handshakes_[number] = {hostOf(address), kj::mv(end.fulfiller)};
-  tasks_.add(here_.timer
-                 .timeoutAfter(toKj(here_.config.limits.handshakeTime),
+  tasks_.add(context_.timer
+                 .timeoutAfter(toKj(context_.config.limits.handshakeTime),
                                kj::evalNow([&] { return handshake(kj::mv(caller), address); }))
                  .then([]() {},
                        [this, address](kj::Exception&& error) {
-                         here_.log.warn("{}: the TLS handshake failed: {}", address,
-                                        tlsProblem(error));
+                         context_.log.warn("{}: the TLS handshake failed: {}", address,
+                                           tlsProblem(error));
                        })
                  .exclusiveJoin(kj::mv(end.promise))
                  .attach(kj::defer([this, number] { handshakes_.erase(number); })));
@@ -120,7 +120,7 @@ void Listener::makeRoom() {
       std::ranges::max_element(counts, {}, [](const auto& each) { return each.second; })->second;
   const auto victim = std::ranges::find_if(
       handshakes_, [&](const auto& each) { return counts[each.second.host] == most; });
-  here_.log.warn(
+  context_.log.warn(
       "{}: {} TLS handshakes are in progress, {} of them with {}: closing the oldest of these",
       listen_.address.text(), handshakes_.size(), most, victim->second.host);
   victim->second.end->fulfill();
@@ -142,20 +142,20 @@ kj::Promise<void> Listener::handshake(kj::AuthenticatedStream caller, const std:
 kj::Promise<void> Listener::openTls(kj::AuthenticatedStream caller, kj::byte first,
                                     const std::string& address) {
   if (first == kFrameByte)
-    turnedAway_.add(kj::mv(caller.stream), FarewellCode::PROTOCOL, kExpectsTls);
+    refusedPeers_.add(kj::mv(caller.stream), FarewellCode::PROTOCOL, kExpectsTls);
   if (first == kFrameByte) {
     return KJ_EXCEPTION(FAILED,
                         "the caller uses plain TCP, and this port expects TLS: set the same "
                         "security at both routers");
   }
-  return here_.tls->accept(kj::mv(caller)).then([this, address](kj::AuthenticatedStream peer) {
+  return context_.tls->accept(kj::mv(caller)).then([this, address](kj::AuthenticatedStream peer) {
     const auto name = peerName(*peer.peerIdentity);
     onCaller_({kj::mv(peer.stream), name, address, true});
   });
 }
 
 void Listener::taskFailed(kj::Exception&& error) {
-  here_.log.error("{}: {}", listen_.address.text(), toStd(error.getDescription()));
+  context_.log.error("{}: {}", listen_.address.text(), toStd(error.getDescription()));
 }
 
 }  // namespace mpf::router

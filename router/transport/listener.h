@@ -17,8 +17,8 @@
 #include <map>
 #include <string>
 
-#include "router/surroundings.h"
-#include "router/transport/turned_away.h"
+#include "router/router_context.h"
+#include "router/transport/refused_peers.h"
 
 namespace mpf::router {
 
@@ -32,7 +32,7 @@ class Listener final : private kj::TaskSet::ErrorHandler {
   };
   using OnCaller = std::function<void(Caller)>;
 
-  Listener(Surroundings& here, const Listen& listen, OnCaller onCaller);
+  Listener(RouterContext& context, const Listen& listen, OnCaller onCaller);
 
   // Resolves when it listens. Dropping the promise does not cancel the start; destroying the
   // Listener does.
@@ -54,7 +54,7 @@ class Listener final : private kj::TaskSet::ErrorHandler {
   void makeRoom();
   void taskFailed(kj::Exception&& error) override;
 
-  Surroundings& here_;
+  RouterContext& context_;
   Listen listen_;
   OnCaller onCaller_;
   std::vector<kj::Own<kj::ConnectionReceiver>> receivers_;
@@ -65,7 +65,7 @@ class Listener final : private kj::TaskSet::ErrorHandler {
   std::map<std::uint64_t, Handshake> handshakes_;  // in progress, the oldest one first
   std::uint64_t lastHandshake_ = 0;
   std::string problem_;  // last error of accepting that was logged
-  TurnedAway turnedAway_;
+  RefusedPeers refusedPeers_;
   kj::TaskSet tasks_;
 };
 

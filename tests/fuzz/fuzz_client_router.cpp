@@ -83,24 +83,24 @@ class Play {
   Play(RouterScene& scene, std::span<const std::uint8_t> input)
       : scene_(scene),
         choices_(input),
-        here_{scene.io.unixEventPort,
-              network_,
-              scene.here.timer,
-              scene.backplane,
-              scene.here.log,
-              scene.statistics,
-              scene.presences,
-              scene.here.config,
-              nullptr,
-              1},
+        context_{scene.io.unixEventPort,
+                 network_,
+                 scene.context.timer,
+                 scene.backplane,
+                 scene.context.log,
+                 scene.statistics,
+                 scene.monitors,
+                 scene.context.config,
+                 nullptr,
+                 1},
         dispatcher_(scene.backplane),
         first_(std::make_unique<Local>(dispatcher_)),
         second_(std::make_unique<Local>(dispatcher_)),
         router_(std::make_unique<router::ClientRouter>(
-            here_, router::Remote{.locations = {kLocation},
-                                  .address = {"127.0.0.1", 1},
-                                  .security = router::Security::plain,
-                                  .tlsName = {}})) {
+            context_, router::Remote{.locations = {kLocation},
+                                     .address = {"127.0.0.1", 1},
+                                     .security = router::Security::plain,
+                                     .tlsName = {}})) {
     router_->setPendingBinds({{kLocation, "echo"}});
     scene_.settle();
   }
@@ -151,7 +151,7 @@ class Play {
   Choices choices_;
   RandomItems<Choices> items_{choices_, Side::server};
   SimulatedNetwork network_{[this] { return connect(); }};
-  router::Surroundings here_;
+  router::RouterContext context_;
   Dispatcher dispatcher_;
   std::unique_ptr<Local> first_;
   std::unique_ptr<Local> second_;

@@ -18,11 +18,11 @@ class Play {
         choices_(input),
         connection_(makeConnection()),
         far_(kj::mv(connection_.ends[1]), items_),
-        router_(std::make_unique<router::ServerRouter>(scene.here, kj::mv(connection_.ends[0]), "",
-                                                       "fuzz", false)),
+        router_(std::make_unique<router::ServerRouter>(scene.context, kj::mv(connection_.ends[0]),
+                                                       "", "fuzz", false)),
         run_(router_->run().then([this] { over_ = true; }).eagerlyEvaluate(nullptr)) {
     openServer();
-    scene_.onServers = [this] { router_->lookAtAll(); };
+    scene_.onServers = [this] { router_->lookAtServers(); };
   }
   ~Play() {
     scene_.onServers = [] {};
@@ -51,7 +51,7 @@ class Play {
       case 2:
         return choices_.below(4) == 0 ? openServer() : server_.reset();
       case 3:
-        return scene_.here.config.serve.empty() || choices_.below(8) != 0 ? serve() : reload();
+        return scene_.context.config.serve.empty() || choices_.below(8) != 0 ? serve() : reload();
       default:
         return far_.send();
     }

@@ -57,16 +57,16 @@ void check(bool isRight, const char* what) {
 RouterScene::RouterScene()
     : backplane(fuzzBackplane()),
       statistics(backplane, "fuzz"),
-      here{.port = io.unixEventPort,
-           .network = io.provider->getNetwork(),
-           .timer = io.provider->getTimer(),
-           .backplane = backplane,
-           .log = Log([](Log::Level, const std::string&) {}),
-           .statistics = statistics,
-           .presences = presences,
-           .config = configOf(backplane),
-           .tls = nullptr,
-           .incarnation = 1} {}
+      context{.port = io.unixEventPort,
+              .network = io.provider->getNetwork(),
+              .timer = io.provider->getTimer(),
+              .backplane = backplane,
+              .log = Log([](Log::Level, const std::string&) {}),
+              .statistics = statistics,
+              .monitors = monitors,
+              .config = configOf(backplane),
+              .tls = nullptr,
+              .incarnation = 1} {}
 
 kj::TwoWayPipe makeConnection() {
   auto pipe = kj::newTwoWayPipe();

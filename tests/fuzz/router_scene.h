@@ -10,7 +10,7 @@
 #include <map>
 #include <utility>
 
-#include "router/surroundings.h"
+#include "router/router_context.h"
 #include "router/transport/frame_reader.h"
 #include "shm/watcher.h"
 #include "tests/fuzz/choices.h"
@@ -30,8 +30,8 @@ struct RouterScene {
   Backplane backplane;
   router::Statistics statistics;
   std::function<void()> onServers = [] {};  // called when servers may have started or ended
-  router::Presences presences{backplane, io.unixEventPort, [this] { onServers(); }};
-  router::Surroundings here;
+  router::ServerMonitors monitors{backplane, io.unixEventPort, [this] { onServers(); }};
+  router::RouterContext context;
   // Keeps the watch open, because starting and ending a watch takes longer than the rest of an
   // input.
   Watcher::Token names = backplane.watcher().watchNames(NameKind::pendingBind, [] {});

@@ -10,7 +10,6 @@
 #include <optional>
 #include <stdexcept>
 
-#include "router/transport/kj_text.h"
 #include "tests/router/held_network.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/watchdog.h"
@@ -131,16 +130,6 @@ TEST_F(SlowLookupTest, ThatFailsIsLoggedWithItsStepAndReason) {
   EXPECT_EQ(
       said_,
       "cannot reach slow.lab:9900: the look-up of slow.lab failed: Name or service not known\n");
-}
-
-TEST(ReasonOf, LeavesOutTheNamesOfCallsAndVariables) {
-  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "connect(): Connection refused")), "Connection refused");
-  EXPECT_EQ(reasonOf(KJ_EXCEPTION(
-                FAILED,
-                "::bind(sockfd, &addr, length): Address already in use; toString() = 127.0.0.1:1")),
-            "Address already in use");
-  EXPECT_EQ(reasonOf(KJ_EXCEPTION(OVERLOADED, "operation timed out")), kTimeout);
-  EXPECT_EQ(reasonOf(KJ_EXCEPTION(FAILED, "something else; whatever")), "something else; whatever");
 }
 
 // For example when the end of a connection cannot be logged: otherwise the router would keep

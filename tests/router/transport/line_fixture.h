@@ -28,7 +28,7 @@ using router::LineEnd;
 using router::PeerGreeting;
 using router::ProtocolError;
 
-class LineTest : public testing::Test, public Line::Owner {
+class LineTest : public testing::Test {
  protected:
   // A long dead time, so that the line sends pings only in tests that want them.
   LineTest() { limits_.deadTime = limits_.handshakeTime = std::chrono::minutes(10); }
@@ -50,10 +50,10 @@ class LineTest : public testing::Test, public Line::Owner {
 
   void start() {
     line_ = std::make_unique<Line>(kj::mv(pipe_.ends[0]), io_.provider->getTimer(), limits_,
-                                   record_, *this);
+                                   record_, events());
     running_ = line_
                    ->run([this](wire::Item::Builder item) {
-                     Line::describe(item.initGreeting(), limits_);
+                     router::fillLimits(item.initGreeting(), limits_);
                    })
                    .then([this](LineEnd end) { end_ = std::move(end.text); })
                    .eagerlyEvaluate(nullptr);
@@ -117,19 +117,23 @@ class LineTest : public testing::Test, public Line::Owner {
                : "none, but: " + items[0];
   }
 
-  // ---- the owner
+  // ---- what the line reports
 
-  void onGreeting(const PeerGreeting&) override { said_.emplace_back("greeted"); }
-  void onItem(wire::Item::Reader item) override {
-    if (onItem_) onItem_(item);
-    said_.push_back(router::toStd(kj::str(item)));
-  }
-  void onRoom() override {
-    if (onRoom_) onRoom_();
-  }
-  void onUnsendable(const Carried& carried, const std::string& why,
-                    wire::Item::Builder /*instead*/) override {
-    said_.push_back("cannot send " + std::to_string(carried.requestId) + ": " + why);
+  Line::Events events() {
+    return {.onGreeting = [this](const PeerGreeting&) { said_.emplace_back("greeted"); },
+            .onItem =
+                [this](wire::Item::Reader item) {
+                  if (onItem_) onItem_(item);
+                  said_.push_back(router::toStd(kj::str(item)));
+                },
+            .onRoom =
+                [this] {
+                  if (onRoom_) onRoom_();
+                },
+            .onUnsendable =
+                [this](const Carried& carried, const std::string& why, wire::Item::Builder) {
+                  said_.push_back("cannot send " + std::to_string(carried.requestId) + ": " + why);
+                }};
   }
 
   static Carried request(std::uint32_t id, std::int32_t value = 0) {
@@ -146,7 +150,7 @@ class LineTest : public testing::Test, public Line::Owner {
   layout::RouterLine row_{};
   router::PeerRecord record_{row_};
   std::unique_ptr<Line> line_;
-  std::vector<std::string> said_;  // what the line has reported to its owner
+  std::vector<std::string> said_;  // what the line has reported
   std::string end_;                // why the line ended; empty: it has not
   bool sent_ = false;              // the bytes of beginToSend() have been read
   std::function<void(wire::Item::Reader)> onItem_;

@@ -181,7 +181,7 @@ TEST_F(LineTest, EndsWithAFarewellAtAnInvalidFrame) {
   EXPECT_THAT(end_, HasSubstr("a frame that cannot be read"));
 }
 
-TEST_F(LineTest, EndsWithTheCodeThatItsOwnerThrows) {
+TEST_F(LineTest, EndsWithTheCodeOfAProtocolErrorOfItsUser) {
   startGreeted();
   onItem_ = [](auto) { throw ProtocolError(FarewellCode::LIMIT, "too many"); };
 

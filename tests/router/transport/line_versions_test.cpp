@@ -59,7 +59,7 @@ TEST_F(NewerPeerTest, IsGreeted) {
   EXPECT_EQ(line_->peer().maxClients, 77u);
 }
 
-// The owner gets them in their order, and ignores them.
+// They are handed on in their order.
 TEST_F(NewerPeerTest, ItemsOfUnknownKindsDoNotEndTheLine) {
   int unknown = 0;
   onItem_ = [&](wire::Item::Reader item) {

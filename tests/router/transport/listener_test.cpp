@@ -97,20 +97,20 @@ class ListenerTest : public testing::Test {
   std::string said_;
   kj::AsyncIoContext io_ = kj::setupAsyncIo();
   Statistics statistics_{backplane_, "test"};
-  Presences presences_{backplane_, io_.unixEventPort, [] {}};
-  Surroundings here_{
+  ServerMonitors monitors_{backplane_, io_.unixEventPort, [] {}};
+  RouterContext context_{
       .port = io_.unixEventPort,
       .network = io_.provider->getNetwork(),
       .timer = io_.provider->getTimer(),
       .backplane = backplane_,
       .log = Log([this](Log::Level, const std::string& text) { said_ += text + '\n'; }),
       .statistics = statistics_,
-      .presences = presences_,
+      .monitors = monitors_,
       .config = withLongHandshakeTime(),
       .tls = std::make_shared<Tls>(ours_.files("server"), io_.provider->getTimer())};
   kj::Own<kj::PromiseFulfiller<std::string>> called_;
   Listener listener_{
-      here_,
+      context_,
       {.address = parseAddress("127.0.0.1:0"), .security = Security::tls},
       [this](const Listener::Caller& caller) { called_->fulfill(std::string(caller.name)); }};
   std::uint16_t port_ = 0;
@@ -140,7 +140,7 @@ TEST_F(ListenerTest, KeepsTheHandshakeOfAHostWithFew) {
 
 // Some peers send nothing; others begin a handshake and stop.
 TEST_F(ListenerTest, ClosesHandshakesThatTakeTooLongWhileOthersConnect) {
-  here_.config.limits.handshakeTime = std::chrono::milliseconds(500);
+  context_.config.limits.handshakeTime = std::chrono::milliseconds(500);
   listen();
   std::vector<FileDescriptor> idlers;
   for (int i = 0; i < kIdlers; ++i) {

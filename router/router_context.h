@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Surroundings: the objects that all parts of a router share.
+// RouterContext: the objects that all parts of a router share.
 //
 // Threads  that of the event loop.
 #pragma once
@@ -11,7 +11,7 @@
 #include <mpf/backplane.h>
 
 #include "router/config/router_config.h"
-#include "router/incoming/presences.h"
+#include "router/incoming/server_monitors.h"
 #include "router/statistics.h"
 #include "router/transport/tls.h"
 #include "schema/router.capnp.h"
@@ -19,14 +19,14 @@
 
 namespace mpf::router {
 
-struct Surroundings {
+struct RouterContext {
   kj::UnixEventPort& port;
   kj::Network& network;
   kj::Timer& timer;
   Backplane backplane;
   Log log;
   Statistics& statistics;
-  Presences& presences;
+  ServerMonitors& monitors;
   RouterConfig config;            // replaced by a reload
   std::shared_ptr<Tls> tls;       // nullptr: no connection uses TLS
   std::uint64_t incarnation = 0;  // distinguishes restarts of this router
@@ -42,6 +42,6 @@ void setSocketOptions(kj::AsyncIoStream& stream, const Limits& limits);
 void checkPlain(kj::NetworkAddress& address, const RouterConfig& config);
 
 // Fills in the fields of a greeting that are the same for client and server routers.
-void fillGreeting(wire::Greeting::Builder greeting, const Surroundings& here);
+void fillGreeting(wire::Greeting::Builder greeting, const RouterContext& context);
 
 }  // namespace mpf::router

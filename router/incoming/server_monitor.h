@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Presence: observes whether a server of this backplane is running, and what it offers, without
-// connecting to it.
+// ServerMonitor: observes whether a server of this backplane is running, and what it offers,
+// without connecting to it.
 //
 // Threads  that of the event loop; `onChange` is also called by the watcher's thread.
 // Trust    values that are read from a server's window are bounded before use.
@@ -17,7 +17,7 @@
 
 namespace mpf::router {
 
-class Presence {
+class ServerMonitor {
  public:
   // Calls `onChange` in two cases:
   // - The process of the server that look() found exits.
@@ -25,10 +25,10 @@ class Presence {
   //   a look() that failed. The other users of this object must then call look(), too.
   // `onChange` is not called when the server ends but its process continues; isDoubtful() is then
   // true.
-  Presence(Backplane backplane, ServerName name, std::function<void()> onChange);
-  ~Presence();
-  Presence(const Presence&) = delete;
-  Presence& operator=(const Presence&) = delete;
+  ServerMonitor(Backplane backplane, ServerName name, std::function<void()> onChange);
+  ~ServerMonitor();
+  ServerMonitor(const ServerMonitor&) = delete;
+  ServerMonitor& operator=(const ServerMonitor&) = delete;
 
   // Asks the kernel whether the server is running. If true, the accessors below describe it.
   bool look();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/surroundings.h"
+#include "router/router_context.h"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "base/version.h"
-#include "router/transport/line.h"
+#include "router/transport/peer_greeting.h"
 
 namespace mpf::router {
 
@@ -40,11 +40,11 @@ void checkPlain(kj::NetworkAddress& address, const RouterConfig& config) {
   }
 }
 
-void fillGreeting(wire::Greeting::Builder greeting, const Surroundings& here) {
-  Line::describe(greeting, here.config.limits);
-  greeting.setRouter(here.config.name);
+void fillGreeting(wire::Greeting::Builder greeting, const RouterContext& context) {
+  fillLimits(greeting, context.config.limits);
+  greeting.setRouter(context.config.name);
   greeting.setProgram(fmt::format("mpf-router {}", kVersion));
-  greeting.setIncarnation(here.incarnation);
+  greeting.setIncarnation(context.incarnation);
 }
 
 }  // namespace mpf::router

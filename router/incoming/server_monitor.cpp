@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/incoming/presence.h"
+#include "router/incoming/server_monitor.h"
 
 #include <algorithm>
 
@@ -8,17 +8,17 @@
 
 namespace mpf::router {
 
-Presence::Presence(Backplane backplane, ServerName name, std::function<void()> onChange)
+ServerMonitor::ServerMonitor(Backplane backplane, ServerName name, std::function<void()> onChange)
     : backplane_(std::move(backplane)), name_(std::move(name)), onChange_(std::move(onChange)) {}
 
-Presence::~Presence() { forget(); }
+ServerMonitor::~ServerMonitor() { forget(); }
 
-void Presence::forget() noexcept {
+void ServerMonitor::forget() noexcept {
   if (window_) backplane_.watcher().forget(token_);
   window_.reset();
 }
 
-bool Presence::look() {
+bool ServerMonitor::look() {
   const auto before = incarnation();
   const bool hadFailed = failed_;
   const bool isThere = find();
@@ -26,7 +26,7 @@ bool Presence::look() {
   return isThere;
 }
 
-bool Presence::find() try {
+bool ServerMonitor::find() try {
   if (window_ && !window_->isDead() && !window_->isClosed() && !window_->isLost() &&
       window_->hasOwner())
     return true;
@@ -47,7 +47,7 @@ bool Presence::find() try {
   return false;
 }
 
-std::uint32_t Presence::queueSize() const noexcept {
+std::uint32_t ServerMonitor::queueSize() const noexcept {
   return std::clamp(window_->control().queueSize.load(std::memory_order_relaxed), 1u,
                     LinkGeometry::kMaxQueueSize);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/transport/turned_away.h"
+#include "router/transport/refused_peers.h"
 
 #include <array>
 #include <capnp/message.h>
@@ -26,7 +26,8 @@ kj::Promise<void> readToEnd(kj::AsyncIoStream& caller) {
 
 }  // namespace
 
-void TurnedAway::add(kj::Own<kj::AsyncIoStream> caller, FarewellCode code, const std::string& why) {
+void RefusedPeers::add(kj::Own<kj::AsyncIoStream> caller, FarewellCode code,
+                       const std::string& why) {
   if (callers_ >= kMost) return;
   ++callers_;
   auto message = kj::heap<capnp::MallocMessageBuilder>();

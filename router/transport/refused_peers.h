@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// TurnedAway: rejected connections. Each peer is sent a farewell with the reason before its
+// RefusedPeers: rejected connections. Each peer is sent a farewell with the reason before its
 // connection is closed.
 //
 // Threads  that of the event loop.
@@ -14,9 +14,9 @@
 
 namespace mpf::router {
 
-class TurnedAway final : private kj::TaskSet::ErrorHandler {
+class RefusedPeers final : private kj::TaskSet::ErrorHandler {
  public:
-  explicit TurnedAway(kj::Timer& timer) : timer_(timer), tasks_(*this) {}
+  explicit RefusedPeers(kj::Timer& timer) : timer_(timer), tasks_(*this) {}
 
   // Sends a farewell, and closes the connection after the peer has closed it.
   void add(kj::Own<kj::AsyncIoStream> caller, FarewellCode code, const std::string& why);

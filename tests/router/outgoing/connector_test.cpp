@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// Connector: the steps of a connection, and the texts of their failures.
+#include "router/outgoing/connector.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <kj/debug.h>
+#include <memory>
+
+#include "tests/router/held_network.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
+
+namespace mpf::router::test {
+namespace {
+
+using testing::HasSubstr;
+
+class ConnectorTest : public testing::Test {
+ public:
+  ~ConnectorTest() noexcept override = default;
+
+ protected:
+  // Begins to connect. The look-up waits in io_.network().lookups[0].
+  void connect() {
+    connecting_ =
+        connector_.connect()
+            .then([this](kj::Own<kj::AsyncIoStream> stream) { stream_ = kj::mv(stream); },
+                  [this](kj::Exception&& error) { problem_ = toStd(error.getDescription()); })
+            .eagerlyEvaluate(nullptr);
+    io_.run();
+  }
+  void runUntilDone() { connecting_.wait(io_.context().waitScope); }
+  auto& lookup() { return *io_.network().lookups.at(0); }
+
+  const mpf::test::Watchdog watchdog_{"connector"};
+  const mpf::test::TestBackplane backplane_;
+  HeldIo io_;
+  Statistics statistics_{backplane_, "test"};
+  ServerMonitors monitors_{backplane_, io_.context().unixEventPort, [] {}};
+  RouterContext context_{.port = io_.context().unixEventPort,
+                         .network = io_.network(),
+                         .timer = io_.context().provider->getTimer(),
+                         .backplane = backplane_,
+                         .log = Log([](Log::Level, const std::string&) {}),
+                         .statistics = statistics_,
+                         .monitors = monitors_,
+                         .config = {},
+                         .tls = nullptr};
+  const Remote remote_{.locations = {1},
+                       .address = parseAddress("slow.lab:9900"),
+                       .security = Security::plain,
+                       .tlsName = {}};
+  Connector connector_{context_, remote_};
+  kj::Own<kj::AsyncIoStream> stream_;
+  std::string problem_;
+  kj::Promise<void> connecting_ = nullptr;
+};
+
+TEST_F(ConnectorTest, NamesAFailedLookUp) {
+  connect();
+
+  lookup().reject(KJ_EXCEPTION(FAILED, "gai_strerror(status) = Name or service not known"));
+  runUntilDone();
+
+  EXPECT_EQ(problem_, "the look-up of slow.lab failed: Name or service not known");
+}
+
+TEST_F(ConnectorTest, NamesALookUpThatTakesTooLong) {
+  context_.config.limits.deadTime = std::chrono::milliseconds(20);
+  connect();
+
+  runUntilDone();
+
+  EXPECT_EQ(problem_, "the look-up of slow.lab took longer than 20ms (dead-time)");
+}
+
+TEST_F(ConnectorTest, RefusesAPublicAddressOverPlainTcp) {
+  connect();
+
+  lookup().fulfill(io_.addressOf("8.8.8.8:9900"));
+  runUntilDone();
+
+  EXPECT_THAT(problem_, HasSubstr("8.8.8.8:9900 is a public address: use TLS"));
+}
+
+}  // namespace
+}  // namespace mpf::router::test

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// ServiceManager: the datagrams that systemd receives.
+#include "router/service_manager.h"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <string>
+
+#include <mpf/file_descriptor.h>
+
+#include "tests/support/temporary_folder.h"
+
+namespace mpf::router::test {
+namespace {
+
+// A socket to which $NOTIFY_SOCKET points during a test. `name` may begin with '@', the written
+// form of an abstract socket.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::string& name)
+      : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path, name.data(), name.size());
+    if (name.front() == '@') address.sun_path[0] = '\0';
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size());
+    EXPECT_EQ(::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), length), 0);
+    ::setenv("NOTIFY_SOCKET", name.c_str(), 1);
+  }
+  ~NotifySocket() { ::unsetenv("NOTIFY_SOCKET"); }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+
+  std::string receive() {
+    std::string text(256, '\0');
+    const auto bytes = ::recv(socket_.get(), text.data(), text.size(), MSG_DONTWAIT);
+    text.resize(bytes < 0 ? 0 : static_cast<std::size_t>(bytes));
+    return text;
+  }
+
+ private:
+  FileDescriptor socket_;
+};
+
+TEST(ServiceManager, ReportsEachState) {
+  const mpf::test::TemporaryFolder folder;
+  NotifySocket systemd((folder.path() / "notify").string());
+
+  ServiceManager::notifyReady();
+  EXPECT_EQ(systemd.receive(), "READY=1");
+  ServiceManager::notifyReloading();
+  EXPECT_THAT(systemd.receive(), testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+"));
+  ServiceManager::notifyStopping();
+  EXPECT_EQ(systemd.receive(), "STOPPING=1");
+}
+
+TEST(ServiceManager, UsesAnAbstractSocket) {
+  NotifySocket systemd("@mpf-service-manager-test-" + std::to_string(::getpid()));
+
+  ServiceManager::notifyReady();
+
+  EXPECT_EQ(systemd.receive(), "READY=1");
+}
+
+TEST(ServiceManager, DoesNothingWithoutASocket) {
+  ServiceManager::notifyReady();
+
+  ::setenv("NOTIFY_SOCKET", std::string(200, 'x').c_str(), 1);  // too long for an address
+  ServiceManager::notifyReady();
+  ::setenv("NOTIFY_SOCKET", "/absent/socket", 1);
+  ServiceManager::notifyReady();
+  ::unsetenv("NOTIFY_SOCKET");
+}
+
+}  // namespace
+}  // namespace mpf::router::test

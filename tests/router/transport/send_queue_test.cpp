@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+// SendQueue: which items share a frame, limits, and the requests that were never sent.
+#include "router/transport/send_queue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <string>
+#include <vector>
+
+#include <mpf/message_of.h>
+
+#include "router/transport/kj_text.h"
+
+namespace mpf::router::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using NoteKind = SendQueue::NoteKind;
+
+class SendQueueTest : public testing::Test {
+ public:
+  ~SendQueueTest() noexcept override = default;
+
+ protected:
+  static constexpr std::uint32_t kQueueSize = 3;
+
+  // Builds a frame, and returns its items as text.
+  std::vector<std::string> frame(std::size_t items = SIZE_MAX) {
+    auto& message = queue_.buildFrame(
+        {.items = items, .bytes = 4096, .messageBytes = 1000},
+        [&](const Carried& carried, const std::string& why, wire::Item::Builder instead) {
+          unsendable_.push_back(std::to_string(carried.requestId) + ": " + why);
+          instead.setClose(99);
+        });
+    std::vector<std::string> texts;
+    for (const auto item : message.getRoot<wire::Frame>().asReader().getItems())
+      texts.push_back(toStd(kj::str(item)));
+    return texts;
+  }
+  static SendQueue::Note close(std::uint32_t number) {
+    return [number](wire::Item::Builder item) { item.setClose(number); };
+  }
+  static Carried request(std::uint32_t id) {
+    return {.isRequest = true, .client = 1, .requestId = id, .message = Int32Message({.value = 0})};
+  }
+  static Carried array(std::uint32_t id, std::size_t bytes) {
+    auto message =
+        Char8ArrayMessage::inBuffer(allocateHeapBody(Char8ArrayMessage::bytesFor(bytes)), bytes);
+    return {.isRequest = true, .client = 1, .requestId = id, .message = std::move(message)};
+  }
+
+  layout::RouterLine row_{};
+  PeerRecord record_{row_};
+  SendQueue queue_{kQueueSize, record_};
+  std::vector<std::string> unsendable_;
+};
+
+TEST_F(SendQueueTest, PutsAllThatWaitsIntoOneFrameInItsOrder) {
+  queue_.push(close(1), NoteKind::own);
+  queue_.push(request(2));
+  queue_.push(close(3), NoteKind::answer);
+
+  EXPECT_THAT(frame(), ElementsAre("(close = 1)", HasSubstr("requestId = 2"), "(close = 3)"));
+  EXPECT_TRUE(queue_.isEmpty());
+  EXPECT_EQ(row_.messagesSent, 1u);
+  EXPECT_EQ(row_.framesSent, 1u);
+  EXPECT_GT(row_.bytesSent, 0u);
+}
+
+TEST_F(SendQueueTest, IsIdleWhenItsLastFrameIsWritten) {
+  EXPECT_TRUE(queue_.isIdle());
+
+  queue_.push(close(1), NoteKind::own);
+  EXPECT_FALSE(queue_.isIdle());
+  frame();
+  EXPECT_FALSE(queue_.isIdle()) << "the frame is being written";
+  queue_.frameWritten();
+
+  EXPECT_TRUE(queue_.isIdle());
+}
+
+TEST_F(SendQueueTest, AFrameIsLimitedInItemsAndBytes) {
+  for (std::uint32_t id = 1; id <= 6; ++id) queue_.push(array(id, 900));
+
+  EXPECT_THAT(frame(1), SizeIs(1));
+  EXPECT_THAT(frame(), SizeIs(3)) << "4096 bytes";
+  EXPECT_THAT(frame(), SizeIs(2));
+}
+
+// One frame after the other uses the same memory, which must be zero at the start.
+TEST_F(SendQueueTest, FramesDoNotMix) {
+  queue_.push(array(1, 900));
+  frame();
+  queue_.push(close(2), NoteKind::own);
+
+  EXPECT_THAT(frame(), ElementsAre("(close = 2)"));
+}
+
+TEST_F(SendQueueTest, HasNoRoomWhileTooManyMessagesWait) {
+  for (std::uint32_t id = 1; id <= kQueueSize; ++id) {
+    EXPECT_TRUE(queue_.hasRoom());
+    queue_.push(request(id));
+  }
+  EXPECT_FALSE(queue_.hasRoom());
+  EXPECT_EQ(row_.inQueue, kQueueSize);
+
+  frame(1);
+
+  EXPECT_TRUE(queue_.hasRoom());
+  EXPECT_EQ(row_.inQueue, kQueueSize - 1);
+}
+
+TEST_F(SendQueueTest, HasNoRoomWhileTooManyNotesWait) {
+  for (std::size_t i = 1; i < SendQueue::kMaxNotes; ++i) queue_.push(close(1), NoteKind::own);
+  EXPECT_TRUE(queue_.hasRoom());
+
+  queue_.push(close(1), NoteKind::own);
+
+  EXPECT_FALSE(queue_.hasRoom());
+  EXPECT_FALSE(queue_.hasMaxAnswers());
+}
+
+TEST_F(SendQueueTest, CountsAnswersUntilTheyAreInAFrame) {
+  for (std::size_t i = 0; i < SendQueue::kMaxNotes; ++i) queue_.push(close(1), NoteKind::answer);
+  EXPECT_TRUE(queue_.hasMaxAnswers());
+
+  frame(1);
+
+  EXPECT_FALSE(queue_.hasMaxAnswers());
+}
+
+TEST_F(SendQueueTest, ReportsAMessageThatCannotBeSentAndSendsAnotherItem) {
+  queue_.push(array(7, 1001));
+  queue_.push(request(8));
+
+  EXPECT_THAT(frame(), ElementsAre("(close = 99)", HasSubstr("requestId = 8")));
+  EXPECT_THAT(unsendable_, ElementsAre(HasSubstr("7: ")));
+}
+
+TEST_F(SendQueueTest, ReturnsTheRequestsThatAreInNoFrame) {
+  queue_.push(request(1));
+  frame();
+  queue_.push(request(2));
+  queue_.push(close(1), NoteKind::own);
+  queue_.push(Carried{.requestId = 3, .message = Int32Message({.value = 0})});  // a reply
+  queue_.reject(request(4));
+  queue_.reject(Carried{.requestId = 5, .message = Int32Message({.value = 0})});
+
+  const auto unsent = queue_.takeUnsentRequests();
+
+  ASSERT_THAT(unsent, SizeIs(2));
+  EXPECT_EQ(unsent[0].requestId, 2u);
+  EXPECT_EQ(unsent[1].requestId, 4u);
+  EXPECT_TRUE(queue_.isEmpty());
+  EXPECT_THAT(queue_.takeUnsentRequests(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace mpf::router::test
