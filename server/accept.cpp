@@ -131,7 +131,7 @@ void ServerCore::open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> cl
 
 void ServerCore::closeIfClientDid(Connection& connection) noexcept {
   auto& link = connection.channel->link();
-  if (link.peerState() == layout::LinkState::open || link.hasMessage()) return;
+  if (link.peerState() == layout::LinkState::open || link.incoming().hasMessage()) return;
   if (link.isLost()) count(endpoint_.control().protocolErrors);
   close(connection);
 }
@@ -145,7 +145,7 @@ void ServerCore::closeDead() {
     // If the client closed the link before it died, take() closes the connection after the requests
     // that remain.
     const auto& link = connection->channel->link();
-    if (link.peerState() == layout::LinkState::closed && link.hasMessage()) continue;
+    if (link.peerState() == layout::LinkState::closed && link.incoming().hasMessage()) continue;
     count(endpoint_.control().peersDied);
     close(*connection);
   }

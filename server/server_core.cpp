@@ -336,7 +336,7 @@ ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noex
     MPF_STEP(reply_sent);
     if (first) unanswered.store(0, std::memory_order_relaxed);
     count(endpoint_.control().sent);
-    link.control().serverSent.store(link.sentMessages(), std::memory_order_relaxed);
+    link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
     if (route.requestId == connection.timedId && first) {
       record(endpoint_.control().serviceNs, Clock::nowNs() - connection.timedFromNs);
       connection.timedId = 0;

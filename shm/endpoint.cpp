@@ -123,7 +123,7 @@ std::optional<std::uint32_t> Endpoint::next() noexcept {
   for (std::size_t looked = 0; looked < hotCount_; ++looked) {
     cursor_ = cursor_ + 1 < hotCount_ ? cursor_ + 1 : 0;
     auto& hot = hot_[cursor_];
-    if (hot.link->hasMessage()) {
+    if (hot.link->incoming().hasMessage()) {
       hot.misses = 0;
       ++sinceHints_;
       return hot.index;
@@ -131,7 +131,7 @@ std::optional<std::uint32_t> Endpoint::next() noexcept {
     if (++hot.misses >= kCoolAfter) {
       const auto index = hot.index;
       cool(cursor_);
-      if (links_[index]->hasMessage()) return index;
+      if (links_[index]->incoming().hasMessage()) return index;
       break;
     }
   }
@@ -212,7 +212,7 @@ void Endpoint::cool(std::size_t position) noexcept {
   const auto hot = hot_[position];
   hot_[position] = hot_[--hotCount_];
   hot.link->setWatched(false);
-  if (hot.link->hasNews()) setReadyBit(hot.index);
+  if (hot.link->hasEvents()) setReadyBit(hot.index);
 }
 
 void Endpoint::coolLink(std::uint32_t index) noexcept {
@@ -281,13 +281,13 @@ bool Endpoint::hasHints() const noexcept { return hasReadyWords() || hasSideNews
 
 bool Endpoint::hasNews() const noexcept {
   for (std::size_t position = 0; position < hotCount_; ++position) {
-    if (hot_[position].link->hasMessage()) return true;
+    if (hot_[position].link->incoming().hasMessage()) return true;
   }
   return isRevisitDue() || hasHints();
 }
 
 bool Endpoint::isRevisitDue() const noexcept {
-  return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasNews();
+  return revisit_ && links_[*revisit_] != nullptr && links_[*revisit_]->hasEvents();
 }
 
 bool Endpoint::wait(Deadline deadline) noexcept {
@@ -361,7 +361,7 @@ bool Endpoint::tryScanAllLinks() noexcept {
     scannedAllNs_ = nowNs;
   }
   for (std::uint32_t index = 0; index < links_.size(); ++index) {
-    if (links_[index] != nullptr && links_[index]->hasNews()) setReadyBit(index);
+    if (links_[index] != nullptr && links_[index]->hasEvents()) setReadyBit(index);
   }
   return true;
 }

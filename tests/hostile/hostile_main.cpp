@@ -115,8 +115,8 @@ class Peer {
     static_cast<void>(link_->trySend(envelope, std::vector<std::byte>(bytes), {}));
   }
   void takeOne(bool frees) {
-    if (!link_->hasMessage()) return;
-    const auto envelope = link_->begin();
+    if (!link_->incoming().hasMessage()) return;
+    const auto envelope = link_->incoming().begin();
     if (!frees) return;
     if ((envelope.flags & layout::kSlotChunk) != 0) {
       try {
@@ -124,7 +124,7 @@ class Peer {
       } catch (const ChunkUnavailable&) {  // NOLINT(bugprone-empty-catch): its server has ended
       }
     }
-    link_->end();
+    link_->incoming().end();
   }
   void act(int step) {
     if (kind_ == "flood")

@@ -57,9 +57,9 @@ struct End {
   // A value for Envelope, for tests that check only one word.
   std::optional<std::uint32_t> tryTake(std::uint32_t index) {
     auto& link = *links[index];
-    if (!link.hasMessage()) return std::nullopt;
-    const auto id = link.begin().requestId;
-    link.end();
+    if (!link.incoming().hasMessage()) return std::nullopt;
+    const auto id = link.incoming().begin().requestId;
+    link.incoming().end();
     return id;
   }
 
