@@ -70,7 +70,7 @@ void ServerCore::accept(std::uint64_t incarnation) {
     if (!link) return;
     const auto window =
         SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
-    auto client = endpoint_.peer(window, layout::SegmentKind::clientWindow);
+    auto client = endpoint_.peers().tryOpen(window, layout::SegmentKind::clientWindow);
     if (client && link->peerState() == layout::LinkState::open)
       return open(std::move(link), std::move(client));
     // A client creates its window before its links and removes it after them: without a window,

@@ -67,7 +67,7 @@ void MessageServer::callHandler(const std::function<void(Message&&)>& handler,
   handler(std::move(request));
 } catch (...) {  // the handler has destroyed the request, which has refused it
   core_->endHandling();
-  core_->callAgain();
+  core_->keepReadable();
   throw;
 }
 

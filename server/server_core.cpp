@@ -167,16 +167,16 @@ int ServerCore::descriptor() {
   return endpoint_.descriptor();
 }
 
-void ServerCore::handleSideHints() {
+void ServerCore::handleControlEvents() {
   // Limited, because a faulty client may knock without end.
   for (std::uint32_t knocks = 0; knocks < layout::kKnocks; ++knocks) {
-    const auto incarnation = endpoint_.takeKnock();
+    const auto incarnation = endpoint_.knocks().tryTake();
     if (!incarnation) break;
     accept(*incarnation);
   }
-  rescanDue_ = endpoint_.takeRescan() || rescanDue_;
+  rescanDue_ = endpoint_.knocks().takeRescan() || rescanDue_;
   if (rescanDue_) acceptAll();
-  if (endpoint_.takeLocalNews() && endpoint_.takePeerDeath()) closeDead();
+  if (endpoint_.takeLocalEvent() && endpoint_.takePeerDeath()) closeDead();
 }
 
 Message ServerCore::receive() {
@@ -184,7 +184,7 @@ Message ServerCore::receive() {
   Message message;
   // Limited, because faulty clients may set hints without end, and receive() must return.
   for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
-    if (endpoint_.hasSideNews()) handleSideHints();
+    if (endpoint_.hasControlEvents()) handleControlEvents();
     if (!thrown_.empty()) throwNext();
     const auto index = endpoint_.next();
     if (index && take(*connections_[*index], message)) return message;
@@ -194,12 +194,12 @@ Message ServerCore::receive() {
     }
   }
   endHandling();
-  callAgain();
+  keepReadable();
   return message;
 }
 
-void ServerCore::callAgain() noexcept {
-  if (hasDescriptor_) endpoint_.callAgain();
+void ServerCore::keepReadable() noexcept {
+  if (hasDescriptor_) endpoint_.keepReadable();
 }
 
 // An exception must not interrupt a change of the links: receive() throws it afterwards.

@@ -56,7 +56,7 @@ class ServerCore {
   [[nodiscard]] std::vector<std::uint32_t> owed(std::uint64_t client) const;
   int descriptor();
   // Keeps the descriptor readable, for requests that were not received yet.
-  void callAgain() noexcept;
+  void keepReadable() noexcept;
   void onShortage(std::function<void(const std::string&)> callback) {
     onShortage_ = std::move(callback);
   }
@@ -80,7 +80,7 @@ class ServerCore {
   static std::uint64_t nameOf(const Connection& connection) noexcept {
     return std::uint64_t{connection.index + 1} << 32 | connection.generation;
   }
-  void handleSideHints();
+  void handleControlEvents();
   void accept(std::uint64_t incarnation);
   void acceptAll();
   void open(std::unique_ptr<Link> link, std::shared_ptr<PeerWindow> client);

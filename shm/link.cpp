@@ -154,6 +154,12 @@ Link::~Link() {
     pool_.leaveNames();
 }
 
+void Link::removeFiles(const std::string& backplane, const std::string& name,
+                       std::uint64_t incarnation) {
+  segments::remove(name);
+  removeBulk(backplane, incarnation);
+}
+
 void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept {
   peer_ = std::move(peer);
   peerIndex_ = peerIndex;

@@ -59,6 +59,9 @@ class Link {
   //   throws  SegmentError, std::system_error: the link is unusable; the caller ignores it
   static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name,
                                        const OwnWindow& own);
+  // Removes the files of a link and its pools, for a peer whose client has died.
+  static void removeFiles(const std::string& backplane, const std::string& name,
+                          std::uint64_t incarnation);
   ~Link();
 
   [[nodiscard]] LinkSide side() const noexcept { return side_; }
@@ -105,7 +108,8 @@ class Link {
                    const Limits& limits) noexcept;
   // Whether the caller must set the time of the next message (Envelope::sentTick).
   [[nodiscard]] bool shouldSampleTime() const noexcept;
-  // The ring that trySend() fills, for the number of messages sent and those that the peer has taken.
+  // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
+  // has taken.
   [[nodiscard]] RingProducer& outgoing() noexcept { return out_; }
 
   // Allocates a chunk for a body; nullopt if there is no memory for it.

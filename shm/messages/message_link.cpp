@@ -15,8 +15,9 @@ MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& mes
       message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
     }
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
-    message.assignInline(type, envelope.bodyBytes,
-                         [&](auto body) { link_->incoming().copyBody(body.first(envelope.bodyBytes)); });
+    message.assignInline(type, envelope.bodyBytes, [&](auto body) {
+      link_->incoming().copyBody(body.first(envelope.bodyBytes));
+    });
   } else {
     auto body = allocateHeapBody(layout::kInlineBodyBytes);
     body.size = envelope.bodyBytes;

@@ -61,8 +61,8 @@ class Peer {
   std::unique_ptr<Link> connect(std::uint32_t index) {
     std::shared_ptr<PeerWindow> server;
     while (!server)
-      server = endpoint_.peer(SegmentName::serverWindow(backplane(), 0, kServer),
-                              layout::SegmentKind::serverWindow);
+      server = endpoint_.peers().tryOpen(SegmentName::serverWindow(backplane(), 0, kServer),
+                                         layout::SegmentKind::serverWindow);
     auto link = Link::create(backplane(), endpoint_.window(), index, server);
     endpoint_.attach(index, *link);
     // The server may still be busy with earlier attacks.
@@ -89,7 +89,7 @@ class Peer {
     if (!link ||
         link->control().serverState.load(std::memory_order_relaxed) != layout::LinkState::none)
       return nullptr;
-    auto client = endpoint_.peer(
+    auto client = endpoint_.peers().tryOpen(
         SegmentName::keyed(backplane(), NameKind::clientWindow, link->header().clientWindow),
         layout::SegmentKind::clientWindow);
     if (!client) return nullptr;

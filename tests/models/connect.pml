@@ -11,7 +11,8 @@
 //   MODELS  client/binding.cpp: onLinkState disconnect nudge leave
 //   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
-//   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer
+//   MODELS  shm/knocks.cpp: tryTake takeRescan
+//   MODELS  shm/peer_windows.cpp: tryOpen
 //   HOLDS   a running client connects to a running server, even if any hints are lost
 //   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never
 //           taken"; a reply that was sent is not lost
