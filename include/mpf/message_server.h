@@ -112,7 +112,7 @@ class MessageServer {
   }
   // The same for an array of n elements, in the memory that is shared with the client, or on the
   // heap when that is full or the client is disconnected.
-  //   throws  std::bad_alloc
+  //   throws  std::bad_alloc; std::length_error when n is above 2^32 - 1
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> allocReplyMessage(const Message& request, std::size_t n) {
     auto message = MessageOf<T>::inBuffer(allocate(request, MessageOf<T>::bytesFor(n)), n);
