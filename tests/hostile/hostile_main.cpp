@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A peer that is valid at first: mpf_test_hostile client|server BACKPLANE KIND. Prints "hostile"
 // after many attacks, and then continues until it is killed; sometimes it creates a new window and
-// link. Kinds in addition to those of Mischief: flood (sends as fast as possible, takes nothing),
+// link. Kinds in addition to those of Attacker: flood (sends as fast as possible, takes nothing),
 // slow (takes one message at a time and frees none).
 #include <sys/prctl.h>
 
@@ -14,7 +14,7 @@
 #include <mpf/message.h>
 
 #include "shm/segment_name.h"
-#include "tests/hostile/mischief.h"
+#include "tests/hostile/attacker.h"
 
 namespace mpf::test {
 namespace {
@@ -42,7 +42,7 @@ class Peer {
                     header.maxPoolBytes = 4 << 20;
                   }),
         kind_(std::move(kind)),
-        mischief_(kind_, endpoint_.window(), random) {
+        attacker_(kind_, endpoint_.window(), random) {
     endpoint_.control().queueSize.store(32, std::memory_order_relaxed);
   }
 
@@ -50,7 +50,7 @@ class Peer {
     const auto index = endpoint_.tryReserve().value();
     link_ = side_ == LinkSide::client ? connect(index) : accept(index);
     beLegal();
-    mischief_.reach(*link_);
+    attacker_.reach(*link_);
     for (int step = 0; step < kStepsOfALink; ++step) act(step);
     endpoint_.detach(index);
     link_->setState(layout::LinkState::closed);
@@ -133,7 +133,7 @@ class Peer {
       if (step % 100 == 0) send(static_cast<std::uint32_t>(step + 5), sizeof(Int32));
       return takeOne(false);
     }
-    mischief_.act(*link_);
+    attacker_.act(*link_);
     if (step % 16 == 0) link_->notifyPeer();
   }
   [[nodiscard]] const std::string& backplane() const { return endpoint_.backplane().name(); }
@@ -142,7 +142,7 @@ class Peer {
   std::unique_ptr<Link> link_;
   Endpoint endpoint_;
   std::string kind_;
-  Mischief mischief_;
+  Attacker attacker_;
 };
 
 }  // namespace
