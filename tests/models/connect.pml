@@ -9,7 +9,8 @@
 //
 //   MODELS  client/connect.cpp: tryConnect pendingBind
 //   MODELS  client/binding.cpp: onLinkState disconnect nudge leave
-//   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
+//   MODELS  server/acceptor.cpp: acceptAll rescan accept open
+//   MODELS  server/connections.cpp: add open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
 //   MODELS  shm/knocks.cpp: tryTake takeRescan
 //   MODELS  shm/peer_windows.cpp: tryOpen
