@@ -14,26 +14,29 @@ void ReadyBits::set(std::uint32_t index) noexcept {
   hints_.readyWords[word / 64].fetch_or(std::uint64_t{1} << (word % 64), std::memory_order_release);
 }
 
-std::optional<std::uint32_t> ReadyBits::tryTakeFrom(std::uint32_t word) noexcept {
+std::optional<std::uint32_t> ReadyBits::tryTakeFrom(std::uint32_t word,
+                                                    std::uint64_t eligible) noexcept {
+  auto bits = hints_.readyBits[word].load(std::memory_order_relaxed);
+  if (bits != 0 && (bits & eligible) == 0) return std::nullopt;
+  auto& words = hints_.readyWords[word / 64];
   const auto wordBit = std::uint64_t{1} << (word % 64);
   // PAIR(ready-word): cleared before the ready bits are read. A peer that sets a ready bit later
   // sets this bit again.
-  hints_.readyWords[word / 64].fetch_and(~wordBit, std::memory_order_acq_rel);
+  words.fetch_and(~wordBit, std::memory_order_acq_rel);
   MPF_STEP(ready_word_taken);
-  const auto bits = hints_.readyBits[word].load(std::memory_order_relaxed);
-  if (bits == 0) return std::nullopt;
-  const auto start = position_ / 64 == word ? position_ % 64 : 0;
-  const auto rotated = std::rotr(bits, static_cast<int>(start));
-  const auto bit = (static_cast<std::uint32_t>(std::countr_zero(rotated)) + start) % 64;
-  // PAIR(ready-bit): cleared before the caller looks at the link.
-  const auto left =
-      hints_.readyBits[word].fetch_and(~(std::uint64_t{1} << bit), std::memory_order_acq_rel) &
-      ~(std::uint64_t{1} << bit);
-  MPF_STEP(ready_bit_taken);
+  bits = hints_.readyBits[word].load(std::memory_order_relaxed);
+  std::optional<std::uint32_t> index;
+  if ((bits & eligible) != 0) {
+    const auto bit = static_cast<std::uint32_t>(std::countr_zero(bits & eligible));
+    const auto others = ~(std::uint64_t{1} << bit);
+    // PAIR(ready-bit): cleared before the caller looks at the link.
+    bits = hints_.readyBits[word].fetch_and(others, std::memory_order_acq_rel) & others;
+    MPF_STEP(ready_bit_taken);
+    index = word * 64 + bit;
+    position_ = (*index + 1) % layout::kMaxLinks;
+  }
   // PAIR(ready-word): set again, because other bits of this word are still set.
-  if (left != 0) hints_.readyWords[word / 64].fetch_or(wordBit, std::memory_order_release);
-  const auto index = word * 64 + bit;
-  position_ = (index + 1) % layout::kMaxLinks;
+  if (bits != 0) words.fetch_or(wordBit, std::memory_order_release);
   return index;
 }
 

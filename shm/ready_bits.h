@@ -9,7 +9,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
+#include <bit>
 #include <cstdint>
 #include <optional>
 
@@ -29,15 +29,19 @@ class ReadyBits {
                        [](const auto& word) { return word.load(std::memory_order_relaxed) != 0; });
   }
   // Clears a set bit and returns its index, if `isLink(index)` is true. Begins at position(), so
-  // that low indices do not starve high ones. Takes at most one bit of each word, because faulty
+  // that low indices do not starve high ones. Takes at most two bits of each word, because faulty
   // peers may set bits without end; nullopt if none of them belongs to a link.
   template <class IsLink>
   std::optional<std::uint32_t> tryTake(const IsLink& isLink) noexcept {
     const auto first = position_ / 64;
-    for (std::uint32_t looked = 0; looked < kWords; ++looked) {
-      const auto word = (first + looked) % kWords;
-      if (!mayHaveBits(word)) continue;
-      if (const auto index = tryTakeFrom(word); index && isLink(*index)) return index;
+    const auto rest = kAllBits << (position_ % 64);
+    for (auto word = nextWord(first); word < kWords; word = nextWord(word + 1)) {
+      const auto index = tryTakeFrom(word, word == first ? rest : kAllBits);
+      if (index && isLink(*index)) return index;
+    }
+    for (auto word = nextWord(0); word <= first; word = nextWord(word + 1)) {
+      const auto index = tryTakeFrom(word, kAllBits);
+      if (index && isLink(*index)) return index;
     }
     return std::nullopt;
   }
@@ -46,10 +50,19 @@ class ReadyBits {
 
  private:
   static constexpr std::uint32_t kWords = layout::kMaxLinks / 64;
-  [[nodiscard]] bool mayHaveBits(std::uint32_t word) const noexcept {
-    return (hints_.readyWords[word / 64].load(std::memory_order_relaxed) >> (word % 64) & 1) != 0;
+  static constexpr auto kAllBits = ~std::uint64_t{0};
+
+  // The first word, from `from` on, that may have set bits; kWords if there is no such word.
+  [[nodiscard]] std::uint32_t nextWord(std::uint32_t from) const noexcept {
+    for (auto group = from / 64; group < hints_.readyWords.size(); ++group) {
+      auto words = hints_.readyWords[group].load(std::memory_order_relaxed);
+      if (group == from / 64) words &= kAllBits << (from % 64);
+      if (words != 0) return group * 64 + static_cast<std::uint32_t>(std::countr_zero(words));
+    }
+    return kWords;
   }
-  std::optional<std::uint32_t> tryTakeFrom(std::uint32_t word) noexcept;
+  // Takes one of the `eligible` bits of a word.
+  std::optional<std::uint32_t> tryTakeFrom(std::uint32_t word, std::uint64_t eligible) noexcept;
 
   layout::WindowHints& hints_;
   std::uint32_t position_ = 0;

@@ -198,6 +198,26 @@ TEST_F(EndpointTest, AFloodOnOneLinkDoesNotStarveOthers) {
   EXPECT_LE(others, 20);
 }
 
+// More busy links than the endpoint polls, and a link whose ready bit is in another word.
+TEST_F(EndpointTest, BusyLinksDoNotStarveALinkWithAHighIndex) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  std::vector<Connected> links;
+  while (links.size() < 2 * HotLinks::kCapacity) links.push_back(connect(client, server));
+  for (int i = 0; i < 60; ++i) connect(client, server);
+  const auto quiet = connect(client, server);
+  shares(server, links, 1000);
+
+  ASSERT_EQ(send(quiet.client, 7), LinkSend::sent);
+  const auto taken = [&] { return quiet.server.incoming().messages() != 0; };
+  for (int turns = 0; turns < 1000 && !taken(); ++turns) {
+    for (const auto& link : links) static_cast<void>(send(link.client, 1));
+    if (const auto index = server.endpoint.next()) server.tryTake(*index);
+  }
+
+  EXPECT_TRUE(taken());
+}
+
 TEST_F(EndpointTest, DoesNotLookAtIdleLinks) {
   End server(backplane_, "server");
   End client(backplane_, "");

@@ -46,9 +46,9 @@ TEST_F(ReadyBitsTest, ReachesEveryIndex) {
 }
 
 TEST_F(ReadyBitsTest, LowIndicesDoNotStarveHighOnes) {
-  for (const std::uint32_t index : {3u, 5u, 60u}) bits_.set(index);
+  for (const std::uint32_t index : {3u, 5u, 70u, 16'000u}) bits_.set(index);
 
-  for (const std::uint32_t index : {3u, 5u, 60u, 3u, 5u}) {
+  for (const std::uint32_t index : {3u, 5u, 70u, 16'000u, 3u, 5u}) {
     EXPECT_EQ(take(), index);
     bits_.set(index);
   }
