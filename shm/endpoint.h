@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Endpoint: a window and the links that end at it; waits for the next message of any of the links.
 //
-//   poll the busy links ─► read the ready bits ─► no message: spin for a while
-//                                                 ─► announce the sleep, look again, sleep
+//   next   HotLinks: poll the busy links ─► ReadyBits: look at links with hints
+//   wait   the same for a while (SpinBudget) ─► announce the sleep, look again, sleep
+//   control events, which are not of a link: Knocks, and local events such as a death (PeerWindows)
 //
 // Idle links cost nothing, however many there are: the endpoint looks at a link that it does not
 // poll only when its ready bit is set. Links take turns, one message each.
