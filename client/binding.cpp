@@ -73,7 +73,7 @@ bool Binding::onLinkState() {
     deliverConnect(ConnectStatus::connectYes);
     return true;
   }
-  if (state == layout::LinkState::closed && !link.hasMessage()) {
+  if (state == layout::LinkState::closed && !link.incoming().hasMessage()) {
     disconnect("the server closed the connection", Ending::serverGone);
     return true;
   }
@@ -219,10 +219,10 @@ void Binding::endAll() {
   end_->isInterrupted = false;
   deliverRemaining(channel.get());
   requests->forEach([&](Request& request) {
-    deliverFate(request,
-                ending != Ending::protocolError && !channel->link().isTaken(request.ordinal)
-                    ? Fate::neverTaken
-                    : Fate::outcomeUnknown);
+    deliverFate(request, ending != Ending::protocolError &&
+                                 !channel->link().outgoing().isTaken(request.ordinal)
+                             ? Fate::neverTaken
+                             : Fate::outcomeUnknown);
   });
   if (channel_ != channel) return;  // a callback destroyed the client
   const bool wasConnected = end_->wasConnected;
@@ -322,7 +322,7 @@ void Binding::expire(std::int64_t nowNs) {
     bool taken = false;
     {
       const std::lock_guard lock(*lock_);
-      taken = channel_->link().isTaken(request.ordinal);
+      taken = channel_->link().outgoing().isTaken(request.ordinal);
     }
     if (!taken) deliverFate(request, Fate::expired);
   });

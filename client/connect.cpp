@@ -75,8 +75,8 @@ void Binding::tryConnect() try {
   if (channel_ || left_) return;
   auto& endpoint = dispatcher_.endpoint();
   const auto& backplane = endpoint.backplane().name();
-  auto server = endpoint.peer(SegmentName::serverWindow(backplane, location_, server_),
-                              layout::SegmentKind::serverWindow);
+  auto server = endpoint.peers().tryOpen(SegmentName::serverWindow(backplane, location_, server_),
+                                         layout::SegmentKind::serverWindow);
   if (!server) return pendingBind();
   const auto index = endpoint.tryReserve();
   if (!index) {

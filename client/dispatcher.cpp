@@ -120,7 +120,7 @@ bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()
   const RunnerGuard guard(isNested ? nullptr : &lock_);
   const auto isOver = [&] { return !isNested && lock_.isRunnerWaiting(); };
   while (!isDone() && !deadline.hasPassed() && !isOver()) run(deadline, isOver);
-  if (hasDescriptor_) endpoint_.callAgain();  // running has made it unreadable
+  if (hasDescriptor_) endpoint_.keepReadable();  // running has made it unreadable
   return true;
 }
 
@@ -148,9 +148,10 @@ bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
 
 // Only servers accept clients: a knock at a client window is invalid.
 void Dispatcher::Impl::dropKnocks() noexcept {
-  for (std::uint32_t knocks = 0; knocks < layout::kKnocks && endpoint_.takeKnock(); ++knocks) {
+  for (std::uint32_t knocks = 0; knocks < layout::kKnocks && endpoint_.knocks().tryTake();
+       ++knocks) {
   }
-  static_cast<void>(endpoint_.takeRescan());
+  static_cast<void>(endpoint_.knocks().takeRescan());
 }
 
 // When a callback throws, the interrupt() makes the next wait return immediately, so that the next
@@ -164,7 +165,7 @@ bool Dispatcher::Impl::tryStep() {
   // A callback may run the dispatcher, too: bindings whose callback is in progress stay alive.
   const DepthGuard inside(depth_);
   if (depth_ == 1) removed_.clear();
-  bool hasActed = endpoint_.takeLocalNews() && handleLocalHints();
+  bool hasActed = endpoint_.takeLocalEvent() && handleLocalHints();
   hasActed = resumeRounds() || hasActed;
   if (const auto index = endpoint_.next()) {
     auto* binding = *index < byIndex_.size() ? byIndex_[*index] : nullptr;
@@ -198,7 +199,7 @@ bool Dispatcher::Impl::runPending(int most) {
     dropKnocks();
     if (!hasDescriptor_ || endpoint_.arm()) return true;
   }
-  if (hasDescriptor_) endpoint_.callAgain();
+  if (hasDescriptor_) endpoint_.keepReadable();
   return false;
 }
 

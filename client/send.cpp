@@ -33,7 +33,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
     envelope.deadlineNs = takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
     request->clientType = envelope.clientType;
     request->clientExtra = envelope.clientExtra;
-    request->ordinal = link.sentMessages() + 1;
+    request->ordinal = link.outgoing().messages() + 1;
     request->deadlineNs = envelope.deadlineNs;
     request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
     if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
@@ -49,7 +49,7 @@ SendResult Binding::send(Message& message, Deadline takeBefore, std::uint32_t& r
     } else {
       isFullReported_ = false;
       nudging = std::exchange(nudging_, true);
-      link.control().clientSent.store(link.sentMessages(), std::memory_order_relaxed);
+      link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
       link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
       requestId = id;
     }

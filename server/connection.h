@@ -2,7 +2,8 @@
 // Connection: the server's end of one client's connection. Connection objects are reused;
 // `generation` distinguishes the clients that have used the same object.
 //
-// Threads  as ServerCore; any thread may call take() and GiveBack.
+// Threads  the server's thread changes a connection; any thread may read and reply under `lock`.
+//          Any thread may call take() and GiveBack.
 // Lifetime a handle of a request refers to its connection by address and may outlive its server:
 //          connections are never freed, and the servers of a process share them. There are as many
 //          connections as the process has had clients at one time.
@@ -25,17 +26,38 @@ struct Connection {
   // Returns a free connection; creates one when there is no free one.
   static Pointer take();
 
+  // The connection of a route with a link.
+  [[nodiscard]] static Connection& of(const Route& route) noexcept {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): only servers interpret the link of a route
+    return *reinterpret_cast<Connection*>(route.link);
+  }
+  // The route of a request of the present client; 0: of no request.
+  [[nodiscard]] Route routeOf(std::uint32_t requestId, RouteKeeper* keeper) noexcept {
+    return {reinterpret_cast<std::uint64_t>(this), requestId, generation, keeper};
+  }
+  // Under lock: whether the client of this route is still connected.
+  [[nodiscard]] bool isOpenFor(const Route& route) const noexcept {
+    return generation == route.flags && channel;
+  }
+  // The number that MessageServer::clientOf() returns for the present client.
+  [[nodiscard]] std::uint64_t client() const noexcept {
+    return std::uint64_t{index + 1} << 32 | generation;
+  }
+  // The place of a request in `unanswered`; it contains the id until the first reply.
+  [[nodiscard]] std::atomic<std::uint32_t>& owed(std::uint32_t requestId) noexcept {
+    return unanswered[requestId & unansweredMask];
+  }
+  [[nodiscard]] bool owes(std::uint32_t requestId) noexcept {
+    return requestId != 0 && owed(requestId).load(std::memory_order_relaxed) == requestId;
+  }
+
   std::shared_ptr<SpinLock> lock = std::make_shared<SpinLock>();
   std::shared_ptr<MessageLink> channel;  // under lock; empty: free
-  std::uint32_t index = 0;
+  std::uint32_t index = 0;  // of the link in the server's endpoint
   std::uint32_t generation = 0;  // under lock
   // Ids of received requests without a reply, by their low bits; the size is a power of two.
   std::vector<std::atomic<std::uint32_t>> unanswered;
   std::uint32_t unansweredMask = 0;
-
-  [[nodiscard]] std::atomic<std::uint32_t>& owed(std::uint32_t requestId) noexcept {
-    return unanswered[requestId & unansweredMask];
-  }
   std::uint32_t timedId = 0;  // the request whose service time is measured, under lock
   std::int64_t timedFromNs = 0;
   Connection* nextFree = nullptr;

@@ -38,15 +38,15 @@ bool MessageServer::waitForMessage(Deadline deadline) { return core_->wait(deadl
 Message MessageServer::receive() { return core_->receive(); }
 void MessageServer::interrupt() noexcept { core_->interrupt(); }
 std::uint64_t MessageServer::clientOf(const Message& request) const noexcept {
-  return core_->clientOf(request);
+  return Connections::clientOf(request.route());
 }
-bool MessageServer::isAwaited(const Message& request) const noexcept {
-  return core_->isAwaited(request);
+bool MessageServer::isClientConnected(const Message& request) const noexcept {
+  return Connections::isConnected(request.route());
 }
-ReplyResult MessageServer::reply(Message&& message) { return core_->reply(message); }
+ReplyResult MessageServer::reply(Message&& message) { return core_->replies().send(message); }
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
-  return core_->allocate(request.route(), bytes);
+  return ReplySender::allocate(request.route(), bytes);
 }
 int MessageServer::descriptor() { return core_->descriptor(); }
 
@@ -67,7 +67,7 @@ void MessageServer::callHandler(const std::function<void(Message&&)>& handler,
   handler(std::move(request));
 } catch (...) {  // the handler has destroyed the request, which has refused it
   core_->endHandling();
-  core_->callAgain();
+  core_->keepReadable();
   throw;
 }
 
@@ -99,7 +99,7 @@ int MessageServer::runUntilSignal() {
 }
 
 void MessageServer::onShortage(std::function<void(const std::string&)> callback) {
-  core_->onShortage(std::move(callback));
+  core_->acceptor().onShortage(std::move(callback));
 }
 void MessageServer::countAlarm() noexcept { core_->countAlarm(); }
 

@@ -6,21 +6,21 @@
 namespace mpf {
 
 void RelayServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
-  core_->onClient(std::move(callback));
+  core_->connections().onClient(std::move(callback));
 }
 Deadline RelayServer::takeBefore() const noexcept { return core_->takeBefore(); }
 ReplyResult RelayServer::replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message) {
-  message.setRoute(core_->routeTo(client, requestId));
-  return core_->reply(message);
+  message.setRoute(core_->connections().routeTo(client, requestId));
+  return core_->replies().send(message);
 }
 bool RelayServer::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
-  return core_->owes(client, requestId);
+  return core_->connections().owes(client, requestId);
 }
 std::vector<std::uint32_t> RelayServer::owed(std::uint64_t client) const {
-  return core_->owed(client);
+  return core_->connections().owed(client);
 }
 BodyBytes RelayServer::allocateBody(std::uint64_t client, std::size_t bytes) {
-  return core_->allocate(core_->routeTo(client, 0), bytes);
+  return ReplySender::allocate(core_->connections().routeTo(client, 0), bytes);
 }
 
 }  // namespace mpf

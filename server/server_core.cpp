@@ -2,48 +2,14 @@
 #include "server/server_core.h"
 
 #include <fmt/format.h>
-#include <list>
 #include <mutex>
-#include <new>
 #include <stdexcept>
-#include <utility>
 
 #include "base/step.h"
 #include "shm/histogram.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
-
-// Handles of requests may outlive their server, so keepers are never freed: they cost a few bytes
-// for each server that the process creates.
-class ServerCore::Keeper final : public RouteKeeper {
- public:
-  static Keeper* make(ServerCore& server) {
-    const std::lock_guard lock(mutex());
-    all().emplace_back().server_ = &server;
-    return &all().back();
-  }
-  void leave() noexcept {
-    const std::lock_guard lock(mutex());
-    server_ = nullptr;
-  }
-  void abandoned(const Route& route) noexcept override {
-    const std::lock_guard lock(mutex());
-    if (server_ != nullptr) server_->abandoned(route);
-  }
-
- private:
-  static std::mutex& mutex() {
-    static auto* const theMutex = new std::mutex;
-    return *theMutex;
-  }
-  static std::list<Keeper>& all() {
-    static auto* const keepers = new std::list<Keeper>;
-    return *keepers;
-  }
-  ServerCore* server_ = nullptr;
-};
-
 namespace {
 
 // More than the number of links, so that receive() looks at each link.
@@ -82,15 +48,19 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
             reinterpret_cast<layout::WindowControl*>(control)->queueSize.store(
                 queueSize, std::memory_order_relaxed);
           }),
-      keeper_(Keeper::make(*this)) {}
+      connections_(endpoint_),
+      acceptor_(endpoint_, connections_),
+      replies_(endpoint_.control()),
+      keeper_(RequestKeeper::make(replies_)),
+      progress_(endpoint_.control()) {}
 
 ServerCore::~ServerCore() {
-  keeper_->leave();
+  keeper_.leave();
   if (endpoint_.forkGuard().isInherited()) return;
   MPF_STEP(server_leaving);
   endpoint_.control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
-  onClient_ = nullptr;
-  closeAll();
+  connections_.onClient(nullptr);
+  connections_.closeAll();
 }
 
 void ServerCore::setQueueSize(int size) {
@@ -113,70 +83,15 @@ void ServerCore::interrupt() noexcept {
   endpoint_.interrupt();
 }
 
-std::uint64_t ServerCore::clientOf(const Message& request) const noexcept {
-  const auto route = request.route();
-  if (route.link == 0) return 0;
-  auto& connection = connectionOf(route);
-  const std::lock_guard lock(*connection.lock);
-  if (connection.generation != route.flags || !connection.channel) return 0;
-  return nameOf(connection);
-}
-
-bool ServerCore::isAwaited(const Message& request) const noexcept {
-  const auto route = request.route();
-  if (route.link == 0) return false;
-  auto& connection = connectionOf(route);
-  const std::lock_guard lock(*connection.lock);
-  if (connection.generation != route.flags || !connection.channel) return false;
-  const auto& link = connection.channel->link();
-  return link.peerState() == layout::LinkState::open && !link.peer()->isDead();
-}
-
-Route ServerCore::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
-  const auto number = client >> 32;
-  if (number == 0 || number > connections_.size()) return {};
-  return {reinterpret_cast<std::uint64_t>(connections_[number - 1].get()), requestId,
-          static_cast<std::uint32_t>(client), nullptr};
-}
-
-bool ServerCore::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
-  const auto route = routeTo(client, requestId);
-  if (route.link == 0 || requestId == 0) return false;
-  auto& connection = connectionOf(route);
-  const std::lock_guard lock(*connection.lock);
-  return connection.generation == route.flags && connection.channel &&
-         connection.owed(requestId).load(std::memory_order_relaxed) == requestId;
-}
-
-std::vector<std::uint32_t> ServerCore::owed(std::uint64_t client) const {
-  const auto route = routeTo(client, 0);
-  std::vector<std::uint32_t> ids;
-  if (route.link == 0) return ids;
-  auto& connection = connectionOf(route);
-  const std::lock_guard lock(*connection.lock);
-  if (connection.generation != route.flags || !connection.channel) return ids;
-  for (const auto& place : connection.unanswered) {
-    if (const auto id = place.load(std::memory_order_relaxed); id != 0) ids.push_back(id);
-  }
-  return ids;
-}
-
 int ServerCore::descriptor() {
   hasDescriptor_ = true;
   static_cast<void>(endpoint_.arm());
   return endpoint_.descriptor();
 }
 
-void ServerCore::handleSideHints() {
-  // Limited, because a faulty client may knock without end.
-  for (std::uint32_t knocks = 0; knocks < layout::kKnocks; ++knocks) {
-    const auto incarnation = endpoint_.takeKnock();
-    if (!incarnation) break;
-    accept(*incarnation);
-  }
-  rescanDue_ = endpoint_.takeRescan() || rescanDue_;
-  if (rescanDue_) acceptAll();
-  if (endpoint_.takeLocalNews() && endpoint_.takePeerDeath()) closeDead();
+void ServerCore::handleControlEvents() {
+  acceptor_.acceptAll();
+  if (endpoint_.takeLocalEvent() && endpoint_.takePeerDeath()) connections_.closeDead();
 }
 
 Message ServerCore::receive() {
@@ -184,40 +99,33 @@ Message ServerCore::receive() {
   Message message;
   // Limited, because faulty clients may set hints without end, and receive() must return.
   for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
-    if (endpoint_.hasSideNews()) handleSideHints();
-    if (!thrown_.empty()) throwNext();
+    if (endpoint_.hasControlEvents()) handleControlEvents();
+    if (connections_.hasThrown()) throwNext();
     const auto index = endpoint_.next();
-    if (index && take(*connections_[*index], message)) return message;
+    if (index && take(*connections_.all()[*index], message)) return message;
     if (!index && (!hasDescriptor_ || endpoint_.arm())) {
       endHandling();
       return message;
     }
   }
   endHandling();
-  callAgain();
+  keepReadable();
   return message;
 }
 
-void ServerCore::callAgain() noexcept {
-  if (hasDescriptor_) endpoint_.callAgain();
-}
-
-// An exception must not interrupt a change of the links: receive() throws it afterwards.
-void ServerCore::reportClient(std::uint64_t client, bool isConnected) noexcept try {
-  if (onClient_) onClient_(client, isConnected);
-} catch (...) {
-  try {
-    thrown_.push_back(std::current_exception());
-  } catch (const std::bad_alloc&) {  // the exception is lost
-  }
+void ServerCore::keepReadable() noexcept {
+  if (hasDescriptor_) endpoint_.keepReadable();
 }
 
 void ServerCore::throwNext() {
-  const auto first = std::move(thrown_.front());
-  thrown_.pop_front();
   // More exceptions or requests may wait: the next wait() returns immediately.
   endpoint_.interrupt();
-  std::rethrow_exception(first);
+  connections_.throwNext();
+}
+
+void ServerCore::closeForProtocolError(Connection& connection) noexcept {
+  count(endpoint_.control().protocolErrors);
+  connections_.close(connection);
 }
 
 bool ServerCore::take(Connection& connection, Message& message) noexcept {
@@ -226,11 +134,10 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   Envelope envelope;
   switch (connection.channel->tryBegin(envelope)) {
     case MessageLink::Take::nothing:
-      closeIfClientDid(connection);
+      connections_.closeIfClientDid(connection);
       return false;
     case MessageLink::Take::invalid:
-      count(control.protocolErrors);
-      close(connection);
+      closeForProtocolError(connection);
       return false;
     case MessageLink::Take::message:
       break;
@@ -239,8 +146,7 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   count(control.progress);
   auto& unanswered = connection.owed(envelope.requestId);
   if (envelope.requestId == 0 || unanswered.load(std::memory_order_relaxed) != 0) {
-    count(control.protocolErrors);
-    close(connection);
+    closeForProtocolError(connection);
     return false;
   }
   unanswered.store(envelope.requestId, std::memory_order_relaxed);
@@ -248,31 +154,27 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   if (envelope.deadlineNs != 0 && hasExpired(envelope)) {
     count(control.expired);
     connection.channel->discard(envelope);
-    sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra,
-             Fate::expired);
+    replies_.sendFate(connection, envelope, Fate::expired);
     return false;
   }
   switch (connection.channel->tryFinish(envelope, message)) {
     case MessageLink::Finish::invalid:
-      count(control.protocolErrors);
-      close(connection);
+      closeForProtocolError(connection);
       return false;
     case MessageLink::Finish::unavailable:
       count(control.refused);
-      sendFate(connection, envelope.requestId, envelope.clientType, envelope.clientExtra,
-               Fate::refused);
+      replies_.sendFate(connection, envelope, Fate::refused);
       return false;
     case MessageLink::Finish::message:
       break;
   }
   if (envelope.sentTick != 0) {
     noteTimes(connection, envelope);
-  } else if (isSlow_) {
-    noteProgress(Clock::nowNs());
+  } else if (progress_.isSlow()) {
+    progress_.note(Clock::nowNs());
   }
-  beginHandling(message);
-  message.setRoute({reinterpret_cast<std::uint64_t>(&connection), envelope.requestId,
-                    connection.generation, keeper_});
+  progress_.begin(message);
+  message.setRoute(connection.routeOf(envelope.requestId, &keeper_));
   takeBefore_ = envelope.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(envelope.deadlineNs);
   return true;
 }
@@ -289,94 +191,10 @@ void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noe
   const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
   record(endpoint_.control().queueWaitNs, waitedNs);
   if (endpoint_.slept()) endpoint_.noteWake(waitedNs);
-  noteProgress(nowNs);
+  progress_.note(nowNs);
   const std::lock_guard lock(*connection.lock);
   connection.timedId = envelope.requestId;
   connection.timedFromNs = nowNs;
-}
-
-ReplyResult ServerCore::reply(Message& message) noexcept {
-  if (!message || message.route().link == 0 || endpoint_.forkGuard().isInherited())
-    return ReplyResult::clientGone;
-  auto& connection = connectionOf(message.route());
-  ReplyResult result{};
-  {
-    const std::lock_guard lock(*connection.lock);
-    result = sendReply(connection, message);
-  }
-  if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
-  return result;
-}
-
-ReplyResult ServerCore::sendReply(Connection& connection, Message& message) noexcept {
-  const auto route = message.route();
-  if (connection.generation != route.flags || !connection.channel) {
-    return ReplyResult::clientGone;
-  }
-  auto& unanswered = connection.owed(route.requestId);
-  const bool first =
-      route.requestId != 0 && unanswered.load(std::memory_order_relaxed) == route.requestId;
-  const auto maxOutstanding = connection.channel->link().header().maxOutstanding;
-  Envelope envelope;
-  envelope.type = static_cast<std::uint16_t>(message.getType());
-  envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
-  envelope.requestId = route.requestId;
-  envelope.clientType = message.getClientType();
-  envelope.clientExtra = message.getClientExtra();
-
-  auto& link = connection.channel->link();
-  if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
-
-  auto unowned = route;
-  unowned.keeper = nullptr;
-  if (first) message.setRoute(unowned);
-  const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
-  const auto result = connection.channel->trySendLocked(envelope, message, limits);
-  if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
-    MPF_STEP(reply_sent);
-    if (first) unanswered.store(0, std::memory_order_relaxed);
-    count(endpoint_.control().sent);
-    link.control().serverSent.store(link.sentMessages(), std::memory_order_relaxed);
-    if (route.requestId == connection.timedId && first) {
-      record(endpoint_.control().serviceNs, Clock::nowNs() - connection.timedFromNs);
-      connection.timedId = 0;
-    }
-    return ReplyResult::sent;
-  }
-  if (first) message.setRoute(route);
-  count(endpoint_.control().replyQueueFull);
-  if (result == LinkSend::full) return ReplyResult::queueFull;
-  return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
-}
-
-void ServerCore::sendFate(Connection& connection, std::uint32_t requestId, std::int32_t clientType,
-                          std::int32_t clientExtra, Fate fate) noexcept {
-  RequestFateMessage message({.fate = fate, .requestId = requestId});
-  message.setClientType(clientType);
-  message.setClientExtra(clientExtra);
-  message.setRoute(
-      {reinterpret_cast<std::uint64_t>(&connection), requestId, connection.generation, nullptr});
-  static_cast<void>(reply(message));
-}
-
-void ServerCore::abandoned(const Route& route) noexcept {
-  auto& connection = connectionOf(route);
-  const std::lock_guard lock(*connection.lock);
-  if (connection.generation != route.flags || !connection.channel) return;
-  if (connection.owed(route.requestId).load(std::memory_order_relaxed) != route.requestId) return;
-  RequestFateMessage message({.fate = Fate::refused, .requestId = route.requestId});
-  message.setRoute({route.link, route.requestId, route.flags, nullptr});
-  if (sendReply(connection, message) == ReplyResult::sent) count(endpoint_.control().refused);
-}
-
-BodyBytes ServerCore::allocate(const Route& route, std::size_t bytes) {
-  std::shared_ptr<MessageLink> channel;
-  if (route.link != 0) {
-    auto& connection = connectionOf(route);
-    const std::lock_guard lock(*connection.lock);
-    if (connection.generation == route.flags) channel = connection.channel;
-  }
-  return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
 }
 
 ServerCore::Counts ServerCore::counts() const {
@@ -384,7 +202,7 @@ ServerCore::Counts ServerCore::counts() const {
   Counts counts{control.queueSize.load(std::memory_order_relaxed), 0,
                 control.received.load(std::memory_order_relaxed), 0,
                 control.sent.load(std::memory_order_relaxed)};
-  for (const auto& connection : connections_) {
+  for (const auto& connection : connections_.all()) {
     const std::lock_guard lock(*connection->lock);
     if (!connection->channel) continue;
     const auto& link = connection->channel->link().control();

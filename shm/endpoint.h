@@ -1,30 +1,34 @@
 // SPDX-License-Identifier: MIT
 // Endpoint: a window and the links that end at it; waits for the next message of any of the links.
 //
-//   poll the busy links ─► read the ready bits ─► no message: spin for a while
-//                                                 ─► announce the sleep, look again, sleep
+//   next   HotLinks: poll the busy links ─► ReadyBits: look at links with hints
+//   wait   the same for a while (SpinBudget) ─► announce the sleep, look again, sleep
+//   control events, which are not of a link: Knocks, and local events such as a death (PeerWindows)
 //
 // Idle links cost nothing, however many there are: the endpoint looks at a link that it does not
 // poll only when its ready bit is set. Links take turns, one message each.
 //
 // Threads  one owner thread; interrupt() may be called by any thread and by a signal handler.
-// Crash    the watcher reports a peer's death as a local event: takeLocalNews(), takePeerDeath().
+// Crash    the watcher reports a peer's death as a local event: takeLocalEvent(), takePeerDeath().
 // Trust    a ready bit may be missing or set without reason: before a sleep the endpoint looks at
 //          every link.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
-#include <map>
-#include <memory>
+#include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <mpf/backplane.h>
 
+#include "shm/hot_links.h"
+#include "shm/knocks.h"
 #include "shm/link.h"
-#include "shm/watcher.h"
+#include "shm/peer_windows.h"
+#include "shm/ready_bits.h"
+#include "shm/spin_budget.h"
 
 namespace mpf {
 
@@ -33,7 +37,6 @@ class Endpoint {
   // The parameters of OwnWindow, and how wait() waits.
   Endpoint(Backplane backplane, layout::SegmentKind kind, const std::string& name, Rights rights,
            WaitMode mode, const std::function<void(layout::SegmentHeader&)>& describe);
-  ~Endpoint();
   Endpoint(const Endpoint&) = delete;
   Endpoint& operator=(const Endpoint&) = delete;
 
@@ -41,6 +44,8 @@ class Endpoint {
   [[nodiscard]] OwnWindow& window() noexcept { return window_; }
   [[nodiscard]] const ForkGuard& forkGuard() const noexcept { return window_.forkGuard(); }
   [[nodiscard]] layout::WindowControl& control() const noexcept { return window_.control(); }
+  // The windows of the peers. The death of a peer is reported as a local event.
+  [[nodiscard]] PeerWindows& peers() noexcept { return peers_; }
 
   // --- links ---
   // Reserves an index (the bit of a new link); nullopt if all are in use.
@@ -52,34 +57,25 @@ class Endpoint {
   // Ignores messages of this link until release(). The index stays reserved.
   void hold(std::uint32_t index) noexcept;
   void release(std::uint32_t index, Link& link) noexcept;
-  // Returns the window of a peer, mapped once and watched; nullptr if there is no open window of
-  // this name whose owner is alive. The owner's death is reported as a local event; then
-  // peer()->isDead() of its links is true.
-  //   throws  as PeerWindow::tryOpen()
-  std::shared_ptr<PeerWindow> peer(const std::string& name, layout::SegmentKind kind);
 
   // --- events ---
   // Index of a link that may have a message or a change of state; nullopt if there is no such link
   // now. The caller takes one message of this link.
   std::optional<std::uint32_t> next() noexcept;
-  // Whether takeKnock(), takeRescan() or takeLocalNews() may return something. Cheap: three loads.
-  [[nodiscard]] bool hasSideNews() const noexcept {
-    const auto& hints = window_.hints();
-    return hints.knocked.load(std::memory_order_relaxed) != knockedSeen_ ||
-           hints.rescan.load(std::memory_order_relaxed) != 0 ||
-           localNews_.load(std::memory_order_relaxed) != 0 || knockCursor_ != layout::kKnocks;
+  // Whether there may be an event that is not one of a link: a knock, a rescan or a local event.
+  // Cheap: three loads.
+  [[nodiscard]] bool hasControlEvents() const noexcept {
+    return knocks_.hasAny() || localEvent_.load(std::memory_order_relaxed) != 0;
   }
-  // The incarnation of a link whose client asks the owner to accept it.
-  std::optional<std::uint64_t> takeKnock() noexcept;
-  // True if knocks were overwritten: the caller must search for new links by name.
-  bool takeRescan() noexcept;
+  // Clients that ask to be accepted.
+  [[nodiscard]] Knocks& knocks() noexcept { return knocks_; }
   // True after an event in this process: a peer died, a server appeared, interrupt() was called.
-  bool takeLocalNews() noexcept;
-  // After takeLocalNews() returned true: whether a peer died. Its links have peer()->isDead().
+  bool takeLocalEvent() noexcept;
+  // After takeLocalEvent() returned true: whether a peer died. Its links have peer()->isDead().
   bool takePeerDeath() noexcept { return peerDied_.exchange(false, std::memory_order_relaxed); }
 
-  // Waits until next(), takeKnock(), takeRescan() or takeLocalNews() may return something. Returns
-  // false if `deadline` passed first.
+  // Waits until next() may return a link, or hasControlEvents() is true. Returns false if
+  // `deadline` passed first.
   bool wait(Deadline deadline) noexcept;
   // Ends the current or the next wait().
   void interrupt() noexcept;
@@ -90,73 +86,47 @@ class Endpoint {
   bool arm() noexcept;
   void disarm() noexcept;
   // Makes the descriptor readable again: the caller has not handled all events.
-  void callAgain() noexcept { window_.ring(); }
+  void keepReadable() noexcept { window_.ring(); }
 
-  // Updates the estimated duration of a wake-up with a measured one.
-  void noteWake(std::int64_t ns) noexcept {
-    wakeNs_ += (std::min<std::int64_t>(ns, 1'000'000) - wakeNs_) / 8;
-  }
+  // The caller has measured the duration of a wake-up.
+  void noteWake(std::int64_t ns) noexcept { spinBudget_.noteWake(ns); }
   // Whether the last wait() slept.
   [[nodiscard]] bool slept() const noexcept { return slept_; }
 
  private:
-  // A link that is polled.
-  struct Hot {
-    std::uint32_t index;
-    std::uint32_t misses;  // consecutive polls without a message
-    Link* link;
-  };
-  static constexpr std::size_t kHotLinks = 8;
-
   std::optional<std::uint32_t> nextReady() noexcept;
   std::optional<std::uint32_t> nextCold() noexcept;
-  std::optional<std::uint32_t> takeReadyBit(std::size_t word) noexcept;
-  void heat(std::uint32_t index) noexcept;
-  void cool(std::size_t position) noexcept;
-  void coolLink(std::uint32_t index) noexcept;
-  void coolAll() noexcept;
-  void setReadyBit(std::uint32_t index) noexcept;
-  [[nodiscard]] bool hasNews() const noexcept;
-  [[nodiscard]] bool hasReadyWords() const noexcept;
+  [[nodiscard]] bool isAttached(std::uint32_t index) const noexcept {
+    return index < links_.size() && links_[index] != nullptr;
+  }
+  void countLinks(std::int32_t more) noexcept;
+  [[nodiscard]] bool hasEvents() const noexcept;
   [[nodiscard]] bool isRevisitDue() const noexcept;
-  [[nodiscard]] bool hasHints() const noexcept;
   bool spin(Deadline deadline) noexcept;
   void announce(layout::SleepState how) noexcept;
   void sleep(Deadline deadline) noexcept;
   bool tryScanAllLinks() noexcept;
-  void dropPeers() noexcept;
 
   Backplane backplane_;
   OwnWindow window_;
   WaitMode mode_;
   std::vector<Link*> links_;
   std::vector<std::uint32_t> freeIndices_;
-  std::array<Hot, kHotLinks> hot_{};
-  std::size_t hotCount_ = 0;
-  std::size_t cursor_ = 0;
+  ReadyBits readyBits_;
+  HotLinks hot_;
+  Knocks knocks_;
   std::uint32_t sinceHints_ = 0;  // messages of polled links since the last look at the hints
   std::uint32_t sinceScan_ = 0;  // looks at the hints since the last scan of all links
-  std::uint32_t readyCursor_ = 0;
   // A link that is not polled and may have further messages after the one that was taken.
   std::optional<std::uint32_t> revisit_;
-  std::uint32_t knockedSeen_ = 0;
-  std::uint32_t knockCursor_ = layout::kKnocks;
-  std::atomic<std::uint32_t> localNews_{0};
+  std::atomic<std::uint32_t> localEvent_{0};
   std::atomic<bool> peerDied_{false};
   bool armed_ = false;
   std::uint64_t sleepNumber_ = 0;  // number of the last sleep that was announced
   bool slept_ = false;
-  std::int64_t wakeNs_ = 10'000;  // estimated duration of a wake-up
-  // How often the spinning time is halved: once more after each long sleep, 0 after a short one.
-  std::uint32_t spinShift_ = 0;
+  SpinBudget spinBudget_;
   std::int64_t scannedAllNs_ = 0;  // time of the last scan of all links
-
-  struct Peer {
-    std::weak_ptr<PeerWindow> window;
-    Watcher::Token token;
-  };
-  // By name: the current window, and older windows of the name whose links have not ended yet.
-  std::multimap<std::string, Peer> peers_;
+  PeerWindows peers_;  // the last member: destroyed first, because deaths interrupt()
 };
 
 }  // namespace mpf

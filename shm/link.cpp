@@ -154,6 +154,12 @@ Link::~Link() {
     pool_.leaveNames();
 }
 
+void Link::removeFiles(const std::string& backplane, const std::string& name,
+                       std::uint64_t incarnation) {
+  segments::remove(name);
+  removeBulk(backplane, incarnation);
+}
+
 void Link::attachPeer(std::shared_ptr<PeerWindow> peer, std::uint32_t peerIndex) noexcept {
   peer_ = std::move(peer);
   peerIndex_ = peerIndex;
@@ -240,8 +246,6 @@ void Link::afterPush() noexcept {
   if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
 }
 
-bool Link::isTaken(std::uint64_t ordinal) noexcept { return out_.isTaken(ordinal); }
-
 std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
 
 void Link::release(const std::byte* data) noexcept {
@@ -254,8 +258,8 @@ void Link::release(const std::byte* data) noexcept {
 
 std::optional<Chunk> Link::tryChunk(const Envelope& envelope) {
   layout::ChunkRef ref{};
-  if (inlineCapacity() == 0) return std::nullopt;
-  copyBody(std::as_writable_bytes(std::span(&ref, 1)));
+  if (in_.inlineCapacity() == 0) return std::nullopt;
+  in_.copyBody(std::as_writable_bytes(std::span(&ref, 1)));
   auto chunk =
       ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
   if (!chunk || envelope.bodyBytes > chunk->capacity) return std::nullopt;

@@ -5,8 +5,8 @@
 //   client side ── requests ring, client's pool ──► server side
 //               ◄── replies ring, server's pool ──
 //
-// Threads  one thread receives (hasMessage, begin, copyBody, end). The caller serialises all other
-//          non-const functions.
+// Threads  one thread receives, with incoming(). The caller serialises all other non-const
+//          functions, those of outgoing() included.
 // Crash    the client owns the segment. If the owner of the client's window dies, the server
 //          removes the segment.
 // Trust    the peer may write every byte. The geometry is copied and checked when the link is
@@ -59,6 +59,9 @@ class Link {
   //   throws  SegmentError, std::system_error: the link is unusable; the caller ignores it
   static std::unique_ptr<Link> tryOpen(const std::string& backplane, const std::string& name,
                                        const OwnWindow& own);
+  // Removes the files of a link and its pools, for a peer whose client has died.
+  static void removeFiles(const std::string& backplane, const std::string& name,
+                          std::uint64_t incarnation);
   ~Link();
 
   [[nodiscard]] LinkSide side() const noexcept { return side_; }
@@ -105,10 +108,9 @@ class Link {
                    const Limits& limits) noexcept;
   // Whether the caller must set the time of the next message (Envelope::sentTick).
   [[nodiscard]] bool shouldSampleTime() const noexcept;
-  // Ordinal of the last message sent; the first one has 1.
-  [[nodiscard]] std::uint64_t sentMessages() const noexcept { return out_.messages(); }
-  // Whether the peer has taken the message with this ordinal.
-  [[nodiscard]] bool isTaken(std::uint64_t ordinal) noexcept;
+  // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
+  // has taken.
+  [[nodiscard]] RingProducer& outgoing() noexcept { return out_; }
 
   // Allocates a chunk for a body; nullopt if there is no memory for it.
   std::optional<Chunk> tryAlloc(std::size_t bytes) noexcept;
@@ -116,24 +118,18 @@ class Link {
   void release(const std::byte* data) noexcept;
 
   // --- receiving ---
-  [[nodiscard]] bool hasMessage() const noexcept { return in_.hasMessage(); }
+  // The ring from which messages are taken.
+  [[nodiscard]] RingConsumer& incoming() noexcept { return in_; }
+  [[nodiscard]] const RingConsumer& incoming() const noexcept { return in_; }
   // Whether there is a message or the peer has ended the link. One hint may stand for both, and the
   // owner may have handled only the message.
-  [[nodiscard]] bool hasNews() const noexcept {
-    return hasMessage() || peerState() >= layout::LinkState::closed;
-  }
-  [[nodiscard]] Envelope begin() noexcept { return in_.begin(); }
-  [[nodiscard]] std::size_t inlineCapacity() const noexcept { return in_.inlineCapacity(); }
-  void copyBody(std::span<std::byte> body) const noexcept { in_.copyBody(body); }
-  // Copies all body bytes of the first slot of the message begun.
-  void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
-    in_.copyFirst(body);
+  [[nodiscard]] bool hasEvents() const noexcept {
+    return in_.hasMessage() || peerState() >= layout::LinkState::closed;
   }
   // The chunk of the kSlotChunk message begun: borrowed from the peer, or one of ours that the peer
   // returns in a message. nullopt if the reference is invalid.
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
   std::optional<Chunk> tryChunk(const Envelope& envelope);
-  void end() noexcept { in_.end(); }
 
   // Announces whether we poll this link. If not, the peer sets our ready bit with each message.
   void setWatched(bool watched) noexcept;

@@ -124,7 +124,7 @@ class RingProducer {
 
   void copyBody(layout::Slot& first, std::span<const std::byte> body) const noexcept {
     if (body.size() == layout::kFirstSlotBodyBytes)
-      return copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
+      return detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     const auto head = std::min(body.size(), first.body.size());
     if (head != 0) std::memcpy(first.body.data(), body.data(), head);
     body = body.subspan(head);
@@ -175,7 +175,7 @@ class RingConsumer {
   }
 
   void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
-    copyWords<layout::kFirstSlotBodyBytes>(body.data(), slot(taken_).body.data());
+    detail::copyWords<layout::kFirstSlotBodyBytes>(body.data(), slot(taken_).body.data());
   }
   // Copies the body of the message begun. `body` must not be longer than inlineCapacity().
   void copyBody(std::span<std::byte> body) const noexcept {

@@ -43,6 +43,7 @@
 
 #include <mpf/detail/copy_words.h>
 #include <mpf/message_body.h>
+#include <mpf/message_layout.h>
 #include <mpf/message_types.h>
 
 namespace mpf {
@@ -280,10 +281,10 @@ class Message {
     BodyBytes body;
     Where() noexcept : inside{} {}
     Where(const Where& other) noexcept {
-      copyWords<kInlineBytes>(inside.data(), other.inside.data());
+      detail::copyWords<kInlineBytes>(inside.data(), other.inside.data());
     }
     Where& operator=(const Where& other) noexcept {
-      copyWords<kInlineBytes>(inside.data(), other.inside.data());
+      detail::copyWords<kInlineBytes>(inside.data(), other.inside.data());
       return *this;
     }
   };
@@ -305,16 +306,16 @@ class Message {
     // Field by field: see copy_words.h.
     State& operator=(const State& other) noexcept {
       at = other.at;
-      copyField(route.link, other.route.link);
-      copyField(route.requestId, other.route.requestId);
-      copyField(route.flags, other.route.flags);
-      copyField(route.keeper, other.route.keeper);
-      copyField(length, other.length);
-      copyField(clientType, other.clientType);
-      copyField(clientExtra, other.clientExtra);
-      copyField(type, other.type);
-      copyField(inlineSize, other.inlineSize);
-      copyField(sound, other.sound);
+      detail::copyField(route.link, other.route.link);
+      detail::copyField(route.requestId, other.route.requestId);
+      detail::copyField(route.flags, other.route.flags);
+      detail::copyField(route.keeper, other.route.keeper);
+      detail::copyField(length, other.length);
+      detail::copyField(clientType, other.clientType);
+      detail::copyField(clientExtra, other.clientExtra);
+      detail::copyField(type, other.type);
+      detail::copyField(inlineSize, other.inlineSize);
+      detail::copyField(sound, other.sound);
       return *this;
     }
   };

@@ -80,7 +80,7 @@ class MessageClient {
   // Allocates an array message of n elements in the memory that is shared with the server, or on
   // the heap when there is no connection or the shared memory is full. Sending the former copies
   // nothing.
-  //   throws  std::bad_alloc
+  //   throws  std::bad_alloc; std::length_error when n is above 2^32 - 1
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> alloc(std::size_t n) {
     return MessageOf<T>::inBuffer(allocate(MessageOf<T>::bytesFor(n)), n);

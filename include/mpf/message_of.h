@@ -20,7 +20,7 @@
 // reply with MessageServer::allocReplyMessage().
 //
 // Threads  as Message: one thread at a time uses a handle.
-// Throws   allocValue(), inBuffer(), setLength() and setSize(); all others are noexcept.
+// Throws   allocValue(), bytesFor(), inBuffer(), setLength() and setSize(); no other function.
 // Trust    as Message: the array length is the one that was checked when the message was received.
 // Source   manual, "Char8ArrayMessage", "Int32ArrayMessage", "Float64ArrayMessage". freeValue() has
 //          no counterpart: the destructor of the handle frees the elements.
@@ -64,14 +64,15 @@ class MessageOf : public Message {
   [[nodiscard]] static MessageOf allocValue(std::size_t n)
     requires ArrayBody<T>
   {
-    if (n > UINT32_MAX) refuseLength(T::kType, n, UINT32_MAX);
     return inBuffer(allocateHeapBody(bytesFor(n)), n);
   }
   // [bytes] The size of the body of an array of n elements, fields included, to be requested from a
-  // lender. Not checked for overflow: n is at most 2^32 - 1.
-  [[nodiscard]] static constexpr std::size_t bytesFor(std::size_t n) noexcept
+  // lender.
+  //   throws  std::length_error when n is above 2^32 - 1
+  [[nodiscard]] static constexpr std::size_t bytesFor(std::size_t n)
     requires ArrayBody<T>
   {
+    if (n > UINT32_MAX) refuseLength(T::kType, n, UINT32_MAX);
     return sizeof(T) + n * sizeof(typename T::Element);
   }
   // As allocValue(), in memory of a lender, of which the message becomes the owner. The array has

@@ -14,7 +14,7 @@
 //   }
 //
 // Threads  one thread waits and receives; any thread may call reply(), allocReplyMessage(),
-//          isAwaited(), countAlarm() and interrupt().
+//          isClientConnected(), countAlarm() and interrupt().
 // Crash    when a client dies, the handles of its requests stay valid; replies to them return
 //          clientGone. Its shared memory is freed when the last of these handles is destroyed.
 // Trust    a client that sends invalid data loses its connection; other clients are not affected.
@@ -99,7 +99,7 @@ class MessageServer {
   [[nodiscard]] std::uint64_t clientOf(const Message& request) const noexcept;
   // Whether that client is still connected and alive. Any thread, also during a handler: clientOf()
   // notices a dead client only when the thread of the server has called receive() again.
-  [[nodiscard]] bool isAwaited(const Message& request) const noexcept;
+  [[nodiscard]] bool isClientConnected(const Message& request) const noexcept;
 
   // Returns a reply to `request`, with its clientType and clientExtra and all fields 0 (manual,
   // "Message Server"). Send it with reply(), before or after a reply that reuses the request
@@ -112,7 +112,7 @@ class MessageServer {
   }
   // The same for an array of n elements, in the memory that is shared with the client, or on the
   // heap when that is full or the client is disconnected.
-  //   throws  std::bad_alloc
+  //   throws  std::bad_alloc; std::length_error when n is above 2^32 - 1
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> allocReplyMessage(const Message& request, std::size_t n) {
     auto message = MessageOf<T>::inBuffer(allocate(request, MessageOf<T>::bytesFor(n)), n);

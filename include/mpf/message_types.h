@@ -38,7 +38,7 @@
 namespace mpf {
 
 // The number of a type, in shared memory. Numbers are never reused. A newer peer may send a number
-// that is not listed here: toString() and layoutOf() accept every number.
+// that is not listed here: <mpf/message_layout.h> accepts every number.
 enum class MessageType : std::uint16_t {
   none = 0,  // of an empty handle; never sent
   connect = 1,
@@ -308,7 +308,7 @@ static_assert(sizeof(OutOfBand) == 24 && sizeof(RequestFate) == 8);
 static_assert(sizeof(Int32Array) == 24 && sizeof(Float64Array) == 24 && sizeof(Char8Array) == 40 &&
               sizeof(User) == 8);
 
-// ---- derived from the descriptions
+// ---- kinds of types
 
 // A body with elements behind its fields.
 template <class T>
@@ -332,51 +332,8 @@ concept CountedInBytes = ArrayBody<T> && sizeof(typename T::Element) == 1;
 template <class T>
 concept CountedInElements = ArrayBody<T> && !CountedInBytes<T>;
 
-// The sizes that are needed to check a body. All are 0 for MessageType::none and unknown types.
-struct BodyLayout {
-  std::uint32_t headerBytes = 0;  // size of the struct
-  std::uint32_t elementBytes = 0;  // size of an element; 0 for a scalar
-  std::uint32_t lengthOffset = 0;  // of the field `length` in the struct
-  std::string_view name = "none";
-};
-
-namespace detail {
-
-template <class T>
-constexpr BodyLayout layoutOf() {
-  static_assert(std::is_standard_layout_v<T> && std::is_trivially_copyable_v<T> && alignof(T) <= 8);
-  static_assert(std::has_unique_object_representations_v<T> || std::is_same_v<T, Float64>,
-                "a struct with padding sends uninitialised bytes to a peer");
-  if constexpr (ArrayBody<T>) {
-    static_assert(sizeof(T) % 8 == 0, "elements are aligned to 8 bytes");
-    return {sizeof(T), sizeof(typename T::Element), offsetof(T, length), T::kName};
-  } else {
-    return {sizeof(T), 0, 0, T::kName};
-  }
-}
-
-template <class... T>
-constexpr auto layoutsOf(std::type_identity<std::tuple<T...>> /*types*/) {
-  std::array<BodyLayout, sizeof...(T) + 1> layouts{};
-  ((layouts[static_cast<std::size_t>(T::kType)] = layoutOf<T>()), ...);
-  return layouts;
-}
-inline constexpr auto kLayouts = layoutsOf(std::type_identity<MessageTypes>{});
-inline constexpr BodyLayout kUnknownLayout{.name = "unknown"};
-
-}  // namespace detail
-
-// The layout of a type; one with sizes 0 and the name "unknown" for a number that has no type.
-[[nodiscard]] constexpr const BodyLayout& layoutOf(MessageType type) noexcept {
-  const auto at = static_cast<std::size_t>(type);
-  return at < detail::kLayouts.size() ? detail::kLayouts[at] : detail::kUnknownLayout;
-}
-
-// The name of a type, a status or a fate, as in texts and JSON; "unknown" for a value that only
-// newer programs have. Valid until the process exits.
-[[nodiscard]] constexpr std::string_view toString(MessageType type) noexcept {
-  return layoutOf(type).name;
-}
+// The name of a status or a fate, as in texts and JSON; "unknown" for a value that only newer
+// programs have. <mpf/message_layout.h> has that of a type. Valid until the process exits.
 [[nodiscard]] constexpr std::string_view toString(ConnectStatus status) noexcept {
   const auto at = static_cast<std::size_t>(status);
   return at < kConnectStatusNames.size() ? kConnectStatusNames[at] : "unknown";

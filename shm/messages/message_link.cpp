@@ -15,12 +15,13 @@ MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& mes
       message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
     }
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
-    message.assignInline(type, envelope.bodyBytes,
-                         [&](auto body) { link_->copyBody(body.first(envelope.bodyBytes)); });
+    message.assignInline(type, envelope.bodyBytes, [&](auto body) {
+      link_->incoming().copyBody(body.first(envelope.bodyBytes));
+    });
   } else {
     auto body = allocateHeapBody(layout::kInlineBodyBytes);
     body.size = envelope.bodyBytes;
-    link_->copyBody({body.data, body.size});
+    link_->incoming().copyBody({body.data, body.size});
     message = Message::adopt(type, body);
   }
   return Finish::message;
@@ -39,7 +40,7 @@ void MessageLink::discard(const Envelope& envelope) noexcept {
     // NOLINTNEXTLINE(bugprone-empty-catch): tryChunk() has returned the chunk to the peer
   } catch (const ChunkUnavailable&) {
   }
-  link_->end();
+  link_->incoming().end();
 }
 
 LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message,

@@ -30,9 +30,9 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   // Begins the next message: copies its envelope and counts it as taken. Returns `nothing`, and
   // changes nothing, if there is no message; `invalid` if the envelope is invalid.
   Take tryBegin(Envelope& envelope) noexcept {
-    if (!link_->hasMessage()) return Take::nothing;
-    envelope = link_->begin();
-    const auto room = link_->inlineCapacity();
+    if (!link_->incoming().hasMessage()) return Take::nothing;
+    envelope = link_->incoming().begin();
+    const auto room = link_->incoming().inlineCapacity();
     const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
     return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room)
                ? Take::message
@@ -48,12 +48,13 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
     if ((envelope.flags & layout::kSlotChunk) == 0 &&
         envelope.bodyBytes <= layout::kFirstSlotBodyBytes) {
       message.assignInline(
-          static_cast<MessageType>(envelope.type), envelope.bodyBytes,
-          [&](auto body) { link_->copyFirst(body.template first<layout::kFirstSlotBodyBytes>()); });
+          static_cast<MessageType>(envelope.type), envelope.bodyBytes, [&](auto body) {
+            link_->incoming().copyFirst(body.template first<layout::kFirstSlotBodyBytes>());
+          });
     } else {
       finish = readBody(envelope, message);
     }
-    link_->end();
+    link_->incoming().end();
     if (!message) return finish == Finish::message ? Finish::invalid : finish;
     message.setClientType(envelope.clientType);
     message.setClientExtra(envelope.clientExtra);

@@ -19,7 +19,7 @@ class Server {
   void turn(std::uint64_t value) try {
     if (!talk_) attach();
     if (talk_) talk_->turn(value);
-  } catch (const std::exception&) {  // as ServerCore::accept() does: it gives up this link
+  } catch (const std::exception&) {  // as Acceptor does: it gives up this link
     talk_.reset();
   }
 

@@ -61,7 +61,7 @@ void Talk::turn(std::uint64_t value) {
   if (link.peerState() != layout::LinkState::open || link.isLost())
     link.setState(layout::LinkState::closed);
   sendArray(*channel_, static_cast<std::uint32_t>(value), value % 2048);
-  static_cast<void>(link.isTaken(value % 8));
+  static_cast<void>(link.outgoing().isTaken(value % 8));
   link.setWatched(value % 2 != 0);
   link.notifyPeer();
 }

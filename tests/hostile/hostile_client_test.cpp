@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class HostileClient : public MischiefTest {
+class HostileClient : public HostileTest {
  protected:
   // Sends requests whose answers can be checked.
   static void ask(SyncClient& client, int number) {
@@ -58,7 +58,7 @@ TEST_P(HostileClient, CostsItsServerOnlyThatLink) {
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
-INSTANTIATE_TEST_SUITE_P(OfEachKind, HostileClient, testing::ValuesIn(kMischief),
+INSTANTIATE_TEST_SUITE_P(OfEachKind, HostileClient, testing::ValuesIn(kAttacks),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A peer that is valid at first: mpf_test_hostile client|server BACKPLANE KIND. Prints "hostile"
 // after many attacks, and then continues until it is killed; sometimes it creates a new window and
-// link. Kinds in addition to those of Mischief: flood (sends as fast as possible, takes nothing),
+// link. Kinds in addition to those of Attacker: flood (sends as fast as possible, takes nothing),
 // slow (takes one message at a time and frees none).
 #include <sys/prctl.h>
 
@@ -14,7 +14,7 @@
 #include <mpf/message.h>
 
 #include "shm/segment_name.h"
-#include "tests/hostile/mischief.h"
+#include "tests/hostile/attacker.h"
 
 namespace mpf::test {
 namespace {
@@ -42,7 +42,7 @@ class Peer {
                     header.maxPoolBytes = 4 << 20;
                   }),
         kind_(std::move(kind)),
-        mischief_(kind_, endpoint_.window(), random) {
+        attacker_(kind_, endpoint_.window(), random) {
     endpoint_.control().queueSize.store(32, std::memory_order_relaxed);
   }
 
@@ -50,7 +50,7 @@ class Peer {
     const auto index = endpoint_.tryReserve().value();
     link_ = side_ == LinkSide::client ? connect(index) : accept(index);
     beLegal();
-    mischief_.reach(*link_);
+    attacker_.reach(*link_);
     for (int step = 0; step < kStepsOfALink; ++step) act(step);
     endpoint_.detach(index);
     link_->setState(layout::LinkState::closed);
@@ -61,8 +61,8 @@ class Peer {
   std::unique_ptr<Link> connect(std::uint32_t index) {
     std::shared_ptr<PeerWindow> server;
     while (!server)
-      server = endpoint_.peer(SegmentName::serverWindow(backplane(), 0, kServer),
-                              layout::SegmentKind::serverWindow);
+      server = endpoint_.peers().tryOpen(SegmentName::serverWindow(backplane(), 0, kServer),
+                                         layout::SegmentKind::serverWindow);
     auto link = Link::create(backplane(), endpoint_.window(), index, server);
     endpoint_.attach(index, *link);
     // The server may still be busy with earlier attacks.
@@ -89,7 +89,7 @@ class Peer {
     if (!link ||
         link->control().serverState.load(std::memory_order_relaxed) != layout::LinkState::none)
       return nullptr;
-    auto client = endpoint_.peer(
+    auto client = endpoint_.peers().tryOpen(
         SegmentName::keyed(backplane(), NameKind::clientWindow, link->header().clientWindow),
         layout::SegmentKind::clientWindow);
     if (!client) return nullptr;
@@ -115,8 +115,8 @@ class Peer {
     static_cast<void>(link_->trySend(envelope, std::vector<std::byte>(bytes), {}));
   }
   void takeOne(bool frees) {
-    if (!link_->hasMessage()) return;
-    const auto envelope = link_->begin();
+    if (!link_->incoming().hasMessage()) return;
+    const auto envelope = link_->incoming().begin();
     if (!frees) return;
     if ((envelope.flags & layout::kSlotChunk) != 0) {
       try {
@@ -124,7 +124,7 @@ class Peer {
       } catch (const ChunkUnavailable&) {  // NOLINT(bugprone-empty-catch): its server has ended
       }
     }
-    link_->end();
+    link_->incoming().end();
   }
   void act(int step) {
     if (kind_ == "flood")
@@ -133,7 +133,7 @@ class Peer {
       if (step % 100 == 0) send(static_cast<std::uint32_t>(step + 5), sizeof(Int32));
       return takeOne(false);
     }
-    mischief_.act(*link_);
+    attacker_.act(*link_);
     if (step % 16 == 0) link_->notifyPeer();
   }
   [[nodiscard]] const std::string& backplane() const { return endpoint_.backplane().name(); }
@@ -142,7 +142,7 @@ class Peer {
   std::unique_ptr<Link> link_;
   Endpoint endpoint_;
   std::string kind_;
-  Mischief mischief_;
+  Attacker attacker_;
 };
 
 }  // namespace

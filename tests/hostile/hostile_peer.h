@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// HostilePeer: a hostile process. MischiefTest: a test with one kind of hostile process.
+// HostilePeer: a hostile process. HostileTest: a test with one kind of hostile process.
 #pragma once
 
 #include <atomic>
@@ -45,7 +45,7 @@ class HostilePeer {
   std::thread listener_;
 };
 
-class MischiefTest : public testing::TestWithParam<const char*> {
+class HostileTest : public testing::TestWithParam<const char*> {
  protected:
   static constexpr std::size_t kSlackKb = 4096;
   static int seeds() {
@@ -57,7 +57,7 @@ class MischiefTest : public testing::TestWithParam<const char*> {
   TestBackplane backplane_;
 };
 
-inline constexpr const char* kMischief[] = {"bytes", "words",     "slots", "hints", "headers",
-                                            "cut",   "backwards", "flood", "slow"};
+inline constexpr const char* kAttacks[] = {"bytes", "words",     "slots", "hints", "headers",
+                                           "cut",   "backwards", "flood", "slow"};
 
 }  // namespace mpf::test

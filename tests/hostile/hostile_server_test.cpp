@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class HostileServer : public MischiefTest {
+class HostileServer : public HostileTest {
  protected:
   // Sends requests to the honest server one by one, and checks each reply.
   void take(const Message& message) {
@@ -33,7 +33,7 @@ class HostileServer : public MischiefTest {
   void TearDown() override {
     honest_.reset();
     dispatcher_.reset();
-    MischiefTest::TearDown();
+    HostileTest::TearDown();
   }
 
   int asked_ = 0;
@@ -96,7 +96,7 @@ TEST_P(HostileServer, CostsItsClientOnlyThatLink) {
   const auto status = server.end(SIGTERM);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
-INSTANTIATE_TEST_SUITE_P(OfEachKind, HostileServer, testing::ValuesIn(kMischief),
+INSTANTIATE_TEST_SUITE_P(OfEachKind, HostileServer, testing::ValuesIn(kAttacks),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace

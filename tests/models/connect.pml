@@ -9,9 +9,11 @@
 //
 //   MODELS  client/connect.cpp: tryConnect pendingBind
 //   MODELS  client/binding.cpp: onLinkState disconnect nudge leave
-//   MODELS  server/accept.cpp: accept acceptAll open closeIfClientDid closeDead close
+//   MODELS  server/acceptor.cpp: acceptAll rescan accept open
+//   MODELS  server/connections.cpp: add open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify
-//   MODELS  shm/endpoint.cpp: takeKnock takeRescan peer
+//   MODELS  shm/knocks.cpp: tryTake takeRescan
+//   MODELS  shm/peer_windows.cpp: tryOpen
 //   HOLDS   a running client connects to a running server, even if any hints are lost
 //   HOLDS   its request ends exactly once; a request that a server acted on never ends as "never
 //           taken"; a reply that was sent is not lost

@@ -5,7 +5,7 @@
 //   owner  announce ─ fence ─ look again ─ sleep
 //   peer   message ─ fence ─ announced? ─ bell, wake
 //
-//   MODELS  shm/endpoint.cpp: sleep announce hasNews interrupt takeLocalNews arm disarm
+//   MODELS  shm/endpoint.cpp: sleep announce hasEvents interrupt takeLocalEvent arm disarm
 //   MODELS  shm/window.cpp: wakeIfAsleep ring
 //   MODELS  shm/doorbell.cpp: sleep ring tryRingFifo drainFifo
 //   HOLDS   no wake-up is lost: the owner does not sleep forever while a message or a reported
@@ -33,10 +33,10 @@
 #define PROCESSES 4
 #define SENT(peer) (peer)
 #define SLEEPING 2
-#define LOCAL_NEWS 3
+#define LOCAL_EVENT 3
 #define NUMBER 4
 #define WORDS 5
-#define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, SLEEPING) FLUSH(OWNER, NUMBER) FLUSH(WATCHER, LOCAL_NEWS)
+#define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, SLEEPING) FLUSH(OWNER, NUMBER) FLUSH(WATCHER, LOCAL_EVENT)
 #include "memory.pml"
 
 #define MESSAGES(peer) (2 - (peer))
@@ -57,8 +57,8 @@ byte number;          // the number that peer 0 has read
 byte rungFor;         // the number for which peer 0 has rung
 
 #define hasMessage (memory[SENT(0)] != taken[0] || memory[SENT(1)] != taken[1])
-#define hasLocalNews (memory[LOCAL_NEWS] == 1 && !deathSeen)
-#define hasNews (hasMessage || hasLocalNews)
+#define hasLocalEvent (memory[LOCAL_EVENT] == 1 && !deathSeen)
+#define hasEvents (hasMessage || hasLocalEvent)
 #define allTaken (taken[0] == memory[SENT(0)] && taken[1] == memory[SENT(1)])
 #define allSeen (allTaken && senderEnded[0] && senderEnded[1] && isVisible(0) && isVisible(1) && deathSeen == (dead[0] || dead[1]))
 
@@ -140,8 +140,8 @@ active proctype Owner() {
   do
   :: atomic { memory[SENT(0)] != taken[0] -> taken[0]++ }
   :: atomic { memory[SENT(1)] != taken[1] -> taken[1]++ }
-  :: atomic { hasLocalNews -> deathSeen = true }
-  :: !hasNews ->
+  :: atomic { hasLocalEvent -> deathSeen = true }
+  :: !hasEvents ->
 #ifndef BELL_READ_LATE
     changed = false;
 #endif
@@ -156,8 +156,8 @@ active proctype Owner() {
 #endif
     if
 #ifndef NO_LOOK
-    :: hasNews
-    :: !hasNews ->
+    :: hasEvents
+    :: !hasEvents ->
 #else
     :: true ->
 #endif
@@ -170,7 +170,7 @@ active proctype Owner() {
       futexWait()
     fi;
     store(OWNER, SLEEPING, AWAKE)
-  :: !hasNews ->
+  :: !hasEvents ->
 #ifndef DRAIN_LATE
     readable = false;
 #endif
@@ -185,8 +185,8 @@ active proctype Owner() {
 #endif
     if
 #ifndef NO_LOOK
-    :: hasNews
-    :: !hasNews ->
+    :: hasEvents
+    :: !hasEvents ->
 #else
     :: true ->
 #endif
@@ -208,7 +208,7 @@ active proctype Watcher() {
 end:
   (isGone(0) || isGone(1));
 #ifndef NO_DEATH_NEWS
-  storeRelease(WATCHER, LOCAL_NEWS, 1);
+  storeRelease(WATCHER, LOCAL_EVENT, 1);
   ringBell(WATCHER);
   readable = true
 #endif

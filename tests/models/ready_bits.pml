@@ -8,7 +8,9 @@
 //
 //   MODELS  shm/link.cpp: afterPush setWatched
 //   MODELS  shm/window.cpp: notify
-//   MODELS  shm/endpoint.cpp: nextReady takeReadyBit heat cool setReadyBit hasNews isRevisitDue
+//   MODELS  shm/ready_bits.cpp: set tryTakeFrom
+//   MODELS  shm/hot_links.cpp: tryAdd cool
+//   MODELS  shm/endpoint.cpp: nextReady hasEvents isRevisitDue
 //   HOLDS   for each link with a message, a hint is set, the link is polled, or it is due for a
 //           revisit; this does not need the scan of all links that an owner makes before it sleeps
 //   HOLDS   no link is forgotten, for every order in which links begin and cease to be polled
@@ -102,7 +104,7 @@ inline cool() {
 }
 
 // Polls the link from now on in place of another one, or does not poll it.
-inline heat(link) {
+inline tryAdd(link) {
   if
   :: hot == link
   :: hot != link && hot != NONE -> cool(); hot = link; store(OWNER, POLLED(link), true); fence(OWNER)
@@ -115,7 +117,7 @@ inline heat(link) {
   fi
 }
 
-inline takeReadyBit() {
+inline tryTakeFrom() {
 #ifdef WORD_OFF_LATE
   seen = bits;
   word = false;
@@ -137,7 +139,7 @@ inline takeReadyBit() {
     :: seen == 0
     fi;
 #endif
-    heat(link);
+    tryAdd(link);
     takeOne(link)
   fi;
   d_step { seen = 0; link = NONE }
@@ -155,7 +157,7 @@ active proctype Owner() {
     fi;
     revisit = NONE;
     if
-    :: word -> takeReadyBit()
+    :: word -> tryTakeFrom()
     :: !word
     fi
   :: allTaken -> break

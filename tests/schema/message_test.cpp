@@ -108,6 +108,14 @@ TEST(Message, AllocatesArraysAlignedAndWhole) {
   EXPECT_EQ(message.lender(), &heapLender());
 }
 
+TEST(Message, RefusesMoreElementsThanALengthCanCount) {
+  constexpr std::size_t kTooMany = std::size_t{1} << 32;
+
+  EXPECT_EQ(Float64ArrayMessage::bytesFor(kTooMany - 1), 24 + 8 * (kTooMany - 1));
+  EXPECT_THROW(static_cast<void>(Float64ArrayMessage::bytesFor(kTooMany)), std::length_error);
+  EXPECT_THROW(Float64ArrayMessage::allocValue(SIZE_MAX / 8), std::length_error);
+}
+
 TEST(Message, ShortensAndLengthensArraysWithinTheirRoom) {
   auto message = Int32ArrayMessage::allocValue(100);
 

@@ -43,9 +43,9 @@ class HintsTest : public ShmTest {
         if (const auto id = end.tryTake(*index)) return *id;
         continue;
       }
-      while (end.endpoint.takeKnock()) {
+      while (end.endpoint.knocks().tryTake()) {
       }
-      static_cast<void>(end.endpoint.takeRescan());
+      static_cast<void>(end.endpoint.knocks().takeRescan());
       EXPECT_TRUE(end.endpoint.wait(Deadline::never()));
     }
   }
@@ -138,12 +138,12 @@ TEST_F(HintsTest, HintsWithoutAMessageDoNoHarm) {
   for (std::uint32_t looks = 0; looks < 2 * layout::kMaxLinks; ++looks) {
     if (const auto index = server.endpoint.next()) sum += server.tryTake(*index).value_or(0);
   }
-  while (server.endpoint.takeKnock()) ++knocks;
+  while (server.endpoint.knocks().tryTake()) ++knocks;
 
   EXPECT_EQ(sum, 3u);
   EXPECT_EQ(knocks, layout::kKnocks);
-  EXPECT_TRUE(server.endpoint.takeRescan());
-  EXPECT_FALSE(server.endpoint.hasSideNews());
+  EXPECT_TRUE(server.endpoint.knocks().takeRescan());
+  EXPECT_FALSE(server.endpoint.hasControlEvents());
   EXPECT_FALSE(server.endpoint.wait(Deadline::after(1ms))) << "no event is left";
 }
 

@@ -57,9 +57,9 @@ struct End {
   // A value for Envelope, for tests that check only one word.
   std::optional<std::uint32_t> tryTake(std::uint32_t index) {
     auto& link = *links[index];
-    if (!link.hasMessage()) return std::nullopt;
-    const auto id = link.begin().requestId;
-    link.end();
+    if (!link.incoming().hasMessage()) return std::nullopt;
+    const auto id = link.incoming().begin().requestId;
+    link.incoming().end();
     return id;
   }
 
@@ -80,14 +80,14 @@ inline Connected connect(End& client, End& server) {
   const auto clientIndex = client.endpoint.tryReserve().value();
   const auto serverIndex = server.endpoint.tryReserve().value();
   const std::string_view serverName(server.endpoint.window().header().name.data());
-  auto peer = client.endpoint.peer(SegmentName::serverWindow(backplane, 0, serverName),
-                                   layout::SegmentKind::serverWindow);
+  auto peer = client.endpoint.peers().tryOpen(SegmentName::serverWindow(backplane, 0, serverName),
+                                              layout::SegmentKind::serverWindow);
   auto& ours = client.keep(
       clientIndex, Link::create(backplane, client.endpoint.window(), clientIndex, std::move(peer)));
   auto link = Link::tryOpen(backplane, ours.name(), server.endpoint.window());
   const auto clientName =
       SegmentName::keyed(backplane, NameKind::clientWindow, link->header().clientWindow);
-  link->attachPeer(server.endpoint.peer(clientName, layout::SegmentKind::clientWindow),
+  link->attachPeer(server.endpoint.peers().tryOpen(clientName, layout::SegmentKind::clientWindow),
                    link->header().clientIndex);
   auto& theirs = server.keep(serverIndex, std::move(link));
   ours.setPeerIndex(serverIndex);

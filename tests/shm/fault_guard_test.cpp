@@ -182,8 +182,8 @@ TEST_F(FaultGuard, ATruncatedLinkAndTruncatedChunksAreLost) {
   End client(backplane_, "", WaitMode::block);
   const auto link = connect(client, server);
   ASSERT_EQ(send(link.client, 1, 5000), LinkSend::sent);
-  ASSERT_TRUE(link.server.hasMessage());
-  const auto envelope = link.server.begin();
+  ASSERT_TRUE(link.server.incoming().hasMessage());
+  const auto envelope = link.server.incoming().begin();
   const auto chunk = link.server.tryChunk(envelope);
   ASSERT_TRUE(chunk);
   cut(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0));
@@ -191,10 +191,10 @@ TEST_F(FaultGuard, ATruncatedLinkAndTruncatedChunksAreLost) {
   EXPECT_EQ(chunk->data[0], std::byte{0});
   EXPECT_FALSE(link.server.tryChunk(envelope)) << "its chunks can no longer be read";
   link.server.release(chunk->data);
-  link.server.end();
+  link.server.incoming().end();
 
   cut(link.client.name());
-  EXPECT_FALSE(link.server.hasMessage());
+  EXPECT_FALSE(link.server.incoming().hasMessage());
   EXPECT_EQ(link.server.peerState(), layout::LinkState::none);
   EXPECT_TRUE(link.server.isLost());
 }

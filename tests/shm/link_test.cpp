@@ -41,18 +41,18 @@ class LinkTest : public ShmTest {
   }
   // Takes the next message and returns its whole body. Returns its chunk to the peer.
   static std::vector<std::byte> take(Link& link) {
-    EXPECT_TRUE(link.hasMessage());
-    const auto envelope = link.begin();
+    EXPECT_TRUE(link.incoming().hasMessage());
+    const auto envelope = link.incoming().begin();
     std::vector<std::byte> body(envelope.bodyBytes);
     if ((envelope.flags & layout::kSlotChunk) == 0) {
-      link.copyBody(body);
+      link.incoming().copyBody(body);
     } else if (const auto chunk = link.tryChunk(envelope)) {
       std::memcpy(body.data(), chunk->data, body.size());
       link.release(chunk->data);
     } else {
       ADD_FAILURE() << "no chunk";
     }
-    link.end();
+    link.incoming().end();
     return body;
   }
   // The error with which the server refuses a link after its client has made this change.
@@ -90,13 +90,13 @@ TEST_F(LinkTest, AChunkIsReadInPlaceAndSentBackUnchanged) {
   built.data[4999] = std::byte{7};
 
   ASSERT_EQ(sendBody(link.client, {built.data, 5000}), LinkSend::sentInPlace);
-  const auto borrowed = link.server.tryChunk(link.server.begin());
-  link.server.end();
+  const auto borrowed = link.server.tryChunk(link.server.incoming().begin());
+  link.server.incoming().end();
   ASSERT_TRUE(borrowed);
   EXPECT_EQ(borrowed->data[4999], std::byte{7});
   ASSERT_EQ(sendBody(link.server, {borrowed->data, 5000}), LinkSend::sentInPlace);
-  const auto back = link.client.tryChunk(link.client.begin());
-  link.client.end();
+  const auto back = link.client.tryChunk(link.client.incoming().begin());
+  link.client.incoming().end();
 
   ASSERT_TRUE(back);
   EXPECT_EQ(back->data, built.data);
@@ -110,7 +110,7 @@ TEST_F(LinkTest, RefusesABodyAboveTheServersLimit) {
   EXPECT_EQ(sendBody(link.client, filled(1000)), LinkSend::sent);
 
   EXPECT_EQ(take(link.server), filled(1000));
-  EXPECT_FALSE(link.server.hasMessage());
+  EXPECT_FALSE(link.server.incoming().hasMessage());
 }
 
 TEST_F(LinkTest, RefusesABodyLongerThanAnEnvelopeCanRepresent) {
@@ -128,7 +128,7 @@ TEST_F(LinkTest, SendsAndLosesNothingWithoutMemory) {
 
   EXPECT_EQ(sendBody(link.client, filled(10'000)), LinkSend::noMemory);
 
-  EXPECT_FALSE(link.server.hasMessage());
+  EXPECT_FALSE(link.server.incoming().hasMessage());
   link.client.release(held.back().data);
   EXPECT_EQ(sendBody(link.client, filled(10'000)), LinkSend::sent);
   EXPECT_EQ(take(link.server), filled(10'000));
@@ -330,9 +330,9 @@ TEST_F(LinkTest, APeerThatWritesInvalidDataDoesNotCrashOrBlockTheOtherSide) {
         }
         break;
       default:
-        if (!link.server.hasMessage()) break;
+        if (!link.server.incoming().hasMessage()) break;
         const auto slots = nextSlot().slots;
-        const auto envelope = link.server.begin();
+        const auto envelope = link.server.incoming().begin();
         ++taken;
         if ((envelope.flags & layout::kSlotChunk) != 0) {
           if (const auto chunk = chunkOf(link.server, envelope)) {
@@ -343,10 +343,10 @@ TEST_F(LinkTest, APeerThatWritesInvalidDataDoesNotCrashOrBlockTheOtherSide) {
             held.erase(chunk->data);
           }
         } else {
-          link.server.copyBody(std::span(body).first(
-              std::min<std::size_t>(envelope.bodyBytes, link.server.inlineCapacity())));
+          link.server.incoming().copyBody(std::span(body).first(
+              std::min<std::size_t>(envelope.bodyBytes, link.server.incoming().inlineCapacity())));
         }
-        link.server.end();
+        link.server.incoming().end();
         position += slots >= 1 && slots <= layout::kMaxMessageSlots ? slots : 1;
     }
   }

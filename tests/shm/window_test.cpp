@@ -4,11 +4,14 @@
 
 #include <sys/stat.h>
 
+#include <array>
 #include <atomic>
+#include <cstdio>
 #include <fstream>
 #include <memory>
 #include <thread>
 
+#include "base/system_call.h"
 #include "tests/shm/child.h"
 #include "tests/shm/shm_fixture.h"
 
@@ -297,6 +300,54 @@ TEST_F(WindowTest, RingsOnlyASleepingOwner) {
   EXPECT_EQ(::read(server->fifo().get(), &byte, 1), 1) << "rung through the FIFO";
   server->control().sleeping.store(static_cast<layout::SleepState>(77), std::memory_order_relaxed);
   peer->notify(0);
+}
+
+class AdmittedPeers : public ShmTest {
+ protected:
+  [[nodiscard]] std::string rightsOf(NameKind kind) const {
+    struct stat status{};
+    checkCall(
+        ::stat(
+            segments::path(SegmentName::keyed(name(), kind, client_.header().incarnation)).c_str(),
+            &status),
+        "stat");
+    std::array<char, 32> text;
+    std::snprintf(text.data(), text.size(), "%04o %u", status.st_mode & 07777u, status.st_gid);
+    return text.data();
+  }
+  void TearDown() override {}
+  static constexpr std::uint32_t kOperators = 54321;
+  OwnWindow client_{
+      name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
+};
+
+TEST_F(AdmittedPeers, IncludeOnlyTheOwnerAtFirst) {
+  EXPECT_THAT(rightsOf(NameKind::clientWindow), testing::StartsWith("0644"));
+  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
+  EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0600"));
+}
+
+TEST_F(AdmittedPeers, OfTheSameUserChangeNoRights) {
+  client_.admit({.mode = 0600});
+
+  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
+}
+
+TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndFifo) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
+  client_.admit({.mode = 0660, .group = kOperators});
+
+  EXPECT_EQ(rightsOf(NameKind::hints), "0664 54321");
+  EXPECT_EQ(rightsOf(NameKind::fifo), "0660 54321");
+}
+
+TEST_F(AdmittedPeers, OfTwoGroupsOpenTheHintsToEveryUser) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
+  client_.admit({.mode = 0660, .group = kOperators});
+  client_.admit({.mode = 0660, .group = kOperators + 1});
+
+  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0666"));
+  EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0666"));
 }
 
 }  // namespace

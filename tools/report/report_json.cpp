@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include <mpf/message_layout.h>
 #include <mpf/message_types.h>
 
 #include "tools/report/router_json.h"

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <thread>
 
+#include <mpf/message_layout.h>
 #include <mpf/message_types.h>
 
 #include "base/duration_text.h"

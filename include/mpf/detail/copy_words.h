@@ -20,7 +20,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace mpf {
+namespace mpf::detail {
 
 // Copies `bytes` bytes, a multiple of 4. Any alignment; `to` and `from` must not overlap.
 template <std::size_t bytes>
@@ -43,4 +43,4 @@ inline void copyField(Field& to, const Field& from) noexcept {
   to = field;
 }
 
-}  // namespace mpf
+}  // namespace mpf::detail

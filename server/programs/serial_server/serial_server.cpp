@@ -138,7 +138,7 @@ void SerialServer::handle(Char8ArrayMessage&& request) {
   port_->abandonWhen(work.isAbandoned);
   serve(work);
   port_->abandonWhen({});
-  if (work.status == serialServerStatusError && !server_.isAwaited(request)) {
+  if (work.status == serialServerStatusError && !server_.isClientConnected(request)) {
     log_->info("a client disconnected during its request (cmd {:#x})", work.fields.cmd);
   } else if (!isStopped_.load(std::memory_order_relaxed)) {
     noteStatus(work);
@@ -159,7 +159,7 @@ void SerialServer::reply(const Char8ArrayMessage& request, const Work& work) {
 bool SerialServer::isAbandoned(const Char8ArrayMessage& request, bool isWrite) {
   if (isStopped_.load(std::memory_order_relaxed) || port_->state() == SerialPortState::unplugged)
     return true;
-  if (server_.isAwaited(request)) return false;
+  if (server_.isClientConnected(request)) return false;
   if (!isWrite) return true;
   if (writeEnds_.isNever()) writeEnds_ = Deadline::after(kGraceOfWrites);
   return writeEnds_.hasPassed();

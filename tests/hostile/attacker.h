@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Mischief: writes invalid data to everything that a peer may write: its link, the pools of the
+// Attacker: writes invalid data to everything that a peer may write: its link, the pools of the
 // link, its own window and the hints of the other side.
 //
 // Threads  one thread.
@@ -15,10 +15,10 @@
 
 namespace mpf::test {
 
-class Mischief {
+class Attacker {
  public:
   // `kind` is bytes, words, slots, hints, headers, cut or backwards.
-  Mischief(const std::string& kind, OwnWindow& own, Random& random)
+  Attacker(const std::string& kind, OwnWindow& own, Random& random)
       : random_(random), kind_(kind), own_(own) {}
 
   // Performs one attack on `link`.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// ServerCore: shows the request in progress, and the progress of requests, in its window.
-#include "shm/handling.h"
+#include "server/progress.h"
 
 #include <array>
 #include <cstddef>
@@ -9,7 +8,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "server/server_core.h"
+#include "shm/handling.h"
 
 namespace mpf {
 namespace {
@@ -45,26 +44,24 @@ std::int32_t cmdOf(const Message& request) noexcept {
 
 }  // namespace
 
-// A fast server reads the clock for one request in 64, a slow server for each request: the stored
-// time is at most 64 * kSlowNs too early.
-void ServerCore::noteProgress(std::int64_t nowNs) noexcept {
-  auto& control = endpoint_.control();
-  const auto taken = control.received.load(std::memory_order_relaxed);
-  isSlow_ = nowNs - progressAtNs_ > kSlowNs * static_cast<std::int64_t>(taken - progressAt_);
-  progressAtNs_ = nowNs;
-  progressAt_ = taken;
-  control.progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);
-}
-
-void ServerCore::beginHandling(const Message& request) noexcept {
+void Progress::begin(const Message& request) noexcept {
   const Handling handling{static_cast<std::uint16_t>(request.getType()), cmdOf(request)};
-  endpoint_.control().handling.store(handling.word(), std::memory_order_relaxed);
+  control_.handling.store(handling.word(), std::memory_order_relaxed);
   isHandling_ = true;
 }
 
-void ServerCore::endHandling() noexcept {
-  if (std::exchange(isHandling_, false))
-    endpoint_.control().handling.store(0, std::memory_order_relaxed);
+void Progress::end() noexcept {
+  if (std::exchange(isHandling_, false)) control_.handling.store(0, std::memory_order_relaxed);
+}
+
+// A fast server reads the clock for one request in 64, a slow server for each request: the stored
+// time is at most 64 * kSlowNs too early.
+void Progress::note(std::int64_t nowNs) noexcept {
+  const auto taken = control_.received.load(std::memory_order_relaxed);
+  isSlow_ = nowNs - notedAtNs_ > kSlowNs * static_cast<std::int64_t>(taken - notedTaken_);
+  notedAtNs_ = nowNs;
+  notedTaken_ = taken;
+  control_.progressAtNs.store(static_cast<std::uint64_t>(nowNs), std::memory_order_relaxed);
 }
 
 }  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "tests/hostile/mischief.h"
+#include "tests/hostile/attacker.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -12,7 +12,7 @@
 
 namespace mpf::test {
 
-void Mischief::open(const std::string& name) {
+void Attacker::open(const std::string& name) {
   auto path = segments::path(name);
   const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
   struct stat status{};
@@ -21,7 +21,7 @@ void Mischief::open(const std::string& name) {
                                              Mapping::Access::readWrite)});
 }
 
-void Mischief::reach(const Link& link) {
+void Attacker::reach(const Link& link) {
   const std::string backplane(own_.header().backplane.data());
   const auto hintsOf = [&](std::uint64_t window) {
     return SegmentName::keyed(backplane, NameKind::hints, window);
@@ -41,7 +41,7 @@ void Mischief::reach(const Link& link) {
   position_ = 0;
 }
 
-void Mischief::act(Link& link) {
+void Attacker::act(Link& link) {
   if (kind_ == "bytes") return writeByte();
   if (kind_ == "words") return writeWord();
   if (kind_ == "slots") return writeSlot(link);
@@ -49,15 +49,15 @@ void Mischief::act(Link& link) {
   if (kind_ == "headers") return writeHeader();
   if (kind_ == "cut") return cut();
   if (kind_ == "backwards") return goBack(link);
-  throw std::invalid_argument("mischief " + kind_);
+  throw std::invalid_argument("unknown attack: " + kind_);
 }
 
-void Mischief::writeByte() {
+void Attacker::writeByte() {
   auto& memory = any();
   memory.data()[random_.below(memory.bytes())] = static_cast<std::byte>(random_.bits());
 }
 
-void Mischief::writeWord() {
+void Attacker::writeWord() {
   auto& memory = any();
   const auto at = random_.below(memory.bytes() / 8) * 8;
   const auto word = random_.nasty();
@@ -65,7 +65,7 @@ void Mischief::writeWord() {
 }
 
 // Writes a next message that looks valid and has random contents.
-void Mischief::writeSlot(Link& link) {
+void Attacker::writeSlot(Link& link) {
   const bool isClient = link.side() == LinkSide::client;
   const auto slots = isClient ? link.header().queueSlots : link.header().replySlots;
   const auto& consumer = isClient ? link.control().requests : link.control().replies;
@@ -95,7 +95,7 @@ void Mischief::writeSlot(Link& link) {
 }
 
 // Sets and clears ready bits at random, and writes invalid knocks.
-void Mischief::writeHints() {
+void Attacker::writeHints() {
   for (const auto& file : files_) {
     if (file.path.find(".h.") == std::string::npos) continue;
     auto& hints = *reinterpret_cast<layout::WindowHints*>(file.memory.data());
@@ -110,21 +110,21 @@ void Mischief::writeHints() {
   }
 }
 
-void Mischief::writeHeader() {
+void Attacker::writeHeader() {
   auto& memory = any();
   const auto word = random_.nasty();
   std::memcpy(memory.data() + random_.below(sizeof(layout::SegmentHeader) / 8) * 8, &word,
               sizeof word);
 }
 
-void Mischief::cut() {
+void Attacker::cut() {
   const auto& file = files_[random_.below(files_.size())];
   const auto bytes = random_.oneIn(3) ? 0 : random_.below(file.memory.bytes());
   [[maybe_unused]] const int result = ::truncate(file.path.c_str(), static_cast<off_t>(bytes));
 }
 
 // Writes wrong positions and counts, and returns chunks that were never lent.
-void Mischief::goBack(Link& link) {
+void Attacker::goBack(Link& link) {
   const bool isClient = link.side() == LinkSide::client;
   auto& control = link.control();
   auto& consumer = isClient ? control.replies : control.requests;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Locks of strangers, which are processes that do not own the segment: they neither make a dead
-// owner look alive nor prevent the removal of its files.
+// OwnerLock: locks of strangers, which are processes that do not own the segment, neither make a
+// dead owner look alive nor prevent the removal of its files.
+#include "shm/owner_lock.h"
+
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -8,7 +10,6 @@
 #include <atomic>
 #include <semaphore>
 
-#include "shm/owner_lock.h"
 #include "shm/stale_segments.h"
 #include "shm/watcher.h"
 #include "shm/window.h"
@@ -217,54 +218,6 @@ TEST_F(ForeignLock, AHeaderThatNamesNoLivingProcessProvesDeath) {
                          [](layout::SegmentHeader& header) { header.ownerStartTicks = 1; });
 
   EXPECT_EQ(segments::probeOwner(serverName()), Owner::dead);
-}
-
-class AdmittedPeers : public ShmTest {
- protected:
-  [[nodiscard]] std::string rightsOf(NameKind kind) const {
-    struct stat status{};
-    checkCall(
-        ::stat(
-            segments::path(SegmentName::keyed(name(), kind, client_.header().incarnation)).c_str(),
-            &status),
-        "stat");
-    std::array<char, 32> text;
-    std::snprintf(text.data(), text.size(), "%04o %u", status.st_mode & 07777u, status.st_gid);
-    return text.data();
-  }
-  void TearDown() override {}
-  static constexpr std::uint32_t kOperators = 54321;
-  OwnWindow client_{
-      name(), SegmentKind::clientWindow, "", {.mode = 0644}, [](layout::SegmentHeader&) {}};
-};
-
-TEST_F(AdmittedPeers, IncludeOnlyTheOwnerAtFirst) {
-  EXPECT_THAT(rightsOf(NameKind::clientWindow), testing::StartsWith("0644"));
-  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
-  EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0600"));
-}
-
-TEST_F(AdmittedPeers, OfTheSameUserChangeNoRights) {
-  client_.admit({.mode = 0600});
-
-  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0644"));
-}
-
-TEST_F(AdmittedPeers, OfAGroupMayWriteHintsAndFifo) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
-  client_.admit({.mode = 0660, .group = kOperators});
-
-  EXPECT_EQ(rightsOf(NameKind::hints), "0664 54321");
-  EXPECT_EQ(rightsOf(NameKind::fifo), "0660 54321");
-}
-
-TEST_F(AdmittedPeers, OfTwoGroupsOpenTheHintsToEveryUser) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root may give files to any group";
-  client_.admit({.mode = 0660, .group = kOperators});
-  client_.admit({.mode = 0660, .group = kOperators + 1});
-
-  EXPECT_THAT(rightsOf(NameKind::hints), testing::StartsWith("0666"));
-  EXPECT_THAT(rightsOf(NameKind::fifo), testing::StartsWith("0666"));
 }
 
 }  // namespace

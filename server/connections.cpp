@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+#include "server/connections.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <chrono>
+#include <mutex>
+#include <new>
+#include <thread>
+#include <utility>
+
+#include "base/step.h"
+#include "shm/histogram.h"
+#include "shm/stale_segments.h"
+
+namespace mpf {
+namespace {
+
+constexpr std::chrono::milliseconds kDrainTimeout{100};
+constexpr std::chrono::microseconds kDrainPoll{500};
+
+}  // namespace
+
+void Connections::reportClient(std::uint64_t client, bool isConnected) noexcept try {
+  if (onClient_) onClient_(client, isConnected);
+} catch (...) {
+  try {
+    thrown_.push_back(std::current_exception());
+  } catch (const std::bad_alloc&) {  // the exception is lost
+  }
+}
+
+void Connections::throwNext() {
+  const auto first = std::move(thrown_.front());
+  thrown_.pop_front();
+  std::rethrow_exception(first);
+}
+
+Connection& Connections::add(std::uint32_t index, std::unique_ptr<Link> link) try {
+  while (all_.size() <= index) all_.push_back(Connection::take());
+  auto& connection = *all_[index];
+  const auto incarnation = link->header().incarnation;
+  std::vector<std::atomic<std::uint32_t>> unanswered(std::bit_ceil(link->header().maxOutstanding));
+  auto channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
+  byLink_[incarnation] = &connection;
+  {
+    const std::lock_guard lock(*connection.lock);
+    connection.index = index;
+    connection.timedId = 0;
+    connection.unanswered = std::move(unanswered);
+    connection.unansweredMask = static_cast<std::uint32_t>(connection.unanswered.size() - 1);
+    connection.channel = std::move(channel);
+  }
+  MPF_STEP(link_opened);
+  return connection;
+} catch (...) {
+  endpoint_.detach(index);
+  throw;
+}
+
+void Connections::open(Connection& connection) {
+  auto& link = connection.channel->link();
+  endpoint_.attach(connection.index, link);
+  count(endpoint_.control().linksOpened);
+  link.control().serverIndex.store(connection.index, std::memory_order_relaxed);
+  link.setState(layout::LinkState::open);
+  MPF_STEP(link_accepted);
+  link.notifyPeer();
+  reportClient(connection.client(), true);
+}
+
+void Connections::close(Connection& connection) noexcept {
+  const auto client = connection.client();
+  std::shared_ptr<MessageLink> channel;
+  {
+    const std::lock_guard lock(*connection.lock);
+    channel = std::move(connection.channel);
+    connection.channel.reset();
+    ++connection.generation;
+  }
+  MPF_STEP(link_closing);
+  endpoint_.detach(connection.index);
+  byLink_.erase(channel->link().header().incarnation);
+  channel->link().setState(layout::LinkState::closed);
+  channel->link().notifyPeer();
+  count(endpoint_.control().linksClosed);
+  reportClient(client, false);
+}
+
+void Connections::closeIfClientDid(Connection& connection) noexcept {
+  auto& link = connection.channel->link();
+  if (link.peerState() == layout::LinkState::open || link.incoming().hasMessage()) return;
+  if (link.isLost()) count(endpoint_.control().protocolErrors);
+  close(connection);
+}
+
+void Connections::closeDead() noexcept {
+  for (const auto& connection : all_) {
+    if (!connection->channel || !connection->channel->link().peer()->isDead()) continue;
+    auto& link = connection->channel->link();
+    MPF_STEP(client_died);
+    removeFilesOf(link);
+    MPF_STEP(client_removed);
+    // If the client closed the link before it died, closeIfClientDid() closes the connection after
+    // the requests that remain.
+    if (link.peerState() == layout::LinkState::closed && link.incoming().hasMessage()) continue;
+    count(endpoint_.control().peersDied);
+    close(*connection);
+  }
+}
+
+// The client owned the link and has died, so the server may remove its names.
+void Connections::removeFilesOf(const Link& link) noexcept {
+  Link::removeFiles(endpoint_.backplane().name(), link.name(), link.header().incarnation);
+}
+
+// Also removes the files of clients whose death the server has not noticed yet: no later call will.
+void Connections::closeAll() noexcept {
+  std::vector<std::shared_ptr<MessageLink>> others;
+  for (const auto& connection : all_) {
+    if (!connection->channel) continue;
+    auto& link = connection->channel->link();
+    if (!link.peer()->hasOwner()) {
+      removeFilesOf(link);
+      stale_segments::removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(),
+                                       link.peer()->header().incarnation);
+    } else if (!link.tryLeavePoolToClient()) {
+      others.push_back(connection->channel);
+    }
+    close(*connection);
+  }
+  // Clients of other users cannot remove the server's pool files, so the server removes them
+  // itself. It first gives these clients a moment to receive the replies that are in the pool.
+  const auto deadline = Deadline::after(kDrainTimeout);
+  const auto isReceiving = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
+  while (std::ranges::any_of(others, isReceiving) && !deadline.hasPassed())
+    std::this_thread::sleep_for(kDrainPoll);
+}
+
+std::uint64_t Connections::clientOf(const Route& request) noexcept {
+  if (request.link == 0) return 0;
+  auto& connection = Connection::of(request);
+  const std::lock_guard lock(*connection.lock);
+  return connection.isOpenFor(request) ? connection.client() : 0;
+}
+
+bool Connections::isConnected(const Route& request) noexcept {
+  if (request.link == 0) return false;
+  auto& connection = Connection::of(request);
+  const std::lock_guard lock(*connection.lock);
+  if (!connection.isOpenFor(request)) return false;
+  const auto& link = connection.channel->link();
+  return link.peerState() == layout::LinkState::open && !link.peer()->isDead();
+}
+
+Route Connections::routeTo(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  const auto number = client >> 32;
+  if (number == 0 || number > all_.size()) return {};
+  return {reinterpret_cast<std::uint64_t>(all_[number - 1].get()), requestId,
+          static_cast<std::uint32_t>(client), nullptr};
+}
+
+bool Connections::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
+  const auto route = routeTo(client, requestId);
+  if (route.link == 0) return false;
+  auto& connection = Connection::of(route);
+  const std::lock_guard lock(*connection.lock);
+  return connection.isOpenFor(route) && connection.owes(requestId);
+}
+
+std::vector<std::uint32_t> Connections::owed(std::uint64_t client) const {
+  const auto route = routeTo(client, 0);
+  std::vector<std::uint32_t> ids;
+  if (route.link == 0) return ids;
+  auto& connection = Connection::of(route);
+  const std::lock_guard lock(*connection.lock);
+  if (!connection.isOpenFor(route)) return ids;
+  for (const auto& place : connection.unanswered) {
+    if (const auto id = place.load(std::memory_order_relaxed); id != 0) ids.push_back(id);
+  }
+  return ids;
+}
+
+}  // namespace mpf

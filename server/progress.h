@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// Progress: publishes in the window of a server which request it handles, and when it last took
+// one, so that tools and clients can show why the server does not take other requests.
+//
+// Threads  the server's thread.
+#pragma once
+
+#include <cstdint>
+
+#include <mpf/message.h>
+
+#include "shm/layout.h"
+
+namespace mpf {
+
+class Progress {
+ public:
+  explicit Progress(layout::WindowControl& control) noexcept : control_(control) {}
+
+  // Shows `request`, until end(), as the one that the server handles.
+  void begin(const Message& request) noexcept;
+  void end() noexcept;
+  // Stores the time of the request that was taken last.
+  void note(std::int64_t nowNs) noexcept;
+  // Whether requests take so long that reading the clock for each of them costs little.
+  [[nodiscard]] bool isSlow() const noexcept { return isSlow_; }
+
+ private:
+  layout::WindowControl& control_;
+  bool isHandling_ = false;  // the window shows a request
+  bool isSlow_ = false;
+  std::int64_t notedAtNs_ = 0;  // the last time that was stored
+  std::uint64_t notedTaken_ = 0;  // number of requests taken until then
+};
+
+}  // namespace mpf

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include "server/reply_sender.h"
+
+#include <memory>
+#include <mutex>
+
+#include <mpf/clock.h>
+
+#include "base/step.h"
+#include "shm/histogram.h"
+
+namespace mpf {
+
+ReplyResult ReplySender::send(Message& message) noexcept {
+  if (!message || message.route().link == 0 || forkGuard_.isInherited())
+    return ReplyResult::clientGone;
+  auto& connection = Connection::of(message.route());
+  ReplyResult result{};
+  {
+    const std::lock_guard lock(*connection.lock);
+    result = sendLocked(connection, message);
+  }
+  if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
+  return result;
+}
+
+ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) noexcept {
+  const auto route = message.route();
+  if (!connection.isOpenFor(route)) return ReplyResult::clientGone;
+  auto& owed = connection.owed(route.requestId);
+  const bool first = connection.owes(route.requestId);
+  auto& link = connection.channel->link();
+  const auto maxOutstanding = link.header().maxOutstanding;
+  Envelope envelope;
+  envelope.type = static_cast<std::uint16_t>(message.getType());
+  envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
+  envelope.requestId = route.requestId;
+  envelope.clientType = message.getClientType();
+  envelope.clientExtra = message.getClientExtra();
+  if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
+
+  auto unowned = route;
+  unowned.keeper = nullptr;
+  if (first) message.setRoute(unowned);
+  const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
+  const auto result = connection.channel->trySendLocked(envelope, message, limits);
+  if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
+    MPF_STEP(reply_sent);
+    if (first) owed.store(0, std::memory_order_relaxed);
+    count(control_.sent);
+    link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+    if (route.requestId == connection.timedId && first) {
+      record(control_.serviceNs, Clock::nowNs() - connection.timedFromNs);
+      connection.timedId = 0;
+    }
+    return ReplyResult::sent;
+  }
+  if (first) message.setRoute(route);
+  count(control_.replyQueueFull);
+  if (result == LinkSend::full) return ReplyResult::queueFull;
+  return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
+}
+
+void ReplySender::sendFate(Connection& connection, const Envelope& request, Fate fate) noexcept {
+  RequestFateMessage message({.fate = fate, .requestId = request.requestId});
+  message.setClientType(request.clientType);
+  message.setClientExtra(request.clientExtra);
+  message.setRoute(connection.routeOf(request.requestId, nullptr));
+  static_cast<void>(send(message));
+}
+
+void ReplySender::refuseAbandoned(const Route& route) noexcept {
+  auto& connection = Connection::of(route);
+  const std::lock_guard lock(*connection.lock);
+  if (!connection.isOpenFor(route) || !connection.owes(route.requestId)) return;
+  RequestFateMessage message({.fate = Fate::refused, .requestId = route.requestId});
+  message.setRoute(connection.routeOf(route.requestId, nullptr));
+  if (sendLocked(connection, message) == ReplyResult::sent) count(control_.refused);
+}
+
+BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {
+  std::shared_ptr<MessageLink> channel;
+  if (route.link != 0) {
+    auto& connection = Connection::of(route);
+    const std::lock_guard lock(*connection.lock);
+    if (connection.isOpenFor(route)) channel = connection.channel;
+  }
+  return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
+}
+
+}  // namespace mpf

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// ReplySender: sends the replies and the fates of a server's requests.
+//
+// Threads  any, also several at once.
+// Crash    a reply to a client that has disconnected or died is clientGone.
+// Trust    a client cannot make the server wait: a reply that does not fit is refused.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <mpf/message_server.h>
+
+#include "server/connection.h"
+#include "shm/fork_guard.h"
+
+namespace mpf {
+
+class ReplySender {
+ public:
+  // Counts what it sends in `control`.
+  explicit ReplySender(layout::WindowControl& control) noexcept : control_(control) {}
+
+  // MessageServer::reply().
+  ReplyResult send(Message& message) noexcept;
+  // Ends a request of `connection` with a fate.
+  void sendFate(Connection& connection, const Envelope& request, Fate fate) noexcept;
+  // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
+  void refuseAbandoned(const Route& route) noexcept;
+  // Allocates a body in the memory that is shared with the client of `route`, or on the heap.
+  //   throws  std::bad_alloc
+  static BodyBytes allocate(const Route& route, std::size_t bytes);
+
+ private:
+  ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
+
+  ForkGuard forkGuard_;
+  layout::WindowControl& control_;
+};
+
+}  // namespace mpf

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// HotLinks: the busy links of an endpoint, which it polls. Their peers need not set ready bits.
+//
+//   ready bit ─► tryAdd ─► polled ─► kCoolAfter polls without a message, or remove() ─► ready bit
+//
+// Threads  one owner thread.
+// Trust    as Link: a peer that writes invalid data affects only its own link.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "shm/link.h"
+#include "shm/ready_bits.h"
+
+namespace mpf {
+
+class HotLinks {
+ public:
+  static constexpr std::size_t kCapacity = 8;
+  // polls without a message before polling of a link ends
+  static constexpr std::uint32_t kCoolAfter = 4096;
+  // polls without a message before a busier link may replace a polled one
+  static constexpr std::uint32_t kReplaceAfter = 64;
+
+  explicit HotLinks(ReadyBits& readyBits) noexcept : readyBits_(readyBits) {}
+
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  // Polls a link from now on, in place of idle ones if necessary. Returns false, and the link is
+  // not polled, if there are kCapacity busier links.
+  bool tryAdd(std::uint32_t index, Link& link) noexcept;
+  // Stops polling a link, if it is polled. Its ready bit is set if it has an event.
+  void remove(std::uint32_t index) noexcept;
+  void removeAll() noexcept;
+
+  [[nodiscard]] bool hasMessage() const noexcept {
+    for (std::size_t place = 0; place < size_; ++place) {
+      if (hot_[place].link->incoming().hasMessage()) return true;
+    }
+    return false;
+  }
+  // Index of the next polled link that has a message; links take turns. nullopt if there is no
+  // message, or if polling of an idle link has ended.
+  std::optional<std::uint32_t> next() noexcept {
+    for (std::size_t looked = 0; looked < size_; ++looked) {
+      turn_ = turn_ + 1 < size_ ? turn_ + 1 : 0;
+      auto& hot = hot_[turn_];
+      if (hot.link->incoming().hasMessage()) {
+        hot.misses = 0;
+        return hot.index;
+      }
+      if (++hot.misses >= kCoolAfter) return cool(turn_);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  struct Hot {
+    std::uint32_t index;
+    std::uint32_t misses;  // consecutive polls without a message
+    Link* link;
+  };
+  // Stops polling the link at `place`; returns its index if a message has arrived.
+  std::optional<std::uint32_t> cool(std::size_t place) noexcept;
+
+  ReadyBits& readyBits_;
+  std::array<Hot, kCapacity> hot_{};
+  std::size_t size_ = 0;
+  std::size_t turn_ = 0;
+};
+
+}  // namespace mpf

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+#include "shm/peer_windows.h"
+
+#include <utility>
+
+#include "shm/stale_segments.h"
+
+namespace mpf {
+
+PeerWindows::PeerWindows(Backplane backplane, std::function<void()> onDeath)
+    : backplane_(std::move(backplane)), onDeath_(std::move(onDeath)) {}
+
+PeerWindows::~PeerWindows() {
+  if (forkGuard_.isInherited()) return;
+  for (const auto& [name, peer] : peers_) backplane_.watcher().forget(peer.token);
+}
+
+std::shared_ptr<PeerWindow> PeerWindows::tryOpen(const std::string& name,
+                                                 layout::SegmentKind kind) {
+  dropUnused();
+  const auto [first, last] = peers_.equal_range(name);
+  for (auto peer = first; peer != last; ++peer) {
+    auto window = peer->second.window.lock();
+    // Links may still use a window that is closed or lost. It stays watched, because its owner may
+    // die before it has closed these links.
+    if (window && !window->isDead() && !window->isClosed() && !window->isLost()) return window;
+  }
+  auto window = PeerWindow::tryOpen(name, kind);
+  if (!window || window->isClosed() || !window->hasOwner()) return nullptr;
+  const auto clean = [this, name, incarnation = window->header().incarnation] {
+    stale_segments::removeDeadWindow(backplane_.name(), name, incarnation);
+    onDeath_();
+  };
+  peers_.emplace(name, Peer{window, backplane_.watcher().watchPeer(window, clean)});
+  return window;
+}
+
+void PeerWindows::dropUnused() noexcept {
+  for (auto peer = peers_.begin(); peer != peers_.end();) {
+    if (peer->second.window.use_count() > 1) {  // the watcher holds one reference
+      ++peer;
+      continue;
+    }
+    backplane_.watcher().forget(peer->second.token);
+    peer = peers_.erase(peer);
+  }
+}
+
+}  // namespace mpf

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// Connection: objects are reused, and each remembers which requests have no reply.
+#include "server/connection.h"
+
+#include <gtest/gtest.h>
+
+namespace mpf::test {
+namespace {
+
+TEST(ConnectionTest, AFreeObjectIsReused) {
+  auto first = Connection::take();
+  auto* const object = first.get();
+  const auto second = Connection::take();
+  EXPECT_NE(second.get(), object) << "in use";
+
+  first.reset();
+
+  EXPECT_EQ(Connection::take().get(), object);
+}
+
+TEST(ConnectionTest, ARouteLeadsToItsConnection) {
+  const auto connection = Connection::take();
+  connection->generation = 7;
+
+  const auto route = connection->routeOf(3, nullptr);
+
+  EXPECT_EQ(&Connection::of(route), connection.get());
+  EXPECT_EQ(route.requestId, 3u);
+  EXPECT_FALSE(connection->isOpenFor(route)) << "it has no client";
+}
+
+TEST(ConnectionTest, ClientsOfOneIndexHaveDifferentNumbers) {
+  const auto connection = Connection::take();
+  const auto former = connection->client();
+
+  ++connection->generation;
+
+  EXPECT_NE(connection->client(), former);
+  EXPECT_NE(former, 0u);
+}
+
+TEST(ConnectionTest, OwesARequestByItsFullId) {
+  const auto connection = Connection::take();
+  connection->unanswered = std::vector<std::atomic<std::uint32_t>>(8);
+  connection->unansweredMask = 7;
+
+  connection->owed(9).store(9, std::memory_order_relaxed);
+
+  EXPECT_TRUE(connection->owes(9));
+  EXPECT_FALSE(connection->owes(1)) << "has the same place";
+  EXPECT_FALSE(connection->owes(2));
+  EXPECT_FALSE(connection->owes(0)) << "means no request";
+}
+
+}  // namespace
+}  // namespace mpf::test

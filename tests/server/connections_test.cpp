@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+// Connections: clients that connect, disconnect and die, and the numbers of clients and requests.
+#include "server/connections.h"
+
+#include <gmock/gmock.h>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/server/server_parts_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::Pair;
+
+class ConnectionsTest : public ServerPartsTest {
+ protected:
+  ConnectionsTest() {
+    connections_.onClient([this](std::uint64_t client, bool isConnected) {
+      reports_.emplace_back(client, isConnected);
+    });
+  }
+  std::vector<std::pair<std::uint64_t, bool>> reports_;
+};
+
+TEST_F(ConnectionsTest, AnOpenConnectionIsReportedAndFound) {
+  auto& link = createLink();
+
+  const auto& connection = accept(link);
+
+  EXPECT_THAT(reports_, ElementsAre(Pair(connection.client(), true)));
+  EXPECT_TRUE(connections_.contains(link.header().incarnation));
+  EXPECT_EQ(valueOf(control().linksOpened), 1u);
+}
+
+TEST_F(ConnectionsTest, AClosedConnectionIsReportedAndForgotten) {
+  auto& link = createLink();
+  auto& connection = accept(link);
+  const auto client = connection.client();
+  const auto route = owe(connection, 3);
+
+  connections_.close(connection);
+
+  EXPECT_EQ(link.peerState(), layout::LinkState::closed);
+  EXPECT_THAT(reports_, ElementsAre(Pair(client, true), Pair(client, false)));
+  EXPECT_FALSE(connections_.contains(link.header().incarnation));
+  EXPECT_EQ(Connections::clientOf(route), 0u);
+  EXPECT_FALSE(connections_.owes(client, 3));
+  EXPECT_EQ(valueOf(control().linksClosed), 1u);
+}
+
+TEST_F(ConnectionsTest, ARouteNamesOneClientAlthoughItsConnectionIsReused) {
+  auto& former = accept(createLink());
+  const auto formerRoute = former.routeOf(1, nullptr);
+  connections_.close(former);
+
+  auto& present = accept(createLink());
+  const auto route = present.routeOf(1, nullptr);
+
+  ASSERT_EQ(&present, &former) << "the test needs the same object";
+  EXPECT_EQ(Connections::clientOf(formerRoute), 0u);
+  EXPECT_EQ(Connections::clientOf(route), present.client());
+}
+
+TEST_F(ConnectionsTest, ARequestWithoutReplyIsOwedToItsClient) {
+  auto& connection = accept(createLink());
+  const auto client = connection.client();
+  owe(connection, 3);
+  owe(connection, 5);
+
+  EXPECT_TRUE(connections_.owes(client, 3));
+  EXPECT_FALSE(connections_.owes(client, 4));
+  EXPECT_FALSE(connections_.owes(client + (std::uint64_t{1} << 32), 3)) << "another client";
+  EXPECT_THAT(connections_.owed(client), testing::UnorderedElementsAre(3u, 5u));
+  EXPECT_EQ(connections_.routeTo(0, 3).link, 0u) << "no client has the number 0";
+}
+
+TEST_F(ConnectionsTest, AConnectionEndsAfterTheLastRequestOfAClientThatClosedIt) {
+  auto& link = createLink();
+  auto& connection = accept(link);
+  const auto route = connection.routeOf(1, nullptr);
+  ASSERT_EQ(send(link, 1), LinkSend::sent);
+  EXPECT_TRUE(Connections::isConnected(route));
+  link.setState(layout::LinkState::closed);
+  EXPECT_FALSE(Connections::isConnected(route));
+
+  connections_.closeIfClientDid(connection);
+  ASSERT_TRUE(connection.channel) << "a request waits";
+  auto& incoming = connection.channel->link().incoming();
+  static_cast<void>(incoming.begin());
+  incoming.end();
+  connections_.closeIfClientDid(connection);
+
+  EXPECT_FALSE(connection.channel);
+  EXPECT_EQ(valueOf(control().protocolErrors), 0u);
+}
+
+TEST_F(ConnectionsTest, ExceptionsOfTheCallbackAreThrownLaterInTheirOrder) {
+  connections_.onClient([](std::uint64_t, bool isConnected) {
+    throw std::runtime_error(isConnected ? "on" : "off");
+  });
+  const auto textOf = [this] {
+    return whatOf<std::runtime_error>([this] { connections_.throwNext(); });
+  };
+
+  auto& connection = accept(createLink());
+  connections_.close(connection);
+
+  ASSERT_TRUE(connections_.hasThrown());
+  EXPECT_EQ(textOf(), "on");
+  EXPECT_EQ(textOf(), "off");
+  EXPECT_FALSE(connections_.hasThrown());
+}
+
+TEST_F(ConnectionsTest, CloseAllEndsEachConnection) {
+  auto& first = createLink();
+  auto& second = createLink();
+  accept(first);
+  accept(second);
+
+  connections_.closeAll();
+
+  EXPECT_EQ(first.peerState(), layout::LinkState::closed);
+  EXPECT_EQ(second.peerState(), layout::LinkState::closed);
+  EXPECT_EQ(control().linkCount.load(std::memory_order_relaxed), 0u);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// MessageServer: arguments that it refuses. The tests of clients show how it serves them.
+#include <mpf/message_server.h>
+
+#include <gtest/gtest.h>
+#include <stdexcept>
+
+#include "tests/support/test_backplane.h"
+
+namespace mpf::test {
+namespace {
+
+TEST(MessageServerTest, AReplyWithMoreElementsThanALengthCanCountIsAnError) {
+  const TestBackplane backplane;
+  MessageServer server(backplane, "server");
+
+  for (const std::size_t n : {std::size_t{1} << 32, std::size_t{1} << 61, SIZE_MAX}) {
+    EXPECT_THROW(static_cast<void>(server.allocReplyMessage<Float64Array>(Message(), n)),
+                 std::length_error);
+  }
+}
+
+TEST(MessageServerTest, AnInvalidNameOrQueueSizeIsAnError) {
+  const TestBackplane backplane;
+
+  EXPECT_THROW(MessageServer(backplane, ""), std::invalid_argument);
+  EXPECT_THROW(MessageServer(backplane, "server", {.queueSize = 0}), std::invalid_argument);
+}
+
+TEST(MessageServerTest, AReplyWithoutARequestIsNotSent) {
+  const TestBackplane backplane;
+  MessageServer server(backplane, "server");
+  auto reply = server.allocReplyMessage<Int32>(Message());
+
+  EXPECT_EQ(server.reply(std::move(reply)), ReplyResult::clientGone);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// ServerCore: which requests it returns, and which it ends itself.
+#include "server/server_core.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+class ServerCoreTest : public ShmTest {
+ protected:
+  ServerCoreTest() {
+    link_->peer()->knock(link_->header().incarnation);
+    EXPECT_FALSE(server_->receive());
+    EXPECT_EQ(link_->peerState(), layout::LinkState::open);
+    link_->setPeerIndex(link_->control().serverIndex.load(std::memory_order_relaxed));
+  }
+  Link* createLink() {
+    auto& endpoint = client_->endpoint;
+    const auto index = endpoint.tryReserve().value();
+    auto server = endpoint.peers().tryOpen(serverName(), layout::SegmentKind::serverWindow);
+    return &client_->keep(index, Link::create(name(), endpoint.window(), index, std::move(server)));
+  }
+  void sendRequest(std::uint32_t requestId, std::int64_t deadlineNs = 0,
+                   std::size_t bytes = sizeof(Int32)) {
+    Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::int32),
+                      .requestId = requestId,
+                      .deadlineNs = deadlineNs};
+    ASSERT_EQ(link_->trySend(envelope, std::vector<std::byte>(bytes), {}), LinkSend::sent);
+  }
+  [[nodiscard]] bool isConnected() const { return link_->peerState() == layout::LinkState::open; }
+  void TearDown() override {
+    server_.reset();
+    client_.reset();
+    ShmTest::TearDown();
+  }
+
+  std::optional<ServerCore> server_{std::in_place, backplane_, "server", ServerOptions{}};
+  std::optional<End> client_{std::in_place, backplane_, ""};
+  Link* link_ = createLink();
+};
+
+TEST_F(ServerCoreTest, ReturnsEachRequestOnce) {
+  sendRequest(1);
+  sendRequest(2);
+
+  const auto first = server_->receive();
+  const auto second = server_->receive();
+
+  EXPECT_EQ(first.route().requestId, 1u);
+  EXPECT_EQ(second.route().requestId, 2u);
+  EXPECT_FALSE(server_->receive());
+  EXPECT_EQ(server_->counts().requests, 2u);
+}
+
+TEST_F(ServerCoreTest, ARequestWhoseDeadlineHasPassedIsNotReturned) {
+  sendRequest(1, 1);
+  sendRequest(2, INT64_MAX);
+
+  const auto request = server_->receive();
+
+  EXPECT_EQ(request.route().requestId, 2u);
+  ASSERT_TRUE(link_->incoming().hasMessage());
+  EXPECT_EQ(link_->incoming().begin().type, static_cast<std::uint16_t>(MessageType::requestFate));
+  link_->incoming().end();
+}
+
+TEST_F(ServerCoreTest, AnIdThatIsInUseEndsTheConnection) {
+  sendRequest(1);
+  const auto request = server_->receive();
+  sendRequest(1);
+
+  EXPECT_FALSE(server_->receive());
+
+  EXPECT_FALSE(isConnected());
+}
+
+TEST_F(ServerCoreTest, ARequestWithoutAnIdEndsTheConnection) {
+  sendRequest(0);
+
+  EXPECT_FALSE(server_->receive());
+
+  EXPECT_FALSE(isConnected());
+}
+
+TEST_F(ServerCoreTest, AnInterruptEndsOneWait) {
+  server_->interrupt();
+  EXPECT_TRUE(server_->isInterrupted());
+
+  EXPECT_FALSE(server_->wait(Deadline::never()));
+  EXPECT_FALSE(server_->isInterrupted());
+  sendRequest(1);
+
+  EXPECT_TRUE(server_->wait(Deadline::never()));
+  EXPECT_TRUE(server_->receive());
+}
+
+TEST_F(ServerCoreTest, AQueueSizeOutsideTheLimitsIsAnError) {
+  EXPECT_THROW(server_->setQueueSize(0), std::invalid_argument);
+  EXPECT_THROW(server_->setQueueSize(16385), std::invalid_argument);
+
+  server_->setQueueSize(16384);
+
+  EXPECT_EQ(server_->counts().queueSize, 16384u);
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// HotLinks: which links are polled, in which order, and what happens when polling ends.
+#include "shm/hot_links.h"
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+class HotLinksTest : public ShmTest {
+ protected:
+  void makeLinks(std::uint32_t count) {
+    while (links_.size() < count) links_.push_back(connect(*client_, *server_));
+  }
+  // Polls link `index`, which is one that makeLinks() has made.
+  bool tryAdd(std::uint32_t index) { return hot_->tryAdd(index, links_[index].server); }
+  std::optional<std::uint32_t> takeReadyBit() {
+    return readyBits_.tryTake([](std::uint32_t) { return true; });
+  }
+  // Whether the peer of the link need not set its ready bit.
+  bool isWatched(std::uint32_t index) {
+    const auto& ring = links_[index].server.control().requests;
+    return ring.unwatched.load(std::memory_order_relaxed) == 0;
+  }
+  void poll(std::uint32_t times) {
+    for (std::uint32_t i = 0; i < times; ++i) EXPECT_FALSE(hot_->next());
+  }
+  void TearDown() override {
+    hot_.reset();
+    client_.reset();
+    server_.reset();
+    ShmTest::TearDown();
+  }
+
+  std::unique_ptr<layout::WindowHints> hints_ = std::make_unique<layout::WindowHints>();
+  ReadyBits readyBits_{*hints_};
+  std::optional<HotLinks> hot_{std::in_place, readyBits_};
+  std::optional<End> server_{std::in_place, backplane_, "server", WaitMode::block};
+  std::optional<End> client_{std::in_place, backplane_, "", WaitMode::block};
+  std::vector<Connected> links_;
+};
+
+TEST_F(HotLinksTest, APolledLinkNeedsNoReadyBits) {
+  makeLinks(1);
+  EXPECT_FALSE(isWatched(0));
+
+  EXPECT_TRUE(tryAdd(0));
+  EXPECT_TRUE(tryAdd(0)) << "polled already";
+  EXPECT_EQ(hot_->size(), 1u);
+  EXPECT_TRUE(isWatched(0));
+  hot_->remove(0);
+
+  EXPECT_EQ(hot_->size(), 0u);
+  EXPECT_FALSE(isWatched(0));
+  EXPECT_FALSE(takeReadyBit()) << "it has no event";
+}
+
+TEST_F(HotLinksTest, LinksWithMessagesTakeTurns) {
+  makeLinks(3);
+  for (const auto index : {0u, 1u, 2u}) ASSERT_TRUE(tryAdd(index));
+  EXPECT_FALSE(hot_->hasMessage());
+  for (const auto index : {0u, 2u}) ASSERT_EQ(send(links_[index].client, 1), LinkSend::sent);
+
+  EXPECT_TRUE(hot_->hasMessage());
+  const auto first = hot_->next();
+  const auto second = hot_->next();
+
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(*first + *second, 2u) << "the links 0 and 2, once each";
+  EXPECT_EQ(hot_->next(), first) << "their messages were not taken";
+}
+
+TEST_F(HotLinksTest, AnEventIsAnnouncedByTheReadyBitWhenPollingEnds) {
+  makeLinks(2);
+  for (const auto index : {0u, 1u}) ASSERT_TRUE(tryAdd(index));
+  ASSERT_EQ(send(links_[1].client, 1), LinkSend::sent);
+
+  hot_->removeAll();
+
+  EXPECT_EQ(hot_->size(), 0u);
+  EXPECT_EQ(takeReadyBit(), 1u);
+  EXPECT_FALSE(takeReadyBit());
+}
+
+TEST_F(HotLinksTest, TheEndOfALinkIsAnEvent) {
+  makeLinks(1);
+  ASSERT_TRUE(tryAdd(0));
+  links_[0].client.setState(layout::LinkState::closed);
+
+  hot_->remove(0);
+
+  EXPECT_EQ(takeReadyBit(), 0u);
+}
+
+TEST_F(HotLinksTest, PollingEndsAfterManyPollsWithoutAMessage) {
+  makeLinks(1);
+  ASSERT_TRUE(tryAdd(0));
+
+  poll(HotLinks::kCoolAfter - 1);
+  EXPECT_EQ(hot_->size(), 1u);
+  poll(1);
+
+  EXPECT_EQ(hot_->size(), 0u);
+  EXPECT_FALSE(isWatched(0));
+}
+
+TEST_F(HotLinksTest, AMessageRestartsTheCountOfPolls) {
+  makeLinks(1);
+  ASSERT_TRUE(tryAdd(0));
+  poll(HotLinks::kCoolAfter - 1);
+  ASSERT_EQ(send(links_[0].client, 1), LinkSend::sent);
+
+  EXPECT_EQ(hot_->next(), 0u);
+  server_->tryTake(links_[0].serverIndex);
+
+  poll(HotLinks::kCoolAfter - 1);
+  EXPECT_EQ(hot_->size(), 1u);
+}
+
+TEST_F(HotLinksTest, ABusierLinkReplacesAnIdleOne) {
+  constexpr auto kCapacity = static_cast<std::uint32_t>(HotLinks::kCapacity);
+  makeLinks(kCapacity + 1);
+  for (std::uint32_t index = 0; index < kCapacity; ++index) ASSERT_TRUE(tryAdd(index));
+
+  EXPECT_FALSE(tryAdd(kCapacity)) << "no link has been idle for long";
+  poll(HotLinks::kReplaceAfter);
+  EXPECT_TRUE(tryAdd(kCapacity));
+
+  EXPECT_EQ(hot_->size(), HotLinks::kCapacity);
+  EXPECT_TRUE(isWatched(kCapacity));
+}
+
+}  // namespace
+}  // namespace mpf::test

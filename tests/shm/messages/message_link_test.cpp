@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+// MessageLink: messages of each size cross a link, and each body returns to its owner once.
+#include "shm/messages/message_link.h"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include <mpf/message_of.h>
+
+#include "tests/shm/endpoint_pair.h"
+#include "tests/shm/shm_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+class MessageLinkTest : public ShmTest {
+ protected:
+  MessageLinkTest() {
+    const auto connected = connect(*clientEnd_, *serverEnd_);
+    client_ = makeLink(*clientEnd_, connected.clientIndex);
+    server_ = makeLink(*serverEnd_, connected.serverIndex);
+  }
+  static std::shared_ptr<MessageLink> makeLink(End& end, std::uint32_t index) {
+    end.endpoint.detach(index);
+    return std::make_shared<MessageLink>(std::move(end.links[index]), std::make_shared<SpinLock>());
+  }
+  // An array whose elements are their indices, in the memory that the client's link chooses.
+  Int32ArrayMessage allocate(std::size_t n) {
+    auto message =
+        Int32ArrayMessage::inBuffer(client_->allocate(Int32ArrayMessage::bytesFor(n)), n);
+    std::int32_t next = 0;
+    for (auto& element : message.value()) element = next++;
+    return message;
+  }
+  LinkSend send(Message& message) {
+    Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()),
+                      .clientType = message.getClientType()};
+    const std::lock_guard guard(client_->lock());
+    return client_->trySendLocked(envelope, message, {});
+  }
+  // The next message that the server receives; an empty handle if it is invalid.
+  Message take() {
+    Envelope envelope;
+    EXPECT_EQ(server_->tryBegin(envelope), MessageLink::Take::message);
+    Message message;
+    finish_ = server_->tryFinish(envelope, message);
+    return message;
+  }
+  void TearDown() override {
+    client_.reset();
+    server_.reset();
+    clientEnd_.reset();
+    serverEnd_.reset();
+    ShmTest::TearDown();
+  }
+
+  std::optional<End> serverEnd_{std::in_place, backplane_, "server"};
+  std::optional<End> clientEnd_{std::in_place, backplane_, ""};
+  std::shared_ptr<MessageLink> client_;
+  std::shared_ptr<MessageLink> server_;
+  MessageLink::Finish finish_{};
+};
+
+class ArrayLengths : public MessageLinkTest, public testing::WithParamInterface<std::size_t> {};
+
+TEST_P(ArrayLengths, Cross) {
+  auto sent = allocate(GetParam());
+  sent.setClientType(9);
+  ASSERT_TRUE(send(sent) == LinkSend::sent || !sent);
+
+  const auto received = Int32ArrayMessage::tryFrom(take());
+
+  ASSERT_TRUE(received);
+  EXPECT_EQ(received->getClientType(), 9);
+  ASSERT_EQ(received->getLength(), GetParam());
+  std::int32_t next = 0;
+  EXPECT_TRUE(std::ranges::all_of(received->value(), [&](auto value) { return value == next++; }));
+}
+// In the first slot, in the handle, in several slots, in a chunk.
+INSTANTIATE_TEST_SUITE_P(OfEachKind, ArrayLengths, testing::Values(0, 2, 40, 10'000));
+
+TEST_F(MessageLinkTest, AMessageThatIsRefusedStaysWithItsOwner) {
+  auto message = Char8ArrayMessage::allocValue((1 << 20) + 1);  // Offer::maxMessageBytes
+
+  EXPECT_EQ(send(message), LinkSend::tooLarge);
+
+  EXPECT_EQ(message.getSize(), (1u << 20) + 1);
+  Envelope envelope;
+  EXPECT_EQ(server_->tryBegin(envelope), MessageLink::Take::nothing);
+}
+
+TEST_F(MessageLinkTest, AShortBodyIsOnTheHeap) {
+  const auto body = client_->allocate(layout::kInlineBodyBytes);
+
+  EXPECT_EQ(body.lender, &heapLender());
+  heapLender().takeBack(body.data, body.capacity);
+}
+
+TEST_F(MessageLinkTest, ALinkStaysUntilItsLastBodyReturns) {
+  std::optional<Int32ArrayMessage> message(allocate(10'000));
+  const std::weak_ptr<MessageLink> link = client_;
+
+  client_.reset();
+  EXPECT_FALSE(link.expired());
+  message.reset();
+
+  EXPECT_TRUE(link.expired());
+}
+
+TEST_F(MessageLinkTest, ADiscardedMessageReturnsItsChunk) {
+  for (int i = 0; i < 100; ++i) {  // more than the pool holds at one time
+    auto message = allocate(250'000);
+    ASSERT_EQ(message.lender(), client_.get()) << "message " << i;
+    ASSERT_EQ(send(message), LinkSend::sentInPlace);
+    Envelope envelope;
+    ASSERT_EQ(server_->tryBegin(envelope), MessageLink::Take::message);
+
+    server_->discard(envelope);
+  }
+}
+
+TEST_F(MessageLinkTest, ABodyThatIsLongerThanItsSlotsIsInvalid) {
+  auto message = Message(Int32Message({.value = 1}));
+  ASSERT_EQ(send(message), LinkSend::sent);
+  auto& link = server_->link();
+  auto* const slots =
+      reinterpret_cast<layout::Slot*>(reinterpret_cast<std::byte*>(&link.control()) -
+                                      layout::kLinkControlOffset + layout::kLinkRingsOffset);
+  slots[0].bodyBytes = 1000;
+
+  Envelope envelope;
+
+  EXPECT_EQ(server_->tryBegin(envelope), MessageLink::Take::invalid);
+}
+
+TEST_F(MessageLinkTest, ABodyOfAnotherTypeThanItsSizeIsAMessageThatIsNotSound) {
+  Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::float64)};
+  const Int32Message body;
+  ASSERT_EQ(client_->link().trySend(envelope, body.body(), {}), LinkSend::sent);
+
+  const auto message = take();
+
+  EXPECT_EQ(finish_, MessageLink::Finish::message);
+  EXPECT_FALSE(message.isSound());
+}
+
+}  // namespace
+}  // namespace mpf::test

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// RightsText: modes and groups as options name them.
+#include "shm/rights_text.h"
+
+#include <gmock/gmock.h>
+#include <stdexcept>
+
+#include "tests/shm/shm_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+TEST(RightsText, AModeIsOctal) {
+  EXPECT_EQ(parseMode("0600"), 0600u);
+  EXPECT_EQ(parseMode("660"), 0660u);
+  EXPECT_EQ(parseMode("0666"), 0666u);
+}
+
+class InvalidModes : public testing::TestWithParam<const char*> {};
+
+TEST_P(InvalidModes, AreRefusedWithTheTextAndTheLimits) {
+  EXPECT_THAT(whatOf<std::invalid_argument>([] { static_cast<void>(parseMode(GetParam())); }),
+              testing::AllOf(testing::StartsWith(GetParam()), testing::HasSubstr("0600 and 0666")));
+}
+INSTANTIATE_TEST_SUITE_P(Each, InvalidModes,
+                         testing::Values("", "0", "0400", "0066", "0777", "0680", "0600 ", "-0600",
+                                         "77777777777777777777"));
+
+TEST(RightsText, AGroupIsFoundByItsName) { EXPECT_EQ(parseGroup("root"), 0u); }
+
+TEST(RightsText, AnUnknownGroupIsNamed) {
+  EXPECT_THAT(
+      whatOf<std::invalid_argument>([] { static_cast<void>(parseGroup("no-such-group-of-mpf")); }),
+      testing::HasSubstr("no-such-group-of-mpf"));
+}
+
+}  // namespace
+}  // namespace mpf::test
