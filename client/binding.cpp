@@ -189,25 +189,23 @@ bool Binding::hasDeadPeer() const noexcept {
 
 // Delivers the messages that the server sent before it closed the link or died. A server that is
 // still alive could send without end, so at most one ring of messages is delivered.
-void Binding::deliverRemaining(const MessageLink* channel) {
+void Binding::deliverRemaining(const MessageLink* ended) {
   Envelope envelope;
-  while (sender_.channel().get() == channel && end_.remainingSlots != 0) {
+  while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
     --end_.remainingSlots;
-    if (this->channel().tryBegin(envelope) == MessageLink::Take::message &&
-        tryDeliverReply(envelope))
+    if (channel().tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope))
       continue;
     end_.remainingSlots = 0;
   }
 }
 
 void Binding::disconnect(const std::string& reason, Ending ending) {
-  const bool wasConnected = isConnected();
-  if (!hasLeft()) setState(BindingState::ending);
-  MPF_STEP(disconnecting);
   connector_.setReason(reason);
   resume();
-  end_ = {ending, wasConnected,
+  end_ = {ending, isConnected(),
           ending == Ending::serverGone ? channel().link().header().replySlots : 0};
+  if (!hasLeft()) setState(BindingState::ending);
+  MPF_STEP(disconnecting);
   resumeEnd();
 }
 

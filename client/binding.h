@@ -111,7 +111,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void postFullReport();
   void resumeEnd();
   void endAll();
-  void deliverRemaining(const MessageLink* channel);
+  void deliverRemaining(const MessageLink* ended);
   void lookForServer(Ending ending);
   void expire(std::int64_t nowNs);
   void nudge(std::int64_t nowNs);

@@ -58,17 +58,25 @@ TEST(RunnerLock, ARunnerWaitsForATemporaryOwner) {
   EXPECT_FALSE(lock.isRunnerWaiting());
 }
 
-TEST(RunnerLock, ATemporaryOwnerYieldsToAWaitingRunner) {
+TEST(RunnerLock, AWaitingRunnerComesBeforeTemporaryOwners) {
   const Watchdog watchdog("runner lock");
   RunnerLock lock;
   ASSERT_TRUE(lock.tryAcquireTemporarily());
   std::latch woken(1);
-  std::thread runner([&] { lock.acquire([&] { woken.count_down(); }); });
+  std::latch mayTake(1);
+  std::thread runner([&] {
+    lock.acquire([&] {
+      woken.count_down();
+      mayTake.wait();
+    });
+    lock.release();
+  });
   woken.wait();
 
-  inAnotherThread([&] { EXPECT_FALSE(lock.tryAcquireTemporarily()); });
-
   lock.release();
+
+  EXPECT_FALSE(lock.tryAcquireTemporarily());
+  mayTake.count_down();
   runner.join();
 }
 
