@@ -5,7 +5,6 @@
 #include <mutex>
 
 #include "base/step.h"
-#include "client/dispatcher_impl.h"
 #include "shm/histogram.h"
 #include "shm/segment_name.h"
 
@@ -25,15 +24,36 @@ bool mayServerSend(const Message& message, const Request* request) noexcept {
 
 }  // namespace
 
-std::uint64_t Binding::maxMessageBytes() const noexcept {
-  const std::lock_guard lock(*lock_);
-  return isConnected() ? channel_->link().maxMessageBytes() : 0;
+void Binding::setState(BindingState state) noexcept {
+  const std::lock_guard lock(*sender_.lock());
+  state_.store(state, std::memory_order_relaxed);
+}
+
+void Binding::setServer(const std::string& server, std::int32_t location) {
+  connector_.setServer(server, location);
+  // PAIR(bound): the server's name, which the dispatcher's thread reads.
+  state_.store(BindingState::waiting, std::memory_order_release);
+}
+
+void Binding::tryConnect() try {
+  // Another thread in bind(), or a callback that ran the dispatcher, may have connected already.
+  if (!isWaiting()) return;
+  const auto server = connector_.tryFindServer();
+  if (!server || !connector_.tryOpenLink(server, sender_, *this)) return;
+  setState(BindingState::connecting);
+  connector_.askForAcceptance(channel().link());
+  nudgeInterval_.start(Clock::nowNs());
+  timer_.wakeAt(nudgeInterval_.dueNs());
+} catch (const std::exception& error) {
+  // No memory, no permission, a window of another version: report the reason and try again later.
+  connector_.setReason(error.what());
+  connector_.retryLater();
 }
 
 bool Binding::takeOne() {
-  if (!channel_ || paused_ || end_) return false;
+  if (!isLinked() || isPaused_) return false;
   Envelope envelope;
-  switch (channel_->tryBegin(envelope)) {
+  switch (channel().tryBegin(envelope)) {
     case MessageLink::Take::nothing:
       return onLinkState();
     case MessageLink::Take::message:
@@ -42,42 +62,29 @@ bool Binding::takeOne() {
     case MessageLink::Take::invalid:
       break;
   }
-  count(dispatcher_.endpoint().control().protocolErrors);
+  count(control().protocolErrors);
   disconnect("the server sent invalid data", Ending::protocolError);
   return true;
 }
 
 // Acts on a change of the state of the link. Returns false when there was none.
 bool Binding::onLinkState() {
-  auto& link = channel_->link();
-  const auto state = link.peerState();
+  auto& link = channel().link();
+  const auto peerState = link.peerState();
   if (link.isLost() || link.peer()->isLost()) {
-    count(dispatcher_.endpoint().control().protocolErrors);
+    count(control().protocolErrors);
     disconnect("the shared memory of the connection was truncated", Ending::protocolError);
     return true;
   }
-  if (state == layout::LinkState::open && !isConnected()) {
-    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) %
-                      layout::kMaxLinks);
-    {
-      const std::lock_guard lock(*lock_);
-      isFullReported_ = false;
-      connected_.store(true, std::memory_order_relaxed);
-    }
-    MPF_STEP(connected);
-    {
-      const std::lock_guard lock(reasonMutex_);
-      connectedChanged_.notify_all();
-    }
-    count(dispatcher_.endpoint().control().linksOpened);
-    deliverConnect(ConnectStatus::connectYes);
+  if (peerState == layout::LinkState::open && !isConnected()) {
+    onAccepted(link);
     return true;
   }
-  if (state == layout::LinkState::closed && !link.incoming().hasMessage()) {
+  if (peerState == layout::LinkState::closed && !link.incoming().hasMessage()) {
     disconnect("the server closed the connection", Ending::serverGone);
     return true;
   }
-  if (state == layout::LinkState::refused) {
+  if (peerState == layout::LinkState::refused) {
     disconnect("the server has its maximum number of clients", Ending::refused);
     deliverConnect(ConnectStatus::connectRefused);
     return true;
@@ -85,21 +92,29 @@ bool Binding::onLinkState() {
   return false;
 }
 
+void Binding::onAccepted(Link& link) {
+  link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) % layout::kMaxLinks);
+  setState(BindingState::connected);
+  MPF_STEP(connected);
+  connector_.notifyConnected();
+  count(control().linksOpened);
+  deliverConnect(ConnectStatus::connectYes);
+}
+
 // Returns false on a protocol error; then it has delivered nothing.
 bool Binding::tryDeliverReply(const Envelope& envelope) {
-  auto& control = dispatcher_.endpoint().control();
-  count(control.received);
-  auto* request = (envelope.flags & layout::kSlotFirstReply) != 0
-                      ? requests_->find(envelope.requestId)
-                      : nullptr;
+  count(control().received);
+  auto& requests = *sender_.requests();
+  auto* request =
+      (envelope.flags & layout::kSlotFirstReply) != 0 ? requests.find(envelope.requestId) : nullptr;
   if ((envelope.flags & layout::kSlotFirstReply) != 0 &&
       (request == nullptr || request->isGivenUp)) {
-    channel_->discard(envelope);
-    if (request != nullptr) requests_->end(*request);
+    channel().discard(envelope);
+    if (request != nullptr) requests.end(*request);
     return true;
   }
   Message message;
-  switch (channel_->tryFinish(envelope, message)) {
+  switch (channel().tryFinish(envelope, message)) {
     case MessageLink::Finish::invalid:
       return false;
     case MessageLink::Finish::unavailable:
@@ -112,16 +127,16 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
     noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
-  if (auto* connect = message.tryAs<Connect>()) connect->incarnation = incarnation_;
+  if (auto* connect = message.tryAs<Connect>()) connect->incarnation = connector_.incarnation();
   if (request != nullptr) {
     // The server sends fates without the marks of the client.
     if (message.getType() == MessageType::requestFate) {
       message.setClientType(request->clientType);
       message.setClientExtra(request->clientExtra);
     }
-    requests_->end(*request);
+    requests.end(*request);
     MPF_STEP(request_ended);
-    channel_->link().control().clientUnanswered.store(requests_->awaited(),
+    channel().link().control().clientUnanswered.store(requests.awaited(),
                                                       std::memory_order_relaxed);
   }
   deliver(std::move(message));
@@ -129,7 +144,7 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
 }
 
 void Binding::noteTimes(const Envelope& envelope, const Request* request) noexcept {
-  auto& endpoint = dispatcher_.endpoint();
+  auto& endpoint = parts_.endpoint;
   const auto nowNs = Clock::nowNs();
   if (request != nullptr && request->sentNs != 0)
     record(endpoint.control().serviceNs, nowNs - request->sentNs);
@@ -141,14 +156,14 @@ void Binding::noteTimes(const Envelope& envelope, const Request* request) noexce
 
 // The callback may throw: callers have finished all other work on the message before.
 void Binding::deliver(Message&& message) try {
-  if (!left_) callback_(std::move(message));
+  if (!hasLeft()) callback_(std::move(message));
 } catch (...) {
-  dispatcher_.noteThrower(server_, location_);
+  parts_.errors.note(connector_.server(), connector_.location());
   throw;
 }
 
 void Binding::deliverConnect(ConnectStatus status) {
-  deliver(ConnectMessage({.status = status, .incarnation = incarnation_}));
+  deliver(ConnectMessage({.status = status, .incarnation = connector_.incarnation()}));
 }
 
 // A cancelled or expired request keeps its entry until the server replies to it or refuses it.
@@ -160,41 +175,37 @@ void Binding::deliverFate(Request& request, Fate fate) {
   message.setClientExtra(request.clientExtra);
   message.setRoute({0, message->requestId, kEndsRequest, nullptr});
   if (fate == Fate::cancelled || fate == Fate::expired) {
-    requests_->giveUp(request);
+    sender_.requests()->giveUp(request);
   } else {
-    requests_->end(request);
+    sender_.requests()->end(request);
   }
   MPF_STEP(fate_given);
   deliver(std::move(message));
 }
 
 bool Binding::hasDeadPeer() const noexcept {
-  return channel_ && !end_ && channel_->link().peer()->isDead();
+  return isLinked() && channel().link().peer()->isDead();
 }
 
 // Delivers the messages that the server sent before it closed the link or died. A server that is
 // still alive could send without end, so at most one ring of messages is delivered.
-void Binding::deliverRemaining(const MessageLink* channel) {
+void Binding::deliverRemaining(const MessageLink* ended) {
   Envelope envelope;
-  while (channel_.get() == channel && end_->remainingSlots != 0) {
-    --end_->remainingSlots;
-    if (channel_->tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope))
+  while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
+    --end_.remainingSlots;
+    if (channel().tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope))
       continue;
-    end_->remainingSlots = 0;
+    end_.remainingSlots = 0;
   }
 }
 
 void Binding::disconnect(const std::string& reason, Ending ending) {
-  bool wasConnected = false;
-  {
-    const std::lock_guard lock(*lock_);
-    wasConnected = connected_.exchange(false, std::memory_order_relaxed);
-  }
-  MPF_STEP(disconnecting);
-  setReason(reason);
+  connector_.setReason(reason);
   resume();
-  end_ = {ending, wasConnected,
-          ending == Ending::serverGone ? channel_->link().header().replySlots : 0};
+  end_ = {ending, isConnected(),
+          ending == Ending::serverGone ? channel().link().header().replySlots : 0};
+  if (!hasLeft()) setState(BindingState::ending);
+  MPF_STEP(disconnecting);
   resumeEnd();
 }
 
@@ -204,19 +215,18 @@ void Binding::resumeEnd() {
   try {
     endAll();
   } catch (...) {
-    if (end_) {
-      end_->isInterrupted = true;
-      wakeAt(Clock::nowNs());
+    if (state() == BindingState::ending) {
+      setState(BindingState::interrupted);
+      timer_.wakeAt(Clock::nowNs());
     }
     throw;
   }
 }
 
 void Binding::endAll() {
-  const auto channel = channel_;
-  const auto requests = requests_;
-  const auto ending = end_->ending;
-  end_->isInterrupted = false;
+  const auto channel = sender_.channel();
+  const auto requests = sender_.requests();
+  const auto ending = end_.ending;
   deliverRemaining(channel.get());
   requests->forEach([&](Request& request) {
     deliverFate(request, ending != Ending::protocolError &&
@@ -224,10 +234,11 @@ void Binding::endAll() {
                              ? Fate::neverTaken
                              : Fate::outcomeUnknown);
   });
-  if (channel_ != channel) return;  // a callback destroyed the client
-  const bool wasConnected = end_->wasConnected;
-  closeChannel();
-  end_.reset();
+  if (sender_.channel() != channel) return;  // a callback destroyed the client
+  const bool wasConnected = end_.wasConnected;
+  resume();  // a callback may have called pause() again
+  connector_.closeLink(sender_);
+  if (!hasLeft()) setState(BindingState::waiting);
   try {
     if (wasConnected) deliverConnect(ConnectStatus::connectNo);
   } catch (...) {
@@ -237,146 +248,89 @@ void Binding::endAll() {
   lookForServer(ending);
 }
 
-void Binding::closeChannel() {
-  auto& link = channel_->link();
-  auto& endpoint = dispatcher_.endpoint();
-  MPF_STEP(requests_ended);
-  const bool serverDied = link.peer()->isDead();
-  if (serverDied) count(endpoint.control().peersDied);
-  link.setState(layout::LinkState::closed);
-  // The server may have accepted the link after the last look at its state.
-  if (link.peerState() == layout::LinkState::open)
-    link.setPeerIndex(link.control().serverIndex.load(std::memory_order_relaxed) %
-                      layout::kMaxLinks);
-  if (!serverDied) link.notifyPeer();
-  removeBulk(endpoint.backplane().name(), link.header().incarnation);
-  MPF_STEP(bulk_removed);
-  segments::remove(link.name());
-  resume();  // a callback may have called pause() again
-  endpoint.detach(index_);
-  dispatcher_.setLink(index_, nullptr);
-  count(endpoint.control().linksClosed);
-  const std::lock_guard lock(*lock_);
-  channel_.reset();
-}
-
 void Binding::lookForServer(Ending ending) {
-  if (left_) return;
+  if (hasLeft()) return;
   if (ending == Ending::serverGone) return tryConnect();
-  wakeAt(Clock::nowNs() + kRetryNs);
+  connector_.retryLater();
 }
 
 void Binding::cancel(std::uint32_t requestId) {
-  if (!requests_) return;
-  if (auto* request = requests_->find(requestId)) deliverFate(*request, Fate::cancelled);
+  if (!sender_.requests()) return;
+  if (auto* request = sender_.requests()->find(requestId)) deliverFate(*request, Fate::cancelled);
 }
 
 void Binding::pause() {
-  if (!channel_ || std::exchange(paused_, true)) return;
-  dispatcher_.endpoint().hold(index_);
+  if (!sender_.channel() || std::exchange(isPaused_, true)) return;
+  parts_.endpoint.hold(connector_.index());
 }
 
 void Binding::resume() {
-  if (std::exchange(paused_, false)) dispatcher_.endpoint().release(index_, channel_->link());
+  if (std::exchange(isPaused_, false))
+    parts_.endpoint.release(connector_.index(), channel().link());
 }
 
 void Binding::leave() {
-  left_ = true;
-  if (channel_) disconnect("the client was destroyed", Ending::serverGone);
-  if (pendingBind_) segments::remove(pendingBind_.name());
-  pendingBind_ = {};
+  setState(BindingState::left);
+  if (sender_.channel()) disconnect("the client was destroyed", Ending::serverGone);
+  connector_.cancelPendingBind();
 }
 
 void Binding::onTime(std::int64_t nowNs) {
-  dueNs_.store(INT64_MAX, std::memory_order_relaxed);
-  if (end_) {
-    if (end_->isInterrupted) resumeEnd();
-    return;
+  timer_.reset();
+  if (state() == BindingState::interrupted) {
+    setState(BindingState::ending);
+    return resumeEnd();
   }
-  if (!channel_) {
-    if (isBound() && !left_) tryConnect();
-    return;
-  }
-  // PAIR(due): a sender that lowers dueNs_ from now on wakes the dispatcher again.
-  doorbell::fence();
+  if (!isLinked()) return tryConnect();
   const auto self = shared_from_this();
   try {
     expire(nowNs);
-    if (channel_) nudge(nowNs);
+    if (isLinked()) nudge(nowNs);
   } catch (...) {
-    wakeAt(nowNs);  // the next call handles the other requests
+    timer_.wakeAt(nowNs);  // the next call handles the other requests
     throw;
   }
 }
 
 void Binding::expire(std::int64_t nowNs) {
-  const auto requests = requests_;
-  const auto channel = channel_;
+  const auto requests = sender_.requests();
+  const auto channel = sender_.channel();
   requests->forEach([&](Request& request) {
-    if (channel_ != channel || end_) return;  // a callback ran the dispatcher
+    if (sender_.channel() != channel || !isLinked()) return;  // a callback ran the dispatcher
     if (request.deadlineNs == 0 || request.isGivenUp) return;
-    if (request.deadlineNs > nowNs) return wakeAt(request.deadlineNs);
+    if (request.deadlineNs > nowNs) return timer_.wakeAt(request.deadlineNs);
     // PAIR(taken-before-clock): if the server has not counted it as taken, it will see that the
     // deadline has passed.
     doorbell::fence();
-    bool taken = false;
-    {
-      const std::lock_guard lock(*lock_);
-      taken = channel_->link().outgoing().isTaken(request.ordinal);
-    }
-    if (!taken) deliverFate(request, Fate::expired);
+    if (!sender_.isTaken(request)) deliverFate(request, Fate::expired);
   });
 }
 
 // A faulty process may overwrite hints in shared memory. While a reply is outstanding, this rings
 // the server's doorbell again from time to time.
 void Binding::nudge(std::int64_t nowNs) {
-  const bool connected = isConnected();
-  if (connected && endNudging()) {
-    nudgeEveryNs_ = kFirstNudgeNs;
-    return;
-  }
-  if (nowNs - knockedNs_ >= nudgeEveryNs_) {
-    knockedNs_ = nowNs;
-    nudgeEveryNs_ = std::min(2 * nudgeEveryNs_, kLastNudgeNs);
-    auto& link = channel_->link();
+  if (isConnected() && sender_.tryEndNudging()) return nudgeInterval_.reset();
+  if (nudgeInterval_.tryTake(nowNs)) {
+    auto& link = channel().link();
     link.peer()->forceNextRing();
-    if (connected) {
+    if (isConnected()) {
       link.notifyPeer();
     } else if (link.peer()->isClosed()) {
       return disconnect("the server exited before it accepted the client", Ending::serverGone);
     } else {
-      link.peer()->knock(link.header().incarnation);
-      setReason(notAcceptedBecause(*link.peer()));
-      if (dispatcher_.endpoint().window().isNameless())
-        setReason(
-            "the files of this process in /dev/shm were removed (by RemoveIPC of systemd-logind?), "
-            "so no server can find this client: restart this process");
+      connector_.askAgain(link);
     }
     takeOne();  // a reply or a change of the link whose hint was lost
   }
-  wakeAt(knockedNs_ + nudgeEveryNs_);
+  timer_.wakeAt(nudgeInterval_.dueNs());
 }
 
-// Returns true when no reply is outstanding; the next send() then starts the nudging again.
-bool Binding::endNudging() {
-  const std::lock_guard lock(*lock_);
-  if (requests_->awaited() != 0) return false;
-  nudging_ = false;
-  return true;
-}
-
-void Binding::wakeAt(std::int64_t ns) noexcept {
-  auto due = dueNs_.load(std::memory_order_relaxed);
-  while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
-  }
-  // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read.
-  doorbell::fence();
-  dispatcher_.noteDue(ns);
-}
-
-void Binding::reportQueueFull() {
-  if (channel_ && isConnected()) deliverConnect(ConnectStatus::connectQueueFull);
+// Called by any thread, under the lock of the sender.
+void Binding::postFullReport() {
+  parts_.commands.postLater([weak = weak_from_this()] {
+    const auto self = weak.lock();
+    if (self && self->isConnected()) self->deliverConnect(ConnectStatus::connectQueueFull);
+  });
 }
 
 }  // namespace mpf

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Binding: the connection of one client to one server, through restarts of the server.
 //
-//   unbound ─bind─► waiting ─server found─► connecting ─accepted─► connected ─server gone─► waiting
+//   RequestSender ─ requests ─► server ─ replies ─► Binding ─► callback
+//   Connector       finds the server and makes the connection
+//   BindingState    the states, with their diagram
 //
 // Threads  the two sections of the public functions name the thread that may call them: any thread,
 //          or the thread that runs the dispatcher.
@@ -11,39 +13,43 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
-#include <functional>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
 
 #include <mpf/message_client.h>
 
-#include "client/request_table.h"
-#include "shm/endpoint.h"
-#include "shm/messages/message_link.h"
+#include "client/binding_state.h"
+#include "client/binding_timer.h"
+#include "client/connector.h"
+#include "client/dispatcher_parts.h"
+#include "client/nudge_interval.h"
+#include "client/request_sender.h"
 
 namespace mpf {
 
 class Binding : public std::enable_shared_from_this<Binding> {
  public:
-  Binding(Dispatcher::Impl& dispatcher, MessageClient::Callback callback)
-      : dispatcher_(dispatcher), callback_(std::move(callback)) {}
+  Binding(DispatcherParts& parts, MessageClient::Callback callback)
+      : parts_(parts), callback_(std::move(callback)) {}
 
   // --- any thread ---
-  //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
-  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
-  BodyBytes allocate(std::size_t bytes);
-  [[nodiscard]] bool isConnected() const noexcept {
-    return connected_.load(std::memory_order_relaxed);
+  // As RequestSender::send().
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept {
+    return sender_.send(message, takeBefore, requestId);
   }
-  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
-  [[nodiscard]] std::string notConnectedBecause() const;
-  // PAIR(bound): server_ and location_.
-  [[nodiscard]] bool isBound() const noexcept { return bound_.load(std::memory_order_acquire); }
+  BodyBytes allocate(std::size_t bytes) { return sender_.allocate(bytes); }
+  [[nodiscard]] bool isConnected() const noexcept { return state() == BindingState::connected; }
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return sender_.maxMessageBytes(); }
+  [[nodiscard]] std::string notConnectedBecause() const {
+    return isConnected() ? std::string() : connector_.notConnectedBecause();
+  }
+  //   throws  as Connector::setServer()
   void setServer(const std::string& server, std::int32_t location);
-  bool waitConnected(Deadline deadline);
+  bool waitConnected(Deadline deadline) {
+    return connector_.wait(deadline, [this] { return isConnected(); });
+  }
+  // When onTime() is due.
+  [[nodiscard]] std::int64_t dueNs() const noexcept { return timer_.dueNs(); }
 
   // --- dispatcher's thread ---
   void tryConnect();
@@ -66,70 +72,60 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void leave();
   // Does what is due: ends expired requests, rings again for hints that may have been lost.
   void onTime(std::int64_t nowNs);
-  [[nodiscard]] std::int64_t dueNs() const noexcept {
-    return dueNs_.load(std::memory_order_relaxed);
+  [[nodiscard]] bool hasLeft() const noexcept { return state() == BindingState::left; }
+  [[nodiscard]] bool isWaiting() const noexcept {
+    // PAIR(bound): the server's name, which bind() has stored.
+    return state_.load(std::memory_order_acquire) == BindingState::waiting;
   }
-  [[nodiscard]] bool hasLeft() const noexcept { return left_; }
-  [[nodiscard]] bool isWaiting() const noexcept { return !channel_ && isBound() && !left_; }
   [[nodiscard]] bool hasDeadPeer() const noexcept;
-  void reportQueueFull();
 
  private:
+  // What disconnect() delivers.
+  struct End {
+    Ending ending{};
+    bool wasConnected = false;
+    std::uint32_t remainingSlots = 0;  // of the server's ring that are still to be delivered
+  };
+
+  [[nodiscard]] BindingState state() const noexcept {
+    return state_.load(std::memory_order_relaxed);
+  }
+  void setState(BindingState state) noexcept;
+  // A link exists, and its end has not begun.
+  [[nodiscard]] bool isLinked() const noexcept {
+    const auto now = state();
+    return now == BindingState::connecting || now == BindingState::connected;
+  }
+  [[nodiscard]] MessageLink& channel() const noexcept { return *sender_.channel(); }
+  [[nodiscard]] layout::WindowControl& control() const noexcept {
+    return parts_.endpoint.control();
+  }
+
+  bool onLinkState();
+  void onAccepted(Link& link);
+  bool tryDeliverReply(const Envelope& envelope);
+  void noteTimes(const Envelope& envelope, const Request* request) noexcept;
   void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
-  bool tryDeliverReply(const Envelope& envelope);
-  void deliverRemaining(const MessageLink* channel);
+  void postFullReport();
   void resumeEnd();
   void endAll();
-  void closeChannel();
+  void deliverRemaining(const MessageLink* ended);
   void lookForServer(Ending ending);
-  void noteTimes(const Envelope& envelope, const Request* request) noexcept;
-  bool onLinkState();
-  void makeChannel(const std::shared_ptr<PeerWindow>& server);
-  void pendingBind();
-  [[nodiscard]] std::string notAcceptedBecause(const PeerWindow& server) const;
-  void setReason(const std::string& reason);
-  [[nodiscard]] std::string shortageAt(const layout::WindowControl& server) const;
-  void wakeAt(std::int64_t ns) noexcept;
-  void noteFull() noexcept;
-  static constexpr std::int64_t kRetryNs = 1'000'000'000;
-  static constexpr std::int64_t kFirstNudgeNs = 50'000'000;
-  static constexpr std::int64_t kLastNudgeNs = 1'000'000'000;
   void expire(std::int64_t nowNs);
   void nudge(std::int64_t nowNs);
-  bool endNudging();
 
-  Dispatcher::Impl& dispatcher_;
+  DispatcherParts& parts_;
   MessageClient::Callback callback_;
-  std::string server_;
-  std::int32_t location_ = 0;
-  std::atomic<bool> bound_{false};
-  std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
-  std::shared_ptr<MessageLink> channel_;  // written by the dispatcher's thread under lock_
-  std::shared_ptr<RequestTable> requests_;  // likewise
-  std::atomic<bool> connected_{false};  // under lock_
-  bool isFullReported_ = false;  // under lock_: the present series of refusals has been reported
-  bool nudging_ = false;  // under lock_: a time for the next nudge() is set
-  std::atomic<std::int64_t> dueNs_{INT64_MAX};
-  std::int64_t knockedNs_ = 0;
-  std::int64_t nudgeEveryNs_ = 0;
-  std::uint32_t index_ = 0;
-  std::uint64_t incarnation_ = 0;  // of the server
-  bool left_ = false;
-  bool paused_ = false;
-  // The state of a disconnect() that is delivering messages, or whose callback has thrown.
-  struct End {
-    Ending ending;
-    bool wasConnected;
-    std::uint32_t remainingSlots;  // of the server's ring that are still to be delivered
-    bool isInterrupted = false;  // by an exception: resumeEnd() is due
-  };
-  std::optional<End> end_;
-  Segment pendingBind_;
-  mutable std::mutex reasonMutex_;
-  std::condition_variable connectedChanged_;
-  std::string reason_ = "not bound to a server yet";
+  // Written by the dispatcher's thread under the sender's lock; the first change is that of bind().
+  std::atomic<BindingState> state_{BindingState::unbound};
+  BindingTimer timer_{parts_.timer};
+  RequestSender sender_{state_, control(), timer_, [this] { postFullReport(); }};
+  Connector connector_{parts_, timer_};
+  NudgeInterval nudgeInterval_;
+  bool isPaused_ = false;
+  End end_;  // in the states ending and interrupted, and at the end in the state left
 };
 
 }  // namespace mpf

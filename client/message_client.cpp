@@ -38,23 +38,24 @@ MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callba
 
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
     : dispatcher_(dispatcher.impl_),
-      binding_(std::make_shared<Binding>(*dispatcher_, std::move(callback))) {
-  dispatcher_->runOrPost(
-      [dispatcher = dispatcher_.get(), binding = binding_] { dispatcher->add(binding); });
+      binding_(std::make_shared<Binding>(dispatcher_->parts(), std::move(callback))) {
+  dispatcher_->commands().runOrPost([dispatcher = dispatcher_.get(), binding = binding_] {
+    dispatcher->bindings().add(binding);
+  });
 }
 
 MessageClient::~MessageClient() {
   if (isInherited()) return;
   dispatcher_->runOrPostAndWait([&] {
     binding_->leave();
-    dispatcher_->remove(binding_);
+    dispatcher_->bindings().remove(binding_);
   });
 }
 
 void MessageClient::bind(const std::string& server, std::int32_t location) {
   dispatcher_->endpoint().forkGuard().check("MessageClient");
   binding_->setServer(server, location);
-  dispatcher_->runOrPost([binding = binding_] { binding->tryConnect(); });
+  dispatcher_->commands().runOrPost([binding = binding_] { binding->tryConnect(); });
 }
 
 SendResult MessageClient::send(Message&& message, Deadline takeBefore,
@@ -70,7 +71,7 @@ BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate
 
 void MessageClient::cancel(std::uint32_t requestId) {
   if (isInherited()) return;
-  dispatcher_->post([binding = binding_, requestId] { binding->cancel(requestId); });
+  dispatcher_->commands().post([binding = binding_, requestId] { binding->cancel(requestId); });
 }
 
 bool MessageClient::isInherited() const noexcept {
@@ -96,7 +97,7 @@ bool MessageClient::connectWait(Nanoseconds timeout) {
     static_cast<void>(binding_->waitConnected(
         dispatcher_->hasThread()
             ? deadline
-            : std::min(deadline, Deadline::after(Dispatcher::Impl::kLookForRunner))));
+            : std::min(deadline, Deadline::after(CommandQueue::kLookForRunner))));
   }
   return isConnected();
 }

@@ -9,12 +9,13 @@
 #include <set>
 #include <vector>
 
-#include "client/binding.h"
-
 namespace mpf {
 
+template <class Binding>
 class Round {
  public:
+  static constexpr int kPerStep = 8;
+
   // Starts a round through `all`; a round in progress is dropped.
   void begin(const std::set<std::shared_ptr<Binding>>& all) {
     bindings_.assign(all.begin(), all.end());
@@ -32,7 +33,6 @@ class Round {
   }
 
  private:
-  static constexpr int kPerStep = 8;
   std::vector<std::weak_ptr<Binding>> bindings_;
   std::size_t next_ = 0;
 };

@@ -7,8 +7,8 @@
 //   server  knock or list of names ─ open the link ─ client alive? ─ accept ─ take ─ reply
 //           a second run of the server follows the first
 //
-//   MODELS  client/connect.cpp: tryConnect pendingBind
-//   MODELS  client/binding.cpp: onLinkState disconnect nudge leave
+//   MODELS  client/connector.cpp: tryFindServer tryOpenLink askForAcceptance publishPendingBind closeLink
+//   MODELS  client/binding.cpp: tryConnect onLinkState disconnect nudge leave
 //   MODELS  server/acceptor.cpp: acceptAll rescan accept open
 //   MODELS  server/connections.cpp: add open closeIfClientDid closeDead close
 //   MODELS  shm/window.cpp: knock notify

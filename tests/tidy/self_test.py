@@ -77,10 +77,10 @@ class Rules(unittest.TestCase):
         self.passes(check.shown_code, {"docs/a.md": shown + "```cpp\nint c;\n```\n", "shm/a.h": SPDX + "int b;\n\nint a;\n"})
 
     def test_named_functions(self):
-        row = "| The client sends. | `Binding::send` | `client/send.cpp` |\n"
-        self.refuses(check.named_functions, {"docs/a.md": row, "client/send.cpp": "void Binding::post() {}\n"}, ("docs/a.md", 1))
+        row = "| The client sends. | `RequestSender::send` | `client/request_sender.cpp` |\n"
+        self.refuses(check.named_functions, {"docs/a.md": row, "client/request_sender.cpp": "void RequestSender::post() {}\n"}, ("docs/a.md", 1))
         self.refuses(check.named_functions, {"docs/a.md": row}, ("docs/a.md", 1))
-        self.passes(check.named_functions, {"docs/a.md": row, "client/send.cpp": "SendResult Binding::send() {}\n"})
+        self.passes(check.named_functions, {"docs/a.md": row, "client/request_sender.cpp": "SendResult RequestSender::send() {}\n"})
 
     def test_sizes(self):
         self.refuses(check.sizes, {"shm/a.cpp": "\n" * 401}, ("shm/a.cpp", 401))

@@ -5,7 +5,7 @@
 namespace mpf::test {
 namespace {
 
-class LiarTest : public ClientTest {
+class ProtocolErrorTest : public ClientTest {
  protected:
   // Sends a request to the server, whose reply must end the connection.
   void expectToBeLeft() {
@@ -20,7 +20,7 @@ class LiarTest : public ClientTest {
   }
 };
 
-TEST_F(LiarTest, AServerMustNotSendConnectMessages) {
+TEST_F(ProtocolErrorTest, AServerMustNotSendConnectMessages) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<Connect>(request);
@@ -31,7 +31,7 @@ TEST_F(LiarTest, AServerMustNotSendConnectMessages) {
   expectToBeLeft();
 }
 
-TEST_F(LiarTest, AFateOfAnotherRequestEndsNoRequest) {
+TEST_F(ProtocolErrorTest, AFateOfAnotherRequestEndsNoRequest) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<RequestFate>(request);
@@ -43,7 +43,7 @@ TEST_F(LiarTest, AFateOfAnotherRequestEndsNoRequest) {
   expectToBeLeft();
 }
 
-TEST_F(LiarTest, AFateAfterTheReplyEndsNothing) {
+TEST_F(ProtocolErrorTest, AFateAfterTheReplyEndsNothing) {
   auto& server = startServer();
   server.on<Int32>([&](Int32Message&& request) {
     auto lie = server.allocReplyMessage<RequestFate>(request);

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// BindingTimer: the time at which a binding has work to do. Its dispatcher wakes up by then.
+//
+// Threads  wakeAt() and dueNs(): any. reset(): the dispatcher's thread.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "client/dispatcher_timer.h"
+
+namespace mpf {
+
+class BindingTimer {
+ public:
+  explicit BindingTimer(DispatcherTimer& dispatcher) noexcept : dispatcher_(dispatcher) {}
+
+  // INT64_MAX: nothing is due.
+  [[nodiscard]] std::int64_t dueNs() const noexcept {
+    return dueNs_.load(std::memory_order_relaxed);
+  }
+  void wakeAt(std::int64_t ns) noexcept {
+    auto due = dueNs_.load(std::memory_order_relaxed);
+    while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
+    }
+    // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read.
+    doorbell::fence();
+    dispatcher_.wakeAt(ns);
+  }
+  // Forgets the time: the caller handles what is due.
+  void reset() noexcept {
+    dueNs_.store(INT64_MAX, std::memory_order_relaxed);
+    // PAIR(due): a sender that lowers dueNs_ from now on wakes the dispatcher again.
+    doorbell::fence();
+  }
+
+ private:
+  DispatcherTimer& dispatcher_;
+  std::atomic<std::int64_t> dueNs_{INT64_MAX};
+};
+
+}  // namespace mpf

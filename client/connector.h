@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// Connector: finds the server of a binding, creates the link to it, and states why the client is
+// not connected.
+//
+// Threads  the dispatcher's thread, unless a comment says: any thread.
+// Crash    a failed attempt leaves no segment and no index in use; the timer starts the next one.
+#pragma once
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <mpf/clock.h>
+
+#include "client/binding_timer.h"
+#include "client/dispatcher_parts.h"
+#include "client/request_sender.h"
+
+namespace mpf {
+
+class Connector {
+ public:
+  Connector(DispatcherParts& parts, BindingTimer& timer) noexcept : parts_(parts), timer_(timer) {}
+
+  // --- any thread ---
+  //   throws  std::invalid_argument for an invalid name; std::logic_error when a server is set
+  void setServer(const std::string& server, std::int32_t location);
+  [[nodiscard]] std::string notConnectedBecause() const;
+  // Waits until `isConnected` returns true, which is checked after each notifyConnected().
+  template <class IsConnected>
+  bool wait(Deadline deadline, const IsConnected& isConnected) {
+    std::unique_lock lock(mutex_);
+    if (!deadline.isNever()) return connected_.wait_for(lock, deadline.left(), isConnected);
+    connected_.wait(lock, isConnected);
+    return true;
+  }
+
+  // --- dispatcher's thread, after setServer() ---
+  [[nodiscard]] const std::string& server() const noexcept { return server_; }
+  [[nodiscard]] std::int32_t location() const noexcept { return location_; }
+  // The server's window. Returns nullptr when there is no such server, and then watches for its
+  // name and publishes a pending bind.
+  std::shared_ptr<PeerWindow> tryFindServer();
+  // Opens a new link to `server`, which `owner` gets the events of. Returns false when the process
+  // has no index left; then a retry is due later.
+  [[nodiscard]] bool tryOpenLink(const std::shared_ptr<PeerWindow>& server, RequestSender& sender,
+                                 Binding& owner);
+  // Asks the server to accept the new link.
+  void askForAcceptance(Link& link);
+  // As askForAcceptance(), again: the server may have missed it.
+  void askAgain(Link& link);
+  // Ends the link and removes its segments.
+  void closeLink(RequestSender& sender);
+  void cancelPendingBind();
+  void retryLater() noexcept;
+
+  void setReason(const std::string& reason);
+  void notifyConnected();
+  // Of the present or the last link.
+  [[nodiscard]] std::uint32_t index() const noexcept { return index_; }
+  // Of the server of that link.
+  [[nodiscard]] std::uint64_t incarnation() const noexcept { return incarnation_; }
+
+ private:
+  void publishPendingBind();
+  [[nodiscard]] std::string notAcceptedBecause(const PeerWindow& server) const;
+  [[nodiscard]] std::string shortageAt(const layout::WindowControl& server) const;
+
+  DispatcherParts& parts_;
+  BindingTimer& timer_;
+  std::string server_;  // written once, by setServer()
+  std::int32_t location_ = 0;  // likewise
+  std::uint32_t index_ = 0;
+  std::uint64_t incarnation_ = 0;
+  Segment pendingBind_;
+  mutable std::mutex mutex_;
+  std::condition_variable connected_;
+  std::string reason_ = "not bound to a server yet";  // under mutex_
+};
+
+}  // namespace mpf

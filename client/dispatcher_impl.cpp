@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT
+#include "client/dispatcher_impl.h"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "base/signals_blocked.h"
+
+namespace mpf {
+namespace {
+
+constexpr int kBatch = 16;  // messages of one link before the next link has its turn
+// The mode of a client window before its first connection: all users may read it, as tools and
+// routers do.
+constexpr mode_t kReadableByAll = 0644;
+constexpr std::uint32_t kWakeupsPerClockCheck = 64;  // wake-ups without work between clock readings
+
+class DepthGuard {
+ public:
+  explicit DepthGuard(int& depth) noexcept : depth_(depth) { ++depth_; }
+  ~DepthGuard() { --depth_; }
+  DepthGuard(const DepthGuard&) = delete;
+  DepthGuard& operator=(const DepthGuard&) = delete;
+
+ private:
+  int& depth_;
+};
+
+}  // namespace
+
+Dispatcher::Impl::Impl(Backplane backplane, const DispatcherOptions& options)
+    : parts_(std::move(backplane), layout::SegmentKind::clientWindow, std::string(),
+             Rights{.mode = kReadableByAll}, options.waitMode, [&](layout::SegmentHeader& header) {
+               options.label.copy(header.name.data(), header.name.size() - 1);
+             }) {}
+
+Dispatcher::Impl::~Impl() {
+  if (endpoint().forkGuard().isInherited()) return;
+  endpoint().control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+}
+
+void Dispatcher::Impl::startThread(const std::shared_ptr<Impl>& self) {
+  const SignalsBlocked blocked;
+  hasThread_ = true;
+  thread_ = std::thread([self] {
+    ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
+    const auto guard = self->acquireLock();
+    while (!self->ended_.load(std::memory_order_relaxed)) {
+      try {
+        self->runOnce(Deadline::atNs(self->parts_.errors.dueNs()));
+      } catch (...) {  // thrown by a callback; this thread has no caller that could handle it
+        self->endpoint().control().alarms.fetch_add(1, std::memory_order_relaxed);
+        self->parts_.errors.report();
+      }
+      self->parts_.errors.writeDue();
+    }
+    self->parts_.errors.writeHeld();
+  });
+}
+
+void Dispatcher::Impl::endThread() {
+  if (!thread_.joinable()) return;
+  if (endpoint().forkGuard().isInherited()) return ForkGuard::abandon(thread_);
+  ended_.store(true, std::memory_order_relaxed);
+  interrupt();
+  // A callback may destroy the last client: then this thread ends after the callback.
+  if (parts_.lock.isMine()) {
+    thread_.detach();
+  } else {
+    thread_.join();
+  }
+}
+
+RunnerGuard Dispatcher::Impl::becomeRunner() {
+  endpoint().forkGuard().check("Dispatcher");
+  if (parts_.lock.isMine()) return RunnerGuard(nullptr);
+  if (hasThread_) RunnerLock::throwOtherRunner();
+  return acquireLock();
+}
+
+RunnerGuard Dispatcher::Impl::acquireLock() {
+  parts_.lock.acquire([this] { endpoint().interrupt(); });
+  return RunnerGuard(&parts_.lock);
+}
+
+bool Dispatcher::Impl::takeStop() noexcept {
+  return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed);
+}
+
+bool Dispatcher::Impl::runOnce(Deadline deadline) {
+  const auto guard = becomeRunner();
+  return run(deadline, [this] { return takeStop(); });
+}
+
+bool Dispatcher::Impl::tryRunUntil(Deadline deadline, const std::function<bool()>& isDone) {
+  const bool isNested = parts_.lock.isMine();
+  if (!isNested &&
+      (hasThread_ || parts_.lock.hasOtherRunner() || !parts_.lock.tryAcquireTemporarily()))
+    return false;
+  const RunnerGuard guard(isNested ? nullptr : &parts_.lock);
+  const auto isOver = [&] { return !isNested && parts_.lock.isRunnerWaiting(); };
+  while (!isDone() && !deadline.hasPassed() && !isOver()) run(deadline, isOver);
+  if (hasDescriptor_) endpoint().keepReadable();  // running has made it unreadable
+  return true;
+}
+
+// Returns true when it has done something, false at the deadline and when isOver() returns true.
+template <class IsOver>
+bool Dispatcher::Impl::run(Deadline deadline, const IsOver& isOver) {
+  parts_.timer.setWaitingThread();
+  for (std::uint32_t wakeups = 0;;) {
+    // Checked even when every step finds work: a busy dispatcher must stop, too.
+    if (isOver()) return false;
+    if (step()) return true;
+    // The step clears the local hints, and with them that of an interrupt() since the check above.
+    if (isOver()) return false;
+    dropKnocks();
+    const bool hasWoken = endpoint().wait(std::min(deadline, nextDue()));
+    // Faulty peers may set hints without end, so the clock is read even when wait() returns true.
+    if ((!hasWoken || ++wakeups % kWakeupsPerClockCheck == 0) && deadline.hasPassed() &&
+        !nextDue().hasPassed())
+      return false;
+  }
+}
+
+// Only servers accept clients: a knock at a client window is invalid.
+void Dispatcher::Impl::dropKnocks() noexcept {
+  for (std::uint32_t knocks = 0; knocks < layout::kKnocks && endpoint().knocks().tryTake();
+       ++knocks) {
+  }
+  static_cast<void>(endpoint().knocks().takeRescan());
+}
+
+// When a callback throws, the interrupt() makes the next wait return immediately, so that the next
+// step handles the remaining work.
+bool Dispatcher::Impl::step() try { return tryStep(); } catch (...) {
+  endpoint().interrupt();
+  throw;
+}
+
+bool Dispatcher::Impl::tryStep() {
+  // A callback may run the dispatcher, too: bindings whose callback is in progress stay alive.
+  const DepthGuard inside(depth_);
+  if (depth_ == 1) bindings_.dropRemoved();
+  bool hasActed = endpoint().takeLocalEvent() && handleLocalHints();
+  hasActed = bindings_.resume() || hasActed;
+  if (const auto index = endpoint().next()) {
+    auto* binding = parts_.linkOwners.find(*index);
+    int taken = 0;
+    // A binding that a callback removes stays alive until the next step.
+    while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;
+    if (taken != 0) return true;
+  }
+  if (!parts_.timer.isDue()) return hasActed;
+  bindings_.handleDue();
+  return true;
+}
+
+void Dispatcher::Impl::interrupt() noexcept {
+  stop_.store(true, std::memory_order_relaxed);
+  endpoint().interrupt();
+}
+
+int Dispatcher::Impl::descriptor() {
+  hasDescriptor_ = true;
+  static_cast<void>(endpoint().arm());
+  return endpoint().descriptor();
+}
+
+bool Dispatcher::Impl::runPending(int most) {
+  const auto guard = becomeRunner();
+  // Peers may send messages and hints without end: the event loop must have its turn.
+  for (int batches = 0; batches < most; ++batches) {
+    if (step()) continue;
+    dropKnocks();
+    if (!hasDescriptor_ || endpoint().arm()) return true;
+  }
+  if (hasDescriptor_) endpoint().keepReadable();
+  return false;
+}
+
+// Handles commands, deaths of peers and new names. Returns true when callbacks may have run.
+bool Dispatcher::Impl::handleLocalHints() {
+  const bool hasCalled = parts_.commands.hasCommands();
+  if (hasCalled) parts_.commands.run();
+  if (endpoint().takePeerDeath()) bindings_.beginDead();
+  if (parts_.names.takeChange()) bindings_.beginWaiting();
+  return hasCalled;
+}
+
+}  // namespace mpf

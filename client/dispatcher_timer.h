@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// DispatcherTimer: the time at which a dispatcher must wake up to do what is due.
+//
+// Threads  any. A thread that lowers the time wakes the thread that waits, if it is another one.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <thread>
+
+#include <mpf/clock.h>
+
+#include "shm/endpoint.h"
+
+namespace mpf {
+
+class DispatcherTimer {
+ public:
+  //   endpoint   the dispatcher waits in endpoint.wait(due())
+  explicit DispatcherTimer(Endpoint& endpoint) noexcept : endpoint_(endpoint) {}
+
+  [[nodiscard]] Deadline due() const noexcept {
+    // PAIR(waiting-thread): read after the waiting thread has stored its id in waitingThread_.
+    return Deadline::atNs(dueNs_.load(std::memory_order_seq_cst));
+  }
+  [[nodiscard]] bool isDue() const noexcept {
+    return dueNs_.load(std::memory_order_relaxed) != INT64_MAX && due().hasPassed();
+  }
+
+  // Makes sure that the dispatcher wakes up at `ns`.
+  void wakeAt(std::int64_t ns) noexcept {
+    auto due = dueNs_.load(std::memory_order_relaxed);
+    // PAIR(waiting-thread): stored before this thread reads which thread waits.
+    while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_seq_cst,
+                                                     std::memory_order_relaxed)) {
+    }
+    // PAIR(waiting-thread): the waiting thread reads the time stored above, or its id is read here.
+    if (ns < due && waitingThread_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
+      endpoint_.interrupt();
+  }
+
+  // The calling thread waits until due() from now on.
+  void setWaitingThread() noexcept {
+    const auto me = std::this_thread::get_id();
+    // PAIR(waiting-thread): stored before this thread reads how long it may wait.
+    if (waitingThread_.load(std::memory_order_relaxed) != me)
+      waitingThread_.store(me, std::memory_order_seq_cst);
+  }
+
+  // Forgets the time: the caller handles all that is due before it.
+  void reset() noexcept {
+    dueNs_.store(INT64_MAX, std::memory_order_relaxed);
+    // PAIR(due): the caller sees a time that a BindingTimer stored before this reset; one that is
+    // stored later lowers dueNs_ again.
+    doorbell::fence();
+  }
+
+ private:
+  Endpoint& endpoint_;
+  std::atomic<std::int64_t> dueNs_{INT64_MAX};
+  // The thread that waits, or waited last.
+  std::atomic<std::thread::id> waitingThread_;
+};
+
+}  // namespace mpf

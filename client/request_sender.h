@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// RequestSender: sends the requests of one client over the present link to its server.
+//
+// Threads  any, unless a comment says: the dispatcher's thread. A spin lock guards the data.
+// Crash    a request in the table that was not sent, or not taken, gets a fate from the binding.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+
+#include <mpf/message_client.h>
+
+#include "client/binding_state.h"
+#include "client/binding_timer.h"
+#include "client/nudge_interval.h"
+#include "client/request_table.h"
+#include "shm/messages/message_link.h"
+
+namespace mpf {
+
+class RequestSender {
+ public:
+  //   state            of the binding; it becomes or stops being `connected` under lock()
+  //   control          counts refusals
+  //   timer            wakes the dispatcher at deadlines of requests, and to nudge the server
+  //   postFullReport   called under lock() for the first refusal of a series
+  RequestSender(const std::atomic<BindingState>& state, layout::WindowControl& control,
+                BindingTimer& timer, std::function<void()> postFullReport)
+      : state_(state),
+        control_(control),
+        timer_(timer),
+        postFullReport_(std::move(postFullReport)) {}
+
+  //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
+  BodyBytes allocate(std::size_t bytes);
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
+  [[nodiscard]] const std::shared_ptr<SpinLock>& lock() const noexcept { return lock_; }
+
+  // --- dispatcher's thread ---
+  // Uses a new link and a new table of requests.
+  //   throws  std::bad_alloc; then nothing has changed
+  void open(std::shared_ptr<MessageLink> channel);
+  // The link has ended. The table stays until the next open().
+  void close() noexcept;
+  // nullptr between close() and open().
+  [[nodiscard]] const std::shared_ptr<MessageLink>& channel() const noexcept { return channel_; }
+  // nullptr before the first open().
+  [[nodiscard]] const std::shared_ptr<RequestTable>& requests() const noexcept { return requests_; }
+  [[nodiscard]] bool isTaken(const Request& request) const noexcept;
+  // Returns true when no reply is outstanding; the next send() then starts the nudging again.
+  bool tryEndNudging() noexcept;
+
+ private:
+  SendResult trySendLocked(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+                           bool& startsNudging) noexcept;
+  void noteFull() noexcept;
+
+  const std::atomic<BindingState>& state_;
+  layout::WindowControl& control_;
+  BindingTimer& timer_;
+  std::function<void()> postFullReport_;
+  std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
+  std::shared_ptr<MessageLink> channel_;  // written by the dispatcher's thread under lock_
+  std::shared_ptr<RequestTable> requests_;  // likewise
+  bool isFullReported_ = false;  // under lock_: the present series of refusals has been reported
+  bool isNudging_ = false;  // under lock_: a time for the next nudge is set
+};
+
+}  // namespace mpf

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// BindingTimer and the DispatcherTimer that it lowers.
+#include "client/binding_timer.h"
+
+#include <gtest/gtest.h>
+#include <thread>
+
+#include "tests/support/test_backplane.h"
+
+namespace mpf::test {
+namespace {
+
+class BindingTimerTest : public testing::Test {
+ protected:
+  // Calls `work` while the dispatcher waits in another thread. Returns whether that wakes it.
+  template <class Work>
+  bool wakes(const Work& work) {
+    std::thread([this] { dispatcher_.setWaitingThread(); }).join();
+    static_cast<void>(endpoint_.takeLocalEvent());
+    work();
+    return endpoint_.takeLocalEvent();
+  }
+
+  TestBackplane backplane_;
+  Endpoint endpoint_{backplane_,      layout::SegmentKind::clientWindow,
+                     std::string(),   Rights{.mode = 0600},
+                     WaitMode::block, [](layout::SegmentHeader&) {}};
+  DispatcherTimer dispatcher_{endpoint_};
+  BindingTimer first_{dispatcher_};
+  BindingTimer second_{dispatcher_};
+};
+
+TEST_F(BindingTimerTest, NothingIsDueAtFirst) {
+  EXPECT_EQ(first_.dueNs(), INT64_MAX);
+  EXPECT_TRUE(dispatcher_.due().isNever());
+  EXPECT_FALSE(dispatcher_.isDue());
+}
+
+TEST_F(BindingTimerTest, TheEarliestTimeCounts) {
+  first_.wakeAt(300);
+  second_.wakeAt(200);
+  first_.wakeAt(400);
+
+  EXPECT_EQ(first_.dueNs(), 300);
+  EXPECT_EQ(second_.dueNs(), 200);
+  EXPECT_EQ(dispatcher_.due().ns(), 200);
+  EXPECT_TRUE(dispatcher_.isDue());
+}
+
+TEST_F(BindingTimerTest, AnEarlierTimeWakesADispatcherThatWaitsInAnotherThread) {
+  EXPECT_TRUE(wakes([&] { first_.wakeAt(300); }));
+  EXPECT_FALSE(wakes([&] { second_.wakeAt(400); }));
+  EXPECT_TRUE(wakes([&] { second_.wakeAt(200); }));
+}
+
+TEST_F(BindingTimerTest, TheThreadThatWaitsDoesNotWakeItself) {
+  dispatcher_.setWaitingThread();
+  static_cast<void>(endpoint_.takeLocalEvent());
+
+  first_.wakeAt(300);
+
+  EXPECT_FALSE(endpoint_.takeLocalEvent());
+}
+
+TEST_F(BindingTimerTest, AResetForgetsTheTime) {
+  first_.wakeAt(300);
+
+  dispatcher_.reset();
+  EXPECT_TRUE(dispatcher_.due().isNever());
+  EXPECT_EQ(first_.dueNs(), 300);
+  first_.reset();
+
+  EXPECT_EQ(first_.dueNs(), INT64_MAX);
+}
+
+}  // namespace
+}  // namespace mpf::test
