@@ -79,8 +79,7 @@ struct DigitalIoNews {
     gone,  // the module is absent or replaced
     back,  // the module is back or was reset; it is programmed again, outputs included
     lostInterrupt,  // a poll found an edge whose interrupt did not come
-    // the request line is stuck: interrupts are masked for a while, repeatedly; reported once
-    storm,
+    storm,  // the request line is stuck: see InterruptThread; reported once until it ends
   };
   Kind kind = Kind::inputs;
   std::uint32_t inputs = 0;  // all inputs; for `gone` their last values
@@ -150,7 +149,7 @@ class DigitalIo {
   bool setUp();
   void restoreOutputs();
   void noteLateness(InterruptThread::Cause cause, bool hadEdges);
-  void noteStorms();
+  void note(InterruptTrouble trouble);
   void tell(const DigitalIoNews& news);
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
   [[nodiscard]] std::uint32_t armed() const noexcept {
@@ -170,7 +169,6 @@ class DigitalIo {
   IndustryPackModule& module_;
   const int vector_;
   const bool usesInterrupts_;
-  const std::chrono::milliseconds stormPause_;
   mutable std::mutex mutex_;  // guards the registers and the members below
   DigitalIoRegisters registers_;
   std::uint32_t rising_ = 0, falling_ = 0, polarity_ = 0;
@@ -180,10 +178,6 @@ class DigitalIo {
   State state_;
   bool mayBeLost_ = false;  // the last poll found an edge whose interrupt may still be under way
   bool isLosing_ = false;  // lostInterrupt was reported
-  bool isStorming_ = false;  // storm was reported
-  bool isAfterPause_ = false;  // the last poll was after the pause
-  Deadline pauseEnds_ = Deadline::never();
-  std::uint64_t storms_ = 0, spurious_ = 0;  // as counted at the last poll
   struct Subscriber {
     std::uint64_t id = 0;
     Listener listener;
@@ -191,7 +185,6 @@ class DigitalIo {
   std::vector<Subscriber> subscribers_;
   std::uint64_t lastId_ = 0;
   std::unique_ptr<Interrupt> noInterrupt_;  // in place of that of a module without interrupts
-  std::atomic<InterruptThread*> running_{nullptr};
   std::unique_ptr<InterruptThread> thread_;  // last: ends before the members that it uses
 };
 
