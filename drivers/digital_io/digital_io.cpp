@@ -240,7 +240,7 @@ bool DigitalIo::lookLocked() {
     tend();
     return false;
   }
-  if (changed != 0) tell({DigitalIoNews::Kind::inputs, state_.inputs, changed});
+  if (changed != 0) report({DigitalIoChange::Kind::inputs, state_.inputs, changed});
   return hadEdges;
 }
 
@@ -257,9 +257,9 @@ bool DigitalIo::tend() {
   if (state_.isThere && !hasVanished()) return true;
   const auto before = state_;
   if (setUp()) {
-    tell({DigitalIoNews::Kind::back, state_.inputs, state_.inputs ^ before.inputs});
+    report({DigitalIoChange::Kind::back, state_.inputs, state_.inputs ^ before.inputs});
   } else if (before.isThere) {
-    tell({DigitalIoNews::Kind::gone, state_.inputs, 0});
+    report({DigitalIoChange::Kind::gone, state_.inputs, 0});
   }
   return false;
 }
@@ -292,7 +292,7 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
     return;
   }
   if (std::exchange(mayBeLost_, hadEdges) && !std::exchange(isLosing_, true))
-    tell({DigitalIoNews::Kind::lostInterrupt, state_.inputs, 0});
+    report({DigitalIoChange::Kind::lostInterrupt, state_.inputs, 0});
 }
 
 // Lost interrupts are found by noteLateness(), which compares edges, and a carrier that polls
@@ -300,11 +300,11 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
 void DigitalIo::note(InterruptTrouble trouble) {
   if (trouble != InterruptTrouble::storm) return;
   const std::lock_guard lock(mutex_);
-  tell({DigitalIoNews::Kind::storm, state_.inputs, 0});
+  report({DigitalIoChange::Kind::storm, state_.inputs, 0});
 }
 
-void DigitalIo::tell(const DigitalIoNews& news) {
-  for (const auto& subscriber : subscribers_) subscriber.listener(news);
+void DigitalIo::report(const DigitalIoChange& change) {
+  for (const auto& subscriber : subscribers_) subscriber.listener(change);
 }
 
 DigitalIo::Subscription DigitalIo::subscribe(Listener listener) {

@@ -4,7 +4,7 @@
 //
 //   DigitalIo io(module, {.vector = 116, .rising = 0xff, .falling = 0xff});
 //   io.trySetBits(0x3);
-//   const auto subscription = io.subscribe([](const DigitalIoNews& news) { ... });
+//   const auto subscription = io.subscribe([](const DigitalIoChange& change) { ... });
 //
 //   an edge ──► interrupt ─┐
 //   pollEvery ─────────────┴► look: pending edges, inputs ──► changes ──► each subscriber
@@ -73,7 +73,7 @@ enum class DigitalIoStatus : std::uint8_t {
 }
 
 // A change that is reported to subscribers.
-struct DigitalIoNews {
+struct DigitalIoChange {
   enum class Kind : std::uint8_t {
     inputs,  // inputs have changed, or had an edge and changed back
     gone,  // the module is absent or replaced
@@ -88,7 +88,7 @@ struct DigitalIoNews {
 
 class DigitalIo {
  public:
-  using Listener = std::function<void(const DigitalIoNews& news)>;
+  using Listener = std::function<void(const DigitalIoChange& change)>;
   // Ends when it is destroyed: the listener is not running then and does not run again. A listener
   // must not destroy a subscription.
   class Subscription;
@@ -150,7 +150,7 @@ class DigitalIo {
   void restoreOutputs();
   void noteLateness(InterruptThread::Cause cause, bool hadEdges);
   void note(InterruptTrouble trouble);
-  void tell(const DigitalIoNews& news);
+  void report(const DigitalIoChange& change);
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
   [[nodiscard]] std::uint32_t armed() const noexcept {
     return (rising_ & ~falling_) | (rising_ & falling_ & ~state_.inputs);
