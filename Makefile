@@ -20,7 +20,8 @@ TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench install format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
+.PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench install
+.PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## print this list
 	@sed -nE 's/^([a-z][a-z0-9-]*):[^#]*## (.*)/  make \1\t\2/p' Makefile | expand -t 24
@@ -35,7 +36,8 @@ demo: release ## run a voltmeter through crashes, then modules that are wired to
 test: test-debug ## build with debug information and run every test
 
 test-repeated: debug ## run all tests in parallel copies, repeatedly (COPIES=6 ROUNDS=20)
-	scripts/repeat-tests build/debug --copies $(or $(COPIES),6) --rounds $(or $(ROUNDS),20) $(if $(TESTS),--tests '$(TESTS)')
+	scripts/repeat-tests build/debug --copies $(or $(COPIES),6) --rounds $(or $(ROUNDS),20) \
+		$(if $(TESTS),--tests '$(TESTS)')
 
 test-big-endian: debug ## exchange messages with an emulated big-endian host
 	@scripts/setup big-endian
@@ -43,12 +45,14 @@ test-big-endian: debug ## exchange messages with an emulated big-endian host
 	@cmake --preset big-endian --log-level=NOTICE
 	cmake --build --preset big-endian --parallel $(JOBS)
 	ctest --preset big-endian $(CTEST_FLAGS)
-	MPF_TEST_BIG_ENDIAN="$(CURDIR)/build/big-endian" ctest --preset debug $(CTEST_FLAGS) --label-regex '^byte_order_test$$'
+	MPF_TEST_BIG_ENDIAN="$(CURDIR)/build/big-endian" \
+		ctest --preset debug $(CTEST_FLAGS) --label-regex '^byte_order_test$$'
 
 test-tpci200: debug ## test the PCI carrier and its octal UARTs in an emulated machine
 	@scripts/setup tpci200
 	@scripts/tpci200-machine make build/debug
-	MPF_TEST_TPCI200="$(CURDIR)/build/debug" ctest --preset debug $(CTEST_FLAGS) --label-regex '^tpci200_test$$'
+	MPF_TEST_TPCI200="$(CURDIR)/build/debug" \
+		ctest --preset debug $(CTEST_FLAGS) --label-regex '^tpci200_test$$'
 
 soak: debug ## check memory and descriptors in hours of traffic with killed clients (DURATION=2h)
 	build/debug/bin/mpf_test_soak $(or $(DURATION),2h)
@@ -62,7 +66,8 @@ fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FU
 # Also writes the table to build/release/bench/.
 bench: release ## measure this host (BENCH=local, remote or hardware)
 	@mkdir -p build/release/bench
-	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | tee build/release/bench/$(or $(BENCH),local).txt'
+	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | \
+		tee build/release/bench/$(or $(BENCH),local).txt'
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"

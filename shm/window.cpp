@@ -208,7 +208,7 @@ void PeerWindow::knock(std::uint64_t incarnation) noexcept {
 }
 
 void PeerWindow::wakeIfAsleep() noexcept {
-  MPF_STEP(peer_told);
+  MPF_STEP(peer_notified);
   // PAIR(sleep-fence): our message is before the fence, our load of the owner's state after it.
   doorbell::fence();
   // PAIR(sleep-number): loaded before the owner's state.

@@ -51,20 +51,20 @@ class Asker {
 
 Outcome askAgainAndAgain(const Stage& stage, HardwareServers& servers, const std::string& server,
                          const Int32& request) {
-  Act act;
-  act.requester = [&](const Scene& scene) {
+  Workload workload;
+  workload.requester = [&](const RunContext& context) {
     Asker asker(servers.bench(), server, request);
     Meter meter(stage.placement(), Meter::kNobody);
-    timeExchanges(scene, meter, 1, [&] { asker.roundTrip(); });
+    timeExchanges(context, meter, 1, [&] { asker.roundTrip(); });
   };
-  return servers.run([&] { return stage.run(act); });
+  return servers.run([&] { return stage.run(workload); });
 }
 
 // Measures one port, with one request at a time.
 Outcome askPort(const Stage& stage, HardwareServers& servers, bool awaitsEcho) {
-  Act act;
-  act.server = playInstruments(stage, servers, awaitsEcho);
-  act.requester = [&](const Scene& scene) {
+  Workload workload;
+  workload.server = playInstruments(stage, servers, awaitsEcho);
+  workload.requester = [&](const RunContext& context) {
     std::uint64_t received = 0;
     PortClients clients(servers.bench(), 1, kInt32Bytes, awaitsEcho,
                         [&](std::size_t, bool isWhole) {
@@ -72,13 +72,13 @@ Outcome askPort(const Stage& stage, HardwareServers& servers, bool awaitsEcho) {
                           ++received;
                         });
     Meter meter(stage.placement(), Meter::kNobody);
-    timeExchanges(scene, meter, 1, [&] {
+    timeExchanges(context, meter, 1, [&] {
       const auto wanted = received + 1;
       clients.send(0);
       while (received < wanted) clients.runOnce();
     });
   };
-  return servers.run([&] { return stage.run(act); });
+  return servers.run([&] { return stage.run(workload); });
 }
 
 Measurement besideEcho(Measurement row) {

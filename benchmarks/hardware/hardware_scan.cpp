@@ -50,7 +50,7 @@ clockid_t clockOfDriver(Ip330& board) {
   return clock.load(std::memory_order_relaxed);
 }
 
-void measureScanning(const Scene& scene, const Bench& bench) {
+void measureScanning(const RunContext& context, const Bench& bench) {
   IndustryPackCarriers carriers;
   auto carrier = std::make_unique<ModelCarrier>();
   carrier->plug("IP_a", std::make_unique<Ip330Model>(Ip330ModelOptions{.noise = 0.5}));
@@ -67,15 +67,15 @@ void measureScanning(const Scene& scene, const Bench& bench) {
 
   auto& board = servers.board();
   const auto driver = clockOfDriver(board);
-  sleepFor(scene.budget().warmUp);
+  sleepFor(context.budget().warmUp);
   const auto before = board.counters();
   const auto driverBefore = nsOf(driver);
   const auto processBefore = cpuNsOf(::getpid());
   const auto fromNs = Clock::nowNs();
-  sleepFor(std::max<Nanoseconds>(scene.budget().measure, kScanAtLeast));
+  sleepFor(std::max<Nanoseconds>(context.budget().measure, kScanAtLeast));
   const auto elapsedNs = static_cast<double>(Clock::nowNs() - fromNs);
   const auto after = board.counters();
-  auto& more = scene.figures().more;
+  auto& more = context.figures().more;
   more[driversThread] = 100 * (nsOf(driver) - driverBefore) / elapsedNs;
   more[wholeProcess] = 100 * (cpuNsOf(::getpid()) - processBefore) / elapsedNs;
   more[scansPerSecond] = static_cast<double>(after.scans - before.scans) * 1e9 / elapsedNs;
@@ -83,12 +83,12 @@ void measureScanning(const Scene& scene, const Bench& bench) {
 }
 
 Outcome runScanning(const Stage& stage, const Bench& bench) {
-  Act act;
-  act.requester = [&](const Scene& scene) {
+  Workload workload;
+  workload.requester = [&](const RunContext& context) {
     pinTo(stage.placement().server);
-    measureScanning(scene, bench);
+    measureScanning(context, bench);
   };
-  auto outcome = stage.run(act);
+  auto outcome = stage.run(workload);
   removeBackplanes(bench.backplane);
   return outcome;
 }

@@ -24,7 +24,7 @@ constexpr const char* kPercentOfCpu = "% of one CPU";
 constexpr std::size_t kServerCpu = 0;  // percent of one CPU
 
 // Measures all ports at once, with one outstanding request at each.
-void measurePorts(const Scene& scene, const HardwareServers& servers, bool awaitsEcho) {
+void measurePorts(const RunContext& context, const HardwareServers& servers, bool awaitsEcho) {
   const Stopwatch watch;
   std::array<std::uint64_t, kPorts> sentAt{};
   LatencyRecorder recorder;
@@ -44,15 +44,15 @@ void measurePorts(const Scene& scene, const HardwareServers& servers, bool await
   const auto resume = [&](Nanoseconds duration) {
     for (const auto end = Deadline::after(duration); !end.hasPassed();) clients.runOnce();
   };
-  resume(scene.budget().warmUp);
+  resume(context.budget().warmUp);
 
   recorder = {};
   static_cast<void>(clients.takeFaults());  // of the warm-up
   const auto cpuBefore = cpuNsOf(servers.pid());
   const auto fromNs = Clock::nowNs();
-  resume(std::max<Nanoseconds>(scene.budget().measure, kTrafficAtLeast));
+  resume(std::max<Nanoseconds>(context.budget().measure, kTrafficAtLeast));
   const auto elapsedNs = static_cast<double>(Clock::nowNs() - fromNs);
-  auto& figures = scene.figures();
+  auto& figures = context.figures();
   figures.more[kServerCpu] = 100 * (cpuNsOf(servers.pid()) - cpuBefore) / elapsedNs;
   if (awaitsEcho) figures.lineFaults = clients.takeFaults();
   figures.latency = recorder;
@@ -61,10 +61,12 @@ void measurePorts(const Scene& scene, const HardwareServers& servers, bool await
 }
 
 Outcome runPorts(const Stage& stage, HardwareServers& servers, bool awaitsEcho) {
-  Act act;
-  act.server = playInstruments(stage, servers, awaitsEcho);
-  act.requester = [&](const Scene& scene) { measurePorts(scene, servers, awaitsEcho); };
-  return servers.run([&] { return stage.run(act); });
+  Workload workload;
+  workload.server = playInstruments(stage, servers, awaitsEcho);
+  workload.requester = [&](const RunContext& context) {
+    measurePorts(context, servers, awaitsEcho);
+  };
+  return servers.run([&] { return stage.run(workload); });
 }
 
 // A row for comparison whose number is not measured.

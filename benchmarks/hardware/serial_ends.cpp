@@ -83,12 +83,13 @@ void Instruments::play(bool echoes) {
   }
 }
 
-std::function<void(const Scene&)> playInstruments(const Stage& stage,
-                                                  const HardwareServers& servers, bool echoes) {
-  return [&stage, &servers, echoes](const Scene& scene) {
+std::function<void(const RunContext&)> playInstruments(const Stage& stage,
+                                                       const HardwareServers& servers,
+                                                       bool echoes) {
+  return [&stage, &servers, echoes](const RunContext& context) {
     pinTo(stage.placement().requester);
     Instruments instruments(servers);
-    scene.ready();
+    context.ready();
     instruments.play(echoes);
   };
 }

@@ -36,11 +36,11 @@ class Instruments {
   std::vector<FileDescriptor> terminals_;
 };
 
-// The Act::server of a row: runs the instruments, on the requester's CPU, because they are the
+// The Workload::server of a row: runs the instruments, on the requester's CPU, because they are the
 // remote ends of the lines.
-[[nodiscard]] std::function<void(const Scene&)> playInstruments(const Stage& stage,
-                                                                const HardwareServers& servers,
-                                                                bool echoes);
+[[nodiscard]] std::function<void(const RunContext&)> playInstruments(const Stage& stage,
+                                                                     const HardwareServers& servers,
+                                                                     bool echoes);
 
 // A client of each of the first `ports` ports, with one outstanding request.
 class PortClients {

@@ -159,21 +159,21 @@ Outcome deaths(const Stage& stage, const std::string& backplane, Victim victim, 
                bool isFloor) {
   auto cpus = stage.placement().server;
   cpus.insert(cpus.end(), stage.placement().requester.begin(), stage.placement().requester.end());
-  Act act;
-  act.requester = [=](const Scene& scene) {
+  Workload workload;
+  workload.requester = [=](const RunContext& context) {
     pinTo(cpus);
     std::minstd_rand random(std::random_device{}());
     std::uniform_int_distribution<std::int64_t> ageNs(age.least.count(), age.most.count());
     LatencyRecorder recorder;
-    const auto end = Deadline::after(scene.budget().measure);
+    const auto end = Deadline::after(context.budget().measure);
     do {
       const auto took = killOnce(backplane, victim, Nanoseconds(ageNs(random)));
       recorder.add(static_cast<std::uint64_t>(isFloor ? took.reapNs : took.notifyNs));
     } while (!end.hasPassed());
-    scene.figures().latency = recorder;
+    context.figures().latency = recorder;
   };
-  act.grace = std::chrono::seconds(30);
-  auto outcome = stage.run(act);
+  workload.grace = std::chrono::seconds(30);
+  auto outcome = stage.run(workload);
   removeBackplanes(backplane);
   return outcome;
 }

@@ -16,7 +16,7 @@
 
 #include "base/print_error.h"
 #include "base/system_call.h"
-#include "benchmarks/local/company.h"
+#include "benchmarks/local/background.h"
 #include "benchmarks/peers/mpf_peer.h"
 #include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/meter.h"
@@ -34,11 +34,11 @@ void connectOrThrow(MessageClient& client) {
 }
 
 // Answers all requests until the process is killed.
-void serveForEver(const Scene& scene, const std::string& backplane, Mode mode) {
+void serveForEver(const RunContext& context, const std::string& backplane, Mode mode) {
   raiseDescriptorLimit();
   MessageServer server(Backplane::attach(backplane), kServer, serverOptions(mode));
   server.on<Int32>([](Int32&) {});
-  scene.ready();
+  context.ready();
   server.run();
 }
 
@@ -77,8 +77,8 @@ class Crowd {
   int pid_ = 0;
 };
 
-Outcome runAndClean(const Stage& stage, const std::string& backplane, const Act& act) {
-  auto outcome = stage.run(act);
+Outcome runAndClean(const Stage& stage, const std::string& backplane, const Workload& workload) {
+  auto outcome = stage.run(workload);
   removeBackplanes(backplane);
   return outcome;
 }
@@ -86,43 +86,43 @@ Outcome runAndClean(const Stage& stage, const std::string& backplane, const Act&
 // Times a client from its construction until it is connected, in a process that already has a
 // dispatcher. The destructor is not timed.
 Outcome connectTime(const Stage& stage, const std::string& backplane, Mode mode) {
-  Act act;
-  act.server = [=](const Scene& scene) { serveForEver(scene, backplane, mode); };
-  act.requester = [=](const Scene& scene) {
+  Workload workload;
+  workload.server = [=](const RunContext& context) { serveForEver(context, backplane, mode); };
+  workload.requester = [=](const RunContext& context) {
     Dispatcher dispatcher(Backplane::attach(backplane), {waitMode(mode), {}});
     const Stopwatch watch;
     LatencyRecorder recorder;
-    const auto end = Deadline::after(scene.budget().measure);
+    const auto end = Deadline::after(context.budget().measure);
     while (!end.hasPassed()) {
       const auto from = Stopwatch::start();
       MessageClient client(dispatcher, ignore);
       connectOrThrow(client);
       recorder.add(watch.elapsedNs(from, Stopwatch::stop()));
     }
-    scene.figures().latency = recorder;
+    context.figures().latency = recorder;
   };
-  return runAndClean(stage, backplane, act);
+  return runAndClean(stage, backplane, workload);
 }
 
 Outcome socketConnectTime(const Stage& stage, const std::string& name) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   name.copy(address.sun_path + 1, sizeof address.sun_path - 2);
-  Act act;
-  act.server = [=](const Scene& scene) {
+  Workload workload;
+  workload.server = [=](const RunContext& context) {
     const FileDescriptor listener(
         checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
     checkCall(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
               "bind", name);
     checkCall(::listen(listener.get(), 1), "listen");
-    scene.ready();
+    context.ready();
     for (;;) {
       const FileDescriptor client(::accept(listener.get(), nullptr, nullptr));
       static_cast<void>(::send(client.get(), "+", 1, MSG_NOSIGNAL));
     }
   };
-  act.requester = [=](const Scene& scene) {
-    timeEach(scene, [&] {
+  workload.requester = [=](const RunContext& context) {
+    timeEach(context, [&] {
       const FileDescriptor fd(
           checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
       checkCall(::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
@@ -131,29 +131,29 @@ Outcome socketConnectTime(const Stage& stage, const std::string& name) {
       checkCall(::recv(fd.get(), &answer, 1, 0), "recv", name);
     });
   };
-  return stage.run(act);
+  return stage.run(workload);
 }
 
 Outcome memoryPerLink(const Stage& stage, const std::string& backplane) {
-  Act act;
-  act.server = [=](const Scene& scene) {
+  Workload workload;
+  workload.server = [=](const RunContext& context) {
     raiseDescriptorLimit();
     MessageServer server(Backplane::attach(backplane), kServer);  // with the default options
-    scene.ready();
+    context.ready();
     while (server.waitForMessage()) {
       while (auto request = server.receive()) server.reply(std::move(request));
     }
   };
-  act.requester = [=](const Scene& scene) {
+  workload.requester = [=](const RunContext& context) {
     constexpr int kLinks = 100;
     Dispatcher dispatcher(Backplane::attach(backplane));
     std::deque<MessageClient> clients;
     connectOrThrow(clients.emplace_back(dispatcher, ignore));
     const auto one = occupiedBytes(dispatcher.backplane());
     for (int i = 0; i < kLinks; ++i) connectOrThrow(clients.emplace_back(dispatcher, ignore));
-    scene.figures().value = (occupiedBytes(dispatcher.backplane()) - one) / kLinks;
+    context.figures().value = (occupiedBytes(dispatcher.backplane()) - one) / kLinks;
   };
-  return runAndClean(stage, backplane, act);
+  return runAndClean(stage, backplane, workload);
 }
 
 // 50 servers and 50 clients with one link each, which do nothing until they are killed. Each client
@@ -204,17 +204,17 @@ class IdlePairs {
 };
 
 Outcome idleCpu(const Stage& stage, const std::string& backplane) {
-  Act act;
-  act.requester = [=](const Scene& scene) {
+  Workload workload;
+  workload.requester = [=](const RunContext& context) {
     const IdlePairs pairs(backplane);
     sleepFor(std::chrono::seconds(1));  // until the work that follows connecting is done
     const auto before = pairs.cpuNs();
     const auto fromNs = Clock::nowNs();
-    sleepFor(std::max<Nanoseconds>(scene.budget().measure, std::chrono::seconds(1)));
-    scene.figures().value =
+    sleepFor(std::max<Nanoseconds>(context.budget().measure, std::chrono::seconds(1)));
+    context.figures().value =
         100.0 * (pairs.cpuNs() - before) / static_cast<double>(Clock::nowNs() - fromNs);
   };
-  return runAndClean(stage, backplane, act);
+  return runAndClean(stage, backplane, workload);
 }
 
 Measurement scaleRow(const std::string& question, const std::string& name, Mode mode,
@@ -230,25 +230,25 @@ Measurement scaleRow(const std::string& question, const std::string& name, Mode 
 }  // namespace
 
 Outcome roundTripBeside(const Stage& stage, const std::string& backplane, Mode mode,
-                        const Company& company) {
-  Act act;
-  act.server = [=](const Scene& scene) { serveForEver(scene, backplane, mode); };
-  act.requester = [=](const Scene& scene) {
-    const auto beside = company ? company() : nullptr;
+                        const Background& background) {
+  Workload workload;
+  workload.server = [=](const RunContext& context) { serveForEver(context, backplane, mode); };
+  workload.requester = [=](const RunContext& context) {
+    const auto beside = background ? background() : nullptr;
     Dispatcher dispatcher(Backplane::attach(backplane), {waitMode(mode), {}});
     std::uint64_t received = 0;
     MessageClient client(dispatcher, [&](Message&& message) {
       received += message.getType() == MessageType::int32 ? 1u : 0u;
     });
     connectOrThrow(client);
-    timeEach(scene, [&] {
+    timeEach(context, [&] {
       const auto wanted = received + 1;
       if (client.send(Int32Message({.value = 1})) != SendResult::sent)
         throw std::runtime_error("a request could not be sent");
       while (received < wanted) dispatcher.runOnce();
     });
   };
-  return runAndClean(stage, backplane, act);
+  return runAndClean(stage, backplane, workload);
 }
 
 std::vector<Measurement> scaleMeasurements(const std::string& runName) {

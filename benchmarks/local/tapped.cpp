@@ -12,7 +12,7 @@
 #include <mpf/file_descriptor.h>
 
 #include "base/system_call.h"
-#include "benchmarks/local/company.h"
+#include "benchmarks/local/background.h"
 #include "benchmarks/peers/mpf_peer.h"
 
 namespace mpf::bench {
@@ -69,7 +69,7 @@ std::vector<Measurement> tappedMeasurements(const std::string& runName) {
       row.run = [=](const Stage& stage) {
         return roundTripBeside(
             stage, backplane, mode,
-            tapped ? Company([=] { return std::make_shared<Tap>(backplane); }) : nullptr);
+            tapped ? Background([=] { return std::make_shared<Tap>(backplane); }) : nullptr);
       };
       rows.push_back(std::move(row));
     }

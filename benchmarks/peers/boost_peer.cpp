@@ -18,11 +18,11 @@ class BoostPeer final : public Peer {
  public:
   explicit BoostPeer(PeerOptions options) : options_(std::move(options)) {}
 
-  void serve(const Scene& scene) override {
-    create(scene);
+  void serve(const RunContext& context) override {
+    create(context);
     for (bool last = false; !last;) {
       take(*requests_);
-      last = scene.stopping();
+      last = context.stopping();
       if (options_.touch) {
         readAll(buffer_.data(), buffer_.size());
         writeAll(buffer_.data(), buffer_.size());
@@ -30,7 +30,7 @@ class BoostPeer final : public Peer {
       put(*replies_);
     }
   }
-  void connect(const Scene&) override {
+  void connect(const RunContext&) override {
     requests_.emplace(ipc::open_only, requestName().c_str());
     replies_.emplace(ipc::open_only, replyName().c_str());
     buffer_.assign(options_.bytes, std::byte{1});
@@ -44,15 +44,15 @@ class BoostPeer final : public Peer {
     if (options_.touch) readAll(buffer_.data(), buffer_.size());
   }
 
-  void sink(const Scene& scene) override {
-    create(scene);
+  void sink(const RunContext& context) override {
+    create(context);
     for (std::uint64_t taken = 0;;) {
       take(*requests_);
-      if (++taken % 64 == 0) scene.consumed(taken);
+      if (++taken % 64 == 0) context.consumed(taken);
     }
   }
-  void flood(const Scene& scene, const std::function<bool()>& resume) override {
-    connect(scene);
+  void flood(const RunContext& context, const std::function<bool()>& resume) override {
+    connect(context);
     while (resume()) {
       for (int i = 0; i < 64; ++i) put(*requests_);
     }
@@ -65,12 +65,12 @@ class BoostPeer final : public Peer {
  private:
   [[nodiscard]] std::string requestName() const { return options_.name + "-requests"; }
   [[nodiscard]] std::string replyName() const { return options_.name + "-replies"; }
-  void create(const Scene& scene) {
+  void create(const RunContext& context) {
     const std::size_t room = options_.bytes <= 4096 ? 128 : 4;
     requests_.emplace(ipc::create_only, requestName().c_str(), room, options_.bytes);
     replies_.emplace(ipc::create_only, replyName().c_str(), room, options_.bytes);
     buffer_.assign(options_.bytes, std::byte{1});
-    scene.ready();
+    context.ready();
   }
 
   void put(ipc::message_queue& queue) {

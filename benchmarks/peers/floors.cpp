@@ -59,29 +59,29 @@ struct Asleep {
 
 // A bounce in which the server and the requester each call `work` before they post.
 template <class Wait>
-Act bounce(std::size_t bytes, std::function<void(std::byte*, std::byte*)> work) {
-  Act act;
-  act.scratchBytes = 4096 + 2 * bytes;
-  act.stopsByItself = true;
+Workload bounce(std::size_t bytes, std::function<void(std::byte*, std::byte*)> work) {
+  Workload workload;
+  workload.scratchBytes = 4096 + 2 * bytes;
+  workload.stopsByItself = true;
   // work(from, to) is empty for the bare bounce.
-  const auto buffers = [bytes](const Scene& scene) {
-    return std::pair(scene.scratch().data() + 4096, scene.scratch().data() + 4096 + bytes);
+  const auto buffers = [bytes](const RunContext& context) {
+    return std::pair(context.scratch().data() + 4096, context.scratch().data() + 4096 + bytes);
   };
-  act.server = [=](const Scene& scene) {
-    auto& lines = *reinterpret_cast<Bounce*>(scene.scratch().data());
-    const auto [request, reply] = buffers(scene);
-    scene.ready();
-    for (std::uint32_t turn = 1; !scene.stopping(); ++turn) {
+  workload.server = [=](const RunContext& context) {
+    auto& lines = *reinterpret_cast<Bounce*>(context.scratch().data());
+    const auto [request, reply] = buffers(context);
+    context.ready();
+    for (std::uint32_t turn = 1; !context.stopping(); ++turn) {
       Wait::wait(lines.request.word, turn);
       if (work) work(request, reply);
       Wait::post(lines.reply.word, turn);
     }
   };
-  act.requester = [=](const Scene& scene) {
-    auto& lines = *reinterpret_cast<Bounce*>(scene.scratch().data());
-    const auto [request, reply] = buffers(scene);
+  workload.requester = [=](const RunContext& context) {
+    auto& lines = *reinterpret_cast<Bounce*>(context.scratch().data());
+    const auto [request, reply] = buffers(context);
     std::uint32_t turn = 0;
-    timeEach(scene, [&] {
+    timeEach(context, [&] {
       ++turn;
       if (work) work(reply, request);
       Wait::post(lines.request.word, turn);
@@ -89,10 +89,10 @@ Act bounce(std::size_t bytes, std::function<void(std::byte*, std::byte*)> work) 
     });
     // The server checks stopping() after its post, so it needs one more turn to end. It may also
     // have ended already.
-    scene.stop();
+    context.stop();
     Wait::post(lines.request.word, ++turn);
   };
-  return act;
+  return workload;
 }
 
 // Slots of one line each, published by their sequence number; the consumer frees them in batches.
@@ -104,20 +104,20 @@ struct RingHead {
   alignas(2 * kLineBytes) std::atomic<std::uint64_t> freed{0};
 };
 
-Act ring(std::uint64_t capacity, std::uint64_t freeEvery) {
-  Act act;
-  act.scratchBytes = 4096 + capacity * sizeof(Slot);
-  const auto slotsOf = [](const Scene& scene) {
-    return reinterpret_cast<Slot*>(scene.scratch().data() + 4096);
+Workload ring(std::uint64_t capacity, std::uint64_t freeEvery) {
+  Workload workload;
+  workload.scratchBytes = 4096 + capacity * sizeof(Slot);
+  const auto slotsOf = [](const RunContext& context) {
+    return reinterpret_cast<Slot*>(context.scratch().data() + 4096);
   };
-  const auto headOf = [](const Scene& scene) -> RingHead& {
-    return *reinterpret_cast<RingHead*>(scene.scratch().data());
+  const auto headOf = [](const RunContext& context) -> RingHead& {
+    return *reinterpret_cast<RingHead*>(context.scratch().data());
   };
-  act.server = [=](const Scene& scene) {
-    auto* slots = slotsOf(scene);
-    auto& freed = headOf(scene).freed;
+  workload.server = [=](const RunContext& context) {
+    auto* slots = slotsOf(context);
+    auto& freed = headOf(context).freed;
     std::uint64_t sum = 0;
-    scene.ready();
+    context.ready();
     for (std::uint64_t taken = 0;;) {
       auto& slot = slots[taken & (capacity - 1)];
       // PAIR(bench-slot-filled): once the sequence is visible, the payload is.
@@ -127,15 +127,15 @@ Act ring(std::uint64_t capacity, std::uint64_t freeEvery) {
       if (++taken % freeEvery != 0) continue;
       // PAIR(bench-slot-freed): the payloads have been read.
       freed.store(taken, std::memory_order_release);
-      scene.consumed(taken);
+      context.consumed(taken);
     }
   };
-  act.requester = [=](const Scene& scene) {
-    auto* slots = slotsOf(scene);
-    auto& freed = headOf(scene).freed;
+  workload.requester = [=](const RunContext& context) {
+    auto* slots = slotsOf(context);
+    auto& freed = headOf(context).freed;
     std::uint64_t pushed = 0;
     std::uint64_t freedSeen = 0;
-    timeOneWay(scene, [&](const auto& resume) {
+    timeOneWay(context, [&](const auto& resume) {
       while (resume()) {
         for (int i = 0; i < 4096; ++i) {
           while (pushed - freedSeen >= capacity) {
@@ -151,33 +151,33 @@ Act ring(std::uint64_t capacity, std::uint64_t freeEvery) {
       }
     });
   };
-  return act;
+  return workload;
 }
 
 // memcpy in one process between its own buffers. It copies `spread` bytes before it uses the same
 // buffer again.
-Act copyAlone(std::size_t bytes, std::size_t spread) {
-  Act act;
-  act.requester = [=](const Scene& scene) {
+Workload copyAlone(std::size_t bytes, std::size_t spread) {
+  Workload workload;
+  workload.requester = [=](const RunContext& context) {
     const auto pairs = std::max<std::size_t>(1, spread / bytes / 2);
     std::vector<std::byte> from(bytes * pairs, std::byte{1});
     std::vector<std::byte> to(bytes * pairs, std::byte{2});
     std::size_t at = 0;
-    timeEach(scene, [&] {
+    timeEach(context, [&] {
       std::memcpy(to.data() + at * bytes, from.data() + at * bytes, bytes);
       asm volatile("" : : "r"(to.data()) : "memory");
       at = at + 1 < pairs ? at + 1 : 0;
     });
   };
-  return act;
+  return workload;
 }
 
 // The floor of connecting: a link consists of at least one segment.
-Act makeSegment() {
-  Act act;
-  act.requester = [](const Scene& scene) {
+Workload makeSegment() {
+  Workload workload;
+  workload.requester = [](const RunContext& context) {
     const std::string name = "/mpf-bench-floor-" + std::to_string(::getpid());
-    timeEach(scene, [&] {
+    timeEach(context, [&] {
       const FileDescriptor fd(checkCall(
           ::shm_open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600), "shm_open", name));
       const int failed = ::posix_fallocate(fd.get(), 0, 4096);
@@ -189,17 +189,17 @@ Act makeSegment() {
       ::munmap(at, 4096);
     });
   };
-  return act;
+  return workload;
 }
 
 Measurement floor(const std::string& question, const std::string& name, Mode mode,
-                  std::size_t bytes, const Act& act) {
+                  std::size_t bytes, const Workload& workload) {
   Measurement row;
   row.question = question;
   row.name = name;
   row.mode = mode;
   row.bytes = bytes;
-  row.run = [act](const Stage& stage) { return stage.run(act); };
+  row.run = [workload](const Stage& stage) { return stage.run(workload); };
   return row;
 }
 

@@ -26,7 +26,7 @@ class IceoryxPeer final : public Peer {
  public:
   explicit IceoryxPeer(PeerOptions options) : options_(std::move(options)) {}
 
-  void serve(const Scene& scene) override {
+  void serve(const RunContext& context) override {
     start("server");
     popo::ServerOptions options;
     options.requestQueueFullPolicy = popo::QueueFullPolicy::BLOCK_PRODUCER;
@@ -36,15 +36,15 @@ class IceoryxPeer final : public Peer {
     waitSet.attachEvent(server, popo::ServerEvent::REQUEST_RECEIVED).or_else([](auto) {
       throw std::runtime_error("attachEvent");
     });
-    scene.ready();
+    context.ready();
     for (bool last = false; !last;) {
       const void* const request = take(server, waitSet);
-      last = scene.stopping();
+      last = context.stopping();
       if (options_.touch) readAll(request, options_.bytes);
       answer(server, request);
     }
   }
-  void connect(const Scene&) override {
+  void connect(const RunContext&) override {
     start("client");
     popo::ClientOptions options;
     options.responseQueueFullPolicy = popo::QueueFullPolicy::BLOCK_PRODUCER;
@@ -74,7 +74,7 @@ class IceoryxPeer final : public Peer {
     client_->releaseResponse(response);
   }
 
-  void sink(const Scene& scene) override {
+  void sink(const RunContext& context) override {
     start("subscriber");
     popo::SubscriberOptions options;
     options.queueFullPolicy = popo::QueueFullPolicy::BLOCK_PRODUCER;
@@ -83,13 +83,13 @@ class IceoryxPeer final : public Peer {
     waitSet.attachEvent(subscriber, popo::SubscriberEvent::DATA_RECEIVED).or_else([](auto) {
       throw std::runtime_error("attachEvent");
     });
-    scene.ready();
+    context.ready();
     for (std::uint64_t taken = 0;;) {
       subscriber.release(take(subscriber, waitSet));
-      if (++taken % 64 == 0) scene.consumed(taken);
+      if (++taken % 64 == 0) context.consumed(taken);
     }
   }
-  void flood(const Scene&, const std::function<bool()>& resume) override {
+  void flood(const RunContext&, const std::function<bool()>& resume) override {
     start("publisher");
     popo::PublisherOptions options;
     options.subscriberTooSlowPolicy = popo::ConsumerTooSlowPolicy::WAIT_FOR_CONSUMER;

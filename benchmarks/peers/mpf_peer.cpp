@@ -25,12 +25,12 @@ class MpfPeer final : public Peer {
   MpfPeer(PeerOptions options, MpfPlaces places)
       : options_(std::move(options)), places_(std::move(places)) {}
 
-  void serve(const Scene& scene) override {
+  void serve(const RunContext& context) override {
     MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
-    scene.ready();
+    context.ready();
     for (bool last = false; !last && server.waitForMessage();) {
       while (auto request = server.receive()) {
-        last = scene.stopping();
+        last = context.stopping();
         if (options_.touch) {
           const auto value = request.template valueAs<Array>();
           readAll(value.data(), value.size_bytes());
@@ -42,7 +42,7 @@ class MpfPeer final : public Peer {
     }
   }
 
-  void connect(const Scene&) override {
+  void connect(const RunContext&) override {
     dispatcher_.emplace(Backplane::attach(places_.clientBackplane),
                         DispatcherOptions{waitMode(options_.mode), {}});
     client_.emplace(*dispatcher_, [this](Message&& message) { take(message); });
@@ -74,16 +74,16 @@ class MpfPeer final : public Peer {
 
   // One way: the server sends any number of replies to one request, and the client receives them in
   // its callback.
-  void sink(const Scene& scene) override {
-    scene.ready();
-    connect(scene);
+  void sink(const RunContext& context) override {
+    context.ready();
+    connect(context);
     send();
     for (;;) {
       dispatcher_->runOnce();
-      if (received_ % 64 == 0) scene.consumed(received_);
+      if (received_ % 64 == 0) context.consumed(received_);
     }
   }
-  void flood(const Scene&, const std::function<bool()>& resume) override {
+  void flood(const RunContext&, const std::function<bool()>& resume) override {
     MessageServer server(Backplane::attach(places_.serverBackplane), kServer, optionsOfServer());
     Message request;
     while (!request) {

@@ -31,10 +31,10 @@ class Peer {
  public:
   virtual ~Peer() = default;
 
-  // Server: answers requests until scene.stopping().
-  virtual void serve(const Scene& scene) = 0;
+  // Server: answers requests until context.stopping().
+  virtual void serve(const RunContext& context) = 0;
 
-  virtual void connect(const Scene& scene) = 0;
+  virtual void connect(const RunContext& context) = 0;
   // Sends one request; waits while the queue is full.
   virtual void send() = 0;
   // Waits for the next reply.
@@ -45,11 +45,11 @@ class Peer {
   }
 
   // One-way traffic: sink() runs in the server's process, receives messages, and reports their
-  // number with scene.consumed() from time to time. flood() runs in the requester's process and
+  // number with context.consumed() from time to time. flood() runs in the requester's process and
   // sends until `resume` returns false. The MPF peer connects as a client in sink() and is the
   // server in flood().
-  virtual void sink(const Scene&) {}
-  virtual void flood(const Scene&, const std::function<bool()>&) {}
+  virtual void sink(const RunContext&) {}
+  virtual void flood(const RunContext&, const std::function<bool()>&) {}
 
   // Called by the runner: removes what killed processes left.
   virtual void removeTraces() noexcept {}

@@ -10,50 +10,51 @@ namespace {
 
 using PeerMaker = std::function<std::unique_ptr<Peer>()>;
 
-Outcome runAndClean(const Stage& stage, const std::shared_ptr<Peer>& peer, const Act& act) {
-  auto outcome = stage.run(act);
+Outcome runAndClean(const Stage& stage, const std::shared_ptr<Peer>& peer,
+                    const Workload& workload) {
+  auto outcome = stage.run(workload);
   peer->removeTraces();
   return outcome;
 }
 
 Outcome roundTrips(const Stage& stage, const std::shared_ptr<Peer>& peer) {
-  Act act;
-  act.stopsByItself = true;
-  act.server = [peer](const Scene& scene) { peer->serve(scene); };
-  act.requester = [peer](const Scene& scene) {
-    peer->connect(scene);
-    timeEach(scene, [&] { peer->roundTrip(); });
-    scene.stop();
+  Workload workload;
+  workload.stopsByItself = true;
+  workload.server = [peer](const RunContext& context) { peer->serve(context); };
+  workload.requester = [peer](const RunContext& context) {
+    peer->connect(context);
+    timeEach(context, [&] { peer->roundTrip(); });
+    context.stop();
     peer->roundTrip();
   };
-  return runAndClean(stage, peer, act);
+  return runAndClean(stage, peer, workload);
 }
 
 Outcome outstanding(const Stage& stage, const std::shared_ptr<Peer>& peer, int window) {
-  Act act;
-  act.stopsByItself = true;
-  act.server = [peer](const Scene& scene) { peer->serve(scene); };
-  act.requester = [peer, window](const Scene& scene) {
-    peer->connect(scene);
+  Workload workload;
+  workload.stopsByItself = true;
+  workload.server = [peer](const RunContext& context) { peer->serve(context); };
+  workload.requester = [peer, window](const RunContext& context) {
+    peer->connect(context);
     for (int i = 0; i < window; ++i) peer->send();
-    timeRate(scene, 1, [&] {
+    timeRate(context, 1, [&] {
       peer->receive();
       peer->send();
     });
     for (int i = 0; i < window; ++i) peer->receive();
-    scene.stop();
+    context.stop();
     peer->roundTrip();
   };
-  return runAndClean(stage, peer, act);
+  return runAndClean(stage, peer, workload);
 }
 
 Outcome oneWay(const Stage& stage, const std::shared_ptr<Peer>& peer) {
-  Act act;
-  act.server = [peer](const Scene& scene) { peer->sink(scene); };
-  act.requester = [peer](const Scene& scene) {
-    timeOneWay(scene, [&](const std::function<bool()>& resume) { peer->flood(scene, resume); });
+  Workload workload;
+  workload.server = [peer](const RunContext& context) { peer->sink(context); };
+  workload.requester = [peer](const RunContext& context) {
+    timeOneWay(context, [&](const std::function<bool()>& resume) { peer->flood(context, resume); });
   };
-  return runAndClean(stage, peer, act);
+  return runAndClean(stage, peer, workload);
 }
 
 std::string sizeText(std::size_t bytes) {

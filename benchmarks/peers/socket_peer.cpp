@@ -22,11 +22,11 @@ class SocketPeer final : public Peer {
  public:
   explicit SocketPeer(PeerOptions options) : options_(std::move(options)) {}
 
-  void serve(const Scene& scene) override {
-    accept(scene);
+  void serve(const RunContext& context) override {
+    accept(context);
     for (bool last = false; !last;) {
       take();
-      last = scene.stopping();
+      last = context.stopping();
       if (options_.touch) {
         readAll(buffer_.data(), buffer_.size());
         writeAll(buffer_.data(), buffer_.size());
@@ -34,7 +34,7 @@ class SocketPeer final : public Peer {
       put();
     }
   }
-  void connect(const Scene&) override {
+  void connect(const RunContext&) override {
     const auto address = addressOf();
     fd_ = FileDescriptor(checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
     checkCall(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
@@ -50,15 +50,15 @@ class SocketPeer final : public Peer {
     if (options_.touch) readAll(buffer_.data(), buffer_.size());
   }
 
-  void sink(const Scene& scene) override {
-    accept(scene);
+  void sink(const RunContext& context) override {
+    accept(context);
     for (std::uint64_t taken = 0;;) {
       take();
-      if (++taken % 64 == 0) scene.consumed(taken);
+      if (++taken % 64 == 0) context.consumed(taken);
     }
   }
-  void flood(const Scene& scene, const std::function<bool()>& resume) override {
-    connect(scene);
+  void flood(const RunContext& context, const std::function<bool()>& resume) override {
+    connect(context);
     while (resume()) {
       for (int i = 0; i < 64; ++i) put();
     }
@@ -72,7 +72,7 @@ class SocketPeer final : public Peer {
     options_.name.copy(address.sun_path + 1, sizeof address.sun_path - 2);
     return address;
   }
-  void accept(const Scene& scene) {
+  void accept(const RunContext& context) {
     const auto address = addressOf();
     const FileDescriptor listener(
         checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
@@ -80,7 +80,7 @@ class SocketPeer final : public Peer {
               "bind", options_.name);
     checkCall(::listen(listener.get(), 1), "listen");
     buffer_.assign(options_.bytes, std::byte{1});
-    scene.ready();
+    context.ready();
     fd_ = FileDescriptor(checkCall(::accept(listener.get(), nullptr, nullptr), "accept"));
   }
 

@@ -27,32 +27,32 @@ class ZeromqPeer final : public Peer {
   ZeromqPeer(const ZeromqPeer&) = delete;
   ZeromqPeer& operator=(const ZeromqPeer&) = delete;
 
-  void serve(const Scene& scene) override {
-    bind(scene);
+  void serve(const RunContext& context) override {
+    bind(context);
     for (bool last = false; !last;) {
       take();
-      last = scene.stopping();
+      last = context.stopping();
       put();
     }
     // Sends the last reply before the process exits.
     close();
   }
-  void connect(const Scene&) override {
+  void connect(const RunContext&) override {
     open();
     check(zmq_connect(socket_, address().c_str()), "zmq_connect");
   }
   void send() override { put(); }
   void receive() override { take(); }
 
-  void sink(const Scene& scene) override {
-    bind(scene);
+  void sink(const RunContext& context) override {
+    bind(context);
     for (std::uint64_t taken = 0;;) {
       take();
-      if (++taken % 64 == 0) scene.consumed(taken);
+      if (++taken % 64 == 0) context.consumed(taken);
     }
   }
-  void flood(const Scene& scene, const std::function<bool()>& resume) override {
-    connect(scene);
+  void flood(const RunContext& context, const std::function<bool()>& resume) override {
+    connect(context);
     while (resume()) {
       for (int i = 0; i < 64; ++i) put();
     }
@@ -73,10 +73,10 @@ class ZeromqPeer final : public Peer {
     socket_ = nullptr;
     context_ = nullptr;
   }
-  void bind(const Scene& scene) {
+  void bind(const RunContext& context) {
     open();
     check(zmq_bind(socket_, address().c_str()), "zmq_bind");
-    scene.ready();
+    context.ready();
   }
 
   void put() {

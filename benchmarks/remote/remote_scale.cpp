@@ -29,14 +29,14 @@ std::array<double, 4> memoryOf(const RouterPair& routers, const Backplane& clien
           occupiedBytes(clients) + occupiedBytes(servers)};
 }
 
-void answerForEver(const Scene& scene, const std::string& backplane, Mode mode) {
+void answerForEver(const RunContext& context, const std::string& backplane, Mode mode) {
   raiseDescriptorLimit();
   ServerOptions options;
   options.location = kRemoteLocation;
   options.waitMode = waitMode(mode);
   MessageServer server(Backplane::attach(backplane), kServer, options);
   server.on<Int32>([](Int32&) {});
-  scene.ready();
+  context.ready();
   server.run();
 }
 
@@ -77,7 +77,7 @@ class Clients {
   std::uint64_t received_ = 0;
 };
 
-void measureCrowd(const Scene& scene, const RouterPair& routers, Mode mode, int clients) {
+void measureCrowd(const RunContext& context, const RouterPair& routers, Mode mode, int clients) {
   raiseDescriptorLimit();
   Clients crowd(routers.clientBackplane(), mode);
   crowd.growTo(1);
@@ -85,7 +85,7 @@ void measureCrowd(const Scene& scene, const RouterPair& routers, Mode mode, int 
   const auto servers = Backplane::attach(routers.serverBackplane());
   const auto before = memoryOf(routers, crowd.backplane(), servers);
 
-  auto& figures = scene.figures();
+  auto& figures = context.figures();
   const auto fromNs = Clock::nowNs();
   crowd.growTo(clients);
   figures.more[connectSeconds] = static_cast<double>(Clock::nowNs() - fromNs) / 1e9;
@@ -108,29 +108,35 @@ void measureCrowd(const Scene& scene, const RouterPair& routers, Mode mode, int 
 }
 
 Outcome runCrowd(const Stage& stage, RouterPair& routers, Mode mode, int clients) {
-  Act act;
-  act.grace = kGrace;
-  act.server = [&](const Scene& scene) { answerForEver(scene, routers.serverBackplane(), mode); };
-  act.requester = [&](const Scene& scene) { measureCrowd(scene, routers, mode, clients); };
-  return routers.run([&] { return stage.run(act); });
+  Workload workload;
+  workload.grace = kGrace;
+  workload.server = [&](const RunContext& context) {
+    answerForEver(context, routers.serverBackplane(), mode);
+  };
+  workload.requester = [&](const RunContext& context) {
+    measureCrowd(context, routers, mode, clients);
+  };
+  return routers.run([&] { return stage.run(workload); });
 }
 
 // The CPU time of both routers while one client is connected and does nothing.
 Outcome runIdle(const Stage& stage, RouterPair& routers, Mode mode) {
-  Act act;
-  act.server = [&](const Scene& scene) { answerForEver(scene, routers.serverBackplane(), mode); };
-  act.requester = [&](const Scene& scene) {
+  Workload workload;
+  workload.server = [&](const RunContext& context) {
+    answerForEver(context, routers.serverBackplane(), mode);
+  };
+  workload.requester = [&](const RunContext& context) {
     Clients one(routers.clientBackplane(), mode);
     one.growTo(1);
     sleepFor(std::chrono::seconds(1));  // until the work that follows connecting is done
     const auto used = [&] { return cpuNsOf(routers.serverPid()) + cpuNsOf(routers.clientPid()); };
     const auto before = used();
     const auto fromNs = Clock::nowNs();
-    sleepFor(std::max<Nanoseconds>(scene.budget().measure, std::chrono::seconds(3)));
-    scene.figures().value =
+    sleepFor(std::max<Nanoseconds>(context.budget().measure, std::chrono::seconds(3)));
+    context.figures().value =
         100.0 * (used() - before) / static_cast<double>(Clock::nowNs() - fromNs);
   };
-  return routers.run([&] { return stage.run(act); });
+  return routers.run([&] { return stage.run(workload); });
 }
 
 }  // namespace

@@ -24,24 +24,24 @@ struct Traffic {
 // `writer` is the pid of the process that has the client's socket.
 Outcome goThereAndBack(const Stage& stage, const std::shared_ptr<Peer>& peer,
                        const Traffic& traffic, int writer) {
-  Act act;
-  act.stopsByItself = true;
-  act.server = [=](const Scene& scene) { peer->serve(scene); };
-  act.requester = [=, &stage](const Scene& scene) {
-    peer->connect(scene);
+  Workload workload;
+  workload.stopsByItself = true;
+  workload.server = [=](const RunContext& context) { peer->serve(context); };
+  workload.requester = [=, &stage](const RunContext& context) {
+    peer->connect(context);
     Meter meter(stage.placement(), writer);
     if (traffic.window != 0) {
-      timeWindow(scene, meter, traffic.window, [&] { peer->send(); }, [&] { peer->receive(); });
+      timeWindow(context, meter, traffic.window, [&] { peer->send(); }, [&] { peer->receive(); });
     } else {
-      timeExchanges(scene, meter, static_cast<std::uint64_t>(traffic.messages), [&] {
+      timeExchanges(context, meter, static_cast<std::uint64_t>(traffic.messages), [&] {
         for (int i = 0; i < traffic.sends; ++i) peer->send();
         for (int i = 0; i < traffic.sends; ++i) peer->receive();
       });
     }
-    scene.stop();
+    context.stop();
     peer->roundTrip();
   };
-  return stage.run(act);
+  return stage.run(workload);
 }
 
 Measurement tcpRow(const Place& place, const std::string& question, const std::string& name,

@@ -24,20 +24,20 @@ class TcpPeer final : public Peer {
  public:
   explicit TcpPeer(TcpOptions options) : options_(std::move(options)) {}
 
-  void serve(const Scene& scene) override {
+  void serve(const RunContext& context) override {
     options_.between.enterServer();
-    accept(scene);
+    accept(context);
     for (bool last = false; !last;) {
       takeUnit();
-      last = scene.stopping();
+      last = context.stopping();
       put(in_);
     }
   }
 
-  void connect(const Scene& scene) override {
+  void connect(const RunContext& context) override {
     options_.between.enterRequester();
     fd_ = FileDescriptor(checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
-    const auto address = addressOf(scene.port());
+    const auto address = addressOf(context.port());
     checkCall(::connect(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
               "connect", options_.between.serverAddress());
     if (options_.reads) checkCall(::fcntl(fd_.get(), F_SETFL, O_NONBLOCK), "fcntl");
@@ -57,7 +57,7 @@ class TcpPeer final : public Peer {
     ::inet_pton(AF_INET, options_.between.serverAddress().c_str(), &address.sin_addr);
     return address;
   }
-  void accept(const Scene& scene) {
+  void accept(const RunContext& context) {
     // Only the client reads while it waits to write. That suffices to prevent a deadlock.
     options_.reads = false;
     const FileDescriptor listener(
@@ -69,7 +69,7 @@ class TcpPeer final : public Peer {
     checkCall(::listen(listener.get(), 1), "listen");
     checkCall(::getsockname(listener.get(), reinterpret_cast<sockaddr*>(&address), &length),
               "getsockname");
-    scene.ready(ntohs(address.sin_port));
+    context.ready(ntohs(address.sin_port));
     fd_ = FileDescriptor(checkCall(::accept(listener.get(), nullptr, nullptr), "accept"));
     prepare();
   }

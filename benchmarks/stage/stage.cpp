@@ -101,31 +101,31 @@ std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterC
 
 }  // namespace
 
-void Scene::ready(std::uint16_t port) const noexcept {
+void RunContext::ready(std::uint16_t port) const noexcept {
   control_.port.store(port, std::memory_order_relaxed);
   // PAIR(bench-ready): the requester sees everything that the server did before.
   control_.ready.store(1, std::memory_order_release);
 }
 
-Outcome Stage::run(const Act& act) const {
-  const Shared memory(sizeof(Control) + act.scratchBytes + 4096);
+Outcome Stage::run(const Workload& workload) const {
+  const Shared memory(sizeof(Control) + workload.scratchBytes + 4096);
   auto& control = *new (memory.bytes().data()) Control;
   constexpr std::size_t kScratchOffset = (sizeof(Control) + 4095) / 4096 * 4096;
-  const Scene scene(
-      control, budget_,
-      memory.bytes().subspan(std::min(kScratchOffset, memory.bytes().size()), act.scratchBytes));
-  const auto limit = budget_.warmUp + budget_.measure + act.grace;
+  const RunContext context(control, budget_,
+                           memory.bytes().subspan(std::min(kScratchOffset, memory.bytes().size()),
+                                                  workload.scratchBytes));
+  const auto limit = budget_.warmUp + budget_.measure + workload.grace;
 
   std::unique_ptr<Child> serverChild;
-  if (act.server)
-    serverChild =
-        std::make_unique<Child>(server, placement_.server, control, [&] { act.server(scene); });
+  if (workload.server)
+    serverChild = std::make_unique<Child>(server, placement_.server, control,
+                                          [&] { workload.server(context); });
   Child requesterChild(requester, placement_.requester, control, [&] {
-    // PAIR(bench-ready): see Scene::ready().
+    // PAIR(bench-ready): see RunContext::ready().
     const auto isReady = [&] { return control.ready.load(std::memory_order_acquire) != 0; };
-    if (act.server && !waitUntil(isReady, act.grace))
+    if (workload.server && !waitUntil(isReady, workload.grace))
       throw std::runtime_error("the server was not ready in time");
-    act.requester(scene);
+    workload.requester(context);
   });
 
   Outcome outcome;
@@ -134,14 +134,14 @@ Outcome Stage::run(const Act& act) const {
     outcome.error = "neither process ended within the time limit";
   } else if (*first == requester) {
     outcome.error = requesterChild.ending("requester", control.errors[requester]);
-    if (serverChild && act.stopsByItself && outcome.error.empty()) {
+    if (serverChild && workload.stopsByItself && outcome.error.empty()) {
       pollfd end{serverChild->fd().get(), POLLIN, 0};
       ::poll(&end, 1, static_cast<int>(std::chrono::milliseconds(kStopGrace).count()));
     }
   } else if (outcome.error = serverChild->ending("server", control.errors[server]);
              outcome.error.empty()) {
     // The server answered the last request and ended before the requester.
-    const auto second = waitForEnd(nullptr, requesterChild, Deadline::after(act.grace));
+    const auto second = waitForEnd(nullptr, requesterChild, Deadline::after(workload.grace));
     outcome.error = second ? requesterChild.ending("requester", control.errors[requester])
                            : "the requester did not end in time";
   }

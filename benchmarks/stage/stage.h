@@ -82,14 +82,14 @@ struct Control {
 };
 
 // The interface between a process of a measurement and the Stage.
-class Scene {
+class RunContext {
  public:
-  Scene(Control& control, Budget budget, std::span<std::byte> scratch) noexcept
+  RunContext(Control& control, Budget budget, std::span<std::byte> scratch) noexcept
       : control_(control), budget_(budget), scratch_(scratch) {}
 
   [[nodiscard]] Budget budget() const noexcept { return budget_; }
   [[nodiscard]] Figures& figures() const noexcept { return control_.figures; }
-  // Shared zeroed memory, page-aligned, of Act::scratchBytes.
+  // Shared zeroed memory, page-aligned, of Workload::scratchBytes.
   [[nodiscard]] std::span<std::byte> scratch() const noexcept { return scratch_; }
 
   // Called by the server when it accepts requests, with its port, if it has one.
@@ -120,9 +120,9 @@ class Scene {
   std::span<std::byte> scratch_;
 };
 
-struct Act {
-  std::function<void(const Scene&)> server;  // may be empty
-  std::function<void(const Scene&)> requester;  // starts when the server is ready
+struct Workload {
+  std::function<void(const RunContext&)> server;  // may be empty
+  std::function<void(const RunContext&)> requester;  // starts when the server is ready
   std::size_t scratchBytes = 0;
   bool stopsByItself = false;  // the server ends by itself soon after stop()
   Nanoseconds grace = std::chrono::seconds(15);  // beyond the budget, to connect and to end
@@ -138,9 +138,9 @@ class Stage {
   Stage(Placement placement, Budget budget) noexcept
       : placement_(std::move(placement)), budget_(budget) {}
 
-  // Returns within the budget plus twice the act's grace plus one second, even if the processes
-  // hang.
-  [[nodiscard]] Outcome run(const Act& act) const;
+  // Returns within the budget plus twice the workload's grace plus one second, even if the
+  // processes hang.
+  [[nodiscard]] Outcome run(const Workload& workload) const;
 
   [[nodiscard]] Budget budget() const noexcept { return budget_; }
   [[nodiscard]] const Placement& placement() const noexcept { return placement_; }

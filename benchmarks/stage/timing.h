@@ -36,14 +36,14 @@ double typicalNs(const Stopwatch& watch, Nanoseconds budget, double aboutNs,
 // Calls `roundTrip` repeatedly. Half of the time it is timed for each call, the other half in
 // groups.
 template <class RoundTrip>
-void timeEach(const Scene& scene, RoundTrip&& roundTrip) {
+void timeEach(const RunContext& context, RoundTrip&& roundTrip) {
   const Stopwatch watch;
-  const auto warm = Stopwatch::start() + watch.ticksOf(scene.budget().warmUp);
+  const auto warm = Stopwatch::start() + watch.ticksOf(context.budget().warmUp);
   do roundTrip();
   while (Stopwatch::start() < warm);
 
   LatencyRecorder recorder;  // private: a shared one would be a line that bounces
-  const auto half = scene.budget().measure / 2;
+  const auto half = context.budget().measure / 2;
   const auto end = Stopwatch::start() + watch.ticksOf(half);
   for (std::uint64_t now = 0; now < end;) {
     const auto from = Stopwatch::start();
@@ -51,45 +51,45 @@ void timeEach(const Scene& scene, RoundTrip&& roundTrip) {
     now = Stopwatch::stop();
     recorder.add(watch.elapsedNs(from, now));
   }
-  scene.figures().typicalNs =
+  context.figures().typicalNs =
       typicalNs(watch, half, static_cast<double>(recorder.percentileNs(50)), roundTrip);
-  scene.figures().latency = recorder;
+  context.figures().latency = recorder;
 }
 
 // Calls `step`, which completes `perStep` messages, repeatedly. The result is messages per second.
 template <class Step>
-void timeRate(const Scene& scene, std::uint64_t perStep, Step&& step) {
-  const auto warm = Deadline::after(scene.budget().warmUp);
+void timeRate(const RunContext& context, std::uint64_t perStep, Step&& step) {
+  const auto warm = Deadline::after(context.budget().warmUp);
   do step();
   while (!warm.hasPassed());
 
   const auto fromNs = Clock::nowNs();
-  const auto end = Deadline::after(scene.budget().measure);
+  const auto end = Deadline::after(context.budget().measure);
   std::uint64_t steps = 0;
   do {
     for (int i = 0; i < 16; ++i) step();  // the clock costs 20 ns
     steps += 16;
   } while (!end.hasPassed());
   const auto elapsedNs = Clock::nowNs() - fromNs;
-  scene.figures().count = steps * perStep;
-  scene.figures().perSecond =
+  context.figures().count = steps * perStep;
+  context.figures().perSecond =
       static_cast<double>(steps * perStep) * 1e9 / static_cast<double>(elapsedNs);
 }
 
 // Calls `exchange`, which sends `perExchange` messages and receives their replies, repeatedly. The
 // latency is that of an exchange; the rate is that of the messages.
 template <class Exchange>
-void timeExchanges(const Scene& scene, Meter& meter, std::uint64_t perExchange,
+void timeExchanges(const RunContext& context, Meter& meter, std::uint64_t perExchange,
                    Exchange&& exchange) {
   const Stopwatch watch;
-  const auto warm = Stopwatch::start() + watch.ticksOf(scene.budget().warmUp);
+  const auto warm = Stopwatch::start() + watch.ticksOf(context.budget().warmUp);
   do exchange();
   while (Stopwatch::start() < warm);
 
   LatencyRecorder recorder;  // private: a shared one would be a line that bounces
   meter.start();
   const auto begin = Stopwatch::start();
-  const auto end = begin + watch.ticksOf(scene.budget().measure);
+  const auto end = begin + watch.ticksOf(context.budget().measure);
   std::uint64_t now = begin;
   while (now < end) {
     const auto from = Stopwatch::start();
@@ -97,17 +97,17 @@ void timeExchanges(const Scene& scene, Meter& meter, std::uint64_t perExchange,
     now = Stopwatch::stop();
     recorder.add(watch.elapsedNs(from, now));
   }
-  meter.stop(scene.figures());
-  scene.figures().latency = recorder;
-  scene.figures().count = recorder.count() * perExchange;
-  scene.figures().perSecond =
-      static_cast<double>(scene.figures().count) * 1e9 / watch.elapsed(begin, now);
+  meter.stop(context.figures());
+  context.figures().latency = recorder;
+  context.figures().count = recorder.count() * perExchange;
+  context.figures().perSecond =
+      static_cast<double>(context.figures().count) * 1e9 / watch.elapsed(begin, now);
 }
 
 // Keeps `window` messages outstanding: `receive` receives the oldest reply, then `send` sends
 // another message. Each message is timed from its send to its reply.
 template <class Send, class Receive>
-void timeWindow(const Scene& scene, Meter& meter, std::size_t window, Send&& send,
+void timeWindow(const RunContext& context, Meter& meter, std::size_t window, Send&& send,
                 Receive&& receive) {
   const Stopwatch watch;
   std::vector<std::uint64_t> sentAt(window);
@@ -127,39 +127,39 @@ void timeWindow(const Scene& scene, Meter& meter, std::size_t window, Send&& sen
     }
   };
   for (std::size_t place = 0; place < window; ++place) sendAt(place);
-  resume(scene.budget().warmUp);
+  resume(context.budget().warmUp);
 
   recorder = {};
   meter.start();
   const auto begin = Stopwatch::start();
-  resume(scene.budget().measure);
+  resume(context.budget().measure);
   const auto elapsed = watch.elapsed(begin, Stopwatch::stop());
-  meter.stop(scene.figures());
+  meter.stop(context.figures());
   for (std::size_t i = 0; i < window; ++i) receive();
-  scene.figures().latency = recorder;
-  scene.figures().count = recorder.count();
-  scene.figures().perSecond = static_cast<double>(recorder.count()) * 1e9 / elapsed;
+  context.figures().latency = recorder;
+  context.figures().count = recorder.count();
+  context.figures().perSecond = static_cast<double>(recorder.count()) * 1e9 / elapsed;
 }
 
 // For one-way traffic: `flood(resume)` sends while resume() returns true. The rate is that of the
 // messages that the other process has received.
 template <class Flood>
-void timeOneWay(const Scene& scene, Flood&& flood) {
+void timeOneWay(const RunContext& context, Flood&& flood) {
   std::int64_t fromNs = 0;
   std::uint64_t fromCount = 0;
   const auto startNs = Clock::nowNs();
-  const auto warmNs = startNs + scene.budget().warmUp.count();
+  const auto warmNs = startNs + context.budget().warmUp.count();
   flood([&] {
     const auto nowNs = Clock::nowNs();
     if (fromNs == 0 && nowNs >= warmNs) {
       fromNs = nowNs;
-      fromCount = scene.consumedCount();
+      fromCount = context.consumedCount();
     }
-    if (fromNs == 0 || nowNs <= fromNs + scene.budget().measure.count()) return true;
-    if (scene.figures().perSecond == 0) {
-      scene.figures().count = scene.consumedCount() - fromCount;
-      scene.figures().perSecond =
-          static_cast<double>(scene.figures().count) * 1e9 / static_cast<double>(nowNs - fromNs);
+    if (fromNs == 0 || nowNs <= fromNs + context.budget().measure.count()) return true;
+    if (context.figures().perSecond == 0) {
+      context.figures().count = context.consumedCount() - fromCount;
+      context.figures().perSecond =
+          static_cast<double>(context.figures().count) * 1e9 / static_cast<double>(nowNs - fromNs);
     }
     return false;
   });

@@ -76,7 +76,6 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
       module_(module),
       vector_(checkVector(options.vector, module)),
       usesInterrupts_(kind_.hasInterrupts && options.vector != 0),
-      stormPause_(options.storm.stormPause),
       registers_(module.io(), kind_),
       rising_(options.rising & kind_.inputs),
       falling_(options.falling & kind_.inputs) {
@@ -89,13 +88,11 @@ DigitalIo::DigitalIo(IndustryPackModule& module, const DigitalIoOptions& options
   threadOptions.pollEvery = options.pollEvery;
   thread_ = std::make_unique<InterruptThread>(
       usesInterrupts_ ? module.interrupt(0) : *noInterrupt_, threadOptions,
-      [this](InterruptThread::Cause cause) { return serve(cause); });
-  // PAIR(dio-thread): the thread object is complete.
-  running_.store(thread_.get(), std::memory_order_release);
+      [this](InterruptThread::Cause cause) { return serve(cause); },
+      [this](InterruptTrouble trouble) { note(trouble); });
 }
 
 DigitalIo::~DigitalIo() {
-  running_.store(nullptr, std::memory_order_relaxed);
   thread_.reset();
   if (usesInterrupts_ && state_.isThere && module_.problem().empty())
     registers_.write(word::kInterruptEnable, kind_.inputs, 0);
@@ -243,7 +240,7 @@ bool DigitalIo::lookLocked() {
     tend();
     return false;
   }
-  if (changed != 0) tell({DigitalIoNews::Kind::inputs, state_.inputs, changed});
+  if (changed != 0) report({DigitalIoChange::Kind::inputs, state_.inputs, changed});
   return hadEdges;
 }
 
@@ -260,9 +257,9 @@ bool DigitalIo::tend() {
   if (state_.isThere && !hasVanished()) return true;
   const auto before = state_;
   if (setUp()) {
-    tell({DigitalIoNews::Kind::back, state_.inputs, state_.inputs ^ before.inputs});
+    report({DigitalIoChange::Kind::back, state_.inputs, state_.inputs ^ before.inputs});
   } else if (before.isThere) {
-    tell({DigitalIoNews::Kind::gone, state_.inputs, 0});
+    report({DigitalIoChange::Kind::gone, state_.inputs, 0});
   }
   return false;
 }
@@ -295,29 +292,19 @@ void DigitalIo::noteLateness(InterruptThread::Cause cause, bool hadEdges) {
     return;
   }
   if (std::exchange(mayBeLost_, hadEdges) && !std::exchange(isLosing_, true))
-    tell({DigitalIoNews::Kind::lostInterrupt, state_.inputs, 0});
-  noteStorms();
+    report({DigitalIoChange::Kind::lostInterrupt, state_.inputs, 0});
 }
 
-// Called at each poll. A stuck line causes a storm after each pause; all these count as one storm
-// until no spurious interrupt comes between two polls.
-void DigitalIo::noteStorms() {
-  // PAIR(dio-thread): null while the constructor creates the thread.
-  const auto* const thread = running_.load(std::memory_order_acquire);
-  const auto counters = thread == nullptr ? InterruptThread::Counters() : thread->counters();
-  const bool isCalm = std::exchange(spurious_, counters.spurious) == counters.spurious;
-  if (std::exchange(storms_, counters.storms) != counters.storms) {
-    pauseEnds_ = Deadline::after(stormPause_);
-    isAfterPause_ = false;
-    if (!std::exchange(isStorming_, true)) tell({DigitalIoNews::Kind::storm, state_.inputs, 0});
-  } else if (isStorming_ && pauseEnds_.hasPassed() && std::exchange(isAfterPause_, true) &&
-             isCalm) {
-    isStorming_ = false;
-  }
+// Lost interrupts are found by noteLateness(), which compares edges, and a carrier that polls
+// reports that itself.
+void DigitalIo::note(InterruptTrouble trouble) {
+  if (trouble != InterruptTrouble::storm) return;
+  const std::lock_guard lock(mutex_);
+  report({DigitalIoChange::Kind::storm, state_.inputs, 0});
 }
 
-void DigitalIo::tell(const DigitalIoNews& news) {
-  for (const auto& subscriber : subscribers_) subscriber.listener(news);
+void DigitalIo::report(const DigitalIoChange& change) {
+  for (const auto& subscriber : subscribers_) subscriber.listener(change);
 }
 
 DigitalIo::Subscription DigitalIo::subscribe(Listener listener) {

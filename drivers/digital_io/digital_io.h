@@ -4,7 +4,7 @@
 //
 //   DigitalIo io(module, {.vector = 116, .rising = 0xff, .falling = 0xff});
 //   io.trySetBits(0x3);
-//   const auto subscription = io.subscribe([](const DigitalIoNews& news) { ... });
+//   const auto subscription = io.subscribe([](const DigitalIoChange& change) { ... });
 //
 //   an edge ──► interrupt ─┐
 //   pollEvery ─────────────┴► look: pending edges, inputs ──► changes ──► each subscriber
@@ -73,14 +73,13 @@ enum class DigitalIoStatus : std::uint8_t {
 }
 
 // A change that is reported to subscribers.
-struct DigitalIoNews {
+struct DigitalIoChange {
   enum class Kind : std::uint8_t {
     inputs,  // inputs have changed, or had an edge and changed back
     gone,  // the module is absent or replaced
     back,  // the module is back or was reset; it is programmed again, outputs included
     lostInterrupt,  // a poll found an edge whose interrupt did not come
-    // the request line is stuck: interrupts are masked for a while, repeatedly; reported once
-    storm,
+    storm,  // the request line is stuck: see InterruptThread; reported once until it ends
   };
   Kind kind = Kind::inputs;
   std::uint32_t inputs = 0;  // all inputs; for `gone` their last values
@@ -89,7 +88,7 @@ struct DigitalIoNews {
 
 class DigitalIo {
  public:
-  using Listener = std::function<void(const DigitalIoNews& news)>;
+  using Listener = std::function<void(const DigitalIoChange& change)>;
   // Ends when it is destroyed: the listener is not running then and does not run again. A listener
   // must not destroy a subscription.
   class Subscription;
@@ -150,8 +149,8 @@ class DigitalIo {
   bool setUp();
   void restoreOutputs();
   void noteLateness(InterruptThread::Cause cause, bool hadEdges);
-  void noteStorms();
-  void tell(const DigitalIoNews& news);
+  void note(InterruptTrouble trouble);
+  void report(const DigitalIoChange& change);
   [[nodiscard]] std::uint32_t edges() const noexcept { return rising_ | falling_; }
   [[nodiscard]] std::uint32_t armed() const noexcept {
     return (rising_ & ~falling_) | (rising_ & falling_ & ~state_.inputs);
@@ -170,7 +169,6 @@ class DigitalIo {
   IndustryPackModule& module_;
   const int vector_;
   const bool usesInterrupts_;
-  const std::chrono::milliseconds stormPause_;
   mutable std::mutex mutex_;  // guards the registers and the members below
   DigitalIoRegisters registers_;
   std::uint32_t rising_ = 0, falling_ = 0, polarity_ = 0;
@@ -180,10 +178,6 @@ class DigitalIo {
   State state_;
   bool mayBeLost_ = false;  // the last poll found an edge whose interrupt may still be under way
   bool isLosing_ = false;  // lostInterrupt was reported
-  bool isStorming_ = false;  // storm was reported
-  bool isAfterPause_ = false;  // the last poll was after the pause
-  Deadline pauseEnds_ = Deadline::never();
-  std::uint64_t storms_ = 0, spurious_ = 0;  // as counted at the last poll
   struct Subscriber {
     std::uint64_t id = 0;
     Listener listener;
@@ -191,7 +185,6 @@ class DigitalIo {
   std::vector<Subscriber> subscribers_;
   std::uint64_t lastId_ = 0;
   std::unique_ptr<Interrupt> noInterrupt_;  // in place of that of a module without interrupts
-  std::atomic<InterruptThread*> running_{nullptr};
   std::unique_ptr<InterruptThread> thread_;  // last: ends before the members that it uses
 };
 

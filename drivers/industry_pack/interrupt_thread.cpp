@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kPollWhilePaused{100};
 constexpr int kSpuriousCompensated = 2;  // by an interrupt with a request
-constexpr int kPausesToCalm = 10;        // storms within that time are reported as one
+constexpr int kPausesToCalm = 2;         // after them a line that was enabled again is calm
 
 }  // namespace
 
@@ -61,7 +61,11 @@ void InterruptThread::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     wait();
     if (stop.stop_requested()) return;
-    if (interrupt_.take() > 0) serveInterrupt();
+    if (interrupt_.take() > 0) {
+      serveInterrupt();
+    } else if (stormEnds_.hasPassed()) {
+      endStorm();
+    }
     eventfd_t wakes = 0;
     const bool isWoken = ::eventfd_read(wakeUp_.get(), &wakes) == 0;
     if (isWoken || pollAt_.hasPassed()) servePoll();
@@ -97,17 +101,25 @@ void InterruptThread::servePoll() {
 void InterruptThread::pause() {
   storms_.fetch_add(1, std::memory_order_relaxed);
   pausedUntil_ = Deadline::after(options_.stormPause);
-  if (stormEnds_.hasPassed()) report(InterruptTrouble::storm);
-  stormEnds_ = Deadline::after((1 + kPausesToCalm) * options_.stormPause);
+  stormEnds_ = Deadline::never();
+  if (!isStorming_.exchange(true, std::memory_order_relaxed)) report(InterruptTrouble::storm);
   servePoll();
 }
 
 void InterruptThread::resume() {
   spuriousExcess_ = lateInRow_ = 0;
   pausedUntil_ = Deadline::never();
+  if (isStorming()) stormEnds_ = Deadline::after(kPausesToCalm * options_.stormPause);
   pollAt_ =
       options_.pollEvery.count() == 0 ? Deadline::never() : Deadline::after(options_.pollEvery);
   interrupt_.enable();
+}
+
+// Called only when no interrupt is pending, so that a stuck line is not taken for a calm one when
+// this thread did not run for some time.
+void InterruptThread::endStorm() {
+  stormEnds_ = Deadline::never();
+  isStorming_.store(false, std::memory_order_relaxed);
 }
 
 void InterruptThread::followPolling() {
@@ -123,7 +135,7 @@ void InterruptThread::report(InterruptTrouble trouble) const {
 void InterruptThread::wait() const {
   std::array<pollfd, 2> events{{{.fd = interrupt_.descriptor(), .events = POLLIN, .revents = 0},
                                 {.fd = wakeUp_.get(), .events = POLLIN, .revents = 0}}};
-  const auto next = std::min(pollAt_, pausedUntil_);
+  const auto next = std::min({pollAt_, pausedUntil_, stormEnds_});
   const auto timeout = timespecOf(next.left());
   ::ppoll(events.data(), events.size(), next.isNever() ? nullptr : &timeout, nullptr);
 }

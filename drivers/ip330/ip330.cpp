@@ -305,7 +305,7 @@ void Ip330::keep(const std::stop_token& stop) {
 
 void Ip330::look() {
   lookForBoard();
-  lookForStorm();
+  faults_.set(Ip330Fault::storm, interruptThread_->isStorming());
   if (faults_.has(Ip330Fault::absent)) return;
   lookForScans();
   calibrateWhenDue();
@@ -343,16 +343,6 @@ void Ip330::lookForScans() {
   if (isSilent || scans_.load(std::memory_order_relaxed) != scansSeen_)
     faults_.set(Ip330Fault::silent, isSilent);
   scansSeen_ = scans_.load(std::memory_order_relaxed);
-}
-
-void Ip330::lookForStorm() {
-  const auto storms = interruptThread_->counters().storms;
-  if (storms != std::exchange(stormsSeen_, storms)) {
-    stormOver_ = Deadline::after(3 * limits_.stormPause);
-    faults_.set(Ip330Fault::storm, true);
-  } else if (stormOver_.hasPassed()) {
-    faults_.set(Ip330Fault::storm, false);
-  }
 }
 
 void Ip330::calibrateWhenDue() {

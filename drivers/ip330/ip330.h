@@ -171,7 +171,6 @@ class Ip330 {
   void look();
   void lookForBoard();
   void lookForScans();
-  void lookForStorm();
   void calibrateWhenDue();
 
   IndustryPackModule& module_;
@@ -197,9 +196,7 @@ class Ip330 {
   std::mutex subscribersMutex_;
   std::list<Subscriber> subscribers_;
 
-  std::uint64_t stormsSeen_ = 0;  // this and below: used by the keeper thread
-  std::uint64_t scansSeen_ = 0;
-  Deadline stormOver_ = Deadline::never();
+  std::uint64_t scansSeen_ = 0;  // used by the keeper thread
   std::mutex keeperMutex_;
   std::condition_variable_any keeperWakes_;
   std::unique_ptr<InterruptThread> interruptThread_;

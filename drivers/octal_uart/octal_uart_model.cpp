@@ -216,19 +216,19 @@ void OctalUartModel::noteAccess(std::size_t offset) {
 
 // ---- far ends
 
-void OctalUartModel::say(int port, std::string_view text, LineFault fault) {
+void OctalUartModel::farEndSend(int port, std::string_view text, LineFault fault) {
   const std::lock_guard lock(mutex_);
   for (const char byte : text)
     channels_.at(index(port)).incoming.push_back({static_cast<std::uint8_t>(byte), fault});
   proceed();
 }
 
-std::string OctalUartModel::heard(int port) const {
+std::string OctalUartModel::farEndReceived(int port) const {
   const std::lock_guard lock(mutex_);
   return channels_.at(index(port)).outgoing;
 }
 
-void OctalUartModel::waitUntilHeard(int port, std::string_view text) const {
+void OctalUartModel::waitUntilFarEndReceived(int port, std::string_view text) const {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return channels_.at(index(port)).outgoing.ends_with(text); });
 }

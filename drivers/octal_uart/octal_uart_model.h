@@ -5,8 +5,8 @@
 //   auto& uart = carrier.plug("IP_a", std::make_unique<OctalUartModel>(options));
 //   uart.terminal(3);                   // "/dev/pts/7", which the program of an instrument opens
 //
-//   uart.say(3, "1.234\r");             // without terminals: the far end in memory
-//   uart.waitUntilHeard(3, "MEAS?\r");
+//   uart.farEndSend(3, "1.234\r");      // without terminals: the far end in memory
+//   uart.waitUntilFarEndReceived(3, "MEAS?\r");
 //
 // A byte takes no time, and none is lost; or it takes the time of its baud rate, by the clock or in
 // steps that a test makes.
@@ -43,7 +43,7 @@ enum class OctalUartModelTime : std::uint8_t {
 struct OctalUartModelOptions {
   std::uint16_t model = 0x22;  // 0x2a: Octal 422, 0x48: Octal 485
   OctalUartModelTime time = OctalUartModelTime::instant;
-  // A pseudo-terminal is the far end of each port; otherwise say() and heard() are.
+  // A pseudo-terminal is the far end of each port; otherwise it is in memory.
   bool terminals = false;
 };
 
@@ -62,11 +62,11 @@ class OctalUartModel final : public DeviceModel {
     return terminals_.at(index(port)).path;
   }
   // The far end sends `text`. `fault` damages each byte of it.
-  void say(int port, std::string_view text, LineFault fault = LineFault::none);
+  void farEndSend(int port, std::string_view text, LineFault fault = LineFault::none);
   // All bytes that the far end has received from the port.
-  [[nodiscard]] std::string heard(int port) const;
+  [[nodiscard]] std::string farEndReceived(int port) const;
   // Waits until these bytes end with `text`.
-  void waitUntilHeard(int port, std::string_view text) const;
+  void waitUntilFarEndReceived(int port, std::string_view text) const;
   // Sets the CTS input of the port.
   void setClearToSend(int port, bool clear);
 

@@ -43,8 +43,8 @@ SerialLine::OpenState TcpLine::tryOpen() {
 SerialLine::OpenState TcpLine::beginLookup() try {
   lookup_.emplace(address_);
   return OpenState::opening;
-} catch (
-    const std::system_error& error) {  // no descriptor or no thread; the next attempt may get one
+} catch (const std::system_error& error) {
+  // There is no descriptor or no thread; the next attempt may get one.
   problem_ = fmt::format("resolve {}: {}", address_.toString(), error.what());
   return OpenState::failed;
 }

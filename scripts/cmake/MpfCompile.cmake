@@ -8,25 +8,31 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 # All programs are in one folder, where the demo, the tests and `make bench` find them.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
-# Public headers are included as users do: <mpf/message.h>. All others are named from the root: "shm/link.h".
-add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}" "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
+# Public headers are included as users do: <mpf/message.h>. All others are named from
+# the root: "shm/link.h".
+add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}"
+  "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
 
 add_library(mpf_warnings INTERFACE)
-target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Werror)
+target_compile_options(mpf_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+  -Wnon-virtual-dtor -Wold-style-cast -Werror)
 
 # With optimisation, g++ 12 reports overlapping copies in "a" + std::string(...) (GCC bug 105651).
 target_compile_options(mpf_warnings INTERFACE $<$<CONFIG:Release>:-Wno-restrict>)
 
 if(CMAKE_CXX_COMPILER_ID STREQUAL Clang) # for fuzzing
   add_compile_options("SHELL:-include ${CMAKE_SOURCE_DIR}/scripts/kj_for_clang.h")
-  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations) # in libstdc++ 12 itself
+  # In libstdc++ 12 itself.
+  target_compile_options(mpf_warnings INTERFACE -Wno-deprecated-declarations)
 endif()
 
-set(MPF_SANITIZE "" CACHE STRING "Sanitizers, in the notation of -fsanitize=: address,undefined or thread")
+set(MPF_SANITIZE "" CACHE STRING
+  "Sanitizers, in the notation of -fsanitize=: address,undefined or thread")
 if(MPF_SANITIZE)
   # -Og -g1 compiles in half the time of -O1 -g, and reports still contain line numbers. In the code
   # that a sanitizer adds, g++ 12 warns of variables that may be uninitialised.
-  add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -Og -g1 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+  add_compile_options(-fsanitize=${MPF_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
+    -Og -g1 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   # These checks cost a fifth of the compile time. AddressSanitizer detects the same errors, or the
   # error is harmless on this processor.
   if(MPF_SANITIZE MATCHES undefined)
@@ -43,7 +49,8 @@ endif()
 # Each build links some fifty programs. GNU ld needs a second for each, mold a fraction of that.
 # Release builds use the default linker.
 find_program(MPF_MOLD mold)
-if(MPF_MOLD AND CMAKE_BUILD_TYPE STREQUAL Debug AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CROSSCOMPILING)
+if(MPF_MOLD AND CMAKE_BUILD_TYPE STREQUAL Debug AND CMAKE_CXX_COMPILER_ID STREQUAL GNU
+    AND NOT CMAKE_CROSSCOMPILING)
   add_link_options(-fuse-ld=mold)
 endif()
 

@@ -1,4 +1,5 @@
-# The installed tree: one library, its headers, mpf::mpf, pkg-config mpf, the programs and their man pages.
+# The installed tree: one library, its headers, mpf::mpf, pkg-config mpf, the programs and their man
+# pages.
 include(CMakePackageConfigHelpers)
 
 # Appends to `out` the targets of `type` that the CMakeLists of `folder` and below define.
@@ -26,7 +27,8 @@ endif()
 
 # External libraries that the public libraries may link, and how a consumer finds them: target,
 # find_package() arguments, pkg-config name ("-": not needed).
-set(outsideTargets Threads::Threads Boost::headers CapnProto::capnp CapnProto::kj fmt::fmt spdlog::spdlog)
+set(outsideTargets Threads::Threads Boost::headers CapnProto::capnp CapnProto::kj fmt::fmt
+  spdlog::spdlog)
 set(outsidePackages Threads "Boost 1.74" CapnProto CapnProto fmt spdlog)
 set(outsideModules - - capnp kj fmt spdlog)
 
@@ -57,7 +59,8 @@ set(findDependencies "")
 foreach(link IN LISTS links)
   list(FIND outsideTargets "${link}" at)
   if(at LESS 0)
-    message(FATAL_ERROR "A public library links ${link}, which is not in the table in scripts/cmake/MpfInstall.cmake: add it there")
+    message(FATAL_ERROR "A public library links ${link}, which is not in the table in "
+      "scripts/cmake/MpfInstall.cmake: add it there")
   endif()
   list(GET outsidePackages ${at} package)
   list(GET outsideModules ${at} module)
@@ -83,21 +86,25 @@ target_include_directories(mpf_all INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL
 # ---- headers and packages
 
 install(DIRECTORY "${CMAKE_SOURCE_DIR}/include/mpf" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(FILES schema/message.capnp schema/router.capnp schema/recording.capnp DESTINATION ${CMAKE_INSTALL_DATADIR}/mpf) # for other implementations
+install(FILES schema/message.capnp schema/router.capnp schema/recording.capnp
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/mpf) # for other implementations
 
 set(packageFolder ${CMAKE_INSTALL_LIBDIR}/cmake/mpf)
 install(TARGETS mpf_all EXPORT mpfTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT mpfTargets NAMESPACE mpf:: DESTINATION ${packageFolder})
-configure_package_config_file(scripts/cmake/mpfConfig.cmake.in mpfConfig.cmake INSTALL_DESTINATION ${packageFolder})
+configure_package_config_file(scripts/cmake/mpfConfig.cmake.in mpfConfig.cmake
+  INSTALL_DESTINATION ${packageFolder})
 write_basic_package_version_file(mpfConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES "${CMAKE_BINARY_DIR}/mpfConfig.cmake" "${CMAKE_BINARY_DIR}/mpfConfigVersion.cmake" DESTINATION ${packageFolder})
+install(FILES "${CMAKE_BINARY_DIR}/mpfConfig.cmake" "${CMAKE_BINARY_DIR}/mpfConfigVersion.cmake"
+  DESTINATION ${packageFolder})
 
 file(RELATIVE_PATH upToPrefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 string(REGEX REPLACE "/$" "" upToPrefix "${upToPrefix}")
 configure_file(scripts/cmake/mpf.pc.in mpf.pc @ONLY)
 install(FILES "${CMAKE_BINARY_DIR}/mpf.pc" DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL) # the tables of `make bench`
+# The tables of `make bench`.
+install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
 
 # ---- programs and man pages: every executable of these folders
 
@@ -114,17 +121,20 @@ endif()
 find_program(MPF_HELP2MAN help2man)
 if(MPF_BUILD_MAN_PAGES AND MPF_HELP2MAN AND NOT CMAKE_CROSSCOMPILING)
   set(pages "")
+  set(makeManPage "${CMAKE_SOURCE_DIR}/scripts/cmake/make-man-page")
   foreach(program IN LISTS programs)
     get_target_property(name ${program} OUTPUT_NAME)
     if(NOT name)
       set(name ${program})
     endif()
     set(page "${CMAKE_BINARY_DIR}/man/${name}.1")
-    add_custom_command(OUTPUT "${page}" DEPENDS ${program} "${CMAKE_SOURCE_DIR}/scripts/cmake/make-man-page"
-      COMMAND "${CMAKE_SOURCE_DIR}/scripts/cmake/make-man-page" $<TARGET_FILE:${program}> "${page}" "MPF ${PROJECT_VERSION}"
+    add_custom_command(OUTPUT "${page}" DEPENDS ${program} "${makeManPage}"
+      COMMAND "${makeManPage}" $<TARGET_FILE:${program}> "${page}" "MPF ${PROJECT_VERSION}"
       COMMENT "Man page of ${program}" VERBATIM)
     list(APPEND pages "${page}")
-    install(DIRECTORY "${CMAKE_BINARY_DIR}/man/${name}.d/" DESTINATION ${CMAKE_INSTALL_MANDIR}/man1) # pages of its subcommands
+    # The pages of its subcommands.
+    install(DIRECTORY "${CMAKE_BINARY_DIR}/man/${name}.d/"
+      DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
   endforeach()
   add_custom_target(mpf_man_pages ALL DEPENDS ${pages})
   if(pages)

@@ -7,9 +7,11 @@ set(CMAKE_LIBRARY_ARCHITECTURE s390x-linux-gnu)
 set(CMAKE_C_COMPILER s390x-linux-gnu-gcc)
 set(CMAKE_CXX_COMPILER s390x-linux-gnu-g++)
 
-cmake_path(SET CMAKE_SYSROOT NORMALIZE "${CMAKE_CURRENT_LIST_DIR}/../../build/big-endian-sysroot/root")
+cmake_path(SET CMAKE_SYSROOT NORMALIZE
+  "${CMAKE_CURRENT_LIST_DIR}/../../build/big-endian-sysroot/root")
 if(NOT EXISTS "${CMAKE_SYSROOT}")
-  message(FATAL_ERROR "The libraries in ${CMAKE_SYSROOT} are missing: run scripts/big-endian-sysroot")
+  message(FATAL_ERROR
+    "The libraries in ${CMAKE_SYSROOT} are missing: run scripts/big-endian-sysroot")
 endif()
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER) # capnp and python3 run on this host
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)

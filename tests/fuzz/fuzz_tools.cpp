@@ -33,8 +33,8 @@ class Reader {
     const auto tree = tools::tryDissect(segments::path(files_.name(file)),
                                         {.last = value / 16 % 16, .raw = value / 256 % 8 == 7});
     if (tree) static_cast<void>(tools::outline(*tree));
-  } catch (
-      const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool reports it and continues
+    // NOLINTNEXTLINE(bugprone-empty-catch): the tool reports it and continues
+  } catch (const SegmentError&) {
   }
 
   void follow(std::uint64_t value) try {
@@ -49,8 +49,8 @@ class Reader {
     }
     static_cast<void>(follower_->missed());
     static_cast<void>(follower_->isOver());
-  } catch (
-      const SegmentError&) {  // NOLINT(bugprone-empty-catch): the tool reports it and continues
+    // NOLINTNEXTLINE(bugprone-empty-catch): the tool reports it and continues
+  } catch (const SegmentError&) {
   }
   const Scene& scene_;
   const HostileFiles& files_;

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Interop: a backplane for programs of an older layout and today's. Arguments: LAYOUT TRAFFIC VICTIM MPF.
+"""Interop: a backplane for programs of an older layout and today's.
+Arguments: LAYOUT TRAFFIC VICTIM MPF.
 
 The folder of LAYOUT, on PYTHONPATH, plays the old programs; the others are today's.
 """
+
 import json
 import os
 import secrets
@@ -26,7 +28,8 @@ CODE = json.loads(subprocess.run([TRAFFIC, "layout"], check=True, capture_output
 
 
 class PatientLibc:
-    """libc, but inotify_init1() waits while the user has no inotify instance left: tests beside this one have some."""
+    """libc, but inotify_init1() waits while the user has no inotify instance left: tests beside
+    this one have some."""
 
     def __getattr__(self, name):
         return getattr(memory.libc, name)
@@ -44,7 +47,9 @@ class Program:
     """One of today's programs, and the lines that it says."""
 
     def __init__(self, *command):
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=False)
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=False
+        )
         self.output = self.process.stdout.fileno()
         os.set_blocking(self.output, False)
         self.said, self.has_ended = b"", False
@@ -114,7 +119,11 @@ class Interop(unittest.TestCase):
         self.assertEqual(left, [])
 
     def names(self):
-        return sorted(name for name in os.listdir(reader.DIRECTORY) if name.startswith(f"mpf.{self.backplane}."))
+        return sorted(
+            name
+            for name in os.listdir(reader.DIRECTORY)
+            if name.startswith(f"mpf.{self.backplane}.")
+        )
 
     def program(self, *command, end=signal.SIGTERM):
         program = Program(*command)
@@ -126,13 +135,18 @@ class Interop(unittest.TestCase):
         self.addCleanup(lambda: program.process.returncode is None and program.end())
         self.assertEqual(program.line(), "open")
         first = self.old_client()
-        self.ask(first, self.connected(first), messages.FLOAT64, messages.float64(0))  # now it minds signals
+        self.ask(
+            first, self.connected(first), messages.FLOAT64, messages.float64(0)
+        )  # now it minds signals
         first.close()
         return program
 
     def crowd(self, clients, *parties):
-        """Today's clients of the server "echo", which say "answered" and its incarnation once all of them have had all replies."""
-        self.addCleanup(subprocess.run, [TRAFFIC, "clean", self.backplane], check=True, capture_output=True)
+        """Today's clients of the server "echo", which say "answered" and its incarnation once
+        all of them have had all replies."""
+        self.addCleanup(
+            subprocess.run, [TRAFFIC, "clean", self.backplane], check=True, capture_output=True
+        )
         program = self.program(VICTIM, "crowd", self.backplane, str(clients), end=signal.SIGKILL)
         self.assertRegex(program.line(*parties), "^waiting:")
         return program
@@ -162,11 +176,14 @@ class Interop(unittest.TestCase):
         connection.send(kind, body, clientType=-had, clientExtra=had)
         run_until(lambda: len(connection.received) > had, party, *others, **how)
         reply = connection.received[-1]
-        self.assertEqual((reply.clientType, reply.clientExtra, reply.requestId), (-had, had, connection.last_id))
+        self.assertEqual(
+            (reply.clientType, reply.clientExtra, reply.requestId), (-had, had, connection.last_id)
+        )
         return messages.value(reply)
 
     def stop_until_asleep(self, program, party, how):
-        """Stops one of today's programs until the party sleeps in that way: what it does then has to wake it."""
+        """Stops one of today's programs until the party sleeps in that way: what it
+        does then has to wake it."""
         today = program.process.pid
         os.kill(today, signal.SIGSTOP)
         os.waitpid(today, os.WUNTRACED)

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""interop_test LAYOUT TRAFFIC VICTIM MPF: programs of an older layout and today's talk to each other, and take each other's place."""
+"""interop_test LAYOUT TRAFFIC VICTIM MPF: programs of an older layout and today's talk to each
+other, and take each other's place."""
+
 import json
 import os
 import signal
@@ -22,8 +24,13 @@ class OldClientOfTodaysServer(Interop):
     def test_has_its_requests_answered(self):
         connection = self.connected(self.client)
         for i in range(3):
-            self.assertEqual(self.ask(self.client, connection, messages.INT32, messages.int32(1000 + i)), 1000 + i)
-            self.assertEqual(self.ask(self.client, connection, messages.FLOAT64, messages.float64(i)), i + 1)
+            self.assertEqual(
+                self.ask(self.client, connection, messages.INT32, messages.int32(1000 + i)),
+                1000 + i,
+            )
+            self.assertEqual(
+                self.ask(self.client, connection, messages.FLOAT64, messages.float64(i)), i + 1
+            )
 
         self.assertEqual({reply.flags for reply in connection.received}, {2})
 
@@ -32,7 +39,12 @@ class OldClientOfTodaysServer(Interop):
         for how, sleep in SLEEPS.items():
             self.client.window.hinted.clear()
             self.stop_until_asleep(self.server, self.client, how)
-            self.assertEqual(self.ask(self.client, connection, messages.FLOAT64, messages.float64(how), sleep=sleep), how + 1)
+            self.assertEqual(
+                self.ask(
+                    self.client, connection, messages.FLOAT64, messages.float64(how), sleep=sleep
+                ),
+                how + 1,
+            )
             self.assertEqual(self.client.window.hinted, {0})
 
     def test_wakes_it(self):
@@ -40,7 +52,9 @@ class OldClientOfTodaysServer(Interop):
         for i in range(3):
             while connection.link.peer.control["sleeping"] == doorbell.AWAKE:
                 os.sched_yield()
-            self.assertEqual(self.ask(self.client, connection, messages.FLOAT64, messages.float64(i)), i + 1)
+            self.assertEqual(
+                self.ask(self.client, connection, messages.FLOAT64, messages.float64(i)), i + 1
+            )
 
     def test_gets_arrays_back_in_slots_in_its_own_chunks_and_in_the_servers(self):
         connection = self.connected(self.client)
@@ -48,14 +62,18 @@ class OldClientOfTodaysServer(Interop):
         for i in range(1, 31):
             sent = tuple(range(i, i + (10 if i % 4 == 0 else 100 * i)))
             expected = 3000 if i % 3 == 0 else len(sent)
-            seen = self.ask(self.client, connection, messages.FLOAT64_ARRAY, messages.float64_array(sent))
+            seen = self.ask(
+                self.client, connection, messages.FLOAT64_ARRAY, messages.float64_array(sent)
+            )
             self.assertEqual(len(seen), expected)
             self.assertTrue(i % 3 == 0 or seen == sent)
             chunk = connection.received[-1].chunk
             ways.add(chunk and chunk[0])
 
         self.assertEqual(ways, {None, 0, 1})
-        self.assertEqual(self.ask(self.client, connection, messages.FLOAT64, messages.float64(1)), 2)
+        self.assertEqual(
+            self.ask(self.client, connection, messages.FLOAT64, messages.float64(1)), 2
+        )
         connection.link.pool.collect()
         self.assertEqual(connection.link.pool.lent, set(), "every chunk has come home")
 
@@ -68,27 +86,41 @@ class OldClientOfTodaysServer(Interop):
         connection.send(messages.INT32, messages.int32(0), deadlineNs=1)
         run_until(lambda: len(connection.received) == 14, self.client)
 
-        fates = [messages.value(message) for message in connection.received if message.type == messages.REQUEST_FATE]
-        self.assertEqual(fates, [(messages.REFUSED, 7), (messages.EXPIRED, 15)], "the server kept the seventh until it got another to keep")
+        fates = [
+            messages.value(message)
+            for message in connection.received
+            if message.type == messages.REQUEST_FATE
+        ]
+        self.assertEqual(
+            fates,
+            [(messages.REFUSED, 7), (messages.EXPIRED, 15)],
+            "the server kept the seventh until it got another to keep",
+        )
 
     def test_shares_it_with_todays_clients(self):
         crowd = self.crowd(3)
         connection = self.connected(self.client)
         for i in range(20):
-            self.assertEqual(self.ask(self.client, connection, messages.FLOAT64, messages.float64(i)), i + 1)
+            self.assertEqual(
+                self.ask(self.client, connection, messages.FLOAT64, messages.float64(i)), i + 1
+            )
 
         self.assert_answers(crowd, self.incarnation(), self.client)
 
     def test_leaves_and_leaves_nothing(self):
         connection = self.connected(self.client)
-        self.ask(self.client, connection, messages.FLOAT64_ARRAY, messages.float64_array([0] * 1000))
+        self.ask(
+            self.client, connection, messages.FLOAT64_ARRAY, messages.float64_array([0] * 1000)
+        )
         self.client.drop(connection)
         self.assertEqual([name for name in self.names() if ".l." in name or ".b." in name], [])
         self.client.close()
 
         self.assertEqual(len(self.names()), 3, "window, hints and pipe of the server")
         another = self.old_client()
-        self.assertEqual(self.ask(another, self.connected(another), messages.INT32, messages.int32(5)), 5)
+        self.assertEqual(
+            self.ask(another, self.connected(another), messages.INT32, messages.int32(5)), 5
+        )
 
     def test_that_is_killed_is_noticed_and_cleaned_up(self):
         child = os.fork()
@@ -105,7 +137,12 @@ class OldClientOfTodaysServer(Interop):
         signal.alarm(WATCHDOG_SECONDS)
         try:
             victim = client.Client(self.layout, self.backplane, "killed")
-            self.ask(victim, self.connected(victim), messages.FLOAT64_ARRAY, messages.float64_array([0] * 1000))
+            self.ask(
+                victim,
+                self.connected(victim),
+                messages.FLOAT64_ARRAY,
+                messages.float64_array([0] * 1000),
+            )
         finally:
             os.kill(os.getpid(), signal.SIGKILL)
 
@@ -116,7 +153,11 @@ class TodaysClientOfAnOldServer(Interop):
         self.server = self.old_server()
 
     def test_has_its_requests_answered(self):
-        answer = json.loads(self.call("float64", "value=3", "--count", "20", "--json", "--print", parties=[self.server]))
+        answer = json.loads(
+            self.call(
+                "float64", "value=3", "--count", "20", "--json", "--print", parties=[self.server]
+            )
+        )
 
         self.assertEqual((answer["replied"], answer["failed"]), (20, 0))
         self.assertEqual({reply["value"] for reply in answer["replies"]}, {4})
@@ -125,7 +166,14 @@ class TodaysClientOfAnOldServer(Interop):
     def test_gets_arrays_back_in_slots_in_its_own_chunks_and_in_the_servers(self):
         for length, count in ((10, 1), (1000, 4)):
             sent = list(range(length))
-            words = ("float64Array", "value=" + ",".join(map(str, sent)), "--count", str(count), "--json", "--print")
+            words = (
+                "float64Array",
+                "value=" + ",".join(map(str, sent)),
+                "--count",
+                str(count),
+                "--json",
+                "--print",
+            )
             answer = json.loads(self.call(*words, parties=[self.server]))
             self.assertEqual([reply["value"] for reply in answer["replies"]], [sent] * count)
 
@@ -134,7 +182,10 @@ class TodaysClientOfAnOldServer(Interop):
         crowd = self.crowd(3, party, self.server)
         connection = self.connected(party, self.server)
         for i in range(20):
-            self.assertEqual(self.ask(party, connection, messages.FLOAT64, messages.float64(i), self.server), i + 1)
+            self.assertEqual(
+                self.ask(party, connection, messages.FLOAT64, messages.float64(i), self.server),
+                i + 1,
+            )
 
         self.assert_answers(crowd, self.server.window.incarnation, party, self.server)
 
@@ -169,12 +220,17 @@ class Rollout(Interop):
         party = self.old_client()
         wish = party.wish("echo")
         self.addCleanup(wish.close)
-        self.assertRegex(self.program(MPF, "ls", "--backplane", self.backplane).rest(), r"old \(layout-1\.\d+\) +alive .* echo \(waiting\)")
+        self.assertRegex(
+            self.program(MPF, "ls", "--backplane", self.backplane).rest(),
+            r"old \(layout-1\.\d+\) +alive .* echo \(waiting\)",
+        )
         self.assertFalse(wish.is_granted())
         self.program(VICTIM, "serve-block", self.backplane)
         run_until(wish.is_granted, party, files=[wish.names])
 
-        self.assertEqual(self.ask(party, self.connected(party), messages.INT32, messages.int32(1)), 1)
+        self.assertEqual(
+            self.ask(party, self.connected(party), messages.INT32, messages.int32(1)), 1
+        )
 
     def test_todays_clients_stay_while_an_old_server_is_replaced_by_todays_and_back(self):
         server_party = self.old_server()
@@ -209,12 +265,16 @@ class Rollout(Interop):
 
         server_party = self.old_server()
         connection = self.connected(party, server_party)
-        self.assertEqual(self.ask(party, connection, messages.INT32, messages.int32(2), server_party), 2)
+        self.assertEqual(
+            self.ask(party, connection, messages.INT32, messages.int32(2), server_party), 2
+        )
         server_party.close()
         run_until(lambda: connection.is_closed, party)
 
         self.todays_server()
-        self.assertEqual(self.ask(party, self.connected(party), messages.INT32, messages.int32(3)), 3)
+        self.assertEqual(
+            self.ask(party, self.connected(party), messages.INT32, messages.int32(3)), 3
+        )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""versions_test LAYOUT TRAFFIC VICTIM MPF: today's layout holds what the older one had; a later minor version is used, another major one refused."""
+"""versions_test LAYOUT TRAFFIC VICTIM MPF: today's layout holds what the older one had; a later
+minor version is used, another major one refused."""
+
 import json
 import re
 import unittest
@@ -17,22 +19,32 @@ class Frozen(unittest.TestCase):
         self.layout = reader.Layout(LAYOUT)
 
     def test_constants_are_as_they_were_and_the_minor_version_has_grown_at_most(self):
-        was, now = dict(self.layout.constants), {name: CODE["constants"].get(name) for name in self.layout.constants}
+        was, now = dict(self.layout.constants), {
+            name: CODE["constants"].get(name) for name in self.layout.constants
+        }
         self.assertGreaterEqual(now.pop("layoutMinor"), was.pop("layoutMinor"))
         self.assertEqual(now, was)
 
     def test_kinds_are_as_they_were(self):
-        today = CODE["kinds"] | {"wish": CODE["kinds"]["pendingBind"]}  # its name in layouts 1.0 and 1.1
+        today = CODE["kinds"] | {
+            "wish": CODE["kinds"]["pendingBind"]
+        }  # its name in layouts 1.0 and 1.1
         self.assertEqual({kind: today.get(kind) for kind in self.layout.kinds}, self.layout.kinds)
 
     def test_fields_are_where_they_were(self):
         for name, fields in self.layout.structs.items():
-            was = {field: [offset, self.layout.sizes[name][field]] for field, (offset, _) in fields.items() if not field.startswith("reserved")}
+            was = {
+                field: [offset, self.layout.sizes[name][field]]
+                for field, (offset, _) in fields.items()
+                if not field.startswith("reserved")
+            }
             now = {field: CODE["structs"][name]["fields"].get(field) for field in was}
             self.assertEqual(now, was, name)
 
     def test_structs_are_as_long_as_they_were(self):
-        self.assertEqual({name: CODE["structs"][name]["bytes"] for name in self.layout.bytes}, self.layout.bytes)
+        self.assertEqual(
+            {name: CODE["structs"][name]["bytes"] for name in self.layout.bytes}, self.layout.bytes
+        )
 
 
 class Versions(Interop):
@@ -57,7 +69,16 @@ class Versions(Interop):
         party = self.old_server(**self.later_minor())
         self.fill_reserved(party)
 
-        answer = json.loads(self.call("float64Array", "value=" + ",".join("1" * 500), "--count", "4", "--json", parties=[party]))
+        answer = json.loads(
+            self.call(
+                "float64Array",
+                "value=" + ",".join("1" * 500),
+                "--count",
+                "4",
+                "--json",
+                parties=[party],
+            )
+        )
 
         self.assertEqual((answer["replied"], answer["failed"]), (4, 0))
 
@@ -69,15 +90,28 @@ class Versions(Interop):
 
         connection = self.connected(party, **more)
 
-        self.assertEqual(len(self.ask(party, connection, messages.FLOAT64_ARRAY, messages.float64_array([0] * 500))), 500)
+        self.assertEqual(
+            len(
+                self.ask(
+                    party, connection, messages.FLOAT64_ARRAY, messages.float64_array([0] * 500)
+                )
+            ),
+            500,
+        )
 
     def test_todays_programs_refuse_a_living_server_of_another_major_version_by_both_numbers(self):
         for major in (0, self.NEWEST + 1):
             party = self.old_server(self.other(layoutMajor=major))
             refusal = f"s.0.echo: layout {major}, this program speaks \\d+-{self.NEWEST}"
             self.assertRegex(self.call("int32", "value=1", "--timeout", "1"), refusal)
-            self.assertRegex(" ".join(self.program(MPF, "ls", "--backplane", self.backplane).rest().split()), f"problem: .*{refusal}")
-            self.assertRegex(self.program(VICTIM, "serve", self.backplane).rest(), f"in use by another program: .*{refusal}")
+            self.assertRegex(
+                " ".join(self.program(MPF, "ls", "--backplane", self.backplane).rest().split()),
+                f"problem: .*{refusal}",
+            )
+            self.assertRegex(
+                self.program(VICTIM, "serve", self.backplane).rest(),
+                f"in use by another program: .*{refusal}",
+            )
             names = self.names()
             self.program(MPF, "clean", "--backplane", self.backplane).rest()
             self.assertEqual(self.names(), names)
@@ -88,7 +122,10 @@ class Versions(Interop):
         self.layout = self.other(layoutMajor=self.NEWEST + 1)
         party = self.old_client()
 
-        with self.assertRaisesRegex(reader.Refused, re.escape(f"s.0.echo: layout {self.NEWEST}, this program speaks {self.NEWEST + 1}")):
+        with self.assertRaisesRegex(
+            reader.Refused,
+            re.escape(f"s.0.echo: layout {self.NEWEST}, this program speaks {self.NEWEST + 1}"),
+        ):
             party.connect("echo")
 
     def test_a_link_of_another_major_version_costs_its_client_alone(self):

@@ -119,10 +119,10 @@ TEST_F(DigitalIoServerTest, SendsAMonitorTheInputsImmediatelyAndEachChange) {
   EXPECT_EQ(first.value, kAll);
   for (int i = 0; i < 50; ++i) {
     model_->setInputs(0x9, i % 2 == 0 ? 0 : 9);
-    const auto news = in_.next();
-    EXPECT_EQ(news.status, 0);
-    EXPECT_EQ(news.value, i % 2 == 0 ? 0xfffff6 : kAll);
-    EXPECT_EQ(news.address, 9);
+    const auto change = in_.next();
+    EXPECT_EQ(change.status, 0);
+    EXPECT_EQ(change.value, i % 2 == 0 ? 0xfffff6 : kAll);
+    EXPECT_EQ(change.address, 9);
   }
 }
 
@@ -133,14 +133,14 @@ TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   start({.pollEvery = kNever, .vector = 116, .falling = 1});
   std::atomic<bool> isHeard{false}, ends{false};
   // behind the server's
-  const auto subscription = io_->subscribe([&](const DigitalIoNews&) { isHeard = true; });
+  const auto subscription = io_->subscribe([&](const DigitalIoChange&) { isHeard = true; });
   model_->connect(5, [&] {
     for (const auto busy = Deadline::after(20us); !busy.hasPassed();) {
     }
     return isHeard ? 0.0 : 5.0;
   });
   std::optional<MessageClient> client;
-  int news = 0, late = 0;
+  int changes = 0, late = 0;
   std::promise<void> started;
   std::promise<int> told;
   const auto ask = [&] {
@@ -149,8 +149,8 @@ TEST_F(DigitalIoServerTest, SendsChangesWhileAnotherClientReadsWithoutAPause) {
   client.emplace(backplane_, [&](Message&& message) {
     const auto* const fields = message.tryAs<Int32>();
     if (fields == nullptr) return;
-    if (fields->cmd == cmdStartMonitor && ++news == 1) started.set_value();
-    if (fields->cmd == cmdStartMonitor && news == 2) told.set_value(late);
+    if (fields->cmd == cmdStartMonitor && ++changes == 1) started.set_value();
+    if (fields->cmd == cmdStartMonitor && changes == 2) told.set_value(late);
     if (fields->cmd != cmdReadBits) return;
     if (fields->value == 0) ++late;
     if (!ends) ask();
@@ -188,9 +188,9 @@ TEST_F(DigitalIoServerTest, SendsAMonitorItsBitsOnly) {
   EXPECT_EQ(in_.ask({.cmd = cmdStartMonitor, .address = 0x2}).address, 0x2);
   model_->setInputs(0x1, 0);
   model_->setInputs(0x2, 0);
-  const auto news = in_.next();
-  EXPECT_EQ(news.address, 0x2);
-  EXPECT_EQ(news.value, 0xfffffc);
+  const auto change = in_.next();
+  EXPECT_EQ(change.address, 0x2);
+  EXPECT_EQ(change.value, 0xfffffc);
   EXPECT_TRUE(in_.isSilent());
 }
 

@@ -73,7 +73,7 @@ class LineFaultsTest : public testing::Test {
   }
   // A byte at a time: nothing gets lost.
   void saySlowly(const std::string& text) {
-    model_->say(0, text);
+    model_->farEndSend(0, text);
     for (std::size_t i = 0; i < text.size(); ++i) {
       model_->advance(byteTime(kFast));
       model_->waitUntilServed();
@@ -115,7 +115,7 @@ class LineFaultsTest : public testing::Test {
 
 TEST_F(LineFaultsTest, AnAnswerThatLostBytesOutsideOfReadsIsNotOk) {
   start(OctalUartModelTime::stepped);
-  model_->say(0, "abcdef\r");
+  model_->farEndSend(0, "abcdef\r");
   model_->advance(10 * byteTime(kFast));  // all at once: the chip loses three bytes
   waitForBytes(4);
   saySlowly("next\r");
@@ -131,7 +131,7 @@ TEST_F(LineFaultsTest, AnAnswerThatLostBytesOutsideOfReadsIsNotOk) {
 TEST_F(LineFaultsTest, TheRestOfAnAnswerAfterAGapIsNotOk) {
   start(OctalUartModelTime::stepped);
   saySlowly("first\r");
-  model_->say(0, "abcdefgh");
+  model_->farEndSend(0, "abcdefgh");
   model_->advance(10 * byteTime(kFast));
   waitForBytes(10);
   saySlowly("ij\r");
@@ -149,9 +149,9 @@ TEST_F(LineFaultsTest, EachKindOfDamageHasItsBitAndIsAnAlarm) {
            {LineFault::parity, serialFaultParity},
            {LineFault::framing, serialFaultFraming},
            {LineFault::breakSignal, serialFaultBreak}}) {
-    model_->say(0, "12");
-    model_->say(0, std::string(1, '\0'), fault);
-    model_->say(0, "4\rwhole\r");
+    model_->farEndSend(0, "12");
+    model_->farEndSend(0, std::string(1, '\0'), fault);
+    model_->farEndSend(0, "4\rwhole\r");
     waitForBytes(bytes += 11);
 
     EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusError, bit, "124\r"}));
@@ -165,9 +165,9 @@ TEST_F(LineFaultsTest, AFaultEndsTheReadThatIsOutstanding) {
   start();
   const auto tap = port_->attachTap([this](std::span<const PeekedByte> bytes) {
     if (bytes.back().direction != ByteDirection::sent || bytes.back().value != '\r') return;
-    model_->say(0, "12");
-    model_->say(0, "3", LineFault::parity);
-    model_->say(0, "4\r");
+    model_->farEndSend(0, "12");
+    model_->farEndSend(0, "3", LineFault::parity);
+    model_->farEndSend(0, "4\r");
   });
 
   EXPECT_EQ(ask(cmdWriteRead, "?\r"), (Answer{serialServerStatusError, serialFaultParity, "12"}));
@@ -177,7 +177,7 @@ TEST_F(LineFaultsTest, AFaultEndsTheReadThatIsOutstanding) {
 
 TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWithoutAFault) {
   start();
-  model_->say(0, "12345");
+  model_->farEndSend(0, "12345");
   waitForBytes(5);
 
   EXPECT_EQ(ask(cmdRead, {}, 4), (Answer{serialServerStatusOK, 4, "1234"}));
@@ -187,11 +187,11 @@ TEST_F(LineFaultsTest, ExtraIsThatOfTheRequestWithoutAFault) {
 
 TEST_F(LineFaultsTest, AFlushRemovesTheFaultsWithTheBytes) {
   start();
-  model_->say(0, "1");
-  model_->say(0, "2", LineFault::framing);
+  model_->farEndSend(0, "1");
+  model_->farEndSend(0, "2", LineFault::framing);
   waitForBytes(2);
   const auto tap = port_->attachTap([this](std::span<const PeekedByte> bytes) {
-    if (bytes.back().direction == ByteDirection::sent) model_->say(0, "ok\r");
+    if (bytes.back().direction == ByteDirection::sent) model_->farEndSend(0, "ok\r");
   });
 
   EXPECT_EQ(ask(cmdWriteRead | cmdFlush, "?"), (Answer{serialServerStatusOK, 0, "ok\r"}));
@@ -199,10 +199,10 @@ TEST_F(LineFaultsTest, AFlushRemovesTheFaultsWithTheBytes) {
 
 TEST_F(LineFaultsTest, AnAnswerThatAnUnplugTruncatedIsNotOk) {
   start();
-  model_->say(0, "whole\r12");
+  model_->farEndSend(0, "whole\r12");
   waitForBytes(8);
   unplugAndBack();
-  model_->say(0, "34\r");
+  model_->farEndSend(0, "34\r");
   waitForBytes(11);
 
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "whole\r"}));
@@ -211,10 +211,10 @@ TEST_F(LineFaultsTest, AnAnswerThatAnUnplugTruncatedIsNotOk) {
 
 TEST_F(LineFaultsTest, AnUnplugBetweenAnswersDamagesNone) {
   start();
-  model_->say(0, "one\r");
+  model_->farEndSend(0, "one\r");
   waitForBytes(4);
   unplugAndBack();
-  model_->say(0, "two\r");
+  model_->farEndSend(0, "two\r");
   waitForBytes(8);
 
   EXPECT_EQ(ask(cmdRead), (Answer{serialServerStatusOK, 0, "one\r"}));
@@ -228,7 +228,7 @@ TEST_F(LineFaultsTest, AStormCausesFewLogLinesWithPortKindsAndCounts) {
   start(OctalUartModelTime::instant, "warning");
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < kFaults; ++i)
-    model_->say(0, "x", i % 2 == 0 ? LineFault::parity : LineFault::framing);
+    model_->farEndSend(0, "x", i % 2 == 0 ? LineFault::parity : LineFault::framing);
   waitForBytes(kFaults);
   EXPECT_EQ(alarmsOf(backplane_, kServer), kFaults);
   stop();

@@ -62,7 +62,7 @@ class OctalStation {
       question_ += static_cast<char>(byte.value);
       if (byte.value != '\r') continue;
       const auto mark = question_.find('?');
-      if (!isSilent_) model_.say(number_, question_.substr(0, mark) + "!\r");
+      if (!isSilent_) model_.farEndSend(number_, question_.substr(0, mark) + "!\r");
       question_.clear();
     }
   }
@@ -138,7 +138,7 @@ TEST_F(OctalServerTest, EveryRequestGetsAReplyWhileTheModuleIsMissing) {
 TEST_F(OctalServerTest, ARequestOnTheLineIsAnsweredWhenTheModuleGoes) {
   station(3).setSilent();
   std::thread puller([&] {
-    model_->waitUntilHeard(3, "never?\r");
+    model_->waitUntilFarEndReceived(3, "never?\r");
     carrier_.unplug("IP_a");
   });
 

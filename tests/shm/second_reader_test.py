@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""second_reader_test DOCUMENT TRAFFIC: compares the document with the code, and checks what a reader written from the document reads of TRAFFIC."""
+"""second_reader_test DOCUMENT TRAFFIC: compares the document with the code, and
+checks what a reader written from the document reads of TRAFFIC."""
+
 import json
 import os
 import signal
@@ -15,7 +17,8 @@ DOCUMENT, TRAFFIC = sys.argv.pop(1), sys.argv.pop(1)
 
 
 class Layout(reader.Layout):
-    """The document's tables, for the reader of layout 1.0, which calls a pending bind a wish, as older documents do."""
+    """The document's tables, for the reader of layout 1.0, which calls a pending bind a
+    wish, as older documents do."""
 
     def __init__(self, document):
         super().__init__(document)
@@ -35,7 +38,9 @@ class Document(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.layout = reader.Layout(DOCUMENT)
-        cls.code = json.loads(subprocess.run([TRAFFIC, "layout"], check=True, capture_output=True).stdout)
+        cls.code = json.loads(
+            subprocess.run([TRAFFIC, "layout"], check=True, capture_output=True).stdout
+        )
 
     def test_constants_are_those_of_the_code(self):
         self.assertEqual(self.layout.constants, self.code["constants"])
@@ -48,13 +53,18 @@ class Document(unittest.TestCase):
 
     def test_every_field_is_where_the_code_has_it(self):
         for name, struct in self.code["structs"].items():
-            documented = {field: [offset, self.layout.sizes[name][field]] for field, (offset, _) in self.layout.structs[name].items()}
+            documented = {
+                field: [offset, self.layout.sizes[name][field]]
+                for field, (offset, _) in self.layout.structs[name].items()
+            }
             self.assertEqual(documented, struct["fields"], name)
 
     def test_every_type_is_as_long_as_its_field(self):
         for name, fields in self.layout.structs.items():
             for field, (_, kind) in fields.items():
-                self.assertEqual(self.layout.size_of(kind), self.layout.sizes[name][field], f"{name}.{field}")
+                self.assertEqual(
+                    self.layout.size_of(kind), self.layout.sizes[name][field], f"{name}.{field}"
+                )
 
     def test_fields_do_not_overlap(self):
         for name, fields in self.layout.structs.items():
@@ -65,27 +75,46 @@ class Document(unittest.TestCase):
             self.assertLessEqual(ends, self.code["structs"][name]["bytes"], name)
 
     def test_every_struct_is_as_long_as_in_the_code(self):
-        self.assertEqual(self.layout.bytes, {name: struct["bytes"] for name, struct in self.code["structs"].items()})
+        self.assertEqual(
+            self.layout.bytes,
+            {name: struct["bytes"] for name, struct in self.code["structs"].items()},
+        )
 
     def test_buckets_end_where_the_formula_says(self):
-        self.assertEqual([reader.bucket_end(i) for i in range(len(self.code["bucketEnds"]))], self.code["bucketEnds"])
+        self.assertEqual(
+            [reader.bucket_end(i) for i in range(len(self.code["bucketEnds"]))],
+            self.code["bucketEnds"],
+        )
 
 
 class Names(unittest.TestCase):
     def test_names_of_other_programs_are_refused(self):
-        for name in ("mpf.default", "mpf.default.c.", "mpf.default.c.X", "mpf.default.s.0", "mpf.default.l.1", "mpf.a.b.c.1", "mpf..c.1", "notes"):
+        for name in (
+            "mpf.default",
+            "mpf.default.c.",
+            "mpf.default.c.X",
+            "mpf.default.s.0",
+            "mpf.default.l.1",
+            "mpf.a.b.c.1",
+            "mpf..c.1",
+            "notes",
+        ):
             self.assertIsNone(reader.parse_name(name), name)
 
     def test_names_of_servers_are_decoded(self):
         letter, parts = reader.parse_name("mpf.default.s.-1.AIM1%2F1%2Ea%20b%25[0]")
-        self.assertEqual((letter, parts[0], reader.decode_server(parts[1])), ("s", "-1", "AIM1/1.a b%[0]"))
+        self.assertEqual(
+            (letter, parts[0], reader.decode_server(parts[1])), ("s", "-1", "AIM1/1.a b%[0]")
+        )
 
 
 class Reader(unittest.TestCase):
     """Reads a server and a client with known traffic."""
 
     def setUp(self):
-        self.process = subprocess.Popen([TRAFFIC, "run"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [TRAFFIC, "run"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
         self.expected = self.answer()
         self.backplane = self.expected["backplane"]
 
@@ -93,7 +122,11 @@ class Reader(unittest.TestCase):
         self.process.kill()
         self.process.communicate()
         subprocess.run([TRAFFIC, "clean", self.backplane], check=True, capture_output=True)
-        left = [file for file in os.listdir(reader.DIRECTORY) if file.startswith(f"mpf.{self.backplane}.")]
+        left = [
+            file
+            for file in os.listdir(reader.DIRECTORY)
+            if file.startswith(f"mpf.{self.backplane}.")
+        ]
         self.assertEqual(left, [])
 
     def answer(self):
@@ -107,7 +140,9 @@ class Reader(unittest.TestCase):
     def look(self):
         seen = look(self.backplane)
         self.assertEqual(seen["refused"], [])
-        self.assertEqual([len(seen[kind]) for kind in ("servers", "clients", "links", "wishes")], [1, 1, 1, 1])
+        self.assertEqual(
+            [len(seen[kind]) for kind in ("servers", "clients", "links", "wishes")], [1, 1, 1, 1]
+        )
         return seen
 
     def check_fields(self, seen, **expected):
@@ -116,24 +151,62 @@ class Reader(unittest.TestCase):
     def test_windows_pending_binds_hints_and_fifos(self):
         seen, expected = self.look(), self.expected
         server, client = seen["servers"][0], seen["clients"][0]
-        owner = {"ownerPid": expected["pid"], "ownerUid": expected["uid"], "program": expected["program"], "alive": True, "state": 1}
-        self.check_fields(server, name=expected["server"], nameOfFile=expected["server"], location=expected["location"], waitMode=2, **owner)
+        owner = {
+            "ownerPid": expected["pid"],
+            "ownerUid": expected["uid"],
+            "program": expected["program"],
+            "alive": True,
+            "state": 1,
+        }
+        self.check_fields(
+            server,
+            name=expected["server"],
+            nameOfFile=expected["server"],
+            location=expected["location"],
+            waitMode=2,
+            **owner,
+        )
         self.check_fields(client, name=expected["label"], **owner)
-        self.check_fields(seen["wishes"][0], name=expected["wish"], location=expected["wishLocation"], alive=True)
+        self.check_fields(
+            seen["wishes"][0], name=expected["wish"], location=expected["wishLocation"], alive=True
+        )
         self.assertEqual([hint["locked"] for hint in seen["hints"]], [True, True])
-        self.assertEqual(sorted(pipe.split(".")[3] for pipe in seen["pipes"]), sorted([server["incarnation"], client["incarnation"]]))
+        self.assertEqual(
+            sorted(pipe.split(".")[3] for pipe in seen["pipes"]),
+            sorted([server["incarnation"], client["incarnation"]]),
+        )
 
     def test_counters_and_positions(self):
         seen, expected = self.look(), self.expected
         server, link, served = seen["servers"][0], seen["links"][0], expected["served"]
         waiting = expected["sent"] - served
         self.assertEqual(waiting, expected["queueSize"])
-        self.check_fields(server, received=served, progress=served, sent=served, linksOpened=1, linkCount=1, protocolErrors=0, peersDied=0)
+        self.check_fields(
+            server,
+            received=served,
+            progress=served,
+            sent=served,
+            linksOpened=1,
+            linkCount=1,
+            protocolErrors=0,
+            peersDied=0,
+        )
         self.check_fields(server, queueSize=expected["queueSize"], expired=0, refused=0)
         self.check_fields(seen["clients"][0], received=expected["replies"], linksOpened=1)
-        self.check_fields(link, name=expected["server"], clientState=1, serverState=1, clientAlive=True, serverAlive=True)
-        self.check_fields(link, clientRefused=1, clientUnanswered=waiting, queueSize=expected["queueSize"])
-        self.check_fields(link["requests"], sent=expected["sent"], taken=served, freed=served, waiting=waiting)
+        self.check_fields(
+            link,
+            name=expected["server"],
+            clientState=1,
+            serverState=1,
+            clientAlive=True,
+            serverAlive=True,
+        )
+        self.check_fields(
+            link, clientRefused=1, clientUnanswered=waiting, queueSize=expected["queueSize"]
+        )
+        self.check_fields(
+            link["requests"], sent=expected["sent"], taken=served, freed=served, waiting=waiting
+        )
         self.check_fields(link["replies"], sent=served, taken=served, waiting=0)
 
     def test_requests_that_wait(self):
@@ -168,7 +241,9 @@ class Reader(unittest.TestCase):
         self.assertEqual(after["servers"][0]["received"], self.expected["sent"])
         self.assertGreater(after["servers"][0]["progress"], before["servers"][0]["progress"])
         self.check_fields(requests, waiting=0, waitingMessages=[], taken=self.expected["sent"])
-        self.check_fields(replies, sent=self.expected["sent"], taken=self.expected["replies"], waiting=8)
+        self.check_fields(
+            replies, sent=self.expected["sent"], taken=self.expected["replies"], waiting=8
+        )
         self.assertEqual([reply["flags"] & 2 for reply in replies["waitingMessages"]], [2] * 8)
 
     def test_a_stopped_process_is_read_as_a_running_one(self):
@@ -182,7 +257,9 @@ class Reader(unittest.TestCase):
         self.process.kill()
         self.process.wait()
         dead = self.look()
-        self.assertEqual([dead[kind][0]["alive"] for kind in ("servers", "clients", "wishes")], [False] * 3)
+        self.assertEqual(
+            [dead[kind][0]["alive"] for kind in ("servers", "clients", "wishes")], [False] * 3
+        )
         self.check_fields(dead["links"][0], clientAlive=False, serverAlive=False)
         self.assertEqual(dead["links"][0]["requests"], running["links"][0]["requests"])
 

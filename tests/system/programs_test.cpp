@@ -26,10 +26,11 @@ std::vector<std::string> programs() {
   return {std::istream_iterator<std::string>(list), {}};
 }
 
-// The name by which users call a program: mpf-bench is executed by `mpf bench`.
+// The name by which users call a program: `mpf bench` executes mpf-bench.
 std::string nameOf(const std::string& program) {
   const auto name = std::filesystem::path(program).filename().string();
-  return name == "mpf-bench" ? "mpf bench" : name;
+  if (name == "mpf-bench") return "mpf bench";
+  return name == "mpf-torture" ? "mpf torture" : name;
 }
 
 // The output of a command; empty unless it succeeds.

@@ -23,7 +23,7 @@ DigitalInputServer::DigitalInputServer(const Backplane& backplane, const std::st
     log_->debug("inputs: a request of type {}: status -1", toString(type));
   });
   logShortages(server_, log_);
-  subscription_ = io.subscribe([this](const DigitalIoNews& news) { hear(news); });
+  subscription_ = io.subscribe([this](const DigitalIoChange& change) { enqueue(change); });
   thread_.start(log, [this] { run(); }, std::move(failed));
 }
 
@@ -102,55 +102,55 @@ std::int32_t DigitalInputServer::stop(const Int32Message& request) {
 }
 
 // Runs on a thread of the driver, or on a thread that calls the driver.
-void DigitalInputServer::hear(const DigitalIoNews& news) {
+void DigitalInputServer::enqueue(const DigitalIoChange& change) {
   {
     const std::lock_guard lock(mutex_);
-    using Kind = DigitalIoNews::Kind;
-    if (news_.size() >= kMaxQueuedChanges && news.kind == Kind::inputs &&
-        news_.back().kind == Kind::inputs) {
-      news_.back().inputs = news.inputs;
-      news_.back().changed |= news.changed;
+    using Kind = DigitalIoChange::Kind;
+    if (changes_.size() >= kMaxQueuedChanges && change.kind == Kind::inputs &&
+        changes_.back().kind == Kind::inputs) {
+      changes_.back().inputs = change.inputs;
+      changes_.back().changed |= change.changed;
     } else {
-      news_.push_back(news);
+      changes_.push_back(change);
     }
   }
   server_.interrupt();
 }
 
 void DigitalInputServer::deliver() {
-  std::deque<DigitalIoNews> all;
+  std::deque<DigitalIoChange> all;
   {
     const std::lock_guard lock(mutex_);
-    if (news_.empty()) return;
-    all = std::exchange(news_, {});
+    if (changes_.empty()) return;
+    all = std::exchange(changes_, {});
   }
-  for (const auto& news : all) {
-    note(news);
-    const bool isThere = news.kind != DigitalIoNews::Kind::gone;
-    const bool isForAll = !isThere || news.kind == DigitalIoNews::Kind::back;
+  for (const auto& change : all) {
+    note(change);
+    const bool isThere = change.kind != DigitalIoChange::Kind::gone;
+    const bool isForAll = !isThere || change.kind == DigitalIoChange::Kind::back;
     std::erase_if(monitors_, [&](Monitor& monitor) {
-      return (isForAll || (news.changed & monitor.mask) != 0) &&
-             !send(monitor, news.inputs, news.changed & monitor.mask, isThere);
+      return (isForAll || (change.changed & monitor.mask) != 0) &&
+             !send(monitor, change.inputs, change.changed & monitor.mask, isThere);
     });
   }
   followCount();
 }
 
-void DigitalInputServer::note(const DigitalIoNews& news) {
-  switch (news.kind) {
-    case DigitalIoNews::Kind::inputs:
+void DigitalInputServer::note(const DigitalIoChange& change) {
+  switch (change.kind) {
+    case DigitalIoChange::Kind::inputs:
       return;
-    case DigitalIoNews::Kind::back:
+    case DigitalIoChange::Kind::back:
       log_->warn(
           "the module works again, or was reset: its settings and outputs have been restored");
       break;
-    case DigitalIoNews::Kind::gone:
+    case DigitalIoChange::Kind::gone:
       log_->warn("the module does not respond");
       break;
-    case DigitalIoNews::Kind::lostInterrupt:
+    case DigitalIoChange::Kind::lostInterrupt:
       log_->warn("interrupts do not arrive: changes are found by polling the inputs");
       break;
-    case DigitalIoNews::Kind::storm:
+    case DigitalIoChange::Kind::storm:
       log_->warn(
           "an interrupt storm: interrupts are disabled for a while, and the inputs are polled");
       break;

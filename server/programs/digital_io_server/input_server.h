@@ -59,9 +59,9 @@ class DigitalInputServer {
   [[nodiscard]] std::int32_t stop(const Int32Message& request);
   void read(Int32& fields);
   void answer(const Int32Message& request, const Int32& fields);
-  void hear(const DigitalIoNews& news);
+  void enqueue(const DigitalIoChange& change);
   void deliver();
-  void note(const DigitalIoNews& news);
+  void note(const DigitalIoChange& change);
   [[nodiscard]] bool send(Monitor& monitor, std::uint32_t inputs, std::uint32_t changed,
                           bool isThere);
   [[nodiscard]] std::vector<Monitor>::iterator find(std::uint64_t client);
@@ -74,7 +74,7 @@ class DigitalInputServer {
   FaultNote faults_;  // of reads; used by the server's thread, as monitors_
   std::vector<Monitor> monitors_;
   std::mutex mutex_;
-  std::deque<DigitalIoNews> news_;  // under mutex_
+  std::deque<DigitalIoChange> changes_;  // under mutex_
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
   DigitalIo::Subscription subscription_;

@@ -15,19 +15,19 @@ void expectToAnswer(const PeerFamily& family, Mode mode, std::size_t bytes) {
   const std::shared_ptr<Peer> peer =
       family.make({mode, bytes, true, "mpf-bench-test-" + std::to_string(::getpid())});
   const auto cpus = allowedCpus();
-  Act act;
-  act.stopsByItself = true;
-  act.server = [peer](const Scene& scene) { peer->serve(scene); };
-  act.requester = [peer](const Scene& scene) {
-    peer->connect(scene);
+  Workload workload;
+  workload.stopsByItself = true;
+  workload.server = [peer](const RunContext& context) { peer->serve(context); };
+  workload.requester = [peer](const RunContext& context) {
+    peer->connect(context);
     for (int i = 0; i < 3; ++i) peer->roundTrip();
     for (int i = 0; i < 2; ++i) peer->send();
     for (int i = 0; i < 2; ++i) peer->receive();
-    scene.stop();
+    context.stop();
     peer->roundTrip();
   };
 
-  const auto outcome = Stage({{cpus.front()}, {cpus.back()}}, {}).run(act);
+  const auto outcome = Stage({{cpus.front()}, {cpus.back()}}, {}).run(workload);
   peer->removeTraces();
 
   EXPECT_EQ(outcome.error, "") << family.name << ", " << toString(mode) << ", " << bytes

@@ -32,20 +32,21 @@ ino_t netOf(const std::string& process) {
 // Sends units and receives their echoes, `window` of them at a time.
 void expectToEcho(const Surroundings& between, std::size_t unitBytes, int window) {
   const std::shared_ptr<Peer> peer = makeTcpPeer({between, unitBytes, window > 1});
-  Act act;
-  act.stopsByItself = true;
-  act.server = [peer](const Scene& scene) { peer->serve(scene); };
-  act.requester = [&](const Scene& scene) {
-    peer->connect(scene);
+  Workload workload;
+  workload.stopsByItself = true;
+  workload.server = [peer](const RunContext& context) { peer->serve(context); };
+  workload.requester = [&](const RunContext& context) {
+    peer->connect(context);
     for (int round = 0; round < 3; ++round) {
       for (int i = 0; i < window; ++i) peer->send();
       for (int i = 0; i < window; ++i) peer->receive();
     }
-    scene.stop();
+    context.stop();
     peer->roundTrip();
   };
 
-  EXPECT_EQ(stageOnTwo().run(act).error, "") << unitBytes << " bytes, " << window << " at a time";
+  EXPECT_EQ(stageOnTwo().run(workload).error, "")
+      << unitBytes << " bytes, " << window << " at a time";
 }
 
 TEST(TcpPeer, EchoesOnLoopback) {
@@ -102,17 +103,17 @@ TEST_F(NamespacesTest, ContainNoProcessAfterTheRunnerIsKilled) {
   };
   const int runner = forkProcess([&] {
     const auto between = Surroundings::namespaces();
-    Act act;
-    act.server = [&](const Scene& scene) {
+    Workload workload;
+    workload.server = [&](const RunContext& context) {
       between.enterServer();
-      scene.ready();
+      context.ready();
       tellAndWait();
     };
-    act.requester = [&](const Scene&) {
+    workload.requester = [&](const RunContext&) {
       between.enterRequester();
       tellAndWait();
     };
-    static_cast<void>(stageOnTwo().run(act));
+    static_cast<void>(stageOnTwo().run(workload));
   });
   const FileDescriptor told(ends[0]);
   std::array<ino_t, 2> nets{};

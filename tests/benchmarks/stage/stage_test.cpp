@@ -17,66 +17,66 @@ Stage smallStage() {
 }
 
 TEST(Stage, ReturnsTheFiguresOfTheRequester) {
-  Act act;
-  act.requester = [](const Scene& scene) { scene.figures().value = 42; };
+  Workload workload;
+  workload.requester = [](const RunContext& context) { context.figures().value = 42; };
 
-  const auto outcome = smallStage().run(act);
+  const auto outcome = smallStage().run(workload);
 
   EXPECT_EQ(outcome.error, "");
   EXPECT_EQ(outcome.figures.value, 42);
 }
 
 TEST(Stage, StartsTheRequesterWhenTheServerIsReady) {
-  Act act;
-  act.scratchBytes = sizeof(int);
-  act.server = [](const Scene& scene) {
-    *reinterpret_cast<int*>(scene.scratch().data()) = 7;
-    scene.ready();
+  Workload workload;
+  workload.scratchBytes = sizeof(int);
+  workload.server = [](const RunContext& context) {
+    *reinterpret_cast<int*>(context.scratch().data()) = 7;
+    context.ready();
     for (;;) ::pause();
   };
-  act.requester = [](const Scene& scene) {
-    scene.figures().value = *reinterpret_cast<int*>(scene.scratch().data());
+  workload.requester = [](const RunContext& context) {
+    context.figures().value = *reinterpret_cast<int*>(context.scratch().data());
   };
 
-  const auto outcome = smallStage().run(act);
+  const auto outcome = smallStage().run(workload);
 
   EXPECT_EQ(outcome.error, "");
   EXPECT_EQ(outcome.figures.value, 7);
 }
 
 TEST(Stage, ReportsWhatTheRequesterThrew) {
-  Act act;
-  act.requester = [](const Scene&) { throw std::runtime_error("no such device"); };
+  Workload workload;
+  workload.requester = [](const RunContext&) { throw std::runtime_error("no such device"); };
 
-  EXPECT_EQ(smallStage().run(act).error, "requester: no such device");
+  EXPECT_EQ(smallStage().run(workload).error, "requester: no such device");
 }
 
 TEST(Stage, NamesTheSignalThatKilledTheServer) {
-  Act act;
-  act.server = [](const Scene& scene) {
-    scene.ready();
+  Workload workload;
+  workload.server = [](const RunContext& context) {
+    context.ready();
     ::raise(SIGKILL);
   };
-  act.requester = [](const Scene&) {
+  workload.requester = [](const RunContext&) {
     for (;;) ::pause();
   };
 
-  EXPECT_EQ(smallStage().run(act).error, "server was killed by signal 9");
+  EXPECT_EQ(smallStage().run(workload).error, "server was killed by signal 9");
 }
 
 TEST(Stage, LeavesNoProcessBehind) {
-  Act act;
-  act.scratchBytes = sizeof(int);
-  act.server = [](const Scene& scene) {
-    *reinterpret_cast<int*>(scene.scratch().data()) = ::getpid();
-    scene.ready();
+  Workload workload;
+  workload.scratchBytes = sizeof(int);
+  workload.server = [](const RunContext& context) {
+    *reinterpret_cast<int*>(context.scratch().data()) = ::getpid();
+    context.ready();
     for (;;) ::pause();
   };
-  act.requester = [](const Scene& scene) {
-    scene.figures().value = *reinterpret_cast<int*>(scene.scratch().data());
+  workload.requester = [](const RunContext& context) {
+    context.figures().value = *reinterpret_cast<int*>(context.scratch().data());
   };
 
-  const auto pid = static_cast<int>(smallStage().run(act).figures.value);
+  const auto pid = static_cast<int>(smallStage().run(workload).figures.value);
 
   EXPECT_GT(pid, 0);
   EXPECT_NE(::kill(pid, 0), 0);

@@ -12,10 +12,10 @@ namespace {
 
 constexpr Budget kMoment{std::chrono::milliseconds(1), std::chrono::milliseconds(30)};
 
-// A scene without a stage.
+// A context without a stage.
 struct Timed {
   Control control;
-  Scene scene{control, kMoment, {}};
+  RunContext context{control, kMoment, {}};
   Placement placement{{allowedCpus().front()}, {allowedCpus().front()}};
   Meter nobody{placement, Meter::kNobody};
 };
@@ -23,7 +23,7 @@ struct Timed {
 TEST(TimeExchanges, CountsMessagesAndTimesExchanges) {
   Timed timed;
 
-  timeExchanges(timed.scene, timed.nobody, 100, [] { sleepFor(std::chrono::milliseconds(1)); });
+  timeExchanges(timed.context, timed.nobody, 100, [] { sleepFor(std::chrono::milliseconds(1)); });
 
   const auto& figures = timed.control.figures;
   EXPECT_EQ(figures.count, 100 * figures.latency.count());
@@ -38,7 +38,7 @@ TEST(TimeWindow, TimesEachFromItsSendToItsReply) {
   int most = 0;
 
   timeWindow(
-      timed.scene, timed.nobody, 4, [&] { most = std::max(most, ++onTheirWay); },
+      timed.context, timed.nobody, 4, [&] { most = std::max(most, ++onTheirWay); },
       [&] {
         sleepFor(std::chrono::milliseconds(1));
         --onTheirWay;

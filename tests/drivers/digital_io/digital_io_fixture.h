@@ -22,50 +22,50 @@ namespace mpf::test {
 class DigitalIoListener {
  public:
   explicit DigitalIoListener(DigitalIo& io)
-      : subscription_(io.subscribe([this](const DigitalIoNews& news) { hear(news); })) {}
+      : subscription_(io.subscribe([this](const DigitalIoChange& change) { record(change); })) {}
 
   // Waits for the next report.
-  DigitalIoNews next() {
+  DigitalIoChange next() {
     std::unique_lock lock(mutex_);
-    came_.wait(lock, [&] { return !news_.empty(); });
-    const auto news = news_.front();
-    news_.pop_front();
-    return news;
+    came_.wait(lock, [&] { return !changes_.empty(); });
+    const auto change = changes_.front();
+    changes_.pop_front();
+    return change;
   }
   // Waits for a report of this kind.
-  DigitalIoNews next(DigitalIoNews::Kind kind) {
+  DigitalIoChange next(DigitalIoChange::Kind kind) {
     for (;;) {
-      if (const auto news = next(); news.kind == kind) return news;
+      if (const auto change = next(); change.kind == kind) return change;
     }
   }
   // Waits for a report of these inputs. Returns all bits that have changed until then.
   std::uint32_t waitForInputs(std::uint32_t inputs) {
     for (std::uint32_t changed = 0;;) {
-      const auto news = next();
-      changed |= news.changed;
-      if (news.kind == DigitalIoNews::Kind::inputs && news.inputs == inputs) return changed;
+      const auto change = next();
+      changed |= change.changed;
+      if (change.kind == DigitalIoChange::Kind::inputs && change.inputs == inputs) return changed;
     }
   }
   bool isEmpty() {
     const std::lock_guard lock(mutex_);
-    return news_.empty();
+    return changes_.empty();
   }
 
  private:
-  void hear(const DigitalIoNews& news) {
+  void record(const DigitalIoChange& change) {
     const std::lock_guard lock(mutex_);
-    news_.push_back(news);
+    changes_.push_back(change);
     came_.notify_one();
   }
   std::mutex mutex_;
   std::condition_variable came_;
-  std::deque<DigitalIoNews> news_;
+  std::deque<DigitalIoChange> changes_;
   DigitalIo::Subscription subscription_;  // last: ends before the members that it uses
 };
 
 class DigitalIoTest : public testing::Test {
  protected:
-  using Kind = DigitalIoNews::Kind;
+  using Kind = DigitalIoChange::Kind;
   static constexpr auto kNever = std::chrono::hours(1);  // period of polls
 
   // Starts a module with this name and its driver, in place of the previous one, whose listeners

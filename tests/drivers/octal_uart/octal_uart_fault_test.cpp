@@ -173,7 +173,7 @@ TEST_F(OctalUartFaultTest, AnOutstandingRequestFailsWhenTheModuleIsLost) {
   BoundOctalPort bound(start(), 3, kFast);
   SerialPortStatus status{};
   std::thread reader([&] { status = bound.line->writeRead(bytesOf("?"), kWatchdog); });
-  model_->waitUntilHeard(3, "?");
+  model_->waitUntilFarEndReceived(3, "?");
 
   carrier_.setFault("IP_a", ModelFault::busError);
 
@@ -292,7 +292,7 @@ TEST_F(OctalUartFaultTest, ALateLineOpensWhenItsModuleIsPresent) {
 
   EXPECT_TRUE(port.waitForState(SerialPortState::plugged, Deadline::never()));
   EXPECT_EQ(bound->write(bytesOf("x"), kWatchdog), SerialPortStatus::success);
-  EXPECT_EQ(model.heard(3), "x");
+  EXPECT_EQ(model.farEndReceived(3), "x");
   EXPECT_EQ(port.description(), "port 3 of UART");
 }
 
@@ -335,7 +335,7 @@ TEST_F(OctalUartFaultTest, TheChipIsDisabledWhenTheDriverIsDestroyed) {
   }
   uart_.reset();
 
-  model_->say(0, "not received");
+  model_->farEndSend(0, "not received");
 
   EXPECT_EQ(carrier_.site(0).interrupt(0).take(), 0U);
   carrier_.site(0).interrupt(0).enable();

@@ -79,7 +79,7 @@ class OctalUartTest : public testing::Test {
   // Returns whether the far end receives a command and the port receives the answer.
   bool echoes(BoundOctalPort& bound, int number) {
     const auto tap = bound.port.attachTap([this, number](std::span<const PeekedByte> bytes) {
-      if (bytes.front().direction == ByteDirection::sent) model_->say(number, "yes\r");
+      if (bytes.front().direction == ByteDirection::sent) model_->farEndSend(number, "yes\r");
     });
     return bound.line->writeRead(bytesOf("ok?\r"), kWatchdog) == SerialPortStatus::success &&
            bound.collector.answer() == "yes\r";

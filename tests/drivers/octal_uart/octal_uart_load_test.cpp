@@ -38,7 +38,7 @@ class OctalUartLoadTest : public OctalUartTest {
   // Every port and every instrument sends `bytes` bytes at the same time. Returns when all bytes
   // have been sent.
   void talkBothWays(std::size_t bytes) {
-    for (int i = 0; i < 8; ++i) model_->say(i, textOf(i, bytes));
+    for (int i = 0; i < 8; ++i) model_->farEndSend(i, textOf(i, bytes));
     std::vector<std::thread> writers;
     for (int i = 0; i < 8; ++i) {
       writers.emplace_back([&, i] {
@@ -59,7 +59,7 @@ class OctalUartLoadTest : public OctalUartTest {
 TEST_F(OctalUartLoadTest, OneInterruptReadsAllBytesOfTheChip) {
   start({.time = OctalUartModelTime::stepped});
   open(kFast);
-  for (int i = 0; i < 8; ++i) model_->say(i, "abcd");
+  for (int i = 0; i < 8; ++i) model_->farEndSend(i, "abcd");
 
   model_->advance(4 * byteTime(kFast));
 
@@ -71,7 +71,7 @@ TEST_F(OctalUartLoadTest, NoByteIsLostWhenTheDriverIsThreeBytesLate) {
   start({.time = OctalUartModelTime::stepped});
   open(kFast);
   constexpr int kBytes = 3000;
-  for (int i = 0; i < 8; ++i) model_->say(i, textOf(i, kBytes));
+  for (int i = 0; i < 8; ++i) model_->farEndSend(i, textOf(i, kBytes));
 
   while (!isQuiet()) {
     model_->advance(3 * byteTime(kFast));
@@ -111,7 +111,7 @@ TEST_F(OctalUartLoadTest, NoByteIsLostInRealTime) {
   }
   for (int i = 0; i < 8; ++i) {
     EXPECT_TRUE(port(i).collector.waitForAll(textOf(i, kBytes))) << i;
-    EXPECT_TRUE(model_->heard(i).ends_with(textOf(i, kBytes))) << i;
+    EXPECT_TRUE(model_->farEndReceived(i).ends_with(textOf(i, kBytes))) << i;
   }
 }
 

@@ -46,7 +46,7 @@ TEST_F(OctalUartModelTest, Mr1IsAccessedOnceAfterItsPointerWasReset) {
 TEST_F(OctalUartModelTest, HoldsThreeBytesAndOneInItsShiftRegister) {
   auto& model = plug({.time = OctalUartModelTime::stepped});
   setUp();
-  model.say(kChannel, "abcdef");
+  model.farEndSend(kChannel, "abcdef");
   model.advance({});
 
   model.advance(4 * byte());
@@ -65,10 +65,10 @@ TEST_F(OctalUartModelTest, HoldsThreeBytesAndOneInItsShiftRegister) {
 TEST_F(OctalUartModelTest, ReportsErrorsWithTheirByte) {
   auto& model = plug({});
   setUp();
-  model.say(kChannel, "a");
-  model.say(kChannel, "b", LineFault::parity);
-  model.say(kChannel, "c", LineFault::framing);
-  model.say(kChannel, std::string(1, '\0'), LineFault::breakSignal);
+  model.farEndSend(kChannel, "a");
+  model.farEndSend(kChannel, "b", LineFault::parity);
+  model.farEndSend(kChannel, "c", LineFault::framing);
+  model.farEndSend(kChannel, std::string(1, '\0'), LineFault::breakSignal);
 
   for (const unsigned error : {0U, unsigned{kSrParity}, unsigned{kSrFraming}, unsigned{kSrBreak}}) {
     EXPECT_EQ(get(kSr) & kSrErrors, error);
@@ -88,10 +88,10 @@ TEST_F(OctalUartModelTest, SendsOneByteWhileTheNextOneIsStored) {
 
   model.advance(byte());
   EXPECT_EQ(get(kSr), kSrTxRdy);
-  EXPECT_EQ(model.heard(kChannel), "a");
+  EXPECT_EQ(model.farEndReceived(kChannel), "a");
   model.advance(byte());
   EXPECT_EQ(get(kSr), kSrTxRdy | kSrTxEmt);
-  EXPECT_EQ(model.heard(kChannel), "ab");
+  EXPECT_EQ(model.farEndReceived(kChannel), "ab");
 }
 
 // The Philips data sheets of this family: "enable transmitter and reset transmitter" cannot be in
@@ -103,10 +103,10 @@ TEST_F(OctalUartModelTest, IsNotEnabledByTheWriteThatResetsIt) {
   set(kCr, kCrResetTx | kCrEnableTx);
   set(kCr, kCrResetRx | kCrEnableRx);
   set(kThr, 'x');
-  model.say(kChannel, "y");
+  model.farEndSend(kChannel, "y");
 
   EXPECT_EQ(get(kSr), 0);
-  EXPECT_EQ(model.heard(kChannel), "");
+  EXPECT_EQ(model.farEndReceived(kChannel), "");
   set(kCr, kCrEnableTx | kCrEnableRx);
   EXPECT_EQ(get(kSr), kSrTxRdy | kSrTxEmt);
 }
@@ -120,7 +120,7 @@ TEST_F(OctalUartModelTest, ReceivesItsOwnBytesInLocalLoopback) {
 
   EXPECT_EQ(get(kSr) & kSrRxRdy, kSrRxRdy);
   EXPECT_EQ(get(kRhr), 'x');
-  EXPECT_EQ(model.heard(kChannel), "");
+  EXPECT_EQ(model.farEndReceived(kChannel), "");
 }
 
 TEST_F(OctalUartModelTest, InterruptsForUnmaskedBitsOnly) {
@@ -132,7 +132,7 @@ TEST_F(OctalUartModelTest, InterruptsForUnmaskedBitsOnly) {
 
   io().write8(atBlock(1, kImr), kIsrRxRdy);
   EXPECT_EQ(interrupt.take(), 0U);
-  model.say(kChannel, "a");
+  model.farEndSend(kChannel, "a");
   EXPECT_EQ(interrupt.take(), 1U);
 
   EXPECT_EQ(io().read8(atBlock(1, kIsr)), kIsrTxRdy | kIsrRxRdy);

@@ -37,7 +37,7 @@ TEST_F(OctalUartPortTest, EveryPortSendsAndReceives) {
 
     EXPECT_TRUE(echoes(bound, i)) << i;
 
-    EXPECT_EQ(model_->heard(i), "ok?\r");
+    EXPECT_EQ(model_->farEndReceived(i), "ok?\r");
   }
 }
 
@@ -47,9 +47,9 @@ TEST_F(OctalUartPortTest, LongTextsPassInOrder) {
   for (int i = 0; i < 20'000; ++i) text += static_cast<char>('a' + i % 23);
 
   EXPECT_EQ(bound.line->write(bytesOf(text), kWatchdog), SerialPortStatus::success);
-  model_->say(7, text);
+  model_->farEndSend(7, text);
 
-  EXPECT_EQ(model_->heard(7), text);
+  EXPECT_EQ(model_->farEndReceived(7), text);
   EXPECT_TRUE(bound.collector.waitForAll(text));
 }
 
@@ -58,7 +58,7 @@ TEST_F(OctalUartPortTest, AWriteEndsWhenTheLastBitIsSent) {
   std::atomic<bool> isDone = false;
   std::thread writer([&] {
     EXPECT_EQ(bound.line->write(bytesOf("abcd"), kWatchdog), SerialPortStatus::success);
-    EXPECT_EQ(model_->heard(1), "abcd");
+    EXPECT_EQ(model_->farEndReceived(1), "abcd");
     isDone = true;
   });
 
@@ -88,7 +88,7 @@ TEST_F(OctalUartPortTest, AnInstantLineNeedsNoTimeToSend) {
 
   ASSERT_EQ(line.tryWrite(bytesOf("at once")), 7U);
 
-  EXPECT_EQ(model_->heard(1), "at once");
+  EXPECT_EQ(model_->farEndReceived(1), "at once");
   EXPECT_EQ(line.timeToSend(), 0ms);
 }
 
@@ -99,11 +99,11 @@ TEST_F(OctalUartPortTest, DamagedBytesAreReportedAndCounted) {
     const auto tap = bound.port.attachTap([&](std::span<const PeekedByte> bytes) {
       for (const auto& byte : bytes) faults.push_back(byte.fault);
     });
-    model_->say(2, "a");
-    model_->say(2, "b", LineFault::parity);
-    model_->say(2, "c", LineFault::framing);
-    model_->say(2, std::string(1, '\0'), LineFault::breakSignal);
-    model_->say(2, "d\r");
+    model_->farEndSend(2, "a");
+    model_->farEndSend(2, "b", LineFault::parity);
+    model_->farEndSend(2, "c", LineFault::framing);
+    model_->farEndSend(2, std::string(1, '\0'), LineFault::breakSignal);
+    model_->farEndSend(2, "d\r");
     EXPECT_TRUE(bound.collector.waitForAll("ad\r"));
   }
 
@@ -118,7 +118,7 @@ TEST_F(OctalUartPortTest, DamagedBytesAreReportedAndCounted) {
 
 TEST_F(OctalUartPortTest, AnOverrunIsCountedAndLosesNoOtherByte) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
-  model_->say(0, "abcdef");
+  model_->farEndSend(0, "abcdef");
 
   model_->advance(10 * byteTime(kFast));  // in one step: the driver cannot read in between
 
@@ -134,7 +134,7 @@ TEST_F(OctalUartPortTest, AnOverrunIsReportedWhereBytesAreMissing) {
     model_->advance(bytes * byteTime(kFast));
     model_->waitUntilServed();
   };
-  model_->say(0, "12345678abcdef\rnext");
+  model_->farEndSend(0, "12345678abcdef\rnext");
   for (int i = 0; i < 8; ++i) pass(1);
   pass(7);
   for (int i = 0; i < 4; ++i) pass(1);
@@ -146,7 +146,7 @@ TEST_F(OctalUartPortTest, AnOverrunIsReportedWhereBytesAreMissing) {
 
 TEST_F(OctalUartPortTest, BytesThatFitIntoTheChipAreNotLost) {
   BoundOctalPort bound(start({.time = OctalUartModelTime::stepped}), 0, kFast);
-  model_->say(0, "abcd");
+  model_->farEndSend(0, "abcd");
 
   model_->advance(10 * byteTime(kFast));
 
@@ -173,7 +173,7 @@ TEST_F(OctalUartPortTest, AWriteTimesOutWhileCtsIsInactive) {
   model_->setClearToSend(3, true);
 
   EXPECT_TRUE(echoes(bound, 3));
-  EXPECT_EQ(model_->heard(3), "ok?\r") << "the late bytes are discarded";
+  EXPECT_EQ(model_->farEndReceived(3), "ok?\r") << "the late bytes are discarded";
 }
 
 TEST_F(OctalUartPortTest, WithoutFlowControlCtsIsIgnored) {
@@ -203,8 +203,8 @@ TEST_F(OctalUartPortTest, Rs485SendsOrReceives) {
   });
   model_->waitUntilServed();
   while (!requestsToSend(5)) std::this_thread::yield();
-  model_->say(5, "unheard");
-  while (model_->heard(5) != "talk") {
+  model_->farEndSend(5, "unheard");
+  while (model_->farEndReceived(5) != "talk") {
     EXPECT_TRUE(requestsToSend(5));
     model_->advance(10us);
   }
@@ -221,9 +221,9 @@ TEST_F(OctalUartPortTest, Rs485ReceivesAnAnswerAtOnce) {
   BoundOctalPort bound(start({.model = 0x48}), 5, kFast);
   std::thread instrument([&] {
     for (int i = 0; i < 100; ++i) {
-      model_->waitUntilHeard(5, "?" + std::to_string(i) + "\r");
+      model_->waitUntilFarEndReceived(5, "?" + std::to_string(i) + "\r");
       while (requestsToSend(5)) std::this_thread::yield();
-      model_->say(5, "yes\r");
+      model_->farEndSend(5, "yes\r");
     }
   });
 

@@ -11,6 +11,10 @@
 //   stormLimit spurious interrupts ──► the line is masked and polled for stormPause
 //   lateLimit polls find a request ──► the line is dead
 //
+//   calm ──stormLimit──► storm: masked ──stormPause──► storm: enabled ──2 x stormPause──► calm
+//                          ▲                             │
+//                          └──────────stormLimit─────────┘
+//
 // Traffic does not hide a stuck line: an interrupt with a request compensates only two spurious
 // ones. A driver can pass a second function, which is called once each time when trouble begins: a
 // storm, a dead line, or a carrier that polls from now on.
@@ -42,7 +46,7 @@ struct InterruptThreadOptions {
 };
 
 enum class InterruptTrouble : std::uint8_t {
-  storm,  // the line is stuck; storms within ten pauses are reported as one
+  storm,  // the line is stuck; reported once until the storm ends
   polled,  // the carrier gets no interrupts any more and polls from now on
   // the chip has requests, but no interrupt comes; ends with the next interrupt. Not during a storm
   never,
@@ -71,9 +75,14 @@ class InterruptThread {
     std::uint64_t interrupts = 0;
     std::uint64_t spurious = 0;  // interrupts without a request of the chip
     std::uint64_t late = 0;  // polls that found a request whose interrupt had not come
-    std::uint64_t storms = 0;
+    std::uint64_t storms = 0;  // pauses because of a storm: a line that stays stuck causes several
   };
   [[nodiscard]] Counters counters() const noexcept;
+  // Whether a storm has begun that has not ended: the line is masked, or was enabled again less
+  // than two pauses ago.
+  [[nodiscard]] bool isStorming() const noexcept {
+    return isStorming_.load(std::memory_order_relaxed);
+  }
 
  private:
   void run(const std::stop_token& stop);
@@ -81,6 +90,7 @@ class InterruptThread {
   void servePoll();
   void pause();
   void resume();
+  void endStorm();
   void wait() const;
   void report(InterruptTrouble trouble) const;
   void followPolling();
@@ -96,7 +106,8 @@ class InterruptThread {
   int lateInRow_ = 0;  // polls in a row that found a request
   bool isPolled_;
   Deadline pausedUntil_ = Deadline::never();
-  Deadline stormEnds_ = Deadline::atNs(0);  // a storm after this is a new one
+  Deadline stormEnds_ = Deadline::never();  // set while the line is enabled in a storm
+  std::atomic<bool> isStorming_{false};
   Deadline pollAt_ = Deadline::never();
   std::atomic<std::uint64_t> interrupts_{0}, spurious_{0}, late_{0}, storms_{0};
   std::jthread thread_;  // last: ends before the members that it uses
