@@ -31,8 +31,10 @@ void Binding::setState(BindingState state) noexcept {
 
 void Binding::setServer(const std::string& server, std::int32_t location) {
   connector_.setServer(server, location);
+  auto expected = BindingState::unbound;  // a client that has left stays in that state
   // PAIR(bound): the server's name, which the dispatcher's thread reads.
-  state_.store(BindingState::waiting, std::memory_order_release);
+  state_.compare_exchange_strong(expected, BindingState::waiting, std::memory_order_release,
+                                 std::memory_order_relaxed);
 }
 
 void Binding::tryConnect() try {

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include "client/connector.h"
+
+#include <gtest/gtest.h>
+#include <stdexcept>
+
+#include <mpf/message_server.h>
+
+#include "client/binding.h"
+#include "shm/segment_name.h"
+#include "tests/support/test_backplane.h"
+
+namespace mpf::test {
+namespace {
+
+class ConnectorTest : public testing::Test {
+ protected:
+  [[nodiscard]] bool hasPendingBind() const {
+    for (const auto& name : backplane_.segmentNames()) {
+      const auto parsed = SegmentName::tryParse(name);
+      if (parsed && parsed->kind == NameKind::pendingBind) return true;
+    }
+    return false;
+  }
+
+  TestBackplane backplane_;
+  DispatcherParts parts_{backplane_,      layout::SegmentKind::clientWindow,
+                         std::string(),   Rights{.mode = 0600},
+                         WaitMode::block, [](layout::SegmentHeader&) {}};
+  std::shared_ptr<Binding> owner_ = std::make_shared<Binding>(parts_, [](Message&&) {});
+  std::atomic<BindingState> state_{BindingState::waiting};
+  BindingTimer timer_{parts_.timer};
+  RequestSender sender_{state_, parts_.endpoint.control(), timer_, [] {}};
+  Connector connector_{parts_, timer_};
+};
+
+TEST_F(ConnectorTest, HasNoServerAtFirst) {
+  EXPECT_EQ(connector_.notConnectedBecause(), "not bound to a server yet");
+  EXPECT_FALSE(connector_.wait(Deadline::atNs(0), [] { return false; }));
+}
+
+TEST_F(ConnectorTest, RefusesASecondServer) {
+  connector_.setServer("dac", 3);
+
+  EXPECT_THROW(connector_.setServer("dac", 3), std::logic_error);
+  EXPECT_EQ(connector_.server(), "dac");
+  EXPECT_EQ(connector_.location(), 3);
+}
+
+TEST_F(ConnectorTest, RefusesAnInvalidName) {
+  EXPECT_THROW(connector_.setServer("", 0), std::invalid_argument);
+
+  connector_.setServer("dac", 0);  // no server is set yet
+}
+
+TEST_F(ConnectorTest, PublishesTheNameOfAMissingServer) {
+  connector_.setServer("dac", 0);
+
+  EXPECT_FALSE(connector_.tryFindServer());
+
+  EXPECT_EQ(connector_.notConnectedBecause(), "server \"dac\" at location 0 is not there");
+  EXPECT_TRUE(hasPendingBind());
+  connector_.cancelPendingBind();
+  EXPECT_FALSE(hasPendingBind());
+}
+
+TEST_F(ConnectorTest, OpensALinkThatTheServerAccepts) {
+  MessageServer server(backplane_, "dac");
+  connector_.setServer("dac", 0);
+  const auto window = connector_.tryFindServer();
+  ASSERT_TRUE(window);
+
+  ASSERT_TRUE(connector_.tryOpenLink(window, sender_, *owner_));
+  connector_.askForAcceptance(sender_.channel()->link());
+
+  while (sender_.channel()->link().peerState() != layout::LinkState::open)
+    static_cast<void>(server.receive());
+  EXPECT_EQ(connector_.incarnation(), window->header().incarnation);
+  connector_.closeLink(sender_);
+  EXPECT_FALSE(sender_.channel());
+}
+
+TEST_F(ConnectorTest, WithdrawsThePendingBindWhenTheServerStarts) {
+  connector_.setServer("dac", 0);
+  ASSERT_FALSE(connector_.tryFindServer());
+  const MessageServer server(backplane_, "dac");
+  const auto window = connector_.tryFindServer();
+
+  ASSERT_TRUE(connector_.tryOpenLink(window, sender_, *owner_));
+  connector_.askForAcceptance(sender_.channel()->link());
+
+  EXPECT_FALSE(hasPendingBind());
+  connector_.closeLink(sender_);
+}
+
+TEST_F(ConnectorTest, ABindAfterTheEndChangesNothing) {
+  owner_->leave();
+
+  owner_->setServer("dac", 0);
+
+  EXPECT_TRUE(owner_->hasLeft());
+}
+
+}  // namespace
+}  // namespace mpf::test
