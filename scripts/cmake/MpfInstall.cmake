@@ -85,7 +85,8 @@ target_include_directories(mpf_all INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL
 
 # ---- headers and packages
 
-install(DIRECTORY "${CMAKE_SOURCE_DIR}/include/mpf" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(DIRECTORY "${CMAKE_SOURCE_DIR}/include/mpf" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  PATTERN epics EXCLUDE) # epics/ installs its own
 install(FILES schema/message.capnp schema/router.capnp schema/recording.capnp
   DESTINATION ${CMAKE_INSTALL_DATADIR}/mpf) # for other implementations
 
@@ -109,7 +110,7 @@ install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR
 # ---- programs and man pages: every executable of these folders
 
 set(programs "")
-foreach(folder client server router tools benchmarks)
+foreach(folder client server router epics tools benchmarks)
   if(folder IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
     mpf_find_targets(programs "${CMAKE_SOURCE_DIR}/${folder}" EXECUTABLE)
   endif()

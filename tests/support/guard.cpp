@@ -44,11 +44,22 @@ struct Registry {
 Registry* registry = nullptr;        // null in a process without a guard
 std::atomic<pid_t> testProcess = 0;  // used by the signal handler
 
-Registry* makeRegistry() {
+// The tests inherit the descriptor of the registry; this variable has its number.
+constexpr const char* kRegistryVariable = "MPF_TEST_REGISTRY";
+
+void* mapRegistry(int descriptor) {
   auto* const memory =
-      ::mmap(nullptr, sizeof(Registry), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+      ::mmap(nullptr, sizeof(Registry), PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
   if (memory == MAP_FAILED) throwSystemError(errno, "mmap", "the registry of the guard");
-  return new (memory) Registry;
+  return memory;
+}
+
+FileDescriptor makeRegistry() {
+  FileDescriptor file(checkCall(::memfd_create("mpf-test-registry", 0), "memfd_create"));
+  checkCall(::ftruncate(file.get(), sizeof(Registry)), "ftruncate");
+  registry = new (mapRegistry(file.get())) Registry;
+  ::setenv(kRegistryVariable, std::to_string(file.get()).c_str(), 1);
+  return file;
 }
 
 // A program that only lists its tests needs no guard. Under a debugger, the tests must run in the
@@ -159,8 +170,16 @@ int runTests(int argc, char** argv) {
   return RUN_ALL_TESTS();
 }
 
-int runGuarded(int argc, char** argv) {
-  registry = makeRegistry();
+// In the process that the guard has started.
+int runAsChild(int argc, char** argv, const char* descriptor) {
+  const FileDescriptor file(std::stoi(descriptor));
+  ::unsetenv(kRegistryVariable);
+  registry = static_cast<Registry*>(mapRegistry(file.get()));
+  return runTests(argc, argv);
+}
+
+int runGuarded(char** argv) {
+  const auto file = makeRegistry();
   const auto folder = makeTemporaryFolder();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);
   const auto guard = ::getpid();
@@ -168,7 +187,9 @@ int runGuarded(int argc, char** argv) {
   if (tests == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != guard) return 1;  // the guard was killed before prctl()
-    return runTests(argc, argv);
+    // EPICS, for one, must not run in a process that was only forked.
+    ::execv("/proc/self/exe", argv);
+    throwSystemError(errno, "run", "/proc/self/exe");
   }
   testProcess = tests;
   forwardSignals();
@@ -195,8 +216,10 @@ void guardBackplane(const std::string& name) {
 }  // namespace mpf::test
 
 int main(int argc, char** argv) try {
+  if (const char* descriptor = ::getenv(mpf::test::kRegistryVariable))
+    return mpf::test::runAsChild(argc, argv, descriptor);
   if (!mpf::test::isGuardNeeded(argc, argv)) return mpf::test::runTests(argc, argv);
-  return mpf::test::runGuarded(argc, argv);
+  return mpf::test::runGuarded(argv);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "guard: %s\n", error.what());
   return 1;

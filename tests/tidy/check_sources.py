@@ -51,6 +51,7 @@ PUBLIC_HEADERS = {
     "shm": ["wait_mode.h", "rights.h", "errors.h", "backplane.h"],
     "client": ["dispatcher.h", "message_client.h", "sync_client.h"],
     "server": ["message_server.h"],
+    "epics": ["epics/dev_mpf.h"],
 }
 
 MAX_LINES = 400

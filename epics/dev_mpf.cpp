@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/epics/dev_mpf.h>
+
+#include <alarm.h>
+#include <atomic>
+#include <callback.h>
+#include <cstring>
+#include <dbAccess.h>
+#include <dbEvent.h>
+#include <dbLock.h>
+#include <dbStaticLib.h>
+#include <epicsStdio.h>
+#include <errlog.h>
+#include <menuPini.h>
+#include <optional>
+#include <recGbl.h>
+#include <recSup.h>
+#include <utility>
+
+#include "epics/ioc_clients.h"
+#include "epics/link_address.h"
+#include "epics/record_queue.h"
+#include "epics/shared_client.h"
+
+namespace mpf {
+namespace {
+
+constexpr Nanoseconds kDefaultTimeout = std::chrono::seconds(5);
+
+// The VAL field of any record.
+void* valueOf(dbCommon* record) noexcept {
+  return reinterpret_cast<char*>(record) + record->rdes->pvalFldDes->offset;
+}
+
+bool isOutputLink(const dbCommon* record, const DBLINK* link) noexcept {
+  const auto* description = record->rdes;
+  for (short at = 0; at < description->no_links; ++at) {
+    const auto* field = description->papFldDes[description->link_ind[at]];
+    if (reinterpret_cast<const char*>(record) + field->offset ==
+        reinterpret_cast<const char*>(link))
+      return field->field_type == DBF_OUTLINK;
+  }
+  return false;
+}
+
+class ScanLock {
+ public:
+  explicit ScanLock(dbCommon* record) : record_(record) { dbScanLock(record); }
+  ~ScanLock() { dbScanUnlock(record_); }
+  ScanLock(const ScanLock&) = delete;
+  ScanLock& operator=(const ScanLock&) = delete;
+
+ private:
+  dbCommon* record_;
+};
+
+}  // namespace
+
+class DevMpf::Impl final : public SharedClient::Member, public IocClients::Device {
+ public:
+  Impl(DevMpf& device, dbCommon* record, DBLINK* link, bool ioInterrupt)
+      : device_(device), record_(record), isOutput_(isOutputLink(record, link)) {
+    callbackSetCallback(onCallback, &callback_);
+    callbackSetUser(this, &callback_);
+    callbackSetPriority(record->prio, &callback_);
+    if (ioInterrupt) scanIoInit(&scan_);
+    try {
+      address_ = LinkAddress::of(*link);
+      connection_ = IocClients::instance().connectionTo(address_.server, address_.location);
+      member_ = connection_->add(*this);
+    } catch (const std::exception& error) {
+      errlogPrintf("%s: %s: %s\n", record->name, isOutput_ ? "OUT" : "INP", error.what());
+      status_ = S_db_badField;
+      record->pact = TRUE;  // the record never processes
+    }
+  }
+
+  // --- any thread
+  void deliver(Message&& message) override {
+    if (queue_.push(std::move(message))) requestCallback();
+  }
+  void tick(std::int64_t nowNs) override {
+    if (isCallbackMissing_.load(std::memory_order_relaxed)) requestCallback();
+    const auto deadlineNs = deadlineNs_.load(std::memory_order_relaxed);
+    if (deadlineNs == 0 || nowNs < deadlineNs) return;
+    connection_->cancel(requestId_.load(std::memory_order_relaxed));
+  }
+  void print() const override {
+    if (const auto overruns = queue_.overruns(); overruns != 0)
+      epicsStdoutPrintf("  %s: %llu overruns\n", record_->name,
+                        static_cast<unsigned long long>(overruns));
+  }
+
+  // --- with the record locked
+  long process() {
+    hasProcessed_ = true;
+    if (reply_) {
+      auto reply = std::move(*reply_);
+      reply_.reset();
+      if (const auto* fate = reply.tryAs<RequestFate>()) return failFate(fate->fate);
+      return device_.completeIO(record_, std::move(reply));
+    }
+    if (!connection_ || !connection_->isConnected()) return failDisconnected();
+    return device_.startIO(record_);
+  }
+  long send(Message&& message, ReplyType reply) {
+    const auto deadline = timeout_.count() == 0 ? Deadline::never() : Deadline::after(timeout_);
+    requestId_.store(0, std::memory_order_relaxed);
+    const auto result =
+        connection_ ? connection_->send(member_, reply, std::move(message), deadline, requestId_)
+                    : SendResult::notConnected;
+    if (result == SendResult::notConnected) return failDisconnected();
+    if (result != SendResult::sent) return device_.fail(record_, toString(result));
+    if (reply == replyTypeCompleteIO) {
+      isRequestOutstanding_ = true;
+      deadlineNs_.store(deadline.isNever() ? 0 : deadline.ns(), std::memory_order_relaxed);
+      record_->pact = TRUE;
+    }
+    return 0;
+  }
+  void onConnect(const Connect& connect) {
+    if (record_->pact) return;  // its request ends with an alarm of its own
+    if (connect.status == ConnectStatus::connectYes) {
+      if (hasProcessed_ || record_->pini == menuPiniYES) dbProcess(record_);
+      return;
+    }
+    failDisconnected();
+    recGblGetTimeStamp(record_);
+    const auto mask = recGblResetAlarms(record_);
+    if (mask != 0) db_post_events(record_, valueOf(record_), mask | DBE_VALUE | DBE_LOG);
+  }
+
+  DevMpf& device_;
+  dbCommon* const record_;
+  const bool isOutput_;
+  LinkAddress address_;
+  std::shared_ptr<SharedClient> connection_;
+  long status_ = 0;
+  IOSCANPVT scan_ = nullptr;
+  Nanoseconds timeout_ = kDefaultTimeout;
+
+ private:
+  static void onCallback(epicsCallback* callback) {
+    void* user = nullptr;
+    callbackGetUser(user, callback);
+    static_cast<Impl*>(user)->takeOne();
+  }
+  void requestCallback() {
+    const bool isRequested = IocClients::instance().isRunning() && callbackRequest(&callback_) == 0;
+    isCallbackMissing_.store(!isRequested, std::memory_order_relaxed);
+  }
+  void takeOne() {
+    bool isMore = false;
+    {
+      const ScanLock lock(record_);
+      Message message;
+      if (queue_.tryTake(message, isRequestOutstanding_)) handle(std::move(message));
+      isMore = queue_.finish(isRequestOutstanding_);
+    }
+    if (isMore) requestCallback();
+  }
+  void handle(Message&& message) {
+    if (const auto* connect = message.tryAs<Connect>()) return device_.connectIO(record_, *connect);
+    if (message.getType() == MessageType::outOfBand)
+      return device_.outOfBandIO(record_, std::move(message));
+    switch (SharedClient::replyTypeOf(message)) {
+      case replyTypeCompleteIO:
+        return complete(std::move(message));
+      case replyTypeReceiveReply:
+        return device_.receiveReply(record_, std::move(message));
+      case replyTypeNone:
+        return;
+    }
+  }
+  void complete(Message&& message) {
+    const bool isFirst = endsRequest(message);
+    if (isFirst) {
+      isRequestOutstanding_ = false;
+      deadlineNs_.store(0, std::memory_order_relaxed);
+    }
+    reply_ = std::move(message);
+    if (!record_->pact) dbProcess(record_);
+    else if (isFirst) record_->rset->process(record_);
+    reply_.reset();  // a disabled record does not use it
+  }
+  long failDisconnected() {
+    recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "%s",
+                     connection_ ? connection_->notConnectedBecause().c_str() : "invalid link");
+    return -1;
+  }
+  long failFate(Fate fate) {
+    switch (fate) {
+      case Fate::refused:
+        return device_.fail(record_, "the server refused the request");
+      case Fate::neverTaken:
+        recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "disconnected before the request");
+        break;
+      case Fate::outcomeUnknown:
+        recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "disconnected before the reply");
+        break;
+      case Fate::expired:
+      case Fate::cancelled:
+        recGblSetSevrMsg(record_, TIMEOUT_ALARM, INVALID_ALARM, "no reply in %g s",
+                         std::chrono::duration<double>(timeout_).count());
+        break;
+    }
+    return -1;
+  }
+
+  friend class DevMpf;
+  std::uint32_t member_ = 0;
+  bool isRequestOutstanding_ = false;  // these three with the record locked
+  bool hasProcessed_ = false;
+  std::optional<Message> reply_;  // the message that the record processes now
+  RecordQueue queue_;
+  epicsCallback callback_{};
+  std::atomic<bool> isCallbackMissing_{false};
+  std::atomic<std::uint32_t> requestId_{0};
+  std::atomic<std::int64_t> deadlineNs_{0};  // of the outstanding request; 0: none
+};
+
+DevMpf::DevMpf(dbCommon* record, DBLINK* link, bool ioInterrupt)
+    : impl_(std::make_unique<Impl>(*this, record, link, ioInterrupt)) {
+  record->dpvt = this;
+}
+
+DevMpf::~DevMpf() { impl_->record_->dpvt = nullptr; }
+
+void DevMpf::bind() {
+  IocClients::instance().add(std::unique_ptr<DevMpf>(this), *impl_);
+  if (impl_->connection_) impl_->connection_->bind();
+}
+
+void DevMpf::receiveReply(dbCommon* record, Message&& message) {
+  errlogPrintf("%s: unexpected %s message\n", record->name,
+               std::string(toString(message.getType())).c_str());
+}
+
+void DevMpf::connectIO(dbCommon*, const Connect& connect) { impl_->onConnect(connect); }
+
+void DevMpf::outOfBandIO(dbCommon* record, Message&&) {
+  errlogPrintf("%s: unexpected outOfBand message\n", record->name);
+}
+
+long DevMpf::convert(dbCommon*, int) { return 0; }
+
+long DevMpf::send(Message&& message, ReplyType reply) {
+  return impl_->send(std::move(message), reply);
+}
+
+bool DevMpf::isConnected() const noexcept {
+  return impl_->connection_ && impl_->connection_->isConnected();
+}
+const char* DevMpf::getUserParm() const noexcept { return impl_->address_.parameters.c_str(); }
+int DevMpf::getSignal() const noexcept { return impl_->address_.signal; }
+const std::string& DevMpf::getServer() const noexcept { return impl_->address_.server; }
+long DevMpf::getStatus() const noexcept { return impl_->status_; }
+void DevMpf::setStatus(long status) noexcept { impl_->status_ = status; }
+void DevMpf::setTimeout(std::chrono::nanoseconds timeout) noexcept { impl_->timeout_ = timeout; }
+IOSCANPVT DevMpf::ioScan() const noexcept { return impl_->scan_; }
+
+long DevMpf::fail(dbCommon* record, const char* reason) {
+  recGblSetSevrMsg(record, impl_->isOutput_ ? WRITE_ALARM : READ_ALARM, INVALID_ALARM, "%s",
+                   reason);
+  return -1;
+}
+
+long DevMpf::report(int level) {
+  IocClients::instance().print(level);
+  return 0;
+}
+
+long DevMpf::readWrite(dbCommon* record) {
+  auto* device = static_cast<DevMpf*>(record->dpvt);
+  if (device == nullptr) {
+    recGblSetSevrMsg(record, SOFT_ALARM, INVALID_ALARM, "no device support");
+    return S_dev_noDevSup;
+  }
+  return device->impl_->process();
+}
+
+long DevMpf::getIoIntInfo(int, dbCommon* record, IOSCANPVT* scan) {
+  const auto* device = static_cast<const DevMpf*>(record->dpvt);
+  if (device == nullptr || device->ioScan() == nullptr) return S_dev_noDevSup;
+  *scan = device->ioScan();
+  return 0;
+}
+
+long DevMpf::linearConvert(dbCommon* record, int pass) {
+  auto* device = static_cast<DevMpf*>(record->dpvt);
+  return device == nullptr ? S_dev_noDevSup : device->convert(record, pass);
+}
+
+}  // namespace mpf

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include "epics/ioc_clients.h"
+
+#include <condition_variable>
+#include <epicsStdio.h>
+#include <initHooks.h>
+
+#include "base/signals_blocked.h"
+
+namespace mpf {
+
+// Never destroyed: threads of the IOC may use it until the process ends.
+IocClients& IocClients::instance() {
+  static auto* clients = new IocClients;
+  return *clients;
+}
+
+namespace {
+void onInitHook(initHookState state) { IocClients::instance().onHook(state); }
+}  // namespace
+
+void IocClients::onHook(int state) {
+  if (state == initHookAfterIocRunning) start();
+  if (state == initHookAtShutdown) close();
+  if (state == initHookAfterShutdown) forget();
+}
+
+void IocClients::start() {
+  isRunning_.store(true, std::memory_order_relaxed);
+  const SignalsBlocked blocked;
+  if (!thread_.joinable())
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+}
+
+void IocClients::close() {
+  isRunning_.store(false, std::memory_order_relaxed);
+  thread_ = {};
+  std::vector<std::shared_ptr<SharedClient>> connections;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [key, connection] : connections_) connections.push_back(connection);
+  }
+  for (const auto& connection : connections) connection->close();
+}
+
+void IocClients::forget() {
+  const std::lock_guard lock(mutex_);
+  devices_.clear();
+  connections_.clear();
+}
+
+std::shared_ptr<SharedClient> IocClients::connectionTo(const std::string& server,
+                                                       std::int32_t location) {
+  initHookRegister(onInitHook);  // Base forgets hooks when an IOC ends
+  const std::lock_guard lock(mutex_);
+  auto& connection = connections_[{server, location}];
+  if (!connection)
+    connection = std::make_shared<SharedClient>(Backplane::attach(), server, location);
+  return connection;
+}
+
+void IocClients::add(std::unique_ptr<DevMpf> owner, Device& device) {
+  const std::lock_guard lock(mutex_);
+  devices_.emplace_back(std::move(owner), &device);
+}
+
+void IocClients::run(const std::stop_token& stop) {
+  std::mutex sleeping;
+  std::condition_variable_any woken;
+  std::unique_lock sleep(sleeping);
+  while (!woken.wait_for(sleep, stop, kTick, [&] { return stop.stop_requested(); })) {
+    const std::lock_guard lock(mutex_);
+    const auto nowNs = Clock::nowNs();
+    for (const auto& [key, connection] : connections_) connection->serveBacklog();
+    for (const auto& [owner, device] : devices_) device->tick(nowNs);
+  }
+}
+
+void IocClients::print(int level) const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, connection] : connections_) {
+    const auto reason = connection->notConnectedBecause();
+    epicsStdoutPrintf("server \"%s\" at location %d: %u records, %s\n", key.first.c_str(),
+                      key.second, static_cast<unsigned>(connection->members()),
+                      reason.empty() ? "connected" : reason.c_str());
+  }
+  if (level < 1) return;
+  for (const auto& [owner, device] : devices_) device->print();
+}
+
+}  // namespace mpf

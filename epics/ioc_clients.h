@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// IocClients: the connections and the device support objects of the IOC of this process.
+//
+//   starting ─ IOC runs ─► running ─ IOC shuts down ─► closed ─ IOC has shut down ─► starting
+//   messages wait          callbacks are requested     no message is received
+//
+// Its thread looks every kTick for requests without a reply in time, and for callbacks that could
+// not be requested.
+//
+// Threads  any.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "epics/shared_client.h"
+
+namespace mpf {
+
+class IocClients {
+ public:
+  static constexpr auto kTick = std::chrono::milliseconds(20);
+
+  class Device {
+   public:
+    virtual void tick(std::int64_t nowNs) = 0;
+    virtual void print() const = 0;
+
+   protected:
+    ~Device() = default;
+  };
+
+  static IocClients& instance();
+
+  // The connection to a server. All callers with the same server get the same object.
+  [[nodiscard]] std::shared_ptr<SharedClient> connectionTo(const std::string& server,
+                                                           std::int32_t location);
+  // Owns `owner` from now on, of which `device` is a part, until the IOC has shut down.
+  void add(std::unique_ptr<DevMpf> owner, Device& device);
+  // Messages are kept until the IOC runs: callbacks before that would process records too early.
+  [[nodiscard]] bool isRunning() const noexcept {
+    return isRunning_.load(std::memory_order_relaxed);
+  }
+  void print(int level) const;
+  // Called by the IOC with an initHookState.
+  void onHook(int state);
+
+ private:
+  IocClients() = default;
+  void start();
+  void close();
+  void forget();
+  void run(const std::stop_token& stop);
+
+  mutable std::mutex mutex_;
+  std::map<std::pair<std::string, std::int32_t>, std::shared_ptr<SharedClient>> connections_;
+  std::vector<std::pair<std::unique_ptr<DevMpf>, Device*>> devices_;  // both under mutex_
+  std::atomic<bool> isRunning_{false};
+  std::jthread thread_;
+};
+
+}  // namespace mpf

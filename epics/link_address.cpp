@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include "epics/link_address.h"
+
+#include <charconv>
+#include <fmt/format.h>
+#include <stdexcept>
+#include <string_view>
+
+#include "shm/segment_name.h"
+
+namespace mpf {
+namespace {
+
+std::int32_t locationOf(std::string_view text) {
+  std::int32_t location = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), location);
+  if (error != std::errc{} || end != text.data() + text.size())
+    throw std::invalid_argument(fmt::format("location \"{}\" is not an integer", text));
+  return location;
+}
+
+}  // namespace
+
+LinkAddress LinkAddress::of(const DBLINK& link) {
+  LinkAddress address;
+  std::string_view text;
+  if (link.type == VME_IO) {
+    address.location = link.value.vmeio.card;
+    address.signal = link.value.vmeio.signal;
+    text = link.value.vmeio.parm;
+  } else if (link.type == INST_IO) {
+    text = link.value.instio.string;
+  } else {
+    throw std::invalid_argument(
+        "the link is neither \"#C<location> S<signal> @<server>\" nor "
+        "\"@<server> <parameters>\"");
+  }
+  const auto end = text.find_first_of(", ");
+  address.server = text.substr(0, end);
+  if (end != std::string_view::npos) address.parameters = text.substr(end + 1);
+  if (const auto colon = address.server.find(':');
+      link.type == INST_IO && colon != std::string::npos) {
+    address.location = locationOf(std::string_view(address.server).substr(colon + 1));
+    address.server.resize(colon);
+  }
+  SegmentName::checkServer(address.server);
+  return address;
+}
+
+}  // namespace mpf

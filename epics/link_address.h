@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// LinkAddress: the server that an INP or OUT link names.
+//
+//   #C<location> S<signal> @<server>[,| ]<parameters>     VME_IO
+//   @<server>[:<location>][,| ]<parameters>               INST_IO; location 0 unless given
+//
+// Source   manual, "MPF Device support": format of the INP or OUT field.
+#pragma once
+
+#include <cstdint>
+#include <link.h>
+#include <string>
+
+namespace mpf {
+
+struct LinkAddress {
+  std::string server;
+  std::int32_t location = 0;
+  int signal = 0;
+  std::string parameters;
+
+  //   throws  std::invalid_argument, which says what is wrong with the link
+  static LinkAddress of(const DBLINK& link);
+};
+
+}  // namespace mpf

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// RecordQueue: messages that wait until their record can process them.
+//
+//   idle ── push() returns true ──► callback pending ── finish() returns false ──► idle
+//
+// At most one callback of a record is pending in the IOC. When kMaxMessages wait, a further reply
+// replaces the oldest further reply and counts as an overrun; first replies, fates and
+// ConnectMessages are never dropped: their number is limited by the requests of the record.
+//
+// Threads  push(): the dispatcher's. tryTake() and finish(): the thread of the callback.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <mutex>
+
+#include <mpf/message_of.h>
+
+namespace mpf {
+
+// What a message does to the request that it belongs to.
+[[nodiscard]] inline bool endsRequest(const Message& message) noexcept {
+  return message.route().flags == kEndsRequest;
+}
+
+class RecordQueue {
+ public:
+  static constexpr std::size_t kMaxMessages = 64;
+
+  // Returns true when the caller must request the callback.
+  [[nodiscard]] bool push(Message&& message);
+  // Takes the oldest message that the record can process now.
+  //   isRequestOutstanding  further replies must wait until the first reply has ended the request
+  [[nodiscard]] bool tryTake(Message& message, bool isRequestOutstanding);
+  // Returns true when the caller must request the callback again.
+  [[nodiscard]] bool finish(bool isRequestOutstanding);
+  [[nodiscard]] std::uint64_t overruns() const;
+
+ private:
+  [[nodiscard]] std::deque<Message>::iterator next(bool isRequestOutstanding);
+  void dropOldest();
+
+  mutable std::mutex mutex_;
+  std::deque<Message> messages_;  // all under mutex_
+  bool isCallbackPending_ = false;
+  std::uint64_t overruns_ = 0;
+};
+
+}  // namespace mpf

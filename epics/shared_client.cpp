@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include "epics/shared_client.h"
+
+#include <utility>
+
+namespace mpf {
+namespace {
+
+bool isFull(SendResult result) noexcept {
+  return result == SendResult::queueFull || result == SendResult::tooManyOutstanding;
+}
+
+Message fateOf(const Message& request, Fate fate) {
+  RequestFateMessage message({.fate = fate, .requestId = 0});
+  message.setClientType(request.getClientType());
+  message.setClientExtra(request.getClientExtra());
+  message.setRoute({0, 0, kEndsRequest, nullptr});
+  return message;
+}
+
+}  // namespace
+
+SharedClient::SharedClient(const Backplane& backplane, std::string server, std::int32_t location)
+    : server_(std::move(server)),
+      location_(location),
+      client_(std::make_unique<MessageClient>(
+          backplane, [this](Message&& message) { onMessage(std::move(message)); })) {}
+
+std::uint32_t SharedClient::add(Member& member) {
+  const std::lock_guard lock(mutex_);
+  members_.push_back(&member);
+  return static_cast<std::uint32_t>(members_.size() - 1);
+}
+
+void SharedClient::bind() {
+  const std::lock_guard lock(mutex_);
+  if (!std::exchange(isBound_, true)) client_->bind(server_, location_);
+}
+
+SendResult SharedClient::send(std::uint32_t member, ReplyType reply, Message&& message,
+                              Deadline deadline, std::atomic<std::uint32_t>& requestId) {
+  message.setClientType(static_cast<std::int32_t>(member << 2) | reply);
+  const std::lock_guard lock(mutex_);
+  if (!client_ || !client_->isConnected()) return SendResult::notConnected;
+  if (backlog_.empty()) {
+    std::uint32_t id = 0;
+    const auto result = client_->send(std::move(message), deadline, &id);
+    if (result == SendResult::sent) requestId.store(id, std::memory_order_relaxed);
+    if (!isFull(result)) return result;
+  }
+  if (backlog_.size() >= kMaxBacklog) return SendResult::queueFull;
+  // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
+  backlog_.push_back({std::move(message), deadline, &requestId});
+  hasBacklog_.store(true, std::memory_order_relaxed);
+  return SendResult::sent;
+}
+
+void SharedClient::cancel(std::uint32_t requestId) {
+  const std::lock_guard lock(mutex_);
+  if (client_) client_->cancel(requestId);
+}
+
+void SharedClient::serveBacklog() {
+  if (!hasBacklog_.load(std::memory_order_relaxed)) return;
+  std::vector<Message> fates;
+  {
+    const std::lock_guard lock(mutex_);
+    while (!backlog_.empty()) {
+      auto& waiting = backlog_.front();
+      std::uint32_t id = 0;
+      auto result = SendResult::sent;
+      if (waiting.deadline.hasPassed()) {
+        fates.push_back(fateOf(waiting.message, Fate::expired));
+      } else {
+        const auto clientType = waiting.message.getClientType();
+        result = client_ ? client_->send(std::move(waiting.message), waiting.deadline, &id)
+                         : SendResult::notConnected;
+        if (isFull(result)) break;
+        if (result == SendResult::sent) {
+          waiting.requestId->store(id, std::memory_order_relaxed);
+        } else {
+          waiting.message.setClientType(clientType);
+          fates.push_back(fateOf(waiting.message, Fate::neverTaken));
+        }
+      }
+      backlog_.pop_front();
+    }
+    hasBacklog_.store(!backlog_.empty(), std::memory_order_relaxed);
+  }
+  for (auto& fate : fates) {
+    const auto clientType = fate.getClientType();
+    deliver(clientType, std::move(fate));
+  }
+}
+
+void SharedClient::endBacklog(Fate fate) {
+  std::deque<Waiting> ended;
+  {
+    const std::lock_guard lock(mutex_);
+    ended.swap(backlog_);
+    hasBacklog_.store(false, std::memory_order_relaxed);
+  }
+  for (auto& waiting : ended)
+    deliver(waiting.message.getClientType(), fateOf(waiting.message, fate));
+}
+
+void SharedClient::close() {
+  std::unique_ptr<MessageClient> client;
+  {
+    const std::lock_guard lock(mutex_);
+    client = std::move(client_);
+  }
+  client.reset();  // waits for a callback in progress, which may wait for the mutex
+  endBacklog(Fate::neverTaken);
+}
+
+void SharedClient::onMessage(Message&& message) {
+  if (const auto* connect = message.tryAs<Connect>()) return onConnect(*connect);
+  const auto clientType = message.getClientType();
+  deliver(clientType, std::move(message));
+  serveBacklog();
+}
+
+void SharedClient::onConnect(const Connect& connect) {
+  if (connect.status == ConnectStatus::connectQueueFull) return;
+  if (connect.status == ConnectStatus::connectNo) endBacklog(Fate::neverTaken);
+  std::vector<Member*> members;
+  {
+    const std::lock_guard lock(mutex_);
+    members = members_;
+  }
+  for (auto* member : members) member->deliver(ConnectMessage(connect));
+}
+
+void SharedClient::deliver(std::int32_t clientType, Message&& message) {
+  const auto number = static_cast<std::uint32_t>(clientType) >> 2;
+  Member* member = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    if (number < members_.size()) member = members_[number];
+  }
+  if (member != nullptr) member->deliver(std::move(message));
+}
+
+bool SharedClient::isConnected() const {
+  const std::lock_guard lock(mutex_);
+  return client_ && client_->isConnected();
+}
+
+std::string SharedClient::notConnectedBecause() const {
+  const std::lock_guard lock(mutex_);
+  return client_ ? client_->notConnectedBecause() : "the IOC is shutting down";
+}
+
+std::size_t SharedClient::members() const {
+  const std::lock_guard lock(mutex_);
+  return members_.size();
+}
+
+}  // namespace mpf

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// SharedClient: the client of one server that all records of the IOC with this server share. The
+// clientType of a message says which record it belongs to, and what happens with the reply.
+//
+//   record ── send() ──► | backlog | ──► MessageClient ──► server
+//   record ◄── Member::deliver() ◄────── MessageClient ◄── replies, fates, connections
+//
+// When the queue of the server is full, messages wait in the backlog until earlier requests end.
+//
+// Threads  any. deliver() runs on the dispatcher's thread, without a lock of the connection.
+// Crash    each message that send() accepted ends in a reply or a fate, also from the backlog.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <mpf/epics/dev_mpf.h>
+#include <mpf/message_client.h>
+
+namespace mpf {
+
+class SharedClient {
+ public:
+  // A record of the connection. It outlives the connection.
+  class Member {
+   public:
+    virtual void deliver(Message&& message) = 0;
+
+   protected:
+    ~Member() = default;
+  };
+
+  static constexpr std::size_t kMaxBacklog = 65'536;
+
+  SharedClient(const Backplane& backplane, std::string server, std::int32_t location);
+  SharedClient(const SharedClient&) = delete;
+  SharedClient& operator=(const SharedClient&) = delete;
+
+  //   returns  the number of the member, for send()
+  [[nodiscard]] std::uint32_t add(Member& member);
+  // Starts to connect. Calls after the first have no effect.
+  void bind();
+  // Empties `message` when the result is `sent`.
+  //   requestId  out: the number of the request as soon as it is known, for cancel(); outlives the
+  //              request
+  [[nodiscard]] SendResult send(std::uint32_t member, ReplyType reply, Message&& message,
+                                Deadline deadline, std::atomic<std::uint32_t>& requestId);
+  void cancel(std::uint32_t requestId);
+  // Sends what waits in the backlog, and ends requests whose deadline has passed there.
+  void serveBacklog();
+  // Ends the client: nothing is delivered after it.
+  void close();
+
+  [[nodiscard]] bool isConnected() const;
+  [[nodiscard]] std::string notConnectedBecause() const;
+  [[nodiscard]] const std::string& server() const noexcept { return server_; }
+  [[nodiscard]] std::int32_t location() const noexcept { return location_; }
+  [[nodiscard]] std::size_t members() const;
+
+  [[nodiscard]] static ReplyType replyTypeOf(const Message& message) noexcept {
+    return static_cast<ReplyType>(message.getClientType() & 3);
+  }
+
+ private:
+  struct Waiting {
+    Message message;
+    Deadline deadline;
+    std::atomic<std::uint32_t>* requestId;
+  };
+  void onMessage(Message&& message);
+  void onConnect(const Connect& connect);
+  void endBacklog(Fate fate);
+  void deliver(std::int32_t clientType, Message&& message);
+
+  const std::string server_;
+  const std::int32_t location_;
+  mutable std::mutex mutex_;
+  std::unique_ptr<MessageClient> client_;  // all below under mutex_
+  std::vector<Member*> members_;
+  std::deque<Waiting> backlog_;
+  bool isBound_ = false;
+  std::atomic<bool> hasBacklog_{false};
+};
+
+}  // namespace mpf

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+// Records and servers that are absent, exit, refuse, answer late or answer with another type.
+#include <optional>
+
+#include "tests/epics/epics_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using DevMpfTest = EpicsTest;
+
+constexpr const char* kRecord = R"(record(ai, "v") {
+  field(DTYP, "ip330Scan") field(INP, "#C0 S0 @adc") field(PINI, "YES") field(VAL, "7")
+})";
+
+void echo(MessageServer& self, Message&& request) {
+  static_cast<void>(self.reply(std::move(request)));
+}
+
+TEST_F(DevMpfTest, AnAbsentServerIsACommAlarmWithTheReason) {
+  const Ioc ioc(kRecord);
+
+  EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
+  EXPECT_EQ(Ioc::get("v.STAT"), "COMM");
+  EXPECT_EQ(Ioc::get("v.PACT"), "0");
+  EXPECT_EQ(Ioc::get("v.AMSG").substr(0, 12), "server \"adc\"");
+}
+
+TEST_F(DevMpfTest, ARecordRecoversWhenItsServerStarts) {
+  const Ioc ioc(kRecord);
+  ASSERT_EQ(Ioc::get("v.STAT"), "COMM");
+
+  const ThreadServer server(backplane_, "adc", echo);
+
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+}
+
+TEST_F(DevMpfTest, ARecordIsInvalidWhenItsServerExitsAndRecoversWithTheNext) {
+  std::optional<ThreadServer> server(std::in_place, backplane_, "adc", echo);
+  const Ioc ioc(kRecord);
+  for (int round = 0; round < 3; ++round) {
+    Ioc::waitFor("v.SEVR", "NO_ALARM");
+    server.reset();
+    Ioc::waitFor("v.STAT", "COMM");
+    EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
+    server.emplace(backplane_, "adc", echo);
+  }
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+}
+
+TEST_F(DevMpfTest, AServerThatExitsWithoutAReplyLeavesNoRecordActive) {
+  std::atomic<bool> isTaken = false;
+  std::vector<Message> kept;
+  std::optional<ThreadServer> server(std::in_place, backplane_, "adc",
+                                     [&](MessageServer&, Message&& request) {
+                                       kept.push_back(std::move(request));
+                                       isTaken = true;
+                                     });
+  const Ioc ioc(kRecord);
+  while (!isTaken) std::this_thread::yield();
+  EXPECT_EQ(Ioc::get("v.PACT"), "1");
+
+  kept.clear();
+  server.reset();
+
+  Ioc::waitFor("v.PACT", "0");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
+}
+
+TEST_F(DevMpfTest, ARefusedRequestIsAReadAlarm) {
+  const ThreadServer server(backplane_, "adc",
+                            [](MessageServer&, Message&& request) { request.reset(); });
+  const Ioc ioc(kRecord);
+
+  Ioc::waitFor("v.STAT", "READ");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "the server refused the request");
+  EXPECT_EQ(Ioc::get("v"), "7");
+}
+
+TEST_F(DevMpfTest, AReplyOfAnotherTypeIsAReadAlarm) {
+  const ThreadServer server(backplane_, "adc", [](MessageServer& self, Message&& request) {
+    static_cast<void>(self.reply(self.allocReplyMessage<Float64>(request)));
+  });
+  const Ioc ioc(kRecord);
+
+  Ioc::waitFor("v.STAT", "READ");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "the reply is not an Int32 message");
+}
+
+TEST_F(DevMpfTest, ANegativeStatusIsAReadAlarm) {
+  const ThreadServer server(backplane_, "adc", [](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->status = -1;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(kRecord);
+
+  Ioc::waitFor("v.STAT", "READ");
+}
+
+TEST_F(DevMpfTest, AServerThatDoesNotReplyIsATimeoutAlarm) {
+  std::vector<Message> kept;
+  const ThreadServer server(backplane_, "adc", [&](MessageServer&, Message&& request) {
+    kept.push_back(std::move(request));
+  });
+  const Ioc ioc(kRecord);
+
+  Ioc::waitFor("v.STAT", "TIMEOUT");
+  EXPECT_EQ(Ioc::get("v.PACT"), "0");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "no reply in 5 s");
+  kept.clear();
+}
+
+TEST_F(DevMpfTest, AnIocShutsDownWithRequestsOutstanding) {
+  std::atomic<bool> isTaken = false;
+  std::vector<Message> kept;
+  const ThreadServer server(backplane_, "adc", [&](MessageServer&, Message&& request) {
+    kept.push_back(std::move(request));
+    isTaken = true;
+  });
+  {
+    const Ioc ioc(kRecord);
+    while (!isTaken) std::this_thread::yield();
+  }
+  kept.clear();
+}
+
+TEST_F(DevMpfTest, MoreRecordsThanTheQueueOfTheServerAllGetTheirValue) {
+  const ThreadServer server(backplane_, "adc", echo);
+  std::string database;
+  constexpr int kRecords = 500;
+  for (int number = 0; number < kRecords; ++number)
+    database +=
+        "record(ai, \"v" + std::to_string(number) +
+        "\") { field(DTYP, \"ip330Scan\") field(INP, \"#C0 S0 @adc\") field(PINI, \"YES\") }\n";
+  const Ioc ioc(database);
+
+  for (int number = 0; number < kRecords; ++number)
+    Ioc::waitFor("v" + std::to_string(number) + ".SEVR", "NO_ALARM");
+}
+
+// A server that sends without end costs overruns, and the IOC goes on.
+TEST_F(DevMpfTest, AServerThatSendsWithoutEndCostsOverrunsOnly) {
+  std::atomic<bool> isOver = false;
+  const ThreadServer server(backplane_, "adc", [&](MessageServer& self, Message&& request) {
+    for (std::int32_t value = 0; !isOver; ++value) {
+      auto reply = self.allocReplyMessage<Int32>(request);
+      reply->value = value;
+      static_cast<void>(self.reply(std::move(reply)));
+    }
+  });
+  const Ioc ioc(std::string(kRecord) + R"(record(ai, "other") { field(INP, "3") })");
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+  const auto before = Ioc::get("v.RVAL");
+  while (Ioc::get("v.RVAL") == before) std::this_thread::yield();
+
+  ASSERT_EQ(Ioc::put("other.PROC", "1"), 0);
+  EXPECT_EQ(Ioc::get("other"), "3");
+  isOver = true;
+}
+
+}  // namespace
+}  // namespace mpf::test
