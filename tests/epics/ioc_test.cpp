@@ -2,6 +2,7 @@
 // The program mpf-ioc, with commands on its standard input.
 #include <sys/wait.h>
 
+#include <cstdlib>
 #include <gmock/gmock.h>
 
 #include "tests/support/command.h"
@@ -12,7 +13,17 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(IocProgram, LoadsADatabaseAndListsItsRecords) {
+// The server for Channel Access listens on loopback only.
+class IocProgram : public testing::Test {
+ protected:
+  IocProgram() {
+    ::setenv("EPICS_CAS_INTF_ADDR_LIST", "127.0.0.1", 1);
+    ::setenv("EPICS_CAS_BEACON_ADDR_LIST", "127.0.0.1", 1);
+    ::setenv("EPICS_CAS_AUTO_BEACON_ADDR_LIST", "NO", 1);
+  }
+};
+
+TEST_F(IocProgram, LoadsADatabaseAndListsItsRecords) {
   const TemporaryFolder folder;
   const auto database =
       folder.write("a.db", "record(ai, \"$(P)v\") { field(DTYP, \"ip330Scan\") }");
@@ -24,7 +35,7 @@ TEST(IocProgram, LoadsADatabaseAndListsItsRecords) {
   EXPECT_THAT(result.output, HasSubstr("lab:v"));
 }
 
-TEST(IocProgram, ReportsADatabaseThatItCannotLoad) {
+TEST_F(IocProgram, ReportsADatabaseThatItCannotLoad) {
   const TemporaryFolder folder;
   const auto database = folder.write("a.db", "record(nothing, \"v\") {}");
 
@@ -35,7 +46,7 @@ TEST(IocProgram, ReportsADatabaseThatItCannotLoad) {
   EXPECT_THAT(result.output, HasSubstr("mpf-ioc: cannot load the database " + database));
 }
 
-TEST(IocProgram, RunsAStartupFile) {
+TEST_F(IocProgram, RunsAStartupFile) {
   const TemporaryFolder folder;
   static_cast<void>(folder.write("a.db", "record(ao, \"v\") { field(VAL, \"4\") }"));
   const auto startup =

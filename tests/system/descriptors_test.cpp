@@ -130,6 +130,8 @@ class EveryProgramStarted : public testing::TestWithParam<std::string> {
     const std::map<std::string, std::vector<std::string>> arguments{
         {"mpf", {"tap", "nobody", "--backplane", backplane_.name()}},
         {"mpf-bench", {"local", "--quick", "--only", "futex bounce", "--json", fifo_}},
+        {"mpf-torture", {"--json", fifo_}},
+        {"mpf-ioc", {fifo_}},
         {"mpf-router",
          {"--listen", "127.0.0.1:0", "--serve", "0", "--plain", "--backplane", backplane_.name()}},
         {"mpf-serial-server", {"line", linkPath_, "1000", "20", "--backplane", backplane_.name()}},
