@@ -20,7 +20,7 @@ DBLINK* linkOf(Record& record) {
 template <class Record>
 MessageType typeOf(const dbCommon* common) {
   const auto& record = *reinterpret_cast<const Record*>(common);
-  if constexpr (requires { record.ftvl; }) return messageTypeOf(record.ftvl);
+  if constexpr (requires { record.bptr; }) return messageTypeOf(record.ftvl);
   else if constexpr (std::is_same_v<Record, eventRecord>) return MessageType::int32;
   else if constexpr (!std::is_arithmetic_v<decltype(record.val)>) return MessageType::char8Array;
   else if constexpr (std::is_same_v<decltype(record.val), epicsFloat64>)

@@ -252,14 +252,14 @@ TEST_F(GeneralDeviceTest, EachOutputTypeCanBeReadBack) {
            parameters + " type=int32 readback=7\") " + fields + " }\n";
   };
   const Ioc ioc(output("ao", "ao", "field(LINR, \"SLOPE\") field(ESLO, \"2\")") +
-                output("int64out", "int64out") + output("bo", "bo", "", "shift=5") +
+                output("int64out", "int64out") + output("bo", "bo", "field(ONAM, \"on\")", "shift=5") +
                 output("mbbo", "mbbo", "field(ONVL, \"33\") field(ONST, \"one\")") +
                 output("mbboDirect", "direct") + output("stringout", "stringout") +
                 output("lso", "lso", "field(SIZV, \"20\")"));
 
   Ioc::waitFor("ao", "66");
   Ioc::waitFor("int64out", "33");
-  Ioc::waitFor("bo", "1");
+  Ioc::waitFor("bo", "on");
   Ioc::waitFor("mbbo", "one");
   Ioc::waitFor("direct", "33");
   Ioc::waitFor("direct.B5", "1");

@@ -86,7 +86,7 @@ TEST_F(GeneralRecordTest, EachInputRecordHasTheValueOfTheReply) {
         Expected{"longinBits", "35"},    Expected{"longinArray", "1"},
         Expected{"int64in", "4660"},     Expected{"bi.RVAL", "4660"},
         Expected{"biClear.RVAL", "0"},   Expected{"biSet.RVAL", "16"},
-        Expected{"mbbi.RVAL", "3"},      Expected{"mbbiMask", "two"},
+        Expected{"mbbi.RVAL", "48"},     Expected{"mbbiMask", "two"},
         Expected{"direct", "18"},        Expected{"direct.B1", "1"},
         Expected{"direct.B4", "1"},      Expected{"stringin", "12.5 V"},
         Expected{"stringNumber", "2.5"}, Expected{"lsi.LEN", "7"},
@@ -109,9 +109,10 @@ class Writes {
         written_[integer->address] = std::to_string(integer->value);
       if (const auto* number = request.tryAs<Float64>())
         written_[number->address] = std::to_string(number->value);
-      if (const auto* array = request.tryAs<Int32Array>())
-        written_[array->address] = std::to_string(request.valueAs<Int32Array>().size()) + ":" +
-                                   std::to_string(request.valueAs<Int32Array>().back());
+      const auto elements = request.valueAs<Int32Array>();
+      if (const auto* array = request.tryAs<Int32Array>(); array != nullptr && !elements.empty())
+        written_[array->address] =
+            std::to_string(elements.size()) + ":" + std::to_string(elements.back());
       if (const auto* text = request.tryAs<Char8Array>()) {
         const auto bytes = request.valueAs<Char8Array>();
         written_[text->address] = std::string(bytes.begin(), bytes.end());
