@@ -2,6 +2,7 @@
 // The device support tables of DTYP "MPF": one line for each record type.
 #include <dbAccess.h>
 #include <dbStaticLib.h>
+#include <vector>
 
 #include "epics/general/general_device.h"
 #include "epics/general/record_fields.h"
@@ -58,8 +59,8 @@ template <class Record>
 long init(dbCommon* common) {
   static constexpr auto access = accessOf<Record>();
   auto& record = *reinterpret_cast<Record*>(common);
-  // Links are not parsed yet in the first pass, in which Base calls the support of aai and aao.
-  if constexpr (std::is_same_v<Record, aaiRecord> || std::is_same_v<Record, aaoRecord>)
+  // Base calls the support of aai in the first pass already, in which links are not parsed yet.
+  if constexpr (std::is_same_v<Record, aaiRecord>)
     if (record.bptr == nullptr) return AAI_DEVINIT_PASS1;
   const auto status = GeneralDevice::init(common, linkOf(record), access);
   // MPF_NoConvert: RVAL of an output is not known, and VAL of the database is kept.
@@ -67,8 +68,30 @@ long init(dbCommon* common) {
   return status == 0 && isRawOutput ? MPF_NoConvert : status;
 }
 
+// Base calls the support of aao in the first pass only: the records are kept until all records are
+// initialised.
+std::vector<dbCommon*>& waitingAaoRecords() {
+  static std::vector<dbCommon*> records;
+  return records;
+}
+long keepAao(dbCommon* record) {
+  waitingAaoRecords().push_back(record);
+  return 0;
+}
+long initAao(int isAfterRecords) {
+  if (isAfterRecords == 0) return 0;
+  for (auto* record : waitingAaoRecords()) static_cast<void>(init<aaoRecord>(record));
+  waitingAaoRecords().clear();
+  return 0;
+}
+MpfDset devAaoMpf{
+    {5, DevMpf::report, initAao, keepAao, DevMpf::getIoIntInfo}, DevMpf::readWrite, nullptr};
+
 }  // namespace
 
+extern "C" {
+epicsExportAddress(dset, devAaoMpf);
+}
 MAKE_LINCONV_DSET(devAiMpf, init<aiRecord>)
 MAKE_LINCONV_DSET(devAoMpf, init<aoRecord>)
 MAKE_DSET(devLonginMpf, init<longinRecord>)
@@ -87,7 +110,6 @@ MAKE_DSET(devLsiMpf, init<lsiRecord>)
 MAKE_DSET(devLsoMpf, init<lsoRecord>)
 MAKE_DSET(devWaveformMpf, init<waveformRecord>)
 MAKE_DSET(devAaiMpf, init<aaiRecord>)
-MAKE_DSET(devAaoMpf, init<aaoRecord>)
 MAKE_DSET(devEventMpf, init<eventRecord>)
 
 }  // namespace mpf
