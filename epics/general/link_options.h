@@ -48,7 +48,7 @@ struct LinkOptions {
 
   // The field `timeout` of requests: whole seconds, at least the timeout of the link.
   [[nodiscard]] std::int32_t timeoutField() const noexcept;
-  // The bits of the value in a message: all unless the link has a mask or a shift.
+  // Whether the link selects bits of the value of a message.
   [[nodiscard]] bool selectsBits() const noexcept { return mask.has_value() || shift.has_value(); }
 };
 

@@ -252,7 +252,8 @@ TEST_F(GeneralDeviceTest, EachOutputTypeCanBeReadBack) {
            parameters + " type=int32 readback=7\") " + fields + " }\n";
   };
   const Ioc ioc(output("ao", "ao", "field(LINR, \"SLOPE\") field(ESLO, \"2\")") +
-                output("int64out", "int64out") + output("bo", "bo", "field(ONAM, \"on\")", "shift=5") +
+                output("int64out", "int64out") +
+                output("bo", "bo", "field(ONAM, \"on\")", "shift=5") +
                 output("mbbo", "mbbo", "field(ONVL, \"33\") field(ONST, \"one\")") +
                 output("mbboDirect", "direct") + output("stringout", "stringout") +
                 output("lso", "lso", "field(SIZV, \"20\")"));
