@@ -66,7 +66,9 @@ class DevMpf::Impl final : public SharedClient::Member, public IocClients::Devic
     if (ioInterrupt) scanIoInit(&scan_);
     try {
       address_ = LinkAddress::of(*link);
-      connection_ = IocClients::instance().connectionTo(address_.server, address_.location);
+      // A server may keep one subscription for each client.
+      connection_ = IocClients::instance().connectionTo(address_.server, address_.location,
+                                                        ioInterrupt ? record->name : "");
       member_ = connection_->add(*this);
     } catch (const std::exception& error) {
       errlogPrintf("%s: %s: %s\n", record->name, isOutput_ ? "OUT" : "INP", error.what());

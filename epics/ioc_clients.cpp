@@ -50,10 +50,11 @@ void IocClients::forget() {
 }
 
 std::shared_ptr<SharedClient> IocClients::connectionTo(const std::string& server,
-                                                       std::int32_t location) {
+                                                       std::int32_t location,
+                                                       const std::string& user) {
   initHookRegister(onInitHook);  // Base forgets hooks when an IOC ends
   const std::lock_guard lock(mutex_);
-  auto& connection = connections_[{server, location}];
+  auto& connection = connections_[{server, location, user}];
   if (!connection)
     connection = std::make_shared<SharedClient>(Backplane::attach(), server, location);
   return connection;
@@ -80,8 +81,9 @@ void IocClients::print(int level) const {
   const std::lock_guard lock(mutex_);
   for (const auto& [key, connection] : connections_) {
     const auto reason = connection->notConnectedBecause();
-    epicsStdoutPrintf("server \"%s\" at location %d: %u records, %s\n", key.first.c_str(),
-                      key.second, static_cast<unsigned>(connection->members()),
+    epicsStdoutPrintf("server \"%s\" at location %d: %u records, %s\n",
+                      connection->server().c_str(), connection->location(),
+                      static_cast<unsigned>(connection->members()),
                       reason.empty() ? "connected" : reason.c_str());
   }
   if (level < 1) return;

@@ -17,6 +17,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -39,9 +40,11 @@ class IocClients {
 
   static IocClients& instance();
 
-  // The connection to a server. All callers with the same server get the same object.
+  // The connection to a server. All callers with the same arguments get the same object.
+  //   user  name of the record that needs a connection of its own; empty: shared
   [[nodiscard]] std::shared_ptr<SharedClient> connectionTo(const std::string& server,
-                                                           std::int32_t location);
+                                                           std::int32_t location,
+                                                           const std::string& user);
   // Owns `owner` from now on, of which `device` is a part, until the IOC has shut down.
   void add(std::unique_ptr<DevMpf> owner, Device& device);
   // Messages are kept until the IOC runs: callbacks before that would process records too early.
@@ -60,7 +63,8 @@ class IocClients {
   void run(const std::stop_token& stop);
 
   mutable std::mutex mutex_;
-  std::map<std::pair<std::string, std::int32_t>, std::shared_ptr<SharedClient>> connections_;
+  using Key = std::tuple<std::string, std::int32_t, std::string>;  // server, location, user
+  std::map<Key, std::shared_ptr<SharedClient>> connections_;
   std::vector<std::pair<std::unique_ptr<DevMpf>, Device*>> devices_;  // both under mutex_
   std::atomic<bool> isRunning_{false};
   std::jthread thread_;

@@ -31,7 +31,8 @@
 //   disconnected ─► connectIO() ─► alarm COMM, INVALID, without processing
 //
 // All records of an IOC share one dispatcher, and records that name the same server share one
-// connection. A message waits for its record in a queue; at most one callback of a record is
+// connection; a record with `ioInterrupt` has its own, because a server may keep one subscription
+// for each client. A message waits for its record in a queue; at most one callback of a record is
 // pending in the IOC. When 64 messages wait, further messages that are not the first reply to a
 // request replace the oldest ones, and are counted as overruns (dbior).
 //

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: MIT
+#include "epics/general/record_fields.h"
+
+#include <algorithm>
+#include <cstring>
+#include <cvtTable.h>
+#include <dbScan.h>
+#include <limits>
+#include <menuConvert.h>
+
+namespace mpf::fields {
+namespace {
+
+// ---- numbers
+
+// The bits of the value that the link selects.
+std::optional<std::int64_t> selectedInteger(const Value& value, const Options& options) {
+  if (!options.selectsBits()) return toInteger(value);
+  const auto bits = toBits(value);
+  if (!bits) return std::nullopt;
+  return (*bits & options.mask.value_or(UINT32_MAX)) >> options.shift.value_or(0);
+}
+
+// 32 bits, as the signed number of an Int32 message.
+Value ofBits(std::uint32_t bits) { return std::int64_t{static_cast<std::int32_t>(bits)}; }
+
+Value placedInteger(std::int64_t number, const Options& options) {
+  if (!options.selectsBits()) return number;
+  return ofBits((static_cast<std::uint32_t>(number) << options.shift.value_or(0)) &
+                options.mask.value_or(UINT32_MAX));
+}
+
+template <class Record>
+Stored storeInteger(Record& record, const Value& value, const Options& options) {
+  const auto integer = selectedInteger(value, options);
+  const auto number = integer ? fit<decltype(record.val)>(*integer) : std::nullopt;
+  if (!number) return Stored::doesNotFit;
+  record.val = *number;
+  record.udf = FALSE;
+  return Stored::done;
+}
+
+// Integers are raw values; other numbers are in engineering units.
+bool isRaw(const Value& value) noexcept {
+  return std::holds_alternative<std::int64_t>(value) ||
+         std::holds_alternative<std::span<const std::int32_t>>(value);
+}
+
+template <class Record>
+double adjusted(const Record& record, double number) {
+  return (record.aslo == 0 ? number : number * record.aslo) + record.aoff;
+}
+
+template <class Record>
+void setSlope(Record& record, const Options& options) {
+  if (!options.range) return;
+  record.eslo = (record.eguf - record.egul) / (options.range->high - options.range->low);
+  record.eoff = record.egul - options.range->low * record.eslo;
+}
+
+double engineeringOfRaw(aoRecord& record, std::int32_t raw) {
+  double number = adjusted(record, static_cast<double>(raw) + record.roff);
+  if (record.linr == menuConvertNO_CONVERSION) return number;
+  if (record.linr == menuConvertLINEAR || record.linr == menuConvertSLOPE)
+    return number * record.eslo + record.eoff;
+  cvtRawToEngBpt(&number, record.linr, record.init, &record.pbrk, &record.lbrk);
+  return number;
+}
+
+// ---- bits
+
+template <class Record>
+Stored storeBits(Record& record, const Value& value) {
+  const auto bits = toBits(value);
+  if (!bits) return Stored::doesNotFit;
+  record.rval = record.mask == 0 ? *bits : *bits & record.mask;
+  record.udf = FALSE;
+  return Stored::done;
+}
+
+template <class Record>
+void setBitMask(Record& record, const Options& options) {
+  if (options.mask) record.mask = *options.mask;
+  else if (options.shift) record.mask = epicsUInt32{1} << *options.shift;
+}
+
+template <class Record>
+void setFieldMask(Record& record, const Options& options) {
+  if (options.shift) record.shft = static_cast<epicsUInt16>(*options.shift);
+  if (options.mask) record.mask = *options.mask;
+  else record.mask = (record.nobt == 0 ? UINT32_MAX : record.mask) << std::min(+record.shft, 31);
+}
+
+template <class Record>
+std::uint32_t unshifted(const Record& record) {
+  return record.shft > 31 ? 0 : record.rval >> record.shft;
+}
+
+// ---- text
+
+template <std::size_t size>
+Stored storeText(char (&field)[size], const Value& value) {
+  const auto text = toText(value);
+  if (!text) return Stored::doesNotFit;
+  field[text->copy(field, size - 1)] = '\0';
+  return text->size() < size ? Stored::done : Stored::truncated;
+}
+
+template <class Record>
+Stored storeLongText(Record& record, const Value& value) {
+  const auto text = toText(value);
+  if (!text || record.sizv == 0) return Stored::doesNotFit;
+  const auto length = text->copy(record.val, record.sizv - 1U);
+  record.val[length] = '\0';
+  record.len = static_cast<epicsUInt32>(length + 1);
+  record.udf = FALSE;
+  return length == text->size() ? Stored::done : Stored::truncated;
+}
+
+// ---- arrays
+
+template <class Record>
+Stored storeArray(Record& record, const Value& value) {
+  std::uint32_t used = 0;
+  const auto stored = storeElements(value, record.ftvl, record.bptr, record.nelm, used);
+  if (stored == Stored::doesNotFit) return stored;
+  record.nord = used;
+  record.udf = FALSE;
+  return stored;
+}
+
+}  // namespace
+
+// ---- numbers
+
+Stored store(aiRecord& record, const Value& value, const Options& options) {
+  if (isRaw(value)) {
+    const auto integer = selectedInteger(value, options);
+    const auto raw = integer ? fit<epicsInt32>(*integer) : std::nullopt;
+    if (!raw) return Stored::doesNotFit;
+    record.rval = *raw;
+    return Stored::done;
+  }
+  const auto number = toDouble(value);
+  if (!number) return Stored::doesNotFit;
+  const double sample = adjusted(record, *number);
+  const bool isSmooth =
+      record.smoo != 0 && record.udf == FALSE && std::isfinite(record.val) && std::isfinite(sample);
+  record.val = isSmooth ? record.val * record.smoo + sample * (1 - record.smoo) : sample;
+  record.udf = std::isnan(record.val);
+  return Stored::converted;
+}
+
+Stored store(aoRecord& record, const Value& value, const Options& options) {
+  std::optional<double> number;
+  if (isRaw(value)) {
+    const auto integer = selectedInteger(value, options);
+    const auto raw = integer ? fit<epicsInt32>(*integer) : std::nullopt;
+    if (raw) number = engineeringOfRaw(record, *raw);
+  } else if (const auto sample = toDouble(value)) {
+    number = adjusted(record, *sample);
+  }
+  if (!number) return Stored::doesNotFit;
+  record.val = record.oval = record.pval = *number;
+  record.udf = std::isnan(*number);
+  return Stored::done;
+}
+
+Stored store(longinRecord& record, const Value& value, const Options& options) {
+  return storeInteger(record, value, options);
+}
+Stored store(longoutRecord& record, const Value& value, const Options& options) {
+  return storeInteger(record, value, options);
+}
+Stored store(int64inRecord& record, const Value& value, const Options& options) {
+  return storeInteger(record, value, options);
+}
+Stored store(int64outRecord& record, const Value& value, const Options& options) {
+  return storeInteger(record, value, options);
+}
+
+Value load(const aoRecord& record, const Options& options, Scratch& /*scratch*/) {
+  if (options.type == MessageType::int32 || options.type == MessageType::int32Array)
+    return placedInteger(record.rval, options);
+  return (record.oval - record.aoff) / (record.aslo == 0 ? 1 : record.aslo);
+}
+Value load(const longoutRecord& record, const Options& options, Scratch& /*scratch*/) {
+  return placedInteger(record.val, options);
+}
+Value load(const int64outRecord& record, const Options& options, Scratch& /*scratch*/) {
+  return placedInteger(record.val, options);
+}
+
+void prepare(aiRecord& record, const Options& options) { setSlope(record, options); }
+void prepare(aoRecord& record, const Options& options) { setSlope(record, options); }
+
+// ---- bits
+
+Stored store(biRecord& record, const Value& value, const Options& /*options*/) {
+  return storeBits(record, value);
+}
+Stored store(mbbiRecord& record, const Value& value, const Options& /*options*/) {
+  return storeBits(record, value);
+}
+Stored store(mbbiDirectRecord& record, const Value& value, const Options& /*options*/) {
+  return storeBits(record, value);
+}
+Stored store(boRecord& record, const Value& value, const Options& /*options*/) {
+  const auto stored = storeBits(record, value);
+  if (stored == Stored::done) record.val = record.rval != 0 ? 1 : 0;
+  return stored;
+}
+Stored store(mbboRecord& record, const Value& value, const Options& /*options*/) {
+  const auto stored = storeBits(record, value);
+  if (stored != Stored::done) return stored;
+  const auto raw = unshifted(record);
+  constexpr epicsUInt16 kUnknownState = 65535;
+  record.val = kUnknownState;
+  if (record.sdef == FALSE) record.val = static_cast<epicsEnum16>(raw);
+  constexpr int kStates = 16;
+  for (int state = kStates - 1; record.sdef != FALSE && state >= 0; --state)
+    if ((&record.zrvl)[state] == raw) record.val = static_cast<epicsEnum16>(state);
+  return record.val == kUnknownState ? Stored::doesNotFit : Stored::done;
+}
+Stored store(mbboDirectRecord& record, const Value& value, const Options& /*options*/) {
+  const auto stored = storeBits(record, value);
+  if (stored != Stored::done) return stored;
+  record.val = static_cast<epicsInt32>(unshifted(record));
+  constexpr int kBits = 32;
+  for (int bit = 0; bit < kBits; ++bit)
+    (&record.b0)[bit] = (static_cast<epicsUInt32>(record.val) >> bit) & 1;
+  return stored;
+}
+
+Value load(const boRecord& record, const Options& /*options*/, Scratch& /*scratch*/) {
+  return ofBits(record.rval);
+}
+Value load(const mbboRecord& record, const Options& /*options*/, Scratch& /*scratch*/) {
+  return ofBits(record.rval & record.mask);
+}
+Value load(const mbboDirectRecord& record, const Options& /*options*/, Scratch& /*scratch*/) {
+  return ofBits(record.rval & record.mask);
+}
+
+void prepare(biRecord& record, const Options& options) { setBitMask(record, options); }
+void prepare(boRecord& record, const Options& options) { setBitMask(record, options); }
+void prepare(mbbiRecord& record, const Options& options) { setFieldMask(record, options); }
+void prepare(mbboRecord& record, const Options& options) { setFieldMask(record, options); }
+void prepare(mbbiDirectRecord& record, const Options& options) { setFieldMask(record, options); }
+void prepare(mbboDirectRecord& record, const Options& options) { setFieldMask(record, options); }
+
+// ---- text
+
+Stored store(stringinRecord& record, const Value& value, const Options& /*options*/) {
+  const auto stored = storeText(record.val, value);
+  if (stored != Stored::doesNotFit) record.udf = FALSE;
+  return stored;
+}
+Stored store(stringoutRecord& record, const Value& value, const Options& /*options*/) {
+  const auto stored = storeText(record.val, value);
+  if (stored != Stored::doesNotFit) record.udf = FALSE;
+  return stored;
+}
+Stored store(lsiRecord& record, const Value& value, const Options& /*options*/) {
+  return storeLongText(record, value);
+}
+Stored store(lsoRecord& record, const Value& value, const Options& /*options*/) {
+  return storeLongText(record, value);
+}
+Stored store(eventRecord& record, const Value& value, const Options& /*options*/) {
+  const auto stored = storeText(record.val, value);
+  if (stored == Stored::doesNotFit) return stored;
+  record.epvt = eventNameToHandle(record.val);
+  record.udf = FALSE;
+  return stored;
+}
+
+Value load(const stringoutRecord& record, const Options& /*options*/, Scratch& /*scratch*/) {
+  return std::string_view(record.val, ::strnlen(record.val, sizeof record.val));
+}
+Value load(const lsoRecord& record, const Options& /*options*/, Scratch& /*scratch*/) {
+  return std::string_view(record.val, ::strnlen(record.val, record.sizv));
+}
+
+// ---- arrays
+
+Stored store(waveformRecord& record, const Value& value, const Options& /*options*/) {
+  return storeArray(record, value);
+}
+Stored store(aaiRecord& record, const Value& value, const Options& /*options*/) {
+  return storeArray(record, value);
+}
+Stored store(aaoRecord& record, const Value& value, const Options& /*options*/) {
+  return storeArray(record, value);
+}
+Value load(const aaoRecord& record, const Options& /*options*/, Scratch& scratch) {
+  return loadElements(record.ftvl, record.bptr, record.nord, scratch);
+}
+
+}  // namespace mpf::fields

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: MIT
+// Requests, writes and subscriptions of records with DTYP "MPF": failures, and servers that come
+// and go.
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "tests/epics/epics_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using GeneralDeviceTest = EpicsTest;
+
+constexpr std::int32_t kReadBack = 7;
+
+std::string longin(const std::string& link, const std::string& fields = "field(PINI, \"YES\")") {
+  return "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"" + link +
+         "\") field(VAL, \"9\") " + fields + " }\n";
+}
+std::string longout(const std::string& link, const std::string& fields = "") {
+  return "record(longout, \"v\") { field(DTYP, \"MPF\") field(OUT, \"" + link + "\") " + fields +
+         " }\n";
+}
+constexpr const char* kIoInterrupt = "field(SCAN, \"I/O Intr\")";
+
+TEST_F(GeneralDeviceTest, ARequestHasTheFieldsOfTheLink) {
+  std::atomic<bool> isAsExpected = false;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    const auto* fields = request.tryAs<Int32>();
+    isAsExpected = fields->cmd == 1 && fields->address == 3 && fields->extra == -4 &&
+                   fields->timeout == 3 && fields->value == 2;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(longin("@s:0 type=int32 cmd=1 address=3 extra=-4 timeout=2.5 value=2"));
+
+  Ioc::waitFor("v", "2");
+
+  EXPECT_TRUE(isAsExpected);
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+}
+
+TEST_F(GeneralDeviceTest, AnInvalidLinkDisablesTheRecord) {
+  for (const char* link : {"@s adress=3", "@s cmd=x", "@", "@s mode=write"}) {
+    SCOPED_TRACE(link);
+    const Ioc ioc(longin(link));
+
+    EXPECT_EQ(Ioc::get("v.PACT"), "1");
+    EXPECT_EQ(Ioc::get("v"), "9");
+  }
+}
+
+TEST_F(GeneralDeviceTest, AStatusOtherThanZeroIsAReadAlarmAndKeepsTheValue) {
+  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->status = -3;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(longin("@s"));
+
+  Ioc::waitFor("v.STAT", "READ");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "INVALID");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "status -3 from the server");
+  EXPECT_EQ(Ioc::get("v"), "9");
+}
+
+TEST_F(GeneralDeviceTest, ANumberThatDoesNotFitIsAReadAlarmAndKeepsTheValue) {
+  std::atomic<double> value = std::numeric_limits<double>::quiet_NaN();
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    request.tryAs<Float64>()->value = value;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(
+      longin("@s type=float64") +
+      "record(ai, \"a\") { field(DTYP, \"MPF\") field(INP, \"@s\") field(PINI, \"YES\") }");
+  Ioc::waitFor("v.STAT", "READ");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "the value does not fit the record");
+  EXPECT_EQ(Ioc::get("v"), "9");
+  Ioc::waitFor("a.STAT", "UDF");
+  EXPECT_EQ(Ioc::get("a"), "nan");
+
+  value = 3;
+  ASSERT_EQ(Ioc::put("v.PROC", "1"), 0);
+  Ioc::waitFor("v", "3");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+}
+
+TEST_F(GeneralDeviceTest, AReplyWithoutAValueIsAReadAlarm) {
+  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
+    static_cast<void>(self.reply(self.allocReplyMessage<SerialConfig>(request)));
+  });
+  const Ioc ioc(longin("@s"));
+
+  Ioc::waitFor("v.AMSG", "serialConfig has no value");
+}
+
+TEST_F(GeneralDeviceTest, TheTimeoutOfTheLinkEndsARequest) {
+  std::vector<Message> kept;
+  const ThreadServer server(backplane_, "s", [&](MessageServer&, Message&& request) {
+    kept.push_back(std::move(request));
+  });
+  const Ioc ioc(longin("@s timeout=0.1"));
+
+  Ioc::waitFor("v.AMSG", "no reply in 0.1 s");
+  EXPECT_EQ(Ioc::get("v.STAT"), "TIMEOUT");
+  kept.clear();
+}
+
+TEST_F(GeneralDeviceTest, AValueThatDoesNotFitTheMessageIsNotWritten) {
+  std::atomic<int> requests = 0;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    ++requests;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(
+      "record(int64out, \"v\") { field(DTYP, \"MPF\") field(OUT, \"@s\") field(VAL, \"0\") "
+      "field(PINI, \"YES\") }");
+  while (requests == 0) std::this_thread::yield();
+  Ioc::waitFor("v.PACT", "0");
+
+  EXPECT_NE(Ioc::put("v", "4294967296"), 0);
+
+  EXPECT_EQ(Ioc::get("v.STAT"), "WRITE");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "the value does not fit the message");
+  EXPECT_EQ(requests, 1);
+}
+
+TEST_F(GeneralDeviceTest, ARefusedWriteIsAWriteAlarm) {
+  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->status = -1;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(longout("@s", "field(VAL, \"4\") field(PINI, \"YES\")"));
+
+  Ioc::waitFor("v.STAT", "WRITE");
+  EXPECT_EQ(Ioc::get("v.AMSG"), "status -1 from the server");
+}
+
+// ---- subscriptions
+
+// Sends `first` and then `first` + 1 to each subscriber.
+class Publisher {
+ public:
+  Publisher(const Backplane& backplane, std::int32_t first)
+      : first_(first), server_(backplane, "s", [this](MessageServer& self, Message&& request) {
+          ++requests_;
+          auto reply = self.allocReplyMessage<Int32>(request);
+          reply->value = first_;
+          static_cast<void>(self.reply(std::move(reply)));
+          auto next = self.allocReplyMessage<Int32>(request);
+          next->value = first_ + 1;
+          static_cast<void>(self.reply(std::move(next)));
+          request.reset();
+        }) {}
+  int requests() const { return requests_; }
+
+ private:
+  std::int32_t first_;
+  std::atomic<int> requests_ = 0;
+  ThreadServer server_;
+};
+
+TEST_F(GeneralDeviceTest, ASubscriptionProcessesTheRecordForEachMessageAndIsRenewed) {
+  std::optional<Publisher> server(std::in_place, backplane_, 10);
+  const Ioc ioc(longin("@s cmd=3", kIoInterrupt) +
+                "record(calc, \"count\") { field(INPA, \"v CPP\") field(CALC, \"VAL+1\") }\n");
+  Ioc::waitFor("v", "11");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+  EXPECT_EQ(server->requests(), 1);
+
+  server.reset();
+  Ioc::waitFor("v.STAT", "COMM");
+  server.emplace(backplane_, 20);
+
+  Ioc::waitFor("v", "21");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+}
+
+TEST_F(GeneralDeviceTest, ASubscribedRecordThatProcessesSendsNothingAndKeepsItsValue) {
+  const Publisher server(backplane_, 10);
+  const Ioc ioc(longin("@s cmd=3 mode=subscribe", ""));
+  Ioc::waitFor("v", "11");
+
+  ASSERT_EQ(Ioc::put("v.PROC", "1"), 0);
+
+  EXPECT_EQ(Ioc::get("v"), "11");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+  EXPECT_EQ(server.requests(), 1);
+}
+
+TEST_F(GeneralDeviceTest, ARefusedSubscriptionIsAReadAlarmAndRepeatedWhenTheRecordProcesses) {
+  std::atomic<bool> isRefusing = true;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    if (isRefusing) return request.reset();
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(longin("@s value=4 mode=subscribe", ""));
+  Ioc::waitFor("v.AMSG", "the request was refused");
+  EXPECT_EQ(Ioc::get("v.STAT"), "READ");
+
+  isRefusing = false;
+  static_cast<void>(Ioc::put("v.PROC", "1"));
+
+  Ioc::waitFor("v", "4");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+}
+
+// ---- outputs and connections
+
+// Has 33 unless a client wrote another value; counts the writes.
+class Register {
+ public:
+  explicit Register(const Backplane& backplane)
+      : server_(backplane, "s", [this](MessageServer& self, Message&& request) {
+          auto* fields = request.tryAs<Int32>();
+          if (fields->cmd == kReadBack) {
+            fields->value = value_;
+          } else {
+            value_ = fields->value;
+            ++writes_;
+          }
+          static_cast<void>(self.reply(std::move(request)));
+        }) {}
+  int value() const { return value_; }
+  int writes() const { return writes_; }
+
+ private:
+  std::atomic<int> value_ = 33;
+  std::atomic<int> writes_ = 0;
+  ThreadServer server_;
+};
+
+TEST_F(GeneralDeviceTest, AnOutputReadsItsValueBackAtTheFirstConnection) {
+  const Register server(backplane_);
+  const Ioc ioc(longout("@s readback=7"));
+
+  Ioc::waitFor("v", "33");
+
+  EXPECT_EQ(Ioc::get("v.UDF"), "0");
+  EXPECT_EQ(Ioc::get("v.SEVR"), "NO_ALARM");
+  EXPECT_EQ(server.writes(), 0);
+
+  ASSERT_EQ(Ioc::put("v", "34"), 0);
+  while (server.value() != 34) std::this_thread::yield();
+  EXPECT_EQ(server.writes(), 1);
+}
+
+TEST_F(GeneralDeviceTest, EachOutputTypeCanBeReadBack) {
+  const Register server(backplane_);
+  const auto output = [](const std::string& type, const std::string& name,
+                         const std::string& fields = "", const std::string& parameters = "") {
+    return "record(" + type + ", \"" + name + "\") { field(DTYP, \"MPF\") field(OUT, \"@s " +
+           parameters + " type=int32 readback=7\") " + fields + " }\n";
+  };
+  const Ioc ioc(output("ao", "ao", "field(LINR, \"SLOPE\") field(ESLO, \"2\")") +
+                output("int64out", "int64out") +
+                output("bo", "bo", "field(ONAM, \"on\")", "shift=5") +
+                output("mbbo", "mbbo", "field(ONVL, \"33\") field(ONST, \"one\")") +
+                output("mbboDirect", "direct") + output("stringout", "stringout") +
+                output("lso", "lso", "field(SIZV, \"20\")"));
+
+  Ioc::waitFor("ao", "66");
+  Ioc::waitFor("int64out", "33");
+  Ioc::waitFor("bo", "on");
+  Ioc::waitFor("mbbo", "one");
+  Ioc::waitFor("direct", "33");
+  Ioc::waitFor("direct.B5", "1");
+  Ioc::waitFor("stringout", "33");
+  Ioc::waitFor("lso", "33");
+  EXPECT_EQ(server.writes(), 0);
+}
+
+TEST_F(GeneralDeviceTest, AReadbackThatFailsIsAnAlarmUntilTheRecordWrites) {
+  const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
+    auto* fields = request.tryAs<Int32>();
+    fields->status = fields->cmd == kReadBack ? -1 : 0;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(longout("@s readback=7"));
+  Ioc::waitFor("v.STAT", "WRITE");
+
+  ASSERT_EQ(Ioc::put("v", "1"), 0);
+
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+}
+
+TEST_F(GeneralDeviceTest, AnOutputWritesAgainAfterAReconnectionOnlyWhenTheLinkSaysSo) {
+  for (const bool isRewriting : {false, true}) {
+    SCOPED_TRACE(isRewriting);
+    std::optional<Register> server(std::in_place, backplane_);
+    const Ioc ioc(
+        longout(isRewriting ? "@s rewrite=yes" : "@s", "field(VAL, \"5\") field(PINI, \"YES\")") +
+        "record(longin, \"other\") { field(DTYP, \"MPF\") "
+        "field(INP, \"@s cmd=7\") field(PINI, \"YES\") }\n");
+    while (server->value() != 5) std::this_thread::yield();
+    Ioc::waitFor("v.PACT", "0");
+
+    server.reset();
+    Ioc::waitFor("v.STAT", "COMM");
+    Ioc::waitFor("other.STAT", "COMM");
+    server.emplace(backplane_);
+
+    Ioc::waitFor("other.SEVR", "NO_ALARM");  // connected, after v
+    if (isRewriting) {
+      Ioc::waitFor("v.SEVR", "NO_ALARM");
+      EXPECT_EQ(server->value(), 5);
+    } else {
+      EXPECT_EQ(server->writes(), 0);
+      EXPECT_EQ(Ioc::get("v.STAT"), "COMM");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
