@@ -12,6 +12,7 @@
 // Source  manual, "devStringMpf".
 #include <array>
 #include <cstring>
+#include <dbFldTypes.h>
 #include <dbLink.h>
 #include <epicsString.h>
 #include <lsiRecord.h>

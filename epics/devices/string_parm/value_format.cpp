@@ -70,7 +70,8 @@ Conversion readConversion(FormatReader& reader, FormatUse use, std::string_view 
                           std::string_view lengthModifier) {
   Conversion result;
   if (use == FormatUse::print) {
-    result.text = reader.readAll("-+ #0") + reader.readNumber();
+    result.text = reader.readAll("-+ #0");
+    result.text += reader.readNumber();
     if (reader.tryRead('.')) result.text += "." + reader.readNumber();
   } else {
     result.isSkipped = reader.tryRead('*');

@@ -69,7 +69,8 @@ using StringRecordTest = EpicsTest;
 
 TEST_F(StringRecordTest, AiSendsItsParametersAndScansTheAnswer) {
   FakeSerial serial(backplane_, "T=12.5\r");
-  const Ioc ioc(inputRecord("ai", "Hideos ai stringParm", ",TERM=0d,IX=2,FMT=%lf,N=20,TO=100"));
+  const Ioc ioc(inputRecord("ai", "Hideos ai stringParm", ",TERM=0d,IX=2,FMT=%lf,N=20,TO=100",
+                            "field(PREC, \"1\")"));
 
   Ioc::waitFor("v.SEVR", "NO_ALARM");
 
@@ -141,7 +142,7 @@ TEST_F(StringRecordTest, BiScansANumber) {
 TEST_F(StringRecordTest, OutputsPrintTheirValueAndAppendTheTerminator) {
   FakeSerial serial(backplane_, "");
   const Ioc ioc(outputRecord("ao", "Hideos ao stringParm", ",TERM=0a,FMT=inst:sel ch1;V %4.3lf",
-                             "field(VAL, \"1.5\")"));
+                             "field(VAL, \"1.5\") field(PREC, \"1\")"));
 
   Ioc::waitFor("v.SEVR", "NO_ALARM");
 
@@ -172,7 +173,7 @@ TEST_F(StringRecordTest, StringoutSendsItsTextFromTheIndexOn) {
 
 TEST_F(StringRecordTest, AWriteThatFailsIsAWriteAlarm) {
   FakeSerial serial(backplane_, "", serial::serialServerStatusTimeout);
-  const Ioc ioc(outputRecord("stringout", "Hideos so stringParm", ""));
+  const Ioc ioc(outputRecord("stringout", "Hideos so stringParm", "", "field(VAL, \"a\")"));
 
   Ioc::waitFor("v.STAT", "WRITE");
 
