@@ -4,7 +4,7 @@
 //   #C<location> S<index> @<server>,TERM=0d0a,IX=3,FMT=V%.2f,TO=500,N=10,0STR=off,1STR=on
 //
 // A parameter may be anywhere in the text: its key is the first place with these characters, inside
-// another word too. FMT, 0STR and 1STR end at the next comma. A number that is none is 0.
+// another word too. FMT, 0STR and 1STR end at the next comma. Text instead of a number is 0.
 //
 // Source  the EPICS module ip, README.devXxStrParm.
 #pragma once

@@ -24,7 +24,7 @@ struct TextRequest {
   std::optional<std::string_view> eom = {};      // new end of message of the server
 };
 
-// What a record is given: its text, or why there is none.
+// The bytes of a reply, with its status.
 struct TextAnswer {
   std::string_view text;
   std::int32_t status = 0;  // serialServerStatus...

@@ -48,7 +48,7 @@ TEST(StringParameters, AKeyIsFoundInsideAnotherWord) {
   EXPECT_EQ(parsed("SCAN=4").maxBytes, 4);
 }
 
-TEST(StringParameters, ANumberThatIsNoneIsZero) {
+TEST(StringParameters, TextInsteadOfANumberIsZero) {
   EXPECT_EQ(parsed("IX=x").index, 0U);
   EXPECT_EQ(parsed("TO=").timeout, 0ms);
   EXPECT_EQ(parsed("TO=-5").timeout, 0ms);

@@ -181,9 +181,20 @@ TEST_F(StringRecordTest, AWriteThatFailsIsAWriteAlarm) {
 }
 
 TEST_F(StringRecordTest, AFormatThatDoesNotFitDisablesTheRecord) {
-  const Ioc ioc(inputRecord("longin", "Hideos li stringParm", ",FMT=%s"));
+  std::string log;
+  const auto append = [](void* text, const char* line) {
+    static_cast<std::string*>(text)->append(line);
+  };
+  errlogAddListener(append, &log);
+  {
+    const Ioc ioc(inputRecord("longin", "Hideos li stringParm", ",FMT=%s"));
 
-  EXPECT_EQ(Ioc::get("v.PACT"), "1");
+    EXPECT_EQ(Ioc::get("v.PACT"), "1");
+  }
+  errlogFlush();
+  errlogRemoveListeners(append, &log);
+  EXPECT_NE(log.find("v: INP: format \"%s\": a conversion 's' does not fit"), std::string::npos)
+      << log;
 }
 
 TEST_F(StringRecordTest, MpfWriteReadSendsTheFieldOfAnotherRecord) {
