@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// Device support that exchanges plain text with a server.
+//
+//   stringin, lsi   "MPFwriteRead"  INP "#C<location> S0 @<server>,<field>": writes the string of
+//                                   the field of another record, and reads the answer
+//   stringin, lsi   "MPFread"       INP "#C<location> S0 @<server>": reads
+//   stringout, lso  "MPFwrite"      OUT "#C<location> S0 @<server>": writes
+//
+// Escapes in a string that is written, such as \r, are translated; nothing is appended. An answer
+// ends as the server decides; its final CR and LF are removed. The server waits at most 5 s.
+//
+// Source  manual, "devStringMpf".
+#include <array>
+#include <cstring>
+#include <dbFldTypes.h>
+#include <dbLink.h>
+#include <epicsString.h>
+#include <lsiRecord.h>
+#include <lsoRecord.h>
+#include <stringinRecord.h>
+#include <stringoutRecord.h>
+#include <vector>
+
+#include "epics/devices/string_parm/text_device.h"
+
+namespace mpf {
+namespace {
+
+constexpr std::size_t kMaxText = 32767;  // as the longest VAL of lsi and lso
+
+std::string translated(std::string_view text) {
+  std::vector<char> raw(text.size() + 1);
+  const auto size = epicsStrnRawFromEscaped(raw.data(), raw.size(), text.data(), text.size());
+  return {raw.data(), static_cast<std::size_t>(std::max(size, 0))};
+}
+
+// ---- the VAL field of each record type
+
+std::string valueOf(const stringoutRecord& record) {
+  return {record.val, ::strnlen(record.val, sizeof record.val)};
+}
+std::string valueOf(const lsoRecord& record) {
+  return {record.val, ::strnlen(record.val, record.sizv)};
+}
+void setValue(stringinRecord& record, std::string_view text) {
+  record.val[text.copy(record.val, sizeof record.val - 1)] = '\0';
+}
+void setValue(lsiRecord& record, std::string_view text) {
+  const auto size = text.copy(record.val, std::size_t{record.sizv} - 1);
+  record.val[size] = '\0';
+  record.len = static_cast<epicsUInt32>(size + 1);
+}
+
+// A link of device support to a field; reading it is part of the processing of the record.
+class FieldLink {
+ public:
+  FieldLink(dbCommon* record, std::string field) : field_(std::move(field)) {
+    link_.precord = record;
+    link_.type = PV_LINK;
+    link_.value.pv_link.pvname = field_.data();
+    dbInitLink(&link_, DBF_INLINK);
+  }
+  [[nodiscard]] std::optional<std::string> read() {
+    std::vector<char> text(kMaxText + 1);
+    epicsUInt32 size = 0;
+    if (dbGetLinkLS(&link_, text.data(), static_cast<epicsUInt32>(text.size()), &size) != 0)
+      return std::nullopt;
+    return std::string(text.data(), ::strnlen(text.data(), text.size()));
+  }
+
+ private:
+  std::string field_;
+  DBLINK link_{};
+};
+
+template <class Record>
+class TextReader : public TextDevice {
+ public:
+  explicit TextReader(Record* record)
+      : TextDevice(reinterpret_cast<dbCommon*>(record), &record->inp) {}
+  long startIO(dbCommon*) override { return sendText({.cmd = serial::cmdRead}); }
+  static long init(dbCommon* record) {
+    return bindDevice<TextReader>(reinterpret_cast<Record*>(record));
+  }
+
+ private:
+  long takeAnswer(dbCommon* common, TextAnswer answer) final {
+    if (answer.status != serial::serialServerStatusOK) return fail(common, reasonOf(answer.status));
+    const auto end = answer.text.find_last_not_of("\r\n");
+    setValue(*reinterpret_cast<Record*>(common), answer.text.substr(0, end + 1));
+    common->udf = FALSE;
+    return MPF_OK;
+  }
+};
+
+template <class Record>
+class TextWriterReader final : public TextReader<Record> {
+ public:
+  explicit TextWriterReader(Record* record) : TextReader<Record>(record) {
+    auto* common = reinterpret_cast<dbCommon*>(record);
+    const std::string field = this->getUserParm();
+    if (field.empty()) refuseLink(*this, common, "INP", "use @<server>,<field to write>");
+    else field_.emplace(common, field);
+  }
+  long startIO(dbCommon* common) override {
+    const auto text = field_->read();
+    if (!text) return this->fail(common, "cannot read the string to write");
+    return this->sendText(
+        {.cmd = serial::cmdWriteRead | serial::cmdFlush, .text = translated(*text)});
+  }
+  static long init(dbCommon* record) {
+    return bindDevice<TextWriterReader>(reinterpret_cast<Record*>(record));
+  }
+
+ private:
+  std::optional<FieldLink> field_;
+};
+
+template <class Record>
+class TextWriter final : public TextDevice {
+ public:
+  explicit TextWriter(Record* record)
+      : TextDevice(reinterpret_cast<dbCommon*>(record), &record->out) {}
+  long startIO(dbCommon* common) override {
+    const auto text = translated(valueOf(*reinterpret_cast<Record*>(common)));
+    return sendText({.cmd = serial::cmdWrite, .text = text});
+  }
+  static long init(dbCommon* record) {
+    return bindDevice<TextWriter>(reinterpret_cast<Record*>(record));
+  }
+
+ private:
+  long takeAnswer(dbCommon* record, TextAnswer answer) final {
+    return takeWriteStatus(*this, record, answer.status);
+  }
+};
+
+}  // namespace
+
+MAKE_DSET(devSiMpfWriteRead, TextWriterReader<stringinRecord>::init)
+MAKE_DSET(devSiMpfRead, TextReader<stringinRecord>::init)
+MAKE_DSET(devSoMpfWrite, TextWriter<stringoutRecord>::init)
+MAKE_DSET(devLsiMpfWriteRead, TextWriterReader<lsiRecord>::init)
+MAKE_DSET(devLsiMpfRead, TextReader<lsiRecord>::init)
+MAKE_DSET(devLsoMpfWrite, TextWriter<lsoRecord>::init)
+
+}  // namespace mpf
