@@ -215,8 +215,8 @@ class Register {
           if (fields->cmd == kReadBack) {
             fields->value = value_;
           } else {
-            value_ = fields->value;
             ++writes_;
+            value_ = fields->value;
           }
           static_cast<void>(self.reply(std::move(request)));
         }) {}
