@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// docs/router-configuration.md: its files can be loaded, and its table has each key with its
+// docs/router-configuration.md: its files can be loaded, and its list has each key with its
 // default.
 #include <unistd.h>
 
@@ -17,6 +17,7 @@
 namespace mpf::router::test {
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 
 class RouterDocs : public ConfigTest {
@@ -78,15 +79,15 @@ TEST_F(RouterDocs, ShowEveryKeyInTheFirstFileAndNoDefault) {
   const auto config = load(file);
 
   for (const auto& key : keys)
-    EXPECT_THAT(page_, HasSubstr("\n| `" + key + "` | ")) << "no row in the table";
+    EXPECT_THAT(page_, ContainsRegex("\n- `" + key + "`(:|, default )")) << "not in the list";
   for (const auto& name : limitNames()) {
     EXPECT_TRUE(keys.contains(name)) << name;
     EXPECT_NE(limitText(config.limits, name), limitText({}, name)) << name << " has its default";
   }
   const auto end = page_.find("## From the old commands");
-  for (auto at = page_.find("\n| `"); at < end; at = page_.find("\n| `", at + 1)) {
+  for (auto at = page_.find("\n- `"); at < end; at = page_.find("\n- `", at + 1)) {
     const auto key = page_.substr(at + 4, page_.find('`', at + 4) - at - 4);
-    EXPECT_TRUE(keys.contains(key)) << key << " is in the table alone";
+    EXPECT_TRUE(keys.contains(key)) << key << " is in the list alone";
   }
 }
 
@@ -110,8 +111,8 @@ TEST_F(RouterDocs, ShowTheDefaultsOfLimits) {
   for (const auto& name : limitNames()) {
     const auto text = limitText({}, name);
     const auto isNumber = text.find_first_not_of("0123456789") == std::string::npos;
-    EXPECT_THAT(page_, HasSubstr("\n| `" + name + "` | `" + (isNumber ? text : "\"" + text + "\"") +
-                                 "` | "))
+    EXPECT_THAT(page_, HasSubstr("\n- `" + name + "`, default `" +
+                                 (isNumber ? text : "\"" + text + "\"") + "`: "))
         << name;
   }
 }
