@@ -220,8 +220,8 @@ MAY_HAVE_LONG_LINES = ("tests/layout/v1_",)
 
 
 def line_lengths(files):
-    """Sources and scripts have at most 100 columns, pictures and raw strings excepted. In documents
-    a row of a table is one line, and a code block shows output as it is."""
+    """Sources, scripts and documents have at most 100 columns, pictures and raw strings excepted.
+    A code block of a document shows output as it is."""
     for path, text in files.items():
         if path.startswith(MAY_HAVE_LONG_LINES):
             continue
@@ -231,7 +231,7 @@ def line_lengths(files):
         is_in_block = False
         for number, line in lines(text):
             is_in_block ^= is_document and line.lstrip().startswith("```")
-            if is_document and (is_in_block or line.startswith("|")):
+            if is_in_block:
                 continue
             if len(line) > MAX_COLUMNS and not MAY_BE_LONG.search(line):
                 yield path, number, f"{len(line)} columns: more than {MAX_COLUMNS}"
@@ -251,11 +251,11 @@ def shown_code(files):
 
 
 def named_functions(files):
-    """A table row that ends in | `Class::function` | `path` | names a function that this file
-    declares or defines."""
-    row = re.compile(r"\| `(?:\w+::)*(\w+)` \| `([\w./]+)` \|$", re.MULTILINE)
+    """A step of a list that ends in the line `Class::function` in `path` names a function that this
+    file declares or defines."""
+    step = re.compile(r"^ +`(?:\w+::)*(\w+)` in `([\w./]+)`$", re.MULTILINE)
     for path, text in files.items():
-        for match in row.finditer(text) if path.endswith(".md") else ():
+        for match in step.finditer(text) if path.endswith(".md") else ():
             if not re.search(rf"\b{match[1]}\(", files.get(match[2], "")):
                 yield path, line_of(
                     text, match.start()
