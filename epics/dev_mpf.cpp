@@ -267,11 +267,6 @@ long DevMpf::fail(dbCommon* record, const char* reason) {
   return -1;
 }
 
-long DevMpf::report(int level) {
-  IocClients::instance().print(level);
-  return 0;
-}
-
 long DevMpf::readWrite(dbCommon* record) {
   auto* device = static_cast<DevMpf*>(record->dpvt);
   if (device == nullptr) {

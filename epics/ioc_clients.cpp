@@ -2,6 +2,8 @@
 #include "epics/ioc_clients.h"
 
 #include <condition_variable>
+#include <drvSup.h>
+#include <epicsExport.h>
 #include <epicsStdio.h>
 #include <initHooks.h>
 
@@ -88,6 +90,21 @@ void IocClients::print(int level) const {
   }
   if (level < 1) return;
   for (const auto& [owner, device] : devices_) device->print();
+}
+
+namespace {
+
+// dbior prints the connections once, as those of a driver.
+long report(int level) {
+  IocClients::instance().print(level);
+  return 0;
+}
+drvet drvMpf{2, report, nullptr};
+
+}  // namespace
+
+extern "C" {
+epicsExportAddress(drvet, drvMpf);
 }
 
 }  // namespace mpf

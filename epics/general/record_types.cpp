@@ -84,8 +84,7 @@ long initAao(int isAfterRecords) {
   waitingAaoRecords().clear();
   return 0;
 }
-MpfDset devAaoMpf{
-    {5, DevMpf::report, initAao, keepAao, DevMpf::getIoIntInfo}, DevMpf::readWrite, nullptr};
+MpfDset devAaoMpf{{5, nullptr, initAao, keepAao, DevMpf::getIoIntInfo}, DevMpf::readWrite, nullptr};
 
 }  // namespace
 

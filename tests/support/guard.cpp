@@ -178,7 +178,7 @@ int runAsChild(int argc, char** argv, const char* descriptor) {
   return runTests(argc, argv);
 }
 
-int runGuarded(char** argv) {
+int runGuarded(int argc, char** argv) {
   const auto file = makeRegistry();
   const auto folder = makeTemporaryFolder();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);
@@ -189,7 +189,10 @@ int runGuarded(char** argv) {
     if (::getppid() != guard) return 1;  // the guard was killed before prctl()
     // EPICS, for one, must not run in a process that was only forked.
     ::execv("/proc/self/exe", argv);
-    throwSystemError(errno, "run", "/proc/self/exe");
+    if (errno != ENOEXEC) throwSystemError(errno, "run", "/proc/self/exe");
+    // The tests run in an emulator, which cannot execute programs of its processor.
+    ::unsetenv(kRegistryVariable);
+    return runTests(argc, argv);
   }
   testProcess = tests;
   forwardSignals();
@@ -219,7 +222,7 @@ int main(int argc, char** argv) try {
   if (const char* descriptor = ::getenv(mpf::test::kRegistryVariable))
     return mpf::test::runAsChild(argc, argv, descriptor);
   if (!mpf::test::isGuardNeeded(argc, argv)) return mpf::test::runTests(argc, argv);
-  return mpf::test::runGuarded(argv);
+  return mpf::test::runGuarded(argc, argv);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "guard: %s\n", error.what());
   return 1;

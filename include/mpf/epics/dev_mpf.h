@@ -132,7 +132,6 @@ class DevMpf {
   [[nodiscard]] IOSCANPVT ioScan() const noexcept;
 
   // Entries of device support tables.
-  static long report(int level);
   static long readWrite(dbCommon* record);
   static long getIoIntInfo(int detach, dbCommon* record, IOSCANPVT* scan);
   static long linearConvert(dbCommon* record, int pass);
@@ -163,14 +162,14 @@ struct MpfDset {
 }  // namespace mpf
 
 // Define and export a device support table `name`. `init` is a long (*)(dbCommon*).
-#define MPF_DSET_(name, init, number, convert)                                               \
-  namespace {                                                                                \
-  mpf::MpfDset name{{number, mpf::DevMpf::report, nullptr, init, mpf::DevMpf::getIoIntInfo}, \
-                    mpf::DevMpf::readWrite,                                                  \
-                    convert};                                                                \
-  }                                                                                          \
-  extern "C" {                                                                               \
-  epicsExportAddress(dset, name);                                                            \
+#define MPF_DSET_(name, init, number, convert)                                   \
+  namespace {                                                                    \
+  mpf::MpfDset name{{number, nullptr, nullptr, init, mpf::DevMpf::getIoIntInfo}, \
+                    mpf::DevMpf::readWrite,                                      \
+                    convert};                                                    \
+  }                                                                              \
+  extern "C" {                                                                   \
+  epicsExportAddress(dset, name);                                                \
   }
 #define MAKE_LINCONV_DSET(name, init) MPF_DSET_(name, init, 6, mpf::DevMpf::linearConvert)
 #define MAKE_DSET(name, init) MPF_DSET_(name, init, 5, nullptr)
