@@ -4,7 +4,6 @@
 #include <atomic>
 #include <barrier>
 #include <gmock/gmock.h>
-#include <stdexcept>
 #include <thread>
 
 #include "drivers/dac128v/dac128v_model.h"
@@ -162,23 +161,6 @@ TEST(Dac128vModel, ReportsTheVoltagesOfItsOutputs) {
   model.write(DeviceModel::Space::io, 2, 0x0fff, DeviceModel::kHigh);
 
   EXPECT_THAT(told, ElementsAre(Pair(1, -10.0), Pair(1, 8.75)));
-}
-
-TEST(Dac128vRange, GivesTheNearestCode) {
-  EXPECT_EQ(kRanges[0].tryCodeOf(-2.5), 1536);
-  EXPECT_EQ(kRanges[1].tryCodeOf(1.25), 1024);
-  EXPECT_EQ(kRanges[1].tryCodeOf(-0.1), std::nullopt);
-  EXPECT_EQ(kRanges[0].tryCodeOf(10.1), std::nullopt);
-  EXPECT_EQ(kRanges[0].tryCodeOf(std::numeric_limits<double>::quiet_NaN()), std::nullopt);
-}
-
-TEST(Dac128vRanges, AcceptTheSettingsOfTheJumpers) {
-  EXPECT_EQ(parseDac128vRanges("-10to10")[1], (Dac128vRange{-10, 10}));
-  EXPECT_EQ(parseDac128vRanges("-5to+5,0to10")[1], (Dac128vRange{0, 10}));
-  EXPECT_EQ(parseDac128vRanges("-5to+5,0to10")[0], (Dac128vRange{-5, 5}));
-  for (const auto* const text :
-       {"", "10", "10to-10", "0to0", "-3to3", "0to10,", "0to10,0to5,0to5", "0to10V"})
-    EXPECT_THROW(static_cast<void>(parseDac128vRanges(text)), std::invalid_argument) << text;
 }
 
 }  // namespace

@@ -291,19 +291,5 @@ TEST_F(DigitalIoTest, WritesNothingToAnotherModuleWhenItIsDestroyed) {
   EXPECT_EQ(other.read(DeviceModel::Space::io, 18, DeviceModel::kBoth), 0x5555);
 }
 
-TEST(DigitalIoKind, KnowsAllModels) {
-  EXPECT_EQ(digitalIoKinds().size(), 18u);
-  for (const auto& kind : digitalIoKinds()) {
-    EXPECT_EQ(findDigitalIoKind(kind.manufacturer, kind.model), &kind);
-    EXPECT_EQ(findDigitalIoKind(kind.name), &kind);
-    EXPECT_EQ(kind.hasInterrupts,
-              kind.name.find("-I-") != std::string_view::npos || kind.name.ends_with("-I"))
-        << kind.name;
-    EXPECT_EQ(kind.hasThreshold, kind.name.find("HV") != std::string_view::npos) << kind.name;
-  }
-  EXPECT_EQ(findDigitalIoKind(kGreenSpring, 0x6d), nullptr);  // a timer
-  EXPECT_EQ(findDigitalIoKind("IP-Unidig-T"), nullptr);
-}
-
 }  // namespace
 }  // namespace mpf::test
