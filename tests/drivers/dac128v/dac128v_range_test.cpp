@@ -8,14 +8,14 @@
 namespace mpf::test {
 namespace {
 
-constexpr Dac128vRanges kRanges{Dac128vRange{-10, 10}, Dac128vRange{0, 5}};
+constexpr Dac128vRanges kMixedRanges{Dac128vRange{-10, 10}, Dac128vRange{0, 5}};
 
 TEST(Dac128vRange, GivesTheNearestCode) {
-  EXPECT_EQ(kRanges[0].tryCodeOf(-2.5), 1536);
-  EXPECT_EQ(kRanges[1].tryCodeOf(1.25), 1024);
-  EXPECT_EQ(kRanges[1].tryCodeOf(-0.1), std::nullopt);
-  EXPECT_EQ(kRanges[0].tryCodeOf(10.1), std::nullopt);
-  EXPECT_EQ(kRanges[0].tryCodeOf(std::numeric_limits<double>::quiet_NaN()), std::nullopt);
+  EXPECT_EQ(kMixedRanges[0].tryCodeOf(-2.5), 1536);
+  EXPECT_EQ(kMixedRanges[1].tryCodeOf(1.25), 1024);
+  EXPECT_EQ(kMixedRanges[1].tryCodeOf(-0.1), std::nullopt);
+  EXPECT_EQ(kMixedRanges[0].tryCodeOf(10.1), std::nullopt);
+  EXPECT_EQ(kMixedRanges[0].tryCodeOf(std::numeric_limits<double>::quiet_NaN()), std::nullopt);
 }
 
 TEST(Dac128vRanges, AcceptTheSettingsOfTheJumpers) {
