@@ -54,6 +54,11 @@ FileDescriptor lockReaperFile(const std::string& name, int flags) {
   return file;
 }
 
+// A write lock on exactly this byte belongs to a reaper, which is removing the name.
+bool isReapers(const struct flock64& lock) noexcept {
+  return lock.l_type == F_WRLCK && lock.l_start == kReapersByte && lock.l_len == 1;
+}
+
 bool isReaperFileLocked(const std::string& name) {
   const FileDescriptor file(
       ::open(segments::path(name).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
@@ -92,6 +97,9 @@ Reaper::~Reaper() {
 }
 
 bool Reaper::tryBesideStrangers(int fd) {
+  // Look before locking the reaper file: a reaper that finds it locked gives up, and so would we.
+  auto writer = findWriteLock(fd, kReapersByte);
+  if (!writer || isReapers(*writer)) return false;
   ownLock_ = lockReaperFile(reaperFile_, O_CREAT);
   if (!ownLock_) return false;
   // A process of root gives the file to the window's user, so that processes of that user can open
@@ -99,12 +107,10 @@ bool Reaper::tryBesideStrangers(int fd) {
   struct stat window{};
   if (::fstat(fd, &window) == 0 && ::geteuid() == 0)
     static_cast<void>(::fchown(ownLock_.get(), window.st_uid, window.st_gid) == 0);
-  const auto writer = findWriteLock(fd, kReapersByte);
-  if (!writer) return false;
+  writer = findWriteLock(fd, kReapersByte);
+  if (!writer || isReapers(*writer)) return false;
   // Strangers hold only read locks: our own read lock keeps other reapers from the write lock.
-  if (writer->l_type == F_UNLCK) return tryLock(fd, F_RDLCK, kReapersByte, 1);
-  // A write lock on exactly this byte belongs to another reaper, which is removing the name.
-  return writer->l_start != kReapersByte || writer->l_len != 1;
+  return writer->l_type != F_UNLCK || tryLock(fd, F_RDLCK, kReapersByte, 1);
 }
 
 bool removeReaperFile(const std::string& name) {

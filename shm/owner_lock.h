@@ -37,7 +37,8 @@ namespace mpf::owner_lock {
 //                                     ─► has the right, unless another reaper has locked byte 1
 //
 // Only the creator's user may open a reaper file, so no stranger can lock it. The file exists only
-// while it is needed.
+// while it is needed. Of several processes that try at the same time, one gets the right; only if a
+// stranger releases its lock at that moment may all of them give up.
 class Reaper {
  public:
   //   file         the window's file, open for writing

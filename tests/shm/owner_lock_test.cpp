@@ -8,7 +8,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <barrier>
 #include <semaphore>
+#include <thread>
+#include <vector>
 
 #include "shm/stale_segments.h"
 #include "shm/watcher.h"
@@ -184,6 +187,34 @@ TEST_F(ForeignLock, AKilledReaperDoesNotBlockTheNextReaper) {
 
   EXPECT_EQ(nameOf(NameKind::reaper), reaperFile);
   EXPECT_TRUE(segments::removeIfOwnerless(serverName()));
+  EXPECT_EQ(nameOf(NameKind::reaper), "");
+}
+
+// Each reaper stays until all have tried. If all gave up, the name would stay.
+TEST_F(ForeignLock, OfReapersThatTryAtOnceOneGetsTheRight) {
+  constexpr int kReapers = 3;
+  constexpr int kRounds = 3000;
+  auto window = createPage(SegmentKind::serverWindow);
+  ASSERT_TRUE(window.tryPublish(serverName()));
+  const auto reaperFile = SegmentName::keyed(name(), NameKind::reaper, 7);
+  std::vector<int> granted(kRounds, 0);
+  std::barrier together(kReapers);
+  const auto reap = [&] {
+    for (auto& count : granted) {
+      const FileDescriptor opened(::open(segments::path(serverName()).c_str(), O_RDWR | O_CLOEXEC));
+      together.arrive_and_wait();
+      const owner_lock::Reaper reaper(opened, reaperFile);
+      if (reaper.mayRemove()) ++std::atomic_ref(count);
+      together.arrive_and_wait();
+    }
+  };
+
+  {
+    std::vector<std::jthread> reapers;
+    for (int i = 0; i < kReapers; ++i) reapers.emplace_back(reap);
+  }
+
+  EXPECT_THAT(granted, testing::Each(1));
   EXPECT_EQ(nameOf(NameKind::reaper), "");
 }
 
