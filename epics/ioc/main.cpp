@@ -48,11 +48,22 @@ void registerCommands() {
     (*registrar)();
 }
 
+// Loads base.dbd and mpf.dbd, the break tables of thermocouples, and QSRV 2 (pvAccess) if this
+// installation has it.
+void loadDefinitions(const std::string& folder) {
+  std::vector<std::string> names{"base.dbd", "mpf.dbd"};
+  for (const char* name : {"bptTypeJdegC.dbd", "bptTypeJdegF.dbd", "bptTypeKdegC.dbd",
+                           "bptTypeKdegF.dbd", "pvxsIoc.dbd"})
+    if (std::filesystem::exists(fmt::format("{}/{}", folder, name))) names.emplace_back(name);
+  for (const auto& name : names)
+    check(dbLoadDatabase(name.c_str(), folder.c_str(), nullptr),
+          fmt::format("cannot load {}/{}", folder, name));
+  ::setenv("PVXS_QSRV_ENABLE", "YES", 0);
+}
+
 void load(const Options& options) {
   const auto folder = dbdFolder();
-  for (const char* name : {"base.dbd", "mpf.dbd"})
-    check(dbLoadDatabase(name, folder.c_str(), nullptr),
-          fmt::format("cannot load {}/{}", folder, name));
+  loadDefinitions(folder);
   // All that the linked libraries export.
   check(registerAllRecordDeviceDrivers(pdbbase), "cannot register the record types");
   ::setenv("EPICS_DB_INCLUDE_PATH", fmt::format(".:{}", folder).c_str(), 0);

@@ -1,7 +1,8 @@
 # Finds EPICS Base 7: the installation EPICS_BASE (variable or environment) with EPICS_HOST_ARCH,
 # else that of the system, else the one that scripts/setup downloaded into build/epics-base.
-# Defines EPICS_DBD_DIR, EPICS_LIBRARY_DIR and the targets EPICS::Com, EPICS::ca, EPICS::dbCore and
-# EPICS::dbRecStd.
+# Defines EPICS_DBD_FILES, EPICS_LIBRARY_DIR and the targets EPICS::Com, EPICS::ca, EPICS::dbCore and
+# EPICS::dbRecStd. EPICS::pvxsIoc, for pvAccess, exists only if PVXS (variable or environment) or the
+# download has it; its dbd file is then one of EPICS_DBD_FILES, and EPICS_PVXS_LIBRARY_DIR is set.
 include(FindPackageHandleStandardArgs)
 
 set(candidates "${EPICS_BASE}" "$ENV{EPICS_BASE}" /usr/lib/epics
@@ -20,7 +21,7 @@ foreach(candidate IN LISTS candidates)
 endforeach()
 
 if(EPICS_ROOT)
-  set(EPICS_DBD_DIR "${EPICS_ROOT}/dbd")
+  file(GLOB EPICS_DBD_FILES "${EPICS_ROOT}/dbd/*.dbd")
   set(EPICS_LIBRARY_DIR "${EPICS_ROOT}/lib")
   if(EXISTS "${EPICS_ROOT}/lib/${architecture}")
     set(EPICS_LIBRARY_DIR "${EPICS_ROOT}/lib/${architecture}")
@@ -39,15 +40,36 @@ endif()
 
 find_package_handle_standard_args(EPICS REQUIRED_VARS EPICS_ROOT VERSION_VAR EPICS_VERSION)
 
+# Adds the target EPICS::<library> for a library in `folder`.
+function(add_epics_library library folder)
+  # The unversioned library of the wheel is a copy, not a link: two of them would be loaded.
+  file(GLOB versioned "${folder}/lib${library}.so.*")
+  list(APPEND versioned "${folder}/lib${library}.so")
+  list(GET versioned 0 location)
+  add_library(EPICS::${library} SHARED IMPORTED)
+  set_target_properties(EPICS::${library} PROPERTIES IMPORTED_LOCATION "${location}")
+endfunction()
+
+foreach(candidate "${PVXS}" "$ENV{PVXS}" "${EPICS_ROOT}/../pvxslibs" "${EPICS_ROOT}")
+  if(EPICS_FOUND AND candidate AND EXISTS "${candidate}/dbd/pvxsIoc.dbd")
+    list(APPEND EPICS_DBD_FILES "${candidate}/dbd/pvxsIoc.dbd")
+    list(REMOVE_DUPLICATES EPICS_DBD_FILES)
+    set(EPICS_PVXS_LIBRARY_DIR "${candidate}/lib")
+    if(EXISTS "${candidate}/lib/${architecture}")
+      set(EPICS_PVXS_LIBRARY_DIR "${candidate}/lib/${architecture}")
+    endif()
+    break()
+  endif()
+endforeach()
+
 if(EPICS_FOUND AND NOT TARGET EPICS::Com)
   foreach(library Com ca dbCore dbRecStd)
-    # The unversioned library of the wheel is a copy, not a link: two of them would be loaded.
-    file(GLOB versioned "${EPICS_LIBRARY_DIR}/lib${library}.so.*")
-    list(APPEND versioned "${EPICS_LIBRARY_DIR}/lib${library}.so")
-    list(GET versioned 0 location)
-    add_library(EPICS::${library} SHARED IMPORTED)
-    set_target_properties(EPICS::${library} PROPERTIES IMPORTED_LOCATION "${location}")
+    add_epics_library(${library} "${EPICS_LIBRARY_DIR}")
   endforeach()
+  if(EPICS_PVXS_LIBRARY_DIR)
+    add_epics_library(pvxsIoc "${EPICS_PVXS_LIBRARY_DIR}")
+    target_link_libraries(EPICS::pvxsIoc INTERFACE EPICS::dbCore)
+  endif()
   target_include_directories(EPICS::Com INTERFACE ${includes})
   target_compile_definitions(EPICS::Com INTERFACE linux UNIX _GNU_SOURCE _DEFAULT_SOURCE
     USE_TYPED_RSET USE_TYPED_DSET USE_TYPED_DRVET)
