@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ChildProgram: a program of this installation that runs as a child of the IOC. It gets SIGTERM when
-// the thread that started it ends, however it ends.
+// ChildProgram: a program of this installation that runs as a child of the IOC. It gets SIGTERM
+// when the thread that started it ends, however it ends.
 //
 // Threads  one thread constructs the object and calls wait(); terminate(): any.
 // Owner    the destructor terminates the program and waits for its end.
@@ -27,8 +27,8 @@ class ChildProgram {
   ChildProgram& operator=(const ChildProgram&) = delete;
 
   // Waits for its end.
-  //   returns  its exit status, 128 + the number of the signal that killed it, or 127 if there is no
-  //            such program
+  //   returns  its exit status, 128 + the number of the signal that killed it, or 127 if there is
+  //            no such program
   int wait();
   void terminate();
 
