@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// The table and the goals of `mpf bench epics`.
+#include <fmt/format.h>
+
+#include "base/duration_text.h"
+#include "benchmarks/epics/epics.h"
+#include "benchmarks/local/goal_sheet.h"
+#include "benchmarks/local/report.h"
+
+namespace mpf::bench {
+namespace {
+
+constexpr const char* kLine = "  {:<44} {:>10} {:>10} {:>10} {:>10} {:>10}  {}\n";
+
+std::string lineOf(const Result& result) {
+  const auto& what = result.measurement;
+  const auto& figures = result.figures;
+  if (!what.skipped.empty()) return fmt::format("  {:<44} left out: {}\n", what.name, what.skipped);
+  if (!result.error.empty()) return fmt::format("  {:<44} failed: {}\n", what.name, result.error);
+  if (!what.unit.empty())
+    return fmt::format("  {:<44} {:>10.4g} {}\n", what.name, figures.value, what.unit);
+  const auto at = [&](double percent) {
+    return figures.latency.count() == 0
+               ? ""
+               : durationText(static_cast<double>(figures.latency.percentileNs(percent)));
+  };
+  const auto each = costNs(figures);
+  return fmt::format(kLine, what.name, figures.perSecond == 0 ? "" : rateText(figures.perSecond),
+                     each == 0 ? "" : durationText(each), at(50), at(99), at(99.9),
+                     result.ratioToFloor > 0
+                         ? fmt::format("{:.2f} x {}", result.ratioToFloor, what.floorName)
+                         : what.detail);
+}
+
+std::string header(const Measurement& first) {
+  if (!first.unit.empty()) return {};  // each line shows its unit
+  return fmt::format(kLine, "", "a second", "each", "p50", "p99", "p99.9", "");
+}
+
+}  // namespace
+
+std::string epicsTable(const std::vector<Result>& results) {
+  return sections(results, header, lineOf);
+}
+
+std::string epicsGoals(const std::vector<Result>& results) {
+  GoalSheet goals(results);
+  constexpr double kGoalRate = 100'000;
+  constexpr double kGoalCpu = 25;
+  constexpr double kMicrosecond = 1000;
+  if (const auto* row = goals.find(kRecords, kThousand))
+    goals.atLeast("1000 records [a second], at least", row->figures.perSecond, kGoalRate);
+  const auto* bare = goals.find(kRecords, kBareClient);
+  const auto* bounce = goals.find("Floors", kFutexBounce);
+  const auto* record = goals.find(kRecords, kOneRecord);
+  if (bare != nullptr && bounce != nullptr && record != nullptr)
+    goals.atMost("added to a bare message by a record [us], half a futex bounce + 5 us",
+                 (record->costNs() - bare->costNs()) / kMicrosecond,
+                 bounce->costNs() / 2 / kMicrosecond + 5);
+  if (const auto* row = goals.find(kScanned, kIocCpu))
+    goals.atMost("10 000 records at 10 Hz, IOC [% of one CPU], at most", row->figures.value,
+                 kGoalCpu);
+  return goals.text();
+}
+
+}  // namespace mpf::bench
