@@ -19,7 +19,7 @@
 namespace mpf::bench {
 namespace {
 
-std::vector<Measurement> allRows(const EpicsBench& bench) {
+std::vector<Measurement> allEpicsRows(const EpicsBench& bench) {
   auto all = floorMeasurements();
   std::erase_if(all, [](const Measurement& row) { return row.name != kFutexBounce; });
   for (auto more : {recordRequestRows(bench), scannedRows(bench), subscriptionRows(bench)})
@@ -63,8 +63,8 @@ int runEpics(const EpicsOptions& options) {
   keepOnLoopback();
   const Pace pace{std::chrono::seconds(2), std::chrono::seconds(6),
                   [&](const Measurement& row) { return options.quick || row.isSlow ? 1 : 3; }};
-  return run(allRows({kRunPrefix + std::to_string(::getpid()), options.wait}), placement, options,
-             pace, [&](const auto& results) {
+  return run(allEpicsRows({kRunPrefix + std::to_string(::getpid()), options.wait}), placement,
+             options, pace, [&](const auto& results) {
                return fmt::format(
                           "CPU {}: server. CPU {}: IOC and bare client. The server waits in "
                           "mode {}.\n",

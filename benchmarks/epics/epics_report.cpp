@@ -10,9 +10,9 @@
 namespace mpf::bench {
 namespace {
 
-constexpr const char* kLine = "  {:<44} {:>10} {:>10} {:>10} {:>10} {:>10}  {}\n";
+constexpr const char* kEpicsLine = "  {:<44} {:>10} {:>10} {:>10} {:>10} {:>10}  {}\n";
 
-std::string lineOf(const Result& result) {
+std::string epicsLineOf(const Result& result) {
   const auto& what = result.measurement;
   const auto& figures = result.figures;
   if (!what.skipped.empty()) return fmt::format("  {:<44} left out: {}\n", what.name, what.skipped);
@@ -25,22 +25,22 @@ std::string lineOf(const Result& result) {
                : durationText(static_cast<double>(figures.latency.percentileNs(percent)));
   };
   const auto each = costNs(figures);
-  return fmt::format(kLine, what.name, figures.perSecond == 0 ? "" : rateText(figures.perSecond),
-                     each == 0 ? "" : durationText(each), at(50), at(99), at(99.9),
-                     result.ratioToFloor > 0
-                         ? fmt::format("{:.2f} x {}", result.ratioToFloor, what.floorName)
-                         : what.detail);
+  return fmt::format(
+      kEpicsLine, what.name, figures.perSecond == 0 ? "" : rateText(figures.perSecond),
+      each == 0 ? "" : durationText(each), at(50), at(99), at(99.9),
+      result.ratioToFloor > 0 ? fmt::format("{:.2f} x {}", result.ratioToFloor, what.floorName)
+                              : what.detail);
 }
 
-std::string header(const Measurement& first) {
+std::string epicsHeader(const Measurement& first) {
   if (!first.unit.empty()) return {};  // each line shows its unit
-  return fmt::format(kLine, "", "a second", "each", "p50", "p99", "p99.9", "");
+  return fmt::format(kEpicsLine, "", "a second", "each", "p50", "p99", "p99.9", "");
 }
 
 }  // namespace
 
 std::string epicsTable(const std::vector<Result>& results) {
-  return sections(results, header, lineOf);
+  return sections(results, epicsHeader, epicsLineOf);
 }
 
 std::string epicsGoals(const std::vector<Result>& results) {

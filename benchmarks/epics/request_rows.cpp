@@ -15,7 +15,7 @@
 namespace mpf::bench {
 namespace {
 
-constexpr std::size_t kInt32Bytes = 4;
+constexpr std::size_t kRequestBytes = 4;
 
 // Counts replies for the budget's time.
 void countRequests(const RunContext& context) {
@@ -77,7 +77,7 @@ Measurement rowOf(const EpicsBench& bench, const std::string& name, bool isServe
   row.question = kRecords;
   row.name = name;
   row.mode = bench.wait;
-  row.bytes = kInt32Bytes;
+  row.bytes = kRequestBytes;
   row.run = [=](const Stage& stage) {
     Workload workload;
     if (isServed)
@@ -92,7 +92,7 @@ Measurement rowOf(const EpicsBench& bench, const std::string& name, bool isServe
 
 Measurement besideBareClient(Measurement row) {
   row.floorName = kBareClient;
-  row.floorBytes = kInt32Bytes;
+  row.floorBytes = kRequestBytes;
   return row;
 }
 
@@ -106,7 +106,7 @@ std::vector<Measurement> recordRequestRows(const EpicsBench& bench) {
   auto bare =
       rowOf(bench, kBareClient, true, [=](const RunContext& context) { askBare(context, bench); });
   bare.floorName = kFutexBounce;
-  bare.floorBytes = kInt32Bytes;
+  bare.floorBytes = kRequestBytes;
   Measurement manual;
   manual.question = kRecords;
   manual.name = "the manual's, 1999";

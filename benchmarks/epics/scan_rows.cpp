@@ -17,10 +17,10 @@ namespace mpf::bench {
 namespace {
 
 constexpr int kScannedRecords = 10'000;
-constexpr auto kScanAtLeast = std::chrono::seconds(3);
+constexpr auto kScannedAtLeast = std::chrono::seconds(3);
 
 // The results of the measurement, in Figures::more.
-enum ScanFound : std::size_t { requestsPerSecond, cpuOfIoc };
+enum ScannedFound : std::size_t { requestsEachSecond, cpuOfIoc };
 
 void measureScan(const RunContext& context, const EpicsBench& bench) {
   std::string database;
@@ -36,10 +36,11 @@ void measureScan(const RunContext& context, const EpicsBench& bench) {
   const auto before = context.consumedCount();
   const auto cpuBefore = cpuNsOf(::getpid());
   const auto fromNs = Clock::nowNs();
-  sleepFor(std::max<Nanoseconds>(context.budget().measure, kScanAtLeast));
+  sleepFor(std::max<Nanoseconds>(context.budget().measure, kScannedAtLeast));
   const auto elapsedNs = static_cast<double>(Clock::nowNs() - fromNs);
   auto& more = context.figures().more;
-  more[requestsPerSecond] = static_cast<double>(context.consumedCount() - before) * 1e9 / elapsedNs;
+  more[requestsEachSecond] =
+      static_cast<double>(context.consumedCount() - before) * 1e9 / elapsedNs;
   more[cpuOfIoc] = 100 * (cpuNsOf(::getpid()) - cpuBefore) / elapsedNs;
 }
 
@@ -54,7 +55,7 @@ std::vector<Measurement> scannedRows(const EpicsBench& bench) {
     made.name = name;
     made.mode = bench.wait;
     made.unit = unit;
-    made.share = what == requestsPerSecond ? 4 : 0;
+    made.share = what == requestsEachSecond ? 4 : 0;
     made.isSlow = true;
     made.run = [=](const Stage& stage) {
       if (!*seen) {
@@ -70,7 +71,7 @@ std::vector<Measurement> scannedRows(const EpicsBench& bench) {
     };
     return made;
   };
-  return {row("requests that the server received", "a second", requestsPerSecond),
+  return {row("requests that the server received", "a second", requestsEachSecond),
           row(kIocCpu, "% of one CPU", cpuOfIoc)};
 }
 
