@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Listeners of a serial line, while a client talks with the instrument at its far end.
+#include "server/programs/serial_server/sniff_server.h"
+
 #include <numeric>
 #include <vector>
 
-#include "server/programs/serial_server/sniff_server.h"
-#include "tests/server/serial_fixture.h"
+#include "tests/server/programs/serial_server/serial_fixture.h"
 #include "tests/support/victim.h"
 
 namespace mpf::test {

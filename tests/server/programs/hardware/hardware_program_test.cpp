@@ -6,7 +6,7 @@
 
 #include <mpf/digital_io_commands.h>
 
-#include "tests/server/hardware_fixture.h"
+#include "tests/server/programs/hardware/hardware_fixture.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_backplane.h"

@@ -14,7 +14,7 @@
 #include "drivers/dac128v/dac128v_model.h"
 #include "drivers/ip330/ip330_model.h"
 #include "server/programs/ip330_server/ip330_servers.h"
-#include "tests/server/hardware_fixture.h"
+#include "tests/server/programs/hardware/hardware_fixture.h"
 
 namespace mpf::test {
 

@@ -6,7 +6,7 @@
 #include <mpf/digital_io_commands.h>
 
 #include "drivers/ip440/ip440_model.h"
-#include "tests/server/hardware_fixture.h"
+#include "tests/server/programs/hardware/hardware_fixture.h"
 
 namespace mpf::test {
 namespace {

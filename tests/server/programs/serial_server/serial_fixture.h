@@ -17,7 +17,7 @@
 #include "drivers/serial/polled_serial_port.h"
 #include "drivers/serial/terminal_line.h"
 #include "server/programs/serial_server/serial_server.h"
-#include "tests/server/ask_serial.h"
+#include "tests/server/programs/serial_server/ask_serial.h"
 #include "tests/support/instrument.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/watchdog.h"

@@ -4,7 +4,7 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/hardware_fixture.h"
+#include "tests/server/programs/hardware/hardware_fixture.h"
 
 namespace mpf::test {
 namespace {

@@ -8,8 +8,8 @@
 #include <mutex>
 
 #include "drivers/serial/polled_serial_port.h"
-#include "tests/server/fickle_line.h"
-#include "tests/server/serial_fixture.h"
+#include "tests/server/programs/serial_server/fickle_line.h"
+#include "tests/server/programs/serial_server/serial_fixture.h"
 #include "tests/support/alarms.h"
 #include "tests/support/victim.h"
 

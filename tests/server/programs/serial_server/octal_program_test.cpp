@@ -9,7 +9,7 @@
 #include <mpf/serial_commands.h>
 #include <mpf/sync_client.h>
 
-#include "tests/server/ask_serial.h"
+#include "tests/server/programs/serial_server/ask_serial.h"
 #include "tests/support/instrument.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"

@@ -3,7 +3,7 @@
 // memory.
 #include <mpf/serial_commands.h>
 
-#include "tests/server/serial_fixture.h"
+#include "tests/server/programs/serial_server/serial_fixture.h"
 
 namespace mpf::test {
 namespace {

@@ -12,7 +12,7 @@
 #include "drivers/octal_uart/octal_uart_model.h"
 #include "drivers/octal_uart/octal_uart_port.h"
 #include "server/programs/serial_server/serial_server.h"
-#include "tests/server/ask_serial.h"
+#include "tests/server/programs/serial_server/ask_serial.h"
 #include "tests/support/model_carrier.h"
 #include "tests/support/test_backplane.h"
 #include "tests/support/watchdog.h"

@@ -8,7 +8,7 @@
 #include "drivers/digital_io/digital_io_model.h"
 #include "server/programs/digital_io_server/input_server.h"
 #include "server/programs/digital_io_server/output_server.h"
-#include "tests/server/hardware_fixture.h"
+#include "tests/server/programs/hardware/hardware_fixture.h"
 #include "tests/support/victim.h"
 
 namespace mpf::test {
