@@ -21,7 +21,7 @@ namespace {
 using testing::ElementsAre;
 using testing::Pair;
 
-constexpr auto kLong = std::chrono::hours(1);
+constexpr auto kPatience = std::chrono::hours(1);
 constexpr int kTurns = 5;
 
 class TraceeTest : public testing::Test {
@@ -59,10 +59,10 @@ class TraceeTest : public testing::Test {
   }
   void runToPlace() {
     processes_.openGate();
-    while (!tracee_->isThere() && !tracee_->isGone()) processes_.handleEvents(kLong);
+    while (!tracee_->isThere() && !tracee_->isGone()) processes_.handleEvents(kPatience);
   }
   void runToEnd() {
-    while (!tracee_->isGone()) processes_.handleEvents(kLong);
+    while (!tracee_->isGone()) processes_.handleEvents(kPatience);
   }
 
   Marks marks_ = Marks::ofThisProgram();
