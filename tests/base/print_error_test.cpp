@@ -2,7 +2,9 @@
 // printError() and writeError(), in a child process whose stderr is captured or cannot be written.
 #include "base/print_error.h"
 
+#include <sched.h>
 #include <signal.h>
+#include <sys/ioctl.h>
 
 #include <array>
 #include <gtest/gtest.h>
@@ -39,21 +41,24 @@ TEST(WriteError, WritesBytesUnchanged) {
   EXPECT_EQ(errorsOf([] { writeError("\r\x1b[K\xff"); }), "\r\x1b[K\xff");
 }
 
-// A pipe accepts fewer bytes than a long message has; the reader gets all of them.
+// A signal ends write() when a part of the message is in the pipe, and the pipe is full.
 TEST(WriteError, ContinuesAfterAPartialWrite) {
   std::array<int, 2> ends{};
   checkCall(::pipe2(ends.data(), O_CLOEXEC), "pipe2");
   FileDescriptor reader(ends[0]);
   FileDescriptor writer(ends[1]);
-  const auto size = 3 * static_cast<std::size_t>(
-                            checkCall(::fcntl(writer.get(), F_GETPIPE_SZ), "fcntl", "the pipe"));
+  const int capacity = checkCall(::fcntl(writer.get(), F_GETPIPE_SZ), "fcntl", "the pipe");
   const auto child = checkCall(::fork(), "fork");
   if (child == 0) {
+    ::signal(SIGUSR1, [](int) {});
     ::dup2(writer.get(), STDERR_FILENO);
-    writeError(std::string(size, 'x'));
+    writeError(std::string(3 * static_cast<std::size_t>(capacity), 'x'));
     ::_exit(kReturned);
   }
   writer.reset();
+  for (int waiting = 0; waiting < capacity; ::sched_yield())
+    checkCall(::ioctl(reader.get(), FIONREAD, &waiting), "ioctl", "the pipe");
+  ::kill(child, SIGUSR1);
 
   std::size_t received = 0;
   std::array<char, 4096> bytes{};
@@ -62,7 +67,7 @@ TEST(WriteError, ContinuesAfterAPartialWrite) {
 
   int status = 0;
   checkCall(::waitpid(child, &status, 0), "waitpid");
-  EXPECT_EQ(received, size);
+  EXPECT_EQ(received, 3 * static_cast<std::size_t>(capacity));
   EXPECT_EQ(WEXITSTATUS(status), kReturned);
 }
 
