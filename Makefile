@@ -10,7 +10,7 @@
 #   TESTS=regex only the tests whose name matches
 #   COPIES=n    of `make test-repeated`: number of parallel runs of all tests (default 6)
 #   ROUNDS=n    of `make test-repeated`: how many times (default 20)
-#   BENCH=...   of `make bench`: local (default), remote or hardware
+#   BENCH=...   of `make bench`: local (default), remote, hardware or epics
 
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
@@ -64,7 +64,7 @@ fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FU
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
 # Also writes the table to build/release/bench/.
-bench: release ## measure this host (BENCH=local, remote or hardware)
+bench: release ## measure this host (BENCH=local, remote, hardware or epics)
 	@mkdir -p build/release/bench
 	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | \
 		tee build/release/bench/$(or $(BENCH),local).txt'

@@ -2,35 +2,14 @@
 // mpf torture, mpf bench: execute mpf-torture and mpf-bench. These are programs of their own, so
 // that `mpf` does not depend on the libraries that only they need: libelf, and those with which MPF
 // is compared.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <fmt/format.h>
-#include <string>
-#include <vector>
 
-#include "base/print_error.h"
+#include "base/program_beside.h"
 #include "tools/commands.h"
 
 namespace mpf::tools {
 namespace {
-
-// Replaces this process by the program mpf-NAME, which is in the folder of `mpf`.
-int execute(const std::string& name, std::vector<std::string> words, const char* remedy) {
-  const auto program =
-      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / ("mpf-" + name)).string();
-  words.insert(words.begin(), program);
-  std::vector<char*> arguments;
-  arguments.reserve(words.size() + 1);
-  for (auto& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  ::execv(program.c_str(), arguments.data());
-  printError("mpf {}: cannot start {}: {}; {}\n", name, program, std::strerror(errno), remedy);
-  return 1;
-}
 
 // A subcommand that passes all its arguments to mpf-NAME.
 void addProgram(CLI::App& app, Run& run, const char* name, const char* purpose,
@@ -39,7 +18,9 @@ void addProgram(CLI::App& app, Run& run, const char* name, const char* purpose,
   command.prefix_command();
   command.set_help_flag();
   command.callback([&command, &run, remedy] {
-    run = [&command, remedy] { return execute(command.get_name(), command.remaining(), remedy); };
+    run = [&command, remedy] {
+      return executeBeside("mpf-" + command.get_name(), command.remaining(), remedy);
+    };
   });
 }
 

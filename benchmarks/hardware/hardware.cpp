@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <iterator>
 
+#include "base/program_beside.h"
 #include "benchmarks/peers/mpf_peer.h"
 
 namespace mpf::bench {

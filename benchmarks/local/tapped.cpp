@@ -11,6 +11,7 @@
 
 #include <mpf/file_descriptor.h>
 
+#include "base/program_beside.h"
 #include "base/system_call.h"
 #include "benchmarks/local/background.h"
 #include "benchmarks/peers/mpf_peer.h"
@@ -18,9 +19,7 @@
 namespace mpf::bench {
 namespace {
 
-std::string tool() {
-  return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mpf").string();
-}
+std::string tool() { return programBeside("mpf"); }
 
 // Runs `mpf tap` from the folder of this program. The constructor returns when it follows the
 // server. The tap writes the messages to /dev/null.

@@ -7,6 +7,7 @@
 #include <array>
 #include <stdexcept>
 
+#include "base/program_beside.h"
 #include "base/system_call.h"
 #include "benchmarks/peers/mpf_peer.h"
 

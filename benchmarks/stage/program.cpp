@@ -63,8 +63,4 @@ std::string Program::lastLine() const {
   return text.substr(text.rfind('\n') + 1);
 }
 
-std::string programBeside(const std::string& name) {
-  return (std::filesystem::read_symlink("/proc/self/exe").parent_path() / name).string();
-}
-
 }  // namespace mpf::bench

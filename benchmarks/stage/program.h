@@ -41,7 +41,4 @@ class Program {
   FileDescriptor said_;  // an in-memory file that receives the output
 };
 
-// The path of an MPF program in the folder of this program.
-[[nodiscard]] std::string programBeside(const std::string& name);
-
 }  // namespace mpf::bench

@@ -77,14 +77,8 @@ long GeneralDevice::startIO(dbCommon* record) {
       break;
   }
   if (pending_) return take(record, *std::exchange(pending_, std::nullopt));
-  if (subscription_ == Subscription::none) {
-    subscription_ = Subscription::requested;
-    if (query(record, options_.cmd) != 0) {
-      subscription_ = Subscription::none;
-      return -1;
-    }
-  }
-  return repeatResult(record);
+  if (subscription_ == Subscription::none) subscribe(record);
+  return subscription_ == Subscription::none ? -1 : repeatResult(record);
 }
 
 long GeneralDevice::write(dbCommon* record) {
@@ -100,6 +94,11 @@ long GeneralDevice::query(dbCommon* record, std::int32_t cmd) {
                  : fail(record, "value= does not fit the type");
 }
 
+void GeneralDevice::subscribe(dbCommon* record) {
+  const bool isSent = query(record, options_.cmd) == 0;
+  subscription_ = isSent ? Subscription::requested : Subscription::none;
+}
+
 long GeneralDevice::completeIO(dbCommon* record, Message&& message) {
   if (options_.mode == Mode::read) return take(record, message);
   const auto reading = readingOf(message);
@@ -108,14 +107,20 @@ long GeneralDevice::completeIO(dbCommon* record, Message&& message) {
 }
 
 void GeneralDevice::receiveReply(dbCommon* record, Message&& message) {
+  const auto* fate = message.tryAs<RequestFate>();
+  const bool isExpired = fate != nullptr && fate->fate == Fate::expired;
   if (options_.mode == Mode::write) {
     if (hasWritten_ || record->pact) return;  // the record has a newer value
+    hasReadBack_ = fate == nullptr;
     static_cast<void>(take(record, message));
-    if (!stored_) return postAlarm(record);
-    dbProcess(record);  // posts the value; write() does not run
+    if (!stored_) postAlarm(record);
+    else dbProcess(record);  // posts the value; write() does not run
     stored_.reset();
+    // The server has not received the request in time; it may be busy or stopped.
+    if (isExpired) static_cast<void>(query(record, *options_.readback));
     return;
   }
+  if (isExpired) return subscribe(record);
   if (record->pact) return;
   pending_ = std::move(message);
   dbProcess(record);
@@ -153,18 +158,14 @@ void GeneralDevice::connectIO(dbCommon* record, const Connect& connect) {
   const bool isConnected = connect.status == ConnectStatus::connectYes;
   if (!isConnected) subscription_ = Subscription::none;
   if (isConnected && options_.mode == Mode::write) return connectOutput(record);
-  if (isConnected && options_.mode == Mode::subscribe) {
-    subscription_ = Subscription::requested;
-    if (query(record, options_.cmd) != 0) subscription_ = Subscription::none;
-    return;
-  }
+  if (isConnected && options_.mode == Mode::subscribe) return subscribe(record);
   DevMpf::connectIO(record, connect);
 }
 
 // A value is written at the first connection only when PINI asked for it.
 void GeneralDevice::connectOutput(dbCommon* record) {
   const bool isFirst = !std::exchange(hasConnected_, true);
-  if (isFirst && options_.readback && !hasWritten_) {
+  if (options_.readback && !hasReadBack_ && !hasWritten_) {
     static_cast<void>(query(record, *options_.readback));
   } else if ((isFirst && record->pini == menuPiniYES) || (options_.rewrite && hasWritten_)) {
     if (!record->pact) dbProcess(record);

@@ -5,10 +5,11 @@
 //   read       processes ─► startIO ─ request ─► PACT ── reply ──► completeIO: stores the value
 //   write      processes ─► startIO ─ value ───► PACT ── reply ──► completeIO: looks at the status
 //   subscribe  connected ─► request             each message ─► receiveReply ─► processes: stores
-//   readback   first connection ─► request             reply ─► receiveReply: stores ─► processes
+//   readback   connected, until a reply ─► request     reply ─► receiveReply: stores ─► processes
 //
 //   subscription:  none ── request sent ──► requested ── disconnected, refused ──► none
 //
+// A request to subscribe or to read back that the server has not received in time is sent again.
 // A record that subscribes is not active while it waits, so that the first message may come at any
 // time. When it processes for another reason, it keeps its value and its alarm.
 //
@@ -66,6 +67,7 @@ class GeneralDevice final : public DevMpf {
   long write(dbCommon* record);
   // Sends a request whose replies arrive at receiveReply().
   long query(dbCommon* record, std::int32_t cmd);
+  void subscribe(dbCommon* record);
   // Stores the value of a message in the record, or sets an alarm.
   long take(dbCommon* record, const Message& message);
   long repeatResult(dbCommon* record);
@@ -76,6 +78,7 @@ class GeneralDevice final : public DevMpf {
   const LinkOptions options_;
   Subscription subscription_ = Subscription::none;
   bool hasConnected_ = false;
+  bool hasReadBack_ = false;
   bool hasWritten_ = false;
   std::optional<Message> pending_;  // the message that the record processes now
   std::optional<Stored> stored_;  // the result of the last message of a subscription; none: failed

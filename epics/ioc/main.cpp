@@ -1,25 +1,23 @@
 // SPDX-License-Identifier: MIT
 // mpf-ioc: an EPICS IOC with the record types of Base and the device support of MPF.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <array>
-#include <climits>
 #include <cstdlib>
 #include <dbAccess.h>
 #include <dlfcn.h>
 #include <epicsExit.h>
-#include <epicsThread.h>
 #include <filesystem>
 #include <fmt/format.h>
 #include <iocInit.h>
 #include <iocsh.h>
 #include <iocshRegisterCommon.h>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/command_line.h"
 #include "base/run_main.h"
+#include "base/stop_bell.h"
 
 namespace {
 
@@ -86,8 +84,10 @@ int run(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   app.add_option("-m,--macros", options.macros, "Macros of the databases: \"P=lab:,N=1\"");
   app.add_flag("-S,--no-shell", options.noShell,
-               "Do not read commands from standard input; run until a signal");
+               "Do not read commands from standard input; run until SIGINT or SIGTERM");
   if (const auto status = mpf::parseCommandLine(app, argc, argv)) return *status;
+  std::optional<mpf::StopBell> stop;
+  if (options.noShell) stop.emplace();
 
   registerCommands();
   load(options);
@@ -97,8 +97,8 @@ int run(int argc, char** argv) {
   } else {
     check(iocInit(), "iocInit failed: see the error above");
   }
-  if (options.noShell) epicsThreadSuspendSelf();
-  iocsh(nullptr);
+  if (stop) stop->wait();
+  else iocsh(nullptr);
   epicsExit(0);
   return 0;
 }

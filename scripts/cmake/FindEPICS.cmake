@@ -1,8 +1,9 @@
 # Finds EPICS Base 7: the installation EPICS_BASE (variable or environment) with EPICS_HOST_ARCH,
 # else that of the system, else the one that scripts/setup downloaded into build/epics-base.
-# Defines EPICS_DBD_FILES, EPICS_LIBRARY_DIR and the targets EPICS::Com, EPICS::ca, EPICS::dbCore and
-# EPICS::dbRecStd. EPICS::pvxsIoc, for pvAccess, exists only if PVXS (variable or environment) or the
-# download has it; its dbd file is then one of EPICS_DBD_FILES, and EPICS_PVXS_LIBRARY_DIR is set.
+# Defines EPICS_DBD_FILES, EPICS_LIBRARY_DIR and the targets EPICS::Com, EPICS::ca, EPICS::dbCore
+# and EPICS::dbRecStd. EPICS::pvxsIoc, for pvAccess, exists only if PVXS (variable or environment)
+# or the download has it; its dbd file is then one of EPICS_DBD_FILES, and EPICS_PVXS_LIBRARY_DIR
+# is set.
 include(FindPackageHandleStandardArgs)
 
 set(candidates "${EPICS_BASE}" "$ENV{EPICS_BASE}" /usr/lib/epics

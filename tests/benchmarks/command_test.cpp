@@ -23,7 +23,8 @@ TEST(BenchCommand, HelpNamesAllBenches) {
   const auto ended = bench({"--help"});
 
   EXPECT_EQ(ended.status, 0);
-  EXPECT_THAT(ended.out, AllOf(HasSubstr("local"), HasSubstr("remote"), HasSubstr("hardware")));
+  EXPECT_THAT(ended.out, AllOf(HasSubstr("local"), HasSubstr("remote"), HasSubstr("hardware"),
+                               HasSubstr("epics")));
 }
 
 TEST(BenchCommand, ListsTheManualsTableAtBothPlaces) {
@@ -83,7 +84,7 @@ TEST(BenchCommand, ListsEachServerOverHardware) {
 }
 
 TEST(BenchCommand, ListsRowsWithoutCheckingTheCpus) {
-  for (const auto* const which : {"local", "remote", "hardware"})
+  for (const auto* const which : {"local", "remote", "hardware", "epics"})
     EXPECT_EQ(bench({which, "--list", "--cpus", "0,9999"}).status, 0) << which;
 }
 
@@ -110,6 +111,20 @@ TEST(BenchCommand, MeasuresAServerOverAModelBesideTheEcho) {
   EXPECT_EQ(rows[1].at("floor_name"), rows[0].at("name"));
   EXPECT_GT(rows[1].at("ratio_to_floor").get<double>(), 0);
   EXPECT_GT(rows[1].at("p99_ns").get<double>(), 0);
+}
+
+TEST(BenchCommand, MeasuresRecordsOfAnIoc) {
+  const auto ended =
+      bench({"epics", "--quick", "--json", "-", "--only", "1 record", "--only", "one value"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  const auto rows = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(rows.size(), 3u);  // with the floor
+  if (rows[1].contains("skipped")) GTEST_SKIP() << rows[1].at("skipped");
+  EXPECT_EQ(rows[1].at("name"), "1 record at a time");
+  EXPECT_GT(rows[1].at("per_s").get<double>(), 0);
+  EXPECT_EQ(rows[1].at("floor_name"), "SyncClient, no record");
+  EXPECT_GT(rows[2].at("p99_ns").get<double>(), 0);
 }
 
 TEST(BenchCommand, MeasuresEightSerialPortsBesideTheManual) {

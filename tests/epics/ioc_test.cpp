@@ -1,26 +1,41 @@
 // SPDX-License-Identifier: MIT
-// The program mpf-ioc, with commands on its standard input.
+// The program mpf-ioc, with commands on its standard input or in a startup file.
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <fmt/format.h>
+#include <fstream>
 #include <gmock/gmock.h>
+#include <sstream>
+
+#include <mpf/message_server.h>
 
 #include "tests/support/command.h"
+#include "tests/support/program.h"
+#include "tests/support/router_process.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
 
 namespace mpf::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::IsEmpty;
 
-// The server for Channel Access listens on loopback only.
+// The servers for Channel Access and pvAccess listen on loopback only.
 class IocProgram : public testing::Test {
  protected:
   IocProgram() {
     ::setenv("EPICS_CAS_INTF_ADDR_LIST", "127.0.0.1", 1);
     ::setenv("EPICS_CAS_BEACON_ADDR_LIST", "127.0.0.1", 1);
     ::setenv("EPICS_CAS_AUTO_BEACON_ADDR_LIST", "NO", 1);
+    ::setenv("EPICS_PVAS_INTF_ADDR_LIST", "127.0.0.1", 1);
+    ::setenv("EPICS_PVAS_BEACON_ADDR_LIST", "127.0.0.1", 1);
+    ::setenv("EPICS_PVAS_AUTO_BEACON_ADDR_LIST", "NO", 1);
+    ::setenv("EPICS_PVAS_SERVER_PORT", "0", 1);
+    ::setenv("MPF_BACKPLANE", backplane_.name().c_str(), 1);
   }
+  TestBackplane backplane_;
 };
 
 TEST_F(IocProgram, LoadsADatabaseAndListsItsRecords) {
@@ -56,6 +71,67 @@ TEST_F(IocProgram, RunsAStartupFile) {
 
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.output, HasSubstr("DBF_DOUBLE:"));
+}
+
+TEST_F(IocProgram, RunsReportsWhoseOutputMayBeRedirected) {
+  const TemporaryFolder folder;
+  const MessageServer server(backplane_, "lamp");
+  const auto startup =
+      folder.write("st.cmd", fmt::format("mpf ls > {}\nmsr lamp\nmrr\n", folder.file("ls.txt")));
+
+  const auto result = runCommand(std::string(MPF_TEST_IOC) + " " + startup + " </dev/null 2>&1");
+
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, HasSubstr("clientRouterList"));
+  std::stringstream listed;
+  listed << std::ifstream(folder.file("ls.txt")).rdbuf();
+  EXPECT_THAT(listed.str(), HasSubstr("lamp"));
+}
+
+class IocRouter : public IocProgram {
+ protected:
+  // Starts an IOC whose startup file connects to another host, and ends it when one of its records
+  // has sent a request to a server there.
+  int runAndEnd(int signal);
+};
+
+int IocRouter::runAndEnd(int signal) {
+  const TestBackplane far;
+  MessageServer server(far, "lamp");
+  RouterProcess router(
+      {"--backplane", far.name(), "--serve", "1=0", "--listen", "127.0.0.1:0", "--plain"});
+  const auto port = router.listening().substr(router.listening().rfind(':') + 1);
+  const TemporaryFolder folder;
+  static_cast<void>(
+      folder.write("a.db",
+                   "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@lamp:1 address=7\")"
+                   " field(SCAN, \".1 second\") }"));
+  const auto startup = folder.write(
+      "st.cmd", fmt::format("routerInit\nlocalMessageRouterStart(0)\n"
+                            "tcpMessageRouterClientStart(1, {0}, \"127.0.0.1\", 1500, 40)\n"
+                            "tcpMessageRouterClientStart(1, {0}, \"127.0.0.1\", 1500, 40)\n"
+                            "dbLoadRecords(\"{1}\")\niocInit\n",
+                            port.substr(0, port.find('\n')), folder.file("a.db")));
+  Program ioc({MPF_TEST_IOC, "-S", startup});
+
+  Message request;
+  while (!(request = server.receive())) server.waitForMessage();
+  const auto* question = request.tryAs<Int32>();
+  EXPECT_TRUE(question != nullptr && question->address == 7);
+  return ioc.end(signal);
+}
+
+TEST_F(IocRouter, EndsWithTheIoc) {
+  EXPECT_EQ(runAndEnd(SIGTERM), 0);
+
+  EXPECT_THAT(backplane_.segmentNames(), IsEmpty());
+}
+
+// A killed IOC cannot end its router; the kernel does.
+TEST_F(IocRouter, EndsWithAnIocThatIsKilled) {
+  EXPECT_EQ(runAndEnd(SIGKILL), SIGKILL);
+
+  while (!backplane_.segmentNames().empty()) static_cast<void>(backplane_.removeDead());
 }
 
 }  // namespace

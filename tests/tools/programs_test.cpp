@@ -40,11 +40,11 @@ TEST_F(ProgramsTest, AMissingProgramIsAnErrorWithARemedy) {
   const auto bench = runCommand(program_ + " bench local 2>&1");
 
   EXPECT_EQ(WEXITSTATUS(torture.status), 1);
-  EXPECT_EQ(torture.output, "mpf torture: cannot start " + folder_.file("mpf-torture") +
+  EXPECT_EQ(torture.output, "cannot start " + folder_.file("mpf-torture") +
                                 ": No such file or directory; install it in the same folder as "
                                 "mpf\n");
   EXPECT_EQ(WEXITSTATUS(bench.status), 1);
-  EXPECT_EQ(bench.output, "mpf bench: cannot start " + folder_.file("mpf-bench") +
+  EXPECT_EQ(bench.output, "cannot start " + folder_.file("mpf-bench") +
                               ": No such file or directory; build MPF with "
                               "MPF_BUILD_BENCHMARKS=ON to get this program\n");
 }

@@ -269,6 +269,29 @@ TEST_F(GeneralDeviceTest, EachOutputTypeCanBeReadBack) {
   EXPECT_EQ(server.writes(), 0);
 }
 
+// The server is busy with the request of `first`, which is sent before the others, while those
+// expire.
+TEST_F(GeneralDeviceTest, ARequestThatTheServerDidNotReceiveInTimeIsSentAgain) {
+  std::atomic<bool> isBusy = true;
+  const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
+    while (isBusy) std::this_thread::yield();
+    request.tryAs<Int32>()->value = 33;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(
+      "record(longin, \"first\") { field(DTYP, \"MPF\") field(INP, \"@s\") field(PINI, \"YES\") }\n"
+      "record(longin, \"subscribed\") { field(DTYP, \"MPF\")"
+      " field(INP, \"@s mode=subscribe timeout=0.01\") }\n" +
+      longout("@s readback=7 timeout=0.01"));
+  Ioc::waitFor("v.AMSG", "the request was expired");
+
+  isBusy = false;
+
+  Ioc::waitFor("v", "33");
+  Ioc::waitFor("v.SEVR", "NO_ALARM");
+  Ioc::waitFor("subscribed", "33");
+}
+
 TEST_F(GeneralDeviceTest, AReadbackThatFailsIsAnAlarmUntilTheRecordWrites) {
   const ThreadServer server(backplane_, "s", [](MessageServer& self, Message&& request) {
     auto* fields = request.tryAs<Int32>();

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// Programs of the same installation: they are in the folder of the running program.
+//
+// Threads  any.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mpf {
+
+// The path of a program in the folder of this program.
+[[nodiscard]] std::string programBeside(const std::string& name);
+
+// Replaces this process by the program `name`.
+//   remedy   what the user does when it is not there
+//   returns  1, after it has printed why it failed
+[[nodiscard]] int executeBeside(const std::string& name, std::vector<std::string> arguments,
+                                const std::string& remedy);
+
+}  // namespace mpf
