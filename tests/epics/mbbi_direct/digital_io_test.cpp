@@ -136,8 +136,8 @@ TEST_F(MbbiDirectDigitalIo, IoEventRecordsHaveTheirOwnBits) {
   Ioc::waitFor("low", "3");
 }
 
-// "the INP field must contain the address of the I/O card": another text is an error, and the record
-// never processes.
+// "the INP field must contain the address of the I/O card": another text is an error, and the
+// record never processes.
 TEST_F(MbbiDirectDigitalIo, ARecordWithAnInvalidAddressNeverProcesses) {
   startServers();
   const Ioc ioc(polled("bit=3"));

@@ -98,8 +98,8 @@ TEST_F(MbbiDirectMonitors, BitsArePostedWhenTheyHaveChanged) {
   EXPECT_THAT(bit1.takeMasks(), IsEmpty());
 }
 
-// The manual does not say what happens to the other bits when the alarm changes: Base 7 posts all of
-// them, with DBE_ALARM.
+// The manual does not say what happens to the other bits when the alarm changes: Base 7 posts all
+// of them, with DBE_ALARM.
 TEST_F(MbbiDirectMonitors, AllBitsArePostedWhenTheAlarmHasChanged) {
   FieldMonitor bit0("d.B0");
   FieldMonitor bit31("d.B1F");

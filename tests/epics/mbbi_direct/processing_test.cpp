@@ -81,8 +81,8 @@ TEST_F(MbbiDirectProcessing, AMaskOfTheDatabaseIsKept) {
 
 // "If device support includes init_record, it is called."
 // "SHFT This can be set by the device support module at init_record time."
-// "refresh_bits is then called to refresh all the bit fields based on a hardware value": Base 7 sets
-// them from VAL, which the device may have set.
+// "refresh_bits is then called to refresh all the bit fields based on a hardware value": Base 7
+// sets them from VAL, which the device may have set.
 TEST_F(MbbiDirectProcessing, InitRecordOfTheDeviceIsCalled) {
   device_.shift = 4;
   const Ioc ioc(recordOf(R"(field(VAL, "5"))"));

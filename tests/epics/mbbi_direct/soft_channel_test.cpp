@@ -32,7 +32,8 @@ TEST_F(MbbiDirectSoft, ReadsAnUnsignedIntegerIntoVal) {
 // "read_mbbiDirect always returns a value of 2, which means that no conversion is performed."
 TEST_F(MbbiDirectSoft, DoesNotConvert) {
   const Ioc ioc(R"(record(longin, "src") { field(VAL, "48") }
-                   record(mbbiDirect, "d") { field(INP, "src") field(NOBT, "2") field(SHFT, "4") })");
+                   record(mbbiDirect, "d") { field(INP, "src") field(NOBT, "2")
+                     field(SHFT, "4") })");
 
   ASSERT_EQ(Ioc::put("d.PROC", "1"), 0);
 
@@ -82,7 +83,7 @@ TEST_F(MbbiDirectSoft, ABitThatAClientWritesIsReplaced) {
 
 // "the INP field can be a constant, a database, or a channel access link"
 // "read_mbbiDirect calls recGblGetLinkValue to read the current value of VAL": a link with PP
-// processes the other record first. ChannelAccessLink.IsAnInput has the third kind.
+// processes the other record first. channel_access_test.cpp has the third kind.
 TEST_F(MbbiDirectSoft, ADatabaseLinkIsReadWhenTheRecordProcesses) {
   const Ioc ioc(R"(record(calc, "src") { field(CALC, "VAL+1") }
                    record(mbbiDirect, "d") { field(INP, "src PP") })");
