@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,12 +25,14 @@ namespace mpf::test {
 namespace {
 
 constexpr const char* kDatabase = R"(
-record(longout, "out") { field(DTYP, "MPF") field(OUT, "@dioOut cmd=6 address=0xff rewrite=yes") }
+record(longout, "out") { field(DTYP, "MPF")
+  field(OUT, "@dioOut cmd=6 address=0xff readback=7 rewrite=yes") }
 record(longin, "in") { field(DTYP, "MPF") field(INP, "@dioIn cmd=3 address=0xff mask=0xff")
   field(SCAN, "I/O Intr") }
 )";
 
 // What clients print: value and severity.
+constexpr const char* kInitial = "255 0";
 constexpr const char* kFiveValid = "5 0";
 constexpr const char* kFiveInvalid = "5 3";
 
@@ -86,6 +88,13 @@ class EpicsClients : public testing::TestWithParam<Client> {
     EXPECT_EQ(client->wait(), 0);
     return printed;
   }
+  // Writes 5, once the IOC has connected to the server and read the outputs.
+  static void putFive() {
+    std::string printed;
+    do printed = run({"get", "out"});
+    while (printed.find(kInitial) == std::string::npos);
+    static_cast<void>(run({"put", "out", "5"}));
+  }
   // Waits for the next update of a monitor with this text.
   static void waitForUpdate(const Program& monitor, const std::string& text) {
     for (auto line = monitor.line(); line != text; line = monitor.line())
@@ -113,19 +122,16 @@ EpicsClients::EpicsClients() {
   ::setenv("PYTHONPATH", MPF_TEST_PYTHONPATH, 1);
 }
 
-// The record has an alarm until the IOC has connected to the server; then it writes again.
 TEST_P(EpicsClients, GetsAndPuts) {
-  static_cast<void>(run({"put", "out", "5"}));
+  putFive();
 
-  std::string printed;
-  do printed = run({"get", "out"});
-  while (printed.find(kFiveValid) == std::string::npos);
+  EXPECT_THAT(run({"get", "out"}), testing::HasSubstr(kFiveValid));
 }
 
 // The monitor of another record, which the server notifies of the new inputs.
 TEST_P(EpicsClients, MonitorsAServerThatIsKilledAndRestarted) {
   const auto monitor = start({"monitor", "in"});
-  static_cast<void>(run({"put", "out", "5"}));
+  putFive();
   waitForUpdate(*monitor, kFiveValid);
 
   server_->end(SIGKILL);
