@@ -29,6 +29,7 @@ SharedClient::SharedClient(const Backplane& backplane, std::string server, std::
 std::uint32_t SharedClient::add(Member& member) {
   const std::lock_guard lock(mutex_);
   members_.push_back(&member);
+  if (isConnected_) member.deliver(ConnectMessage({.status = ConnectStatus::connectYes}));
   return static_cast<std::uint32_t>(members_.size() - 1);
 }
 
@@ -124,12 +125,9 @@ void SharedClient::onMessage(Message&& message) {
 void SharedClient::onConnect(const Connect& connect) {
   if (connect.status == ConnectStatus::connectQueueFull) return;
   if (connect.status == ConnectStatus::connectNo) endBacklog(Fate::neverTaken);
-  std::vector<Member*> members;
-  {
-    const std::lock_guard lock(mutex_);
-    members = members_;
-  }
-  for (auto* member : members) member->deliver(ConnectMessage(connect));
+  const std::lock_guard lock(mutex_);
+  isConnected_ = connect.status == ConnectStatus::connectYes;
+  for (auto* member : members_) member->deliver(ConnectMessage(connect));
 }
 
 void SharedClient::deliver(std::int32_t clientType, Message&& message) {

@@ -7,7 +7,8 @@
 //
 // When the queue of the server is full, messages wait in the backlog until earlier requests end.
 //
-// Threads  any. deliver() runs on the dispatcher's thread, without a lock of the connection.
+// Threads  any. deliver() runs on the dispatcher's thread, or in add(); it must not call this
+//          object.
 // Crash    each message that send() accepted ends in a reply or a fate, also from the backlog.
 #pragma once
 
@@ -41,6 +42,7 @@ class SharedClient {
   SharedClient(const SharedClient&) = delete;
   SharedClient& operator=(const SharedClient&) = delete;
 
+  // A member that is added when the server is connected gets a ConnectMessage at once.
   //   returns  the number of the member, for send()
   [[nodiscard]] std::uint32_t add(Member& member);
   // Starts to connect. Calls after the first have no effect.
@@ -84,6 +86,7 @@ class SharedClient {
   std::vector<Member*> members_;
   std::deque<Waiting> backlog_;
   bool isBound_ = false;
+  bool isConnected_ = false;  // what the members know
   std::atomic<bool> hasBacklog_{false};
 };
 

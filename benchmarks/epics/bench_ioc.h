@@ -7,6 +7,7 @@
 // Owner    lives until the process ends.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -22,6 +23,9 @@ class BenchIoc {
   // Writes a field, such as "a0.PROC", and processes the record where EPICS does so.
   virtual void put(const std::string& field, const std::string& value) = 0;
   [[nodiscard]] virtual std::string get(const std::string& field) = 0;
+  // The number of a record for isInvalid().
+  [[nodiscard]] virtual std::size_t find(const std::string& record) = 0;
+  [[nodiscard]] virtual bool isInvalid(std::size_t record) const = 0;
   virtual void process(const std::string& record, int times) = 0;
 
   // Monitors a record of an IOC as a client of Channel Access.

@@ -4,9 +4,11 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <alarm.h>
 #include <array>
 #include <cstdlib>
 #include <dbAccess.h>
+#include <dbCommon.h>
 #include <dbLock.h>
 #include <errlog.h>
 #include <filesystem>
@@ -15,6 +17,7 @@
 #include <iocshRegisterCommon.h>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include <mpf/file_descriptor.h>
 
@@ -85,6 +88,15 @@ class EpicsIoc final : public BenchIoc {
     return text.data();
   }
 
+  std::size_t find(const std::string& record) override {
+    records_.push_back(addressOf(record).precord);
+    return records_.size() - 1;
+  }
+  // Without its lock: the caller looks again and again.
+  bool isInvalid(std::size_t record) const override {
+    return *static_cast<const volatile epicsEnum16*>(&records_.at(record)->sevr) == INVALID_ALARM;
+  }
+
   void process(const std::string& record, int times) override {
     auto* common = addressOf(record).precord;
     for (int time = 0; time < times; ++time) {
@@ -99,6 +111,7 @@ class EpicsIoc final : public BenchIoc {
 
  private:
   std::optional<CaMonitor> monitor_;
+  std::vector<const dbCommon*> records_;
 };
 
 }  // namespace

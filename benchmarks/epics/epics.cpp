@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <iterator>
@@ -12,6 +13,7 @@
 
 #include <mpf/file_descriptor.h>
 
+#include "base/command_line.h"
 #include "base/system_call.h"
 #include "benchmarks/epics/bench_ioc.h"
 #include "benchmarks/peers/mpf_peer.h"
@@ -22,7 +24,8 @@ namespace {
 std::vector<Measurement> allEpicsRows(const EpicsBench& bench) {
   auto all = floorMeasurements();
   std::erase_if(all, [](const Measurement& row) { return row.name != kFutexBounce; });
-  for (auto more : {recordRequestRows(bench), scannedRows(bench), subscriptionRows(bench)})
+  for (auto more :
+       {recordRequestRows(bench), scannedRows(bench), subscriptionRows(bench), faultRows(bench)})
     std::move(more.begin(), more.end(), std::back_inserter(all));
   for (auto& row : all) row.skipped = whyNoBenchIoc();
   return all;
@@ -55,6 +58,9 @@ void keepOnLoopback() {
 void addOptions(CLI::App& app, EpicsOptions& options) {
   addOptions(app, static_cast<Options&>(options));
   addWaitOption(app, options.wait);
+  app.add_option("--kills", options.kills,
+                 "Number of kills in the rows about servers that are killed; default 500")
+      ->check(wholeNumber(1, 1'000'000));
 }
 
 int runEpics(const EpicsOptions& options) {
@@ -63,8 +69,8 @@ int runEpics(const EpicsOptions& options) {
   keepOnLoopback();
   const Pace pace{std::chrono::seconds(2), std::chrono::seconds(6),
                   [&](const Measurement& row) { return options.quick || row.isSlow ? 1 : 3; }};
-  return run(allEpicsRows({kRunPrefix + std::to_string(::getpid()), options.wait}), placement,
-             options, pace, [&](const auto& results) {
+  return run(allEpicsRows({kRunPrefix + std::to_string(::getpid()), options.wait, options.kills}),
+             placement, options, pace, [&](const auto& results) {
                return fmt::format(
                           "CPU {}: server. CPU {}: IOC and bare client. The server waits in "
                           "mode {}.\n",

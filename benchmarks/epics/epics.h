@@ -17,6 +17,7 @@ namespace mpf::bench {
 
 struct EpicsOptions : Options {
   Mode wait = Mode::adaptive;  // of the server and of the bare client
+  int kills = 500;             // of servers, in each row about them
 };
 
 inline constexpr const char* kEpicsHelp =
@@ -31,12 +32,15 @@ void addOptions(CLI::App& app, EpicsOptions& options);
 struct EpicsBench {
   std::string backplane;  // unique on this host
   Mode wait = Mode::adaptive;
+  int kills = 0;
 };
 
 // The rows of one source file each.
 [[nodiscard]] std::vector<Measurement> recordRequestRows(const EpicsBench& bench);
 [[nodiscard]] std::vector<Measurement> scannedRows(const EpicsBench& bench);
 [[nodiscard]] std::vector<Measurement> subscriptionRows(const EpicsBench& bench);
+
+[[nodiscard]] std::vector<Measurement> faultRows(const EpicsBench& bench);
 
 [[nodiscard]] std::string epicsTable(const std::vector<Result>& results);
 [[nodiscard]] std::string epicsGoals(const std::vector<Result>& results);
@@ -48,6 +52,10 @@ inline constexpr const char* kPushed = "A server that sends, records with SCAN \
 inline constexpr const char* kBareClient = "SyncClient, no record";
 inline constexpr const char* kOneRecord = "1 record at a time";
 inline constexpr const char* kThousand = "1000 records";
+inline constexpr const char* kFaults = "1000 records, SCAN \".1 second\", on 50 servers";
+inline constexpr const char* kDeath = "from a kill until 20 records are INVALID";
+inline constexpr const char* kReturn = "from a restart until 20 records are valid";
+inline constexpr const char* kStopped = "change of any scan rate while one server is stopped";
 inline constexpr const char* kIocCpu = "CPU of the IOC";
 
 }  // namespace mpf::bench

@@ -60,6 +60,17 @@ std::string epicsGoals(const std::vector<Result>& results) {
   if (const auto* row = goals.find(kScanned, kIocCpu))
     goals.atMost("10 000 records at 10 Hz, IOC [% of one CPU], at most", row->figures.value,
                  kGoalCpu);
+  const auto percentileMs = [&](const std::string& name) -> std::optional<double> {
+    for (const auto& result : results)
+      if (result.isGood() && result.measurement.name.starts_with(name))
+        return static_cast<double>(result.figures.latency.percentileNs(99)) / 1e6;
+    return std::nullopt;
+  };
+  goals.atMost("a kill until INVALID, p99 [ms], at most", percentileMs(kDeath), 10);
+  goals.atMost("a restart until values, p99 [ms], at most", percentileMs(kReturn), 1000);
+  if (const auto* row = goals.find(kFaults, kStopped))
+    goals.atMost("change of a scan rate while one server is stopped [%], at most",
+                 row->figures.value, 1);
   return goals.text();
 }
 

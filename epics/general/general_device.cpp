@@ -121,10 +121,8 @@ void GeneralDevice::receiveReply(dbCommon* record, Message&& message) {
     return;
   }
   if (isExpired) return subscribe(record);
-  if (record->pact) return;
   pending_ = std::move(message);
-  dbProcess(record);
-  pending_.reset();  // a disabled record does not use it
+  if (!record->pact) dbProcess(record);  // a disabled or simulated record uses it later
 }
 
 long GeneralDevice::take(dbCommon* record, const Message& message) {
@@ -156,7 +154,10 @@ long GeneralDevice::failStatus(dbCommon* record, std::int32_t status) {
 
 void GeneralDevice::connectIO(dbCommon* record, const Connect& connect) {
   const bool isConnected = connect.status == ConnectStatus::connectYes;
-  if (!isConnected) subscription_ = Subscription::none;
+  if (!isConnected) {
+    subscription_ = Subscription::none;
+    pending_.reset();
+  }
   if (isConnected && options_.mode == Mode::write) return connectOutput(record);
   if (isConnected && options_.mode == Mode::subscribe) return subscribe(record);
   DevMpf::connectIO(record, connect);

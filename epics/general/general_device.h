@@ -80,7 +80,7 @@ class GeneralDevice final : public DevMpf {
   bool hasConnected_ = false;
   bool hasReadBack_ = false;
   bool hasWritten_ = false;
-  std::optional<Message> pending_;  // the message that the record processes now
+  std::optional<Message> pending_;  // the message that the record processes next
   std::optional<Stored> stored_;  // the result of the last message of a subscription; none: failed
   std::vector<double> scratch_;
 };

@@ -3,66 +3,24 @@
 #include "base/run_main.h"
 
 #include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <sys/sysmacros.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdio>
-#include <functional>
 #include <gtest/gtest.h>
 #include <stdexcept>
-#include <string>
 
-#include <mpf/file_descriptor.h>
-
-#include "base/standard_descriptors.h"
-#include "base/system_call.h"
+#include "tests/base/child_process.h"
 
 namespace mpf {
 namespace {
 
+using test::closeAll;
+using test::endOf;
+using test::Errors;
+using test::isNull;
+using test::redirect;
+
 constexpr int kGood = 42;
-
-// Runs `act` in a child. Returns its exit status, or minus the signal that killed it.
-int endOf(const std::function<int()>& act) {
-  std::fflush(nullptr);
-  const auto child = checkCall(::fork(), "fork");
-  if (child == 0) ::_exit(act());
-  int status = 0;
-  checkCall(::waitpid(child, &status, 0), "waitpid");
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-}
-
-bool isNull(int descriptor) {
-  struct stat status{};
-  return ::fstat(descriptor, &status) == 0 && S_ISCHR(status.st_mode) &&
-         status.st_rdev == makedev(1, 3);
-}
-
-void closeAll(unsigned subset) {
-  for (int descriptor = 0; descriptor < 3; ++descriptor) {
-    if ((subset >> descriptor & 1u) != 0) ::close(descriptor);
-  }
-}
-
-void redirect(int descriptor, const char* path) { ::dup2(::open(path, O_WRONLY), descriptor); }
-
-// Captures stderr.
-class Errors {
- public:
-  Errors() : file_(::memfd_create("stderr", MFD_CLOEXEC)) {}
-  void take() const { ::dup2(file_.get(), STDERR_FILENO); }
-  [[nodiscard]] std::string text() const {
-    std::string text(static_cast<std::size_t>(::lseek(file_.get(), 0, SEEK_END)), '\0');
-    text.resize(static_cast<std::size_t>(::pread(file_.get(), text.data(), text.size(), 0)));
-    return text;
-  }
-
- private:
-  FileDescriptor file_;
-};
 
 TEST(RunMain, OpensTheStandardDescriptorsThatAreClosed) {
   for (unsigned subset = 0; subset < 8; ++subset) {
@@ -129,18 +87,6 @@ TEST(RunMain, FailsIfOutputCannotBeWritten) {
   EXPECT_EQ(end, kExitFailed);
   EXPECT_EQ(errors.text(),
             "x: standard output: not everything could be written: No space left on device\n");
-}
-
-TEST(CloseDescriptor, KeepsAStandardDescriptorNumberInUse) {
-  const auto end = endOf([] {
-    closeDescriptor(STDERR_FILENO);
-    if (!isNull(STDERR_FILENO)) return 1;
-    const int other = ::open("/dev/zero", O_RDONLY);
-    closeDescriptor(other);
-    return ::fcntl(other, F_GETFD) < 0 ? kGood : 2;
-  });
-
-  EXPECT_EQ(end, kGood);
 }
 
 }  // namespace

@@ -262,6 +262,19 @@ def named_functions(files):
                 ), f"names {match[1]}(), which is not in {match[2]}"
 
 
+def named_tests(files):
+    """A document names tests as `Suite.Name`. Nested types of .capnp files are written alike."""
+    defined = re.compile(r"^TEST(?:_[FP])?\((\w+),\s+(\w+)\)", re.MULTILINE)
+    named = re.compile(r"`([A-Z]\w+)\.([A-Z]\w+)`")
+    tests = {match for text in files.values() for match in defined.findall(text)}
+    schema = "".join(text for path, text in files.items() if path.endswith(".capnp"))
+    for path, text in files.items():
+        for match in named.finditer(text) if path.endswith(".md") else ():
+            if match.groups() in tests or re.search(rf"\bstruct {match[1]}\b", schema):
+                continue
+            yield path, line_of(text, match.start()), f"names a test that is absent: {match[0]}"
+
+
 def machine_paths(files):
     """No file depends on the place of the tree or on a package host."""
     place = re.compile(
@@ -299,6 +312,7 @@ RULES = (
     plain_language,
     shown_code,
     named_functions,
+    named_tests,
     machine_paths,
     errors_never_throw,
 )

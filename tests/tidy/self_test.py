@@ -152,6 +152,14 @@ class Rules(unittest.TestCase):
             },
         )
 
+    def test_named_tests(self):
+        rule, document = check.named_tests, "Full: `SlotRing.RefusesPush`, `Server.State`.\n"
+        schema = {"schema/wire.capnp": "struct Server {\n"}
+        self.refuses(rule, {"docs/a.md": document, **schema}, ("docs/a.md", 1))
+        test = {"tests/ring_test.cpp": "TEST(SlotRing, RefusesPush) {\n"}
+        self.refuses(rule, {"docs/a.md": document, **test}, ("docs/a.md", 1))
+        self.passes(rule, {"docs/a.md": document, **schema, **test})
+
     def test_sizes(self):
         self.refuses(check.sizes, {"shm/a.cpp": "\n" * 401}, ("shm/a.cpp", 401))
         self.passes(check.sizes, {"shm/a.cpp": "\n" * 400, "docs/long.md": "\n" * 900})

@@ -27,7 +27,7 @@ std::vector<std::byte> BulkReader::read(const layout::ChunkRef& ref, std::size_t
   const auto& header = segment.header();
   const auto room =
       segment.bytes() < layout::kBulkChunksOffset ? 0 : segment.bytes() - layout::kBulkChunksOffset;
-  if (bytes > header.chunkBytes || ref.chunk >= header.chunkCount || header.chunkBytes > room ||
+  if (header.chunkBytes == 0 || bytes > header.chunkBytes || ref.chunk >= header.chunkCount ||
       header.chunkCount > room / header.chunkBytes) {
     throw SegmentError(fmt::format("{}: {} bytes of chunk {} are not in {} chunks of {} bytes",
                                    segments::path(segment.name()), bytes, ref.chunk,

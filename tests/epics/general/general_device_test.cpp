@@ -269,9 +269,8 @@ TEST_F(GeneralDeviceTest, EachOutputTypeCanBeReadBack) {
   EXPECT_EQ(server.writes(), 0);
 }
 
-// The server is busy with the request of `first`, which is sent before the others, while those
-// expire.
-TEST_F(GeneralDeviceTest, ARequestThatTheServerDidNotReceiveInTimeIsSentAgain) {
+// The server is busy with the request of `first`, which is sent before the other.
+TEST_F(GeneralDeviceTest, AReadbackThatTheServerDidNotReceiveInTimeIsSentAgain) {
   std::atomic<bool> isBusy = true;
   const ThreadServer server(backplane_, "s", [&](MessageServer& self, Message&& request) {
     while (isBusy) std::this_thread::yield();
@@ -279,9 +278,8 @@ TEST_F(GeneralDeviceTest, ARequestThatTheServerDidNotReceiveInTimeIsSentAgain) {
     static_cast<void>(self.reply(std::move(request)));
   });
   const Ioc ioc(
-      "record(longin, \"first\") { field(DTYP, \"MPF\") field(INP, \"@s\") field(PINI, \"YES\") }\n"
-      "record(longin, \"subscribed\") { field(DTYP, \"MPF\")"
-      " field(INP, \"@s mode=subscribe timeout=0.01\") }\n" +
+      "record(longin, \"first\") { field(DTYP, \"MPF\") field(INP, \"@s\") field(PINI, \"YES\") "
+      "}\n" +
       longout("@s readback=7 timeout=0.01"));
   Ioc::waitFor("v.AMSG", "the request was expired");
 
@@ -289,7 +287,27 @@ TEST_F(GeneralDeviceTest, ARequestThatTheServerDidNotReceiveInTimeIsSentAgain) {
 
   Ioc::waitFor("v", "33");
   Ioc::waitFor("v.SEVR", "NO_ALARM");
-  Ioc::waitFor("subscribed", "33");
+}
+
+TEST_F(GeneralDeviceTest, ASubscriptionThatTheServerDidNotReceiveInTimeIsSentAgain) {
+  MessageServer server(backplane_, "s");
+  const auto receive = [&] {
+    Message request;
+    while (!(request = server.receive())) server.waitForMessage();
+    return request;
+  };
+  const Ioc ioc(longin("@s mode=subscribe timeout=0.01", ""));
+  receive().reset();  // refused
+  Ioc::waitFor("v.AMSG", "the request was refused");
+
+  static_cast<void>(Ioc::put("v.PROC", "1"));
+  const auto expired = Deadline::after(std::chrono::milliseconds(20));
+  while (!expired.hasPassed()) std::this_thread::yield();
+
+  auto request = receive();
+  request.tryAs<Int32>()->value = 4;
+  EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent);
+  Ioc::waitFor("v", "4");
 }
 
 TEST_F(GeneralDeviceTest, AReadbackThatFailsIsAnAlarmUntilTheRecordWrites) {

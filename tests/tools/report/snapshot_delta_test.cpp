@@ -5,54 +5,22 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/tools/report/views.h"
+
 namespace mpf::tools {
 namespace {
 
-constexpr std::uint64_t kServer = 1;
-constexpr std::uint64_t kClient = 2;
-
-LinkView link(std::uint64_t incarnation, Traffic requests, Traffic replies = {}) {
-  LinkView view;
-  view.incarnation = incarnation;
-  view.serverWindow = kServer;
-  view.clientWindow = kClient;
-  view.requests = requests;
-  view.replies = replies;
-  return view;
-}
-
-WindowView server(std::uint64_t received, std::uint64_t sent, std::vector<LinkView> links = {}) {
-  WindowView view;
-  view.isServer = true;
-  view.incarnation = kServer;
-  view.received = received;
-  view.sent = sent;
-  view.processState = 'S';
-  view.links = std::move(links);
-  return view;
-}
-
-WindowView client(std::uint64_t received, std::vector<LinkView> links = {}) {
-  auto view = server(received, 0, std::move(links));
-  view.isServer = false;
-  view.incarnation = kClient;
-  return view;
-}
-
-Snapshot snapshot(std::int64_t atNs, std::vector<WindowView> servers,
-                  std::vector<WindowView> clients = {}) {
-  Snapshot made;
-  made.atNs = atNs;
-  made.servers = std::move(servers);
-  made.clients = std::move(clients);
-  return made;
-}
-
-constexpr std::int64_t kHalfASecond = 500'000'000;
+using test::clientView;
+using test::kClient;
+using test::kHalfASecond;
+using test::kServer;
+using test::linkView;
+using test::serverView;
+using test::snapshotOf;
 
 TEST(SnapshotDelta, RatesOfAServerAreWhatItReceivedAndSent) {
-  const SnapshotDelta delta(snapshot(0, {server(100, 50)}),
-                            snapshot(kHalfASecond, {server(200, 80)}));
+  const SnapshotDelta delta(snapshotOf(0, {serverView(100, 50)}),
+                            snapshotOf(kHalfASecond, {serverView(200, 80)}));
 
   const auto rates = delta.ratesOf(delta.now().servers.front());
 
@@ -63,8 +31,9 @@ TEST(SnapshotDelta, RatesOfAServerAreWhatItReceivedAndSent) {
 // The links of clients that connect and leave between two snapshots are not in either of them, but
 // their requests count.
 TEST(SnapshotDelta, RatesOfAServerIncludeClientsThatLeft) {
-  const SnapshotDelta delta(snapshot(0, {server(100, 100, {link(7, {100, 100}, {100, 100})})}),
-                            snapshot(kHalfASecond, {server(130, 130)}));
+  const SnapshotDelta delta(
+      snapshotOf(0, {serverView(100, 100, {linkView(7, {100, 100}, {100, 100})})}),
+      snapshotOf(kHalfASecond, {serverView(130, 130)}));
 
   const auto rates = delta.ratesOf(delta.now().servers.front());
 
@@ -74,8 +43,8 @@ TEST(SnapshotDelta, RatesOfAServerIncludeClientsThatLeft) {
 
 TEST(SnapshotDelta, RatesOfAClientAreWhatItsLinksSentAndItReceived) {
   const SnapshotDelta delta(
-      snapshot(0, {}, {client(10, {link(7, {10, 10}), link(8, {1000, 1000})})}),
-      snapshot(kHalfASecond, {}, {client(15, {link(7, {20, 20}), link(9, {5, 5})})}));
+      snapshotOf(0, {}, {clientView(10, {linkView(7, {10, 10}), linkView(8, {1000, 1000})})}),
+      snapshotOf(kHalfASecond, {}, {clientView(15, {linkView(7, {20, 20}), linkView(9, {5, 5})})}));
 
   const auto rates = delta.ratesOf(delta.now().clients.front());
 
@@ -84,22 +53,23 @@ TEST(SnapshotDelta, RatesOfAClientAreWhatItsLinksSentAndItReceived) {
 }
 
 TEST(SnapshotDelta, AWindowWithoutAnEarlierSnapshotHasNoRates) {
-  const SnapshotDelta delta(snapshot(0, {}), snapshot(kHalfASecond, {server(100, 100)}));
+  const SnapshotDelta delta(snapshotOf(0, {}), snapshotOf(kHalfASecond, {serverView(100, 100)}));
 
   EXPECT_DOUBLE_EQ(delta.ratesOf(delta.now().servers.front()).receivedPerSecond, 0);
 }
 
 TEST(SnapshotDelta, DecreasingCountersAndEqualTimesGiveNoRates) {
-  const SnapshotDelta back(snapshot(0, {server(100, 100)}),
-                           snapshot(kHalfASecond, {server(10, 10)}));
-  const SnapshotDelta standing(snapshot(5, {server(1, 1)}), snapshot(5, {server(2, 2)}));
+  const SnapshotDelta back(snapshotOf(0, {serverView(100, 100)}),
+                           snapshotOf(kHalfASecond, {serverView(10, 10)}));
+  const SnapshotDelta standing(snapshotOf(5, {serverView(1, 1)}),
+                               snapshotOf(5, {serverView(2, 2)}));
 
   EXPECT_DOUBLE_EQ(back.ratesOf(back.now().servers.front()).sentPerSecond, 0);
   EXPECT_DOUBLE_EQ(standing.ratesOf(standing.now().servers.front()).sentPerSecond, 0);
 }
 
 TEST(SnapshotDelta, FindsWindowsByTheirIncarnation) {
-  const SnapshotDelta delta(snapshot(0, {}), snapshot(1, {server(0, 0)}, {client(0)}));
+  const SnapshotDelta delta(snapshotOf(0, {}), snapshotOf(1, {serverView(0, 0)}, {clientView(0)}));
 
   EXPECT_EQ(delta.find(kServer), &delta.now().servers.front());
   EXPECT_EQ(delta.find(kClient), &delta.now().clients.front());
@@ -107,45 +77,53 @@ TEST(SnapshotDelta, FindsWindowsByTheirIncarnation) {
 }
 
 std::string serverState(const WindowView& before, const WindowView& now) {
-  const SnapshotDelta delta(snapshot(0, {before}), snapshot(kHalfASecond, {now}));
+  const SnapshotDelta delta(snapshotOf(0, {before}), snapshotOf(kHalfASecond, {now}));
   return delta.stateOf(delta.now().servers.front());
 }
 
 TEST(SnapshotDelta, AnIdleServerIsAlive) {
-  EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {5, 5})})), "alive");
+  EXPECT_EQ(
+      serverState(serverView(5, 5, {linkView(7, {5, 5})}), serverView(5, 5, {linkView(7, {5, 5})})),
+      "alive");
 }
 
 TEST(SnapshotDelta, AServerThatTakesNothingWhileRequestsWaitIsStalled) {
-  EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {9, 5})})),
-            "stalled");
+  EXPECT_EQ(
+      serverState(serverView(5, 5, {linkView(7, {6, 5})}), serverView(5, 5, {linkView(7, {9, 5})})),
+      "stalled");
 }
 
 TEST(SnapshotDelta, AServerThatReceivesIsAliveEvenIfMessagesWait) {
-  EXPECT_EQ(serverState(server(5, 5, {link(7, {60, 5})}), server(6, 6, {link(7, {60, 6})})),
+  EXPECT_EQ(serverState(serverView(5, 5, {linkView(7, {60, 5})}),
+                        serverView(6, 6, {linkView(7, {60, 6})})),
             "alive");
 }
 
 TEST(SnapshotDelta, ARequestThatJustArrivedIsNotAStall) {
-  EXPECT_EQ(serverState(server(5, 5, {link(7, {5, 5})}), server(5, 5, {link(7, {6, 5})})), "alive");
-  EXPECT_EQ(serverState(server(5, 5, {link(7, {6, 5})}), server(5, 5, {link(7, {6, 6})})), "alive");
+  EXPECT_EQ(
+      serverState(serverView(5, 5, {linkView(7, {5, 5})}), serverView(5, 5, {linkView(7, {6, 5})})),
+      "alive");
+  EXPECT_EQ(
+      serverState(serverView(5, 5, {linkView(7, {6, 5})}), serverView(5, 5, {linkView(7, {6, 6})})),
+      "alive");
 }
 
 // The sums of the links decrease when another client leaves; the server is still stalled.
 TEST(SnapshotDelta, AStalledServerStaysStalledWhenAClientLeaves) {
-  EXPECT_EQ(serverState(server(9, 9, {link(7, {6, 5}), link(8, {4, 4})}),
-                        server(9, 9, {link(7, {6, 5})})),
+  EXPECT_EQ(serverState(serverView(9, 9, {linkView(7, {6, 5}), linkView(8, {4, 4})}),
+                        serverView(9, 9, {linkView(7, {6, 5})})),
             "stalled");
 }
 
 TEST(SnapshotDelta, AClientThatDoesNotTakeItsRepliesIsStalled) {
-  const auto stuck = client(2, {link(7, {5, 5}, {5, 2})});
-  const SnapshotDelta delta(snapshot(0, {}, {stuck}), snapshot(kHalfASecond, {}, {stuck}));
+  const auto stuck = clientView(2, {linkView(7, {5, 5}, {5, 2})});
+  const SnapshotDelta delta(snapshotOf(0, {}, {stuck}), snapshotOf(kHalfASecond, {}, {stuck}));
 
   EXPECT_EQ(delta.stateOf(delta.now().clients.front()), "stalled");
 }
 
 TEST(SnapshotDelta, TheWorstStateIsReported) {
-  const auto stuck = server(5, 5, {link(7, {6, 5})});
+  const auto stuck = serverView(5, 5, {linkView(7, {6, 5})});
   auto stopped = stuck;
   stopped.processState = 'T';
   auto traced = stuck;
@@ -162,14 +140,14 @@ TEST(SnapshotDelta, TheWorstStateIsReported) {
 }
 
 TEST(Totals, IncomingAreRequestsOfAServerAndRepliesOfAClient) {
-  auto one = link(7, {10, 8}, {7, 6});
+  auto one = linkView(7, {10, 8}, {7, 6});
   one.refused = 1;
   one.unanswered = 2;
   one.bytes = 4096;
   const std::vector<LinkView> links{one, one};
 
-  const auto ofServer = Totals::of(server(0, 0, links));
-  const auto ofClient = Totals::of(client(0, links));
+  const auto ofServer = Totals::of(serverView(0, 0, links));
+  const auto ofClient = Totals::of(clientView(0, links));
 
   EXPECT_EQ(ofServer.incoming.waiting(), 4U);
   EXPECT_EQ(ofServer.outgoing.waiting(), 2U);
@@ -204,8 +182,8 @@ RouterLineView line(const std::string& address, std::uint64_t count) {
 }
 
 SnapshotDelta routersAt(const RouterView& before, const RouterView& now) {
-  auto was = snapshot(0, {});
-  auto is = snapshot(kHalfASecond, {});
+  auto was = snapshotOf(0, {});
+  auto is = snapshotOf(kHalfASecond, {});
   was.routers = {before};
   is.routers = {now};
   return {std::move(was), std::move(is)};
@@ -250,12 +228,12 @@ TEST(SnapshotDelta, AConnectionHasTheStateOfADeadRouter) {
 }
 
 TEST(SnapshotDelta, AWindowOfARouterLeadsToItsConnection) {
-  auto proxy = server(0, 0);
+  auto proxy = serverView(0, 0);
   proxy.router = 5;
   proxy.routerRow = 3;
-  auto is = snapshot(1, {proxy, server(0, 0)});
+  auto is = snapshotOf(1, {proxy, serverView(0, 0)});
   is.routers = {router({line("a", 0)})};
-  const SnapshotDelta delta(snapshot(0, {}), std::move(is));
+  const SnapshotDelta delta(snapshotOf(0, {}), std::move(is));
 
   EXPECT_EQ(delta.routerOf(delta.now().servers.front()).line,
             &delta.now().routers.front().lines.front());

@@ -10,11 +10,13 @@
 #include <mpf/sync_client.h>
 
 #include "tests/shm/shm_fixture.h"
+#include "tests/tools/report/latencies.h"
 
 namespace mpf::tools {
 namespace {
 
 using namespace std::chrono_literals;
+using test::latencies;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
@@ -210,6 +212,38 @@ TEST_F(SnapshotTest, AForeignFileUnderAnyNameIsAProblem) {
     segments::remove(each);
   }
   EXPECT_THAT(problems, SizeIs(junk.size()));
+}
+
+TEST(Latencies, AreZeroWithoutSamples) { EXPECT_EQ(Latencies().percentileNs(50), 0U); }
+
+TEST(Latencies, OneSampleIsEveryPercentile) {
+  const auto one = latencies({{1000, 1}});
+
+  for (const double percent : {0.0, 50.0, 99.9, 100.0})
+    EXPECT_EQ(one.percentileNs(percent), 1000U) << percent;
+}
+
+TEST(Latencies, APercentileIsTheEndOfItsBucket) {
+  const auto some = latencies({{1024, 50}, {5000, 49}, {100'000, 1}});
+
+  EXPECT_EQ(some.percentileNs(50), 1280U);
+  EXPECT_EQ(some.percentileNs(51), 5120U);
+  EXPECT_EQ(some.percentileNs(99), 5120U);
+  EXPECT_EQ(some.percentileNs(99.9), 100'000U);
+}
+
+// One sample in a thousand is not within the lower 99.9 %, in spite of rounding errors of 99.9.
+TEST(Latencies, AnOutlierDoesNotChangeLowerPercentiles) {
+  const auto some = latencies({{1024, 999}, {1'000'000, 1}});
+
+  EXPECT_EQ(some.percentileNs(99.9), 1280U);
+  EXPECT_EQ(some.percentileNs(100), 1'000'000U);
+}
+
+TEST(Latencies, SamplesBeyondTheLastBucketAreTheMaximum) {
+  const auto some = latencies({{std::uint64_t{1} << 45, 1}});
+
+  EXPECT_EQ(some.percentileNs(50), std::uint64_t{1} << 45);
 }
 
 }  // namespace

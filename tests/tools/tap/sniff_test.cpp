@@ -4,7 +4,7 @@
 #include <regex>
 
 #include "server/programs/serial_server/sniff_server.h"
-#include "tests/server/serial_fixture.h"
+#include "tests/server/programs/serial_server/serial_fixture.h"
 #include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {

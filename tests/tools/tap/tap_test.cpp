@@ -1,61 +1,16 @@
 // SPDX-License-Identifier: MIT
-// `mpf tap` and `mpf replay`: read and record messages, and send them again.
-#include <filesystem>
+// `mpf tap`: shows and records messages.
 #include <regex>
 
-#include <mpf/sync_client.h>
-
 #include "tests/support/victim.h"
-#include "tests/tools/tools_fixture.h"
+#include "tests/tools/tap/tap_fixture.h"
 
 namespace mpf::test {
 namespace {
 
-using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::MatchesRegex;
-
-class TapTest : public ToolsTest {
- protected:
-  void TearDown() override {
-    std::filesystem::remove(file_);
-    ToolsTest::TearDown();
-  }
-  // Returns when the tap follows `links` links of the server.
-  std::unique_ptr<Tool> tap(std::vector<std::string> more, int links = 1) const {
-    std::vector<std::string> arguments{"tap", "echo"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    auto tool = std::make_unique<Tool>(arguments, backplane_.name());
-    while (tool->err().find("mpf tap: \"echo\" has " + std::to_string(links)) == std::string::npos)
-      std::this_thread::yield();
-    return tool;
-  }
-  static void callMany(SyncClient& client, int from, int to) {
-    for (int i = from; i < to; ++i) {
-      const auto answer = client.call(Int32Message({.value = i}), 1h);
-      ASSERT_TRUE(answer);
-    }
-  }
-  static std::vector<nlohmann::json> objects(const std::string& lines) {
-    std::vector<nlohmann::json> all;
-    std::istringstream stream(lines);
-    for (std::string line; std::getline(stream, line);) all.push_back(nlohmann::json::parse(line));
-    return all;
-  }
-  // The messages of one direction.
-  static std::vector<nlohmann::json> messages(const std::vector<nlohmann::json>& all,
-                                              const std::string& direction) {
-    std::vector<nlohmann::json> some;
-    for (const auto& object : all) {
-      if (object.value("direction", "") == direction) some.push_back(object.at("message"));
-    }
-    return some;
-  }
-
-  std::string file_ = std::filesystem::temp_directory_path() / (backplane_.name() + ".mpf");
-};
 
 TEST_F(TapTest, ShowsRequestsAndTheirReplies) {
   const EchoThread echo(backplane_, "echo");
@@ -210,87 +165,6 @@ TEST_F(TapTest, FollowsOneChosenLink) {
     EXPECT_THAT(wrong.err, HasSubstr(std::string("\"") + word +
                                      "\" is not a link: use the 16 hexadecimal digits"));
   }
-}
-
-TEST_F(TapTest, ReplaySendsARecordingInOrder) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient one(backplane_, "echo");
-    SyncClient two(backplane_, "echo");
-    callMany(one, 0, 1);
-    callMany(two, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "44"}, 2);
-    for (int i = 0; i < 10; ++i) {
-      callMany(one, i, i + 1);
-      callMany(two, 100 + i, 101 + i);
-    }
-    auto array = Int32ArrayMessage::allocValue(1000);
-    std::ranges::fill(array.value(), 7);
-    ASSERT_TRUE(one.call(std::move(array), 1h));
-    ASSERT_TRUE(two.call(Char8ArrayMessage::allocValue(0), 1h));
-    EXPECT_EQ(tool->end().status, 0);
-  }
-  std::vector<std::int32_t> values;
-  std::size_t elements = 0;
-  MessageServer server(backplane_, "echo");
-  server.on<Int32>([&](Int32& request) { values.push_back(request.value); });
-  server.on<Int32Array>([&](Int32ArrayMessage& request) { elements += request.value().size(); });
-  server.on<Char8Array>([](Char8ArrayMessage&) {});
-  std::thread thread([&] { server.run(); });
-
-  const auto ended = run({"replay", file_, "--timeout", "1000", "--json"});
-
-  server.interrupt();
-  thread.join();
-  EXPECT_EQ(ended.status, 0) << ended.err;
-  const auto report = nlohmann::json::parse(ended.out);
-  EXPECT_EQ(report.at("clients"), 2);
-  EXPECT_EQ(report.at("requests"), 22);
-  EXPECT_EQ(report.at("replied"), 22);
-  EXPECT_THAT(report.at("ends"), IsEmpty());
-  std::vector<std::int32_t> ofOne;
-  std::ranges::copy_if(values, std::back_inserter(ofOne), [](auto value) { return value < 100; });
-  EXPECT_THAT(ofOne, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9));
-  EXPECT_EQ(values.size(), 20u);
-  EXPECT_EQ(elements, 1000u);
-}
-
-TEST_F(TapTest, ReplayRefusesAFileThatIsNotARecording) {
-  std::ofstream(file_) << "a text that is not a recording, but long enough for frame headers: ";
-
-  const auto ended = run({"replay", file_});
-
-  EXPECT_EQ(ended.status, 1);
-  EXPECT_EQ(ended.err, "mpf replay: " + file_ +
-                           ": record 1, at byte 0 of 67: not a recording of `mpf tap "
-                           "--write`, or one that was cut off within its "
-                           "first record\n");
-  EXPECT_EQ(ended.out, "") << "no request was sent";
-  EXPECT_EQ(run({"replay", file_ + ".none"}).status, 2);
-}
-
-TEST_F(TapTest, ReplaySendsATruncatedRecordingUpToItsEnd) {
-  {
-    const EchoThread echo(backplane_, "echo");
-    SyncClient client(backplane_, "echo");
-    callMany(client, 0, 1);
-    const auto tool = tap({"--write", file_, "--count", "4"});
-    callMany(client, 0, 2);
-    EXPECT_EQ(tool->end().status, 0);
-  }
-  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) - 5);
-  const EchoThread echo(backplane_, "echo");
-
-  const auto ended = run({"replay", file_, "--speed", "0", "--timeout", "1000"});
-
-  EXPECT_EQ(ended.status, 1);
-  EXPECT_THAT(ended.out, HasSubstr("2 requests of 1 client to \"echo\": 2 replied"));
-  EXPECT_THAT(ended.err,
-              testing::MatchesRegex("mpf replay: .*: record 5, at byte [0-9]+ of [0-9]+: the file "
-                                    "is damaged, or was cut off here; the "
-                                    "records before it can be read: `head -c [0-9]+ FILE >NEW` "
-                                    "keeps them, `mpf tap --write` records "
-                                    "again\n"));
 }
 
 TEST_F(TapTest, FailsAtOnceWhenTheFileCannotBeWritten) {

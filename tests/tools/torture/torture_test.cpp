@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // `mpf torture`: everything holds when processes are stopped and killed at each step, and the
 // program detects mistakes.
-#include <sys/ptrace.h>
-
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +10,7 @@
 
 #include "tests/support/watchdog.h"
 #include "tests/tools/tool.h"
+#include "tests/tools/torture/may_trace.h"
 
 namespace mpf::test {
 namespace {
@@ -29,16 +28,6 @@ class TortureTest : public testing::Test {
     GTEST_SKIP() << "ThreadSanitizer does not follow processes that fork and start threads";
 #endif
     if (!mayTrace()) GTEST_SKIP() << "this host does not let a process trace its children";
-  }
-  static bool mayTrace() {
-    const auto child = checkCall(::fork(), "fork");
-    if (child == 0) {
-      for (;;) ::pause();
-    }
-    const bool may = ::ptrace(PTRACE_SEIZE, child, nullptr, nullptr) == 0;
-    ::kill(child, SIGKILL);
-    ::waitpid(child, nullptr, 0);
-    return may;
   }
   static Ended torture(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "torture");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Records, a serial server and an instrument on a pseudo-terminal.
 #include "tests/epics/ioc.h"
-#include "tests/server/serial_fixture.h"
+#include "tests/server/programs/serial_server/serial_fixture.h"
 
 namespace mpf::test {
 namespace {
