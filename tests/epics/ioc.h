@@ -20,7 +20,8 @@ namespace mpf::test {
 class Ioc {
  public:
   //   database  text of a .db file
-  explicit Ioc(const std::string& database) {
+  //   macros    "P=lab:,N=1"
+  explicit Ioc(const std::string& database, const std::string& macros = "") {
     testPlan(0);
     eltc(0);  // errors are expected; not on the terminal
     testdbPrepare();
@@ -28,7 +29,7 @@ class Ioc {
     testdbReadDatabase("mpf.dbd", MPF_TEST_DBD, nullptr);
     EXPECT_EQ(registerAllRecordDeviceDrivers(pdbbase), 0);
     static_cast<void>(folder_.write("test.db", database));
-    testdbReadDatabase("test.db", folder_.path().c_str(), nullptr);
+    testdbReadDatabase("test.db", folder_.path().c_str(), macros.c_str());
     testIocInitOk();
   }
   ~Ioc() {

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Records that exchange text with a server of Char8Array messages.
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
 #include <mutex>
-#include <regex>
-#include <vector>
 
 #include <mpf/serial_commands.h>
 
@@ -226,47 +222,6 @@ TEST_F(StringRecordTest, MpfReadAndMpfWrite) {
 
   ASSERT_EQ(Ioc::put("o.PROC", "1"), 0);
   serial.waitForText("a\t");
-}
-
-// ---- databases of a real site
-
-// The records of `file` that use this device support, with "x" for macros and 0 for numbers.
-std::string stringRecordsOf(const std::filesystem::path& file, std::vector<std::string>& names) {
-  static const std::regex record(R"re(g?record\s*\(\s*\w+\s*,\s*"([^"]*)"\s*\)\s*\{[^{}]*\})re");
-  static const std::regex device(R"re(DTYP\s*,\s*"(Hideos \w\w stringParm|MPF\w+)")re");
-  static const std::regex location(R"re(#C\$\(\w+\))re");
-  static const std::regex macro(R"re(\$\(\w+\))re");
-  std::ifstream stream(file);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  std::string result;
-  for (std::sregex_iterator at(text.begin(), text.end(), record), end; at != end; ++at) {
-    auto body = at->str();
-    if (!std::regex_search(body, device)) continue;
-    body = std::regex_replace(std::regex_replace(body, location, "#C0"), macro, "x");
-    const auto name = std::to_string(names.size());
-    const auto begin = body.find('"') + 1;
-    body.replace(begin, body.find('"', begin) - begin, name);
-    names.push_back(name);
-    result += body + "\n";
-  }
-  return result;
-}
-
-TEST_F(StringRecordTest, RecordsOfASiteInitialise) {
-  const char* folder = std::getenv("MPF_CORPUS");
-  const auto databases =
-      std::filesystem::path(folder != nullptr ? folder : MPF_TEST_CORPUS) / "db/ip-R1-4";
-  if (!std::filesystem::exists(databases)) GTEST_SKIP() << "no databases in " << databases;
-  std::string database;
-  std::vector<std::string> names;
-  for (const auto& file : std::filesystem::directory_iterator(databases))
-    if (file.path().extension() == ".db") database += stringRecordsOf(file.path(), names);
-
-  const Ioc ioc(database);
-
-  EXPECT_EQ(names.size(), 401U);
-  for (const auto& name : names)
-    EXPECT_EQ(Ioc::get(name + ".PACT"), "0") << Ioc::get(name + ".DTYP") << Ioc::get(name + ".INP");
 }
 
 }  // namespace
