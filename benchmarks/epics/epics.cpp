@@ -49,7 +49,8 @@ void keepOnLoopback() {
         {"EPICS_CAS_BEACON_ADDR_LIST", "127.0.0.1"},
         {"EPICS_CAS_AUTO_BEACON_ADDR_LIST", "NO"},
         {"EPICS_CA_ADDR_LIST", "127.0.0.1"},
-        {"EPICS_CA_AUTO_ADDR_LIST", "NO"}})
+        {"EPICS_CA_AUTO_ADDR_LIST", "NO"},
+        {"PVXS_QSRV_ENABLE", "NO"}})
     ::setenv(name, value.c_str(), 1);
 }
 

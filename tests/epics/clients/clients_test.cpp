@@ -5,6 +5,9 @@
 //   client ── Channel Access or pvAccess ──► mpf-ioc ── backplane ──► mpf-digital-io-server
 //
 // The inputs of the server's module are its outputs. The IOC listens on an address of its own.
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -15,6 +18,9 @@
 #include <string>
 #include <vector>
 
+#include <mpf/file_descriptor.h>
+
+#include "base/system_call.h"
 #include "tests/support/command.h"
 #include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
@@ -41,6 +47,20 @@ std::string ownAddress() {
   const auto number = static_cast<unsigned>(::getpid());
   return fmt::format("127.{}.{}.{}", 1 + (number >> 16U) % 250, (number >> 8U) & 0xffU,
                      number & 0xffU);
+}
+
+// A port for pvAccess that was free: a server of another process that listens on all addresses would
+// get the searches at the usual port.
+std::string freePort(const std::string& address) {
+  const FileDescriptor socket(
+      checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  checkCall(::inet_pton(AF_INET, address.c_str(), &at.sin_addr), "inet_pton");
+  socklen_t length = sizeof at;
+  checkCall(::bind(socket.get(), reinterpret_cast<sockaddr*>(&at), length), "bind");
+  checkCall(::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&at), &length), "getsockname");
+  return std::to_string(ntohs(at.sin_port));
 }
 
 struct Client {
@@ -112,8 +132,11 @@ EpicsClients::EpicsClients() {
   const auto address = ownAddress();
   for (const auto* variable :
        {"EPICS_CAS_INTF_ADDR_LIST", "EPICS_CAS_BEACON_ADDR_LIST", "EPICS_PVAS_INTF_ADDR_LIST",
-        "EPICS_PVAS_BEACON_ADDR_LIST", "EPICS_CA_ADDR_LIST", "EPICS_PVA_NAME_SERVERS"})
+        "EPICS_PVAS_BEACON_ADDR_LIST", "EPICS_CA_ADDR_LIST"})
     ::setenv(variable, address.c_str(), 1);
+  const auto port = freePort(address);
+  ::setenv("EPICS_PVAS_SERVER_PORT", port.c_str(), 1);
+  ::setenv("EPICS_PVA_NAME_SERVERS", fmt::format("{}:{}", address, port).c_str(), 1);
   for (const auto* variable :
        {"EPICS_CAS_AUTO_BEACON_ADDR_LIST", "EPICS_PVAS_AUTO_BEACON_ADDR_LIST",
         "EPICS_CA_AUTO_ADDR_LIST", "EPICS_PVA_AUTO_ADDR_LIST"})
