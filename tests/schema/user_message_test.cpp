@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/user_message.h>
+
 #include <capnp/any.h>
 #include <capnp/message.h>
 #include <gmock/gmock.h>
 #include <kj/exception.h>
-
-#include <mpf/user_message.h>
 
 #include "schema/message.capnp.h"
 

@@ -49,8 +49,8 @@ std::string ownAddress() {
                      number & 0xffU);
 }
 
-// A port for pvAccess that was free: a server of another process that listens on all addresses would
-// get the searches at the usual port.
+// A port for pvAccess that was free. At the usual port, a server of another process that listens on
+// all addresses would get the searches.
 std::string freePort(const std::string& address) {
   const FileDescriptor socket(
       checkCall(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
