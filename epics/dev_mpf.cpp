@@ -3,7 +3,6 @@
 
 #include <alarm.h>
 #include <atomic>
-#include <callback.h>
 #include <cstring>
 #include <dbAccess.h>
 #include <dbEvent.h>
@@ -56,13 +55,12 @@ class ScanLock {
 
 }  // namespace
 
-class DevMpf::Impl final : public SharedClient::Member, public IocClients::Device {
+class DevMpf::Impl final : public SharedClient::Member,
+                           public IocClients::Device,
+                           public CallbackQueue::Record {
  public:
   Impl(DevMpf& device, dbCommon* record, DBLINK* link, bool ioInterrupt)
       : device_(device), record_(record), isOutput_(isOutputLink(record, link)) {
-    callbackSetCallback(onCallback, &callback_);
-    callbackSetUser(this, &callback_);
-    callbackSetPriority(record->prio, &callback_);
     if (ioInterrupt) scanIoInit(&scan_);
     try {
       address_ = LinkAddress::of(*link);
@@ -79,10 +77,9 @@ class DevMpf::Impl final : public SharedClient::Member, public IocClients::Devic
 
   // --- any thread
   void deliver(Message&& message) override {
-    if (queue_.push(std::move(message))) requestCallback();
+    if (queue_.push(std::move(message))) callbacks_.add(*this);
   }
   void tick(std::int64_t nowNs) override {
-    if (isCallbackMissing_.load(std::memory_order_relaxed)) requestCallback();
     const auto deadlineNs = deadlineNs_.load(std::memory_order_relaxed);
     if (deadlineNs == 0 || nowNs < deadlineNs) return;
     connection_->cancel(requestId_.load(std::memory_order_relaxed));
@@ -91,6 +88,14 @@ class DevMpf::Impl final : public SharedClient::Member, public IocClients::Devic
     if (const auto overruns = queue_.overruns(); overruns != 0)
       epicsStdoutPrintf("  %s: %llu overruns\n", record_->name,
                         static_cast<unsigned long long>(overruns));
+  }
+
+  // --- the callback's thread
+  bool processOne() override {
+    const ScanLock lock(record_);
+    Message message;
+    if (queue_.tryTake(message, isRequestOutstanding_)) handle(std::move(message));
+    return queue_.finish(isRequestOutstanding_);
   }
 
   // --- with the record locked
@@ -142,25 +147,6 @@ class DevMpf::Impl final : public SharedClient::Member, public IocClients::Devic
   Nanoseconds timeout_ = kDefaultTimeout;
 
  private:
-  static void onCallback(epicsCallback* callback) {
-    void* user = nullptr;
-    callbackGetUser(user, callback);
-    static_cast<Impl*>(user)->takeOne();
-  }
-  void requestCallback() {
-    const bool isRequested = IocClients::instance().isRunning() && callbackRequest(&callback_) == 0;
-    isCallbackMissing_.store(!isRequested, std::memory_order_relaxed);
-  }
-  void takeOne() {
-    bool isMore = false;
-    {
-      const ScanLock lock(record_);
-      Message message;
-      if (queue_.tryTake(message, isRequestOutstanding_)) handle(std::move(message));
-      isMore = queue_.finish(isRequestOutstanding_);
-    }
-    if (isMore) requestCallback();
-  }
   void handle(Message&& message) {
     if (const auto* connect = message.tryAs<Connect>()) return device_.connectIO(record_, *connect);
     if (message.getType() == MessageType::outOfBand)
@@ -215,8 +201,7 @@ class DevMpf::Impl final : public SharedClient::Member, public IocClients::Devic
   bool hasProcessed_ = false;
   std::optional<Message> reply_;  // the message that the record processes now
   RecordQueue queue_;
-  epicsCallback callback_{};
-  std::atomic<bool> isCallbackMissing_{false};
+  CallbackQueue& callbacks_ = IocClients::instance().callbacks(record_->prio);
   std::atomic<std::uint32_t> requestId_{0};
   std::atomic<std::int64_t> deadlineNs_{0};  // of the outstanding request; 0: none
 };

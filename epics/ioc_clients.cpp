@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "epics/ioc_clients.h"
 
-#include <condition_variable>
+#include <pthread.h>
+
 #include <drvSup.h>
 #include <epicsExport.h>
 #include <epicsStdio.h>
+#include <errlog.h>
 #include <initHooks.h>
 
 #include "base/signals_blocked.h"
@@ -27,26 +29,26 @@ void IocClients::onHook(int state) {
   if (state == initHookAfterShutdown) forget();
 }
 
-void IocClients::start() {
-  isRunning_.store(true, std::memory_order_relaxed);
-  const SignalsBlocked blocked;
-  if (!thread_.joinable())
-    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
-}
+void IocClients::start() { isRunning_.store(true, std::memory_order_relaxed); }
 
 void IocClients::close() {
   isRunning_.store(false, std::memory_order_relaxed);
-  thread_ = {};
   std::vector<std::shared_ptr<SharedClient>> connections;
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [key, connection] : connections_) connections.push_back(connection);
   }
   for (const auto& connection : connections) connection->close();
+  if (!dispatcher_) return;
+  thread_.request_stop();
+  dispatcher_->interrupt();
+  thread_.join();
+  dispatcher_.reset();
 }
 
 void IocClients::forget() {
   const std::lock_guard lock(mutex_);
+  for (auto& callbacks : callbacks_) callbacks.clear();
   devices_.clear();
   connections_.clear();
 }
@@ -56,9 +58,10 @@ std::shared_ptr<SharedClient> IocClients::connectionTo(const std::string& server
                                                        const std::string& user) {
   initHookRegister(onInitHook);  // Base forgets hooks when an IOC ends
   const std::lock_guard lock(mutex_);
+  if (!dispatcher_) startDispatcher();
   auto& connection = connections_[{server, location, user}];
   if (!connection)
-    connection = std::make_shared<SharedClient>(Backplane::attach(), server, location);
+    connection = std::make_shared<SharedClient>(*dispatcher_, server, location);
   return connection;
 }
 
@@ -67,16 +70,40 @@ void IocClients::add(std::unique_ptr<DevMpf> owner, Device& device) {
   devices_.emplace_back(std::move(owner), &device);
 }
 
+void IocClients::startDispatcher() {
+  dispatcher_.emplace(Backplane::attach());
+  const SignalsBlocked blocked;
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+}
+
 void IocClients::run(const std::stop_token& stop) {
-  std::mutex sleeping;
-  std::condition_variable_any woken;
-  std::unique_lock sleep(sleeping);
-  while (!woken.wait_for(sleep, stop, kTick, [&] { return stop.stop_requested(); })) {
-    const std::lock_guard lock(mutex_);
-    const auto nowNs = Clock::nowNs();
-    for (const auto& [key, connection] : connections_) connection->serveBacklog();
-    for (const auto& [owner, device] : devices_) device->tick(nowNs);
+  constexpr int kBatches = 8;  // steps of the dispatcher before callbacks are requested
+  ::pthread_setname_np(::pthread_self(), "mpf-dispatcher");
+  auto nextTick = Deadline::after(kTick);
+  while (!stop.stop_requested()) {
+    try {
+      if (dispatcher_->runOnce(nextTick)) static_cast<void>(dispatcher_->runPending(kBatches));
+    } catch (const std::exception& error) {  // no memory for a message
+      errlogPrintf("MPF: a message is lost: %s\n", error.what());
+    }
+    if (nextTick.hasPassed()) {
+      tick();
+      nextTick = Deadline::after(kTick);
+    }
+    flush();
   }
+}
+
+void IocClients::tick() {
+  const std::lock_guard lock(mutex_);
+  const auto nowNs = Clock::nowNs();
+  for (const auto& [key, connection] : connections_) connection->serveBacklog();
+  for (const auto& [owner, device] : devices_) device->tick(nowNs);
+}
+
+void IocClients::flush() {
+  if (!isRunning_.load(std::memory_order_relaxed)) return;
+  for (auto& callbacks : callbacks_) callbacks.flush();
 }
 
 void IocClients::print(int level) const {

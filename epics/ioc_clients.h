@@ -4,23 +4,28 @@
 //   starting ─ IOC runs ─► running ─ IOC shuts down ─► closed ─ IOC has shut down ─► starting
 //   messages wait          callbacks are requested     no message is received
 //
-// Its thread looks every kTick for requests without a reply in time, and for callbacks that could
-// not be requested.
+// Its thread runs the dispatcher of all connections. After each few messages it requests the
+// callbacks of their records, and every kTick it looks for requests without a reply in time.
 //
 // Threads  any.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include <mpf/dispatcher.h>
+
+#include "epics/callback_queue.h"
 #include "epics/shared_client.h"
 
 namespace mpf {
@@ -47,10 +52,9 @@ class IocClients {
                                                            const std::string& user);
   // Owns `owner` from now on, of which `device` is a part, until the IOC has shut down.
   void add(std::unique_ptr<DevMpf> owner, Device& device);
-  // Messages are kept until the IOC runs: callbacks before that would process records too early.
-  [[nodiscard]] bool isRunning() const noexcept {
-    return isRunning_.load(std::memory_order_relaxed);
-  }
+  // The queue of records with this PRIO. Its callback is requested soon, but not before the IOC
+  // runs: that would process records too early.
+  [[nodiscard]] CallbackQueue& callbacks(int priority) { return callbacks_.at(priority); }
   void print(int level) const;
   // Called by the IOC with an initHookState.
   void onHook(int state);
@@ -60,13 +64,19 @@ class IocClients {
   void start();
   void close();
   void forget();
+  void startDispatcher();
   void run(const std::stop_token& stop);
+  void tick();
+  void flush();
 
   mutable std::mutex mutex_;
   using Key = std::tuple<std::string, std::int32_t, std::string>;  // server, location, user
   std::map<Key, std::shared_ptr<SharedClient>> connections_;
   std::vector<std::pair<std::unique_ptr<DevMpf>, Device*>> devices_;  // both under mutex_
+  std::array<CallbackQueue, NUM_CALLBACK_PRIORITIES> callbacks_{
+      CallbackQueue(priorityLow), CallbackQueue(priorityMedium), CallbackQueue(priorityHigh)};
   std::atomic<bool> isRunning_{false};
+  std::optional<Dispatcher> dispatcher_;  // from the first connection until the IOC shuts down
   std::jthread thread_;
 };
 

@@ -17,7 +17,7 @@ bool RecordQueue::push(Message&& message) {
   const std::lock_guard lock(mutex_);
   if (messages_.size() >= kMaxMessages && isFurtherReply(message)) dropOldest();
   messages_.push_back(std::move(message));
-  return !std::exchange(isCallbackPending_, true);
+  return !std::exchange(isInCallbackQueue_, true);
 }
 
 void RecordQueue::dropOldest() {
@@ -43,8 +43,8 @@ bool RecordQueue::tryTake(Message& message, bool isRequestOutstanding) {
 
 bool RecordQueue::finish(bool isRequestOutstanding) {
   const std::lock_guard lock(mutex_);
-  isCallbackPending_ = next(isRequestOutstanding) != messages_.end();
-  return isCallbackPending_;
+  isInCallbackQueue_ = next(isRequestOutstanding) != messages_.end();
+  return isInCallbackQueue_;
 }
 
 std::uint64_t RecordQueue::overruns() const {

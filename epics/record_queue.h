@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // RecordQueue: messages that wait until their record can process them.
 //
-//   idle ── push() returns true ──► callback pending ── finish() returns false ──► idle
+//   idle ── push() returns true ──► in its CallbackQueue ── finish() returns false ──► idle
 //
-// At most one callback of a record is pending in the IOC. When kMaxMessages wait, a further reply
-// replaces the oldest further reply and counts as an overrun; first replies, fates and
-// ConnectMessages are never dropped: their number is limited by the requests of the record.
+// When kMaxMessages wait, a further reply replaces the oldest further reply and counts as an
+// overrun; first replies, fates and ConnectMessages are never dropped: their number is limited by
+// the requests of the record.
 //
 // Threads  push(): the dispatcher's. tryTake() and finish(): the thread of the callback.
 #pragma once
@@ -27,12 +27,12 @@ class RecordQueue {
  public:
   static constexpr std::size_t kMaxMessages = 64;
 
-  // Returns true when the caller must request the callback.
+  // Returns true when the caller must add the record to its CallbackQueue.
   [[nodiscard]] bool push(Message&& message);
   // Takes the oldest message that the record can process now.
   //   isRequestOutstanding  further replies must wait until the first reply has ended the request
   [[nodiscard]] bool tryTake(Message& message, bool isRequestOutstanding);
-  // Returns true when the caller must request the callback again.
+  // Returns true when the record stays in its CallbackQueue.
   [[nodiscard]] bool finish(bool isRequestOutstanding);
   [[nodiscard]] std::uint64_t overruns() const;
 
@@ -42,7 +42,7 @@ class RecordQueue {
 
   mutable std::mutex mutex_;
   std::deque<Message> messages_;  // all under mutex_
-  bool isCallbackPending_ = false;
+  bool isInCallbackQueue_ = false;
   std::uint64_t overruns_ = 0;
 };
 

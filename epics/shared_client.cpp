@@ -20,11 +20,11 @@ Message fateOf(const Message& request, Fate fate) {
 
 }  // namespace
 
-SharedClient::SharedClient(const Backplane& backplane, std::string server, std::int32_t location)
+SharedClient::SharedClient(Dispatcher& dispatcher, std::string server, std::int32_t location)
     : server_(std::move(server)),
       location_(location),
       client_(std::make_unique<MessageClient>(
-          backplane, [this](Message&& message) { onMessage(std::move(message)); })) {}
+          dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
 
 std::uint32_t SharedClient::add(Member& member) {
   const std::lock_guard lock(mutex_);

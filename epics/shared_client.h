@@ -38,7 +38,8 @@ class SharedClient {
 
   static constexpr std::size_t kMaxBacklog = 65'536;
 
-  SharedClient(const Backplane& backplane, std::string server, std::int32_t location);
+  // The dispatcher outlives the client.
+  SharedClient(Dispatcher& dispatcher, std::string server, std::int32_t location);
   ~SharedClient() { close(); }
   SharedClient(const SharedClient&) = delete;
   SharedClient& operator=(const SharedClient&) = delete;

@@ -60,7 +60,8 @@ class SharedClientTest : public testing::Test {
   TestBackplane backplane_;
   RecordingMember one_, two_;
   std::atomic<std::uint32_t> requestId_{0};
-  SharedClient client_{backplane_, "s", 0};
+  const std::shared_ptr<Dispatcher> dispatcher_ = Dispatcher::shared(backplane_);
+  SharedClient client_{*dispatcher_, "s", 0};
 };
 
 TEST_F(SharedClientTest, AMemberThatIsAddedLaterIsNotifiedOfTheConnection) {

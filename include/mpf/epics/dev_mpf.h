@@ -32,9 +32,9 @@
 //
 // All records of an IOC share one dispatcher, and records that name the same server share one
 // connection; a record with `ioInterrupt` has its own, because a server may keep one subscription
-// for each client. A message waits for its record in a queue; at most one callback of a record is
-// pending in the IOC. When 64 messages wait, further messages that are not the first reply to a
-// request replace the oldest ones, and are counted as overruns (dbior).
+// for each client. A message waits for its record in a queue; one callback for each PRIO processes
+// the messages of all records. When 64 messages of a record wait, further messages that are not the
+// first reply to a request replace the oldest ones, and are counted as overruns (dbior).
 //
 // Threads  EPICS calls the virtual functions with the record locked (dbScanLock), on a thread that
 //          processes records or on a callback thread. Call send() only in them.
