@@ -2,6 +2,7 @@
 #include "router/outgoing/connector.h"
 
 #include <fmt/format.h>
+#include <kj/debug.h>
 #include <sstream>
 #include <utility>
 
@@ -11,16 +12,33 @@ namespace mpf::router {
 
 // A name may have several addresses, and the first of them may not answer.
 kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connect() {
+  return withTimeout(fmt::format("the look-up of {}", remote_.address.host), lookUp())
+      .then([this](Addresses&& addresses) { return connectToOne(std::move(addresses)); });
+}
+
+kj::Promise<Connector::Addresses> Connector::lookUp() {
+  if (lookUp_ == nullptr) lookUp_ = startLookUp().fork();
+  return KJ_ASSERT_NONNULL(lookUp_).addBranch().then(
+      [this](Addresses&& addresses) -> kj::Promise<Addresses> {
+        lookUp_ = nullptr;
+        return std::move(addresses);
+      },
+      [this](kj::Exception&& error) -> kj::Promise<Addresses> {
+        lookUp_ = nullptr;
+        return kj::mv(error);
+      });
+}
+
+kj::Promise<Connector::Addresses> Connector::startLookUp() {
   const auto& address = remote_.address;
-  auto lookUp =
-      kj::evalNow([&] { return context_.network.parseAddress(hostForKj(address), address.port); });
-  return withTimeout(fmt::format("the look-up of {}", address.host), kj::mv(lookUp))
+  return kj::evalNow(
+             [&] { return context_.network.parseAddress(hostForKj(address), address.port); })
       .then([this](kj::Own<kj::NetworkAddress> parsed) {
         if (remote_.security == Security::plain) checkPlain(*parsed, context_.config);
-        std::vector<std::string> addresses;
+        Addresses addresses;
         std::istringstream all(toStd(parsed->toString()));
         for (std::string one; std::getline(all, one, ',');) addresses.push_back(one);
-        return connectToOne(std::move(addresses));
+        return addresses;
       });
 }
 
@@ -33,8 +51,7 @@ kj::Exception Connector::stepFailed(const std::string& step, const kj::Exception
   return {kj::Exception::Type::FAILED, __FILE__, __LINE__, kj::heapString(text)};
 }
 
-kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectToOne(
-    std::vector<std::string> addresses) {
+kj::Promise<kj::Own<kj::AsyncIoStream>> Connector::connectToOne(Addresses addresses) {
   const auto next = addresses.front();
   addresses.erase(addresses.begin());
   return withTimeout(fmt::format("the connection to {}", next), connectTo(next))

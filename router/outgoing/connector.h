@@ -5,6 +5,9 @@
 //   look-up ─► address 1 ─ fails ─► address 2 ...
 //   each address: TCP connection ─► TLS handshake
 //
+// A look-up occupies a thread until it ends. One that takes too long continues, and the next
+// connect() waits for it instead of starting another one.
+//
 // Threads  that of the event loop.
 #pragma once
 
@@ -28,7 +31,10 @@ class Connector {
   [[nodiscard]] kj::Promise<kj::Own<kj::AsyncIoStream>> connect();
 
  private:
-  kj::Promise<kj::Own<kj::AsyncIoStream>> connectToOne(std::vector<std::string> addresses);
+  using Addresses = std::vector<std::string>;
+  kj::Promise<Addresses> lookUp();
+  kj::Promise<Addresses> startLookUp();
+  kj::Promise<kj::Own<kj::AsyncIoStream>> connectToOne(Addresses addresses);
   kj::Promise<kj::Own<kj::AsyncIoStream>> connectTo(const std::string& address);
   template <class T>
   kj::Promise<T> withTimeout(const std::string& step, kj::Promise<T> promise) {
@@ -41,6 +47,7 @@ class Connector {
 
   RouterContext& context_;
   const Remote& remote_;
+  kj::Maybe<kj::ForkedPromise<Addresses>> lookUp_;  // until its result has been used
 };
 
 }  // namespace mpf::router

@@ -75,6 +75,27 @@ TEST_F(ConnectorTest, NamesALookUpThatTakesTooLong) {
   EXPECT_EQ(problem_, "the look-up of slow.lab took longer than 20ms (dead-time)");
 }
 
+// A look-up cannot be stopped: another one for each attempt would use up threads.
+TEST_F(ConnectorTest, WaitsForALookUpThatTookTooLongInsteadOfStartingAnother) {
+  context_.config.limits.deadTime = std::chrono::milliseconds(20);
+  connect();
+  runUntilDone();
+  connect();
+  runUntilDone();
+  ASSERT_EQ(io_.network().lookups.size(), 1u);
+  ASSERT_TRUE(lookup().isWaiting());
+
+  lookup().reject(KJ_EXCEPTION(FAILED, "gai_strerror(status) = Name or service not known"));
+  io_.run();
+  connect();
+  runUntilDone();
+
+  EXPECT_EQ(problem_, "the look-up of slow.lab failed: Name or service not known");
+  EXPECT_EQ(io_.network().lookups.size(), 1u);
+  connect();
+  EXPECT_EQ(io_.network().lookups.size(), 2u) << "each result is used once";
+}
+
 TEST_F(ConnectorTest, RefusesAPublicAddressOverPlainTcp) {
   connect();
 
