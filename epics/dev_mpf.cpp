@@ -10,6 +10,7 @@
 #include <dbStaticLib.h>
 #include <epicsStdio.h>
 #include <errlog.h>
+#include <fmt/format.h>
 #include <menuPini.h>
 #include <optional>
 #include <recGbl.h>
@@ -40,6 +41,15 @@ bool isOutputLink(const dbCommon* record, const DBLINK* link) noexcept {
       return field->field_type == DBF_OUTLINK;
   }
   return false;
+}
+
+// Why the server is not connected, in the 39 characters of AMSG: the link has the server's name.
+std::string whyDisconnected(const SharedClient& connection) {
+  const auto reason = connection.notConnectedBecause();
+  const auto name = fmt::format("server \"{}\" ", connection.server());
+  for (const auto& prefix : {fmt::format("{}at location {} ", name, connection.location()), name})
+    if (reason.starts_with(prefix)) return "server " + reason.substr(prefix.size());
+  return reason;
 }
 
 class ScanLock {
@@ -173,7 +183,7 @@ class DevMpf::Impl final : public SharedClient::Member,
   }
   long failDisconnected() {
     recGblSetSevrMsg(record_, COMM_ALARM, INVALID_ALARM, "%s",
-                     connection_ ? connection_->notConnectedBecause().c_str() : "invalid link");
+                     connection_ ? whyDisconnected(*connection_).c_str() : "invalid link");
     return -1;
   }
   long failFate(Fate fate) {
