@@ -29,9 +29,10 @@ help: ## print this list
 setup: ## install the Debian packages that are missing (every other target calls it)
 	@scripts/setup
 
-demo: release ## run a voltmeter through crashes, then modules that are wired together
+demo: release ## a voltmeter through crashes, modules that are wired together, an EPICS IOC
 	./examples/demo/run build/release
 	./examples/demo/hardware build/release
+	./examples/demo/ioc build/release
 
 test: test-debug ## build with debug information and run every test
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The second half of `make demo`: models that are wired to each other, their servers, the
-// voltmeter, and the client that draws their values.
+// The parts of `make demo` after the first: models that are wired to each other, their servers, the
+// voltmeter, and the client that draws their values; and the IOC.
 #include <filesystem>
 #include <gmock/gmock.h>
 #include <string>
@@ -90,6 +90,17 @@ TEST_F(Demo, ExitsOnQAndCtrlC) {
     EXPECT_EQ(demo.wait(), 0);
     EXPECT_TRUE(demo.isRestored());
   }
+}
+
+TEST_F(Demo, AnIocShowsADeadServerToItsClients) {
+  const auto demo = runCommand(MPF_TEST_DEMO_IOC " " MPF_TEST_BUILD " </dev/null 2>&1");
+  if (demo.output.starts_with("left out")) GTEST_SKIP() << demo.output;
+
+  EXPECT_EQ(demo.status, 0) << demo.output;
+  EXPECT_THAT(demo.output, AllOf(HasSubstr("   lab:volts 2.50 V, severity 0\n"),
+                                 HasSubstr("   lab:volts 2.50 V, severity 3\n"),
+                                 HasSubstr("'server is not there'"),
+                                 HasSubstr("   lab:volts -1.25 V, severity 0\n")));
 }
 
 }  // namespace
