@@ -9,6 +9,7 @@
 #include <dbLock.h>
 #include <dbStaticLib.h>
 #include <epicsStdio.h>
+#include <epicsTime.h>
 #include <errlog.h>
 #include <fmt/format.h>
 #include <menuPini.h>
@@ -177,6 +178,8 @@ class DevMpf::Impl final : public SharedClient::Member,
       deadlineNs_.store(0, std::memory_order_relaxed);
     }
     reply_ = std::move(message);
+    // Messages have no time of their own.
+    if (record_->tse == epicsTimeEventDeviceTime) epicsTimeGetCurrent(&record_->time);
     if (!record_->pact) dbProcess(record_);
     else if (isFirst) record_->rset->process(record_);
     reply_.reset();  // a disabled record does not use it

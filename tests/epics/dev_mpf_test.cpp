@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Records and servers that are absent, exit, refuse, answer late or answer with another type.
+#include <dbLock.h>
+#include <epicsTime.h>
 #include <optional>
 
 #include "tests/epics/epics_fixture.h"
@@ -108,6 +110,26 @@ TEST_F(DevMpfTest, AServerThatDoesNotReplyIsATimeoutAlarm) {
   EXPECT_EQ(Ioc::get("v.PACT"), "0");
   EXPECT_EQ(Ioc::get("v.AMSG"), "no reply in 5 s");
   kept.clear();
+}
+
+TEST_F(DevMpfTest, ADeviceTimeStampIsTheTimeOfTheMessage) {
+  const ThreadServer server(backplane_, "adc", echo);
+  epicsTimeStamp before;
+  epicsTimeGetCurrent(&before);
+  const Ioc ioc(
+      "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@adc value=7\")"
+      " field(PINI, \"YES\") field(TSE, \"-2\") }");
+  Ioc::waitFor("v", "7");
+
+  DBADDR address;
+  ASSERT_EQ(dbNameToAddr("v", &address), 0);
+  dbScanLock(address.precord);
+  const auto stamp = address.precord->time;
+  dbScanUnlock(address.precord);
+  epicsTimeStamp after;
+  epicsTimeGetCurrent(&after);
+  EXPECT_GE(epicsTimeDiffInSeconds(&stamp, &before), 0);
+  EXPECT_LE(epicsTimeDiffInSeconds(&stamp, &after), 0);
 }
 
 TEST_F(DevMpfTest, AnIocShutsDownWithRequestsOutstanding) {

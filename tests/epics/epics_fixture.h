@@ -20,8 +20,9 @@ namespace mpf::test {
 class ThreadServer {
  public:
   using Handler = std::function<void(MessageServer&, Message&&)>;
-  ThreadServer(const Backplane& backplane, const std::string& name, Handler handler)
-      : server_(backplane, name), thread_([this, handler = std::move(handler)] {
+  ThreadServer(const Backplane& backplane, const std::string& name, Handler handler,
+               const ServerOptions& options = {})
+      : server_(backplane, name, options), thread_([this, handler = std::move(handler)] {
           while (!isOver_) {
             server_.waitForMessage(Deadline::after(std::chrono::milliseconds(10)));
             while (auto request = server_.receive()) handler(server_, std::move(request));
