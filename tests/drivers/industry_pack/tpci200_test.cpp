@@ -9,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <semaphore>
 
-#include <mpf/drivers/industry_pack/create_carrier.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
 
@@ -342,7 +341,6 @@ TEST(Tpci200ParametersTest, AreAnAddressAndAPollingPeriod) {
   for (const auto* const wrong :
        {"eth0", "../0000:03:00.0", "0,fast", "0,poll=", "0,poll=0", "0,poll=5ms", "0,poll=2000000"})
     EXPECT_THROW(static_cast<void>(Tpci200Options::parse(wrong)), IndustryPackError) << wrong;
-  EXPECT_THROW(static_cast<void>(createCarrier("tpci200", "0,poll=0")), IndustryPackError);
 }
 
 }  // namespace
