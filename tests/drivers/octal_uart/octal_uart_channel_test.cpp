@@ -227,6 +227,13 @@ TEST_F(OctalUartChannelTest, Rs485SendsOrReceives) {
   EXPECT_FALSE(channel.waitsForTurn());
   EXPECT_EQ(channel.timeToSend().count(), 0);
   EXPECT_EQ(model.with(kNumber, [](const auto& chip) { return chip.unheard(); }), 1U);
+  model.farEndSend(kNumber, "y");
+  model.advance({});
+  model.advance(byteTime(kSettings));
+  EXPECT_TRUE(channel.serve(kIsrRxRdy, false));
+  std::vector<LineByte> bytes;
+  channel.take(bytes);
+  EXPECT_THAT(bytes, ElementsAre(LineByte{'y'}));
 }
 
 TEST_F(OctalUartChannelTest, Rs485KeepsTheTransmitterOnDuringABreak) {
