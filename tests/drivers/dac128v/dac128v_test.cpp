@@ -3,7 +3,7 @@
 
 #include <atomic>
 #include <barrier>
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <thread>
 
 #include "drivers/dac128v/dac128v_model.h"
@@ -12,9 +12,6 @@
 
 namespace mpf::test {
 namespace {
-
-using testing::ElementsAre;
-using testing::Pair;
 
 constexpr Dac128vRanges kRanges{Dac128vRange{-10, 10}, Dac128vRange{0, 5}};
 
@@ -147,20 +144,6 @@ TEST_F(Dac128vTest, ReadsBackItsOwnWriteWhenTwoThreadsWriteAtOnce) {
     write(2);
   }
   EXPECT_EQ(failures, 0);
-}
-
-TEST(Dac128vModel, ReportsTheVoltagesOfItsOutputs) {
-  std::vector<std::pair<int, double>> told;
-  Dac128vModel model(kRanges,
-                     [&](int channel, double volts) { told.emplace_back(channel, volts); });
-  EXPECT_EQ(told.size(), 8u);
-  EXPECT_EQ(told[7], std::pair(7, 2.5));
-  told.clear();
-
-  model.write(DeviceModel::Space::io, 2, 0, DeviceModel::kBoth);
-  model.write(DeviceModel::Space::io, 2, 0x0fff, DeviceModel::kHigh);
-
-  EXPECT_THAT(told, ElementsAre(Pair(1, -10.0), Pair(1, 8.75)));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <sys/fsuid.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -18,6 +19,15 @@
 #include "tests/support/temporary_folder.h"
 
 namespace mpf::test {
+
+// Opens files without the privileges of root.
+class NoRoot {
+ public:
+  NoRoot() { ::setfsuid(65534); }
+  ~NoRoot() { ::setfsuid(::geteuid()); }
+  NoRoot(const NoRoot&) = delete;
+  NoRoot& operator=(const NoRoot&) = delete;
+};
 
 class FakePci {
  public:

@@ -105,27 +105,5 @@ TEST_F(IdPromTest, IsRefusedWhenTheContentsAreNotAnIdProm) {
   }
 }
 
-TEST(MemoryRegistersTest, AreBigEndianAndAccessedWithTheGivenWidth) {
-  alignas(4) std::array<std::uint8_t, 8> window{0x12, 0x34, 0x56, 0x78};
-  MemoryRegisters registers(window.data(), window.size());
-  EXPECT_EQ(registers.read8(1), 0x34);
-  EXPECT_EQ(registers.read16(2), 0x5678);
-  EXPECT_EQ(registers.read32(0), 0x12345678u);
-  registers.write16(4, 0xabcd);
-  EXPECT_EQ(window[4], 0xab);
-  EXPECT_EQ(window[5], 0xcd);
-  registers.write32(4, 0x01020304);
-  EXPECT_EQ(window[7], 4);
-}
-
-TEST(MemoryRegistersTest, RefuseOffsetsThatAreOutsideOrUnaligned) {
-  alignas(4) std::array<std::uint8_t, 8> window{};
-  MemoryRegisters registers(window.data(), window.size());
-  EXPECT_THROW(static_cast<void>(registers.read16(8)), std::out_of_range);
-  EXPECT_THROW(static_cast<void>(registers.read32(6)), std::invalid_argument);
-  EXPECT_THROW(registers.write16(1, 0), std::invalid_argument);
-  EXPECT_THROW(static_cast<void>(registers.read8(SIZE_MAX)), std::out_of_range);
-}
-
 }  // namespace
 }  // namespace mpf::test

@@ -127,13 +127,5 @@ TEST_F(ModuleTest, SharesItsVectorWithNoOtherModule) {
   EXPECT_THROW(modules_.takeVector(256, b), IndustryPackError);
 }
 
-TEST(CarriersTest, AreLimitedToTwentyOne) {
-  IndustryPackCarriers carriers;
-  for (int i = 0; i < 21; ++i)
-    carriers.add("ipac" + std::to_string(i), std::make_unique<ModelCarrier>());
-  EXPECT_THROW(carriers.add("ipac0", std::make_unique<ModelCarrier>()), std::invalid_argument);
-  EXPECT_THROW(carriers.add("ipac21", std::make_unique<ModelCarrier>()), IndustryPackError);
-}
-
 }  // namespace
 }  // namespace mpf::test

@@ -4,12 +4,10 @@
 #include "drivers/industry_pack/tpci200.h"
 
 #include <poll.h>
-#include <sys/fsuid.h>
 
 #include <gmock/gmock.h>
 #include <semaphore>
 
-#include <mpf/drivers/industry_pack/create_carrier.h>
 #include <mpf/drivers/industry_pack/industry_pack_error.h>
 #include <mpf/drivers/industry_pack/interrupt_thread.h>
 
@@ -24,15 +22,6 @@ using testing::HasSubstr;
 constexpr const char* kBoard = "0000:03:00.0";
 constexpr std::size_t kInPage = FakePci::kInPage;
 
-// Opens files without the privileges of root.
-class NoRoot {
- public:
-  NoRoot() { ::setfsuid(65534); }
-  ~NoRoot() { ::setfsuid(::geteuid()); }
-  NoRoot(const NoRoot&) = delete;
-  NoRoot& operator=(const NoRoot&) = delete;
-};
-
 class Tpci200Test : public testing::Test {
  protected:
   [[nodiscard]] Tpci200Options options(const std::string& board = "") const {
@@ -40,14 +29,6 @@ class Tpci200Test : public testing::Test {
     options.board = board;
     options.places = pci_.places();
     return options;
-  }
-  [[nodiscard]] std::string problem(const std::string& board = "") const {
-    try {
-      const Tpci200 carrier(options(board));
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "none";
   }
   [[nodiscard]] std::uint16_t control(int site) const {
     return le16toh(pci_.get<std::uint16_t>(kBoard, "resource2",
@@ -81,39 +62,6 @@ TEST_F(Tpci200Test, IsFoundByAddressNumberOrAsTheFirst) {
   EXPECT_EQ(Tpci200(options("")).description(), "TPCI200 at 0000:03:00.0");
 }
 
-TEST_F(Tpci200Test, ThatIsAbsentIsRefused) {
-  EXPECT_THAT(problem(), HasSubstr("this host has no TPCI200 (PCI id 0x1498:0x30c8)"));
-  pci_.add(kBoard);
-  pci_.add("0000:02:00.0", "0x8086", "0x100e");
-  EXPECT_THAT(
-      problem("1"),
-      HasSubstr("this host has no TPCI200 number 1, counted from 0; its boards: 0000:03:00.0"));
-  EXPECT_THAT(problem("04:00.0"),
-              HasSubstr("no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0"));
-  EXPECT_THAT(
-      problem("02:00.0"),
-      HasSubstr("the PCI device at 0000:02:00.0 is not a TPCI200: its id is 0x8086:0x100e"));
-}
-
-TEST_F(Tpci200Test, ThatIsBoundToAnotherDriverIsRefusedWithTheCommandsToRebindIt) {
-  pci_.add(kBoard);
-  pci_.setDriver(kBoard, "tpci200");
-  const auto said = problem();
-  EXPECT_THAT(said, HasSubstr("the board is bound to the kernel's driver tpci200"));
-  EXPECT_THAT(said, HasSubstr("echo 0000:03:00.0 > " + pci_.file(kBoard, "driver/unbind")));
-  EXPECT_THAT(said, HasSubstr("modprobe uio_pci_generic; echo uio_pci_generic > " +
-                              pci_.file(kBoard, "driver_override")));
-}
-
-TEST_F(Tpci200Test, WithoutPermissionIsRefusedWithTheNameOfTheFile) {
-  pci_.add(kBoard);
-  std::filesystem::permissions(pci_.file(kBoard, "resource2"), std::filesystem::perms::none);
-  const NoRoot noRoot;
-  const auto said = problem();
-  EXPECT_THAT(said, HasSubstr("no permission to read and write " + pci_.file(kBoard, "resource2")));
-  EXPECT_THAT(said, HasSubstr("chgrp GROUP"));
-}
-
 TEST_F(Tpci200Test, WithoutPermissionForTheInterruptPollsAndNamesTheFile) {
   pci_.add(kBoard);
   pci_.giveInterrupt(kBoard);
@@ -124,42 +72,6 @@ TEST_F(Tpci200Test, WithoutPermissionForTheInterruptPollsAndNamesTheFile) {
   const Tpci200 carrier(options());
   EXPECT_THAT(carrier.remark(), HasSubstr("its interrupts are polled"));
   EXPECT_THAT(carrier.remark(), HasSubstr("/dev/uio7 cannot be opened (Permission denied)"));
-}
-
-TEST_F(Tpci200Test, WithoutAWindowIsRefused) {
-  pci_.add(kBoard);
-  pci_.write(kBoard, "resource", "0x0 0x0 0x0\n");
-  EXPECT_THAT(problem(), HasSubstr("window 2 is too small"));
-  pci_.add(kBoard);
-  std::filesystem::remove(pci_.file(kBoard, "resource3"));
-  EXPECT_THAT(problem(), HasSubstr("resource3 cannot be opened: No such file"));
-}
-
-TEST_F(Tpci200Test, ThatDoesNotAnswerIsRefused) {
-  pci_.add(kBoard);
-  pci_.set(kBoard, "resource0", kInPage + 0x2c, UINT32_MAX);
-  EXPECT_THAT(problem(), HasSubstr("TPCI200 at 0000:03:00.0 does not answer"));
-}
-
-TEST_F(Tpci200Test, EnablesTheBoard) {
-  pci_.add(kBoard);
-  pci_.write(kBoard, "enable", "0\n");
-  const Tpci200 carrier(options());
-  EXPECT_EQ(pci_.get<char>(kBoard, "enable", 0), '1');
-}
-
-TEST_F(Tpci200Test, SwapsTheBytesOfModulesOnly) {
-  pci_.add(kBoard);
-  pci_.set(kBoard, "resource0", kInPage + 0x28, htole32(0xd54160a0));
-  const Tpci200 carrier(options());
-  const auto isBig = [&](std::size_t space) {
-    return (le32toh(pci_.get<std::uint32_t>(kBoard, "resource0", kInPage + space)) & 0x1000000) !=
-           0;
-  };
-  EXPECT_FALSE(isBig(0x28));
-  EXPECT_TRUE(isBig(0x2c));
-  EXPECT_TRUE(isBig(0x30));
-  EXPECT_FALSE(isBig(0x34));
 }
 
 TEST_F(Tpci200Test, HasTheSpacesOfEachSiteAtTheirAddresses) {
@@ -184,20 +96,6 @@ TEST_F(Tpci200Test, HasTheSpacesOfEachSiteAtTheirAddresses) {
     EXPECT_EQ(site.id().read8(3), 0x50);
   }
   EXPECT_THROW(static_cast<void>(carrier.site(4)), std::out_of_range);
-}
-
-TEST_F(Tpci200Test, ReadsOnesWhereACycleTimesOut) {
-  pci_.add(kBoard);
-  Tpci200 carrier(options());
-  auto& a = carrier.site(0);
-  auto& b = carrier.site(1);
-  setStatus(0x1000);
-  EXPECT_EQ(a.io().read16(0), 0xffff);
-  EXPECT_EQ(b.io().read16(0), 0);
-  EXPECT_EQ(a.io().read32(4), 0xffffffff);
-  setStatus(0x2000);
-  EXPECT_EQ(b.io().read8(1), 0xff);
-  EXPECT_EQ(a.io().read16(0), 0);
 }
 
 TEST_F(Tpci200Test, GivesASiteToOneProcessAtATime) {
@@ -342,7 +240,6 @@ TEST(Tpci200ParametersTest, AreAnAddressAndAPollingPeriod) {
   for (const auto* const wrong :
        {"eth0", "../0000:03:00.0", "0,fast", "0,poll=", "0,poll=0", "0,poll=5ms", "0,poll=2000000"})
     EXPECT_THROW(static_cast<void>(Tpci200Options::parse(wrong)), IndustryPackError) << wrong;
-  EXPECT_THROW(static_cast<void>(createCarrier("tpci200", "0,poll=0")), IndustryPackError);
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/octal_uart/octal_uart_port.h"
 
-#include <poll.h>
-
 #include <thread>
 
 #include "octal_uart_fixture.h"
@@ -65,31 +63,6 @@ TEST_F(OctalUartPortTest, AWriteEndsWhenTheLastBitIsSent) {
   stepUntil([&] { return isDone.load(); });
 
   writer.join();
-}
-
-// timeToSend() is an estimate until the chip has the last byte, so the line must become readable
-// then.
-TEST_F(OctalUartPortTest, TheLineIsReadableWhenTheChipHasAllBytes) {
-  auto& uart = start({.time = OctalUartModelTime::stepped});
-  OctalUartLine line(uart, 1, kFast);
-  ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
-
-  ASSERT_EQ(line.tryWrite(bytesOf("abc")), 3U);
-  model_->advance(byteTime(kFast));
-
-  auto bell = line.waitsFor();
-  EXPECT_EQ(::poll(&bell, 1, -1), 1);
-}
-
-TEST_F(OctalUartPortTest, AnInstantLineNeedsNoTimeToSend) {
-  auto& uart = start();
-  OctalUartLine line(uart, 1, {75, 1, 8, 'N', 'N'});
-  ASSERT_EQ(line.tryOpen(), SerialLine::OpenState::open);
-
-  ASSERT_EQ(line.tryWrite(bytesOf("at once")), 7U);
-
-  EXPECT_EQ(model_->farEndReceived(1), "at once");
-  EXPECT_EQ(line.timeToSend(), 0ms);
 }
 
 TEST_F(OctalUartPortTest, DamagedBytesAreReportedAndCounted) {

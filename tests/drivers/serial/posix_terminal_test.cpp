@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include "drivers/serial/terminal_settings.h"
 #include "tests/drivers/serial/line_collector.h"
 #include "tests/support/instrument.h"
 #include "tests/support/temporary_folder.h"
@@ -50,32 +49,6 @@ TEST_F(PosixTerminalTest, StartsWithItsSettings) {
   EXPECT_EQ(::cfgetospeed(&line), speed_t{B19200});
   EXPECT_TRUE((line.c_cflag & CSTOPB) != 0);
   EXPECT_TRUE((line.c_cflag & CRTSCTS) != 0);
-}
-
-TEST_F(PosixTerminalTest, NamedSpeedsAreSetByTheirConstants) {
-  const auto port = openPosixTerminal(options());
-  const std::vector<std::pair<int, speed_t>> speeds = {
-      {50, B50},         {110, B110},         {300, B300},         {1200, B1200},
-      {9600, B9600},     {38400, B38400},     {115200, B115200},   {460800, B460800},
-      {921600, B921600}, {1000000, B1000000}, {3000000, B3000000}, {4000000, B4000000}};
-  for (const auto& [baud, constant] : speeds) {
-    EXPECT_EQ(port->config({.baud = baud}), "");
-
-    const auto line = instrument_.settings();
-
-    EXPECT_EQ(::cfgetospeed(&line), constant) << baud;
-  }
-}
-
-TEST_F(PosixTerminalTest, AcceptsSpeedsWithoutAConstant) {
-  const auto port = openPosixTerminal(options());
-
-  EXPECT_EQ(port->config({.baud = 250'000}), "");
-
-  // 100 characters of 10 bits.
-  const FileDescriptor line(::open(folder_.file("tty").c_str(), O_RDWR | O_NOCTTY));
-  if (!line) GTEST_SKIP() << "only root may open an exclusive line to look at it";
-  EXPECT_EQ(terminal::timeFor(line.get(), 100), 4ms);
 }
 
 TEST_F(PosixTerminalTest, ZeroLeavesASettingAsItIs) {

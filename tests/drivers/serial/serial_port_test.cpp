@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include <mpf/drivers/serial/posix_terminal.h>
-#include <mpf/drivers/serial/serial_port_registry.h>
 
 #include "tests/drivers/serial/line_collector.h"
 #include "tests/support/instrument.h"
@@ -237,35 +236,6 @@ TEST_F(SerialPortTest, SendBreakLastsForItsDuration) {
   EXPECT_EQ(line->sendBreak(20ms), kSuccess);
 
   EXPECT_TRUE(end.hasPassed());
-}
-
-TEST(SerialPortRegistry, FindsByName) {
-  const TemporaryFolder folder;
-  const Instrument instrument(folder.file("tty"));
-  SerialPortRegistry registry;
-  const std::shared_ptr<SerialPort> port = openPosixTerminal({.device = folder.file("tty")});
-
-  registry.registerName("UART[0]", port);
-
-  EXPECT_EQ(registry.find("UART[0]"), port);
-  EXPECT_EQ(registry.find("UART[1]"), nullptr);
-  EXPECT_THAT(registry.names(), ElementsAre("UART[0]"));
-  EXPECT_THROW(registry.registerName("UART[0]", port), std::invalid_argument);
-  EXPECT_THROW(registry.registerName("", port), std::invalid_argument);
-}
-
-TEST(SerialPortRegistry, BindsByName) {
-  const TemporaryFolder folder;
-  Instrument instrument(folder.file("tty"));
-  LineCollector collector;
-  SerialPortRegistry registry;
-  registry.registerName("UART[0]", openPosixTerminal({.device = folder.file("tty")}));
-
-  const auto line = registry.bind("UART[0]", collector);
-
-  EXPECT_EQ(line->writeRead(bytesOf("*IDN?\n"), kWatchdog), kSuccess);
-  EXPECT_THROW(static_cast<void>(registry.bind("UART[0]", collector)), std::runtime_error);
-  EXPECT_THROW(static_cast<void>(registry.bind("UART[1]", collector)), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/drivers/serial/tcp_serial_port.h>
 
-#include <netinet/in.h>
-#include <poll.h>
 #include <sys/socket.h>
 
 #include <array>
@@ -13,52 +11,13 @@
 #include <stdexcept>
 
 #include "tests/drivers/serial/line_collector.h"
+#include "tests/drivers/serial/terminal_server.h"
 #include "tests/support/instrument.h"
 
 namespace mpf::test {
 namespace {
 
 using testing::HasSubstr;
-
-// A port of a terminal server, simulated on a free TCP port of this host.
-class TerminalServer {
- public:
-  explicit TerminalServer(int family = AF_INET) : family_(family) { listen(0); }
-
-  [[nodiscard]] TcpAddress address() const {
-    return {family_ == AF_INET ? "127.0.0.1" : "::1", std::to_string(port_)};
-  }
-  [[nodiscard]] FileDescriptor accept() const {
-    pollfd ready{listener_.get(), POLLIN, 0};
-    const auto watchdogMs = static_cast<int>(std::chrono::milliseconds(kWatchdog).count());
-    if (retryInterrupted([&] { return ::poll(&ready, 1, watchdogMs); }) != 1)
-      throw std::runtime_error("accept: no connection within the time of the watchdog");
-    return FileDescriptor(
-        checkCall(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept"));
-  }
-  void switchOff() { listener_.reset(); }
-  void switchOn() { listen(port_); }
-
- private:
-  void listen(std::uint16_t port) {
-    listener_.reset(checkCall(::socket(family_, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket"));
-    const int yes = 1;
-    checkCall(::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes),
-              "setsockopt");
-    sockaddr_in6 address{};  // the port is at the same place in sockaddr_in
-    address.sin6_family = static_cast<sa_family_t>(family_);
-    address.sin6_port = htons(port);
-    socklen_t length = family_ == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
-    auto* generic = reinterpret_cast<sockaddr*>(&address);
-    checkCall(::bind(listener_.get(), generic, length), "bind");
-    checkCall(::listen(listener_.get(), 1), "listen");
-    checkCall(::getsockname(listener_.get(), generic, &length), "getsockname");
-    port_ = ntohs(address.sin6_port);
-  }
-  const int family_;
-  std::uint16_t port_ = 0;
-  FileDescriptor listener_;
-};
 
 class TcpSerialPortTest : public testing::Test {
  protected:

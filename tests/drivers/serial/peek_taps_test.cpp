@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <mpf/drivers/serial/peek_taps.h>
+
 #include <gtest/gtest.h>
 #include <mutex>
 #include <optional>
 
-#include <mpf/drivers/serial/peek_taps.h>
 #include <mpf/drivers/serial/posix_terminal.h>
 
 #include "tests/drivers/serial/line_collector.h"
@@ -107,6 +108,57 @@ TEST_F(PeekTest, AttachingAndDetachingTapsDoesNotDisturbRequests) {
   for (int i = 0; i < 200; ++i) ask("*IDN?\n");
 
   EXPECT_EQ(line_->counters().timeouts + line_->counters().failures, 0U);
+}
+
+// Lets `taps` show a byte, for tests without a port.
+void show(const PeekTaps& taps, char value) {
+  const PeekedByte byte{.value = static_cast<std::uint8_t>(value),
+                        .direction = ByteDirection::received};
+  taps.show({&byte, 1});
+}
+
+TEST(PeekTaps, AreEmptyWithoutATap) {
+  const auto taps = std::make_shared<PeekTaps>();
+  EXPECT_TRUE(taps->isEmpty());
+  {
+    const auto tap = taps->attach([](auto) {});
+    EXPECT_FALSE(taps->isEmpty());
+  }
+  EXPECT_TRUE(taps->isEmpty());
+}
+
+TEST(PeekTaps, SeeBytesInTheOrderInWhichTheyWereAttached) {
+  const auto taps = std::make_shared<PeekTaps>();
+  std::string order;
+  auto first = taps->attach([&](auto) { order += '1'; });
+  const auto second = taps->attach([&](auto) { order += '2'; });
+  show(*taps, 'a');
+  first.detach();
+  first = taps->attach([&](auto) { order += '3'; });
+
+  show(*taps, 'b');
+
+  EXPECT_EQ(order, "1223");
+}
+
+TEST(PeekTap, ListensAfterAMoveAndReplacesTheTapThatItIsAssignedTo) {
+  const auto taps = std::make_shared<PeekTaps>();
+  Recorder one;
+  Recorder other;
+  auto source = taps->attach(one.handler());
+  auto target = taps->attach(other.handler());
+  show(*taps, 'a');
+
+  target = std::move(source);
+  show(*taps, 'b');
+  source.detach();  // NOLINT(bugprone-use-after-move): a moved tap is not attached
+  show(*taps, 'c');
+
+  EXPECT_EQ(one.text(), "R:abc");
+  EXPECT_EQ(other.text(), "R:a");
+  target.detach();
+  target.detach();
+  EXPECT_TRUE(taps->isEmpty());
 }
 
 TEST(PeekTap, MayOutliveThePort) {

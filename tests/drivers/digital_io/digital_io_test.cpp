@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "drivers/digital_io/digital_io.h"
+
 #include <barrier>
 #include <thread>
 
