@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""exported_symbols_test LIBRARY: libmpfEpics.so exports no function that a program with its own copy
-of the client library defines, too: the dynamic linker would let one copy call functions of the
+"""exported_symbols_test LIBRARY: libmpfEpics.so exports no function that a program with its own
+copy of the client library defines, too: the dynamic linker would let one copy call functions of the
 other. It exports device support."""
 import re
 import subprocess
