@@ -50,7 +50,7 @@ std::string orNone(const std::vector<std::string>& addresses) {
 
 std::string chooseByNumber(const PciKind& kind, const std::vector<std::string>& boards,
                            const std::string& number) {
-  std::size_t n = 0;
+  auto n = boards.size();  // also when the number is too large for its type
   std::from_chars(number.data(), number.data() + number.size(), n);
   if (n < boards.size()) return boards[n];
   throw std::runtime_error(

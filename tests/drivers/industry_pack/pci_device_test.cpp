@@ -54,6 +54,7 @@ TEST_F(PciDeviceTest, ThatIsAbsentIsRefused) {
   pci_.add("0000:02:00.0", "0x8086", "0x100e");
 
   expectRefused("1", "this host has no TPCI200 number 1, counted from 0; its boards: 0000:03:00.0");
+  expectRefused("18446744073709551616", "this host has no TPCI200 number 18446744073709551616,");
   expectRefused("04:00.0", "no PCI device at 04:00.0; boards of kind TPCI200: 0000:03:00.0");
   expectRefused("../devices/0000:03:00.0", "no PCI device at ../devices/0000:03:00.0");
   expectRefused("02:00.0",
