@@ -12,7 +12,7 @@
 
 #include "tests/support/command.h"
 #include "tests/support/program.h"
-#include "tests/support/router_process.h"
+#include "tests/support/router_pair.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_backplane.h"
 
@@ -132,6 +132,28 @@ TEST_F(IocRouter, EndsWithAnIocThatIsKilled) {
   EXPECT_EQ(runAndEnd(SIGKILL), SIGKILL);
 
   while (!backplane_.segmentNames().empty()) static_cast<void>(backplane_.removeDead());
+}
+
+// examples/epics_two_hosts, both sides on this host.
+TEST_F(IocProgram, RecordsOfTheExampleReachTheServersOfTheOtherHost) {
+  const TestBackplane far;
+  const FreePort port;
+  const auto& address = port.address();
+  ::setenv("MPF_BACKPLANE", far.name().c_str(), 1);
+  Program servers({MPF_TEST_TWO_HOSTS "/server", MPF_TEST_BUILD, address});
+  ::setenv("MPF_BACKPLANE", backplane_.name().c_str(), 1);
+
+  const auto client = fmt::format(
+      "printf 'epicsThreadSleep 3\\ndbgf rst:int32\\ndbgf rst:text\\ndbgf rst:serial7\\n' "
+      "| " MPF_TEST_TWO_HOSTS "/client " MPF_TEST_BUILD " 127.0.0.1 {} 2>&1",
+      address.substr(address.find(':') + 1));
+  std::string printed;
+  do printed = runCommand(client).output;
+  while (printed.find("\"line 7: ") == std::string::npos);
+
+  EXPECT_THAT(printed, testing::ContainsRegex("DBF_LONG: +[1-9]"));
+  EXPECT_THAT(printed, HasSubstr("\"value "));
+  servers.end(SIGTERM);
 }
 
 }  // namespace
