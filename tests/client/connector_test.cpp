@@ -6,14 +6,13 @@
 
 #include <mpf/message_server.h>
 
-#include "client/binding.h"
 #include "shm/segment_name.h"
-#include "tests/support/test_backplane.h"
+#include "tests/client/binding_parts_fixture.h"
 
 namespace mpf::test {
 namespace {
 
-class ConnectorTest : public testing::Test {
+class ConnectorTest : public BindingPartsTest {
  protected:
   [[nodiscard]] bool hasPendingBind() const {
     for (const auto& name : backplane_.segmentNames()) {
@@ -22,16 +21,6 @@ class ConnectorTest : public testing::Test {
     }
     return false;
   }
-
-  TestBackplane backplane_;
-  DispatcherParts parts_{backplane_,      layout::SegmentKind::clientWindow,
-                         std::string(),   Rights{.mode = 0600},
-                         WaitMode::block, [](layout::SegmentHeader&) {}};
-  std::shared_ptr<Binding> owner_ = std::make_shared<Binding>(parts_, [](Message&&) {});
-  std::atomic<BindingState> state_{BindingState::waiting};
-  BindingTimer timer_{parts_.timer};
-  RequestSender sender_{state_, parts_.endpoint.control(), timer_, [] {}};
-  Connector connector_{parts_, timer_};
 };
 
 TEST_F(ConnectorTest, HasNoServerAtFirst) {

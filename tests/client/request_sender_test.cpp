@@ -6,14 +6,12 @@
 
 #include <mpf/message_server.h>
 
-#include "client/binding.h"
-#include "client/connector.h"
-#include "tests/support/test_backplane.h"
+#include "tests/client/binding_parts_fixture.h"
 
 namespace mpf::test {
 namespace {
 
-class RequestSenderTest : public testing::Test {
+class RequestSenderTest : public BindingPartsTest {
  protected:
   void SetUp() override { connector_.setServer("dac", 0); }
   // Opens a link that the server never accepts: its messages stay in the link.
@@ -30,17 +28,6 @@ class RequestSenderTest : public testing::Test {
     EXPECT_EQ(static_cast<bool>(message), result != SendResult::sent);
     return result;
   }
-
-  TestBackplane backplane_;
-  DispatcherParts parts_{backplane_,      layout::SegmentKind::clientWindow,
-                         std::string(),   Rights{.mode = 0600},
-                         WaitMode::block, [](layout::SegmentHeader&) {}};
-  std::shared_ptr<Binding> owner_ = std::make_shared<Binding>(parts_, [](Message&&) {});
-  std::atomic<BindingState> state_{BindingState::waiting};
-  BindingTimer timer_{parts_.timer};
-  int reports_ = 0;
-  RequestSender sender_{state_, parts_.endpoint.control(), timer_, [this] { ++reports_; }};
-  Connector connector_{parts_, timer_};
 };
 
 TEST_F(RequestSenderTest, RefusesRequestsWithoutAConnection) {

@@ -15,6 +15,36 @@ namespace {
 void inAnotherThread(const std::function<void()>& work) { std::thread(work).join(); }
 void wakeNobody() {}
 
+// A lock with a temporary owner, this thread, and a runner that waits for it.
+class LockWithWaitingRunner {
+ public:
+  LockWithWaitingRunner() {
+    EXPECT_TRUE(lock_.tryAcquireTemporarily());
+    runner_ = std::thread([this] {
+      lock_.acquire([this] {
+        isWaiting_.count_down();
+        mayTake_.wait();
+      });
+      EXPECT_TRUE(lock_.isMine());
+      lock_.release();
+    });
+    isWaiting_.wait();
+  }
+  RunnerLock& lock() { return lock_; }
+  // Lets the runner take the lock, which this thread has released. Returns when it has run.
+  void letRun() {
+    mayTake_.count_down();
+    runner_.join();
+  }
+
+ private:
+  const Watchdog watchdog_{"runner lock"};
+  RunnerLock lock_;
+  std::latch isWaiting_{1};
+  std::latch mayTake_{1};
+  std::thread runner_;
+};
+
 TEST(RunnerLock, BelongsToOneThread) {
   RunnerLock lock;
   EXPECT_FALSE(lock.isMine());
@@ -40,46 +70,23 @@ TEST(RunnerLock, RefusesASecondRunner) {
 }
 
 TEST(RunnerLock, ARunnerWaitsForATemporaryOwner) {
-  const Watchdog watchdog("runner lock");
-  RunnerLock lock;
-  ASSERT_TRUE(lock.tryAcquireTemporarily());
-  std::latch woken(1);
+  LockWithWaitingRunner waiting;
 
-  std::thread runner([&] {
-    lock.acquire([&] { woken.count_down(); });
-    EXPECT_TRUE(lock.isMine());
-    lock.release();
-  });
-  woken.wait();
-
-  EXPECT_TRUE(lock.isRunnerWaiting());
-  lock.release();
-  runner.join();
-  EXPECT_FALSE(lock.isRunnerWaiting());
+  EXPECT_TRUE(waiting.lock().isRunnerWaiting());
+  waiting.lock().release();
+  waiting.letRun();
+  EXPECT_FALSE(waiting.lock().isRunnerWaiting());
 }
 
 TEST(RunnerLock, AWaitingRunnerComesBeforeTemporaryOwners) {
-  const Watchdog watchdog("runner lock");
-  RunnerLock lock;
-  ASSERT_TRUE(lock.tryAcquireTemporarily());
-  std::latch woken(1);
-  std::latch mayTake(1);
-  std::thread runner([&] {
-    lock.acquire([&] {
-      woken.count_down();
-      mayTake.wait();
-    });
-    lock.release();
-  });
-  woken.wait();
+  LockWithWaitingRunner waiting;
 
-  lock.release();
-  const bool isTaken = lock.tryAcquireTemporarily();
+  waiting.lock().release();
+  const bool isTaken = waiting.lock().tryAcquireTemporarily();
 
   EXPECT_FALSE(isTaken);
-  if (isTaken) lock.release();
-  mayTake.count_down();
-  runner.join();
+  if (isTaken) waiting.lock().release();
+  waiting.letRun();
 }
 
 TEST(RunnerLock, TellsWhetherTheLastRunnerIsAnotherLivingThread) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Requests that end without a reply: refused, expired, cancelled, lost.
+// Bindings: requests that end without a reply: refused, expired, cancelled, lost.
 #include <vector>
 
 #include "tests/client/client_fixture.h"

@@ -1,35 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Functions of clients and servers for routers, which act on behalf of others.
-#include "tests/client/client_fixture.h"
+// What a router needs of a server that acts on behalf of another server.
+#include "server/relay_server.h"
+
+#include "tests/client/relay_fixture.h"
 
 namespace mpf::test {
 namespace {
-
-class RelayTest : public ClientTest {
- protected:
-  RelayServer& startWatched() {
-    auto& server = startServer({.queueSize = 4});
-    server.onClient(
-        [this](std::uint64_t client, bool isThere) { comings_.emplace_back(client, isThere); });
-    serverRuns_ = false;
-    return server;
-  }
-  // The next request, without a handler.
-  Message take() {
-    for (;;) {
-      if (auto request = server_->receive()) return request;
-      dispatcher_.runOnce(Deadline::after(100us));
-    }
-  }
-  void bindByHand() {
-    client_.bind("device[0]/a");
-    while (!client_.isConnected()) {
-      EXPECT_FALSE(server_->receive());
-      dispatcher_.runOnce(Deadline::after(100us));
-    }
-  }
-  std::vector<std::pair<std::uint64_t, bool>> comings_;
-};
 
 TEST_F(RelayTest, AServerReportsClientsThatConnectAndDisconnect) {
   startWatched();
@@ -67,9 +43,11 @@ TEST_F(RelayTest, AReplyByNumbersReachesItsRequest) {
   }
   EXPECT_TRUE(server.owes(client, id));
   EXPECT_FALSE(server.owes(client, id + 1));
+  EXPECT_THAT(server.owed(client), testing::ElementsAre(id));
 
   EXPECT_EQ(server.replyTo(client, id, Int32Message({.value = 4})), ReplyResult::sent);
   EXPECT_FALSE(server.owes(client, id));
+  EXPECT_THAT(server.owed(client), testing::IsEmpty());
   EXPECT_EQ(server.replyTo(client, id, Int32Message({.value = 5})), ReplyResult::sent);
   EXPECT_EQ(server.replyTo(client + 1, id, Int32Message()), ReplyResult::clientGone);
 
@@ -79,22 +57,6 @@ TEST_F(RelayTest, AReplyByNumbersReachesItsRequest) {
   EXPECT_FALSE(RelayClient::endsRequest(second));
   EXPECT_EQ(first.tryAs<Int32>()->value, 4);
   EXPECT_EQ(second.tryAs<Int32>()->value, 5);
-}
-
-TEST_F(RelayTest, ARequestHasTheIdThatTheCallerChose) {
-  startWatched();
-  bindByHand();
-  ASSERT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent);
-  EXPECT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::tooManyOutstanding);
-
-  auto request = take();
-  EXPECT_EQ(request.route().requestId, 77u);
-  static_cast<void>(server_->reply(std::move(request)));
-  EXPECT_EQ(next().route().requestId, 77u);
-  EXPECT_EQ(client_.sendAs(77, Int32Message(), Deadline::never()), SendResult::sent)
-      << "its place is free again";
-  static_cast<void>(server_->reply(take()));
-  static_cast<void>(next());
 }
 
 TEST_F(RelayTest, AServerGetsTheDeadlineOfARequest) {
@@ -109,28 +71,6 @@ TEST_F(RelayTest, AServerGetsTheDeadlineOfARequest) {
   EXPECT_TRUE(server_->takeBefore().isNever());
   static_cast<void>(next());
   static_cast<void>(next());
-}
-
-// While a client is paused, the reply queue of its server becomes full; after resume() no reply is
-// missing.
-TEST_F(RelayTest, APausedClientLeavesRepliesInTheQueue) {
-  auto& server = startWatched();
-  bindByHand();
-  ASSERT_EQ(client_.send(Int32Message()), SendResult::sent);
-  auto request = take();
-  client_.pause();
-
-  int sent = 0;
-  for (;; ++sent) {
-    auto extra = server.allocReplyMessage<Int32>(request);
-    extra->value = sent;
-    if (server.reply(std::move(extra)) != ReplyResult::sent) break;
-  }
-  for (int looks = 0; looks < 10; ++looks) dispatcher_.runOnce(Deadline::after(1ms));
-  EXPECT_THAT(messages_, testing::IsEmpty());
-
-  client_.resume();
-  for (int got = 0; got < sent; ++got) EXPECT_EQ(next().tryAs<Int32>()->value, got);
 }
 
 // A router reports in this way that a queue behind it is full.
