@@ -5,11 +5,25 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <string>
+#include <vector>
 
 #include "router/config/router_config.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mpf::router::test {
+
+// Entries of a file.
+// NOLINTBEGIN(modernize-raw-string-literal)
+inline const std::string kServe = "[[serve]]\nlocation = 1\n";
+inline const std::string kRemote =
+    "[[remote]]\nlocations = [2]\naddress = \"a:1\"\nsecurity = \"plain\"\n";
+// NOLINTEND(modernize-raw-string-literal)
+
+// An invalid file.
+struct Wrong {
+  std::string text;
+  std::string complaint;  // without "router.toml:"
+};
 
 class ConfigTest : public testing::Test {
  protected:
@@ -25,6 +39,10 @@ class ConfigTest : public testing::Test {
     } catch (const ConfigError& error) {
       return withoutFolder(error.what());
     }
+  }
+  void expectComplaints(const std::vector<Wrong>& all) {
+    for (const auto& [text, complaint] : all)
+      EXPECT_EQ(complaintOf(text), "router.toml:" + complaint) << text;
   }
   [[nodiscard]] std::string withoutFolder(std::string text) const {
     const auto prefix = folder_.path().string() + "/";

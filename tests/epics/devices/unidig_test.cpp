@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+// Inputs and outputs of an IP-Unidig, with the messages of their servers.
+#include <mpf/digital_io_commands.h>
+
+#include "tests/epics/epics_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using UnidigRecordTest = EpicsTest;
+
+TEST_F(UnidigRecordTest, InputsFollowEachChange) {
+  std::atomic<std::int32_t> inputs = 5;
+  const ThreadServer server(backplane_, "c-UnidigIn", [&](MessageServer& self, Message&& request) {
+    for (int message = 0; message < 2; ++message) {
+      auto reply = self.allocReplyMessage<Int32>(request);
+      reply->value = inputs + message;
+      static_cast<void>(self.reply(std::move(reply)));
+    }
+    request.reset();
+  });
+  const Ioc ioc(R"(
+    record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-UnidigIn")
+      field(PINI, "YES") }
+    record(bi, "bit0") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @in")
+      field(SCAN, "I/O Intr") field(ZNAM, "off") field(ONAM, "on") }
+    record(bi, "bit1") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S1 @in")
+      field(SCAN, "I/O Intr") field(ZNAM, "off") field(ONAM, "on") }
+  )");
+
+  Ioc::waitFor("in", "6");
+  Ioc::waitFor("bit1", "on");
+  Ioc::waitFor("bit0", "off");
+}
+
+TEST_F(UnidigRecordTest, OutputsSetAndClearTheirBit) {
+  std::atomic<std::int32_t> outputs = 0xff;
+  const ThreadServer server(backplane_, "c-UnidigOut", [&](MessageServer& self, Message&& request) {
+    const auto* fields = request.tryAs<Int32>();
+    if (fields->cmd == digital::cmdSetBits) outputs |= fields->address;
+    if (fields->cmd == digital::cmdClearBits) outputs &= ~fields->address;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(R"(record(bo, "out") { field(DTYP, "Greenspring IP-Unidig")
+    field(OUT, "#C0 S3 @c-UnidigOut") field(VAL, "0") field(PINI, "YES") })");
+  while (outputs == 0xff) std::this_thread::yield();
+  EXPECT_EQ(outputs, 0xf7);
+
+  ASSERT_EQ(Ioc::put("out", "1"), 0);
+  while (outputs != 0xff) std::this_thread::yield();
+}
+
+TEST_F(UnidigRecordTest, AnInputBitHasTheAlarmOfItsInputs) {
+  const ThreadServer server(backplane_, "c-UnidigIn", [](MessageServer& self, Message&& request) {
+    request.tryAs<Int32>()->status = -1;
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(R"(
+    record(longin, "in") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @c-UnidigIn")
+      field(PINI, "YES") }
+    record(bi, "bit") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S23 @in")
+      field(SCAN, "I/O Intr") }
+  )");
+
+  Ioc::waitFor("bit.AMSG", "the server cannot read the inputs");
+
+  EXPECT_EQ(Ioc::get("bit.SEVR"), "INVALID");
+}
+
+TEST_F(UnidigRecordTest, BitsThatDoNotExistAndInputsThatAreNoLonginNeverProcess) {
+  const Ioc ioc(R"(
+    record(longin, "in") {}
+    record(ai, "other") {}
+    record(bi, "bit23") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S23 @in") }
+    record(bi, "bit24") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S24 @in") }
+    record(bi, "ofOther") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @other") }
+    record(bi, "ofNone") { field(DTYP, "Greenspring IP-Unidig") field(INP, "#C0 S0 @none") }
+    record(bo, "out23") { field(DTYP, "Greenspring IP-Unidig") field(OUT, "#C0 S23 @c-Out") }
+    record(bo, "out24") { field(DTYP, "Greenspring IP-Unidig") field(OUT, "#C0 S24 @c-Out") }
+  )");
+
+  EXPECT_EQ(Ioc::get("bit23.PACT"), "0");
+  EXPECT_EQ(Ioc::get("bit24.PACT"), "1");
+  EXPECT_EQ(Ioc::get("ofOther.PACT"), "1");
+  EXPECT_EQ(Ioc::get("ofNone.PACT"), "1");
+  EXPECT_EQ(Ioc::get("out23.PACT"), "0");
+  EXPECT_EQ(Ioc::get("out24.PACT"), "1");
+}
+
+}  // namespace
+}  // namespace mpf::test
