@@ -54,6 +54,7 @@ PUBLIC_HEADERS = {
     "epics": ["epics/dev_mpf.h"],
 }
 
+TESTED_ELSEWHERE = "tests/tidy/tested_elsewhere.txt"
 MAX_LINES = 400
 MAX_COLUMNS = 100
 MAY_BE_LONG = re.compile(r'[│┌┐└┘├─►◄]|NOLINT|R"|https?://')
@@ -275,6 +276,27 @@ def named_tests(files):
             yield path, line_of(text, match.start()), f"names a test that is absent: {match[0]}"
 
 
+def mirrored_tests(files):
+    """Each source has tests/SAME/PATH_test.cpp, or a line in TESTED_ELSEWHERE: the test that covers
+    it, or why it has no logic."""
+    table = list(lines(files.get(TESTED_ELSEWHERE, "")))
+    elsewhere = dict(line.split(": ", 1) for _, line in table if ": " in line)
+    for path in files:
+        without = path.startswith(MAY_INCLUDE_ANYTHING) or path.endswith("main.cpp")
+        if not path.endswith(".cpp") or without or path in elsewhere:
+            continue
+        if f"tests/{path[:-4]}_test.cpp" not in files:
+            yield path, 1, f"has no test of its path and no line in {TESTED_ELSEWHERE}"
+    for number, line in table:
+        source, _, test = line.partition(": ")
+        if source not in files:
+            yield TESTED_ELSEWHERE, number, f"names an absent source: {source}"
+        elif f"tests/{source[:-4]}_test.cpp" in files:
+            yield TESTED_ELSEWHERE, number, f"names a source that has a test: {source}"
+        elif not test.startswith("no logic, ") and f"tests/{test}" not in files:
+            yield TESTED_ELSEWHERE, number, f"names an absent test: {test}"
+
+
 def machine_paths(files):
     """No file depends on the place of the tree or on a package host."""
     place = re.compile(
@@ -313,6 +335,7 @@ RULES = (
     shown_code,
     named_functions,
     named_tests,
+    mirrored_tests,
     machine_paths,
     errors_never_throw,
 )

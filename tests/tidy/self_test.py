@@ -160,6 +160,19 @@ class Rules(unittest.TestCase):
         self.refuses(rule, {"docs/a.md": document, **test}, ("docs/a.md", 1))
         self.passes(rule, {"docs/a.md": document, **schema, **test})
 
+    def test_mirrored_tests(self):
+        rule, source = check.mirrored_tests, {"shm/a.cpp": "", "shm/main.cpp": ""}
+        table = check.TESTED_ELSEWHERE
+        self.refuses(rule, source, ("shm/a.cpp", 1))
+        self.passes(rule, {**source, "tests/shm/a_test.cpp": ""})
+        self.passes(rule, {**source, table: "shm/a.cpp: no logic, two constants\n"})
+        other = {table: "shm/a.cpp: shm/b_test.cpp\n"}
+        self.refuses(rule, {**source, **other}, (table, 1))
+        self.passes(rule, {**source, **other, "tests/shm/b_test.cpp": ""})
+        both = {"tests/shm/a_test.cpp": "", "tests/shm/b_test.cpp": ""}
+        self.refuses(rule, {**source, **other, **both}, (table, 1))
+        self.refuses(rule, {**other, "tests/shm/b_test.cpp": ""}, (table, 1))
+
     def test_sizes(self):
         self.refuses(check.sizes, {"shm/a.cpp": "\n" * 401}, ("shm/a.cpp", 401))
         self.passes(check.sizes, {"shm/a.cpp": "\n" * 400, "docs/long.md": "\n" * 900})
