@@ -38,6 +38,13 @@ class LocalServersTest : public RouterPartsTest {
   }
   // Opens client 1 of binding 1.
   void openClient() { sendItems({open(1, 1, monitors_.of({0, "echo"})->incarnation())}); }
+  // Sends a request of client 1, which the server receives.
+  Message receiveRequest(std::uint32_t id, std::int32_t value = 0) {
+    sendItems({test::request(1, id, value)});
+    Message request;
+    runUntil([&] { return static_cast<bool>(request = server_->receive()); });
+    return request;
+  }
 
   std::optional<MessageServer> server_;
   std::optional<LocalServers> servers_;
@@ -81,9 +88,7 @@ TEST_F(LocalServersTest, RefuseABindingThatTheNewConfigurationDoesNotAllow) {
 TEST_F(LocalServersTest, CarryARequestAndItsReply) {
   bindToServer();
   openClient();
-  sendItems({test::request(1, 5, 42)});
-  Message request;
-  runUntil([&] { return static_cast<bool>(request = server_->receive()); });
+  auto request = receiveRequest(5, 42);
   auto* fields = request.tryAs<Int32>();
   ASSERT_NE(fields, nullptr);
   EXPECT_EQ(fields->value, 42);
@@ -98,12 +103,30 @@ TEST_F(LocalServersTest, CarryARequestAndItsReply) {
   EXPECT_EQ(record_->clients, 0u);
 }
 
-// The requests that the server has not received end before the peer is told that it is absent.
+// All requests end before the peer is told that the server is absent.
 TEST_F(LocalServersTest, EndTheRequestsOfAServerBeforeItIsAbsent) {
   bindToServer();
   openClient();
+  const auto received = receiveRequest(5);
+  sendItems({test::request(1, 6)});
+
+  server_.reset();
+  servers_->lookAtAll();
+
+  EXPECT_THAT(nextItem(),
+              AllOf(StartsWith("(fate = (client = 1, requestId = 5"), HasSubstr("outcomeUnknown")));
+  EXPECT_THAT(nextItem(),
+              AllOf(StartsWith("(fate = (client = 1, requestId = 6"), HasSubstr("neverTaken")));
+  EXPECT_THAT(nextItem(), HasSubstr("state = absent"));
+  sendItems({test::request(1, 7)});
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 7"), HasSubstr("neverTaken"),
+                                HasSubstr("the server is gone")));
+}
+
+TEST_F(LocalServersTest, EndTheRequestsThatWaitForTheServerToAcceptTheirClient) {
+  bindToServer();
+  openClient();
   sendItems({test::request(1, 5)});
-  runUntil([&] { return server_->waitForMessage(Deadline::after(Nanoseconds(0))); });
 
   server_.reset();
   servers_->lookAtAll();
@@ -111,9 +134,6 @@ TEST_F(LocalServersTest, EndTheRequestsOfAServerBeforeItIsAbsent) {
   EXPECT_THAT(nextItem(),
               AllOf(StartsWith("(fate = (client = 1, requestId = 5"), HasSubstr("neverTaken")));
   EXPECT_THAT(nextItem(), HasSubstr("state = absent"));
-  sendItems({test::request(1, 6)});
-  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 6"), HasSubstr("neverTaken"),
-                                HasSubstr("the server is gone")));
 }
 
 TEST_F(LocalServersTest, ReportALostFirstReplyAsOutcomeUnknown) {
