@@ -16,14 +16,13 @@
 #include <mpf/message_client.h>
 
 #include "client/relay_client.h"
-#include "tests/support/router_pair.h"
 
 namespace mpf::test {
 
 class Caller {
  public:
   explicit Caller(Dispatcher& dispatcher, const std::string& server = "echo",
-                  std::int32_t location = RouterPair::kLocation)
+                  std::int32_t location = 1)
       : client(dispatcher, [this](Message&& message) { note(std::move(message)); }) {
     client.bind(server, location);
   }

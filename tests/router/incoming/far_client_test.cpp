@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+// FarClient: requests that are held, and the window of its replies.
+#include "router/incoming/far_client.h"
+
+#include <mpf/message_server.h>
+
+#include "router/readable.h"
+#include "tests/router/client_items.h"
+#include "tests/router/router_parts_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using router::FarClient;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class FarClientTest : public RouterPartsTest {
+ protected:
+  ~FarClientTest() noexcept override = default;
+
+  void SetUp() override {
+    startGreeted();
+    onItem_ = [this](wire::Item::Reader item) {
+      if (item.isRequest()) client_->request(item.getRequest());
+      if (item.isCredit()) client_->credit(item.getCredit().getBytes());
+    };
+  }
+  void TearDown() override {
+    client_.reset();
+    RouterPartsTest::TearDown();
+  }
+  void makeClient(const FarClient::Terms& terms) {
+    client_.emplace(FarClient::Shared{context_.timer, dispatcher_, *line_, record_, heldBytes_},
+                    terms,
+                    FarClient::Events{.onConnected = [](FarClient&) {},
+                                      .onDisconnected = [this](FarClient&) { ++disconnects_; },
+                                      .onRefused = [](FarClient&, const std::string&) {}});
+    client_->bind("echo", 0);
+  }
+  // A client whose window has room for one reply, and a server that has sent two.
+  void sendTwoReplies() {
+    server_.emplace(backplane_, "echo");
+    const auto monitor = monitors_.of({0, "echo"});
+    ASSERT_TRUE(monitor->look());
+    makeClient({.number = 1, .incarnation = monitor->incarnation(), .queueSize = 4, .window = 1});
+    sendItems({test::request(1, 5), test::request(1, 6)});
+    for (int replies = 0; replies < 2;) {
+      runUntil([&] { return server_->waitForMessage(Deadline::after(Nanoseconds(0))); });
+      while (auto request = server_->receive()) {
+        EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+        ++replies;
+      }
+    }
+    EXPECT_THAT(nextItem(), StartsWith("(reply = (client = 1, requestId = 5"));
+    dispatcher_.runPending();
+  }
+  void sendItems(const std::vector<Fill>& items) { send(frameOf(items)); }
+  // Expects that the peer has received all items.
+  void expectNoItem() {
+    sendItems({ping(1)});
+    EXPECT_THAT(nextItem(), StartsWith("(pong"));
+  }
+
+  Dispatcher dispatcher_{backplane_, {.waitMode = WaitMode::block, .label = {}}};
+  const router::Readable readable_{context_.port, dispatcher_.descriptor(),
+                                   [this] { dispatcher_.runPending(); }};
+  std::size_t heldBytes_ = 0;
+  int disconnects_ = 0;
+  std::optional<MessageServer> server_;
+  std::optional<FarClient> client_;
+};
+
+TEST_F(FarClientTest, RequestsBeyondTheQueueSizeAreRefusedAndReportedOnce) {
+  makeClient({.number = 1, .queueSize = 2, .window = 4096});
+
+  sendItems({test::request(1, 1), test::request(1, 2), test::request(1, 3), test::request(1, 4)});
+
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 3"), HasSubstr("refused")));
+  EXPECT_EQ(nextItem(), "(queueFull = 1)");
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 4"), HasSubstr("refused")));
+  expectNoItem();
+}
+
+TEST_F(FarClientTest, AHeldRequestExpires) {
+  makeClient({.number = 1, .queueSize = 2, .window = 4096});
+
+  sendItems({[](wire::Item::Builder item) {
+    test::request(1, 5)(item);
+    item.getRequest().setTakeWithinNs(1);
+  }});
+
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 5"), HasSubstr("expired")));
+}
+
+TEST_F(FarClientTest, AnotherIncarnationOfTheServerReceivesNoRequest) {
+  server_.emplace(backplane_, "echo");
+  makeClient({.number = 1, .incarnation = 1, .queueSize = 2, .window = 4096});
+  sendItems({test::request(1, 5)});
+
+  runUntil([&] {
+    EXPECT_FALSE(server_->receive());
+    return heldBytes_ == 0;
+  });
+
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 5"), HasSubstr("neverTaken")));
+  sendItems({test::request(1, 6)});
+  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 6"), HasSubstr("neverTaken")));
+}
+
+TEST_F(FarClientTest, RepliesBeyondTheWindowWaitForCredit) {
+  sendTwoReplies();
+  expectNoItem();
+
+  sendItems({test::credit(1, 64)});
+
+  EXPECT_THAT(nextItem(), StartsWith("(reply = (client = 1, requestId = 6"));
+}
+
+TEST_F(FarClientTest, RepliesBeyondTheWindowAreOutcomeUnknownWhenTheServerIsGone) {
+  sendTwoReplies();
+  server_.reset();
+
+  client_->onServerGone();
+
+  EXPECT_THAT(nextItem(),
+              AllOf(StartsWith("(fate = (client = 1, requestId = 6"), HasSubstr("outcomeUnknown")));
+  runUntil([this] { return disconnects_ == 1; });
+  EXPECT_FALSE(client_->isConnected());
+}
+
+}  // namespace
+}  // namespace mpf::test
