@@ -104,7 +104,7 @@ TEST_F(FarClientTest, AnotherIncarnationOfTheServerReceivesNoRequest) {
     return heldBytes_ == 0;
   });
 
-  EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 5"), HasSubstr("neverTaken")));
+  ASSERT_THAT(nextItem(), AllOf(HasSubstr("requestId = 5"), HasSubstr("neverTaken")));
   sendItems({test::request(1, 6)});
   EXPECT_THAT(nextItem(), AllOf(HasSubstr("requestId = 6"), HasSubstr("neverTaken")));
 }

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// Proxy: credit for replies, and replies for which their client has no room.
+#include "router/outgoing/proxy.h"
+
+#include "tests/router/router_parts_fixture.h"
+#include "tests/router/server_items.h"
+#include "tests/support/caller.h"
+
+namespace mpf::test {
+namespace {
+
+using router::Proxy;
+using router::RemoteConnection;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class ProxyTest : public RouterPartsTest {
+ protected:
+  static constexpr std::uint32_t kWindowBytes = 1 << 20;
+
+  void SetUp() override {
+    context_.config.limits.windowBytes = kWindowBytes;
+    startGreeted();
+    connection_.emplace(*line_, record_, context_.log, "far:9900", [] {});
+    proxy_.emplace(context_, *connection_, router::ServerName{1, "echo"},
+                   Proxy::Offer{.binding = 1,
+                                .incarnation = kIncarnation,
+                                .queueSize = 4,
+                                .maxMessageBytes = kWindowBytes});
+    onItem_ = [this](wire::Item::Reader item) {
+      if (item.isReply()) proxy_->reply(item.getReply().getClient(), item.getReply());
+    };
+    caller_.emplace(dispatcher_);
+    runClientUntil([this] { return caller_->isConnected(); });
+    EXPECT_THAT(nextItem(), StartsWith("(open = (client = 1, binding = 1"));
+  }
+  void TearDown() override {
+    caller_.reset();
+    proxy_.reset();
+    connection_.reset();
+    RouterPartsTest::TearDown();
+  }
+  std::uint32_t sendRequest() {
+    const auto id = caller_->send(Int32Message());
+    EXPECT_THAT(nextItem(), StartsWith("(request = (client = 1, "));
+    return id;
+  }
+  void runClientUntil(const std::function<bool()>& isDone) {
+    runUntil([&] {
+      dispatcher_.runPending();
+      return isDone();
+    });
+  }
+
+  Dispatcher dispatcher_{backplane_, {}};
+  std::optional<RemoteConnection> connection_;
+  std::optional<Proxy> proxy_;
+  std::optional<Caller> caller_;
+};
+
+TEST_F(ProxyTest, AReplyThatUsesUpTheWindowGivesItAllBack) {
+  const auto id = sendRequest();
+
+  send(frameOf(
+      {replyOf(1, id, [](auto message) { message.initUser().initValue(kWindowBytes - 64); })}));
+
+  EXPECT_THAT(nextItem(), HasSubstr("(credit = (client = 1, bytes = 1048576))"));
+}
+
+// Far more replies than the client has room for, before it receives the first one.
+TEST_F(ProxyTest, RepliesAreHeldInOrderUntilTheClientHasRoom) {
+  constexpr std::int32_t kReplies = 200;
+  const auto id = sendRequest();
+  std::vector<Fill> replies;
+  for (std::int32_t i = 0; i < kReplies; ++i) replies.push_back(test::reply(1, id, i == 0, i));
+
+  send(frameOf(replies));
+  runClientUntil([this] { return caller_->messages.size() == kReplies; });
+
+  for (std::int32_t i = 0; i < kReplies; ++i) {
+    const auto reply = caller_->take();
+    ASSERT_NE(reply.tryAs<Int32>(), nullptr);
+    ASSERT_EQ(reply.tryAs<Int32>()->value, i);
+  }
+}
+
+}  // namespace
+}  // namespace mpf::test
