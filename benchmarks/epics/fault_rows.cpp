@@ -121,7 +121,14 @@ Outcome onFarm(const Stage& stage, const EpicsBench& bench, bool isStarted,
     workload.server = [&](const RunContext& context) { ServerFarm(context).keep(context, bench); };
   workload.requester = requester;
   auto outcome = stage.run(workload);
-  removeBackplanes(bench.backplane);
+  // The servers die after the farm.
+  const auto isEmpty = [&] {
+    removeBackplanes(bench.backplane);
+    return std::ranges::none_of(Backplane::names(), [&](const std::string& name) {
+      return name.starts_with(bench.backplane);
+    });
+  };
+  if (!waitUntil(isEmpty, kFaultLimit)) outcome.error = "the servers left shared memory";
   return outcome;
 }
 
