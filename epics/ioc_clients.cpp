@@ -60,8 +60,7 @@ std::shared_ptr<SharedClient> IocClients::connectionTo(const std::string& server
   const std::lock_guard lock(mutex_);
   if (!dispatcher_) startDispatcher();
   auto& connection = connections_[{server, location, user}];
-  if (!connection)
-    connection = std::make_shared<SharedClient>(*dispatcher_, server, location);
+  if (!connection) connection = std::make_shared<SharedClient>(*dispatcher_, server, location);
   return connection;
 }
 

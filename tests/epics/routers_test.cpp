@@ -18,13 +18,12 @@ class RecordsOverRouters : public EpicsTest {
 TEST_F(RecordsOverRouters, ARouterThatIsKilledIsACommAlarmUntilTheNextOneIsThere) {
   std::atomic<bool> isSilent = false;
   std::vector<Message> kept;  // requests without a reply
-  const ThreadServer server(
-      routers_.far(), "adc",
-      [&](MessageServer& self, Message&& request) {
-        if (isSilent) kept.push_back(std::move(request));
-        else static_cast<void>(self.reply(std::move(request)));
-      },
-      {.location = RouterPair::kLocation});
+  const ThreadServer server(routers_.far(), "adc",
+                            [&](MessageServer& self, Message&& request) {
+                              if (isSilent) kept.push_back(std::move(request));
+                              else static_cast<void>(self.reply(std::move(request)));
+                            },
+                            {.location = RouterPair::kLocation});
   const Ioc ioc(
       "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@adc:1 value=7\")"
       " field(PINI, \"YES\") }");

@@ -71,9 +71,8 @@ class ListenerTest : public testing::Test {
     auto called = kj::newPromiseAndFulfiller<std::string>();
     called_ = kj::mv(called.fulfiller);
     Tls tls(ours_.files("honest"), io_.provider->getTimer());
-    auto connected =
-        tls.connect({kj::mv(stream), kj::UnknownPeerIdentity::newInstance()}, "server")
-            .wait(io_.waitScope);
+    auto connected = tls.connect({kj::mv(stream), kj::UnknownPeerIdentity::newInstance()}, "server")
+                         .wait(io_.waitScope);
     auto closed = connected.stream->tryRead(&unread_, 1, 1).then([](std::size_t) -> std::string {
       kj::throwFatalException(KJ_EXCEPTION(DISCONNECTED, "the listener closed the connection"));
     });
