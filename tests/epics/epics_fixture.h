@@ -42,7 +42,7 @@ class EpicsTest : public testing::Test {
  protected:
   EpicsTest() { ::setenv("MPF_BACKPLANE", backplane_.name().c_str(), 1); }
   TestBackplane backplane_;
-  const Watchdog watchdog_{"EPICS test", std::chrono::seconds(120)};
+  const Watchdog watchdog_{"EPICS test"};
 };
 
 }  // namespace mpf::test

@@ -56,7 +56,7 @@ class SharedClientTest : public testing::Test {
     return fields == nullptr ? -1 : fields->value;
   }
 
-  const Watchdog watchdog_{"SharedClient", std::chrono::seconds(120)};
+  const Watchdog watchdog_{"SharedClient"};
   TestBackplane backplane_;
   RecordingMember one_, two_;
   std::atomic<std::uint32_t> requestId_{0};

@@ -31,7 +31,7 @@ class MbbiDirectChannelAccess : public testing::Test {
   }
   FreePort port_;
   TestBackplane backplane_;
-  const Watchdog watchdog_{"Channel Access test", std::chrono::seconds(120)};
+  const Watchdog watchdog_{"Channel Access test"};
 };
 
 // "the INP field can be a constant, a database, or a channel access link"
