@@ -8,19 +8,19 @@
 #include <stdexcept>
 
 #include "base/run_main.h"
+#include "base/service_manager.h"
 #include "base/standard_descriptors.h"
 #include "router/arguments.h"
 #include "router/kj_log.h"
 #include "router/router.h"
-#include "router/service_manager.h"
 #include "router/transport/kj_text.h"
 #include "server/programs/server_log.h"
 
 namespace {
 
+using mpf::ServiceManager;
 using mpf::router::Router;
 using mpf::router::RouterArguments;
-using mpf::router::ServiceManager;
 
 constexpr auto kStopTimeout = 2 * kj::SECONDS;  // for sending farewells
 constexpr unsigned kTurnsBetweenPolls = 32;     // polls of descriptors, timers and signals

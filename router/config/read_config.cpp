@@ -2,11 +2,10 @@
 // readConfig(): reads a RouterConfig from a TOML file; this file names all keys.
 #include <filesystem>
 #include <fmt/format.h>
-#include <system_error>
 
+#include "base/toml/toml_table.h"
 #include "router/config/limit_text.h"
-#include "router/config/toml_table.h"
-#include "router/config/whole_file.h"
+#include "router/config/written_config.h"
 #include "shm/rights_text.h"
 
 namespace mpf::router {
@@ -102,22 +101,16 @@ void readRoot(TomlTable& table, WrittenConfig& to, const std::filesystem::path& 
   table.finish();
 }
 
-toml::table parseToml(const std::string& file) try {
-  return toml::parse(readWholeFile(file), file);
-} catch (const toml::parse_error& error) {
-  throw ConfigError(fmt::format("{}:{}: {}", file, error.source().begin.line, error.description()));
-} catch (const std::system_error& error) {
-  throw ConfigError(fmt::format("{}: cannot be read: {}", file, error.code().message()));
-}
-
 }  // namespace
 
 WrittenConfig readConfig(const std::string& file) {
-  const auto root = parseToml(file);
+  const auto root = parseTomlFile(file);
   WrittenConfig to;
-  TomlTable table(root, file, "");
+  ConfigErrors errors;
+  TomlTable table(root, file, "", errors);
   to.places.root = to.places.tls = to.places.limits = table.places();
   readRoot(table, to, std::filesystem::path(file).parent_path());
+  errors.throwIfAny();
   return to;
 }
 

@@ -14,10 +14,10 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "base/toml/config_errors.h"
 #include "shm/window.h"
 
 namespace mpf::router {
@@ -108,12 +108,6 @@ struct RouterConfig {
   std::vector<Allow> allow;
   Limits limits;
   bool operator==(const RouterConfig&) const = default;
-};
-
-// Its text is "FILE:LINE: what is wrong, and what to write", or "--option: ..." for a command line.
-class ConfigError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
 };
 
 //   throws  ConfigError

@@ -9,7 +9,7 @@
 #include <openssl/x509.h>
 #include <system_error>
 
-#include "router/config/whole_file.h"
+#include "base/whole_file.h"
 
 namespace mpf::router {
 namespace {

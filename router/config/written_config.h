@@ -8,25 +8,12 @@
 // Threads  plain data.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
 #include "router/config/router_config.h"
 
 namespace mpf::router {
-
-// The place of each key of a table, in the form in which errors begin: "FILE:LINE" or "--listen".
-// The key "" is the table itself.
-struct Places : std::map<std::string, std::string> {
-  using map::map;
-
-  // The place of `key`, or of the table when the key is absent.
-  [[nodiscard]] const std::string& of(const std::string& key) const {
-    const auto found = find(key);
-    return found != end() ? found->second : at("");
-  }
-};
 
 struct ConfigPlaces {
   bool isFile = true;

@@ -176,7 +176,7 @@ TEST_F(ArgumentsTest, ErrorsOfAFileNameItsLine) {
   const auto started = start({folder_.write("r.toml", "\nnam = \"a\"\n")});
 
   EXPECT_EQ(started.status, 2);
-  EXPECT_EQ(started.err, "mpf-router: r.toml:2: unknown key \"nam\"; did you mean \"name\"?\n");
+  EXPECT_EQ(started.err, "mpf-router: r.toml:2:1: unknown key \"nam\"; did you mean \"name\"?\n");
 }
 
 TEST_F(ArgumentsTest, SomeCannotBeCombinedWithAFile) {

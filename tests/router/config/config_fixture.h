@@ -4,9 +4,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <regex>
 #include <string>
 #include <vector>
 
+#include "base/toml/config_errors.h"
 #include "router/config/router_config.h"
 #include "tests/support/temporary_folder.h"
 
@@ -22,7 +24,7 @@ inline const std::string kRemote =
 // An invalid file.
 struct Wrong {
   std::string text;
-  std::string complaint;  // without "router.toml:"
+  std::string complaint;  // without "router.toml:" and the column
 };
 
 class ConfigTest : public testing::Test {
@@ -31,13 +33,14 @@ class ConfigTest : public testing::Test {
     return loadConfig(folder_.write("router.toml", text));
   }
 
-  // Returns the error of a file, or "nothing".
+  // Returns the errors of a file without their columns, or "nothing".
   std::string complaintOf(const std::string& text) {
     try {
       static_cast<void>(load(text));
       return "nothing";
     } catch (const ConfigError& error) {
-      return withoutFolder(error.what());
+      return std::regex_replace(withoutFolder(error.what()), std::regex("(toml:[0-9]+):[0-9]+"),
+                                "$1");
     }
   }
   void expectComplaints(const std::vector<Wrong>& all) {

@@ -96,7 +96,8 @@ TEST_F(RouterDocs, HaveEveryKeyThatTheProgramReads) {
   const auto keys = keysIn(files().front());
   for (const std::string table : {"", "[tls]\n", "[limits]\n", "[[serve]]\n", "[[listen]]\n",
                                   "[[remote]]\n", "[[allow]]\n"}) {
-    const auto complaint = complaintOf(table + "qqqqqqqqqqqqqqqqqq = 1\n");
+    const auto complaints = complaintOf(table + "qqqqqqqqqqqqqqqqqq = 1\n");
+    const auto complaint = complaints.substr(0, complaints.find('\n'));
     constexpr std::string_view kBegin = "the keys are ";
     ASSERT_THAT(complaint, HasSubstr(kBegin));
     std::istringstream known(complaint.substr(complaint.find(kBegin) + kBegin.size()));

@@ -147,14 +147,17 @@ TEST_F(ReadConfigTest, UnknownKeys) {
       {"nam = \"a\"\n", "1: unknown key \"nam\"; did you mean \"name\"?"},
       {kRemote + "adress = \"a:1\"\n",
        "5: [[remote]]: unknown key \"adress\"; did you mean \"address\"?"},
-      {"[[remote]]\nlocation = 1\n",
-       "2: [[remote]]: unknown key \"location\"; did you mean \"locations\"?"},
+      {kRemote + "location = 1\n",
+       "5: [[remote]]: unknown key \"location\"; did you mean \"locations\"?"},
       {kServe + "locations = [1]\n",
        "3: [[serve]]: unknown key \"locations\"; did you mean \"location\"?"},
       {"[limits]\nqueue_size = 1\n",
        "2: [limits]: unknown key \"queue_size\"; did you mean \"queue-size\"?"},
       {"[tls]\n\npassword = \"x\"\n",
-       "3: [tls]: unknown key \"password\"; the keys are certificate, key, authorities"},
+       "3: [tls]: unknown key \"password\"; the keys are certificate, key, authorities\n"
+       "router.toml:1: [tls] has no certificate; write certificate = \"ours.pem\"\n"
+       "router.toml:1: [tls] has no key; write key = \"ours.key\"\n"
+       "router.toml:1: [tls] has no authorities; write authorities = \"authorities.pem\""},
       {"[[remotes]]\nlocations = 1\n", "1: unknown key \"remotes\"; did you mean \"remote\"?"},
   });
 }
@@ -181,8 +184,10 @@ TEST_F(ReadConfigTest, ValuesOfTheWrongType) {
       {"[[serve]]\nlocation = [1]\n", "2: location is a list; write an integer"},
       {"[[serve]]\nlocation = 3000000000\n",
        "2: location 3000000000 is out of range: use -2147483648 to 2147483647"},
-      {"[[remote]]\nlocations = [\n1,\n\"2\"]\n", "4: locations is a string; write an integer"},
-      {"[[remote]]\nlocations = []\n", "2: locations is an empty list; write at least one value"},
+      {"[[remote]]\naddress = \"a:1\"\nlocations = [\n1,\n\"2\"]\n",
+       "5: locations is a string; write an integer"},
+      {"[[remote]]\naddress = \"a:1\"\nlocations = []\n",
+       "3: locations is an empty list; write at least one value"},
       {"[[allow]]\nservers = [1]\n", "2: servers is an integer; write strings in quotes"},
       {"[limits]\ndead-time = 2024-01-01\n",
        "2: dead-time is a date or a time; write a string in quotes"},
@@ -201,7 +206,8 @@ TEST_F(ReadConfigTest, InvalidValues) {
       {"[[listen]]\naddress = \"a\"\n",
        "2: address: \"a\" has no port; write HOST:PORT, such as ioc1.lab:9900, 10.0.0.7:9900, "
        "[fd00::7]:9900 or, to listen, *:9900"},
-      {"[[listen]]\nsecurity = \"none\"\n", "2: security: \"none\": write \"tls\" or \"plain\""},
+      {"[[listen]]\naddress = \"a:1\"\nsecurity = \"none\"\n",
+       "3: security: \"none\": write \"tls\" or \"plain\""},
       {"[limits]\ndead-time = 2\n",
        "2: dead-time: \"2\": write a time with its unit, such as 500ms, 2s or 1min"},
       {"[limits]\nqueue-size = 0\n", "2: queue-size: 0 is out of range: use 1 to 1000000"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/config/whole_file.h"
+#include "base/whole_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 
 #include "base/system_call.h"
 
-namespace mpf::router {
+namespace mpf {
 
 std::string readWholeFile(const std::string& file) {
   const FileDescriptor opened(checkCall(::open(file.c_str(), O_RDONLY | O_CLOEXEC), "open", file));
@@ -25,4 +25,4 @@ std::string readWholeFile(const std::string& file) {
   }
 }
 
-}  // namespace mpf::router
+}  // namespace mpf

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // ServiceManager: the datagrams that systemd receives.
-#include "router/service_manager.h"
+#include "base/service_manager.h"
 
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -16,7 +16,7 @@
 
 #include "tests/support/temporary_folder.h"
 
-namespace mpf::router::test {
+namespace mpf::test {
 namespace {
 
 // A socket to which $NOTIFY_SOCKET points during a test. `name` may begin with '@', the written
@@ -49,7 +49,7 @@ class NotifySocket {
 };
 
 TEST(ServiceManager, ReportsEachState) {
-  const mpf::test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   NotifySocket systemd((folder.path() / "notify").string());
 
   ServiceManager::notifyReady();
@@ -79,4 +79,4 @@ TEST(ServiceManager, DoesNothingWithoutASocket) {
 }
 
 }  // namespace
-}  // namespace mpf::router::test
+}  // namespace mpf::test

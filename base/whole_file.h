@@ -4,10 +4,10 @@
 
 #include <string>
 
-namespace mpf::router {
+namespace mpf {
 
 // Returns the whole content of a file.
 //   throws  std::system_error
 [[nodiscard]] std::string readWholeFile(const std::string& file);
 
-}  // namespace mpf::router
+}  // namespace mpf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "router/service_manager.h"
+#include "base/service_manager.h"
 
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -11,7 +11,7 @@
 #include <mpf/clock.h>
 #include <mpf/file_descriptor.h>
 
-namespace mpf::router {
+namespace mpf {
 
 void ServiceManager::notifyReloading() noexcept {
   notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000));
@@ -33,4 +33,4 @@ void ServiceManager::notify(const std::string& state) noexcept {
                              static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length)));
 }
 
-}  // namespace mpf::router
+}  // namespace mpf

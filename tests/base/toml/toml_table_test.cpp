@@ -1,31 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Reads one table of a TOML file: values, places, and errors with file and line.
-#include "router/config/toml_table.h"
+// Reads one table of a TOML file: values, places, and errors with their places.
+#include "base/toml/toml_table.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-namespace mpf::router::test {
+namespace mpf::test {
 namespace {
+
+using testing::ElementsAre;
 
 struct Parsed {
   explicit Parsed(const std::string& text) : root(toml::parse(text)) {}
   toml::table root;
-  TomlTable table{root, "FILE", ""};
+  ConfigErrors errors;
+  TomlTable table{root, "FILE", "", errors};
 };
-
-// Returns the error that `act` throws, or "nothing".
-template <class Act>
-std::string complaintOf(Act act) {
-  try {
-    act();
-    return "nothing";
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-}
 
 TEST(TomlTable, ReadsEachTypeAndLeavesAbsentKeysUnchanged) {
   Parsed parsed("name = \"a\"\nnumber = -7\nflag = true\n");
@@ -58,26 +51,43 @@ TEST(TomlTable, ReadsOneValueAsAList) {
   EXPECT_EQ(many, (std::vector<std::int32_t>{2, 3}));
 }
 
-TEST(TomlTable, ErrorsBeginWithFileAndLine) {
-  Parsed parsed("a = 1\nname = 2\nother = 3\n");
-  std::string name;
+TEST(TomlTable, CollectsAllErrorsWithTheirPlaces) {
+  Parsed parsed("a = 1\nname = 2\nother =  3\n");
+  std::string name = "as before";
 
-  EXPECT_EQ(complaintOf([&] { parsed.table.read("name", name); }).substr(0, 8), "FILE:2: ");
-  EXPECT_EQ(complaintOf([&] {
-              parsed.table.readWith(
-                  "other", [](const std::string&) { throw std::invalid_argument("wrong"); });
-            }).substr(0, 8),
-            "FILE:3: ");
+  parsed.table.read("name", name);
+  parsed.table.readWith("other", [](const std::string&) { throw std::invalid_argument("wrong"); });
+  parsed.table.finish({"location = 1"});
+
+  EXPECT_EQ(name, "as before");
+  EXPECT_THAT(parsed.errors.lines(),
+              ElementsAre("FILE:2:8: name is an integer; write a string in quotes",
+                          "FILE:3:10: other: wrong",
+                          "FILE:1:1: unknown key \"a\"; the keys are name, other",
+                          "FILE:1:1: the file has no location; write location = 1"));
 }
 
-TEST(TomlTable, RefusesKeysThatWereNotReadAndTheAbsenceOfRequiredOnes) {
-  Parsed unknown("a = 1\nb = 2\n");
-  std::int32_t a = 0;
-  unknown.table.read("a", a);
+TEST(TomlTable, ReadsTheNamesOfATable) {
+  Parsed parsed("[carrier]\nipac = \"model\"\nother = \"model\"\n");
+  std::vector<std::string> names;
 
-  EXPECT_EQ(complaintOf([&] { unknown.table.finish(); }).substr(0, 8), "FILE:2: ");
-  EXPECT_NE(complaintOf([&] { Parsed("").table.finish({"location = 1"}); }).find("location = 1"),
-            std::string::npos);
+  parsed.table.readNamed("carrier", [&](const std::string& name, const toml::node& value) {
+    names.push_back(name);
+    EXPECT_TRUE(value.is_string());
+  });
+
+  EXPECT_THAT(names, ElementsAre("ipac", "other"));
+}
+
+TEST(ConfigErrors, AreThrownTogether) {
+  ConfigErrors errors;
+  EXPECT_NO_THROW(errors.throwIfAny());
+
+  errors.add("FILE:1:1", "one");
+  errors.add("", "two");
+
+  EXPECT_THAT([&] { errors.throwIfAny(); },
+              testing::ThrowsMessage<ConfigError>("FILE:1:1: one\ntwo"));
 }
 
 TEST(TomlTable, ReadsTablesWithTheirPlaces) {
@@ -94,8 +104,8 @@ TEST(TomlTable, ReadsTablesWithTheirPlaces) {
 
   EXPECT_EQ(key, "k");
   EXPECT_EQ(locations, (std::vector<std::int32_t>{1, 2}));
-  EXPECT_EQ(place, "FILE:6");
+  EXPECT_EQ(place, "FILE:6:12");
 }
 
 }  // namespace
-}  // namespace mpf::router::test
+}  // namespace mpf::test

@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace mpf::router {
+namespace mpf {
 
 class ServiceManager {
  public:
@@ -17,4 +17,4 @@ class ServiceManager {
   static void notify(const std::string& state) noexcept;
 };
 
-}  // namespace mpf::router
+}  // namespace mpf

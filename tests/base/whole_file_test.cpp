@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Reads files that are empty, longer than a read, or absent.
-#include "router/config/whole_file.h"
+#include "base/whole_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,11 +9,11 @@
 
 #include "tests/support/temporary_folder.h"
 
-namespace mpf::router::test {
+namespace mpf::test {
 namespace {
 
 TEST(ReadWholeFile, ReturnsAllBytes) {
-  const mpf::test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   std::string text(10'000, 'x');
   text[5000] = '\0';
 
@@ -22,7 +22,7 @@ TEST(ReadWholeFile, ReturnsAllBytes) {
 }
 
 TEST(ReadWholeFile, NamesTheFileThatCannotBeRead) {
-  const mpf::test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const auto absent = (folder.path() / "absent").string();
 
   try {
@@ -37,4 +37,4 @@ TEST(ReadWholeFile, NamesTheFileThatCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace mpf::router::test
+}  // namespace mpf::test
