@@ -15,6 +15,7 @@
 #include "tests/support/router_pair.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
 
 namespace mpf::test {
 namespace {
@@ -36,6 +37,7 @@ class IocProgram : public testing::Test {
     ::setenv("MPF_BACKPLANE", backplane_.name().c_str(), 1);
   }
   TestBackplane backplane_;
+  const Watchdog watchdog_{"IOC program"};
 };
 
 TEST_F(IocProgram, LoadsADatabaseAndListsItsRecords) {
