@@ -64,6 +64,7 @@ struct Process {
   std::map<std::string, std::string> environment;
   std::string user;  // empty: the user of the supervisor
   std::string workingFolder;  // empty: the folder of the crate file
+  std::optional<std::int32_t> location;  // nothing: that of the crate
   Supervision supervision;
   std::string place;  // of the table
   std::map<std::string, std::string> places;  // of its keys

@@ -150,8 +150,8 @@ TEST_F(IocProgram, RecordsOfTheExampleReachTheServersOfTheOtherHost) {
       "| " MPF_TEST_TWO_HOSTS "/client " MPF_TEST_BUILD " 127.0.0.1 {} 2>&1",
       address.substr(address.find(':') + 1));
   std::string printed;
-  // The routers may need more than the 3 seconds. The output of such a trial is printed, so that the
-  // log of a test that does not end shows why.
+  // The routers may need more than the 3 seconds. The output of such a trial is printed, so that
+  // the log of a test that does not end shows why.
   for (;;) {
     printed = runCommand(client).output;
     if (printed.find("\"line 7: ") != std::string::npos) break;

@@ -26,7 +26,8 @@ MAY_INCLUDE = {
     # A router is a server to local clients, and a client to local servers.
     "router": ["schema", "shm", "client", "server", "server/programs"],
     "epics": ["client"],
-    "crate": ["base"],
+    # The supervisor reads shared memory as reports do, and prints tables.
+    "crate": ["base", "shm", "tools"],
     "benchmarks": ["client", "server"],
     "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
     "tools/torture": ["tools", "server"],
