@@ -11,6 +11,7 @@
 #include "base/output_file.h"
 #include "base/print_error.h"
 #include "crate/commands/commands.h"
+#include "crate/config/crate_schema.h"
 #include "crate/config/process_plan.h"
 #include "crate/config/read_crate.h"
 #include "crate/supervisor/supervisor.h"
@@ -125,6 +126,14 @@ void addNew(CLI::App& app, Run& run) {
   auto& command =
       *app.add_subcommand("new", "Writes a crate file with comments, which runs on device models");
   auto& kind = *command.add_subcommand("crate", "Writes NAME.toml");
+  auto& schema =
+      *command.add_subcommand("schema", "Prints a JSON schema of crate files, for editors");
+  schema.callback([&run] {
+    run = [] {
+      fmt::print("{}\n", crateSchema().dump(2));
+      return 0;
+    };
+  });
   command.require_subcommand(1);
   auto name = std::make_shared<std::string>();
   kind.add_option("name", *name, "Name of the crate")->required();
