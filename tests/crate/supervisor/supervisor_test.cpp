@@ -5,6 +5,12 @@
 
 #include <sys/wait.h>
 
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include <mpf/sync_client.h>
+
 #include "base/whole_file.h"
 #include "tests/crate/supervisor/supervisor_fixture.h"
 
@@ -12,6 +18,7 @@
 namespace mpf::crate::test {
 namespace {
 
+using namespace std::chrono_literals;
 using mpf::test::runCommand;
 using testing::HasSubstr;
 
@@ -96,6 +103,36 @@ TEST_F(SupervisorTest, StopsAndStartsAProcess) {
   ask({{"do", "start"}, {"name", "int32"}});
   waitForState("int32", "ready");
   EXPECT_TRUE(isReplying("Int32"));
+}
+
+// The server is replaced while clients call it: no call fails, and none gets the wrong reply.
+TEST_F(SupervisorTest, ReplacesAServerUnderLoad) {
+  run(kServer);
+  waitForState("int32", "ready");
+  std::atomic<bool> isOver{false};
+  std::vector<std::thread> clients;
+  for (int thread = 0; thread < 2; ++thread) {
+    clients.emplace_back([&, thread] {
+      SyncClient client(backplane_, "Int32");
+      for (int i = 0; !isOver; ++i) {
+        const auto value = thread * 1'000'000'000 + i;
+        auto answer = client.call(Int32Message({.value = value}), 900s, Retry::neverTaken);
+        const auto reply = answer.as<Int32>();
+        ASSERT_TRUE(reply) << answer.why();
+        ASSERT_EQ((*reply)->value, value);
+      }
+    });
+  }
+
+  for (int i = 0; i < 20; ++i) {
+    const auto before = pidOf("int32");
+    ask({{"do", "restart"}, {"name", "int32"}});
+    waitForNew("int32", before);
+  }
+
+  isOver = true;
+  for (auto& client : clients) client.join();
+  EXPECT_EQ(process("int32").at("restarts"), 20);
 }
 
 TEST_F(SupervisorTest, RefusesUnknownRequestsAndNames) {
