@@ -12,11 +12,25 @@
 namespace mpf::crate {
 namespace {
 
+// Names of crates and processes are names of folders and files.
+constexpr const char* kNameRule =
+    "use 1 to 100 characters without blanks and slashes, and no dot at the beginning";
+
+bool isFileName(const std::string& name) {
+  const auto isAllowed = [](char one) {
+    return static_cast<unsigned char>(one) > ' ' && one != '/' && one != 0x7f;
+  };
+  return !name.empty() && name.size() <= 100 && name.front() != '.' &&
+         std::ranges::all_of(name, isAllowed);
+}
+
 class CrateCheck {
  public:
   CrateCheck(const Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
 
   void run() {
+    if (!isFileName(crate_.name))
+      errors_.add(crate_.file, fmt::format("name \"{}\": {}", crate_.name, kNameRule));
     if (crate_.processes.empty())
       errors_.add(crate_.file,
                   "the crate starts nothing; write a [[server]], [[router]], [[ioc]] "
@@ -33,16 +47,8 @@ class CrateCheck {
 
  private:
   void checkName(const Process& process) {
-    const auto isAllowed = [](char one) {
-      return one > ' ' && one != '/' && static_cast<unsigned char>(one) != 0x7f;
-    };
-    if (process.name.empty() || process.name.size() > 100 || process.name.front() == '.' ||
-        !std::ranges::all_of(process.name, isAllowed))
-      errors_.add(
-          process.placeOf("name"),
-          fmt::format("name \"{}\": use 1 to 100 characters without blanks and slashes, and "
-                      "no dot at the beginning",
-                      process.name));
+    if (!isFileName(process.name))
+      errors_.add(process.placeOf("name"), fmt::format("name \"{}\": {}", process.name, kNameRule));
     const auto [first, isNew] = names_.emplace(process.name, &process);
     if (!isNew)
       errors_.add(process.placeOf("name"),
@@ -128,6 +134,7 @@ class CrateCheck {
                         carriers.empty()
                             ? fmt::format("write [carriers] and {} = \"model\"", module.carrier)
                             : suggestion(module.carrier, carriers, "carriers")));
+      if (module.isShared) continue;
       const auto [first, isNew] = modules_.emplace(module.carrier + " " + module.site, &process);
       if (!isNew && first->second != &process)
         errors_.add(

@@ -190,13 +190,14 @@ std::vector<std::string> serversOf(const Process& process) {
 std::vector<DrivenModule> modulesOf(const Process& process) {
   std::vector<DrivenModule> modules;
   if (const auto* const carrier = process.find("carrier"))
-    modules.push_back({process.valueOf("carrier"), process.valueOf("site"), carrier->place});
+    modules.push_back({process.valueOf("carrier"), process.valueOf("site"), carrier->place, false});
   for (const auto* const key : {"octal-uart", "dac"}) {
     const auto* const setting = process.find(key);
     if (setting == nullptr) continue;
     for (const auto& value : setting->values) {
       const auto fields = fieldsOf(value);
-      if (fields.size() >= 3) modules.push_back({fields[1], fields[2], setting->place});
+      if (fields.size() >= 3)
+        modules.push_back({fields[1], fields[2], setting->place, setting->key == "dac"});
     }
   }
   return modules;

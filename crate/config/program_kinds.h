@@ -50,6 +50,9 @@ struct ProgramKind {
 struct DrivenModule {
   std::string carrier, site;
   std::string place;
+  // Whether another process may drive it, too: the channels of a DAC are independent, so a PID
+  // server may write one of them beside the server of the module.
+  bool isShared = false;
 };
 [[nodiscard]] std::vector<DrivenModule> modulesOf(const Process& process);
 

@@ -22,6 +22,9 @@ TEST_F(CheckCrateTest, AnEmptyCrateStartsNothing) {
 TEST_F(CheckCrateTest, NamesAreUnique) {
   EXPECT_THAT(errorsOf(kOne + "name = \"a\"\n" + kOne + "name = \"a\"\nservers = [\"two\"]\n"),
               HasSubstr("lab.toml:8:8: the process \"a\" of"));
+  for (const std::string name : {"a/b", "", "..", "a b"})
+    EXPECT_THAT(errorsOf("name = \"" + name + "\"\n" + kOne),
+                HasSubstr("name \"" + name + "\": use 1 to 100"));
   EXPECT_THAT(errorsOf(kOne + "name = \"a/b\"\n"), HasSubstr("name \"a/b\": use 1 to 100"));
 }
 
@@ -65,6 +68,14 @@ TEST_F(CheckCrateTest, OneProcessDrivesAModule) {
                        "carrier = \"ipac\"\nsite = \"IP_a\"\n"),
               HasSubstr("the module at IP_a of carrier \"ipac\" is also driven by the process "
                         "\"dac\""));
+}
+
+TEST_F(CheckCrateTest, APidServerMayUseADacBesideItsServer) {
+  EXPECT_EQ(errorsOf(kCarrier + kDac +
+                     "[[server]]\nprogram = \"ip330\"\nmodule = \"adc\"\n"
+                     "carrier = \"ipac\"\nsite = \"IP_b\"\n"
+                     "pid = \"p,0,dac,1\"\ndac = \"dac,ipac,IP_a\"\n"),
+            "");
 }
 
 }  // namespace

@@ -231,6 +231,18 @@ TEST_F(SupervisorTest, KillsAProcessThatDoesNotEnd) {
   EXPECT_EQ(pidOf("deaf"), 0);
 }
 
+TEST_F(SupervisorTest, ReapsTheProcessesThatOthersLeave) {
+  const auto file = files_.file("orphan");
+  run("[[program]]\nname = \"parent\"\ncommand = [\"/bin/sh\", \"-c\", \"(sh -c 'echo $$ > " +
+      file + ".new; mv " + file + ".new " + file + "' &); exec sleep 1000\"]\n");
+  while (!std::filesystem::exists(file)) continue;
+  const auto orphan = std::stoi(readWholeFile(file));
+
+  while (::kill(orphan, 0) == 0) continue;  // a process that is not reaped still has its pid
+
+  EXPECT_EQ(stateOf("parent"), "ready");
+}
+
 TEST_F(SupervisorTest, PrintsTheLinesOfItsProcesses) {
   run("[[program]]\nname = \"talker\"\ncommand = [\"/bin/sh\", \"-c\", \"echo one; exec sleep "
       "1000\"]\n");
