@@ -27,7 +27,7 @@ MAY_INCLUDE = {
     "router": ["schema", "shm", "client", "server", "server/programs"],
     # Sources that were written for the original MPF.
     "classic/messages": ["schema"],
-    "classic": ["classic/messages", "client", "server"],
+    "classic": ["classic/messages", "client", "server", "drivers"],
     "epics": ["client", "classic/messages"],
     "crate": ["base"],
     "benchmarks": ["client", "server"],
@@ -57,11 +57,12 @@ PUBLIC_HEADERS = {
     "classic/messages": ["classic/message.h"],
     "classic": [
         "classic.h",
+        "classic/industry_pack.h",
         "classic/message_client.h",
         "classic/message_server.h",
         "classic/vxworks.h",
     ],
-    "epics": ["epics/dev_mpf.h"],
+    "epics": ["epics/dev_mpf.h", "epics/classic.h"],
 }
 
 TESTED_ELSEWHERE = "tests/tidy/tested_elsewhere.txt"
@@ -103,6 +104,8 @@ def layer(path):
         return "drivers"
     if path.startswith("include/mpf/classic/names/"):
         return "classic"
+    if path.startswith("include/mpf/epics/names/"):
+        return "epics"
     if path.startswith("include/mpf/"):
         name = path.removeprefix("include/mpf/")
         return next((folder for folder, names in PUBLIC_HEADERS.items() if name in names), None)
