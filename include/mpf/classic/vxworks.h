@@ -33,6 +33,9 @@
 #define SEM_DELETE_SAFE 0x4
 #define SEM_INVERSION_SAFE 0x8
 
+typedef std::uint8_t UINT8;
+typedef std::uint16_t UINT16;
+typedef std::uint32_t UINT32;
 typedef int STATUS;
 typedef int BOOL;
 typedef int (*FUNCPTR)(...);
