@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 
+#include <mpf/dispatcher.h>
 #include <mpf/message_server.h>
 
 #include "tests/classic/classic_fixture.h"
@@ -180,6 +181,8 @@ TEST_F(ClassicClientTest, BindRefusesASecondCallAndInvalidNames) {
 }
 
 TEST_F(ClassicClientTest, ACallbackMayDeleteItsClient) {
+  // Without it, the thread of the dispatcher would remove its segments at an unknown time.
+  const auto dispatcher = Dispatcher::shared(backplane_);
   struct SelfDeleting {
     static void onMessage(::Message* message, void* pvt) {
       auto& self = *static_cast<SelfDeleting*>(pvt);
