@@ -3,6 +3,7 @@
 
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <unistd.h>
 
 #include <cstddef>
 #include <cstdlib>
@@ -15,6 +16,17 @@ namespace mpf {
 
 void ServiceManager::notifyReloading() noexcept {
   notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(Clock::nowNs() / 1000));
+}
+
+std::optional<std::chrono::microseconds> ServiceManager::watchdogTime() noexcept {
+  // NOLINTBEGIN(concurrency-mt-unsafe): no thread changes the environment
+  const char* const time = std::getenv("WATCHDOG_USEC");
+  const char* const pid = std::getenv("WATCHDOG_PID");
+  // NOLINTEND(concurrency-mt-unsafe)
+  if (time == nullptr || (pid != nullptr && std::atoi(pid) != ::getpid())) return std::nullopt;
+  const auto microseconds = std::atoll(time);
+  if (microseconds <= 0) return std::nullopt;
+  return std::chrono::microseconds(microseconds);
 }
 
 void ServiceManager::notify(const std::string& state) noexcept {

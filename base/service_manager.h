@@ -3,6 +3,8 @@
 // (sd_notify(3)). Does nothing when the variable is not set.
 #pragma once
 
+#include <chrono>
+#include <optional>
 #include <string>
 
 namespace mpf {
@@ -12,6 +14,12 @@ class ServiceManager {
   static void notifyReady() noexcept { notify("READY=1"); }
   static void notifyReloading() noexcept;
   static void notifyStopping() noexcept { notify("STOPPING=1"); }
+  // One line that `systemctl status` shows.
+  static void notifyStatus(const std::string& status) noexcept { notify("STATUS=" + status); }
+  // Tells systemd that the program makes progress; due twice within watchdogTime().
+  static void notifyAlive() noexcept { notify("WATCHDOG=1"); }
+  // WatchdogSec= of the unit; nullopt: systemd does not watch this process.
+  [[nodiscard]] static std::optional<std::chrono::microseconds> watchdogTime() noexcept;
 
  private:
   static void notify(const std::string& state) noexcept;

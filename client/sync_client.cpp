@@ -46,9 +46,21 @@ bool SyncClient::connectWait(Nanoseconds timeout) {
   return client_.isConnected();
 }
 
-Answer SyncClient::call(Message&& message, Nanoseconds timeout) {
+Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
   const auto deadline = Deadline::after(timeout);
-  if (!client_.isConnected() && !connectWait(timeout)) return Answer(SendResult::notConnected);
+  if (retry == Retry::never) return callOnce(std::move(message), deadline);
+  for (;;) {
+    auto answer = callOnce(message.duplicate(), deadline);
+    // The server may stop between the connection and the sending.
+    const auto isUndone =
+        answer.fate() == Fate::neverTaken || answer.refusal() == SendResult::notConnected;
+    if (!isUndone || deadline.hasPassed()) return answer;
+  }
+}
+
+Answer SyncClient::callOnce(Message&& message, Deadline deadline) {
+  if (!client_.isConnected() && !connectWait(deadline.left()))
+    return Answer(SendResult::notConnected);
   answer_.reset();
   // send() may write awaited_ before the reply is handled: only this thread delivers replies.
   if (const auto result = client_.send(std::move(message), deadline, &awaited_);

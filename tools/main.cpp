@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf: shows backplanes, servers and clients, and exchanges messages with them from the shell.
+// mpf: runs servers, shows backplanes, servers and clients, and exchanges messages with them from
+// the shell.
 #include <CLI/CLI.hpp>
 
 #include "base/command_line.h"
@@ -12,15 +13,16 @@ namespace {
 constexpr const char* kFooter =
     "Reports (ls, mrr, msr, top, inspect) only read: they disturb no process, remove nothing, and "
     "work when processes are stopped or dead.\n"
-    "Environment: MPF_BACKPLANE, MPF_LOCATION.\n"
+    "Environment: MPF_BACKPLANE, MPF_LOCATION, MPF_CRATES.\n"
     "Exit status: 0 success; 1 failure, the text on stderr says why; 2 usage error.";
 
 int runSubcommand(int argc, char** argv) {
   CLI::App app(
-      "mpf - shows backplanes, servers and clients, and exchanges messages with them from the "
-      "shell",
+      "mpf - runs servers, shows backplanes, servers and clients, and exchanges messages with them "
+      "from the shell",
       "mpf");
   mpf::tools::Run run;
+  mpf::tools::addCrate(app, run);
   mpf::tools::addLs(app, run);
   mpf::tools::addMrr(app, run);
   mpf::tools::addMsr(app, run);

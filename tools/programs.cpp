@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// mpf torture, mpf bench: execute mpf-torture and mpf-bench. These are programs of their own, so
-// that `mpf` does not depend on the libraries that only they need: libelf, and those with which MPF
-// is compared.
+// mpf run, mpf torture, mpf bench and others: execute mpf-crate, mpf-torture and mpf-bench. These
+// are programs of their own, so that `mpf` does not depend on the libraries that only they need:
+// toml++, libelf, and those with which MPF is compared.
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
@@ -11,30 +11,50 @@
 namespace mpf::tools {
 namespace {
 
-// A subcommand that passes all its arguments to mpf-NAME.
-void addProgram(CLI::App& app, Run& run, const char* name, const char* purpose,
+// A subcommand that passes all its arguments to `program`.
+//   before  arguments before those of the user
+void addProgram(CLI::App& app, Run& run, const std::string& name, const std::string& purpose,
+                const std::string& program, const std::vector<std::string>& before,
                 const char* remedy) {
-  auto& command = *app.add_subcommand(name, fmt::format("{}; see `mpf {} --help`", purpose, name));
+  auto& command = *app.add_subcommand(name, purpose);
   command.prefix_command();
   command.set_help_flag();
-  command.callback([&command, &run, remedy] {
-    run = [&command, remedy] {
-      return executeBeside("mpf-" + command.get_name(), command.remaining(), remedy);
+  command.callback([&command, &run, program, before, remedy] {
+    run = [&command, program, before, remedy] {
+      auto arguments = before;
+      const auto others = command.remaining();
+      arguments.insert(arguments.end(), others.begin(), others.end());
+      return executeBeside(program, arguments, remedy);
     };
   });
 }
 
 }  // namespace
 
+void addCrate(CLI::App& app, Run& run) {
+  for (const auto& [name, purpose] : std::vector<std::pair<const char*, const char*>>{
+           {"run", "Starts the servers, routers and IOCs of a crate file, and supervises them"},
+           {"new", "Writes a crate file with comments, which runs on device models"},
+           {"ps", "Lists the processes of crates, with their states and restarts"},
+           {"logs", "Shows what a process of a crate has printed"},
+           {"stop", "Stops a process of a crate, or the whole crate"},
+           {"start", "Starts a process of a crate that was stopped or has failed"},
+           {"restart", "Restarts a process of a crate"},
+           {"reload", "Reads a crate file again, and restarts what has changed"}})
+    addProgram(app, run, name, purpose, "mpf-crate", {name},
+               "install it in the same folder as mpf");
+}
+
 void addTorture(CLI::App& app, Run& run) {
   addProgram(app, run, "torture",
-             "Kills clients and servers at each step, and checks that all other processes continue",
-             "install it in the same folder as mpf");
+             "Kills clients and servers at each step, and checks that all other processes "
+             "continue; see `mpf torture --help`",
+             "mpf-torture", {}, "install it in the same folder as mpf");
 }
 
 void addBench(CLI::App& app, Run& run) {
-  addProgram(app, run, "bench", "Measures the speed of messages",
-             "build MPF with MPF_BUILD_BENCHMARKS=ON to get this program");
+  addProgram(app, run, "bench", "Measures the speed of messages; see `mpf bench --help`",
+             "mpf-bench", {}, "build MPF with MPF_BUILD_BENCHMARKS=ON to get this program");
 }
 
 }  // namespace mpf::tools

@@ -56,6 +56,14 @@ class Answer {
   std::string details_;
 };
 
+// Which requests call() sends again, without an action of its caller.
+enum class Retry {
+  never,
+  // Those whose fate says that no server has received them, for example because the server was
+  // stopped or replaced. No request is executed twice by it.
+  neverTaken
+};
+
 class SyncClient {
  public:
   // Creates a client window in shared memory and binds to the server. call() and connectWait() make
@@ -70,7 +78,10 @@ class SyncClient {
   // limits all three together. After it, the answer is a refusal if the request was not sent, else
   // a fate: `expired` when the server had not received the request, `outcomeUnknown` when it had.
   //   message   unchanged when it was not sent
-  Answer call(Message&& message, Nanoseconds timeout);
+  //   retry     with neverTaken, the request is sent again, to the next server of the name, until
+  //             `timeout`; each attempt sends a copy, made by duplicate(), and leaves `message`
+  //   throws    std::bad_alloc, with neverTaken only
+  Answer call(Message&& message, Nanoseconds timeout, Retry retry = Retry::never);
   // Waits for a message that is not the first reply to a call: a further reply, for example of a
   // monitor, or an OutOfBand message. call() stores such messages until receive() returns them, in
   // their order. Returns an empty handle after `timeout`.
@@ -82,6 +93,7 @@ class SyncClient {
   [[nodiscard]] MessageClient& client() noexcept { return client_; }
 
  private:
+  Answer callOnce(Message&& message, Deadline deadline);
   void take(Message&& message);
   Dispatcher dispatcher_;
   MessageClient client_;

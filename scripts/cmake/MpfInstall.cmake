@@ -112,7 +112,7 @@ install(DIRECTORY "${CMAKE_BINARY_DIR}/bench" DESTINATION ${CMAKE_INSTALL_DOCDIR
 # ---- programs and man pages: every executable of these folders
 
 set(programs "")
-foreach(folder client server router epics tools benchmarks)
+foreach(folder client server router epics crate tools benchmarks)
   if(folder IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/${folder}/CMakeLists.txt")
     mpf_find_targets(programs "${CMAKE_SOURCE_DIR}/${folder}" EXECUTABLE)
   endif()

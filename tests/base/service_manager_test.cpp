@@ -58,6 +58,26 @@ TEST(ServiceManager, ReportsEachState) {
   EXPECT_THAT(systemd.receive(), testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+"));
   ServiceManager::notifyStopping();
   EXPECT_EQ(systemd.receive(), "STOPPING=1");
+  ServiceManager::notifyStatus("2 of 3");
+  EXPECT_EQ(systemd.receive(), "STATUS=2 of 3");
+  ServiceManager::notifyAlive();
+  EXPECT_EQ(systemd.receive(), "WATCHDOG=1");
+}
+
+TEST(ServiceManager, KnowsTheWatchdogOfItsProcess) {
+  EXPECT_EQ(ServiceManager::watchdogTime(), std::nullopt);
+  ::setenv("WATCHDOG_USEC", "5000000", 1);
+  EXPECT_EQ(ServiceManager::watchdogTime(), std::chrono::seconds(5));
+  ::setenv("WATCHDOG_PID", std::to_string(::getpid()).c_str(), 1);
+  EXPECT_EQ(ServiceManager::watchdogTime(), std::chrono::seconds(5));
+
+  ::setenv("WATCHDOG_PID", "1", 1);  // inherited from another process
+
+  EXPECT_EQ(ServiceManager::watchdogTime(), std::nullopt);
+  ::unsetenv("WATCHDOG_PID");
+  ::setenv("WATCHDOG_USEC", "x", 1);
+  EXPECT_EQ(ServiceManager::watchdogTime(), std::nullopt);
+  ::unsetenv("WATCHDOG_USEC");
 }
 
 TEST(ServiceManager, UsesAnAbstractSocket) {

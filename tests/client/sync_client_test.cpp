@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/sync_client.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <gtest/gtest.h>
 #include <thread>
+#include <vector>
 
 #include <mpf/message_server.h>
 
@@ -59,6 +63,59 @@ TEST(SyncClientTest, ReportsWhyThereIsNoReply) {
   EXPECT_EQ(unknown.fate(), Fate::outcomeUnknown);
   EXPECT_EQ(expired.fate(), Fate::expired);
   EXPECT_EQ(expired.why(), "no reply: expired");
+}
+
+// Servers that end and are replaced while clients call: each request is executed exactly once.
+TEST(SyncClientTest, SendsAgainWhatNoServerHasTaken) {
+  constexpr std::size_t kServers = 100;
+  const Watchdog watchdog("sync client");
+  const TestBackplane backplane;
+  std::atomic<bool> isOver{false};
+  std::atomic<bool> haveClientsEnded{false};
+  std::vector<int> executed;  // by the servers, of which one runs at a time
+  // A server that ends when `hasEnough` is true, perhaps while requests wait.
+  const auto serve = [&](const auto& hasEnough) {
+    MessageServer server(backplane, "counter");
+    while (!hasEnough()) {
+      server.waitForMessage(Deadline::after(10ms));
+      if (auto request = server.receive()) {
+        executed.push_back(request.tryAs<Int32>()->value);
+        EXPECT_EQ(server.reply(std::move(request)), ReplyResult::sent);
+      }
+    }
+  };
+  std::thread servers([&] {
+    for (std::size_t i = 1; i <= kServers; ++i)
+      serve([&, enough = executed.size() + 20 + i] { return executed.size() >= enough; });
+    isOver = true;
+    serve([&] { return haveClientsEnded.load(); });
+  });
+
+  std::array<int, 4> called{};
+  std::vector<std::thread> clients;
+  for (int thread = 0; thread < 4; ++thread) {
+    clients.emplace_back([&, thread] {
+      SyncClient client(backplane, "counter");
+      for (int& i = called[static_cast<std::size_t>(thread)]; !isOver; ++i) {
+        const auto value = thread * 1'000'000 + i;
+        auto answer = client.call(Int32Message({.value = value}), 900s, Retry::neverTaken);
+        const auto reply = answer.as<Int32>();
+        ASSERT_TRUE(reply) << answer.why();
+        ASSERT_EQ((*reply)->value, value);
+      }
+    });
+  }
+  for (auto& client : clients) client.join();
+  haveClientsEnded = true;
+  servers.join();
+
+  std::sort(executed.begin(), executed.end());
+  std::vector<int> expected;
+  for (int thread = 0; thread < 4; ++thread)
+    for (int i = 0; i < called[static_cast<std::size_t>(thread)]; ++i)
+      expected.push_back(thread * 1'000'000 + i);
+  EXPECT_EQ(executed, expected);
+  EXPECT_GT(executed.size(), 7000U);
 }
 
 }  // namespace

@@ -128,7 +128,9 @@ class OldClientOfTodaysServer(Interop):
             self.be_killed_as_a_client()
         os.waitpid(child, 0)
         connection = self.connected(self.client)
-        while len(self.names()) != 7:  # of the server, of the client that lives, and their link
+        # 7 files: of the server, of the client that lives, and their link. The server removes the
+        # files of the dead client before it counts it.
+        while len(self.names()) != 7 or connection.link.peer.control["peersDied"] == 0:
             self.ask(self.client, connection, messages.FLOAT64, messages.float64(0))
 
         self.assertEqual(connection.link.peer.control["peersDied"], 1)

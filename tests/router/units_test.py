@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""units_test CMAKE BUILD: installs the router's systemd units, and verifies them with
-systemd-analyze.
+"""units_test CMAKE BUILD: installs the systemd units of routers and crates, and verifies them
+with systemd-analyze.
 
 Exits with 77, which ctest shows as skipped, on a host without systemd-analyze.
 """
@@ -15,16 +15,17 @@ SKIPPED = 77
 
 
 def install(cmake, build, prefix):
-    """Installs only the units, with the install script of their folder."""
-    script = os.path.join(build, "router", "systemd", "cmake_install.cmake")
-    command = [cmake, f"-DCMAKE_INSTALL_PREFIX={prefix}", "-P", script]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    """Installs only the units, with the install scripts of their folders."""
+    for folder in ("router", "crate"):
+        script = os.path.join(build, folder, "systemd", "cmake_install.cmake")
+        command = [cmake, f"-DCMAKE_INSTALL_PREFIX={prefix}", "-P", script]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
-def stand_in(prefix):
-    """Installs a stand-in for mpf-router: systemd-analyze checks that the program exists."""
-    program = os.path.join(prefix, "bin", "mpf-router")
-    os.makedirs(os.path.dirname(program))
+def stand_in(prefix, name):
+    """Installs a stand-in for a program: systemd-analyze checks that it exists."""
+    program = os.path.join(prefix, "bin", name)
+    os.makedirs(os.path.dirname(program), exist_ok=True)
     shutil.copy("/bin/true", program)
     return program
 
@@ -55,13 +56,15 @@ def main():
         return SKIPPED
     with tempfile.TemporaryDirectory() as prefix:
         install(cmake, build, prefix)
-        program = stand_in(prefix)
+        program = stand_in(prefix, "mpf-router")
         units = os.path.join(prefix, "lib", "systemd", "system")
         found = check(os.path.join(units, "mpf-router.service"), program, "/etc/mpf/router.toml")
         found += check(os.path.join(units, "mpf-router@.service"), program, "/etc/mpf/%i.toml")
+        crate = stand_in(prefix, "mpf")
+        found += check(os.path.join(units, "mpf-crate@.service"), crate, "run /etc/mpf/%i.toml")
         if not os.path.exists(os.path.join(prefix, "lib", "sysusers.d", "mpf.conf")):
             found.append("lib/sysusers.d/mpf.conf is missing")
-    print("\n".join(found) or "both units are valid")
+    print("\n".join(found) or "the units are valid")
     return 1 if found else 0
 
 

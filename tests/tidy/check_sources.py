@@ -29,7 +29,8 @@ MAY_INCLUDE = {
     "classic/messages": ["schema"],
     "classic": ["classic/messages", "client", "server", "drivers"],
     "epics": ["client", "classic/messages"],
-    "crate": ["base"],
+    # The supervisor reads shared memory as reports do, and prints tables.
+    "crate": ["base", "shm", "tools"],
     "benchmarks": ["client", "server"],
     "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
     "tools/torture": ["tools", "server"],

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// mpf ps: the processes of the crates that run. mpf logs: what a process has printed.
+#include <fcntl.h>
+#include <sys/inotify.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <fmt/format.h>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "base/duration_text.h"
+#include "base/printable.h"
+#include "base/system_call.h"
+#include "base/whole_file.h"
+#include "crate/commands/commands.h"
+#include "crate/commands/control.h"
+#include "crate/supervisor/control_protocol.h"
+#include "tools/text/json_text.h"
+#include "tools/text/table.h"
+
+namespace mpf::crate {
+namespace {
+
+using nlohmann::json;
+using tools::jsonText;
+using tools::Table;
+
+// Processor time [s] and resident memory [bytes] of a process; zeros when it has ended.
+void addUse(json& process) {
+  const auto pid = process.value("pid", 0);
+  std::ifstream stat(fmt::format("/proc/{}/stat", pid));
+  std::string text;
+  std::getline(stat, text);
+  std::istringstream fields(text.substr(text.rfind(')') + 1));
+  std::string field;
+  double ticks = 0;
+  for (int number = 3; number <= 15 && fields >> field; ++number)
+    if (number >= 14) ticks += std::strtod(field.c_str(), nullptr);
+  process["cpuS"] = ticks / static_cast<double>(::sysconf(_SC_CLK_TCK));
+  std::ifstream memory(fmt::format("/proc/{}/statm", pid));
+  std::uint64_t size = 0, resident = 0;
+  memory >> size >> resident;
+  process["memoryBytes"] = resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+std::string stateOf(const json& process) {
+  return process.value("isStalled", false) ? "stalled" : process.at("state").get<std::string>();
+}
+
+void printCrate(const json& crate) {
+  fmt::print("crate {}, {}, supervisor {}\n", crate.at("crate").get<std::string>(),
+             crate.at("file").get<std::string>(), crate.at("pid").get<int>());
+  Table table({"PROCESS", "STATE", ">PID", ">RESTARTS", ">UP", ">CPU", ">MEMORY", "LAST END"});
+  for (const auto& process : crate.at("processes")) {
+    const auto pid = process.at("pid").get<int>();
+    const auto isRunning = pid != 0;
+    table.add(
+        {process.at("name"), stateOf(process), isRunning ? fmt::to_string(pid) : "-",
+         fmt::to_string(process.at("restarts").get<int>()),
+         isRunning ? durationText(process.at("upS").get<double>() * 1e9) : "-",
+         isRunning ? durationText(process.at("cpuS").get<double>() * 1e9) : "-",
+         isRunning ? fmt::format("{:.1f} MB", process.at("memoryBytes").get<double>() / 1e6) : "-",
+         process.at("reason")});
+  }
+  fmt::print("{}", table.fitted("  "));
+}
+
+int listProcesses(const std::string& name, bool isJson) {
+  auto all = json::array();
+  std::vector<CrateFolder> folders;
+  if (name.empty()) folders = CrateFolder::all();
+  else folders.push_back(CrateFolder::of(name));
+  for (const auto& folder : folders) {
+    if (name.empty() && !folder.isLocked()) continue;
+    auto crate = askSupervisor(folder, {{"do", "ps"}});
+    for (auto& process : crate.at("processes")) addUse(process);
+    all.push_back(std::move(crate));
+  }
+  if (isJson) {
+    fmt::print("{}\n", jsonText(all));
+    return 0;
+  }
+  if (all.empty())
+    fmt::print("no crate is running (in {}); start one with `mpf run FILE`\n",
+               CrateFolder::parent().string());
+  for (const auto& crate : all) printCrate(crate);
+  return 0;
+}
+
+// ---- logs
+
+struct LogArguments {
+  std::string crate, process;
+  int lines = 50;
+  bool follow = false;
+};
+
+// The last lines of a log; the beginning of a log may be a hole.
+std::string lastLines(const std::string& text, int lines) {
+  auto begin = text.size();
+  for (int i = 0; i <= lines && begin != 0; ++i) {
+    const auto end = begin == text.size() && text.ends_with('\n') ? begin - 1 : begin;
+    const auto at = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
+    if (at == std::string::npos) return text.substr(text.find_first_not_of('\0'));
+    if (i == lines) break;
+    begin = at;
+  }
+  return text.substr(begin + 1);
+}
+
+// Prints what is appended to the file, until a signal ends the program.
+[[noreturn]] void follow(const std::string& path, std::int64_t offset) {
+  const FileDescriptor events(checkCall(::inotify_init1(IN_CLOEXEC), "inotify_init1"));
+  checkCall(::inotify_add_watch(events.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
+  const FileDescriptor file(checkCall(::open(path.c_str(), O_RDONLY | O_CLOEXEC), "open", path));
+  std::array<char, 65536> bytes{};
+  for (;;) {
+    for (;;) {
+      const auto length = ::pread(file.get(), bytes.data(), bytes.size(), offset);
+      if (length <= 0) break;
+      offset += length;
+      fmt::print("{}", printableLines({bytes.data(), static_cast<std::size_t>(length)}));
+    }
+    std::fflush(stdout);
+    checkCall(retryInterrupted([&] { return ::read(events.get(), bytes.data(), bytes.size()); }),
+              "read", "inotify");
+  }
+}
+
+int showLog(const LogArguments& arguments) try {
+  const auto path = chooseCrate(arguments.crate).log(arguments.process);
+  const auto text = readWholeFile(path);
+  if (!text.empty()) fmt::print("{}", printableLines(lastLines(text, arguments.lines)));
+  if (arguments.follow) follow(path, static_cast<std::int64_t>(text.size()));
+  return 0;
+} catch (const std::system_error& error) {
+  if (error.code().value() != ENOENT) throw;
+  throw std::runtime_error(
+      fmt::format("there is no log of \"{}\"; `mpf ps` shows the processes", arguments.process));
+}
+
+}  // namespace
+
+void addPs(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand(
+      "ps", "Lists the processes of the crates that run, with their states and restarts");
+  auto crate = std::make_shared<std::string>();
+  auto isJson = std::make_shared<bool>(false);
+  command.add_option("--crate", *crate, "Name of the crate; default: all that run");
+  command.add_flag("--json", *isJson, "Print JSON, for programs");
+  command.callback(
+      [crate, isJson, &run] { run = [crate, isJson] { return listProcesses(*crate, *isJson); }; });
+}
+
+void addLogs(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand("logs", "Shows what a process of a crate has printed");
+  auto arguments = std::make_shared<LogArguments>();
+  command.add_option("process", arguments->process, "Name of the process")->required();
+  command.add_flag("-f,--follow", arguments->follow, "Also show what it prints from now on");
+  command.add_option("-n,--lines", arguments->lines, "How many lines of the past")
+      ->capture_default_str();
+  addCrateOption(command, arguments->crate);
+  command.callback([arguments, &run] { run = [arguments] { return showLog(*arguments); }; });
+}
+
+}  // namespace mpf::crate

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// mpf run: starts the processes of a crate file and supervises them. mpf new: writes a crate file.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fmt/format.h>
+#include <memory>
+
+#include "base/output_file.h"
+#include "base/print_error.h"
+#include "crate/commands/commands.h"
+#include "crate/config/crate_schema.h"
+#include "crate/config/process_plan.h"
+#include "crate/config/read_crate.h"
+#include "crate/supervisor/supervisor.h"
+
+namespace mpf::crate {
+namespace {
+
+struct RunArguments {
+  std::string file;
+  bool checkOnly = false;
+  bool dryRun = false;
+};
+
+CrateFolder folderOf(const Crate& crate) { return CrateFolder::of(crate.name); }
+
+void printPlans(const Crate& crate) {
+  for (const auto& plan : planProcesses(crate, folderOf(crate).path().string()))
+    fmt::print("# {}\n{}\n", plan.name, shellText(plan));
+}
+
+int runCrate(const RunArguments& arguments) try {
+  const auto load = [file = arguments.file] { return readCrate(file); };
+  if (arguments.checkOnly || arguments.dryRun) {
+    const auto crate = load();
+    if (arguments.dryRun) printPlans(crate);
+    else fmt::print("{}: {} processes, no error\n", arguments.file, crate.processes.size());
+    return 0;
+  }
+  Supervisor(folderOf(load()), load).run();
+  return 0;
+} catch (const ConfigError& error) {
+  printError("{}\n", error.what());
+  return 2;
+}
+
+constexpr const char* kNewCrate =
+    R"(# Crate {0}: processes that `mpf run {0}.toml` starts and supervises.
+# It runs on device models, without hardware. `mpf run --check {0}.toml` checks the file.
+#
+#   mpf run {0}.toml                          starts everything; Ctrl-C stops it
+#   mpf ps                                    the processes and their states
+#   mpf call Int32 int32 value=7              a message to the first server
+
+# backplane = "lab"                # default: $MPF_BACKPLANE, or "default"
+# mode = "0660"                    # which users may be clients; default: this user
+# group = "mpf"
+
+[carriers]                         # boards that hold IndustryPack modules
+ipac = "model"                     # a model; a real board: "tpci200"
+
+[[server]]                         # sends each message back
+program = "int32"
+server = "Int32"
+
+[[server]]                         # eight analog outputs
+program = "dac128v"
+module = "dac"
+carrier = "ipac"
+site = "IP_a"
+queuesize = 20
+
+[[server]]                         # sixteen analog inputs; input 0 measures output 0
+program = "ip330"
+module = "adc"
+carrier = "ipac"
+site = "IP_b"
+type = "D"
+signal = "0=wire:dac.0"
+
+# [[server]]                       # an instrument on a serial line
+# program = "serial"
+# server = "dmm"
+# port = "/dev/ttyS0"
+# baud = 19200
+
+# [[router]]                       # servers of this host for other hosts
+# serve = "1=0"
+# listen = "*:9900"
+# plain = true
+
+# [[ioc]]                          # EPICS records
+# database = ["lab.db"]
+# macros = "P=lab:"
+# needs = ["dac", "adc"]
+)";
+
+int writeNewCrate(const std::string& name) {
+  const auto file = name + ".toml";
+  if (std::filesystem::exists(file))
+    throw std::runtime_error(fmt::format("{} exists; choose another name, or remove it", file));
+  OutputFile output(file);
+  output.write(fmt::format(fmt::runtime(kNewCrate), name));
+  output.close();
+  fmt::print("{} is written; start it with: mpf run {}\n", file, file);
+  return 0;
+}
+
+}  // namespace
+
+void addRun(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand(
+      "run", "Starts the servers, routers and IOCs of a crate file, and restarts those that fail");
+  auto arguments = std::make_shared<RunArguments>();
+  command.add_option("file", arguments->file, "Crate file (TOML); see `mpf new`")->required();
+  auto* const check = command.add_flag("--check", arguments->checkOnly,
+                                       "Only check the file, and print all errors");
+  command.add_flag("--dry-run", arguments->dryRun, "Only print the command lines")->excludes(check);
+  command.callback([arguments, &run] { run = [arguments] { return runCrate(*arguments); }; });
+}
+
+void addNew(CLI::App& app, Run& run) {
+  auto& command =
+      *app.add_subcommand("new", "Writes a crate file with comments, which runs on device models");
+  auto& kind = *command.add_subcommand("crate", "Writes NAME.toml");
+  auto& schema =
+      *command.add_subcommand("schema", "Prints a JSON schema of crate files, for editors");
+  schema.callback([&run] {
+    run = [] {
+      fmt::print("{}\n", crateSchema().dump(2));
+      return 0;
+    };
+  });
+  command.require_subcommand(1);
+  auto name = std::make_shared<std::string>();
+  kind.add_option("name", *name, "Name of the crate")->required();
+  kind.callback([name, &run] { run = [name] { return writeNewCrate(*name); }; });
+}
+
+}  // namespace mpf::crate

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+// checkCrate(): what concerns several entries of a crate.
+#include <algorithm>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <set>
+
+#include "base/toml/toml_table.h"
+#include "crate/config/program_kinds.h"
+#include "crate/config/read_crate.h"
+
+namespace mpf::crate {
+namespace {
+
+class CrateCheck {
+ public:
+  CrateCheck(const Crate& crate, ConfigErrors& errors) : crate_(crate), errors_(errors) {}
+
+  void run() {
+    if (crate_.processes.empty())
+      errors_.add(crate_.file,
+                  "the crate starts nothing; write a [[server]], [[router]], [[ioc]] "
+                  "or [[program]]");
+    for (const auto& process : crate_.processes) {
+      checkName(process);
+      checkRequired(process);
+      checkNeeds(process);
+      checkServers(process);
+      checkModules(process);
+    }
+    checkCircles();
+  }
+
+ private:
+  void checkName(const Process& process) {
+    const auto isAllowed = [](char one) {
+      return one > ' ' && one != '/' && static_cast<unsigned char>(one) != 0x7f;
+    };
+    if (process.name.empty() || process.name.size() > 100 || process.name.front() == '.' ||
+        !std::ranges::all_of(process.name, isAllowed))
+      errors_.add(
+          process.placeOf("name"),
+          fmt::format("name \"{}\": use 1 to 100 characters without blanks and slashes, and "
+                      "no dot at the beginning",
+                      process.name));
+    const auto [first, isNew] = names_.emplace(process.name, &process);
+    if (!isNew)
+      errors_.add(process.placeOf("name"),
+                  fmt::format("the process \"{}\" of {} has the same name; write another name = "
+                              "\"...\"",
+                              process.name, first->second->place));
+  }
+
+  void checkRequired(const Process& process) {
+    if (process.kind.empty()) {
+      if (process.command.empty())
+        errors_.add(process.place, fmt::format("\"{}\" has no command", process.name));
+      return;
+    }
+    const auto& kind = *findKind(process.kind);
+    for (std::size_t i = 0; i < kind.required; ++i) requireKey(process, kind, i);
+    if (kind.name == "serial" && process.find("server") == nullptr)
+      errors_.add(process.place,
+                  "[[server]] of program \"serial\" has no server; write server = "
+                  "\"NAME\" and port = \"/dev/ttyS0\", or server = [{server = "
+                  "\"NAME\", port = \"/dev/ttyS0\"}]");
+    if (kind.name == "router" && process.find("file") == nullptr &&
+        process.find("serve") == nullptr && process.find("remote") == nullptr)
+      errors_.add(process.place,
+                  "[[router]] has nothing to do; write file = \"router.toml\", "
+                  "or serve and listen, or remote");
+    checkGaps(process, kind);
+  }
+
+  void requireKey(const Process& process, const ProgramKind& kind, std::size_t position) {
+    const auto& key = kind.positionals[position];
+    if (process.find(key) == nullptr)
+      errors_.add(process.place, fmt::format("[[server]] of program \"{}\" has no {}; write {} = "
+                                             "\"...\"",
+                                             kind.name, key, key));
+  }
+
+  // An argument of a command line cannot be left out if a later one is given.
+  void checkGaps(const Process& process, const ProgramKind& kind) {
+    const std::string* missing = nullptr;
+    for (std::size_t i = kind.required; i < kind.positionals.size(); ++i) {
+      const auto& key = kind.positionals[i];
+      if (process.find(key) == nullptr) {
+        if (missing == nullptr) missing = &key;
+      } else if (missing != nullptr) {
+        errors_.add(
+            process.find(key)->place,
+            fmt::format("{} needs {}, too, because the program takes them in this order: {}", key,
+                        *missing, fmt::join(kind.positionals, ", ")));
+      }
+    }
+  }
+
+  void checkNeeds(const Process& process) {
+    std::vector<std::string> all;
+    for (const auto& other : crate_.processes) all.push_back(other.name);
+    for (const auto& need : process.needs) {
+      if (std::ranges::find(all, need) == all.end())
+        errors_.add(process.placeOf("needs"),
+                    fmt::format("needs \"{}\": no process has this name; {}", need,
+                                suggestion(need, all, "processes")));
+    }
+  }
+
+  void checkServers(const Process& process) {
+    for (const auto& server : serversOf(process)) {
+      const auto [first, isNew] = servers_.emplace(server, &process);
+      if (!isNew)
+        errors_.add(process.place, fmt::format("the server \"{}\" is also in the process \"{}\" of "
+                                               "{}; each name can be served once",
+                                               server, first->second->name, first->second->place));
+    }
+  }
+
+  void checkModules(const Process& process) {
+    std::vector<std::string> carriers;
+    for (const auto& carrier : crate_.carriers) carriers.push_back(carrier.name);
+    for (const auto& module : modulesOf(process)) {
+      if (std::ranges::find(carriers, module.carrier) == carriers.end())
+        errors_.add(
+            module.place,
+            fmt::format("carrier \"{}\" is not in [carriers]; {}", module.carrier,
+                        carriers.empty()
+                            ? fmt::format("write [carriers] and {} = \"model\"", module.carrier)
+                            : suggestion(module.carrier, carriers, "carriers")));
+      const auto [first, isNew] = modules_.emplace(module.carrier + " " + module.site, &process);
+      if (!isNew && first->second != &process)
+        errors_.add(
+            module.place,
+            fmt::format("the module at {} of carrier \"{}\" is also driven by the process "
+                        "\"{}\" of {}; only one process can drive a module",
+                        module.site, module.carrier, first->second->name, first->second->place));
+    }
+  }
+
+  void checkCircles() {
+    for (const auto& process : crate_.processes) {
+      std::vector<std::string> path;
+      if (findCircle(process, path)) {
+        errors_.add(process.placeOf("needs"),
+                    fmt::format("the needs form a circle: {}; remove one of them",
+                                fmt::join(path, " needs ")));
+        return;
+      }
+    }
+  }
+  // Whether the needs of `process` lead back to the first process of `path`.
+  bool findCircle(const Process& process, std::vector<std::string>& path) {
+    path.push_back(process.name);
+    if (path.size() > 1 && path.front() == process.name) return true;
+    if (path.size() <= crate_.processes.size()) {
+      for (const auto& need : process.needs) {
+        const auto found = names_.find(need);
+        if (found != names_.end() && findCircle(*found->second, path)) return true;
+      }
+    }
+    path.pop_back();
+    return false;
+  }
+
+  const Crate& crate_;
+  ConfigErrors& errors_;
+  std::map<std::string, const Process*> names_;
+  std::map<std::string, const Process*> servers_;
+  std::map<std::string, const Process*> modules_;  // by "CARRIER SITE"
+};
+
+}  // namespace
+
+void checkCrate(const Crate& crate, ConfigErrors& errors) { CrateCheck(crate, errors).run(); }
+
+}  // namespace mpf::crate

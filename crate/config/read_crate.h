@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+// readCrate(): reads a crate file and checks it. All errors are reported at once.
+//
+// Threads  one.
+#pragma once
+
+#include <string>
+
+#include "base/toml/config_errors.h"
+#include "crate/config/crate.h"
+
+namespace mpf::crate {
+
+//   throws  ConfigError with all errors, each with file, line and column
+[[nodiscard]] Crate readCrate(const std::string& file);
+
+// Checks what concerns several entries: names that are used twice, needs that form a circle,
+// modules that two processes drive, unknown carriers, missing values.
+void checkCrate(const Crate& crate, ConfigErrors& errors);
+
+// Parses "500ms", "2s", "5min" or "off" (0).
+//   throws  std::invalid_argument that shows the form
+[[nodiscard]] std::chrono::milliseconds parseDuration(const std::string& text);
+
+}  // namespace mpf::crate

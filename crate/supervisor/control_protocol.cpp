@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+#include "crate/supervisor/control_protocol.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fmt/format.h>
+#include <stdexcept>
+
+#include <mpf/clock.h>
+
+#include "base/system_call.h"
+
+namespace mpf::crate {
+namespace {
+
+// The address of the socket. The path goes through a descriptor of the folder, because the path of
+// a socket has at most 107 bytes, and that of the folder may be longer.
+struct SocketAddress {
+  explicit SocketAddress(const CrateFolder& folder)
+      : opened(checkCall(::open(folder.path().c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC), "open",
+                         folder.path().string())) {
+    address.sun_family = AF_UNIX;
+    fmt::format_to_n(address.sun_path, sizeof address.sun_path - 1, "/proc/self/fd/{}/control",
+                     opened.get());
+  }
+  [[nodiscard]] const sockaddr* get() const { return reinterpret_cast<const sockaddr*>(&address); }
+  FileDescriptor opened;
+  sockaddr_un address{};
+};
+
+FileDescriptor makeSocket() {
+  return FileDescriptor(
+      checkCall(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket"));
+}
+
+std::string readLine(int socket, const Deadline& deadline) {
+  std::string text;
+  std::array<char, 4096> bytes{};
+  for (;;) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline.left());
+    pollfd poll{socket, POLLIN, 0};
+    if (retryInterrupted([&] { return ::poll(&poll, 1, static_cast<int>(left.count())); }) <= 0)
+      throw std::runtime_error("it does not reply");
+    const auto length =
+        retryInterrupted([&] { return ::read(socket, bytes.data(), bytes.size()); });
+    if (length <= 0) return text;
+    text.append(bytes.data(), static_cast<std::size_t>(length));
+    if (text.ends_with('\n')) return text;
+  }
+}
+
+}  // namespace
+
+FileDescriptor listenForControl(const CrateFolder& folder) {
+  auto listening = makeSocket();
+  const SocketAddress address(folder);
+  ::unlink(folder.file("control").c_str());  // of a supervisor that was killed
+  checkCall(::bind(listening.get(), address.get(), sizeof address.address), "bind",
+            folder.file("control"));
+  checkCall(::listen(listening.get(), 16), "listen", folder.file("control"));
+  return listening;
+}
+
+nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& request,
+                             std::chrono::milliseconds patience) try {
+  const auto socket = makeSocket();
+  const SocketAddress address(folder);
+  checkCall(::connect(socket.get(), address.get(), sizeof address.address), "connect",
+            folder.file("control"));
+  const auto text = request.dump() + "\n";
+  checkCall(::send(socket.get(), text.data(), text.size(), MSG_NOSIGNAL), "send",
+            folder.file("control"));
+  auto reply = nlohmann::json::parse(readLine(socket.get(), Deadline::after(patience)));
+  if (reply.contains("error")) throw std::runtime_error(reply.at("error").get<std::string>());
+  return reply;
+} catch (const std::system_error& error) {
+  if (error.code().value() != ENOENT && error.code().value() != ECONNREFUSED) throw;
+  throw std::runtime_error(
+      fmt::format("the crate \"{}\" is not running; start it with `mpf run FILE`", folder.name()));
+} catch (const nlohmann::json::exception&) {
+  throw std::runtime_error(
+      fmt::format("the supervisor of the crate \"{}\" sent no valid reply; "
+                  "it may have been killed just now",
+                  folder.name()));
+}
+
+}  // namespace mpf::crate

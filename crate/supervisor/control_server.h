@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// ControlServer: the supervisor's end of the ControlProtocol. It waits for no caller: a request
+// that arrives in pieces is collected, and a reply that a caller does not read is cut off.
+//
+// Threads  one.
+// Trust    a caller may send anything, or nothing: callers and requests are limited.
+#pragma once
+
+#include <poll.h>
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "crate/supervisor/control_protocol.h"
+
+namespace mpf::crate {
+
+class ControlServer {
+ public:
+  // Returns the reply to a request; the text of an exception becomes its error.
+  using Answer = std::function<nlohmann::json(const nlohmann::json& request)>;
+
+  explicit ControlServer(Answer answer) : answer_(std::move(answer)) {}
+  //   throws  std::system_error
+  void listen(const CrateFolder& folder) { listening_ = listenForControl(folder); }
+
+  // Adds its descriptors to those for poll().
+  void addTo(std::vector<pollfd>& polled) const;
+  // Serves the callers whose descriptors, in the order of addTo(), are readable.
+  void handle(const std::vector<pollfd>& polled);
+
+ private:
+  struct Caller {
+    FileDescriptor socket;
+    std::string request;
+  };
+  void accept();
+  [[nodiscard]] bool serve(Caller& caller);
+
+  Answer answer_;
+  FileDescriptor listening_;
+  std::vector<Caller> callers_;
+};
+
+}  // namespace mpf::crate

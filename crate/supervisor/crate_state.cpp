@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#include "crate/supervisor/crate_state.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "base/output_file.h"
+#include "base/system_call.h"
+#include "base/whole_file.h"
+
+namespace mpf::crate {
+namespace {
+
+std::string bootId() { return readWholeFile("/proc/sys/kernel/random/boot_id"); }
+
+}  // namespace
+
+CrateState CrateState::read(const std::string& path) try {
+  const auto json = nlohmann::json::parse(readWholeFile(path));
+  CrateState state;
+  if (json.at("boot") != bootId()) return state;
+  state.file = json.at("crate");
+  for (const auto& one : json.at("processes")) {
+    state.processes.push_back({one.at("name"), one.at("pid"), one.at("startTicks"),
+                               one.at("restarts"), one.at("command"), one.at("isStopRequested")});
+  }
+  return state;
+} catch (const std::system_error&) {
+  return {};
+} catch (const nlohmann::json::exception&) {
+  return {};
+}
+
+void CrateState::write(const std::string& path) const {
+  auto all = nlohmann::json::array();
+  for (const auto& one : processes) {
+    all.push_back({{"name", one.name},
+                   {"pid", one.pid},
+                   {"startTicks", one.startTicks},
+                   {"restarts", one.restarts},
+                   {"command", one.command},
+                   {"isStopRequested", one.isStopRequested}});
+  }
+  const nlohmann::json json{{"boot", bootId()}, {"crate", file}, {"processes", all}};
+  const auto fresh = path + ".new";
+  OutputFile output(fresh, 0600);
+  output.write(json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  output.close();
+  checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
+}
+
+}  // namespace mpf::crate

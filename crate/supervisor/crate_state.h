@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// CrateState: the processes that a supervisor has started, in a file, so that another supervisor
+// can take them over.
+//
+//   state.json  {"boot": ID, "crate": FILE, "processes": [{"name", "pid", "startTicks", ...}]}
+//
+// Threads  one.
+// Crash    the file is replaced as a whole: a reader finds the old or the new state.
+// Trust    a file that cannot be read, or of another boot, counts as empty.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace mpf::crate {
+
+struct RecordedProcess {
+  std::string name;
+  pid_t pid = 0;
+  std::uint64_t startTicks = 0;
+  int restarts = 0;
+  std::string command;  // as shellText() writes it: a process with another one is restarted
+  bool isStopRequested = false;
+};
+
+struct CrateState {
+  std::string file;  // the crate file
+  std::vector<RecordedProcess> processes;
+
+  [[nodiscard]] static CrateState read(const std::string& path);
+  //   throws  std::system_error
+  void write(const std::string& path) const;
+};
+
+}  // namespace mpf::crate

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include "crate/supervisor/log_follower.h"
+
+#include <fcntl.h>
+#include <sys/inotify.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cctype>
+#include <fmt/format.h>
+#include <functional>
+
+#include "base/printable.h"
+#include "base/system_call.h"
+
+namespace mpf::crate {
+namespace {
+
+// Digits are what differs between the lines of a storm: times, counts, addresses.
+std::string withoutNumbers(const std::string& line) {
+  std::string text;
+  for (const char one : line)
+    if (std::isdigit(static_cast<unsigned char>(one)) == 0) text += one;
+  return text;
+}
+
+}  // namespace
+
+std::string LineFolder::fold(const std::string& line) {
+  auto bare = withoutNumbers(line);
+  if (bare == last_ && ++printed_ > kMostPrinted) {
+    ++folded_;
+    return {};
+  }
+  auto text = finish();
+  if (bare != last_) printed_ = 1;
+  last_ = std::move(bare);
+  return text + line + "\n";
+}
+
+std::string LineFolder::finish() {
+  if (folded_ == 0) return {};
+  auto text = fmt::format("(the line before came {} more times)\n", folded_);
+  folded_ = 0;
+  return text;
+}
+
+LogFollower::LogFollower(bool hasColour, std::uint64_t maxBytes)
+    : hasColour_(hasColour),
+      maxBytes_(maxBytes),
+      events_(checkCall(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK), "inotify_init1")) {}
+
+void LogFollower::add(const std::string& name, const std::string& path) {
+  if (logs_.contains(name)) return;
+  auto& log = logs_[name];
+  log.path = path;
+  log.file = FileDescriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
+  log.offset = ::lseek(log.file.get(), 0, SEEK_END);
+  checkCall(::inotify_add_watch(events_.get(), path.c_str(), IN_MODIFY), "inotify_add_watch", path);
+}
+
+std::string LogFollower::takeLines() {
+  std::array<char, 4096> events{};
+  while (::read(events_.get(), events.data(), events.size()) > 0) continue;
+  std::string text;
+  for (auto& [name, log] : logs_) {
+    readNew(name, log, text);
+    limit(log);
+  }
+  return text;
+}
+
+std::string LogFollower::prefix(const std::string& name) const {
+  if (!hasColour_) return name + " | ";
+  const auto colour = 31 + std::hash<std::string>()(name) % 6;
+  return fmt::format("\x1b[{}m{}\x1b[0m | ", colour, name);
+}
+
+void LogFollower::readNew(const std::string& name, Log& log, std::string& to) const {
+  std::array<char, 65536> bytes{};
+  struct stat status{};
+  if (::fstat(log.file.get(), &status) == 0 && status.st_size < log.offset) log.offset = 0;
+  for (;;) {
+    const auto length = ::pread(log.file.get(), bytes.data(), bytes.size(), log.offset);
+    if (length <= 0) break;
+    log.offset += length;
+    log.partial.append(bytes.data(), static_cast<std::size_t>(length));
+  }
+  std::string folded;
+  for (auto end = log.partial.find('\n'); end != std::string::npos; end = log.partial.find('\n')) {
+    folded += log.folder.fold(printable(log.partial.substr(0, end)));
+    log.partial.erase(0, end + 1);
+  }
+  folded += log.folder.finish();
+  for (std::size_t begin = 0; begin < folded.size();) {
+    const auto end = folded.find('\n', begin);
+    to += prefix(name) + folded.substr(begin, end - begin + 1);
+    begin = end + 1;
+  }
+}
+
+// Removes the first half of a log that is too long. The file system removes it as a whole, so no
+// line that is written meanwhile is lost; where it cannot (tmpfs), the log begins with a hole.
+void LogFollower::limit(Log& log) const {
+  constexpr std::int64_t kBlockBytes = 65536;
+  struct stat status{};
+  if (::fstat(log.file.get(), &status) != 0) return;
+  const auto bytes = std::min<std::int64_t>(status.st_size, status.st_blocks * 512);
+  if (bytes <= static_cast<std::int64_t>(maxBytes_)) return;
+  const auto removed = (status.st_size - bytes / 2) / kBlockBytes * kBlockBytes;
+  if (removed == 0) return;
+  if (::fallocate(log.file.get(), FALLOC_FL_COLLAPSE_RANGE, 0, removed) == 0) log.offset -= removed;
+  else ::fallocate(log.file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, removed);
+}
+
+}  // namespace mpf::crate

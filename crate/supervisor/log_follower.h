@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// LogFollower: copies the lines that processes append to their logs to the stderr of the
+// supervisor, each with the name of its process, and limits the size of the logs. A line that
+// repeats more than three times is counted instead of copied.
+//
+//   NAME.log ─ pread ─► "NAME | line"
+//
+// Threads  one.
+// Crash    the processes write to files, so they never wait for the supervisor.
+// Trust    lines may contain anything; control characters are escaped.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include <mpf/file_descriptor.h>
+
+namespace mpf::crate {
+
+// Counts repetitions of a line.
+class LineFolder {
+ public:
+  // The text to print for a line: nothing if it repeats the lines before; a count of such lines
+  // before a line that differs. Digits, as in times, do not count as differences.
+  [[nodiscard]] std::string fold(const std::string& line);
+  // The count that was not printed yet.
+  [[nodiscard]] std::string finish();
+
+ private:
+  static constexpr int kMostPrinted = 3;
+  std::string last_;  // without its digits
+  int printed_ = 0;  // how often the last line came
+  std::uint64_t folded_ = 0;
+};
+
+class LogFollower {
+ public:
+  //   hasColour  whether names are coloured
+  //   maxBytes   of each log; the first half of a longer one is removed
+  //   throws     std::system_error
+  LogFollower(bool hasColour, std::uint64_t maxBytes);
+
+  // Follows a log from its present end; it need not exist.
+  void add(const std::string& name, const std::string& path);
+  // Readable when a log has grown.
+  [[nodiscard]] int descriptor() const noexcept { return events_.get(); }
+  // Returns all new lines.
+  [[nodiscard]] std::string takeLines();
+
+ private:
+  struct Log {
+    std::string path;
+    FileDescriptor file;
+    std::int64_t offset = 0;
+    std::string partial;  // a line without its end
+    LineFolder folder;
+  };
+  void readNew(const std::string& name, Log& log, std::string& to) const;
+  void limit(Log& log) const;
+  [[nodiscard]] std::string prefix(const std::string& name) const;
+
+  bool hasColour_;
+  std::uint64_t maxBytes_;
+  FileDescriptor events_;  // inotify
+  std::map<std::string, Log> logs_;
+};
+
+}  // namespace mpf::crate

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// A Service as the reply to "ps" shows it.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <mpf/clock.h>
+
+#include "crate/supervisor/service.h"
+
+namespace mpf::crate {
+
+[[nodiscard]] inline nlohmann::json toJson(const Service& service) {
+  const auto upNs = service.isRunning() ? Clock::nowNs() - service.startedNs() : 0;
+  return {{"name", service.plan().name},       {"state", toString(service.state())},
+          {"isStalled", service.isStalled()},  {"pid", service.pid()},
+          {"restarts", service.restarts()},    {"upS", static_cast<double>(upNs) / 1e9},
+          {"reason", service.reason()},        {"needs", service.plan().needs},
+          {"servers", service.plan().servers}, {"command", service.plan().command}};
+}
+
+}  // namespace mpf::crate

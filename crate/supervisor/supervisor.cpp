@@ -1,0 +1,398 @@
+// SPDX-License-Identifier: MIT
+#include "crate/supervisor/supervisor.h"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fmt/format.h>
+
+#include <mpf/clock.h>
+
+#include "base/duration_text.h"
+#include "base/print_error.h"
+#include "base/service_manager.h"
+#include "base/system_call.h"
+#include "crate/supervisor/child_process.h"
+#include "crate/supervisor/service_json.h"
+
+namespace mpf::crate {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Nanoseconds kLookWhileStarting = milliseconds(20);
+constexpr Nanoseconds kLook = std::chrono::seconds(1);
+
+bool isSettled(ServiceState state) {
+  return state == ServiceState::ready || state == ServiceState::failed ||
+         state == ServiceState::stopped;
+}
+
+}  // namespace
+
+Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
+    : folder_(std::move(folder)),
+      load_(std::move(load)),
+      crate_(load_()),
+      logs_(::isatty(STDERR_FILENO) != 0, crate_.maxLogBytes) {
+  folder_.create();
+  lock_ = folder_.lock();
+  ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // reaps what the processes leave behind
+  control_.listen(folder_);
+  apply(planProcesses(crate_, folder_.path().string()));
+  takeOver();
+}
+
+void Supervisor::run() {
+  const auto isRunning = [](const auto& member) { return member->service.isRunning(); };
+  while (!isShuttingDown_ || std::ranges::any_of(members_, isRunning)) {
+    act();
+    reportStatus();
+    wait();
+  }
+  record();
+  writeError(logs_.takeLines());
+  ::unlink(folder_.file("control").c_str());
+}
+
+// Each process that an earlier supervisor has started and that still runs is supervised again. One
+// that the crate has no more, or with another command line, is ended.
+void Supervisor::takeOver() {
+  for (const auto& recorded : CrateState::read(folder_.file("state.json")).processes) {
+    auto* member = find(recorded.name);
+    if (member != nullptr && recorded.isStopRequested) member->service.requestStop(Clock::nowNs());
+    auto pidfd = openPidfd(recorded.pid);
+    if (pidfd.get() < 0 || startTicksOf(recorded.pid) != recorded.startTicks) continue;
+    if (member == nullptr) {
+      ProcessPlan plan;
+      plan.name = recorded.name;
+      member = members_.emplace_back(std::make_unique<Member>(plan)).get();
+      member->isRemoved = true;
+    }
+    auto& service = member->service;
+    member->adopted = std::move(pidfd);
+    member->isNotified = true;
+    service.adopted(recorded.pid, recorded.startTicks, recorded.restarts, Clock::nowNs(),
+                    startNsOf(recorded.startTicks));
+    log(service, fmt::format("taken over, pid {}", recorded.pid));
+    if (member->isRemoved) service.requestStop(Clock::nowNs());
+    else if (recorded.command != shellText(service.plan())) service.requestRestart(Clock::nowNs());
+  }
+}
+
+// Takes these plans in place of the present ones. Processes whose plans are unchanged continue.
+void Supervisor::apply(const std::vector<ProcessPlan>& plans) {
+  std::vector<std::unique_ptr<Member>> fresh;
+  for (const auto& plan : plans) {
+    const auto found = std::ranges::find_if(members_, [&](const auto& member) {
+      return member && member->service.plan() == plan && !member->isRemoved;
+    });
+    if (found != members_.end()) fresh.push_back(std::move(*found));
+    else fresh.push_back(std::make_unique<Member>(plan));
+    logs_.add(plan.name, folder_.log(plan.name));
+    watches_.try_emplace(plan.backplane, plan.backplane);
+  }
+  // The others end. Those that are replaced are first in the list, so that their successors wait.
+  for (auto& member : members_) {
+    if (!member) continue;
+    member->isRemoved = true;
+    member->service.requestStop(Clock::nowNs());
+    fresh.insert(fresh.begin(), std::move(member));
+  }
+  members_ = std::move(fresh);
+}
+
+void Supervisor::reload() try {
+  ServiceManager::notifyReloading();
+  crate_ = load_();
+  apply(planProcesses(crate_, folder_.path().string()));
+  printError("mpf run: reloaded {}\n", crate_.file);
+  ServiceManager::notifyReady();
+} catch (...) {
+  ServiceManager::notifyReady();
+  throw;
+}
+
+void Supervisor::beginShutdown() {
+  if (isShuttingDown_) {  // the second signal: at once
+    for (const auto& member : members_) signal(*member, SIGKILL);
+  }
+  isShuttingDown_ = true;
+  ServiceManager::notifyStopping();
+}
+
+Supervisor::Member* Supervisor::find(const std::string& name) {
+  const auto found = std::ranges::find_if(members_, [&](const auto& member) {
+    return !member->isRemoved && member->service.plan().name == name;
+  });
+  return found != members_.end() ? found->get() : nullptr;
+}
+
+bool Supervisor::areNeedsReady(const Service& service) const {
+  const auto& plan = service.plan();
+  return std::ranges::none_of(members_, [&](const auto& member) {
+    const auto& other = member->service;
+    if (member->isRemoved && other.plan().name == plan.name) return other.isRunning();
+    return std::ranges::find(plan.needs, other.plan().name) != plan.needs.end() &&
+           other.state() != ServiceState::ready;
+  });
+}
+
+bool Supervisor::hasDependants(const Service& service) const {
+  return std::ranges::any_of(members_, [&](const auto& member) {
+    const auto& needs = member->service.plan().needs;
+    return member->service.isRunning() &&
+           std::ranges::find(needs, service.plan().name) != needs.end();
+  });
+}
+
+// Does what each service wants now.
+void Supervisor::act() {
+  const auto now = Clock::nowNs();
+  for (const auto& member : members_) {
+    auto& service = member->service;
+    if (isShuttingDown_ && !service.isStopRequested() && !hasDependants(service))
+      service.requestStop(now);
+    switch (service.action(areNeedsReady(service), now)) {
+      case Action::start:
+        start(*member);
+        break;
+      case Action::terminate:
+        log(service, fmt::format("{}; SIGTERM", service.reason()));
+        signal(*member, SIGTERM);
+        break;
+      case Action::kill:
+        log(service, fmt::format("{}; SIGKILL", service.reason()));
+        signal(*member, SIGKILL);
+        break;
+      case Action::none:
+        break;
+    }
+  }
+  std::erase_if(members_, [](const auto& member) {
+    return member->isRemoved && !member->service.isRunning();
+  });
+}
+
+void Supervisor::start(Member& member) {
+  auto& service = member.service;
+  const auto& plan = service.plan();
+  try {
+    ChildProcess child(plan, folder_.log(plan.name), notify_.name());
+    member.isNotified = false;
+    member.adopted.reset();
+    service.started(child.pid(), child.startTicks(), Clock::nowNs());
+    nextLookNs_ = 0;
+    record();
+    if (const auto why = child.open(); !why.empty())
+      throw std::runtime_error(
+          fmt::format("{} in {}: {}", plan.command.front(), plan.workingFolder, why));
+  } catch (const std::exception& error) {
+    service.startFailed(fmt::format("cannot be started: {}", error.what()), Clock::nowNs());
+    log(service, service.reason());
+  }
+}
+
+void Supervisor::signal(Member& member, int number) {
+  const auto& service = member.service;
+  if (!service.isRunning()) return;
+  sendSignal(service.pid(), member.adopted, number);
+}
+
+void Supervisor::handleSignals() {
+  while (const auto number = signals_.take()) {
+    switch (*number) {
+      case SIGCHLD:
+        reapChildren();
+        break;
+      case SIGHUP:
+        try {
+          reload();
+        } catch (const std::exception& error) {
+          printError("mpf run: not reloaded, nothing has changed:\n{}\n", error.what());
+        }
+        break;
+      default:
+        printError("mpf run: SIG{}: stopping\n", ::sigabbrev_np(*number));
+        beginShutdown();
+        break;
+    }
+  }
+}
+
+// Also reaps processes that are not of the crate: they were left by others.
+void Supervisor::reapChildren() {
+  int status = 0;
+  for (;;) {
+    const auto pid = ::waitpid(-1, &status, WNOHANG);
+    if (pid <= 0) return;
+    for (const auto& member : members_) {
+      if (member->service.pid() == pid) handleEnd(*member, {status});
+    }
+  }
+}
+
+void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
+  auto& service = member.service;
+  const auto pid = service.pid();
+  const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
+  member.adopted.reset();
+  service.ended(end, Clock::nowNs());
+  record();
+  if (const auto watch = watches_.find(service.plan().backplane); watch != watches_.end())
+    watch->second.removeFilesOfDead();
+  const auto next = service.state() == ServiceState::pausing
+                        ? fmt::format("; restart {}", service.restarts())
+                        : fmt::format("; {}", toString(service.state()));
+  log(service, fmt::format("{} after {}, pid {}{}", end.text(), durationText(aliveNs), pid, next));
+  if (service.state() == ServiceState::failed)
+    log(service, fmt::format("failed: {}; see {}, then `mpf restart {}`", service.reason(),
+                             folder_.log(service.plan().name), service.plan().name));
+}
+
+// Finds out which processes are ready, and which are stalled.
+void Supervisor::look() {
+  for (auto& [backplane, watch] : watches_) watch.look();
+  const auto now = Clock::nowNs();
+  for (const auto& member : members_) {
+    auto& service = member->service;
+    const auto watch = watches_.find(service.plan().backplane);
+    if (!service.isRunning() || watch == watches_.end()) continue;
+    service.looked(watch->second.isStalled(service.pid()), now);
+    if (service.state() != ServiceState::starting || !isReady(*member)) continue;
+    service.becameReady(now);
+    log(service, fmt::format("ready, pid {}, {} after its start", service.pid(),
+                             durationText(static_cast<double>(now - service.startedNs()))));
+  }
+  const auto isStarting = [](const auto& member) {
+    return member->service.state() == ServiceState::starting;
+  };
+  const auto pause = std::ranges::any_of(members_, isStarting) ? kLookWhileStarting : kLook;
+  nextLookNs_ = Clock::nowNs() + pause.count();
+}
+
+bool Supervisor::isReady(const Member& member) const {
+  const auto& plan = member.service.plan();
+  return (member.isNotified || !plan.notifies) &&
+         watches_.at(plan.backplane).isServing(member.service.pid(), plan.location, plan.servers);
+}
+
+void Supervisor::takeReports() {
+  while (const auto pid = notify_.takeReady()) {
+    for (const auto& member : members_)
+      if (member->service.pid() == *pid) member->isNotified = true;
+  }
+  nextLookNs_ = 0;
+}
+
+void Supervisor::record() const {
+  CrateState state;
+  state.file = crate_.file;
+  for (const auto& member : members_) {
+    const auto& service = member->service;
+    state.processes.push_back({service.plan().name, service.pid(), service.startTicks(),
+                               service.restarts(), shellText(service.plan()),
+                               service.isStopRequested() && !isShuttingDown_});
+  }
+  state.write(folder_.file("state.json"));
+}
+
+nlohmann::json Supervisor::answer(const nlohmann::json& request) {
+  const std::string what = request.at("do");
+  const auto now = Clock::nowNs();
+  if (what == "ps") return describe();
+  if (what == "reload") reload();
+  else if (what == "shutdown") beginShutdown();
+  else if (what == "stop") memberOf(request).service.requestStop(now);
+  else if (what == "start") memberOf(request).service.requestStart();
+  else if (what == "restart") memberOf(request).service.requestRestart(now);
+  else throw std::runtime_error(fmt::format("unknown request \"{}\"", what));
+  record();
+  return nlohmann::json::object();
+}
+
+// The member that a request names.
+Supervisor::Member& Supervisor::memberOf(const nlohmann::json& request) {
+  const std::string name = request.at("name");
+  if (auto* const member = find(name)) return *member;
+  std::string names;
+  for (const auto& one : members_) names += (names.empty() ? "" : ", ") + one->service.plan().name;
+  throw std::runtime_error(fmt::format("the crate has no process \"{}\"; it has {}", name, names));
+}
+
+nlohmann::json Supervisor::describe() const {
+  auto processes = nlohmann::json::array();
+  for (const auto& member : members_) {
+    auto one = toJson(member->service);
+    one["log"] = folder_.log(member->service.plan().name);
+    processes.push_back(std::move(one));
+  }
+  return {{"crate", crate_.name},
+          {"file", crate_.file},
+          {"folder", folder_.path().string()},
+          {"pid", ::getpid()},
+          {"processes", processes}};
+}
+
+int Supervisor::waitMs() const {
+  auto next = nextLookNs_;
+  for (const auto& member : members_) {
+    if (const auto time = member->service.nextActionNs()) next = std::min(next, *time);
+  }
+  if (const auto watchdog = ServiceManager::watchdogTime())
+    next = std::min(next, Clock::nowNs() + std::int64_t{watchdog->count()} * 1000 / 2);
+  const auto left = std::chrono::ceil<milliseconds>(Nanoseconds(next - Clock::nowNs())).count();
+  return static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000));
+}
+
+void Supervisor::wait() {
+  std::vector<pollfd> polled{{signals_.descriptor(), POLLIN, 0},
+                             {logs_.descriptor(), POLLIN, 0},
+                             {notify_.descriptor(), POLLIN, 0}};
+  const auto firstAdopted = polled.size();
+  std::vector<Member*> adopted;
+  for (const auto& member : members_) {
+    if (member->adopted.get() < 0) continue;
+    adopted.push_back(member.get());
+    polled.push_back({member->adopted.get(), POLLIN, 0});
+  }
+  const auto firstControl = polled.size();
+  control_.addTo(polled);
+  ::poll(polled.data(), polled.size(), waitMs());
+
+  for (std::size_t i = 0; i < adopted.size(); ++i)
+    if (polled[firstAdopted + i].revents != 0) handleEnd(*adopted[i], {});
+  if (polled[0].revents != 0) handleSignals();
+  control_.handle({polled.begin() + static_cast<std::ptrdiff_t>(firstControl), polled.end()});
+  if (polled[1].revents != 0) writeError(logs_.takeLines());
+  if (polled[2].revents != 0) takeReports();
+  if (Clock::nowNs() >= nextLookNs_) look();
+}
+
+void Supervisor::reportStatus() {
+  if (ServiceManager::watchdogTime()) ServiceManager::notifyAlive();
+  const auto ready = std::ranges::count_if(
+      members_, [](const auto& member) { return member->service.state() == ServiceState::ready; });
+  auto status = fmt::format("{} of {} processes ready", ready, members_.size());
+  for (const auto& member : members_) {
+    if (!isSettled(member->service.state()) || member->service.state() == ServiceState::failed)
+      status +=
+          fmt::format("; {} {}", member->service.plan().name, toString(member->service.state()));
+  }
+  if (status == status_) return;
+  status_ = status;
+  ServiceManager::notifyStatus(status);
+  if (std::ranges::all_of(members_,
+                          [](const auto& member) { return isSettled(member->service.state()); }))
+    ServiceManager::notifyReady();
+}
+
+void Supervisor::log(const Service& service, const std::string& text) const {
+  printError("mpf run: {}: {}\n", service.plan().name, text);
+}
+
+}  // namespace mpf::crate

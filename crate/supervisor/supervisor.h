@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// Supervisor: starts the processes of a crate, watches them, restarts those that end or stall, and
+// stops them in order. It is on the path of no message.
+//
+//   signals, ends of processes ─┐                       ┌─► ChildProcess, signals to processes
+//   requests (mpf stop, ...) ───┼─► Service::action() ──┤
+//   ServerWatch, time ──────────┘                       └─► CrateState, log, systemd
+//
+// Threads  one, and the process may have no other, because it forks.
+// Crash    the processes continue. The next supervisor of the crate finds them in the CrateState
+//          and takes them over.
+#pragma once
+
+#include <signal.h>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "crate/supervisor/control_server.h"
+#include "crate/supervisor/crate_state.h"
+#include "crate/supervisor/log_follower.h"
+#include "crate/supervisor/notify_socket.h"
+#include "crate/supervisor/server_watch.h"
+#include "crate/supervisor/service.h"
+#include "crate/supervisor/signal_queue.h"
+
+namespace mpf::crate {
+
+class Supervisor {
+ public:
+  // Locks the folder, and takes over the processes that an earlier supervisor has left.
+  //   load    reads the crate again; called at the start and for each reload
+  //   throws  ConfigError, std::runtime_error, std::system_error
+  Supervisor(CrateFolder folder, std::function<Crate()> load);
+  Supervisor(const Supervisor&) = delete;
+  Supervisor& operator=(const Supervisor&) = delete;
+
+  // Runs until SIGINT, SIGTERM or the request "shutdown"; returns when all processes have ended.
+  // SIGHUP reloads the crate.
+  void run();
+
+ private:
+  struct Member {  // a service with what the supervisor holds for it
+    explicit Member(ProcessPlan plan) : service(std::move(plan)) {}
+    Service service;
+    FileDescriptor adopted;  // pidfd of a process that is not a child
+    bool isNotified = false;  // it has reported that it is ready
+    bool isRemoved = false;  // no longer in the crate: forgotten when it has ended
+  };
+
+  void takeOver();
+  void apply(const std::vector<ProcessPlan>& plans);
+  void reload();
+  void beginShutdown();
+  void act();
+  void start(Member& member);
+  void signal(Member& member, int number);
+  void handleSignals();
+  void reapChildren();
+  void handleEnd(Member& member, const ProcessEnd& end);
+  void look();
+  [[nodiscard]] bool isReady(const Member& member) const;
+  void takeReports();
+  void record() const;
+  nlohmann::json answer(const nlohmann::json& request);
+  [[nodiscard]] nlohmann::json describe() const;
+  void wait();
+  [[nodiscard]] int waitMs() const;
+  void reportStatus();
+  [[nodiscard]] bool areNeedsReady(const Service& service) const;
+  // Whether a process that runs needs this one.
+  [[nodiscard]] bool hasDependants(const Service& service) const;
+  Member* find(const std::string& name);
+  Member& memberOf(const nlohmann::json& request);
+  void log(const Service& service, const std::string& text) const;
+
+  CrateFolder folder_;
+  std::function<Crate()> load_;
+  Crate crate_;
+  FileDescriptor lock_;
+  SignalQueue signals_{SIGINT, SIGTERM, SIGHUP, SIGCHLD};
+  std::vector<std::unique_ptr<Member>> members_;  // each after those that it needs
+  std::map<std::string, ServerWatch> watches_;  // by backplane
+  LogFollower logs_;
+  NotifySocket notify_;
+  ControlServer control_{[this](const auto& request) { return answer(request); }};
+  std::int64_t nextLookNs_ = 0;
+  std::string status_;  // as last reported to systemd
+  bool isShuttingDown_ = false;
+};
+
+}  // namespace mpf::crate

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// checkCrate(): errors that concern several entries.
+#include "tests/crate/config/crate_text.h"
+
+// NOLINTBEGIN(modernize-raw-string-literal): a test case is one line
+namespace mpf::crate::test {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kOne = "[[server]]\nprogram = \"int32\"\nserver = \"one\"\n";
+const std::string kCarrier = "[carriers]\nipac = \"model\"\n";
+const std::string kDac =
+    "[[server]]\nprogram = \"dac128v\"\nmodule = \"dac\"\ncarrier = \"ipac\"\nsite = \"IP_a\"\n";
+
+using CheckCrateTest = CrateTextTest;
+
+TEST_F(CheckCrateTest, AnEmptyCrateStartsNothing) {
+  EXPECT_THAT(errorsOf(""), HasSubstr("the crate starts nothing; write a [[server]]"));
+}
+
+TEST_F(CheckCrateTest, NamesAreUnique) {
+  EXPECT_THAT(errorsOf(kOne + "name = \"a\"\n" + kOne + "name = \"a\"\nservers = [\"two\"]\n"),
+              HasSubstr("lab.toml:8:8: the process \"a\" of"));
+  EXPECT_THAT(errorsOf(kOne + "name = \"a/b\"\n"), HasSubstr("name \"a/b\": use 1 to 100"));
+}
+
+TEST_F(CheckCrateTest, AServerIsInOneProcess) {
+  EXPECT_THAT(errorsOf(kOne + "name = \"a\"\n" + kOne + "name = \"b\"\n"),
+              HasSubstr("the server \"one\" is also in the process \"a\""));
+}
+
+TEST_F(CheckCrateTest, RequiredValues) {
+  EXPECT_THAT(errorsOf("[[server]]\nprogram = \"dac128v\"\nmodule = \"dac\"\n"),
+              HasSubstr("lab.toml:1:1: [[server]] of program \"dac128v\" has no carrier"));
+  EXPECT_THAT(errorsOf("[[server]]\nprogram = \"serial\"\n"), HasSubstr("has no server; write"));
+  EXPECT_THAT(errorsOf("[[router]]\n"), HasSubstr("[[router]] has nothing to do"));
+}
+
+TEST_F(CheckCrateTest, AnArgumentNeedsThoseBeforeIt) {
+  EXPECT_THAT(errorsOf("[[server]]\nprogram = \"serial\"\nserver = \"a\"\nport = \"b\"\n"
+                       "queuesize = 3\n"),
+              HasSubstr("lab.toml:5:13: queuesize needs bufsize, too"));
+}
+
+TEST_F(CheckCrateTest, NeedsNameProcesses) {
+  EXPECT_THAT(errorsOf(kOne + "needs = [\"onee\"]\n"),
+              HasSubstr("lab.toml:4:9: needs \"onee\": no process has this name; did you mean "
+                        "\"one\"?"));
+  EXPECT_THAT(errorsOf(kOne + "needs = [\"b\"]\n[[program]]\nname = \"b\"\ncommand = \"b\"\n"
+                              "needs = [\"one\"]\n"),
+              HasSubstr("the needs form a circle: one needs b needs one"));
+}
+
+TEST_F(CheckCrateTest, ModulesAreOnCarriersOfTheCrate) {
+  EXPECT_THAT(errorsOf(kDac), HasSubstr("carrier \"ipac\" is not in [carriers]; write [carriers]"));
+  EXPECT_THAT(errorsOf("[carriers]\nipca = \"model\"\n" + kDac),
+              HasSubstr("did you mean \"ipca\"?"));
+}
+
+TEST_F(CheckCrateTest, OneProcessDrivesAModule) {
+  EXPECT_EQ(errorsOf(kCarrier + kDac), "");
+  EXPECT_THAT(errorsOf(kCarrier + kDac +
+                       "[[server]]\nprogram = \"ip440\"\nmodule = \"in\"\n"
+                       "carrier = \"ipac\"\nsite = \"IP_a\"\n"),
+              HasSubstr("the module at IP_a of carrier \"ipac\" is also driven by the process "
+                        "\"dac\""));
+}
+
+}  // namespace
+}  // namespace mpf::crate::test
+// NOLINTEND(modernize-raw-string-literal)

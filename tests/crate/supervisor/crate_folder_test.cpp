@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// CrateFolder: where it is, and its lock.
+#include "crate/supervisor/crate_folder.h"
+
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/temporary_folder.h"
+
+namespace mpf::crate::test {
+namespace {
+
+using mpf::test::TemporaryFolder;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(CrateFolder, IsInTheFolderOfCrates) {
+  ::setenv("MPF_CRATES", "/a/b", 1);
+  EXPECT_EQ(CrateFolder::of("lab").path(), "/a/b/lab");
+  EXPECT_EQ(CrateFolder::of("lab").name(), "lab");
+  EXPECT_EQ(CrateFolder::of("lab").log("dac"), "/a/b/lab/dac.log");
+}
+
+TEST(CrateFolder, IsForItsUserOnly) {
+  const TemporaryFolder parent;
+  const CrateFolder folder(parent.path() / "x/lab");
+
+  folder.create();
+  folder.create();
+
+  struct stat status{};
+  ASSERT_EQ(::stat(folder.path().c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0700U);
+}
+
+TEST(CrateFolder, HasOneSupervisor) {
+  const TemporaryFolder parent;
+  const CrateFolder folder(parent.path() / "lab");
+  folder.create();
+  EXPECT_FALSE(folder.isLocked());
+
+  auto lock = folder.lock();
+
+  EXPECT_TRUE(folder.isLocked());
+  EXPECT_THAT([&] { static_cast<void>(folder.lock()); },
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("the crate \"lab\" is already running in " + folder.path().string())));
+  lock.reset();
+  EXPECT_FALSE(folder.isLocked());
+  EXPECT_NO_THROW(static_cast<void>(folder.lock()));
+}
+
+TEST(CrateFolder, AllAreListed) {
+  const TemporaryFolder parent;
+  ::setenv("MPF_CRATES", parent.path().c_str(), 1);
+  EXPECT_TRUE(CrateFolder::all().empty());
+  CrateFolder::of("b").create();
+  CrateFolder::of("a").create();
+  static_cast<void>(parent.write("file", ""));
+
+  const auto all = CrateFolder::all();
+
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].name() + all[1].name(), "ab");
+}
+
+}  // namespace
+}  // namespace mpf::crate::test

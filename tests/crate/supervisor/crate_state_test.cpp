@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// CrateState: written and read; damaged files and files of another boot.
+#include "crate/supervisor/crate_state.h"
+
+#include <gtest/gtest.h>
+
+#include "base/whole_file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mpf::crate::test {
+namespace {
+
+class CrateStateTest : public testing::Test {
+ protected:
+  CrateStateTest() {
+    state_.file = "/etc/lab.toml";
+    state_.processes.push_back({"dac", 12, 345, 6, "mpf-x 'a b'", true});
+    state_.write(path_);
+  }
+  mpf::test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("state.json");
+  CrateState state_;
+};
+
+TEST_F(CrateStateTest, IsReadAsItWasWritten) {
+  const auto read = CrateState::read(path_);
+
+  EXPECT_EQ(read.file, "/etc/lab.toml");
+  ASSERT_EQ(read.processes.size(), 1U);
+  const auto& one = read.processes[0];
+  EXPECT_EQ(one.name, "dac");
+  EXPECT_EQ(one.pid, 12);
+  EXPECT_EQ(one.startTicks, 345U);
+  EXPECT_EQ(one.restarts, 6);
+  EXPECT_EQ(one.command, "mpf-x 'a b'");
+  EXPECT_TRUE(one.isStopRequested);
+}
+
+TEST_F(CrateStateTest, OfAnotherBootCountsAsEmpty) {
+  auto text = readWholeFile(path_);
+  const auto at = text.find("\"boot\": \"") + 9;
+  text[at] = text[at] == '0' ? '1' : '0';
+
+  EXPECT_TRUE(CrateState::read(folder_.write("other", text)).processes.empty());
+}
+
+TEST_F(CrateStateTest, ThatIsDamagedCountsAsEmpty) {
+  const auto text = readWholeFile(path_);
+  for (std::size_t length = 0; length + 2 < text.size(); ++length) {
+    const auto cut = folder_.write("cut", text.substr(0, length));
+    ASSERT_TRUE(CrateState::read(cut).processes.empty()) << length;
+  }
+  EXPECT_TRUE(CrateState::read(folder_.file("absent")).processes.empty());
+  EXPECT_TRUE(CrateState::read(folder_.write("list", "[1]")).processes.empty());
+}
+
+}  // namespace
+}  // namespace mpf::crate::test

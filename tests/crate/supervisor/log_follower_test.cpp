@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// LogFollower: new lines with the names of their processes, storms, and logs that are too long.
+#include "crate/supervisor/log_follower.h"
+
+#include <sys/stat.h>
+
+#include <fstream>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/temporary_folder.h"
+
+namespace mpf::crate::test {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(LineFolder, CountsLinesThatRepeat) {
+  LineFolder folder;
+  std::string text;
+  for (int i = 0; i < 10; ++i) text += folder.fold("12:00:0" + std::to_string(i) + " full");
+  text += folder.fold("empty");
+
+  EXPECT_EQ(text,
+            "12:00:00 full\n12:00:01 full\n12:00:02 full\n"
+            "(the line before came 7 more times)\nempty\n");
+  EXPECT_EQ(folder.finish(), "");
+}
+
+class LogFollowerTest : public testing::Test {
+ protected:
+  static void append(const std::string& path, const std::string& text) {
+    std::ofstream(path, std::ios::app) << text;
+  }
+  mpf::test::TemporaryFolder folder_;
+  std::string path_ = folder_.file("dac.log");
+};
+
+TEST_F(LogFollowerTest, ReturnsWholeLinesFromItsBeginning) {
+  append(path_, "before\n");
+  LogFollower follower(false, 1u << 20);
+  follower.add("dac", path_);
+
+  append(path_, "one\ntw");
+  EXPECT_EQ(follower.takeLines(), "dac | one\n");
+  append(path_, "o\n\x1b[2J\n");
+  EXPECT_EQ(follower.takeLines(), "dac | two\ndac | \\x1b[2J\n");
+  EXPECT_EQ(follower.takeLines(), "");
+}
+
+TEST_F(LogFollowerTest, ColoursNamesOnATerminal) {
+  LogFollower follower(true, 1u << 20);
+  follower.add("dac", path_);
+  append(path_, "one\n");
+
+  EXPECT_THAT(follower.takeLines(), testing::MatchesRegex("\x1b\\[3[1-6]mdac\x1b\\[0m \\| one\n"));
+}
+
+TEST_F(LogFollowerTest, RemovesTheFirstHalfOfALogThatIsTooLong) {
+  constexpr std::uint64_t kMost = 1u << 20;
+  LogFollower follower(false, kMost);
+  follower.add("dac", path_);
+  const std::string line(99, 'x');
+  std::string last;
+  for (int i = 0; i < 3'000; ++i) {
+    std::string block;
+    for (int j = 0; j < 10; ++j) block += line + "\n";
+    append(path_, block + std::to_string(i) + "\n");
+    last = follower.takeLines();
+    struct stat status{};
+    ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+    ASSERT_LE(static_cast<std::uint64_t>(status.st_blocks) * 512, kMost + 200'000);
+  }
+  EXPECT_THAT(last, HasSubstr("dac | 2999\n"));
+}
+
+}  // namespace
+}  // namespace mpf::crate::test

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+// SupervisorTest: a crate with a folder and a backplane of its own, run by `mpf run`.
+#pragma once
+
+#include <signal.h>
+
+#include <cstdlib>
+#include <functional>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "crate/supervisor/control_protocol.h"
+#include "tests/support/command.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_backplane.h"
+#include "tests/support/watchdog.h"
+
+namespace mpf::crate::test {
+
+class SupervisorTest : public testing::Test {
+ protected:
+  SupervisorTest() {
+    ::setenv("MPF_CRATES", files_.file("crates").c_str(), 1);
+    ::setenv("MPF_BACKPLANE", backplane_.name().c_str(), 1);
+  }
+  // Ends the crate, also after a test that has failed.
+  ~SupervisorTest() override {
+    if (supervisor_) stop();
+  }
+
+  void write(const std::string& text) { static_cast<void>(files_.write("lab.toml", text)); }
+  // Starts the crate, and waits until the supervisor answers.
+  void run(const std::string& text) {
+    write(text);
+    run();
+  }
+  void run() {
+    supervisor_.emplace(std::vector<std::string>{MPF, "run", files_.file("lab.toml")});
+    while (!isAnswering()) continue;
+  }
+  int stop() {
+    const auto status = supervisor_->end(SIGTERM);
+    supervisor_.reset();
+    return status;
+  }
+  void killSupervisor() {
+    supervisor_->end(SIGKILL);
+    supervisor_.reset();
+  }
+
+  nlohmann::json ask(const nlohmann::json& request) { return askSupervisor(folder(), request); }
+  nlohmann::json process(const std::string& name) {
+    const auto report = ask({{"do", "ps"}});
+    for (const auto& one : report.at("processes"))
+      if (one.at("name") == name) return one;
+    return nlohmann::json::object();
+  }
+  pid_t pidOf(const std::string& name) { return process(name).value("pid", 0); }
+  std::string stateOf(const std::string& name) { return process(name).value("state", "absent"); }
+  void waitForState(const std::string& name, const std::string& state) {
+    while (stateOf(name) != state) continue;
+  }
+  // Waits until the process is ready with another pid.
+  void waitForNew(const std::string& name, pid_t before) {
+    while (stateOf(name) != "ready" || pidOf(name) == before) continue;
+  }
+  // Sends an Int32 message, and returns whether the server has replied.
+  bool isReplying(const std::string& server) {
+    return mpf::test::runCommand(std::string(MPF) + " call " + server + " int32 value=1 2>&1")
+               .status == 0;
+  }
+  CrateFolder folder() { return CrateFolder::of("lab"); }
+
+  const mpf::test::Watchdog watchdog_{"Supervisor"};
+  mpf::test::TestBackplane backplane_;
+  mpf::test::TemporaryFolder files_;
+  std::optional<mpf::test::Program> supervisor_;
+
+ private:
+  bool isAnswering() {
+    try {
+      ask({{"do", "ps"}});
+      return true;
+    } catch (const std::runtime_error&) {
+      return false;
+    }
+  }
+};
+
+}  // namespace mpf::crate::test

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+// Supervisor: crates that run: processes that die, stall and are replaced; supervisors that are
+// killed.
+#include "crate/supervisor/supervisor.h"
+
+#include <sys/wait.h>
+
+#include "base/whole_file.h"
+#include "tests/crate/supervisor/supervisor_fixture.h"
+
+// NOLINTBEGIN(modernize-raw-string-literal): a crate is one line
+namespace mpf::crate::test {
+namespace {
+
+using mpf::test::runCommand;
+using testing::HasSubstr;
+
+const std::string kServer = "[[server]]\nprogram = \"int32\"\n";
+const std::string kFast = "[supervision]\nfirst-pause = \"10ms\"\n";
+
+TEST_F(SupervisorTest, StartsProcessesUntilTheirServersAreBindable) {
+  run(kServer +
+      "[carriers]\nipac = \"model\"\n[[server]]\nprogram = \"dac128v\"\n"
+      "module = \"dac\"\ncarrier = \"ipac\"\nsite = \"IP_a\"\n");
+
+  waitForState("int32", "ready");
+  waitForState("dac", "ready");
+
+  EXPECT_TRUE(isReplying("Int32"));
+  EXPECT_TRUE(isReplying("dac"));
+  EXPECT_EQ(WEXITSTATUS(stop()), 0);
+  EXPECT_FALSE(folder().isLocked());
+}
+
+TEST_F(SupervisorTest, RestartsAProcessThatDies) {
+  run(kFast + kServer);
+  waitForState("int32", "ready");
+  const auto before = pidOf("int32");
+
+  ::kill(before, SIGSEGV);
+  waitForNew("int32", before);
+
+  EXPECT_EQ(process("int32").at("restarts"), 1);
+  EXPECT_EQ(process("int32").at("reason"), "SIGSEGV");
+  EXPECT_TRUE(isReplying("Int32"));
+}
+
+TEST_F(SupervisorTest, RestartsAServerThatIsStalled) {
+  run("[supervision]\nstall-limit = \"100ms\"\nfirst-pause = \"10ms\"\n" + kServer);
+  waitForState("int32", "ready");
+  const auto before = pidOf("int32");
+  mpf::test::Program client({MPF, "call", "Int32", "int32", "--count", "1000000000"});
+  ::kill(before, SIGSTOP);
+
+  waitForNew("int32", before);
+
+  EXPECT_THAT(process("int32").at("reason").get<std::string>(), HasSubstr("stalled for"));
+}
+
+TEST_F(SupervisorTest, AProcessStartsAfterThoseThatItNeeds) {
+  run(kServer + "name = \"a\"\nneeds = [\"b\"]\n" + kServer + "name = \"b\"\nserver = \"B\"\n");
+  waitForState("a", "ready");
+  ASSERT_EQ(stateOf("b"), "ready");
+
+  EXPECT_EQ(WEXITSTATUS(stop()), 0);
+}
+
+TEST_F(SupervisorTest, ARouterIsReadyWhenItListens) {
+  run("[[router]]\nserve = \"1=0\"\nlisten = \"127.0.0.1:0\"\nplain = true\n" + kServer +
+      "needs = [\"router\"]\n");
+
+  waitForState("int32", "ready");
+
+  EXPECT_EQ(stateOf("router"), "ready");
+  EXPECT_NE(supervisor_->waitForLine("router | "), "");
+}
+
+TEST_F(SupervisorTest, AProcessWaitsForOneThatFails) {
+  run(kServer +
+      "name = \"a\"\nneeds = [\"b\"]\n[[program]]\nname = \"b\"\n"
+      "command = [\"/bin/sh\", \"-c\", \"exit 2\"]\nservers = [\"never\"]\n");
+
+  waitForState("b", "failed");
+
+  EXPECT_EQ(stateOf("a"), "waiting");
+}
+
+TEST_F(SupervisorTest, StopsAndStartsAProcess) {
+  run(kServer);
+  waitForState("int32", "ready");
+
+  ask({{"do", "stop"}, {"name", "int32"}});
+  waitForState("int32", "stopped");
+  EXPECT_FALSE(isReplying("Int32"));
+
+  ask({{"do", "start"}, {"name", "int32"}});
+  waitForState("int32", "ready");
+  EXPECT_TRUE(isReplying("Int32"));
+}
+
+TEST_F(SupervisorTest, RefusesUnknownRequestsAndNames) {
+  run(kServer);
+
+  EXPECT_THAT([&] { ask({{"do", "stop"}, {"name", "int23"}}); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  "the crate has no process \"int23\"; it has int32"));
+  EXPECT_THAT([&] { ask({{"do", "dance"}, {"name", "int32"}}); },
+              testing::ThrowsMessage<std::runtime_error>("unknown request \"dance\""));
+  EXPECT_THROW(ask({{"name", "int32"}}), std::runtime_error);
+}
+
+// "The supervisor itself may be killed at any moment: servers go on, and a new supervisor takes
+// over those that run."
+TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
+  run(kFast + kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
+  waitForState("int32", "ready");
+  waitForState("two", "ready");
+  const auto one = pidOf("int32");
+  const auto two = pidOf("two");
+
+  killSupervisor();
+  EXPECT_TRUE(isReplying("Int32"));
+  ::kill(two, SIGKILL);
+  run();
+  waitForState("int32", "ready");
+  waitForState("two", "ready");
+
+  EXPECT_EQ(pidOf("int32"), one);
+  EXPECT_NE(pidOf("two"), two);
+  ::kill(one, SIGKILL);
+  waitForNew("int32", one);
+  EXPECT_TRUE(isReplying("Int32"));
+}
+
+TEST_F(SupervisorTest, IsKilledAtRandomMomentsWithoutOrphansOrDoubles) {
+  run(kFast + kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
+  for (int i = 0; i < 30; ++i) {
+    const auto pid = i % 3 == 0 ? pidOf("two") : 0;
+    if (pid > 0) ::kill(pid, SIGKILL);
+    killSupervisor();
+    run();
+  }
+  waitForState("int32", "ready");
+  waitForState("two", "ready");
+
+  EXPECT_TRUE(isReplying("Int32"));
+  EXPECT_TRUE(isReplying("Two"));
+  EXPECT_EQ(WEXITSTATUS(stop()), 0);
+  EXPECT_EQ(backplane_.segmentNames().size(), 0U) << "each process was supervised, and has ended";
+}
+
+TEST_F(SupervisorTest, ReloadsOnlyWhatHasChanged) {
+  run(kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
+  waitForState("int32", "ready");
+  waitForState("two", "ready");
+  const auto one = pidOf("int32");
+  const auto two = pidOf("two");
+
+  write(kServer + kServer + "name = \"two\"\nserver = \"Two\"\nqueue-size = 7\n" + kServer +
+        "name = \"three\"\nserver = \"Three\"\n");
+  ask({{"do", "reload"}});
+  waitForNew("two", two);
+  waitForState("three", "ready");
+  EXPECT_EQ(pidOf("int32"), one);
+
+  write(kServer);
+  ask({{"do", "reload"}});
+  waitForState("two", "absent");
+  waitForState("three", "absent");
+  EXPECT_EQ(pidOf("int32"), one);
+}
+
+TEST_F(SupervisorTest, AnInvalidFileChangesNothing) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const auto one = pidOf("int32");
+  write("[[server]]\nprogram = \"none\"\n");
+
+  EXPECT_THAT([&] { ask({{"do", "reload"}}); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("unknown program \"none\"")));
+
+  EXPECT_EQ(pidOf("int32"), one);
+  EXPECT_EQ(stateOf("int32"), "ready");
+}
+
+TEST_F(SupervisorTest, KillsAProcessThatDoesNotEnd) {
+  run("[[program]]\nname = \"deaf\"\ncommand = [\"/bin/sh\", \"-c\", \"trap '' TERM; echo on; "
+      "while :; do sleep 1000 & wait; done\"]\nstop-time = \"50ms\"\n");
+  ASSERT_NE(supervisor_->waitForLine("deaf | on"), "");
+
+  ask({{"do", "stop"}, {"name", "deaf"}});
+  waitForState("deaf", "stopped");
+
+  EXPECT_EQ(pidOf("deaf"), 0);
+}
+
+TEST_F(SupervisorTest, PrintsTheLinesOfItsProcesses) {
+  run("[[program]]\nname = \"talker\"\ncommand = [\"/bin/sh\", \"-c\", \"echo one; exec sleep "
+      "1000\"]\n");
+
+  EXPECT_EQ(supervisor_->waitForLine("one"), "talker | one");
+  waitForState("talker", "ready");
+  EXPECT_EQ(runCommand(MPF " logs talker").output, "one\n");
+}
+
+TEST_F(SupervisorTest, OneCrateHasOneSupervisor) {
+  run(kServer);
+
+  const auto second = runCommand(std::string(MPF) + " run " + files_.file("lab.toml") + " 2>&1");
+
+  EXPECT_EQ(WEXITSTATUS(second.status), 1);
+  EXPECT_THAT(second.output, HasSubstr("the crate \"lab\" is already running"));
+}
+
+TEST_F(SupervisorTest, CommandsOfTheShellControlIt) {
+  run(kServer);
+  waitForState("int32", "ready");
+  const std::string mpf = MPF;
+
+  EXPECT_THAT(runCommand(mpf + " ps").output, testing::ContainsRegex("int32 +ready"));
+  EXPECT_EQ(runCommand(mpf + " restart int32").output, "int32 is ready\n");
+  EXPECT_EQ(runCommand(mpf + " stop int32").output, "int32 is stopped\n");
+  EXPECT_EQ(runCommand(mpf + " start int32").output, "int32 is ready\n");
+  EXPECT_EQ(nlohmann::json::parse(runCommand(mpf + " ps --json").output)[0].at("crate"), "lab");
+  EXPECT_EQ(runCommand(mpf + " stop").output, "the crate \"lab\" has stopped\n");
+  EXPECT_EQ(WEXITSTATUS(supervisor_->wait()), 0);
+  supervisor_.reset();
+  EXPECT_THAT(runCommand(mpf + " stop 2>&1").output, HasSubstr("no crate is running"));
+}
+
+}  // namespace
+}  // namespace mpf::crate::test
+// NOLINTEND(modernize-raw-string-literal)
