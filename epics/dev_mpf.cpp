@@ -9,6 +9,7 @@
 #include <dbLock.h>
 #include <dbStaticLib.h>
 #include <epicsStdio.h>
+#include <epicsThread.h>
 #include <epicsTime.h>
 #include <errlog.h>
 #include <fmt/format.h>
@@ -27,6 +28,7 @@ namespace mpf {
 namespace {
 
 constexpr Nanoseconds kDefaultTimeout = std::chrono::seconds(5);
+constexpr double kConnectPollSeconds = 0.01;
 
 // The VAL field of any record.
 void* valueOf(dbCommon* record) noexcept {
@@ -250,6 +252,14 @@ long DevMpf::send(Message&& message, ReplyType reply) {
 
 bool DevMpf::isConnected() const noexcept {
   return impl_->connection_ && impl_->connection_->isConnected();
+}
+bool DevMpf::connectWait(std::chrono::nanoseconds timeout) const {
+  const auto deadline = Deadline::after(timeout);
+  while (!isConnected()) {
+    if (deadline.hasPassed()) return false;
+    epicsThreadSleep(kConnectPollSeconds);
+  }
+  return true;
 }
 const char* DevMpf::getUserParm() const noexcept { return impl_->address_.parameters.c_str(); }
 int DevMpf::getSignal() const noexcept { return impl_->address_.signal; }

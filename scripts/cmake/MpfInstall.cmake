@@ -1,5 +1,5 @@
-# The installed tree: one library, its headers, mpf::mpf, pkg-config mpf, the programs and their man
-# pages.
+# The installed tree: one library, its headers, mpf::mpf, mpf::classic, pkg-config mpf, the programs
+# and their man pages.
 include(CMakePackageConfigHelpers)
 
 # Appends to `out` the targets of `type` that the CMakeLists of `folder` and below define.
@@ -20,7 +20,8 @@ endfunction()
 
 # The public libraries, which other repositories link as one archive libmpf.a: one name, and no link
 # order to get right. All libraries of drivers/ are public.
-set(publicLibraries mpf_base mpf_schema mpf_shm mpf_message_link mpf_client mpf_server)
+set(publicLibraries mpf_base mpf_schema mpf_shm mpf_message_link mpf_client mpf_server
+  mpf_classic_messages mpf_classic)
 if(drivers IN_LIST folders AND EXISTS "${CMAKE_SOURCE_DIR}/drivers/CMakeLists.txt")
   mpf_find_targets(publicLibraries "${CMAKE_SOURCE_DIR}/drivers" STATIC_LIBRARY)
 endif()
@@ -91,7 +92,8 @@ install(FILES schema/message.capnp schema/router.capnp schema/recording.capnp
   DESTINATION ${CMAKE_INSTALL_DATADIR}/mpf) # for other implementations
 
 set(packageFolder ${CMAKE_INSTALL_LIBDIR}/cmake/mpf)
-install(TARGETS mpf_all EXPORT mpfTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS mpf_all mpf_classic_names EXPORT mpfTargets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT mpfTargets NAMESPACE mpf:: DESTINATION ${packageFolder})
 configure_package_config_file(scripts/cmake/mpfConfig.cmake.in mpfConfig.cmake
   INSTALL_DESTINATION ${packageFolder})

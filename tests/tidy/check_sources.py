@@ -25,7 +25,10 @@ MAY_INCLUDE = {
     "drivers": ["base"],
     # A router is a server to local clients, and a client to local servers.
     "router": ["schema", "shm", "client", "server", "server/programs"],
-    "epics": ["client"],
+    # Sources that were written for the original MPF.
+    "classic/messages": ["schema"],
+    "classic": ["classic/messages", "client", "server", "drivers"],
+    "epics": ["client", "classic/messages"],
     # The supervisor reads shared memory as reports do, and prints tables.
     "crate": ["base", "shm", "tools"],
     "benchmarks": ["client", "server"],
@@ -52,7 +55,15 @@ PUBLIC_HEADERS = {
     "shm": ["wait_mode.h", "rights.h", "errors.h", "backplane.h"],
     "client": ["dispatcher.h", "message_client.h", "sync_client.h"],
     "server": ["message_server.h"],
-    "epics": ["epics/dev_mpf.h"],
+    "classic/messages": ["classic/message.h"],
+    "classic": [
+        "classic.h",
+        "classic/industry_pack.h",
+        "classic/message_client.h",
+        "classic/message_server.h",
+        "classic/vxworks.h",
+    ],
+    "epics": ["epics/dev_mpf.h", "epics/classic.h"],
 }
 
 TESTED_ELSEWHERE = "tests/tidy/tested_elsewhere.txt"
@@ -92,6 +103,10 @@ def layer(path):
     the folder that implements it."""
     if path.startswith("include/mpf/drivers/"):
         return "drivers"
+    if path.startswith("include/mpf/classic/names/"):
+        return "classic"
+    if path.startswith("include/mpf/epics/names/"):
+        return "epics"
     if path.startswith("include/mpf/"):
         name = path.removeprefix("include/mpf/")
         return next((folder for folder, names in PUBLIC_HEADERS.items() if name in names), None)
