@@ -32,7 +32,7 @@ struct Diagnostic {
   Place place;
   std::vector<Place> includedFrom;  // the `<` lines that led to the file, the outermost first
   std::string text;
-  std::string line;  // of the file, printable
+  std::string line;  // of the file; formatted() makes it printable
 
   // As in the picture above.
   [[nodiscard]] std::string formatted() const;

@@ -15,8 +15,7 @@
 //              | name "<" file                               ld < file: the name is an argument
 //              | expression ]
 //   arguments  = [ expression { "," expression } ]
-//   expression = expression "?" expression ":" expression
-//              | expression ("||" | "&&" | "|" | "^" | "&" | "==" | "!=" | "<" | "<=" | ">" | ">="
+//   expression = expression ("||" | "&&" | "|" | "^" | "&" | "==" | "!=" | "<" | "<=" | ">" | ">="
 //                            | "<<" | ">>" | "+" | "-" | "*" | "/" | "%") expression
 //              | ("-" | "+" | "!" | "~" | "*") expression | "&" name | "(" type ")" expression
 //              | name "(" arguments ")" | "(" expression ")" | name | literal
@@ -25,10 +24,10 @@
 // Grammar of the iocsh dialect. $(MACRO), $(MACRO=default) and ${MACRO} are replaced first:
 //
 //   line       = "<" file | word { (blank | "," | "(" | ")") word }
-//   word       = characters | "text" | 'text'
+//   word       = characters | "text" | 'text'              escapes stay as they are: unescaped()
 //
-// The shell itself defines cd, pwd, putenv, epicsEnvSet, epicsEnvShow, var, malloc, calloc, free,
-// strcpy, strcat, strlen and sprintf; `ld` and all others go to the handler.
+// The shell itself defines cd, pwd, putenv, epicsEnvSet, epicsEnvShow, var, iocsh, iocshLoad,
+// malloc, calloc, free, strcpy, strcat, strlen and sprintf; `ld` and all others go to the handler.
 //
 // Threads  one.
 // Trust    a file may contain anything. Depth, sizes and counts are limited (Limits); what exceeds
@@ -40,11 +39,12 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "crate/startup/shell/diagnostics.h"
 #include "crate/startup/shell/dialect.h"
+#include "crate/startup/shell/shell_state.h"
 #include "crate/startup/shell/value.h"
 
 namespace mpf::startup {
@@ -100,9 +100,11 @@ class StartupShell {
   StartupShell(CommandHandler& handler, std::filesystem::path folder);
 
   // Defines a symbol before the first file, such as those of cdCommands: top, topbin, startup.
-  void define(const std::string& name, Value value) { symbols_[name] = std::move(value); }
+  void define(const std::string& name, Value value) { state_.symbols[name] = std::move(value); }
   // Environment variables, which are also the macros of the iocsh dialect.
-  void setEnvironment(const std::string& name, std::string value);
+  void setEnvironment(const std::string& name, std::string value) {
+    state_.environment[name] = std::move(value);
+  }
   // Executes all files in this dialect instead of the detected one.
   void forceDialect(Dialect dialect) { forced_ = dialect; }
 
@@ -111,13 +113,15 @@ class StartupShell {
   void execute(const std::filesystem::path& file);
 
   [[nodiscard]] const Diagnostics& diagnostics() const noexcept { return diagnostics_; }
-  [[nodiscard]] const std::map<std::string, Value>& symbols() const noexcept { return symbols_; }
+  [[nodiscard]] const std::map<std::string, Value>& symbols() const noexcept {
+    return state_.symbols;
+  }
   [[nodiscard]] const std::map<std::string, std::string>& environment() const noexcept {
-    return environment_;
+    return state_.environment;
   }
   // Where `cd` has led; relative names of files in arguments are relative to it. The directory of
   // the process does not change.
-  [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
+  [[nodiscard]] const std::filesystem::path& folder() const noexcept { return state_.folder; }
 
   // Reports something about a command, at its name or at one of its arguments (from 0).
   void report(Severity severity, const Command& command, const std::string& text);
@@ -125,14 +129,14 @@ class StartupShell {
                       const std::string& text);
 
  private:
-  struct File;
-  friend class CommandRunner;
+  class Execution;
+  //   from  the execution of the file that includes this one; nullptr: none
+  void executeFile(const std::filesystem::path& file, const Execution* from, std::size_t column);
 
   CommandHandler& handler_;
-  std::filesystem::path folder_;
+  ShellState state_;
   std::optional<Dialect> forced_;
-  std::map<std::string, Value> symbols_;
-  std::map<std::string, std::string> environment_;
+  std::size_t files_ = 0;  // executed
   Diagnostics diagnostics_;
 };
 

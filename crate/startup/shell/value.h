@@ -5,7 +5,7 @@
 //   .5                real         malloc(256)     string        NoSuch    undefined
 //   result of a command            opaque          of a command that failed  unavailable
 //
-// On vxWorks a string is a pointer: after `s = malloc(99)`, `t = s` and `t + 2` are the same memory.
+// On vxWorks a string is a pointer: after `s = malloc(99); t = s`, both are the same memory.
 //
 // Threads  one.
 #pragma once
@@ -32,9 +32,9 @@ class Value {
     integer,
     real,
     string,
-    address,     // &name
-    opaque,      // the result of a command, for other commands
-    undefined,   // an undefined symbol: name()
+    address,  // &name
+    opaque,  // the result of a command, for other commands
+    undefined,  // an undefined symbol: name()
     unavailable  // the result of a command that failed or was skipped, which has been reported
   };
 
