@@ -5,8 +5,8 @@
 #   JOBS=n      parallel jobs (default: all processors)
 #   PREFIX=dir  where `make install` puts the tree (default /usr/local)
 #   DURATION=t  of `make soak`: 30s, 10m, 2h; of `make fuzz`: seconds
-#   FUZZERS=... only these fuzzers: client, server, tools, recording, frames, server_router,
-#               client_router
+#   FUZZERS=... only these fuzzers: client, server, tools, recording, frames, startup,
+#               server_router, client_router
 #   TESTS=regex only the tests whose name matches
 #   COPIES=n    of `make test-repeated`: number of parallel runs of all tests (default 6)
 #   ROUNDS=n    of `make test-repeated`: how many times (default 20)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/classic/message.h>
 
-#include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <new>
 #include <utility>
 
@@ -101,12 +101,13 @@ mpf::Message OutOfBandMessage::unload() { return unloadValue<mpf::OutOfBand>(*th
 void Char8ArrayMessage::loadOthers(const mpf::Char8Array& body) {
   numberRetrys = body.numberRetrys;
   eomLen = body.eomLen;
-  std::ranges::copy(body.eomString, eomString);
+  static_assert(sizeof eomString == sizeof body.eomString);
+  std::memcpy(eomString, body.eomString.data(), sizeof eomString);
 }
 void Char8ArrayMessage::unloadOthers(mpf::Char8Array& body) const {
   body.numberRetrys = numberRetrys;
   body.eomLen = eomLen;
-  std::ranges::copy(eomString, body.eomString.begin());
+  std::memcpy(body.eomString.data(), eomString, sizeof eomString);
 }
 
 namespace mpf::classic {
