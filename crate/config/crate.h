@@ -60,6 +60,7 @@ struct Process {
   std::vector<std::string> command;  // without a kind; with one: further arguments, unchecked
   std::vector<Setting> settings;  // of a kind, in the order in which they were written
   std::vector<std::string> servers;  // names that must be bindable before it counts as ready
+  bool notifies = false;  // reports that it is ready, as sd_notify(3) does
   std::vector<std::string> needs;  // processes that must be ready before it starts
   std::map<std::string, std::string> environment;
   std::string user;  // empty: the user of the supervisor

@@ -100,6 +100,7 @@ nlohmann::ordered_json crateSchema() {
   keys["ioc"] = listOf(Entry::ioc);
   auto command = processKeys();
   command["command"] = texts();
+  command["notify"] = {{"type", "boolean"}};
   keys["program"] = {{"type", "array"}, {"items", table(command, {"name", "command"})}};
   auto schema = table(keys);
   schema["$schema"] = "https://json-schema.org/draft/2020-12/schema";

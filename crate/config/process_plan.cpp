@@ -89,6 +89,7 @@ ProcessPlan planOf(const Crate& crate, const Process& process, const std::string
   const auto folder = std::filesystem::path(crate.file).parent_path();
   plan.workingFolder = (folder / process.workingFolder).lexically_normal().string();
   plan.servers = serversOf(process);
+  plan.notifies = process.notifies;
   plan.needs = process.needs;
   const auto choose = [&](auto& value, auto member) {
     if (process.supervision.*member) value = *(process.supervision.*member);

@@ -17,6 +17,7 @@ struct ProcessPlan {
   std::string backplane;
   std::int32_t location = 0;
   std::vector<std::string> servers;  // must be bindable before the process is ready
+  bool notifies = false;  // reports that it is ready
   std::vector<std::string> needs;
   Restart restart = kRestart;
   std::chrono::milliseconds startTime = kStartTime;

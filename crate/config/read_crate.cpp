@@ -199,6 +199,7 @@ class CrateReader {
     process.kind = defaultKind;
     readCommon(table, process);
     table.read("arguments", process.command);
+    process.notifies = entry != Entry::server;
     if (entry == Entry::server) table.read("program", process.kind);
     if (const auto* const kind = checkedKind(process, entry)) {
       readSettings(table, *kind, process);
@@ -248,6 +249,7 @@ class CrateReader {
     Process process;
     readCommon(table, process);
     table.read("command", process.command);
+    table.read("notify", process.notifies);
     table.finish({R"(name = "viewer")", R"(command = ["viewer", "--all"])"});
     crate_.processes.push_back(std::move(process));
   }

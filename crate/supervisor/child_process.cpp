@@ -3,7 +3,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <array>
@@ -57,7 +57,7 @@ User userOf(const ProcessPlan& plan) {
 // Everything that the child needs, prepared before the fork: it may call only functions that are
 // safe in a signal handler.
 struct Image {
-  explicit Image(const ProcessPlan& plan) : command(plan.command) {
+  Image(const ProcessPlan& plan, const std::string& notifySocket) : command(plan.command) {
     for (char** one = environ; *one != nullptr; ++one) {
       const std::string text = *one;
       const auto name = text.substr(0, text.find('='));
@@ -66,6 +66,7 @@ struct Image {
         environment.push_back(text);
     }
     for (const auto& [name, value] : plan.environment) environment.push_back(name + "=" + value);
+    if (plan.notifies) environment.push_back("NOTIFY_SOCKET=" + notifySocket);
     for (auto& word : command) arguments.push_back(word.data());
     for (auto& one : environment) variables.push_back(one.data());
     arguments.push_back(nullptr);
@@ -101,13 +102,14 @@ bool becomeUser(const User& user) {
 
 }  // namespace
 
-ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log) {
+ChildProcess::ChildProcess(const ProcessPlan& plan, const std::string& log,
+                           const std::string& notifySocket) {
   Pipe gate;
   Pipe failure;
   const FileDescriptor logFile(
       checkCall(::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600), "open", log));
   const auto user = userOf(plan);
-  const Image image(plan);
+  const Image image(plan, notifySocket);
   const auto folder = plan.workingFolder.empty() ? std::string(".") : plan.workingFolder;
   pid_ = checkCall(::fork(), "fork");
   if (pid_ == 0) {
@@ -125,6 +127,15 @@ std::string ChildProcess::open() {
   int why = 0;
   const auto length = retryInterrupted([&] { return ::read(failure_.get(), &why, sizeof why); });
   return length == sizeof why ? std::string(std::strerror(why)) : std::string();
+}
+
+FileDescriptor openPidfd(pid_t pid) {
+  return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
+}
+
+void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number) {
+  if (pidfd.get() < 0) ::kill(pid, number);
+  else ::syscall(SYS_pidfd_send_signal, pidfd.get(), number, nullptr, 0);
 }
 
 std::uint64_t startTicksOf(pid_t pid) {

@@ -23,8 +23,10 @@ namespace mpf::crate {
 class ChildProcess {
  public:
   // Forks. stdout and stderr of the program are appended to the file `log`.
+  //   notifySocket  NOTIFY_SOCKET of the program, if it notifies
   //   throws  std::system_error; std::runtime_error for a user that does not exist
-  ChildProcess(const ProcessPlan& plan, const std::string& log);
+  ChildProcess(const ProcessPlan& plan, const std::string& log,
+               const std::string& notifySocket = {});
 
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   [[nodiscard]] std::uint64_t startTicks() const noexcept { return startTicks_; }
@@ -37,6 +39,12 @@ class ChildProcess {
   FileDescriptor gate_;  // closes when the supervisor ends
   FileDescriptor failure_;  // errno of exec; the end of file when it succeeded
 };
+
+// A descriptor that becomes readable when the process ends; empty: there is no such process.
+[[nodiscard]] FileDescriptor openPidfd(pid_t pid);
+// Sends a signal through the descriptor, if it is open: the process may have ended, and its pid may
+// be in use again. Otherwise `pid` is a child that has not been reaped.
+void sendSignal(pid_t pid, const FileDescriptor& pidfd, int number);
 
 // The start time of a process since boot, which identifies it together with its pid; 0: there is no
 // such process, or it is a zombie.

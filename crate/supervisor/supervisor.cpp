@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <sys/prctl.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -27,10 +26,6 @@ using std::chrono::milliseconds;
 
 constexpr Nanoseconds kLookWhileStarting = milliseconds(20);
 constexpr Nanoseconds kLook = std::chrono::seconds(1);
-
-FileDescriptor openPidfd(pid_t pid) {
-  return FileDescriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
-}
 
 bool isSettled(ServiceState state) {
   return state == ServiceState::ready || state == ServiceState::failed ||
@@ -80,6 +75,7 @@ void Supervisor::takeOver() {
     }
     auto& service = member->service;
     member->adopted = std::move(pidfd);
+    member->isNotified = true;
     service.adopted(recorded.pid, recorded.startTicks, recorded.restarts, Clock::nowNs(),
                     startNsOf(recorded.startTicks));
     log(service, fmt::format("taken over, pid {}", recorded.pid));
@@ -186,7 +182,8 @@ void Supervisor::start(Member& member) {
   auto& service = member.service;
   const auto& plan = service.plan();
   try {
-    ChildProcess child(plan, folder_.log(plan.name));
+    ChildProcess child(plan, folder_.log(plan.name), notify_.name());
+    member.isNotified = false;
     member.adopted.reset();
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
     nextLookNs_ = 0;
@@ -203,10 +200,7 @@ void Supervisor::start(Member& member) {
 void Supervisor::signal(Member& member, int number) {
   const auto& service = member.service;
   if (!service.isRunning()) return;
-  // A process that was taken over may have ended, and its pid may be in use again.
-  if (member.adopted.get() >= 0)
-    ::syscall(SYS_pidfd_send_signal, member.adopted.get(), number, nullptr, 0);
-  else ::kill(service.pid(), number);
+  sendSignal(service.pid(), member.adopted, number);
 }
 
 void Supervisor::handleSignals() {
@@ -266,22 +260,33 @@ void Supervisor::look() {
   const auto now = Clock::nowNs();
   for (const auto& member : members_) {
     auto& service = member->service;
-    const auto& plan = service.plan();
-    const auto watch = watches_.find(plan.backplane);
+    const auto watch = watches_.find(service.plan().backplane);
     if (!service.isRunning() || watch == watches_.end()) continue;
     service.looked(watch->second.isStalled(service.pid()), now);
-    if (service.state() == ServiceState::starting &&
-        watch->second.isServing(service.pid(), plan.location, plan.servers)) {
-      service.becameReady(now);
-      log(service, fmt::format("ready, pid {}, {} after its start", service.pid(),
-                               durationText(static_cast<double>(now - service.startedNs()))));
-    }
+    if (service.state() != ServiceState::starting || !isReady(*member)) continue;
+    service.becameReady(now);
+    log(service, fmt::format("ready, pid {}, {} after its start", service.pid(),
+                             durationText(static_cast<double>(now - service.startedNs()))));
   }
   const auto isStarting = [](const auto& member) {
     return member->service.state() == ServiceState::starting;
   };
   const auto pause = std::ranges::any_of(members_, isStarting) ? kLookWhileStarting : kLook;
   nextLookNs_ = Clock::nowNs() + pause.count();
+}
+
+bool Supervisor::isReady(const Member& member) const {
+  const auto& plan = member.service.plan();
+  return (member.isNotified || !plan.notifies) &&
+         watches_.at(plan.backplane).isServing(member.service.pid(), plan.location, plan.servers);
+}
+
+void Supervisor::takeReports() {
+  while (const auto pid = notify_.takeReady()) {
+    for (const auto& member : members_)
+      if (member->service.pid() == *pid) member->isNotified = true;
+  }
+  nextLookNs_ = 0;
 }
 
 void Supervisor::record() const {
@@ -351,7 +356,9 @@ int Supervisor::waitMs() const {
 }
 
 void Supervisor::wait() {
-  std::vector<pollfd> polled{{signals_.descriptor(), POLLIN, 0}, {logs_.descriptor(), POLLIN, 0}};
+  std::vector<pollfd> polled{{signals_.descriptor(), POLLIN, 0},
+                             {logs_.descriptor(), POLLIN, 0},
+                             {notify_.descriptor(), POLLIN, 0}};
   const auto firstAdopted = polled.size();
   std::vector<Member*> adopted;
   for (const auto& member : members_) {
@@ -368,6 +375,7 @@ void Supervisor::wait() {
   if (polled[0].revents != 0) handleSignals();
   control_.handle({polled.begin() + static_cast<std::ptrdiff_t>(firstControl), polled.end()});
   if (polled[1].revents != 0) writeError(logs_.takeLines());
+  if (polled[2].revents != 0) takeReports();
   if (Clock::nowNs() >= nextLookNs_) look();
 }
 

@@ -23,6 +23,7 @@
 #include "crate/supervisor/control_server.h"
 #include "crate/supervisor/crate_state.h"
 #include "crate/supervisor/log_follower.h"
+#include "crate/supervisor/notify_socket.h"
 #include "crate/supervisor/server_watch.h"
 #include "crate/supervisor/service.h"
 #include "crate/supervisor/signal_queue.h"
@@ -47,6 +48,7 @@ class Supervisor {
     explicit Member(ProcessPlan plan) : service(std::move(plan)) {}
     Service service;
     FileDescriptor adopted;  // pidfd of a process that is not a child
+    bool isNotified = false;  // it has reported that it is ready
     bool isRemoved = false;  // no longer in the crate: forgotten when it has ended
   };
 
@@ -61,6 +63,8 @@ class Supervisor {
   void reapChildren();
   void handleEnd(Member& member, const ProcessEnd& end);
   void look();
+  [[nodiscard]] bool isReady(const Member& member) const;
+  void takeReports();
   void record() const;
   nlohmann::json answer(const nlohmann::json& request);
   [[nodiscard]] nlohmann::json describe() const;
@@ -81,6 +85,7 @@ class Supervisor {
   std::vector<std::unique_ptr<Member>> members_;  // each after those that it needs
   std::map<std::string, ServerWatch> watches_;  // by backplane
   LogFollower logs_;
+  NotifySocket notify_;
   ControlServer control_{[this](const auto& request) { return answer(request); }};
   std::int64_t nextLookNs_ = 0;
   std::string status_;  // as last reported to systemd

@@ -17,6 +17,7 @@
 
 #include "base/command_line.h"
 #include "base/run_main.h"
+#include "base/service_manager.h"
 #include "base/stop_bell.h"
 
 namespace {
@@ -97,6 +98,7 @@ int run(int argc, char** argv) {
   } else {
     check(iocInit(), "iocInit failed: see the error above");
   }
+  mpf::ServiceManager::notifyReady();
   if (stop) stop->wait();
   else iocsh(nullptr);
   epicsExit(0);

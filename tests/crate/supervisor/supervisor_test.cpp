@@ -65,6 +65,16 @@ TEST_F(SupervisorTest, AProcessStartsAfterThoseThatItNeeds) {
   EXPECT_EQ(WEXITSTATUS(stop()), 0);
 }
 
+TEST_F(SupervisorTest, ARouterIsReadyWhenItListens) {
+  run("[[router]]\nserve = \"1=0\"\nlisten = \"127.0.0.1:0\"\nplain = true\n" + kServer +
+      "needs = [\"router\"]\n");
+
+  waitForState("int32", "ready");
+
+  EXPECT_EQ(stateOf("router"), "ready");
+  EXPECT_NE(supervisor_->waitForLine("router | "), "");
+}
+
 TEST_F(SupervisorTest, AProcessWaitsForOneThatFails) {
   run(kServer +
       "name = \"a\"\nneeds = [\"b\"]\n[[program]]\nname = \"b\"\n"
