@@ -103,8 +103,10 @@ void readWindow(Tree& tree, const WitnessedWindow& window, const CapsuleLimits& 
   tree["handling"] = nullptr;
   auto links = Tree::array();
   std::vector<std::pair<Tree, Tree>> taken;
+  const auto rings = std::max<std::size_t>(1, 2 * window.links.size());
+  const auto last = std::max<std::size_t>(1, std::min(limits.messages, limits.allMessages / rings));
   for (const auto& [incarnation, link] : window.links) {
-    auto record = LinkRecord::of(link, limits.messages);
+    auto record = LinkRecord::of(link, last);
     if (record.lastTaken)
       taken.emplace_back(Tree{{"client", link.client}, {"clientPid", link.clientPid}},
                          std::move(*record.lastTaken));

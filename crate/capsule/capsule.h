@@ -53,6 +53,7 @@ struct Death {
 
 struct CapsuleLimits {
   std::size_t messages = 16;  // of each ring
+  std::size_t allMessages = 4096;  // of a server: with many links, each shows fewer, at least one
   std::size_t logBytes = std::size_t{64} << 10;
 };
 

@@ -85,8 +85,10 @@ TEST_F(CapsuleTest, ContainsTheEndOfTheLog) {
   const auto log = files_.write("log", std::string(100, 'a') + "last\x1b");
   Death death;
   death.log = log;
+  CapsuleLimits limits;
+  limits.logBytes = 5;
 
-  const auto tree = capsuleOf(death, nullptr, {.messages = 1, .logBytes = 5});
+  const auto tree = capsuleOf(death, nullptr, limits);
 
   EXPECT_EQ(tree.at("log").at("text"), "last\\x1b");
   EXPECT_EQ(tree.at("log").at("leftOutBytes"), 100);
