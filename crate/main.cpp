@@ -23,6 +23,7 @@ int runSubcommand(int argc, char** argv) {
   mpf::crate::addNew(app, run);
   mpf::crate::addPs(app, run);
   mpf::crate::addLogs(app, run);
+  mpf::crate::addCapsule(app, run);
   mpf::crate::addControl(app, run);
   app.require_subcommand(1);
   app.footer(kFooter);

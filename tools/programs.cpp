@@ -37,6 +37,7 @@ void addCrate(CLI::App& app, Run& run) {
            {"new", "Writes a crate file with comments, which runs on device models"},
            {"ps", "Lists the processes of crates, with their states and restarts"},
            {"logs", "Shows what a process of a crate has printed"},
+           {"capsule", "Shows the last words of a process that died"},
            {"stop", "Stops a process of a crate, or the whole crate"},
            {"start", "Starts a process of a crate that was stopped or has failed"},
            {"restart", "Restarts a process of a crate"},

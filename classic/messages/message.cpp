@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <mpf/classic/message.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <new>

@@ -55,6 +55,7 @@ void Service::started(pid_t pid, std::uint64_t startTicks, std::int64_t nowNs) {
   startedNs_ = nowNs;
   readyAtLatestNs_ = nowNs + nanoseconds(plan_.startTime);
   isRestartRequested_ = false;
+  endReason_ = EndReason::none;
   stalledSinceNs_.reset();
 }
 
@@ -125,11 +126,12 @@ void Service::looked(bool isStalled, std::int64_t nowNs) {
   if (!stalledSinceNs_) stalledSinceNs_ = nowNs;
 }
 
-void Service::terminate(const std::string& why, std::int64_t nowNs) {
+void Service::terminate(EndReason reason, const std::string& why, std::int64_t nowNs) {
   reason_ = why;
   if (!isRunning()) return;
   if (state_ == ServiceState::stopping) return;
   state_ = ServiceState::stopping;
+  endReason_ = reason;
   isSignalled_ = false;
   killAtNs_ = nowNs + nanoseconds(plan_.stopTime);
 }
@@ -144,7 +146,7 @@ void Service::requestStart() {
 void Service::requestStop(std::int64_t nowNs) {
   isStopRequested_ = true;
   isRestartRequested_ = false;
-  terminate("stopped by request", nowNs);
+  terminate(EndReason::stopRequest, "stopped by request", nowNs);
   if (!isRunning()) state_ = ServiceState::stopped;
 }
 
@@ -153,7 +155,7 @@ void Service::requestRestart(std::int64_t nowNs) {
   isStopRequested_ = false;
   isRestartRequested_ = true;
   recentEndsNs_.clear();
-  terminate("restarted by request", nowNs);
+  terminate(EndReason::restartRequest, "restarted by request", nowNs);
 }
 
 Action Service::action(bool areNeedsReady, std::int64_t nowNs) {
@@ -168,7 +170,8 @@ Action Service::action(bool areNeedsReady, std::int64_t nowNs) {
       return Action::start;
     case ServiceState::starting:
       if (nowNs >= readyAtLatestNs_) {
-        terminate(fmt::format("not ready within {}",
+        terminate(EndReason::notReady,
+                  fmt::format("not ready within {}",
                               durationText(static_cast<double>(nanoseconds(plan_.startTime)))),
                   nowNs);
       }
@@ -176,7 +179,8 @@ Action Service::action(bool areNeedsReady, std::int64_t nowNs) {
     case ServiceState::ready:
       if (stalledSinceNs_ && plan_.stallLimit.count() != 0 &&
           nowNs >= *stalledSinceNs_ + nanoseconds(plan_.stallLimit)) {
-        terminate(fmt::format("stalled for {}",
+        terminate(EndReason::stalled,
+                  fmt::format("stalled for {}",
                               durationText(static_cast<double>(nowNs - *stalledSinceNs_))),
                   nowNs);
         killAtNs_ = nowNs;  // a server that takes no message ends no better

@@ -31,6 +31,9 @@ enum class ServiceState { waiting, starting, ready, stopping, pausing, failed, s
 // What the supervisor must do now.
 enum class Action { none, start, terminate, kill };
 
+// Why the supervisor ends a process.
+enum class EndReason { none, stopRequest, restartRequest, stalled, notReady };
+
 // How a process ended.
 struct ProcessEnd {
   std::optional<int> waitStatus;  // as from waitpid(); nothing: another supervisor started it
@@ -67,6 +70,11 @@ class Service {
 
   [[nodiscard]] const ProcessPlan& plan() const noexcept { return plan_; }
   [[nodiscard]] ServiceState state() const noexcept { return state_; }
+  // Whether it stays in its state without an event: ready, failed or stopped.
+  [[nodiscard]] bool isSettled() const noexcept {
+    return state_ == ServiceState::ready || state_ == ServiceState::failed ||
+           state_ == ServiceState::stopped;
+  }
   [[nodiscard]] bool isRunning() const noexcept { return pid_ != 0; }
   [[nodiscard]] bool isStopRequested() const noexcept { return isStopRequested_; }
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
@@ -74,11 +82,13 @@ class Service {
   [[nodiscard]] int restarts() const noexcept { return restarts_; }
   [[nodiscard]] std::int64_t startedNs() const noexcept { return startedNs_; }
   [[nodiscard]] bool isStalled() const noexcept { return stalledSinceNs_.has_value(); }
+  // Why the supervisor ends the process that runs; none: it does not.
+  [[nodiscard]] EndReason endReason() const noexcept { return endReason_; }
   // Why it is not running, or was last restarted: "SIGSEGV", "stalled for 10 s".
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
 
  private:
-  void terminate(const std::string& why, std::int64_t nowNs);
+  void terminate(EndReason reason, const std::string& why, std::int64_t nowNs);
   void plan(std::int64_t nowNs);  // of the next start, after an end
   [[nodiscard]] bool mayRestart(const ProcessEnd& end) const;
   [[nodiscard]] std::chrono::nanoseconds pause() const;
@@ -97,6 +107,7 @@ class Service {
   std::int64_t killAtNs_ = 0;  // while stopping
   bool isSignalled_ = false;  // while stopping: SIGTERM was sent
   std::optional<std::int64_t> stalledSinceNs_;
+  EndReason endReason_ = EndReason::none;
   std::string reason_;
 };
 

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "crate/supervisor/supervisor.h"
 
-#include <fcntl.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <fmt/format.h>
 
 #include <mpf/clock.h>
@@ -24,12 +22,10 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr Nanoseconds kLookWhileStarting = milliseconds(20);
-constexpr Nanoseconds kLook = std::chrono::seconds(1);
+constexpr Nanoseconds kLookWhileStarting = milliseconds(20), kLook = milliseconds(1000);
 
-bool isSettled(ServiceState state) {
-  return state == ServiceState::ready || state == ServiceState::failed ||
-         state == ServiceState::stopped;
+void log(const Service& service, const std::string& text) {
+  printError("mpf run: {}: {}\n", service.plan().name, text);
 }
 
 }  // namespace
@@ -38,7 +34,8 @@ Supervisor::Supervisor(CrateFolder folder, std::function<Crate()> load)
     : folder_(std::move(folder)),
       load_(std::move(load)),
       crate_(load_()),
-      logs_(::isatty(STDERR_FILENO) != 0, crate_.maxLogBytes) {
+      logs_(::isatty(STDERR_FILENO) != 0, crate_.maxLogBytes),
+      lastWords_(folder_, crate_) {
   folder_.create();
   lock_ = folder_.lock();
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // reaps what the processes leave behind
@@ -78,6 +75,7 @@ void Supervisor::takeOver() {
     member->isNotified = true;
     service.adopted(recorded.pid, recorded.startTicks, recorded.restarts, Clock::nowNs(),
                     startNsOf(recorded.startTicks));
+    lastWords_.watch(service);
     log(service, fmt::format("taken over, pid {}", recorded.pid));
     if (member->isRemoved) service.requestStop(Clock::nowNs());
     else if (recorded.command != shellText(service.plan())) service.requestRestart(Clock::nowNs());
@@ -162,11 +160,9 @@ void Supervisor::act() {
         start(*member);
         break;
       case Action::terminate:
-        log(service, fmt::format("{}; SIGTERM", service.reason()));
         signal(*member, SIGTERM);
         break;
       case Action::kill:
-        log(service, fmt::format("{}; SIGKILL", service.reason()));
         signal(*member, SIGKILL);
         break;
       case Action::none:
@@ -186,6 +182,7 @@ void Supervisor::start(Member& member) {
     member.isNotified = false;
     member.adopted.reset();
     service.started(child.pid(), child.startTicks(), Clock::nowNs());
+    lastWords_.watch(service);
     nextLookNs_ = 0;
     record();
     if (const auto why = child.open(); !why.empty())
@@ -200,6 +197,7 @@ void Supervisor::start(Member& member) {
 void Supervisor::signal(Member& member, int number) {
   const auto& service = member.service;
   if (!service.isRunning()) return;
+  log(service, fmt::format("{}; SIG{}", service.reason(), ::sigabbrev_np(number)));
   sendSignal(service.pid(), member.adopted, number);
 }
 
@@ -241,22 +239,25 @@ void Supervisor::handleEnd(Member& member, const ProcessEnd& end) {
   const auto pid = service.pid();
   const auto aliveNs = static_cast<double>(Clock::nowNs() - service.startedNs());
   member.adopted.reset();
+  lastWords_.look();
+  const auto capsule = lastWords_.collect(service, end);
   service.ended(end, Clock::nowNs());
   record();
-  if (const auto watch = watches_.find(service.plan().backplane); watch != watches_.end())
-    watch->second.removeFilesOfDead();
+  for (const auto& [backplane, watch] : watches_) watch.removeFilesOfDead();
   const auto next = service.state() == ServiceState::pausing
-                        ? fmt::format("; restart {}", service.restarts())
-                        : fmt::format("; {}", toString(service.state()));
-  log(service, fmt::format("{} after {}, pid {}{}", end.text(), durationText(aliveNs), pid, next));
+                        ? fmt::format("restart {}", service.restarts())
+                        : std::string(toString(service.state()));
+  log(service, fmt::format("{} after {}, pid {}; {}{}", end.text(), durationText(aliveNs), pid,
+                           next, capsule.empty() ? "" : "; see `mpf capsule " + capsule + "`"));
   if (service.state() == ServiceState::failed)
-    log(service, fmt::format("failed: {}; see {}, then `mpf restart {}`", service.reason(),
-                             folder_.log(service.plan().name), service.plan().name));
+    log(service,
+        fmt::format("failed: {}; `mpf logs {}` shows why", service.reason(), service.plan().name));
 }
 
 // Finds out which processes are ready, and which are stalled.
 void Supervisor::look() {
   for (auto& [backplane, watch] : watches_) watch.look();
+  lastWords_.look();
   const auto now = Clock::nowNs();
   for (const auto& member : members_) {
     auto& service = member->service;
@@ -360,39 +361,40 @@ void Supervisor::wait() {
     adopted.push_back(member.get());
     polled.push_back({member->adopted.get(), POLLIN, 0});
   }
-  const auto firstControl = polled.size();
+  const auto firstWitness = static_cast<std::ptrdiff_t>(polled.size());
+  lastWords_.addTo(polled);
+  const auto firstControl = static_cast<std::ptrdiff_t>(polled.size());
   control_.addTo(polled);
   ::poll(polled.data(), polled.size(), waitMs());
 
   for (std::size_t i = 0; i < adopted.size(); ++i)
     if (polled[firstAdopted + i].revents != 0) handleEnd(*adopted[i], {});
   if (polled[0].revents != 0) handleSignals();
-  control_.handle({polled.begin() + static_cast<std::ptrdiff_t>(firstControl), polled.end()});
+  control_.handle({polled.begin() + firstControl, polled.end()});
   if (polled[1].revents != 0) writeError(logs_.takeLines());
   if (polled[2].revents != 0) takeReports();
+  if (std::any_of(polled.begin() + firstWitness, polled.begin() + firstControl,
+                  [](const pollfd& one) { return one.revents != 0; }))
+    lastWords_.look();
   if (Clock::nowNs() >= nextLookNs_) look();
 }
 
 void Supervisor::reportStatus() {
   if (ServiceManager::watchdogTime()) ServiceManager::notifyAlive();
-  const auto ready = std::ranges::count_if(
-      members_, [](const auto& member) { return member->service.state() == ServiceState::ready; });
-  auto status = fmt::format("{} of {} processes ready", ready, members_.size());
+  std::size_t ready = 0;
+  bool isSettled = true;
+  std::string others;
   for (const auto& member : members_) {
-    if (!isSettled(member->service.state()) || member->service.state() == ServiceState::failed)
-      status +=
-          fmt::format("; {} {}", member->service.plan().name, toString(member->service.state()));
+    const auto& service = member->service;
+    isSettled = isSettled && service.isSettled();
+    if (service.state() == ServiceState::ready) ++ready;
+    else others += fmt::format("; {} {}", service.plan().name, toString(service.state()));
   }
+  const auto status = fmt::format("{} of {} processes ready{}", ready, members_.size(), others);
   if (status == status_) return;
   status_ = status;
   ServiceManager::notifyStatus(status);
-  if (std::ranges::all_of(members_,
-                          [](const auto& member) { return isSettled(member->service.state()); }))
-    ServiceManager::notifyReady();
-}
-
-void Supervisor::log(const Service& service, const std::string& text) const {
-  printError("mpf run: {}: {}\n", service.plan().name, text);
+  if (isSettled) ServiceManager::notifyReady();
 }
 
 }  // namespace mpf::crate

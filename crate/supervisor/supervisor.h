@@ -22,6 +22,7 @@
 
 #include "crate/supervisor/control_server.h"
 #include "crate/supervisor/crate_state.h"
+#include "crate/supervisor/last_words.h"
 #include "crate/supervisor/log_follower.h"
 #include "crate/supervisor/notify_socket.h"
 #include "crate/supervisor/server_watch.h"
@@ -76,7 +77,6 @@ class Supervisor {
   [[nodiscard]] bool hasDependants(const Service& service) const;
   Member* find(const std::string& name);
   Member& memberOf(const nlohmann::json& request);
-  void log(const Service& service, const std::string& text) const;
 
   CrateFolder folder_;
   std::function<Crate()> load_;
@@ -86,6 +86,7 @@ class Supervisor {
   std::vector<std::unique_ptr<Member>> members_;  // each after those that it needs
   std::map<std::string, ServerWatch> watches_;  // by backplane
   LogFollower logs_;
+  LastWords lastWords_;
   NotifySocket notify_;
   ControlServer control_{[this](const auto& request) { return answer(request); }};
   std::int64_t nextLookNs_ = 0;

@@ -17,10 +17,6 @@ namespace mpf::tools {
 
 namespace {
 
-// The largest segment of any kind, not counting the chunks of a pool: a link with the longest
-// rings.
-constexpr std::size_t kMostBytes = layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots);
-
 // The kind that a header contains, unchecked; 0 when the file is too short.
 layout::SegmentKind kindOf(int file) noexcept {
   layout::SegmentKind kind{};
@@ -47,8 +43,13 @@ std::optional<SegmentImage> SegmentImage::tryLoad(const std::string& path,
     if (errno == ENOENT) return std::nullopt;
     throwSystemError(errno, "open", path);
   }
+  return readOpen(file.get(), path, kind, bytes);
+}
+
+SegmentImage SegmentImage::readOpen(int file, const std::string& path,
+                                    std::optional<layout::SegmentKind> kind, std::size_t bytes) {
   struct stat status{};
-  checkCall(::fstat(file.get(), &status), "look at", path);
+  checkCall(::fstat(file, &status), "look at", path);
   if (!S_ISREG(status.st_mode))
     throw SegmentError(fmt::format("{}: not a segment of MPF (not a regular file)", path));
 
@@ -57,14 +58,13 @@ std::optional<SegmentImage> SegmentImage::tryLoad(const std::string& path,
   // The memory is large enough for all accessors, even if the file is shorter.
   constexpr auto kLeast =
       std::max({layout::kWindowBytes, layout::kLinkRingsOffset, sizeof(layout::WindowHints)});
-  const auto most = kind || kindOf(file.get()) != layout::SegmentKind::bulk
-                        ? bytes
-                        : sizeof(layout::SegmentHeader);
+  const auto most =
+      kind || kindOf(file) != layout::SegmentKind::bulk ? bytes : sizeof(layout::SegmentHeader);
   const auto wanted = std::min<std::uint64_t>(most, image.fileBytes_);
   image.blocks_ = std::make_unique<Block[]>(
       (std::max<std::size_t>(wanted, kLeast) + sizeof(Block) - 1) / sizeof(Block));
   image.bytesRead_ = static_cast<std::size_t>(
-      checkCall(::pread(file.get(), image.blocks_.get(), wanted, 0), "read", path));
+      checkCall(::pread(file, image.blocks_.get(), wanted, 0), "read", path));
   if (image.bytesRead_ < sizeof(layout::SegmentHeader)) {
     throw SegmentError(
         fmt::format("{}: truncated, {} bytes are too few for a header", path, image.bytesRead_));

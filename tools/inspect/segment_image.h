@@ -20,6 +20,11 @@ namespace mpf::tools {
 
 class SegmentImage {
  public:
+  // The largest segment of any kind, not counting the chunks of a pool: a link with the longest
+  // rings.
+  static constexpr std::size_t kMostBytes =
+      layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots);
+
   // Up to `bytes` of the segment; bytes behind the end of the file are zero. nullopt when no
   // segment of that name exists (any more).
   //   throws  SegmentError when the file is not a segment of this kind, std::system_error when it
@@ -29,6 +34,12 @@ class SegmentImage {
   // The same for a file of any kind in any folder, for example a copy. Reads the whole segment, but
   // only the header of a bulk segment.
   static std::optional<SegmentImage> tryReadFile(const std::string& path);
+  // The same for an open file, which may have lost its name. `path` is for error messages. Without
+  // `kind`, any kind will do.
+  //   throws  as tryRead()
+  static SegmentImage readOpen(int file, const std::string& path,
+                               std::optional<layout::SegmentKind> kind = std::nullopt,
+                               std::size_t bytes = kMostBytes);
 
   [[nodiscard]] const layout::SegmentHeader& header() const noexcept {
     return at<layout::SegmentHeader>(0);

@@ -21,16 +21,6 @@ namespace {
 
 constexpr std::size_t kLinkImageBytes = layout::kLinkControlOffset + sizeof(layout::LinkControl);
 
-Latencies latenciesOf(const layout::Histogram& histogram) {
-  Latencies latencies;
-  for (std::size_t i = 0; i < latencies.buckets.size(); ++i) {
-    latencies.buckets[i] = value(histogram.buckets[i]);
-    latencies.count += latencies.buckets[i];
-  }
-  latencies.maxNs = value(histogram.maxNs);
-  return latencies;
-}
-
 void checkIsFifo(const std::string& name) {
   struct stat status{};
   if (::lstat(segments::path(name).c_str(), &status) == 0 && !S_ISFIFO(status.st_mode)) {
@@ -70,8 +60,8 @@ void copyCounters(const layout::WindowControl& from, WindowView& to) {
   to.peersDied = value(from.peersDied);
   to.protocolErrors = value(from.protocolErrors);
   to.alarms = value(from.alarms);
-  to.queueWait = latenciesOf(from.queueWaitNs);
-  to.service = latenciesOf(from.serviceNs);
+  to.queueWait = Latencies::of(from.queueWaitNs);
+  to.service = Latencies::of(from.serviceNs);
 }
 
 // Reads the segments of one backplane, one by one, into a Snapshot.
@@ -315,6 +305,16 @@ bool HintsView::isReady(std::uint32_t index) const noexcept {
 
 bool HintsView::hasKnocked(std::uint64_t link) const noexcept {
   return std::ranges::find(knocks, link) != knocks.end();
+}
+
+Latencies Latencies::of(const layout::Histogram& histogram) noexcept {
+  Latencies latencies;
+  for (std::size_t i = 0; i < latencies.buckets.size(); ++i) {
+    latencies.buckets[i] = value(histogram.buckets[i]);
+    latencies.count += latencies.buckets[i];
+  }
+  latencies.maxNs = value(histogram.maxNs);
+  return latencies;
 }
 
 std::uint64_t Latencies::percentileNs(double percent) const noexcept {

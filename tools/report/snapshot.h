@@ -32,6 +32,7 @@ struct Latencies {
   std::array<std::uint64_t, layout::kHistogramBuckets> buckets{};
   std::uint64_t count = 0;
   std::uint64_t maxNs = 0;
+  [[nodiscard]] static Latencies of(const layout::Histogram& histogram) noexcept;
   // Upper end of the bucket that contains the percentile, at most maxNs; 0 without samples.
   [[nodiscard]] std::uint64_t percentileNs(double percent) const noexcept;
 };

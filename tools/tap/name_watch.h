@@ -24,6 +24,8 @@ class NameWatch {
   [[nodiscard]] std::optional<std::vector<std::string>> take();
   // Returns when there are new names, after `limit`, or on a signal.
   void wait(Nanoseconds limit) const noexcept;
+  // Readable when there are new names; -1 without an inotify instance.
+  [[nodiscard]] int descriptor() const noexcept { return inotify_ ? inotify_.get() : -1; }
 
  private:
   FileDescriptor inotify_;

@@ -7,24 +7,10 @@
 #include <utility>
 
 #include "crate/startup/shell/line_error.h"
+#include "crate/startup/shell/string_argument.h"
 
 namespace mpf::startup {
 namespace {
-
-std::size_t columnOf(const Command& command, std::size_t index) {
-  return index < command.arguments.size() ? command.arguments[index].column : command.place.column;
-}
-
-std::string textOf(const Command& command, std::size_t index) {
-  const auto value = command.argument(index);
-  if (auto text = value.text()) return *std::move(text);
-  const auto column = columnOf(command, index);
-  if (value.is(Value::Kind::undefined))
-    throw LineError{column, fmt::format("undefined symbol {}: assign a string to it before {}",
-                                        value.name(), command.name)};
-  throw LineError{column, fmt::format("{}: a string is expected instead of {}", command.name,
-                                      value.description())};
-}
 
 // A folder of the site that does not exist here does not stop the file: what follows is then
 // looked up where the shell is.

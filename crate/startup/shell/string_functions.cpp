@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "crate/startup/shell/line_error.h"
+#include "crate/startup/shell/string_argument.h"
 
 namespace mpf::startup {
 namespace {
@@ -16,19 +17,10 @@ namespace {
 using Kind = Value::Kind;
 using Limits = StartupShell::Limits;
 
-std::size_t columnOf(const Command& command, std::size_t index) {
-  return index < command.arguments.size() ? command.arguments[index].column : command.place.column;
-}
-
 [[noreturn]] void refuse(const Command& command, std::size_t index, const std::string& expected) {
   throw LineError{columnOf(command, index),
                   fmt::format("{}: {} is expected instead of {}", command.name, expected,
                               command.argument(index).description())};
-}
-
-std::string textOf(const Command& command, std::size_t index) {
-  if (auto text = command.argument(index).text()) return *std::move(text);
-  refuse(command, index, "a string");
 }
 
 Value allocate(const Command& command) {

@@ -11,11 +11,11 @@
 namespace mpf::startup {
 namespace {
 
-using Kind = Token::Kind;
+using TokenKind = Token::Kind;
 
 bool isAssignment(const Token& token) {
   static constexpr std::string_view kCompound = "+-*/%&|^";
-  if (token.kind != Kind::symbol || !token.text.ends_with('=')) return false;
+  if (token.kind != TokenKind::symbol || !token.text.ends_with('=')) return false;
   const auto& text = token.text;
   return text == "=" || text == "<<=" || text == ">>=" ||
          (text.size() == 2 && kCompound.find(text.front()) != std::string_view::npos);
@@ -51,9 +51,9 @@ Value converted(const Value& value, bool isReal) {
 void VxWorksLine::failAtToken(const std::string& expected) {
   const auto& token = lexer_.token();
   std::string found = token.text;
-  if (token.kind == Kind::end) found = "the end of the line";
-  else if (token.kind == Kind::string) found = '"' + token.text + '"';
-  else if (token.kind != Kind::name && token.kind != Kind::symbol) found = "a number";
+  if (token.kind == TokenKind::end) found = "the end of the line";
+  else if (token.kind == TokenKind::string) found = '"' + token.text + '"';
+  else if (token.kind != TokenKind::name && token.kind != TokenKind::symbol) found = "a number";
   throw LineError{token.column, fmt::format("{} is expected instead of {}", expected, found)};
 }
 
@@ -70,7 +70,7 @@ void VxWorksLine::execute() {
     if (!isAtEnd()) failAtToken("the end of the line");
     return actions_.include(file, column);
   }
-  while (lexer_.token().kind != Kind::end) {
+  while (lexer_.token().kind != TokenKind::end) {
     if (!lexer_.token().isSymbol(";")) statement();
     if (!isAtEnd()) failAtToken("an operator, a comma or the end of the line");
     if (lexer_.token().isSymbol(";")) lexer_.advance();
@@ -79,7 +79,7 @@ void VxWorksLine::execute() {
 
 Value VxWorksLine::statement() {
   const Nesting nesting(nesting_, lexer_.token().column);
-  if (lexer_.token().kind != Kind::name) return expression();
+  if (lexer_.token().kind != TokenKind::name) return expression();
   const auto start = lexer_;
   const auto name = lexer_.token();
   lexer_.advance();
@@ -88,7 +88,7 @@ Value VxWorksLine::statement() {
   const bool isRedirected =
       lexer_.token().isSymbol("<") || lexer_.token().isSymbol(">") || lexer_.token().isSymbol(">>");
   // After a symbol these are operators, and - & * are binary.
-  const bool isPlainOperand = lexer_.token().kind != Kind::symbol && !isAtEnd();
+  const bool isPlainOperand = lexer_.token().kind != TokenKind::symbol && !isAtEnd();
   if (isPlainOperand || (!isSymbol && (isAtEnd() || beginsOperand() || isRedirected)))
     return bareCall(name);
   const bool isCall = lexer_.token().isSymbol("(");
@@ -103,7 +103,7 @@ Value VxWorksLine::assignment(const Token& name) {
   lexer_.advance();
   const auto column = lexer_.token().column;
   if (isAtEnd()) failAtToken("a value");
-  const bool isOneName = lexer_.token().kind == Kind::name;
+  const bool isOneName = lexer_.token().kind == TokenKind::name;
   const auto start = lexer_;
   if (isOneName) lexer_.advance();
   // `x = y` copies a symbol; as a statement of its own, `y` would be a call.
@@ -127,7 +127,7 @@ Value VxWorksLine::assignment(const Token& name) {
 bool VxWorksLine::beginsOperand() {
   static constexpr std::array<std::string_view, 6> kUnary = {"-", "+", "!", "~", "*", "&"};
   const auto& token = lexer_.token();
-  if (token.kind != Kind::symbol) return token.kind != Kind::end;
+  if (token.kind != TokenKind::symbol) return token.kind != TokenKind::end;
   return std::ranges::find(kUnary, token.text) != kUnary.end();
 }
 
@@ -172,7 +172,7 @@ Value VxWorksLine::expression(int lowest) {
   auto left = operand();
   for (;;) {
     const auto symbol = lexer_.token();
-    const int precedence = symbol.kind == Kind::symbol ? precedenceOf(symbol.text) : 0;
+    const int precedence = symbol.kind == TokenKind::symbol ? precedenceOf(symbol.text) : 0;
     if (precedence < lowest || precedence == 0) return left;
     lexer_.advance();
     left = applyBinary(symbol.text, left, expression(precedence + 1), symbol.column);
@@ -183,20 +183,20 @@ Value VxWorksLine::operand() {
   const Nesting nesting(nesting_, lexer_.token().column);
   const auto token = lexer_.token();
   switch (token.kind) {
-    case Kind::name:
+    case TokenKind::name:
       return nameOrCall();
-    case Kind::integer:
+    case TokenKind::integer:
       lexer_.advance();
       return Value::ofInteger(token.integer);
-    case Kind::real:
+    case TokenKind::real:
       lexer_.advance();
       return Value::ofReal(token.real);
-    case Kind::string:
+    case TokenKind::string:
       lexer_.advance();
       return Value::ofString(token.text);
-    case Kind::symbol:
+    case TokenKind::symbol:
       break;
-    case Kind::end:
+    case TokenKind::end:
       failAtToken("a value");
   }
   if (token.text == "&") return addressOf();
@@ -212,7 +212,7 @@ Value VxWorksLine::operand() {
 
 Value VxWorksLine::addressOf() {
   lexer_.advance();
-  if (lexer_.token().kind != Kind::name) failAtToken("the name of a symbol");
+  if (lexer_.token().kind != TokenKind::name) failAtToken("the name of a symbol");
   auto value = Value::ofAddress(lexer_.token().text);
   lexer_.advance();
   return value;
@@ -223,7 +223,7 @@ bool VxWorksLine::tryType(Value& value) {
   static constexpr std::array<std::string_view, 9> kTypes = {
       "int", "char", "short", "long", "unsigned", "signed", "float", "double", "void"};
   const auto isType = [&] {
-    return lexer_.token().kind == Kind::name &&
+    return lexer_.token().kind == TokenKind::name &&
            std::ranges::find(kTypes, lexer_.token().text) != kTypes.end();
   };
   if (!isType()) return false;

@@ -52,6 +52,37 @@ TEST_F(SupervisorTest, RestartsAProcessThatDies) {
   EXPECT_TRUE(isReplying("Int32"));
 }
 
+TEST_F(SupervisorTest, KeepsTheLastWordsOfAProcessThatDies) {
+  run(kFast + kServer);
+  waitForState("int32", "ready");
+  ASSERT_TRUE(isReplying("Int32"));
+  const auto before = pidOf("int32");
+
+  ::kill(before, SIGSEGV);
+  waitForNew("int32", before);
+
+  EXPECT_THAT(supervisor_->waitForLine("SIGSEGV after"), HasSubstr("see `mpf capsule "));
+  const auto capsules = runCommand(MPF " capsule").output;
+  EXPECT_THAT(capsules, HasSubstr("\"int32\" died by SIGSEGV"));
+  const auto path = capsules.substr(0, capsules.find('\n'));
+  EXPECT_THAT(runCommand(MPF " capsule " + path).output, HasSubstr("Int32"));
+}
+
+TEST_F(SupervisorTest, ARequestedStopLeavesNoCapsule) {
+  run(kServer);
+  waitForState("int32", "ready");
+  ask({{"do", "restart"}, {"name", "int32"}});
+  while (process("int32").at("restarts") != 1) continue;
+  waitForState("int32", "ready");
+  ask({{"do", "stop"}, {"name", "int32"}});
+  waitForState("int32", "stopped");
+
+  const auto capsules = runCommand(MPF " capsule").output;
+
+  EXPECT_THAT(capsules, HasSubstr("restart"));
+  EXPECT_EQ(std::count(capsules.begin(), capsules.end(), '\n'), 2) << capsules;
+}
+
 TEST_F(SupervisorTest, RestartsAServerThatIsStalled) {
   run("[supervision]\nstall-limit = \"100ms\"\nfirst-pause = \"10ms\"\n" + kServer);
   waitForState("int32", "ready");

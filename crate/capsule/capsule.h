@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// Capsule: the last words of a process that died, as one JSON document in one file.
+//
+//   SegmentWitness ─┐
+//   Death ──────────┼─► capsuleOf() ─► CapsuleStore::add() ─► file ─► readCapsule() ─► mpf capsule
+//   log of process ─┘
+//
+// The document has "mpfCapsule", the version of its format; when, host, crate, process, cause, the
+// end of the log, and for each server: counters, latencies, the request in work ("handling"), and
+// its links with their last messages.
+//
+// Threads  one.
+// Trust    segments and files of capsules may contain anything. A capsule that is damaged is an
+//          error that names the file and the problem.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "crate/capsule/segment_witness.h"
+
+namespace mpf::crate {
+
+inline constexpr int kCapsuleVersion = 1;
+
+enum class CauseKind { signal, exit, stalled, restarted, unknown };
+[[nodiscard]] const char* toString(CauseKind kind) noexcept;
+
+struct Cause {
+  CauseKind kind = CauseKind::unknown;
+  int number = 0;  // signal or exit status
+  std::optional<int> signalCode{};  // si_code, if it is known
+  // From the status of waitpid().
+  [[nodiscard]] static Cause ofWaitStatus(int status) noexcept;
+};
+
+// What the supervisor knows about a process that died.
+struct Death {
+  std::string crate;
+  std::string process;
+  std::vector<std::string> command;
+  pid_t pid = 0;
+  std::int64_t startedNs = 0;  // CLOCK_MONOTONIC
+  int restarts = 0;
+  Cause cause;
+  std::string log;  // path; empty: none
+};
+
+struct CapsuleLimits {
+  std::size_t messages = 16;  // of each ring
+  std::size_t allMessages = 4096;  // of a server: with many links, each shows fewer, at least one
+  std::size_t logBytes = std::size_t{64} << 10;
+};
+
+// `witnessed` is nullptr when the process had no witness. Never throws because of invalid segments
+// or an unreadable log: they are "problems" of the capsule.
+[[nodiscard]] nlohmann::ordered_json capsuleOf(const Death& death,
+                                               const WitnessedProcess* witnessed,
+                                               const CapsuleLimits& limits = {});
+
+// Reads a capsule.
+//   throws  std::system_error; std::runtime_error that names the file and what is wrong with it
+[[nodiscard]] nlohmann::ordered_json readCapsule(const std::string& path);
+
+}  // namespace mpf::crate

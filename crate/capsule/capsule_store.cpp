@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+#include "crate/capsule/capsule_store.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <ctime>
+#include <fmt/format.h>
+
+#include "base/output_file.h"
+#include "base/system_call.h"
+
+namespace mpf::crate {
+namespace {
+
+constexpr const char* kEnding = ".capsule.json";
+
+// A name that sorts by time: 20 digits of nanoseconds.
+std::string freshName(const nlohmann::ordered_json& capsule) {
+  timespec now{};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  std::string process = capsule.value("process", "");
+  std::ranges::replace_if(process, [](char c) { return c == '/' || c == '\0'; }, '_');
+  return fmt::format("{:011}{:09}-{}-{}{}", now.tv_sec, now.tv_nsec, process.substr(0, 64),
+                     capsule.value("pid", 0), kEnding);
+}
+
+}  // namespace
+
+std::string CapsuleStore::add(const nlohmann::ordered_json& capsule) const {
+  if (::mkdir(folder_.c_str(), 0700) != 0 && errno != EEXIST)
+    throwSystemError(errno, "create", folder_.string());
+  const auto path = (folder_ / freshName(capsule)).string();
+  const auto fresh = path + ".new";
+  OutputFile file(fresh, 0600);
+  file.write(capsule.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  file.close();
+  checkCall(std::rename(fresh.c_str(), path.c_str()), "rename", path);
+  prune();
+  return path;
+}
+
+std::vector<std::string> CapsuleStore::list() const {
+  std::vector<std::string> paths;
+  std::error_code absent;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, absent)) {
+    if (entry.path().filename().string().ends_with(kEnding)) paths.push_back(entry.path().string());
+  }
+  std::ranges::sort(paths);
+  return paths;
+}
+
+void CapsuleStore::prune() const {
+  const auto paths = list();
+  std::uint64_t bytes = 0;
+  std::size_t kept = 0;
+  for (auto path = paths.rbegin(); path != paths.rend(); ++path) {
+    std::error_code gone;
+    const auto size = std::filesystem::file_size(*path, gone);
+    if (!gone) bytes += size;
+    if (kept != 0 && (kept >= maxFiles_ || bytes > maxBytes_)) std::filesystem::remove(*path, gone);
+    else ++kept;
+  }
+}
+
+}  // namespace mpf::crate

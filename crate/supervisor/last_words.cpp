@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#include "crate/supervisor/last_words.h"
+
+#include <exception>
+
+#include "base/print_error.h"
+#include "crate/capsule/capsule.h"
+
+namespace mpf::crate {
+namespace {
+
+Cause causeOf(const Service& service, const ProcessEnd& end) {
+  auto cause = end.waitStatus ? Cause::ofWaitStatus(*end.waitStatus) : Cause();
+  if (service.endReason() == EndReason::stalled) cause.kind = CauseKind::stalled;
+  if (service.endReason() == EndReason::restartRequest) cause.kind = CauseKind::restarted;
+  return cause;
+}
+
+}  // namespace
+
+void LastWords::addTo(std::vector<pollfd>& polled) const {
+  for (const auto& [backplane, witness] : witnesses_)
+    polled.push_back({witness.descriptor(), POLLIN, 0});
+}
+
+void LastWords::look() {
+  for (auto& [backplane, witness] : witnesses_) witness.look();
+}
+
+void LastWords::watch(const Service& service) {
+  const auto& backplane = service.plan().backplane;
+  if (backplane.empty()) return;  // a process that is no longer in the crate
+  auto& witness = witnesses_.try_emplace(backplane, backplane).first->second;
+  witness.watch(service.pid(), service.startTicks());
+}
+
+std::string LastWords::collect(const Service& service, const ProcessEnd& end) try {
+  const auto& plan = service.plan();
+  const auto found = witnesses_.find(plan.backplane);
+  if (found == witnesses_.end()) return {};
+  auto& witness = found->second;
+  std::string path;
+  if (service.endReason() != EndReason::stopRequest) {
+    Death death;
+    death.crate = crate_;
+    death.process = plan.name;
+    death.command = plan.command;
+    death.pid = service.pid();
+    death.startedNs = service.startedNs();
+    death.restarts = service.restarts();
+    death.cause = causeOf(service, end);
+    death.log = folder_.log(plan.name);
+    path = store_.add(capsuleOf(death, witness.find(service.pid())));
+  }
+  witness.forget(service.pid());
+  return path;
+} catch (const std::exception& error) {
+  printError("mpf run: {}: no capsule: {}\n", service.plan().name, error.what());
+  return {};
+}
+
+}  // namespace mpf::crate
