@@ -17,7 +17,10 @@ constexpr const char* kFooter =
     "crate file.";
 
 int runSubcommand(int argc, char** argv) {
-  CLI::App app("mpf-crate - runs and supervises the processes of a crate file", "mpf");
+  // `mpf run` executes `mpf-crate run`: help and errors show what the user has typed.
+  const auto isSubcommand = argc > 1 && argv[1][0] != '-';
+  CLI::App app("mpf-crate - runs and supervises the processes of a crate file",
+               isSubcommand ? "mpf" : "mpf-crate");
   mpf::crate::Run run;
   mpf::crate::addRun(app, run);
   mpf::crate::addNew(app, run);
@@ -35,5 +38,5 @@ int runSubcommand(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return mpf::runMain("mpf", [&] { return runSubcommand(argc, argv); });
+  return mpf::runMain("mpf-crate", [&] { return runSubcommand(argc, argv); });
 }

@@ -31,6 +31,6 @@ inline constexpr std::size_t kMaxRequestBytes = 65536;
 //   throws  std::runtime_error when no supervisor runs, when it does not reply within `patience`,
 //           or with the error that it replied
 nlohmann::json askSupervisor(const CrateFolder& folder, const nlohmann::json& request,
-                             std::chrono::milliseconds patience = std::chrono::seconds(5));
+                             std::chrono::milliseconds patience = std::chrono::seconds(30));
 
 }  // namespace mpf::crate

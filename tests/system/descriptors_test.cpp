@@ -132,6 +132,7 @@ class EveryProgramStarted : public testing::TestWithParam<std::string> {
         {"mpf-bench", {"local", "--quick", "--only", "futex bounce", "--json", fifo_}},
         {"mpf-torture", {"--json", fifo_}},
         {"mpf-ioc", {fifo_}},
+        {"mpf-crate", {"run", fifo_}},
         {"mpf-router",
          {"--listen", "127.0.0.1:0", "--serve", "0", "--plain", "--backplane", backplane_.name()}},
         {"mpf-serial-server", {"line", linkPath_, "1000", "20", "--backplane", backplane_.name()}},

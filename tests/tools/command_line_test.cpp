@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Usage, errors and exit status of `mpf`.
+#include <set>
+
 #include "tests/tools/tools_fixture.h"
 
 namespace mpf::test {
@@ -10,9 +12,10 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-constexpr std::array<const char*, 13> kSubcommands{"ls",     "mrr",     "msr",  "top",    "inspect",
-                                                   "call",   "sniff",   "tap",  "replay", "clean",
-                                                   "doctor", "torture", "bench"};
+constexpr std::array<const char*, 22> kSubcommands{
+    "run",    "new",    "ps",    "logs",   "capsule", "stop",    "start", "restart",
+    "reload", "ls",     "mrr",   "msr",    "top",     "inspect", "call",  "sniff",
+    "tap",    "replay", "clean", "doctor", "torture", "bench"};
 
 class CommandLineTest : public ToolsTest {};
 
@@ -21,7 +24,7 @@ TEST_F(CommandLineTest, PrintsUsageWithoutArguments) {
 
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
-  EXPECT_THAT(ended.err, StartsWith("mpf - shows backplanes, servers and clients"));
+  EXPECT_THAT(ended.err, StartsWith("mpf - runs servers, shows backplanes, servers and clients"));
   for (const auto* name : kSubcommands)
     EXPECT_THAT(ended.err, HasSubstr(std::string("\n  ") + name + " "));
 }
@@ -45,8 +48,10 @@ TEST_F(CommandLineTest, EachSubcommandHasHelp) {
 
     EXPECT_EQ(ended.status, 0) << name;
     EXPECT_THAT(ended.out, HasSubstr("Usage: mpf " + name)) << name;
-    // doctor looks at the host, torture has a backplane of its own.
-    const bool hasBackplane = name != "doctor" && name != "torture";
+    // doctor looks at the host, torture has a backplane of its own, crates have theirs in a file.
+    const std::set<std::string> others{"doctor",  "torture", "run",   "new",     "ps",    "logs",
+                                       "capsule", "stop",    "start", "restart", "reload"};
+    const bool hasBackplane = !others.contains(name);
     EXPECT_EQ(ended.out.find("--backplane") != std::string::npos, hasBackplane) << name;
     EXPECT_THAT(ended.err, IsEmpty()) << name;
   }
@@ -58,7 +63,8 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsAnErrorThatListsAll) {
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"unknown\"; there are ls, mrr, msr, top, inspect, "
+            "mpf: no subcommand or option \"unknown\"; there are run, new, ps, logs, "
+            "capsule, stop, start, restart, reload, ls, mrr, msr, top, inspect, "
             "call, sniff, tap, replay, clean, doctor, torture, "
             "bench; "
             "`mpf --help` shows what they do\n");

@@ -129,12 +129,19 @@ class StartupShell::Execution final : public LineActions {
     const auto severity = isOfSite ? Severity::note : Severity::error;
     auto text = fmt::format("{}: {}", path_.string(), reason);
     if (isOfSite) text += "; each site generates or writes its own";
-    if (from_ == nullptr)
-      return shell_.diagnostics_.add({severity, {path_.string()}, {}, reason, {}});
-    auto outer = includedFrom_;
-    const auto place = outer.back();
-    outer.pop_back();
-    shell_.diagnostics_.add({severity, place, outer, text, from_->line_});
+    Diagnostic diagnostic;
+    diagnostic.severity = severity;
+    if (from_ == nullptr) {
+      diagnostic.place.file = path_.string();
+      diagnostic.text = reason;
+    } else {
+      diagnostic.includedFrom = includedFrom_;
+      diagnostic.place = diagnostic.includedFrom.back();
+      diagnostic.includedFrom.pop_back();
+      diagnostic.text = text;
+      diagnostic.line = from_->line_;
+    }
+    shell_.diagnostics_.add(std::move(diagnostic));
   }
 
   StartupShell& shell_;

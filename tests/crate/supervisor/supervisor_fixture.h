@@ -32,10 +32,18 @@ class SupervisorTest : public testing::Test {
     if (supervisor_) stop();
   }
 
-  void write(const std::string& text) { static_cast<void>(files_.write("lab.toml", text)); }
+  // Writes the crate file. Its limits are those of a machine with much load, except `limits`.
+  void write(const std::string& text, const std::string& limits = {}) {
+    std::string supervision = "[supervision]\n" + limits;
+    for (const std::string limit : {"start-time = \"15min\"\n", "stop-time = \"15min\"\n",
+                                    "stall-limit = \"off\"\n", "first-pause = \"10ms\"\n"}) {
+      if (limits.find(limit.substr(0, limit.find(' '))) == std::string::npos) supervision += limit;
+    }
+    static_cast<void>(files_.write("lab.toml", supervision + text));
+  }
   // Starts the crate, and waits until the supervisor answers.
-  void run(const std::string& text) {
-    write(text);
+  void run(const std::string& text, const std::string& limits = {}) {
+    write(text, limits);
     run();
   }
   void run() {
@@ -52,7 +60,9 @@ class SupervisorTest : public testing::Test {
     supervisor_.reset();
   }
 
-  nlohmann::json ask(const nlohmann::json& request) { return askSupervisor(folder(), request); }
+  nlohmann::json ask(const nlohmann::json& request) {
+    return askSupervisor(folder(), request, std::chrono::minutes(15));
+  }
   nlohmann::json process(const std::string& name) {
     const auto report = ask({{"do", "ps"}});
     for (const auto& one : report.at("processes"))

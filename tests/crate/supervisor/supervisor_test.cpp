@@ -23,7 +23,6 @@ using mpf::test::runCommand;
 using testing::HasSubstr;
 
 const std::string kServer = "[[server]]\nprogram = \"int32\"\n";
-const std::string kFast = "[supervision]\nfirst-pause = \"10ms\"\n";
 
 TEST_F(SupervisorTest, StartsProcessesUntilTheirServersAreBindable) {
   run(kServer +
@@ -40,7 +39,7 @@ TEST_F(SupervisorTest, StartsProcessesUntilTheirServersAreBindable) {
 }
 
 TEST_F(SupervisorTest, RestartsAProcessThatDies) {
-  run(kFast + kServer);
+  run(kServer);
   waitForState("int32", "ready");
   const auto before = pidOf("int32");
 
@@ -53,7 +52,7 @@ TEST_F(SupervisorTest, RestartsAProcessThatDies) {
 }
 
 TEST_F(SupervisorTest, KeepsTheLastWordsOfAProcessThatDies) {
-  run(kFast + kServer);
+  run(kServer);
   waitForState("int32", "ready");
   ASSERT_TRUE(isReplying("Int32"));
   const auto before = pidOf("int32");
@@ -84,7 +83,7 @@ TEST_F(SupervisorTest, ARequestedStopLeavesNoCapsule) {
 }
 
 TEST_F(SupervisorTest, RestartsAServerThatIsStalled) {
-  run("[supervision]\nstall-limit = \"100ms\"\nfirst-pause = \"10ms\"\n" + kServer);
+  run(kServer, "stall-limit = \"100ms\"\n");
   waitForState("int32", "ready");
   const auto before = pidOf("int32");
   mpf::test::Program client({MPF, "call", "Int32", "int32", "--count", "1000000000"});
@@ -180,7 +179,7 @@ TEST_F(SupervisorTest, RefusesUnknownRequestsAndNames) {
 // "The supervisor itself may be killed at any moment: servers go on, and a new supervisor takes
 // over those that run."
 TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
-  run(kFast + kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
+  run(kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
   waitForState("int32", "ready");
   waitForState("two", "ready");
   const auto one = pidOf("int32");
@@ -201,7 +200,7 @@ TEST_F(SupervisorTest, ANewSupervisorTakesOverWhatRuns) {
 }
 
 TEST_F(SupervisorTest, IsKilledAtRandomMomentsWithoutOrphansOrDoubles) {
-  run(kFast + kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
+  run(kServer + kServer + "name = \"two\"\nserver = \"Two\"\n");
   for (int i = 0; i < 30; ++i) {
     const auto pid = i % 3 == 0 ? pidOf("two") : 0;
     if (pid > 0) ::kill(pid, SIGKILL);
@@ -298,11 +297,11 @@ TEST_F(SupervisorTest, CommandsOfTheShellControlIt) {
   const std::string mpf = MPF;
 
   EXPECT_THAT(runCommand(mpf + " ps").output, testing::ContainsRegex("int32 +ready"));
-  EXPECT_EQ(runCommand(mpf + " restart int32").output, "int32 is ready\n");
-  EXPECT_EQ(runCommand(mpf + " stop int32").output, "int32 is stopped\n");
-  EXPECT_EQ(runCommand(mpf + " start int32").output, "int32 is ready\n");
+  EXPECT_EQ(runCommand(mpf + " restart int32 --wait 900").output, "int32 is ready\n");
+  EXPECT_EQ(runCommand(mpf + " stop int32 --wait 900").output, "int32 is stopped\n");
+  EXPECT_EQ(runCommand(mpf + " start int32 --wait 900").output, "int32 is ready\n");
   EXPECT_EQ(nlohmann::json::parse(runCommand(mpf + " ps --json").output)[0].at("crate"), "lab");
-  EXPECT_EQ(runCommand(mpf + " stop").output, "the crate \"lab\" has stopped\n");
+  EXPECT_EQ(runCommand(mpf + " stop --wait 900").output, "the crate \"lab\" has stopped\n");
   EXPECT_EQ(WEXITSTATUS(supervisor_->wait()), 0);
   supervisor_.reset();
   EXPECT_THAT(runCommand(mpf + " stop 2>&1").output, HasSubstr("no crate is running"));
