@@ -155,6 +155,7 @@ TEST_F(IocProgram, RecordsOfTheExampleReachTheServersOfTheOtherHost) {
   for (;;) {
     printed = runCommand(client).output;
     if (printed.find("\"line 7: ") != std::string::npos) break;
+    ASSERT_FALSE(servers.hasEnded()) << servers.errors();
     fmt::print("again, because the IOC printed:\n{}\n", printed);
     std::fflush(stdout);
   }

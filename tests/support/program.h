@@ -44,6 +44,12 @@ class Program {
     signal(number);
     return wait();
   }
+  // Whether the process has ended; wait() still returns its status.
+  [[nodiscard]] bool hasEnded() const {
+    siginfo_t info{};
+    return ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == pid_;
+  }
   // Waits for a line on stderr that contains `text`, and returns it without its line end. The line
   // may have been written before the call, because the order of lines of two threads is not
   // certain. Empty if the program ends without such a line.
