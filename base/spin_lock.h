@@ -6,14 +6,23 @@
 #include <sched.h>
 
 #include <atomic>
+#include <chrono>
+#include <thread>
 
 namespace mpf {
 
 class SpinLock {
  public:
+  // A waiting thread that only yields would keep its processor from a holder of lower real-time
+  // priority, such as a scan thread of an IOC from another one, and so wait forever. It sleeps
+  // after a few attempts.
   void lock() noexcept {
+    constexpr int kYields = 20;
     // PAIR(spin-lock): sees the writes of the previous holder.
-    while (locked_.test_and_set(std::memory_order_acquire)) ::sched_yield();
+    for (int attempts = 0; locked_.test_and_set(std::memory_order_acquire); ++attempts) {
+      if (attempts < kYields) ::sched_yield();
+      else std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
   }
   void unlock() noexcept {
     // PAIR(spin-lock): publishes the writes made under the lock.

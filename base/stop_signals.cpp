@@ -2,14 +2,15 @@
 #include "base/stop_signals.h"
 
 #include <pthread.h>
-#include <sched.h>
 #include <signal.h>
 
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <mutex>
 #include <stdexcept>
+#include <thread>
 
 namespace mpf {
 namespace {
@@ -80,7 +81,8 @@ StopSignals::~StopSignals() {
   // PAIR(stop-handling): a handler that the loop below does not see finds no callback.
   slots[slot_].callback.store(nullptr, std::memory_order_seq_cst);
   // PAIR(stop-handled): the handlers in other threads have finished.
-  while (handling.load(std::memory_order_seq_cst) != 0) ::sched_yield();
+  while (handling.load(std::memory_order_seq_cst) != 0)
+    std::this_thread::sleep_for(std::chrono::microseconds(20));
   slots[slot_].used.store(false, std::memory_order_relaxed);
 }
 

@@ -2,14 +2,15 @@
 #include "shm/window.h"
 
 #include <fcntl.h>
-#include <sched.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fmt/format.h>
 #include <optional>
 #include <system_error>
+#include <thread>
 
 #include "base/step.h"
 #include "shm/segment_name.h"
@@ -126,7 +127,7 @@ void OwnWindow::publish(const std::string& name) {
   while (!window_.tryPublish(name)) {
     if (segments::removeIfOwnerless(name)) continue;
     if (patience.hasPassed()) checkConflict(name, header().kind, reaperIsLate);
-    ::sched_yield();
+    std::this_thread::sleep_for(std::chrono::microseconds(20));
   }
 }
 
