@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <iostream>
 #include <string>
+#include <thread>
 
 #include "base/system_call.h"
 #include "shm/segment.h"
@@ -48,6 +49,9 @@ class DyingTest : public testing::Test {
 };
 
 TEST_F(DyingTest, Hangs) {
+  const std::jthread other([] {
+    for (;;) ::pause();
+  });
   const Watchdog watchdog("a test that", std::chrono::seconds(1));
   for (;;) ::pause();
 }

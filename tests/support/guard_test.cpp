@@ -63,6 +63,24 @@ TEST_P(GuardTest, RemovesWhatADyingTestLeaves) {
   EXPECT_EQ(::kill(std::stoi(valueOf("child", ended.output)), 0), -1);
 }
 
+#ifndef __SANITIZE_THREAD__
+TEST(WatchdogTest, PrintsTheStackOfEachThread) {
+  const Watchdog watchdog("watchdog test");
+
+  const auto ended = runCommand("exec " MPF_TEST_DYING " --gtest_filter=DyingTest.Hangs 2>&1");
+
+  EXPECT_THAT(ended.output, HasSubstr("watchdog: a test that hangs"));
+  int threads = 0, pauses = 0;
+  std::istringstream lines(ended.output);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("thread ")) ++threads;
+    if (line.find("pause") != std::string::npos) ++pauses;
+  }
+  EXPECT_EQ(threads, 2) << ended.output;
+  EXPECT_EQ(pauses, 2) << ended.output;
+}
+#endif
+
 INSTANTIATE_TEST_SUITE_P(Of, GuardTest,
                          testing::Values(Death{"Hangs", kWatchdogSignal},
                                          Death{"IsKilled", SIGKILL},
