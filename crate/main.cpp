@@ -24,6 +24,7 @@ int runSubcommand(int argc, char** argv) {
   mpf::crate::Run run;
   mpf::crate::addRun(app, run);
   mpf::crate::addNew(app, run);
+  mpf::crate::addConvert(app, run);
   mpf::crate::addPs(app, run);
   mpf::crate::addLogs(app, run);
   mpf::crate::addCapsule(app, run);

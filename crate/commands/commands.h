@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The subcommands of mpf-crate: run, new, ps, logs, capsule, stop, start, restart, reload. Each
-// function adds its subcommands to the command line; the one that the user names sets `run`.
+// The subcommands of mpf-crate: run, new, convert, ps, logs, capsule, stop, start, restart, reload.
+// Each function adds its subcommands to the command line; the one that the user names sets `run`.
 #pragma once
 
 #include <functional>
@@ -16,6 +16,7 @@ using Run = std::function<int()>;
 
 void addRun(CLI::App& app, Run& run);
 void addNew(CLI::App& app, Run& run);
+void addConvert(CLI::App& app, Run& run);
 void addPs(CLI::App& app, Run& run);
 void addLogs(CLI::App& app, Run& run);
 void addCapsule(CLI::App& app, Run& run);

@@ -10,17 +10,18 @@
 
 #include "base/output_file.h"
 #include "base/print_error.h"
+#include "base/toml/config_errors.h"
 #include "crate/commands/commands.h"
+#include "crate/commands/crate_source.h"
 #include "crate/config/crate_schema.h"
 #include "crate/config/process_plan.h"
-#include "crate/config/read_crate.h"
 #include "crate/supervisor/supervisor.h"
 
 namespace mpf::crate {
 namespace {
 
 struct RunArguments {
-  std::string file;
+  CrateSource source;
   bool checkOnly = false;
   bool dryRun = false;
 };
@@ -32,14 +33,24 @@ void printPlans(const Crate& crate) {
     fmt::print("# {}\n{}\n", plan.name, shellText(plan));
 }
 
+// Prints what the file means, without starting anything.
+void show(const RunArguments& arguments) {
+  const auto& source = arguments.source;
+  if (source.isStartupFile())
+    printDiagnostics(source.readStartup("", false).diagnostics, arguments.checkOnly);
+  const auto crate = source.read();
+  if (arguments.dryRun) printPlans(crate);
+  else fmt::print("{}: {} processes, no error\n", source.file(), crate.processes.size());
+}
+
 int runCrate(const RunArguments& arguments) try {
-  const auto load = [file = arguments.file] { return readCrate(file); };
   if (arguments.checkOnly || arguments.dryRun) {
-    const auto crate = load();
-    if (arguments.dryRun) printPlans(crate);
-    else fmt::print("{}: {} processes, no error\n", arguments.file, crate.processes.size());
+    show(arguments);
     return 0;
   }
+  const auto load = [source = arguments.source] { return source.prepare(); };
+  if (arguments.source.isStartupFile())
+    printDiagnostics(arguments.source.readStartup("", false).diagnostics, false);
   Supervisor(folderOf(load()), load).run();
   return 0;
 } catch (const ConfigError& error) {
@@ -113,9 +124,11 @@ int writeNewCrate(const std::string& name) {
 
 void addRun(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "run", "Starts the servers, routers and IOCs of a crate file, and restarts those that fail");
+      "run",
+      "Starts the servers, routers and IOCs of a crate file or startup file, and restarts those "
+      "that fail");
   auto arguments = std::make_shared<RunArguments>();
-  command.add_option("file", arguments->file, "Crate file (TOML); see `mpf new`")->required();
+  arguments->source.addOptions(command);
   auto* const check = command.add_flag("--check", arguments->checkOnly,
                                        "Only check the file, and print all errors");
   command.add_flag("--dry-run", arguments->dryRun, "Only print the command lines")->excludes(check);

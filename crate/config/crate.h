@@ -93,6 +93,7 @@ struct Carrier {
   std::string name;
   std::string kind;
   std::string place;
+  std::string comment;  // as that of a process
 };
 
 struct Crate {

@@ -53,7 +53,11 @@ void addOption(const Setting& setting, const OptionKind* option,
 
 std::vector<std::string> commandOf(const Crate& crate, const Process& process,
                                    const std::string& runFolder) {
-  if (process.kind.empty()) return process.command;
+  if (process.kind.empty()) {
+    auto command = process.command;
+    if (command.front().starts_with("mpf")) command.front() = programBeside(command.front());
+    return command;
+  }
   const auto& kind = *findKind(process.kind);
   std::vector<std::string> command{programBeside(kind.program)};
   for (const auto& key : kind.positionals) {
@@ -61,9 +65,10 @@ std::vector<std::string> commandOf(const Crate& crate, const Process& process,
     if (setting != nullptr && isPositional(process, kind, key) && !setting->values.empty())
       command.push_back(setting->values.front());
   }
-  for (const auto& setting : process.settings) {
-    if (!isPositional(process, kind, setting.key))
-      addOption(setting, kind.findOption(setting.key), command);
+  for (const auto& key : kind.keys()) {
+    const auto* const setting = process.find(key);
+    if (setting != nullptr && !isPositional(process, kind, key))
+      addOption(*setting, kind.findOption(key), command);
   }
   for (const auto& setting : crate.defaults) {
     const auto keys = kind.keys();

@@ -72,7 +72,7 @@ class CrateReader {
     });
     table.readNamed("carriers", [&](const std::string& name, const toml::node& node) {
       if (const auto kind = node.value_exact<std::string>())
-        crate_.carriers.push_back({name, *kind, table.placeOf(node)});
+        crate_.carriers.push_back({name, *kind, table.placeOf(node), {}});
       else
         table.refuse(node, fmt::format("{} is {}; write a string in quotes, such as \"model\"",
                                        name, kindOf(node)));

@@ -30,7 +30,7 @@ MAY_INCLUDE = {
     "classic": ["classic/messages", "client", "server", "drivers"],
     "epics": ["client", "classic/messages"],
     # The supervisor reads shared memory as reports do, and prints tables.
-    "crate": ["base", "shm", "tools"],
+    "crate": ["base", "shm", "tools", "drivers"],
     "benchmarks": ["client", "server"],
     "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
     "tools/torture": ["tools", "server"],

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// The commands of MPF in startup files, and what each of them does.
+//
+// Threads  constant data.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "crate/startup/commands/command_call.h"
+#include "crate/startup/commands/startup_site.h"
+
+namespace mpf::startup {
+
+struct CommandEntry {
+  std::string_view name;
+  // Returns the result of the command, or Value::unavailable() after an error.
+  Value (*execute)(CommandCall& call, StartupSite& site);
+};
+
+std::span<const CommandEntry> carrierCommands();  // ipacAddCarrier, initIpacCarrier, ...
+std::span<const CommandEntry>
+serialCommands();  // initOctalUART, initSerialServer, initTtyPort, ...
+std::span<const CommandEntry> tyGsOctalCommands();  // tyGSOctalModuleInit, ...
+std::span<const CommandEntry> moduleCommands();  // initDAC128V, initIpUnidig
+std::span<const CommandEntry> ip330Commands();  // initIp330, initIp330Scan, ...
+std::span<const CommandEntry> routerCommands();  // routerInit, localMessageRouterStart, ...
+std::span<const CommandEntry> iocCommands();  // dbLoadRecords, iocInit, ...
+std::span<const CommandEntry> otherCommands();  // what MPF does not do, and why
+
+// nullptr: there is no such command.
+[[nodiscard]] const CommandEntry* findCommand(std::string_view name);
+
+// The carrier and the site of a module, as two arguments of a command.
+struct SiteArguments {
+  std::string carrier, site;
+};
+// Reads ("ipac", "IP_a"), or the numbers of MPF R2: (0, 2) is IP_c of board 0.
+[[nodiscard]] SiteArguments readSite(CommandCall& call, std::size_t index, Boards& boards);
+
+// Reads the settings of a serial line: 9600, "N", 1, 8, "N". Missing ones have their defaults.
+[[nodiscard]] LineSettings readLineSettings(CommandCall& call, std::size_t index);
+
+}  // namespace mpf::startup

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#include "crate/startup/commands/ioc_file.h"
+
+#include <fmt/format.h>
+
+namespace mpf::startup {
+
+// Inside quotes, iocsh takes each character as it is.
+std::string iocshQuoted(std::string_view text) {
+  const char quote = text.find('"') == std::string_view::npos ? '"' : '\'';
+  return quote + std::string(text) + quote;
+}
+
+void IocFile::add(const std::string& command, const std::vector<std::string>& arguments,
+                  const std::string& source) {
+  text_ += fmt::format("# {}\n{}", source, command);
+  if (!arguments.empty()) {
+    text_ += '(';
+    for (std::size_t i = 0; i < arguments.size(); ++i)
+      text_ += (i == 0 ? "" : ", ") + iocshQuoted(arguments[i]);
+    text_ += ')';
+  }
+  text_ += '\n';
+  isNeeded_ = isNeeded_ || command == "iocInit" || command.starts_with("dbLoad");
+}
+
+}  // namespace mpf::startup

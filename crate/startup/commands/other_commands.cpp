@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// Commands that MPF knows and does not execute: what it has no program for, and what has no meaning
+// outside vxWorks.
+#include <fmt/format.h>
+
+#include "crate/startup/commands/command_table.h"
+
+namespace mpf::startup {
+namespace {
+
+Value skipGpib(CommandCall& call, StartupSite& /*site*/) {
+  call.warn(fmt::format("{} is skipped: MPF has no GPIB server yet", call.commandName()));
+  return Value::unavailable();
+}
+
+// Servers of other packages that used MPF.
+Value skipServer(CommandCall& call, StartupSite& /*site*/) {
+  call.warn(
+      fmt::format("{} is skipped: it starts a server of another package; port its source "
+                  "with <mpf/classic.h> and add the program to the crate file",
+                  call.commandName()));
+  return Value::unavailable();
+}
+
+Value skip(CommandCall& call, StartupSite& /*site*/) {
+  call.note(fmt::format("{} is skipped: it has no meaning here", call.commandName()));
+  return Value();
+}
+
+Value skipSequence(CommandCall& call, StartupSite& /*site*/) {
+  call.warn("seq is skipped: mpf-ioc has no state notation programs");
+  return Value();
+}
+
+constexpr CommandEntry kOtherCommands[] = {
+    {"initGpibGsTi9914", skipGpib},
+    {"initGpibServer", skipGpib},
+    {"HiDEOSGpibLinkConfig", skipGpib},
+    {"gpibSniff", skipGpib},
+    {"initMPCServer", skipServer},
+    {"initLoveServer", skipServer},
+    {"initQuadEM", skipServer},
+    {"initQuadEMScan", skipServer},
+    {"initQuadEMSweep", skipServer},
+    {"initQuadEMPID", skipServer},
+    {"AIMConfig", skipServer},
+    {"icbSetup", skipServer},
+    {"icbConfig", skipServer},
+    {"icbAddModule", skipServer},
+    {"icbTcaConfig", skipServer},
+    {"DXPConfig", skipServer},
+    {"seq", skipSequence},
+    {"ld", skip},
+    {"module_types", skip},
+    {"taskDelay", skip},
+    {"shellPromptSet", skip},
+    {"loginUserAdd", skip},
+    {"hostAdd", skip},
+    {"nfsMount", skip},
+    {"nfsAuthUnixSet", skip},
+    {"registerRecordDeviceDriver", skip},
+};
+
+}  // namespace
+
+std::span<const CommandEntry> otherCommands() { return kOtherCommands; }
+
+}  // namespace mpf::startup
