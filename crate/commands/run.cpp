@@ -33,12 +33,19 @@ void printPlans(const Crate& crate) {
     fmt::print("# {}\n{}\n", plan.name, shellText(plan));
 }
 
+// Prints what a startup file means, without starting anything.
+Crate showStartup(const RunArguments& arguments) {
+  auto startup = arguments.source.readStartup("ioc.cmd", false);
+  printDiagnostics(startup.diagnostics, arguments.checkOnly);
+  if (arguments.checkOnly)
+    fmt::print("{} commands, {} of them skipped\n", startup.commands, startup.skipped);
+  return std::move(startup.crate);
+}
+
 // Prints what the file means, without starting anything.
 void show(const RunArguments& arguments) {
   const auto& source = arguments.source;
-  if (source.isStartupFile())
-    printDiagnostics(source.readStartup("", false).diagnostics, arguments.checkOnly);
-  const auto crate = source.read();
+  const auto crate = source.isStartupFile() ? showStartup(arguments) : source.read();
   if (arguments.dryRun) printPlans(crate);
   else fmt::print("{}: {} processes, no error\n", source.file(), crate.processes.size());
 }

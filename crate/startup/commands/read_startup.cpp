@@ -22,11 +22,13 @@ class SiteCommands final : public CommandHandler {
  public:
   explicit SiteCommands(StartupSite& site) : site_(site) {}
   std::optional<Value> tryExecute(const Command& command, StartupShell& shell) override {
+    ++commands;
     const auto* const entry = findCommand(command.name);
     if (entry == nullptr) return std::nullopt;
     CommandCall call(command, shell);
     return entry->execute(call, site_);
   }
+  int commands = 0;
 
  private:
   StartupSite& site_;
@@ -81,6 +83,13 @@ void addLocalLocation(crate::Process& router, std::int32_t location) {
     setValue(router, "serve", fmt::format("{}={}", serve->values.front(), location), serve->place);
 }
 
+// Each command that is skipped says so.
+int countSkipped(const Diagnostics& diagnostics) {
+  return static_cast<int>(std::ranges::count_if(diagnostics.all(), [](const auto& diagnostic) {
+    return diagnostic.text.find("skipped") != std::string::npos;
+  }));
+}
+
 crate::Crate crateOf(StartupSite& site, const StartupOptions& options, const fs::path& file,
                      const std::map<std::string, std::string>& environment) {
   crate::Crate crate;
@@ -117,7 +126,8 @@ Startup readStartup(const std::string& file, const StartupOptions& options) {
     if (diagnostic.severity == Severity::error) errors.add("", diagnostic.formatted());
   errors.throwIfAny();
   Startup startup{crateOf(site, options, path, shell.environment()),
-                  site.ioc.isNeeded() ? site.ioc.text() : "", shell.diagnostics()};
+                  site.ioc.isNeeded() ? site.ioc.text() : "", shell.diagnostics(),
+                  commands.commands, countSkipped(shell.diagnostics())};
   if (startup.crate.processes.empty())
     errors.add(path.string(), "no command of the file starts a server, a router or an IOC");
   else checkCrate(startup.crate, errors);

@@ -53,7 +53,7 @@ Route readRoute(CommandCall& call, StartupSite& site, const char* role) {
                                  "replace it by --address",
                                  address));
   }
-  static_cast<void>(call.integer(3, "bufSize", 0, 1 << 30));  // TCP has its own buffers
+  const auto bufferSize = call.integer(3, "bufSize", 0, 64 << 20);
   const auto queueSize = call.integer(4, "queueSize", 0, 1'000'000);
   route.address = fmt::format("{}:{}", address, port);
   route.process =
@@ -61,6 +61,9 @@ Route readRoute(CommandCall& call, StartupSite& site, const char* role) {
   route.process.notifies = true;
   if (queueSize != 0)
     addValue(route.process, "queue-size", fmt::to_string(queueSize), call.place());
+  if (bufferSize != 0)
+    addValue(route.process, "buffer-size", fmt::to_string(std::max<std::int64_t>(bufferSize, 256)),
+             call.place());
   addValue(route.process, "plain", "true", call.place());
   addValue(route.process, "allow-public-plain", "true", call.place());
   const auto hasName = [&](const auto& other) { return other.name == route.process.name; };

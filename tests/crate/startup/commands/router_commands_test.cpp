@@ -15,8 +15,8 @@ TEST_F(RouterCommands, AServerRouterOffersTheServersOfThisHost) {
       "routerInit\nlocalMessageRouterStart(3)\n");
 
   EXPECT_THAT(settingsOf(startup, "router-server-9900"),
-              ElementsAre("queue-size=40", "plain=true", "allow-public-plain=true", "serve=1=3",
-                          "listen=10.0.0.7:9900"));
+              ElementsAre("queue-size=40", "buffer-size=1500", "plain=true",
+                          "allow-public-plain=true", "serve=1=3", "listen=10.0.0.7:9900"));
   EXPECT_EQ(startup.crate.location, 3);
 }
 
@@ -26,8 +26,8 @@ TEST_F(RouterCommands, AClientRouterConnectsToAnotherHost) {
       "tcpMessageRouterClientStart location, 9900, address, 10000, 100\n");
 
   EXPECT_THAT(settingsOf(startup, "router-client-9900"),
-              ElementsAre("queue-size=100", "plain=true", "allow-public-plain=true",
-                          "remote=1=10.0.0.7:9900"));
+              ElementsAre("queue-size=100", "buffer-size=10000", "plain=true",
+                          "allow-public-plain=true", "remote=1=10.0.0.7:9900"));
 }
 
 TEST_F(RouterCommands, AnotherAddressCanBeUsed) {
