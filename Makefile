@@ -20,7 +20,8 @@ TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench install
+.PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
+.PHONY: startup-files install
 .PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## print this list
@@ -69,6 +70,10 @@ bench: release ## measure this host (BENCH=local, remote, hardware or epics)
 	@mkdir -p build/release/bench
 	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | \
 		tee build/release/bench/$(or $(BENCH),local).txt'
+
+# FILES: a folder with startup files; IP: the folder of the databases that they name ipApp/Db/...
+startup-files: release ## run startup files of a site on device models (FILES=folder IP=folder)
+	scripts/check-startup-files $(if $(IP),--ip '$(IP)') '$(FILES)'
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"

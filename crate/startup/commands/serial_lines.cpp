@@ -107,6 +107,7 @@ crate::Process SerialLines::processOf(const SerialModule& module) const {
 crate::Process SerialLines::processOf(const SerialPort& port) const {
   auto process = newProcess("serial", port.name, port.place, port.source);
   addServers(port.name, port.device, process);
+  addValue(process, "wait", "true", port.place);  // as the original, which started without the line
   if (port.device.starts_with("tcp:")) return process;
   const auto& line = port.settings;
   addValue(process, "baud", fmt::to_string(line.baud), port.place);

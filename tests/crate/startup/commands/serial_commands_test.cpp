@@ -36,10 +36,10 @@ TEST_F(SerialCommands, OtherPortsHaveAProcessEach) {
       "initSerialServer(\"second\", \"two\", 1000, 20, \"\\x03,\")\n");
 
   EXPECT_THAT(settingsOf(startup, "one"),
-              ElementsAre("server=first,/dev/ttyS0,1000,20,,1", "baud=19200", "parity=O",
-                          "stop-bits=2", "bits=7", "flow=N"));
+              ElementsAre("server=first,/dev/ttyS0,1000,20,,1", "wait=true", "baud=19200",
+                          "parity=O", "stop-bits=2", "bits=7", "flow=N"));
   EXPECT_THAT(settingsOf(startup, "two"),
-              ElementsAre("server=second,tcp:moxa:4001,1000,20,\\x03\\x2c,1"));
+              ElementsAre("server=second,tcp:moxa:4001,1000,20,\\x03\\x2c,1", "wait=true"));
 }
 
 TEST_F(SerialCommands, APortWithoutServerIsNotServed) {
