@@ -48,7 +48,8 @@ class SupervisorTest : public testing::Test {
   }
   void run() {
     supervisor_.emplace(std::vector<std::string>{MPF, "run", files_.file("lab.toml")});
-    while (!isAnswering()) continue;
+    while (!isAnswering())
+      if (supervisor_->hasEnded()) throw std::runtime_error("mpf run: " + supervisor_->errors());
   }
   int stop() {
     const auto status = supervisor_->end(SIGTERM);
@@ -85,7 +86,7 @@ class SupervisorTest : public testing::Test {
   }
   CrateFolder folder() { return CrateFolder::of("lab"); }
 
-  const mpf::test::Watchdog watchdog_{"Supervisor"};
+  std::optional<mpf::test::Watchdog> watchdog_{std::in_place, "Supervisor"};
   mpf::test::TestBackplane backplane_;
   mpf::test::TemporaryFolder files_;
   std::optional<mpf::test::Program> supervisor_;
