@@ -21,12 +21,14 @@ std::string variable(const char* name) {
   return value != nullptr ? value : "";
 }
 
-// Returns whether this call has locked the open file.
+// Returns whether this process has locked the open file. The lock ends with this process; one of
+// flock() or F_OFD_SETLK would be inherited by a child that is about to execute its program, and
+// the next supervisor could not start as long as that child lives.
 bool tryLock(int file) {
   struct flock range{};
   range.l_type = F_WRLCK;
-  if (::fcntl(file, F_OFD_SETLK, &range) == 0) return true;
-  if (errno != EAGAIN && errno != EACCES) throwSystemError(errno, "fcntl(F_OFD_SETLK)", "lock");
+  if (::fcntl(file, F_SETLK, &range) == 0) return true;
+  if (errno != EAGAIN && errno != EACCES) throwSystemError(errno, "fcntl(F_SETLK)", "lock");
   return false;
 }
 

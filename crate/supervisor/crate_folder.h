@@ -38,10 +38,11 @@ class CrateFolder {
   // Creates the folder, with access for this user only.
   //   throws  std::system_error
   void create() const;
-  // Locks the folder for as long as the descriptor is open.
+  // Locks the folder for this process, for as long as the descriptor is open, and as long as the
+  // process calls neither lock() nor isLocked() again: closing any descriptor of the file unlocks it.
   //   throws  std::runtime_error when another supervisor holds the lock
   [[nodiscard]] FileDescriptor lock() const;
-  // Whether a supervisor holds the lock.
+  // Whether another process holds the lock.
   [[nodiscard]] bool isLocked() const;
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

@@ -2,14 +2,17 @@
 // CrateFolder: where it is, and its lock.
 #include "crate/supervisor/crate_folder.h"
 
+#include <signal.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdlib>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/system_call.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mpf::crate::test {
@@ -38,20 +41,48 @@ TEST(CrateFolder, IsForItsUserOnly) {
   EXPECT_EQ(status.st_mode & 0777, 0700U);
 }
 
+// A supervisor, which has a child, in processes of their own.
+class OtherSupervisor {
+ public:
+  explicit OtherSupervisor(const CrateFolder& folder) {
+    std::array<int, 2> pipe{};
+    checkCall(::pipe(pipe.data()), "pipe");
+    supervisor_ = checkCall(::fork(), "fork");
+    if (supervisor_ == 0) {
+      const auto lock = folder.lock();
+      const auto child = ::fork();
+      if (child == 0)
+        for (;;) ::pause();
+      [[maybe_unused]] const auto written = ::write(pipe[1], &child, sizeof child);
+      for (;;) ::pause();
+    }
+    EXPECT_EQ(::read(pipe[0], &child_, sizeof child_), static_cast<ssize_t>(sizeof child_));
+    for (const int end : pipe) ::close(end);
+  }
+  ~OtherSupervisor() { ::kill(child_, SIGKILL); }
+  void kill() const {
+    ::kill(supervisor_, SIGKILL);
+    ::waitpid(supervisor_, nullptr, 0);
+  }
+
+ private:
+  pid_t supervisor_ = 0, child_ = 0;
+};
+
 TEST(CrateFolder, HasOneSupervisor) {
   const TemporaryFolder parent;
   const CrateFolder folder(parent.path() / "lab");
   folder.create();
   EXPECT_FALSE(folder.isLocked());
 
-  auto lock = folder.lock();
+  const OtherSupervisor supervisor(folder);
 
   EXPECT_TRUE(folder.isLocked());
   EXPECT_THAT([&] { static_cast<void>(folder.lock()); },
               ThrowsMessage<std::runtime_error>(
                   HasSubstr("the crate \"lab\" is already running in " + folder.path().string())));
-  lock.reset();
-  EXPECT_FALSE(folder.isLocked());
+  supervisor.kill();
+  EXPECT_FALSE(folder.isLocked()) << "the child of the supervisor holds no lock";
   EXPECT_NO_THROW(static_cast<void>(folder.lock()));
 }
 
