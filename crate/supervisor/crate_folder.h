@@ -38,8 +38,8 @@ class CrateFolder {
   // Creates the folder, with access for this user only.
   //   throws  std::system_error
   void create() const;
-  // Locks the folder for this process, for as long as the descriptor is open, and as long as the
-  // process calls neither lock() nor isLocked() again: closing any descriptor of the file unlocks it.
+  // Locks the folder for this process, for as long as the descriptor is open, and the process calls
+  // neither lock() nor isLocked() again: closing any descriptor of the file unlocks it.
   //   throws  std::runtime_error when another supervisor holds the lock
   [[nodiscard]] FileDescriptor lock() const;
   // Whether another process holds the lock.
