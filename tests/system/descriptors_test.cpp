@@ -165,7 +165,7 @@ class EveryProgramStarted : public testing::TestWithParam<std::string> {
   std::string linkPath_ = folder_.file("tty");
   Pty line_{linkPath_};
   std::string fifo_ = [this] {
-    auto path = folder_.file("fifo");
+    auto path = folder_.file("fifo.toml");  // a crate file for mpf-crate
     checkCall(::mkfifo(path.c_str(), 0600), "mkfifo", path);
     return path;
   }();

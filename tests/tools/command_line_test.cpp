@@ -63,7 +63,7 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsAnErrorThatListsAll) {
   EXPECT_EQ(ended.status, 2);
   EXPECT_THAT(ended.out, IsEmpty());
   EXPECT_EQ(ended.err,
-            "mpf: no subcommand or option \"unknown\"; there are run, new, ps, logs, "
+            "mpf: no subcommand or option \"unknown\"; there are run, new, convert, ps, logs, "
             "capsule, stop, start, restart, reload, ls, mrr, msr, top, inspect, "
             "call, sniff, tap, replay, clean, doctor, torture, "
             "bench; "
