@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// GpibInstrumentModel: an instrument on a model of a GPIB bus. The same instruments stand behind the
-// model of the bus with its handshake lines (TI9914), the model of a Prologix controller and the
-// model of a USBTMC device.
+// GpibInstrumentModel: an instrument on a model of a GPIB bus. The same instruments stand behind
+// the model of the bus with its handshake lines (TI9914), the model of a Prologix controller and
+// the model of a USBTMC device.
 //
 //   bus ── receive(byte, end) ──► instrument: commands
 //       ◄── nextByte() ─────────  instrument: answers

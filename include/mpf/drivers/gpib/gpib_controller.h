@@ -12,8 +12,9 @@
 // Threads  GpibBus calls the operations one at a time, from any thread. The handlers may be called
 //          by any thread of the controller, one at a time.
 // Crash    nothing here survives the process.
-// Trust    gpib_types.h. No operation lasts longer than its deadline and a millisecond, except where
-//          the kernel's driver of the controller makes it wait longer, which the class then says.
+// Trust    gpib_types.h. No operation lasts longer than its deadline and a millisecond, except
+//          where the kernel's driver of the controller makes it wait longer, which the class then
+//          says.
 #pragma once
 
 #include <cstdint>

@@ -27,11 +27,11 @@ struct GpibAddress {
 
   auto operator<=>(const GpibAddress&) const = default;
 
-  // From one number, as EPICS links and asyn write addresses: 0 to 30 is a primary address; from 100
-  // on, 100 * primary + secondary. Empty when the number is no address.
+  // From one number, as EPICS links and asyn write addresses: 0 to 30 is a primary address; from
+  // 100 on, 100 * primary + secondary. Empty when the number is no address.
   [[nodiscard]] static std::optional<GpibAddress> fromNumber(std::int32_t number) noexcept;
-  // The inverse of fromNumber(), except for primary address 0 with a secondary address, which has no
-  // number: then the primary address alone.
+  // The inverse of fromNumber(), except for primary address 0 with a secondary address, which has
+  // no number: then the primary address alone.
   [[nodiscard]] std::int32_t number() const noexcept;
 };
 // As people write it: "22", or "22.5" with a secondary address.
