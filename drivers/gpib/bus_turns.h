@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// BusTurns: who may use a GPIB bus now: a queue, first come first served, and a lease.
+// BusTurns: the turns of callers on a GPIB bus: a queue, first come first served, and a lease.
 //
 //   take() ──► | waiting | waiting | ──► on the bus ──► give()
-//                  while the bus is leased, only its holder goes on the bus; others keep their place
+//              while the bus is leased, only its holder goes on it; others keep their places
 //
 //              lease()                             release()
 //   shared ───────────────────► leased by NAME ───────────────────────────► shared

@@ -3,8 +3,8 @@
 //
 //   const auto entry = list.add(handler);   // handler is called until `entry` is destroyed
 //
-// Threads  any. call() holds the lock: add() and the end of an entry wait for handlers that run, and
-//          deadlock when a handler of the same list calls them.
+// Threads  any. call() holds the lock: add() and the end of an entry wait for handlers that run,
+//          and deadlock when a handler of the same list calls them.
 #pragma once
 
 #include <algorithm>

@@ -49,6 +49,8 @@ PUBLIC_HEADERS = {
         "user_message.h",
         "serial_commands.h",
         "serial_sniff.h",
+        "gpib_commands.h",
+        "gpib_sniff.h",
         "digital_io_commands.h",
         "ip330_commands.h",
     ],

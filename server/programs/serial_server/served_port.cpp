@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <utility>
 
+#include "server/programs/serial_server/sniff_source.h"
+
 namespace mpf {
 namespace {
 
@@ -28,7 +30,7 @@ ServedPort::ServedPort(const Backplane& backplane, const SerialStartOptions& opt
       log_(nameInLog(options, start), options.arguments.logLevel),
       server_(backplane, start.server, messagesOf(options, start)),
       serial_(server_, port, start.serial, log_),
-      sniff_(backplane, start.server, messagesOf(options, start), port, log_) {
+      sniff_(backplane, start.server, messagesOf(options, start), sniffSourceOf(port), log_) {
   logShortages(server_, log_);
   port.onStateChange([this](SerialPortState state, const std::string& because) {
     if (state == SerialPortState::plugged) return log_->info("the line is connected");

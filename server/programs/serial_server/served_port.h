@@ -10,10 +10,10 @@
 #include <mpf/drivers/serial/serial_port.h>
 
 #include "server/programs/serial_server/serial_server.h"
-#include "server/programs/serial_server/sniff_server.h"
 #include "server/programs/serial_server/start_options.h"
 #include "server/programs/server_log.h"
 #include "server/programs/serving_thread.h"
+#include "server/programs/sniff/sniff_server.h"
 
 namespace mpf {
 

@@ -3,7 +3,8 @@
 // format.
 #include <regex>
 
-#include "server/programs/serial_server/sniff_server.h"
+#include "server/programs/serial_server/sniff_source.h"
+#include "server/programs/sniff/sniff_server.h"
 #include "tests/server/programs/serial_server/serial_fixture.h"
 #include "tests/tools/tools_fixture.h"
 
@@ -22,8 +23,8 @@ class SniffToolTest : public SerialServerTest {
 
   void SetUp() override { start(); }
   void listen(const SniffBatching& batching = {}) {
-    sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_,
-                                           batching);
+    sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(),
+                                           sniffSourceOf(port_), log_, batching);
     sniff_->start([] { ADD_FAILURE() << "the sniff server failed"; });
   }
   // Returns when the tool listens, and both it and the server have noticed.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "server/programs/serial_server/sniff_queue.h"
+#include "server/programs/sniff/sniff_queue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,11 +10,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-std::vector<PeekedByte> bytesOf(std::string_view text) {
-  std::vector<PeekedByte> bytes;
-  for (const char value : text)
-    bytes.push_back({0, static_cast<std::uint8_t>(value), ByteDirection::sent, LineFault::none});
-  return bytes;
+std::vector<SniffBytes> recordsOf(std::string_view text) {
+  std::vector<SniffBytes> records;
+  for (const char value : text) records.push_back({value});
+  return records;
 }
 
 struct Taken {
@@ -24,16 +23,16 @@ struct Taken {
 };
 
 Taken takeFrom(SniffQueue& queue) {
-  std::vector<PeekedByte> bytes;
-  Taken taken{{}, queue.take(bytes)};
-  for (const auto& byte : bytes) taken.text += static_cast<char>(byte.value);
+  std::vector<SniffBytes> records;
+  Taken taken{{}, queue.take(records)};
+  for (const auto& record : records) taken.text += record[0];
   return taken;
 }
 
 TEST(SniffQueue, ReturnsBytesInOrderOnce) {
   SniffQueue queue({});
-  static_cast<void>(queue.push(bytesOf("ab")));
-  static_cast<void>(queue.push(bytesOf("c")));
+  static_cast<void>(queue.push(recordsOf("ab")));
+  static_cast<void>(queue.push(recordsOf("c")));
 
   EXPECT_EQ(takeFrom(queue), (Taken{"abc", 0}));
   EXPECT_EQ(takeFrom(queue), (Taken{"", 0}));
@@ -42,7 +41,7 @@ TEST(SniffQueue, ReturnsBytesInOrderOnce) {
 TEST(SniffQueue, IsDueNeverWhileEmpty) {
   SniffQueue queue({});
   EXPECT_TRUE(queue.dueAt().isNever());
-  static_cast<void>(queue.push(bytesOf("a")));
+  static_cast<void>(queue.push(recordsOf("a")));
   takeFrom(queue);
 
   EXPECT_TRUE(queue.dueAt().isNever());
@@ -52,36 +51,36 @@ TEST(SniffQueue, IsDueWhenItsFirstByteIsOld) {
   SniffQueue queue({.maxAge = 24h});
   const auto before = Deadline::after(24h);
 
-  EXPECT_TRUE(queue.push(bytesOf("a")));
+  EXPECT_TRUE(queue.push(recordsOf("a")));
 
   const auto due = queue.dueAt();
   EXPECT_GE(due, before);
   EXPECT_LE(due, Deadline::after(24h));
-  EXPECT_FALSE(queue.push(bytesOf("b")));
+  EXPECT_FALSE(queue.push(recordsOf("b")));
   EXPECT_EQ(queue.dueAt(), due);
 }
 
 TEST(SniffQueue, IsDueImmediatelyWhenLarge) {
   SniffQueue queue({.maxAge = 24h, .largeBytes = 3});
-  EXPECT_TRUE(queue.push(bytesOf("a")));
-  EXPECT_FALSE(queue.push(bytesOf("b")));
+  EXPECT_TRUE(queue.push(recordsOf("a")));
+  EXPECT_FALSE(queue.push(recordsOf("b")));
   EXPECT_FALSE(queue.dueAt().hasPassed());
 
-  EXPECT_TRUE(queue.push(bytesOf("cd")));
+  EXPECT_TRUE(queue.push(recordsOf("cd")));
 
   EXPECT_TRUE(queue.dueAt().hasPassed());
-  EXPECT_FALSE(queue.push(bytesOf("e")));
+  EXPECT_FALSE(queue.push(recordsOf("e")));
 }
 
 TEST(SniffQueue, CountsBytesThatDoNotFit) {
   SniffQueue queue({.maxBytes = 4});
-  static_cast<void>(queue.push(bytesOf("abc")));
+  static_cast<void>(queue.push(recordsOf("abc")));
 
-  static_cast<void>(queue.push(bytesOf("defg")));
-  static_cast<void>(queue.push(bytesOf("h")));
+  static_cast<void>(queue.push(recordsOf("defg")));
+  static_cast<void>(queue.push(recordsOf("h")));
 
   EXPECT_EQ(takeFrom(queue), (Taken{"abcd", 4}));
-  static_cast<void>(queue.push(bytesOf("i")));
+  static_cast<void>(queue.push(recordsOf("i")));
   EXPECT_EQ(takeFrom(queue), (Taken{"i", 0}));
 }
 

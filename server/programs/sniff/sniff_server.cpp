@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "server/programs/serial_server/sniff_server.h"
+#include "server/programs/sniff/sniff_server.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -11,9 +11,6 @@
 namespace mpf {
 namespace {
 
-using serial::SniffKind;
-using serial::SniffRecord;
-
 // The thread never spins: listeners need no low latency, and the line needs the processor. About
 // 250 messages may wait for each listener, with bodies of at most 16 MB.
 ServerOptions sniffOptions(ServerOptions options) {
@@ -21,21 +18,6 @@ ServerOptions sniffOptions(ServerOptions options) {
   options.maxPoolBytes = 16ULL << 20;
   options.waitMode = WaitMode::block;
   return options;
-}
-
-SniffKind kindOf(const PeekedByte& byte) noexcept {
-  if (byte.fault == LineFault::breakSignal) return SniffKind::breakSignal;
-  if (byte.fault != LineFault::none) return SniffKind::damaged;
-  return byte.direction == ByteDirection::sent ? SniffKind::sent : SniffKind::received;
-}
-
-void writeRecords(std::span<const PeekedByte> bytes, std::vector<char>& records) {
-  records.resize(bytes.size() * SniffRecord::kBytes);
-  std::span<char> rest(records);
-  for (const auto& byte : bytes) {
-    SniffRecord{byte.atNs, kindOf(byte), byte.value}.write(rest.first<SniffRecord::kBytes>());
-    rest = rest.subspan(SniffRecord::kBytes);
-  }
 }
 
 // The part of a count that fits a field.
@@ -46,10 +28,10 @@ std::int32_t clamped(std::uint64_t count) noexcept {
 }  // namespace
 
 SniffServer::SniffServer(const Backplane& backplane, const std::string& server,
-                         const ServerOptions& like, SerialPort& port, const ServerLog& log,
+                         const ServerOptions& like, SniffSource source, const ServerLog& log,
                          const SniffBatching& batching)
     : log_(log),
-      port_(port),
+      source_(std::move(source)),
       queue_(batching),
       server_(backplane, server + std::string(serial::sniffSuffix), sniffOptions(like)) {
   server_.on<Int32>([this](Int32Message&& request) { handle(std::move(request)); });
@@ -95,8 +77,8 @@ void SniffServer::listen(Int32Message&& request) {
   if (client == 0) return;  // the client has disconnected
   if (const auto former = find(client); former != listeners_.end()) listeners_.erase(former);
   if (!tap_) {
-    tap_ = port_.attachTap([this](std::span<const PeekedByte> bytes) {
-      if (queue_.push(bytes)) server_.interrupt();
+    tap_ = source_([this](std::span<const SniffBytes> records) {
+      if (queue_.push(records)) server_.interrupt();
     });
   }
   listeners_.push_back({std::move(request), client, 0});
@@ -135,18 +117,17 @@ void SniffServer::forgetGone() {
 void SniffServer::followCount() {
   const auto before = count_.load(std::memory_order_relaxed);
   const auto now = listeners_.size();
-  if (now != before) log_->info("{} clients listen to the line", now);
+  if (now != before) log_->info("{} clients listen to every byte", now);
   if (now == 0 && tap_) {
     tap_.reset();
-    queue_.take(bytes_);
+    queue_.take(records_);
   }
   count_.store(now, std::memory_order_relaxed);
 }
 
 void SniffServer::deliver() {
-  const auto lost = queue_.take(bytes_);
-  if (bytes_.empty()) return;
-  writeRecords(bytes_, records_);
+  const auto lost = queue_.take(records_);
+  if (records_.empty()) return;
   for (auto& listener : listeners_) {
     send(listener);
     listener.lost += lost;  // they were lost after these bytes
@@ -154,15 +135,17 @@ void SniffServer::deliver() {
 }
 
 void SniffServer::send(Listener& listener) {
-  auto message = server_.allocReplyMessage<Char8Array>(listener.request, records_.size());
-  message->extra = static_cast<std::int32_t>(bytes_.size());
+  auto message =
+      server_.allocReplyMessage<Char8Array>(listener.request, records_.size() * sizeof(SniffBytes));
+  message->extra = static_cast<std::int32_t>(records_.size());
   message->address = clamped(listener.lost);
-  std::copy(records_.begin(), records_.end(), message.value().begin());
+  auto at = message.value().begin();
+  for (const auto& record : records_) at = std::copy(record.begin(), record.end(), at);
   const auto reported = static_cast<std::uint64_t>(message->address);
   if (server_.reply(std::move(message)) == ReplyResult::sent) {
     listener.lost -= reported;
   } else {
-    listener.lost += bytes_.size();
+    listener.lost += records_.size();
   }
 }
 

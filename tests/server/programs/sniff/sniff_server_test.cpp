@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Listeners of a serial line, while a client talks with the instrument at its far end.
-#include "server/programs/serial_server/sniff_server.h"
+#include "server/programs/sniff/sniff_server.h"
 
 #include <numeric>
 #include <vector>
 
+#include "server/programs/serial_server/sniff_source.h"
 #include "tests/server/programs/serial_server/serial_fixture.h"
 #include "tests/support/victim.h"
 
@@ -83,8 +84,8 @@ class SniffTest : public SerialServerTest {
   void startWithListening(const SniffBatching& batching = {}) {
     start(
         {.bufferBytes = 100, .eom = "\r\n", .circularBuffer = true, .limits = {.settleTime = 0ms}});
-    sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(), port_, log_,
-                                           batching);
+    sniff_ = std::make_unique<SniffServer>(backplane_, "serial[0]", ServerOptions(),
+                                           sniffSourceOf(port_), log_, batching);
     sniff_->start([] { FAIL() << "the sniff server failed"; });
   }
   // Sends one question. Returns the records that a listener must receive of it and its answer.

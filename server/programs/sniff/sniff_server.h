@@ -1,40 +1,45 @@
 // SPDX-License-Identifier: MIT
-// SniffServer: sends every byte of a serial line to listeners, as described in
-// include/mpf/serial_sniff.h.
+// SniffServer: sends every byte of a serial line or of a GPIB bus to listeners, as described in
+// include/mpf/serial_sniff.h and gpib_sniff.h.
 //
-//   port's thread ── tap ──► SniffQueue ── own thread ──► a batch ──► listener 1, listener 2, ...
+//   line's thread ── tap ──► SniffQueue ── own thread ──► a batch ──► listener 1, listener 2, ...
 //
 // The tap is attached while there are listeners; the thread sleeps while there is nothing to send.
 //
-// Threads  its own thread waits for requests and bytes, and never for a listener. The port's thread
-//          copies bytes into the queue and wakes it.
+// Threads  its own thread waits for requests and bytes, and never for a listener. The line's thread
+//          copies records into the queue and wakes it.
 // Crash    a listener that dies is removed when the server notices its death.
 // Trust    a listener that does not receive its messages loses bytes; the next message counts them.
 #pragma once
 
 #include <atomic>
 #include <functional>
-#include <optional>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
-#include <mpf/drivers/serial/serial_port.h>
 #include <mpf/message_server.h>
 #include <mpf/serial_sniff.h>
 
-#include "server/programs/serial_server/sniff_queue.h"
 #include "server/programs/server_log.h"
 #include "server/programs/serving_thread.h"
+#include "server/programs/sniff/sniff_queue.h"
 
 namespace mpf {
+
+// Attaches a tap to a line or bus: shows the record of each byte to `show`, on the threads of the
+// line, until the returned object is destroyed.
+using SniffSource =
+    std::function<std::shared_ptr<void>(std::function<void(std::span<const SniffBytes>)> show)>;
 
 class SniffServer {
  public:
   // Serves "<server>.sniff" at the location and with the rights of `like`.
-  //   port    must outlive this
+  //   source  the objects that it uses must outlive this
   //   throws  as MessageServer
   SniffServer(const Backplane& backplane, const std::string& server, const ServerOptions& like,
-              SerialPort& port, const ServerLog& log, const SniffBatching& batching = {});
+              SniffSource source, const ServerLog& log, const SniffBatching& batching = {});
   ~SniffServer();
   SniffServer(const SniffServer&) = delete;
   SniffServer& operator=(const SniffServer&) = delete;
@@ -67,13 +72,12 @@ class SniffServer {
   void send(Listener& listener);
 
   const ServerLog& log_;
-  SerialPort& port_;
+  const SniffSource source_;
   SniffQueue queue_;
   MessageServer server_;
   std::vector<Listener> listeners_;  // this and below: the thread's
-  std::optional<PeekTap> tap_;  // exists while there are listeners; destroyed before the queue
-  std::vector<PeekedByte> bytes_;  // of the batch that is being delivered
-  std::vector<char> records_;  // the same as records
+  std::shared_ptr<void> tap_;  // exists while there are listeners; destroyed before the queue
+  std::vector<SniffBytes> records_;  // of the batch that is being delivered
   std::atomic<std::size_t> count_{0};
   std::atomic<bool> ends_{false};
   ServingThread thread_;

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include <mpf/gpib_sniff.h>
+
+#include <array>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace mpf::test {
+namespace {
+
+using gpib::SniffRecord;
+using testing::ElementsAre;
+using testing::Eq;
+using testing::Optional;
+
+using GpibRecordBytes = std::array<char, SniffRecord::kBytes>;
+
+TEST(GpibSniffRecord, IsTenBytesWithTheTimeFirst) {
+  GpibRecordBytes bytes{};
+
+  SniffRecord{0x0102030405060708, SniffRecord::kReceived | SniffRecord::kEnd, 0xfe}.write(bytes);
+
+  EXPECT_THAT(bytes, ElementsAre(8, 7, 6, 5, 4, 3, 2, 1, 5, static_cast<char>(0xfe)));
+}
+
+TEST(GpibSniffRecord, ReadsWhatItWroteAndRefusesUnknownFlags) {
+  for (std::uint8_t flags = 0; flags < 16; ++flags) {
+    const SniffRecord record{-5, flags, 0x3f};
+    GpibRecordBytes bytes{};
+    record.write(bytes);
+
+    const auto read = SniffRecord::tryRead(bytes);
+
+    EXPECT_EQ(read, flags < 8 ? std::optional(record) : std::nullopt) << int{flags};
+  }
+}
+
+TEST(GpibSniffReply, ReturnsItsRecordsAndRefusesAWrongCount) {
+  const SniffRecord record{7, SniffRecord::kAttention, '?'};
+  auto reply = Char8ArrayMessage::allocValue(SniffRecord::kBytes);
+  record.write(reply.value().first<SniffRecord::kBytes>());
+
+  reply->extra = 1;
+  EXPECT_THAT(gpib::tryReadRecords(reply), Optional(ElementsAre(record)));
+  reply->extra = 2;
+  EXPECT_THAT(gpib::tryReadRecords(reply), Eq(std::nullopt));
+}
+
+}  // namespace
+}  // namespace mpf::test

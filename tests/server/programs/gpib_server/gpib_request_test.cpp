@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+#include "server/programs/gpib_server/gpib_request.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <mpf/gpib_commands.h>
+
+namespace mpf::test {
+namespace {
+
+using namespace gpib;
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+const GpibLimits kLimits{
+    .bufferBytes = 1000, .timeout = 3s, .maxTimeout = 60s, .maxLease = std::chrono::seconds(10)};
+
+GpibRequest requestOf(const Char8Array& fields, std::string_view value = {}) {
+  auto message = Char8ArrayMessage::allocValue(value.size());
+  *message = fields;
+  message.setSize(value.size());
+  std::ranges::copy(value, message.value().begin());
+  return GpibRequest::from(message, kLimits);
+}
+
+bool isAfter(Deadline until, std::chrono::milliseconds wait) {
+  return until <= Deadline::after(wait) && until > Deadline::after(wait - 10min);
+}
+
+TEST(GpibRequest, HasACommandAnAddressAndData) {
+  const auto request = requestOf({.cmd = cmdWrite | cmdWithoutEnd, .address = 502}, "ID?");
+
+  EXPECT_EQ(request.problem, "");
+  EXPECT_EQ(request.command, cmdWrite);
+  EXPECT_FALSE(request.sendEnd);
+  EXPECT_THAT(request.addresses, ElementsAre(GpibAddress{5, 2}));
+  EXPECT_THAT(request.data, ElementsAre('I', 'D', '?'));
+  EXPECT_EQ(request.text(), "write of " + toString(GpibAddress{5, 2}));
+}
+
+TEST(GpibRequest, ATimeoutIsInSecondsOrMillisecondsAndLimited) {
+  const auto timeoutOf = [](std::int32_t timeout, std::int32_t option) {
+    return requestOf({.timeout = timeout, .cmd = cmdInterfaceClear | option}).until;
+  };
+  const auto before = Clock::nowNs();
+  const auto seconds = timeoutOf(2, 0);
+  const auto milliseconds = timeoutOf(2, cmdTimeoutMilliseconds);
+  const auto otherwise = timeoutOf(0, 0);
+  const auto longest = timeoutOf(INT32_MAX, 0);
+
+  EXPECT_GE(seconds.ns() - before, Nanoseconds(2s).count());
+  EXPECT_TRUE(isAfter(seconds, 2s));
+  EXPECT_TRUE(isAfter(milliseconds, 2ms));
+  EXPECT_GE(otherwise.ns() - before, Nanoseconds(3s).count());
+  EXPECT_TRUE(isAfter(otherwise, 3s));
+  EXPECT_TRUE(isAfter(timeoutOf(-1, 0), 3s));
+  EXPECT_GE(longest.ns() - before, Nanoseconds(60s).count());
+  EXPECT_TRUE(isAfter(longest, 60s));
+}
+
+TEST(GpibRequest, AReadIsLimitedByExtraTheBufferAndTheEndOfString) {
+  const auto unlimited = requestOf({.cmd = cmdRead, .address = 22});
+  EXPECT_EQ(unlimited.limits.maxBytes, 1000U);
+  EXPECT_FALSE(unlimited.isCountRequested);
+  EXPECT_FALSE(unlimited.limits.endOfString);
+
+  const auto counted = requestOf({.cmd = cmdWriteRead, .address = 22, .extra = 1000});
+  EXPECT_EQ(counted.limits.maxBytes, 1000U);
+  EXPECT_TRUE(counted.isCountRequested);
+
+  const auto tooLong = requestOf({.cmd = cmdRead, .address = 22, .extra = 1001});
+  EXPECT_EQ(tooLong.limits.maxBytes, 1000U);
+  EXPECT_FALSE(tooLong.isCountRequested);
+
+  const auto ended =
+      requestOf({.cmd = cmdRead, .address = 22, .eomLen = 2, .eomString = {'\r', '\n'}});
+  EXPECT_EQ(ended.limits.endOfString, '\n');
+}
+
+TEST(GpibRequest, ATriggerHasFurtherAddresses) {
+  const auto request =
+      requestOf({.cmd = cmdTrigger, .address = 1}, std::string_view("\x02\xff\x03\x04", 4));
+
+  EXPECT_EQ(request.problem, "");
+  EXPECT_THAT(request.addresses,
+              ElementsAre(GpibAddress{1}, GpibAddress{2}, GpibAddress{3, 4}));
+}
+
+TEST(GpibRequest, OnlyAClearAndAnUnsubscriptionAreForAllInstruments) {
+  EXPECT_THAT(requestOf({.cmd = cmdClear, .address = allInstruments}).problem, IsEmpty());
+  EXPECT_THAT(requestOf({.cmd = cmdUnsubscribe, .address = allInstruments}).problem, IsEmpty());
+  for (const auto command : {cmdRead, cmdWrite, cmdSerialPoll, cmdGoToLocal, cmdSubscribe})
+    EXPECT_THAT(requestOf({.cmd = command, .address = allInstruments}).problem,
+                HasSubstr("address -1"));
+}
+
+TEST(GpibRequest, ALeaseIsLimited) {
+  EXPECT_EQ(requestOf({.cmd = cmdLease, .extra = 500}).lease, 500ms);
+  EXPECT_EQ(requestOf({.cmd = cmdLease, .extra = INT32_MAX}).lease, 10s);
+  EXPECT_THAT(requestOf({.cmd = cmdLease}).problem, HasSubstr("lease of 0 ms"));
+}
+
+TEST(GpibRequest, AnInvalidRequestHasAProblem) {
+  const auto problemOf = [](const Char8Array& fields, std::string_view value = {}) {
+    return requestOf(fields, value).problem;
+  };
+  EXPECT_THAT(problemOf({}), HasSubstr("no such command"));
+  EXPECT_THAT(problemOf({.cmd = cmdUnsubscribe + 1}), HasSubstr("cmd 0x11"));
+  EXPECT_THAT(problemOf({.cmd = cmdRead | 0x400}), HasSubstr("cmd 0x401"));
+  EXPECT_THAT(problemOf({.cmd = -1}), HasSubstr("cmd 0xffffffff"));
+  EXPECT_THAT(problemOf({.cmd = cmdRead | cmdWithoutEnd}), HasSubstr("a read without END"));
+  for (const auto address : {-2, 31, 99, 131, 3100, INT32_MAX, INT32_MIN})
+    EXPECT_THAT(problemOf({.cmd = cmdRead, .address = address}), HasSubstr("address")) << address;
+  EXPECT_THAT(problemOf({.cmd = cmdRead, .extra = -1}), HasSubstr("-1 bytes"));
+  EXPECT_THAT(problemOf({.cmd = cmdRemoteEnable, .extra = 2}), HasSubstr("1 (on) or 0 (off)"));
+  EXPECT_THAT(problemOf({.cmd = cmdTrigger}, "\x01"), HasSubstr("pairs"));
+  EXPECT_THAT(problemOf({.cmd = cmdTrigger}, "\x1f\xff"), HasSubstr("pairs"));
+}
+
+}  // namespace
+}  // namespace mpf::test
