@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The program behind Victim. Its roles: an echo server, a server that counts requests, a client
 // that sends as fast as it can, many clients, a client that listens to a serial line or to another
-// server, a client that sends commands to an instrument.
+// server, a client that sends commands to an instrument, a client that leases a GPIB bus.
 #include <signal.h>
 #include <sys/inotify.h>
 #include <sys/prctl.h>
@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <mpf/file_descriptor.h>
+#include <mpf/gpib_commands.h>
 #include <mpf/message_server.h>
 #include <mpf/serial_commands.h>
 #include <mpf/serial_sniff.h>
@@ -193,6 +194,16 @@ int ask(const mpf::Backplane& backplane, const std::string& server, const std::s
   return client.call(std::move(message), 24h) ? 0 : 1;
 }
 
+// Leases the bus for a day, and tells when it has it.
+int lease(const mpf::Backplane& backplane, const std::string& server) {
+  mpf::SyncClient client(backplane, server);
+  auto message = mpf::Char8ArrayMessage::allocValue(0);
+  *message = {.cmd = mpf::gpib::cmdLease, .extra = 86'400'000};
+  if (!client.call(std::move(message), 60s)) return 1;
+  say("leased");
+  for (;;) static_cast<void>(client.receive(24h));
+}
+
 // Arguments: role, backplane, arguments of the role; then "as USER GROUP", "without-inotify".
 int play(const std::vector<std::string>& arguments) {
   const auto argument = [&](std::size_t index) {
@@ -213,8 +224,10 @@ int play(const std::vector<std::string>& arguments) {
     return listen(backplane, "serial[0].sniff", mpf::serial::cmdSniffStart);
   if (role == "listen") return listen(backplane, argument(3), std::stoi(argument(4)));
   if (role == "ask") return ask(backplane, argument(3), argument(4));
+  if (role == "lease") return lease(backplane, argument(3));
   if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
-  std::fprintf(stderr, "role \"%s\": use serve, serve-block, count, flood, listen, ask or crowd\n",
+  std::fprintf(stderr,
+               "role \"%s\": use serve, serve-block, count, flood, listen, ask, lease or crowd\n",
                role.c_str());
   return 2;
 }

@@ -32,9 +32,7 @@ GpibServer::GpibServer(MessageServer& server, GpibBus& bus, const GpibLimits& li
 }
 
 GpibServer::~GpibServer() {
-  ends_.store(true, std::memory_order_relaxed);
-  server_.interrupt();
-  queue_.wake();
+  stop();
   receiving_.join();
   serving_.join();
 }
@@ -44,15 +42,23 @@ void GpibServer::start(const std::function<void()>& failed) {
   serving_.start(log_, [this] { serveBus(); }, failed);
 }
 
+void GpibServer::stop() {
+  ends_.store(true, std::memory_order_relaxed);
+  server_.interrupt();
+  queue_.wake();
+}
+
 // ---- the server's thread
 
 void GpibServer::receive() {
   while (!ends_.load(std::memory_order_relaxed)) {
     static_cast<void>(server_.waitForMessage(queue_.nextExpiry()));
-    do {
+    // After each request: clients that send many must not delay the others' timeouts.
+    for (bool mayHaveMore = true; mayHaveMore && !ends_.load(std::memory_order_relaxed);) {
+      mayHaveMore = server_.handleOne();
       forgetGone();
       endExpired();
-    } while (!ends_.load(std::memory_order_relaxed) && server_.handleOne());
+    }
   }
 }
 

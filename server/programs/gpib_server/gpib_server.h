@@ -39,15 +39,17 @@ class GpibServer {
   // status -1.
   //   server, bus, log  must outlive this object
   GpibServer(MessageServer& server, GpibBus& bus, const GpibLimits& limits, const ServerLog& log);
-  // Waits for the operation in progress, at most until its timeout. Requests that have not begun
-  // end as `refused`.
+  // Stops, and waits for the operation in progress, at most until its timeout. Requests that have
+  // not begun end as `refused`.
   ~GpibServer();
   GpibServer(const GpibServer&) = delete;
   GpibServer& operator=(const GpibServer&) = delete;
 
-  // Serves until this object is destroyed. `failed` is called, on any thread, when the server has
+  // Serves until stop(). `failed` is called, on any thread, when the server has
   // failed, after it has logged the error.
   void start(const std::function<void()>& failed);
+  // No request begins any more. Any thread; does not wait.
+  void stop();
 
  private:
   // The request of the client that has the lease: it shows whether the client is still there.

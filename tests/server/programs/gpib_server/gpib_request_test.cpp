@@ -85,8 +85,7 @@ TEST(GpibRequest, ATriggerHasFurtherAddresses) {
       requestOf({.cmd = cmdTrigger, .address = 1}, std::string_view("\x02\xff\x03\x04", 4));
 
   EXPECT_EQ(request.problem, "");
-  EXPECT_THAT(request.addresses,
-              ElementsAre(GpibAddress{1}, GpibAddress{2}, GpibAddress{3, 4}));
+  EXPECT_THAT(request.addresses, ElementsAre(GpibAddress{1}, GpibAddress{2}, GpibAddress{3, 4}));
 }
 
 TEST(GpibRequest, OnlyAClearAndAnUnsubscriptionAreForAllInstruments) {
