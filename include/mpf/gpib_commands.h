@@ -5,7 +5,7 @@
 //             address: the instrument: 0 to 30, or 100 * primary + secondary address
 //             value = bytes to write, commands, or a name
 //             extra: longest read [bytes], or what the command says
-//             eomLen, eomString: a read ends with the last byte of eomString; eomLen 0: no such byte
+//             eomLen, eomString: a read ends at the last byte of eomString; eomLen 0: at no byte
 //             timeout [s], or [ms] with cmdTimeoutMilliseconds: the wait for the bus and the
 //             operation together, from the arrival of the request; 0: the server's default
 //   reply     status = gpibStatus..., extra = gpibReadEnded... of a read, value = bytes that were
@@ -63,10 +63,10 @@ inline constexpr std::int32_t cmdGoToLocal = 10;
 inline constexpr std::int32_t cmdSendCommands = 11;
 
 // Makes the bus exclusive to this client, for `extra` milliseconds from the reply on; a holder that
-// asks again extends its lease. `value` is the name of the holder, for messages to people. The lease
-// ends earlier with cmdUnlease, or when the client disconnects or dies. The extra of the reply is
-// the number of milliseconds, which the server limits. Requests of others wait for the end of the
-// lease until their timeout.
+// asks again extends its lease. `value` is the name of the holder, for messages to people. The
+// lease ends earlier with cmdUnlease, or when the client disconnects or dies. The extra of the reply
+// is the number of milliseconds, which the server limits. Requests of others wait for the end of
+// the lease until their timeout.
 inline constexpr std::int32_t cmdLease = 12;
 // Ends the lease of this client, if it has one.
 inline constexpr std::int32_t cmdUnlease = 13;
@@ -78,7 +78,7 @@ inline constexpr std::int32_t cmdLeaseHolder = 14;
 // message with cmd = cmdSubscribe, address, and value = status byte. extra = number of such messages
 // that are missing before, because this client did not receive them in time. The same message comes
 // when the instrument requests service in the reply to somebody's cmdSerialPoll. Does not wait for
-// the bus. During a lease, only instruments are polled to which the holder subscribes.
+// the bus. During a lease, the server polls only instruments to which the holder subscribes.
 inline constexpr std::int32_t cmdSubscribe = 15;
 // Ends the subscription of this client to `address`; allInstruments: all its subscriptions.
 inline constexpr std::int32_t cmdUnsubscribe = 16;

@@ -72,7 +72,7 @@ std::string readAddresses(const Char8Array& fields, GpibRequest& request) {
   const auto address = GpibAddress::fromNumber(fields.address);
   if (!address)
     return fmt::format(
-        "address {} is none of an instrument: use 0 to 30, or 100 * primary + secondary address",
+        "address {} is not the address of an instrument: use 0 to 30, or 100 * primary + secondary address",
         fields.address);
   request.addresses.push_back(*address);
   if (addressing != Addressing::list) return {};

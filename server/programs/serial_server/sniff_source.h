@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// sniffSourceOf(): the bytes of a serial port as records for listeners (include/mpf/serial_sniff.h).
+// sniffSourceOf(): the bytes of a serial port as records for listeners
+// (include/mpf/serial_sniff.h).
 #pragma once
 
 #include <mpf/drivers/serial/serial_port.h>

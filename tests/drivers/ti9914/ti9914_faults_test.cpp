@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// Faults of the bus at random places of an operation: each operation ends with a status, and the
+// next one on the healed bus works.
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fmt/format.h>
+#include <random>
+
+#include "tests/drivers/ti9914/ti9914_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using Kind = GpibFault::Kind;
+
+class Ti9914FaultsTest : public Ti9914Test {
+ protected:
+  static constexpr int kFaults = 1000;
+  static constexpr int kOperations = 6;
+
+  Ti9914FaultsTest() { start(); }
+
+  std::size_t below(std::size_t limit) {
+    return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random_);
+  }
+  GpibFault randomFault() {
+    static constexpr std::array kKinds{Kind::stuckActive, Kind::stuckInactive, Kind::vanished,
+                                       Kind::frozen, Kind::neverAccepts};
+    const std::array addresses{kMeter, kMemory, kSecond};
+    return {.kind = kKinds.at(below(kKinds.size())),
+            .lines = static_cast<std::uint8_t>(1U << below(8)),
+            .at = addresses.at(below(addresses.size()))};
+  }
+  GpibStatus perform(std::size_t operation, Deadline deadline) {
+    auto& gpib = *controller_;
+    switch (operation) {
+      case 0:
+        return gpib.write(kMemory, bytesOf("0123456789"), true, deadline).status;
+      case 1:
+        return gpib.write(kSecond, bytesOf("abc"), true, deadline).status;
+      case 2:
+        return gpib.read(kMeter, {.maxBytes = 100}, deadline).status;
+      case 3:
+        return gpib.read(kMeter, {.maxBytes = 100, .endOfString = '\n'}, deadline).status;
+      case 4:
+        return gpib.serialPoll(kMeter, deadline).status;
+      default:
+        return gpib.trigger(std::array{kMemory, kSecond}, deadline).status;
+    }
+  }
+  // How many changes of the lines the operation causes on a healthy bus.
+  std::uint64_t changesOf(std::size_t operation) {
+    const auto before = bus_->changes();
+    EXPECT_EQ(perform(operation, Deadline::never()), GpibStatus::success);
+    return bus_->changes() - before;
+  }
+  [[nodiscard]] std::string describe(std::size_t operation, const GpibFault& fault,
+                                     std::uint64_t place) const {
+    return fmt::format("seed {}, operation {}, fault {} (lines {}, instrument {}) at {}: ", seed_,
+                       operation, static_cast<int>(fault.kind), namesOfLines(fault.lines),
+                       toString(fault.at), place);
+  }
+  // Whether all instruments work, and the meter sends a reading from its first byte on.
+  void expectHealthy(const std::string& after) {
+    auto& gpib = *controller_;
+    memory_->received.clear();
+    const auto sent = gpib.write(kMemory, bytesOf("hello"), true, Deadline::never());
+    EXPECT_TRUE(sent.ok()) << after << sent.reason;
+    EXPECT_EQ(memory_->text(), "hello") << after;
+    EXPECT_TRUE(gpib.write(kMeter, bytesOf("ID?"), true, Deadline::never()).ok()) << after;
+    const auto read = gpib.read(kMeter, {.maxBytes = 100}, Deadline::never());
+    EXPECT_EQ(textOf(read.data), "HP3458A\r\n") << after << read.reason;
+    EXPECT_TRUE(gpib.write(kSecond, bytesOf("x"), true, Deadline::never()).ok()) << after;
+  }
+
+  unsigned seed_ = std::random_device{}();
+  std::mt19937 random_{seed_};
+};
+
+TEST_F(Ti9914FaultsTest, EndsEachOperationWithAStatusAndWorksAfterEachFault) {
+  std::array<std::uint64_t, kOperations> changes{};
+  for (std::size_t i = 0; i < kOperations; ++i) changes.at(i) = changesOf(i);
+  std::array<int, 6> ends{};
+  std::int64_t latest = 0;
+  for (int round = 0; round < kFaults && !HasFailure(); ++round) {
+    const auto operation = below(kOperations);
+    const auto fault = randomFault();
+    const auto place = 1 + below(changes.at(operation));
+    bus_->setFaultAfter(place, fault);
+    const auto deadline = Deadline::after(std::chrono::milliseconds(2));
+
+    const auto status = perform(operation, deadline);
+
+    EXPECT_TRUE(status != GpibStatus::timeout || deadline.hasPassed()) << "a timeout came early";
+    latest = std::max(latest, Clock::nowNs() - deadline.ns());
+    ++ends.at(static_cast<std::size_t>(status));
+    bus_->heal();
+    expectHealthy(describe(operation, fault, place));
+  }
+  std::printf("seed %u: %d succeeded, %d timeouts, %d without listener; latest end %lld us late\n",
+              seed_, ends.at(0), ends.at(1), ends.at(2), static_cast<long long>(latest / 1000));
+  EXPECT_GT(ends.at(1), 0);
+  EXPECT_EQ(model_->lostCommands(), 0U);
+}
+
+}  // namespace
+}  // namespace mpf::test
