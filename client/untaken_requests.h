@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// UntakenRequests: the requests of one client that no server has received, and that the client sends
-// to the next server (Retry::neverTaken), in their order.
+// UntakenRequests: the requests of one client that no server has received, and that the client
+// sends to the next server (Retry::neverTaken), in their order.
 //
 // Threads  the dispatcher's thread changes them, under the sender's lock; any thread asks isEmpty()
 //          under that lock.

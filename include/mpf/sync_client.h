@@ -70,8 +70,8 @@ class SyncClient {
   // limits all three together. After it, the answer is a refusal if the request was not sent, else
   // a fate: `expired` when the server had not received the request, `outcomeUnknown` when it had.
   //   message   unchanged when it was not sent
-  //   retry     as MessageClient::send(): with neverTaken, the request goes to the next server of the
-  //             name, until `timeout`
+  //   retry     as MessageClient::send(): with neverTaken, the request goes to the next server of
+  //             the name, until `timeout`
   Answer call(Message&& message, Nanoseconds timeout, Retry retry = Retry::never);
   // Waits for a message that is not the first reply to a call: a further reply, for example of a
   // monitor, or an OutOfBand message. call() stores such messages until receive() returns them, in
