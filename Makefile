@@ -21,7 +21,7 @@ SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-sta
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
-.PHONY: startup-files install
+.PHONY: startup-files install container
 .PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## print this list
@@ -77,6 +77,10 @@ startup-files: release ## run startup files of a site on device models (FILES=fo
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"
+
+container: release ## build a container image that runs a crate, with podman, buildah or docker
+	rm -rf build/container && cmake --install build/release --strip --prefix build/container/usr
+	scripts/container-image build/container
 
 format: setup ## format all sources
 	$(SOURCES) | xargs -0 --no-run-if-empty clang-format-19 -i

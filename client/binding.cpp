@@ -11,6 +11,18 @@
 namespace mpf {
 namespace {
 
+// The pause before requests are sent again that found no room at the server.
+constexpr std::int64_t kSendUntakenAfterNs = 1'000'000;
+
+Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
+                    std::int32_t clientExtra) {
+  RequestFateMessage message({.fate = fate, .requestId = requestId});
+  message.setClientType(clientType);
+  message.setClientExtra(clientExtra);
+  message.setRoute({0, requestId, kEndsRequest, nullptr});
+  return message;
+}
+
 // A server may send a ConnectMessage only to report a full queue behind it (a router does), not as
 // a reply; and a fate only as the reply to the request that it names.
 bool mayServerSend(const Message& message, const Request* request) noexcept {
@@ -100,6 +112,7 @@ void Binding::onAccepted(Link& link) {
   MPF_STEP(connected);
   connector_.notifyConnected();
   count(control().linksOpened);
+  if (!sender_.untaken().isEmpty()) timer_.wakeAt(Clock::nowNs());  // onTime() sends them
   deliverConnect(ConnectStatus::connectYes);
 }
 
@@ -126,6 +139,12 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
       break;
   }
   if (!mayServerSend(message, request)) return false;
+  // A router reports that the server behind it has not taken the request.
+  if (const auto* fate = message.tryAs<RequestFate>();
+      fate != nullptr && fate->fate == Fate::neverTaken && sender_.tryKeep(*request)) {
+    timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
+    return true;
+  }
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
     noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
@@ -171,11 +190,8 @@ void Binding::deliverConnect(ConnectStatus status) {
 // A cancelled or expired request keeps its entry until the server replies to it or refuses it.
 void Binding::deliverFate(Request& request, Fate fate) {
   if (request.isGivenUp) return;
-  RequestFateMessage message(
-      {.fate = fate, .requestId = request.id.load(std::memory_order_relaxed)});
-  message.setClientType(request.clientType);
-  message.setClientExtra(request.clientExtra);
-  message.setRoute({0, message->requestId, kEndsRequest, nullptr});
+  auto message = fateMessage(fate, request.id.load(std::memory_order_relaxed), request.clientType,
+                             request.clientExtra);
   if (fate == Fate::cancelled || fate == Fate::expired) {
     sender_.requests()->giveUp(request);
   } else {
@@ -183,6 +199,11 @@ void Binding::deliverFate(Request& request, Fate fate) {
   }
   MPF_STEP(fate_given);
   deliver(std::move(message));
+}
+
+void Binding::deliverFate(const UntakenRequest& request, Fate fate) {
+  deliver(fateMessage(fate, request.id, request.message->getClientType(),
+                      request.message->getClientExtra()));
 }
 
 bool Binding::hasDeadPeer() const noexcept {
@@ -231,10 +252,10 @@ void Binding::endAll() {
   const auto ending = end_.ending;
   deliverRemaining(channel.get());
   requests->forEach([&](Request& request) {
-    deliverFate(request, ending != Ending::protocolError &&
-                                 !channel->link().outgoing().isTaken(request.ordinal)
-                             ? Fate::neverTaken
-                             : Fate::outcomeUnknown);
+    const bool isUntaken =
+        ending != Ending::protocolError && !channel->link().outgoing().isTaken(request.ordinal);
+    if (isUntaken && !hasLeft() && sender_.tryKeep(request)) return;
+    deliverFate(request, isUntaken ? Fate::neverTaken : Fate::outcomeUnknown);
   });
   if (sender_.channel() != channel) return;  // a callback destroyed the client
   const bool wasConnected = end_.wasConnected;
@@ -258,7 +279,10 @@ void Binding::lookForServer(Ending ending) {
 
 void Binding::cancel(std::uint32_t requestId) {
   if (!sender_.requests()) return;
-  if (auto* request = sender_.requests()->find(requestId)) deliverFate(*request, Fate::cancelled);
+  if (auto* request = sender_.requests()->find(requestId))
+    return deliverFate(*request, Fate::cancelled);
+  const auto isIt = [requestId](const UntakenRequest& request) { return request.id == requestId; };
+  if (const auto request = sender_.takeUntaken(isIt)) deliverFate(*request, Fate::cancelled);
 }
 
 void Binding::pause() {
@@ -283,10 +307,12 @@ void Binding::onTime(std::int64_t nowNs) {
     setState(BindingState::ending);
     return resumeEnd();
   }
-  if (!isLinked()) return tryConnect();
   const auto self = shared_from_this();
   try {
+    expireUntaken(nowNs);
+    if (!isLinked()) return tryConnect();
     expire(nowNs);
+    if (isConnected()) sendUntaken();
     if (isLinked()) nudge(nowNs);
   } catch (...) {
     timer_.wakeAt(nowNs);  // the next call handles the other requests
@@ -306,6 +332,25 @@ void Binding::expire(std::int64_t nowNs) {
     doorbell::fence();
     if (!sender_.isTaken(request)) deliverFate(request, Fate::expired);
   });
+}
+
+void Binding::expireUntaken(std::int64_t nowNs) {
+  const auto hasExpired = [nowNs](const auto& request) { return request.hasExpired(nowNs); };
+  while (const auto request = sender_.takeUntaken(hasExpired)) deliverFate(*request, Fate::expired);
+  for (const auto& request : sender_.untaken().all()) {
+    if (request.deadlineNs != 0) timer_.wakeAt(request.deadlineNs);
+  }
+}
+
+// Sends the requests that no server has taken, as far as the present server has room for them.
+void Binding::sendUntaken() {
+  while (!sender_.untaken().isEmpty()) {
+    const auto result = sender_.trySendUntaken();
+    if (result == SendResult::sent) continue;
+    if (result != SendResult::tooLarge) return timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
+    const auto isFirst = [](const UntakenRequest&) { return true; };
+    deliverFate(*sender_.takeUntaken(isFirst), Fate::neverTaken);
+  }
 }
 
 // A faulty process may overwrite hints in shared memory. While a reply is outstanding, this rings

@@ -34,8 +34,9 @@ class Binding : public std::enable_shared_from_this<Binding> {
 
   // --- any thread ---
   // As RequestSender::send().
-  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept {
-    return sender_.send(message, takeBefore, requestId);
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+                  Retry retry = Retry::never) noexcept {
+    return sender_.send(message, takeBefore, requestId, retry);
   }
   BodyBytes allocate(std::size_t bytes) { return sender_.allocate(bytes); }
   [[nodiscard]] bool isConnected() const noexcept { return state() == BindingState::connected; }
@@ -108,12 +109,15 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);
+  void deliverFate(const UntakenRequest& request, Fate fate);
   void postFullReport();
   void resumeEnd();
   void endAll();
   void deliverRemaining(const MessageLink* ended);
   void lookForServer(Ending ending);
+  void sendUntaken();
   void expire(std::int64_t nowNs);
+  void expireUntaken(std::int64_t nowNs);
   void nudge(std::int64_t nowNs);
 
   DispatcherParts& parts_;

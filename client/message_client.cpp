@@ -58,11 +58,11 @@ void MessageClient::bind(const std::string& server, std::int32_t location) {
   dispatcher_->commands().runOrPost([binding = binding_] { binding->tryConnect(); });
 }
 
-SendResult MessageClient::send(Message&& message, Deadline takeBefore,
-                               std::uint32_t* requestId) noexcept {
+SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint32_t* requestId,
+                               Retry retry) noexcept {
   if (isInherited()) return SendResult::notConnected;
   std::uint32_t id = 0;
-  const auto result = binding_->send(message, takeBefore, id);
+  const auto result = binding_->send(message, takeBefore, id, retry);
   if (requestId != nullptr && result == SendResult::sent) *requestId = id;
   return result;
 }

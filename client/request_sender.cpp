@@ -26,67 +26,112 @@ SendResult resultOf(LinkSend sent) noexcept {
   return SendResult::noMemory;
 }
 
+std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
+  return std::make_unique<Message>(message.duplicate());
+} catch (const std::bad_alloc&) {
+  return {};
+}
+
 }  // namespace
 
-SendResult RequestSender::send(Message& message, Deadline takeBefore,
-                               std::uint32_t& requestId) noexcept {
+SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+                               Retry retry) noexcept {
   if (!message) return SendResult::empty;
-  bool startsNudging = false;
+  std::unique_ptr<Message> copy;
+  if (retry == Retry::neverTaken && !(copy = tryCopy(message))) return SendResult::noMemory;
+  Attempt attempt{message, takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1),
+                  requestId, copy};
   {
     const std::lock_guard lock(*lock_);
-    const auto result = trySendLocked(message, takeBefore, requestId, startsNudging);
+    const auto result = untaken_.isEmpty() ? trySendLocked(attempt) : refuseBehindUntaken();
     if (result != SendResult::sent) return result;
   }
-  message.reset();
-  MPF_STEP(request_sent);
-  if (startsNudging) timer_.wakeAt(Clock::nowNs() + NudgeInterval::kFirstNs);
-  if (!takeBefore.isNever()) timer_.wakeAt(takeBefore.ns());
+  requestId = attempt.id;
+  onSent(attempt);
   return SendResult::sent;
 }
 
-// After a successful send, the caller resets `message` without the lock.
-SendResult RequestSender::trySendLocked(Message& message, Deadline takeBefore,
-                                        std::uint32_t& requestId, bool& startsNudging) noexcept {
+// Without the lock.
+void RequestSender::onSent(const Attempt& attempt) noexcept {
+  attempt.message.reset();
+  MPF_STEP(request_sent);
+  if (attempt.startsNudging) timer_.wakeAt(Clock::nowNs() + NudgeInterval::kFirstNs);
+  if (attempt.deadlineNs != 0) timer_.wakeAt(attempt.deadlineNs);
+}
+
+SendResult RequestSender::refuseBehindUntaken() noexcept {
+  if (state_.load(std::memory_order_relaxed) != BindingState::connected)
+    return SendResult::notConnected;
+  noteFull();
+  return SendResult::queueFull;
+}
+
+// After a successful send, the caller calls onSent().
+SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
   if (state_.load(std::memory_order_relaxed) != BindingState::connected)
     return SendResult::notConnected;
   auto& link = channel_->link();
-  std::uint32_t id = requestId;
-  auto* request = requests_->tryReserve(id);
+  auto* request = requests_->tryReserve(attempt.id);
   if (request == nullptr) {
     count(link.control().clientRefused);
     noteFull();
     return SendResult::tooManyOutstanding;
   }
+  const auto& message = attempt.message;
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
-  envelope.requestId = id;
+  envelope.requestId = attempt.id;
   envelope.clientType = message.getClientType();
   envelope.clientExtra = message.getClientExtra();
-  envelope.deadlineNs = takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
+  envelope.deadlineNs = attempt.deadlineNs;
   request->clientType = envelope.clientType;
   request->clientExtra = envelope.clientExtra;
   request->ordinal = link.outgoing().messages() + 1;
   request->deadlineNs = envelope.deadlineNs;
   request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
+  request->copy = std::move(attempt.copy);
   if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
   // Added before the message is sent, because the dispatcher may receive the reply before
   // trySendLocked() of the channel returns.
-  requests_->add(*request, id);
+  requests_->add(*request, attempt.id);
   MPF_STEP(request_added);
   const auto result =
-      resultOf(channel_->trySendLocked(envelope, message, {link.header().queueSize, 0, 0}));
+      resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0, 0}));
   if (result != SendResult::sent) {
-    requests_->takeBack(*request);
+    attempt.copy = requests_->takeBack(*request);
     count(link.control().clientRefused);
     if (result == SendResult::queueFull) noteFull();
     return result;
   }
   isFullReported_ = false;
-  startsNudging = !std::exchange(isNudging_, true);
+  attempt.startsNudging = !std::exchange(isNudging_, true);
   link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
   link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
-  requestId = id;
   return result;
+}
+
+bool RequestSender::tryKeep(Request& request) {
+  if (!request.copy || request.isGivenUp) return false;
+  {
+    const std::lock_guard lock(*lock_);
+    untaken_.add(request);
+  }
+  requests_->end(request);
+  return true;
+}
+
+SendResult RequestSender::trySendUntaken() {
+  auto message = untaken_.front().message->duplicate();
+  auto& next = untaken_.front();
+  Attempt attempt{message, next.deadlineNs, next.id, next.message};
+  {
+    const std::lock_guard lock(*lock_);
+    const auto result = trySendLocked(attempt);
+    if (result != SendResult::sent) return result;
+    untaken_.removeFront();
+  }
+  onSent(attempt);
+  return SendResult::sent;
 }
 
 // Counts each refusal, and reports a series of them once, in its place among the other messages.

@@ -16,6 +16,7 @@
 #include "client/binding_timer.h"
 #include "client/nudge_interval.h"
 #include "client/request_table.h"
+#include "client/untaken_requests.h"
 #include "shm/messages/message_link.h"
 
 namespace mpf {
@@ -34,7 +35,9 @@ class RequestSender {
         postFullReport_(std::move(postFullReport)) {}
 
   //   requestId   in: the id for the request, or 0 for a new one; out: its id when it was sent
-  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId) noexcept;
+  //   retry       as MessageClient::send()
+  SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+                  Retry retry) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   [[nodiscard]] const std::shared_ptr<SpinLock>& lock() const noexcept { return lock_; }
@@ -50,12 +53,31 @@ class RequestSender {
   // nullptr before the first open().
   [[nodiscard]] const std::shared_ptr<RequestTable>& requests() const noexcept { return requests_; }
   [[nodiscard]] bool isTaken(const Request& request) const noexcept;
+  // Keeps a request that no server has taken, if it has a copy: the request ends in the table, and
+  // trySendUntaken() sends it. Returns false when it has none.
+  [[nodiscard]] bool tryKeep(Request& request);
+  // Sends the first request that was kept; it is kept until the result is `sent`.
+  [[nodiscard]] SendResult trySendUntaken();
+  [[nodiscard]] const UntakenRequests& untaken() const noexcept { return untaken_; }
+  template <class Predicate>
+  std::optional<UntakenRequest> takeUntaken(Predicate&& isWanted) {
+    const std::lock_guard lock(*lock_);
+    return untaken_.take(std::forward<Predicate>(isWanted));
+  }
   // Returns true when no reply is outstanding; the next send() then starts the nudging again.
   bool tryEndNudging() noexcept;
 
  private:
-  SendResult trySendLocked(Message& message, Deadline takeBefore, std::uint32_t& requestId,
-                           bool& startsNudging) noexcept;
+  struct Attempt {
+    Message& message;
+    std::int64_t deadlineNs;
+    std::uint32_t id;  // in: 0 for a new one
+    std::unique_ptr<Message>& copy;  // moved from when the request is sent
+    bool startsNudging = false;
+  };
+  SendResult trySendLocked(Attempt& attempt) noexcept;
+  void onSent(const Attempt& attempt) noexcept;
+  SendResult refuseBehindUntaken() noexcept;
   void noteFull() noexcept;
 
   const std::atomic<BindingState>& state_;
@@ -65,6 +87,7 @@ class RequestSender {
   std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
   std::shared_ptr<MessageLink> channel_;  // written by the dispatcher's thread under lock_
   std::shared_ptr<RequestTable> requests_;  // likewise
+  UntakenRequests untaken_;
   bool isFullReported_ = false;  // under lock_: the present series of refusals has been reported
   bool isNudging_ = false;  // under lock_: a time for the next nudge is set
 };

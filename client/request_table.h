@@ -15,6 +15,8 @@
 #include <memory>
 #include <utility>
 
+#include <mpf/message.h>
+
 namespace mpf {
 
 struct Request {
@@ -25,6 +27,7 @@ struct Request {
   std::int64_t deadlineNs = 0;
   std::int64_t sentNs = 0;  // of a timed request; else 0
   bool isGivenUp = false;  // used by the dispatcher's thread only
+  std::unique_ptr<Message> copy{};  // to be sent again if no server takes the request; else null
 };
 
 class RequestTable {
@@ -69,10 +72,12 @@ class RequestTable {
     request.id.store(id, std::memory_order_release);
   }
 
-  // Undoes add() when the message could not be sent.
-  void takeBack(Request& request) noexcept {
+  // Undoes add() when the message could not be sent. Returns the copy.
+  std::unique_ptr<Message> takeBack(Request& request) noexcept {
+    auto copy = std::move(request.copy);
     added_.store(added_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
     request.id.store(0, std::memory_order_relaxed);
+    return copy;
   }
 
   // Returns the entry of an outstanding request, or nullptr.
@@ -88,6 +93,7 @@ class RequestTable {
   void end(Request& request) noexcept {
     if (std::exchange(request.isGivenUp, false))
       givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
+    request.copy.reset();
     ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     // PAIR(request-ended): this thread no longer uses the entry.
     request.id.store(0, std::memory_order_release);

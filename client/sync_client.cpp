@@ -46,26 +46,23 @@ bool SyncClient::connectWait(Nanoseconds timeout) {
   return client_.isConnected();
 }
 
-Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
-  const auto deadline = Deadline::after(timeout);
-  if (retry == Retry::never) return callOnce(std::move(message), deadline);
+// Connects if necessary, and sets awaited_ when the result is `sent`.
+SendResult SyncClient::send(Message&& message, Deadline deadline, Retry retry) {
   for (;;) {
-    auto answer = callOnce(message.duplicate(), deadline);
+    if (!client_.isConnected() && !connectWait(deadline.left())) return SendResult::notConnected;
+    // send() may write awaited_ before the reply is handled: only this thread delivers replies.
+    const auto result = client_.send(std::move(message), deadline, &awaited_, retry);
     // The server may stop between the connection and the sending.
-    const auto isUndone =
-        answer.fate() == Fate::neverTaken || answer.refusal() == SendResult::notConnected;
-    if (!isUndone || deadline.hasPassed()) return answer;
+    if (result != SendResult::notConnected || retry == Retry::never || deadline.hasPassed())
+      return result;
   }
 }
 
-Answer SyncClient::callOnce(Message&& message, Deadline deadline) {
-  if (!client_.isConnected() && !connectWait(deadline.left()))
-    return Answer(SendResult::notConnected);
+Answer SyncClient::call(Message&& message, Nanoseconds timeout, Retry retry) {
+  const auto deadline = Deadline::after(timeout);
   answer_.reset();
-  // send() may write awaited_ before the reply is handled: only this thread delivers replies.
-  if (const auto result = client_.send(std::move(message), deadline, &awaited_);
-      result != SendResult::sent) {
-    awaited_ = 0;
+  awaited_ = 0;
+  if (const auto result = send(std::move(message), deadline, retry); result != SendResult::sent) {
     // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
     if (result == SendResult::tooLarge)
       return Answer(result, limitExceeded(message, client_.maxMessageBytes()));

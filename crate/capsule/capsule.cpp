@@ -18,6 +18,7 @@
 
 #include "base/printable.h"
 #include "base/system_call.h"
+#include "crate/capsule/core_file.h"
 #include "crate/capsule/link_record.h"
 #include "schema/text.h"
 #include "shm/handling.h"
@@ -132,7 +133,6 @@ Tree describe(const Cause& cause) {
   tree["signal"] = cause.number;
   tree["name"] =
       name == nullptr ? fmt::format("signal {}", cause.number) : fmt::format("SIG{}", name);
-  if (cause.signalCode) tree["code"] = *cause.signalCode;
   return tree;
 }
 
@@ -173,10 +173,8 @@ const char* toString(CauseKind kind) noexcept {
 }
 
 Cause Cause::ofWaitStatus(int status) noexcept {
-  if (WIFSIGNALED(status))
-    return {.kind = CauseKind::signal, .number = WTERMSIG(status), .signalCode = {}};
-  if (WIFEXITED(status))
-    return {.kind = CauseKind::exit, .number = WEXITSTATUS(status), .signalCode = {}};
+  if (WIFSIGNALED(status)) return {CauseKind::signal, WTERMSIG(status), WCOREDUMP(status) != 0};
+  if (WIFEXITED(status)) return {.kind = CauseKind::exit, .number = WEXITSTATUS(status)};
   return {};
 }
 
@@ -192,7 +190,9 @@ nlohmann::ordered_json capsuleOf(const Death& death, const WitnessedProcess* wit
             {"pid", death.pid},
             {"upNs", std::max<std::int64_t>(0, Clock::nowNs() - death.startedNs)},
             {"restarts", death.restarts},
-            {"cause", describe(death.cause)}};
+            {"cause", describe(death.cause)},
+            {"core", nullptr}};
+  if (death.cause.hasCore) tree["core"] = describeCore({death.pid, death.folder}, limits.coreTime);
   auto servers = Tree::array();
   if (witnessed != nullptr) {
     for (const auto& [incarnation, window] : witnessed->windows) {

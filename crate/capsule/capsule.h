@@ -6,19 +6,19 @@
 //   log of process ─┘
 //
 // The document has "mpfCapsule", the version of its format; when, host, crate, process, cause, the
-// end of the log, and for each server: counters, latencies, the request in work ("handling"), and
-// its links with their last messages.
+// stacks of its core, the end of the log, and for each server: counters, latencies, the request in
+// work ("handling"), and its links with their last messages.
 //
-// Threads  one.
+// Threads  one, and no other in the process: see core_file.h.
 // Trust    segments and files of capsules may contain anything. A capsule that is damaged is an
 //          error that names the file and the problem.
 #pragma once
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstdint>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,7 +34,7 @@ enum class CauseKind { signal, exit, stalled, restarted, unknown };
 struct Cause {
   CauseKind kind = CauseKind::unknown;
   int number = 0;  // signal or exit status
-  std::optional<int> signalCode{};  // si_code, if it is known
+  bool hasCore = false;
   // From the status of waitpid().
   [[nodiscard]] static Cause ofWaitStatus(int status) noexcept;
 };
@@ -49,12 +49,14 @@ struct Death {
   int restarts = 0;
   Cause cause;
   std::string log;  // path; empty: none
+  std::string folder;  // in which it ran
 };
 
 struct CapsuleLimits {
   std::size_t messages = 16;  // of each ring
   std::size_t allMessages = 4096;  // of a server: with many links, each shows fewer, at least one
   std::size_t logBytes = std::size_t{64} << 10;
+  std::chrono::milliseconds coreTime{3000};  // longest time for reading a core
 };
 
 // `witnessed` is nullptr when the process had no witness. Never throws because of invalid segments

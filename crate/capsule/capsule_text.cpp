@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "crate/capsule/capsule_text.h"
 
+#include <signal.h>
+
+#include <cstdint>
 #include <fmt/format.h>
+#include <utility>
 
 #include "base/duration_text.h"
 #include "base/printable.h"
@@ -132,6 +136,45 @@ std::string serverText(const Tree& server) {
   return all + linksText(at(server, "links"));
 }
 
+// Why the kernel sent the signal; empty when it is not known.
+std::string reasonText(const Tree& cause, const Tree& core) {
+  if (!at(core, "code").is_number_integer() || !at(cause, "signal").is_number_integer()) return {};
+  const auto code = at(core, "code").get<int>();
+  if (code <= 0) return " sent by a process";
+  const auto& address = at(core, "address");
+  const auto where =
+      address.is_number_unsigned() ? fmt::format(" 0x{:x}", address.get<std::uint64_t>()) : "";
+  const auto signal = at(cause, "signal").get<int>();
+  if (signal == SIGSEGV && code == SEGV_MAPERR) return ": nothing is mapped at" + where;
+  if (signal == SIGSEGV && code == SEGV_ACCERR) return ": no right to access" + where;
+  if (signal == SIGBUS && code == BUS_ADRERR) return ": no memory behind" + where;
+  return fmt::format(": code {} at{}", code, where);
+}
+
+std::string frameText(const Tree& frame) {
+  const auto& address = at(frame, "address");
+  auto all =
+      at(frame, "function").is_null()
+          ? fmt::format("0x{:x}", address.is_number_unsigned() ? address.get<std::uint64_t>() : 0)
+          : text(frame, "function");
+  if (!at(frame, "at").is_null()) return all + "  " + text(frame, "at");
+  return at(frame, "module").is_null() ? all : all + "  in " + text(frame, "module");
+}
+
+std::string coreText(const Tree& capsule) {
+  const auto& core = at(capsule, "core");
+  if (!core.is_object()) return {};
+  if (isTrouble(core)) return fmt::format("\ncore: {}\n", text(core, "problem"));
+  const auto& cause = at(capsule, "cause");
+  auto all = fmt::format("\ncore {}\n", text(core, "file"));
+  auto reason = fmt::format(", which received {}{}", text(cause, "name"), reasonText(cause, core));
+  for (const auto& thread : at(core, "threads")) {
+    all += fmt::format("  thread {}{}\n", text(thread, "tid"), std::exchange(reason, {}));
+    for (const auto& frame : at(thread, "frames")) all += "    " + frameText(frame) + '\n';
+  }
+  return all;
+}
+
 std::string logText(const Tree& log) {
   if (!log.is_object()) return {};
   if (isTrouble(log)) return fmt::format("\nlog {}: {}\n", text(log, "file"), text(log, "problem"));
@@ -158,6 +201,7 @@ std::string capsuleText(const Tree& capsule) {
       "  command {}\n",
       text(capsule, "at"), text(capsule, "host"), text(capsule, "pid"), text(capsule, "crate"),
       text(capsule, "restarts"), command);
+  all += coreText(capsule);
   for (const auto& server : at(capsule, "servers")) all += serverText(server);
   return all + logText(at(capsule, "log"));
 }

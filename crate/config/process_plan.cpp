@@ -5,9 +5,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
+#include <functional>
+#include <ranges>
 #include <set>
 
 #include "base/program_beside.h"
+#include "base/whole_file.h"
 #include "crate/config/program_kinds.h"
 
 namespace mpf::crate {
@@ -81,6 +84,23 @@ std::vector<std::string> commandOf(const Crate& crate, const Process& process,
   return command;
 }
 
+// The arguments that name files: "file", "--option=file".
+std::map<std::string, std::size_t> inputsOf(const ProcessPlan& plan) {
+  std::map<std::string, std::size_t> inputs;
+  for (const auto& word : plan.command | std::views::drop(1)) {
+    const auto name = word.starts_with("--") ? word.substr(word.find('=') + 1) : word;
+    const auto path = std::filesystem::path(plan.workingFolder) / name;
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) continue;
+    try {
+      inputs[name] = std::hash<std::string>()(readWholeFile(path));
+    } catch (const std::system_error&) {
+      inputs[name] = 0;  // the process itself will report it
+    }
+  }
+  return inputs;
+}
+
 ProcessPlan planOf(const Crate& crate, const Process& process, const std::string& runFolder) {
   ProcessPlan plan;
   plan.name = process.name;
@@ -93,6 +113,8 @@ ProcessPlan planOf(const Crate& crate, const Process& process, const std::string
   plan.user = process.user.empty() ? crate.user : process.user;
   const auto folder = std::filesystem::path(crate.file).parent_path();
   plan.workingFolder = (folder / process.workingFolder).lexically_normal().string();
+  const auto* const kind = findKind(process.kind);
+  if (kind != nullptr && kind->entry != Entry::server) plan.inputs = inputsOf(plan);
   plan.servers = serversOf(process);
   plan.notifies = process.notifies;
   plan.needs = process.needs;

@@ -4,6 +4,8 @@
 // Threads  plain data.
 #pragma once
 
+#include <map>
+
 #include "crate/config/crate.h"
 
 namespace mpf::crate {
@@ -18,6 +20,9 @@ struct ProcessPlan {
   std::int32_t location = 0;
   std::vector<std::string> servers;  // must be bindable before the process is ready
   bool notifies = false;  // reports that it is ready
+  // The files that a router or an IOC reads at its start, with a number that changes with the
+  // content, so that a reload restarts it.
+  std::map<std::string, std::size_t> inputs;
   std::vector<std::string> needs;
   Restart restart = kRestart;
   std::chrono::milliseconds startTime = kStartTime;

@@ -2,6 +2,7 @@
 #include "crate/supervisor/last_words.h"
 
 #include <exception>
+#include <filesystem>
 
 #include "base/print_error.h"
 #include "crate/capsule/capsule.h"
@@ -50,6 +51,8 @@ std::string LastWords::collect(const Service& service, const ProcessEnd& end) tr
     death.restarts = service.restarts();
     death.cause = causeOf(service, end);
     death.log = folder_.log(plan.name);
+    death.folder =
+        plan.workingFolder.empty() ? std::filesystem::current_path().string() : plan.workingFolder;
     path = store_.add(capsuleOf(death, witness.find(service.pid())));
   }
   witness.forget(service.pid());

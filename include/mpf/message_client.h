@@ -45,6 +45,14 @@ enum class SendResult {
 // The result in words, for messages to people.
 [[nodiscard]] const char* toString(SendResult result) noexcept;
 
+// Which requests a client sends again by itself.
+enum class Retry {
+  never,
+  // Those whose fate would be neverTaken, for example because the server was stopped or replaced.
+  // They go to the next server of the name. No request is executed twice by it.
+  neverTaken
+};
+
 class MessageClient {
  public:
   // Owns the message that it receives.
@@ -74,8 +82,13 @@ class MessageClient {
   // waits.
   //   takeBefore  a request that the server has not received by then ends as `expired`
   //   requestId   out, unless null: the number of the request, for cancel() and in its fate
+  //   retry       with neverTaken, the client keeps a copy, made by duplicate(), until the request
+  //               ends. If no server receives the request, the client sends it again when it is
+  //               connected again, under the same number and with the same deadline. While such
+  //               requests wait, send() returns `queueFull`, so that requests keep their order
   [[nodiscard]] SendResult send(Message&& message, Deadline takeBefore = Deadline::never(),
-                                std::uint32_t* requestId = nullptr) noexcept;
+                                std::uint32_t* requestId = nullptr,
+                                Retry retry = Retry::never) noexcept;
 
   // Allocates an array message of n elements in the memory that is shared with the server, or on
   // the heap when there is no connection or the shared memory is full. Sending the former copies

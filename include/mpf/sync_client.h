@@ -56,14 +56,6 @@ class Answer {
   std::string details_;
 };
 
-// Which requests call() sends again, without an action of its caller.
-enum class Retry {
-  never,
-  // Those whose fate says that no server has received them, for example because the server was
-  // stopped or replaced. No request is executed twice by it.
-  neverTaken
-};
-
 class SyncClient {
  public:
   // Creates a client window in shared memory and binds to the server. call() and connectWait() make
@@ -78,9 +70,8 @@ class SyncClient {
   // limits all three together. After it, the answer is a refusal if the request was not sent, else
   // a fate: `expired` when the server had not received the request, `outcomeUnknown` when it had.
   //   message   unchanged when it was not sent
-  //   retry     with neverTaken, the request is sent again, to the next server of the name, until
-  //             `timeout`; each attempt sends a copy, made by duplicate(), and leaves `message`
-  //   throws    std::bad_alloc, with neverTaken only
+  //   retry     as MessageClient::send(): with neverTaken, the request goes to the next server of
+  //             the name, until `timeout`
   Answer call(Message&& message, Nanoseconds timeout, Retry retry = Retry::never);
   // Waits for a message that is not the first reply to a call: a further reply, for example of a
   // monitor, or an OutOfBand message. call() stores such messages until receive() returns them, in
@@ -93,7 +84,7 @@ class SyncClient {
   [[nodiscard]] MessageClient& client() noexcept { return client_; }
 
  private:
-  Answer callOnce(Message&& message, Deadline deadline);
+  SendResult send(Message&& message, Deadline deadline, Retry retry);
   void take(Message&& message);
   Dispatcher dispatcher_;
   MessageClient client_;

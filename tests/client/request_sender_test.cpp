@@ -24,7 +24,7 @@ class RequestSenderTest : public BindingPartsTest {
   }
   SendResult send(std::uint32_t id = 0) {
     Message message = Int32Message({.value = 1});
-    const auto result = sender_.send(message, Deadline::never(), id);
+    const auto result = sender_.send(message, Deadline::never(), id, Retry::never);
     EXPECT_EQ(static_cast<bool>(message), result != SendResult::sent);
     return result;
   }

@@ -5,6 +5,7 @@
 
 #include <sys/wait.h>
 
+#include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <optional>
@@ -52,7 +53,8 @@ class CrashTest : public testing::Test {
     if (reply.getType() == MessageType::int32) ++replies_;
   }
   void send(std::int32_t number, std::int32_t cmd = 0) {
-    ASSERT_EQ(client_->send(Int32Message({.cmd = cmd, .value = number})), SendResult::sent);
+    ASSERT_EQ(client_->send(Int32Message({.cmd = cmd, .address = 0x10, .value = number})),
+              SendResult::sent);
   }
   // Sends requests and waits for the reply to each.
   void exchange(int count) {
@@ -72,6 +74,7 @@ class CrashTest : public testing::Test {
     death.process = "victim";
     death.pid = pid_;
     death.cause = Cause::ofWaitStatus(waitStatus);
+    death.folder = std::filesystem::current_path();
     return capsuleOf(death, witness_.find(pid_));
   }
 

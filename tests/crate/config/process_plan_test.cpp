@@ -99,6 +99,20 @@ TEST_F(ProcessPlanTest, AProcessComesAfterThoseThatItNeeds) {
   EXPECT_EQ(plans[0].name + plans[1].name + plans[2].name, "cba");
 }
 
+// Otherwise a reload would not restart the IOC.
+TEST_F(ProcessPlanTest, AChangedFileOfAnIocChangesItsPlan) {
+  const std::string crate = "[[ioc]]\nstartup = \"st.cmd\"\ndatabase = [\"a.db\", \"none.db\"]\n";
+  folder_.write("a.db", "record(ai, \"a\") {}");
+  folder_.write("st.cmd", "iocInit");
+  const auto before = plan(crate);
+
+  EXPECT_EQ(before[0].inputs.size(), 2U);
+  folder_.write("a.db", "record(ai, \"a\") {}");
+  EXPECT_EQ(plan(crate), before) << "the same content";
+  folder_.write("a.db", "record(ai, \"b\") {}");
+  EXPECT_NE(plan(crate), before);
+}
+
 TEST(ShellText, QuotesWhatAShellWouldChange) {
   ProcessPlan plan;
   plan.environment = {{"A", "x y"}};
