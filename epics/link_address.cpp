@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "epics/gpib_links.h"
 #include "shm/segment_name.h"
 
 namespace mpf {
@@ -19,9 +20,21 @@ std::int32_t locationOf(std::string_view text) {
   return location;
 }
 
+LinkAddress ofGpib(const gpibio& link) {
+  const auto bus = GpibLinks::instance().find(link.link);
+  if (!bus) {
+    throw std::invalid_argument(
+        fmt::format("GPIB link {0} has no server; call HiDEOSGpibLinkConfig({0}, location, "
+                    "\"server\") before iocInit",
+                    link.link));
+  }
+  return {bus->server, bus->location, link.addr, link.parm};
+}
+
 }  // namespace
 
 LinkAddress LinkAddress::of(const DBLINK& link) {
+  if (link.type == GPIB_IO) return ofGpib(link.value.gpibio);
   LinkAddress address;
   std::string_view text;
   if (link.type == VME_IO) {
@@ -33,7 +46,7 @@ LinkAddress LinkAddress::of(const DBLINK& link) {
   } else {
     throw std::invalid_argument(
         "the link is neither \"#C<location> S<signal> @<server>\" nor "
-        "\"@<server> <parameters>\"");
+        "\"@<server> <parameters>\" nor \"#L<link> A<address> @<parameters>\"");
   }
   const auto end = text.find_first_of(", ");
   address.server = text.substr(0, end);

@@ -3,6 +3,7 @@
 //
 //   #C<location> S<signal> @<server>[,| ]<parameters>     VME_IO
 //   @<server>[:<location>][,| ]<parameters>               INST_IO; location 0 unless given
+//   #L<link> A<address> @<parameters>                     GPIB_IO; see gpib_links.h
 //
 // Source   manual, "MPF Device support": format of the INP or OUT field.
 #pragma once
@@ -16,7 +17,7 @@ namespace mpf {
 struct LinkAddress {
   std::string server;
   std::int32_t location = 0;
-  int signal = 0;
+  int signal = 0;  // or the GPIB address
   std::string parameters;
 
   //   throws  std::invalid_argument, which says what is wrong with the link

@@ -13,6 +13,7 @@
 #include <iocsh.h>
 #include <iterator>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@
 #include "base/system_call.h"
 #include "epics/commands/child_program.h"
 #include "epics/commands/router_processes.h"
+#include "epics/gpib_links.h"
 
 namespace mpf {
 namespace {
@@ -73,6 +75,14 @@ void connectRouter(const iocshArgBuf* values) {
   RouterProcesses::instance().connect(location, fmt::format("{}:{}", host, port), options);
 }
 
+// HiDEOSGpibLinkConfig(link, location, "server")
+void configureGpibLink(const iocshArgBuf* values) try {
+  GpibLinks::instance().add(values[0].ival, {values[1].ival, textOf(values[2].sval)});
+} catch (const std::invalid_argument& error) {
+  errlogPrintf("HiDEOSGpibLinkConfig: %s\n", error.what());
+  iocshSetError(-1);
+}
+
 iocshArg anything{"arguments", iocshArgArgv};
 iocshArg location{"location", iocshArgInt};
 iocshArg port{"port", iocshArgInt};
@@ -81,9 +91,13 @@ iocshArg bufferSize{"bufSize (ignored)", iocshArgInt};
 iocshArg queueSize{"queueSize (ignored)", iocshArgInt};
 iocshArg options{"options of mpf-router (default: --plain)", iocshArgString};
 
+iocshArg gpibLink{"GPIB link", iocshArgInt};
+iocshArg gpibServer{"server", iocshArgString};
+
 const iocshArg* const kAnything[] = {&anything};
 const iocshArg* const kLocation[] = {&location};
 const iocshArg* const kRemote[] = {&location, &port, &address, &bufferSize, &queueSize, &options};
+const iocshArg* const kGpibLink[] = {&gpibLink, &location, &gpibServer};
 
 const iocshFuncDef kMpf{"mpf", 1, kAnything, "Runs a command of `mpf`, such as: mpf ls\n"};
 const iocshFuncDef kMrr{"mrr", 1, kAnything, "Message router report; as `mpf mrr`.\n"};
@@ -96,6 +110,9 @@ const iocshFuncDef kLocalRouter{
 const iocshFuncDef kRemoteRouter{
     "tcpMessageRouterClientStart", 6, kRemote,
     "Starts a router: clients of this host reach the servers of the other host at `location`.\n"};
+const iocshFuncDef kGpibLinkConfig{
+    "HiDEOSGpibLinkConfig", 3, kGpibLink,
+    "GPIB links \"#L<link> A<address>\" of records reach the GPIB server at the location.\n"};
 
 void registerCommands() {
   iocshRegister(&kMpf, [](const iocshArgBuf* values) { runMpf(argumentsOf(values, {})); });
@@ -104,6 +121,7 @@ void registerCommands() {
   iocshRegister(&kRouterInit, [](const iocshArgBuf*) {});
   iocshRegister(&kLocalRouter, [](const iocshArgBuf*) {});
   iocshRegister(&kRemoteRouter, connectRouter);
+  iocshRegister(&kGpibLinkConfig, configureGpibLink);
 }
 
 }  // namespace

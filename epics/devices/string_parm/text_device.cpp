@@ -20,6 +20,7 @@ long TextDevice::sendText(const TextRequest& request) {
   std::copy(request.text.begin(), request.text.end(), message.value().begin());
   message->cmd = request.cmd;
   message->extra = request.maxBytes;
+  message->address = request.address;
   // Whole seconds are sent as seconds, which every server understands.
   const auto milliseconds = request.timeout.count();
   const bool isSeconds = milliseconds % 1000 == 0;

@@ -21,6 +21,7 @@ struct TextRequest {
   std::string_view text = {};                    // bytes to write
   std::chrono::milliseconds timeout{5000};       // longest wait for the line
   std::int32_t maxBytes = 0;                     // > 0: the answer ends after so many bytes
+  std::int32_t address = 0;                      // of the instrument, for a GPIB server
   std::optional<std::string_view> eom = {};      // new end of message of the server
 };
 
