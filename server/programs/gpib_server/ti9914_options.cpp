@@ -83,7 +83,9 @@ std::unique_ptr<GpibController> openTi9914(const Ti9914Options& options, const T
   if (start.vector) hardware.modules().takeVector(*start.vector, *module);
   hardware.logPriority(log);
   return std::make_unique<Ti9914Controller>(
-      *module, Ti9914Chip::Options{.vector = start.vector.value_or(0)});
+      *module,
+      Ti9914Chip::Options{.vector = start.vector.value_or(0),
+                          .onAlarm = [&log](const std::string& what) { log->warn("{}", what); }});
 }
 
 }  // namespace mpf
