@@ -3,8 +3,8 @@
 //
 //   manual   T_?V
 //            R-8.874270409E-01 0x0d 0x0a
-//            A line for each direction, as in the manual ("gpibSniff"): _ is UNT, ? is UNL, V is the
-//            talk address of instrument 22. Bytes that are no printable ASCII are hexadecimal.
+//            A line for each direction, as in the manual ("gpibSniff"): _ is UNT, ? is UNL, V is
+//            the talk address of instrument 22. Bytes that are not printable are hexadecimal.
 //   decode   14:03:27.120   +0.0 ms  T  UNT, UNL, TAG 22
 //            14:03:27.121   +0.8 ms  R  "-8.874270409E-01\r\n", EOI
 //            A line for each sequence of commands, and for data of one direction up to EOI or a

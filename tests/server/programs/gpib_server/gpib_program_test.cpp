@@ -81,7 +81,9 @@ TEST_F(GpibProgramTest, SniffingShowsTheListingOfTheManual) {
   while (auto message = listener.receive(0s)) {
     const auto reply = Char8ArrayMessage::tryFrom(std::move(message));
     ASSERT_TRUE(reply);
-    for (const auto& record : tryReadRecords(*reply).value()) {
+    const auto records = tryReadRecords(*reply);
+    ASSERT_TRUE(records);
+    for (const auto& record : *records) {
       if (record.has(SniffRecord::kAttention)) shown += '^';
       shown += static_cast<char>(record.value);
       if (record.has(SniffRecord::kEnd)) shown += '!';
@@ -91,12 +93,24 @@ TEST_F(GpibProgramTest, SniffingShowsTheListingOfTheManual) {
 }
 
 TEST_F(GpibProgramTest, AMissingControllerEndsItWithTheReason) {
-  Program server({MPF_TEST_GPIB_SERVER, "GPIB0", "nowhere", "--backplane", backplane_.name()});
+  const std::string missing = "/nowhere/tty";
+  for (const auto& [module, exit] :
+       {std::pair(std::string("unknown"), 2), std::pair("prologix:" + missing, 1)}) {
+    Program server({MPF_TEST_GPIB_SERVER, "GPIB0", module, "--backplane", backplane_.name()});
 
-  const int status = server.wait();
+    const int status = server.wait();
 
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << status;
-  EXPECT_THAT(server.errors(), HasSubstr("nowhere"));
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == exit) << module << ": " << status;
+    EXPECT_THAT(server.errors(), HasSubstr(module == "unknown" ? module : missing));
+  }
+}
+
+TEST_F(GpibProgramTest, WithWaitItWaitsForTheControllerUntilSigterm) {
+  Program server({MPF_TEST_GPIB_SERVER, "GPIB0", "prologix:/nowhere/tty", "--wait", "--backplane",
+                  backplane_.name()});
+  EXPECT_THAT(server.waitForLine("waiting for the controller"), HasSubstr("/nowhere/tty"));
+
+  EXPECT_EQ(server.end(SIGTERM), 0);
 }
 
 }  // namespace
