@@ -12,14 +12,14 @@
 namespace mpf::tools {
 namespace {
 
-using gpib::SniffRecord;
+using GpibRecord = gpib::SniffRecord;
 
-char letter(const SniffRecord& record) { return record.has(SniffRecord::kReceived) ? 'R' : 'T'; }
+char letter(const GpibRecord& record) { return record.has(GpibRecord::kReceived) ? 'R' : 'T'; }
 
 // Begins with a line of received bytes, as the original did.
 class ManualLines final : public GpibSniffFormat {
  public:
-  std::string add(const SniffRecord& record) override {
+  std::string add(const GpibRecord& record) override {
     auto text = turnTo(letter(record));
     const bool isPrintable = record.value >= 0x20 && record.value < 0x7f;
     text += isPrintable ? std::string(1, static_cast<char>(record.value))
@@ -56,8 +56,8 @@ class DecodedLines final : public GpibSniffFormat {
  public:
   explicit DecodedLines(std::int64_t realtimeOffsetNs) : time_(realtimeOffsetNs) {}
 
-  std::string add(const SniffRecord& record) override {
-    const bool isCommand = record.has(SniffRecord::kAttention);
+  std::string add(const GpibRecord& record) override {
+    const bool isCommand = record.has(GpibRecord::kAttention);
     std::string text;
     if (isOpen_ &&
         (isCommand != isCommand_ || letter(record) != direction_ || bytes_.size() >= kMostBytes))
@@ -69,7 +69,7 @@ class DecodedLines final : public GpibSniffFormat {
     } else {
       bytes_ += static_cast<char>(record.value);
     }
-    return record.has(SniffRecord::kEnd) ? text + close(", EOI") : text;
+    return record.has(GpibRecord::kEnd) ? text + close(", EOI") : text;
   }
   std::string missing(std::uint64_t bytes) override {
     return flush() + fmt::format("({} missing)\n", counted(bytes, "byte"));
@@ -79,9 +79,9 @@ class DecodedLines final : public GpibSniffFormat {
  private:
   static constexpr std::size_t kMostBytes = 80;
 
-  void begin(const SniffRecord& record) {
+  void begin(const GpibRecord& record) {
     isOpen_ = true;
-    isCommand_ = record.has(SniffRecord::kAttention);
+    isCommand_ = record.has(GpibRecord::kAttention);
     direction_ = letter(record);
     startNs_ = record.atNs;
     commands_.clear();
@@ -104,11 +104,11 @@ class DecodedLines final : public GpibSniffFormat {
 
 class JsonObjects final : public GpibSniffFormat {
  public:
-  std::string add(const SniffRecord& record) override {
+  std::string add(const GpibRecord& record) override {
     return fmt::format(
         "{{\"at_ns\": {}, \"direction\": \"{}\", \"atn\": {}, \"eoi\": {}, \"value\": {}}}\n",
-        record.atNs, letter(record), record.has(SniffRecord::kAttention),
-        record.has(SniffRecord::kEnd), record.value);
+        record.atNs, letter(record), record.has(GpibRecord::kAttention),
+        record.has(GpibRecord::kEnd), record.value);
   }
   std::string missing(std::uint64_t bytes) override {
     return fmt::format("{{\"missing\": {}}}\n", bytes);

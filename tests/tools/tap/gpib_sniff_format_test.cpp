@@ -10,11 +10,11 @@
 namespace mpf::tools {
 namespace {
 
-using gpib::SniffRecord;
+using GpibRecord = gpib::SniffRecord;
 
 constexpr std::uint8_t kSent = 0;
-constexpr std::uint8_t kCommand = SniffRecord::kAttention;
-constexpr std::uint8_t kReceived = SniffRecord::kReceived;
+constexpr std::uint8_t kCommand = GpibRecord::kAttention;
+constexpr std::uint8_t kReceived = GpibRecord::kReceived;
 
 class GpibSniffFormatTest : public testing::Test {
  protected:
@@ -28,7 +28,7 @@ class GpibSniffFormatTest : public testing::Test {
     std::string text;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       const bool isEnd = withEnd && i + 1 == bytes.size();
-      const auto all = static_cast<std::uint8_t>(flags | (isEnd ? SniffRecord::kEnd : 0));
+      const auto all = static_cast<std::uint8_t>(flags | (isEnd ? GpibRecord::kEnd : 0));
       text += format.add({atNs, all, static_cast<std::uint8_t>(bytes[i])});
     }
     return text;
