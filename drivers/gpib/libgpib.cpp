@@ -9,7 +9,7 @@ namespace mpf {
 namespace {
 
 template <class Function>
-void find(void* handle, const std::string& library, const char* name, Function*& function) {
+void findFunction(void* handle, const std::string& library, const char* name, Function*& function) {
   function = reinterpret_cast<Function*>(::dlsym(handle, name));
   if (function == nullptr)
     throw std::runtime_error(fmt::format(
@@ -26,7 +26,7 @@ LibGpib::LibGpib(const std::string& library) : handle_(::dlopen(library.c_str(),
         "load {}: {}; install the library of Linux GPIB, or use another kind of controller",
         library, ::dlerror()));
   const auto load = [&](const char* name, auto*& function) {
-    find(handle_.get(), library, name, function);
+    findFunction(handle_.get(), library, name, function);
   };
   load("ibask", ask);
   load("ibcmd", command);

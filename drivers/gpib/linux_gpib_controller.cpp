@@ -20,7 +20,7 @@ using std::chrono_literals::operator""ms;
 using std::chrono_literals::operator""s;
 
 constexpr int kBoards = 16;
-constexpr long kBytesOfRead = 64 << 10;
+constexpr long kBytesOfCall = 64 << 10;
 
 // The time for the commands that end an operation; not counted, because they end a failure, too.
 constexpr Nanoseconds kTimeToEnd = 10ms;
@@ -45,7 +45,8 @@ int codeNotAfter(Deadline deadline) {
   return kFirstCode + static_cast<int>(index);
 }
 
-void append(std::vector<std::uint8_t>& commands, std::uint8_t base, const GpibAddress& address) {
+void appendAddress(std::vector<std::uint8_t>& commands, std::uint8_t base,
+                   const GpibAddress& address) {
   commands.push_back(base + address.primary);
   if (address.secondary) commands.push_back(gpib_command::kSecondary + *address.secondary);
 }
@@ -71,7 +72,7 @@ GpibResult LinuxGpibController::write(const GpibAddress& to, Bytes data, bool se
   auto result = addBoard(gpib_command::kTalk, commands);
   if (!result.ok()) return result;
   commands.push_back(gpib_command::kUnlisten);
-  append(commands, gpib_command::kListen, to);
+  appendAddress(commands, gpib_command::kListen, to);
   result = sendCommands(commands, deadline);
   if (result.ok()) result = transmit(data, sendEnd, deadline);
   unaddress(result);
@@ -97,7 +98,7 @@ GpibReadResult LinuxGpibController::read(const GpibAddress& from, const GpibRead
   Commands commands{gpib_command::kUnlisten};
   static_cast<GpibResult&>(result) = addBoard(gpib_command::kListen, commands);
   if (!result.ok()) return result;
-  append(commands, gpib_command::kTalk, from);
+  appendAddress(commands, gpib_command::kTalk, from);
   static_cast<GpibResult&>(result) = sendCommands(commands, deadline);
   if (result.ok()) result = receive(limits, deadline);
   unaddress(result);
@@ -108,7 +109,7 @@ GpibReadResult LinuxGpibController::receive(const GpibReadLimits& limits, Deadli
   GpibReadResult result;
   const auto stopAt = limits.endOfString;
   library_.setEndOfString(board_, stopAt ? LibGpib::kStopAtByte | *stopAt : 0);
-  std::vector<std::uint8_t> bytes(std::min<std::size_t>(limits.maxBytes, kBytesOfRead));
+  std::vector<std::uint8_t> bytes(std::min<std::size_t>(limits.maxBytes, kBytesOfCall));
   for (;;) {
     const auto wanted = std::min(bytes.size(), limits.maxBytes - result.data.size());
     library_.setTimeout(board_, codeNotAfter(deadline));
@@ -146,7 +147,7 @@ GpibPollResult LinuxGpibController::serialPoll(const GpibAddress& at, Deadline d
   Commands commands{gpib_command::kUnlisten, gpib_command::kSerialPollEnable};
   static_cast<GpibResult&>(result) = addBoard(gpib_command::kListen, commands);
   if (!result.ok()) return result;
-  append(commands, gpib_command::kTalk, at);
+  appendAddress(commands, gpib_command::kTalk, at);
   static_cast<GpibResult&>(result) = sendCommands(commands, deadline);
   if (result.ok()) {
     const auto answer = receive({.maxBytes = 1}, deadline);
@@ -184,7 +185,7 @@ GpibResult LinuxGpibController::goToLocal(const GpibAddress& at, Deadline deadli
 GpibResult LinuxGpibController::addressed(std::span<const GpibAddress> at, std::uint8_t command,
                                           Deadline deadline) {
   Commands commands{gpib_command::kUnlisten};
-  for (const auto& address : at) append(commands, gpib_command::kListen, address);
+  for (const auto& address : at) appendAddress(commands, gpib_command::kListen, address);
   commands.push_back(command);
   auto result = sendCommands(commands, deadline);
   unaddress(result);

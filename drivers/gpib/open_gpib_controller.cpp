@@ -25,7 +25,7 @@ int boardIn(const std::string& text) {
   return board;
 }
 
-std::unique_ptr<GpibController> open(std::string_view kind, const std::string& device) {
+std::unique_ptr<GpibController> openKind(std::string_view kind, const std::string& device) {
   if (device.empty()) throw std::invalid_argument("it names no device");
   if (kind == "prologix") return openPrologix({.address = device});
   if (kind == "usbtmc") return openUsbtmc({.device = device});
@@ -39,7 +39,7 @@ std::unique_ptr<GpibController> openGpibController(std::string_view text) {
   const auto colon = text.find(':');
   const auto device = colon == std::string_view::npos ? "" : text.substr(colon + 1);
   try {
-    return open(text.substr(0, colon), std::string(device));
+    return openKind(text.substr(0, colon), std::string(device));
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(
         fmt::format("GPIB controller \"{}\": {}; the forms are {}", text, error.what(), kForms));

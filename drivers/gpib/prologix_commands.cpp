@@ -8,7 +8,6 @@ namespace mpf::prologix {
 namespace {
 
 constexpr std::size_t kMostBytesOfLine = 120;  // with escapes, without the end of the line
-constexpr int kFirstSecondary = 96;
 
 }  // namespace
 

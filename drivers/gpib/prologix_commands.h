@@ -21,6 +21,8 @@ namespace mpf::prologix {
 inline constexpr char kEscape = '\x1b';
 // How each version of the hardware begins its answer to ++ver.
 inline constexpr std::string_view kName = "Prologix GPIB";
+// What secondary address 0 is in commands.
+inline constexpr int kFirstSecondary = 96;
 // The range of ++read_tmo_ms.
 inline constexpr std::chrono::milliseconds kShortestSilence{1};
 inline constexpr std::chrono::milliseconds kLongestSilence{3000};

@@ -25,7 +25,7 @@ std::chrono::milliseconds silenceFor(Deadline deadline) {
   return std::clamp(wanted, prologix::kShortestSilence, prologix::kLongestSilence);
 }
 
-std::string select(const GpibAddress& address, std::chrono::milliseconds silence) {
+std::string selection(const GpibAddress& address, std::chrono::milliseconds silence) {
   return fmt::format("++addr {}\n++read_tmo_ms {}\n", addressText(address), silence.count());
 }
 
@@ -42,28 +42,29 @@ std::optional<int> numberOf(std::string_view line) {
   return number;
 }
 
+PrologixLink::OpenPort portAt(const std::string& address) {
+  if (address.starts_with('/'))
+    return [address] { return openPosixTerminal({.device = address, .waitForDevice = true}); };
+  return [parsed = TcpAddress::parse(address)] {
+    return openTcpSerialPort({.address = parsed, .waitForServer = true});
+  };
+}
+
 }  // namespace
 
 std::unique_ptr<GpibController> openPrologix(const PrologixOptions& options) {
-  auto description = fmt::format("Prologix at {}", options.address);
-  PrologixLink::OpenPort openPort;
-  if (options.address.starts_with('/')) {
-    openPort = [device = options.address] {
-      return openPosixTerminal({.device = device, .waitForDevice = true});
-    };
-  } else {
-    openPort = [address = TcpAddress::parse(options.address)] {
-      return openTcpSerialPort({.address = address, .waitForServer = true});
-    };
-  }
-  return std::make_unique<PrologixController>(std::move(description), std::move(openPort));
+  return std::make_unique<PrologixController>(options.address);
 }
+
+PrologixController::PrologixController(const std::string& address,
+                                       std::chrono::milliseconds patience)
+    : link_(fmt::format("Prologix at {}", address), portAt(address), patience) {}
 
 GpibResult PrologixController::write(const GpibAddress& to, Bytes data, bool sendEnd,
                                      Deadline deadline) {
   received_.erase(to);
   if (data.empty()) return {};
-  auto lines = select(to, silenceFor(deadline));
+  auto lines = selection(to, silenceFor(deadline));
   prologix::appendData(lines, data, sendEnd);
   auto answer = ask(lines, deadline);
   if (answer.ok()) showPeeked(peek_, data, {.direction = GpibDirection::sent, .end = sendEnd});
@@ -101,7 +102,7 @@ GpibReadResult PrologixController::read(const GpibAddress& from, const GpibReadL
 PrologixLink::Answer PrologixController::readOnce(const GpibAddress& from,
                                                   const GpibReadLimits& limits, Deadline deadline) {
   const auto silence = silenceFor(deadline);
-  auto lines = select(from, silence);
+  auto lines = selection(from, silence);
   if (limits.endOfString) {
     lines += fmt::format("++read {}\n", *limits.endOfString);
   } else {
@@ -120,7 +121,7 @@ GpibResult PrologixController::sendCommands(Bytes /*commands*/, Deadline /*deadl
 GpibPollResult PrologixController::serialPoll(const GpibAddress& at, Deadline deadline) {
   GpibPollResult result;
   const auto lines =
-      fmt::format("{}++spoll {}\n", select(at, silenceFor(deadline)), addressText(at));
+      fmt::format("{}++spoll {}\n", selection(at, silenceFor(deadline)), addressText(at));
   const auto answer = ask(lines, deadline);
   static_cast<GpibResult&>(result) = answer;
   if (!answer.ok()) return result;

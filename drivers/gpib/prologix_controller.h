@@ -27,9 +27,10 @@ namespace mpf {
 
 class PrologixController final : public GpibController {
  public:
-  PrologixController(std::string description, PrologixLink::OpenPort openPort,
-                     std::chrono::milliseconds patience = PrologixLink::kUsualPatience)
-      : link_(std::move(description), std::move(openPort), patience) {}
+  //   address  as PrologixOptions
+  //   throws   as openPrologix()
+  explicit PrologixController(const std::string& address,
+                              std::chrono::milliseconds patience = PrologixLink::kUsualPatience);
 
   GpibResult write(const GpibAddress& to, Bytes data, bool sendEnd, Deadline deadline) override;
   GpibReadResult read(const GpibAddress& from, const GpibReadLimits& limits,

@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{1};  // at an instrument that is not ready
 constexpr std::size_t kMostUnsent = 4096;
-constexpr int kFirstSecondary = 96;
 constexpr int kHighestPrimary = 30;
 constexpr std::size_t kPlusSigns = 2;
 
@@ -34,7 +33,7 @@ std::vector<GpibAddress> addressesIn(const std::vector<int>& words) {
     if (word <= kHighestPrimary) {
       addresses.push_back({.primary = static_cast<std::uint8_t>(word)});
     } else if (!addresses.empty()) {
-      addresses.back().secondary = static_cast<std::uint8_t>(word - kFirstSecondary);
+      addresses.back().secondary = static_cast<std::uint8_t>(word - prologix::kFirstSecondary);
     }
   }
   return addresses;

@@ -71,7 +71,7 @@ void PrologixLink::open() {
 
 void PrologixLink::becomeUnknown() {
   state_ = State::unknown;
-  reopenAt_ = Deadline::after(patience_);
+  reopenAt_ = Deadline::never();
 }
 
 PrologixLink::Answer PrologixLink::exchange(const Request& request) {
@@ -104,6 +104,7 @@ PrologixLink::Answer PrologixLink::exchange(const Request& request) {
 // no harm: then it begins again.
 GpibResult PrologixLink::identify(Deadline deadline) {
   if (reopenAt_.hasPassed()) open();
+  if (reopenAt_.isNever()) reopenAt_ = Deadline::after(patience_);
   const auto limit = std::min(deadline, Deadline::after(patience_));
   const auto mark = nextMark({});
   const auto end = fmt::format("\r\n{}\r\n", mark);
@@ -158,6 +159,11 @@ GpibResult PrologixLink::transact(std::string_view text, Deadline deadline) {
 bool PrologixLink::wasLost() const { return port_->counters().unplugs != unplugs_; }
 
 GpibResult PrologixLink::explainMissingVersion(GpibStatus status) const {
+  if (!version_.empty())
+    return {status,
+            fmt::format("{} does not answer; it is still busy with an earlier operation, or "
+                        "it has stopped: then switch it off and on",
+                        description_)};
   const auto shown = collector_.answer().substr(0, kMostShown);
   if (shown.empty())
     return {status, fmt::format("{} does not answer to ++ver; check that it is a Prologix "

@@ -114,7 +114,7 @@ class PrologixLink {
   std::unique_ptr<SerialPort> port_;
   std::optional<BoundSerialPort> binding_;  // after port_ and collector_: released first
   State state_ = State::unknown;
-  Deadline reopenAt_ = Deadline::never();  // in the state `unknown`
+  Deadline reopenAt_ = Deadline::never();  // in the state `unknown`, from the first attempt on
   std::uint64_t unplugs_ = 0;  // of the port, when the controller was set up
   std::string version_;
   std::uint8_t mark_;

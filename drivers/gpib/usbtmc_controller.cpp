@@ -19,10 +19,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kShortestTimeout{100};  // of the kernel's driver
 constexpr std::chrono::hours kLongestTimeout{24};
-constexpr std::size_t kBytesOfRead = 64 << 10;
-constexpr std::uint8_t kEndOfMessage = 0x01;  // of the attributes of an answer
+constexpr std::size_t kMostBytesOfRead = 64 << 10;
 
-std::string reasonOf(std::int64_t result) {
+std::string systemReason(std::int64_t result) {
   return std::generic_category().message(static_cast<int>(-result));
 }
 
@@ -112,14 +111,14 @@ GpibResult UsbtmcController::readOnce(const GpibReadLimits& limits) {
   int result = file_->control(USBTMC_IOCTL_CONFIG_TERMCHAR, &stopAt);
   // The instrument cannot stop at a byte: received_ divides its message.
   if (result < 0 && result != -EINVAL) return failed("read", result);
-  std::vector<std::uint8_t> bytes(std::min(limits.maxBytes, kBytesOfRead));
+  std::vector<std::uint8_t> bytes(std::min(limits.maxBytes, kMostBytesOfRead));
   const auto length = file_->read(bytes);
   if (length < 0) return failed("read", length);
   bytes.resize(static_cast<std::size_t>(length));
   std::uint8_t attributes = 0;
   result = file_->control(USBTMC_IOCTL_MSG_IN_ATTR, &attributes);
   if (result < 0) return failed("read", result);
-  const bool end = (attributes & kEndOfMessage) != 0;
+  const bool end = (attributes & kUsbtmcEndOfMessage) != 0;
   received_.append(bytes, end);
   showPeeked(peek_, bytes, {.direction = GpibDirection::received, .end = end});
   return {};
@@ -204,7 +203,7 @@ GpibResult UsbtmcController::failed(std::string_view what, std::int64_t result) 
     state_ = State::closed;
   }
   return {GpibStatus::failure,
-          fmt::format("{}: {}: {}{}", description_, what, reasonOf(result), adviceOn(result))};
+          fmt::format("{}: {}: {}{}", description_, what, systemReason(result), adviceOn(result))};
 }
 
 GpibResult UsbtmcController::unsupported(std::string_view what) const {

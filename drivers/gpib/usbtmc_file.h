@@ -15,6 +15,10 @@
 
 namespace mpf {
 
+// Bits of USBTMC_IOCTL_MSG_IN_ATTR, which concerns the last read().
+inline constexpr std::uint8_t kUsbtmcEndOfMessage = 0x01;
+inline constexpr std::uint8_t kUsbtmcStoppedAtByte = 0x02;
+
 class UsbtmcFile {
  public:
   UsbtmcFile() = default;

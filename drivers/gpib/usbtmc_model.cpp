@@ -17,9 +17,7 @@ namespace {
 using Control = GpibInstrumentModel::Control;
 
 constexpr std::uint32_t kShortestTimeoutMs = 100;
-constexpr std::chrono::milliseconds kLookEvery{1};  // at an instrument that is not ready
-constexpr std::uint8_t kEndOfMessage = 0x01;
-constexpr std::uint8_t kStoppedAtByte = 0x02;
+constexpr std::chrono::milliseconds kInstrumentPause{1};  // at an instrument that is not ready
 
 std::uint8_t& byteAt(void* argument) { return *static_cast<std::uint8_t*>(argument); }
 
@@ -42,7 +40,7 @@ std::int64_t UsbtmcModel::write(std::span<const std::uint8_t> bytes) {
     const bool end = sendsEnd_ && i + 1 == bytes.size();
     while (!instrument_->receive(bytes[i], end)) {
       if (giveUp.hasPassed()) return -ETIMEDOUT;
-      std::this_thread::sleep_for(kLookEvery);
+      std::this_thread::sleep_for(kInstrumentPause);
     }
   }
   return static_cast<std::int64_t>(bytes.size());
@@ -57,14 +55,14 @@ std::int64_t UsbtmcModel::read(std::span<std::uint8_t> bytes) {
     const auto byte = instrument_->nextByte();
     if (byte) {
       bytes[length++] = byte->value;
-      if (byte->end) attributes_ |= kEndOfMessage;
-      if (byte->value == stopAt_) attributes_ |= kStoppedAtByte;
+      if (byte->end) attributes_ |= kUsbtmcEndOfMessage;
+      if (byte->value == stopAt_) attributes_ |= kUsbtmcStoppedAtByte;
     } else if (length > 0) {
       break;  // a part of the answer
     } else if (giveUp.hasPassed()) {
       return -ETIMEDOUT;
     } else {
-      std::this_thread::sleep_for(kLookEvery);
+      std::this_thread::sleep_for(kInstrumentPause);
     }
   }
   return static_cast<std::int64_t>(length);

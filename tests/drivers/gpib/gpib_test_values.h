@@ -24,6 +24,13 @@ inline Deadline patient() { return Deadline::after(Watchdog::kPatience); }
 // For operations that time out.
 inline Deadline soon() { return Deadline::after(std::chrono::milliseconds(200)); }
 
+// Calls `act` with deadlines that are further and further away, until it returns true: for results
+// that a busy host may not reach before a near deadline.
+template <class Act>
+void withLaterDeadlines(const Act& act) {
+  for (auto wait = std::chrono::milliseconds(200); !act(Deadline::after(wait)); wait *= 2) continue;
+}
+
 inline std::span<const std::uint8_t> raw(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }

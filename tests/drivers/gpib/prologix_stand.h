@@ -3,7 +3,7 @@
 // pseudo-terminal.
 //
 //   PrologixStand stand(PrologixStand::Line::tcp);
-//   const auto controller = openPrologix({.address = stand.address()});
+//   PrologixController controller(stand.address(), Watchdog::kPatience);
 //   stand.plugIn();                     // again after each unplug()
 //
 // Threads  one at a time.
