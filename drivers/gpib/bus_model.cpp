@@ -124,8 +124,8 @@ bool GpibBusModel::followAll() {
 bool GpibBusModel::offerAll() {
   bool hasChanged = false;
   for (auto& connection : connections_) {
-    if (connection.condition == Condition::works)
-      hasChanged |= drive(connection, connection.participant->offer(lines_));
+    if (connection.condition == Condition::works && connection.participant->offer(lines_))
+      hasChanged |= drive(connection, connection.participant->follow(lines_));
   }
   return hasChanged;
 }
