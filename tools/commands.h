@@ -23,6 +23,7 @@ void addTop(CLI::App& app, Run& run);
 void addInspect(CLI::App& app, Run& run);
 void addCall(CLI::App& app, Run& run);
 void addSniff(CLI::App& app, Run& run);
+void addGpibSniff(CLI::App& app, Run& run);
 void addTap(CLI::App& app, Run& run);
 void addReplay(CLI::App& app, Run& run);
 void addClean(CLI::App& app, Run& run);

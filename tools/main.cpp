@@ -30,6 +30,7 @@ int runSubcommand(int argc, char** argv) {
   mpf::tools::addInspect(app, run);
   mpf::tools::addCall(app, run);
   mpf::tools::addSniff(app, run);
+  mpf::tools::addGpibSniff(app, run);
   mpf::tools::addTap(app, run);
   mpf::tools::addReplay(app, run);
   mpf::tools::addClean(app, run);

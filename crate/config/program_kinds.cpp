@@ -38,6 +38,17 @@ std::vector<ProgramKind> makeKinds() {
             {"max-timeout", {}},
             {"max-retries", {}}}),
        true});
+  kinds.push_back({"gpib",
+                   "mpf-gpib-server",
+                   Entry::server,
+                   {"server", "module", "bufsize", "queuesize"},
+                   2,
+                   withHardware({{"timeout", {}},
+                                 {"max-timeout", {}},
+                                 {"max-lease", {}},
+                                 {"ti9914", {"module", "carrier", "site", "vector"}},
+                                 {"meter", {"address", "wire"}}}),
+                   true});
   kinds.push_back({"dac128v",
                    "mpf-dac128v-server",
                    Entry::server,
@@ -179,6 +190,8 @@ std::vector<std::string> serversOf(const Process& process) {
     if (names.size() == before) names.insert(names.end(), {module, module + "Config"});
   } else if (process.kind == "serial") {
     addField(process, "server", 0, names);
+  } else if (process.kind == "gpib") {
+    names.push_back(process.valueOf("server"));
   } else if (process.kind == "int32" || process.kind == "char8-array") {
     const auto server = process.valueOf("server");
     const auto* const otherwise = process.kind == "int32" ? "Int32" : "Char8Array";
@@ -191,7 +204,7 @@ std::vector<DrivenModule> modulesOf(const Process& process) {
   std::vector<DrivenModule> modules;
   if (const auto* const carrier = process.find("carrier"))
     modules.push_back({process.valueOf("carrier"), process.valueOf("site"), carrier->place, false});
-  for (const auto* const key : {"octal-uart", "dac"}) {
+  for (const auto* const key : {"octal-uart", "ti9914", "dac"}) {
     const auto* const setting = process.find(key);
     if (setting == nullptr) continue;
     for (const auto& value : setting->values) {

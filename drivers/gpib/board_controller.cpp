@@ -13,7 +13,6 @@ namespace {
 
 using gpib_command::Command;
 
-constexpr std::uint8_t kHighestAddress = 30;
 constexpr std::array<std::uint8_t, 2> kUnaddress{gpib_command::kUntalk, gpib_command::kUnlisten};
 constexpr std::array<std::uint8_t, 3> kEndPoll{gpib_command::kSerialPollDisable,
                                                gpib_command::kUntalk, gpib_command::kUnlisten};
@@ -54,7 +53,7 @@ Result failed(GpibResult&& problem) {
 }  // namespace
 
 GpibResult GpibBoardController::check(const GpibAddress& address) const {
-  if (address.primary > kHighestAddress || address.secondary.value_or(0) > kHighestAddress)
+  if (!address.isValid())
     return {GpibStatus::failure,
             fmt::format("{} is no GPIB address: addresses are 0 to 30", toString(address))};
   if (address.primary == own_)

@@ -13,7 +13,6 @@ namespace {
 
 // A talker and listeners that never pause continue at the next access.
 constexpr int kMaxRounds = 1000;
-constexpr std::uint8_t kHighestAddress = 30;
 
 }  // namespace
 
@@ -22,7 +21,7 @@ GpibBusModel::~GpibBusModel() = default;
 
 void GpibBusModel::attach(const GpibAddress& address,
                           std::shared_ptr<GpibInstrumentModel> instrument) {
-  if (address.primary > kHighestAddress || address.secondary.value_or(0) > kHighestAddress)
+  if (!address.isValid())
     throw std::invalid_argument(
         fmt::format("model of an instrument at {}: GPIB addresses are 0 to 30", toString(address)));
   const std::lock_guard lock(mutex_);
@@ -125,8 +124,8 @@ bool GpibBusModel::followAll() {
 bool GpibBusModel::offerAll() {
   bool hasChanged = false;
   for (auto& connection : connections_) {
-    if (connection.condition == Condition::works)
-      hasChanged |= drive(connection, connection.participant->offer(lines_));
+    if (connection.condition == Condition::works && connection.participant->offer(lines_))
+      hasChanged |= drive(connection, connection.participant->follow(lines_));
   }
   return hasChanged;
 }

@@ -11,7 +11,7 @@
 //
 // The bus needs no time and no thread: after each access by the controller, the handshake goes on
 // until a participant waits. An instrument that had no byte, or did not take one, is asked again at
-// the next access.
+// the next access and by proceed().
 //
 // Threads  any number of callers at a time.
 // Source   IEEE 488.1.
@@ -59,8 +59,15 @@ class GpibBusModel {
   void connect(GpibParticipant& participant);
   void disconnect(GpibParticipant& participant);
 
-  // Calls `act` with the lines, under the lock, then lets the handshake go on; returns what `act`
-  // returns. For the registers of a controller, and for tests that look at an instrument.
+  // Calls `act` with the lines, under the lock, and returns what it returns. For registers of a
+  // controller that change nothing on the bus.
+  template <class Act>
+  auto look(Act act) {
+    const std::lock_guard lock(mutex_);
+    return act(lines_);
+  }
+  // The same, then lets the handshake go on. For the other registers of a controller, and for what
+  // a test does to an instrument.
   template <class Act>
   auto access(Act act) {
     const std::lock_guard lock(mutex_);

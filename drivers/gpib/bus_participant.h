@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // GpibParticipant: what is connected to the lines of a GpibBusModel: an instrument or a controller.
 //
-//   lines ──► follow() ──► what it drives ──► lines ──► follow() ... until nothing changes
-//                                              └─► offer(): a byte with DAV, once all is settled
+//   lines ──► follow() ──► what it drives ──► lines ──► follow() ... until nothing changes;
+//   then offer() ──► it has a byte ──► follow() ──► DAV ──► lines ──► follow() ...
 //
 // Threads  GpibBusModel calls one function of one participant at a time.
 #pragma once
@@ -20,9 +20,9 @@ class GpibParticipant {
 
   // Returns what it drives now that the lines are `seen`.
   virtual GpibLines follow(const GpibLines& seen) = 0;
-  // Returns what it drives after the settling time of the lines (T1): this is the time at which a
-  // talker or controller may offer its next byte.
-  virtual GpibLines offer(const GpibLines& seen) = 0;
+  // Called after the settling time of the lines (T1): a talker or controller may offer its next
+  // byte now. Returns whether it does: then follow() drives it.
+  virtual bool offer(const GpibLines& seen) = 0;
 };
 
 }  // namespace mpf

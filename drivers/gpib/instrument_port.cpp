@@ -34,10 +34,11 @@ GpibLines GpibInstrumentPort::follow(const GpibLines& seen) {
   return driven;
 }
 
-GpibLines GpibInstrumentPort::offer(const GpibLines& seen) {
+bool GpibInstrumentPort::offer(const GpibLines& seen) {
   const bool isReady = !seen.has(gpib_line::kNrfd) && seen.has(gpib_line::kNdac);
-  if (mayTalk(seen) && isReady && !offered_) offered_ = nextByte();
-  return follow(seen);
+  if (!mayTalk(seen) || !isReady || offered_) return false;
+  offered_ = nextByte();
+  return offered_.has_value();
 }
 
 void GpibInstrumentPort::powerUp() {

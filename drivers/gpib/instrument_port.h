@@ -26,7 +26,7 @@ class GpibInstrumentPort final : public GpibParticipant {
   GpibInstrumentPort(GpibAddress address, std::shared_ptr<GpibInstrumentModel> instrument);
 
   GpibLines follow(const GpibLines& seen) override;
-  GpibLines offer(const GpibLines& seen) override;
+  bool offer(const GpibLines& seen) override;
 
   [[nodiscard]] const GpibAddress& address() const noexcept { return address_; }
   // Simulates a fault: while false, it takes commands, but never a data byte.

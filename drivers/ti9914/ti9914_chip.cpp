@@ -2,6 +2,7 @@
 #include "drivers/ti9914/ti9914_chip.h"
 
 #include <algorithm>
+#include <fmt/format.h>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -32,8 +33,10 @@ Ti9914Chip::Ti9914Chip(IndustryPackModule& module, const Options& options,
       io_(module.io()),
       options_{options},
       onServiceRequest_(std::move(onServiceRequest)),
-      thread_(module.interrupt(0), {.pollEvery = options.idlePollEvery},
-              [this](InterruptThread::Cause cause) { return serve(cause); }) {
+      thread_(
+          module.interrupt(0), {.pollEvery = options.idlePollEvery},
+          [this](InterruptThread::Cause cause) { return serve(cause); },
+          [this](InterruptTrouble trouble) { report(trouble); }) {
   static_cast<void>(module_.checkedVector(options_.vector));
 }
 
@@ -50,10 +53,12 @@ std::string Ti9914Chip::setUp() {
   const bool isRemoteEnabled = (statesOn_ & (1U << kSre)) != 0;
   command(kSwrst, true);
   spinUntil(Clock::nowNs() + kResetNs);
-  statesOn_ = 0;
   io_.write8(kAdr, 0);
   io_.write8(kVector, static_cast<std::uint8_t>(options_.vector | kVectorEnabled));
   command(kSwrst, false);
+  // A reset need not end them.
+  for (const auto state : {kHdfa, kHdfe, kLon, kTon, kDai}) command(state, false);
+  statesOn_ = 0;
   {
     const std::lock_guard lock(mutex_);
     static_cast<void>(io_.read8(kIsr0));
@@ -182,6 +187,24 @@ bool Ti9914Chip::serve(InterruptThread::Cause cause) {
   }
   if (isServiceRequested) onServiceRequest_();
   return hadRequest;
+}
+
+void Ti9914Chip::report(InterruptTrouble trouble) const {
+  if (!options_.onAlarm) return;
+  const auto line =
+      fmt::format("module \"{}\" ({}): the interrupt line ", module_.name(), module_.where());
+  switch (trouble) {
+    case InterruptTrouble::storm:
+      return options_.onAlarm(line +
+                              "is stuck active without a request of the chip: it is masked for a "
+                              "second at a time until it is released");
+    case InterruptTrouble::polled:
+      return options_.onAlarm(line + "is polled by its carrier from now on: transfers are slower");
+    case InterruptTrouble::never:
+      return options_.onAlarm(line +
+                              "stays inactive although the chip has requests: the chip is polled, "
+                              "and transfers are slower");
+  }
 }
 
 }  // namespace mpf

@@ -30,20 +30,25 @@ Ti9914Model::Ti9914Model(std::shared_ptr<GpibBusModel> bus)
 Ti9914Model::~Ti9914Model() { bus_->disconnect(*this); }
 
 std::uint64_t Ti9914Model::lostCommands() const {
-  return bus_->access([&](const GpibLines& /*lines*/) { return lostCommands_; });
+  return bus_->look([&](const GpibLines& /*lines*/) { return lostCommands_; });
 }
 
 int Ti9914Model::vector() const {
-  return bus_->access([&](const GpibLines& /*lines*/) { return vector_; });
+  return bus_->look([&](const GpibLines& /*lines*/) { return vector_; });
 }
 
 // ---- registers
 
 std::uint16_t Ti9914Model::read(Space space, std::size_t offset, Lanes lanes) {
   if (space != Space::io || (lanes & kLow) == 0) return kUndrivenHigh | kUndriven;
-  return bus_->access([&](const GpibLines& lines) -> std::uint16_t {
+  const auto act = [&](const GpibLines& lines) -> std::uint16_t {
     return kUndrivenHigh | readRegister(offset + 1, lines);
-  });
+  };
+  if (offset + 1 == kDir) return bus_->access(act);
+  const auto value = bus_->look(act);
+  // A driver that waits gives slow instruments the chance to go on.
+  if (offset + 1 == kIsr0 && value == kUndrivenHigh) bus_->proceed();
+  return value;
 }
 
 void Ti9914Model::write(Space space, std::size_t offset, std::uint16_t value, Lanes lanes) {
@@ -198,13 +203,12 @@ GpibLines Ti9914Model::follow(const GpibLines& seen) {
   return driven;
 }
 
-GpibLines Ti9914Model::offer(const GpibLines& seen) {
+bool Ti9914Model::offer(const GpibLines& seen) {
   const bool isReady = !seen.has(gpib_line::kNrfd);
-  if (source_ != Source::none && output_ && !isOffered_ && isReady) {
-    isOffered_ = seen.has(gpib_line::kNdac);
-    if (!isOffered_ && !std::exchange(hasNoAcceptor_, true)) raise(isr1_, kErr);
-  }
-  return follow(seen);
+  if (source_ == Source::none || !output_ || isOffered_ || !isReady) return false;
+  isOffered_ = seen.has(gpib_line::kNdac);
+  if (!isOffered_ && !std::exchange(hasNoAcceptor_, true)) raise(isr1_, kErr);
+  return isOffered_;
 }
 
 bool Ti9914Model::seesAttention(const GpibLines& seen) const noexcept {

@@ -59,7 +59,7 @@ class Ti9914Model final : public DeviceModel, private GpibParticipant {
   };
 
   GpibLines follow(const GpibLines& seen) override;
-  GpibLines offer(const GpibLines& seen) override;
+  bool offer(const GpibLines& seen) override;
   std::uint8_t readRegister(std::size_t offset, const GpibLines& lines);
   void writeRegister(std::size_t offset, std::uint8_t value, const GpibLines& lines);
   void command(std::uint8_t command, const GpibLines& lines);

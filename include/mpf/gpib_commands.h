@@ -64,9 +64,9 @@ inline constexpr std::int32_t cmdSendCommands = 11;
 
 // Makes the bus exclusive to this client, for `extra` milliseconds from the reply on; a holder that
 // asks again extends its lease. `value` is the name of the holder, for messages to people. The
-// lease ends earlier with cmdUnlease, or when the client disconnects or dies. The extra of the reply
-// is the number of milliseconds, which the server limits. Requests of others wait for the end of
-// the lease until their timeout.
+// lease ends earlier with cmdUnlease, or when the client disconnects or dies. The extra of the
+// reply is the number of milliseconds, which the server limits. Requests of others wait for the end
+// of the lease until their timeout.
 inline constexpr std::int32_t cmdLease = 12;
 // Ends the lease of this client, if it has one.
 inline constexpr std::int32_t cmdUnlease = 13;
@@ -75,10 +75,11 @@ inline constexpr std::int32_t cmdUnlease = 13;
 inline constexpr std::int32_t cmdLeaseHolder = 14;
 
 // From now on, when the instrument requests service, the server polls it and sends an OutOfBand
-// message with cmd = cmdSubscribe, address, and value = status byte. extra = number of such messages
-// that are missing before, because this client did not receive them in time. The same message comes
-// when the instrument requests service in the reply to somebody's cmdSerialPoll. Does not wait for
-// the bus. During a lease, the server polls only instruments to which the holder subscribes.
+// message with cmd = cmdSubscribe, address, and value = status byte. extra = number of such
+// messages that are missing before, because this client did not receive them in time. The same
+// message comes when somebody's cmdSerialPoll returns a status byte that requests service. Does not
+// wait for the bus. During a lease, the server polls only instruments to which the holder
+// subscribes.
 inline constexpr std::int32_t cmdSubscribe = 15;
 // Ends the subscription of this client to `address`; allInstruments: all its subscriptions.
 inline constexpr std::int32_t cmdUnsubscribe = 16;

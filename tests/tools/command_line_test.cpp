@@ -12,10 +12,10 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-constexpr std::array<const char*, 22> kSubcommands{
-    "run",    "new",    "ps",    "logs",   "capsule", "stop",    "start", "restart",
-    "reload", "ls",     "mrr",   "msr",    "top",     "inspect", "call",  "sniff",
-    "tap",    "replay", "clean", "doctor", "torture", "bench"};
+constexpr std::array<const char*, 23> kSubcommands{
+    "run",        "new", "ps",     "logs",  "capsule", "stop",    "start", "restart",
+    "reload",     "ls",  "mrr",    "msr",   "top",     "inspect", "call",  "sniff",
+    "gpib-sniff", "tap", "replay", "clean", "doctor",  "torture", "bench"};
 
 class CommandLineTest : public ToolsTest {};
 
@@ -65,7 +65,7 @@ TEST_F(CommandLineTest, AnUnknownSubcommandIsAnErrorThatListsAll) {
   EXPECT_EQ(ended.err,
             "mpf: no subcommand or option \"unknown\"; there are run, new, convert, ps, logs, "
             "capsule, stop, start, restart, reload, ls, mrr, msr, top, inspect, "
-            "call, sniff, tap, replay, clean, doctor, torture, "
+            "call, sniff, gpib-sniff, tap, replay, clean, doctor, torture, "
             "bench; "
             "`mpf --help` shows what they do\n");
 }
@@ -108,6 +108,7 @@ TEST_F(CommandLineTest, RefusesWrongArguments) {
       {{"torture", "--role", "router"}, "mpf torture: --role: router not in {client,server};"},
       {{"torture", "--mode", "0"}, "mpf torture: --mode: 0 not in {kill,stop};"},
       {{"sniff"}, "mpf sniff: server is required; `mpf sniff --help`"},
+      {{"gpib-sniff", "gpib", "--json", "--decode"}, "mpf gpib-sniff: --decode excludes --json"},
       {{"sniff", "serial[0]", "soon"}, "mpf sniff: seconds: soon is not a time"},
       {{"sniff", "serial[0]", "--format", "hex"}, "mpf sniff: --format: hex not in {lines,manual}"},
   };

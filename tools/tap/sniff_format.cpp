@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "tools/tap/sniff_format.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <optional>
 #include <stdexcept>
 
 #include "schema/text.h"
+#include "tools/tap/line_time.h"
 #include "tools/text/wrap.h"
 
 namespace mpf::tools {
@@ -45,7 +44,7 @@ class Manual final : public SniffFormat {
 
 class Lines final : public SniffFormat {
  public:
-  explicit Lines(std::int64_t realtimeOffsetNs) : offsetNs_(realtimeOffsetNs) {}
+  explicit Lines(std::int64_t realtimeOffsetNs) : time_(realtimeOffsetNs) {}
 
   std::string add(const SniffRecord& record) override {
     std::string text;
@@ -62,24 +61,17 @@ class Lines final : public SniffFormat {
   }
   std::string flush() override {
     if (bytes_.empty()) return {};
-    constexpr std::int64_t kSecond = 1'000'000'000;
-    const auto wallNs = startNs_ + offsetNs_;
-    const auto sinceNs = lastNs_ ? startNs_ - *lastNs_ : 0;
-    auto line = fmt::format("{:%H:%M:%S}.{:03} {:>+10.1f} ms  {}  {}\n",
-                            fmt::localtime(static_cast<std::time_t>(wallNs / kSecond)),
-                            wallNs % kSecond / 1'000'000, static_cast<double>(sinceNs) / 1e6,
-                            static_cast<char>(kind_), escape(bytes_));
-    lastNs_ = startNs_;
+    auto line =
+        fmt::format("{}  {}  {}\n", time_.of(startNs_), static_cast<char>(kind_), escape(bytes_));
     bytes_.clear();
     return line;
   }
 
  private:
   static constexpr std::size_t kMostBytes = 80;
-  std::int64_t offsetNs_;
+  LineTime time_;
   SniffKind kind_{};
   std::int64_t startNs_ = 0;
-  std::optional<std::int64_t> lastNs_;
   std::string bytes_;
 };
 

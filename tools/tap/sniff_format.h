@@ -23,11 +23,16 @@ namespace mpf::tools {
 class SniffFormat {
  public:
   virtual ~SniffFormat() = default;
+  [[nodiscard]] static auto tryRead(const Char8ArrayMessage& message) {
+    return serial::tryReadRecords(message);
+  }
   // Adds a byte. Returns the complete lines; an incomplete line is kept.
   [[nodiscard]] virtual std::string add(const serial::SniffRecord& record) = 0;
   [[nodiscard]] virtual std::string missing(std::uint64_t bytes) = 0;
   // Returns the incomplete line: for pauses of the line, and the end.
   [[nodiscard]] virtual std::string flush() = 0;
+  // Returns what follows the last line.
+  [[nodiscard]] static std::string end() { return {}; }
 
   // `name` is lines, manual or json.
   //   realtimeOffsetNs  wall clock minus CLOCK_MONOTONIC

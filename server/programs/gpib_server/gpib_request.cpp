@@ -52,13 +52,12 @@ std::chrono::milliseconds timeoutOf(const Char8Array& fields, const GpibLimits& 
 
 // The further addresses of a trigger; nullopt when they are invalid.
 std::optional<std::vector<GpibAddress>> addressesIn(std::span<const std::uint8_t> bytes) {
-  constexpr std::uint8_t kHighest = 30;
   if (bytes.size() % 2 != 0) return std::nullopt;
   std::vector<GpibAddress> addresses;
   for (std::size_t i = 0; i < bytes.size(); i += 2) {
     GpibAddress address{bytes[i]};
     if (bytes[i + 1] != noSecondaryAddress) address.secondary = bytes[i + 1];
-    if (address.primary > kHighest || address.secondary.value_or(0) > kHighest) return std::nullopt;
+    if (!address.isValid()) return std::nullopt;
     addresses.push_back(address);
   }
   return addresses;
@@ -72,7 +71,7 @@ std::string readAddresses(const Char8Array& fields, GpibRequest& request) {
   const auto address = GpibAddress::fromNumber(fields.address);
   if (!address)
     return fmt::format(
-        "address {} is not the address of an instrument: use 0 to 30, or 100 * primary + secondary address",
+        "address {} is not that of an instrument: use 0 to 30, or 100 * primary + secondary",
         fields.address);
   request.addresses.push_back(*address);
   if (addressing != Addressing::list) return {};

@@ -16,14 +16,12 @@ namespace {
 
 using testing::ElementsAre;
 
-const std::map<std::string, std::string> kPrograms{{"serial", MPF_TEST_SERIAL_SERVER},
-                                                   {"dac128v", MPF_TEST_DAC128V_SERVER},
-                                                   {"digital-io", MPF_TEST_DIGITAL_IO_SERVER},
-                                                   {"ip330", MPF_TEST_IP330_SERVER},
-                                                   {"ip440", MPF_TEST_IP440_SERVER},
-                                                   {"int32", MPF_TEST_INT32_SERVER},
-                                                   {"char8-array", MPF_TEST_CHAR8_ARRAY_SERVER},
-                                                   {"router", MPF_TEST_ROUTER}};
+const std::map<std::string, std::string> kPrograms{
+    {"serial", MPF_TEST_SERIAL_SERVER},   {"gpib", MPF_TEST_GPIB_SERVER},
+    {"dac128v", MPF_TEST_DAC128V_SERVER}, {"digital-io", MPF_TEST_DIGITAL_IO_SERVER},
+    {"ip330", MPF_TEST_IP330_SERVER},     {"ip440", MPF_TEST_IP440_SERVER},
+    {"int32", MPF_TEST_INT32_SERVER},     {"char8-array", MPF_TEST_CHAR8_ARRAY_SERVER},
+    {"router", MPF_TEST_ROUTER}};
 
 struct Help {
   std::vector<std::string> positionals;
@@ -97,6 +95,7 @@ TEST(ServersOf, AreTheNamesThatClientsBindTo) {
               ElementsAre("s", "t", "p"));
   EXPECT_THAT(serversOf(processOf("serial", {{"server", {"a[0],UART0", "a[1],UART1"}, {}}})),
               ElementsAre("a[0]", "a[1]"));
+  EXPECT_THAT(serversOf(processOf("gpib", {{"server", {"GPIB0"}, {}}})), ElementsAre("GPIB0"));
   EXPECT_THAT(serversOf(processOf("int32", {})), ElementsAre("Int32"));
 }
 

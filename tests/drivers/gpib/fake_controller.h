@@ -23,11 +23,10 @@
 
 #include <mpf/drivers/gpib/gpib_controller.h>
 
+#include "tests/drivers/gpib/echo_instrument.h"
+
 namespace mpf::test {
 
-inline std::string textOf(std::span<const std::uint8_t> bytes) {
-  return {bytes.begin(), bytes.end()};
-}
 inline std::vector<std::uint8_t> bytesOf(std::string_view text) {
   return {text.begin(), text.end()};
 }

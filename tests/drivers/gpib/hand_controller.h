@@ -20,7 +20,7 @@ class HandController final : public GpibParticipant {
   ~HandController() override { bus_.disconnect(*this); }
 
   GpibLines follow(const GpibLines& /*seen*/) override { return driven_; }
-  GpibLines offer(const GpibLines& /*seen*/) override { return driven_; }
+  bool offer(const GpibLines& /*seen*/) override { return false; }
 
   // Drives exactly these lines.
   void drive(std::uint8_t control, std::uint8_t data = 0) {

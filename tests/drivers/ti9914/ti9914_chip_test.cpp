@@ -99,6 +99,16 @@ TEST_F(Ti9914ChipTest, CallsForServiceAlsoWhenTheCallerSawTheRequestFirst) {
   served_.get_future().wait();
 }
 
+TEST_F(Ti9914ChipTest, ReportsAnInterruptLineThatIsStuck) {
+  std::promise<std::string> alarm;
+  startChip({.vector = 104, .onAlarm = [&](const std::string& what) { alarm.set_value(what); }});
+
+  carrier_.setFault("IP_a", ModelFault::interruptStorm);
+
+  EXPECT_THAT(alarm.get_future().get(), HasSubstr("module \"a-ip488\" (carrier ipac, site IP_a): "
+                                                  "the interrupt line is stuck active"));
+}
+
 TEST_F(Ti9914ChipTest, WritesAStateOnlyWhenItChanges) {
   auto& chip = startChip();
   chip.setState(ti9914::kSre, false);

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// mpf gpib-sniff: shows every byte on the bus of a GPIB server, live (manual, "gpibSniff"), without
+// disturbing the bus.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "tools/arguments.h"
+#include "tools/commands.h"
+#include "tools/tap/gpib_sniff_format.h"
+#include "tools/tap/sniffer.h"
+
+namespace mpf::tools {
+namespace {
+
+struct GpibSniffArguments : ServerArguments {
+  double seconds = 0;
+  bool decode = false;
+  bool json = false;
+
+  [[nodiscard]] std::string format() const {
+    if (json) return "json";
+    return decode ? "decode" : "manual";
+  }
+};
+
+}  // namespace
+
+void addGpibSniff(CLI::App& app, Run& run) {
+  auto& command = *app.add_subcommand(
+      "gpib-sniff", "Shows every byte that a GPIB server sends (T) and receives (R), live");
+  auto arguments = std::make_shared<GpibSniffArguments>();
+  addServer(command, *arguments);
+  addSeconds(command, "seconds", arguments->seconds, "Duration; 0: until Ctrl-C", true);
+  auto* const decode = command.add_flag(
+      "--decode", arguments->decode,
+      "Names of commands (UNL, LAG 22, TAG 5), data and EOI, with times; otherwise as in the "
+      "manual of MPF: _ is UNT, ? is UNL");
+  addJson(command, arguments->json);
+  command.get_option("--json")->excludes(decode);
+  command.callback([arguments, &run] {
+    run = [arguments] {
+      auto format = GpibSniffFormat::make(arguments->format(), realtimeOffsetNs());
+      return sniff({.command = "gpib-sniff",
+                    .kind = "a GPIB server",
+                    .backplane = arguments->backplane,
+                    .location = arguments->location,
+                    .server = arguments->server,
+                    .seconds = arguments->seconds},
+                   std::make_unique<SniffTextOf<GpibSniffFormat>>(std::move(format)));
+    };
+  });
+}
+
+}  // namespace mpf::tools
