@@ -8,11 +8,6 @@
 namespace mpf::startup {
 namespace {
 
-Value skipGpib(CommandCall& call, StartupSite& /*site*/) {
-  call.warn(fmt::format("{} is skipped: MPF has no GPIB server yet", call.commandName()));
-  return Value::unavailable();
-}
-
 // Servers of other packages that used MPF.
 Value skipServer(CommandCall& call, StartupSite& /*site*/) {
   call.warn(
@@ -33,10 +28,6 @@ Value skipSequence(CommandCall& call, StartupSite& /*site*/) {
 }
 
 constexpr CommandEntry kOtherCommands[] = {
-    {"initGpibGsTi9914", skipGpib},
-    {"initGpibServer", skipGpib},
-    {"HiDEOSGpibLinkConfig", skipGpib},
-    {"gpibSniff", skipGpib},
     {"initMPCServer", skipServer},
     {"initLoveServer", skipServer},
     {"initQuadEM", skipServer},

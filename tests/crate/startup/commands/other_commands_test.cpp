@@ -11,14 +11,13 @@ using OtherCommands = StartupScene;
 
 TEST_F(OtherCommands, AreSkippedWithTheReason) {
   const auto startup = read(kCarrier +
-                            "ld < mpfLib\ninitGpibServer(\"GPIB0\",\"GS-IP488-0\",1024,1000)\n"
+                            "ld < mpfLib\n"
                             "AIMConfig(\"AIM1/1\", 0x98b, 1, 2048, 1, 1, \"dc0\", 100)\n"
                             "seq &Keithley, \"P=x:\"\nmotorSetup(1)\niocInit\n");
 
   EXPECT_THAT(
       remarksOf(startup),
       ElementsAre("ld is skipped: it has no meaning here",
-                  "initGpibServer is skipped: MPF has no GPIB server yet",
                   HasSubstr("AIMConfig is skipped: it starts a server of another package"),
                   HasSubstr("seq is skipped"), "unknown command motorSetup; it is skipped"));
 }
