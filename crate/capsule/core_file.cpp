@@ -10,6 +10,7 @@
 #include <array>
 #include <fmt/format.h>
 #include <functional>
+#include <fcntl.h>
 #include <glob.h>
 
 #include <mpf/clock.h>
