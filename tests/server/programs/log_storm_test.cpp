@@ -55,6 +55,7 @@ class LogStormTest : public testing::Test {
   static Message copyOf(const Message& request) {
     if (const auto* float64 = request.tryAs<Float64>()) return Float64Message(*float64);
     if (const auto* config = request.tryAs<SerialConfig>()) return SerialConfigMessage(*config);
+    if (request.tryAs<Char8Array>() != nullptr) return Char8ArrayMessage::allocValue(0);
     return Int32Message(*request.tryAs<Int32>());
   }
   // Stops the program. `text` is in the lines about each request.
@@ -126,6 +127,13 @@ TEST_F(LogStormTest, OfTheSerialServersSettings) {
   start({MPF_TEST_SERIAL_SERVER, "dmm", folder.file("line")});
   storm("dmm", SerialConfigMessage({.baud = -4711}));
   expectShortLog("settings refused");
+}
+
+TEST_F(LogStormTest, OfTheGpibServer) {
+  start({MPF_TEST_GPIB_SERVER, "gpib", "module", "--ti9914", "module,ipac,IP_a,105", "--carrier",
+         "ipac=model"});
+  storm("gpib", Char8ArrayMessage::allocValue(0));
+  expectShortLog("an invalid request: cmd 0x0");
 }
 
 // They log nothing about requests of other types.
