@@ -6,10 +6,11 @@
 namespace mpf {
 namespace {
 
-constexpr std::int32_t kHighest = 30;
 constexpr std::int32_t kPerPrimary = 100;
 
-constexpr bool isAddress(std::int32_t number) noexcept { return number >= 0 && number <= kHighest; }
+constexpr bool isAddress(std::int32_t number) noexcept {
+  return number >= 0 && number <= GpibAddress::kHighest;
+}
 
 }  // namespace
 

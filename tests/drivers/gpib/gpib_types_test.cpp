@@ -29,6 +29,12 @@ TEST(GpibTypes, GivesEachNumberBack) {
   EXPECT_EQ((GpibAddress{0, 5}.number()), 0) << "it has no number";
 }
 
+TEST(GpibTypes, RefusesPartsAbove30) {
+  EXPECT_TRUE((GpibAddress{30, 30}.isValid()));
+  EXPECT_FALSE(GpibAddress{31}.isValid());
+  EXPECT_FALSE((GpibAddress{30, 31}.isValid()));
+}
+
 TEST(GpibTypes, ShowsAddressesAsPeopleWriteThem) {
   EXPECT_EQ(toString(GpibAddress{22}), "22");
   EXPECT_EQ(toString(GpibAddress{22, 5}), "22.5");

@@ -22,10 +22,17 @@ namespace mpf {
 // The address of an instrument: primary 0 to 30, and a secondary address 0 to 30 when the
 // instrument has one.
 struct GpibAddress {
+  static constexpr std::uint8_t kHighest = 30;
+
   std::uint8_t primary = 0;
   std::optional<std::uint8_t> secondary{};
 
   auto operator<=>(const GpibAddress&) const = default;
+
+  // Whether both parts are in their range.
+  [[nodiscard]] bool isValid() const noexcept {
+    return primary <= kHighest && secondary.value_or(0) <= kHighest;
+  }
 
   // From one number, as EPICS links and asyn write addresses: 0 to 30 is a primary address; from
   // 100 on, 100 * primary + secondary. Empty when the number is no address.
