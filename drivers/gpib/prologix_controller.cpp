@@ -11,7 +11,6 @@
 #include <mpf/drivers/serial/tcp_serial_port.h>
 
 #include "base/printable.h"
-#include "drivers/gpib/peeked_bytes.h"
 #include "drivers/gpib/prologix_commands.h"
 
 namespace mpf {
@@ -67,7 +66,7 @@ GpibResult PrologixController::write(const GpibAddress& to, Bytes data, bool sen
   auto lines = selection(to, silenceFor(deadline));
   prologix::appendData(lines, data, sendEnd);
   auto answer = ask(lines, deadline);
-  if (answer.ok()) showPeeked(peek_, data, {.direction = GpibDirection::sent, .end = sendEnd});
+  if (answer.ok()) peek_.show(data, {.end = sendEnd, .direction = GpibDirection::sent});
   return answer;
 }
 
@@ -87,7 +86,7 @@ GpibReadResult PrologixController::read(const GpibAddress& from, const GpibReadL
                      (limits.endOfString || !answer.endsWithSilence);
     if (end) answer.bytes.pop_back();
     received.append(answer.bytes, end);
-    showPeeked(peek_, answer.bytes, {.direction = GpibDirection::received, .end = end});
+    peek_.show(answer.bytes, {.end = end, .direction = GpibDirection::received});
     isInstrumentSilent |= answer.isComplete;
     static_cast<GpibResult&>(result) = std::move(answer);
     if (result.ok() && deadline.hasPassed()) result.status = GpibStatus::timeout;
