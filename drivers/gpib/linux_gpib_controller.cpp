@@ -15,32 +15,34 @@
 namespace mpf {
 namespace {
 
-using std::chrono_literals::operator""ms;
-using std::chrono_literals::operator""s;
-
 constexpr int kBoards = 16;
 constexpr std::size_t kBytesOfCall = 64 << 10;
 
 // The time for the commands that end an operation; not counted, because they end a failure, too.
-constexpr Nanoseconds kTimeToEnd = 10ms;
+constexpr std::chrono::milliseconds kTimeToEnd{10};
 
 // The timeouts of the library: T1ms and those after it.
 constexpr int kFirstCode = 5;
-constexpr std::array<Nanoseconds, 13> kTimeouts{1ms, 3ms, 10ms, 30ms, 100ms, 300ms, 1s,
-                                                3s,  10s, 30s,  100s, 300s,  1000s};
+constexpr std::array<int, 13> kTimeoutsMs{1,    3,      10,     30,      100,     300,      1000,
+                                          3000, 10'000, 30'000, 100'000, 300'000, 1'000'000};
+constexpr auto kToNanoseconds = [](int timeoutMs) {
+  return Nanoseconds(std::chrono::milliseconds(timeoutMs));
+};
 
 // The shortest timeout of the library that is not before the deadline.
 int codeNotBefore(Deadline deadline) {
-  const auto* const found = std::ranges::lower_bound(kTimeouts, deadline.left());
-  const auto index = std::min<std::ptrdiff_t>(found - kTimeouts.begin(), kTimeouts.size() - 1);
+  const auto* const found =
+      std::ranges::lower_bound(kTimeoutsMs, deadline.left(), {}, kToNanoseconds);
+  const auto index = std::min<std::ptrdiff_t>(found - kTimeoutsMs.begin(), kTimeoutsMs.size() - 1);
   return kFirstCode + static_cast<int>(index);
 }
 
 // The longest timeout of the library that is not after the deadline; the shortest one, when the
 // deadline is nearer.
 int codeNotAfter(Deadline deadline) {
-  const auto* const found = std::ranges::upper_bound(kTimeouts, deadline.left());
-  const auto index = std::max<std::ptrdiff_t>(found - kTimeouts.begin() - 1, 0);
+  const auto* const found =
+      std::ranges::upper_bound(kTimeoutsMs, deadline.left(), {}, kToNanoseconds);
+  const auto index = std::max<std::ptrdiff_t>(found - kTimeoutsMs.begin() - 1, 0);
   return kFirstCode + static_cast<int>(index);
 }
 
