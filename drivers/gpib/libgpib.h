@@ -22,6 +22,7 @@ struct LibGpib {
     systemCall = 0,  // EDVR; count() is the error number of the system
     notController = 1,  // ECIC
     noListener = 2,  // ENOL
+    notAddressed = 3,  // EADR
     notSystemController = 5,  // ESAC
     aborted = 6,  // EABO: a timeout, too
     noBoard = 7,  // ENEB

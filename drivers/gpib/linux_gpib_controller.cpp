@@ -7,48 +7,43 @@
 #include <fmt/format.h>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include <mpf/drivers/gpib/linux_gpib.h>
-
-#include "drivers/gpib/command_bytes.h"
-#include "drivers/gpib/peeked_bytes.h"
 
 namespace mpf {
 namespace {
 
-using std::chrono_literals::operator""ms;
-using std::chrono_literals::operator""s;
-
 constexpr int kBoards = 16;
-constexpr long kBytesOfCall = 64 << 10;
+constexpr std::size_t kBytesOfCall = 64 << 10;
 
 // The time for the commands that end an operation; not counted, because they end a failure, too.
-constexpr Nanoseconds kTimeToEnd = 10ms;
+constexpr std::chrono::milliseconds kTimeToEnd{10};
 
 // The timeouts of the library: T1ms and those after it.
 constexpr int kFirstCode = 5;
-constexpr std::array<Nanoseconds, 13> kTimeouts{1ms, 3ms, 10ms, 30ms, 100ms, 300ms, 1s,
-                                                3s,  10s, 30s,  100s, 300s,  1000s};
+constexpr std::array<int, 13> kTimeoutsMs{1,    3,      10,     30,      100,     300,      1000,
+                                          3000, 10'000, 30'000, 100'000, 300'000, 1'000'000};
+constexpr auto kToNanoseconds = [](int timeoutMs) {
+  return Nanoseconds(std::chrono::milliseconds(timeoutMs));
+};
 
 // The shortest timeout of the library that is not before the deadline.
 int codeNotBefore(Deadline deadline) {
-  const auto* const found = std::ranges::lower_bound(kTimeouts, deadline.left());
-  const auto index = std::min<std::ptrdiff_t>(found - kTimeouts.begin(), kTimeouts.size() - 1);
+  const auto* const found =
+      std::ranges::lower_bound(kTimeoutsMs, deadline.left(), {}, kToNanoseconds);
+  const auto index = std::min<std::ptrdiff_t>(found - kTimeoutsMs.begin(), kTimeoutsMs.size() - 1);
   return kFirstCode + static_cast<int>(index);
 }
 
 // The longest timeout of the library that is not after the deadline; the shortest one, when the
 // deadline is nearer.
 int codeNotAfter(Deadline deadline) {
-  const auto* const found = std::ranges::upper_bound(kTimeouts, deadline.left());
-  const auto index = std::max<std::ptrdiff_t>(found - kTimeouts.begin() - 1, 0);
+  const auto* const found =
+      std::ranges::upper_bound(kTimeoutsMs, deadline.left(), {}, kToNanoseconds);
+  const auto index = std::max<std::ptrdiff_t>(found - kTimeoutsMs.begin() - 1, 0);
   return kFirstCode + static_cast<int>(index);
-}
-
-void appendAddress(std::vector<std::uint8_t>& commands, std::uint8_t base,
-                   const GpibAddress& address) {
-  commands.push_back(base + address.primary);
-  if (address.secondary) commands.push_back(gpib_command::kSecondary + *address.secondary);
 }
 
 }  // namespace
@@ -57,139 +52,66 @@ std::unique_ptr<GpibController> openLinuxGpib(const LinuxGpibOptions& options) {
   if (options.board < 0 || options.board >= kBoards)
     throw std::invalid_argument(
         fmt::format("Linux GPIB board {}: boards have numbers from 0 to 15", options.board));
-  return std::make_unique<LinuxGpibController>(options.board, options.library);
+  LibGpib library(options.library);
+  int own = 0;  // stays 0, the usual address, while the board is absent
+  library.ask(options.board, LibGpib::kOwnPrimaryAddress, &own);
+  return std::make_unique<LinuxGpibController>(options.board, std::move(library),
+                                               static_cast<std::uint8_t>(own));
 }
 
-LinuxGpibController::LinuxGpibController(int board, const std::string& library)
-    : board_(board),
+LinuxGpibController::LinuxGpibController(int board, LibGpib library, std::uint8_t own)
+    : GpibBoardController(OwnAddress::sent, own),
+      board_(board),
       description_(fmt::format("Linux GPIB board {} (/dev/gpib{})", board, board)),
-      library_(library) {}
+      library_(std::move(library)) {}
 
-GpibResult LinuxGpibController::write(const GpibAddress& to, Bytes data, bool sendEnd,
-                                      Deadline deadline) {
-  if (data.empty()) return {};
-  Commands commands;
-  auto result = addBoard(gpib_command::kTalk, commands);
-  if (!result.ok()) return result;
-  commands.push_back(gpib_command::kUnlisten);
-  appendAddress(commands, gpib_command::kListen, to);
-  result = sendCommands(commands, deadline);
-  if (result.ok()) result = transmit(data, sendEnd, deadline);
-  unaddress(result);
-  return result;
+GpibResult LinuxGpibController::command(Bytes commands, Deadline deadline) {
+  if (deadline.hasPassed())
+    return {GpibStatus::timeout, "the deadline had passed before the operation began"};
+  library_.setTimeout(board_, codeNotBefore(deadline));
+  const int status = library_.command(board_, commands.data(), static_cast<long>(commands.size()));
+  peek_.show(commands.first(transferred(status, commands.size())),
+             {.attention = true, .direction = GpibDirection::sent});
+  return resultOf("send commands", status);
 }
 
-GpibResult LinuxGpibController::transmit(Bytes data, bool sendEnd, Deadline deadline) {
+GpibResult LinuxGpibController::send(Bytes data, bool sendEnd, Deadline deadline) {
   library_.setEnd(board_, sendEnd ? 1 : 0);
   library_.setTimeout(board_, codeNotBefore(deadline));
   const int status = library_.write(board_, data.data(), static_cast<long>(data.size()));
-  const bool isDone = (status & LibGpib::kError) == 0;
-  const auto sent = std::clamp<long>(library_.count(), 0, static_cast<long>(data.size()));
-  const auto shown = isDone            ? data
-                     : isSystemError() ? Bytes{}
-                                       : data.first(static_cast<std::size_t>(sent));
-  showPeeked(peek_, shown, {.direction = GpibDirection::sent, .end = isDone && sendEnd});
+  const auto sent = data.first(transferred(status, data.size()));
+  peek_.show(sent,
+             {.end = sendEnd && sent.size() == data.size(), .direction = GpibDirection::sent});
   return resultOf("write", status);
-}
-
-GpibReadResult LinuxGpibController::read(const GpibAddress& from, const GpibReadLimits& limits,
-                                         Deadline deadline) {
-  GpibReadResult result;
-  Commands commands{gpib_command::kUnlisten};
-  static_cast<GpibResult&>(result) = addBoard(gpib_command::kListen, commands);
-  if (!result.ok()) return result;
-  appendAddress(commands, gpib_command::kTalk, from);
-  static_cast<GpibResult&>(result) = sendCommands(commands, deadline);
-  if (result.ok()) result = receive(limits, deadline);
-  unaddress(result);
-  return result;
 }
 
 GpibReadResult LinuxGpibController::receive(const GpibReadLimits& limits, Deadline deadline) {
   GpibReadResult result;
   const auto stopAt = limits.endOfString;
   library_.setEndOfString(board_, stopAt ? LibGpib::kStopAtByte | *stopAt : 0);
-  std::vector<std::uint8_t> bytes(std::min<std::size_t>(limits.maxBytes, kBytesOfCall));
+  std::vector<std::uint8_t> bytes(std::min(limits.maxBytes, kBytesOfCall));
   for (;;) {
     const auto wanted = std::min(bytes.size(), limits.maxBytes - result.data.size());
     library_.setTimeout(board_, codeNotAfter(deadline));
     const int status = library_.read(board_, bytes.data(), static_cast<long>(wanted));
-    static_cast<GpibResult&>(result) = resultOf("read", status);
-    const auto count = isSystemError() && !result.ok() ? 0 : library_.count();
-    const auto length =
-        static_cast<std::size_t>(std::clamp<long>(count, 0, static_cast<long>(wanted)));
-    const Bytes received(bytes.data(), length);
+    const auto received = Bytes(bytes).first(transferred(status, wanted));
+    const bool isString = stopAt && !received.empty() && received.back() == *stopAt;
+    const bool ended = (status & LibGpib::kEnd) != 0 && !received.empty();
     result.data.insert(result.data.end(), received.begin(), received.end());
-    const bool isString = stopAt && length > 0 && received.back() == *stopAt;
-    const bool ended = (status & LibGpib::kEnd) != 0 && length > 0;
     result.sawEnd = ended && !isString;
-    showPeeked(peek_, received, {.direction = GpibDirection::received, .end = result.sawEnd});
-    const bool isComplete = ended || isString || result.data.size() == limits.maxBytes;
-    if (isComplete && result.status == GpibStatus::timeout) static_cast<GpibResult&>(result) = {};
-    const bool mayContinue = result.ok() || result.status == GpibStatus::timeout;
-    if (isComplete || !mayContinue || deadline.hasPassed()) return result;
+    peek_.show(received, {.end = result.sawEnd, .direction = GpibDirection::received});
+    if (ended || isString || result.data.size() == limits.maxBytes) return result;
+    const auto problem = resultOf("read", status);
+    if ((problem.ok() || problem.status == GpibStatus::timeout) && !deadline.hasPassed()) continue;
+    static_cast<GpibResult&>(result) = problem;
+    if (problem.ok()) result.status = GpibStatus::timeout;
+    return result;
   }
 }
 
-GpibResult LinuxGpibController::sendCommands(Bytes commands, Deadline deadline) {
-  if (deadline.hasPassed())
-    return {GpibStatus::timeout, "the deadline had passed before the operation began"};
-  library_.setTimeout(board_, codeNotBefore(deadline));
-  const int status = library_.command(board_, commands.data(), static_cast<long>(commands.size()));
-  auto result = resultOf("send commands", status);
-  if (result.ok())
-    showPeeked(peek_, commands, {.direction = GpibDirection::sent, .attention = true});
-  return result;
-}
-
-GpibPollResult LinuxGpibController::serialPoll(const GpibAddress& at, Deadline deadline) {
-  GpibPollResult result;
-  Commands commands{gpib_command::kUnlisten, gpib_command::kSerialPollEnable};
-  static_cast<GpibResult&>(result) = addBoard(gpib_command::kListen, commands);
-  if (!result.ok()) return result;
-  appendAddress(commands, gpib_command::kTalk, at);
-  static_cast<GpibResult&>(result) = sendCommands(commands, deadline);
-  if (result.ok()) {
-    const auto answer = receive({.maxBytes = 1}, deadline);
-    static_cast<GpibResult&>(result) = answer;
-    if (!answer.data.empty()) result.statusByte = answer.data.front();
-  }
-  constexpr std::array<std::uint8_t, 1> kDisable{gpib_command::kSerialPollDisable};
-  static_cast<void>(sendCommands(kDisable, Deadline::after(kTimeToEnd)));
-  unaddress(result);
-  return result;
-}
-
-GpibResult LinuxGpibController::clearAll(Deadline deadline) {
-  constexpr std::array<std::uint8_t, 1> kCommands{gpib_command::kDeviceClear};
-  return sendCommands(kCommands, deadline);
-}
-
-GpibResult LinuxGpibController::clear(const GpibAddress& at, Deadline deadline) {
-  return addressed({&at, 1}, gpib_command::kSelectedDeviceClear, deadline);
-}
-
-GpibResult LinuxGpibController::trigger(std::span<const GpibAddress> at, Deadline deadline) {
-  return addressed(at, gpib_command::kGroupExecuteTrigger, deadline);
-}
-
-GpibResult LinuxGpibController::localLockout(Deadline deadline) {
-  constexpr std::array<std::uint8_t, 1> kCommands{gpib_command::kLocalLockout};
-  return sendCommands(kCommands, deadline);
-}
-
-GpibResult LinuxGpibController::goToLocal(const GpibAddress& at, Deadline deadline) {
-  return addressed({&at, 1}, gpib_command::kGoToLocal, deadline);
-}
-
-GpibResult LinuxGpibController::addressed(std::span<const GpibAddress> at, std::uint8_t command,
-                                          Deadline deadline) {
-  Commands commands{gpib_command::kUnlisten};
-  for (const auto& address : at) appendAddress(commands, gpib_command::kListen, address);
-  commands.push_back(command);
-  auto result = sendCommands(commands, deadline);
-  unaddress(result);
-  return result;
+void LinuxGpibController::recover(Bytes closing) {
+  if (!command(closing, Deadline::after(kTimeToEnd)).ok())
+    static_cast<void>(library_.interfaceClear(board_));
 }
 
 GpibResult LinuxGpibController::interfaceClear(Deadline /*deadline*/) {
@@ -207,21 +129,12 @@ std::optional<bool> LinuxGpibController::requestsService(Deadline /*deadline*/) 
   return isKnown ? std::optional((lines & LibGpib::kServiceRequest) != 0) : std::nullopt;
 }
 
-GpibResult LinuxGpibController::addBoard(std::uint8_t base, Commands& commands) const {
-  int own = 0;
-  const int status = library_.ask(board_, LibGpib::kOwnPrimaryAddress, &own);
-  commands.push_back(static_cast<std::uint8_t>(base + own));
-  return resultOf("find the address of the board", status);
-}
-
-void LinuxGpibController::unaddress(const GpibResult& result) {
-  constexpr std::array<std::uint8_t, 2> kCommands{gpib_command::kUntalk, gpib_command::kUnlisten};
-  const auto ended = sendCommands(kCommands, Deadline::after(kTimeToEnd));
-  if (!ended.ok() && !result.ok()) static_cast<void>(library_.interfaceClear(board_));
-}
-
-bool LinuxGpibController::isSystemError() const {
-  return library_.error() == static_cast<int>(LibGpib::Error::systemCall);
+std::size_t LinuxGpibController::transferred(int status, std::size_t wanted) const {
+  // After other errors, count() means something else.
+  const bool isCount = (status & LibGpib::kError) == 0 ||
+                       library_.error() == static_cast<int>(LibGpib::Error::aborted);
+  if (!isCount) return 0;
+  return static_cast<std::size_t>(std::clamp<long>(library_.count(), 0, static_cast<long>(wanted)));
 }
 
 GpibResult LinuxGpibController::resultOf(std::string_view what, int status) const {
@@ -241,6 +154,9 @@ GpibResult LinuxGpibController::resultOf(std::string_view what, int status) cons
     case LibGpib::Error::noListener:
       return failed(GpibStatus::noListener,
                     "no instrument accepted the bytes; check the address and that it is on");
+    case LibGpib::Error::notAddressed:
+      return failed(GpibStatus::failure,
+                    "the board has another address than when it was opened; open it again");
     case LibGpib::Error::notSystemController:
       return failed(GpibStatus::failure,
                     "the board is not the system controller; set master = yes in gpib.conf");

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: MIT
-// LinuxGpibController: operations of a GPIB bus as calls of libgpib for a board. It sends the
-// addresses itself, so it needs no device descriptors, and secondary addresses and group triggers
-// are commands like any other.
+// LinuxGpibController: a board of Linux GPIB as a GpibController. It needs no device descriptors of
+// libgpib, because GpibBoardController sends the addresses.
 //
-//   write(22, "ID?")   command: MTA 0, UNL, LAG 22    write: "ID?" END    command: UNT UNL
-//   read(22)           command: UNL, MLA 0, TAG 22    read: ... END       command: UNT UNL
-//
-// After a failure it sends UNT UNL; if that fails too, IFC.
+// After a failure it sends the commands that end the operation; if that fails too, IFC.
 //
 // Threads  see GpibController.
 // Trust    see GpibController.
@@ -14,56 +10,38 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include <mpf/drivers/gpib/gpib_controller.h>
-
+#include "drivers/gpib/board_controller.h"
 #include "drivers/gpib/libgpib.h"
+#include "drivers/gpib/peek_buffer.h"
 
 namespace mpf {
 
-class LinuxGpibController final : public GpibController {
+class LinuxGpibController final : public GpibBoardController {
  public:
-  // Loads the library.
-  //   throws  as LibGpib
-  LinuxGpibController(int board, const std::string& library);
+  //   own  primary address of the board
+  LinuxGpibController(int board, LibGpib library, std::uint8_t own);
 
-  GpibResult write(const GpibAddress& to, Bytes data, bool sendEnd, Deadline deadline) override;
-  GpibReadResult read(const GpibAddress& from, const GpibReadLimits& limits,
-                      Deadline deadline) override;
-  GpibResult sendCommands(Bytes commands, Deadline deadline) override;
-  GpibPollResult serialPoll(const GpibAddress& at, Deadline deadline) override;
-  GpibResult clearAll(Deadline deadline) override;
-  GpibResult clear(const GpibAddress& at, Deadline deadline) override;
-  GpibResult trigger(std::span<const GpibAddress> at, Deadline deadline) override;
   GpibResult interfaceClear(Deadline deadline) override;
   GpibResult remoteEnable(bool on, Deadline deadline) override;
-  GpibResult localLockout(Deadline deadline) override;
-  GpibResult goToLocal(const GpibAddress& at, Deadline deadline) override;
   [[nodiscard]] std::optional<bool> requestsService(Deadline deadline) override;
   bool onServiceRequest(std::function<void()> /*handler*/) override { return false; }
-  void onPeek(GpibPeekHandler handler) override { peek_ = std::move(handler); }
+  void onPeek(GpibPeekHandler handler) override { peek_.setHandler(std::move(handler)); }
   [[nodiscard]] std::string description() const override { return description_; }
 
  private:
-  using Commands = std::vector<std::uint8_t>;
-
-  // Appends the command that makes the board a talker or listener.
-  GpibResult addBoard(std::uint8_t base, Commands& commands) const;
-  // Sends `commands` to the listeners `at`.
-  GpibResult addressed(std::span<const GpibAddress> at, std::uint8_t command, Deadline deadline);
-  GpibResult transmit(Bytes data, bool sendEnd, Deadline deadline);
-  GpibReadResult receive(const GpibReadLimits& limits, Deadline deadline);
-  // Ends an operation: nobody talks or listens afterwards.
-  void unaddress(const GpibResult& result);
-  // Whether the last call failed with a system error, and count() is its number.
-  [[nodiscard]] bool isSystemError() const;
+  GpibResult command(Bytes commands, Deadline deadline) override;
+  GpibResult send(Bytes data, bool sendEnd, Deadline deadline) override;
+  GpibReadResult receive(const GpibReadLimits& limits, Deadline deadline) override;
+  void recover(Bytes closing) override;
+  // The number of bytes that the last call has transferred, at most `wanted`.
+  [[nodiscard]] std::size_t transferred(int status, std::size_t wanted) const;
   [[nodiscard]] GpibResult resultOf(std::string_view what, int status) const;
 
   const int board_;
   const std::string description_;
   const LibGpib library_;
-  GpibPeekHandler peek_;
+  GpibPeekBuffer peek_;
 };
 
 }  // namespace mpf

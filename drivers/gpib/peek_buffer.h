@@ -26,6 +26,19 @@ class GpibPeekBuffer {
     bytes_.at(count_++) = {Clock::nowNs(), value, attention, end, direction};
     if (count_ == bytes_.size()) flush();
   }
+  struct Transfer {
+    bool attention = false;
+    bool end = false;  // the last byte has END
+    GpibDirection direction = GpibDirection::sent;
+  };
+  // Shows bytes that were transferred at once.
+  void show(std::span<const std::uint8_t> bytes, const Transfer& transfer) {
+    for (const auto& byte : bytes) {
+      const bool isLast = &byte == &bytes.back();
+      add(byte, transfer.attention, transfer.end && isLast, transfer.direction);
+    }
+    flush();
+  }
   // Shows all bytes; to be called when the controller begins to wait.
   void flush() {
     if (count_ == 0) return;

@@ -11,7 +11,6 @@
 #include <mpf/drivers/serial/tcp_serial_port.h>
 
 #include "base/printable.h"
-#include "drivers/gpib/peeked_bytes.h"
 #include "drivers/gpib/prologix_commands.h"
 
 namespace mpf {
@@ -66,9 +65,9 @@ GpibResult PrologixController::write(const GpibAddress& to, Bytes data, bool sen
   if (data.empty()) return {};
   auto lines = selection(to, silenceFor(deadline));
   prologix::appendData(lines, data, sendEnd);
-  auto answer = ask(lines, deadline);
-  if (answer.ok()) showPeeked(peek_, data, {.direction = GpibDirection::sent, .end = sendEnd});
-  return answer;
+  auto result = ask(lines, deadline).result;
+  if (result.ok()) peek_.show(data, {.end = sendEnd, .direction = GpibDirection::sent});
+  return result;
 }
 
 GpibReadResult PrologixController::read(const GpibAddress& from, const GpibReadLimits& limits,
@@ -87,9 +86,9 @@ GpibReadResult PrologixController::read(const GpibAddress& from, const GpibReadL
                      (limits.endOfString || !answer.endsWithSilence);
     if (end) answer.bytes.pop_back();
     received.append(answer.bytes, end);
-    showPeeked(peek_, answer.bytes, {.direction = GpibDirection::received, .end = end});
+    peek_.show(answer.bytes, {.end = end, .direction = GpibDirection::received});
     isInstrumentSilent |= answer.isComplete;
-    static_cast<GpibResult&>(result) = std::move(answer);
+    static_cast<GpibResult&>(result) = std::move(answer.result);
     if (result.ok() && deadline.hasPassed()) result.status = GpibStatus::timeout;
   }
   if (result.status == GpibStatus::timeout && isInstrumentSilent)
@@ -123,8 +122,8 @@ GpibPollResult PrologixController::serialPoll(const GpibAddress& at, Deadline de
   const auto lines =
       fmt::format("{}++spoll {}\n", selection(at, silenceFor(deadline)), addressText(at));
   const auto answer = ask(lines, deadline);
-  static_cast<GpibResult&>(result) = answer;
-  if (!answer.ok()) return result;
+  static_cast<GpibResult&>(result) = answer.result;
+  if (!result.ok()) return result;
   const auto number = numberOf(textOf(answer.bytes));
   if (number && *number >= 0 && *number <= 255) {
     result.statusByte = static_cast<std::uint8_t>(*number);
@@ -146,7 +145,7 @@ GpibResult PrologixController::clearAll(Deadline /*deadline*/) {
 
 GpibResult PrologixController::clear(const GpibAddress& at, Deadline deadline) {
   received_.erase(at);
-  return ask(fmt::format("++addr {}\n++clr\n", addressText(at)), deadline);
+  return ask(fmt::format("++addr {}\n++clr\n", addressText(at)), deadline).result;
 }
 
 GpibResult PrologixController::trigger(std::span<const GpibAddress> at, Deadline deadline) {
@@ -154,30 +153,32 @@ GpibResult PrologixController::trigger(std::span<const GpibAddress> at, Deadline
     return unsupported(fmt::format("it triggers {} instruments at most", prologix::kMostTriggered));
   std::string line = "++trg";
   for (const auto& address : at) line.append(" ").append(addressText(address));
-  return ask(line.append("\n"), deadline);
+  return ask(line.append("\n"), deadline).result;
 }
 
 GpibResult PrologixController::interfaceClear(Deadline deadline) {
   received_.clear();
-  return ask("++ifc\n", deadline);
+  return ask("++ifc\n", deadline).result;
 }
 
 // A controller without ++ren holds REN all the time.
 GpibResult PrologixController::remoteEnable(bool on, Deadline deadline) {
-  auto answer = ask(on ? "++ren 1\n" : "++ren 0\n", deadline);
-  if (!answer.ok() || answer.bytes.empty() || on) return answer;
+  const auto answer = ask(on ? "++ren 1\n" : "++ren 0\n", deadline);
+  if (!answer.result.ok() || answer.bytes.empty() || on) return answer.result;
   return unsupported("this version has no ++ren and holds the REN line all the time");
 }
 
-GpibResult PrologixController::localLockout(Deadline deadline) { return ask("++llo\n", deadline); }
+GpibResult PrologixController::localLockout(Deadline deadline) {
+  return ask("++llo\n", deadline).result;
+}
 
 GpibResult PrologixController::goToLocal(const GpibAddress& at, Deadline deadline) {
-  return ask(fmt::format("++addr {}\n++loc\n", addressText(at)), deadline);
+  return ask(fmt::format("++addr {}\n++loc\n", addressText(at)), deadline).result;
 }
 
 std::optional<bool> PrologixController::requestsService(Deadline deadline) {
   const auto answer = ask("++srq\n", deadline);
-  if (!answer.ok()) return std::nullopt;
+  if (!answer.result.ok()) return std::nullopt;
   const auto number = numberOf(textOf(answer.bytes));
   return number ? std::optional(*number != 0) : std::nullopt;
 }

@@ -20,6 +20,7 @@
 
 #include <mpf/drivers/gpib/gpib_controller.h>
 
+#include "drivers/gpib/peek_buffer.h"
 #include "drivers/gpib/prologix_link.h"
 #include "drivers/gpib/read_buffer.h"
 
@@ -46,7 +47,7 @@ class PrologixController final : public GpibController {
   GpibResult goToLocal(const GpibAddress& at, Deadline deadline) override;
   [[nodiscard]] std::optional<bool> requestsService(Deadline deadline) override;
   bool onServiceRequest(std::function<void()> /*handler*/) override { return false; }
-  void onPeek(GpibPeekHandler handler) override { peek_ = std::move(handler); }
+  void onPeek(GpibPeekHandler handler) override { peek_.setHandler(std::move(handler)); }
   [[nodiscard]] std::string description() const override { return link_.description(); }
 
  private:
@@ -58,7 +59,7 @@ class PrologixController final : public GpibController {
 
   PrologixLink link_;
   std::map<GpibAddress, ReadBuffer> received_;
-  GpibPeekHandler peek_;
+  GpibPeekBuffer peek_;
 };
 
 }  // namespace mpf

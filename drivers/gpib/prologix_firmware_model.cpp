@@ -21,9 +21,9 @@ constexpr std::size_t kPlusSigns = 2;
 
 std::optional<int> numberIn(std::string_view word) {
   int number = 0;
-  const auto* const end = word.data() + word.size();
-  const auto [rest, error] = std::from_chars(word.data(), end, number);
-  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
+  const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  return error == std::errc() && rest == word.data() + word.size() ? std::optional(number)
+                                                                   : std::nullopt;
 }
 
 // Addresses in the form "22", "22 101".

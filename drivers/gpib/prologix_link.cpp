@@ -77,22 +77,21 @@ void PrologixLink::becomeUnknown() {
 PrologixLink::Answer PrologixLink::exchange(const Request& request) {
   Answer answer;
   if (request.deadline.hasPassed()) {
-    answer.status = GpibStatus::timeout;
-    answer.reason = "the deadline had passed before the operation began";
+    answer.result = {GpibStatus::timeout, "the deadline had passed before the operation began"};
     return answer;
   }
   if (state_ == State::ready && wasLost()) becomeUnknown();
   if (state_ == State::unknown) {
-    static_cast<GpibResult&>(answer) = identify(request.deadline);
-    if (!answer.ok()) return answer;
+    answer.result = identify(request.deadline);
+    if (!answer.result.ok()) return answer;
   }
   answer.mark = nextMark(request.otherMarkThan);
   const auto end = fmt::format("{}\r\n{}\r\n", version_, answer.mark);
   collector_.expect(end, request.silence);
   const auto text = fmt::format("{}{}{}", beginOf(answer.mark), request.commands, kAskForEnd);
-  static_cast<GpibResult&>(answer) = transact(text, request.deadline);
+  answer.result = transact(text, request.deadline);
   auto bytes = collector_.answer();
-  const auto endAt = answer.ok() ? bytes.size() - end.size() : bytes.rfind(prologix::kName);
+  const auto endAt = answer.result.ok() ? bytes.size() - end.size() : bytes.rfind(prologix::kName);
   answer.isComplete = endAt < bytes.size() && end.starts_with(bytes.substr(endAt));
   if (answer.isComplete) bytes = bytes.substr(0, endAt);
   answer.endsWithSilence = collector_.hadSilenceBefore(bytes.size());

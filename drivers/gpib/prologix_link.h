@@ -45,9 +45,10 @@ class PrologixLink {
   static constexpr std::chrono::milliseconds kUsualPatience{5000};
   static constexpr std::size_t kMostBytes = 64 << 20;
 
-  struct Answer : GpibResult {
+  struct Answer {
+    GpibResult result;
     // What the controller sent before the end of the answer, as far as it has arrived.
-    std::vector<std::uint8_t> bytes{};
+    std::vector<std::uint8_t> bytes;
     // All of it has arrived; possible also on a timeout, when a part of the end has arrived.
     bool isComplete = false;
     std::uint8_t mark = 0;
@@ -58,6 +59,7 @@ class PrologixLink {
     std::string commands;  // whole lines
     Deadline deadline;
     std::chrono::milliseconds silence{0};  // the ++read_tmo_ms in `commands`, if there is one
+    // NOLINTNEXTLINE(readability-redundant-member-init): g++ wants it
     std::optional<std::uint8_t> otherMarkThan{};
   };
 

@@ -30,7 +30,9 @@ class PrologixModel {
     std::string version = "Prologix GPIB-ETHERNET Controller version 01.06.06.00";
     bool hasRemoteEnable = false;  // ++ren
     std::chrono::milliseconds delay{0};  // before it executes a line
-    std::string garbage{};  // sent before each line is executed
+    // Sent before each line is executed.
+    // NOLINTNEXTLINE(readability-redundant-member-init): g++ wants it
+    std::string garbage{};
     bool isSilent = false;  // receives, and executes nothing
     bool cutsConnection = false;  // instead of executing a line
   };

@@ -12,8 +12,6 @@
 
 #include <mpf/drivers/gpib/usbtmc.h>
 
-#include "drivers/gpib/peeked_bytes.h"
-
 namespace mpf {
 namespace {
 
@@ -89,7 +87,7 @@ GpibResult UsbtmcController::write(const GpibAddress& /*to*/, Bytes data, bool s
   if (static_cast<std::size_t>(sent) < data.size())
     return {GpibStatus::failure, fmt::format("{}: write: the instrument accepted {} of {} bytes",
                                              description_, sent, data.size())};
-  showPeeked(peek_, data, {.direction = GpibDirection::sent, .end = sendEnd});
+  peek_.show(data, {.end = sendEnd, .direction = GpibDirection::sent});
   return {};
 }
 
@@ -120,7 +118,7 @@ GpibResult UsbtmcController::readOnce(const GpibReadLimits& limits) {
   if (result < 0) return failed("read", result);
   const bool end = (attributes & kUsbtmcEndOfMessage) != 0;
   received_.append(bytes, end);
-  showPeeked(peek_, bytes, {.direction = GpibDirection::received, .end = end});
+  peek_.show(bytes, {.end = end, .direction = GpibDirection::received});
   return {};
 }
 

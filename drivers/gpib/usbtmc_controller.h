@@ -19,6 +19,7 @@
 
 #include <mpf/drivers/gpib/gpib_controller.h>
 
+#include "drivers/gpib/peek_buffer.h"
 #include "drivers/gpib/read_buffer.h"
 #include "drivers/gpib/usbtmc_file.h"
 
@@ -43,7 +44,7 @@ class UsbtmcController final : public GpibController {
   GpibResult goToLocal(const GpibAddress& at, Deadline deadline) override;
   [[nodiscard]] std::optional<bool> requestsService(Deadline deadline) override;
   bool onServiceRequest(std::function<void()> /*handler*/) override { return false; }
-  void onPeek(GpibPeekHandler handler) override { peek_ = std::move(handler); }
+  void onPeek(GpibPeekHandler handler) override { peek_.setHandler(std::move(handler)); }
   [[nodiscard]] std::string description() const override { return description_; }
 
  private:
@@ -67,7 +68,7 @@ class UsbtmcController final : public GpibController {
   State state_ = State::closed;
   std::uint8_t capabilities_ = 0;  // USBTMC488_CAPABILITY_...
   ReadBuffer received_;
-  GpibPeekHandler peek_;
+  GpibPeekBuffer peek_;
 };
 
 }  // namespace mpf

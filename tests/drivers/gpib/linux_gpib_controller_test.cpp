@@ -204,13 +204,13 @@ TEST_F(LinuxGpibControllerTest, ShowsCommandsAndDataToAPeekHandler) {
   read(kEcho);
 
   EXPECT_EQ(seen,
-            "!C!?!6>a.!_!?"
-            "!?!#!V<a.!_!?");
+            "!_!?!C!6>a.!_!?"
+            "!_!?!V!#<a.!_!?");
 }
 
 TEST_F(LinuxGpibControllerTest, EachErrorIsAStatusAndTheNextOperationWorks) {
   using Error = LibGpib::Error;
-  for (const auto* const function : {"ibask", "ibcmd", "ibwrt", "ibrd"}) {
+  for (const auto* const function : {"ibcmd", "ibwrt", "ibrd"}) {
     for (const auto error : {Error::systemCall, Error::notController, Error::noListener,
                              Error::notSystemController, Error::aborted, Error::noBoard}) {
       library_.fail(function, error, ENODEV);
@@ -230,6 +230,15 @@ TEST_F(LinuxGpibControllerTest, SaysThatTheBoardIsAbsent) {
               HasSubstr("board 0 (/dev/gpib0): IFC: no such board"));
   library_.fail("ibsre", LibGpib::Error::systemCall, EACCES);
   EXPECT_THAT(controller_->remoteEnable(true, patient()).reason, HasSubstr("Permission denied"));
+}
+
+TEST_F(LinuxGpibControllerTest, SaysThatTheAddressOfTheBoardHasChanged) {
+  library_.fail("ibask", LibGpib::Error::noBoard);
+  const auto early = openLinuxGpib({.library = MPF_TEST_FAKE_LIBGPIB});
+
+  EXPECT_THAT(early->write(kEcho, raw("a"), true, patient()).reason, HasSubstr("open it again"));
+
+  expectWorks();
 }
 
 TEST_F(LinuxGpibControllerTest, ClearsABusThatStaysBusyAfterAFailure) {

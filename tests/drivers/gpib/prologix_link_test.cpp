@@ -194,7 +194,7 @@ TEST(PrologixLink, AnExchangeReturnsWhatTheCommandsAnswered) {
       link.exchange({.commands = "++addr 9 101\n++addr\n++eos\n", .deadline = patient()});
   const auto next = link.exchange({.commands = "++eot_char\n", .deadline = patient()});
 
-  EXPECT_TRUE(answer.ok()) << answer.reason;
+  EXPECT_TRUE(answer.result.ok()) << answer.result.reason;
   EXPECT_EQ(textOf(answer.bytes), "9 101\r\n3\r\n");
   EXPECT_EQ(textOf(next.bytes), std::to_string(next.mark) + "\r\n");
   EXPECT_NE(next.mark, answer.mark);
@@ -221,7 +221,7 @@ TEST(PrologixLink, TellsWhetherThereWasSilenceBeforeTheEnd) {
         {.commands = fmt::format("++addr 22\n++read_tmo_ms {}\n++read eoi\n", silence.count()),
          .deadline = patient(),
          .silence = silence});
-    EXPECT_TRUE(answer.ok()) << answer.reason;
+    EXPECT_TRUE(answer.result.ok()) << answer.result.reason;
     return answer.endsWithSilence;
   };
 

@@ -5,7 +5,7 @@
 //
 // The library libgpib is loaded when a board is opened, so MPF needs it neither to build nor to run
 // on a host without such a board. The board must be configured (gpib_config) and be the system
-// controller.
+// controller. Its own address is read when it is opened, and is taken to be 0 while it is absent.
 //
 // libgpib knows only the timeouts 1, 3, 10, 30 ms ... 1000 s: a write, commands, or a poll that the
 // bus does not accept end at the next of these times after their deadline. A read is divided into
