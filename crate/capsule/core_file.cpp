@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "crate/capsule/core_file.h"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -10,7 +11,6 @@
 #include <array>
 #include <fmt/format.h>
 #include <functional>
-#include <fcntl.h>
 #include <glob.h>
 
 #include <mpf/clock.h>

@@ -44,10 +44,10 @@ TEST_F(Demo, PrintsValuesWithoutATerminal) {
   const auto demo = runDemo(MPF_TEST_BUILD);
 
   EXPECT_EQ(demo.status, 0) << demo.output;
-  EXPECT_THAT(demo.output,
-              AllOf(HasSubstr("$ mpf-ip330-server adc ipac IP_b"), HasSubstr("VOLTMETER"),
-                    HasSubstr("  voltmeter "),
-                    HasSubstr("the ADC measured the output of the DAC in"), HasSubstr("dioOut")));
+  EXPECT_THAT(demo.output, AllOf(HasSubstr("$ mpf-ip330-server adc ipac IP_b"),
+                                 HasSubstr("VOLTMETER"), HasSubstr("  voltmeter "),
+                                 HasSubstr("the ADC measured the output of the DAC in"),
+                                 HasSubstr("dioOut"), HasSubstr("value=\"HP3458A\\r\\n\"")));
 }
 
 TEST_F(Demo, PrintsTheOutputOfAServerThatDoesNotStart) {
@@ -98,6 +98,7 @@ TEST_F(Demo, AnIocShowsADeadServerToItsClients) {
 
   EXPECT_EQ(demo.status, 0) << demo.output;
   EXPECT_THAT(demo.output, AllOf(HasSubstr("   lab:volts 2.50 V, severity 0\n"),
+                                 HasSubstr(" 2.495117188\n"),  // lab:meter
                                  HasSubstr("   lab:volts 2.50 V, severity 3\n"),
                                  HasSubstr("'server is not there'"),
                                  HasSubstr("   lab:volts -1.25 V, severity 0\n")));
