@@ -15,11 +15,15 @@ constexpr bool isAddress(std::int32_t number) noexcept {
 }  // namespace
 
 std::optional<GpibAddress> GpibAddress::fromNumber(std::int32_t number) noexcept {
-  if (isAddress(number)) return GpibAddress{static_cast<std::uint8_t>(number)};
-  const auto primary = number / kPerPrimary;
+  const bool isPrimary = isAddress(number);
+  const auto primary = isPrimary ? number : number / kPerPrimary;
   const auto secondary = number % kPerPrimary;
-  if (primary < 1 || !isAddress(primary) || !isAddress(secondary)) return std::nullopt;
-  return GpibAddress{static_cast<std::uint8_t>(primary), static_cast<std::uint8_t>(secondary)};
+  if (!isPrimary && (primary < 1 || !isAddress(primary) || !isAddress(secondary)))
+    return std::nullopt;
+  GpibAddress address;
+  address.primary = static_cast<std::uint8_t>(primary);
+  if (!isPrimary) address.secondary = static_cast<std::uint8_t>(secondary);
+  return address;
 }
 
 std::int32_t GpibAddress::number() const noexcept {

@@ -9,10 +9,10 @@ using testing::HasSubstr;
 
 using GpibCommands = StartupScene;
 
-const std::string kModule = kCarrier + "initGpibGsTi9914(\"M\",\"ipac\",\"IP_c\",105)\n";
+const std::string kGpibModule = kCarrier + "initGpibGsTi9914(\"M\",\"ipac\",\"IP_c\",105)\n";
 
 TEST_F(GpibCommands, AModuleAndItsServerAreAProcess) {
-  const auto startup = read(kModule + "initGpibServer(\"GPIB0\",\"M\",4096,1000)\n");
+  const auto startup = read(kGpibModule + "initGpibServer(\"GPIB0\",\"M\",4096,1000)\n");
 
   EXPECT_THAT(settingsOf(startup, "M"),
               ElementsAre("server=GPIB0", "module=M", "ti9914=M,ipac,IP_c,105", "bufsize=4096",
@@ -20,12 +20,12 @@ TEST_F(GpibCommands, AModuleAndItsServerAreAProcess) {
 }
 
 TEST_F(GpibCommands, AModuleWithoutServerHasOneOfItsName) {
-  EXPECT_THAT(settingsOf(read(kModule), "M"),
+  EXPECT_THAT(settingsOf(read(kGpibModule), "M"),
               ElementsAre("server=M", "module=M", "ti9914=M,ipac,IP_c,105"));
 }
 
 TEST_F(GpibCommands, LinksAreThoseOfTheIoc) {
-  const auto startup = read(kModule + "initGpibServer(\"GPIB0\",\"M\",4096,1000)\n" +
+  const auto startup = read(kGpibModule + "initGpibServer(\"GPIB0\",\"M\",4096,1000)\n" +
                             "HiDEOSGpibLinkConfig(10,1,\"GPIB1\")\n"
                             "HiDEOSGpibLinkConfig(11,0,\"M\")\niocInit\n");
 
@@ -35,7 +35,7 @@ TEST_F(GpibCommands, LinksAreThoseOfTheIoc) {
 }
 
 TEST_F(GpibCommands, ASnifferIsAProgram) {
-  const auto startup = read(kModule + "gpibSniff(\"M\",3)\n");
+  const auto startup = read(kGpibModule + "gpibSniff(\"M\",3)\n");
 
   ASSERT_EQ(startup.crate.processes.size(), 2U);
   EXPECT_THAT(startup.crate.processes.at(1).command, ElementsAre("mpf", "gpib-sniff", "M", "3"));
@@ -47,10 +47,10 @@ TEST_F(GpibCommands, RefuseWhatDoesNotExist) {
               HasSubstr("initGpibServer: the module \"M\" does not exist at this line"));
   EXPECT_THAT(errorOf(kCarrier + "gpibSniff(\"M\",3)\n"),
               HasSubstr("gpibSniff: the module \"M\" does not exist at this line"));
-  EXPECT_THAT(errorOf(kModule + "initGpibGsTi9914(\"M\",\"ipac\",\"IP_d\",105)\n"),
+  EXPECT_THAT(errorOf(kGpibModule + "initGpibGsTi9914(\"M\",\"ipac\",\"IP_d\",105)\n"),
               HasSubstr("the module \"M\" exists already"));
   EXPECT_THAT(
-      errorOf(kModule + "initGpibServer(\"A\",\"M\",1,1)\ninitGpibServer(\"B\",\"M\",1,1)\n"),
+      errorOf(kGpibModule + "initGpibServer(\"A\",\"M\",1,1)\ninitGpibServer(\"B\",\"M\",1,1)\n"),
       HasSubstr("the module \"M\" has the server \"A\" already"));
 }
 
