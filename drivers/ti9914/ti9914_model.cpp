@@ -175,7 +175,10 @@ void Ti9914Model::execute(std::uint8_t command, bool set, const GpibLines& lines
 void Ti9914Model::takeControl() noexcept { states_.drivesAttention = states_.isInCharge; }
 
 void Ti9914Model::reset(bool on) {
-  states_ = {.isReset = on, .hasNoInterrupts = states_.hasNoInterrupts};
+  states_ = {.isReset = on,
+             .holdsOffAll = states_.holdsOffAll,
+             .holdsOffEnd = states_.holdsOffEnd,
+             .hasNoInterrupts = states_.hasNoInterrupts};
   acceptor_ = {};
   source_ = Source::none;
   output_.reset();

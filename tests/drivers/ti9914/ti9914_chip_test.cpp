@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "drivers/ti9914/ti9914_chip.h"
 
+#include <atomic>
 #include <future>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,13 +21,20 @@ class Ti9914ChipTest : public Ti9914Test {
  protected:
   Chip& startChip(const Chip::Options& options = {.vector = 104}) {
     auto& module = modules_.create("a-ip488", "ipac", "IP_a", kIp488);
-    chip_.emplace(module, options, [this] { served_.set_value(); });
+    chip_.emplace(module, options, [this] {
+      ++served_;
+      served_.notify_all();
+    });
     EXPECT_EQ(chip_->setUp(), "");
     return *chip_;
   }
   [[nodiscard]] bool isActive(gpib_line::Line line) const { return bus_->lines().has(line); }
 
-  std::promise<void> served_;
+  void waitForServed(int count) {
+    for (int seen = served_; seen < count; seen = served_) served_.wait(seen);
+  }
+
+  std::atomic<int> served_{0};  // calls for service
   std::optional<Chip> chip_;
 };
 
@@ -85,7 +93,7 @@ TEST_F(Ti9914ChipTest, CallsForServiceFromAThreadOfItsOwn) {
 
   bus_->access([&](const GpibLines& /*lines*/) { memory_->requestService(0); });
 
-  served_.get_future().wait();
+  waitForServed(1);
 }
 
 TEST_F(Ti9914ChipTest, CallsForServiceAlsoWhenTheCallerSawTheRequestFirst) {
@@ -96,7 +104,24 @@ TEST_F(Ti9914ChipTest, CallsForServiceAlsoWhenTheCallerSawTheRequestFirst) {
 
   chip.forget(0);
 
-  served_.get_future().wait();
+  waitForServed(1);
+}
+
+// A service request that the caller sees first leaves an interrupt without an event behind.
+TEST_F(Ti9914ChipTest, DoesNotTakeManyServiceRequestsForAStuckLine) {
+  std::atomic<int> alarms{0};
+  auto& chip =
+      startChip({.vector = 104, .onAlarm = [&](const std::string& /*what*/) { ++alarms; }});
+  chip.forget(Chip::kCanSend);
+
+  for (int i = 0; i < 5000; ++i) {
+    bus_->access([&](const GpibLines& /*lines*/) { memory_->requestService(0); });
+    chip.forget(0);
+    bus_->access([&](const GpibLines& /*lines*/) { memory_->serialPoll(); });
+    waitForServed(i + 1);
+  }
+
+  EXPECT_EQ(alarms, 0);
 }
 
 TEST_F(Ti9914ChipTest, ReportsAnInterruptLineThatIsStuck) {

@@ -16,6 +16,7 @@ namespace mpf::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 class Ti9914ControllerTest : public Ti9914Test {
  protected:
@@ -103,11 +104,12 @@ TEST_F(Ti9914ControllerTest, ReachesInstrumentsBySecondaryAddress) {
 }
 
 TEST_F(Ti9914ControllerTest, ReportsThatNoInstrumentListens) {
-  const auto result = send(kNobody, "x");
+  const auto result = send(kNobody, "\x14");
 
   EXPECT_EQ(result.status, GpibStatus::noListener);
   EXPECT_THAT(result.reason, HasSubstr("instrument 9: no instrument accepts data"));
-  EXPECT_EQ(readLine(kMeter), "-8.874270409E-01\r\n") << "the byte must not become a command";
+  EXPECT_EQ(readLine(kMeter), "-8.874270409E-01\r\n");
+  EXPECT_EQ(memory_->log, "") << "the byte must not become a command, DCL";
 }
 
 TEST_F(Ti9914ControllerTest, ReportsAnEmptyBus) {
@@ -142,8 +144,12 @@ TEST_F(Ti9914ControllerTest, ReturnsWhatCameBeforeATimeout) {
 TEST_F(Ti9914ControllerTest, NamesTheLinesAtATimeoutOfAWrite) {
   memory_->accepts = false;
 
-  const auto result = gpib().write(kMemory, bytesOf("abc"), true, soon());
+  const auto result = gpib().write(kMemory,
+                                   bytesOf("\x14"
+                                           "bc"),
+                                   true, soon());
 
+  EXPECT_THAT(memory_->log, Not(HasSubstr("clear"))) << "the byte must not become a command, DCL";
   EXPECT_EQ(result.status, GpibStatus::timeout);
   EXPECT_THAT(result.reason, HasSubstr("data byte 1 of 3 was not accepted in time; active lines: "
                                        "DAV NRFD NDAC REN"));
@@ -185,6 +191,15 @@ TEST_F(Ti9914ControllerTest, KeepsRemoteEnableOverAReset) {
   EXPECT_EQ(gpib().write(kMemory, bytesOf("x"), true, soon()).status, GpibStatus::timeout);
 
   EXPECT_FALSE(bus_->lines().has(gpib_line::kRen));
+}
+
+TEST_F(Ti9914ControllerTest, EndsTheHoldoffOfEachByteByAReset) {
+  memory_->send("a;bc");
+  EXPECT_TRUE(gpib().read(kMemory, {.maxBytes = 9, .endOfString = ';'}, Deadline::never()).ok());
+  memory_->accepts = false;
+  EXPECT_EQ(gpib().write(kMemory, bytesOf("x"), true, soon()).status, GpibStatus::timeout);
+
+  EXPECT_EQ(readLine(kMeter), "-8.874270409E-01\r\n");
 }
 
 TEST_F(Ti9914ControllerTest, SendsExactlyTheseCommands) {
