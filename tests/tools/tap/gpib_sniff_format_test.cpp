@@ -70,13 +70,13 @@ TEST_F(GpibSniffFormatTest, ManualBeginsWithALineOfReceivedBytes) {
 }
 
 TEST_F(GpibSniffFormatTest, DecodeNamesCommandsAndQuotesData) {
-  constexpr std::int64_t kMs = 1'000'000;
+  constexpr std::int64_t kMillisecond = 1'000'000;
   const auto format = GpibSniffFormat::make("decode", 0);
 
-  auto text = add(*format, kCommand, "_?V", kMs);
-  text += add(*format, kReceived, "-8.8\r\n", 3 * kMs, true);
-  text += add(*format, kCommand, "6e", 4 * kMs);
-  text += add(*format, kSent, "ID", 5 * kMs);
+  auto text = add(*format, kCommand, "_?V", kMillisecond);
+  text += add(*format, kReceived, "-8.8\r\n", 3 * kMillisecond, true);
+  text += add(*format, kCommand, "6e", 4 * kMillisecond);
+  text += add(*format, kSent, "ID", 5 * kMillisecond);
   text += format->flush();
 
   EXPECT_EQ(text,
