@@ -82,11 +82,11 @@ class GpibBus::Impl {
       controller_->onPeek({});
     }
   }
-  [[nodiscard]] bool isServiceRequested() {
-    const auto limit = Deadline::after(kLineLimit);
-    if (!turns_.take(BusTurns::kBusItself, limit).ok()) return false;
+  // Empty: the bus was busy, or the controller could not tell.
+  [[nodiscard]] std::optional<bool> isServiceRequested() {
+    if (!turns_.take(BusTurns::kBusItself, Deadline::after(kLineLimit)).ok()) return std::nullopt;
     const Turn turn(turns_);
-    return controller_->requestsService(limit).value_or(false);
+    return controller_->requestsService(Deadline::after(kLineLimit));
   }
 
   const std::unique_ptr<GpibController> controller_;

@@ -7,7 +7,7 @@
 
 namespace mpf {
 
-ServiceRequestWatch::ServiceRequestWatch(std::function<bool()> isActive,
+ServiceRequestWatch::ServiceRequestWatch(std::function<std::optional<bool>()> isActive,
                                          std::chrono::milliseconds every)
     : isActive_(std::move(isActive)), every_(every) {
   const SignalsBlocked blocked;
@@ -62,7 +62,7 @@ void ServiceRequestWatch::run() {
       hasNewHandler_ = false;
       isReported = std::exchange(hasReport_, false);
     }
-    isActive = isReported || (!handlers_.isEmpty() && isActive_());
+    isActive = isReported || (!handlers_.isEmpty() && isActive_().value_or(isActive));
     if (isActive) handlers_.call();
   }
 }

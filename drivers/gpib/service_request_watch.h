@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "drivers/gpib/handler_list.h"
@@ -23,7 +24,8 @@ class ServiceRequestWatch {
  public:
   //   isActive  asks for the line; may take its time
   //   every     the period
-  ServiceRequestWatch(std::function<bool()> isActive, std::chrono::milliseconds every);
+  ServiceRequestWatch(std::function<std::optional<bool>()> isActive,
+                      std::chrono::milliseconds every);
   ~ServiceRequestWatch();
   ServiceRequestWatch(const ServiceRequestWatch&) = delete;
   ServiceRequestWatch& operator=(const ServiceRequestWatch&) = delete;
@@ -38,7 +40,7 @@ class ServiceRequestWatch {
  private:
   void run();
 
-  const std::function<bool()> isActive_;
+  const std::function<std::optional<bool>()> isActive_;
   const std::chrono::milliseconds every_;
   HandlerList<> handlers_;
   std::mutex mutex_;  // all below but the thread

@@ -17,6 +17,8 @@ using Chip = Ti9914Chip;
 constexpr std::chrono::microseconds kGrace{300};
 // Also read when no module answers.
 constexpr std::uint8_t kAllLines = 0xff;
+// A bus that never pauses is looked at for the deadline after so many bytes.
+constexpr std::size_t kBytesOfLook = 64;
 
 }  // namespace
 
@@ -106,6 +108,8 @@ GpibResult Ti9914Controller::transmit(Bytes bytes, bool attention, bool sendEnd,
     if (accepted > 0)
       peek_.add(bytes[accepted - 1], attention, isEnd(accepted - 1), GpibDirection::sent);
     if (accepted == bytes.size()) break;
+    if (accepted % kBytesOfLook == kBytesOfLook - 1 && deadline.hasPassed())
+      return notAccepted(0, attention, accepted, bytes.size());
     if (isEnd(accepted)) chip_.command(ti9914::kFeoi);
     hasByteOnBus_ = true;
     chip_.write(bytes[accepted]);
@@ -157,7 +161,8 @@ GpibResult Ti9914Controller::takeBytes(const GpibReadLimits& limits, Deadline de
                                        GpibReadResult& result) {
   auto& data = result.data;
   for (;;) {
-    const auto events = wait(Chip::kHasByte, deadline);
+    const bool isLate = data.size() % kBytesOfLook == kBytesOfLook - 1 && deadline.hasPassed();
+    const auto events = isLate ? 0 : wait(Chip::kHasByte, deadline);
     if ((events & Chip::kLost) != 0) return lost(module_.problem());
     if ((events & Chip::kHasByte) == 0)
       return {GpibStatus::timeout,

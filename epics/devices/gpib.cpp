@@ -8,8 +8,8 @@
 //                                            stringout, lso: text with %s at the place of the value
 //
 // HiDEOSGpibLinkConfig gives a link its server (gpib_links.h). <address> is the primary address, or
-// 100 * primary + secondary address. Escapes are translated ("\\n" in a database file is a line
-// feed), and nothing is appended. An answer ends with END; its final CR and LF are removed. The
+// 100 * primary + secondary address. Escapes in questions and formats are translated ("\\n" in
+// a database file is a line feed), and nothing is appended. An answer ends with END; its final CR and LF are removed. The
 // value of ai and longin is the first number of the answer. The server waits at most 5 s.
 //
 // Source  drvGpib of EPICS Base 3.13 for links and DTYP; the parameters are of this project.
@@ -72,22 +72,28 @@ bool tryStore(lsiRecord& record, const std::string& text) {
 }
 // The first number in the text.
 bool tryStore(aiRecord& record, const std::string& text) {
-  const auto begin = text.find_first_of("+-.0123456789");
-  if (begin == std::string::npos) return false;
-  char* end = nullptr;
-  const auto value = std::strtod(text.c_str() + begin, &end);
-  if (end == text.c_str() + begin) return false;
-  record.val = value;
-  return true;
+  constexpr auto* kFirst = "+-.0123456789";
+  for (auto at = text.find_first_of(kFirst); at != std::string::npos;
+       at = text.find_first_of(kFirst, at + 1)) {
+    char* end = nullptr;
+    const auto value = std::strtod(text.c_str() + at, &end);
+    if (end == text.c_str() + at) continue;
+    record.val = value;
+    return true;
+  }
+  return false;
 }
 bool tryStore(longinRecord& record, const std::string& text) {
-  const auto begin = text.find_first_of("+-0123456789");
-  const auto value =
-      begin == std::string::npos
-          ? std::nullopt
-          : ValueFormat<std::int32_t>("%d", FormatUse::scan).scan(text.substr(begin));
-  if (value) record.val = *value;
-  return value.has_value();
+  constexpr auto* kFirst = "+-0123456789";
+  const ValueFormat<std::int32_t> format("%d", FormatUse::scan);
+  for (auto at = text.find_first_of(kFirst); at != std::string::npos;
+       at = text.find_first_of(kFirst, at + 1)) {
+    const auto value = format.scan(text.substr(at));
+    if (!value) continue;
+    record.val = *value;
+    return true;
+  }
+  return false;
 }
 
 std::string printed(const aoRecord& record, const std::string& format) {
@@ -142,15 +148,16 @@ template <class Record>
 class GpibOutput final : public TextDevice {
  public:
   explicit GpibOutput(Record* record)
-      : TextDevice(reinterpret_cast<dbCommon*>(record), &record->out) {
+      : TextDevice(reinterpret_cast<dbCommon*>(record), &record->out),
+        format_(translated(getUserParm())) {
     try {
-      static_cast<void>(printed(*record, getUserParm()));
+      static_cast<void>(printed(*record, format_));
     } catch (const std::exception& error) {
       refuseLink(*this, reinterpret_cast<dbCommon*>(record), "OUT", error.what());
     }
   }
   long startIO(dbCommon* common) override {
-    const auto text = translated(printed(*reinterpret_cast<Record*>(common), getUserParm()));
+    const auto text = printed(*reinterpret_cast<Record*>(common), format_);
     return sendText({.cmd = gpib::cmdWrite, .text = text, .address = getSignal()});
   }
   // MPF_NoConvert keeps the VAL of the database: the output is not read back.
@@ -163,6 +170,7 @@ class GpibOutput final : public TextDevice {
   long takeAnswer(dbCommon* common, TextAnswer answer) override {
     return answer.status == gpib::gpibStatusOK ? MPF_OK : fail(common, reasonOf(answer.status));
   }
+  const std::string format_;
 };
 
 }  // namespace

@@ -96,7 +96,8 @@ inline constexpr std::int32_t allInstruments = -1;
 // A byte in the value of cmdTrigger.
 inline constexpr std::uint8_t noSecondaryAddress = 0xff;
 
-// `status` of a reply. With any status but gpibStatusLeased, `value` has all bytes that were read.
+// `status` of a reply. `value` has all bytes that were read, unless the status says
+// otherwise.
 inline constexpr std::int32_t gpibStatusOK = 0;
 // The instrument did not answer or accept bytes in time, or the bus was busy until the timeout.
 inline constexpr std::int32_t gpibStatusTimeout = 1;
@@ -110,7 +111,8 @@ inline constexpr std::int32_t gpibStatusNoListener = 4;
 inline constexpr std::int32_t gpibStatusUnsupported = 5;
 // Another client held the lease until the timeout; `value` is its name.
 inline constexpr std::int32_t gpibStatusLeased = 6;
-// The request is invalid: an unknown command or option, an address or a field out of range.
+// The request is invalid: an unknown command or option, an address or a field out of range; `value`
+// is the reason, in words.
 inline constexpr std::int32_t gpibStatusInvalid = 7;
 
 // `extra` of the reply to a read: what ended it; 0: its timeout or an error.

@@ -42,6 +42,8 @@ Addressing addressingOf(std::int32_t command) noexcept {
   }
 }
 
+constexpr std::size_t kLongestName = 80;  // of the holder of a lease
+
 std::chrono::milliseconds timeoutOf(const Char8Array& fields, const GpibLimits& limits) {
   if (fields.timeout <= 0) return std::min(limits.timeout, limits.maxTimeout);
   const bool isInMilliseconds = (fields.cmd & cmdTimeoutMilliseconds) != 0;
@@ -90,7 +92,14 @@ std::string readLimits(const Char8Array& fields, const GpibLimits& limits, GpibR
   }
   if (request.command == cmdRemoteEnable && fields.extra != 0 && fields.extra != 1)
     return fmt::format("remote enable with extra {}: use 1 (on) or 0 (off)", fields.extra);
+  if (request.command == cmdLease && request.data.size() > kLongestName)
+    return fmt::format("a holder with a name of {} bytes: use at most {}", request.data.size(),
+                       kLongestName);
+  if (request.command == cmdSubscribe && !request.data.empty())
+    return fmt::format("a subscription with a value of {} bytes: use none", request.data.size());
   if (request.command != cmdRead && request.command != cmdWriteRead) return {};
+  if (fields.eomLen < 0 || fields.eomLen > static_cast<std::int32_t>(fields.eomString.size()))
+    return fmt::format("eomLen {}: use 0 to {}", fields.eomLen, fields.eomString.size());
   if (fields.extra < 0) return fmt::format("a read of {} bytes: use 0 or more", fields.extra);
   const auto asked = static_cast<std::size_t>(fields.extra);
   request.isCountRequested = asked != 0 && asked <= limits.bufferBytes;
@@ -108,6 +117,7 @@ std::string readCommand(const Char8Array& fields, GpibRequest& request) {
   if (!isKnown)
     return fmt::format("cmd {:#x} has no such command or option: use those of gpib_commands.h",
                        static_cast<std::uint32_t>(fields.cmd));
+  if (fields.timeout < 0) return fmt::format("timeout {}: use 0 or more", fields.timeout);
   if (!request.sendEnd && request.command != cmdWrite)
     return fmt::format("a {} without END: the option is for writes",
                        kNames.at(static_cast<std::size_t>(request.command)));

@@ -60,6 +60,7 @@ void GpibServer::receive() {
       endExpired();
     }
   }
+  queue_.removeGone([](const GpibWork&) { return true; });  // they end as `refused` now
 }
 
 void GpibServer::handle(Char8ArrayMessage&& message) {
@@ -68,7 +69,7 @@ void GpibServer::handle(Char8ArrayMessage&& message) {
   if (client == 0) return;  // the client has disconnected
   if (!request.problem.empty()) {
     log_->warn("an invalid request: {}", request.problem);
-    return reply(message, {gpibStatusInvalid, request.extra, {}, {}});
+    return reply(message, {gpibStatusInvalid, request.extra, bytesOf(request.problem), {}});
   }
   switch (request.command) {
     case cmdLeaseHolder:
@@ -170,7 +171,11 @@ void GpibServer::keepLease(Char8ArrayMessage&& request, GpibUser client) {
 void GpibServer::note(const GpibWork& work, const GpibReply& reply) {
   log_->debug("{}: status {}{}{}", work.request.text(), reply.status,
               reply.reason.empty() ? "" : ": ", reply.reason);
-  if (reply.status == gpibStatusError) server_.countAlarm();
+  if (reply.status == gpibStatusError) {
+    server_.countAlarm();
+    log_->warn("{}: {}", work.request.text(), reply.reason);
+    return;
+  }
   if (work.request.addresses.size() != 1) return;
   const auto& address = work.request.addresses.front();
   if (reply.status == gpibStatusOK || reply.status == gpibStatusOverflow) {

@@ -22,9 +22,9 @@ int serve(int argc, char** argv) {
   if (const auto exit = options.parse(argc, argv)) return *exit;
   const auto& arguments = options.arguments;
   const mpf::ServerLog log("mpf-gpib-server", arguments.logLevel);
-  const auto bus = mpf::openBus(options, log);
+  mpf::StopBell stop;  // before the controller, whose start may take seconds
+  const auto bus = mpf::openBus(options, log, stop);
   if (!bus) return 0;
-  mpf::StopBell stop;
   const auto backplane = mpf::Backplane::attach(arguments.backplane);
   mpf::MessageServer server(backplane, options.server, arguments.messages);
   mpf::logShortages(server, log);

@@ -15,12 +15,11 @@ constexpr std::chrono::milliseconds kRetryEvery{500};
 
 }  // namespace
 
-std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log) {
+std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log, StopBell& stop) {
   if (const auto* const start = options.ti9914.find(options.module)) {
     auto controller = openTi9914(options.ti9914, *start, options.hardware, log);
     return controller ? std::make_unique<GpibBus>(std::move(controller)) : nullptr;
   }
-  StopBell stop;
   for (std::string logged;;) {
     try {
       return std::make_unique<GpibBus>(openGpibController(options.module));

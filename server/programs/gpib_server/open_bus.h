@@ -6,6 +6,7 @@
 
 #include <mpf/drivers/gpib/gpib_bus.h>
 
+#include "base/stop_bell.h"
 #include "server/programs/gpib_server/start_options.h"
 #include "server/programs/server_log.h"
 
@@ -15,6 +16,7 @@ namespace mpf {
 // used, and returns null when SIGINT or SIGTERM arrived meanwhile.
 //   options, log  outlive the bus
 //   throws        as openTi9914() and openGpibController()
-[[nodiscard]] std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log);
+[[nodiscard]] std::unique_ptr<GpibBus> openBus(GpibStartOptions& options, const ServerLog& log,
+                                               StopBell& stop);
 
 }  // namespace mpf

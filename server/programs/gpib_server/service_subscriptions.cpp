@@ -90,21 +90,25 @@ std::vector<GpibAddress> ServiceSubscriptions::instrumentsOf(GpibUser holder) co
 }
 
 void ServiceSubscriptions::pollInstruments(GpibUser holder) {
-  if (!isRequested_.exchange(false, std::memory_order_relaxed) || !noPollsBefore_.hasPassed())
-    return;
-  const auto instruments = instrumentsOf(holder);
-  if (instruments.empty()) return;
-  bool isFound = false;
-  for (const auto& address : instruments) {
-    const auto poll = bus_.serialPoll(address, Deadline::after(kPollLimit), holder);
-    if (!poll.ok()) {
-      log_->debug("the poll of instrument {} failed: {}", toString(address), poll.reason);
-      continue;
-    }
-    isFound = isFound || (poll.statusByte & kGpibRequestsService) != 0;
-    report(address, poll.statusByte);
+  if (holder != std::exchange(holder_, holder)) round_.clear();
+  if (round_.empty()) {
+    if (!noPollsBefore_.hasPassed() || !isRequested_.exchange(false, std::memory_order_relaxed))
+      return;
+    round_ = instrumentsOf(holder);
+    isFound_ = false;
+    if (round_.empty()) return;
   }
-  pause_ = isFound ? milliseconds(0) : std::clamp(pause_ * 2, kFirstPause, kLongestPause);
+  const auto address = round_.back();
+  round_.pop_back();
+  const auto poll = bus_.serialPoll(address, Deadline::after(kPollLimit), holder);
+  if (poll.ok()) {
+    isFound_ = isFound_ || (poll.statusByte & kGpibRequestsService) != 0;
+    report(address, poll.statusByte);
+  } else {
+    log_->debug("the poll of instrument {} failed: {}", toString(address), poll.reason);
+  }
+  if (!round_.empty()) return requested_();  // requests come between two polls
+  pause_ = isFound_ ? milliseconds(0) : std::clamp(pause_ * 2, kFirstPause, kLongestPause);
   noPollsBefore_ = Deadline::after(pause_);
 }
 

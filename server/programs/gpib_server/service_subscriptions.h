@@ -65,6 +65,9 @@ class ServiceSubscriptions {
   mutable std::mutex mutex_;
   std::vector<Subscription> subscriptions_;  // under mutex_
   std::atomic<bool> isRequested_{false};
+  GpibUser holder_ = 0;
+  std::vector<GpibAddress> round_;  // still to be polled
+  bool isFound_ = false;  // an instrument of this round requested service
   Deadline noPollsBefore_ = Deadline::atNs(0);  // this and below: the bus thread
   std::chrono::milliseconds pause_{0};
   std::optional<GpibBus::Subscription>

@@ -20,11 +20,12 @@ class ServiceRequestWatchTest : public testing::Test {
 
   Watchdog watchdog_{"service request watch test"};
   std::atomic<bool> isActive_{false};
+  std::atomic<bool> isBusy_{false};
   std::atomic<int> looks_{0};
   std::atomic<int> calls_{0};
   ServiceRequestWatch watch_{[this] {
                                ++looks_;
-                               return isActive_.load();
+                               return isBusy_ ? std::nullopt : std::optional(isActive_.load());
                              },
                              1ms};
 };
@@ -56,6 +57,19 @@ TEST_F(ServiceRequestWatchTest, AReportCallsEachHandlerWithoutALook) {
 
   waitFor(calls_, 1);
   waitFor(others, 1);
+}
+
+// Otherwise a request for service during a long operation would be lost: its report does not come
+// again.
+TEST_F(ServiceRequestWatchTest, ALineThatCannotBeSeenIsStillActive) {
+  watch_.setReported(true);
+  const auto entry = watch_.add([this] { ++calls_; });
+  waitFor(looks_, 1);
+  isBusy_ = true;
+
+  watch_.report();
+
+  waitFor(calls_, 3);
 }
 
 TEST_F(ServiceRequestWatchTest, AReportedLineIsLookedAtWhileItIsActive) {

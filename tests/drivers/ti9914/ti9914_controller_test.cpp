@@ -141,6 +141,23 @@ TEST_F(Ti9914ControllerTest, ReturnsWhatCameBeforeATimeout) {
   EXPECT_EQ(readLine(kMeter), "-8.874270409E-01\r\n");
 }
 
+class EndlessTalker : public GpibInstrumentModel {
+ public:
+  bool receive(std::uint8_t /*byte*/, bool /*end*/) override { return true; }
+  std::optional<Byte> nextByte() override { return Byte{'x', false}; }
+};
+
+TEST_F(Ti9914ControllerTest, KeepsTheDeadlineWhileATalkerNeverPauses) {
+  constexpr GpibAddress kEndless{11};
+  bus_->attach(kEndless, std::make_shared<EndlessTalker>());
+
+  const auto result = gpib().read(kEndless, {.maxBytes = 4 << 20}, soon());
+
+  EXPECT_EQ(result.status, GpibStatus::timeout);
+  EXPECT_THAT(result.data, Not(testing::IsEmpty()));
+  EXPECT_EQ(readLine(kMeter), "-8.874270409E-01\r\n") << "the next call works";
+}
+
 TEST_F(Ti9914ControllerTest, NamesTheLinesAtATimeoutOfAWrite) {
   memory_->accepts = false;
 

@@ -56,6 +56,17 @@ TEST_F(GpibRecordTest, ALonginReadsTheFirstNumber) {
   Ioc::waitFor("v", "-221");
 }
 
+TEST_F(GpibRecordTest, TheFirstNumberMayFollowADashOrAPoint) {
+  const FakeSerial server(backplane_, "DC-V. 1.5");
+  const Ioc ioc(input("ai", "#L10 A1 @?", "field(PREC, \"1\")") +
+                fmt::format("record(longin, \"n\") {{ {} field(INP, \"#L10 A1 @?\") "
+                            "field(PINI, \"YES\") }}",
+                            kDtyp));
+
+  Ioc::waitFor("v", "1.5");
+  Ioc::waitFor("n", "1");
+}
+
 TEST_F(GpibRecordTest, ALongAnswerIsNotCut) {
   FakeSerial server(backplane_, std::string(100, 'x'));
   const Ioc ioc(input("lsi", "#L10 A1 @LONG?", "field(SIZV, \"200\")"));
@@ -76,8 +87,8 @@ TEST_F(GpibRecordTest, OutputsPrintTheirValue) {
     server.waitForText("-7");
   }
   {
-    const Ioc ioc(output("stringout", "#L10 A9 @DISP %s", "HI\\\\n"));
-    server.waitForText("DISP HI\n");
+    const Ioc ioc(output("stringout", "#L10 A9 @DISP %s\\\\n", "C:\\\\new"));
+    server.waitForText("DISP C:\\new\n");  // the value is sent as it is
   }
   const Ioc ioc(fmt::format(
       "record(lso, \"v\") {{ {} field(OUT, \"#L10 A9 @\") field(SIZV, \"80\") }}", kDtyp));

@@ -114,6 +114,12 @@ TEST(GpibRequest, AnInvalidRequestHasAProblem) {
   for (const auto address : {-2, 31, 99, 131, 3100, INT32_MAX, INT32_MIN})
     EXPECT_THAT(problemOf({.cmd = cmdRead, .address = address}), HasSubstr("address")) << address;
   EXPECT_THAT(problemOf({.cmd = cmdRead, .extra = -1}), HasSubstr("-1 bytes"));
+  EXPECT_THAT(problemOf({.timeout = -5, .cmd = cmdRead}), HasSubstr("timeout -5"));
+  EXPECT_THAT(problemOf({.cmd = cmdRead, .eomLen = 100}), HasSubstr("eomLen 100"));
+  EXPECT_THAT(problemOf({.cmd = cmdRead, .eomLen = -7}), HasSubstr("eomLen -7"));
+  EXPECT_THAT(problemOf({.cmd = cmdSubscribe, .address = 1}, "x"), HasSubstr("value of 1 bytes"));
+  EXPECT_THAT(problemOf({.cmd = cmdLease, .extra = 1}, std::string(81, 'x')),
+              HasSubstr("name of 81 bytes"));
   EXPECT_THAT(problemOf({.cmd = cmdRemoteEnable, .extra = 2}), HasSubstr("1 (on) or 0 (off)"));
   EXPECT_THAT(problemOf({.cmd = cmdTrigger}, "\x01"), HasSubstr("pairs"));
   EXPECT_THAT(problemOf({.cmd = cmdTrigger}, "\x1f\xff"), HasSubstr("pairs"));

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/stop_bell.h"
 #include "tests/server/programs/command_line.h"
 #include "tests/support/watchdog.h"
 
@@ -24,12 +25,13 @@ class OpenBusTest : public testing::Test {
   Watchdog watchdog_{"open bus test"};
   ServerLog log_{"test", "off"};
   GpibStartOptions options_;
+  StopBell stop_;
 };
 
 TEST_F(OpenBusTest, AModelOfAModuleHasAMeter) {
   parse({"GPIB0", "a-ip488", "--ti9914", "a-ip488,ipac,IP_a,105", "--carrier", "ipac=model"});
 
-  const auto bus = openBus(options_, log_);
+  const auto bus = openBus(options_, log_, stop_);
 
   ASSERT_NE(bus, nullptr);
   const auto reading = bus->read({22}, {.maxBytes = 100}, Deadline::after(60s));
@@ -40,7 +42,7 @@ TEST_F(OpenBusTest, AModelOfAModuleHasAMeter) {
 TEST_F(OpenBusTest, AnUnknownControllerIsAnError) {
   parse({"GPIB0", "nowhere"});
   try {
-    static_cast<void>(openBus(options_, log_));
+    static_cast<void>(openBus(options_, log_, stop_));
     ADD_FAILURE() << "it was opened";
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), HasSubstr("nowhere"));
