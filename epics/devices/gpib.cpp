@@ -8,9 +8,10 @@
 //                                            stringout, lso: text with %s at the place of the value
 //
 // HiDEOSGpibLinkConfig gives a link its server (gpib_links.h). <address> is the primary address, or
-// 100 * primary + secondary address. Escapes in questions and formats are translated ("\\n" in
-// a database file is a line feed), and nothing is appended. An answer ends with END; its final CR and LF are removed. The
-// value of ai and longin is the first number of the answer. The server waits at most 5 s.
+// 100 * primary + secondary address. Escapes in questions and formats are translated
+// ("\\n" in a database file is a line feed), and nothing is appended. An answer ends with END; its
+// final CR and LF are removed. The value of ai and longin is the first number of the answer. The
+// server waits at most 5 s.
 //
 // Source  drvGpib of EPICS Base 3.13 for links and DTYP; the parameters are of this project.
 #include <aiRecord.h>
