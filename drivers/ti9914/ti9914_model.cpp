@@ -3,8 +3,6 @@
 
 #include <utility>
 
-#include <mpf/clock.h>
-
 #include "drivers/ti9914/ti9914.h"
 
 namespace mpf {
@@ -19,11 +17,12 @@ constexpr std::uint16_t kUndrivenHigh = 0xff00;
 
 }  // namespace
 
-Ti9914Model::Ti9914Model(std::shared_ptr<GpibBusModel> bus)
+Ti9914Model::Ti9914Model(std::shared_ptr<GpibBusModel> bus, std::function<std::int64_t()> now)
     : DeviceModel({.manufacturer = kIp488.manufacturer,
                    .model = kIp488.models.front(),
                    .revision = kRevision}),
-      bus_(std::move(bus)) {
+      bus_(std::move(bus)),
+      now_(std::move(now)) {
   bus_->connect(*this);
 }
 
@@ -117,7 +116,7 @@ void Ti9914Model::writeRegister(std::size_t offset, std::uint8_t value, const Gp
 }
 
 void Ti9914Model::command(std::uint8_t command, const GpibLines& lines) {
-  const auto now = Clock::nowNs();
+  const auto now = now_();
   if (now - std::exchange(commandAtNs_, now) < kAuxSpacingNs) {
     ++lostCommands_;
     return;

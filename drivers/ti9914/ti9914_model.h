@@ -14,9 +14,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 
+#include <mpf/clock.h>
 #include <mpf/drivers/industry_pack/device_model.h>
 
 #include "drivers/gpib/acceptor.h"
@@ -27,7 +29,9 @@ namespace mpf {
 
 class Ti9914Model final : public DeviceModel, private GpibParticipant {
  public:
-  explicit Ti9914Model(std::shared_ptr<GpibBusModel> bus);
+  //   now  the time [ns], which decides whether a command comes too soon
+  explicit Ti9914Model(std::shared_ptr<GpibBusModel> bus,
+                       std::function<std::int64_t()> now = Clock::nowNs);
   ~Ti9914Model() override;
 
   std::uint16_t read(Space space, std::size_t offset, Lanes lanes) override;
@@ -74,6 +78,7 @@ class Ti9914Model final : public DeviceModel, private GpibParticipant {
   void followInterrupt();
 
   const std::shared_ptr<GpibBusModel> bus_;
+  const std::function<std::int64_t()> now_;
   // guarded by the bus
   States states_;
   GpibAcceptor acceptor_;
