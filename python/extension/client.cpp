@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: MIT
+#include "python/extension/client.h"
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "python/extension/errors.h"
+#include "python/extension/options.h"
+
+namespace mpf::python {
+namespace {
+
+using namespace nb::literals;
+
+constexpr const char* kClient = "client";
+
+Retry retryOf(bool retry) { return retry ? Retry::neverTaken : Retry::never; }
+
+nb::object replyOf(const std::string& server, Message&& message, const Expected& expected) {
+  auto reply = toPython(std::move(message));
+  if (!expected.check) return reply;
+  if (nb::cast<PyMessage&>(reply).status() != 0) raiseStatus(server, std::move(reply));
+  if (!reply.type().is(expected.type) && !expected.type.is(nb::type<PyMessage>()))
+    raiseUnexpected(server, std::move(reply));
+  return reply;
+}
+
+// The type of the reply to a request of type `request`, unless the caller names another.
+nb::object expectedType(nb::handle request, nb::object wanted) {
+  if (!wanted.is_none()) return wanted;
+  const auto type = request.type();
+  return nb::borrow(type.is(nb::type<PyScalar<SerialConfig>>()) ? nb::type<PyScalar<Int32>>()
+                                                                : type);
+}
+
+// Ends an exchange whose wait was interrupted or has ended.
+nb::object finish(Connection& connection, Exchange& exchange, bool wasInterrupted, bool timedOut,
+                  const Expected& expected) {
+  if (wasInterrupted) throw nb::python_error();
+  if (exchange.reply) return replyOf(connection.server, std::move(exchange.reply), expected);
+  if (timedOut && exchange.fate == Fate::outcomeUnknown) raiseTimedOut(connection.server);
+  raiseFate(connection.server, *exchange.fate);
+}
+
+}  // namespace
+
+// ---- Connection
+
+Connection::Connection(const std::string& backplane, std::string serverName, std::int32_t location,
+                       WaitMode waitMode)
+    : server(std::move(serverName)),
+      forks_(forkCount()),
+      requester_(std::make_shared<Requester>(Backplane::attach(backplane), server, location,
+                                             waitMode)) {}
+
+Connection::~Connection() {
+  // Threads of the parent may have waited in the requester: its parts cannot be destroyed here.
+  if (isInherited()) static_cast<void>(new std::shared_ptr<Requester>(std::move(requester_)));
+}
+
+bool Connection::isInherited() const noexcept { return forks_ != forkCount(); }
+
+void Connection::close() {
+  if (!requester_ || isInherited()) return;
+  requester_->close();
+  requester_.reset();
+}
+
+std::shared_ptr<Requester> Connection::requester() const {
+  if (!requester_) raiseClosed(kClient);
+  if (isInherited()) raiseInherited(kClient);
+  return requester_;
+}
+
+void Connection::connect(Requester& requester, Deadline deadline) {
+  if (requester.client().isConnected()) return;
+  bool wasInterrupted = false;
+  {
+    WithoutGil unlocked;
+    requester.connect(deadline, unlocked.interruption());
+    wasInterrupted = unlocked.wasInterrupted();
+  }
+  if (wasInterrupted) throw nb::python_error();
+}
+
+void Connection::send(PyMessage& message, Exchange& exchange, Deadline deadline,
+                      Deadline connectBefore, Retry retry) {
+  for (;;) {
+    const auto requester = this->requester();
+    connect(*requester, connectBefore);
+    auto& client = requester->client();
+    auto sent = message.toMessage(Allocator(client));
+    const auto result = requester->send(std::move(sent), exchange, deadline, retry);
+    if (result == SendResult::sent) return;
+    // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
+    const auto bytes = sent.body().size();
+    message.restore(std::move(sent));
+    // The server may have stopped since.
+    if (result == SendResult::notConnected && !connectBefore.hasPassed()) continue;
+    if (result == SendResult::notConnected)
+      raiseNotSent(server, result, client.notConnectedBecause());
+    raiseNotSent(server, result, result == SendResult::tooLarge
+                                     ? std::to_string(bytes) + " bytes, the limit is " +
+                                           std::to_string(client.maxMessageBytes())
+                                     : std::string());
+  }
+}
+
+// ---- PyRequest
+
+PyRequest::PyRequest(std::shared_ptr<Connection> connection, Deadline deadline, nb::object type,
+                     std::size_t limit)
+    : connection_(std::move(connection)), deadline_(deadline), type_(std::move(type)) {
+  exchange_.limit = limit;
+}
+
+PyRequest::~PyRequest() { close(); }
+
+void PyRequest::send(PyMessage& message, Retry retry, bool waits) {
+  connection_->send(message, exchange_, deadline_, waits ? deadline_ : Deadline::atNs(0), retry);
+}
+
+nb::object PyRequest::wait(bool check) {
+  bool wasInterrupted = false;
+  if (!exchange_.hasEnded()) {
+    const auto requester = connection_->requester();
+    WithoutGil unlocked;
+    requester->waitForEnd(exchange_, deadline_, unlocked.interruption());
+    wasInterrupted = unlocked.wasInterrupted();
+  }
+  return finish(*connection_, exchange_, wasInterrupted, deadline_.hasPassed(), {type_, check});
+}
+
+nb::object PyRequest::result(bool check) {
+  if (!connection_->isClosed() && !connection_->requester()->hasEnded(exchange_))
+    return nb::none();
+  return finish(*connection_, exchange_, false, deadline_.hasPassed(), {type_, check});
+}
+
+nb::object PyRequest::next(double timeout) {
+  Message message;
+  bool wasInterrupted = false;
+  {
+    const auto requester = connection_->requester();
+    WithoutGil unlocked;
+    message = requester->waitForFurther(exchange_, deadlineOf(timeout), unlocked.interruption());
+    wasInterrupted = unlocked.wasInterrupted();
+  }
+  if (wasInterrupted) throw nb::python_error();
+  return message ? toPython(std::move(message)) : nb::none();
+}
+
+nb::object PyRequest::takeNext() {
+  auto message = connection_->requester()->takeFurther(exchange_);
+  return message ? toPython(std::move(message)) : nb::none();
+}
+
+std::uint64_t PyRequest::missed() const {
+  return connection_->isClosed() ? exchange_.missed : connection_->requester()->missed(exchange_);
+}
+
+bool PyRequest::isConnected() const {
+  return !connection_->isClosed() && !connection_->requester()->isDisconnected(exchange_);
+}
+
+void PyRequest::cancel() { connection_->requester()->cancel(exchange_); }
+
+void PyRequest::close() {
+  if (connection_->isClosed() || connection_->isInherited()) return;
+  const auto requester = connection_->requester();
+  if (exchange_.id != 0 && !requester->hasEnded(exchange_)) requester->cancel(exchange_);
+  requester->forget(exchange_);
+}
+
+// ---- PyClient
+
+namespace {
+
+class PyClient {
+ public:
+  PyClient(std::string server, std::optional<std::int32_t> location, const std::string& backplane,
+           double timeout, const std::string& wait)
+      : location_(location.value_or(Backplane::defaultLocation())),
+        timeout_(timeout),
+        connection_(std::make_shared<Connection>(backplane, std::move(server), location_,
+                                                 waitModeOf(wait))) {}
+
+  nb::object call(nb::handle message, std::optional<double> timeout, nb::object reply, bool retry,
+                  bool check) {
+    PyRequest request(connection_, deadline(timeout),
+                      expectedType(message, std::move(reply)), 0);
+    request.send(messageOf(message), retryOf(retry), true);
+    return request.wait(check);
+  }
+  std::shared_ptr<PyRequest> send(nb::handle message, std::optional<double> timeout,
+                                  nb::object reply, bool retry, std::size_t further, bool waits) {
+    auto request =
+        std::make_shared<PyRequest>(connection_, deadline(timeout),
+                                    expectedType(message, std::move(reply)), further);
+    request->send(messageOf(message), retryOf(retry), waits);
+    return request;
+  }
+  bool waitConnected(std::optional<double> timeout) {
+    bool isConnected = false;
+    bool wasInterrupted = false;
+    {
+      const auto requester = connection_->requester();
+      WithoutGil unlocked;
+      isConnected = requester->connect(deadline(timeout), unlocked.interruption());
+      wasInterrupted = unlocked.wasInterrupted();
+    }
+    if (wasInterrupted) throw nb::python_error();
+    return isConnected;
+  }
+  nb::object loan(nb::handle type, std::size_t length) {
+    const auto requester = connection_->requester();
+    return python::loan(Allocator(requester->client()), type, length);
+  }
+  std::vector<std::uint32_t> runPending() {
+    const auto requester = connection_->requester();
+    const WithoutGil unlocked;
+    return requester->runPending();
+  }
+  // [s] from now; None without one.
+  std::optional<double> nextDeadline() {
+    const auto next = connection_->requester()->nextDeadline();
+    if (next.isNever()) return std::nullopt;
+    return std::chrono::duration<double>(next.left()).count();
+  }
+  int descriptor() { return connection_->requester()->descriptor(); }
+  bool isConnected() { return connection_->requester()->client().isConnected(); }
+  std::string notConnectedBecause() {
+    return connection_->requester()->client().notConnectedBecause();
+  }
+  std::uint64_t maxMessageBytes() {
+    return connection_->requester()->client().maxMessageBytes();
+  }
+  [[nodiscard]] const std::string& server() const { return connection_->server; }
+  [[nodiscard]] std::int32_t location() const { return location_; }
+  [[nodiscard]] double timeout() const { return timeout_; }
+  void close() { connection_->close(); }
+
+ private:
+  static PyMessage& messageOf(nb::handle message) {
+    PyMessage* result = nullptr;
+    if (!nb::try_cast(message, result) || result == nullptr)
+      throw nb::type_error("the request must be a message, for example mpf.Int32(value=3)");
+    return *result;
+  }
+  Deadline deadline(std::optional<double> timeout) const {
+    return deadlineOf(timeout.value_or(timeout_));
+  }
+
+  const std::int32_t location_;
+  const double timeout_;
+  const std::shared_ptr<Connection> connection_;
+};
+
+constexpr const char* kCallText =
+    R"(Sends a request and waits for its reply.
+
+message: the request. It can be sent again; a loaned array is empty then.
+timeout: [s] for the connection, the request and the reply together; None: that of the client.
+reply: the class of the reply, mpf.Message for any; by default that of the request, and Int32 for a
+    SerialConfig.
+retry: if the server ends before it has received the request, send it to the next server of this
+    name. No request is executed twice by it.
+check: raise StatusError if the status of the reply is not 0, and UnexpectedReply if it is of
+    another class. False: return any reply.
+
+Raises NotConnected, QueueFull or TooLarge if the request was not sent; NeverTaken or Expired if the
+server has not received it; TimedOut, OutcomeUnknown or Refused otherwise.)";
+
+void addRequest(nb::module_& module) {
+  nb::class_<PyRequest>(module, "Request", "A request that was sent: Client.send() returns it.")
+      .def("wait", &PyRequest::wait, nb::kw_only(), "check"_a = true,
+           nb::sig("def wait(self, *, check: bool = True) -> Message"),
+           "Waits for the reply, at most until the time limit of send().\n\n"
+           "check: raise StatusError if the status of the reply is not 0.")
+      .def("result", &PyRequest::result, nb::kw_only(), "check"_a = true,
+           nb::sig("def result(self, *, check: bool = True) -> Message | None"),
+           "As wait(), without waiting: None while the request has not ended.")
+      .def("next", &PyRequest::next, "timeout"_a,
+           nb::sig("def next(self, timeout: float) -> Message | None"),
+           "Waits [s] for a further reply. None after that time, and when the connection has "
+           "ended.")
+      .def("take_next", &PyRequest::takeNext, nb::sig("def take_next(self) -> Message | None"),
+           "As next(), without waiting.")
+      .def("cancel", &PyRequest::cancel,
+           "Ends the request as Cancelled, unless it has ended. The server may act on it.")
+      .def("close", &PyRequest::close, "Cancels the request, and drops further replies.")
+      .def_prop_ro("id", &PyRequest::id, "The number of the request in its client.")
+      .def_prop_ro("missed", &PyRequest::missed,
+                   "The number of further replies that were dropped because the program did not "
+                   "take the earlier ones.")
+      .def_prop_ro("connected", &PyRequest::isConnected,
+                   "False when the connection of the request has ended: no further reply will "
+                   "come.");
+}
+
+}  // namespace
+
+void addClient(nb::module_& module) {
+  addRequest(module);
+  nb::class_<PyClient>(module, "BaseClient", nb::is_weak_referenceable(),
+                       "What mpf.Client and mpf.AsyncClient have in common.")
+      .def(nb::init<std::string, std::optional<std::int32_t>, const std::string&, double,
+                    const std::string&>(),
+           "server"_a, "location"_a = nb::none(), nb::kw_only(), "backplane"_a = "",
+           "timeout"_a = 5.0, "wait"_a = "adaptive")
+      .def("_call", &PyClient::call, "message"_a, "timeout"_a = nb::none(), nb::kw_only(),
+           "reply"_a = nb::none(), "retry"_a = false, "check"_a = true,
+           nb::sig("def _call(self, message: Message, timeout: float | None = None, *, reply: "
+                   "type[Message] | None = None, retry: bool = False, check: bool = True) -> "
+                   "Message"),
+           kCallText)
+      .def("_send", &PyClient::send, "message"_a, "timeout"_a = nb::none(), nb::kw_only(),
+           "reply"_a = nb::none(), "retry"_a = false, "further"_a = 0, "waits"_a = true,
+           nb::sig("def _send(self, message: Message, timeout: float | None = None, *, reply: "
+                   "type[Message] | None = None, retry: bool = False, further: int = 0, waits: "
+                   "bool = True) -> Request"))
+      .def("_wait_connected", &PyClient::waitConnected, "timeout"_a = nb::none())
+      .def("loan", &PyClient::loan, "type"_a, "length"_a,
+           nb::sig("def loan(self, type: type[_Array], length: int) -> _Array"),
+           "Returns an array message of `length` elements in the memory that is shared with the "
+           "server, for the program to fill in; its elements are not initialised. Sending it "
+           "copies nothing, unless an array of numpy still refers to it.\n\n"
+           "Without a connection, or when the shared memory is full, it is ordinary memory.")
+      .def("_run_pending", &PyClient::runPending)
+      .def("_next_deadline", &PyClient::nextDeadline)
+      .def("_fileno", &PyClient::descriptor)
+      .def_prop_ro("connected", &PyClient::isConnected, "Whether the client is connected.")
+      .def_prop_ro("why_not_connected", &PyClient::notConnectedBecause,
+                   "The reason in words; empty when the client is connected.")
+      .def_prop_ro("max_message_bytes", &PyClient::maxMessageBytes,
+                   "[bytes] The largest message that the server accepts; 0 without a connection.")
+      .def_prop_ro("server", &PyClient::server, "The name of the server.")
+      .def_prop_ro("location", &PyClient::location, "The location of the server.")
+      .def_prop_ro("timeout", &PyClient::timeout, "[s] The time limit of calls without their own.")
+      .def("_close", &PyClient::close);
+}
+
+}  // namespace mpf::python

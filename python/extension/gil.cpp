@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "python/extension/gil.h"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <thread>
+
+namespace mpf::python {
+namespace {
+
+std::atomic<bool> isExiting = false;
+std::atomic<int> entering = 0;  // threads that ask for the GIL
+pthread_t exitingThread;  // valid when isExiting is true
+
+void resume(PyThreadState* state) {
+  // Either prepareExit() sees this thread in `entering`, or this thread sees isExiting.
+  entering.fetch_add(1);
+  if (isExiting.load() && pthread_equal(pthread_self(), exitingThread) == 0) {
+    entering.fetch_sub(1);
+    for (;;) ::pause();
+  }
+  PyEval_RestoreThread(state);
+  entering.fetch_sub(1);
+}
+
+}  // namespace
+
+WithoutGil::WithoutGil() : state_(PyEval_SaveThread()) {}
+
+WithoutGil::~WithoutGil() { resume(state_); }
+
+std::function<bool()> WithoutGil::interruption() {
+  return [this] {
+    resume(state_);
+    wasInterrupted_ = PyErr_CheckSignals() != 0;
+    state_ = PyEval_SaveThread();
+    return wasInterrupted_;
+  };
+}
+
+void prepareExit() {
+  exitingThread = pthread_self();
+  isExiting.store(true);
+  auto* state = PyEval_SaveThread();
+  while (entering.load() != 0) std::this_thread::yield();
+  PyEval_RestoreThread(state);
+}
+
+}  // namespace mpf::python

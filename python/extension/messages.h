@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// PyMessage: what Python holds of one message. The classes of Python are made from the descriptions
+// in <mpf/message_types.h>: mpf.Int32, mpf.Float64Array and so on.
+//
+//   PyMessage ─┬─ PyScalar<T>   the fields
+//              └─ PyArray<T>    the fields, and the elements: those of an object of Python, or in
+//                               place in a message that was received or loaned
+//
+// Threads  the thread that holds the GIL.
+// Trust    fields are copied when a message is received; elements in shared memory are read-only,
+//          and their number is the one that was checked.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <cstring>
+
+#include <mpf/message_client.h>
+#include <mpf/message_of.h>
+#include <mpf/message_server.h>
+
+namespace mpf::python {
+
+namespace nb = nanobind;
+
+inline constexpr const char* kWasSent = "the message was sent: its memory belongs to the receiver";
+
+// Where messages are allocated: for a client, or for a reply of a server.
+class Allocator {
+ public:
+  explicit Allocator(MessageClient& client) : client_(&client) {}
+  Allocator(MessageServer& server, const Message& request) : server_(&server), request_(&request) {}
+
+  template <ScalarBody T>
+  [[nodiscard]] MessageOf<T> scalar() const {
+    return server_ != nullptr ? server_->allocReplyMessage<T>(*request_) : MessageOf<T>();
+  }
+  template <ArrayBody T>
+  [[nodiscard]] MessageOf<T> array(std::size_t length) const {
+    return server_ != nullptr ? server_->allocReplyMessage<T>(*request_, length)
+                              : client_->alloc<T>(length);
+  }
+
+ private:
+  MessageClient* client_ = nullptr;
+  MessageServer* server_ = nullptr;
+  const Message* request_ = nullptr;
+};
+
+class PyMessage {
+ public:
+  virtual ~PyMessage() = default;
+  PyMessage() = default;
+  PyMessage(PyMessage&&) = default;
+  PyMessage& operator=(PyMessage&&) = delete;
+
+  // Returns the message to send. Copies the elements, unless they are in a loaned message that no
+  // object of Python refers to: that message itself is returned, and this object is empty then.
+  [[nodiscard]] virtual Message toMessage(const Allocator& allocator) = 0;
+  // Takes back a message of toMessage() that was not sent.
+  virtual void restore(Message&& message) noexcept = 0;
+  // The field `status`; 0 of types without it.
+  [[nodiscard]] virtual std::int32_t status() const noexcept = 0;
+
+  // A message with elements that was received or loaned; of a request that a server received, also
+  // its route. Empty otherwise.
+  Message handle;
+};
+
+template <class T>
+std::int32_t statusOf(const T& fields) noexcept {
+  if constexpr (requires { fields.status; }) {
+    return fields.status;
+  }
+  return 0;
+}
+
+template <ScalarBody T>
+class PyScalar final : public PyMessage {
+ public:
+  T fields{};
+
+  Message toMessage(const Allocator& allocator) override {
+    auto message = allocator.scalar<T>();
+    *message = fields;
+    return message;
+  }
+  void restore(Message&& /*message*/) noexcept override {}
+  [[nodiscard]] std::int32_t status() const noexcept override { return statusOf(fields); }
+};
+
+template <ArrayBody T>
+class PyArray final : public PyMessage {
+ public:
+  T fields{};  // `length` is not used
+  nb::object values;  // an object with a contiguous buffer of elements; null: they are in `handle`
+  bool isLoaned = false;  // writable, and may be sent without a copy
+  bool isEmpty = false;  // it was sent without a copy
+  std::int32_t exports = 0;  // objects of Python that refer to the elements in `handle`
+  Py_ssize_t length = 0;  // elements
+
+  Message toMessage(const Allocator& allocator) override {
+    if (isLoaned && exports == 0 && !isEmpty) {
+      writeFields(handle);
+      isEmpty = true;
+      return std::move(handle);
+    }
+    return copied(allocator);
+  }
+  void restore(Message&& message) noexcept override {
+    if (!isEmpty || !isLoaned) return;
+    handle = std::move(message);
+    isEmpty = false;
+  }
+  [[nodiscard]] std::int32_t status() const noexcept override { return statusOf(fields); }
+
+ private:
+  void writeFields(Message& message) const {
+    T* written = message.tryAs<T>();
+    const auto kept = written->length;
+    *written = fields;
+    written->length = kept;
+  }
+  Message copied(const Allocator& allocator) const;
+};
+
+// A view of the buffer of an object, for one function.
+class BufferView {
+ public:
+  // Throws nb::python_error, BufferError among others.
+  explicit BufferView(nb::handle object) {
+    if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_C_CONTIGUOUS) != 0) throw nb::python_error();
+  }
+  ~BufferView() { PyBuffer_Release(&view_); }
+  BufferView(const BufferView&) = delete;
+  BufferView& operator=(const BufferView&) = delete;
+
+  [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
+    return {static_cast<const std::byte*>(view_.buf), static_cast<std::size_t>(view_.len)};
+  }
+
+ private:
+  Py_buffer view_{};
+};
+
+// Copies large arrays without the GIL.
+void copyBytes(std::byte* to, std::span<const std::byte> from);
+
+template <ArrayBody T>
+Message PyArray<T>::copied(const Allocator& allocator) const {
+  if (isEmpty) throw nb::value_error(kWasSent);
+  auto message = allocator.array<T>(static_cast<std::size_t>(length));
+  auto* to = reinterpret_cast<std::byte*>(message.value().data());
+  if (values.is_valid()) {
+    const BufferView view(values);
+    copyBytes(to, view.bytes());
+  } else {
+    copyBytes(to, std::as_bytes(std::as_const(handle).template valueAs<T>()));
+  }
+  writeFields(message);
+  return message;
+}
+
+// The object of Python for a received message, which it owns.
+//   throws  nb::python_error; TypeError of a type that Python does not have
+[[nodiscard]] nb::object toPython(Message&& message);
+// The same for a request, whose handle the object owns.
+[[nodiscard]] nb::object requestToPython(Message&& request);
+// An array message in the memory that is shared with the peer, for the program to fill in.
+//   type  mpf.Int32Array, mpf.Float64Array, mpf.Char8Array or mpf.User
+[[nodiscard]] nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length);
+
+// Adds the classes to the module.
+void addMessages(nb::module_& module);
+
+}  // namespace mpf::python

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: MIT
+#include "python/extension/requester.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace mpf::python {
+namespace {
+
+// A signal handler of Python runs at most this late.
+constexpr auto kLook = std::chrono::milliseconds(100);
+
+}  // namespace
+
+Requester::Requester(const Backplane& backplane, const std::string& server, std::int32_t location,
+                     WaitMode waitMode)
+    : dispatcher_(backplane, {waitMode, "python"}),
+      client_(dispatcher_, [this](Message&& message) { take(std::move(message)); }) {
+  client_.bind(server, location);
+}
+
+Requester::~Requester() = default;
+
+void Requester::close() {
+  const std::lock_guard lock(mutex_);
+  isClosed_ = true;
+  for (const auto& [id, exchange] : exchanges_) {
+    exchange->isDisconnected = true;
+    if (!exchange->hasEnded()) exchange->fate = Fate::cancelled;
+  }
+  changed_.notify_all();
+  dispatcher_.interrupt();
+}
+
+// ---- messages that arrive, on the thread that runs the dispatcher
+
+void Requester::take(Message&& message) {
+  const std::lock_guard lock(mutex_);
+  if (const auto* connect = message.tryAs<Connect>()) {
+    takeConnect(*connect);
+  } else if (const auto at = exchanges_.find(message.route().requestId); at != exchanges_.end()) {
+    takeAnswer(*at->second, std::move(message));
+  }
+  changed_.notify_all();
+}
+
+void Requester::takeAnswer(Exchange& exchange, Message&& message) {
+  if (const auto* fate = message.tryAs<RequestFate>()) {
+    if (!exchange.hasEnded()) exchange.fate = fate->fate;
+  } else if (message.route().flags == kEndsRequest) {
+    if (!exchange.hasEnded()) exchange.reply = std::move(message);
+  } else if (exchange.limit > 0) {
+    if (exchange.further.size() == exchange.limit) {
+      exchange.further.pop_front();
+      ++exchange.missed;
+    }
+    exchange.further.push_back(std::move(message));
+  }
+  if (keepsEvents_) events_.push_back(exchange.id);
+}
+
+void Requester::takeConnect(const Connect& connect) {
+  if (connect.status == ConnectStatus::connectNo)
+    for (const auto& [id, exchange] : exchanges_) exchange->isDisconnected = true;
+  if (keepsEvents_) events_.push_back(0);
+}
+
+// ---- waiting
+
+void Requester::runDispatcher(std::unique_lock<std::mutex>& lock, Deadline deadline) {
+  isRunning_ = true;
+  lock.unlock();
+  try {
+    dispatcher_.runOnce(deadline);
+  } catch (...) {
+    lock.lock();
+    isRunning_ = false;
+    changed_.notify_all();
+    throw;
+  }
+  lock.lock();
+  isRunning_ = false;
+  changed_.notify_all();
+}
+
+template <class Done>
+bool Requester::wait(const Done& isDone, Deadline deadline, const IsInterrupted& isInterrupted) {
+  auto look = Deadline::after(kLook);
+  std::unique_lock lock(mutex_);
+  while (!isDone()) {
+    if (isClosed_ || deadline.hasPassed()) return false;
+    if (look.hasPassed()) {
+      lock.unlock();
+      if (isInterrupted()) return false;
+      lock.lock();
+      look = Deadline::after(kLook);
+      continue;  // it may be done now
+    }
+    const auto end = std::min(deadline, look);
+    if (isRunning_) changed_.wait_for(lock, end.left());
+    else runDispatcher(lock, end);
+  }
+  return true;
+}
+
+bool Requester::connect(Deadline deadline, const IsInterrupted& isInterrupted) {
+  if (client_.isConnected()) return true;
+  return wait([this] { return client_.isConnected(); }, deadline, isInterrupted);
+}
+
+void Requester::waitForEnd(Exchange& exchange, Deadline deadline,
+                           const IsInterrupted& isInterrupted) {
+  const auto hasEnded = [&exchange] { return exchange.hasEnded(); };
+  if (wait(hasEnded, deadline, isInterrupted)) return;
+  std::unique_lock lock(mutex_);
+  // Delivers `expired` if the server has not received the request.
+  if (!exchange.hasEnded() && !isRunning_) runDispatcher(lock, Deadline::atNs(0));
+  if (exchange.hasEnded()) return;
+  lock.unlock();
+  client_.cancel(exchange.id);
+  lock.lock();
+  if (!exchange.hasEnded() || exchange.fate == Fate::cancelled)
+    exchange.fate =
+        deadline.hasPassed() && !isClosed_ ? Fate::outcomeUnknown : Fate::cancelled;
+}
+
+Message Requester::waitForFurther(Exchange& exchange, Deadline deadline,
+                                  const IsInterrupted& isInterrupted) {
+  const auto hasSome = [&] { return !exchange.further.empty() || exchange.isDisconnected; };
+  wait(hasSome, deadline, isInterrupted);
+  return takeFurther(exchange);
+}
+
+Message Requester::takeFurther(Exchange& exchange) {
+  const std::lock_guard lock(mutex_);
+  if (exchange.further.empty()) return {};
+  auto message = std::move(exchange.further.front());
+  exchange.further.pop_front();
+  return message;
+}
+
+// ---- requests
+
+SendResult Requester::send(Message&& message, Exchange& exchange, Deadline takeBefore,
+                           Retry retry) {
+  // The lock is held until the request is in the table: its reply may arrive at once.
+  const std::lock_guard lock(mutex_);
+  const auto result = client_.send(std::move(message), takeBefore, &exchange.id, retry);
+  if (result == SendResult::sent) exchanges_.insert_or_assign(exchange.id, &exchange);
+  return result;
+}
+
+bool Requester::hasEnded(const Exchange& exchange) {
+  const std::lock_guard lock(mutex_);
+  return exchange.hasEnded();
+}
+
+bool Requester::isDisconnected(const Exchange& exchange) {
+  const std::lock_guard lock(mutex_);
+  return exchange.isDisconnected;
+}
+
+std::uint64_t Requester::missed(const Exchange& exchange) {
+  const std::lock_guard lock(mutex_);
+  return exchange.missed;
+}
+
+void Requester::cancel(Exchange& exchange) { client_.cancel(exchange.id); }
+
+void Requester::forget(Exchange& exchange) {
+  const std::lock_guard lock(mutex_);
+  exchanges_.erase(exchange.id);
+}
+
+// ---- event loops
+
+std::vector<std::uint32_t> Requester::runPending() {
+  {
+    const std::lock_guard lock(mutex_);
+    keepsEvents_ = true;
+  }
+  dispatcher_.runPending();
+  const std::lock_guard lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+}  // namespace mpf::python

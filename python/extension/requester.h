@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// Requester: the requests of one Python client. It contains no Python.
+//
+//   thread A ── waits ─┐   one of the waiting threads runs the dispatcher; it gives the answers
+//   thread B ── waits ─┼─► of the others to them
+//   event loop ────────┘   runPending(), when descriptor() is readable
+//
+// Threads  any. Either threads wait, or an event loop calls runPending(), not both.
+// Crash    as MessageClient: each request ends with a reply or a fate.
+// Fork     as MessageClient: a child cannot use the requesters of its parent.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <mpf/message_client.h>
+
+namespace mpf::python {
+
+// A request and what came back. Requester guards it.
+struct Exchange {
+  std::uint32_t id = 0;  // 0: not sent, or sent again under another number
+  Message reply;  // empty: none yet, or moved out
+  std::optional<Fate> fate;
+  // Further replies wait here, at most `limit`; then the oldest is dropped and counted in `missed`.
+  std::deque<Message> further;
+  std::size_t limit = 0;
+  std::uint64_t missed = 0;
+  bool isDisconnected = false;  // no more further replies: the connection has ended
+
+  [[nodiscard]] bool hasEnded() const noexcept { return fate || reply; }
+};
+
+class Requester {
+ public:
+  //   throws  as SyncClient
+  Requester(const Backplane& backplane, const std::string& server, std::int32_t location,
+            WaitMode waitMode);
+  ~Requester();
+  Requester(const Requester&) = delete;
+  Requester& operator=(const Requester&) = delete;
+
+  // Runs before a wait and during it, about ten times a second; returns true to end the wait.
+  using IsInterrupted = std::function<bool()>;
+
+  // Waits for the connection; returns false after the deadline or an interruption.
+  bool connect(Deadline deadline, const IsInterrupted& isInterrupted);
+  // Sends `message` as the request of `exchange`, which must live until forget().
+  SendResult send(Message&& message, Exchange& exchange, Deadline takeBefore, Retry retry);
+  // Waits until `exchange` has ended. After the deadline it ends as `expired` or `outcomeUnknown`,
+  // after an interruption as `cancelled`.
+  void waitForEnd(Exchange& exchange, Deadline deadline, const IsInterrupted& isInterrupted);
+  // Waits for the next further reply of `exchange`. Empty after the deadline, after an interruption
+  // and when the connection has ended.
+  Message waitForFurther(Exchange& exchange, Deadline deadline, const IsInterrupted& isInterrupted);
+  // Returns the next further reply of `exchange`, or an empty handle.
+  Message takeFurther(Exchange& exchange);
+  [[nodiscard]] bool hasEnded(const Exchange& exchange);
+  [[nodiscard]] bool isDisconnected(const Exchange& exchange);
+  [[nodiscard]] std::uint64_t missed(const Exchange& exchange);
+  // Ends a request that has no reply as `cancelled`.
+  void cancel(Exchange& exchange);
+  // Drops later replies to `exchange`.
+  void forget(Exchange& exchange);
+
+  // Ends all requests as `cancelled` and all waits. The destructor disconnects.
+  void close();
+
+  // --- for event loops
+  [[nodiscard]] int descriptor() { return dispatcher_.descriptor(); }
+  [[nodiscard]] Deadline nextDeadline() const noexcept { return dispatcher_.nextDeadline(); }
+  // Handles what has arrived, and returns the numbers of the requests that it belongs to; 0 stands
+  // for a change of the connection.
+  std::vector<std::uint32_t> runPending();
+
+  [[nodiscard]] MessageClient& client() noexcept { return client_; }
+
+ private:
+  void take(Message&& message);
+  void takeAnswer(Exchange& exchange, Message&& message);
+  void takeConnect(const Connect& connect);
+  template <class Done>
+  bool wait(const Done& isDone, Deadline deadline, const IsInterrupted& isInterrupted);
+  void runDispatcher(std::unique_lock<std::mutex>& lock, Deadline deadline);
+
+  Dispatcher dispatcher_;
+  std::mutex mutex_;  // guards all below
+  std::condition_variable changed_;  // an exchange has changed, or no thread runs the dispatcher
+  bool isRunning_ = false;  // a thread runs the dispatcher
+  std::unordered_map<std::uint32_t, Exchange*> exchanges_;
+  std::vector<std::uint32_t> events_;
+  bool keepsEvents_ = false;
+  bool isClosed_ = false;
+  MessageClient client_;
+};
+
+}  // namespace mpf::python

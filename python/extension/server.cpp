@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include "python/extension/server.h"
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "python/extension/errors.h"
+#include "python/extension/gil.h"
+#include "python/extension/messages.h"
+#include "python/extension/options.h"
+
+namespace mpf::python {
+namespace {
+
+using namespace nb::literals;
+
+constexpr const char* kServer = "server";
+// A signal handler of Python runs at most this late.
+constexpr auto kLook = std::chrono::milliseconds(100);
+
+class PyServer {
+ public:
+  PyServer(const std::string& name, std::optional<std::int32_t> location,
+           const std::string& backplane, int queueSize, std::uint64_t maxMessageBytes,
+           const std::string& wait)
+      : name_(name), forks_(forkCount()) {
+    ServerOptions options{.queueSize = queueSize,
+                          .maxMessageBytes = maxMessageBytes,
+                          .waitMode = waitModeOf(wait)};
+    if (location) options.location = *location;
+    server_ = std::make_shared<MessageServer>(Backplane::attach(backplane), name, options);
+  }
+
+  // Waits for the next request; None after `timeout` and after interrupt().
+  nb::object receive(double timeout) {
+    const auto server = opened();
+    Message request = server->receive();
+    if (!request) request = wait(*server, deadlineOf(timeout));
+    if (!request) return nb::none();
+    return requestToPython(std::move(request));
+  }
+  // Returns false when the client has gone.
+  bool reply(PyMessage& request, PyMessage& message) {
+    const auto server = opened();
+    if (request.handle.route().link == 0)
+      throw nb::value_error("reply: the first argument is not a request of this server");
+    auto sent = message.toMessage(Allocator(*server, request.handle));
+    const auto result = server->reply(std::move(sent));
+    if (result == ReplyResult::sent) return true;
+    if (result == ReplyResult::clientGone) return false;
+    // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
+    message.restore(std::move(sent));
+    raiseReply(name_, result);
+  }
+  void refuse(PyMessage& request) { opened()->refuse(std::move(request.handle)); }
+  nb::object loan(PyMessage& request, nb::handle type, std::size_t length) {
+    const auto server = opened();
+    return python::loan(Allocator(*server, request.handle), type, length);
+  }
+  bool isClientConnected(const PyMessage& request) {
+    return opened()->isClientConnected(request.handle);
+  }
+  void interrupt() {
+    const auto server = opened();
+    isInterrupted_ = true;
+    server->interrupt();
+  }
+  // Whether interrupt() was called since the last call.
+  bool takeInterrupt() {
+    static_cast<void>(opened());
+    return isInterrupted_.exchange(false);
+  }
+  int descriptor() { return opened()->descriptor(); }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  std::int32_t location() { return opened()->location(); }
+  void close() {
+    if (!server_ || forks_ != forkCount()) return;
+    interrupt();
+    server_.reset();
+  }
+
+ private:
+  std::shared_ptr<MessageServer> opened() const {
+    if (!server_) raiseClosed(kServer);
+    if (forks_ != forkCount()) raiseInherited(kServer);
+    return server_;
+  }
+  Message wait(MessageServer& server, Deadline deadline) {
+    bool wasInterrupted = false;
+    Message request;
+    {
+      WithoutGil unlocked;
+      request = waitUnlocked(server, deadline, unlocked.interruption());
+      wasInterrupted = unlocked.wasInterrupted();
+    }
+    if (wasInterrupted) throw nb::python_error();
+    return request;
+  }
+  Message waitUnlocked(MessageServer& server, Deadline deadline,
+                       const std::function<bool()>& hasSignal) {
+    while (!deadline.hasPassed() && !isInterrupted_) {
+      const auto look = Deadline::after(kLook);
+      if (server.waitForMessage(std::min(deadline, look))) {
+        if (auto request = server.receive()) return request;
+      }
+      if (look.hasPassed() && hasSignal()) break;
+    }
+    return {};
+  }
+
+  const std::string name_;
+  const int forks_;
+  std::shared_ptr<MessageServer> server_;  // null: closed
+  std::atomic<bool> isInterrupted_ = false;
+};
+
+}  // namespace
+
+void addServer(nb::module_& module) {
+  nb::class_<PyServer>(module, "BaseServer", nb::is_weak_referenceable(),
+                       "What mpf.Server is made of.")
+      .def(nb::init<const std::string&, std::optional<std::int32_t>, const std::string&, int,
+                    std::uint64_t, const std::string&>(),
+           "name"_a, "location"_a = nb::none(), nb::kw_only(), "backplane"_a = "",
+           "queue_size"_a = 100, "max_message_bytes"_a = std::uint64_t{64} << 20,
+           "wait"_a = "adaptive")
+      .def("_receive", &PyServer::receive, "timeout"_a,
+           nb::sig("def _receive(self, timeout: float) -> Message | None"))
+      .def("reply", &PyServer::reply, "request"_a, "message"_a,
+           "Sends `message` to the client of `request`. The first reply ends the request; any "
+           "number may follow. Any thread; never waits.\n\n"
+           "Returns False when the client has gone. Raises QueueFull when the client does not "
+           "receive further replies, and TooLarge.")
+      .def("refuse", &PyServer::refuse, "request"_a,
+           "Ends the request without a reply: its client gets Refused.")
+      .def("loan", &PyServer::loan, "request"_a, "type"_a, "length"_a,
+           nb::sig("def loan(self, request: Message, type: type[_Array], length: int) -> _Array"),
+           "As Client.loan(), for a reply to `request`.")
+      .def("is_client_connected", &PyServer::isClientConnected, "request"_a,
+           "Whether the client of `request` is connected and alive.")
+      .def("interrupt", &PyServer::interrupt,
+           "Ends the call of run() that is in progress, or else the next one. Any thread.")
+      .def("_take_interrupt", &PyServer::takeInterrupt)
+      .def("_fileno", &PyServer::descriptor)
+      .def_prop_ro("name", &PyServer::name, "The name of the server.")
+      .def_prop_ro("location", &PyServer::location, "The location of the server.")
+      .def("_close", &PyServer::close);
+}
+
+}  // namespace mpf::python

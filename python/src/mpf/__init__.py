@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""MPF: message passing for hosts that control instruments.
+
+    import mpf
+
+    with mpf.Client("dac") as dac:
+        print(dac.int32(address=3, value=100).value)
+
+`Client` and `AsyncClient` send requests to a server, `Server` answers them. The classes of messages
+are `Int32`, `Int32Array`, `Float64`, `Float64Array`, `Char8Array`, `SerialConfig`, `OutOfBand` and
+`User`. `servers()`, `stats()` and `tap()` show what happens on this host; `replay()` starts a server
+that answers from a recording.
+"""
+
+from mpf._mpf import (
+    Char8Array,
+    Float64,
+    Float64Array,
+    Int32,
+    Int32Array,
+    Message,
+    OutOfBand,
+    Request,
+    SerialConfig,
+    User,
+)
+from mpf.aio import AsyncClient, AsyncSubscription
+from mpf.client import Client, Subscription
+from mpf.errors import (
+    Cancelled,
+    Error,
+    Expired,
+    NameInUse,
+    NeverTaken,
+    NoReply,
+    NotConnected,
+    NotSent,
+    OutcomeUnknown,
+    QueueFull,
+    Refused,
+    StatusError,
+    TimedOut,
+    TooLarge,
+    UnexpectedReply,
+)
+from mpf.inspection import Tap, servers, stats, tap
+from mpf.server import Server
+
+__all__ = [
+    "AsyncClient",
+    "AsyncSubscription",
+    "Cancelled",
+    "Char8Array",
+    "Client",
+    "Error",
+    "Expired",
+    "Float64",
+    "Float64Array",
+    "Int32",
+    "Int32Array",
+    "Message",
+    "NameInUse",
+    "NeverTaken",
+    "NoReply",
+    "NotConnected",
+    "NotSent",
+    "OutOfBand",
+    "OutcomeUnknown",
+    "QueueFull",
+    "Refused",
+    "Request",
+    "SerialConfig",
+    "Server",
+    "StatusError",
+    "Subscription",
+    "Tap",
+    "TimedOut",
+    "TooLarge",
+    "UnexpectedReply",
+    "User",
+    "servers",
+    "stats",
+    "tap",
+]

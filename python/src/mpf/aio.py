@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: MIT
+"""AsyncClient: the client for asyncio. A task that is cancelled cancels its request.
+
+A client belongs to the event loop in which it is first used. The loop watches one file descriptor;
+no thread is started.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import AsyncIterator
+from types import TracebackType
+from typing import Any, Generic, TypeVar, cast, overload
+
+from mpf import _mpf
+from mpf._mpf import Message, Request
+from mpf.client import LIMIT
+from mpf.errors import NoReply, NotConnected
+
+M = TypeVar("M", bound=Message)
+R = TypeVar("R", bound=Message)
+Self = TypeVar("Self")
+
+_CONNECTION = 0  # stands for the connection among the numbers of requests
+
+
+class AsyncClient(_mpf.BaseClient):
+    """As Client, for asyncio: `await client.call(...)`, `async for ... in client.subscribe(...)`."""
+
+    def __init__(
+        self,
+        server: str,
+        location: int | None = None,
+        *,
+        backplane: str = "",
+        timeout: float = 5.0,
+        wait: str = "adaptive",
+    ) -> None:
+        super().__init__(server, location, backplane=backplane, timeout=timeout, wait=wait)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._descriptor = -1
+        self._timer: asyncio.TimerHandle | None = None
+        self._waiting: dict[int, list[asyncio.Future[None]]] = {}
+
+    async def __aenter__(self: Self) -> Self:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnects. Calls in progress raise Cancelled."""
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.remove_reader(self._descriptor)
+            if self._timer is not None:
+                self._timer.cancel()
+        self._loop = None
+        self._close()
+        for number in list(self._waiting):
+            self._wake(number)
+
+    async def wait_connected(self, timeout: float | None = None) -> bool:
+        """Waits [s] for the connection; returns False after that time."""
+        self._attach()
+        limit = self._until(timeout)
+        while not self.connected:
+            if not await self._changed(_CONNECTION, limit):
+                return False
+        return True
+
+    @overload
+    async def call(
+        self,
+        message: M,
+        timeout: float | None = None,
+        *,
+        retry: bool = False,
+    ) -> M: ...
+    @overload
+    async def call(
+        self,
+        message: Message,
+        timeout: float | None = None,
+        *,
+        reply: type[R],
+        retry: bool = False,
+    ) -> R: ...
+    @overload
+    async def call(
+        self,
+        message: Message,
+        timeout: float | None = None,
+        *,
+        reply: type[Message] | None = None,
+        retry: bool = False,
+        check: bool,
+    ) -> Any: ...
+    async def call(
+        self,
+        message: Message,
+        timeout: float | None = None,
+        *,
+        reply: type[Message] | None = None,
+        retry: bool = False,
+        check: bool = True,
+    ) -> Any:
+        """As Client.call()."""
+        limit = self._until(timeout)
+        request = await self._start(message, limit, reply=reply, retry=retry)
+        try:
+            return await self._end(request, limit, check)
+        finally:
+            request.close()  # cancels the request if it has not ended
+
+    def subscribe(
+        self, message: M, *, timeout: float = math.inf, limit: int = LIMIT, renew: bool = True
+    ) -> AsyncSubscription[M]:
+        """As Client.subscribe(): `async for reply in client.subscribe(message)`."""
+        return AsyncSubscription(self, message, timeout, limit, renew)
+
+    # ---- the event loop
+
+    def _attach(self) -> asyncio.AbstractEventLoop:
+        loop = asyncio.get_running_loop()
+        if self._loop is None:
+            self._loop = loop
+            self._descriptor = self._fileno()
+            loop.add_reader(self._descriptor, self._drain)
+            self._drain()
+        elif self._loop is not loop:
+            raise RuntimeError("the client belongs to another event loop: create one for each")
+        return loop
+
+    def _drain(self) -> None:
+        for number in self._run_pending():
+            self._wake(number)
+        self._set_timer()
+
+    def _wake(self, number: int) -> None:
+        waiting = self._waiting
+        if number == _CONNECTION:  # each request may have lost its connection
+            futures = [future for group in waiting.values() for future in group]
+            waiting.clear()
+        else:
+            futures = waiting.pop(number, [])
+        for future in futures:
+            if not future.done():
+                future.set_result(None)
+
+    def _set_timer(self) -> None:
+        left = self._next_deadline()
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if left is not None and self._loop is not None:
+            self._timer = self._loop.call_later(left, self._drain)
+
+    def _until(self, timeout: float | None) -> float:
+        return self._attach().time() + (self.timeout if timeout is None else timeout)
+
+    async def _changed(self, number: int, limit: float) -> bool:
+        """Waits for an event of request `number`; returns False after `limit`."""
+        loop = self._attach()
+        left = limit - loop.time()
+        if left <= 0:
+            return False
+        future: asyncio.Future[None] = loop.create_future()
+        self._waiting.setdefault(number, []).append(future)
+        timer = None
+        if left < math.inf:
+            timer = loop.call_later(left, lambda: future.done() or future.set_result(None))
+        try:
+            await future
+        finally:
+            if timer is not None:
+                timer.cancel()
+            group = self._waiting.get(number, [])
+            if future in group:
+                group.remove(future)
+                if not group:
+                    del self._waiting[number]
+        return True
+
+    # ---- requests
+
+    async def _start(self, message: Message, limit: float, **options: Any) -> Request:
+        loop = self._attach()
+        while True:
+            left = limit - loop.time()
+            try:
+                request = self._send(message, max(left, 0.0), waits=False, **options)
+            except NotConnected:
+                if left <= 0 or not await self.wait_connected(left):
+                    raise
+            else:
+                self._set_timer()
+                return request
+
+    async def _end(self, request: Request, limit: float, check: bool) -> Message:
+        while (reply := request.result(check=check)) is None:
+            if not await self._changed(request.id, limit):
+                return request.wait(check=check)  # raises: its time has passed
+        return reply
+
+
+class AsyncSubscription(Generic[M]):
+    """The replies to one request; AsyncClient.subscribe() creates it."""
+
+    def __init__(
+        self, client: AsyncClient, message: M, timeout: float, limit: int, renew: bool
+    ) -> None:
+        self._client = client
+        self._message = message
+        self._timeout = timeout
+        self._limit = limit
+        self._renew = renew
+        self._request: Request | None = None
+        self._missed = 0
+        self._isClosed = False
+
+    async def __aenter__(self: Self) -> Self:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __aiter__(self) -> AsyncIterator[M]:
+        return self
+
+    async def __anext__(self) -> M:
+        while not self._isClosed:
+            message = await (self._first() if self._request is None else self._further())
+            if message is not None:
+                return message
+            if not self._renew:
+                self.close()
+        raise StopAsyncIteration
+
+    @property
+    def missed(self) -> int:
+        """The number of replies that were dropped because the program did not take others."""
+        return self._missed + (self._request.missed if self._request else 0)
+
+    def close(self) -> None:
+        """Ends the iteration, and drops later replies. The server is not told."""
+        self._drop()
+        self._isClosed = True
+
+    async def _first(self) -> M | None:
+        client = self._client
+        limit = client._until(self._timeout)
+        self._request = await client._start(self._message, limit, further=self._limit)
+        try:
+            return cast(M, await client._end(self._request, limit, True))
+        except NoReply:
+            self._drop()
+            if not self._renew:
+                raise
+            return None
+
+    async def _further(self) -> M | None:
+        limit = self._client._until(self._timeout)
+        while self._request is not None:
+            message = self._request.take_next()
+            if message is not None:
+                return cast(M, message)
+            if not self._request.connected:
+                self._drop()
+            elif not await self._client._changed(self._request.id, limit):
+                raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
+        return None
+
+    def _drop(self) -> None:
+        if self._request is not None:
+            self._missed += self._request.missed
+            self._request.close()
+            self._request = None

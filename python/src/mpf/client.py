@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: MIT
+"""Client: calls of a server that wait for the reply, and subscriptions as iterators.
+
+Any number of threads may use one client at the same time. A call that waits releases the GIL, and
+Ctrl-C ends it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
+
+from mpf import _mpf
+from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
+from mpf.errors import NoReply
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+M = TypeVar("M", bound=Message)
+R = TypeVar("R", bound=Message)
+Self = TypeVar("Self")
+
+#: Further replies that wait for a program, for each subscription.
+LIMIT = 1000
+
+
+class Client(_mpf.BaseClient):
+    """A client of the server `server` at `location`.
+
+    location: of the server; by default MPF_LOCATION, or 0.
+    backplane: the name of the backplane; by default MPF_BACKPLANE, or "default".
+    timeout: [s] the time limit of calls without their own.
+    wait: "adaptive" polls for a short time and then sleeps; "spin" only polls, which gives the
+        shortest latency and keeps a processor busy; "block" sleeps at once.
+
+    The constructor does not wait for the server, which may start later, and restart.
+
+    Raises OSError if there is no memory in /dev/shm or no file descriptor, ValueError if an
+    argument is invalid.
+    """
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnects. Requests without a reply end as Cancelled."""
+        self._close()
+
+    def wait_connected(self, timeout: float | None = None) -> bool:
+        """Waits [s] for the connection; returns False after that time."""
+        return self._wait_connected(timeout)
+
+    @overload
+    def call(
+        self,
+        message: M,
+        timeout: float | None = None,
+        *,
+        retry: bool = False,
+    ) -> M: ...
+    @overload
+    def call(
+        self,
+        message: Message,
+        timeout: float | None = None,
+        *,
+        reply: type[R],
+        retry: bool = False,
+    ) -> R: ...
+    @overload
+    def call(
+        self,
+        message: Message,
+        timeout: float | None = None,
+        *,
+        reply: type[Message] | None = None,
+        retry: bool = False,
+        check: bool,
+    ) -> Any: ...
+    def call(self, message: Message, timeout: float | None = None, **options: Any) -> Any:
+        return self._call(message, timeout, **options)
+
+    call.__doc__ = _mpf.BaseClient._call.__doc__
+
+    def send(
+        self,
+        message: Message,
+        timeout: float | None = None,
+        *,
+        reply: type[Message] | None = None,
+        retry: bool = False,
+        further: int = 0,
+    ) -> Request:
+        """Sends a request, and returns it without waiting for its reply.
+
+        further: the number of further replies to the request that may wait for the program.
+
+        The other arguments and the exceptions are those of call().
+        """
+        return self._send(message, timeout, reply=reply, retry=retry, further=further)
+
+    def subscribe(
+        self, message: M, *, timeout: float = math.inf, limit: int = LIMIT, renew: bool = True
+    ) -> Subscription[M]:
+        """Sends a request to which the server replies any number of times, and iterates over all
+        replies.
+
+        timeout: [s] the longest wait for the next reply; then TimeoutError.
+        limit: replies that may wait for the program; then the oldest is dropped and counted.
+        renew: when the server ends, subscribe again as soon as there is one. Otherwise the
+            iteration ends.
+        """
+        return Subscription(self, message, timeout, limit, renew)
+
+    # ---- calls by type
+
+    def int32(
+        self,
+        value: int = 0,
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Int32:
+        """Calls with an Int32 of these fields; `timeout` is that of call()."""
+        return self.call(Int32(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    def float64(
+        self,
+        value: float = 0.0,
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Float64:
+        """Calls with a Float64 of these fields; `timeout` is that of call()."""
+        return self.call(Float64(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    def int32_array(
+        self,
+        value: ArrayLike = (),
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Int32Array:
+        """Calls with an Int32Array of these fields; `timeout` is that of call()."""
+        return self.call(Int32Array(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    def float64_array(
+        self,
+        value: ArrayLike = (),
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Float64Array:
+        """Calls with a Float64Array of these fields; `timeout` is that of call()."""
+        return self.call(Float64Array(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    def char8_array(
+        self,
+        value: str | bytes = b"",
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Char8Array:
+        """Calls with a Char8Array of these fields; `timeout` is that of call()."""
+        return self.call(Char8Array(value, cmd=cmd, address=address, extra=extra), timeout)
+
+
+class Subscription(Generic[M]):
+    """The replies to one request, as an iterator; Client.subscribe() creates it."""
+
+    def __init__(
+        self, client: Client, message: M, timeout: float, limit: int, renew: bool
+    ) -> None:
+        self._client = client
+        self._message = message
+        self._timeout = timeout
+        self._limit = limit
+        self._renew = renew
+        self._request: Request | None = None
+        self._missed = 0
+        self._isClosed = False
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[M]:
+        return self
+
+    def __next__(self) -> M:
+        while not self._isClosed:
+            message = self._first() if self._request is None else self._further()
+            if message is not None:
+                return message
+            if not self._renew:
+                self.close()
+        raise StopIteration
+
+    @property
+    def missed(self) -> int:
+        """The number of replies that were dropped because the program did not take others."""
+        return self._missed + (self._request.missed if self._request else 0)
+
+    def close(self) -> None:
+        """Ends the iteration, and drops later replies. The server is not told."""
+        self._drop()
+        self._isClosed = True
+
+    def _first(self) -> M | None:
+        request = self._client._send(self._message, self._timeout, further=self._limit)
+        self._request = request
+        try:
+            return cast(M, request.wait())
+        except NoReply:
+            self._drop()
+            if not self._renew:
+                raise
+            return None
+
+    def _further(self) -> M | None:
+        assert self._request is not None
+        message = self._request.next(self._timeout)
+        if message is None and self._request.connected:
+            raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
+        if message is None:
+            self._drop()
+        return cast("M | None", message)
+
+    def _drop(self) -> None:
+        if self._request is not None:
+            self._missed += self._request.missed
+            self._request.close()
+            self._request = None

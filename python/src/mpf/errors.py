@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""The exceptions of mpf.
+
+    Error ─┬─ NotSent ─┬─ NotConnected   also a ConnectionError
+           │           ├─ QueueFull
+           │           └─ TooLarge
+           ├─ NoReply ─┬─ Refused
+           │           ├─ NeverTaken     nothing was done
+           │           ├─ Expired        nothing was done; also a TimeoutError
+           │           ├─ OutcomeUnknown ── TimedOut   also a TimeoutError
+           │           └─ Cancelled
+           ├─ StatusError                the server replied with an error
+           ├─ UnexpectedReply            the reply is of another class
+           └─ NameInUse                  another process serves this name
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from mpf._mpf import Message
+
+
+class Error(Exception):
+    """Any failure that this package reports."""
+
+
+class NotSent(Error):
+    """The request was not sent: nothing was done."""
+
+
+class NotConnected(NotSent, ConnectionError):
+    """The server is absent, or the connection to it was not made in time."""
+
+
+class QueueFull(NotSent):
+    """The server has not received earlier requests, or too many of them have no reply."""
+
+
+class TooLarge(NotSent):
+    """The message is larger than the server accepts."""
+
+
+class NoReply(Error):
+    """The request was sent and ended without a reply. Each kind says what happened to it."""
+
+    #: The name of the fate, as in the tools and in C++.
+    fate: ClassVar[str] = ""
+
+
+class Refused(NoReply):
+    """The server did not accept the request, or ended it without a reply."""
+
+    fate = "refused"
+
+
+class NeverTaken(NoReply):
+    """The connection ended before the server received the request: nothing was done."""
+
+    fate = "neverTaken"
+
+
+class OutcomeUnknown(NoReply):
+    """The server received the request, or may have received it, and no reply followed."""
+
+    fate = "outcomeUnknown"
+
+
+class TimedOut(OutcomeUnknown, TimeoutError):
+    """The server received the request and did not reply in time. It may still act on it."""
+
+
+class Expired(NoReply, TimeoutError):
+    """The server did not receive the request in time: nothing was done."""
+
+    fate = "expired"
+
+
+class Cancelled(NoReply):
+    """The program cancelled the request. The server may have acted on it."""
+
+    fate = "cancelled"
+
+
+class UnexpectedReply(Error):
+    """The reply is of another class than the call expects."""
+
+    def __init__(self, server: str, reply: Message) -> None:
+        #: The reply.
+        self.reply = reply
+        super().__init__(
+            f"{server}: the reply is a {type(reply).__name__}; "
+            f"pass reply=mpf.{type(reply).__name__} if you expect it"
+        )
+
+
+class NameInUse(Error):
+    """Another process serves this name at this location."""
+
+
+class StatusError(Error):
+    """The server replied with a status other than 0.
+
+    In a handler of a :class:`mpf.Server`, ``raise StatusError("no such channel", status=-3)`` sends
+    this status and this text.
+    """
+
+    def __init__(self, text: str, reply: Message | None = None, *, status: int = -1) -> None:
+        #: The reply, or None if a handler raised the exception.
+        self.reply = reply
+        #: The status of the reply.
+        self.status: int = status if reply is None else getattr(reply, "status")
+        #: The words of the server, without its name; empty if it sent none.
+        self.text = text if reply is None else _text_of(reply)
+        if reply is None:
+            super().__init__(text)
+        else:
+            super().__init__(f"{text}: status {self.status}" + (f": {self.text}" if self.text else ""))
+
+
+def _text_of(reply: Message) -> str:
+    from mpf._mpf import Char8Array
+
+    return reply.text if isinstance(reply, Char8Array) else ""

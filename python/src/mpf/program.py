@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""Finds, starts and stops the program `mpf`, which is part of the package."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def find() -> str:
+    """The program `mpf` of this package, or else of PATH.
+
+    Raises FileNotFoundError if there is none.
+    """
+    own = Path(__file__).parent / "bin" / "mpf"
+    found = str(own) if own.exists() else shutil.which("mpf")
+    if found is None:
+        raise FileNotFoundError("the program mpf is neither in the package nor in PATH")
+    return found
+
+
+def command(arguments: Sequence[str]) -> list[str]:
+    """The command line of the program with these arguments."""
+    return [find(), *arguments]
+
+
+def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
+    """Starts the program; its stdout and stderr are pipes."""
+    return subprocess.Popen(
+        command(arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def stop(process: subprocess.Popen[str]) -> None:
+    """Ends the program, and waits until it has ended."""
+    if process.poll() is None:
+        process.terminate()
+    process.communicate()
+
+
+def error_of(process: subprocess.Popen[str]) -> str:
+    """What a program that has failed has written to stderr."""
+    return process.communicate()[1].strip()
+
+
+def main() -> None:
+    """The console script `mpf`: replaces this process by the program."""
+    path = find()
+    os.execv(path, [path, *sys.argv[1:]])

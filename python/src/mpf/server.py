@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: MIT
+"""Server: a server whose handlers are functions or coroutines.
+
+    server = mpf.Server("doubler")
+
+    @server.on(mpf.Int32)
+    def double(request):
+        return request.value * 2
+
+    server.run()
+
+What a handler returns is the reply:
+
+    a message                 as it is
+    a number, array or text   the request with this value, and status 0
+    None                      the request itself, with the fields that the handler has changed
+    a generator               what it yields, one reply each; it waits while the client does not
+                              receive them, and a function keeps the server from other requests
+
+An exception becomes a reply with its text and a status: -1, or that of a StatusError. The client
+gets it as a StatusError; a client in C++ gets a Char8Array.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+import logging
+import math
+import threading
+import time
+from collections.abc import AsyncIterable, Callable, Iterable
+from types import TracebackType
+from typing import Any, TypeVar, cast
+
+from mpf import _mpf
+from mpf._mpf import Char8Array, Message
+from mpf.errors import Error, QueueFull, StatusError
+
+M = TypeVar("M", bound=Message)
+Self = TypeVar("Self")
+Handler = Callable[[M], object]
+H = TypeVar("H", bound=Callable[..., object])
+
+_log = logging.getLogger("mpf")
+_PAUSE = 0.001  # [s] between attempts to send a reply to a full queue
+_COPIED = ("timeout", "cmd", "address", "extra", "number_retrys", "eom")
+
+
+class Server(_mpf.BaseServer):
+    """A server with this name.
+
+    location: by default MPF_LOCATION, or 0.
+    backplane: the name of the backplane; by default MPF_BACKPLANE, or "default".
+    queue_size: requests of one client that may wait, 1 to 16384.
+    max_message_bytes: the largest request and reply [bytes].
+    wait: "adaptive", "spin" or "block", as for a client.
+
+    Raises NameInUse if another process serves this name, OSError if there is no memory in /dev/shm,
+    ValueError if an argument is invalid.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        location: int | None = None,
+        *,
+        backplane: str = "",
+        queue_size: int = 100,
+        max_message_bytes: int = 64 << 20,
+        wait: str = "adaptive",
+    ) -> None:
+        super().__init__(
+            name,
+            location,
+            backplane=backplane,
+            queue_size=queue_size,
+            max_message_bytes=max_message_bytes,
+            wait=wait,
+        )
+        self._handlers: dict[type[Message], Callable[[Any], object]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def on(self, type: type[M]) -> Callable[[H], H]:
+        """Makes a function or a coroutine function the handler of requests of this class.
+        `mpf.Message`: of requests without a handler of their own, which are refused otherwise."""
+
+        def register(handler: H) -> H:
+            self._handlers[type] = handler
+            return handler
+
+        return register
+
+    def run(self) -> None:
+        """Handles requests until interrupt(), close() or Ctrl-C. Coroutines run in an event loop of
+        its own, at the same time; functions run one after the other."""
+        try:
+            if any(inspect.iscoroutinefunction(h) or inspect.isasyncgenfunction(h)
+                   for h in self._handlers.values()):
+                asyncio.run(self.serve())
+            else:
+                self._run()
+        except KeyboardInterrupt:
+            pass
+
+    def start(self: Self) -> Self:
+        """Calls run() in a thread, which close() ends."""
+        server = cast(Server, self)
+        server._thread = threading.Thread(target=server.run, name=f"mpf {server.name}", daemon=True)
+        server._thread.start()
+        return self
+
+    def close(self) -> None:
+        """Ends run(), and disconnects all clients. Requests that wait end as NeverTaken."""
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            self.interrupt()
+            thread.join()
+            self._thread = None
+        self._close()
+
+    async def serve(self) -> None:
+        """Handles requests in the running event loop until interrupt() or close()."""
+        loop = asyncio.get_running_loop()
+        descriptor = self._fileno()
+        readable = asyncio.Event()
+        loop.add_reader(descriptor, readable.set)
+        try:
+            while not self._take_interrupt():
+                while (request := self._receive(0)) is not None:
+                    await self._start(request)
+                await readable.wait()
+                readable.clear()
+        finally:
+            loop.remove_reader(descriptor)
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    # ---- requests
+
+    def _run(self) -> None:
+        while not self._take_interrupt():
+            request = self._receive(math.inf)
+            if request is None:
+                continue
+            try:
+                self._answer(request, self._handle(request))
+            except Exception as error:
+                self._fail(request, error)
+
+    async def _start(self, request: Message) -> None:
+        task = asyncio.ensure_future(self._serve_one(request))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        await asyncio.sleep(0)
+
+    async def _serve_one(self, request: Message) -> None:
+        try:
+            result = self._handle(request)
+            if inspect.isawaitable(result):
+                result = await result
+            if isinstance(result, AsyncIterable):
+                async for value in result:
+                    while not self._try_reply(request, value):
+                        await asyncio.sleep(_PAUSE)
+            else:
+                self._answer(request, result)
+        except Exception as error:
+            self._fail(request, error)
+
+    def _handle(self, request: Message) -> object:
+        handler = self._handlers.get(type(request)) or self._handlers.get(Message)
+        if handler is None:
+            raise TypeError(f"{self.name} does not handle {type(request).__name__} messages")
+        return handler(request)
+
+    def _answer(self, request: Message, result: object) -> None:
+        if inspect.isgenerator(result):
+            for value in cast(Iterable[object], result):
+                while not self._try_reply(request, value):
+                    time.sleep(_PAUSE)
+        else:
+            self._reply_with(request, result)
+
+    def _try_reply(self, request: Message, value: object) -> bool:
+        """Returns False while the client does not receive the earlier replies."""
+        try:
+            self._reply_with(request, value)
+        except QueueFull:
+            return not self.is_client_connected(request)
+        return True
+
+    def _reply_with(self, request: Message, value: object) -> None:
+        if value is None:
+            self.reply(request, request)
+        elif isinstance(value, Message):
+            self.reply(request, value)
+        else:
+            self.reply(request, type(request)(value, **_fields_of(request)))  # type: ignore[call-arg]
+
+    def _fail(self, request: Message, error: Exception) -> None:
+        _log.error("%s: %r failed", self.name, request, exc_info=error)
+        if isinstance(error, StatusError):
+            status, text = error.status or -1, error.text
+        else:
+            status, text = -1, f"{type(error).__name__}: {error}"
+        try:
+            self.reply(request, Char8Array(text, **{**_fields_of(request), "status": status}))
+        except Error as failure:
+            _log.error("%s: %s", self.name, failure)
+
+
+def _fields_of(request: Message) -> dict[str, Any]:
+    return {name: getattr(request, name) for name in _COPIED if hasattr(request, name)}

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""mpf.AsyncClient: calls, cancellation, subscriptions in an event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+from conftest import PATIENCE
+
+import mpf
+
+
+async def test_a_call_returns_the_reply(doubler: mpf.Server) -> None:
+    async with mpf.AsyncClient("doubler") as client:
+        reply = await client.call(mpf.Int32(21))
+
+    assert reply.value == 42
+
+
+async def test_calls_run_at_the_same_time(doubler: mpf.Server) -> None:
+    async with mpf.AsyncClient("doubler", timeout=PATIENCE) as client:
+        replies = await asyncio.gather(*(client.call(mpf.Int32(n)) for n in range(90)))
+
+    assert [reply.value for reply in replies] == [2 * n for n in range(90)]
+
+
+async def test_an_absent_server_is_not_connected() -> None:
+    async with mpf.AsyncClient("nobody") as client:
+        with pytest.raises(mpf.NotConnected, match="nobody"):
+            await client.call(mpf.Int32(), timeout=0.01)
+
+
+async def test_a_server_that_starts_later_is_found() -> None:
+    async with mpf.AsyncClient("late", timeout=PATIENCE) as client:
+        calling = asyncio.ensure_future(client.call(mpf.Int32(1)))
+        await asyncio.sleep(0)
+        with mpf.Server("late") as server:
+            server.on(mpf.Int32)(lambda request: request.value + 1)
+            server.start()
+            assert (await calling).value == 2
+
+
+@pytest.fixture
+async def silent() -> AsyncIterator[tuple[mpf.Server, list[mpf.Message], asyncio.Event]]:
+    """A server that keeps its requests."""
+    server = mpf.Server("silent")
+    kept: list[mpf.Message] = []
+    came = asyncio.Event()
+    released = asyncio.Event()
+
+    @server.on(mpf.Int32)
+    async def keep(request: mpf.Int32) -> None:
+        kept.append(request)
+        came.set()
+        await released.wait()
+
+    serving = asyncio.ensure_future(server.serve())
+    yield server, kept, came
+    kept.clear()
+    server.interrupt()
+    await serving
+    server.close()
+
+
+Silent = tuple[mpf.Server, list[mpf.Message], asyncio.Event]
+
+
+async def test_a_call_times_out(silent: Silent) -> None:
+    async with mpf.AsyncClient("silent") as client:
+        calling = asyncio.ensure_future(client.call(mpf.Int32(), timeout=0.3))
+        await silent[2].wait()
+        with pytest.raises(mpf.TimedOut):
+            await calling
+
+
+async def test_a_cancelled_task_cancels_its_request(silent: Silent, backplane: str) -> None:
+    server, kept, came = silent
+    async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
+        calling = asyncio.ensure_future(client.call(mpf.Int32()))
+        await came.wait()
+        calling.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await calling
+        assert not client._waiting
+        server.reply(kept[0], mpf.Int32(5))  # too late: it is dropped
+
+        other = asyncio.ensure_future(client.call(mpf.Int32(7)))
+        came.clear()
+        await came.wait()
+        server.reply(kept[1], mpf.Int32(8))
+        assert (await other).value == 8
+
+
+async def test_asyncio_timeouts_work(silent: Silent) -> None:
+    async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(client.call(mpf.Int32()), 0.01)
+
+
+async def test_closing_ends_calls(silent: Silent) -> None:
+    client = mpf.AsyncClient("silent", timeout=PATIENCE)
+    calling = asyncio.ensure_future(client.call(mpf.Int32()))
+    await silent[2].wait()
+    client.close()
+
+    with pytest.raises(mpf.Error):
+        await calling
+
+
+async def test_a_subscription_iterates(doubler: mpf.Server) -> None:
+    doubler.on(mpf.Float64)(lambda request: (float(n) for n in range(4)))
+    values = []
+    async with mpf.AsyncClient("doubler") as client:
+        async with client.subscribe(mpf.Float64()) as replies:
+            async for reply in replies:
+                values.append(reply.value)
+                if len(values) == 4:
+                    break
+
+    assert values == [0.0, 1.0, 2.0, 3.0]
+
+
+async def test_a_subscription_is_renewed(doubler: mpf.Server) -> None:
+    def serve() -> mpf.Server:
+        server = mpf.Server("source")
+        server.on(mpf.Int32)(lambda request: (n for n in (1, 2)))
+        return server.start()
+
+    first = serve()
+    async with mpf.AsyncClient("source") as client, client.subscribe(mpf.Int32()) as replies:
+        before = [(await anext(replies)).value for _ in range(2)]
+        first.close()
+        with serve():
+            after = [(await anext(replies)).value for _ in range(2)]
+
+    assert before == after == [1, 2]
+
+
+async def test_a_thousand_subscriptions_of_one_client() -> None:
+    sources = []
+    with mpf.Server("source", queue_size=1000) as server:
+
+        @server.on(mpf.Float64)
+        def keep(request: mpf.Float64) -> mpf.Float64:
+            sources.append(request)
+            return mpf.Float64(request.value)
+
+        server.start()
+        async with mpf.AsyncClient("source", timeout=PATIENCE) as client:
+            subscriptions = [client.subscribe(mpf.Float64(float(n))) for n in range(1000)]
+            first = [(await anext(each)).value for each in subscriptions]
+            for source in sources:
+                server.reply(source, mpf.Float64(source.value + 0.5))
+            second = [(await anext(each)).value for each in subscriptions]
+        sources.clear()
+
+    assert first == [float(n) for n in range(1000)]
+    assert second == [n + 0.5 for n in range(1000)]
+
+
+def test_a_client_belongs_to_one_loop(doubler: mpf.Server) -> None:
+    client = mpf.AsyncClient("doubler")
+
+    async def use() -> None:
+        await client.call(mpf.Int32())
+
+    asyncio.run(use())
+    with pytest.raises(RuntimeError, match="another event loop"):
+        asyncio.run(use())

@@ -1,0 +1,338 @@
+# SPDX-License-Identifier: MIT
+"""mpf.Client: calls, exceptions, subscriptions, Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+from conftest import PATIENCE, PROGRAMS
+
+import mpf
+
+
+def test_a_call_returns_the_reply_of_a_server_in_another_process(
+    start: Callable[..., subprocess.Popen[str]],
+) -> None:
+    start(PROGRAMS / "mpf-int32-server")
+
+    with mpf.Client("Int32") as client:
+        reply = client.call(mpf.Int32(value=3), timeout=PATIENCE)
+
+    assert isinstance(reply, mpf.Int32)
+    assert reply.status == 0
+
+
+def test_a_call_by_type_sends_the_fields(doubler: mpf.Server) -> None:
+    with mpf.Client("doubler") as client:
+        reply = client.int32(21, cmd=2, address=3, extra=4)
+
+    assert (reply.value, reply.cmd, reply.address, reply.extra) == (42, 2, 3, 4)
+
+
+def test_a_message_can_be_sent_again(doubler: mpf.Server) -> None:
+    message = mpf.Int32(value=5)
+    with mpf.Client("doubler") as client:
+        assert [client.call(message).value for _ in range(3)] == [10, 10, 10]
+
+
+def test_requests_may_be_outstanding(doubler: mpf.Server) -> None:
+    with mpf.Client("doubler") as client:
+        requests = [client.send(mpf.Int32(value=number)) for number in range(50)]
+        values = [getattr(request.wait(), "value") for request in requests]
+
+    assert values == [2 * number for number in range(50)]
+
+
+def test_an_absent_server_is_not_connected() -> None:
+    with mpf.Client("nobody") as client, pytest.raises(mpf.NotConnected, match="nobody"):
+        client.int32(timeout=0.01)
+
+
+def test_the_text_and_the_status_of_the_server_are_the_exception(doubler: mpf.Server) -> None:
+    @doubler.on(mpf.Float64)
+    def refuse(request: mpf.Float64) -> object:
+        raise mpf.StatusError("no channel 7", status=-3)
+
+    with mpf.Client("doubler") as client:
+        with pytest.raises(mpf.StatusError, match="doubler: status -3: no channel 7") as caught:
+            client.float64(address=7)
+        reply = client.call(mpf.Float64(address=7), check=False)
+
+    assert (caught.value.status, caught.value.text) == (-3, "no channel 7")
+    assert (reply.status, reply.text, reply.address) == (-3, "no channel 7", 7)
+
+
+def test_a_reply_of_another_type_is_an_error_unless_it_is_expected(doubler: mpf.Server) -> None:
+    @doubler.on(mpf.Float64)
+    def other(request: mpf.Float64) -> mpf.Int32:
+        return mpf.Int32(7)
+
+    with mpf.Client("doubler") as client:
+        with pytest.raises(mpf.UnexpectedReply, match="reply=mpf.Int32") as caught:
+            client.float64()
+        expected = client.call(mpf.Float64(), reply=mpf.Int32)
+        anything = client.call(mpf.Float64(), reply=mpf.Message)
+
+    assert isinstance(caught.value.reply, mpf.Int32)
+    assert expected.value == 7
+    assert isinstance(anything, mpf.Int32)
+
+
+class Silent:
+    """A server that keeps its requests until the test ends them."""
+
+    def __init__(self) -> None:
+        self.server = mpf.Server("silent")
+        self.requests: list[mpf.Message] = []
+        self.came = threading.Semaphore(0)
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self) -> None:
+        while not self.server._take_interrupt():
+            request = self.server._receive(PATIENCE)
+            if request is not None:
+                self.requests.append(request)
+                self.came.release()
+
+    def close(self) -> None:
+        self.server.interrupt()
+        self.thread.join()
+        self.server.close()
+        self.requests.clear()
+
+
+@pytest.fixture
+def silent() -> Iterator[Silent]:
+    server = Silent()
+    yield server
+    server.close()
+
+
+def test_a_request_that_was_taken_and_has_no_reply_times_out(silent: Silent) -> None:
+    with mpf.Client("silent") as client:
+        request = client.send(mpf.Int32(), timeout=0.2)
+        assert silent.came.acquire(timeout=PATIENCE)
+
+        with pytest.raises(mpf.TimedOut, match="may have acted") as caught:
+            request.wait()
+
+    assert isinstance(caught.value, (mpf.OutcomeUnknown, TimeoutError))
+    assert caught.value.fate == "outcomeUnknown"
+
+
+def test_a_request_that_the_server_refuses_is_refused(silent: Silent) -> None:
+    with mpf.Client("silent") as client:
+        request = client.send(mpf.Int32(), timeout=PATIENCE)
+        assert silent.came.acquire(timeout=PATIENCE)
+        silent.server.refuse(silent.requests[0])
+
+        with pytest.raises(mpf.Refused):
+            request.wait()
+
+
+def test_a_request_whose_server_dies_has_an_unknown_outcome(
+    start: Callable[..., subprocess.Popen[str]],
+) -> None:
+    process = start(PROGRAMS / "mpf-int32-server")
+    with mpf.Client("Int32") as client:
+        client.int32(timeout=PATIENCE)
+        process.send_signal(signal.SIGSTOP)
+        request = client.send(mpf.Int32(), timeout=PATIENCE)
+        process.kill()
+
+        with pytest.raises((mpf.NeverTaken, mpf.OutcomeUnknown)):
+            request.wait()
+
+
+def test_a_request_that_no_server_takes_expires(
+    start: Callable[..., subprocess.Popen[str]],
+) -> None:
+    process = start(PROGRAMS / "mpf-int32-server")
+    with mpf.Client("Int32") as client:
+        client.int32(timeout=PATIENCE)
+        process.send_signal(signal.SIGSTOP)
+
+        with pytest.raises(mpf.Expired, match="nothing was done"):
+            client.int32(timeout=0.05)
+
+
+def test_a_cancelled_request_ends(silent: Silent) -> None:
+    with mpf.Client("silent") as client:
+        request = client.send(mpf.Int32(), timeout=PATIENCE)
+        request.cancel()
+
+        with pytest.raises(mpf.Cancelled):
+            request.wait()
+
+
+def test_retry_sends_a_request_that_was_never_taken_to_the_next_server() -> None:
+    first = mpf.Server("again")
+    with mpf.Client("again") as client:
+        replies: list[int] = []
+
+        def accept() -> None:  # connects the client, and takes no request
+            while not client.connected:
+                first._receive(0.01)
+
+        accepting = threading.Thread(target=accept)
+        accepting.start()
+        assert client.wait_connected(PATIENCE)
+        accepting.join()
+        sender = threading.Thread(
+            target=lambda: replies.append(client.call(mpf.Int32(4), PATIENCE, retry=True).value)
+        )
+        sender.start()
+        while not mpf.stats("again")["links"][0]["unanswered"]:
+            pass
+        first.close()
+        with mpf.Server("again") as second:
+            second.on(mpf.Int32)(lambda request: request.value + 1)
+            second.start()
+            sender.join()
+
+    assert replies == [5]
+
+
+def test_a_full_queue_refuses_the_next_request(silent: Silent) -> None:
+    with mpf.Client("silent") as client, pytest.raises(mpf.QueueFull):
+        requests = [client.send(mpf.Int32(), timeout=PATIENCE)]
+        while True:
+            requests.append(client.send(mpf.Int32(), timeout=PATIENCE))
+
+
+def test_a_message_that_is_too_large_is_refused_with_the_limit() -> None:
+    with mpf.Server("small", max_message_bytes=1000).start(), mpf.Client("small") as client:
+        with pytest.raises(mpf.TooLarge, match="the limit is 1000"):
+            client.float64_array(range(1000), timeout=PATIENCE)
+
+
+def test_invalid_arguments_are_named() -> None:
+    with pytest.raises(OverflowError, match="address: 4294967296"):
+        mpf.Int32(address=2**32)
+    with pytest.raises(ValueError, match="eom: 5 bytes"):
+        mpf.Char8Array(eom=b"12345")
+    with pytest.raises(ValueError, match="parity: 'Even'"):
+        mpf.SerialConfig(parity="Even")
+    with pytest.raises(ValueError, match="wait: 'fast'"):
+        mpf.Client("dac", wait="fast")
+    with pytest.raises(ValueError, match="name"):
+        mpf.Client("")
+    with mpf.Client("dac") as client, pytest.raises(TypeError, match="mpf.Int32"):
+        client.call(3)  # type: ignore[type-var]
+
+
+def test_a_closed_client_raises(doubler: mpf.Server) -> None:
+    client = mpf.Client("doubler")
+    client.close()
+
+    with pytest.raises(mpf.Error, match="the client is closed"):
+        client.int32()
+
+
+def test_a_subscription_iterates_over_all_replies(doubler: mpf.Server) -> None:
+    @doubler.on(mpf.Float64)
+    def count(request: mpf.Float64) -> Iterator[float]:
+        yield from map(float, range(int(request.value)))
+
+    with mpf.Client("doubler") as client, client.subscribe(mpf.Float64(5.0)) as replies:
+        values = [next(replies).value for _ in range(5)]
+
+    assert values == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert replies.missed == 0
+
+
+def test_a_subscription_counts_what_the_program_did_not_take(doubler: mpf.Server) -> None:
+    @doubler.on(mpf.Float64)
+    def count(request: mpf.Float64) -> Iterator[float]:
+        yield from map(float, range(10))
+
+    with mpf.Client("doubler") as client:
+        replies = client.subscribe(mpf.Float64(), limit=3)
+        first = next(replies).value
+        client.int32()  # behind the further replies
+        while replies.missed < 6:
+            client.int32()
+        rest = [next(replies).value for _ in range(3)]
+
+    assert (first, rest) == (0.0, [7.0, 8.0, 9.0])
+
+
+def test_a_subscription_is_renewed_when_the_server_starts_again() -> None:
+    def serve() -> mpf.Server:
+        server = mpf.Server("source")
+        server.on(mpf.Int32)(lambda request: (number for number in (1, 2)))
+        return server.start()
+
+    first = serve()
+    with mpf.Client("source") as client, client.subscribe(mpf.Int32()) as replies:
+        before = [next(replies).value, next(replies).value]
+        first.close()
+        with serve():
+            after = [next(replies).value, next(replies).value]
+
+    assert before == after == [1, 2]
+
+
+def test_a_subscription_without_renewal_ends_with_the_server() -> None:
+    server = mpf.Server("source")
+    server.on(mpf.Int32)(lambda request: 1)
+    server.start()
+    with mpf.Client("source") as client:
+        replies = client.subscribe(mpf.Int32(), renew=False)
+        next(replies)
+        server.close()
+
+        assert list(replies) == []
+
+
+def test_a_subscription_times_out(doubler: mpf.Server) -> None:
+    with mpf.Client("doubler") as client:
+        replies = client.subscribe(mpf.Int32(), timeout=0.05)
+        next(replies)
+
+        with pytest.raises(TimeoutError):
+            next(replies)
+
+
+def test_ctrl_c_ends_a_call(silent: Silent) -> None:
+    def interrupt() -> None:
+        assert silent.came.acquire(timeout=PATIENCE)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with mpf.Client("silent") as client, pytest.raises(KeyboardInterrupt):
+        client.int32(timeout=PATIENCE)
+    thread.join()
+
+
+def test_ctrl_c_ends_the_wait_for_a_connection() -> None:
+    threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    with mpf.Client("nobody") as client, pytest.raises(KeyboardInterrupt):
+        client.int32(timeout=PATIENCE)
+
+
+def test_threads_share_a_client(doubler: mpf.Server) -> None:
+    results: dict[int, list[int]] = {}
+    with mpf.Client("doubler") as client:
+
+        def ask(first: int) -> None:
+            numbers = range(first, first + 200)
+            results[first] = [client.int32(number, timeout=PATIENCE).value for number in numbers]
+
+        threads = [threading.Thread(target=ask, args=(1000 * number,)) for number in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    assert len(results) == 8
+    for first, values in results.items():
+        assert values == [2 * number for number in range(first, first + 200)]

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""mpf.Server: functions, coroutines, generators, errors."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import threading
+from collections.abc import AsyncIterator, Iterator
+
+import numpy as np
+import pytest
+from conftest import PATIENCE, PROGRAMS
+
+import mpf
+
+
+@pytest.fixture
+def server() -> Iterator[mpf.Server]:
+    with mpf.Server("tested") as server:
+        yield server
+
+
+def call(message: mpf.Message) -> object:
+    with mpf.Client("tested") as client:
+        return client.call(message, PATIENCE, reply=mpf.Message)
+
+
+def test_a_handler_may_change_the_request(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    def change(request: mpf.Int32) -> None:
+        request.value += 1
+        request.status = 0
+
+    with server.start():
+        assert call(mpf.Int32(1)).value == 2  # type: ignore[attr-defined]
+
+
+def test_a_handler_may_return_an_array(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    def scan(request: mpf.Int32) -> mpf.Float64Array:
+        return mpf.Float64Array(np.arange(float(request.value)), address=request.address)
+
+    with server.start():
+        reply = call(mpf.Int32(100_000, address=2))
+
+    assert isinstance(reply, mpf.Float64Array)
+    assert (len(reply), reply.address, reply.value[-1]) == (100_000, 2, 99_999.0)
+
+
+def test_a_handler_may_fill_a_loaned_array(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    def scan(request: mpf.Int32) -> mpf.Float64Array:
+        reply = server.loan(request, mpf.Float64Array, request.value)
+        reply.value[:] = 3
+        return reply
+
+    with server.start():
+        assert call(mpf.Int32(100_000)).value.sum() == 300_000  # type: ignore[attr-defined]
+
+
+def test_a_handler_may_reply_later_and_often(server: mpf.Server) -> None:
+    kept: list[mpf.Float64] = []
+
+    @server.on(mpf.Float64)
+    async def keep(request: mpf.Float64) -> mpf.Int32:
+        kept.append(request)
+        return mpf.Int32(0)
+
+    with server.start(), mpf.Client("tested") as client:
+        request = client.send(mpf.Float64(), reply=mpf.Message, further=10)
+        request.wait()
+        assert server.is_client_connected(kept[0])
+        for number in (1, 2, 3):
+            assert server.reply(kept[0], mpf.OutOfBand(number))
+        further = [request.next(PATIENCE) for _ in range(3)]
+        client.close()
+        while server.is_client_connected(kept[0]):
+            pass
+
+    assert [getattr(message, "value") for message in further] == [1, 2, 3]
+    kept.clear()
+
+
+def test_coroutines_run_at_the_same_time(server: mpf.Server) -> None:
+    both = 0
+    met: asyncio.Event | None = None
+
+    @server.on(mpf.Int32)
+    async def meet(request: mpf.Int32) -> int:
+        nonlocal both, met
+        met = met or asyncio.Event()
+        both += 1
+        if both == 2:
+            met.set()
+        await asyncio.wait_for(met.wait(), PATIENCE)
+        return request.value
+
+    with server.start(), mpf.Client("tested", timeout=PATIENCE) as client:
+        requests = [client.send(mpf.Int32(number)) for number in (1, 2)]
+
+        assert [getattr(request.wait(), "value") for request in requests] == [1, 2]
+
+
+def test_an_async_generator_sends_many_replies(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    async def count(request: mpf.Int32) -> AsyncIterator[int]:
+        for number in range(request.value):
+            await asyncio.sleep(0)
+            yield number
+
+    with server.start(), mpf.Client("tested") as client:
+        with client.subscribe(mpf.Int32(3)) as replies:
+            assert [next(replies).value for _ in range(3)] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("isCoroutine", [False, True])
+def test_an_exception_becomes_a_status_and_a_text(server: mpf.Server, isCoroutine: bool) -> None:
+    if isCoroutine:
+
+        @server.on(mpf.Int32)
+        async def fail(request: mpf.Int32) -> None:
+            raise ZeroDivisionError("no range")
+    else:
+
+        @server.on(mpf.Int32)
+        def fail(request: mpf.Int32) -> None:
+            raise ZeroDivisionError("no range")
+
+    with server.start():
+        for _ in range(2):  # the server goes on
+            with pytest.raises(mpf.StatusError, match="ZeroDivisionError: no range") as caught:
+                call(mpf.Int32(address=4))
+
+    assert caught.value.status == -1
+    assert getattr(caught.value.reply, "address") == 4
+
+
+def test_a_type_without_a_handler_is_an_error(server: mpf.Server) -> None:
+    server.on(mpf.Float64)(lambda request: 1.0)
+    with server.start(), pytest.raises(mpf.StatusError, match="does not handle Int32"):
+        call(mpf.Int32())
+
+
+def test_a_program_of_c_plus_plus_sees_status_and_text(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    def fail(request: mpf.Int32) -> None:
+        raise mpf.StatusError("the shutter is closed", status=5)
+
+    with server.start():
+        done = subprocess.run(
+            [PROGRAMS / "mpf", "call", "tested", "int32", "value=3", "--timeout", str(PATIENCE)],
+            capture_output=True,
+            text=True,
+        )
+
+    assert "the shutter is closed" in done.stdout
+    assert "status=5" in done.stdout
+
+
+def test_a_name_in_use_is_an_error(server: mpf.Server) -> None:
+    with pytest.raises(mpf.NameInUse, match="tested"):
+        mpf.Server("tested")
+
+
+def test_run_ends_with_interrupt(server: mpf.Server) -> None:
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    server.interrupt()
+    thread.join()
+
+
+def test_serve_runs_in_an_event_loop_beside_a_client(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: request.value + 1)
+
+    async def both() -> int:
+        serving = asyncio.ensure_future(server.serve())
+        async with mpf.AsyncClient("tested", timeout=PATIENCE) as client:
+            reply = await client.call(mpf.Int32(1))
+        server.interrupt()
+        await serving
+        return reply.value
+
+    assert asyncio.run(both()) == 2
+
+
+def test_a_closed_server_raises(server: mpf.Server) -> None:
+    server.close()
+
+    with pytest.raises(mpf.Error, match="the server is closed"):
+        server.run()
+
+
+def test_only_requests_have_replies(server: mpf.Server) -> None:
+    with pytest.raises(ValueError, match="not a request"):
+        server.reply(mpf.Int32(), mpf.Int32())
