@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "python/extension/client.h"
 
+#include <cmath>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
-
-#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -56,8 +55,8 @@ Connection::Connection(const std::string& backplane, std::string serverName, std
                        WaitMode waitMode)
     : server(std::move(serverName)),
       forks_(forkCount()),
-      requester_(std::make_shared<Requester>(Backplane::attach(backplane), server, location,
-                                             waitMode)) {}
+      requester_(
+          std::make_shared<Requester>(Backplane::attach(backplane), server, location, waitMode)) {}
 
 Connection::~Connection() {
   // Threads of the parent may have waited in the requester: its parts cannot be destroyed here.
@@ -105,10 +104,10 @@ void Connection::send(PyMessage& message, Exchange& exchange, Deadline deadline,
     if (result == SendResult::notConnected && !connectBefore.hasPassed()) continue;
     if (result == SendResult::notConnected)
       raiseNotSent(server, result, client.notConnectedBecause());
-    raiseNotSent(server, result, result == SendResult::tooLarge
-                                     ? std::to_string(bytes) + " bytes, the limit is " +
-                                           std::to_string(client.maxMessageBytes())
-                                     : std::string());
+    raiseNotSent(server, result,
+                 result == SendResult::tooLarge ? std::to_string(bytes) + " bytes, the limit is " +
+                                                      std::to_string(client.maxMessageBytes())
+                                                : std::string());
   }
 }
 
@@ -138,8 +137,7 @@ nb::object PyRequest::wait(bool check) {
 }
 
 nb::object PyRequest::result(bool check) {
-  if (!connection_->isClosed() && !connection_->requester()->hasEnded(exchange_))
-    return nb::none();
+  if (!connection_->isClosed() && !connection_->requester()->hasEnded(exchange_)) return nb::none();
   return finish(*connection_, exchange_, false, deadline_.hasPassed(), {type_, check});
 }
 
@@ -193,16 +191,14 @@ class PyClient {
 
   nb::object call(nb::handle message, std::optional<double> timeout, nb::object reply, bool retry,
                   bool check) {
-    PyRequest request(connection_, deadline(timeout),
-                      expectedType(message, std::move(reply)), 0);
+    PyRequest request(connection_, deadline(timeout), expectedType(message, std::move(reply)), 0);
     request.send(messageOf(message), retryOf(retry), true);
     return request.wait(check);
   }
   std::shared_ptr<PyRequest> send(nb::handle message, std::optional<double> timeout,
                                   nb::object reply, bool retry, std::size_t further, bool waits) {
-    auto request =
-        std::make_shared<PyRequest>(connection_, deadline(timeout),
-                                    expectedType(message, std::move(reply)), further);
+    auto request = std::make_shared<PyRequest>(connection_, deadline(timeout),
+                                               expectedType(message, std::move(reply)), further);
     request->send(messageOf(message), retryOf(retry), waits);
     return request;
   }
@@ -238,9 +234,7 @@ class PyClient {
   std::string notConnectedBecause() {
     return connection_->requester()->client().notConnectedBecause();
   }
-  std::uint64_t maxMessageBytes() {
-    return connection_->requester()->client().maxMessageBytes();
-  }
+  std::uint64_t maxMessageBytes() { return connection_->requester()->client().maxMessageBytes(); }
   [[nodiscard]] const std::string& server() const { return connection_->server; }
   [[nodiscard]] std::int32_t location() const { return location_; }
   [[nodiscard]] double timeout() const { return timeout_; }

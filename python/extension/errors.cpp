@@ -22,11 +22,15 @@ template <class... Argument>
 
 const char* nameOf(SendResult result) {
   switch (result) {
-    case SendResult::notConnected: return "NotConnected";
+    case SendResult::notConnected:
+      return "NotConnected";
     case SendResult::queueFull:
-    case SendResult::tooManyOutstanding: return "QueueFull";
-    case SendResult::tooLarge: return "TooLarge";
-    default: return "NotSent";
+    case SendResult::tooManyOutstanding:
+      return "QueueFull";
+    case SendResult::tooLarge:
+      return "TooLarge";
+    default:
+      return "NotSent";
   }
 }
 
@@ -37,13 +41,15 @@ struct Ending {
 
 Ending endingOf(Fate fate) {
   switch (fate) {
-    case Fate::refused: return {"Refused", "the server refused the request"};
+    case Fate::refused:
+      return {"Refused", "the server refused the request"};
     case Fate::neverTaken:
       return {"NeverTaken",
               "the connection ended before the server received the request: nothing was done"};
     case Fate::expired:
       return {"Expired", "the server did not receive the request in time: nothing was done"};
-    case Fate::cancelled: return {"Cancelled", "the request was cancelled"};
+    case Fate::cancelled:
+      return {"Cancelled", "the request was cancelled"};
     default:
       return {"OutcomeUnknown",
               "the connection ended after the server had received the request: it may have been "
@@ -85,8 +91,9 @@ void raiseFate(const std::string& server, Fate fate) {
 }
 
 void raiseTimedOut(const std::string& server) {
-  raise("TimedOut", sentence(server, "no reply in time: the server received the request, and may "
-                                     "have acted on it"));
+  raise("TimedOut", sentence(server,
+                             "no reply in time: the server received the request, and may "
+                             "have acted on it"));
 }
 
 void raiseClosed(const char* object) {

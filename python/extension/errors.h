@@ -3,7 +3,6 @@
 #pragma once
 
 #include <nanobind/nanobind.h>
-
 #include <string>
 
 #include <mpf/message_client.h>

@@ -3,14 +3,13 @@
 // description is the attribute `number_retrys`.
 #pragma once
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/string.h>
-
 #include <array>
 #include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
 #include <string>
 #include <string_view>
 #include <tuple>

@@ -10,12 +10,14 @@
 namespace mpf::python {
 namespace {
 
+constexpr std::chrono::microseconds kLookEvery{100};
+
 std::atomic<bool> isExiting = false;
 std::atomic<int> entering = 0;  // threads that ask for the GIL
 pthread_t exitingThread;  // valid when isExiting is true
 
 void resume(PyThreadState* state) {
-  // Either prepareExit() sees this thread in `entering`, or this thread sees isExiting.
+  // PAIR(python-exit): either prepareExit() sees this thread in `entering`, or it sees isExiting.
   entering.fetch_add(1);
   if (isExiting.load() && pthread_equal(pthread_self(), exitingThread) == 0) {
     entering.fetch_sub(1);
@@ -42,9 +44,10 @@ std::function<bool()> WithoutGil::interruption() {
 
 void prepareExit() {
   exitingThread = pthread_self();
-  isExiting.store(true);
   auto* state = PyEval_SaveThread();
-  while (entering.load() != 0) std::this_thread::yield();
+  // PAIR(python-exit): no thread enters after this store.
+  isExiting.store(true);
+  while (entering.load() != 0) std::this_thread::sleep_for(kLookEvery);
   PyEval_RestoreThread(state);
 }
 

@@ -11,9 +11,8 @@
 // Threads  any.
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <functional>
+#include <nanobind/nanobind.h>
 
 namespace mpf::python {
 

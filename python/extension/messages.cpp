@@ -2,7 +2,6 @@
 #include "python/extension/messages.h"
 
 #include <nanobind/stl/string.h>
-
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -31,16 +30,17 @@ int getBuffer(PyObject* self, Py_buffer* view, int flags) {
   auto& array = *nb::inst_ptr<PyArray<T>>(self);
   view->obj = nullptr;
   if (array.isEmpty || array.values.is_valid()) {
-    PyErr_SetString(PyExc_BufferError, array.isEmpty ? "the message was sent"
-                                                     : "use the attribute `value`");
+    PyErr_SetString(PyExc_BufferError,
+                    array.isEmpty ? "the message was sent" : "use the attribute `value`");
     return -1;
   }
   if ((flags & PyBUF_WRITABLE) != 0 && !array.isLoaned) {
     PyErr_SetString(PyExc_BufferError, "a received message is read-only");
     return -1;
   }
-  static Py_ssize_t stride = sizeof(typename T::Element);
-  view->buf = const_cast<typename T::Element*>(std::as_const(array.handle).template valueAs<T>().data());
+  using Element = typename T::Element;
+  static Py_ssize_t stride = sizeof(Element);
+  view->buf = const_cast<Element*>(std::as_const(array.handle).template valueAs<T>().data());
   view->obj = Py_NewRef(self);
   view->len = array.length * stride;
   view->itemsize = stride;
@@ -65,9 +65,7 @@ PyType_Slot kBufferSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(getBuffe
                               {Py_bf_releasebuffer, reinterpret_cast<void*>(releaseBuffer<T>)},
                               {0, nullptr}};
 
-nb::object numpy(const char* function) {
-  return nb::module_::import_("numpy").attr(function);
-}
+nb::object numpy(const char* function) { return nb::module_::import_("numpy").attr(function); }
 
 // The elements as users see them: a numpy array, bytes or a memoryview.
 template <class T>
@@ -153,7 +151,7 @@ using PyClass = nb::class_<PyScalar<T>, PyMessage>;
 template <ArrayBody T>
 using PyArrayClass = nb::class_<PyArray<T>, PyMessage>;
 
-#define MPF_STANDARD_ARGUMENTS                                                                    \
+#define MPF_STANDARD_ARGUMENTS \
   nb::kw_only(), "timeout"_a = 0, "cmd"_a = 0, "status"_a = 0, "address"_a = 0, "extra"_a = 0
 
 template <class T>
@@ -194,9 +192,10 @@ PyArrayClass<T> addArrayClass(nb::module_& module, const char* doc, const char* 
 template <class T>
 void addArray(nb::module_& module, const char* doc, const char* valueSignature,
               const char* initSignature) {
-  auto type = addArrayClass<T>(module, doc, valueSignature,
-                               "The elements, one dimension. Those of a received message are in "
-                               "shared memory and read-only; they stay valid as long as the array.");
+  auto type =
+      addArrayClass<T>(module, doc, valueSignature,
+                       "The elements, one dimension. Those of a received message are in "
+                       "shared memory and read-only; they stay valid as long as the array.");
   type.def(
       "__init__",
       [](PyArray<T>* self, nb::handle value, long long timeout, long long cmd, long long status,
@@ -280,9 +279,8 @@ void addSerialConfig(nb::module_& module) {
       nb::kw_only(), "baud"_a = 0, "stop_bits"_a = 0, "bits_per_char"_a = 0, "parity"_a = "",
       "flow_control"_a = "");
   addFields<Config, SerialConfig>(type);
-  type.def("__repr__", [](const Config& self) {
-    return describe(kClassName<SerialConfig>, self.fields, "");
-  });
+  type.def("__repr__",
+           [](const Config& self) { return describe(kClassName<SerialConfig>, self.fields, ""); });
 }
 
 // ---- messages that arrive

@@ -11,9 +11,8 @@
 //          and their number is the one that was checked.
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cstring>
+#include <nanobind/nanobind.h>
 
 #include <mpf/message_client.h>
 #include <mpf/message_of.h>

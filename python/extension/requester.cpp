@@ -121,8 +121,7 @@ void Requester::waitForEnd(Exchange& exchange, Deadline deadline,
   client_.cancel(exchange.id);
   lock.lock();
   if (!exchange.hasEnded() || exchange.fate == Fate::cancelled)
-    exchange.fate =
-        deadline.hasPassed() && !isClosed_ ? Fate::outcomeUnknown : Fate::cancelled;
+    exchange.fate = deadline.hasPassed() && !isClosed_ ? Fate::outcomeUnknown : Fate::cancelled;
 }
 
 Message Requester::waitForFurther(Exchange& exchange, Deadline deadline,

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "python/extension/server.h"
 
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
 #include <optional>
 #include <string>
 #include <utility>
@@ -33,9 +32,8 @@ class PyServer {
            const std::string& backplane, int queueSize, std::uint64_t maxMessageBytes,
            const std::string& wait)
       : name_(name), forks_(forkCount()) {
-    ServerOptions options{.queueSize = queueSize,
-                          .maxMessageBytes = maxMessageBytes,
-                          .waitMode = waitModeOf(wait)};
+    ServerOptions options{
+        .queueSize = queueSize, .maxMessageBytes = maxMessageBytes, .waitMode = waitModeOf(wait)};
     if (location) options.location = *location;
     server_ = std::make_shared<MessageServer>(Backplane::attach(backplane), name, options);
   }

@@ -29,6 +29,7 @@ MAY_INCLUDE = {
     "classic/messages": ["schema"],
     "classic": ["classic/messages", "client", "server", "drivers"],
     "epics": ["client", "classic/messages"],
+    "python": ["client", "server"],
     # The supervisor reads shared memory as reports do, and prints tables.
     "crate": ["base", "shm", "tools", "drivers"],
     "benchmarks": ["client", "server"],
@@ -84,11 +85,8 @@ def is_cpp(path):
 
 
 def is_source(path):
-    name = os.path.basename(path)
-    return (
-        is_cpp(path)
-        or path.endswith((".py", ".sh", ".capnp", ".cmake"))
-        or name in ("CMakeLists.txt", "Makefile")
+    return is_cpp(path) or path.endswith(
+        (".py", ".sh", ".capnp", ".cmake", "CMakeLists.txt", "Makefile")
     )
 
 
@@ -163,7 +161,8 @@ def pairs(files):
             for tag in PAIR.findall(line):
                 places.setdefault(tag, []).append((path, number))
                 below = "\n".join(source[number - 1:number + PAIR_REACH])
-                orders.setdefault(tag, set()).update(match[2] for match in ORDERED.finditer(below))
+                found = {match[2] or "seq_cst" for match in ORDERED.finditer(below)}
+                orders.setdefault(tag, set()).update(found)
                 if "fence()" in below:
                     orders[tag].add("seq_cst")
     for tag, found in places.items():

@@ -8,8 +8,8 @@
 
 `Client` and `AsyncClient` send requests to a server, `Server` answers them. The classes of messages
 are `Int32`, `Int32Array`, `Float64`, `Float64Array`, `Char8Array`, `SerialConfig`, `OutOfBand` and
-`User`. `servers()`, `stats()` and `tap()` show what happens on this host; `replay()` starts a server
-that answers from a recording.
+`User`. `servers()`, `stats()` and `tap()` show what happens on this host; `replay()` starts a
+server that answers from a recording.
 """
 
 from mpf._mpf import (

@@ -26,7 +26,7 @@ _CONNECTION = 0  # stands for the connection among the numbers of requests
 
 
 class AsyncClient(_mpf.BaseClient):
-    """As Client, for asyncio: `await client.call(...)`, `async for ... in client.subscribe(...)`."""
+    """As Client, for asyncio: `await client.call(...)`, `async for ... in client.subscribe()`."""
 
     def __init__(
         self,

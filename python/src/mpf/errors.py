@@ -116,7 +116,8 @@ class StatusError(Error):
         if reply is None:
             super().__init__(text)
         else:
-            super().__init__(f"{text}: status {self.status}" + (f": {self.text}" if self.text else ""))
+            reason = f": {self.text}" if self.text else ""
+            super().__init__(f"{text}: status {self.status}{reason}")
 
 
 def _text_of(reply: Message) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 def find() -> str:
     """The program `mpf` of this package, or else of PATH.
 
-    Raises FileNotFoundError if there is none.
+    Raises FileNotFoundError if neither exists.
     """
     own = Path(__file__).parent / "bin" / "mpf"
     found = str(own) if own.exists() else shutil.which("mpf")

@@ -209,7 +209,8 @@ class Server(_mpf.BaseServer):
         elif isinstance(value, Message):
             self.reply(request, value)
         else:
-            self.reply(request, type(request)(value, **_fields_of(request)))  # type: ignore[call-arg]
+            kind = type(request)
+            self.reply(request, kind(value, **_fields_of(request)))  # type: ignore[call-arg]
 
     def _fail(self, request: Message, error: Exception) -> None:
         _log.error("%s: %r failed", self.name, request, exc_info=error)

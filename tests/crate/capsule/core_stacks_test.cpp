@@ -14,10 +14,15 @@ using testing::HasSubstr;
 
 class CoreStacksTest : public CrashTest {
  protected:
-  void SetUp() override { ::setenv("MPF_TEST_CORES", "1", 1); }
+  // In a folder of its own: where every core has the name "core", those of other tests that run at
+  // the same time would take its place.
+  void SetUp() override {
+    ::setenv("MPF_TEST_CORES", "1", 1);
+    std::filesystem::current_path(files_.path());
+  }
   void TearDown() override {
     ::unsetenv("MPF_TEST_CORES");
-    if (!core_.empty()) std::filesystem::remove(core_);
+    std::filesystem::current_path(folderBefore_);
   }
   // Makes the server die in the middle of a request.
   nlohmann::ordered_json die(std::int32_t cmd) {
@@ -27,6 +32,7 @@ class CoreStacksTest : public CrashTest {
     if (const auto& core = tree.at("core"); core.is_object()) core_ = core.value("file", "");
     return tree;
   }
+  const std::filesystem::path folderBefore_ = std::filesystem::current_path();
   std::string core_;
 };
 

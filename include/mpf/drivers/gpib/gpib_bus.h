@@ -71,6 +71,7 @@ class GpibBus {
   ~GpibBus();
 
   // Operations. `deadline` holds for the wait and the operation together.
+  // After a write that failed, the instrument may hold a part of the data: clear() removes it.
   //   user  who asks; matters only while the bus is leased
   GpibResult write(const GpibAddress& to, Bytes data, Deadline deadline, GpibUser user = 0,
                    bool sendEnd = true);
