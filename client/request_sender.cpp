@@ -83,11 +83,11 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
   envelope.requestId = attempt.id;
   envelope.clientType = message.getClientType();
   envelope.clientExtra = message.getClientExtra();
-  envelope.deadlineNs = attempt.deadlineNs;
+  envelope.timeNs = attempt.deadlineNs;
   request->clientType = envelope.clientType;
   request->clientExtra = envelope.clientExtra;
   request->ordinal = link.outgoing().messages() + 1;
-  request->deadlineNs = envelope.deadlineNs;
+  request->deadlineNs = envelope.timeNs;
   request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
   request->copy = std::move(attempt.copy);
   if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);

@@ -55,6 +55,20 @@ std::string whyDisconnected(const SharedClient& connection) {
   return reason;
 }
 
+// The time stamp of a message; now, if the server sent none or one that EPICS cannot represent.
+epicsTimeStamp timeStampOf(std::int64_t timeNs) noexcept {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  epicsTimeStamp stamp{};
+  const auto seconds = timeNs / kSecond - POSIX_TIME_AT_EPICS_EPOCH;
+  if (timeNs <= 0 || seconds < 0 || seconds > UINT32_MAX) {
+    epicsTimeGetCurrent(&stamp);
+  } else {
+    stamp.secPastEpoch = static_cast<epicsUInt32>(seconds);
+    stamp.nsec = static_cast<epicsUInt32>(timeNs % kSecond);
+  }
+  return stamp;
+}
+
 class ScanLock {
  public:
   explicit ScanLock(dbCommon* record) : record_(record) { dbScanLock(record); }
@@ -162,6 +176,8 @@ class DevMpf::Impl final : public SharedClient::Member,
  private:
   void handle(Message&& message) {
     if (const auto* connect = message.tryAs<Connect>()) return device_.connectIO(record_, *connect);
+    if (record_->tse == epicsTimeEventDeviceTime)
+      record_->time = timeStampOf(message.getTimeStampNs());
     if (message.getType() == MessageType::outOfBand)
       return device_.outOfBandIO(record_, std::move(message));
     switch (SharedClient::replyTypeOf(message)) {
@@ -180,8 +196,6 @@ class DevMpf::Impl final : public SharedClient::Member,
       deadlineNs_.store(0, std::memory_order_relaxed);
     }
     reply_ = std::move(message);
-    // Messages have no time of their own.
-    if (record_->tse == epicsTimeEventDeviceTime) epicsTimeGetCurrent(&record_->time);
     if (!record_->pact) dbProcess(record_);
     else if (isFirst) record_->rset->process(record_);
     reply_.reset();  // a disabled record does not use it

@@ -231,6 +231,7 @@ bool tryToWire(const Message& message, wire::Envelope::Builder envelope,
   error = {};
   envelope.setClientType(message.getClientType());
   envelope.setClientExtra(message.getClientExtra());
+  envelope.setTimeStampNs(message.getTimeStampNs());
   bool known = false;
   const bool done = withType(message.getType(), [&]<class T>(std::type_identity<T>) {
     known = true;
@@ -267,6 +268,7 @@ std::optional<Message> tryFromWire(wire::Envelope::Reader envelope, const Conver
   if (result) {
     result->setClientType(envelope.getClientType());
     result->setClientExtra(envelope.getClientExtra());
+    result->setTimeStampNs(envelope.getTimeStampNs());
   }
   return result;
 }

@@ -3,9 +3,10 @@
 //
 //   {"type": "float64", "clientType": 0, "clientExtra": 0, "timeout": 0, ..., "value": 1.5}
 //
-// Values that JSON cannot express as numbers are strings: "nan", "inf", "-inf". A string of bytes
-// has one character for each byte, U+0000 to U+00FF; the bytes of a user message are hexadecimal
-// digits. An invalid body, or one of an unknown type, has "bytes", its size, in place of fields.
+// "timeStampNs" is there if the server sent it. Values that JSON cannot express as numbers are
+// strings: "nan", "inf", "-inf". A string of bytes has one character for each byte, U+0000 to
+// U+00FF; the bytes of a user message are hexadecimal digits. An invalid body, or one of an unknown
+// type, has "bytes", its size, in place of fields.
 #pragma once
 
 #include <cmath>
@@ -67,6 +68,7 @@ nlohmann::json toJson(std::span<const Number> numbers) {
   const auto add = [&](std::string_view name, const auto& value) {
     json[std::string(name)] = detail::toJson(value);
   };
+  if (message.getTimeStampNs() != 0) json["timeStampNs"] = message.getTimeStampNs();
   const bool ours = visitFields(message, add);
   if (!ours) json["bytes"] = message.body().size();
   return json;

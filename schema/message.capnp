@@ -23,6 +23,7 @@ struct Envelope {
     requestFate @10 :RequestFate;
     user @11 :User;
   }
+  timeStampNs @12 :Int64;  # of a reply: CLOCK_REALTIME of its data; 0: the server did not say
 }
 
 enum ConnectStatus {

@@ -50,6 +50,7 @@ Message Message::duplicate() const {
   }
   copy.state_.clientType = state_.clientType;
   copy.state_.clientExtra = state_.clientExtra;
+  copy.state_.timeStampNs = state_.timeStampNs;
   copy.state_.route = state_.route;
   copy.state_.route.keeper = nullptr;  // only the first handle reports a request that is dropped
   return copy;

@@ -37,6 +37,8 @@ ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) no
   envelope.requestId = route.requestId;
   envelope.clientType = message.getClientType();
   envelope.clientExtra = message.getClientExtra();
+  envelope.timeNs = message.getTimeStampNs();
+  if (stamps_ && envelope.timeNs == 0) envelope.timeNs = Clock::wallNs();
   if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
 
   auto unowned = route;

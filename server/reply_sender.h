@@ -19,7 +19,9 @@ namespace mpf {
 class ReplySender {
  public:
   // Counts what it sends in `control`.
-  explicit ReplySender(layout::WindowControl& control) noexcept : control_(control) {}
+  //   stamps  give replies without a time stamp the time at which they are sent
+  ReplySender(layout::WindowControl& control, bool stamps) noexcept
+      : control_(control), stamps_(stamps) {}
 
   // MessageServer::reply().
   ReplyResult send(Message& message) noexcept;
@@ -36,6 +38,7 @@ class ReplySender {
 
   ForkGuard forkGuard_;
   layout::WindowControl& control_;
+  const bool stamps_;
 };
 
 }  // namespace mpf

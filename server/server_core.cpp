@@ -50,7 +50,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
           }),
       connections_(endpoint_),
       acceptor_(endpoint_, connections_),
-      replies_(endpoint_.control()),
+      replies_(endpoint_.control(), options.stampsReplies),
       keeper_(RequestKeeper::make(replies_)),
       progress_(endpoint_.control()) {}
 
@@ -151,7 +151,7 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   }
   unanswered.store(envelope.requestId, std::memory_order_relaxed);
   MPF_STEP(request_taken);
-  if (envelope.deadlineNs != 0 && hasExpired(envelope)) {
+  if (envelope.timeNs != 0 && hasExpired(envelope)) {
     count(control.expired);
     connection.channel->discard(envelope);
     replies_.sendFate(connection, envelope, Fate::expired);
@@ -175,7 +175,7 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   }
   progress_.begin(message);
   message.setRoute(connection.routeOf(envelope.requestId, &keeper_));
-  takeBefore_ = envelope.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(envelope.deadlineNs);
+  takeBefore_ = envelope.timeNs == 0 ? Deadline::never() : Deadline::atNs(envelope.timeNs);
   return true;
 }
 
@@ -183,7 +183,7 @@ bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
   // PAIR(taken-before-clock): the client sees that the server counted the request as taken, or the
   // server sees that the deadline has passed.
   doorbell::fence();
-  return Clock::nowNs() >= envelope.deadlineNs;
+  return Clock::nowNs() >= envelope.timeNs;
 }
 
 void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noexcept {

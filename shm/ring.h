@@ -45,7 +45,7 @@ struct Envelope {
   std::int32_t clientType{};
   std::int32_t clientExtra{};
   std::uint32_t sentTick{};
-  std::int64_t deadlineNs{};
+  std::int64_t timeNs{};  // requests: the deadline; replies: the time stamp; 0: none
 };
 
 [[nodiscard]] constexpr std::uint32_t slotsFor(std::size_t inlineBytes) noexcept {
@@ -84,7 +84,7 @@ class RingProducer {
     first.clientType = envelope.clientType;
     first.clientExtra = envelope.clientExtra;
     first.sentTick = envelope.sentTick;
-    first.deadlineNs = envelope.deadlineNs;
+    first.timeNs = envelope.timeNs;
     copyBody(first, body);
     MPF_STEP(slot_written);
     const auto sequence = pushed_ + 1;
@@ -165,7 +165,7 @@ class RingConsumer {
     const auto& first = slot(taken_);
     slotsNow_ = first.slots;
     return {first.type,       first.flags,       first.bodyBytes, first.requestId,
-            first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
+            first.clientType, first.clientExtra, first.sentTick,  first.timeNs};
   }
 
   // Body bytes in the slots of the message begun; 0 if its number of slots is invalid.

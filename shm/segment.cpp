@@ -169,9 +169,7 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
   header.ownerWindow = header.incarnation;
   Process::self().describe(header);
   header.createdMonotonicNs = Clock::nowNs();
-  timespec wall{};
-  ::clock_gettime(CLOCK_REALTIME, &wall);
-  header.createdRealtimeNs = std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec;
+  header.createdRealtimeNs = Clock::wallNs();
   backplane.copy(header.backplane.data(), header.backplane.size() - 1);
   segment.header_ = header;
   MPF_STEP(segment_created);

@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <ctime>
 #include <fmt/format.h>
+
+#include <mpf/clock.h>
 
 #include "base/output_file.h"
 #include "base/system_call.h"
@@ -19,11 +20,9 @@ constexpr const char* kEnding = ".capsule.json";
 
 // A name that sorts by time: 20 digits of nanoseconds.
 std::string freshName(const nlohmann::ordered_json& capsule) {
-  timespec now{};
-  ::clock_gettime(CLOCK_REALTIME, &now);
   std::string process = capsule.value("process", "");
   std::ranges::replace_if(process, [](char c) { return c == '/' || c == '\0'; }, '_');
-  return fmt::format("{:011}{:09}-{}-{}{}", now.tv_sec, now.tv_nsec, process.substr(0, 64),
+  return fmt::format("{:020}-{}-{}{}", Clock::wallNs(), process.substr(0, 64),
                      capsule.value("pid", 0), kEnding);
 }
 

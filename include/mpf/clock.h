@@ -31,7 +31,19 @@ struct Clock {
   [[nodiscard]] static std::int64_t nowNs() noexcept {
     timespec now{};
     ::clock_gettime(CLOCK_MONOTONIC, &now);
-    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+    return nsOf(now);
+  }
+  // The current CLOCK_REALTIME [ns], since 1970, for time stamps that people see and that other
+  // hosts receive. It may jump.
+  [[nodiscard]] static std::int64_t wallNs() noexcept {
+    timespec now{};
+    ::clock_gettime(CLOCK_REALTIME, &now);
+    return nsOf(now);
+  }
+
+ private:
+  static std::int64_t nsOf(const timespec& time) noexcept {
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
   }
 };
 

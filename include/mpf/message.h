@@ -2,7 +2,8 @@
 // Message: a handle that owns one message of any type. <mpf/message_of.h> adds MessageOf<T>, the
 // handle of a message of type T.
 //
-//   Message = | type, clientType, clientExtra | route | body: 32 bytes inline, or out of line |
+//   Message = | type, clientType, clientExtra, time stamp | route | body: 32 bytes inline, or out
+//               of line |
 //
 // Sending moves the message away; a received message belongs to the receiver. A server may change a
 // request and reply with it, or allocate another message. Handles cannot be copied; duplicate()
@@ -117,6 +118,12 @@ class Message {
   [[nodiscard]] std::int32_t getClientExtra() const noexcept { return state_.clientExtra; }
   void setClientExtra(std::int32_t extra) noexcept { state_.clientExtra = extra; }
 
+  // When the data of a reply was taken: [ns] since 1970, UTC without leap seconds (CLOCK_REALTIME).
+  // 0: the server did not say. Servers may set it in each message that they send; in a request it
+  // is not sent. A peer may have sent any value.
+  [[nodiscard]] std::int64_t getTimeStampNs() const noexcept { return state_.timeStampNs; }
+  void setTimeStampNs(std::int64_t timeNs) noexcept { state_.timeStampNs = timeNs; }
+
   // The fields, in place: valid until the handle is moved, sent or destroyed. Returns nullptr when
   // the message has another type than T or its body is invalid. A peer may change T::length at any
   // time: use arrayLength() or valueAs(). It may change all other fields as well, if the body is in
@@ -151,9 +158,10 @@ class Message {
   // fields, empty for an empty handle.
   [[nodiscard]] std::span<const std::byte> body() const noexcept { return {data(), size()}; }
 
-  // Copies type, clientType, clientExtra, route and body; a large body is copied to the heap. The
-  // array length of the copy is the checked one. Only the original reports to the RouteKeeper: a
-  // request is not refused when only its copy is destroyed. A server may reply with the copy.
+  // Copies type, clientType, clientExtra, time stamp, route and body; a large body is copied to the
+  // heap. The array length of the copy is the checked one. Only the original reports to the
+  // RouteKeeper: a request is not refused when only its copy is destroyed. A server may reply with
+  // the copy.
   //   throws  std::bad_alloc
   [[nodiscard]] Message duplicate() const;
 
@@ -291,6 +299,7 @@ class Message {
   struct State {
     Where at;
     Route route{};
+    std::int64_t timeStampNs = 0;
     // Of an array: the checked number of elements. A peer cannot write here.
     std::uint32_t length = 0;
     std::int32_t clientType = 0;
@@ -310,6 +319,7 @@ class Message {
       detail::copyField(route.requestId, other.route.requestId);
       detail::copyField(route.flags, other.route.flags);
       detail::copyField(route.keeper, other.route.keeper);
+      detail::copyField(timeStampNs, other.timeStampNs);
       detail::copyField(length, other.length);
       detail::copyField(clientType, other.clientType);
       detail::copyField(clientExtra, other.clientExtra);
@@ -338,6 +348,7 @@ class Message {
     state_.type = MessageType::none;
     state_.route.keeper = nullptr;
     state_.inlineSize = 0;
+    state_.timeStampNs = 0;
     state_.length = 0;
     state_.sound = false;
   }
@@ -352,6 +363,6 @@ class Message {
   State state_;
 };
 // Each move copies the whole handle, so it stays small.
-static_assert(sizeof(Message) <= 72);
+static_assert(sizeof(Message) <= 80);
 
 }  // namespace mpf

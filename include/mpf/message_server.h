@@ -48,6 +48,8 @@ struct ServerOptions {
   std::uint64_t maxPoolBytes = 320ull << 20;  // [bytes] of large messages, per client and direction
   WaitMode waitMode = WaitMode::adaptive;  // how waitForMessage() waits
   Rights rights{};  // which users may bind: mode 0660 and a group admit the members of the group
+  // Whether a reply without a time stamp (Message::setTimeStampNs()) gets that of its sending.
+  bool stampsReplies = false;
 };
 
 // The result of a reply.

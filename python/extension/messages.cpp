@@ -291,11 +291,13 @@ nb::object make(Message&& message, bool isRequest) {
     PyArray<T> array;
     array.fields = *std::as_const(message).tryAs<T>();
     array.length = message.arrayLength();
+    array.timeStampNs = message.getTimeStampNs();
     array.handle = std::move(message);
     return nb::cast(std::move(array));
   } else {
     PyScalar<T> scalar;
     scalar.fields = *std::as_const(message).tryAs<T>();
+    scalar.timeStampNs = message.getTimeStampNs();
     if (isRequest) scalar.handle = std::move(message);
     return nb::cast(std::move(scalar));
   }
@@ -350,7 +352,10 @@ nb::object loan(const Allocator& allocator, nb::handle type, std::size_t length)
 }
 
 void addMessages(nb::module_& module) {
-  nb::class_<PyMessage>(module, "Message", "A message of any type.");
+  nb::class_<PyMessage>(module, "Message", "A message of any type.")
+      .def_rw("time_stamp_ns", &PyMessage::timeStampNs,
+              "Of a reply: when its data was taken [ns since 1970, UTC], as the server says; 0: it "
+              "does not say. A Server fills in the time at which it replies.");
   addScalar<Int32>(module, "One 32-bit integer.");
   addArray<Int32Array>(module, "32-bit integers.",
                        "def value(self) -> numpy.typing.NDArray[numpy.int32]",

@@ -61,6 +61,7 @@ class PyMessage {
   // The field `status`; 0 of types without it.
   [[nodiscard]] virtual std::int32_t status() const noexcept = 0;
 
+  std::int64_t timeStampNs = 0;
   // A message with elements that was received or loaned; of a request that a server received, also
   // its route. Empty otherwise.
   Message handle;

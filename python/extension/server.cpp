@@ -32,8 +32,10 @@ class PyServer {
            const std::string& backplane, int queueSize, std::uint64_t maxMessageBytes,
            const std::string& wait)
       : name_(name), forks_(forkCount()) {
-    ServerOptions options{
-        .queueSize = queueSize, .maxMessageBytes = maxMessageBytes, .waitMode = waitModeOf(wait)};
+    ServerOptions options{.queueSize = queueSize,
+                          .maxMessageBytes = maxMessageBytes,
+                          .waitMode = waitModeOf(wait),
+                          .stampsReplies = true};
     if (location) options.location = *location;
     server_ = std::make_shared<MessageServer>(Backplane::attach(backplane), name, options);
   }
@@ -52,6 +54,7 @@ class PyServer {
     if (request.handle.route().link == 0)
       throw nb::value_error("reply: the first argument is not a request of this server");
     auto sent = message.toMessage(Allocator(*server, request.handle));
+    sent.setTimeStampNs(message.timeStampNs);
     const auto result = server->reply(std::move(sent));
     if (result == ReplyResult::sent) return true;
     if (result == ReplyResult::clientGone) return false;

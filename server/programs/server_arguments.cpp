@@ -30,6 +30,7 @@ void take(const char* option, const std::string& text, Value (*parse)(const std:
 
 void ServerArguments::addQueueSizeTo(CLI::App& app) {
   messages.queueSize = kDefaultQueueSize;
+  messages.stampsReplies = true;
   app.add_option("queuesize", messages.queueSize, "Requests of one client that may wait")
       ->capture_default_str()
       ->check(wholeNumber(1, LinkGeometry::kMaxQueueSize));

@@ -72,6 +72,7 @@ class Asker {
   void askEverything() {
     for (auto& request : everyRequest()) {
       send(request.duplicate());
+      request.setTimeStampNs(kEchoStamp);
       const auto reply = next();
       if (isSame(reply, request)) say("right: {}", print(reply));
       else say("wrong: {} in place of {}", print(reply), print(request));

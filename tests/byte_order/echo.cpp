@@ -48,6 +48,7 @@ class Echo {
     if (const auto command = toCommand(request)) return obey(*command, std::move(request));
     const bool isRight = next_ < expected_.size() && isSame(request, expected_[next_]);
     ++next_;
+    request.setTimeStampNs(kEchoStamp);
     say("{}: {}", isRight ? "right" : "wrong", print(request));
     server_.reply(std::move(request));
   }

@@ -19,6 +19,8 @@ enum class Command : std::int32_t {
   die,
 };
 inline constexpr std::int32_t kQueueSize = 4;
+// The time stamp of each echo.
+inline constexpr std::int64_t kEchoStamp = 0x0102'0304'0506'0708;
 
 inline Int32Message toMessage(Command command) {
   return Int32Message({.cmd = static_cast<std::int32_t>(command)});

@@ -34,6 +34,51 @@ TEST_F(ClientTest, FindsARestartedServerByItself) {
                                           ConnectStatus::connectYes));
 }
 
+TEST_F(ClientTest, RepliesHaveTheTimeStampOfTheServer) {
+  startServer();
+  auto request = heldRequest();
+  EXPECT_EQ(request.getTimeStampNs(), 0);
+  request.setTimeStampNs(0x0102'0304'0506'0708);
+  auto further = server_->allocReplyMessage<Float64Array>(request, 1000);  // not in the ring
+  further.setTimeStampNs(-1);
+
+  ASSERT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  ASSERT_EQ(server_->reply(std::move(further)), ReplyResult::sent);
+
+  EXPECT_EQ(next().getTimeStampNs(), 0x0102'0304'0506'0708);
+  EXPECT_EQ(next().getTimeStampNs(), -1);
+}
+
+// A deadline is not a time stamp, though both are in the same place of a slot.
+TEST_F(ClientTest, ARequestWithADeadlineHasNoTimeStamp) {
+  startServer();
+  Message request;
+  server_->on<Int32>([&](Int32Message&& message) { request = std::move(message); });
+  bind();
+  ASSERT_EQ(client_.send(Int32Message(), Deadline::after(std::chrono::hours(1))), SendResult::sent);
+  runUntil([&] { return static_cast<bool>(request); });
+
+  EXPECT_EQ(request.getTimeStampNs(), 0);
+  ASSERT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  EXPECT_EQ(next().getTimeStampNs(), 0);
+}
+
+TEST_F(ClientTest, AServerStampsItsRepliesIfItIsAskedTo) {
+  startServer({.stampsReplies = true});
+  auto request = heldRequest();
+  auto stamped = request.duplicate();
+  stamped.setTimeStampNs(5);
+  const auto before = Clock::wallNs();
+
+  ASSERT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  ASSERT_EQ(server_->reply(std::move(stamped)), ReplyResult::sent);
+
+  const auto stamp = next().getTimeStampNs();
+  EXPECT_GE(stamp, before);
+  EXPECT_LE(stamp, Clock::wallNs());
+  EXPECT_EQ(next().getTimeStampNs(), 5);
+}
+
 // The process of the server does not exit, and the server could not close a link.
 TEST_F(ClientTest, AClientNoticesThatItsServerEndedBeforeItAcceptedTheClient) {
   startServer();

@@ -2,6 +2,7 @@
 // Records and servers that are absent, exit, refuse, answer late or answer with another type.
 #include <dbLock.h>
 #include <epicsTime.h>
+#include <limits>
 #include <optional>
 
 #include "tests/epics/epics_fixture.h"
@@ -112,20 +113,57 @@ TEST_F(DevMpfTest, AServerThatDoesNotReplyIsATimeoutAlarm) {
   kept.clear();
 }
 
-TEST_F(DevMpfTest, ADeviceTimeStampIsTheTimeOfTheMessage) {
-  const ThreadServer server(backplane_, "adc", echo);
-  epicsTimeStamp before;
-  epicsTimeGetCurrent(&before);
-  const Ioc ioc(
-      "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@adc value=7\")"
-      " field(PINI, \"YES\") field(TSE, \"-2\") }");
-  Ioc::waitFor("v", "7");
-
+epicsTimeStamp stampOf(const char* name) {
   DBADDR address;
-  ASSERT_EQ(dbNameToAddr("v", &address), 0);
+  EXPECT_EQ(dbNameToAddr(name, &address), 0);
   dbScanLock(address.precord);
   const auto stamp = address.precord->time;
   dbScanUnlock(address.precord);
+  return stamp;
+}
+
+const std::string kStampedRecord =
+    "record(longin, \"v\") { field(DTYP, \"MPF\") field(INP, \"@adc value=7\")"
+    " field(PINI, \"YES\") field(TSE, \"-2\") }";
+
+TEST_F(DevMpfTest, ADeviceTimeStampIsThatOfTheServer) {
+  std::atomic<std::int64_t> stampNs = 946'684'800'123'456'789;
+  const ThreadServer server(backplane_, "adc", [&](MessageServer& self, Message&& request) {
+    request.setTimeStampNs(stampNs);
+    static_cast<void>(self.reply(std::move(request)));
+  });
+  const Ioc ioc(kStampedRecord);
+  Ioc::waitFor("v", "7");
+  EXPECT_EQ(stampOf("v").secPastEpoch, 946'684'800u - POSIX_TIME_AT_EPICS_EPOCH);
+  EXPECT_EQ(stampOf("v").nsec, 123'456'789u);
+}
+
+// Times that EPICS cannot represent: the time of the IOC.
+TEST_F(DevMpfTest, AnImpossibleTimeStampIsNotUsed) {
+  epicsTimeStamp before;
+  epicsTimeGetCurrent(&before);
+  for (const auto stampNs :
+       {std::int64_t{-1}, std::int64_t{1}, std::int64_t{631'151'999'999'999'999},
+        std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()}) {
+    const ThreadServer server(backplane_, "adc", [&](MessageServer& self, Message&& request) {
+      request.setTimeStampNs(stampNs);
+      static_cast<void>(self.reply(std::move(request)));
+    });
+    const Ioc ioc(kStampedRecord);
+    Ioc::waitFor("v", "7");
+    const auto stamp = stampOf("v");
+    EXPECT_GE(epicsTimeDiffInSeconds(&stamp, &before), 0) << stampNs;
+  }
+}
+
+TEST_F(DevMpfTest, ADeviceTimeStampIsTheTimeOfAMessageWithoutOne) {
+  const ThreadServer server(backplane_, "adc", echo);
+  epicsTimeStamp before;
+  epicsTimeGetCurrent(&before);
+  const Ioc ioc(kStampedRecord);
+  Ioc::waitFor("v", "7");
+
+  const auto stamp = stampOf("v");
   epicsTimeStamp after;
   epicsTimeGetCurrent(&after);
   EXPECT_GE(epicsTimeDiffInSeconds(&stamp, &before), 0);

@@ -6,6 +6,7 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import threading
+import time
 from collections.abc import AsyncIterator, Iterator
 
 import numpy as np
@@ -194,3 +195,16 @@ def test_a_closed_server_raises(server: mpf.Server) -> None:
 def test_only_requests_have_replies(server: mpf.Server) -> None:
     with pytest.raises(ValueError, match="not a request"):
         server.reply(mpf.Int32(), mpf.Int32())
+
+
+def test_replies_have_time_stamps(server: mpf.Server) -> None:
+    @server.on(mpf.Int32)
+    def stamp(request: mpf.Int32) -> mpf.Int32:
+        reply = mpf.Int32(1)
+        reply.time_stamp_ns = request.value
+        return reply
+
+    with server.start(), mpf.Client("tested") as client:
+        assert client.int32(5).time_stamp_ns == 5
+        before = time.time_ns()
+        assert before <= client.int32(0).time_stamp_ns <= time.time_ns()

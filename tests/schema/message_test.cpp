@@ -297,10 +297,23 @@ TEST(Message, CopiesSmallBodiesIntoTheHandleAndLargeOnesOntoTheHeap) {
   EXPECT_EQ(typed.body().size(), 28U);
 }
 
-TEST(Message, DuplicatesItsClientFieldsAndRoute) {
+// A handle that is filled again does not keep the time of its former message.
+TEST(Message, AnEmptiedHandleHasNoTimeStamp) {
+  Message message = MessageOf(Int32{.value = 5});
+  message.setTimeStampNs(6);
+
+  auto moved = std::move(message);
+
+  EXPECT_EQ(moved.getTimeStampNs(), 6);
+  // NOLINTNEXTLINE(bugprone-use-after-move): what a move leaves is tested
+  EXPECT_EQ(message.getTimeStampNs(), 0);
+}
+
+TEST(Message, DuplicatesItsClientFieldsTimeStampAndRoute) {
   auto message = MessageOf(Int32{.value = 5});
   message.setClientType(1);
   message.setClientExtra(2);
+  message.setTimeStampNs(6);
   message.setRoute({.link = 3, .requestId = 4, .flags = 5});
 
   const auto copy = message.duplicate();
@@ -308,6 +321,7 @@ TEST(Message, DuplicatesItsClientFieldsAndRoute) {
   EXPECT_EQ(copy.tryAs<Int32>()->value, 5);
   EXPECT_EQ(copy.getClientType(), 1);
   EXPECT_EQ(copy.getClientExtra(), 2);
+  EXPECT_EQ(copy.getTimeStampNs(), 6);
   EXPECT_EQ(copy.route().flags, 5U);
 }
 

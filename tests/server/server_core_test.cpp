@@ -28,7 +28,7 @@ class ServerCoreTest : public ShmTest {
                    std::size_t bytes = sizeof(Int32)) {
     Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::int32),
                       .requestId = requestId,
-                      .deadlineNs = deadlineNs};
+                      .timeNs = deadlineNs};
     ASSERT_EQ(link_->trySend(envelope, std::vector<std::byte>(bytes), {}), LinkSend::sent);
   }
   [[nodiscard]] bool isConnected() const { return link_->peerState() == layout::LinkState::open; }

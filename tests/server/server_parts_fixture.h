@@ -54,7 +54,7 @@ class ServerPartsTest : public ShmTest {
   std::optional<End> client_{std::in_place, backplane_, ""};
   Connections connections_{server_->endpoint};
   Acceptor acceptor_{server_->endpoint, connections_};
-  ReplySender replies_{control()};
+  ReplySender replies_{control(), false};
 };
 
 inline std::uint64_t valueOf(const layout::Word64& word) {

@@ -20,7 +20,7 @@ TEST_F(RingTest, DeliversMessagesInOrderWithTheirEnvelopes) {
                       .clientType = -5,
                       .clientExtra = -6,
                       .sentTick = 7,
-                      .deadlineNs = 8};
+                      .timeNs = 8};
 
   ASSERT_TRUE(producer_.tryPush(sent, pattern(1, 3)));
   ASSERT_TRUE(push(2));
@@ -34,7 +34,7 @@ TEST_F(RingTest, DeliversMessagesInOrderWithTheirEnvelopes) {
   EXPECT_EQ(got.clientType, -5);
   EXPECT_EQ(got.clientExtra, -6);
   EXPECT_EQ(got.sentTick, 7u);
-  EXPECT_EQ(got.deadlineNs, 8);
+  EXPECT_EQ(got.timeNs, 8);
   Bytes body(3);
   consumer_.copyBody(body);
   EXPECT_EQ(body, pattern(1, 3));

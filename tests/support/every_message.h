@@ -98,19 +98,21 @@ inline std::vector<Message> everyRequest() {
   return messages;
 }
 
-// The messages that MPF itself sends to a client.
+// The messages that a client may receive: replies with time stamps, and those of MPF itself.
 inline std::vector<Message> everyMessage() {
   auto messages = everyRequest();
+  for (auto& message : messages) message.setTimeStampNs(0x0102'0304'0506'0708);
   messages.emplace_back(MessageOf(
       Connect{.status = ConnectStatus::connectQueueFull, .incarnation = 0x0102'0304'0506'0708}));
   messages.emplace_back(MessageOf(RequestFate{.fate = Fate::expired, .requestId = 0x01020304}));
   return messages;
 }
 
-// Whether both have the same type, client fields and bytes.
+// Whether both have the same type, client fields, time stamp and bytes.
 inline bool isSame(const Message& one, const Message& other) {
   return one.getType() == other.getType() && one.getClientType() == other.getClientType() &&
          one.getClientExtra() == other.getClientExtra() &&
+         one.getTimeStampNs() == other.getTimeStampNs() &&
          std::ranges::equal(one.body(), other.body());
 }
 

@@ -131,6 +131,7 @@ void LinkFollower::readBody(const RingCopy& copy, const Side& side, TappedMessag
   }
   tapped.message.setClientType(copy.envelope.clientType);
   tapped.message.setClientExtra(copy.envelope.clientExtra);
+  if (tapped.direction == Direction::reply) tapped.message.setTimeStampNs(copy.envelope.timeNs);
 }
 
 bool LinkFollower::isOver() const {

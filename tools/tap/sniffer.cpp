@@ -139,10 +139,6 @@ int sniff(const SnifferOptions& options, std::unique_ptr<SniffText> text) {
   return Sniffer(options, std::move(text)).run();
 }
 
-std::int64_t realtimeOffsetNs() {
-  timespec wall{};
-  ::clock_gettime(CLOCK_REALTIME, &wall);
-  return std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec - Clock::nowNs();
-}
+std::int64_t realtimeOffsetNs() { return Clock::wallNs() - Clock::nowNs(); }
 
 }  // namespace mpf::tools

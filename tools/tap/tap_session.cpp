@@ -2,7 +2,6 @@
 #include "tools/tap/tap_session.h"
 
 #include <algorithm>
-#include <ctime>
 #include <exception>
 #include <utility>
 
@@ -13,12 +12,6 @@ namespace mpf::tools {
 namespace {
 
 constexpr auto kLookEvery = std::chrono::milliseconds(200);
-
-std::int64_t realtimeNs() {
-  timespec wall{};
-  ::clock_gettime(CLOCK_REALTIME, &wall);
-  return std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec;
-}
 
 TappedLink describe(const std::string& backplane, const layout::SegmentHeader& header) {
   TappedLink link;
@@ -93,7 +86,8 @@ void TapSession::follow(const std::string& name, FollowFrom from) {
   if (followed_.contains(name) || notFollowed_.contains(name)) return;
   auto followed = tryOpen(name, from);
   if (!followed) return;
-  sink_.opened(realtimeNs(), followed->link);  // throws, and ends the session, if it cannot write
+  sink_.opened(Clock::wallNs(),
+               followed->link);  // throws, and ends the session, if it cannot write
   followed_.emplace(name, std::move(*followed));
 }
 
@@ -127,7 +121,7 @@ bool TapSession::runOnce() {
 bool TapSession::take(Followed& followed) {
   batch_.clear();
   const bool some = followed.follower->take(batch_);
-  const auto atNs = realtimeNs();
+  const auto atNs = Clock::wallNs();
   for (const auto& message : batch_) sink_.message(atNs, followed.link, message);
   seen_ += batch_.size();
   return some;
@@ -140,7 +134,7 @@ void TapSession::reportMissed(Followed& followed) {
   if (missed != std::exchange(followed.missedSeen, missed) || missed == followed.missedReported)
     return;
   followed.missedReported = missed;
-  sink_.missed(realtimeNs(), followed.link, missed);
+  sink_.missed(Clock::wallNs(), followed.link, missed);
 }
 
 void TapSession::drain(Followed& followed) {
@@ -157,7 +151,7 @@ void TapSession::drain(Followed& followed) {
 
 void TapSession::close(Followed& followed) {
   drain(followed);
-  sink_.closed(realtimeNs(), followed.link);
+  sink_.closed(Clock::wallNs(), followed.link);
 }
 
 void TapSession::finish() {

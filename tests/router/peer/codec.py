@@ -12,7 +12,7 @@ from layouts import kEnums, kLayouts
 
 kMaxSegments = 512
 kMaxLevels = 16
-_numbers = {"u8": "<B", "u16": "<H", "u32": "<I", "u64": "<Q", "i32": "<i", "f64": "<d"}
+_numbers = dict(u8="<B", u16="<H", u32="<I", u64="<Q", i32="<i", i64="<q", f64="<d")
 _listSizes = {"i32": 4, "f64": 5, "u8": 2}  # the code of an element's size in a list pointer
 _elementBits = (0, 1, 8, 16, 32, 64, 64)
 

@@ -24,6 +24,7 @@ kTypes = {
   "UInt32": "u32",
   "UInt64": "u64",
   "Int32": "i32",
+  "Int64": "i64",
   "Float64": "f64",
   "Text": "text",
   "Data": "data",
@@ -227,10 +228,10 @@ class Codec(unittest.TestCase):
   # The second frame of the document's example, and the differences that it lists for the reply.
   def testReadsAndWritesTheExamplesOfTheDocument(self):
     request = bytes.fromhex("""
-        00000000 0e000000 00000000 00000100 01000000 17000000 04000000 01000100 0b000000 00000000
-        00000000 02000100 01000000 01000000 8c203fa5 04000000 00000000 02000100 00000000 00000000
-        01000000 00000000 00000000 03000000 00000000 00000000 00000000 02000000 00000000
-        07000000""")
+        00000000 0f000000 00000000 00000100 01000000 17000000 04000000 01000100 0b000000 00000000
+        00000000 02000100 01000000 01000000 8c203fa5 04000000 00000000 03000100 00000000 00000000
+        01000000 00000000 00000000 00000000 00000000 03000000 00000000 00000000 00000000 02000000
+        00000000 07000000""")
     body = message("int32", timeout=0, cmd=0, status=0, address=2, extra=0, value=7)
     sent = item("request", client=1, requestId=1, takeWithinNs=19952246924, message=body)
     self.assertEqual(decoded(request), [sent])

@@ -125,9 +125,9 @@ kLayouts = {
   "Credit": Layout(1, 0, {"client": ("u32", 0), "bytes": ("u32", 4)}),
   # message.capnp
   "Envelope": Layout(
-    2,
+    3,
     1,
-    {"clientType": ("i32", 0), "clientExtra": ("i32", 4)},
+    {"clientType": ("i32", 0), "clientExtra": ("i32", 4), "timeStampNs": ("i64", 16)},
     tagAt=8,
     members=(
       ("connect", "Connect", 0),

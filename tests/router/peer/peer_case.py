@@ -15,8 +15,14 @@ kNaN = struct.unpack("<d", bytes.fromhex("efbeadde0000f87f"))[0]
 kSpeech = ({}, {"version": "newer", "protocolMinor": 1}, {"version": "older"}, {"spread": True})
 
 
-def message(kind, clientType=0, clientExtra=0, **body):
-  return {"clientType": clientType, "clientExtra": clientExtra, "kind": kind, "body": body}
+def message(kind, clientType=0, clientExtra=0, timeStampNs=0, **body):
+  return {
+    "clientType": clientType,
+    "clientExtra": clientExtra,
+    "timeStampNs": timeStampNs,
+    "kind": kind,
+    "body": body,
+  }
 
 
 def inBytes(envelope):

@@ -37,9 +37,9 @@ Bytes segmentTable(std::uint32_t segments, std::uint64_t words) {
 
 // A message of an unknown type, with lists that are nested `depth` deep.
 Bytes nestedFrame(const std::function<Fill(const FillMessage&)>& carry, std::uint32_t depth) {
-  // The last word is the pointer of User; its discriminant is three words before that.
+  // The last word is the pointer of User; its discriminant is four words before that.
   auto bytes = frameOf({carry([](auto message) { message.initUser(); })});
-  bytes[bytes.size() - 3 * kWord] = 99;
+  bytes[bytes.size() - 4 * kWord] = 99;
   std::uint32_t words = 0;
   std::memcpy(&words, &bytes[4], sizeof words);
   words += depth;
