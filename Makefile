@@ -21,7 +21,7 @@ SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-sta
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
-.PHONY: startup-files install container
+.PHONY: startup-files install container epics-base-tsan
 .PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## print this list
@@ -102,6 +102,10 @@ clean: ## remove build/
 $(PRESETS): setup
 	@cmake --preset $@ --log-level=NOTICE
 	cmake --build --preset $@ --parallel $(JOBS)
+
+tsan: epics-base-tsan
+epics-base-tsan: setup
+	@scripts/epics-base-tsan
 
 $(TESTED:%=test-%): test-%: %
 	ctest --preset $* $(CTEST_FLAGS) $(if $(TESTS),--tests-regex '$(TESTS)')

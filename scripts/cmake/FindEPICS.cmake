@@ -8,6 +8,9 @@ include(FindPackageHandleStandardArgs)
 
 set(candidates "${EPICS_BASE}" "$ENV{EPICS_BASE}" /usr/lib/epics
   "${CMAKE_SOURCE_DIR}/build/epics-base/epicscorelibs")
+if(MPF_SANITIZE STREQUAL thread) # only a Base that is compiled with it
+  set(candidates "${CMAKE_SOURCE_DIR}/build/epics-base-tsan/epicscorelibs")
+endif()
 set(architecture "$ENV{EPICS_HOST_ARCH}")
 if(EPICS_HOST_ARCH)
   set(architecture "${EPICS_HOST_ARCH}")

@@ -17,6 +17,7 @@
 #include <epicsString.h>
 #include <lsiRecord.h>
 #include <lsoRecord.h>
+#include <span>
 #include <stringinRecord.h>
 #include <stringoutRecord.h>
 #include <vector>
@@ -61,7 +62,9 @@ class FieldLink {
     dbInitLink(&link_, DBF_INLINK);
   }
   [[nodiscard]] std::optional<std::string> read() {
-    std::vector<char> text(kMaxText + 1);
+    // Of a field of CHARs without elements, Base sets the byte before the buffer to 0.
+    std::vector<char> memory(kMaxText + 2);
+    const auto text = std::span(memory).subspan(1);
     epicsUInt32 size = 0;
     if (dbGetLinkLS(&link_, text.data(), static_cast<epicsUInt32>(text.size()), &size) != 0)
       return std::nullopt;
