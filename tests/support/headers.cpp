@@ -1,0 +1,3 @@
+// SPDX-License-Identifier: MIT
+// The source of a program that only has precompiled headers.
+int main() {}
