@@ -10,6 +10,7 @@
 #   TESTS=regex only the tests whose name matches
 #   COPIES=n    of `make test-repeated`: number of parallel runs of all tests (default 6)
 #   ROUNDS=n    of `make test-repeated`: how many times (default 20)
+#   PYTHONS=... interpreters of `make wheel` (default: python3)
 #   BENCH=...   of `make bench`: local (default), remote, hardware or epics
 
 JOBS ?= $(shell nproc)
@@ -21,7 +22,7 @@ SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-sta
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
-.PHONY: startup-files install container epics-base-tsan
+.PHONY: startup-files install container wheel epics-base-tsan
 .PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## print this list
@@ -77,6 +78,9 @@ startup-files: release ## run startup files of a site on device models (FILES=fo
 
 install: release ## install headers, libraries, programs and man pages under PREFIX
 	cmake --install build/release --prefix "$(PREFIX)"
+
+wheel: release ## build the wheel of the Python package in build/wheels (PYTHONS="python3.10 ...")
+	scripts/python-wheels $(PYTHONS)
 
 container: release ## build a container image that runs a crate, with podman, buildah or docker
 	rm -rf build/container && cmake --install build/release --strip --prefix build/container/usr

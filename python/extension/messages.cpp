@@ -225,8 +225,8 @@ void addChar8Array(nb::module_& module) {
       },
       "value"_a = nb::bytes("", 0), MPF_STANDARD_ARGUMENTS, "number_retrys"_a = 0,
       "eom"_a = nb::bytes("", 0),
-      nb::sig("def __init__(self, value: str | collections.abc.Buffer = b'', *, timeout: int = 0, "
-              "cmd: int = 0, status: int = 0, address: int = 0, extra: int = 0, "
+      nb::sig("def __init__(self, value: str | typing_extensions.Buffer = b'', *, timeout: int = "
+              "0, cmd: int = 0, status: int = 0, address: int = 0, extra: int = 0, "
               "number_retrys: int = 0, eom: bytes = b'') -> None"));
   type.def_prop_rw(
       "eom",
@@ -258,7 +258,7 @@ void addUser(nb::module_& module) {
         setValues(*self, value);
       },
       "value"_a = nb::bytes("", 0),
-      nb::sig("def __init__(self, value: collections.abc.Buffer = b'') -> None"));
+      nb::sig("def __init__(self, value: typing_extensions.Buffer = b'') -> None"));
 }
 
 void addSerialConfig(nb::module_& module) {

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""mpf.servers(), mpf.stats() and mpf.tap()."""
+"""mpf.servers(), mpf.stats(), mpf.tap(), mpf.record() and mpf.replay()."""
 
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -56,3 +57,35 @@ def test_a_tap_shows_each_message(doubler: mpf.Server) -> None:
 def test_a_tap_that_cannot_start_says_why() -> None:
     with pytest.raises(mpf.Error, match="location"):
         next(mpf.tap("doubler", location=2**40))
+
+
+def test_a_recording_answers_as_the_server_did(tmp_path: Path) -> None:
+    file = tmp_path / "calls.mpf"
+    with mpf.Server("dac") as server:
+
+        @server.on(mpf.Int32)
+        def answer(request: mpf.Int32) -> int:
+            if request.cmd == 9:
+                raise mpf.StatusError("no such channel", status=-9)
+            return request.value + 1
+
+        with server.start(), mpf.Client("dac") as client, mpf.record("dac", file):
+            for value in range(5):
+                client.int32(value, timeout=PATIENCE)
+            with pytest.raises(mpf.StatusError):
+                client.int32(cmd=9, timeout=PATIENCE)
+
+    with mpf.replay(file, speed=0) as ghost, mpf.Client("dac") as client:
+        assert [client.int32(value, timeout=PATIENCE).value for value in (3, 0, 4)] == [4, 1, 5]
+        with pytest.raises(mpf.StatusError, match="no such channel"):
+            client.int32(cmd=9, timeout=PATIENCE)
+        with pytest.raises(mpf.Refused):
+            client.float64(timeout=PATIENCE)
+
+    assert ghost.counts == {"requests": 5, "similar": 0, "unknown": 1, "silent": 0, "replies": 4}
+
+
+def test_a_file_that_is_no_recording_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("a text that is not a recording\n" * 10)
+    with pytest.raises(mpf.Error, match="not a recording"):
+        mpf.replay(tmp_path / "text")

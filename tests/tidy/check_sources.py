@@ -33,7 +33,8 @@ MAY_INCLUDE = {
     # The supervisor reads shared memory as reports do, and prints tables.
     "crate": ["base", "shm", "tools", "drivers"],
     "benchmarks": ["client", "server"],
-    "tools": ["client", "shm", "schema", "benchmarks"],  # benchmarks: the subcommand `mpf bench`
+    # server: `mpf replay --as-server`; benchmarks: `mpf bench`
+    "tools": ["client", "server", "shm", "schema", "benchmarks"],
     "tools/torture": ["tools", "server"],
 }
 MAY_INCLUDE_ANYTHING = ("tests", "benchmarks", "examples")

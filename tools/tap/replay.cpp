@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf replay: sends the requests of a recording to a server, with the timing that they had.
+// mpf replay: sends the requests of a recording to a server, with the timing that they had; or
+// replies to requests as the recorded server did.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -19,6 +20,7 @@
 #include "schema/conversion.h"
 #include "tools/arguments.h"
 #include "tools/commands.h"
+#include "tools/tap/ghost.h"
 #include "tools/tap/recording.h"
 #include "tools/text/json_text.h"
 #include "tools/text/wrap.h"
@@ -34,6 +36,7 @@ struct ReplayArguments {
   double speed = 1;     // 0: as fast as the server accepts them
   double timeout = 10;  // [s]
   bool json = false;
+  bool asServer = false;
 };
 
 // One client for each client of the recording, so that the requests of each stay in their order.
@@ -208,7 +211,9 @@ class Replayer {
 
 void addReplay(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand(
-      "replay", "Sends the requests of a recording to a server, with the timing that they had");
+      "replay",
+      "Sends the requests of a recording to a server, with the timing that they had; or replies as "
+      "the recorded server did");
   auto arguments = std::make_shared<ReplayArguments>();
   addBackplane(command, arguments->backplane, "\"default\"");
   arguments->location = Backplane::defaultLocation();
@@ -218,17 +223,30 @@ void addReplay(CLI::App& app, Run& run) {
       ->required()
       ->check(CLI::ExistingFile);
   command.add_option("--server", arguments->server, "Name of the server; default: the recording's");
+  command.add_flag("--as-server", arguments->asServer,
+                   "Be the server: reply to clients as the recorded server did, with its delays");
   command
       .add_option("--speed", arguments->speed,
-                  "2: twice as fast as recorded; 0: as fast as the server accepts them")
+                  "2: twice as fast as recorded; 0: as fast as possible")
       ->capture_default_str()
       ->check(number(0, 1e6));
   addSeconds(command, "--timeout", arguments->timeout,
              "Longest wait for the server, for room in its queue, and for the last reply", false);
   addJson(command, arguments->json);
   command.footer(
-      "Exit status: 0 every request got a reply; 1 a request got no reply; 2 usage error.");
-  command.callback([arguments, &run] { run = [arguments] { return Replayer(*arguments).run(); }; });
+      "Exit status: 0 every request got a reply; 1 a request got no reply; 2 usage error. With "
+      "--as-server: 0 after SIGINT or SIGTERM; 1 the server cannot start.");
+  command.callback([arguments, &run] {
+    run = [arguments] {
+      if (!arguments->asServer) return Replayer(*arguments).run();
+      return serveGhost({.file = arguments->file,
+                         .backplane = arguments->backplane,
+                         .server = arguments->server,
+                         .location = arguments->location,
+                         .speed = arguments->speed,
+                         .json = arguments->json});
+    };
+  });
 }
 
 }  // namespace mpf::tools

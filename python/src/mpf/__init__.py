@@ -8,8 +8,8 @@
 
 `Client` and `AsyncClient` send requests to a server, `Server` answers them. The classes of messages
 are `Int32`, `Int32Array`, `Float64`, `Float64Array`, `Char8Array`, `SerialConfig`, `OutOfBand` and
-`User`. `servers()`, `stats()` and `tap()` show what happens on this host; `replay()` starts a
-server that answers from a recording.
+`User`. `servers()`, `stats()` and `tap()` show what happens on this host; `record()` writes it to a
+file, and `replay()` starts a server that replies as in that file.
 """
 
 from mpf._mpf import (
@@ -43,7 +43,7 @@ from mpf.errors import (
     TooLarge,
     UnexpectedReply,
 )
-from mpf.inspection import Tap, servers, stats, tap
+from mpf.inspection import Ghost, Running, Tap, record, replay, servers, stats, tap
 from mpf.server import Server
 
 __all__ = [
@@ -56,6 +56,7 @@ __all__ = [
     "Expired",
     "Float64",
     "Float64Array",
+    "Ghost",
     "Int32",
     "Int32Array",
     "Message",
@@ -69,6 +70,7 @@ __all__ = [
     "QueueFull",
     "Refused",
     "Request",
+    "Running",
     "SerialConfig",
     "Server",
     "StatusError",
@@ -78,6 +80,8 @@ __all__ = [
     "TooLarge",
     "UnexpectedReply",
     "User",
+    "record",
+    "replay",
     "servers",
     "stats",
     "tap",

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 from collections.abc import Iterator
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 from mpf import program
 from mpf.errors import Error
@@ -38,8 +39,8 @@ def stats(server: str, backplane: str = "", *, location: int | None = None) -> d
     return found[0]
 
 
-class Tap:
-    """The messages between a server and its clients, as an iterator; tap() creates it."""
+class Running:
+    """A subcommand of `mpf` that runs until close(), or until the end of a `with` block."""
 
     def __init__(self, command: list[str]) -> None:
         self._process = program.start(command)
@@ -55,6 +56,22 @@ class Tap:
     ) -> None:
         self.close()
 
+    def close(self) -> None:
+        """Ends it."""
+        program.stop(self._process)
+
+    def _await(self, stream: IO[str] | None) -> str:
+        """The first line of its stdout or stderr."""
+        assert stream is not None
+        line = stream.readline()
+        if not line or self._process.poll() not in (None, 0):
+            raise Error((line + program.error_of(self._process)).strip())
+        return line
+
+
+class Tap(Running):
+    """The messages between a server and its clients, as an iterator; tap() creates it."""
+
     def __iter__(self) -> Iterator[dict[str, Any]]:
         return self
 
@@ -67,10 +84,6 @@ class Tap:
         if self._process.wait() != 0:
             raise Error(program.error_of(self._process))
         raise StopIteration
-
-    def close(self) -> None:
-        """Ends the iteration."""
-        program.stop(self._process)
 
 
 def tap(
@@ -88,6 +101,62 @@ def tap(
     """
     options = ["--json", "--count", str(count), *_backplane(backplane), *_at(location)]
     return Tap(["tap", server, str(seconds), *options])
+
+
+def record(
+    server: str, file: str | os.PathLike[str], backplane: str = "", *, location: int | None = None
+) -> Running:
+    """Writes each message between a server and its clients from now on to a file, until close():
+
+        with mpf.record("dac", "calls.mpf"):
+            ...
+
+    The same as `mpf tap --write`. Raises Error if the file cannot be written.
+    """
+    options = ["--write", os.fspath(file), *_backplane(backplane), *_at(location)]
+    recording = Running(["tap", server, "0", *options])
+    recording._await(recording._process.stderr)
+    return recording
+
+
+class Ghost(Running):
+    """A server that replies as in a recording; replay() creates it."""
+
+    #: After close(): `requests`, `similar`, `unknown` (refused), `silent` (not answered), `replies`.
+    counts: dict[str, int]
+
+    def close(self) -> None:
+        """Ends the server, and sets `counts`."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            self.counts = json.loads(self._process.communicate()[0])
+
+
+def replay(
+    file: str | os.PathLike[str],
+    server: str = "",
+    backplane: str = "",
+    *,
+    location: int | None = None,
+    speed: float = 1.0,
+) -> Ghost:
+    """Starts a server that replies to its clients as in a recording, with the same delays:
+
+        with mpf.replay("calls.mpf"), mpf.Client("dac") as dac:
+            ...
+
+    docs/tools.md describes which reply belongs to which request, at `mpf replay`.
+
+    server: its name; by default that of the recording.
+    speed: 2 halves the delays, 0 leaves them out.
+
+    Raises Error if the recording is damaged or if another process serves this name.
+    """
+    options = ["--server", server] if server else []
+    options += ["--speed", str(speed), "--json", *_backplane(backplane), *_at(location)]
+    ghost = Ghost(["replay", os.fspath(file), "--as-server", *options])
+    ghost._await(ghost._process.stdout)
+    return ghost
 
 
 # ---- the program
