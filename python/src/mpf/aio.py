@@ -174,7 +174,7 @@ class AsyncClient(_mpf.BaseClient):
         self._waiting.setdefault(number, []).append(future)
         timer = None
         if left < math.inf:
-            timer = loop.call_later(left, lambda: future.done() or future.set_result(None))
+            timer = loop.call_later(left, _finish, future)
         try:
             await future
         finally:
@@ -286,3 +286,8 @@ class AsyncSubscription(Generic[M]):
             self._missed += self._request.missed
             self._request.close()
             self._request = None
+
+
+def _finish(future: asyncio.Future[None]) -> None:
+    if not future.done():
+        future.set_result(None)

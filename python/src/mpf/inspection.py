@@ -122,7 +122,8 @@ def record(
 class Ghost(Running):
     """A server that replies as in a recording; replay() creates it."""
 
-    #: After close(): `requests`, `similar`, `unknown` (refused), `silent` (not answered), `replies`.
+    #: After close(): numbers of `requests`, `similar` ones, `unknown` (refused) ones, `silent` (not
+    #: answered) ones, and of `replies`.
     counts: dict[str, int]
 
     def close(self) -> None:

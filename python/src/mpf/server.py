@@ -173,7 +173,7 @@ class Server(_mpf.BaseServer):
             if inspect.isawaitable(result):
                 result = await result
             if isinstance(result, AsyncIterable):
-                async for value in result:
+                async for value in cast(AsyncIterable[object], result):
                     while not self._try_reply(request, value):
                         await asyncio.sleep(_PAUSE)
             else:
@@ -219,7 +219,8 @@ class Server(_mpf.BaseServer):
         else:
             status, text = -1, f"{type(error).__name__}: {error}"
         try:
-            self.reply(request, Char8Array(text, **{**_fields_of(request), "status": status}))
+            fields: dict[str, Any] = {**_fields_of(request), "status": status}
+            self.reply(request, Char8Array(text, **fields))
         except Error as failure:
             _log.error("%s: %s", self.name, failure)
 

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""The package, and programs that use it, pass the strict checks of mypy and pyright."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mpf
+
+PROGRAM = """
+import mpf
+import numpy as np
+
+with mpf.Client("dac") as client:
+    value: int = client.int32(1, address=2).value
+    array = client.call(mpf.Int32(1), reply=mpf.Float64Array).value
+    mean: np.floating = array.mean()
+    loaned = client.loan(mpf.Float64Array, 5)
+    loaned.value[:] = 0.5
+    client.call(loaned, retry=True)
+"""
+WRONG = """
+import mpf
+
+with mpf.Client("dac") as client:
+    value: str = client.int32(1).value
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A folder with a copy of the package, as a type checker sees an installed one."""
+    shutil.copytree(Path(mpf.__file__).parent, tmp_path / "mpf", symlinks=False)
+    (tmp_path / "program.py").write_text(PROGRAM)
+    settings = {
+        "typeCheckingMode": "strict",
+        "reportPrivateUsage": False,
+        "extraPaths": sys.path,
+        "pythonVersion": "3.10",
+    }
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
+    return tmp_path
+
+
+def check(project: Path, *command: str) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", *command], cwd=project, capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_mypy_has_no_complaint(project: Path) -> None:
+    assert check(project, "mypy", "--strict", "mpf", "program.py")[0] == 0
+
+
+def test_pyright_has_no_complaint(project: Path) -> None:
+    status, text = check(project, "pyright")
+    assert status == 0, text
+
+
+def test_a_wrong_type_is_found(project: Path) -> None:
+    (project / "program.py").write_text(WRONG)
+    status, text = check(project, "mypy", "--strict", "program.py")
+    assert status == 1
+    assert "program.py:5" in text
