@@ -204,8 +204,8 @@ struct alignas(kCacheLineBytes) Slot {
   std::int32_t clientType;
   std::int32_t clientExtra;
   std::uint32_t sentTick;  // sampled messages: CLOCK_MONOTONIC / 16 ns, low 32 bits; others: 0
-  // requests: the deadline, CLOCK_MONOTONIC; replies: the server's time stamp, since 1970; 0: none
-  std::int64_t timeNs;
+  // requests: CLOCK_MONOTONIC; replies: the server's time stamp, since 1970; 0: none
+  std::int64_t deadlineNs;
   std::array<std::byte, 24> body;
 };
 static_assert(sizeof(Slot) == kCacheLineBytes && offsetof(Slot, body) == 40);

@@ -84,7 +84,7 @@ class RingProducer {
     first.clientType = envelope.clientType;
     first.clientExtra = envelope.clientExtra;
     first.sentTick = envelope.sentTick;
-    first.timeNs = envelope.timeNs;
+    first.deadlineNs = envelope.timeNs;
     copyBody(first, body);
     MPF_STEP(slot_written);
     const auto sequence = pushed_ + 1;
@@ -165,7 +165,7 @@ class RingConsumer {
     const auto& first = slot(taken_);
     slotsNow_ = first.slots;
     return {first.type,       first.flags,       first.bodyBytes, first.requestId,
-            first.clientType, first.clientExtra, first.sentTick,  first.timeNs};
+            first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
   }
 
   // Body bytes in the slots of the message begun; 0 if its number of slots is invalid.

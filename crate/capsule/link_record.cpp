@@ -73,7 +73,7 @@ Tree describe(const WitnessedLink& link, const RingMessage& message) {
             {"state", toString(message.state)},
             {"requestId", slot.requestId},
             {"type", slot.type}};
-  if (slot.timeNs != 0) tree["timeNs"] = slot.timeNs;
+  if (slot.deadlineNs != 0) tree["timeNs"] = slot.deadlineNs;
   try {
     const auto decoded = decode(link, message);
     tree["text"] = print(decoded);

@@ -83,7 +83,7 @@ void Attacker::writeSlot(Link& link) {
       static_cast<std::uint32_t>(random_.oneIn(2) ? random_.below(300) : random_.nasty());
   slot.requestId =
       static_cast<std::uint32_t>(random_.oneIn(4) ? random_.nasty() : random_.below(100));
-  slot.timeNs = random_.oneIn(4) ? static_cast<std::int64_t>(random_.nasty()) : 0;
+  slot.deadlineNs = random_.oneIn(4) ? static_cast<std::int64_t>(random_.nasty()) : 0;
   slot.sentTick = static_cast<std::uint32_t>(random_.bits());
   const layout::ChunkRef ref{static_cast<std::uint32_t>(random_.below(6)),
                              static_cast<std::uint32_t>(random_.below(300)),

@@ -106,7 +106,7 @@ inline nlohmann::json layoutFields() {
         {"fields",
          {MPF_FIELD(sequence), MPF_FIELD(type), MPF_FIELD(slots), MPF_FIELD(flags),
           MPF_FIELD(bodyBytes), MPF_FIELD(requestId), MPF_FIELD(clientType), MPF_FIELD(clientExtra),
-          MPF_FIELD(sentTick), MPF_FIELD(timeNs), MPF_FIELD(body)}}};
+          MPF_FIELD(sentTick), MPF_FIELD(deadlineNs), MPF_FIELD(body)}}};
   }
   {
     using Struct = MoreSlot;

@@ -74,7 +74,7 @@ Tree dissectMessage(const RingMessage& message, const Beside& beside, bool raw) 
   Tree tree{{"position", message.position},
             {"state", toString(message.state)},
             {"request_id", slot.requestId}};
-  if (slot.timeNs != 0) tree["time_ns"] = slot.timeNs;
+  if (slot.deadlineNs != 0) tree["time_ns"] = slot.deadlineNs;
   tree["first_reply"] = (slot.flags & layout::kSlotFirstReply) != 0;
   auto body = message.inlineBody();
   try {

@@ -70,7 +70,7 @@ bool RingFollower::tryCopy(std::uint32_t slots, RingCopy& copy) const noexcept {
   const auto& first = slot(position_);
   if (slots < 1 || slots > layout::kMaxMessageSlots) return false;
   copy.envelope = {first.type,       first.flags,       first.bodyBytes, first.requestId,
-                   first.clientType, first.clientExtra, first.sentTick,  first.timeNs};
+                   first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
   const bool isChunk = (copy.envelope.flags & layout::kSlotChunk) != 0;
   copy.size = isChunk ? sizeof(layout::ChunkRef) : copy.envelope.bodyBytes;
   if (copy.size > layout::kFirstSlotBodyBytes + (slots - 1) * sizeof(layout::MoreSlot::body))

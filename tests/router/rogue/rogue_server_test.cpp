@@ -124,7 +124,7 @@ TEST_F(RogueServerTest, AnUnknownMessageTypeIsOutcomeUnknown) {
   const auto id = asked(peer);
   auto bytes =
       frameOf({replyOf(client_, id, [](auto message) { message.initUser().initValue(800); })});
-  bytes[bytes.size() - 24 - 800] = 99;
+  bytes[bytes.size() - 32 - 800] = 99;
   peer.send(bytes);
 
   runUntil([&] { return !caller_->messages.empty(); });
