@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import mpf
+import pyvisa_mpf
 
 PROGRAM = """
 import mpf
@@ -35,8 +36,9 @@ with mpf.Client("dac") as client:
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A folder with a copy of the package, as a type checker sees an installed one."""
-    shutil.copytree(Path(mpf.__file__).parent, tmp_path / "mpf", symlinks=False)
+    """A folder with copies of the packages, as a type checker sees installed ones."""
+    for package in (mpf, pyvisa_mpf):
+        shutil.copytree(Path(package.__file__).parent, tmp_path / package.__name__)
     (tmp_path / "program.py").write_text(PROGRAM)
     settings = {
         "typeCheckingMode": "strict",
@@ -56,7 +58,7 @@ def check(project: Path, *command: str) -> tuple[int, str]:
 
 
 def test_mypy_has_no_complaint(project: Path) -> None:
-    assert check(project, "mypy", "--strict", "mpf", "program.py")[0] == 0
+    assert check(project, "mypy", "--strict", "mpf", "pyvisa_mpf", "program.py")[0] == 0
 
 
 def test_pyright_has_no_complaint(project: Path) -> None:

@@ -8,8 +8,9 @@
 
 `Client` and `AsyncClient` send requests to a server, `Server` answers them. The classes of messages
 are `Int32`, `Int32Array`, `Float64`, `Float64Array`, `Char8Array`, `SerialConfig`, `OutOfBand` and
-`User`. `servers()`, `stats()` and `tap()` show what happens on this host; `record()` writes it to a
-file, and `replay()` starts a server that replies as in that file.
+`User`. `Serial` and `Gpib` are instruments behind the servers of such lines. `servers()`, `stats()`
+and `tap()` show what happens on this host; `record()` writes it to a file, and `replay()` starts a
+server that replies as in that file.
 """
 
 from mpf._mpf import (
@@ -30,6 +31,8 @@ from mpf.errors import (
     Cancelled,
     Error,
     Expired,
+    InstrumentError,
+    InstrumentTimeout,
     NameInUse,
     NeverTaken,
     NoReply,
@@ -44,6 +47,7 @@ from mpf.errors import (
     UnexpectedReply,
 )
 from mpf.inspection import Ghost, Running, Tap, record, replay, servers, stats, tap
+from mpf.instruments import Gpib, Instrument, Serial
 from mpf.server import Server
 
 __all__ = [
@@ -57,6 +61,10 @@ __all__ = [
     "Float64",
     "Float64Array",
     "Ghost",
+    "Gpib",
+    "Instrument",
+    "InstrumentError",
+    "InstrumentTimeout",
     "Int32",
     "Int32Array",
     "Message",
@@ -71,6 +79,7 @@ __all__ = [
     "Refused",
     "Request",
     "Running",
+    "Serial",
     "SerialConfig",
     "Server",
     "StatusError",

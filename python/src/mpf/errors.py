@@ -10,6 +10,7 @@
            │           ├─ OutcomeUnknown ── TimedOut   also a TimeoutError
            │           └─ Cancelled
            ├─ StatusError                the server replied with an error
+           │     └─ InstrumentError ── InstrumentTimeout   also a TimeoutError
            ├─ UnexpectedReply            the reply is of another class
            └─ NameInUse                  another process serves this name
 """
@@ -19,7 +20,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
-    from mpf._mpf import Message
+    from mpf._mpf import Char8Array, Message
 
 
 class Error(Exception):
@@ -118,6 +119,19 @@ class StatusError(Error):
         else:
             reason = f": {self.text}" if self.text else ""
             super().__init__(f"{text}: status {self.status}{reason}")
+
+
+class InstrumentError(StatusError):
+    """An operation of Serial or Gpib failed. `status` is that of the server."""
+
+    def __init__(self, text: str, reply: Char8Array) -> None:
+        super().__init__(text, reply)
+        #: The bytes that the instrument had sent; of a failed request the reason in words.
+        self.answer = reply.value
+
+
+class InstrumentTimeout(InstrumentError, TimeoutError):
+    """The instrument did not answer completely, or did not accept all bytes, in time."""
 
 
 def _text_of(reply: Message) -> str:

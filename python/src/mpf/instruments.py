@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: MIT
+"""Serial and Gpib: instruments behind mpf-serial-server and mpf-gpib-server.
+
+    with mpf.Serial("voltmeter") as meter:
+        print(meter.query("VOLT?\\r"))
+
+    with mpf.Gpib("GPIB0", 22) as meter:
+        print(meter.query("ID?\\n"), meter.poll())
+
+The servers let each operation finish before the next one, of any client, begins: what query()
+writes and reads belongs together. The commands are those of <mpf/serial_commands.h> and
+<mpf/gpib_commands.h>.
+"""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+from typing import TypeVar
+
+from mpf._mpf import Char8Array, Int32, SerialConfig
+from mpf.client import Client
+from mpf.errors import InstrumentError, InstrumentTimeout
+
+Self = TypeVar("Self")
+
+_READ, _WRITE, _WRITE_READ, _POLL, _CLEAR, _TRIGGER = 1, 2, 3, 4, 5, 6
+_FLUSH, _SET_EOM, _MILLISECONDS = 0x10, 0x80, 0x100
+_LEASE, _UNLEASE = 12, 13
+_TIMEOUT = 1  # the status of both servers
+#: How much longer than its timeout an operation may take: those of other clients come before [s].
+PATIENCE = 60.0
+
+_SERIAL_STATUS = {
+    1: "no complete answer in time",
+    2: "the answer is longer than the buffer",
+    3: "the line failed",
+}
+_GPIB_STATUS = {
+    1: "no complete answer in time, or the bus was busy",
+    2: "the answer is longer than the buffer of the server",
+    3: "the controller or the bus failed",
+    4: "no instrument accepts bytes at this address",
+    5: "this controller cannot do it",
+    6: "another client has the bus to itself",
+    7: "the request is invalid",
+}
+
+
+class Instrument:
+    """What Serial and Gpib have in common.
+
+    timeout: [s] of operations without their own: how long the instrument may take.
+
+    Any thread may use an instrument. Operations raise InstrumentTimeout or InstrumentError, whose
+    `answer` has the bytes that were read, or an exception of Client.call().
+    """
+
+    def __init__(
+        self,
+        server: str,
+        address: int = 0,
+        location: int | None = None,
+        *,
+        backplane: str = "",
+        timeout: float = 1.0,
+        status_texts: dict[int, str],
+    ) -> None:
+        self.client = Client(server, location, backplane=backplane)
+        #: The address on the bus; 0 on a serial line.
+        self.address = address
+        #: [s]
+        self.timeout = timeout
+        self._status_texts = status_texts
+
+    def __enter__(self: Self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disconnects from the server."""
+        self.client.close()
+
+    def write(self, data: str | bytes, timeout: float | None = None) -> None:
+        """Writes all bytes."""
+        self._ask(_WRITE, data, timeout=timeout)
+
+    def read(self, size: int = 0, timeout: float | None = None, *, eom: bytes = b"") -> bytes:
+        """Reads until the end of message.
+
+        size: [bytes] at most; 0: as the buffer of the server.
+        eom: bytes that end the answer, besides what always does.
+        """
+        return self._ask(_READ, b"", size, timeout, eom).value
+
+    def query(
+        self,
+        data: str | bytes,
+        size: int = 0,
+        timeout: float | None = None,
+        *,
+        eom: bytes = b"",
+    ) -> bytes:
+        """Writes, then reads; nothing comes between."""
+        return self._ask(_WRITE_READ, data, size, timeout, eom).value
+
+    def _eom_options(self, eom: bytes) -> int:
+        return 0
+
+    def _ask(
+        self,
+        cmd: int,
+        data: str | bytes = b"",
+        extra: int = 0,
+        timeout: float | None = None,
+        eom: bytes = b"",
+    ) -> Char8Array:
+        limit = self.timeout if timeout is None else timeout
+        request = Char8Array(
+            data,
+            cmd=cmd | _MILLISECONDS | self._eom_options(eom),
+            address=self.address,
+            extra=extra,
+            timeout=max(1, math.ceil(limit * 1000)),
+            eom=eom,
+        )
+        reply = self.client.call(request, limit + PATIENCE, reply=Char8Array, check=False)
+        assert isinstance(reply, Char8Array)
+        if reply.status != 0:
+            kind = InstrumentTimeout if reply.status == _TIMEOUT else InstrumentError
+            reason = self._status_texts.get(reply.status, f"status {reply.status}")
+            raise kind(f"{self.client.server}: {reason}", reply)
+        return reply
+
+
+class Serial(Instrument):
+    """An instrument on the line of a serial server. The server knows the end of its messages;
+    `eom`, at most 2 bytes, changes it for all clients."""
+
+    def __init__(
+        self,
+        server: str,
+        location: int | None = None,
+        *,
+        backplane: str = "",
+        timeout: float = 1.0,
+    ) -> None:
+        super().__init__(
+            server,
+            location=location,
+            backplane=backplane,
+            timeout=timeout,
+            status_texts=_SERIAL_STATUS,
+        )
+
+    def flush(self) -> None:
+        """Drops bytes that have arrived."""
+        try:
+            self._ask(_READ | _FLUSH, b"", 0, 0.001)
+        except InstrumentTimeout:
+            pass
+
+    def configure(
+        self,
+        *,
+        baud: int = 0,
+        stop_bits: int = 0,
+        bits_per_char: int = 0,
+        parity: str = "",
+        flow_control: str = "",
+    ) -> None:
+        """Changes settings of the line, for all clients; 0 and "" keep the present one.
+
+        parity: "E", "O" or "N". flow_control: "H" (hardware) or "N".
+        """
+        config = SerialConfig(
+            baud=baud,
+            stop_bits=stop_bits,
+            bits_per_char=bits_per_char,
+            parity=parity,
+            flow_control=flow_control,
+        )
+        self.client.call(config, PATIENCE, reply=Int32)
+
+    def _eom_options(self, eom: bytes) -> int:
+        return _SET_EOM if eom else 0
+
+
+class Gpib(Instrument):
+    """The instrument at an address of a GPIB bus: 0 to 30, or 100 * primary + secondary address."""
+
+    def __init__(
+        self,
+        server: str,
+        address: int,
+        location: int | None = None,
+        *,
+        backplane: str = "",
+        timeout: float = 1.0,
+    ) -> None:
+        super().__init__(
+            server,
+            address,
+            location,
+            backplane=backplane,
+            timeout=timeout,
+            status_texts=_GPIB_STATUS,
+        )
+
+    def poll(self, timeout: float | None = None) -> int:
+        """A serial poll; returns the status byte."""
+        return self._ask(_POLL, timeout=timeout).value[0]
+
+    def clear(self, timeout: float | None = None) -> None:
+        """Selected device clear."""
+        self._ask(_CLEAR, timeout=timeout)
+
+    def trigger(self, timeout: float | None = None) -> None:
+        """Group execute trigger of this instrument."""
+        self._ask(_TRIGGER, timeout=timeout)
+
+    def lease(self, duration: float, holder: str = "", timeout: float | None = None) -> float:
+        """Makes the bus exclusive to this object, for `duration` [s]; returns the time that the
+        server granted.
+
+        holder: a name for the messages that others get.
+        """
+        reply = self._ask(_LEASE, holder, round(duration * 1000), timeout)
+        return reply.extra / 1000
+
+    def unlease(self) -> None:
+        """Ends the lease."""
+        self._ask(_UNLEASE)

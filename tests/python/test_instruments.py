@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""mpf.Serial and mpf.Gpib with the servers of MPF: a terminal line, and a bus of models."""
+
+from __future__ import annotations
+
+import os
+import threading
+import tty
+from collections.abc import Callable, Iterator
+
+import pytest
+from conftest import PATIENCE, PROGRAMS
+
+import mpf
+
+
+class Line:
+    """The far end of a terminal line: answers VOLT? and is silent otherwise."""
+
+    def __init__(self) -> None:
+        self.end, near = os.openpty()
+        tty.setraw(near)
+        self.device = os.ttyname(near)
+        self._near = near
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        asked = b""
+        while True:
+            try:
+                asked += os.read(self.end, 100)
+            except OSError:
+                return
+            while b"\r" in asked:
+                question, asked = asked.split(b"\r", 1)
+                if question == b"VOLT?":
+                    os.write(self.end, b"+1.25\r")
+
+    def close(self) -> None:
+        os.close(self._near)
+        os.close(self.end)
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    yield line
+    line.close()
+
+
+@pytest.fixture
+def meter(line: Line, start: Callable[..., object]) -> Iterator[mpf.Serial]:
+    start(PROGRAMS / "mpf-serial-server", "meter", line.device, "--log-level", "error")
+    with mpf.Serial("meter", timeout=PATIENCE) as meter:
+        assert meter.client.wait_connected(PATIENCE)
+        yield meter
+
+
+def test_a_query_writes_and_reads(meter: mpf.Serial) -> None:
+    assert meter.query("VOLT?\r") == b"+1.25\r"
+
+
+def test_a_write_and_a_read_may_be_separate(meter: mpf.Serial) -> None:
+    meter.write(b"VOLT?\r")
+    assert meter.read() == b"+1.25\r"
+
+
+def test_an_end_of_message_may_be_given(meter: mpf.Serial) -> None:
+    assert meter.query("VOLT?\r", eom=b".") == b"+1."
+
+
+def test_a_silent_instrument_is_a_timeout(meter: mpf.Serial) -> None:
+    with pytest.raises(mpf.InstrumentTimeout, match="no complete answer in time") as failure:
+        meter.query("CURR?\r", timeout=0.01)
+    assert failure.value.answer == b""
+    assert isinstance(failure.value, TimeoutError)
+    assert meter.query("VOLT?\r") == b"+1.25\r"
+
+
+def test_the_line_may_be_configured(meter: mpf.Serial) -> None:
+    meter.configure(baud=19200)
+    assert meter.query("VOLT?\r") == b"+1.25\r"
+
+
+@pytest.fixture
+def bus(start: Callable[..., object]) -> None:
+    start(PROGRAMS / "mpf-gpib-server", "GPIB0", "a-ip488", "4096", "20", "--carrier",
+          "ipac=model", "--ti9914", "a-ip488,ipac,IP_a,105", "--log-level", "error")
+
+
+def test_a_gpib_instrument(bus: None) -> None:
+    with mpf.Gpib("GPIB0", 22, timeout=PATIENCE) as meter:
+        assert meter.client.wait_connected(PATIENCE)
+        assert meter.query("ID?\n").startswith(b"HP3458A")
+        assert 0 <= meter.poll() <= 255
+        assert meter.lease(1, "test") > 0
+        meter.unlease()
+        meter.clear()
+        meter.trigger()
+
+
+def test_an_absent_gpib_instrument_is_an_error(bus: None) -> None:
+    with mpf.Gpib("GPIB0", 5, timeout=PATIENCE) as nobody:
+        assert nobody.client.wait_connected(PATIENCE)
+        with pytest.raises(mpf.InstrumentError, match="no instrument accepts bytes"):
+            nobody.write("ID?\n")
