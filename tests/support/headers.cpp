@@ -1,3 +1,2 @@
 // SPDX-License-Identifier: MIT
-// The source of a program that only has precompiled headers.
-int main() {}
+// The source of a target that only has precompiled headers.
