@@ -247,6 +247,18 @@ def test_a_subscription_iterates_over_all_replies(doubler: mpf.Server) -> None:
     assert replies.missed == 0
 
 
+def test_a_subscription_may_have_replies_of_another_class(doubler: mpf.Server) -> None:
+    @doubler.on(mpf.Char8Array)
+    def count(request: mpf.Char8Array) -> Iterator[mpf.Float64]:
+        yield from (mpf.Float64(number) for number in range(2))
+
+    with mpf.Client("doubler") as client:
+        with client.subscribe(mpf.Char8Array("count"), reply=mpf.Float64) as replies:
+            assert [next(replies).value for _ in range(2)] == [0.0, 1.0]
+        with pytest.raises(mpf.UnexpectedReply):
+            next(client.subscribe(mpf.Char8Array("count")))
+
+
 def test_a_subscription_counts_what_the_program_did_not_take(doubler: mpf.Server) -> None:
     @doubler.on(mpf.Float64)
     def count(request: mpf.Float64) -> Iterator[float]:

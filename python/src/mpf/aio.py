@@ -118,11 +118,31 @@ class AsyncClient(_mpf.BaseClient):
         finally:
             request.close()  # cancels the request if it has not ended
 
+    @overload
     def subscribe(
         self, message: M, *, timeout: float = math.inf, limit: int = LIMIT, renew: bool = True
-    ) -> AsyncSubscription[M]:
+    ) -> AsyncSubscription[M]: ...
+    @overload
+    def subscribe(
+        self,
+        message: Message,
+        *,
+        reply: type[R],
+        timeout: float = math.inf,
+        limit: int = LIMIT,
+        renew: bool = True,
+    ) -> AsyncSubscription[R]: ...
+    def subscribe(
+        self,
+        message: Message,
+        *,
+        reply: type[Message] | None = None,
+        timeout: float = math.inf,
+        limit: int = LIMIT,
+        renew: bool = True,
+    ) -> AsyncSubscription[Any]:
         """As Client.subscribe(): `async for reply in client.subscribe(message)`."""
-        return AsyncSubscription(self, message, timeout, limit, renew)
+        return AsyncSubscription(self, message, reply, timeout, limit, renew)
 
     # ---- the event loop
 
@@ -213,10 +233,17 @@ class AsyncSubscription(Generic[M]):
     """The replies to one request; AsyncClient.subscribe() creates it."""
 
     def __init__(
-        self, client: AsyncClient, message: M, timeout: float, limit: int, renew: bool
+        self,
+        client: AsyncClient,
+        message: Message,
+        reply: type[Message] | None,
+        timeout: float,
+        limit: int,
+        renew: bool,
     ) -> None:
         self._client = client
         self._message = message
+        self._reply = reply
         self._timeout = timeout
         self._limit = limit
         self._renew = renew
@@ -260,7 +287,9 @@ class AsyncSubscription(Generic[M]):
     async def _first(self) -> M | None:
         client = self._client
         limit = client._until(self._timeout)
-        self._request = await client._start(self._message, limit, further=self._limit)
+        self._request = await client._start(
+            self._message, limit, reply=self._reply, further=self._limit
+        )
         try:
             return cast(M, await client._end(self._request, limit, True))
         except NoReply:

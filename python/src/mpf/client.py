@@ -110,18 +110,39 @@ class Client(_mpf.BaseClient):
         """
         return self._send(message, timeout, reply=reply, retry=retry, further=further)
 
+    @overload
     def subscribe(
         self, message: M, *, timeout: float = math.inf, limit: int = LIMIT, renew: bool = True
-    ) -> Subscription[M]:
+    ) -> Subscription[M]: ...
+    @overload
+    def subscribe(
+        self,
+        message: Message,
+        *,
+        reply: type[R],
+        timeout: float = math.inf,
+        limit: int = LIMIT,
+        renew: bool = True,
+    ) -> Subscription[R]: ...
+    def subscribe(
+        self,
+        message: Message,
+        *,
+        reply: type[Message] | None = None,
+        timeout: float = math.inf,
+        limit: int = LIMIT,
+        renew: bool = True,
+    ) -> Subscription[Any]:
         """Sends a request to which the server replies any number of times, and iterates over all
         replies.
 
+        reply: the class of the first reply, by default that of the request.
         timeout: [s] the longest wait for the next reply; then TimeoutError.
         limit: replies that may wait for the program; then the oldest is dropped and counted.
         renew: when the server ends, subscribe again as soon as there is one. Otherwise the
             iteration ends.
         """
-        return Subscription(self, message, timeout, limit, renew)
+        return Subscription(self, message, reply, timeout, limit, renew)
 
     # ---- calls by type
 
@@ -190,10 +211,17 @@ class Subscription(Generic[M]):
     """The replies to one request, as an iterator; Client.subscribe() creates it."""
 
     def __init__(
-        self, client: Client, message: M, timeout: float, limit: int, renew: bool
+        self,
+        client: Client,
+        message: Message,
+        reply: type[Message] | None,
+        timeout: float,
+        limit: int,
+        renew: bool,
     ) -> None:
         self._client = client
         self._message = message
+        self._reply = reply
         self._timeout = timeout
         self._limit = limit
         self._renew = renew
@@ -235,7 +263,9 @@ class Subscription(Generic[M]):
         self._isClosed = True
 
     def _first(self) -> M | None:
-        request = self._client._send(self._message, self._timeout, further=self._limit)
+        request = self._client._send(
+            self._message, self._timeout, reply=self._reply, further=self._limit
+        )
         self._request = request
         try:
             return cast(M, request.wait())
