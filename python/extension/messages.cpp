@@ -65,7 +65,21 @@ PyType_Slot kBufferSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(getBuffe
                               {Py_bf_releasebuffer, reinterpret_cast<void*>(releaseBuffer<T>)},
                               {0, nullptr}};
 
-nb::object numpy(const char* function) { return nb::module_::import_("numpy").attr(function); }
+// A function of numpy, looked up at its first use. Not a static initialiser: a thread that waits
+// for it would hold the GIL, which the import needs.
+nb::handle numpy(PyObject*& function, const char* name) {
+  if (function == nullptr)
+    function = nb::object(nb::module_::import_("numpy").attr(name)).release().ptr();
+  return function;
+}
+nb::handle asArray() {
+  static PyObject* function = nullptr;
+  return numpy(function, "asarray");
+}
+nb::handle asContiguousArray() {
+  static PyObject* function = nullptr;
+  return numpy(function, "ascontiguousarray");
+}
 
 // The elements as users see them: a numpy array, bytes or a memoryview.
 template <class T>
@@ -73,7 +87,7 @@ nb::object valueOf(nb::handle self) {
   auto& array = *nb::inst_ptr<PyArray<T>>(self);
   if (array.isEmpty) throw nb::value_error(kWasSent);
   if constexpr (CountedInElements<T>) {
-    return array.values.is_valid() ? array.values : numpy("asarray")(self);
+    return array.values.is_valid() ? array.values : asArray()(self);
   } else {
     const auto view = array.values.is_valid() ? array.values : nb::borrow(self);
     if constexpr (std::is_same_v<T, Char8Array>) {
@@ -92,7 +106,7 @@ template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
   if constexpr (CountedInElements<T>) {
     const char* type = std::is_same_v<T, Int32Array> ? "int32" : "float64";
-    array.values = numpy("ascontiguousarray")(numpy("asarray")(value), "dtype"_a = type);
+    array.values = asContiguousArray()(asArray()(value), "dtype"_a = type);
     if (nb::cast<int>(array.values.attr("ndim")) != 1)
       throw nb::value_error("the elements must have one dimension");
     array.length = nb::cast<Py_ssize_t>(array.values.attr("size"));

@@ -25,6 +25,7 @@ void refuseSubinterpreter() {
 
 NB_MODULE(_mpf, module) {
   refuseSubinterpreter();
+  nanobind::set_leak_warnings(false);  // a program may end while its threads use objects
   module.doc() = "The parts of mpf that are written in C++.";
   mpf::python::countForks();
   nanobind::module_::import_("atexit").attr("register")(
