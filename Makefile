@@ -11,7 +11,7 @@
 #   COPIES=n    of `make test-repeated`: number of parallel runs of all tests (default 6)
 #   ROUNDS=n    of `make test-repeated`: how many times (default 20)
 #   PYTHONS=... interpreters of `make wheel` (default: python3)
-#   BENCH=...   of `make bench`: local (default), remote, hardware or epics
+#   BENCH=...   of `make bench`: local (default), remote, hardware, epics or python
 
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
@@ -20,9 +20,12 @@ PRESETS := release debug edit asan tsan
 TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
+BENCH_PYTHON := PATH="$$PWD/build/release/bin:$$PATH" \
+	PYTHONPATH=build/release/python:build/python-packages python3 -m mpf.bench
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
-.PHONY: startup-files install container wheel epics-base-tsan
+.PHONY: startup-files install container wheel python-reference epics-base-tsan
 .PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
 help: ## print this list
@@ -67,10 +70,10 @@ fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FU
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
 # Also writes the table to build/release/bench/.
-bench: release ## measure this host (BENCH=local, remote, hardware or epics)
+bench: release ## measure this host (BENCH=local, remote, hardware, epics or python)
 	@mkdir -p build/release/bench
-	bash -o pipefail -c 'build/release/bin/mpf bench $(or $(BENCH),local) | \
-		tee build/release/bench/$(or $(BENCH),local).txt'
+	bash -o pipefail -c '$(if $(filter python,$(BENCH)),$(BENCH_PYTHON),build/release/bin/mpf bench \
+		$(or $(BENCH),local)) | tee build/release/bench/$(or $(BENCH),local).txt'
 
 # FILES: a folder with startup files; IP: the folder of the databases that they name ipApp/Db/...
 startup-files: release ## run startup files of a site on device models (FILES=folder IP=folder)
@@ -81,6 +84,9 @@ install: release ## install headers, libraries, programs and man pages under PRE
 
 wheel: release ## build the wheel of the Python package in build/wheels (PYTHONS="python3.10 ...")
 	scripts/python-wheels $(PYTHONS)
+
+python-reference: release ## write the reference of the Python package to build/python-reference
+	scripts/python-reference
 
 container: release ## build a container image that runs a crate, with podman, buildah or docker
 	rm -rf build/container && cmake --install build/release --strip --prefix build/container/usr

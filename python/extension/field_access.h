@@ -92,11 +92,15 @@ inline const char* describe(std::string_view name) {
 
 // ---- all fields of a type
 
+// Not an attribute: the length of the attribute `eom`.
+inline constexpr std::string_view kUsedBytesOfEom = "eomLen";
+
 // Held: a class of C++ with the member `fields` of type T.
 template <class Held, class T, class Class>
 void addFields(Class& type) {
   const auto add = [&type](const auto& field) {
     if constexpr (!requires { field.used; }) {
+      if (field.name == kUsedBytesOfEom) return;
       const auto member = field.member;
       using Attribute = decltype(toAttribute(std::declval<T>().*member));
       const auto name = attributeName(field.name);

@@ -91,7 +91,7 @@ class Client(_mpf.BaseClient):
     def call(self, message: Message, timeout: float | None = None, **options: Any) -> Any:
         return self._call(message, timeout, **options)
 
-    call.__doc__ = _mpf.BaseClient._call.__doc__
+    call.__doc__ = (_mpf.BaseClient._call.__doc__ or "").partition("\n\n")[2]  # no signature
 
     def send(
         self,
