@@ -20,9 +20,6 @@ PRESETS := release debug edit asan tsan
 TESTED := debug edit asan tsan
 SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-standard '*.h' '*.cpp'
 
-BENCH_PYTHON := PATH="$$PWD/build/release/bin:$$PATH" \
-	PYTHONPATH=build/release/python:build/python-packages python3 -m mpf.bench
-
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
 .PHONY: startup-files install container wheel python-reference epics-base-tsan
@@ -72,8 +69,9 @@ fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FU
 # Also writes the table to build/release/bench/.
 bench: release ## measure this host (BENCH=local, remote, hardware, epics or python)
 	@mkdir -p build/release/bench
-	bash -o pipefail -c '$(if $(filter python,$(BENCH)),$(BENCH_PYTHON),build/release/bin/mpf bench \
-		$(or $(BENCH),local)) | tee build/release/bench/$(or $(BENCH),local).txt'
+	PYTHONPATH=build/release/python:build/python-packages PATH="build/release/bin:$$PATH" \
+		bash -o pipefail -c 'mpf bench $(or $(BENCH),local) | \
+		tee build/release/bench/$(or $(BENCH),local).txt'
 
 # FILES: a folder with startup files; IP: the folder of the databases that they name ipApp/Db/...
 startup-files: release ## run startup files of a site on device models (FILES=folder IP=folder)

@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: MIT
-// mpf-bench: the program that `mpf bench` executes.
+// mpf-bench: the program that `mpf bench` executes. `mpf bench python` is the module mpf.bench of the
+// Python package.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <fmt/format.h>
+#include <string>
+#include <system_error>
+#include <vector>
 
 #include "base/command_line.h"
 #include "base/run_main.h"
@@ -12,6 +19,22 @@
 
 namespace {
 
+constexpr const char* kPythonHelp =
+    "Measures calls from Python beside other packages, with the package mpf of python3; its "
+    "options "
+    "are those of `python3 -m mpf.bench --help`";
+
+// Replaces this process by Python.
+int runPython(const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {"python3", "-m", "mpf.bench"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (auto& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  ::execvp(pointers[0], pointers.data());
+  throw std::system_error(errno, std::generic_category(), "cannot execute python3");
+}
+
 int bench(int argc, char** argv) {
   CLI::App app("mpf bench - measures messages beside the physical floors and other message systems",
                "mpf bench");
@@ -19,6 +42,8 @@ int bench(int argc, char** argv) {
   auto& remote = *app.add_subcommand("remote", mpf::bench::kRemoteHelp);
   auto& hardware = *app.add_subcommand("hardware", mpf::bench::kHardwareHelp);
   auto& epics = *app.add_subcommand("epics", mpf::bench::kEpicsHelp);
+  auto& python = *app.add_subcommand("python", kPythonHelp);
+  python.prefix_command();
   mpf::bench::Options localOptions;
   mpf::bench::RemoteOptions remoteOptions;
   mpf::bench::HardwareOptions hardwareOptions;
@@ -33,6 +58,7 @@ int bench(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) commandLine += std::string(" ") + argv[i];
   localOptions.commandLine = remoteOptions.commandLine = hardwareOptions.commandLine =
       epicsOptions.commandLine = commandLine;
+  if (python.parsed()) return runPython(python.remaining());
   if (epics.parsed()) return mpf::bench::runEpics(epicsOptions);
   if (hardware.parsed()) return mpf::bench::runHardware(hardwareOptions);
   return local.parsed() ? mpf::bench::runLocal(localOptions) : mpf::bench::runRemote(remoteOptions);

@@ -274,11 +274,15 @@ def main() -> int:
     parser = argparse.ArgumentParser("python -m mpf.bench", description=__doc__)
     parser.add_argument("--seconds", type=float, default=1.0, help="for each row in each round")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--cpus", default="1,0", help="those of the client and of the servers")
+    parser.add_argument("--no-cpp", action="store_true", help="omit the rows of C++")
+    everywhere = os.sched_getaffinity(0)
+    parser.add_argument(
+        "--cpus", default=f"{max(everywhere)},{min(everywhere)}", metavar="CLIENT,SERVERS",
+        help="default: %(default)s",
+    )
     arguments = parser.parse_args()
     client_cpu, server_cpu = (int(cpu) for cpu in arguments.cpus.split(","))
     os.environ["MPF_BACKPLANE"] = f"bench-{os.getpid()}"
-    everywhere = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {client_cpu})
     bench = _Bench(server_cpu)
     times: dict[str, _Times] = {}
@@ -289,7 +293,9 @@ def main() -> int:
     replies = bench.replies_per_second()
     os.sched_setaffinity(0, everywhere)
     sys.stderr.write("\rC++" + 48 * " ")
-    rows = {name: one.columns() for name, one in times.items()} | _cpp_rows()
+    rows = {name: one.columns() for name, one in times.items()}
+    if not arguments.no_cpp:
+        rows |= _cpp_rows()
     sys.stderr.write("\r" + 51 * " " + "\r")
     print(f"{os.uname().machine}, load {os.getloadavg()[0]:.2f}, client on CPU {client_cpu}, "
           f"servers on CPU {server_cpu}, Python {sys.version.split()[0]}")
