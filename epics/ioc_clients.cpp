@@ -29,7 +29,8 @@ void IocClients::onHook(int state) {
   if (state == initHookAfterShutdown) forget();
 }
 
-void IocClients::start() { isRunning_.store(true, std::memory_order_relaxed); }
+// Callbacks see what the records' initialisation wrote.
+void IocClients::start() { isRunning_.store(true, std::memory_order_release); }
 
 void IocClients::close() {
   isRunning_.store(false, std::memory_order_relaxed);
@@ -101,7 +102,7 @@ void IocClients::tick() {
 }
 
 void IocClients::flush() {
-  if (!isRunning_.load(std::memory_order_relaxed)) return;
+  if (!isRunning_.load(std::memory_order_acquire)) return;
   for (auto& callbacks : callbacks_) callbacks.flush();
 }
 

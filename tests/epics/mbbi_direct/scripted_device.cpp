@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tests/epics/mbbi_direct/scripted_device.h"
 
+#include <atomic>
 #include <registryDeviceSupport.h>
 
 namespace mpf::test {
@@ -31,7 +32,7 @@ long getIoIntInfo(int cmd, dbCommon* /*record*/, IOSCANPVT* scan) {
   return 0;
 }
 long read(mbbiDirectRecord* record) {
-  ++device.reads;
+  ++std::atomic_ref(device.reads);  // records of several threads are locked one by one
   record->rval = device.raw;
   if (device.isSlow) record->pact = TRUE;
   return device.status;
