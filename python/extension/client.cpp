@@ -21,8 +21,7 @@ constexpr const char* kClient = "client";
 
 Retry retryOf(bool retry) { return retry ? Retry::neverTaken : Retry::never; }
 
-nb::object replyOf(const std::string& server, Message&& message, const Expected& expected) {
-  auto reply = toPython(std::move(message));
+nb::object checked(const std::string& server, nb::object reply, const Expected& expected) {
   if (!expected.check) return reply;
   if (nb::cast<PyMessage&>(reply).status() != 0) raiseStatus(server, std::move(reply));
   if (!reply.type().is(expected.type) && !expected.type.is(nb::type<PyMessage>()))
@@ -36,15 +35,6 @@ nb::object expectedType(nb::handle request, nb::object wanted) {
   const auto type = request.type();
   return nb::borrow(type.is(nb::type<PyScalar<SerialConfig>>()) ? nb::type<PyScalar<Int32>>()
                                                                 : type);
-}
-
-// Ends an exchange whose wait was interrupted or has ended.
-nb::object finish(Connection& connection, Exchange& exchange, bool wasInterrupted, bool timedOut,
-                  const Expected& expected) {
-  if (wasInterrupted) throw nb::python_error();
-  if (exchange.reply) return replyOf(connection.server, std::move(exchange.reply), expected);
-  if (timedOut && exchange.fate == Fate::outcomeUnknown) raiseTimedOut(connection.server);
-  raiseFate(connection.server, *exchange.fate);
 }
 
 }  // namespace
@@ -133,12 +123,22 @@ nb::object PyRequest::wait(bool check) {
     requester->waitForEnd(exchange_, deadline_, unlocked.interruption());
     wasInterrupted = unlocked.wasInterrupted();
   }
-  return finish(*connection_, exchange_, wasInterrupted, deadline_.hasPassed(), {type_, check});
+  if (wasInterrupted) throw nb::python_error();
+  return finish(check);
 }
 
 nb::object PyRequest::result(bool check) {
   if (!connection_->isClosed() && !connection_->requester()->hasEnded(exchange_)) return nb::none();
-  return finish(*connection_, exchange_, false, deadline_.hasPassed(), {type_, check});
+  return finish(check);
+}
+
+// The exchange has ended.
+nb::object PyRequest::finish(bool check) {
+  if (exchange_.reply) reply_ = toPython(std::move(exchange_.reply));
+  if (reply_.is_valid()) return checked(connection_->server, reply_, {type_, check});
+  if (deadline_.hasPassed() && exchange_.fate == Fate::outcomeUnknown)
+    raiseTimedOut(connection_->server);
+  raiseFate(connection_->server, *exchange_.fate);
 }
 
 nb::object PyRequest::next(double timeout) {

@@ -60,9 +60,9 @@ class PyRequest {
   PyRequest& operator=(const PyRequest&) = delete;
 
   void send(PyMessage& message, Retry retry, bool waits);
-  // Waits for the reply.
+  // Waits for the reply, the same object at each call.
   nb::object wait(bool check);
-  // The reply; None while the request has not ended.
+  // The same without waiting; None while the request has not ended.
   nb::object result(bool check);
   // The next further reply; None after the deadline, and when the connection has ended.
   nb::object next(double timeout);
@@ -74,10 +74,13 @@ class PyRequest {
   [[nodiscard]] bool isConnected() const;
 
  private:
+  nb::object finish(bool check);
+
   const std::shared_ptr<Connection> connection_;
   Deadline deadline_;
   nb::object type_;
   Exchange exchange_;
+  nb::object reply_;  // once it was asked for
 };
 
 void addClient(nb::module_& module);

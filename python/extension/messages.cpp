@@ -65,20 +65,25 @@ PyType_Slot kBufferSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(getBuffe
                               {Py_bf_releasebuffer, reinterpret_cast<void*>(releaseBuffer<T>)},
                               {0, nullptr}};
 
-// A function of numpy, looked up at its first use. Not a static initialiser: a thread that waits
-// for it would hold the GIL, which the import needs.
-nb::handle numpy(PyObject*& function, const char* name) {
-  if (function == nullptr)
-    function = nb::object(nb::module_::import_("numpy").attr(name)).release().ptr();
-  return function;
+// Something of numpy, looked up at its first use. Not a static initialiser: a thread that waits for
+// it would hold the GIL, which the import needs.
+nb::handle ofNumpy(PyObject*& found, const char* name) {
+  if (found == nullptr)
+    found = nb::object(nb::module_::import_("numpy").attr(name)).release().ptr();
+  return found;
 }
-nb::handle asArray() {
-  static PyObject* function = nullptr;
-  return numpy(function, "asarray");
+nb::handle fromBuffer() {
+  static PyObject* found = nullptr;
+  return ofNumpy(found, "frombuffer");
 }
 nb::handle asContiguousArray() {
-  static PyObject* function = nullptr;
-  return numpy(function, "ascontiguousarray");
+  static PyObject* found = nullptr;
+  return ofNumpy(found, "ascontiguousarray");
+}
+template <class T>
+nb::handle elementType() {
+  static PyObject* found = nullptr;
+  return ofNumpy(found, std::is_same_v<T, Int32Array> ? "int32" : "float64");
 }
 
 // The elements as users see them: a numpy array, bytes or a memoryview.
@@ -87,7 +92,7 @@ nb::object valueOf(nb::handle self) {
   auto& array = *nb::inst_ptr<PyArray<T>>(self);
   if (array.isEmpty) throw nb::value_error(kWasSent);
   if constexpr (CountedInElements<T>) {
-    return array.values.is_valid() ? array.values : asArray()(self);
+    return array.values.is_valid() ? array.values : fromBuffer()(self, elementType<T>());
   } else {
     const auto view = array.values.is_valid() ? array.values : nb::borrow(self);
     if constexpr (std::is_same_v<T, Char8Array>) {
@@ -105,8 +110,7 @@ nb::object valueOf(nb::handle self) {
 template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
   if constexpr (CountedInElements<T>) {
-    const char* type = std::is_same_v<T, Int32Array> ? "int32" : "float64";
-    array.values = asContiguousArray()(asArray()(value), "dtype"_a = type);
+    array.values = asContiguousArray()(value, elementType<T>());
     if (nb::cast<int>(array.values.attr("ndim")) != 1)
       throw nb::value_error("the elements must have one dimension");
     array.length = nb::cast<Py_ssize_t>(array.values.attr("size"));

@@ -49,7 +49,10 @@ void Requester::takeAnswer(Exchange& exchange, Message&& message) {
   if (const auto* fate = message.tryAs<RequestFate>()) {
     if (!exchange.hasEnded()) exchange.fate = fate->fate;
   } else if (message.route().flags == kEndsRequest) {
-    if (!exchange.hasEnded()) exchange.reply = std::move(message);
+    if (!exchange.hasEnded()) {
+      exchange.reply = std::move(message);
+      exchange.hasReply = true;
+    }
   } else if (exchange.limit > 0) {
     if (exchange.further.size() == exchange.limit) {
       exchange.further.pop_front();

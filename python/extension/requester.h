@@ -28,7 +28,8 @@ namespace mpf::python {
 // A request and what came back. Requester guards it.
 struct Exchange {
   std::uint32_t id = 0;  // 0: not sent, or sent again under another number
-  Message reply;  // empty: none yet, or moved out
+  Message reply;
+  bool hasReply = false;  // also after `reply` was moved out
   std::optional<Fate> fate;
   // Further replies wait here, at most `limit`; then the oldest is dropped and counted in `missed`.
   std::deque<Message> further;
@@ -36,7 +37,7 @@ struct Exchange {
   std::uint64_t missed = 0;
   bool isDisconnected = false;  // no more further replies: the connection has ended
 
-  [[nodiscard]] bool hasEnded() const noexcept { return fate || reply; }
+  [[nodiscard]] bool hasEnded() const noexcept { return fate || hasReply; }
 };
 
 class Requester {

@@ -162,6 +162,15 @@ def test_a_request_that_no_server_takes_expires(
             client.int32(timeout=0.05)
 
 
+def test_a_reply_may_be_asked_for_again(doubler: mpf.Server) -> None:
+    doubler.on(mpf.Float64Array)(lambda request: request.value * 2)
+    with mpf.Client("doubler") as client:
+        request = client.send(mpf.Float64Array([1.0, 2.0]), PATIENCE)
+        reply = request.wait()
+        assert request.wait() is reply
+        assert request.result() is reply
+
+
 def test_a_cancelled_request_ends(silent: Silent) -> None:
     with mpf.Client("silent") as client:
         request = client.send(mpf.Int32(), timeout=PATIENCE)
