@@ -43,6 +43,7 @@ class PyServer {
   // Waits for the next request; None after `timeout` and after interrupt().
   nb::object receive(double timeout) {
     const auto server = opened();
+    if (isInterrupted_) return nb::none();
     Message request = server->receive();
     if (!request) request = wait(*server, deadlineOf(timeout));
     if (!request) return nb::none();

@@ -30,7 +30,7 @@ import math
 import threading
 import time
 from collections.abc import AsyncIterable, Callable, Iterable
-from types import TracebackType
+from types import GeneratorType, TracebackType
 from typing import Any, TypeVar, cast
 
 from mpf import _mpf
@@ -152,9 +152,11 @@ class Server(_mpf.BaseServer):
     # ---- requests
 
     def _run(self) -> None:
-        while not self._take_interrupt():
+        while True:
             request = self._receive(math.inf)
             if request is None:
+                if self._take_interrupt():
+                    return
                 continue
             try:
                 self._answer(request, self._handle(request))
@@ -188,7 +190,7 @@ class Server(_mpf.BaseServer):
         return handler(request)
 
     def _answer(self, request: Message, result: object) -> None:
-        if inspect.isgenerator(result):
+        if isinstance(result, GeneratorType):
             for value in cast(Iterable[object], result):
                 while not self._try_reply(request, value):
                     time.sleep(_PAUSE)
