@@ -29,7 +29,7 @@ void IocClients::onHook(int state) {
   if (state == initHookAfterShutdown) forget();
 }
 
-// Callbacks see what the records' initialisation wrote.
+// PAIR(ioc-running): stored after the initialisation of the records.
 void IocClients::start() { isRunning_.store(true, std::memory_order_release); }
 
 void IocClients::close() {
@@ -102,6 +102,7 @@ void IocClients::tick() {
 }
 
 void IocClients::flush() {
+  // PAIR(ioc-running): callbacks see what the initialisation of the records wrote.
   if (!isRunning_.load(std::memory_order_acquire)) return;
   for (auto& callbacks : callbacks_) callbacks.flush();
 }
