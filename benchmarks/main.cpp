@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// mpf-bench: the program that `mpf bench` executes. `mpf bench python` executes the module mpf.bench
-// of the Python package.
+// mpf-bench: the program that `mpf bench` executes. `mpf bench python` executes the module
+// mpf.bench of the Python package.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
