@@ -13,20 +13,25 @@ namespace mpf {
 
 class SpinLock {
  public:
-  // A waiting thread that only yields would keep its processor from a holder of lower real-time
-  // priority, such as a scan thread of an IOC from another one, and so wait forever. It sleeps
-  // after a few attempts.
   void lock() noexcept {
-    constexpr int kYields = 20;
     // PAIR(spin-lock): sees the writes of the previous holder.
-    for (int attempts = 0; locked_.test_and_set(std::memory_order_acquire); ++attempts) {
-      if (attempts < kYields) ::sched_yield();
-      else std::this_thread::sleep_for(std::chrono::microseconds(20));
-    }
+    waitUntil([this] { return !locked_.test_and_set(std::memory_order_acquire); });
   }
   void unlock() noexcept {
     // PAIR(spin-lock): publishes the writes made under the lock.
     locked_.clear(std::memory_order_release);
+  }
+
+  // A waiting thread that only yields would keep its processor from a holder of lower real-time
+  // priority, such as a scan thread of an IOC from another one, and so wait forever. It sleeps
+  // after a few attempts.
+  template <class IsTrue>
+  static void waitUntil(const IsTrue& isTrue) noexcept {
+    constexpr int kYields = 20;
+    for (int attempts = 0; !isTrue(); ++attempts) {
+      if (attempts < kYields) ::sched_yield();
+      else std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
   }
 
  private:

@@ -23,6 +23,10 @@ Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
   return message;
 }
 
+constexpr bool isControl(MessageType type) noexcept {
+  return type == MessageType::connect || type == MessageType::requestFate;
+}
+
 // A server may send a ConnectMessage only to report a full queue behind it (a router does), not as
 // a reply; and a fate only as the reply to the request that it names.
 bool mayServerSend(const Message& message, const Request* request) noexcept {
@@ -64,18 +68,22 @@ void Binding::tryConnect() try {
   connector_.retryLater();
 }
 
-bool Binding::takeOne() {
+// A change of state that comes with messages has a hint of its own, or is found when the endpoint
+// stops polling the link.
+bool Binding::takeSome(int most) {
+  if (!tryTakeMessage()) return isLinked() && !isPaused_ && onLinkState();
+  while (--most > 0 && tryTakeMessage()) {
+  }
+  return true;
+}
+
+// Returns false when there is no message.
+bool Binding::tryTakeMessage() {
   if (!isLinked() || isPaused_) return false;
   Envelope envelope;
-  switch (channel().tryBegin(envelope)) {
-    case MessageLink::Take::nothing:
-      return onLinkState();
-    case MessageLink::Take::message:
-      if (tryDeliverReply(envelope)) return true;
-      break;
-    case MessageLink::Take::invalid:
-      break;
-  }
+  const auto take = channel().tryBegin(envelope);
+  if (take == MessageLink::Take::nothing) return false;
+  if (take == MessageLink::Take::message && tryDeliverReply(envelope)) return true;
   count(control().protocolErrors);
   disconnect("the server sent invalid data", Ending::protocolError);
   return true;
@@ -120,42 +128,31 @@ void Binding::onAccepted(Link& link) {
 bool Binding::tryDeliverReply(const Envelope& envelope) {
   count(control().received);
   auto& requests = *sender_.requests();
-  auto* request =
-      (envelope.flags & layout::kSlotFirstReply) != 0 ? requests.find(envelope.requestId) : nullptr;
-  if ((envelope.flags & layout::kSlotFirstReply) != 0 &&
-      (request == nullptr || request->isGivenUp)) {
-    channel().discard(envelope);
-    if (request != nullptr) requests.end(*request);
-    return true;
+  Request* request = nullptr;
+  if ((envelope.flags & layout::kSlotFirstReply) != 0) {
+    request = requests.find(envelope.requestId);
+    if (request == nullptr || request->isGivenUp) {
+      channel().discard(envelope);
+      if (request != nullptr) requests.end(*request);
+      return true;
+    }
   }
   Message message;
-  switch (channel().tryFinish(envelope, message)) {
-    case MessageLink::Finish::invalid:
-      return false;
-    case MessageLink::Finish::unavailable:
-      if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
-      return true;
-    case MessageLink::Finish::message:
-      break;
-  }
-  if (!mayServerSend(message, request)) return false;
-  // A router reports that the server behind it has not taken the request.
-  if (const auto* fate = message.tryAs<RequestFate>();
-      fate != nullptr && fate->fate == Fate::neverTaken && sender_.tryKeep(*request)) {
-    timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
+  if (const auto finish = channel().tryFinish(envelope, message);
+      finish != MessageLink::Finish::message) {
+    if (finish == MessageLink::Finish::invalid) return false;
+    if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
     return true;
+  }
+  if (isControl(message.getType())) {
+    const auto control = prepareControl(message, request);
+    if (control != Control::deliver) return control == Control::keep;
   }
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
     noteTimes(envelope, request);
   message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
   message.setTimeStampNs(envelope.timeNs);
-  if (auto* connect = message.tryAs<Connect>()) connect->incarnation = connector_.incarnation();
   if (request != nullptr) {
-    // The server sends fates without the marks of the client.
-    if (message.getType() == MessageType::requestFate) {
-      message.setClientType(request->clientType);
-      message.setClientExtra(request->clientExtra);
-    }
     requests.end(*request);
     MPF_STEP(request_ended);
     channel().link().control().clientUnanswered.store(requests.awaited(),
@@ -165,7 +162,25 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
   return true;
 }
 
-void Binding::noteTimes(const Envelope& envelope, const Request* request) noexcept {
+// A ConnectMessage or a fate that the server has sent. `keep`: the request was kept, to be sent
+// again.
+Binding::Control Binding::prepareControl(Message& message, Request* request) {
+  if (!mayServerSend(message, request)) return Control::invalid;
+  if (auto* connect = message.tryAs<Connect>()) connect->incarnation = connector_.incarnation();
+  const auto* fate = message.tryAs<RequestFate>();
+  if (fate == nullptr) return Control::deliver;
+  // A router reports that the server behind it has not taken the request.
+  if (fate->fate == Fate::neverTaken && sender_.tryKeep(*request)) {
+    timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
+    return Control::keep;
+  }
+  // The server sends fates without the marks of the client.
+  message.setClientType(request->clientType);
+  message.setClientExtra(request->clientExtra);
+  return Control::deliver;
+}
+
+void Binding::noteTimes(Envelope envelope, const Request* request) noexcept {
   auto& endpoint = parts_.endpoint;
   const auto nowNs = Clock::nowNs();
   if (request != nullptr && request->sentNs != 0)
@@ -368,7 +383,7 @@ void Binding::nudge(std::int64_t nowNs) {
     } else {
       connector_.askAgain(link);
     }
-    takeOne();  // a reply or a change of the link whose hint was lost
+    takeSome(1);  // a reply or a change of the link whose hint was lost
   }
   timer_.wakeAt(nudgeInterval_.dueNs());
 }

@@ -54,8 +54,9 @@ class Binding : public std::enable_shared_from_this<Binding> {
 
   // --- dispatcher's thread ---
   void tryConnect();
-  // Handles one message or one change of state of the link. Returns false when there was none.
-  bool takeOne();
+  // Handles up to `most` messages of the link, or one change of its state. Returns false when there
+  // was neither.
+  bool takeSome(int most);
   enum class Ending {
     // The server is dead or has closed the link: it will not receive the remaining requests.
     serverGone,
@@ -102,10 +103,13 @@ class Binding : public std::enable_shared_from_this<Binding> {
     return parts_.endpoint.control();
   }
 
+  bool tryTakeMessage();
   bool onLinkState();
   void onAccepted(Link& link);
   bool tryDeliverReply(const Envelope& envelope);
-  void noteTimes(const Envelope& envelope, const Request* request) noexcept;
+  enum class Control { deliver, keep, invalid };
+  Control prepareControl(Message& message, Request* request);
+  void noteTimes(Envelope envelope, const Request* request) noexcept;
   void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);

@@ -17,26 +17,24 @@ void BindingRounds::remove(const std::shared_ptr<Binding>& binding) {
   if (parts_.names.isRunning()) parts_.names.noteChange();
 }
 
-bool BindingRounds::resume() {
-  if (dead_.isOver() && waiting_.isOver()) return false;
+void BindingRounds::resumeRounds() {
   dead_.resume([](Binding& binding) {
     if (!binding.hasDeadPeer()) return false;
     binding.disconnect("the process of the server exited", Binding::Ending::serverGone);
     return true;
   });
-  if (waiting_.isOver()) return true;
+  if (waiting_.isOver()) return;
   waiting_.resume([](Binding& binding) {
     if (!binding.isWaiting()) return false;
     binding.tryConnect();
     return true;
   });
-  if (!waiting_.isOver()) return true;
+  if (!waiting_.isOver()) return;
   if (std::ranges::any_of(bindings_, [](const auto& binding) { return binding->isWaiting(); })) {
     parts_.names.start();
   } else {
     parts_.names.stop();
   }
-  return true;
 }
 
 void BindingRounds::handleDue() {

@@ -30,11 +30,17 @@ class BindingRounds {
   // A server may have appeared: connects the bindings that wait for one.
   void beginWaiting() { waiting_.begin(bindings_); }
   // Continues these rounds. Returns true when one was in progress.
-  bool resume();
+  bool resume() {
+    if (dead_.isOver() && waiting_.isOver()) return false;
+    resumeRounds();
+    return true;
+  }
   // Begins or continues the round of the bindings whose timer is due.
   void handleDue();
 
  private:
+  void resumeRounds();
+
   DispatcherParts& parts_;
   std::set<std::shared_ptr<Binding>> bindings_;
   std::vector<std::shared_ptr<Binding>> removed_;

@@ -148,10 +148,8 @@ bool Dispatcher::Impl::tryStep() {
   hasActed = bindings_.resume() || hasActed;
   if (const auto index = endpoint().next()) {
     auto* binding = parts_.linkOwners.find(*index);
-    int taken = 0;
     // A binding that a callback removes stays alive until the next step.
-    while (binding != nullptr && taken < kBatch && binding->takeOne()) ++taken;
-    if (taken != 0) return true;
+    if (binding != nullptr && binding->takeSome(kBatch)) return true;
   }
   if (!parts_.timer.isDue()) return hasActed;
   bindings_.handleDue();

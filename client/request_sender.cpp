@@ -37,16 +37,26 @@ std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
 SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
                                Retry retry) noexcept {
   if (!message) return SendResult::empty;
-  std::unique_ptr<Message> copy;
-  if (retry == Retry::neverTaken && !(copy = tryCopy(message))) return SendResult::noMemory;
   Attempt attempt{message, takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1),
-                  requestId, copy};
+                  requestId};
+  const auto result = retry == Retry::never ? send(attempt) : sendWithCopy(attempt);
+  if (result == SendResult::sent) requestId = attempt.id;
+  return result;
+}
+
+SendResult RequestSender::sendWithCopy(Attempt& attempt) noexcept {
+  auto copy = tryCopy(attempt.message);
+  if (!copy) return SendResult::noMemory;
+  attempt.copy = &copy;
+  return send(attempt);
+}
+
+SendResult RequestSender::send(Attempt& attempt) noexcept {
   {
     const std::lock_guard lock(*lock_);
     const auto result = untaken_.isEmpty() ? trySendLocked(attempt) : refuseBehindUntaken();
     if (result != SendResult::sent) return result;
   }
-  requestId = attempt.id;
   onSent(attempt);
   return SendResult::sent;
 }
@@ -89,7 +99,7 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
   request->ordinal = link.outgoing().messages() + 1;
   request->deadlineNs = envelope.timeNs;
   request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
-  request->copy = std::move(attempt.copy);
+  if (attempt.copy != nullptr) request->copy = std::move(*attempt.copy);
   if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
   // Added before the message is sent, because the dispatcher may receive the reply before
   // trySendLocked() of the channel returns.
@@ -98,7 +108,8 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
   const auto result =
       resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0, 0}));
   if (result != SendResult::sent) {
-    attempt.copy = requests_->takeBack(*request);
+    auto copy = requests_->takeBack(*request);
+    if (attempt.copy != nullptr) *attempt.copy = std::move(copy);
     count(link.control().clientRefused);
     if (result == SendResult::queueFull) noteFull();
     return result;
@@ -123,7 +134,7 @@ bool RequestSender::tryKeep(Request& request) {
 SendResult RequestSender::trySendUntaken() {
   auto message = untaken_.front().message->duplicate();
   auto& next = untaken_.front();
-  Attempt attempt{message, next.deadlineNs, next.id, next.message};
+  Attempt attempt{message, next.deadlineNs, next.id, &next.message};
   {
     const std::lock_guard lock(*lock_);
     const auto result = trySendLocked(attempt);

@@ -40,7 +40,7 @@ class RequestSender {
                   Retry retry) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
-  [[nodiscard]] const std::shared_ptr<SpinLock>& lock() const noexcept { return lock_; }
+  [[nodiscard]] const std::shared_ptr<BiasedLock>& lock() const noexcept { return lock_; }
 
   // --- dispatcher's thread ---
   // Uses a new link and a new table of requests.
@@ -72,9 +72,11 @@ class RequestSender {
     Message& message;
     std::int64_t deadlineNs;
     std::uint32_t id;  // in: 0 for a new one
-    std::unique_ptr<Message>& copy;  // moved from when the request is sent
+    std::unique_ptr<Message>* copy = nullptr;  // moved from when the request is sent
     bool startsNudging = false;
   };
+  SendResult send(Attempt& attempt) noexcept;
+  SendResult sendWithCopy(Attempt& attempt) noexcept;
   SendResult trySendLocked(Attempt& attempt) noexcept;
   void onSent(const Attempt& attempt) noexcept;
   SendResult refuseBehindUntaken() noexcept;
@@ -84,7 +86,7 @@ class RequestSender {
   layout::WindowControl& control_;
   BindingTimer& timer_;
   std::function<void()> postFullReport_;
-  std::shared_ptr<SpinLock> lock_ = std::make_shared<SpinLock>();
+  std::shared_ptr<BiasedLock> lock_ = std::make_shared<BiasedLock>();
   std::shared_ptr<MessageLink> channel_;  // written by the dispatcher's thread under lock_
   std::shared_ptr<RequestTable> requests_;  // likewise
   UntakenRequests untaken_;

@@ -15,10 +15,35 @@ const std::shared_ptr<void>& lifeOfThread() {
 }  // namespace
 
 bool RunnerLock::tryAcquireTemporarily() noexcept {
-  return !isRunnerWaiting() && tryTake(thisThread() | kTemporary);
+  if (isRunnerWaiting() || !tryTake(threadNumber() | kTemporary)) return false;
+  if (bias_.disable()) return true;
+  release();
+  return false;
+}
+
+void RunnerLock::noteRunner() {
+  if (bias_.isOfAnotherThread()) endOtherBias();
+  bias_.noteEntry();
+  if (lastRunner_.load(std::memory_order_relaxed) != threadNumber()) noteLastRunner();
+}
+
+// The owner of the bias may be the runner. Until that is known, the calling thread is a temporary
+// owner, so that a runner that has lost the bias waits and does not throw.
+void RunnerLock::endOtherBias() {
+  owner_.store(threadNumber() | kTemporary, std::memory_order_relaxed);
+  if (!bias_.disable()) {
+    release();
+    throwOtherRunner();
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    owner_.store(threadNumber(), std::memory_order_relaxed);
+  }
+  released_.notify_all();
 }
 
 void RunnerLock::release() noexcept {
+  if (bias_.isMine()) return bias_.leave();
   if ((owner_.load(std::memory_order_relaxed) & kTemporary) == 0) {
     // PAIR(runner): before another thread takes the lock.
     owner_.store(0, std::memory_order_release);
@@ -34,7 +59,8 @@ void RunnerLock::release() noexcept {
 
 bool RunnerLock::hasOtherRunner() {
   const std::lock_guard lock(mutex_);
-  return lastRunner_.load(std::memory_order_relaxed) != thisThread() && !lastRunnerAlive_.expired();
+  return lastRunner_.load(std::memory_order_relaxed) != threadNumber() &&
+         !lastRunnerAlive_.expired();
 }
 
 void RunnerLock::throwOtherRunner() {
@@ -46,7 +72,7 @@ void RunnerLock::throwOtherRunner() {
 void RunnerLock::waitForTemporaryOwner() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (tryTake(thisThread())) return;
+    if (tryTake(threadNumber())) return;
     const auto owner = owner_.load(std::memory_order_relaxed);
     if (owner != 0 && (owner & kTemporary) == 0) throwOtherRunner();
     if (owner != 0) released_.wait(lock);
@@ -57,7 +83,7 @@ void RunnerLock::noteLastRunner() try {
   const auto& life = lifeOfThread();
   const std::lock_guard lock(mutex_);
   lastRunnerAlive_ = life;
-  lastRunner_.store(thisThread(), std::memory_order_relaxed);
+  lastRunner_.store(threadNumber(), std::memory_order_relaxed);
 } catch (...) {  // std::bad_alloc
   release();
   throw;

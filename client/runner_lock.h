@@ -20,12 +20,15 @@
 #include <memory>
 #include <mutex>
 
+#include "base/bias.h"
+
 namespace mpf {
 
 class RunnerLock {
  public:
   [[nodiscard]] bool isMine() const noexcept {
-    return (owner_.load(std::memory_order_relaxed) & ~kTemporary) == thisThread();
+    return bias_.isMine() ||
+           (owner_.load(std::memory_order_relaxed) & ~kTemporary) == threadNumber();
   }
 
   // Makes the calling thread, which does not own the lock, the runner.
@@ -33,12 +36,13 @@ class RunnerLock {
   //   throws     std::logic_error when another thread is the runner
   template <class WakeOwner>
   void acquire(const WakeOwner& wakeOwner) {
-    if (!tryTake(thisThread())) {
+    if (bias_.tryEnter()) return;
+    if (!tryTake(threadNumber())) {
       const WaitingRunner waiting(waitingRunners_);
       wakeOwner();
       waitForTemporaryOwner();
     }
-    if (lastRunner_.load(std::memory_order_relaxed) != thisThread()) noteLastRunner();
+    noteRunner();
   }
 
   // Throws the std::logic_error of acquire().
@@ -71,12 +75,6 @@ class RunnerLock {
     std::atomic<int>& number_;
   };
 
-  // An even number that no other thread of the process has or had.
-  static std::uint64_t thisThread() noexcept {
-    static std::atomic<std::uint64_t> last{0};
-    thread_local const std::uint64_t number = last.fetch_add(2, std::memory_order_relaxed) + 2;
-    return number;
-  }
   bool tryTake(std::uint64_t owner) noexcept {
     std::uint64_t free = 0;
     // PAIR(runner): what the previous owner did.
@@ -84,11 +82,15 @@ class RunnerLock {
                                           std::memory_order_relaxed);
   }
   void waitForTemporaryOwner();
+  void noteRunner();
+  void endOtherBias();
   void noteLastRunner();
 
-  std::atomic<std::uint64_t> owner_{0};  // thisThread() of the owner, plus kTemporary; 0: free
+  // threadNumber() of the owner, plus kTemporary; 0: free, or the runner has the bias
+  std::atomic<std::uint64_t> owner_{0};
+  Bias bias_;  // of the thread that has been the runner for a while
   std::atomic<int> waitingRunners_{0};  // threads that wait in acquire()
-  std::atomic<std::uint64_t> lastRunner_{0};  // its thisThread(); written under mutex_
+  std::atomic<std::uint64_t> lastRunner_{0};  // its threadNumber(); written under mutex_
   std::mutex mutex_;
   std::condition_variable released_;  // by a temporary owner
   std::weak_ptr<void> lastRunnerAlive_;  // under mutex_; expires when that thread ends

@@ -51,7 +51,7 @@ struct Connection {
     return requestId != 0 && owed(requestId).load(std::memory_order_relaxed) == requestId;
   }
 
-  std::shared_ptr<SpinLock> lock = std::make_shared<SpinLock>();
+  std::shared_ptr<BiasedLock> lock = std::make_shared<BiasedLock>();
   std::shared_ptr<MessageLink> channel;  // under lock; empty: free
   std::uint32_t index = 0;  // of the link in the server's endpoint
   std::uint32_t generation = 0;  // under lock

@@ -25,25 +25,23 @@ ReplyResult ReplySender::send(Message& message) noexcept {
 }
 
 ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) noexcept {
-  const auto route = message.route();
-  if (!connection.isOpenFor(route)) return ReplyResult::clientGone;
-  auto& owed = connection.owed(route.requestId);
-  const bool first = connection.owes(route.requestId);
+  if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
+  const auto requestId = message.route().requestId;
+  auto& owed = connection.owed(requestId);
+  const bool first = connection.owes(requestId);
   auto& link = connection.channel->link();
   const auto maxOutstanding = link.header().maxOutstanding;
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
   envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
-  envelope.requestId = route.requestId;
+  envelope.requestId = requestId;
   envelope.clientType = message.getClientType();
   envelope.clientExtra = message.getClientExtra();
   envelope.timeNs = message.getTimeStampNs();
   if (stamps_ && envelope.timeNs == 0) envelope.timeNs = Clock::wallNs();
   if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
 
-  auto unowned = route;
-  unowned.keeper = nullptr;
-  if (first) message.setRoute(unowned);
+  auto* const keeper = first ? message.exchangeKeeper(nullptr) : nullptr;
   const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
   const auto result = connection.channel->trySendLocked(envelope, message, limits);
   if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
@@ -51,19 +49,19 @@ ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) no
     if (first) owed.store(0, std::memory_order_relaxed);
     count(control_.sent);
     link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-    if (route.requestId == connection.timedId && first) {
+    if (requestId == connection.timedId && first) {
       record(control_.serviceNs, Clock::nowNs() - connection.timedFromNs);
       connection.timedId = 0;
     }
     return ReplyResult::sent;
   }
-  if (first) message.setRoute(route);
+  if (first) message.exchangeKeeper(keeper);
   count(control_.replyQueueFull);
   if (result == LinkSend::full) return ReplyResult::queueFull;
   return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
 }
 
-void ReplySender::sendFate(Connection& connection, const Envelope& request, Fate fate) noexcept {
+void ReplySender::sendFate(Connection& connection, Envelope request, Fate fate) noexcept {
   RequestFateMessage message({.fate = fate, .requestId = request.requestId});
   message.setClientType(request.clientType);
   message.setClientExtra(request.clientExtra);

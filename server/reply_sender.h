@@ -26,7 +26,7 @@ class ReplySender {
   // MessageServer::reply().
   ReplyResult send(Message& message) noexcept;
   // Ends a request of `connection` with a fate.
-  void sendFate(Connection& connection, const Envelope& request, Fate fate) noexcept;
+  void sendFate(Connection& connection, Envelope request, Fate fate) noexcept;
   // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
   void refuseAbandoned(const Route& route) noexcept;
   // Allocates a body in the memory that is shared with the client of `route`, or on the heap.

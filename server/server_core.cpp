@@ -179,14 +179,14 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   return true;
 }
 
-bool ServerCore::hasExpired(const Envelope& envelope) noexcept {
+bool ServerCore::hasExpired(Envelope envelope) noexcept {
   // PAIR(taken-before-clock): the client sees that the server counted the request as taken, or the
   // server sees that the deadline has passed.
   doorbell::fence();
   return Clock::nowNs() >= envelope.timeNs;
 }
 
-void ServerCore::noteTimes(Connection& connection, const Envelope& envelope) noexcept {
+void ServerCore::noteTimes(Connection& connection, Envelope envelope) noexcept {
   const auto nowNs = Clock::nowNs();
   const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
   record(endpoint_.control().queueWaitNs, waitedNs);

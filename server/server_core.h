@@ -65,8 +65,8 @@ class ServerCore {
   void throwNext();
   bool take(Connection& connection, Message& message) noexcept;
   void closeForProtocolError(Connection& connection) noexcept;
-  bool hasExpired(const Envelope& envelope) noexcept;
-  void noteTimes(Connection& connection, const Envelope& envelope) noexcept;
+  bool hasExpired(Envelope envelope) noexcept;
+  void noteTimes(Connection& connection, Envelope envelope) noexcept;
 
   std::string name_;
   std::int32_t location_;

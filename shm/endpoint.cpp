@@ -12,7 +12,6 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kHintsEvery = 16;  // messages of polled links between looks at the hints
 constexpr std::uint32_t kClockEvery = 64;  // spins between readings of the clock
 // spins between calls of sched_yield(), for peers that share the processor
 constexpr std::uint32_t kYieldEvery = 1u << 14;
@@ -82,29 +81,23 @@ void Endpoint::release(std::uint32_t index, Link& link) noexcept {
   window_.ring();
 }
 
-std::optional<std::uint32_t> Endpoint::next() noexcept {
+MaybeIndex Endpoint::nextAfterHints() noexcept {
   if (armed_) disarm();
-  // The polled links have had their turns. The next turn goes to another link: while all polled
-  // links are busy, the other links would never be reached below.
-  if (sinceHints_ >= (hot_.size() == HotLinks::kCapacity ? HotLinks::kCapacity : kHintsEvery)) {
+  if (areHintsDue()) {
     if (const auto index = nextCold()) return index;
   }
-  if (const auto index = hot_.next()) {
-    ++sinceHints_;
-    return index;
-  }
-  return nextReady();
+  return next();
 }
 
 // Takes one message of each ready link. The round ends when the index wraps around.
-std::optional<std::uint32_t> Endpoint::nextCold() noexcept {
+MaybeIndex Endpoint::nextCold() noexcept {
   const auto from = readyBits_.position();
   const auto index = nextReady();
   if (!index || *index < from) sinceHints_ = 0;
   return index;
 }
 
-std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
+MaybeIndex Endpoint::nextReady() noexcept {
   if (revisit_) {
     if (isRevisitDue()) readyBits_.set(*revisit_);
     revisit_.reset();
@@ -113,10 +106,11 @@ std::optional<std::uint32_t> Endpoint::nextReady() noexcept {
     sinceScan_ = 0;
     tryScanAllLinks();
   }
-  if (!readyBits_.hasAny()) return std::nullopt;
+  if (!readyBits_.hasAny()) return {};
   const auto index = readyBits_.tryTake([this](std::uint32_t of) { return isAttached(of); });
-  if (index && !hot_.tryAdd(*index, *links_[*index])) revisit_ = index;
-  return index;
+  if (!index) return {};
+  if (!hot_.tryAdd(*index, *links_[*index])) revisit_ = index;
+  return *index;
 }
 
 bool Endpoint::takeLocalEvent() noexcept {

@@ -59,9 +59,15 @@ class Endpoint {
   void release(std::uint32_t index, Link& link) noexcept;
 
   // --- events ---
-  // Index of a link that may have a message or a change of state; nullopt if there is no such link
+  // Index of a link that may have a message or a change of state; nothing if there is no such link
   // now. The caller takes one message of this link.
-  std::optional<std::uint32_t> next() noexcept;
+  MaybeIndex next() noexcept {
+    if (armed_ || areHintsDue()) return nextAfterHints();
+    const auto index = hot_.next();
+    if (!index) return nextReady();
+    ++sinceHints_;
+    return index;
+  }
   // Whether there may be an event that is not one of a link: a knock, a rescan or a local event.
   // Cheap: three loads.
   [[nodiscard]] bool hasControlEvents() const noexcept {
@@ -94,8 +100,18 @@ class Endpoint {
   [[nodiscard]] bool slept() const noexcept { return slept_; }
 
  private:
-  std::optional<std::uint32_t> nextReady() noexcept;
-  std::optional<std::uint32_t> nextCold() noexcept;
+  static constexpr std::uint32_t kHintsEvery =
+      16;  // messages of polled links between looks at hints
+
+  // The polled links have had their turns. The next turn goes to another link: while all polled
+  // links are busy, the other links would never be reached.
+  [[nodiscard]] bool areHintsDue() const noexcept {
+    return sinceHints_ >= kHintsEvery ||
+           (sinceHints_ >= HotLinks::kCapacity && hot_.size() == HotLinks::kCapacity);
+  }
+  MaybeIndex nextAfterHints() noexcept;
+  MaybeIndex nextReady() noexcept;
+  MaybeIndex nextCold() noexcept;
   [[nodiscard]] bool isAttached(std::uint32_t index) const noexcept {
     return index < links_.size() && links_[index] != nullptr;
   }

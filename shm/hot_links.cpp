@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "shm/hot_links.h"
 
+#include <algorithm>
+
 namespace mpf {
 
 bool HotLinks::tryAdd(std::uint32_t index, Link& link) noexcept {
@@ -11,8 +13,8 @@ bool HotLinks::tryAdd(std::uint32_t index, Link& link) noexcept {
     if (hot_[place].misses >= kReplaceAfter) cool(place);
   }
   if (size_ == kCapacity) return false;
-  hot_[size_++] = {index, 0, &link};
-  link.setWatched(true);
+  hot_[size_++] = {index, 0, 0, &link};
+  link.watch();
   return true;
 }
 
@@ -24,16 +26,26 @@ void HotLinks::remove(std::uint32_t index) noexcept {
   }
 }
 
+// One barrier for all links.
 void HotLinks::removeAll() noexcept {
-  while (size_ != 0) cool(size_ - 1);
+  if (size_ == 0) return;
+  auto barrier = Link::Barrier::fence;
+  for (std::size_t place = 0; place < size_; ++place)
+    barrier = std::max(barrier, hot_[place].link->unwatch());
+  Link::execute(barrier);
+  for (; size_ != 0; --size_) noteEvents(hot_[size_ - 1]);
 }
 
-std::optional<std::uint32_t> HotLinks::cool(std::size_t place) noexcept {
+void HotLinks::noteEvents(const Hot& cooled) noexcept {
+  if (cooled.link->hasEvents()) readyBits_.set(cooled.index);
+}
+
+MaybeIndex HotLinks::cool(std::size_t place) noexcept {
   const auto cooled = hot_[place];
   hot_[place] = hot_[--size_];
-  cooled.link->setWatched(false);
-  if (cooled.link->hasEvents()) readyBits_.set(cooled.index);
-  return cooled.link->incoming().hasMessage() ? std::optional(cooled.index) : std::nullopt;
+  Link::execute(cooled.link->unwatch());
+  noteEvents(cooled);
+  return cooled.link->incoming().hasMessage() ? cooled.index : MaybeIndex();
 }
 
 }  // namespace mpf

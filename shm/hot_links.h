@@ -10,9 +10,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
 #include "shm/link.h"
+#include "shm/maybe_index.h"
 #include "shm/ready_bits.h"
 
 namespace mpf {
@@ -24,6 +24,10 @@ class HotLinks {
   static constexpr std::uint32_t kCoolAfter = 4096;
   // polls without a message before a busier link may replace a polled one
   static constexpr std::uint32_t kReplaceAfter = 64;
+
+  // Polls with a message before the peer may send without a fence. The end of polling then costs a
+  // barrier in all processes (15 us), so a link that sleeps after each message never gets there.
+  static constexpr std::uint32_t kUnfencedAfter = 1024;
 
   explicit HotLinks(ReadyBits& readyBits) noexcept : readyBits_(readyBits) {}
 
@@ -41,29 +45,33 @@ class HotLinks {
     }
     return false;
   }
-  // Index of the next polled link that has a message; links take turns. nullopt if there is no
+  // Index of the next polled link that has a message; links take turns. Nothing if there is no
   // message, or if polling of an idle link has ended.
-  std::optional<std::uint32_t> next() noexcept {
+  MaybeIndex next() noexcept {
     for (std::size_t looked = 0; looked < size_; ++looked) {
       turn_ = turn_ + 1 < size_ ? turn_ + 1 : 0;
       auto& hot = hot_[turn_];
       if (hot.link->incoming().hasMessage()) {
         hot.misses = 0;
+        if (++hot.turns == kUnfencedAfter) hot.link->letPeerSendUnfenced();
         return hot.index;
       }
       if (++hot.misses >= kCoolAfter) return cool(turn_);
     }
-    return std::nullopt;
+    return {};
   }
 
  private:
   struct Hot {
     std::uint32_t index;
     std::uint32_t misses;  // consecutive polls without a message
+    std::uint32_t turns;  // polls with a message
     Link* link;
   };
   // Stops polling the link at `place`; returns its index if a message has arrived.
-  std::optional<std::uint32_t> cool(std::size_t place) noexcept;
+  MaybeIndex cool(std::size_t place) noexcept;
+  // Sets the ready bit if the link has an event.
+  void noteEvents(const Hot& cooled) noexcept;
 
   ReadyBits& readyBits_;
   std::array<Hot, kCapacity> hot_{};

@@ -86,7 +86,8 @@ struct SegmentHeader {
   std::int64_t createdMonotonicNs;
   std::int64_t createdRealtimeNs;
   std::int32_t location;
-  std::uint32_t reserved0;
+  // windows: 1 if barriers of other processes (membarrier) reach the owner; else 0
+  std::uint32_t takesBarriers;
   std::array<char, kBackplaneChars> backplane;
   // server window, pending bind, link: the server; client window: the client's label
   std::array<char, kNameChars> name;
@@ -235,11 +236,14 @@ struct ChunkRef {
 };
 static_assert(sizeof(ChunkRef) == 16);
 
-// The state of a ring's consumer. Written only by the consumer.
+// How the consumer of a ring looks for messages. With `polledUnfenced`, the producer needs no fence
+// between its message and its load of this value: before the consumer changes it, it executes a
+// barrier in all processes.
+enum class Watch : std::uint32_t { polled = 0, unwatched = 1, polledUnfenced = 2 };
+
+// How far a ring's consumer is.
 struct RingControl {
-  // 1: the consumer does not poll this ring; the producer sets the ready bit. 0: it polls the ring
-  alignas(kPairBytes) Word32 unwatched;
-  alignas(kPairBytes) Word64 freed;  // slots before this position may be overwritten
+  Word64 freed;  // slots before this position may be overwritten
   // messages taken so far; the consumer has not looked at a message that is not counted here
   Word64 taken;
 };
@@ -255,16 +259,20 @@ struct ReturnRing {
 enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused = 3 };
 
 struct LinkControl {
-  alignas(kPairBytes) std::atomic<LinkState> clientState;  // this to clientUnanswered: client
+  // Both sides read these words for each message, so nothing here changes with each message.
+  alignas(kPairBytes) std::atomic<LinkState> clientState;  // client
+  std::atomic<LinkState> serverState;  // server
+  std::atomic<Watch> requestWatch;  // server
+  std::atomic<Watch> replyWatch;  // client
+  Word32 serverIndex;  // bit of this link in the server window's ready bits; server
+  // The client writes these words for each message. The server seldom reads them.
+  alignas(kPairBytes) RingControl replies;
   Word64 clientSent;
   Word64 clientRefused;  // sends refused: queue full, too many unanswered, too large, no memory
   Word64 clientUnanswered;  // requests without a reply or fate
-  alignas(kPairBytes) std::atomic<LinkState> serverState;  // this to serverSent: server
-  Word32 serverIndex;  // bit of this link in the server window's ready bits
-  Word32 reserved0;
+  // The server writes these words for each message. The client seldom reads them.
+  alignas(kPairBytes) RingControl requests;
   Word64 serverSent;
-  RingControl requests;  // consumer: server
-  RingControl replies;  // consumer: client
   ReturnRing requestChunks;  // client's pool: borrower server
   ReturnRing replyChunks;  // server's pool: borrower client
 };

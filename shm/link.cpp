@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <fmt/format.h>
+#include <utility>
 
 #include <mpf/clock.h>
 
@@ -13,10 +14,6 @@
 
 namespace mpf {
 namespace {
-
-// Of the messages to a peer that polls, one in kSampleEvery is timed, because reading the clock
-// costs a quarter of a round trip. All messages to a peer that does not poll are timed.
-constexpr std::uint64_t kSampleEvery = 64;
 
 layout::Slot* slotsOf(const Segment& segment, LinkSide producer) {
   auto* slots = &segment.at<layout::Slot>(layout::kLinkRingsOffset);
@@ -30,6 +27,11 @@ std::uint32_t slotCount(const Segment& segment, LinkSide producer) {
 layout::RingControl& ringControl(const Segment& segment, LinkSide producer) {
   auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
   return producer == LinkSide::client ? control.requests : control.replies;
+}
+
+std::atomic<layout::Watch>& watchOf(const Segment& segment, LinkSide consumer) {
+  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+  return consumer == LinkSide::client ? control.replyWatch : control.requestWatch;
 }
 
 layout::ReturnRing& returnRing(const Segment& segment, LinkSide poolOwner) {
@@ -101,8 +103,8 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   header.ringBytesOffset = layout::kLinkControlOffset;
   auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
   control.clientState.store(layout::LinkState::open, std::memory_order_relaxed);
-  control.requests.unwatched.store(1, std::memory_order_relaxed);
-  control.replies.unwatched.store(1, std::memory_order_relaxed);
+  control.requestWatch.store(layout::Watch::unwatched, std::memory_order_relaxed);
+  control.replyWatch.store(layout::Watch::unwatched, std::memory_order_relaxed);
   const auto name = SegmentName::link(backplane, offer.incarnation, header.incarnation);
   if (!segment.tryPublish(name))
     throw SegmentError(fmt::format("{}: duplicate incarnation number", segments::path(name)));
@@ -137,8 +139,10 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
     : segment_(std::move(segment)),
       backplane_(backplane),
       side_(side),
-      outControl_(ringControl(segment_, side)),
-      out_(slotsOf(segment_, side), slotCount(segment_, side), outControl_),
+      maxMessageBytes_(std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX)),
+      outWatch_(watchOf(segment_, other(side))),
+      inWatch_(watchOf(segment_, side)),
+      out_(slotsOf(segment_, side), slotCount(segment_, side), ringControl(segment_, side)),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
           ringControl(segment_, other(side))),
       pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user},
@@ -193,30 +197,19 @@ void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
-bool Link::shouldSampleTime() const noexcept {
-  return outControl_.unwatched.load(std::memory_order_relaxed) != 0 ||
-         out_.messages() % kSampleEvery == 0;
-}
-
-LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body,
-                       const Limits& limits) noexcept {
-  if (body.size() > maxMessageBytes()) return LinkSend::tooLarge;
-  if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting &&
-      out_.waiting() >= limits.waiting)
-    return LinkSend::full;
+LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
+                           Limits limits) noexcept {
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
-
-  const auto slots = slotsFor(body.size());
   // Each message that the queue may still accept needs one slot. A message of several slots may use
   // only the slots beyond these.
   const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
   const auto queueLeft = limits.waiting > queued + 1 ? limits.waiting - queued - 1 : 0;
-  const auto needed = slots == 1 ? limits.reserve : std::max(limits.longReserve, queueLeft);
+  const auto needed = std::max(limits.longReserve, queueLeft);
   if (body.size() <= layout::kInlineBodyBytes && out_.tryPush(envelope, body, needed)) {
     afterPush();
     return LinkSend::sent;
   }
-  if (slots == 1 || !out_.hasFree(1 + limits.reserve)) return LinkSend::full;
+  if (!out_.hasFree(1 + limits.reserve)) return LinkSend::full;
 
   auto own = pool_.tryFind(body.data());
   const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
@@ -239,11 +232,10 @@ LinkSend Link::trySend(Envelope& envelope, std::span<const std::byte> body,
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
 
-void Link::afterPush() noexcept {
-  // PAIR(watch-fence): our message is before the fence, our load of `unwatched` after it.
+void Link::afterFencedPush() noexcept {
+  // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
-  MPF_STEP(peer_checked);
-  if (outControl_.unwatched.load(std::memory_order_relaxed) != 0) notifyPeer();
+  if (outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched) notifyPeer();
 }
 
 std::optional<Chunk> Link::tryAlloc(std::size_t bytes) noexcept { return pool_.tryAlloc(bytes); }
@@ -256,7 +248,7 @@ void Link::release(const std::byte* data) noexcept {
   }
 }
 
-std::optional<Chunk> Link::tryChunk(const Envelope& envelope) {
+std::optional<Chunk> Link::tryChunk(Envelope envelope) {
   layout::ChunkRef ref{};
   if (in_.inlineCapacity() == 0) return std::nullopt;
   in_.copyBody(std::as_writable_bytes(std::span(&ref, 1)));
@@ -277,10 +269,23 @@ std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
   throw ChunkUnavailable();
 }
 
-void Link::setWatched(bool watched) noexcept {
-  in_.control().unwatched.store(watched ? 0 : 1, std::memory_order_relaxed);
-  // PAIR(watch-fence): our `unwatched` is stored before the fence; the caller looks for messages
-  // after the fence.
+void Link::watch() noexcept { inWatch_.store(layout::Watch::polled, std::memory_order_relaxed); }
+
+void Link::letPeerSendUnfenced() noexcept {
+  if (!expedited_barrier::tryRegister() || peer_->header().takesBarriers == 0) return;
+  isUnfenced_ = true;
+  inWatch_.store(layout::Watch::polledUnfenced, std::memory_order_relaxed);
+}
+
+Link::Barrier Link::unwatch() noexcept {
+  inWatch_.store(layout::Watch::unwatched, std::memory_order_relaxed);
+  return std::exchange(isUnfenced_, false) ? Barrier::acrossProcesses : Barrier::fence;
+}
+
+void Link::execute(Barrier barrier) noexcept {
+  if (barrier == Barrier::acrossProcesses) return expedited_barrier::acrossProcesses();
+  // PAIR(watch-fence): our `Watch` is stored before the fence; the caller looks for messages after
+  // the fence.
   doorbell::fence();
 }
 

@@ -20,6 +20,8 @@
 #include <span>
 #include <string>
 
+#include "base/expedited_barrier.h"
+#include "base/step.h"
 #include "shm/pool.h"
 #include "shm/ring.h"
 #include "shm/window.h"
@@ -91,8 +93,6 @@ class Link {
   void notifyPeer() noexcept;
 
   // --- sending ---
-  // Always pass it by reference. To pass it in registers, the compiler would load several fields
-  // with one instruction while their separate stores are still in progress, which stalls.
   struct Limits {
     // highest number of messages that the peer has not taken; 0: as many as fit into the ring
     std::uint32_t waiting = 0;
@@ -101,13 +101,25 @@ class Link {
     // slots that a message of several slots must leave free; otherwise its body goes into a chunk
     std::uint32_t longReserve = 0;
   };
-  // Sends a body, and sets its length and flags in `envelope`. A short body is copied into slots of
+  // Sends a body; sets its length and flags in the envelope. A short body is copied into slots of
   // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets
   // this chunk; otherwise the body is copied into a new chunk.
-  LinkSend trySend(Envelope& envelope, std::span<const std::byte> body,
-                   const Limits& limits) noexcept;
+  LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
+                   const Limits& limits) noexcept {
+    if (body.size() > maxMessageBytes_) return LinkSend::tooLarge;
+    if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting &&
+        out_.waiting() >= limits.waiting)
+      return LinkSend::full;
+    if (body.size() > layout::kFirstSlotBodyBytes) return trySendLong(envelope, body, limits);
+    if (!out_.tryPushShort(envelope, body, limits.reserve)) return LinkSend::full;
+    afterPush();
+    return LinkSend::sent;
+  }
   // Whether the caller must set the time of the next message (Envelope::sentTick).
-  [[nodiscard]] bool shouldSampleTime() const noexcept;
+  [[nodiscard]] bool shouldSampleTime() const noexcept {
+    return outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched ||
+           out_.messages() % kSampleEvery == 0;
+  }
   // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
   // has taken.
   [[nodiscard]] RingProducer& outgoing() noexcept { return out_; }
@@ -129,20 +141,40 @@ class Link {
   // The chunk of the kSlotChunk message begun: borrowed from the peer, or one of ours that the peer
   // returns in a message. nullopt if the reference is invalid.
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
-  std::optional<Chunk> tryChunk(const Envelope& envelope);
+  std::optional<Chunk> tryChunk(Envelope envelope);
 
-  // Announces whether we poll this link. If not, the peer sets our ready bit with each message.
-  void setWatched(bool watched) noexcept;
+  // Announces that we poll this link: the peer need not set our ready bit.
+  void watch() noexcept;
+  // For a link that we poll and that is busy: lets the peer send without a fence, if barriers reach
+  // the peer.
+  void letPeerSendUnfenced() noexcept;
+  // Announces that we do not poll this link: the peer sets our ready bit with each message. The
+  // caller executes the barrier that is returned, for several links the stronger one, and then
+  // looks for messages.
+  enum class Barrier { fence, acrossProcesses };
+  [[nodiscard]] Barrier unwatch() noexcept;
+  static void execute(Barrier barrier) noexcept;
 
   // Largest body that may be sent: the limit of the link, or the largest length that an envelope
   // can represent, if that is smaller.
-  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept {
-    return std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX);
-  }
+  [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return maxMessageBytes_; }
 
  private:
+  // Of the messages to a peer that polls, one in kSampleEvery is timed, because reading the clock
+  // costs a quarter of a round trip. All messages to a peer that does not poll are timed.
+  static constexpr std::uint64_t kSampleEvery = 64;
+
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
-  void afterPush() noexcept;
+  // For a body that does not fit into the first slot. Takes copies, so that those of trySend() stay
+  // in registers.
+  LinkSend trySendLong(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept;
+  void afterPush() noexcept {
+    MPF_STEP(peer_checked);
+    expedited_barrier::frequentSide();
+    if (outWatch_.load(std::memory_order_relaxed) != layout::Watch::polledUnfenced)
+      afterFencedPush();
+  }
+  void afterFencedPush() noexcept;
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
 
   ForkGuard forkGuard_;
@@ -151,7 +183,10 @@ class Link {
   LinkSide side_;
   std::shared_ptr<PeerWindow> peer_;
   std::uint32_t peerIndex_ = 0;
-  const layout::RingControl& outControl_;
+  std::uint64_t maxMessageBytes_;
+  const std::atomic<layout::Watch>& outWatch_;  // the peer's
+  std::atomic<layout::Watch>& inWatch_;
+  bool isUnfenced_ = false;  // the peer may send without a fence
   RingProducer out_;
   RingConsumer in_;
   PoolOwner pool_;

@@ -22,6 +22,7 @@
 
 #include "base/step.h"
 #include "shm/layout.h"
+#include "shm/prefetch.h"
 
 namespace mpf {
 
@@ -76,23 +77,22 @@ class RingProducer {
     const auto count = slotsFor(body.size());
     if (!hasFree(count + reserve)) return false;
     auto& first = slot(pushed_);
-    first.type = envelope.type;
-    first.slots = static_cast<std::uint8_t>(count);
-    first.flags = envelope.flags;
-    first.bodyBytes = envelope.bodyBytes;
-    first.requestId = envelope.requestId;
-    first.clientType = envelope.clientType;
-    first.clientExtra = envelope.clientExtra;
-    first.sentTick = envelope.sentTick;
-    first.deadlineNs = envelope.timeNs;
+    write(first, envelope, count, envelope.bodyBytes);
     copyBody(first, body);
-    MPF_STEP(slot_written);
-    const auto sequence = pushed_ + 1;
-    pushed_ += count;
-    ++messages_;
-    // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
-    first.sequence.store(sequence, std::memory_order_release);
-    MPF_STEP(slot_published);
+    publish(first, count);
+    return true;
+  }
+  // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes; ignores envelope.bodyBytes.
+  [[nodiscard]] bool tryPushShort(const Envelope& envelope, std::span<const std::byte> body,
+                                  std::uint32_t reserve) noexcept {
+    if (!hasFree(1 + reserve)) return false;
+    prefetchForWriting(&slot(pushed_ + kPrefetchedSlots));
+    auto& first = slot(pushed_);
+    write(first, envelope, 1, static_cast<std::uint32_t>(body.size()));
+    if (body.size() == layout::kFirstSlotBodyBytes) [[likely]]
+      detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
+    else if (!body.empty()) std::memcpy(first.body.data(), body.data(), body.size());
+    publish(first, 1);
     return true;
   }
 
@@ -118,13 +118,36 @@ class RingProducer {
   }
 
  private:
+  // The producer's processor owns the line of a slot before it is written: it was asked for it this
+  // many slots ago.
+  static constexpr std::uint64_t kPrefetchedSlots = 8;
+
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
   }
 
+  static void write(layout::Slot& first, const Envelope& envelope, std::uint32_t slots,
+                    std::uint32_t bodyBytes) noexcept {
+    first.type = envelope.type;
+    first.slots = static_cast<std::uint8_t>(slots);
+    first.flags = envelope.flags;
+    first.bodyBytes = bodyBytes;
+    first.requestId = envelope.requestId;
+    first.clientType = envelope.clientType;
+    first.clientExtra = envelope.clientExtra;
+    first.sentTick = envelope.sentTick;
+    first.deadlineNs = envelope.timeNs;
+  }
+  void publish(layout::Slot& first, std::uint32_t slots) noexcept {
+    MPF_STEP(slot_written);
+    const auto sequence = pushed_ + 1;
+    pushed_ += slots;
+    ++messages_;
+    // PAIR(slot-filled): a consumer that sees this sequence sees the whole message.
+    first.sequence.store(sequence, std::memory_order_release);
+    MPF_STEP(slot_published);
+  }
   void copyBody(layout::Slot& first, std::span<const std::byte> body) const noexcept {
-    if (body.size() == layout::kFirstSlotBodyBytes)
-      return detail::copyWords<layout::kFirstSlotBodyBytes>(first.body.data(), body.data());
     const auto head = std::min(body.size(), first.body.size());
     if (head != 0) std::memcpy(first.body.data(), body.data(), head);
     body = body.subspan(head);
@@ -148,11 +171,11 @@ class RingProducer {
 class RingConsumer {
  public:
   RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own) noexcept
-      : slots_(slots), capacity_(capacity), own_(own) {}
+      : slots_(slots), capacity_(capacity), own_(own), first_(slots) {}
 
   [[nodiscard]] bool hasMessage() const noexcept {
     // PAIR(slot-filled): the message is complete.
-    return slot(taken_).sequence.load(std::memory_order_acquire) == taken_ + 1;
+    return first_->sequence.load(std::memory_order_acquire) == taken_ + 1;
   }
 
   // Counts the next message as taken and copies its envelope. Call it only after hasMessage()
@@ -162,11 +185,13 @@ class RingConsumer {
     // PAIR(message-taken): stored before we look at the message.
     own_.taken.store(messages_, std::memory_order_release);
     MPF_STEP(message_counted);
-    const auto& first = slot(taken_);
+    const auto& first = *first_;
     slotsNow_ = first.slots;
     return {first.type,       first.flags,       first.bodyBytes, first.requestId,
             first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
   }
+  // Whether the message begun has one slot.
+  [[nodiscard]] bool isShort() const noexcept { return slotsNow_ == 1; }
 
   // Body bytes in the slots of the message begun; 0 if its number of slots is invalid.
   [[nodiscard]] std::size_t inlineCapacity() const noexcept {
@@ -175,11 +200,11 @@ class RingConsumer {
   }
 
   void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
-    detail::copyWords<layout::kFirstSlotBodyBytes>(body.data(), slot(taken_).body.data());
+    detail::copyWords<layout::kFirstSlotBodyBytes>(body.data(), first_->body.data());
   }
   // Copies the body of the message begun. `body` must not be longer than inlineCapacity().
   void copyBody(std::span<std::byte> body) const noexcept {
-    const auto& first = slot(taken_);
+    const auto& first = *first_;
     const auto head = std::min(body.size(), first.body.size());
     if (head != 0) std::memcpy(body.data(), first.body.data(), head);
     body = body.subspan(head);
@@ -194,6 +219,7 @@ class RingConsumer {
   // Ends the message begun. Slots are freed in batches, and when the ring is empty.
   void end() noexcept {
     taken_ += slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u;
+    first_ = &slot(taken_);
     if (taken_ - freed_ >= capacity_ / kFreeFraction || !hasMessage()) {
       freed_ = taken_;
       // PAIR(slot-freed): we have finished reading these slots.
@@ -203,7 +229,6 @@ class RingConsumer {
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
-  [[nodiscard]] layout::RingControl& control() const noexcept { return own_; }
 
  private:
   layout::Slot& slot(std::uint64_t position) const noexcept {
@@ -213,6 +238,7 @@ class RingConsumer {
   layout::Slot* slots_;
   std::uint64_t capacity_;
   layout::RingControl& own_;
+  const layout::Slot* first_;  // slot(taken_)
   std::uint64_t taken_ = 0;  // slots
   std::uint64_t freed_ = 0;  // private copy of own_.freed
   std::uint64_t messages_ = 0;

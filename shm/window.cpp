@@ -12,6 +12,7 @@
 #include <system_error>
 #include <thread>
 
+#include "base/expedited_barrier.h"
 #include "base/step.h"
 #include "shm/segment_name.h"
 
@@ -92,6 +93,7 @@ OwnWindow::OwnWindow(const std::string& backplane, layout::SegmentKind kind,
   auto& header = window_.sharedHeader();
   header.linkMode = rights.mode;
   header.linkGroup = rights.group;
+  header.takesBarriers = expedited_barrier::tryRegister() ? 1 : 0;
   describe(header);
   const auto incarnation = header.incarnation;
   control().state.store(layout::WindowState::open, std::memory_order_relaxed);

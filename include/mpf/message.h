@@ -41,6 +41,7 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <utility>
 
 #include <mpf/detail/copy_words.h>
 #include <mpf/message_body.h>
@@ -173,6 +174,10 @@ class Message {
   // The route is not owned: setRoute() drops the former one without a call of its keeper.
   [[nodiscard]] const Route& route() const noexcept { return state_.route; }
   void setRoute(const Route& route) noexcept { state_.route = route; }
+  // Replaces the keeper of the route, and returns the former one without a call.
+  RouteKeeper* exchangeKeeper(RouteKeeper* keeper) noexcept {
+    return std::exchange(state_.route.keeper, keeper);
+  }
 
   // Becomes the owner of a body and checks it: isSound() is the result. The lender gets the body
   // back when the handle is destroyed or reset, also when the body is invalid.
@@ -241,6 +246,14 @@ class Message {
   }
 
  protected:
+  // Fills an empty handle with a scalar.
+  template <class T>
+  void setFields(MessageType type, const T& fields) noexcept {
+    state_.type = type;
+    state_.inlineSize = sizeof(T);
+    state_.sound = true;
+    std::memcpy(state_.at.inside.data(), &fields, sizeof(T));
+  }
   // True when the type is T and the body is valid; false for an empty handle.
   template <class T>
   [[nodiscard]] bool isA() const noexcept {

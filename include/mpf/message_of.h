@@ -52,8 +52,9 @@ class MessageOf : public Message {
       : MessageOf(T{}) {}
   explicit MessageOf(const T& fields) noexcept
     requires ScalarBody<T>
-      : Message(copyInline(T::kType, std::as_bytes(std::span(&fields, 1)))) {
+  {
     static_assert(sizeof(T) <= kInlineBytes);
+    setFields(T::kType, fields);
   }
 
   // Allocates an array of n elements on the heap: fields 0, elements not initialised, and room for

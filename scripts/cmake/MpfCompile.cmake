@@ -10,6 +10,9 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 
 # Public headers are included as users do: <mpf/message.h>. All others are named from
 # the root: "shm/link.h".
+# Fields of messages are stored one by one and loaded soon afterwards. A vector load of several
+# fields would have to wait until their stores have reached the cache.
+add_compile_options(-fno-tree-slp-vectorize)
 add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}"
   "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
 

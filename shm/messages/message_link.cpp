@@ -5,7 +5,15 @@
 
 namespace mpf {
 
-MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& message) noexcept try {
+MessageLink::Take MessageLink::checkLong(Envelope envelope) const noexcept {
+  const auto room = link_->incoming().inlineCapacity();
+  const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
+  return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room)
+             ? Take::message
+             : Take::invalid;
+}
+
+MessageLink::Finish MessageLink::readBody(Envelope envelope, Message& message) noexcept try {
   const auto type = static_cast<MessageType>(envelope.type);
   message.reset();
   if ((envelope.flags & layout::kSlotChunk) != 0) {
@@ -31,7 +39,7 @@ MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& mes
   return Finish::unavailable;
 }
 
-void MessageLink::discard(const Envelope& envelope) noexcept {
+void MessageLink::discard(Envelope envelope) noexcept {
   try {
     if ((envelope.flags & layout::kSlotChunk) != 0) {
       const std::lock_guard guard(*lock_);
@@ -43,8 +51,8 @@ void MessageLink::discard(const Envelope& envelope) noexcept {
   link_->incoming().end();
 }
 
-LinkSend MessageLink::trySendLocked(Envelope& envelope, Message& message,
-                                    const Link::Limits& limits) noexcept {
+LinkSend MessageLink::trySendBodyLocked(Envelope envelope, Message& message,
+                                        Link::Limits limits) noexcept {
   const bool ours = message.lender() == this;
   const auto result = link_->trySend(envelope, message.body(), limits);
   if (result == LinkSend::sentInPlace) {

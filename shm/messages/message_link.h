@@ -13,18 +13,18 @@
 
 #include <mpf/message.h>
 
-#include "base/spin_lock.h"
+#include "base/biased_lock.h"
 #include "shm/link.h"
 
 namespace mpf {
 
 class MessageLink final : public BodyLender, public std::enable_shared_from_this<MessageLink> {
  public:
-  MessageLink(std::unique_ptr<Link> link, std::shared_ptr<SpinLock> lock)
+  MessageLink(std::unique_ptr<Link> link, std::shared_ptr<BiasedLock> lock)
       : link_(std::move(link)), lock_(std::move(lock)) {}
 
   [[nodiscard]] Link& link() noexcept { return *link_; }
-  [[nodiscard]] SpinLock& lock() noexcept { return *lock_; }
+  [[nodiscard]] BiasedLock& lock() noexcept { return *lock_; }
 
   enum class Take { nothing, message, invalid };
   // Begins the next message: copies its envelope and counts it as taken. Returns `nothing`, and
@@ -32,11 +32,8 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   Take tryBegin(Envelope& envelope) noexcept {
     if (!link_->incoming().hasMessage()) return Take::nothing;
     envelope = link_->incoming().begin();
-    const auto room = link_->incoming().inlineCapacity();
-    const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
-    return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room)
-               ? Take::message
-               : Take::invalid;
+    const bool fitsSlot = link_->incoming().isShort() && isShort(envelope);
+    return fitsSlot ? Take::message : checkLong(envelope);
   }
   // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
   // has ended or memory is short; the message is lost, but the link is sound.
@@ -45,8 +42,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   // unless the result is `message`.
   [[nodiscard]] Finish tryFinish(const Envelope& envelope, Message& message) noexcept {
     auto finish = Finish::message;
-    if ((envelope.flags & layout::kSlotChunk) == 0 &&
-        envelope.bodyBytes <= layout::kFirstSlotBodyBytes) {
+    if (isShort(envelope)) {
       message.assignInline(
           static_cast<MessageType>(envelope.type), envelope.bodyBytes, [&](auto body) {
             link_->incoming().copyFirst(body.template first<layout::kFirstSlotBodyBytes>());
@@ -61,12 +57,16 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
     return finish;
   }
   // Ends the message begun without reading its body; returns its chunk, if it has one.
-  void discard(const Envelope& envelope) noexcept;
+  void discard(Envelope envelope) noexcept;
 
   // Sends `message`. The caller holds lock(). After a successful send, `message` has no body of
   // this link; the caller destroys it after it has released the lock, because the return of a body
   // of another link may need that lock. If the message was not sent, `message` is unchanged.
-  LinkSend trySendLocked(Envelope& envelope, Message& message, const Link::Limits& limits) noexcept;
+  LinkSend trySendLocked(const Envelope& envelope, Message& message,
+                         const Link::Limits& limits) noexcept {
+    if (!message.isInline()) return trySendBodyLocked(envelope, message, limits);
+    return link_->trySend(envelope, message.body(), limits);
+  }
 
   // Allocates a body in the pool of this link, or on the heap if the body is short or the pool has
   // no chunk for it.
@@ -75,13 +75,21 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
+  // Whether the body fits into one slot.
+  [[nodiscard]] static bool isShort(const Envelope& envelope) noexcept {
+    return (envelope.flags & layout::kSlotChunk) == 0 &&
+           envelope.bodyBytes <= layout::kFirstSlotBodyBytes;
+  }
+  [[nodiscard]] Take checkLong(Envelope envelope) const noexcept;
   // For a message that does not fit into one slot.
-  Finish readBody(const Envelope& envelope, Message& message) noexcept;
+  Finish readBody(Envelope envelope, Message& message) noexcept;
+  // For a body outside the handle.
+  LinkSend trySendBodyLocked(Envelope envelope, Message& message, Link::Limits limits) noexcept;
   void lendOne() noexcept;
   void endLending() noexcept;
 
   std::unique_ptr<Link> link_;
-  std::shared_ptr<SpinLock> lock_;
+  std::shared_ptr<BiasedLock> lock_;
   std::uint32_t lent_ = 0;  // bodies that have not been returned; under lock_
   std::shared_ptr<MessageLink> self_;  // set while lent_ is not 0; under lock_
 };

@@ -42,7 +42,7 @@ void lookAt(const Message& message) {
 }
 
 Talk::Talk(std::unique_ptr<Link> link)
-    : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<SpinLock>())) {
+    : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<BiasedLock>())) {
   [[maybe_unused]] const auto unused = behind(channel_->link());
   ASAN_POISON_MEMORY_REGION(unused.data(), unused.size());
 }
@@ -62,7 +62,8 @@ void Talk::turn(std::uint64_t value) {
     link.setState(layout::LinkState::closed);
   sendArray(*channel_, static_cast<std::uint32_t>(value), value % 2048);
   static_cast<void>(link.outgoing().isTaken(value % 8));
-  link.setWatched(value % 2 != 0);
+  if (value % 2 != 0) link.watch();
+  else Link::execute(link.unwatch());
   link.notifyPeer();
 }
 

@@ -131,7 +131,8 @@ void Attacker::goBack(Link& link) {
   auto& returns = isClient ? control.replyChunks : control.requestChunks;
   consumer.freed.store(random_.nasty(), std::memory_order_relaxed);
   consumer.taken.store(random_.oneIn(2) ? 0 : random_.nasty(), std::memory_order_relaxed);
-  consumer.unwatched.store(static_cast<std::uint32_t>(random_.below(3)), std::memory_order_relaxed);
+  auto& watch = isClient ? control.replyWatch : control.requestWatch;
+  watch.store(static_cast<layout::Watch>(random_.below(4)), std::memory_order_relaxed);
   returns.chunks[random_.below(returns.chunks.size())].store(
       random_.below(4) << 32 | random_.below(40), std::memory_order_relaxed);
   returns.returned.store(random_.oneIn(4) ? random_.nasty() : random_.below(1000),

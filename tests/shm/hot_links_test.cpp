@@ -24,8 +24,8 @@ class HotLinksTest : public ShmTest {
   }
   // Whether the peer of the link need not set its ready bit.
   bool isWatched(std::uint32_t index) {
-    const auto& ring = links_[index].server.control().requests;
-    return ring.unwatched.load(std::memory_order_relaxed) == 0;
+    const auto& control = links_[index].server.control();
+    return control.requestWatch.load(std::memory_order_relaxed) != layout::Watch::unwatched;
   }
   void poll(std::uint32_t times) {
     for (std::uint32_t i = 0; i < times; ++i) EXPECT_FALSE(hot_->next());

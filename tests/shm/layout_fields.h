@@ -36,7 +36,7 @@ inline nlohmann::json layoutFields() {
                               MPF_FIELD(createdMonotonicNs),
                               MPF_FIELD(createdRealtimeNs),
                               MPF_FIELD(location),
-                              MPF_FIELD(reserved0),
+                              MPF_FIELD(takesBarriers),
                               MPF_FIELD(backplane),
                               MPF_FIELD(name),
                               MPF_FIELD(program),
@@ -89,15 +89,15 @@ inline nlohmann::json layoutFields() {
     all["LinkControl"] = {
         {"bytes", sizeof(Struct)},
         {"fields",
-         {MPF_FIELD(clientState), MPF_FIELD(clientSent), MPF_FIELD(clientRefused),
-          MPF_FIELD(clientUnanswered), MPF_FIELD(serverState), MPF_FIELD(serverIndex),
-          MPF_FIELD(reserved0), MPF_FIELD(serverSent), MPF_FIELD(requests), MPF_FIELD(replies),
-          MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
+         {MPF_FIELD(clientState), MPF_FIELD(serverState), MPF_FIELD(requestWatch),
+          MPF_FIELD(replyWatch), MPF_FIELD(serverIndex), MPF_FIELD(replies), MPF_FIELD(clientSent),
+          MPF_FIELD(clientRefused), MPF_FIELD(clientUnanswered), MPF_FIELD(requests),
+          MPF_FIELD(serverSent), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
   }
   {
     using Struct = RingControl;
     all["RingControl"] = {{"bytes", sizeof(Struct)},
-                          {"fields", {MPF_FIELD(unwatched), MPF_FIELD(freed), MPF_FIELD(taken)}}};
+                          {"fields", {MPF_FIELD(freed), MPF_FIELD(taken)}}};
   }
   {
     using Struct = Slot;

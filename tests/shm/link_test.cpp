@@ -183,10 +183,10 @@ TEST_F(LinkTest, SetsTheReadyBitWhileTheReceiverDoesNotPoll) {
   const auto takeBits = [&] { return hints.readyBits[0].exchange(0, std::memory_order_relaxed); };
   takeBits();
 
-  link.server.setWatched(true);
+  link.server.watch();
   ASSERT_EQ(sendBody(link.client, filled(1)), LinkSend::sent);
   EXPECT_EQ(takeBits(), 0u);
-  link.server.setWatched(false);
+  Link::execute(link.server.unwatch());
   ASSERT_EQ(sendBody(link.client, filled(1)), LinkSend::sent);
   EXPECT_EQ(takeBits(), std::uint64_t{1} << link.serverIndex);
 
@@ -196,9 +196,9 @@ TEST_F(LinkTest, SetsTheReadyBitWhileTheReceiverDoesNotPoll) {
 
 TEST_F(LinkTest, TimesEveryMessageToASleepingPeerAndOneIn64ToAPollingOne) {
   const auto link = makeLink();
-  link.server.setWatched(false);
+  Link::execute(link.server.unwatch());
   EXPECT_TRUE(link.client.shouldSampleTime());
-  link.server.setWatched(true);
+  link.server.watch();
 
   int timed = 0;
   for (int i = 0; i < 256; ++i) {

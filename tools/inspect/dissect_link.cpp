@@ -105,6 +105,7 @@ struct RingPlace {
   std::uint32_t slots;
   const layout::RingControl& control;
   const layout::RingControl& laterControl;
+  layout::Watch watch;
   std::uint64_t sent;
 };
 
@@ -120,7 +121,7 @@ Tree dissectRing(const RingPlace& place, const SegmentImage& image, const Segmen
             {"waiting", words.waiting()},
             {"freed", words.freed},
             {"end", view.end},
-            {"polled", said(place.control.unwatched) == 0}};
+            {"polled", place.watch != layout::Watch::unwatched}};
   if (view.overwritten != 0) tree["overwritten"] = view.overwritten;
   tree["messages"] = Tree::array();
   const auto skipped = view.messages.size() - std::min(view.messages.size(), options.last);
@@ -204,12 +205,13 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
   auto again = SegmentImage::tryReadFile(path);
   const auto& later = again && again->bytes().size() == image.bytes().size() ? *again : image;
   const auto replies = layout::kLinkRingsOffset + header.queueSlots * sizeof(layout::Slot);
-  tree["requests"] = dissectRing({layout::kLinkRingsOffset, header.queueSlots, control.requests,
-                                  later.link().requests, said(control.clientSent)},
-                                 image, later, beside, options);
-  tree["replies"] = dissectRing(
-      {replies, header.replySlots, control.replies, later.link().replies, said(control.serverSent)},
-      image, later, beside, options);
+  tree["requests"] =
+      dissectRing({layout::kLinkRingsOffset, header.queueSlots, control.requests,
+                   later.link().requests, control.requestWatch, said(control.clientSent)},
+                  image, later, beside, options);
+  tree["replies"] = dissectRing({replies, header.replySlots, control.replies, later.link().replies,
+                                 control.replyWatch, said(control.serverSent)},
+                                image, later, beside, options);
   tree["client_pool"] = dissectPool(0, control.requestChunks, beside);
   tree["server_pool"] = dissectPool(1, control.replyChunks, beside);
 }

@@ -169,8 +169,8 @@ class SnapshotReader {
     view.serverState = value(control.serverState);
     view.clientIndex = header.clientIndex;
     view.serverIndex = value(control.serverIndex);
-    view.isPolledByClient = value(control.replies.unwatched) == 0;
-    view.isPolledByServer = value(control.requests.unwatched) == 0;
+    view.isPolledByClient = value(control.replyWatch) != layout::Watch::unwatched;
+    view.isPolledByServer = value(control.requestWatch) != layout::Watch::unwatched;
     view.queueSize = header.queueSize;
     view.requests = {value(control.clientSent), value(control.requests.taken)};
     view.replies = {value(control.serverSent), value(control.replies.taken)};

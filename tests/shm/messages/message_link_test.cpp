@@ -25,7 +25,8 @@ class MessageLinkTest : public ShmTest {
   }
   static std::shared_ptr<MessageLink> makeLink(End& end, std::uint32_t index) {
     end.endpoint.detach(index);
-    return std::make_shared<MessageLink>(std::move(end.links[index]), std::make_shared<SpinLock>());
+    return std::make_shared<MessageLink>(std::move(end.links[index]),
+                                         std::make_shared<BiasedLock>());
   }
   // An array whose elements are their indices, in the memory that the client's link chooses.
   Int32ArrayMessage allocate(std::size_t n) {

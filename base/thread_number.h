@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// threadNumber(): identifies a thread of this process. Unlike a thread id or an address of
+// thread-local data, no later thread gets the number of a thread that has ended.
+//
+// Threads  any.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+namespace mpf {
+
+// An even number that no other thread of this process has or had; never 0.
+inline std::uint64_t threadNumber() noexcept {
+  static constinit std::atomic<std::uint64_t> last{0};
+  static constinit thread_local std::uint64_t number = 0;
+  if (number == 0) number = last.fetch_add(2, std::memory_order_relaxed) + 2;
+  return number;
+}
+
+}  // namespace mpf
