@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "client/runner_lock.h"
 
+#include <atomic>
 #include <functional>
 #include <gtest/gtest.h>
 #include <latch>
@@ -67,6 +68,95 @@ TEST(RunnerLock, RefusesASecondRunner) {
   });
 
   lock.release();
+}
+
+// The thread that has been the runner for a while enters without a locked instruction.
+class LockOfALoneRunner {
+ public:
+  LockOfALoneRunner() {
+    for (int i = 0; i < 10'000; ++i) {
+      lock_.acquire(wakeNobody);
+      lock_.release();
+    }
+  }
+  RunnerLock& lock() { return lock_; }
+
+ private:
+  RunnerLock lock_;
+};
+
+TEST(RunnerLock, RefusesASecondRunnerBesideALoneOne) {
+  LockOfALoneRunner alone;
+  auto& lock = alone.lock();
+  lock.acquire(wakeNobody);
+  EXPECT_TRUE(lock.isMine());
+
+  inAnotherThread([&] {
+    EXPECT_FALSE(lock.isMine());
+    EXPECT_THROW(lock.acquire(wakeNobody), std::logic_error);
+    EXPECT_FALSE(lock.tryAcquireTemporarily());
+  });
+
+  EXPECT_TRUE(lock.isMine());
+  lock.release();
+  EXPECT_FALSE(lock.isMine());
+  lock.acquire(wakeNobody);
+  EXPECT_TRUE(lock.isMine());
+  lock.release();
+}
+
+TEST(RunnerLock, AnotherThreadMayRunAfterALoneRunner) {
+  LockOfALoneRunner alone;
+  auto& lock = alone.lock();
+
+  inAnotherThread([&] {
+    lock.acquire(wakeNobody);
+    EXPECT_TRUE(lock.isMine());
+    lock.release();
+    EXPECT_TRUE(lock.tryAcquireTemporarily());
+    lock.release();
+  });
+
+  EXPECT_TRUE(lock.tryAcquireTemporarily());
+  lock.release();
+}
+
+// Two threads become alone runners, lose this right to each other, and are refused, all the time.
+TEST(RunnerLock, ThreadsThatCompeteNeverRunTogetherAndNeverHang) {
+  const Watchdog watchdog("runner lock");
+  RunnerLock lock;
+  std::atomic<int> running{0};
+  std::atomic<bool> isOver{false};
+  const auto run = [&](int times) {
+    for (int i = 0; i < times; ++i) {
+      lock.acquire(wakeNobody);
+      EXPECT_EQ(++running, 1);
+      EXPECT_TRUE(lock.isMine());
+      --running;
+      lock.release();
+    }
+  };
+  std::atomic<int> refused{0};
+  const auto compete = [&] {
+    while (!isOver) {
+      try {
+        run(1000);
+      } catch (const std::logic_error&) {
+        ++refused;
+      }
+      if (lock.tryAcquireTemporarily()) {
+        EXPECT_EQ(++running, 1);
+        --running;
+        lock.release();
+      }
+    }
+  };
+  std::thread first(compete);
+  std::thread second(compete);
+  while (refused < 100) std::this_thread::yield();
+  isOver = true;
+  first.join();
+  second.join();
 }
 
 TEST(RunnerLock, ARunnerWaitsForATemporaryOwner) {

@@ -2,11 +2,12 @@
 // Ready bits: two levels of hints that say which links have messages, and links that the owner
 // polls instead; with weak memory.
 //
-//   peer    message ─ fence ─ unwatched? ─ bit of the link ─ bit of its word
+//   peer    message ─ polled without fences? ─ fence ─ unwatched? ─ bit of the link ─ bit of its word
 //   owner   clear bit of the word ─ read bits ─ clear bit of the link
 //           ─ more left? set bit of the word ─ poll or revisit link
 //
-//   MODELS  shm/link.cpp: afterPush setWatched
+//   MODELS  shm/link.h: afterPush
+//   MODELS  shm/link.cpp: afterFencedPush watch letPeerSendUnfenced unwatch execute
 //   MODELS  shm/window.cpp: notify
 //   MODELS  shm/ready_bits.cpp: set tryTakeFrom
 //   MODELS  shm/hot_links.cpp: tryAdd cool
@@ -17,7 +18,10 @@
 //   ASSUMES two links of one word, two messages each; one link at a time may be polled
 //   ASSUMES no process overwrites the hints; the scan of all links repairs that
 //           (tests/shm/endpoint_hints_test.cpp)
-//   BREAK   NO_WATCH_FENCE   the peer reads `unwatched` before its message is visible
+//   BREAK   NO_WATCH_FENCE   the peer reads "unwatched" before its message is visible
+//   BREAK   NO_SECOND_LOOK   the peer uses what it read before its fence
+//   BREAK   NO_BARRIER       the owner executes its own fence alone after it let peers omit theirs
+//   BREAK   BARRIER_EARLY    the owner executes the barrier before it stores "unwatched"
 //   BREAK   NO_COOL_FENCE    the owner looks for messages before its "not polled" is visible
 //   BREAK   NO_COOL_LOOK     the owner does not look when it stops polling
 //   BREAK   WORD_FIRST       the peer sets the bit of the word before the bit of the link
@@ -28,13 +32,17 @@
 #define OWNER 2
 #define PROCESSES 3
 #define SENT(link) (link)
-#define POLLED(link) (LINKS + (link))  // the opposite of the word `unwatched` of the layout
+#define WATCH(link) (LINKS + (link))
 #define WORDS 4
-#define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, POLLED(0)) FLUSH(OWNER, POLLED(1))
+#define FLUSH_ALL FLUSH(0, SENT(0)) FLUSH(1, SENT(1)) FLUSH(OWNER, WATCH(0)) FLUSH(OWNER, WATCH(1))
 #include "memory.pml"
 
 #define MESSAGES 2
 #define NONE 2
+// The values of a watch word; their numbers differ from those of the layout.
+#define UNWATCHED 0
+#define POLLED 1
+#define UNFENCED 2
 
 byte bits;  // bit i: link i may have a message
 bool word;  // bits is not 0
@@ -53,26 +61,34 @@ inline setBits(process, link) {
 }
 
 proctype Peer(byte me) {
-  byte sent;
-  bool polled;
+  byte sent, watch;
   do
   :: sent < MESSAGES ->
     sent++;
     storeRelease(me, SENT(me), sent);
-#ifndef NO_WATCH_FENCE
-    fence(me);
-#endif
-    polled = memory[POLLED(me)];
+    watch = memory[WATCH(me)];
     if
-    :: polled
-    :: !polled -> setBits(me, me)
-    fi
+    :: watch == UNFENCED
+    :: watch != UNFENCED ->
+#ifndef NO_WATCH_FENCE
+      fence(me);
+#endif
+#ifndef NO_SECOND_LOOK
+      watch = memory[WATCH(me)];
+#endif
+      if
+      :: watch == UNWATCHED -> setBits(me, me)
+      :: else
+      fi
+    fi;
+    watch = UNWATCHED
   :: sent == MESSAGES -> break
   od;
 }
 
 byte taken[LINKS];
 byte hot = NONE;      // the link that is polled
+bool isUnfenced;      // the peer of that link may omit its fence
 byte revisit = NONE;
 
 #define hasMessage(link) (memory[SENT(link)] != taken[link])
@@ -87,13 +103,31 @@ inline takeOne(link) {
   fi
 }
 
+// membarrier(): each peer executes a fence between the call and its return.
+inline barrier() {
+  fence(OWNER);
+#ifndef NO_BARRIER
+  fence(0);
+  fence(1);
+#endif
+}
+
 inline cool() {
   was = hot;
   hot = NONE;
-  store(OWNER, POLLED(was), false);
-#ifndef NO_COOL_FENCE
-  fence(OWNER);
+#ifdef BARRIER_EARLY
+  barrier();
 #endif
+  store(OWNER, WATCH(was), UNWATCHED);
+#ifndef NO_COOL_FENCE
+  if
+#ifndef BARRIER_EARLY
+  :: isUnfenced -> barrier()
+#endif
+  :: else -> fence(OWNER)
+  fi;
+#endif
+  isUnfenced = false;
 #ifndef NO_COOL_LOOK
   if
   :: hasMessage(was) -> setBits(OWNER, was)
@@ -107,13 +141,13 @@ inline cool() {
 inline tryAdd(link) {
   if
   :: hot == link
-  :: hot != link && hot != NONE -> cool(); hot = link; store(OWNER, POLLED(link), true); fence(OWNER)
+  :: hot != link && hot != NONE -> cool(); hot = link; store(OWNER, WATCH(link), POLLED)
 #ifndef NO_REVISIT
   :: hot != link && hot != NONE -> revisit = link
 #else
   :: hot != link && hot != NONE
 #endif
-  :: hot == NONE -> hot = link; store(OWNER, POLLED(link), true); fence(OWNER)
+  :: hot == NONE -> hot = link; store(OWNER, WATCH(link), POLLED)
   fi
 }
 
@@ -150,6 +184,7 @@ active proctype Owner() {
   do
   :: isHotReady -> takeOne(hot)
   :: hot != NONE && !allTaken -> cool()  // too many polls without a message
+  :: hot != NONE && !isUnfenced && !allTaken -> isUnfenced = true; store(OWNER, WATCH(hot), UNFENCED)
   :: isRevisitDue || word ->
     if
     :: isRevisitDue -> setBits(OWNER, revisit)

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/expedited_barrier.h"
 #include "tests/shm/endpoint_pair.h"
 #include "tests/shm/shm_fixture.h"
 
@@ -120,6 +121,44 @@ TEST_F(HotLinksTest, AMessageRestartsTheCountOfPolls) {
 
   poll(HotLinks::kCoolAfter - 1);
   EXPECT_EQ(hot_->size(), 1u);
+}
+
+TEST_F(HotLinksTest, ThePeerOfABusyLinkNeedsNoFenceUntilPollingEnds) {
+  if (!expedited_barrier::tryRegister()) GTEST_SKIP() << "no membarrier() here";
+  makeLinks(1);
+  ASSERT_TRUE(tryAdd(0));
+  const auto watch = [&] {
+    return links_[0].server.control().requestWatch.load(std::memory_order_relaxed);
+  };
+  const auto exchangeMessages = [&](std::uint32_t times) {
+    for (std::uint32_t i = 0; i < times; ++i) {
+      ASSERT_EQ(send(links_[0].client, 1), LinkSend::sent);
+      ASSERT_EQ(hot_->next(), 0u);
+      server_->tryTake(links_[0].serverIndex);
+    }
+  };
+
+  exchangeMessages(HotLinks::kUnfencedAfter - 1);
+  EXPECT_EQ(watch(), layout::Watch::polled);
+  exchangeMessages(1);
+  EXPECT_EQ(watch(), layout::Watch::polledUnfenced);
+  hot_->removeAll();
+
+  EXPECT_EQ(watch(), layout::Watch::unwatched);
+  EXPECT_FALSE(takeReadyBit());
+  ASSERT_EQ(send(links_[0].client, 1), LinkSend::sent);
+  EXPECT_TRUE(server_->endpoint.window().hints().readyBits[0].load() != 0) << "hints are back";
+}
+
+TEST_F(HotLinksTest, APeerWithoutBarriersKeepsItsFence) {
+  makeLinks(1);
+  auto& peer = const_cast<layout::SegmentHeader&>(links_[0].server.peer()->header());
+  peer.takesBarriers = 0;  // the private copy of the server
+  ASSERT_TRUE(tryAdd(0));
+
+  links_[0].server.letPeerSendUnfenced();
+
+  EXPECT_EQ(links_[0].server.control().requestWatch.load(), layout::Watch::polled);
 }
 
 TEST_F(HotLinksTest, ABusierLinkReplacesAnIdleOne) {
