@@ -73,18 +73,6 @@ void Dispatcher::Impl::endThread() {
   }
 }
 
-RunnerGuard Dispatcher::Impl::becomeRunner() {
-  endpoint().forkGuard().check("Dispatcher");
-  if (parts_.lock.isMine()) return RunnerGuard(nullptr);
-  if (hasThread_) RunnerLock::throwOtherRunner();
-  return acquireLock();
-}
-
-RunnerGuard Dispatcher::Impl::acquireLock() {
-  parts_.lock.acquire([this] { endpoint().interrupt(); });
-  return RunnerGuard(&parts_.lock);
-}
-
 bool Dispatcher::Impl::takeStop() noexcept {
   return stop_.load(std::memory_order_relaxed) && stop_.exchange(false, std::memory_order_relaxed);
 }

@@ -29,7 +29,12 @@ class Dispatcher::Impl {
   // Makes the calling thread the runner until the guard ends. Changes nothing when the thread
   // already has the lock.
   //   throws  std::logic_error when another thread runs the dispatcher
-  [[nodiscard]] RunnerGuard becomeRunner();
+  [[nodiscard]] RunnerGuard becomeRunner() {
+    endpoint().forkGuard().check("Dispatcher");
+    if (parts_.lock.isMine()) return RunnerGuard(nullptr);
+    if (hasThread_) RunnerLock::throwOtherRunner();
+    return acquireLock();
+  }
   bool runOnce(Deadline deadline);
   bool runPending(int most);
   int descriptor();
@@ -53,7 +58,10 @@ class Dispatcher::Impl {
   [[nodiscard]] BindingRounds& bindings() noexcept { return bindings_; }
 
  private:
-  RunnerGuard acquireLock();
+  RunnerGuard acquireLock() {
+    parts_.lock.acquire([this] { endpoint().interrupt(); });
+    return RunnerGuard(&parts_.lock);
+  }
   template <class IsOver>
   bool run(Deadline deadline, const IsOver& isOver);
   bool takeStop() noexcept;

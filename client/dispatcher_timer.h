@@ -6,10 +6,10 @@
 
 #include <atomic>
 #include <cstdint>
-#include <thread>
 
 #include <mpf/clock.h>
 
+#include "base/thread_number.h"
 #include "shm/endpoint.h"
 
 namespace mpf {
@@ -35,13 +35,13 @@ class DispatcherTimer {
                                                      std::memory_order_relaxed)) {
     }
     // PAIR(waiting-thread): the waiting thread reads the time stored above, or its id is read here.
-    if (ns < due && waitingThread_.load(std::memory_order_seq_cst) != std::this_thread::get_id())
+    if (ns < due && waitingThread_.load(std::memory_order_seq_cst) != threadNumber())
       endpoint_.interrupt();
   }
 
   // The calling thread waits until due() from now on.
   void setWaitingThread() noexcept {
-    const auto me = std::this_thread::get_id();
+    const auto me = threadNumber();
     // PAIR(waiting-thread): stored before this thread reads how long it may wait.
     if (waitingThread_.load(std::memory_order_relaxed) != me)
       waitingThread_.store(me, std::memory_order_seq_cst);
@@ -58,8 +58,8 @@ class DispatcherTimer {
  private:
   Endpoint& endpoint_;
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
-  // The thread that waits, or waited last.
-  std::atomic<std::thread::id> waitingThread_;
+  std::atomic<std::uint64_t> waitingThread_{
+      0};  // threadNumber() of the one that waits, or waited last
 };
 
 }  // namespace mpf

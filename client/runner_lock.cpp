@@ -42,8 +42,7 @@ void RunnerLock::endOtherBias() {
   released_.notify_all();
 }
 
-void RunnerLock::release() noexcept {
-  if (bias_.isMine()) return bias_.leave();
+void RunnerLock::releaseReal() noexcept {
   if ((owner_.load(std::memory_order_relaxed) & kTemporary) == 0) {
     // PAIR(runner): before another thread takes the lock.
     owner_.store(0, std::memory_order_release);

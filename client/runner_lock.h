@@ -37,12 +37,7 @@ class RunnerLock {
   template <class WakeOwner>
   void acquire(const WakeOwner& wakeOwner) {
     if (bias_.tryEnter()) return;
-    if (!tryTake(threadNumber())) {
-      const WaitingRunner waiting(waitingRunners_);
-      wakeOwner();
-      waitForTemporaryOwner();
-    }
-    noteRunner();
+    acquireReal(wakeOwner);
   }
 
   // Throws the std::logic_error of acquire().
@@ -50,7 +45,10 @@ class RunnerLock {
 
   // False when another thread owns the lock or waits in acquire().
   [[nodiscard]] bool tryAcquireTemporarily() noexcept;
-  void release() noexcept;
+  void release() noexcept {
+    if (bias_.isMine()) bias_.leave();
+    else releaseReal();
+  }
 
   // True when a temporary owner must release the lock.
   [[nodiscard]] bool isRunnerWaiting() const noexcept {
@@ -63,6 +61,16 @@ class RunnerLock {
 
  private:
   static constexpr std::uint64_t kTemporary = 1;
+
+  template <class WakeOwner>
+  [[gnu::noinline]] void acquireReal(const WakeOwner& wakeOwner) {
+    if (!tryTake(threadNumber())) {
+      const WaitingRunner waiting(waitingRunners_);
+      wakeOwner();
+      waitForTemporaryOwner();
+    }
+    noteRunner();
+  }
 
   struct WaitingRunner {
     explicit WaitingRunner(std::atomic<int>& number) noexcept : number_(number) {
@@ -81,6 +89,7 @@ class RunnerLock {
     return owner_.compare_exchange_strong(free, owner, std::memory_order_acquire,
                                           std::memory_order_relaxed);
   }
+  void releaseReal() noexcept;
   void waitForTemporaryOwner();
   void noteRunner();
   void endOtherBias();
