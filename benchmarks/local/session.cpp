@@ -98,7 +98,8 @@ int show(const std::vector<Result>& results, const Machine& machine, const Place
 }  // namespace
 
 void addOptions(CLI::App& app, Options& options) {
-  app.add_flag("--quick", options.quick, "End within 40 s: shorter, and so noisier, measurements");
+  app.add_flag("--quick", options.quick,
+               "Shorter, and so noisier, measurements: end within 40 s, local within 90 s");
   app.add_flag("--list", options.list, "Only list the rows that would be measured");
   app.add_option(
       "--json", options.jsonFile,
