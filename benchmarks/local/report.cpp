@@ -19,7 +19,7 @@ std::string ratioText(const Result& result) {
 std::string disturbanceText(const Result& result) {
   if (!result.isDisturbed()) return {};
   std::string text = "  disturbed:";
-  if (result.disturbance.isLarge())
+  if (result.hadLessCpu())
     text += fmt::format(" others took {:.0f} % of the CPUs", 100 * result.disturbance.share());
   if (result.hasFloorMoved()) text += fmt::format(" floor moved x {:.2f}", result.floorDrift);
   return text;

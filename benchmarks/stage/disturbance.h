@@ -12,6 +12,7 @@
 
 #include <cstdint>
 
+#include "benchmarks/stage/mode.h"
 #include "benchmarks/stage/stage.h"
 
 namespace mpf::bench {
@@ -25,9 +26,10 @@ struct Disturbance {
   [[nodiscard]] double share() const noexcept {
     return availableNs > 0 ? takenNs / availableNs : 0;
   }
-  // See README.md, "Rows that were disturbed", for both limits.
-  [[nodiscard]] bool isLarge() const noexcept {
-    return share() > kLargeShare && takenNs > kResolutionNs;
+  // See README.md, "Rows that were disturbed", for the limits.
+  [[nodiscard]] bool isLarge(Mode mode) const noexcept {
+    return share() > (mode == Mode::spin ? kPollingShare : kSleepingShare) &&
+           takenNs > kResolutionNs;
   }
   void add(const Disturbance& other) noexcept {
     takenNs += other.takenNs;
@@ -35,7 +37,8 @@ struct Disturbance {
     preemptions += other.preemptions;
   }
 
-  static constexpr double kLargeShare = 0.05;
+  static constexpr double kPollingShare = 0.05;
+  static constexpr double kSleepingShare = 0.15;  // the idle time of short sleeps is not exact
   static constexpr double kResolutionNs = 25e6;
 };
 

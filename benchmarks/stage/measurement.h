@@ -53,9 +53,10 @@ struct Result {
   }
   [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
   [[nodiscard]] bool hasFloorMoved() const noexcept { return floorDrift > kLargeDrift; }
-  // Why this row is noise; see README.md, "Rows that were disturbed".
+  [[nodiscard]] bool hadLessCpu() const noexcept { return disturbance.isLarge(measurement.mode); }
+  // Whether this row is noise; see README.md, "Rows that were disturbed".
   [[nodiscard]] bool isDisturbed() const noexcept {
-    return isGood() && (disturbance.isLarge() || hasFloorMoved());
+    return isGood() && (hadLessCpu() || hasFloorMoved());
   }
 
   static constexpr double kLargeDrift = 1.25;

@@ -78,17 +78,19 @@ TEST(Disturbance, CountsOtherPrograms) {
 }
 
 TEST(Disturbance, IsLargeAboveAShareAndAboveItsResolution) {
-  const auto of = [](double takenNs, double availableNs) {
+  const auto of = [](double takenNs, double availableNs, Mode mode = Mode::spin) {
     Disturbance disturbance;
     disturbance.takenNs = takenNs;
     disturbance.availableNs = availableNs;
-    return disturbance.isLarge();
+    return disturbance.isLarge(mode);
   };
 
   EXPECT_TRUE(of(100e6, 1e9));
   EXPECT_FALSE(of(40e6, 1e9)) << "4 %";
   EXPECT_FALSE(of(20e6, 100e6)) << "not more than the steps of the idle time";
   EXPECT_FALSE(of(0, 0));
+  EXPECT_FALSE(of(100e6, 1e9, Mode::block)) << "sleeps make the idle time inexact";
+  EXPECT_TRUE(of(200e6, 1e9, Mode::block));
 }
 
 }  // namespace
