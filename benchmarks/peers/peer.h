@@ -100,5 +100,6 @@ struct PeerFamily {
 [[nodiscard]] PeerFamily iceoryx2Peer();  // request-response
 [[nodiscard]] PeerFamily iceoryx2PublishingPeer();  // publish-subscribe in both directions
 [[nodiscard]] PeerFamily aeronPeer();  // the client in Java
+[[nodiscard]] PeerFamily aeronClientPeer();  // the client in C
 
 }  // namespace mpf::bench

@@ -115,7 +115,8 @@ std::vector<PeerFamily> families() {
           iceoryxPeer(),
           iceoryx2Peer(),
           iceoryx2PublishingPeer(),
-          aeronPeer()};
+          aeronPeer(),
+          aeronClientPeer()};
 }
 
 // A family that is not installed has only one row for each question.

@@ -88,7 +88,7 @@ TEST(BenchCommand, ListsEachPeerInstalledOrNot) {
 
   EXPECT_EQ(ended.status, 0) << ended.err;
   for (const auto* peer : {"MPF", "Boost message_queue", "Unix socket", "ZeroMQ", "iceoryx 2.0",
-                           "iceoryx2", "iceoryx2 pub-sub", "Aeron (Java)"})
+                           "iceoryx2", "iceoryx2 pub-sub", "Aeron (Java)", "Aeron (C)"})
     EXPECT_THAT(ended.out, HasSubstr(std::string("Round trip of 4 B: ") + peer + ","));
 }
 
