@@ -22,6 +22,7 @@ SOURCES := git -c safe.directory='*' ls-files -z --cached --others --exclude-sta
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-repeated test-big-endian test-tpci200 soak fuzz bench
+.PHONY: bench-peers
 .PHONY: startup-files install container wheel python-reference epics-base-tsan
 .PHONY: format format-check tidy clean $(PRESETS) $(TESTED:%=test-%)
 
@@ -66,8 +67,12 @@ fuzz: ## search for shared memory and messages that harm readers (DURATION=60 FU
 	cmake --build --preset fuzz --parallel $(JOBS)
 	scripts/fuzz build/fuzz $(or $(DURATION),60) $(FUZZERS)
 
+bench-peers: release ## build iceoryx2 and Aeron for `make bench` (after scripts/setup bench)
+	@scripts/bench-peers build/release/bin
+
 # Also writes the table to build/release/bench/.
-bench: release ## measure this host (BENCH=local, remote, hardware, epics or python)
+bench: release $(if $(filter-out local,$(BENCH)),,bench-peers)
+bench: ## measure this host (BENCH=local, remote, hardware, epics or python)
 	@mkdir -p build/release/bench
 	PYTHONPATH=build/release/python:build/python-packages PATH="build/release/bin:$$PATH" \
 		bash -o pipefail -c 'mpf bench $(or $(BENCH),local) | \

@@ -22,10 +22,13 @@ namespace mpf {
 
 class LatencyRecorder {
  public:
-  void add(std::uint64_t ns) noexcept {
-    ++buckets_[indexOf(ns)];
-    ++count_;
-    sum_ += ns;
+  void add(std::uint64_t ns) noexcept { add(ns, 1); }
+  // Adds a duration `times` times.
+  void add(std::uint64_t ns, std::uint64_t times) noexcept {
+    if (times == 0) return;
+    buckets_[indexOf(ns)] += times;
+    count_ += times;
+    sum_ += ns * times;
     max_ = std::max(max_, ns);
   }
   void add(const LatencyRecorder& other) noexcept {

@@ -3,7 +3,6 @@
 // request, a server is told that the client is gone. The floor is the time until waitpid() returns
 // in the parent: before that the kernel has not finished with the process.
 #include <signal.h>
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <time.h>
 
@@ -25,6 +24,7 @@
 #include "benchmarks/peers/mpf_peer.h"
 #include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/meter.h"
+#include "benchmarks/stage/shared_object.h"
 #include "server/relay_server.h"
 
 namespace mpf::bench {
@@ -48,23 +48,6 @@ constexpr std::array kAges{
 struct Board {
   std::atomic<std::int64_t> connectedNs{0};
   std::atomic<std::int64_t> notifiedNs{0};
-};
-
-class SharedBoard {
- public:
-  SharedBoard()
-      : memory_(::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
-                       -1, 0)) {
-    if (memory_ == MAP_FAILED) throwSystemError(errno, "mmap", "memory shared by a measurement");
-    new (memory_) Board;
-  }
-  ~SharedBoard() { ::munmap(memory_, sizeof(Board)); }
-  SharedBoard(const SharedBoard&) = delete;
-  SharedBoard& operator=(const SharedBoard&) = delete;
-  [[nodiscard]] Board& operator*() const noexcept { return *static_cast<Board*>(memory_); }
-
- private:
-  void* memory_;
 };
 
 // Receives requests and keeps them, so that a client's request is open when its server dies.
@@ -133,7 +116,7 @@ void sleepUntil(std::int64_t ns) {
 
 // Where the server is killed, the client waits for it before it starts, as after a restart.
 Durations killOnce(const std::string& backplane, Victim victim, Nanoseconds age) {
-  const SharedBoard shared;
+  const SharedObject<Board> shared;
   auto& board = *shared;
   std::optional<Process> client;
   std::optional<Process> server;

@@ -60,6 +60,12 @@ Json toObject(const Result& result, const Machine& machine, const Placement& pla
   object["floor_name"] = what.floorName.empty() ? Json() : Json(what.floorName);
   object["floor_ns"] = result.floorNs > 0 ? Json(result.floorNs) : Json();
   object["ratio_to_floor"] = result.ratioToFloor > 0 ? Json(result.ratioToFloor) : Json();
+  if (result.disturbance.availableNs > 0) {
+    object["disturbed"] = result.isDisturbed();
+    object["disturbed_percent"] = 100 * result.disturbance.share();
+    object["preemptions"] = result.disturbance.preemptions;
+  }
+  if (result.floorDrift > 0) object["floor_drift"] = result.floorDrift;
   auto cpus = placement.server;
   cpus.insert(cpus.end(), placement.requester.begin(), placement.requester.end());
   object["cpus"] = cpus;

@@ -15,6 +15,16 @@ std::string ratioText(const Result& result) {
   return result.ratioToFloor > 0 ? fmt::format("{:.2f}", result.ratioToFloor) : "";
 }
 
+// Empty for a row that was not disturbed.
+std::string disturbanceText(const Result& result) {
+  if (!result.isDisturbed()) return {};
+  std::string text = "  disturbed:";
+  if (result.hadLessCpu())
+    text += fmt::format(" others took {:.0f} % of the CPUs", 100 * result.disturbance.share());
+  if (result.hasFloorMoved()) text += fmt::format(" floor moved x {:.2f}", result.floorDrift);
+  return text;
+}
+
 std::string heading(const Measurement&) {
   return fmt::format(kRow, "", "mode", "typical", "p50", "p99", "p99.9", "max", "rate", "x floor",
                      "floor");
@@ -32,7 +42,8 @@ std::string row(const Result& result) {
   const auto name = nameOf(what);
   const auto& latency = result.figures.latency;
   const auto floor =
-      result.floorNs > 0 ? what.floorName + " of " + durationText(result.floorNs) : "";
+      (result.floorNs > 0 ? what.floorName + " of " + durationText(result.floorNs) : "") +
+      disturbanceText(result);
   const auto line = [&](const std::array<std::string, 5>& percentiles, const std::string& rate) {
     return fmt::format(kRow, name, toString(what.mode), percentiles[0], percentiles[1],
                        percentiles[2], percentiles[3], percentiles[4], rate, ratioText(result),
@@ -43,8 +54,8 @@ std::string row(const Result& result) {
   if (!result.error.empty())
     return fmt::format("  {:<24} {:<9} failed: {}\n", name, toString(what.mode), result.error);
   if (!what.unit.empty())
-    return fmt::format("  {:<24} {:<9} {:.6g} {}\n", name, toString(what.mode),
-                       result.figures.value, what.unit);
+    return fmt::format("  {:<24} {:<9} {:.6g} {}{}\n", name, toString(what.mode),
+                       result.figures.value, what.unit, disturbanceText(result));
   if (latency.count() == 0) return line({}, rateText(result.figures.perSecond));
   const auto at = [&](double percent) {
     return durationText(static_cast<double>(latency.percentileNs(percent)));

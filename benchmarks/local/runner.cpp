@@ -32,6 +32,7 @@ class Rounds {
     floors_.push_back(floorNs);
     ratios_.push_back(costNs(figures) / floorNs);
   }
+  void addDrift(double drift) { drifts_.push_back(drift); }
   void writeTo(Result& result) const {
     result.figures = {latency_,
                       median(typical_),
@@ -44,6 +45,7 @@ class Rounds {
     result.figures.lineFaults = lineFaults_;
     result.floorNs = median(floors_);
     result.ratioToFloor = median(ratios_);
+    result.floorDrift = median(drifts_);
   }
 
  private:
@@ -51,27 +53,44 @@ class Rounds {
   std::uint64_t count_ = 0;
   LineFaultFigures lineFaults_;  // of the last round; rows of serial lines have only one
   std::vector<double> typical_, perSecond_, values_, writes_, idleServer_, idleRequester_, floors_,
-      ratios_;
+      ratios_, drifts_;
 };
 
 }  // namespace
 
-Result Runner::run(Measurement row, Budget budget, int rounds) {
-  Result result;
-  if (row.skipped.empty()) row.skipped = enter(row);
-  result.measurement = std::move(row);
-  if (!result.isGood()) return result;
-  const Stage stage(placement_, budget);
-  Rounds all;
-  for (int round = 0; round < std::max(rounds, 1); ++round) {
-    const auto floorNs = measureFloor(result.measurement, budget, rounds);
-    const auto outcome = result.measurement.run(stage);
-    all.add(outcome.figures, floorNs);
-    result.error = outcome.error;
-    if (!result.error.empty()) break;
+std::vector<Result> Runner::run(std::vector<PlannedRow> block) {
+  std::vector<Result> results(block.size());
+  std::vector<Rounds> rounds(block.size());
+  int last = 1;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    results[i].measurement = std::move(block[i].row);
+    last = std::max(last, block[i].rounds);
   }
-  all.writeTo(result);
-  return result;
+  for (int round = 0; round < last; ++round) {
+    Floors floors;
+    std::map<std::size_t, const Floor*> compared;  // by index of a row of this round
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      auto& result = results[i];
+      auto& row = result.measurement;
+      if (!result.isGood() || round >= std::max(block[i].rounds, 1)) continue;
+      row.skipped = enter(row);
+      if (!row.skipped.empty()) continue;
+      const auto& floor = floorOf(row, block[i].budget, floors);
+      compared[i] = &floor;
+      const DisturbanceMeter meter(placement_);
+      const auto outcome = row.run(Stage(placement_, block[i].budget));
+      result.disturbance.add(meter.read());
+      rounds[i].add(outcome.figures, floor.beforeNs);
+      result.error = outcome.error;
+    }
+    if (block.size() == 1) continue;
+    for (auto& [key, floor] : floors) floor.afterNs = measure(floor);
+    for (const auto& [index, floor] : compared) rounds[index].addDrift(floor->drift());
+  }
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    if (results[i].measurement.skipped.empty()) rounds[i].writeTo(results[i]);
+  }
+  return results;
 }
 
 // Starts the environment of this row. Empty, or why it cannot be started; it is not tried again.
@@ -89,18 +108,28 @@ std::string Runner::enter(const Measurement& row) try {
   return missing_[row.environmentName] = exception.what();
 }
 
-// 0 when the row has no floor.
-double Runner::measureFloor(const Measurement& row, Budget budget, int rounds) {
-  if (row.floorName.empty()) return 0;
-  auto& known = lastFloor_[{row.setting, row.floorName, row.floorBytes}];
-  if (rounds == 0 && known > 0) return known;
-  const auto floor = std::find_if(all_.begin(), all_.end(), [&](const Measurement& other) {
+const Runner::Floor& Runner::floorOf(const Measurement& row, Budget budget, Floors& floors) {
+  const auto [known, isNew] = floors.try_emplace({row.setting, row.floorName, row.floorBytes});
+  auto& floor = known->second;
+  if (!isNew || row.floorName.empty()) return floor;
+  const auto found = std::find_if(all_.begin(), all_.end(), [&](const Measurement& other) {
     return other.setting == row.setting && other.name == row.floorName &&
            other.bytes == row.floorBytes;
   });
-  if (floor == all_.end()) return 0;
-  return known =
-             costNs(floor->run(Stage(placement_, {budget.warmUp / 2, budget.measure / 2})).figures);
+  if (found != all_.end()) floor.row = &*found;
+  floor.budget = {budget.warmUp / 2, budget.measure / 2};
+  floor.beforeNs = measure(floor);
+  return floor;
+}
+
+// 0 without a floor.
+double Runner::measure(const Floor& floor) const {
+  return floor.row == nullptr ? 0 : costNs(floor.row->run(Stage(placement_, floor.budget)).figures);
+}
+
+double Runner::Floor::drift() const noexcept {
+  if (beforeNs <= 0 || afterNs <= 0) return 0;
+  return std::max(beforeNs, afterNs) / std::min(beforeNs, afterNs);
 }
 
 }  // namespace mpf::bench

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Runner: measures rows one after another, each beside its floor.
+// Runner: measures the rows of a block in rounds, and compares all of them with the same floor.
 //
-//   floor, row, floor, row, floor, row ...     ratio = median of the rounds' ratios
+//   floor, row 1, row 2 ... row n, floor;  floor, row 1 ... row n, floor;  ...
+//   ratio of a row = median of its ratios in all rounds, each to the floor of that round
 //
 // A host may move the processors of a virtual machine at any time, and a cache line then needs
 // 70 ns or 500 ns between the same two CPUs. A floor that was measured a minute ago cannot be
-// compared, and so every round measures its floor again.
+// compared, and so every round measures its floors again; two rows with different measurements of a
+// floor cannot be compared with each other, and so the rows of a round share them. The floors are
+// measured once more after a round of several rows: if they have moved meanwhile, its rows say so.
 //
 // Threads  the runner's only one.
 #pragma once
@@ -21,26 +24,42 @@
 
 namespace mpf::bench {
 
+struct PlannedRow {
+  Measurement row;
+  Budget budget;
+  int rounds = 1;  // at least 1
+};
+
 class Runner {
  public:
   // `all` must outlive the runner; it contains the floors.
   Runner(Placement placement, const std::vector<Measurement>& all) noexcept
       : placement_(std::move(placement)), all_(all) {}
 
-  //   rounds  0: measure the row once, and divide it by the last measurement of its floor
-  [[nodiscard]] Result run(Measurement row, Budget budget, int rounds);
+  // The results of the rows, in their order.
+  [[nodiscard]] std::vector<Result> run(std::vector<PlannedRow> block);
 
  private:
+  // A floor in one round.
+  struct Floor {
+    const Measurement* row = nullptr;  // nullptr: not among `all`
+    Budget budget;
+    double beforeNs = 0;
+    double afterNs = 0;
+    [[nodiscard]] double drift() const noexcept;
+  };
+  // By setting, name and bytes.
+  using Floors = std::map<std::tuple<std::string, std::string, std::size_t>, Floor>;
   [[nodiscard]] std::string enter(const Measurement& row);
-  [[nodiscard]] double measureFloor(const Measurement& row, Budget budget, int rounds);
+  // The floor of a row, which is measured the first time in a round.
+  [[nodiscard]] const Floor& floorOf(const Measurement& row, Budget budget, Floors& floors);
+  [[nodiscard]] double measure(const Floor& floor) const;
 
   Placement placement_;
   const std::vector<Measurement>& all_;
   std::unique_ptr<Environment> environment_;  // of the last row; the next row may use it again
   std::string current_;
   std::map<std::string, std::string> missing_;
-  // By setting, name and bytes [ns].
-  std::map<std::tuple<std::string, std::string, std::size_t>, double> lastFloor_;
 };
 
 }  // namespace mpf::bench

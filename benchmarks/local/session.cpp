@@ -43,6 +43,15 @@ Budget budgetOf(const Measurement& row, const std::vector<Measurement>& rows, co
   return {mine / 5, mine - mine / 5};
 }
 
+using Row = std::vector<Measurement>::const_iterator;
+
+Row endOfBlock(Row begin, Row all, const Pace& pace) {
+  if (!pace.sharesFloors) return begin + 1;
+  return std::find_if(begin, all, [&](const Measurement& row) {
+    return row.setting != begin->setting || row.question != begin->question;
+  });
+}
+
 // Parses "0+2"; empty when the text is something else.
 Cpus parseCpus(const std::string& text) {
   Cpus cpus;
@@ -89,7 +98,8 @@ int show(const std::vector<Result>& results, const Machine& machine, const Place
 }  // namespace
 
 void addOptions(CLI::App& app, Options& options) {
-  app.add_flag("--quick", options.quick, "End within 40 s: shorter, and so noisier, measurements");
+  app.add_flag("--quick", options.quick,
+               "Shorter, and so noisier, measurements: end within 40 s, local within 90 s");
   app.add_flag("--list", options.list, "Only list the rows that would be measured");
   app.add_option(
       "--json", options.jsonFile,
@@ -156,9 +166,16 @@ std::vector<Result> takeAll(const std::vector<Measurement>& rows, const Placemen
                             const Options& options, const Pace& pace) {
   Runner runner(placement, rows);
   std::vector<Result> results;
-  for (const auto& row : rows) {
-    results.push_back(runner.run(row, budgetOf(row, rows, pace, options.quick), pace.rounds(row)));
-    printError("{:3}% {}\n", results.size() * 100 / rows.size(), oneLine(results.back()));
+  for (auto begin = rows.begin(); begin != rows.end();) {
+    const auto end = endOfBlock(begin, rows.end(), pace);
+    std::vector<PlannedRow> block;
+    for (auto row = begin; row != end; ++row)
+      block.push_back({*row, budgetOf(*row, rows, pace, options.quick), pace.rounds(*row)});
+    for (auto& result : runner.run(std::move(block))) {
+      results.push_back(std::move(result));
+      printError("{:3}% {}\n", results.size() * 100 / rows.size(), oneLine(results.back()));
+    }
+    begin = end;
   }
   return results;
 }

@@ -22,7 +22,7 @@ class App;
 namespace mpf::bench {
 
 struct Options {
-  bool quick = false;    // ends within 40 s
+  bool quick = false;    // ends within 40 s, `mpf bench local` with all peers within 90 s
   bool list = false;     // only lists the rows that would be measured
   std::string jsonFile;  // empty: none; "-": stdout instead of the table
   // Of server and requester: "0", or several as "0+2"; empty: the first two allowed.
@@ -42,6 +42,7 @@ struct Pace {
   Nanoseconds fullRow{};
   Nanoseconds quickRun{};  // of all rows together in a quick run, without the time to set up
   std::function<int(const Measurement&)> rounds;
+  bool sharesFloors = false;  // successive rows of one question are a block; see Runner
 };
 
 // The rows that the user asked for, and their floors.

@@ -21,5 +21,10 @@ PeerFamily zeromqPeer() { return missing("ZeroMQ", "libzmq3-dev"); }
 #ifndef MPF_BENCH_ICEORYX
 PeerFamily iceoryxPeer() { return missing("iceoryx 2.0", "libiceoryx-posh-dev"); }
 #endif
+#ifndef MPF_BENCH_AERON
+PeerFamily aeronClientPeer() {
+  return missing("Aeron (C)", "Aeron's libaeron and libaeron_driver");
+}
+#endif
 
 }  // namespace mpf::bench

@@ -76,12 +76,16 @@ class Running final : public Environment {
   std::shared_ptr<Started> started_;
 };
 
-// A kind of peer. `skipped` says why it cannot be measured here; then `make` may be empty.
+struct ExternalProgram;  // external_peer.h
+
+// A kind of peer: a class, or a program of its own. `skipped` says why it cannot be measured here;
+// then both may be empty.
 struct PeerFamily {
   std::string name;
   std::string skipped;
   std::vector<Mode> modes;
   std::function<std::unique_ptr<Peer>(const PeerOptions&)> make;
+  std::shared_ptr<const ExternalProgram> program;
   bool oneWay = false;
   int maxOutstanding = 100;
   // Starts what the peer needs; empty: nothing. Throws std::runtime_error with the reason.
@@ -93,5 +97,9 @@ struct PeerFamily {
 [[nodiscard]] PeerFamily socketPeer();
 [[nodiscard]] PeerFamily zeromqPeer();
 [[nodiscard]] PeerFamily iceoryxPeer();
+[[nodiscard]] PeerFamily iceoryx2Peer();  // request-response
+[[nodiscard]] PeerFamily iceoryx2PublishingPeer();  // publish-subscribe in both directions
+[[nodiscard]] PeerFamily aeronPeer();  // the client in Java
+[[nodiscard]] PeerFamily aeronClientPeer();  // the client in C
 
 }  // namespace mpf::bench

@@ -2,6 +2,7 @@
 // The measurements that are made with every peer.
 #include <algorithm>
 
+#include "benchmarks/peers/external_peer.h"
 #include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/timing.h"
 
@@ -85,11 +86,20 @@ class Asker {
     row.floorBytes = copies ? bytes : 4;
     return row;
   }
-  // A function with which the runner creates the peer of a row.
-  std::function<std::shared_ptr<Peer>()> maker(const PeerFamily& family, const Measurement& row) {
-    if (!family.make) return {};
+  // The function that measures a row: `ask` for a class, `task` for a program.
+  template <class Ask>
+  std::function<Outcome(const Stage&)> runner(const PeerFamily& family, const Measurement& row,
+                                              const Ask& ask, const ExternalTask& task) {
     PeerOptions options{row.mode, row.bytes, row.touched, runName_ + "-" + std::to_string(++made_)};
-    return [make = family.make, options] { return std::shared_ptr<Peer>(make(options)); };
+    if (family.make) {
+      return [make = family.make, options, ask](const Stage& stage) {
+        return ask(stage, std::shared_ptr<Peer>(make(options)));
+      };
+    }
+    if (!family.program) return {};
+    return [program = family.program, options, task](const Stage& stage) {
+      return runExternal(stage, *program, task, options);
+    };
   }
 
  private:
@@ -98,7 +108,15 @@ class Asker {
 };
 
 std::vector<PeerFamily> families() {
-  return {mpfPeer(), boostPeer(), socketPeer(), zeromqPeer(), iceoryxPeer()};
+  return {mpfPeer(),
+          boostPeer(),
+          socketPeer(),
+          zeromqPeer(),
+          iceoryxPeer(),
+          iceoryx2Peer(),
+          iceoryx2PublishingPeer(),
+          aeronPeer(),
+          aeronClientPeer()};
 }
 
 // A family that is not installed has only one row for each question.
@@ -112,9 +130,9 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
   Asker asker(runName);
   std::vector<Measurement> rows;
   const auto all = families();
-  const auto add = [&](const PeerFamily& family, Measurement row, auto ask) {
-    if (const auto make = asker.maker(family, row))
-      row.run = [make, ask](const Stage& stage) { return ask(stage, make()); };
+  const auto add = [&](const PeerFamily& family, Measurement row, const auto& ask,
+                       const ExternalTask& task) {
+    row.run = asker.runner(family, row, ask, task);
     rows.push_back(std::move(row));
   };
 
@@ -122,14 +140,13 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
        {std::size_t{4}, std::size_t{1} << 10, std::size_t{1} << 16, std::size_t{1} << 20}) {
     for (const bool touched : {false, true}) {
       if (touched && bytes == 4) continue;  // an Int32 is always written and read
-      const auto question = "Round trip of " + sizeText(bytes) +
-                            (bytes == 4 ? ""
-                             : touched  ? ", every byte written and read both ways"
-                                        : ", untouched");
+      const auto question =
+          bytes == 4 ? std::string(kSmallRoundTrip)
+                     : "Round trip of " + sizeText(bytes) +
+                           (touched ? ", every byte written and read both ways" : ", untouched");
       for (const auto& family : all) {
         for (const auto mode : modesOf(family)) {
-          add(family, asker.row(family, question, mode, bytes, touched),
-              [](const Stage& stage, const auto& peer) { return roundTrips(stage, peer); });
+          add(family, asker.row(family, question, mode, bytes, touched), roundTrips, {});
         }
       }
     }
@@ -139,8 +156,7 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
     for (const auto mode : modesOf(family)) {
       auto row = asker.row(family, "One way, 4 B", mode, 4, false);
       row.floorName = kRing;
-      add(family, std::move(row),
-          [](const Stage& stage, const auto& peer) { return oneWay(stage, peer); });
+      add(family, std::move(row), oneWay, {"one-way"});
     }
   }
   for (const int window : {1, 10, 100}) {
@@ -152,9 +168,11 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
         row.detail = std::to_string(window) + " outstanding";
         if (row.skipped.empty() && window > family.maxOutstanding)
           row.skipped = "holds at most " + std::to_string(family.maxOutstanding);
-        add(family, std::move(row), [window](const Stage& stage, const auto& peer) {
-          return outstanding(stage, peer, window);
-        });
+        add(family, std::move(row),
+            [window](const Stage& stage, const auto& peer) {
+              return outstanding(stage, peer, window);
+            },
+            {"outstanding", window});
       }
     }
   }

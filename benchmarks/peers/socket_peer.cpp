@@ -12,6 +12,7 @@
 
 #include "base/system_call.h"
 #include "benchmarks/peers/peer.h"
+#include "benchmarks/stage/measurement.h"
 #include "benchmarks/stage/touch.h"
 #include "shm/cpu_relax.h"
 
@@ -118,7 +119,7 @@ class SocketPeer final : public Peer {
 
 PeerFamily socketPeer() {
   PeerFamily family;
-  family.name = "Unix socket";
+  family.name = kUnixSocket;
   family.modes = {Mode::spin, Mode::block};
   family.make = [](const PeerOptions& options) { return std::make_unique<SocketPeer>(options); };
   family.oneWay = true;

@@ -14,8 +14,9 @@ double costNs(const Figures& figures) noexcept {
 
 std::vector<Measurement> catalogue(const std::string& runName) {
   auto all = floorMeasurements();
-  for (auto more : {peerMeasurements(runName), scaleMeasurements(runName),
-                    deathMeasurements(runName), tappedMeasurements(runName)}) {
+  for (auto more :
+       {peerMeasurements(runName), underLoadMeasurements(runName), scaleMeasurements(runName),
+        deathMeasurements(runName), tappedMeasurements(runName)}) {
     std::move(more.begin(), more.end(), std::back_inserter(all));
   }
   return all;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "benchmarks/peers/peer.h"
+#include "benchmarks/stage/disturbance.h"
 #include "benchmarks/stage/mode.h"
 #include "benchmarks/stage/stage.h"
 
@@ -40,13 +41,25 @@ struct Result {
   Measurement measurement;
   Figures figures;
   std::string error;
-  double floorNs = 0;       // a message of the floor, measured right before the row
+  double floorNs = 0;       // a message of the floor, measured in the rounds of the row
   double ratioToFloor = 0;  // above 1: slower than the floor; 0: the row has no floor
+  // The floor after a round divided by that before it, or the inverse if that is larger: median of
+  // the rounds. 0: the row has no floor.
+  double floorDrift = 0;
+  Disturbance disturbance;  // of all rounds together
 
   [[nodiscard]] bool isGood() const noexcept {
     return measurement.skipped.empty() && error.empty();
   }
   [[nodiscard]] double costNs() const noexcept { return isGood() ? bench::costNs(figures) : 0; }
+  [[nodiscard]] bool hasFloorMoved() const noexcept { return floorDrift > kLargeDrift; }
+  [[nodiscard]] bool hadLessCpu() const noexcept { return disturbance.isLarge(measurement.mode); }
+  // Whether this row is noise; see README.md, "Rows that were disturbed".
+  [[nodiscard]] bool isDisturbed() const noexcept {
+    return isGood() && (hadLessCpu() || hasFloorMoved());
+  }
+
+  static constexpr double kLargeDrift = 1.25;
 };
 
 // All rows of `mpf bench local`, in order, floors first.
@@ -59,11 +72,16 @@ struct Result {
 [[nodiscard]] std::vector<Measurement> scaleMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> deathMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> tappedMeasurements(const std::string& runName);
+// Uses rows of the first two.
+[[nodiscard]] std::vector<Measurement> underLoadMeasurements(const std::string& runName);
 
 inline constexpr const char* kBounce = "cache-line bounce";
 inline constexpr const char* kFutexBounce = "futex bounce";
 inline constexpr const char* kMemcpyBounce = "memcpy bounce";
 inline constexpr const char* kFutexMemcpyBounce = "memcpy bounce, asleep";
 inline constexpr const char* kRing = "bare slot ring";
+inline constexpr const char* kLoadedFutexBounce = "futex bounce, busy CPUs";
+inline constexpr const char* kUnixSocket = "Unix socket";
+inline constexpr const char* kSmallRoundTrip = "Round trip of 4 B";
 
 }  // namespace mpf::bench

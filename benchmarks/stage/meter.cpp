@@ -30,8 +30,9 @@ std::string fileOf(int pid, const char* name) {
   return "/proc/" + (pid == Meter::kThisProcess ? "self" : std::to_string(pid)) + "/" + name;
 }
 
-// Of /proc/stat's lines "cpuN user nice system idle iowait ...": idle and iowait, of the CPUs named
-// [s].
+}  // namespace
+
+// Reads the lines "cpuN user nice system idle iowait ..." of /proc/stat.
 double idleSeconds(const Cpus& cpus) {
   std::ifstream file("/proc/stat");
   double ticks = 0;
@@ -44,8 +45,6 @@ double idleSeconds(const Cpus& cpus) {
   }
   return ticks / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
-
-}  // namespace
 
 Meter::Reading Meter::read() const {
   Reading reading;

@@ -41,6 +41,8 @@ class Meter {
   Reading from_;
 };
 
+// Time that these CPUs have been idle so far, also while they waited for devices [s].
+[[nodiscard]] double idleSeconds(const Cpus& cpus);
 // CPU time that all threads of a process have used so far [ns]. Throws std::system_error when the
 // process does not exist.
 [[nodiscard]] double cpuNsOf(int pid);

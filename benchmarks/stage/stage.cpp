@@ -20,7 +20,6 @@
 namespace mpf::bench {
 namespace {
 
-constexpr auto kStopGrace = std::chrono::milliseconds(500);  // for a server that ends by itself
 enum Role : std::size_t { server = 0, requester = 1 };
 
 // Shared anonymous memory, populated.
@@ -136,7 +135,8 @@ Outcome Stage::run(const Workload& workload) const {
     outcome.error = requesterChild.ending("requester", control.errors[requester]);
     if (serverChild && workload.stopsByItself && outcome.error.empty()) {
       pollfd end{serverChild->fd().get(), POLLIN, 0};
-      ::poll(&end, 1, static_cast<int>(std::chrono::milliseconds(kStopGrace).count()));
+      const auto grace = std::chrono::duration_cast<std::chrono::milliseconds>(workload.stopGrace);
+      ::poll(&end, 1, static_cast<int>(grace.count()));
     }
   } else if (outcome.error = serverChild->ending("server", control.errors[server]);
              outcome.error.empty()) {

@@ -125,6 +125,7 @@ struct Workload {
   std::function<void(const RunContext&)> requester;  // starts when the server is ready
   std::size_t scratchBytes = 0;
   bool stopsByItself = false;  // the server ends by itself soon after stop()
+  Nanoseconds stopGrace = std::chrono::milliseconds(500);  // how soon; then it is killed
   Nanoseconds grace = std::chrono::seconds(15);  // beyond the budget, to connect and to end
 };
 

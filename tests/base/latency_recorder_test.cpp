@@ -63,6 +63,17 @@ TEST(LatencyRecorder, CountsDurationsBeyondTheLastBucket) {
   EXPECT_GT(recorder.percentileNs(50), 1'000'000'000'000u / 2);
 }
 
+TEST(LatencyRecorder, AddsADurationSeveralTimes) {
+  LatencyRecorder recorder;
+
+  recorder.add(10, 3);
+  recorder.add(900, 0);
+
+  EXPECT_EQ(recorder.count(), 3u);
+  EXPECT_EQ(recorder.meanNs(), 10);
+  EXPECT_EQ(recorder.maxNs(), 10u);
+}
+
 TEST(LatencyRecorder, AddsAnotherRecorder) {
   LatencyRecorder one;
   LatencyRecorder other;

@@ -83,6 +83,15 @@ TEST(BenchCommand, ListsEachServerOverHardware) {
   EXPECT_THAT(ended.out, AllOf(HasSubstr("the driver's thread"), HasSubstr("the manual's, local")));
 }
 
+TEST(BenchCommand, ListsEachPeerInstalledOrNot) {
+  const auto ended = bench({"local", "--list"});
+
+  EXPECT_EQ(ended.status, 0) << ended.err;
+  for (const auto* peer : {"MPF", "Boost message_queue", "Unix socket", "ZeroMQ", "iceoryx 2.0",
+                           "iceoryx2", "iceoryx2 pub-sub", "Aeron (Java)", "Aeron (C)"})
+    EXPECT_THAT(ended.out, HasSubstr(std::string("Round trip of 4 B: ") + peer + ","));
+}
+
 TEST(BenchCommand, ListsRowsWithoutCheckingTheCpus) {
   for (const auto* const which : {"local", "remote", "hardware", "epics"})
     EXPECT_EQ(bench({which, "--list", "--cpus", "0,9999"}).status, 0) << which;

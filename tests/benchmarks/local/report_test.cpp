@@ -25,7 +25,7 @@ TEST(Json, HasWhatReadersCountOnForALatency) {
   const auto asleep = std::find_if(rows.begin(), rows.end(),
                                    [](const auto& row) { return row.name == kFutexBounce; });
 
-  const auto row = parsed(Runner(placement, rows).run(*asleep, moment, 1));
+  const auto row = parsed(Runner(placement, rows).run({{*asleep, moment, 1}}).front());
 
   EXPECT_EQ(row.at("name"), kFutexBounce);
   EXPECT_EQ(row.at("mode"), "block");
@@ -81,6 +81,35 @@ TEST(Table, ShowsWhyRowsWereLeftOutOrFailed) {
   EXPECT_THAT(text, HasSubstr("ZeroMQ"));
   EXPECT_THAT(text, HasSubstr("left out: not installed"));
   EXPECT_THAT(text, HasSubstr("failed: server died"));
+}
+
+Result disturbed(double share) {
+  Result result;
+  result.measurement.name = "MPF";
+  result.figures.perSecond = 2e6;
+  result.disturbance.availableNs = 2e9;
+  result.disturbance.takenNs = share * 2e9;
+  result.disturbance.preemptions = 7;
+  return result;
+}
+
+TEST(Json, SaysHowMuchARowWasDisturbed) {
+  const auto row = parsed(disturbed(0.25));
+
+  EXPECT_EQ(row.at("disturbed"), true);
+  EXPECT_EQ(row.at("disturbed_percent"), 25);
+  EXPECT_EQ(row.at("preemptions"), 7);
+  EXPECT_EQ(parsed(disturbed(0.01)).at("disturbed"), false);
+  EXPECT_FALSE(parsed(Result{}).contains("disturbed")) << "not measured";
+}
+
+TEST(Table, MarksRowsThatWereDisturbed) {
+  auto moved = disturbed(0.01);
+  moved.floorDrift = 2;
+
+  EXPECT_THAT(table({disturbed(0.25)}), HasSubstr("disturbed: others took 25 % of the CPUs"));
+  EXPECT_THAT(table({moved}), HasSubstr("disturbed: floor moved x 2.00"));
+  EXPECT_THAT(table({disturbed(0.01)}), testing::Not(HasSubstr("disturbed")));
 }
 
 TEST(Goals, AreShownOnlyForRowsThatWereTaken) { EXPECT_EQ(goals({}), ""); }

@@ -19,28 +19,84 @@ Measurement costing(const std::string& name, std::vector<double> ns) {
   return row;
 }
 
+Measurement over(const std::string& floor, Measurement row) {
+  row.floorName = floor;
+  return row;
+}
+
+Result runAlone(Runner& runner, const Measurement& row, int rounds) {
+  return runner.run({{row, {}, rounds}}).front();
+}
+
 TEST(Runner, DividesEachRoundByTheFloorOfThatRound) {
   const std::vector<Measurement> rows{costing("floor", {70, 500, 70})};
   auto row = costing("ours", {84, 600, 7000});  // near, far, and disturbed
   row.floorName = "floor";
 
-  const auto result = Runner({}, rows).run(row, {}, 3);
+  Runner runner({}, rows);
+
+  const auto result = runAlone(runner, row, 3);
 
   EXPECT_DOUBLE_EQ(result.ratioToFloor, 1.2);
   EXPECT_DOUBLE_EQ(result.floorNs, 70);
   EXPECT_DOUBLE_EQ(result.costNs(), 600);
 }
 
-TEST(Runner, DividesByTheLastFloorWithoutRounds) {
-  const std::vector<Measurement> rows{costing("floor", {100, 999})};
-  Runner runner({}, rows);
-  auto row = costing("ours", {150});
-  row.floorName = "floor";
-  static_cast<void>(runner.run(row, {}, 1));
+// The floor is measured before and after each round, and never between two rows.
+TEST(Runner, ComparesTheRowsOfARoundWithOneFloor) {
+  const std::vector<Measurement> rows{costing("floor", {100, 100, 200, 200, 400, 400})};
+  const auto ours = over("floor", costing("ours", {150, 300, 600}));
+  const auto theirs = over("floor", costing("theirs", {200, 400, 800}));
+  const auto slow = over("floor", costing("slow", {1000}));
 
-  const auto result = runner.run(row, {}, 0);
+  const auto results = Runner({}, rows).run({{ours, {}, 3}, {theirs, {}, 3}, {slow, {}, 1}});
 
-  EXPECT_DOUBLE_EQ(result.ratioToFloor, 1.5);
+  ASSERT_EQ(results.size(), 3u);
+  EXPECT_DOUBLE_EQ(results[0].ratioToFloor, 1.5);
+  EXPECT_DOUBLE_EQ(results[1].ratioToFloor, 2);
+  EXPECT_DOUBLE_EQ(results[2].ratioToFloor, 10) << "measured in the first round only";
+  for (const auto& result : results) EXPECT_FALSE(result.hasFloorMoved());
+}
+
+TEST(Runner, MeasuresTheRowsOfABlockInTurn) {
+  const std::vector<Measurement> rows;
+  std::string order;
+  const auto noting = [&](char name) {
+    Measurement row;
+    row.run = [&order, name](const Stage&) {
+      order += name;
+      return Outcome{};
+    };
+    return row;
+  };
+
+  static_cast<void>(Runner({}, rows).run({{noting('a'), {}, 2}, {noting('b'), {}, 2}}));
+
+  EXPECT_EQ(order, "abab");
+}
+
+TEST(Runner, SaysWhenTheFloorMovedDuringARound) {
+  const std::vector<Measurement> rows{costing("steady", {100}), costing("moved", {100, 400})};
+  const auto ours = over("steady", costing("ours", {150}));
+  const auto theirs = over("moved", costing("theirs", {150}));
+
+  const auto results = Runner({}, rows).run({{ours, {}, 1}, {theirs, {}, 1}});
+
+  EXPECT_FALSE(results[0].hasFloorMoved());
+  EXPECT_TRUE(results[1].hasFloorMoved());
+  EXPECT_DOUBLE_EQ(results[1].floorDrift, 4);
+}
+
+TEST(Runner, FailsOnlyTheRowThatFails) {
+  const std::vector<Measurement> rows;
+  auto failing = costing("failing", {1});
+  failing.run = [](const Stage&) { return Outcome{{}, "it hangs"}; };
+
+  const auto results = Runner({}, rows).run({{failing, {}, 3}, {costing("ours", {5}), {}, 3}});
+
+  EXPECT_EQ(results[0].error, "it hangs");
+  EXPECT_EQ(results[1].error, "");
+  EXPECT_DOUBLE_EQ(results[1].costNs(), 5);
 }
 
 TEST(Runner, LeavesOutARowWhoseEnvironmentCannotStart) {
@@ -51,7 +107,9 @@ TEST(Runner, LeavesOutARowWhoseEnvironmentCannotStart) {
     throw std::runtime_error("not installed");
   };
 
-  const auto result = Runner({}, rows).run(row, {}, 1);
+  Runner runner({}, rows);
+
+  const auto result = runAlone(runner, row, 1);
 
   EXPECT_EQ(result.measurement.skipped, "not installed");
   EXPECT_EQ(result.error, "");
@@ -68,8 +126,8 @@ TEST(Runner, KeepsAnEnvironmentForRowsThatShareIt) {
   };
   Runner runner({}, rows);
 
-  static_cast<void>(runner.run(row, {}, 0));
-  static_cast<void>(runner.run(row, {}, 0));
+  static_cast<void>(runAlone(runner, row, 1));
+  static_cast<void>(runAlone(runner, row, 1));
 
   EXPECT_EQ(started, 1);
 }

@@ -92,5 +92,25 @@ TEST(Session, MeasuresAllRowsInOrder) {
   EXPECT_EQ(shorter[0].figures.perSecond, 0.2e9);
 }
 
+TEST(Session, MeasuresTheRowsOfAQuestionAsABlock) {
+  std::string order;
+  const auto noting = [&](const std::string& question, const std::string& name) {
+    auto row = named(question, name, "floor");
+    row.run = [&order, name](const Stage&) {
+      order += name;
+      return Outcome{};
+    };
+    return row;
+  };
+  const Pace pace{std::chrono::seconds(1), std::chrono::seconds(1),
+                  [](const Measurement&) { return 2; }, true};
+
+  const auto results =
+      takeAll({noting("one", "a"), noting("one", "b"), noting("two", "c")}, {}, {}, pace);
+
+  EXPECT_EQ(order, "ababcc");
+  EXPECT_EQ(results.size(), 3u);
+}
+
 }  // namespace
 }  // namespace mpf::bench

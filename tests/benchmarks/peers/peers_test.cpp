@@ -46,6 +46,7 @@ TEST(Peers, MpfAnswers) { expectToAnswer(mpfPeer()); }
 TEST(Peers, BoostAnswers) { expectToAnswer(boostPeer()); }
 TEST(Peers, SocketAnswers) { expectToAnswer(socketPeer()); }
 TEST(Peers, ZeromqAnswers) { expectToAnswer(zeromqPeer()); }
+TEST(Peers, AeronAnswers) { expectToAnswer(aeronClientPeer()); }
 // iceoryx is not tested: it needs a daemon of which a host can have only one, and tests run in
 // parallel.
 
