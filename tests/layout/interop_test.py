@@ -220,15 +220,15 @@ class Rollout(Interop):
 
     def test_an_old_client_waits_for_todays_server(self):
         party = self.old_client()
-        wish = party.wish("echo")
-        self.addCleanup(wish.close)
+        pending = party.pending_bind("echo")
+        self.addCleanup(pending.close)
         self.assertRegex(
             self.program(MPF, "ls", "--backplane", self.backplane).rest(),
             r"old \(layout-1\.\d+\) +alive .* echo \(waiting\)",
         )
-        self.assertFalse(wish.is_granted())
+        self.assertFalse(pending.is_granted())
         self.program(VICTIM, "serve-block", self.backplane)
-        run_until(wish.is_granted, party, files=[wish.names])
+        run_until(pending.is_granted, party, files=[pending.names])
 
         self.assertEqual(
             self.ask(party, self.connected(party), messages.INT32, messages.int32(1)), 1

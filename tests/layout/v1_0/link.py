@@ -12,6 +12,8 @@ CLIENT, SERVER = 0, 1
 NONE, OPEN, CLOSED, REFUSED = 0, 1, 2, 3
 STATES, SENT = ("clientState", "serverState"), ("clientSent", "serverSent")
 RINGS, RETURNS = ("requests", "replies"), ("requestChunks", "replyChunks")
+WATCHES = ("requestWatch", "replyWatch")  # of those rings
+UNWATCHED = 1
 CHUNK, FIRST_REPLY = 1, 2
 FIRST_BYTES, MORE_BYTES = 24, 56  # of a body: in the first slot of a message, in each of the others
 ENVELOPE = ("type", "flags", "requestId", "clientType", "clientExtra", "deadlineNs")
@@ -130,7 +132,7 @@ class Link:
         self.out.push(message, body, size)
         self.control[SENT[self.side]] = self.out.messages
         doorbell.fence()
-        if self.out.control["unwatched"]:
+        if self.control[WATCHES[self.side]] == UNWATCHED:
             self.peer.notify(self.peer_index)
 
     def receive(self):
@@ -185,8 +187,8 @@ def create(layout, backplane, own, index, peer, **fields):
     )
     control = segment.view("LinkControl", layout.constants["linkControlOffset"])
     control["clientState"] = OPEN
-    for ring in RINGS:
-        control.inner(ring)["unwatched"] = 1
+    for watch in WATCHES:
+        control[watch] = UNWATCHED
     segment.publish(f"mpf.{backplane}.l.{offer['incarnation']:x}.{segment.header()['incarnation']:x}")
     return Link(layout, backplane, segment, CLIENT, peer)
 
