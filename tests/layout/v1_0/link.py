@@ -13,7 +13,7 @@ NONE, OPEN, CLOSED, REFUSED = 0, 1, 2, 3
 STATES, SENT = ("clientState", "serverState"), ("clientSent", "serverSent")
 RINGS, RETURNS = ("requests", "replies"), ("requestChunks", "replyChunks")
 WATCHES = ("requestWatch", "replyWatch")  # of those rings
-UNWATCHED = 1
+POLLED, UNWATCHED, POLLED_UNFENCED = 0, 1, 2
 CHUNK, FIRST_REPLY = 1, 2
 FIRST_BYTES, MORE_BYTES = 24, 56  # of a body: in the first slot of a message, in each of the others
 ENVELOPE = ("type", "flags", "requestId", "clientType", "clientExtra", "deadlineNs")
@@ -118,6 +118,16 @@ class Link:
 
     def has_news(self):
         return self.into.has_message() or self.peer_state() != self.state_seen
+
+    def watch(self, how):
+        """How we look for messages from now on. A caller that stops polling looks for messages afterwards, and only then sleeps."""
+        field = WATCHES[1 - self.side]
+        was = self.control[field]
+        self.control[field] = how
+        if was == POLLED_UNFENCED:
+            doorbell.fence_in_all_processes()
+        else:
+            doorbell.fence()
 
     def send(self, message):
         """A body that lies in a chunk which it came in goes back in it; a long one goes into a chunk of ours."""
