@@ -237,8 +237,8 @@ struct ChunkRef {
 static_assert(sizeof(ChunkRef) == 16);
 
 // How the consumer of a ring looks for messages. With `polledUnfenced`, the producer needs no fence
-// between its message and its load of this value: before the consumer changes it, it executes a
-// barrier in all processes.
+// between its message and its load of this value: a consumer that stops polling stores `unwatched`,
+// executes a barrier in all processes, and then looks for messages once more.
 enum class Watch : std::uint32_t { polled = 0, unwatched = 1, polledUnfenced = 2 };
 
 // How far a ring's consumer is.
