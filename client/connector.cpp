@@ -164,9 +164,8 @@ std::string Connector::notAcceptedBecause(const PeerWindow& server) const {
   const auto sinceNs =
       static_cast<std::int64_t>(control.progressAtNs.load(std::memory_order_relaxed));
   const auto busyNs = Clock::nowNs() - sinceNs;
-  if (!handling || server.header().layoutMinor < Handling::kSinceMinor || busyNs < kBusyNs) {
+  if (!handling || busyNs < kBusyNs)
     return fmt::format("server \"{}\" has not accepted the client yet", server_);
-  }
   return fmt::format(
       "server \"{}\" is busy with a request, {} cmd={}, since {}, and has not accepted the client "
       "yet",

@@ -21,8 +21,6 @@
 namespace mpf {
 
 struct Handling {
-  static constexpr std::uint16_t kSinceMinor = 1;
-
   std::uint16_t type = 0;
   std::int32_t cmd = 0;  // 0 for message types without a cmd field
 

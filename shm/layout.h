@@ -38,7 +38,7 @@ namespace mpf::layout {
 // "MPF-WIN1" as bytes on a little-endian host; a host of another byte order reads another number
 inline constexpr std::uint64_t kMagic = 0x314e'4957'2d46'504d;
 inline constexpr std::uint16_t kMajor = 1;
-inline constexpr std::uint16_t kMinor = 1;
+inline constexpr std::uint16_t kMinor = 0;
 inline constexpr std::uint16_t kOldestMajor = 1;  // oldest major version that this code reads
 
 inline constexpr std::size_t kCacheLineBytes = 64;
@@ -135,7 +135,7 @@ static_assert(sizeof(Histogram) == sizeof(std::uint64_t) * (kHistogramBuckets + 
 
 enum class WindowState : std::uint32_t { open = 1, closed = 2 };
 enum class SleepState : std::uint32_t { awake = 0, onFutex = 1, onDescriptor = 2 };
-// What a server lacks to accept another client. Since 1.1.
+// What a server lacks to accept another client.
 enum class Shortage : std::uint32_t { none = 0, descriptors = 1, openFiles = 2, memory = 3 };
 
 // State, counters and histograms of a window's owner, at offset 512 of a server or client window.
@@ -168,7 +168,7 @@ struct WindowControl {
   // server windows: faults of the hardware; client windows: exceptions that callbacks threw on the
   // thread of the shared dispatcher, where no caller can catch them
   Word64 alarms;
-  Word64 handling;  // the request that a server works on, see Handling; 0: none. Since layout 1.1
+  Word64 handling;  // the request that a server works on, see Handling; 0: none
   std::array<Word64, (kHistogramBuckets / 4) - 2> reserved;
   Histogram queueWaitNs;  // from push to take, sampled
   Histogram serviceNs;  // server: from take to reply; client: from send to reply, sampled
@@ -237,8 +237,8 @@ struct ChunkRef {
 static_assert(sizeof(ChunkRef) == 16);
 
 // How the consumer of a ring looks for messages. With `polledUnfenced`, the producer needs no fence
-// between its message and its load of this value: before the consumer changes it, it executes a
-// barrier in all processes.
+// between its message and its load of this value: a consumer that stops polling stores `unwatched`,
+// executes a barrier in all processes, and then looks for messages once more.
 enum class Watch : std::uint32_t { polled = 0, unwatched = 1, polledUnfenced = 2 };
 
 // How far a ring's consumer is.

@@ -108,9 +108,7 @@ bool Reaper::tryBesideStrangers(int fd) {
   if (::fstat(fd, &window) == 0 && ::geteuid() == 0)
     static_cast<void>(::fchown(ownLock_.get(), window.st_uid, window.st_gid) == 0);
   writer = findWriteLock(fd, kReapersByte);
-  if (!writer || isReapers(*writer)) return false;
-  // Strangers hold only read locks: our own read lock keeps other reapers from the write lock.
-  return writer->l_type != F_UNLCK || tryLock(fd, F_RDLCK, kReapersByte, 1);
+  return writer && !isReapers(*writer);
 }
 
 bool removeReaperFile(const std::string& name) {

@@ -113,10 +113,7 @@ void readWindow(Tree& tree, const WitnessedWindow& window, const CapsuleLimits& 
                          std::move(*record.lastTaken));
     links.push_back(std::move(record.tree));
   }
-  const auto handling = header.layoutMinor >= Handling::kSinceMinor
-                            ? Handling::of(value(control.handling))
-                            : std::nullopt;
-  if (handling) {
+  if (const auto handling = Handling::of(value(control.handling))) {
     const auto since = static_cast<std::int64_t>(value(control.progressAtNs));
     tree["handling"] =
         handlingOf(*handling, std::max<std::int64_t>(0, Clock::nowNs() - since), taken);

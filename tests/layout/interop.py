@@ -17,9 +17,9 @@ import client
 import doorbell
 import memory
 import messages
+import pending_bind
 import reader
 import server
-import wish
 from party import run_until
 
 LAYOUT, TRAFFIC, VICTIM, MPF = (sys.argv.pop(1) for _ in range(4))
@@ -40,7 +40,7 @@ class PatientLibc:
         return instance
 
 
-wish.libc = PatientLibc()
+pending_bind.libc = PatientLibc()
 
 
 class Program:

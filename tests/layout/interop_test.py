@@ -10,6 +10,7 @@ import unittest
 
 import client
 import doorbell
+import link
 import messages
 from interop import MPF, SLEEPS, VICTIM, WATCHDOG_SECONDS, Interop
 from party import run_until
@@ -46,6 +47,45 @@ class OldClientOfTodaysServer(Interop):
                 how + 1,
             )
             self.assertEqual(self.client.window.hinted, {0})
+
+    def replies_polled_for(self, connection, count):
+        for _ in range(count):
+            connection.send(messages.FLOAT64, messages.float64(0))
+            while not connection.link.into.has_message():
+                os.sched_yield()
+            self.client.work()
+
+    def test_gets_no_notice_while_it_polls_and_is_woken_when_it_has_stopped(self):
+        connection = self.connected(self.client)
+        for watch in self.ways_to_poll(connection):
+            connection.link.watch(watch)
+            self.replies_polled_for(connection, 2)  # with the second one, all earlier notices came
+            self.client.window.hinted.clear()
+            self.replies_polled_for(connection, 100)
+            self.assertEqual(self.client.window.hinted, set())
+
+            connection.link.watch(link.UNWATCHED)
+            for how, sleep in SLEEPS.items():
+                self.client.window.hinted.clear()
+                self.stop_until_asleep(self.server, self.client, how)
+                self.ask(
+                    self.client, connection, messages.FLOAT64, messages.float64(0), sleep=sleep
+                )
+                self.assertEqual(self.client.window.hinted, {0})
+
+    def test_loses_no_reply_when_it_stops_polling(self):
+        connection = self.connected(self.client)
+        for watch in self.ways_to_poll(connection):
+            for i in range(500):
+                connection.link.watch(watch)
+                had = len(connection.received)
+                connection.send(messages.FLOAT64, messages.float64(i))
+                connection.link.watch(link.UNWATCHED)
+                run_until(lambda had=had: len(connection.received) > had, self.client)
+
+    def ways_to_poll(self, connection):
+        takes_barriers = connection.link.peer.header["takesBarriers"]
+        return (link.POLLED, link.POLLED_UNFENCED) if takes_barriers else (link.POLLED,)
 
     def test_wakes_it(self):
         connection = self.connected(self.client)
@@ -220,15 +260,15 @@ class Rollout(Interop):
 
     def test_an_old_client_waits_for_todays_server(self):
         party = self.old_client()
-        wish = party.wish("echo")
-        self.addCleanup(wish.close)
+        pending = party.pending_bind("echo")
+        self.addCleanup(pending.close)
         self.assertRegex(
             self.program(MPF, "ls", "--backplane", self.backplane).rest(),
             r"old \(layout-1\.\d+\) +alive .* echo \(waiting\)",
         )
-        self.assertFalse(wish.is_granted())
+        self.assertFalse(pending.is_granted())
         self.program(VICTIM, "serve-block", self.backplane)
-        run_until(wish.is_granted, party, files=[wish.names])
+        run_until(pending.is_granted, party, files=[pending.names])
 
         self.assertEqual(
             self.ask(party, self.connected(party), messages.INT32, messages.int32(1)), 1

@@ -22,10 +22,8 @@
 //           lockReaperFile() gives up if it has lost its name
 //   ASSUMES a starter waits longer than a reaper that removes a dead window, and longer than the
 //           kernel (it waits 50 ms for some microseconds)
-//   ASSUMES three starters, each also a reaper, and one process of layout 1.0 that only reaps and
-//           does not use reaper files; two of them are killed; no other process removes names
-//   ASSUMES a stranger places read locks, and write locks only while the reaper of layout 1.0 does
-//           not reap
+//   ASSUMES three starters, each also a reaper, and one process that only reaps; two of them are
+//           killed; no other process removes names
 //   BREAK   NO_COMPARE    a reaper does not check that the name still refers to the locked file
 //   BREAK   NO_LOCK       a reaper tests the lock but does not place it
 //   BREAK   ONE_LOCK      a reaper locks the file as an owner does
@@ -34,7 +32,7 @@
 //   BREAK   LEAVE_LATE    an owner that leaves releases the lock before it removes its name
 //   BREAK   NO_REAPING    a starter waits for others to remove dead windows
 //   BREAK   NO_BESIDE     there is no reaper file: a reaper needs byte 1
-//   BREAK   NO_SHARED     a reaper that works beside readers places no read lock
+//   BREAK   NO_LOOK       a reaper that has locked byte 1 does not look at the reaper file
 #define STARTERS 3
 #define REAPER 3
 #define PROCESSES 4
@@ -46,10 +44,7 @@ byte name = NO_FILE;       // the file that the name refers to
 byte lock[STARTERS + 1];   // of each file: the process that holds the owner's lock
 byte reaper[STARTERS + 1]; // of each file: the process that holds the lock on byte 1
 byte beside[STARTERS + 1]; // of each file: the process that has locked its reaper file
-byte shared[STARTERS + 1]; // of each file: the reaper that has a read lock on byte 1
-mtype = { nothing, reads, writes };
-mtype stranger[STARTERS + 1]; // of each file: the lock that a stranger has on the whole file
-bool oldReaperEnded;
+bool stranger[STARTERS + 1]; // of each file: a stranger has a lock, of either kind, on it
 bool left[STARTERS];
 bool dead[PROCESSES];
 
@@ -69,7 +64,7 @@ inline removeName(mayBe) {
   }
 }
 
-#define isByteFree(file) (lock[file] == FREE && reaperOf[file] == FREE && shared[file] == FREE && stranger[file] == nothing)
+#define isByteFree(file) (lock[file] == FREE && reaperOf[file] == FREE && !stranger[file])
 
 // Locks byte 1 or the reaper file. Sets `mine`.
 inline becomeReaper(me) {
@@ -78,20 +73,19 @@ inline becomeReaper(me) {
   :: isByteFree(file) -> mine = true
 #else
   :: d_step { isByteFree(file) -> reaperOf[file] = me } ->
+#ifdef NO_LOOK
+    mine = true
+#else
     if
     :: beside[file] == FREE -> mine = true
     :: else -> reaperOf[file] = FREE
     fi
 #endif
+#endif
 #if !defined(NO_BESIDE) && !defined(NO_LOCK)
   :: d_step { lock[file] == FREE && !isByteFree(file) && beside[file] == FREE -> beside[file] = me } ->
     if
-#ifdef NO_SHARED
-    :: reaperOf[file] == FREE && stranger[file] != writes -> mine = true
-#else
-    :: d_step { reaperOf[file] == FREE && stranger[file] != writes && shared[file] == FREE -> shared[file] = me } -> mine = true
-#endif
-    :: reaperOf[file] == FREE && stranger[file] == writes -> mine = true
+    :: reaperOf[file] == FREE -> mine = true
     :: reaperOf[file] != FREE -> beside[file] = FREE
     fi
 #endif
@@ -103,10 +97,6 @@ inline stopReaping(me) {
   d_step {
     if
     :: reaperOf[file] == me -> reaperOf[file] = FREE
-    :: else
-    fi;
-    if
-    :: shared[file] == me -> shared[file] = FREE
     :: else
     fi;
     if
@@ -146,28 +136,9 @@ inline removeIfOwnerless(me) {
   file = NO_FILE
 }
 
-// A reaper of layout 1.0.
-inline removeAsOfOld(me) {
-  file = name;  // open
-  if
-  :: file == NO_FILE
-  :: file != NO_FILE ->
-    if
-    :: d_step { isByteFree(file) -> reaperOf[file] = me } ->
-      if
-      :: name == file -> removeName(NO_FILE)
-      :: name != file
-      fi;
-      d_step { reaperOf[file] == me -> reaperOf[file] = FREE }
-    :: else
-    fi
-  fi;
-  file = NO_FILE
-}
-
 // Whether a reaper can continue: another reaper, or the kernel, releases that reaper's locks.
 #ifdef NO_BESIDE
-#define isReapable(file) (lock[file] == FREE && stranger[file] == nothing)
+#define isReapable(file) (lock[file] == FREE && !stranger[file])
 #else
 #define isReapable(file) (lock[file] == FREE)
 #endif
@@ -211,9 +182,9 @@ refused:
 
 active proctype Reaper() {
   byte file;
+  bool mine;
   {
-    removeAsOfOld(REAPER);
-    oldReaperEnded = true
+    removeIfOwnerless(REAPER)
   } unless { dead[REAPER] }
 }
 
@@ -222,12 +193,11 @@ active proctype Reaper() {
 #define LOCKED 1
 active proctype Stranger() {
   if
-  :: d_step { name == LOCKED && lock[LOCKED] == FREE && reaperOf[LOCKED] == FREE -> stranger[LOCKED] = reads }
-  :: d_step { name == LOCKED && isByteFree(LOCKED) && (oldReaperEnded || dead[REAPER]) -> stranger[LOCKED] = writes }
+  :: d_step { name == LOCKED && isByteFree(LOCKED) -> stranger[LOCKED] = true }
   :: skip -> goto done
   fi;
   if
-  :: stranger[LOCKED] = nothing
+  :: stranger[LOCKED] = false
   :: skip
   fi;
 done:
@@ -250,10 +220,6 @@ inline kill(process) {
       fi;
       if
       :: beside[file] == process -> beside[file] = FREE
-      :: else
-      fi;
-      if
-      :: shared[file] == process -> shared[file] = FREE
       :: else
       fi;
       file++
@@ -284,12 +250,6 @@ init {
     beside[1] = FREE;
     beside[2] = FREE;
     beside[3] = FREE;
-    shared[1] = FREE;
-    shared[2] = FREE;
-    shared[3] = FREE;
-    stranger[1] = nothing;
-    stranger[2] = nothing;
-    stranger[3] = nothing;
     run Starter(0);
     run Starter(1);
     run Starter(2)

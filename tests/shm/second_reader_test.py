@@ -9,27 +9,15 @@ import signal
 import subprocess
 import sys
 import unittest
-import unittest.mock
 
 import reader
 
 DOCUMENT, TRAFFIC = sys.argv.pop(1), sys.argv.pop(1)
 
 
-class Layout(reader.Layout):
-    """The document's tables, for the reader of layout 1.0, which calls a pending bind a
-    wish, as older documents do."""
-
-    def __init__(self, document):
-        super().__init__(document)
-        if "pendingBind" in self.kinds:
-            self.kinds["wish"] = self.kinds["pendingBind"]
-
-
 def look(backplane):
-    """What the reader sees on the backplane, with the tables of today's document."""
-    with unittest.mock.patch.object(reader, "Layout", Layout):
-        return reader.look(DOCUMENT, backplane)
+    """What the reader sees on the backplane, with the tables of the document."""
+    return reader.look(DOCUMENT, backplane)
 
 
 class Document(unittest.TestCase):
@@ -141,7 +129,8 @@ class Reader(unittest.TestCase):
         seen = look(self.backplane)
         self.assertEqual(seen["refused"], [])
         self.assertEqual(
-            [len(seen[kind]) for kind in ("servers", "clients", "links", "wishes")], [1, 1, 1, 1]
+            [len(seen[kind]) for kind in ("servers", "clients", "links", "pendingBinds")],
+            [1, 1, 1, 1],
         )
         return seen
 
@@ -168,7 +157,10 @@ class Reader(unittest.TestCase):
         )
         self.check_fields(client, name=expected["label"], **owner)
         self.check_fields(
-            seen["wishes"][0], name=expected["wish"], location=expected["wishLocation"], alive=True
+            seen["pendingBinds"][0],
+            name=expected["absentServer"],
+            location=expected["absentLocation"],
+            alive=True,
         )
         self.assertEqual([hint["locked"] for hint in seen["hints"]], [True, True])
         self.assertEqual(
@@ -258,7 +250,8 @@ class Reader(unittest.TestCase):
         self.process.wait()
         dead = self.look()
         self.assertEqual(
-            [dead[kind][0]["alive"] for kind in ("servers", "clients", "wishes")], [False] * 3
+            [dead[kind][0]["alive"] for kind in ("servers", "clients", "pendingBinds")],
+            [False] * 3,
         )
         self.check_fields(dead["links"][0], clientAlive=False, serverAlive=False)
         self.assertEqual(dead["links"][0]["requests"], running["links"][0]["requests"])

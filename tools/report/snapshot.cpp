@@ -147,8 +147,7 @@ class SnapshotReader {
     view.queueSize = view.isServer ? value(image->window().queueSize) : header.queueSize;
     view.maxMessageBytes = header.maxMessageBytes;
     copyCounters(image->window(), view);
-    if (header.layoutMinor >= Handling::kSinceMinor)
-      view.handling = Handling::of(value(image->window().handling));
+    view.handling = Handling::of(value(image->window().handling));
     view.progressAtNs = static_cast<std::int64_t>(value(image->window().progressAtNs));
     (view.isServer ? snapshot_.servers : snapshot_.clients).push_back(std::move(view));
   }

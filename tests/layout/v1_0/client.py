@@ -4,8 +4,8 @@ import itertools
 
 import link
 import party
+import pending_bind
 import window
-import wish
 
 
 class Connection:
@@ -36,8 +36,8 @@ class Client(party.Party):
     def __init__(self, layout, backplane, label="", **fields):
         super().__init__(layout, backplane, None, name=label.encode(), **fields)
 
-    def wish(self, server, location=0):
-        return wish.Wish(self.layout, self.backplane, self.window, server, location)
+    def pending_bind(self, server, location=0):
+        return pending_bind.PendingBind(self.layout, self.backplane, self.window, server, location)
 
     def connect(self, server, location=0, **fields):
         """Raises FileNotFoundError, or Refused with what is wrong with the server's window."""

@@ -11,9 +11,10 @@ import stat
 import reader
 from memory import libc
 
-SYS_FUTEX = 202  # x86-64
+SYS_FUTEX, SYS_MEMBARRIER = 202, 324  # x86-64
 FUTEX_WAIT, FUTEX_WAKE_OP = 0, 5
 ADD, OR, AND_NOT = 1, 2, 3
+GLOBAL_EXPEDITED = 2
 SHIFTED = 8  # the operand is the number of a bit
 
 AWAKE, ON_BELL, ON_PIPE = 0, 1, 2
@@ -46,6 +47,12 @@ _anywhere = ctypes.c_uint32()
 def fence():
     """Our stores before it, our loads after it."""
     change(ctypes.addressof(_anywhere), ADD, 0)
+
+
+def fence_in_all_processes():
+    """The same for the threads of every process that has registered for it."""
+    if libc.syscall(SYS_MEMBARRIER, GLOBAL_EXPEDITED, 0, 0) < 0:
+        raise OSError(ctypes.get_errno(), "membarrier")
 
 
 def ring_pipe(name):

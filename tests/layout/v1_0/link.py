@@ -12,6 +12,8 @@ CLIENT, SERVER = 0, 1
 NONE, OPEN, CLOSED, REFUSED = 0, 1, 2, 3
 STATES, SENT = ("clientState", "serverState"), ("clientSent", "serverSent")
 RINGS, RETURNS = ("requests", "replies"), ("requestChunks", "replyChunks")
+WATCHES = ("requestWatch", "replyWatch")  # of those rings
+POLLED, UNWATCHED, POLLED_UNFENCED = 0, 1, 2
 CHUNK, FIRST_REPLY = 1, 2
 FIRST_BYTES, MORE_BYTES = 24, 56  # of a body: in the first slot of a message, in each of the others
 ENVELOPE = ("type", "flags", "requestId", "clientType", "clientExtra", "deadlineNs")
@@ -117,6 +119,16 @@ class Link:
     def has_news(self):
         return self.into.has_message() or self.peer_state() != self.state_seen
 
+    def watch(self, how):
+        """How we look for messages from now on. A caller that stops polling looks for messages afterwards, and only then sleeps."""
+        field = WATCHES[1 - self.side]
+        was = self.control[field]
+        self.control[field] = how
+        if was == POLLED_UNFENCED:
+            doorbell.fence_in_all_processes()
+        else:
+            doorbell.fence()
+
     def send(self, message):
         """A body that lies in a chunk which it came in goes back in it; a long one goes into a chunk of ours."""
         body, size = message.body, len(message.body)
@@ -130,7 +142,7 @@ class Link:
         self.out.push(message, body, size)
         self.control[SENT[self.side]] = self.out.messages
         doorbell.fence()
-        if self.out.control["unwatched"]:
+        if self.control[WATCHES[self.side]] == UNWATCHED:
             self.peer.notify(self.peer_index)
 
     def receive(self):
@@ -185,8 +197,8 @@ def create(layout, backplane, own, index, peer, **fields):
     )
     control = segment.view("LinkControl", layout.constants["linkControlOffset"])
     control["clientState"] = OPEN
-    for ring in RINGS:
-        control.inner(ring)["unwatched"] = 1
+    for watch in WATCHES:
+        control[watch] = UNWATCHED
     segment.publish(f"mpf.{backplane}.l.{offer['incarnation']:x}.{segment.header()['incarnation']:x}")
     return Link(layout, backplane, segment, CLIENT, peer)
 

@@ -106,7 +106,7 @@ class Segment:
 
     def is_locked(self):
         # struct flock: l_type, l_whence, l_start, l_len, l_pid
-        asked = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, 0, 1, 0)
+        asked = struct.pack("hhqqi4x", fcntl.F_RDLCK, os.SEEK_SET, 0, 1, 0)
         try:
             answer = fcntl.fcntl(self.fd, fcntl.F_OFD_GETLK, asked)
         except OSError:
@@ -253,7 +253,7 @@ class Backplane:
         control = self.layout.read(segment.data, "LinkControl", header["ringBytesOffset"])
         keys = ("name", "location", "queueSlots", "replySlots", "queueSize", "maxOutstanding", "clientIndex")
         result = {key: header[key] for key in keys}
-        result |= {key: control[key] for key in ("clientState", "serverState", "serverIndex", "clientRefused", "clientUnanswered")}
+        result |= {key: control[key] for key in ("clientState", "serverState", "serverIndex", "requestWatch", "replyWatch", "clientRefused", "clientUnanswered")}
         result["file"] = segment.name
         result["clientAlive"], result["serverAlive"] = self.lives(header["clientWindow"]), self.lives(header["serverWindow"])
         result["requests"] = self.ring(segment, 0, header["queueSlots"], control["requests"], control["clientSent"])
@@ -269,7 +269,7 @@ class Backplane:
             "servers": [self.window(one) for one in self.of("serverWindow")],
             "clients": [self.window(one) for one in self.of("clientWindow")],
             "links": [self.link(one) for one in self.of("link")],
-            "wishes": [self.other(one) for one in self.of("wish")],
+            "pendingBinds": [self.other(one) for one in self.of("pendingBind")],
             "bulk": [self.other(one) for one in self.of("bulk")],
             "hints": [self.other(one) | {"locked": one.is_locked()} for one in self.of("hints")],
             "pipes": self.pipes,

@@ -2,6 +2,7 @@
 """Server of layout 1.0. It echoes, and adds 1 to a Float64."""
 import math
 import os
+import sys
 import time
 
 import link
@@ -54,9 +55,18 @@ class Server(party.Party):
         while self.answered < self.limit and end.link.into.has_message():
             self.window.control.count("received")
             self.window.control.count("progress")
-            self.answer(end.link, end.link.receive())
+            request = end.link.receive()
+            self.show(request)
+            self.answer(end.link, request)
+            self.window.control["handling"] = 0
         if end.link.state_seen != link.OPEN:
             self.drop(end)
+
+    def show(self, request):
+        """What it works on, and since when."""
+        cmd = int.from_bytes(bytes(request.body[4:8]), sys.byteorder)
+        self.window.control["progressAtNs"] = time.monotonic_ns()
+        self.window.control["handling"] = 1 << 63 | request.type << 32 | cmd
 
     def answer(self, end, request):
         if request.deadlineNs and time.monotonic_ns() >= request.deadlineNs:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wish: shows whom a client waits for, and tells when a name appears (inotify: a segment's name is created, complete, by link())."""
+"""PendingBind: shows whom a client waits for, and tells when a name appears (inotify: a segment's name is created, complete, by link())."""
 import ctypes
 import os
 
@@ -11,11 +11,11 @@ from memory import libc
 IN_CREATE = 0x100
 
 
-class Wish:
+class PendingBind:
     def __init__(self, layout, backplane, own, server, location):
         size = layout.size_of("SegmentHeader")
         fields = {"ownerWindow": own.incarnation, "name": server.encode(), "location": location}
-        self.segment = memory.create(layout, "wish", size, backplane, **fields)
+        self.segment = memory.create(layout, "pendingBind", size, backplane, **fields)
         self.segment.publish(window.keyed(backplane, "w", self.segment.header()["incarnation"]))
         self.awaited = os.path.join(reader.DIRECTORY, window.server_window(backplane, server, location))
         self.names = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)  # readable when there is a new name
