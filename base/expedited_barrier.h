@@ -17,8 +17,6 @@
 // Trust    a process that pretends to be registered loses only its own wake-ups.
 #pragma once
 
-#include <atomic>
-
 namespace mpf::expedited_barrier {
 
 // Lets barriers of other processes reach this process, and returns true when they do and this
@@ -32,7 +30,8 @@ namespace mpf::expedited_barrier {
 void acrossProcesses() noexcept;
 void inThisProcess() noexcept;
 
-// The frequent side: keeps the compiler from moving the load before the store.
-inline void frequentSide() noexcept { std::atomic_signal_fence(std::memory_order_seq_cst); }
+// The frequent side: keeps the compiler from moving the load before the store. It has no PAIR line,
+// because the barrier of the rare side is a system call.
+inline void frequentSide() noexcept { asm volatile("" : : : "memory"); }
 
 }  // namespace mpf::expedited_barrier

@@ -11,11 +11,19 @@ std::string goals(const std::vector<Result>& results) {
   const std::string idle = "Round trip of 4 B beside";
   const auto* small = goals.find("Round trip of 4 B", kMpf, Mode::spin);
   goals.atMost("Int32 round trip, polling, x cache-line bounce, at most",
-               goals.ratioToFloor(goals.find("Round trip of 4 B", kMpf, Mode::spin)), 1.4);
+               goals.ratioToFloor(goals.find("Round trip of 4 B", kMpf, Mode::spin)), 1.1);
   goals.atMost("Int32 round trip, asleep, x futex bounce, at most",
-               goals.ratioToFloor(goals.find("Round trip of 4 B", kMpf, Mode::block)), 1.15);
+               goals.ratioToFloor(goals.find("Round trip of 4 B", kMpf, Mode::block)), 1.05);
+  if (const auto* row = goals.find("Round trip of 4 B in one thread", kMpf, Mode::spin))
+    goals.atMost("Int32 round trip in one thread [ns], at most", row->costNs(), 40);
   if (const auto* row = goals.find("One way", kMpf, Mode::spin))
-    goals.atLeast("Int32 one way, million a second, at least", row->figures.perSecond / 1e6, 40);
+    goals.atLeast("Int32 one way, million a second, at least", row->figures.perSecond / 1e6, 60);
+  if (const auto* row = goals.find("One way", kMpf, Mode::adaptive))
+    goals.atLeast("Int32 one way, adaptive, million a second, at least",
+                  row->figures.perSecond / 1e6, 30);
+  if (const auto* row = goals.find("4 B with 100 outstanding", kMpf, Mode::spin))
+    goals.atLeast("100 outstanding, polling, million a second, at least",
+                  row->figures.perSecond / 1e6, 20);
   goals.atMost(
       "1 MiB untouched, polling, x Int32 round trip, at most",
       goals.costRatio(goals.find("Round trip of 1 MiB, untouched", kMpf, Mode::spin), small), 2);
