@@ -147,7 +147,9 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
   }
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
     noteTimes(envelope, request);
-  message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
+  const auto missed = Message::missedFlags(message.getMissed());
+  message.setRoute(
+      {0, envelope.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
   message.setTimeStampNs(envelope.timeNs);
   if (auto* connect = message.tryAs<Connect>()) connect->incarnation = connector_.incarnation();
   if (request != nullptr) {

@@ -20,6 +20,8 @@
 #include <span>
 #include <string>
 
+#include "shm/fan_out_borrower.h"
+#include "shm/fan_out_pool.h"
 #include "shm/pool.h"
 #include "shm/ring.h"
 #include "shm/window.h"
@@ -106,6 +108,18 @@ class Link {
   // this chunk; otherwise the body is copied into a new chunk.
   LinkSend trySend(Envelope& envelope, std::span<const std::byte> body,
                    const Limits& limits) noexcept;
+  // At the server: sends a body of `bytes` bytes that lies in a chunk of the fan-out pool. Returns
+  // `full` if the client holds `maxBorrowed` chunks of this pool, and `noMemory` if `chunk` is
+  // null; then the message counts as missed by its request.
+  LinkSend trySendFanOut(Envelope& envelope, const std::shared_ptr<FanOutChunk>& chunk,
+                         std::size_t bytes, const Limits& limits,
+                         std::uint32_t maxBorrowed) noexcept;
+  // At the server: takes what the client has returned of both pools.
+  void collectReturned() noexcept { pool_.collectReturned(); }
+  // At the server: the client reads no chunk any more if it was killed; otherwise it may.
+  void endFanOut() noexcept;
+  // At the server: the number of chunks of the fan-out pool that the client holds.
+  [[nodiscard]] std::uint32_t borrowedFanOut() noexcept { return pool_.loans().count(); }
   // Whether the caller must set the time of the next message (Envelope::sentTick).
   [[nodiscard]] bool shouldSampleTime() const noexcept;
   // The ring that trySend() fills; it counts the messages that were sent, and those that the peer
@@ -157,6 +171,7 @@ class Link {
   PoolOwner pool_;
   bool leavesPool_ = false;
   PoolBorrower borrowed_;
+  FanOutBorrower fanOut_;  // at the client
 };
 
 }  // namespace mpf

@@ -3,6 +3,8 @@
 
 #include <mutex>
 
+#include "shm/private_pages.h"
+
 namespace mpf {
 
 MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& message) noexcept try {
@@ -12,7 +14,10 @@ MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& mes
     const std::lock_guard guard(*lock_);
     if (const auto chunk = link_->tryChunk(envelope)) {
       lendOne();
-      message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
+      const bool isFanOut = chunk->ref.side == layout::kFanOutSide;
+      BodyLender* const lender = isFanOut ? static_cast<BodyLender*>(&fanOut_) : this;
+      message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, lender});
+      if (isFanOut) message.setRoute({0, 0, Message::missedFlags(chunk->ref.missed), nullptr});
     }
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
     message.assignInline(type, envelope.bodyBytes, [&](auto body) {
@@ -71,6 +76,11 @@ BodyBytes MessageLink::allocate(std::size_t bytes) {
     }
   }
   return allocateHeapBody(bytes);
+}
+
+void MessageLink::FanOutLender::takeBack(std::byte* data, std::size_t capacity) noexcept {
+  private_pages::drop(data, capacity);
+  link_.takeBack(data, capacity);
 }
 
 void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {

@@ -133,7 +133,9 @@ void Attacker::goBack(Link& link) {
   consumer.taken.store(random_.oneIn(2) ? 0 : random_.nasty(), std::memory_order_relaxed);
   consumer.unwatched.store(static_cast<std::uint32_t>(random_.below(3)), std::memory_order_relaxed);
   returns.chunks[random_.below(returns.chunks.size())].store(
-      random_.below(4) << 32 | random_.below(40), std::memory_order_relaxed);
+      random_.oneIn(2) ? layout::kReturnsFanOut | random_.below(8)
+                       : random_.below(4) << 32 | random_.below(40),
+      std::memory_order_relaxed);
   returns.returned.store(random_.oneIn(4) ? random_.nasty() : random_.below(1000),
                          std::memory_order_relaxed);
   if (random_.oneIn(2)) writeSlot(link);
