@@ -2,9 +2,10 @@
 // The processes of fan_out_test.cpp:
 //
 //   fan_out_actor server BACKPLANE 0        publishes images as fast as it can
-//   fan_out_actor reader BACKPLANE NUMBER   reports each image to the server; keeps the last images,
-//                                           and checks that they do not change; exits with 1 when an
-//                                           image is not what the server has published
+//   fan_out_actor reader BACKPLANE NUMBER   reports each image to the server
+//
+// A reader keeps the last images, and checks that they do not change. It exits with 1 when an image
+// is not what the server has published.
 #include <sys/prctl.h>
 
 #include <csignal>

@@ -65,8 +65,8 @@ class Camera {
       while (server_.handleOne()) continue;
     }
   }
-  // Publishes `count` images, each after this reader has reported the one before. Returns false when
-  // an image was dropped for it.
+  // Publishes `count` images, each after this reader has reported the one before. Returns false
+  // when an image was dropped for it.
   [[nodiscard]] bool tryShow(std::int32_t number, int count) {
     runUntil([&] { return readers_.contains(number); });
     for (int shown = 0; shown < count; ++shown) {
