@@ -15,7 +15,8 @@ double costNs(const Figures& figures) noexcept {
 std::vector<Measurement> catalogue(const std::string& runName) {
   auto all = floorMeasurements();
   for (auto more : {peerMeasurements(runName), scaleMeasurements(runName),
-                    deathMeasurements(runName), tappedMeasurements(runName)}) {
+                    deathMeasurements(runName), tappedMeasurements(runName),
+                    fanOutMeasurements(runName)}) {
     std::move(more.begin(), more.end(), std::back_inserter(all));
   }
   return all;

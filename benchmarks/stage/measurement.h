@@ -59,6 +59,7 @@ struct Result {
 [[nodiscard]] std::vector<Measurement> scaleMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> deathMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> tappedMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> fanOutMeasurements(const std::string& runName);
 
 inline constexpr const char* kBounce = "cache-line bounce";
 inline constexpr const char* kFutexBounce = "futex bounce";
