@@ -48,7 +48,9 @@ bool mayExist(const std::byte* data, std::size_t bytes) noexcept {
 }
 
 void drop(std::byte* data, std::size_t bytes) noexcept {
-  if (mayExist(data, bytes)) ::madvise(data, bytes, MADV_DONTNEED);
+  if (!mayExist(data, bytes) || ::madvise(data, bytes, MADV_DONTNEED) == 0) return;
+  ::munlock(data, bytes);  // mlockall() has locked, and so copied, the pages
+  ::madvise(data, bytes, MADV_DONTNEED);
 }
 
 }  // namespace mpf::private_pages

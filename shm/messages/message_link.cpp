@@ -11,14 +11,7 @@ MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& mes
   const auto type = static_cast<MessageType>(envelope.type);
   message.reset();
   if ((envelope.flags & layout::kSlotChunk) != 0) {
-    const std::lock_guard guard(*lock_);
-    if (const auto chunk = link_->tryChunk(envelope)) {
-      lendOne();
-      const bool isFanOut = chunk->ref.side == layout::kFanOutSide;
-      BodyLender* const lender = isFanOut ? static_cast<BodyLender*>(&fanOut_) : this;
-      message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, lender});
-      if (isFanOut) message.setRoute({0, 0, Message::missedFlags(chunk->ref.missed), nullptr});
-    }
+    message = readChunk(envelope);
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
     message.assignInline(type, envelope.bodyBytes, [&](auto body) {
       link_->incoming().copyBody(body.first(envelope.bodyBytes));
@@ -34,6 +27,24 @@ MessageLink::Finish MessageLink::readBody(const Envelope& envelope, Message& mes
   return Finish::unavailable;
 } catch (const std::bad_alloc&) {
   return Finish::unavailable;
+}
+
+Message MessageLink::readChunk(const Envelope& envelope) {
+  std::optional<Chunk> chunk;
+  {
+    const std::lock_guard guard(*lock_);
+    chunk = link_->tryChunk(envelope);
+    if (!chunk) return {};
+    lendOne();
+  }
+  const bool isFanOut = chunk->ref.side == layout::kFanOutSide;
+  // The program may have written to the last message in this mapping. Without the lock, because
+  // this takes longer than anything else.
+  if (isFanOut) private_pages::drop(chunk->data, chunk->capacity);
+  auto message = Message::adopt(static_cast<MessageType>(envelope.type),
+                                {chunk->data, envelope.bodyBytes, chunk->capacity, this});
+  if (isFanOut) message.setRoute({0, 0, Message::missedFlags(chunk->ref.missed), nullptr});
+  return message;
 }
 
 void MessageLink::discard(const Envelope& envelope) noexcept {
@@ -76,11 +87,6 @@ BodyBytes MessageLink::allocate(std::size_t bytes) {
     }
   }
   return allocateHeapBody(bytes);
-}
-
-void MessageLink::FanOutLender::takeBack(std::byte* data, std::size_t capacity) noexcept {
-  private_pages::drop(data, capacity);
-  link_.takeBack(data, capacity);
 }
 
 void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {

@@ -75,24 +75,16 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
-  // Takes back bodies of the server's fan-out pool, of which this process may have written copies.
-  class FanOutLender final : public BodyLender {
-   public:
-    explicit FanOutLender(MessageLink& link) noexcept : link_(link) {}
-    void takeBack(std::byte* data, std::size_t capacity) noexcept override;
-
-   private:
-    MessageLink& link_;
-  };
-
   // For a message that does not fit into one slot.
   Finish readBody(const Envelope& envelope, Message& message) noexcept;
+  // For a body in a chunk; an empty handle if there is no such chunk.
+  //   throws  ChunkUnavailable
+  Message readChunk(const Envelope& envelope);
   void lendOne() noexcept;
   void endLending() noexcept;
 
   std::unique_ptr<Link> link_;
   std::shared_ptr<SpinLock> lock_;
-  FanOutLender fanOut_{*this};
   std::uint32_t lent_ = 0;  // bodies that have not been returned; under lock_
   std::shared_ptr<MessageLink> self_;  // set while lent_ is not 0; under lock_
 };

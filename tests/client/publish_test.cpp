@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Published messages at their clients: read, changed, kept, sent back and missed.
 #include <algorithm>
+#include <atomic>
 #include <optional>
 #include <thread>
 #include <vector>
@@ -168,6 +169,35 @@ TEST_F(PublishTest, AMessageStaysReadableAfterItsClientAndItsServer) {
 
   EXPECT_TRUE(holds(kept, 9));
   EXPECT_EQ(countNames(backplane_, NameKind::fanOut), 0);
+}
+
+TEST_F(PublishTest, SeveralThreadsPublishWhileTheServerReceives) {
+  startServer({.maxBorrowed = 64});
+  const auto request = heldRequest();
+  constexpr int kEach = 200;
+  std::atomic<int> published{0};
+  const auto publish = [&](double with) {
+    for (int i = 0; i < kEach; ++i) {
+      const auto message = filled(with);
+      // The ring holds fewer messages than both threads publish.
+      while (server_->publish(message, request) == ReplyResult::queueFull)
+        std::this_thread::yield();
+      ++published;
+    }
+  };
+
+  std::thread one(publish, 1);
+  std::thread two(publish, 2);
+  int received = 0;
+  while (received < 2 * kEach) {
+    const auto message = next();
+    EXPECT_TRUE(holds(message, 1) || holds(message, 2));
+    ++received;
+  }
+  one.join();
+  two.join();
+
+  EXPECT_EQ(published, 2 * kEach);
 }
 
 TEST_F(PublishTest, RequestsOfAnotherServerOfTheProcessAreRefused) {
