@@ -48,7 +48,7 @@ class MessageClient::Impl {
     if (const auto* fate = message.tryAs<mpf::RequestFate>())
       return withFate(takeRequest(fate->requestId), fate->fate);
     const auto route = message.route();
-    auto request = route.flags == mpf::kEndsRequest ? takeRequest(route.requestId) : nullptr;
+    auto request = (route.flags & mpf::kEndsRequest) != 0 ? takeRequest(route.requestId) : nullptr;
     auto received = Transfer::receive(std::move(message));
     return received ? std::move(received) : withFate(std::move(request), mpf::Fate::outcomeUnknown);
   }

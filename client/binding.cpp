@@ -71,10 +71,9 @@ void Binding::tryConnect() try {
 // A change of state that comes with messages has a hint of its own, or is found when the endpoint
 // stops polling the link.
 bool Binding::takeSome(int most) {
-  if (!tryTakeMessage()) return isLinked() && !isPaused_ && onLinkState();
-  while (--most > 0 && tryTakeMessage()) {
-  }
-  return true;
+  int taken = 0;
+  while (taken < most && tryTakeMessage()) ++taken;
+  return taken != 0 || (isLinked() && !isPaused_ && onLinkState());
 }
 
 // Returns false when there is no message.
@@ -150,7 +149,9 @@ bool Binding::tryDeliverReply(const Envelope& envelope) {
   }
   if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
     noteTimes(envelope, request);
-  message.setRoute({0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr});
+  const auto missed = Message::missedFlags(message.getMissed());
+  message.setRoute(
+      {0, envelope.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
   message.setTimeStampNs(envelope.timeNs);
   if (request != nullptr) {
     requests.end(*request);

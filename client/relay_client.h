@@ -18,7 +18,7 @@ class RelayClient : public MessageClient {
                                   Deadline takeBefore) noexcept;
   // Whether a message that the callback received ended its request.
   [[nodiscard]] static bool endsRequest(const Message& message) noexcept {
-    return message.route().flags == kEndsRequest;
+    return (message.route().flags & kEndsRequest) != 0;
   }
   // Stops the delivery of messages from the server until resume() or the end of the connection. The
   // messages wait in the link; when it is full, the server's replies fail with queueFull.

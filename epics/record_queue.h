@@ -20,7 +20,7 @@ namespace mpf {
 
 // What a message does to the request that it belongs to.
 [[nodiscard]] inline bool endsRequest(const Message& message) noexcept {
-  return message.route().flags == kEndsRequest;
+  return (message.route().flags & kEndsRequest) != 0;
 }
 
 class RecordQueue {

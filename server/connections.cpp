@@ -20,6 +20,14 @@ namespace {
 constexpr std::chrono::milliseconds kDrainTimeout{100};
 constexpr std::chrono::microseconds kDrainPoll{500};
 
+// Whether the client holds messages of the fan-out pool, or has not received them.
+bool isBorrowing(Connection& connection) noexcept {
+  const std::lock_guard lock(*connection.lock);
+  auto& link = connection.channel->link();
+  link.collectReturned();
+  return link.borrowedFanOut() != 0;
+}
+
 }  // namespace
 
 void Connections::reportClient(std::uint64_t client, bool isConnected) noexcept try {
@@ -78,6 +86,7 @@ void Connections::close(Connection& connection) noexcept {
     channel = std::move(connection.channel);
     connection.channel.reset();
     ++connection.generation;
+    channel->link().endFanOut();
   }
   MPF_STEP(link_closing);
   endpoint_.detach(connection.index);
@@ -125,13 +134,14 @@ void Connections::closeAll() noexcept {
       removeFilesOf(link);
       stale_segments::removeDeadWindow(endpoint_.backplane().name(), link.peer()->name(),
                                        link.peer()->header().incarnation);
-    } else if (!link.tryLeavePoolToClient()) {
+    } else if (!link.tryLeavePoolToClient() || isBorrowing(*connection)) {
       others.push_back(connection->channel);
     }
     close(*connection);
   }
-  // Clients of other users cannot remove the server's pool files, so the server removes them
-  // itself. It first gives these clients a moment to receive the replies that are in the pool.
+  // Clients of other users cannot remove the server's pool files, and none can remove those of the
+  // fan-out pool, so the server removes them itself. It first gives these clients a moment to
+  // receive the replies that are in the pools.
   const auto deadline = Deadline::after(kDrainTimeout);
   const auto isReceiving = [](const auto& channel) { return !channel->link().hasPeerEnded(); };
   while (std::ranges::any_of(others, isReceiving) && !deadline.hasPassed())

@@ -48,6 +48,13 @@ void MessageServer::refuse(Message&& request) { const Message dropped = std::mov
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
   return ReplySender::allocate(request.route(), bytes);
 }
+BodyBytes MessageServer::allocateShared(std::size_t bytes) {
+  return core_->publisher().allocate(bytes);
+}
+std::size_t MessageServer::publish(const Message& message, std::span<const Message> requests,
+                                   std::span<ReplyResult> results) noexcept {
+  return core_->publisher().publish(message, requests, results);
+}
 int MessageServer::descriptor() { return core_->descriptor(); }
 
 void MessageServer::address(Message& reply, const Message& request) noexcept {

@@ -51,6 +51,7 @@ ServerCore::ServerCore(const Backplane& backplane, const std::string& name,
       connections_(endpoint_),
       acceptor_(endpoint_, connections_),
       replies_(endpoint_.control(), options.stampsReplies),
+      publisher_(backplane.name(), endpoint_.window(), options),
       keeper_(RequestKeeper::make(replies_)),
       progress_(endpoint_.control()) {}
 

@@ -3,6 +3,7 @@
 // keep their connections and send replies.
 //
 //   clients ─► Acceptor ─► Connections ─► ServerCore ─► request, handler ─► ReplySender ─► clients
+//                                                                  └► Publisher ───► clients
 //
 // Threads  as MessageServer: one thread owns it, any thread may reply.
 // Crash    the links of a dead client are closed and their names removed.
@@ -20,6 +21,7 @@
 #include "server/acceptor.h"
 #include "server/connections.h"
 #include "server/progress.h"
+#include "server/publisher.h"
 #include "server/reply_sender.h"
 #include "server/request_keeper.h"
 #include "shm/endpoint.h"
@@ -38,6 +40,7 @@ class ServerCore {
   [[nodiscard]] Acceptor& acceptor() noexcept { return acceptor_; }
   [[nodiscard]] Connections& connections() noexcept { return connections_; }
   [[nodiscard]] ReplySender& replies() noexcept { return replies_; }
+  [[nodiscard]] Publisher& publisher() noexcept { return publisher_; }
 
   bool wait(Deadline deadline);
   Message receive();
@@ -74,6 +77,7 @@ class ServerCore {
   Connections connections_;
   Acceptor acceptor_;
   ReplySender replies_;
+  Publisher publisher_;
   RequestKeeper& keeper_;
   Progress progress_;
   Deadline takeBefore_ = Deadline::never();  // of the request received last

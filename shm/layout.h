@@ -9,6 +9,7 @@
 //   mpf.<backplane>.h.<incarnation>         hints           WindowHints
 //   mpf.<backplane>.l.<server>.<link>       link            LinkControl, two rings of slots
 //   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks
+//   mpf.<backplane>.p.<incarnation>.<n>     fan-out         one chunk
 //   mpf.<backplane>.w.<incarnation>         pending bind    only the header
 //   mpf.<backplane>.r.<incarnation>         router          RouterLines
 //
@@ -16,6 +17,7 @@
 //   hints         bell, knocks and ready bits of one window; every peer writes them
 //   link          mapped only by one client and one server
 //   bulk          bodies of messages that do not fit into a ring; written by `side` of the link
+//   fan-out       a body that a server sends to many clients, which map it read-only
 //   pending bind  says that a client waits for a server
 //   router        the connections of a router, for reports; written and locked by the router
 //
@@ -66,7 +68,8 @@ enum class SegmentKind : std::uint32_t {
   link = 4,
   bulk = 5,
   pendingBind = 6,
-  router = 7
+  router = 7,
+  fanOut = 8
 };
 
 // First 512 bytes of every segment. Written before the segment gets its name; constant afterwards.
@@ -111,7 +114,7 @@ struct SegmentHeader {
   std::uint64_t clientWindow;  // incarnation
   std::uint64_t ringBytesOffset;  // offset of LinkControl; rings follow it
 
-  // Bulk only.
+  // Bulk and fan-out.
   std::uint64_t chunkBytes;
   std::uint32_t chunkCount;
   std::uint32_t bulkSide;  // 0 the client's, 1 the server's
@@ -227,12 +230,17 @@ inline constexpr std::size_t kInlineBodyBytes =
 inline constexpr std::uint8_t kSlotChunk = 1;  // the body is a ChunkRef to a bulk segment
 inline constexpr std::uint8_t kSlotFirstReply = 2;  // ends the request that it answers
 
+// The side of a ChunkRef to the fan-out pool of the server; only servers send it.
+inline constexpr std::uint32_t kFanOutSide = 2;
+
 // Body of a kSlotChunk message.
 struct ChunkRef {
-  std::uint32_t segment;  // n of mpf.<backplane>.b.<link>.<side>.<n>
+  // n of mpf.<backplane>.b.<link>.<side>.<n>, or of mpf.<backplane>.p.<server window>.<n>
+  std::uint32_t segment;
   std::uint32_t chunk;
-  std::uint32_t side;  // owner of the pool: 0 the client, 1 the server
-  std::uint32_t reserved;
+  std::uint32_t side;  // owner of the pool: 0 the client, 1 the server; kFanOutSide
+  // kFanOutSide: messages of this request that the server has dropped since the last one
+  std::uint32_t missed;
 };
 static_assert(sizeof(ChunkRef) == 16);
 
@@ -252,9 +260,12 @@ struct RingControl {
 inline constexpr std::uint32_t kReturnSlots = 256;
 struct ReturnRing {
   alignas(kPairBytes) Word64 returned;  // chunks returned so far
-  // segment << 32 | chunk; a pool never lends more than kReturnSlots
+  // segment << 32 | chunk, or kReturnsFanOut | segment; the two pools together never lend more than
+  // kReturnSlots
   std::array<Word64, kReturnSlots> chunks;
 };
+// In ReturnRing::chunks: a chunk of the fan-out pool.
+inline constexpr std::uint64_t kReturnsFanOut = std::uint64_t{1} << 63;
 
 enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused = 3 };
 

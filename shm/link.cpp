@@ -148,7 +148,8 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
       pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user},
             segment_.header().maxPoolBytes, returnRing(segment_, side)),
       borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes,
-                returnRing(segment_, other(side))) {}
+                returnRing(segment_, other(side))),
+      fanOut_(backplane, segment_.header().serverWindow) {}
 
 Link::~Link() {
   if (side_ == LinkSide::client && !forkGuard_.isInherited()) segments::remove(segment_.name());
@@ -232,6 +233,40 @@ LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }
 
+LinkSend Link::trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+                             std::size_t bytes, const Limits& limits,
+                             std::uint32_t maxBorrowed) noexcept {
+  if (bytes > maxMessageBytes()) return LinkSend::tooLarge;
+  auto& loans = pool_.loans();
+  const auto id = envelope.requestId;
+  pool_.collectReturned();
+  if (loans.count() >= maxBorrowed || !pool_.canLend() || !out_.hasFree(1 + limits.reserve)) {
+    loans.noteMissed(id);
+    return LinkSend::full;
+  }
+  if (!chunk || !loans.tryLend(chunk)) {
+    loans.noteMissed(id);
+    return LinkSend::noMemory;
+  }
+  envelope.bodyBytes = static_cast<std::uint32_t>(bytes);
+  envelope.flags |= layout::kSlotChunk;
+  const layout::ChunkRef ref{chunk->number(), 0, layout::kFanOutSide, loans.missed(id)};
+  // hasFree() above has checked that it fits.
+  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve))
+    return LinkSend::full;
+  loans.forgetMissed(id);
+  afterPush();
+  return LinkSend::sent;
+}
+
+void Link::endFanOut() noexcept {
+  pool_.collectReturned();
+  // A client that has ended the link may be alive although its window is gone.
+  const bool wasKilled = peer_->isDead() && peerState() != layout::LinkState::closed;
+  if (wasKilled) pool_.loans().endAll();
+  else pool_.loans().retireAll();
+}
+
 void Link::afterFencedPush() noexcept {
   // PAIR(watch-fence): our message is before the fence, our load of the peer's `Watch` after it.
   doorbell::fence();
@@ -245,6 +280,8 @@ void Link::release(const std::byte* data) noexcept {
     pool_.free(*own);
   } else if (const auto foreign = borrowed_.tryFind(data)) {
     borrowed_.giveBack(*foreign);
+  } else if (const auto shared = fanOut_.tryRelease(data)) {
+    borrowed_.giveBack(*shared);
   }
 }
 
@@ -260,7 +297,9 @@ std::optional<Chunk> Link::tryChunk(Envelope envelope) {
 
 std::optional<Chunk> Link::tryBorrow(const layout::ChunkRef& ref) {
   try {
-    auto chunk = borrowed_.tryBorrow(ref);
+    auto chunk = ref.side == layout::kFanOutSide && side_ == LinkSide::client
+                     ? fanOut_.tryBorrow(ref)
+                     : borrowed_.tryBorrow(ref);
     if (chunk || !hasPeerEnded()) return chunk;
     // NOLINTNEXTLINE(bugprone-empty-catch): no descriptor or no memory: the chunk is unavailable
   } catch (const std::exception&) {

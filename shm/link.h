@@ -22,6 +22,8 @@
 
 #include "base/expedited_barrier.h"
 #include "base/step.h"
+#include "shm/fan_out_borrower.h"
+#include "shm/fan_out_pool.h"
 #include "shm/pool.h"
 #include "shm/ring.h"
 #include "shm/window.h"
@@ -115,6 +117,18 @@ class Link {
     afterPush();
     return LinkSend::sent;
   }
+  // At the server: sends a body of `bytes` bytes that lies in a chunk of the fan-out pool. Returns
+  // `full` if the client holds `maxBorrowed` chunks of this pool, and `noMemory` if `chunk` is
+  // null; then the message counts as missed by its request.
+  LinkSend trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+                         std::size_t bytes, const Limits& limits,
+                         std::uint32_t maxBorrowed) noexcept;
+  // At the server: takes what the client has returned of both pools.
+  void collectReturned() noexcept { pool_.collectReturned(); }
+  // At the server: the client reads no chunk any more if it was killed; otherwise it may.
+  void endFanOut() noexcept;
+  // At the server: the number of chunks of the fan-out pool that the client holds.
+  [[nodiscard]] std::uint32_t borrowedFanOut() noexcept { return pool_.loans().count(); }
   // Whether the caller must set the time of the next message (Envelope::sentTick).
   [[nodiscard]] bool shouldSampleTime() const noexcept {
     return outWatch_.load(std::memory_order_relaxed) == layout::Watch::unwatched ||
@@ -192,6 +206,7 @@ class Link {
   PoolOwner pool_;
   bool leavesPool_ = false;
   PoolBorrower borrowed_;
+  FanOutBorrower fanOut_;  // at the client
 };
 
 }  // namespace mpf

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "shm/mapping.h"
 
+#include <sys/mman.h>
+
 #include <boost/interprocess/shared_memory_object.hpp>
 #include <fmt/format.h>
 #include <utility>
@@ -23,9 +25,23 @@ class OpenFile {
   decltype(std::declval<ipc::shared_memory_object>().get_mapping_handle()) handle_{};
 };
 
+ipc::mode_t modeOf(Mapping::Access access) {
+  switch (access) {
+    case Mapping::Access::readOnly:
+      return ipc::read_only;
+    case Mapping::Access::readWrite:
+      return ipc::read_write;
+    case Mapping::Access::copyOnWrite:
+      return ipc::copy_on_write;
+  }
+  return ipc::invalid_mode;
+}
+
 ipc::mapped_region mapRegion(int file, std::size_t bytes, Mapping::Access access) try {
-  return {OpenFile(file), access == Mapping::Access::readOnly ? ipc::read_only : ipc::read_write, 0,
-          bytes};
+  // Private copies exist only of pages that are written: reserve no memory for the others.
+  const auto options =
+      access == Mapping::Access::copyOnWrite ? MAP_NORESERVE : ipc::default_map_options;
+  return {OpenFile(file), modeOf(access), 0, bytes, nullptr, options};
 } catch (const ipc::interprocess_exception& error) {
   throwSystemError(error.get_native_error(), fmt::format("map {} bytes of a segment", bytes), {});
 }
@@ -35,7 +51,7 @@ ipc::mapped_region mapRegion(int file, std::size_t bytes, Mapping::Access access
 Mapping::Mapping(int file, std::size_t bytes, Access access)
     : region_(mapRegion(file, bytes, access)),
       range_(fault_guard::add(region_.get_address(), region_.get_size(),
-                              access == Access::readWrite)) {}
+                              access != Access::readOnly)) {}
 
 Mapping::Mapping(Mapping&& other) noexcept
     : region_(std::move(other.region_)), range_(std::exchange(other.range_, nullptr)) {}

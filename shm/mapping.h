@@ -17,7 +17,9 @@ namespace mpf {
 
 class Mapping {
  public:
-  enum class Access { readOnly, readWrite };
+  // copyOnWrite: this process may write, to copies of the pages that no other process sees. Reading
+  // needs a descriptor that may only read.
+  enum class Access { readOnly, readWrite, copyOnWrite };
 
   Mapping() noexcept = default;
   // Maps the first `bytes` of `file`, which may be closed afterwards.

@@ -43,7 +43,7 @@ PoolOwner::~PoolOwner() {
 
 std::optional<Chunk> PoolOwner::tryAlloc(std::size_t bytes) noexcept {
   collectReturned();
-  if (inUse_ >= layout::kReturnSlots || bytes > kMaxChunkBytes) return std::nullopt;
+  if (!canLend() || bytes > kMaxChunkBytes) return std::nullopt;
   const auto chunkBytes = chunkBytesFor(bytes);
   for (int attempt = 0; attempt < 2; ++attempt) {
     for (std::uint32_t segment = 0; segment < bulks_.size(); ++segment) {
@@ -122,6 +122,10 @@ void PoolOwner::collectReturned() noexcept {
   for (; collected_ < end; ++collected_) {
     const auto packed =
         returns_->chunks[collected_ % layout::kReturnSlots].load(std::memory_order_relaxed);
+    if ((packed & layout::kReturnsFanOut) != 0) {
+      loans_.takeBack(static_cast<std::uint32_t>(packed));
+      continue;
+    }
     const layout::ChunkRef ref{static_cast<std::uint32_t>(packed >> 32),
                                static_cast<std::uint32_t>(packed), place_.side, 0};
     if (tryReceiveBack(ref)) free(ref);
@@ -170,8 +174,10 @@ std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) try {
 }
 
 void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
-  returns_->chunks[returned_ % layout::kReturnSlots].store(
-      std::uint64_t{ref.segment} << 32 | ref.chunk, std::memory_order_relaxed);
+  const auto packed = ref.side == layout::kFanOutSide
+                          ? layout::kReturnsFanOut | ref.segment
+                          : std::uint64_t{ref.segment} << 32 | ref.chunk;
+  returns_->chunks[returned_ % layout::kReturnSlots].store(packed, std::memory_order_relaxed);
   MPF_STEP(chunk_noted);
   // PAIR(chunk-returned): we have finished with the chunk.
   returns_->returned.store(++returned_, std::memory_order_release);

@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "shm/fan_out_loans.h"
 #include "shm/fork_guard.h"
 #include "shm/layout.h"
 #include "shm/segment.h"
@@ -58,6 +59,14 @@ class PoolOwner {
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
   // Memory of all segments of this pool.
   [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
+  // Takes what the peer has returned through the ring.
+  void collectReturned() noexcept;
+  // What a client holds of the fan-out pool of its server. It is returned through the same ring.
+  [[nodiscard]] FanOutLoans& loans() noexcept { return loans_; }
+  // Whether another chunk, of either pool, fits into the ring of returns.
+  [[nodiscard]] bool canLend() const noexcept {
+    return inUse_ + loans_.count() < layout::kReturnSlots;
+  }
   // Makes the destructor keep the names of the segments: the peer removes them.
   void leaveNames() noexcept { leavesNames_ = true; }
 
@@ -72,7 +81,6 @@ class PoolOwner {
       return segment.data() + layout::kBulkChunksOffset + index * chunkBytes;
     }
   };
-  void collectReturned() noexcept;
   bool addBulk(std::size_t chunkBytes);
   bool isState(const layout::ChunkRef& ref, ChunkState state) const noexcept;
 
@@ -84,7 +92,8 @@ class PoolOwner {
   layout::ReturnRing* returns_;
   std::uint64_t collected_ = 0;
   bool leavesNames_ = false;
-  std::uint32_t inUse_ = 0;  // chunks held or lent, at most kReturnSlots
+  std::uint32_t inUse_ = 0;  // chunks held or lent
+  FanOutLoans loans_;
   std::vector<Bulk> bulks_;
 };
 
@@ -96,7 +105,7 @@ class PoolBorrower {
   // Maps a chunk that the peer sent; nullopt if there is no such chunk.
   //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it
   std::optional<Chunk> tryBorrow(const layout::ChunkRef& ref);
-  // Returns a chunk to the peer.
+  // Returns a chunk to the peer, also one of its fan-out pool.
   void giveBack(const layout::ChunkRef& ref) noexcept;
   std::optional<layout::ChunkRef> tryFind(const std::byte* data) const noexcept;
 

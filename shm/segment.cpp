@@ -208,7 +208,7 @@ std::optional<Segment> Segment::tryOpen(const std::string& name, layout::Segment
   Segment segment;
   segment.name_ = name;
   segment.file_ =
-      openChecked(name, kind, access == Access::readOnly ? O_RDONLY : O_RDWR, segment.header_);
+      openChecked(name, kind, access == Access::readWrite ? O_RDWR : O_RDONLY, segment.header_);
   if (!segment.file_) return std::nullopt;
   segment.mapping_ = Mapping(segment.file_.get(), segment.header_.totalBytes, access);
   return segment;

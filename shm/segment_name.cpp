@@ -119,6 +119,15 @@ std::string SegmentName::bulk(std::string_view backplane, std::uint64_t link, st
   return fmt::format("mpf.{}.b.{:x}.{}.{}", backplane, link, side, segment);
 }
 
+std::string SegmentName::fanOutPrefix(std::string_view backplane, std::uint64_t serverWindow) {
+  return fmt::format("mpf.{}.p.{:x}.", backplane, serverWindow);
+}
+
+std::string SegmentName::fanOut(std::string_view backplane, std::uint64_t serverWindow,
+                                std::uint32_t segment) {
+  return fmt::format("{}{}", fanOutPrefix(backplane, serverWindow), segment);
+}
+
 std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) {
   const auto parts = split(name);
   if (parts.size() < 4 || parts[0] != "mpf" || !isBackplane(parts[1]) || parts[2].size() != 1)
@@ -137,6 +146,13 @@ std::optional<SegmentName::Parsed> SegmentName::tryParse(std::string_view name) 
       if (!server || !link) return std::nullopt;
       parsed.serverWindow = *server;
       parsed.incarnation = *link;
+      return parsed;
+    }
+    case NameKind::fanOut: {
+      const auto server = tryHex(parts[3]);
+      if (!server || parts.size() != 5 || !tryNumber<std::uint32_t>(parts[4], 10))
+        return std::nullopt;
+      parsed.incarnation = *server;
       return parsed;
     }
     case NameKind::bulk:

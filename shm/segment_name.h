@@ -19,7 +19,8 @@ enum class NameKind : char {
   pendingBind = 'w',
   fifo = 'f',
   router = 'r',
-  reaper = 'k'
+  reaper = 'k',
+  fanOut = 'p'
 };
 
 struct SegmentName {
@@ -38,9 +39,13 @@ struct SegmentName {
   static std::string bulk(std::string_view backplane, std::uint64_t link, std::uint32_t side,
                           std::uint32_t segment);
 
+  static std::string fanOut(std::string_view backplane, std::uint64_t serverWindow,
+                            std::uint32_t segment);
+
   // The prefix of all names of one backplane; of all backplanes if `backplane` is empty.
   static std::string prefix(std::string_view backplane);
   static std::string linkPrefix(std::string_view backplane, std::uint64_t serverWindow);
+  static std::string fanOutPrefix(std::string_view backplane, std::uint64_t serverWindow);
 
   struct Parsed {
     std::string backplane;

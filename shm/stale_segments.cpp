@@ -154,7 +154,7 @@ class Judge {
     return {Verdict::unknown, fmt::format("cannot be judged: {}", error.what())};
   }
 
-  // A pool belongs to its link, a FIFO to its hints.
+  // A pool belongs to its link; a FIFO and the fan-out pool to a window, whose hints were judged.
   void last(const std::string& name, const Parsed& parsed) {
     if (parsed.kind == NameKind::bulk) {
       const auto link = links_.find(parsed.incarnation);
@@ -162,7 +162,7 @@ class Judge {
       add(name, link == links_.end() ? Finding{Verdict::dead, fmt::format("its link {:x} is gone",
                                                                           parsed.incarnation)}
                                      : link->second);
-    } else if (parsed.kind == NameKind::fifo) {
+    } else if (parsed.kind == NameKind::fifo || parsed.kind == NameKind::fanOut) {
       add(name, ownerOf(hints_, NameKind::hints, parsed.incarnation));
     }
   }
@@ -226,6 +226,18 @@ bool tryRemove(const Judged& file) {
   }
 }
 
+namespace {
+
+// An attach removes what remains when the names cannot be listed.
+void removeFanOut(const std::string& backplane, std::uint64_t incarnation) noexcept try {
+  for (const auto& name : segments::list(SegmentName::fanOutPrefix(backplane, incarnation)))
+    segments::remove(name);
+  // NOLINTNEXTLINE(bugprone-empty-catch): no descriptor or no memory
+} catch (const std::exception&) {
+}
+
+}  // namespace
+
 void removeDeadWindow(const std::string& backplane, const std::string& name,
                       std::uint64_t incarnation) {
   const bool isDead = segments::probeOwner(name, incarnation) == segments::Owner::dead;
@@ -240,6 +252,7 @@ void removeDeadWindow(const std::string& backplane, const std::string& name,
   // Every peer may lock the hints. Their lock decides only if there is no window to ask.
   if (ownsHints ? segments::remove(hints) : segments::removeKeyedIfOwnerless(hints)) {
     segments::remove(SegmentName::keyed(backplane, NameKind::fifo, incarnation));
+    removeFanOut(backplane, incarnation);
   }
 }
 

@@ -4,7 +4,7 @@
 //
 //   1. windows, hints         dead if their lock is free
 //   2. links, pending binds   dead if the window of their client is dead
-//   3. pools, FIFOs           dead if their link or their hints are dead
+//   3. pools, FIFOs           dead if their link or the hints of their window are dead
 //
 // Threads  any.
 // Crash    a dead file stays dead, so any number of processes may remove it at the same time.
@@ -39,7 +39,7 @@ std::vector<Judged> judgeSome(const std::string& backplane, std::size_t most);
 bool tryRemove(const Judged& file);
 
 // If the owner of the window `name` with this incarnation is proven dead, removes the window, its
-// hints and its FIFO.
+// hints, its FIFO and its fan-out pool.
 void removeDeadWindow(const std::string& backplane, const std::string& name,
                       std::uint64_t incarnation);
 

@@ -135,7 +135,8 @@ void OwnWindow::publish(const std::string& name) {
 
 OwnWindow::~OwnWindow() {
   if (forkGuard_.isInherited()) return;
-  control().state.store(layout::WindowState::closed, std::memory_order_relaxed);
+  // PAIR(window-closed): the owner has closed its links before.
+  control().state.store(layout::WindowState::closed, std::memory_order_release);
   MPF_STEP(window_closed);
   segments::remove(SegmentName::keyed(backplane_, NameKind::fifo, header().incarnation));
   segments::remove(hints_.name());

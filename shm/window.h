@@ -96,15 +96,22 @@ class PeerWindow {
   void forceNextRing() noexcept { rungFor_.store(0, std::memory_order_relaxed); }
 
   // Set by the watcher when the owner is proven dead, and never reset.
-  [[nodiscard]] bool isDead() const noexcept { return dead_.load(std::memory_order_relaxed); }
-  void setDead() noexcept { dead_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] bool isDead() const noexcept {
+    // PAIR(peer-dead): also sees the last states of the peer's links.
+    return dead_.load(std::memory_order_acquire);
+  }
+  void setDead() noexcept {
+    // PAIR(peer-dead): the watcher has seen that the owner gave up its window.
+    dead_.store(true, std::memory_order_release);
+  }
   // Whether one of its files was truncated. Its contents are then meaningless.
   [[nodiscard]] bool isLost() const noexcept { return window_.isLost() || hints_.isLost(); }
   // Asks the kernel whether the owner is alive.
   [[nodiscard]] bool hasOwner() const noexcept { return window_.hasOwner(); }
   [[nodiscard]] std::uint32_t user() const { return window_.fileUser(); }
   [[nodiscard]] bool isClosed() const noexcept {
-    return control().state.load(std::memory_order_relaxed) == layout::WindowState::closed;
+    // PAIR(window-closed): also sees that the owner has closed its links.
+    return control().state.load(std::memory_order_acquire) == layout::WindowState::closed;
   }
 
  private:

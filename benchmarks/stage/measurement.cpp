@@ -16,7 +16,8 @@ std::vector<Measurement> catalogue(const std::string& runName) {
   auto all = floorMeasurements();
   for (auto more :
        {peerMeasurements(runName), oneThreadMeasurements(runName), underLoadMeasurements(runName),
-        scaleMeasurements(runName), deathMeasurements(runName), tappedMeasurements(runName)}) {
+        scaleMeasurements(runName), deathMeasurements(runName), tappedMeasurements(runName),
+        fanOutMeasurements(runName)}) {
     std::move(more.begin(), more.end(), std::back_inserter(all));
   }
   return all;

@@ -72,6 +72,7 @@ struct Result {
 [[nodiscard]] std::vector<Measurement> scaleMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> deathMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> tappedMeasurements(const std::string& runName);
+[[nodiscard]] std::vector<Measurement> fanOutMeasurements(const std::string& runName);
 [[nodiscard]] std::vector<Measurement> oneThreadMeasurements(const std::string& runName);
 // Uses rows of the first two.
 [[nodiscard]] std::vector<Measurement> underLoadMeasurements(const std::string& runName);

@@ -19,6 +19,8 @@
 //   larger             on the heap                              copied
 //                      in the memory that client and server     in place: nothing is copied
 //                      share for this connection
+//                      in the memory that a server shares       MessageServer::publish() copies
+//                      with all of its clients                  nothing; others copy
 //
 // A received large body occupies the shared memory of its sender until the handle is destroyed or
 // sent: a program that keeps many such handles makes the sender run out of memory. The body stays
@@ -64,8 +66,8 @@ class RouteKeeper {
   ~RouteKeeper() = default;
 };
 
-// A value of Route::flags, in messages that a client received: the message ended its request.
-// Further replies, and messages that belong to no request, have flags 0.
+// A bit of Route::flags, in messages that a client received: the message ended its request. Further
+// replies, and messages that belong to no request, do not have it.
 inline constexpr std::uint32_t kEndsRequest = 1;
 
 // Where a reply to this message goes. Transports write and read it; servers do not interpret it,
@@ -74,7 +76,8 @@ inline constexpr std::uint32_t kEndsRequest = 1;
 struct Route {
   std::uint64_t link{};  // the connection of the client; 0 in messages that a client received
   std::uint32_t requestId{};  // the client's number of the request; 0: of no request
-  std::uint32_t flags{};  // at a client: kEndsRequest or 0; at a server: for the transport only
+  // at a client: kEndsRequest, and Message::getMissed(); at a server: for the transport only
+  std::uint32_t flags{};
   RouteKeeper* keeper = nullptr;  // of requests that have had no reply; not owned
 };
 
@@ -124,6 +127,14 @@ class Message {
   // is not sent. A peer may have sent any value.
   [[nodiscard]] std::int64_t getTimeStampNs() const noexcept { return state_.timeStampNs; }
   void setTimeStampNs(std::int64_t timeNs) noexcept { state_.timeStampNs = timeNs; }
+
+  // In messages that a client received: how many messages to the same request the server has
+  // dropped since the last one that it published (MessageServer::publish()), because this client
+  // had not destroyed, or not received, enough of the earlier ones; at most 2^24 - 1. 0 for all
+  // other messages, and across routers.
+  [[nodiscard]] std::uint32_t getMissed() const noexcept {
+    return state_.route.link == 0 ? state_.route.flags >> kMissedShift : 0;
+  }
 
   // The fields, in place: valid until the handle is moved, sent or destroyed. Returns nullptr when
   // the message has another type than T or its body is invalid. A peer may change T::length at any
@@ -177,6 +188,11 @@ class Message {
   // Replaces the keeper of the route, and returns the former one without a call.
   RouteKeeper* exchangeKeeper(RouteKeeper* keeper) noexcept {
     return std::exchange(state_.route.keeper, keeper);
+  }
+
+  // The bits of Route::flags for a number of missed messages.
+  [[nodiscard]] static constexpr std::uint32_t missedFlags(std::uint32_t missed) noexcept {
+    return std::min(missed, UINT32_MAX >> kMissedShift) << kMissedShift;
   }
 
   // Becomes the owner of a body and checks it: isSound() is the result. The lender gets the body
@@ -296,6 +312,7 @@ class Message {
 
  private:
   static constexpr std::uint8_t kOutside = 0xff;
+  static constexpr unsigned kMissedShift = 8;
   // The bytes of an inline body, or the description of an out-of-line body: see inlineSize.
   union Where {
     alignas(8) std::array<std::byte, kInlineBytes> inside;

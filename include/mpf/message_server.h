@@ -14,9 +14,10 @@
 //   }
 //
 // Threads  one thread waits and receives; any thread may call reply(), allocReplyMessage(),
-//          isClientConnected(), countAlarm() and interrupt().
+//          allocShared(), publish(), isClientConnected(), countAlarm() and interrupt().
 // Crash    when a client dies, the handles of its requests stay valid; replies to them return
-//          clientGone. Its shared memory is freed when the last of these handles is destroyed.
+//          clientGone. Its shared memory is freed when the last of these handles is destroyed;
+//          published messages that it held are freed at once.
 // Trust    a client that sends invalid data loses its connection; other clients are not affected.
 // Throws   an exception that leaves a handler leaves run(), runUntilSignal() or handleOne(); the
 //          request, if it has had no reply, ends as `refused`. An exception that leaves the
@@ -28,6 +29,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -50,15 +52,21 @@ struct ServerOptions {
   Rights rights{};  // which users may bind: mode 0660 and a group admit the members of the group
   // Whether a reply without a time stamp (Message::setTimeStampNs()) gets that of its sending.
   bool stampsReplies = false;
+  // [bytes] Memory of the messages made by allocShared(), together for all clients.
+  std::uint64_t maxSharedBytes = 320ull << 20;
+  // Published messages that one client may hold, 1 to 64: those that it has not received and those
+  // whose handles it has not destroyed. Above this number, publish() drops messages for the client.
+  int maxBorrowed = 4;
 };
 
 // The result of a reply.
 enum class ReplyResult {
   sent,
   clientGone,  // the client has disconnected or died, or the message is no reply
-  queueFull,  // further replies only: the client has not received the earlier ones yet
+  queueFull,  // further replies only: the client has not received the earlier ones yet; publish()
+  // only: it holds ServerOptions::maxBorrowed published messages
   tooLarge,  // larger than ServerOptions::maxMessageBytes
-  noMemory  // the shared memory of the connection, or /dev/shm, is full
+  noMemory  // the shared memory of the connection, that of publish(), or /dev/shm, is full
 };
 // The result in words, for messages to people.
 [[nodiscard]] const char* toString(ReplyResult result) noexcept;
@@ -129,6 +137,48 @@ class MessageServer {
   // Ends a request without a reply: its client gets the fate `refused`.
   void refuse(Message&& request);
 
+  // --- one message for many clients
+  //
+  //   std::vector<mpf::Message> subscribers;  // requests that the server keeps
+  //   auto image = server.allocShared<mpf::Int32Array>(pixels);
+  //   camera.read(image.value());
+  //   server.publish(image, subscribers);     // nothing is copied; image is destroyed as usual
+
+  // Returns an array of n elements, fields 0, elements not initialised, in memory that all clients
+  // of this server can read and only the server can write; on the heap when that memory is full.
+  // The memory is free again when the handle and those of all clients are destroyed, and when a
+  // client that holds one is killed. Do not write to the message after it was published: clients
+  // would see it change.
+  //   throws  std::bad_alloc; std::length_error when n is above 2^32 - 1
+  template <ArrayBody T>
+  [[nodiscard]] MessageOf<T> allocShared(std::size_t n) {
+    return MessageOf<T>::inBuffer(allocateShared(MessageOf<T>::bytesFor(n)), n);
+  }
+  // Sends `message` as a reply to each of `requests`, which the server keeps: the first reply to a
+  // request ends it, the others are further replies. A message of allocShared() is not copied; any
+  // other message is copied once. Each client gets the clientType and the clientExtra of its own
+  // request, and may write to what it receives: that changes neither the message of another client
+  // nor the server's. Any thread; never waits.
+  //
+  // A client that holds ServerOptions::maxBorrowed published messages gets no more until it has
+  // destroyed one: the result is queueFull, and no other client is affected. The next message that
+  // is published to the same request tells it how many it has missed (queueFull and noMemory):
+  // Message::getMissed().
+  //
+  //   message   keeps its contents, and may be published again, to these or other requests
+  //   requests  unchanged; a request of another server, and an empty handle, is a clientGone
+  //   results   out: the result for each request; may be shorter, and is then filled as far as it
+  //             goes
+  //   returns   the number of results `sent`
+  std::size_t publish(const Message& message, std::span<const Message> requests,
+                      std::span<ReplyResult> results = {}) noexcept;
+  // The same for one request.
+  ReplyResult publish(const Message& message, const Message& request) noexcept {
+    ReplyResult result{};
+    publish(message, std::span(&request, 1), std::span(&result, 1));
+    return result;
+  }
+
   // Sets the handler that run() and handleOne() call for each request of type T. A handler with the
   // parameter T& (the fields) or MessageOf<T>& (the fields and the elements) changes the request,
   // which is then sent as the reply. A handler with the parameter MessageOf<T>&& owns the request
@@ -186,6 +236,7 @@ class MessageServer {
   void setHandler(MessageType type, std::function<void(Message&&)> handler);
   void callHandler(const std::function<void(Message&&)>& handler, Message&& request);
   BodyBytes allocate(const Message& request, std::size_t bytes);
+  BodyBytes allocateShared(std::size_t bytes);
   static void address(Message& reply, const Message& request) noexcept;
   std::unique_ptr<class ServerCore> core_;
   std::map<MessageType, std::function<void(Message&&)>> handlers_;

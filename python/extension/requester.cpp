@@ -46,9 +46,10 @@ void Requester::take(Message&& message) {
 }
 
 void Requester::takeAnswer(Exchange& exchange, Message&& message) {
+  exchange.missed += message.getMissed();
   if (const auto* fate = message.tryAs<RequestFate>()) {
     if (!exchange.hasEnded()) exchange.fate = fate->fate;
-  } else if (message.route().flags == kEndsRequest) {
+  } else if ((message.route().flags & kEndsRequest) != 0) {
     if (!exchange.hasEnded()) {
       exchange.reply = std::move(message);
       exchange.hasReply = true;

@@ -3,6 +3,8 @@
 
 #include <mutex>
 
+#include "shm/private_pages.h"
+
 namespace mpf {
 
 MessageLink::Take MessageLink::checkLong(Envelope envelope) const noexcept {
@@ -17,11 +19,7 @@ MessageLink::Finish MessageLink::readBody(Envelope envelope, Message& message) n
   const auto type = static_cast<MessageType>(envelope.type);
   message.reset();
   if ((envelope.flags & layout::kSlotChunk) != 0) {
-    const std::lock_guard guard(*lock_);
-    if (const auto chunk = link_->tryChunk(envelope)) {
-      lendOne();
-      message = Message::adopt(type, {chunk->data, envelope.bodyBytes, chunk->capacity, this});
-    }
+    message = readChunk(envelope);
   } else if (envelope.bodyBytes <= Message::kInlineBytes) {
     message.assignInline(type, envelope.bodyBytes, [&](auto body) {
       link_->incoming().copyBody(body.first(envelope.bodyBytes));
@@ -37,6 +35,24 @@ MessageLink::Finish MessageLink::readBody(Envelope envelope, Message& message) n
   return Finish::unavailable;
 } catch (const std::bad_alloc&) {
   return Finish::unavailable;
+}
+
+Message MessageLink::readChunk(Envelope envelope) {
+  std::optional<Chunk> chunk;
+  {
+    const std::lock_guard guard(*lock_);
+    chunk = link_->tryChunk(envelope);
+    if (!chunk) return {};
+    lendOne();
+  }
+  const bool isFanOut = chunk->ref.side == layout::kFanOutSide;
+  // The program may have written to the last message in this mapping. Without the lock, because
+  // this takes longer than anything else.
+  if (isFanOut) private_pages::drop(chunk->data, chunk->capacity);
+  auto message = Message::adopt(static_cast<MessageType>(envelope.type),
+                                {chunk->data, envelope.bodyBytes, chunk->capacity, this});
+  if (isFanOut) message.setRoute({0, 0, Message::missedFlags(chunk->ref.missed), nullptr});
+  return message;
 }
 
 void MessageLink::discard(Envelope envelope) noexcept {

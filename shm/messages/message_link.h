@@ -83,6 +83,9 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] Take checkLong(Envelope envelope) const noexcept;
   // For a message that does not fit into one slot.
   Finish readBody(Envelope envelope, Message& message) noexcept;
+  // For a body in a chunk; an empty handle if there is no such chunk.
+  //   throws  ChunkUnavailable
+  Message readChunk(Envelope envelope);
   // For a body outside the handle.
   LinkSend trySendBodyLocked(Envelope envelope, Message& message, Link::Limits limits) noexcept;
   void lendOne() noexcept;

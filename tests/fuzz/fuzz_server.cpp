@@ -35,9 +35,11 @@ class Server {
     link->attachPeer(std::move(client), link->header().clientIndex);
     link->setState(layout::LinkState::open);
     link->notifyPeer();
-    talk_.emplace(std::move(link));
+    talk_.emplace(std::move(link), &fanOut_);
   }
   Scene& scene_;
+  FanOutPool fanOut_{scene_.backplaneName(), scene_.server.header().incarnation, Rights{},
+                     16 * layout::kPageBytes};
   std::optional<Talk> talk_;
 };
 

@@ -41,8 +41,9 @@ void lookAt(const Message& message) {
   static_cast<void>(tryToWire(message, builder.initRoot<wire::Envelope>(), {}, error));
 }
 
-Talk::Talk(std::unique_ptr<Link> link)
-    : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<BiasedLock>())) {
+Talk::Talk(std::unique_ptr<Link> link, FanOutPool* fanOut)
+    : channel_(std::make_shared<MessageLink>(std::move(link), std::make_shared<BiasedLock>())),
+      fanOut_(fanOut) {
   [[maybe_unused]] const auto unused = behind(channel_->link());
   ASAN_POISON_MEMORY_REGION(unused.data(), unused.size());
 }
@@ -61,6 +62,7 @@ void Talk::turn(std::uint64_t value) {
   if (link.peerState() != layout::LinkState::open || link.isLost())
     link.setState(layout::LinkState::closed);
   sendArray(*channel_, static_cast<std::uint32_t>(value), value % 2048);
+  if (fanOut_ != nullptr) publish(value);
   static_cast<void>(link.outgoing().isTaken(value % 8));
   if (value % 2 != 0) link.watch();
   else Link::execute(link.unwatch());
@@ -84,6 +86,20 @@ bool Talk::tryTakeOne(std::uint64_t choice) {
   if (choice % 4 == 0) sendBack(envelope, message);
   else if (choice % 4 == 1) kept_ = std::move(message);
   return true;
+}
+
+// The client may return this chunk, or others that it never had, at any time.
+void Talk::publish(std::uint64_t value) {
+  constexpr std::uint32_t kMaxBorrowed = 3;
+  const auto bytes = value % 2048;
+  const auto chunk = fanOut_->tryAlloc(bytes);
+  Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::char8Array),
+                    .requestId = static_cast<std::uint32_t>(value % 4)};
+  {
+    const std::lock_guard lock(channel_->lock());
+    static_cast<void>(channel_->link().trySendFanOut(envelope, chunk, bytes, {}, kMaxBorrowed));
+  }
+  if (chunk) chunk->drop();
 }
 
 void Talk::sendBack(Envelope envelope, Message& message) {

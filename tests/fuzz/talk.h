@@ -16,7 +16,8 @@ void lookAt(const Message& message);
 
 class Talk {
  public:
-  explicit Talk(std::unique_ptr<Link> link);
+  //   fanOut  of a server that publishes; null for a client
+  explicit Talk(std::unique_ptr<Link> link, FanOutPool* fanOut = nullptr);
   ~Talk();
   Talk(const Talk&) = delete;
   Talk& operator=(const Talk&) = delete;
@@ -28,8 +29,10 @@ class Talk {
  private:
   bool tryTakeOne(std::uint64_t choice);
   void sendBack(Envelope envelope, Message& message);
+  void publish(std::uint64_t value);
 
   std::shared_ptr<MessageLink> channel_;
+  FanOutPool* fanOut_;
   Message kept_;  // its body is released late
   bool isOver_ = false;
 };

@@ -134,7 +134,9 @@ void Attacker::goBack(Link& link) {
   auto& watch = isClient ? control.replyWatch : control.requestWatch;
   watch.store(static_cast<layout::Watch>(random_.below(4)), std::memory_order_relaxed);
   returns.chunks[random_.below(returns.chunks.size())].store(
-      random_.below(4) << 32 | random_.below(40), std::memory_order_relaxed);
+      random_.oneIn(2) ? layout::kReturnsFanOut | random_.below(8)
+                       : random_.below(4) << 32 | random_.below(40),
+      std::memory_order_relaxed);
   returns.returned.store(random_.oneIn(4) ? random_.nasty() : random_.below(1000),
                          std::memory_order_relaxed);
   if (random_.oneIn(2)) writeSlot(link);

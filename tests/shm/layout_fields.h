@@ -122,7 +122,7 @@ inline nlohmann::json layoutFields() {
     using Struct = ChunkRef;
     all["ChunkRef"] = {
         {"bytes", sizeof(Struct)},
-        {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(reserved)}}};
+        {"fields", {MPF_FIELD(segment), MPF_FIELD(chunk), MPF_FIELD(side), MPF_FIELD(missed)}}};
   }
   {
     using Struct = RouterLine;
@@ -185,7 +185,8 @@ inline nlohmann::json layoutKinds() {
           {"link", SegmentKind::link},
           {"bulk", SegmentKind::bulk},
           {"pendingBind", SegmentKind::pendingBind},
-          {"router", SegmentKind::router}};
+          {"router", SegmentKind::router},
+          {"fanOut", SegmentKind::fanOut}};
 }
 
 }  // namespace mpf::test

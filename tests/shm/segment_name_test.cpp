@@ -14,8 +14,11 @@ TEST(SegmentName, ParsesEachKindOfNameThatItBuilds) {
   const auto window = SegmentName::tryParse(SegmentName::serverWindow("crate-1", -7, "serial[0]"));
   const auto link = SegmentName::tryParse(SegmentName::link("crate-1", kWindow, kKey));
   const auto bulk = SegmentName::tryParse(SegmentName::bulk("crate-1", kKey, 1, 255));
+  const auto fanOut = SegmentName::tryParse(SegmentName::fanOut("crate-1", kWindow, 4294967295));
 
-  ASSERT_TRUE(window && link && bulk);
+  ASSERT_TRUE(window && link && bulk && fanOut);
+  EXPECT_EQ(fanOut->kind, NameKind::fanOut);
+  EXPECT_EQ(fanOut->incarnation, kWindow) << "a chunk has the incarnation of its server";
   EXPECT_EQ(window->backplane, "crate-1");
   EXPECT_EQ(window->kind, NameKind::serverWindow);
   EXPECT_EQ(link->kind, NameKind::link);
@@ -41,6 +44,8 @@ TEST(SegmentName, HasTheDocumentedFormat) {
   EXPECT_EQ(SegmentName::link("default", 0xab, 0xcd), "mpf.default.l.ab.cd");
   EXPECT_EQ(SegmentName::bulk("default", 0xcd, 1, 10), "mpf.default.b.cd.1.10");
   EXPECT_EQ(SegmentName::linkPrefix("default", 0xab), "mpf.default.l.ab.");
+  EXPECT_EQ(SegmentName::fanOut("default", 0xab, 10), "mpf.default.p.ab.10");
+  EXPECT_EQ(SegmentName::fanOutPrefix("default", 0xab), "mpf.default.p.ab.");
   EXPECT_EQ(SegmentName::prefix("default"), "mpf.default.");
   EXPECT_EQ(SegmentName::prefix(""), "mpf.");
 }

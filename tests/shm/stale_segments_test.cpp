@@ -94,12 +94,15 @@ TEST_F(StaleSegmentsTest, FilesWithoutAnOwnerAreDead) {
   leave(pendingBind, SegmentKind::pendingBind, 0x99);
   const auto bulk = SegmentName::bulk(name(), 0x55, 1, 0);
   leave(bulk, SegmentKind::bulk, 0x99);
+  const auto fanOut = SegmentName::fanOut(name(), 0x66, 3);
+  leave(fanOut, SegmentKind::fanOut, 0x66);
   const auto link = SegmentName::link(name(), 1, 2);
   std::ofstream(segments::path(link)) << "junk";
 
   EXPECT_EQ(judgementOf(pendingBind).reason,
             "its owner's " + keyed(NameKind::clientWindow, 0x99) + " is gone");
   EXPECT_EQ(judgementOf(bulk).reason, "its link 55 is gone");
+  EXPECT_EQ(judgementOf(fanOut).reason, "its owner's " + keyed(NameKind::hints, 0x66) + " is gone");
   EXPECT_THAT(judgementOf(link).reason, HasSubstr("no program can use it: "));
   for (const auto& [file, judged] : judge()) EXPECT_TRUE(stale_segments::tryRemove(judged)) << file;
 }
@@ -110,8 +113,13 @@ TEST_F(StaleSegmentsTest, AWindowWithoutANameKeepsItsOtherFiles) {
   const auto pendingBind = keyed(NameKind::pendingBind, 7);
   leave(pendingBind, SegmentKind::pendingBind, client.header().incarnation);
 
+  const auto fanOut = SegmentName::fanOut(name(), client.header().incarnation, 0);
+  leave(fanOut, SegmentKind::fanOut, client.header().incarnation);
+
   segments::remove(keyed(NameKind::clientWindow, client.header().incarnation));
 
+  EXPECT_EQ(judgementOf(fanOut).verdict, Verdict::alive);
+  segments::remove(fanOut);
   EXPECT_EQ(judgementOf(pendingBind).verdict, Verdict::alive);
   EXPECT_EQ(judgementOf(pendingBind).reason,
             "the lock of " + keyed(NameKind::hints, client.header().incarnation) + " is held");

@@ -38,10 +38,14 @@ void say(fmt::format_string<Values...> format, Values&&... values) {
   std::fflush(stdout);
 }
 
+enum class Publishes { no, some };
+
 // Echoes. Keeps every seventh Int32, which drops the one kept before, and answers some arrays with
-// new arrays.
-int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
+// new arrays, which it may publish.
+int serve(const mpf::Backplane& backplane, mpf::ServerOptions options,
+          Publishes publishes = Publishes::some) {
   options.queueSize = 32;
+  options.maxBorrowed = 64;
   mpf::MessageServer server(backplane, "echo", options);
   mpf::Message kept;
   int requests = 0;
@@ -54,6 +58,9 @@ int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
   });
   server.on<mpf::Float64Array>([&](mpf::Float64ArrayMessage&& request) {
     if (++requests % 3 != 0) return static_cast<void>(server.reply(std::move(request)));
+    if (publishes == Publishes::some && requests % 2 == 0)
+      return static_cast<void>(
+          server.publish(server.allocShared<mpf::Float64Array>(3000), request));
     auto reply = server.allocReplyMessage<mpf::Float64Array>(request, 3000);
     static_cast<void>(server.reply(std::move(reply)));
   });
@@ -217,6 +224,7 @@ int play(const std::vector<std::string>& arguments) {
   const auto role = argument(1);
   const auto backplane = mpf::Backplane::attach(argument(2));
   if (role == "serve") return serve(backplane, {});
+  if (role == "serve-replies") return serve(backplane, {}, Publishes::no);
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
   if (role == "count") return count(backplane, argument(3), {});
   if (role == "flood") return flood(backplane);
@@ -227,7 +235,8 @@ int play(const std::vector<std::string>& arguments) {
   if (role == "lease") return lease(backplane, argument(3));
   if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
   std::fprintf(stderr,
-               "role \"%s\": use serve, serve-block, count, flood, listen, ask, lease or crowd\n",
+               "role \"%s\": use serve, serve-replies, serve-block, count, flood, listen, ask, "
+               "lease or crowd\n",
                role.c_str());
   return 2;
 }

@@ -26,9 +26,9 @@ auto now(const Word& word) noexcept {
 }
 
 const char* kindName(SegmentKind kind) noexcept {
-  constexpr std::array<const char*, 8> kNames{"unknown",      "server window", "client window",
+  constexpr std::array<const char*, 9> kNames{"unknown",      "server window", "client window",
                                               "hints",        "link",          "bulk",
-                                              "pending bind", "router"};
+                                              "pending bind", "router",        "fan-out"};
   const auto number = static_cast<std::size_t>(kind);
   return number < kNames.size() ? kNames[number] : kNames[0];
 }
@@ -167,6 +167,10 @@ std::optional<Tree> tryDissect(const std::string& path, const DissectOptions& op
       tree["chunk_bytes"] = header.chunkBytes;
       tree["chunk_count"] = header.chunkCount;
       tree["side"] = header.bulkSide;
+      break;
+    case SegmentKind::fanOut:
+      tree["chunk_bytes"] = header.chunkBytes;
+      tree["server_window"] = hex(header.serverWindow);
       break;
     case SegmentKind::pendingBind:
       tree["server"] = segments::text(header.name);

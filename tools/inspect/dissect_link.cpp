@@ -31,30 +31,38 @@ auto said(const Word& word) noexcept {
   return word.load(std::memory_order_relaxed);
 }
 
-// The paths of the bulk segments of a link.
+// The paths of the pools of a link.
 struct Beside {
   std::filesystem::path link;
   std::string backplane;
   std::uint64_t incarnation = 0;
+  std::uint64_t serverWindow = 0;
   [[nodiscard]] std::string bulk(std::uint32_t side, std::uint32_t segment) const {
-    return std::filesystem::path(link)
-        .replace_filename(SegmentName::bulk(backplane, incarnation, side, segment))
-        .string();
+    return of(SegmentName::bulk(backplane, incarnation, side, segment));
+  }
+  [[nodiscard]] std::string fanOut(std::uint32_t segment) const {
+    return of(SegmentName::fanOut(backplane, serverWindow, segment));
+  }
+
+ private:
+  [[nodiscard]] std::string of(const std::string& name) const {
+    return std::filesystem::path(link).replace_filename(name).string();
   }
 };
 
 // Reads the body of a message from its chunk. Throws SegmentError with the reason when it cannot.
 std::vector<std::byte> readChunk(const Beside& beside, const layout::ChunkRef& ref,
                                  std::size_t bodyBytes) {
-  if (ref.side > 1)
-    throw SegmentError(
-        fmt::format("a chunk of side {}; the sides of a link are 0 and 1", ref.side));
-  const auto path = beside.bulk(ref.side, ref.segment);
+  const bool isFanOut = ref.side == layout::kFanOutSide;
+  if (ref.side > 1 && !isFanOut)
+    throw SegmentError(fmt::format(
+        "a chunk of side {}; the sides of a link are 0 and 1, the fan-out pool is 2", ref.side));
+  const auto path = isFanOut ? beside.fanOut(ref.segment) : beside.bulk(ref.side, ref.segment);
+  const auto kind = isFanOut ? layout::SegmentKind::fanOut : layout::SegmentKind::bulk;
   const auto image = SegmentImage::tryReadFile(path);
   if (!image) throw SegmentError(path + ": the file does not exist");
   const auto& header = image->header();
-  if (header.kind != layout::SegmentKind::bulk || ref.chunk >= header.chunkCount ||
-      bodyBytes > header.chunkBytes) {
+  if (header.kind != kind || ref.chunk >= header.chunkCount || bodyBytes > header.chunkBytes) {
     throw SegmentError(fmt::format("{}: has no chunk {} of {} bytes", path, ref.chunk, bodyBytes));
   }
   if (bodyBytes > kMostBody)
@@ -82,6 +90,7 @@ Tree dissectMessage(const RingMessage& message, const Beside& beside, bool raw) 
       layout::ChunkRef ref{};
       std::memcpy(&ref, body.data(), sizeof ref);
       tree["chunk"] = {{"side", ref.side}, {"segment", ref.segment}, {"chunk", ref.chunk}};
+      if (ref.side == layout::kFanOutSide) tree["missed"] = ref.missed;
       body = readChunk(beside, ref, slot.bodyBytes);
     } else if (slot.bodyBytes > body.size()) {
       throw SegmentError(fmt::format("{} bytes of body in {} slots", slot.bodyBytes,
@@ -184,7 +193,8 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
                     {"max_outstanding", header.maxOutstanding},
                     {"max_message_bytes", header.maxMessageBytes},
                     {"max_pool_bytes", header.maxPoolBytes}};
-  const Beside beside{path, segments::text(header.backplane), header.incarnation};
+  const Beside beside{path, segments::text(header.backplane), header.incarnation,
+                      header.serverWindow};
   if (!isRing(header.queueSlots) || !isRing(header.replySlots)) {
     tree["problem"] =
         fmt::format("rings of {} and {} slots are invalid", header.queueSlots, header.replySlots);

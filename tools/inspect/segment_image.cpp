@@ -58,8 +58,9 @@ SegmentImage SegmentImage::readOpen(int file, const std::string& path,
   // The memory is large enough for all accessors, even if the file is shorter.
   constexpr auto kLeast =
       std::max({layout::kWindowBytes, layout::kLinkRingsOffset, sizeof(layout::WindowHints)});
-  const auto most =
-      kind || kindOf(file) != layout::SegmentKind::bulk ? bytes : sizeof(layout::SegmentHeader);
+  const auto found = kindOf(file);
+  const bool isPool = found == layout::SegmentKind::bulk || found == layout::SegmentKind::fanOut;
+  const auto most = kind || !isPool ? bytes : sizeof(layout::SegmentHeader);
   const auto wanted = std::min<std::uint64_t>(most, image.fileBytes_);
   image.blocks_ = std::make_unique<Block[]>(
       (std::max<std::size_t>(wanted, kLeast) + sizeof(Block) - 1) / sizeof(Block));

@@ -98,6 +98,7 @@ json toJson(const SnapshotDelta& delta, const WindowView& window) {
                   {"expired", window.expired},
                   {"refused", window.refused},
                   {"reply_queue_full", window.replyQueueFull},
+                  {"fan_out_bytes", window.fanOutBytes},
                   {"max_message_bytes", window.maxMessageBytes}});
   }
   if (delta.isBusy(window)) {

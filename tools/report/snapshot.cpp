@@ -102,6 +102,12 @@ class SnapshotReader {
           bulkBytes_[parsed.incarnation] += image->fileBytes();
         }
         return;
+      case NameKind::fanOut:
+        if (const auto image =
+                read(name, layout::SegmentKind::fanOut, sizeof(layout::SegmentHeader))) {
+          fanOutBytes_[parsed.incarnation] += image->fileBytes();
+        }
+        return;
       case NameKind::hints:
         if (const auto image =
                 read(name, layout::SegmentKind::hints, sizeof(layout::WindowHints))) {
@@ -223,6 +229,8 @@ class SnapshotReader {
       for (auto& [incarnation, window] : *windows) {
         if (const auto hints = hints_.find(incarnation); hints != hints_.end())
           window->hints = hints->second;
+        if (const auto pool = fanOutBytes_.find(incarnation); pool != fanOutBytes_.end())
+          window->fanOutBytes = pool->second;
       }
     }
     for (auto& link : links_) {
@@ -262,6 +270,7 @@ class SnapshotReader {
   Snapshot& snapshot_;
   std::vector<LinkView> links_;
   std::unordered_map<std::uint64_t, std::uint64_t> bulkBytes_;  // by link
+  std::unordered_map<std::uint64_t, std::uint64_t> fanOutBytes_;  // by window
   std::unordered_map<std::uint64_t, HintsView> hints_;  // by window
 };
 

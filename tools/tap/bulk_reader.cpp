@@ -11,8 +11,12 @@ namespace mpf::tools {
 const Segment& BulkReader::open(const layout::ChunkRef& ref) {
   const auto key = std::pair(ref.side, ref.segment);
   if (const auto known = segments_.find(key); known != segments_.end()) return known->second;
-  const auto name = SegmentName::bulk(backplane_, link_, ref.side, ref.segment);
-  auto segment = Segment::tryOpen(name, layout::SegmentKind::bulk, Segment::Access::readOnly);
+  const bool isFanOut = ref.side == layout::kFanOutSide;
+  const auto name = isFanOut ? SegmentName::fanOut(backplane_, serverWindow_, ref.segment)
+                             : SegmentName::bulk(backplane_, link_, ref.side, ref.segment);
+  auto segment =
+      Segment::tryOpen(name, isFanOut ? layout::SegmentKind::fanOut : layout::SegmentKind::bulk,
+                       Segment::Access::readOnly);
   if (!segment)
     throw SegmentError(fmt::format("{}: the pool no longer exists", segments::path(name)));
   segment->closeFile();
@@ -20,9 +24,9 @@ const Segment& BulkReader::open(const layout::ChunkRef& ref) {
 }
 
 std::vector<std::byte> BulkReader::read(const layout::ChunkRef& ref, std::size_t bytes) {
-  if (ref.side > 1)
-    throw SegmentError(
-        fmt::format("a chunk of side {}; the sides of a link are 0 and 1", ref.side));
+  if (ref.side > layout::kFanOutSide)
+    throw SegmentError(fmt::format(
+        "a chunk of side {}; the sides of a link are 0 and 1, the fan-out pool is 2", ref.side));
   const auto& segment = open(ref);
   const auto& header = segment.header();
   const auto room =

@@ -52,7 +52,7 @@ std::unique_ptr<LinkFollower> LinkFollower::tryOpen(const std::string& backplane
 
 LinkFollower::LinkFollower(const std::string& backplane, Segment segment, FollowFrom from)
     : segment_(std::move(segment)),
-      bulk_(backplane, segment_.header().incarnation),
+      bulk_(backplane, segment_.header().incarnation, segment_.header().serverWindow),
       requests_(begin(Direction::request, from)),
       replies_(begin(Direction::reply, from)) {}
 

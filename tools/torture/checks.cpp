@@ -45,6 +45,7 @@ bool belongs(const std::string& name, const SegmentName::Parsed& parsed, Living&
       return isLivingWindow(name, parsed.kind, living);
     case NameKind::hints:
     case NameKind::fifo:
+    case NameKind::fanOut:
       return living.windows.contains(parsed.incarnation);
     case NameKind::router:
     case NameKind::reaper:

@@ -16,12 +16,14 @@ namespace {
 
 constexpr auto kBoardInterval = std::chrono::milliseconds(2);  // between two reads of the board
 constexpr std::uint32_t kNewEvery = 3;  // every third array gets a new message as its reply
+constexpr std::uint32_t kPublishEvery = 2;  // every second of these is published
 
 }  // namespace
 
 Echo::Echo(const Backplane& backplane, const std::string& name, World& world, WaitMode waitMode)
     : world_(world),
-      server_(backplane, name, {.location = 0, .queueSize = 16, .waitMode = waitMode}) {}
+      server_(backplane, name,
+              {.location = 0, .queueSize = 16, .waitMode = waitMode, .maxBorrowed = 64}) {}
 
 void Echo::run(const Board& board, bool byDescriptor) {
   pollfd descriptor{byDescriptor ? server_.descriptor() : -1, POLLIN, 0};
@@ -70,14 +72,18 @@ void Echo::answer(Float64ArrayMessage&& request) {
     request->extra = answerTo(value);
     return send(std::move(request));
   }
-  auto reply = server_.allocReplyMessage<Float64Array>(request, request.getLength());
+  const bool isShared = arrays_ / kNewEvery % kPublishEvery == 0;
+  auto reply = isShared ? server_.allocShared<Float64Array>(request.getLength())
+                        : server_.allocReplyMessage<Float64Array>(request, request.getLength());
   reply->extra = answerTo(value);
   std::ranges::copy(request.value(), reply.value().begin());
-  send(std::move(reply));
+  if (isShared) check(server_.publish(reply, request));
+  else send(std::move(reply));
 }
 
-void Echo::send(Message&& reply) {
-  const auto result = server_.reply(std::move(reply));
+void Echo::send(Message&& reply) { check(server_.reply(std::move(reply))); }
+
+void Echo::check(ReplyResult result) {
   if (result != ReplyResult::sent && result != ReplyResult::clientGone) {
     world_.complain(fmt::format("a first reply could not be sent: {}", toString(result)));
   }

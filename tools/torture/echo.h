@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Echo: the servers of `mpf torture`. It checks every byte of each request, and answers in place,
-// with a new message, or late.
+// with a new message, with a published one, or late.
 //
 // Threads  one.
 #pragma once
@@ -27,6 +27,7 @@ class Echo {
   void answer(Int32Message&& request);
   void answer(Float64ArrayMessage&& request);
   void send(Message&& reply);
+  void check(ReplyResult result);
   bool note(std::int32_t value, bool isSound);
 
   World& world_;

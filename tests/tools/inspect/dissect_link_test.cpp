@@ -92,6 +92,24 @@ TEST_F(DissectLinkTest, ReadsABodyFromItsPool) {
   EXPECT_EQ(link.at("server_pool").at("segments"), Tree::array());
 }
 
+TEST_F(DissectLinkTest, ReadsABodyFromTheFanOutPoolOfItsServer) {
+  connect();
+  Int32Message kept;
+  server_->on<Int32>([&](Int32Message&& request) { kept = std::move(request); });
+  sendValue(5);
+  handle(1);
+  auto message = server_->allocShared<Float64Array>(1000);
+  message.value()[0] = 2.5;
+  ASSERT_EQ(server_->publish(message, kept), ReplyResult::sent);
+
+  const auto link = dissect();
+
+  const auto& reply = link.at("replies").at("messages").at(0);
+  EXPECT_EQ(reply.at("chunk"), (Tree{{"side", 2}, {"segment", 0}, {"chunk", 0}}));
+  EXPECT_EQ(reply.at("missed"), 0);
+  EXPECT_EQ(reply.at("message").at("value").at(0), 2.5);
+}
+
 TEST_F(DissectLinkTest, SaysWhyABodyCannotBeRead) {
   connect();
   sendArray(1.5);
@@ -101,14 +119,14 @@ TEST_F(DissectLinkTest, SaysWhyABodyCannotBeRead) {
   const auto chunks = dissect().at("client_pool").at("segments").at(0).at("chunk_count");
   const auto refer = [&](layout::ChunkRef ref) { std::memcpy(slot.body.data(), &ref, sizeof ref); };
 
-  refer({.segment = 0, .chunk = chunks, .side = 0, .reserved = 0});
+  refer({.segment = 0, .chunk = chunks, .side = 0, .missed = 0});
   EXPECT_EQ(problem(), bulkPath() + ": has no chunk " + chunks.dump() + " of " +
                            std::to_string(bodyBytes) + " bytes");
-  refer({.segment = 0, .chunk = 0, .side = 2, .reserved = 0});
-  EXPECT_EQ(problem(), "a chunk of side 2; the sides of a link are 0 and 1");
-  refer({.segment = 1, .chunk = 0, .side = 1, .reserved = 0});
+  refer({.segment = 0, .chunk = 0, .side = 3, .missed = 0});
+  EXPECT_EQ(problem(), "a chunk of side 3; the sides of a link are 0 and 1, the fan-out pool is 2");
+  refer({.segment = 1, .chunk = 0, .side = 1, .missed = 0});
   EXPECT_THAT(problem(), testing::EndsWith(".1.1: the file does not exist"));
-  refer({.segment = 0, .chunk = 0, .side = 0, .reserved = 0});
+  refer({.segment = 0, .chunk = 0, .side = 0, .missed = 0});
   slot.bodyBytes = UINT32_MAX;
   EXPECT_THAT(problem(), StartsWith(bulkPath() + ": has no chunk 0 of 4294967295 bytes"));
   slot.bodyBytes = bodyBytes;
@@ -121,7 +139,7 @@ TEST_F(DissectLinkTest, SaysThatAPoolIsTooShort) {
   const auto bulk =
       openForWriting(SegmentName::bulk(name(), incarnation(), 0, 0), layout::SegmentKind::bulk);
   bulk.sharedHeader().chunkCount = 1'000'001;
-  const layout::ChunkRef ref{.segment = 0, .chunk = 1'000'000, .side = 0, .reserved = 0};
+  const layout::ChunkRef ref{.segment = 0, .chunk = 1'000'000, .side = 0, .missed = 0};
   std::memcpy(firstSlot(openLink()).body.data(), &ref, sizeof ref);
   EXPECT_EQ(problem(), bulkPath() + ": chunk 1000000 is cut off");
 

@@ -158,6 +158,17 @@ TEST_F(DissectTest, ABulkSegmentHasItsChunks) {
   EXPECT_EQ(tree.at("side"), 1);
 }
 
+TEST_F(DissectTest, AFanOutSegmentHasItsChunkAndItsServer) {
+  const auto tree = dissectPage(SegmentKind::fanOut, [](layout::SegmentHeader& header) {
+    header.chunkBytes = 4096;
+    header.serverWindow = 0xabc;
+  });
+
+  EXPECT_EQ(tree.at("kind"), "fan-out");
+  EXPECT_EQ(tree.at("chunk_bytes"), 4096);
+  EXPECT_EQ(tree.at("server_window"), "abc");
+}
+
 TEST_F(DissectTest, AKindOfALaterReleaseIsAProblem) {
   const auto tree = dissectPage(SegmentKind::pendingBind, [](layout::SegmentHeader& header) {
     header.kind = static_cast<SegmentKind>(99);

@@ -121,6 +121,19 @@ TEST_F(SnapshotTest, CountsThePoolsInTheMemoryOfALink) {
   EXPECT_GE(take().servers.front().links.front().bytes, before + 800'000);
 }
 
+TEST_F(SnapshotTest, CountsTheFanOutPoolInTheMemoryOfItsServer) {
+  MessageServer server(backplane_, "dac");
+  const auto before = take();
+  EXPECT_EQ(before.servers.front().fanOutBytes, 0U);
+
+  const auto message = server.allocShared<Float64Array>(100'000);
+
+  const auto after = take();
+  EXPECT_GE(after.servers.front().fanOutBytes, 800'000U);
+  EXPECT_GE(after.bytes, before.bytes + 800'000U);
+  EXPECT_THAT(after.problems, IsEmpty());
+}
+
 TEST_F(SnapshotTest, SeveralClientsOfAProcessAreLinksOfOneWindow) {
   MessageServer dac(backplane_, "dac");
   MessageServer adc(backplane_, "adc");

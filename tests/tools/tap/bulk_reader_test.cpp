@@ -5,6 +5,7 @@
 #include <cstring>
 #include <optional>
 
+#include "shm/fan_out_pool.h"
 #include "shm/pool.h"
 #include "shm/segment_name.h"
 #include "tests/shm/shm_fixture.h"
@@ -19,6 +20,7 @@ using testing::StartsWith;
 class BulkReaderTest : public test::ShmTest {
  protected:
   static constexpr std::uint64_t kLink = 0xabc;
+  static constexpr std::uint64_t kServer = 0xdef;
 
   void TearDown() override {
     owner_.reset();
@@ -42,13 +44,13 @@ class BulkReaderTest : public test::ShmTest {
   // The error when `bytes` bytes of the chunk are read by a reader that opens the pool for it.
   [[nodiscard]] std::string refusal(const ChunkRef& ref, std::size_t bytes = 8) const {
     return test::whatOf<SegmentError>(
-        [&] { static_cast<void>(BulkReader(name(), kLink).read(ref, bytes)); });
+        [&] { static_cast<void>(BulkReader(name(), kLink, kServer).read(ref, bytes)); });
   }
 
   layout::ReturnRing returns_{};
   std::optional<PoolOwner> owner_{std::in_place, PoolPlace{name(), kLink, 1, 0xdef}, Rights{},
                                   std::uint64_t{64} << 20, returns_};
-  BulkReader reader_{name(), kLink};
+  BulkReader reader_{name(), kLink, kServer};
 };
 
 TEST_F(BulkReaderTest, CopiesTheBytesOfEachChunk) {
@@ -86,8 +88,24 @@ TEST_F(BulkReaderTest, RefusesAReferenceThatDoesNotFitTheSegment) {
   ref.chunk = chunks;
   EXPECT_THAT(refusal(ref), HasSubstr("8 bytes of chunk " + std::to_string(chunks) +
                                       " are not in " + std::to_string(chunks) + " chunks of "));
-  ref.side = 2;
-  EXPECT_EQ(refusal(ref), "a chunk of side 2; the sides of a link are 0 and 1");
+  ref.side = 3;
+  EXPECT_EQ(refusal(ref),
+            "a chunk of side 3; the sides of a link are 0 and 1, the fan-out pool is 2");
+}
+
+TEST_F(BulkReaderTest, ReadsTheFanOutPoolOfTheServer) {
+  std::optional<FanOutPool> pool(std::in_place, name(), kServer, Rights{}, 1 << 20);
+  const auto chunk = pool->tryAlloc(1000);
+  std::memset(chunk->data(), 5, 1000);
+  const ChunkRef ref{chunk->number(), 0, layout::kFanOutSide, 0};
+
+  EXPECT_EQ(reader_.read(ref, 1000), std::vector(1000, std::byte{5}));
+  EXPECT_THAT(refusal({chunk->number(), 1, layout::kFanOutSide, 0}),
+              HasSubstr("8 bytes of chunk 1"));
+  const auto path = segments::path(chunk->segment().name());
+  pool.reset();
+
+  EXPECT_EQ(refusal(ref), path + ": the pool no longer exists");
 }
 
 // The header is in shared memory: its owner may write anything.

@@ -134,14 +134,15 @@ TEST_F(LinkFollowerTest, SaysWhyABodyCannotBeRead) {
   follow(FollowFrom::newest);
   sendArray(1.5);
   const auto link = openForWriting(linkName(), layout::SegmentKind::link);
-  layout::ChunkRef ref{.segment = 0, .chunk = 0, .side = 2, .reserved = 0};
+  layout::ChunkRef ref{.segment = 0, .chunk = 0, .side = 3, .missed = 0};
   std::memcpy((&link.at<layout::Slot>(layout::kLinkRingsOffset))->body.data(), &ref, sizeof ref);
 
   const auto all = takeAll();
 
   ASSERT_THAT(all, SizeIs(1));
   EXPECT_FALSE(all[0].message);
-  EXPECT_EQ(all[0].problem, "a chunk of side 2; the sides of a link are 0 and 1");
+  EXPECT_EQ(all[0].problem,
+            "a chunk of side 3; the sides of a link are 0 and 1, the fan-out pool is 2");
 }
 
 // Every message that was sent is either seen or missed.

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Publisher: sends one message of a server to many of its clients, without a copy for each.
+//
+//   allocate ─► FanOutChunk ◄─ holder ─ message of the program
+//   publish  ─► lends the chunk to the link of each request ─► ChunkRef in its reply ring
+//
+// Threads  any.
+// Crash    Connections ends the loans of a client that has died.
+// Trust    a client that returns nothing gets no more than maxBorrowed messages.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include <mpf/message.h>
+#include <mpf/message_server.h>
+
+#include "server/connection.h"
+#include "shm/fan_out_pool.h"
+#include "shm/fork_guard.h"
+#include "shm/window.h"
+
+namespace mpf {
+
+// The lender of the bodies that a program builds. Such a body may outlive the server.
+class FanOutBodies final : public BodyLender, public std::enable_shared_from_this<FanOutBodies> {
+ public:
+  //   throws  std::bad_alloc
+  BodyBytes lend(std::shared_ptr<FanOutChunk> chunk, std::size_t bytes);
+  // The chunk of a body that was lent.
+  [[nodiscard]] std::shared_ptr<FanOutChunk> tryFind(const std::byte* data) const noexcept;
+  void takeBack(std::byte* data, std::size_t capacity) noexcept override;
+
+ private:
+  mutable std::mutex mutex_;  // for the rest
+  std::vector<std::shared_ptr<FanOutChunk>> lent_;
+  std::shared_ptr<FanOutBodies> self_;  // set while lent_ is not empty
+};
+
+class Publisher {
+ public:
+  //   throws  std::invalid_argument when options.maxBorrowed is out of range
+  Publisher(const std::string& backplane, OwnWindow& window, const ServerOptions& options);
+
+  // A body in the fan-out pool, or on the heap if the pool has no chunk for it.
+  //   throws  std::bad_alloc
+  BodyBytes allocate(std::size_t bytes);
+  // MessageServer::publish().
+  std::size_t publish(const Message& message, std::span<const Message> requests,
+                      std::span<ReplyResult> results) noexcept;
+
+ private:
+  std::shared_ptr<FanOutChunk> tryAlloc(std::size_t bytes) noexcept;
+  std::shared_ptr<FanOutChunk> tryCopy(std::span<const std::byte> body) noexcept;
+  ReplyResult send(const Message& message, const Message& request,
+                   const std::shared_ptr<FanOutChunk>& chunk) noexcept;
+  ReplyResult sendLocked(Connection& connection, const Message& message, const Message& request,
+                         const std::shared_ptr<FanOutChunk>& chunk) noexcept;
+  void noteBorrower(const std::shared_ptr<MessageLink>& channel) noexcept;
+  void collectReturned() noexcept;
+
+  ForkGuard forkGuard_;
+  layout::WindowControl& control_;
+  std::uint64_t serverWindow_;
+  std::uint32_t maxBorrowed_;
+  bool stamps_;
+  FanOutPool pool_;
+  std::shared_ptr<FanOutBodies> bodies_ = std::make_shared<FanOutBodies>();
+  std::mutex mutex_;  // for the rest
+  std::vector<std::weak_ptr<MessageLink>> borrowers_;  // links that have had a loan
+};
+
+}  // namespace mpf
