@@ -5,7 +5,11 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
+
+#include "base/print_error.h"
 
 namespace mpf::expedited_barrier {
 namespace {
@@ -28,6 +32,16 @@ bool canRegister() noexcept {
          tryCommand(MEMBARRIER_CMD_PRIVATE_EXPEDITED);
 }
 
+void execute(membarrier_cmd command) noexcept {
+  if (tryCommand(command)) return;
+  printError(
+      "mpf: membarrier() worked when this process started and is refused now: {}. Let the filter "
+      "of "
+      "system calls (seccomp) allow it, or install the filter before MPF is used.\n",
+      std::strerror(errno));
+  std::abort();
+}
+
 }  // namespace
 
 bool tryRegister() noexcept {
@@ -35,12 +49,7 @@ bool tryRegister() noexcept {
   return kIsRegistered;
 }
 
-void acrossProcesses() noexcept {
-  if (!tryCommand(MEMBARRIER_CMD_GLOBAL_EXPEDITED)) std::abort();
-}
-
-void inThisProcess() noexcept {
-  if (!tryCommand(MEMBARRIER_CMD_PRIVATE_EXPEDITED)) std::abort();
-}
+void acrossProcesses() noexcept { execute(MEMBARRIER_CMD_GLOBAL_EXPEDITED); }
+void inThisProcess() noexcept { execute(MEMBARRIER_CMD_PRIVATE_EXPEDITED); }
 
 }  // namespace mpf::expedited_barrier

@@ -59,8 +59,6 @@ class RequestTable {
       // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
       return request.id.load(std::memory_order_acquire) == 0 ? &request : nullptr;
     }
-    // Without other requests, the entry that was used last is used again: it is in the cache.
-    if (outstanding() == 0) lastId_ += size_ - 1;
     for (;;) {
       id = ++lastId_;
       auto& request = requests_[id & (size_ - 1)];
