@@ -101,9 +101,9 @@ void raiseClosed(const char* object) {
 }
 
 void raiseInherited(const char* object) {
-  raise("Error", nb::str((std::string("the ") + object +
-                          " belongs to the parent process: create one after fork()")
-                             .c_str()));
+  PyErr_Format(PyExc_RuntimeError, "the %s belongs to the parent process: create one after fork()",
+               object);
+  throw nb::python_error();
 }
 
 void raiseReply(const std::string& server, ReplyResult result) {

@@ -42,6 +42,10 @@ std::function<bool()> WithoutGil::interruption() {
   };
 }
 
+void forgetThreadsInForks() {
+  ::pthread_atfork(nullptr, nullptr, [] { entering.store(0); });
+}
+
 void prepareExit() {
   exitingThread = pthread_self();
   auto* state = PyEval_SaveThread();

@@ -34,6 +34,10 @@ class WithoutGil {
   bool wasInterrupted_ = false;
 };
 
+// To be called once: from then on, the child of a fork does not wait for the threads of its parent,
+// which it does not have.
+void forgetThreadsInForks();
+
 // To be called by atexit, with the GIL, on the main thread.
 void prepareExit();
 

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "python/extension/field_access.h"
+#include "python/extension/gil.h"
 
 namespace mpf::python {
 namespace {
@@ -106,6 +107,13 @@ nb::object valueOf(nb::handle self) {
   }
 }
 
+// The number of elements.
+template <class T>
+std::size_t lengthOf(const PyArray<T>& array) {
+  if (!array.values.is_valid()) return static_cast<std::size_t>(array.length);
+  return BufferView(array.values).bytes().size() / sizeof(typename T::Element);
+}
+
 // Sets the elements of a message that Python creates.
 template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
@@ -113,10 +121,9 @@ void setValues(PyArray<T>& array, nb::handle value) {
     array.values = asContiguousArray()(value, elementType<T>());
     if (nb::cast<int>(array.values.attr("ndim")) != 1)
       throw nb::value_error("the elements must have one dimension");
-    array.length = nb::cast<Py_ssize_t>(array.values.attr("size"));
   } else {
     array.values = nb::isinstance<nb::str>(value) ? value.attr("encode")() : nb::borrow(value);
-    array.length = static_cast<Py_ssize_t>(BufferView(array.values).bytes().size());
+    static_cast<void>(lengthOf(array));  // throws unless it has a contiguous buffer
   }
 }
 
@@ -198,7 +205,7 @@ PyArrayClass<T> addArrayClass(nb::module_& module, const char* doc, const char* 
   PyArrayClass<T> type(module, kClassName<T>, nb::type_slots(kBufferSlots<T>), doc);
   addFields<PyArray<T>, T>(type);
   type.def_prop_ro("value", &valueOf<T>, nb::for_getter(nb::sig(valueSignature)), valueDoc);
-  type.def("__len__", [](const PyArray<T>& self) { return self.length; });
+  type.def("__len__", &lengthOf<T>);
   type.def("__repr__", [](nb::handle self) {
     const auto& array = *nb::inst_ptr<PyArray<T>>(self);
     const auto value = array.isEmpty ? "sent" : nb::cast<std::string>(nb::repr(valueOf<T>(self)));
@@ -345,7 +352,7 @@ void copyBytes(std::byte* to, std::span<const std::byte> from) {
     std::memcpy(to, from.data(), from.size());
     return;
   }
-  const nb::gil_scoped_release release;
+  const WithoutGil unlocked;
   std::memcpy(to, from.data(), from.size());
 }
 

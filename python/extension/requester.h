@@ -72,7 +72,8 @@ class Requester {
   // Drops later replies to `exchange`.
   void forget(Exchange& exchange);
 
-  // Ends all requests as `cancelled` and all waits. The destructor disconnects.
+  // Ends all requests as `cancelled` and all waits; exchanges need no forget() afterwards. The
+  // destructor disconnects.
   void close();
 
   // --- for event loops

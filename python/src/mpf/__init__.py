@@ -13,6 +13,11 @@ and `tap()` show what happens on this host; `record()` writes it to a file, and 
 server that replies as in that file.
 """
 
+try:
+    import mpf._mpf
+except ImportError as error:  # its cause is the reason, for example a sub-interpreter
+    raise error.__cause__ or error
+
 from mpf._mpf import (
     Char8Array,
     Float64,
