@@ -5,12 +5,15 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
+#include <cstring>
 #include <thread>
 
 namespace mpf::python {
 namespace {
 
 constexpr std::chrono::microseconds kLookEvery{100};
+constexpr std::size_t kManyBytes = 64 * 1024;
 
 std::atomic<bool> isExiting = false;
 std::atomic<int> entering = 0;  // threads that ask for the GIL
@@ -40,6 +43,16 @@ std::function<bool()> WithoutGil::interruption() {
     state_ = PyEval_SaveThread();
     return wasInterrupted_;
   };
+}
+
+void copyBytes(std::byte* to, std::span<const std::byte> from) {
+  if (from.empty()) return;
+  if (from.size() < kManyBytes) {
+    std::memcpy(to, from.data(), from.size());
+    return;
+  }
+  const WithoutGil unlocked;
+  std::memcpy(to, from.data(), from.size());
 }
 
 void forgetThreadsInForks() {

@@ -11,8 +11,10 @@
 // Threads  any.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <nanobind/nanobind.h>
+#include <span>
 
 namespace mpf::python {
 
@@ -33,6 +35,9 @@ class WithoutGil {
   PyThreadState* state_;
   bool wasInterrupted_ = false;
 };
+
+// Copies many bytes without the GIL.
+void copyBytes(std::byte* to, std::span<const std::byte> from);
 
 // To be called once: from then on, the child of a fork does not wait for the threads of its parent,
 // which it does not have.

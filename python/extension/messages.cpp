@@ -7,14 +7,11 @@
 #include <tuple>
 
 #include "python/extension/field_access.h"
-#include "python/extension/gil.h"
 
 namespace mpf::python {
 namespace {
 
 using namespace nb::literals;
-
-constexpr std::size_t kLargeBytes = 64 * 1024;
 
 // ---- elements
 
@@ -225,9 +222,10 @@ void addArray(nb::module_& module, const char* doc, const char* valueSignature,
       "__init__",
       [](PyArray<T>* self, nb::handle value, long long timeout, long long cmd, long long status,
          long long address, long long extra) {
-        new (self) PyArray<T>;
-        setValues(*self, value);
-        setStandardFields(self->fields, timeout, cmd, status, address, extra);
+        PyArray<T> array;  // nothing destroys *self after an exception
+        setValues(array, value);
+        setStandardFields(array.fields, timeout, cmd, status, address, extra);
+        new (self) PyArray<T>(std::move(array));
       },
       "value"_a = nb::make_tuple(), MPF_STANDARD_ARGUMENTS, nb::sig(initSignature));
 }
@@ -241,12 +239,13 @@ void addChar8Array(nb::module_& module) {
       [](PyArray<Char8Array>* self, nb::handle value, long long timeout, long long cmd,
          long long status, long long address, long long extra, long long retries,
          const nb::bytes& eom) {
-        new (self) PyArray<Char8Array>;
-        setValues(*self, value);
-        auto& fields = self->fields;
+        PyArray<Char8Array> array;
+        setValues(array, value);
+        auto& fields = array.fields;
         setStandardFields(fields, timeout, cmd, status, address, extra);
         fields.numberRetrys = narrow<std::int32_t>(retries, "number_retrys");
         setBytes(fields.eomString, fields.eomLen, {eom.c_str(), eom.size()}, "eom");
+        new (self) PyArray<Char8Array>(std::move(array));
       },
       "value"_a = nb::bytes("", 0), MPF_STANDARD_ARGUMENTS, "number_retrys"_a = 0,
       "eom"_a = nb::bytes("", 0),
@@ -279,8 +278,9 @@ void addUser(nb::module_& module) {
   type.def(
       "__init__",
       [](PyArray<User>* self, nb::handle value) {
-        new (self) PyArray<User>;
-        setValues(*self, value);
+        PyArray<User> array;
+        setValues(array, value);
+        new (self) PyArray<User>(std::move(array));
       },
       "value"_a = nb::bytes("", 0),
       nb::sig("def __init__(self, value: typing_extensions.Buffer = b'') -> None"));
@@ -345,16 +345,6 @@ nb::object convert(Message&& message, bool isRequest) {
 }
 
 }  // namespace
-
-void copyBytes(std::byte* to, std::span<const std::byte> from) {
-  if (from.empty()) return;
-  if (from.size() < kLargeBytes) {
-    std::memcpy(to, from.data(), from.size());
-    return;
-  }
-  const WithoutGil unlocked;
-  std::memcpy(to, from.data(), from.size());
-}
 
 nb::object toPython(Message&& message) { return convert(std::move(message), false); }
 nb::object requestToPython(Message&& request) { return convert(std::move(request), true); }

@@ -18,6 +18,8 @@
 #include <mpf/message_of.h>
 #include <mpf/message_server.h>
 
+#include "python/extension/gil.h"
+
 namespace mpf::python {
 
 namespace nb = nanobind;
@@ -145,9 +147,6 @@ class BufferView {
  private:
   Py_buffer view_{};
 };
-
-// Copies large arrays without the GIL.
-void copyBytes(std::byte* to, std::span<const std::byte> from);
 
 template <ArrayBody T>
 Message PyArray<T>::copied(const Allocator& allocator) const {

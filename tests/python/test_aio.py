@@ -145,7 +145,7 @@ async def test_a_subscription_is_renewed(doubler: mpf.Server) -> None:
         return server.start()
 
     first = serve()
-    async with mpf.AsyncClient("source", timeout=PATIENCE) as client, client.subscribe(mpf.Int32()) as replies:
+    async with mpf.AsyncClient("source") as client, client.subscribe(mpf.Int32()) as replies:
         before = [(await anext(replies)).value for _ in range(2)]
         first.close()
         with serve():

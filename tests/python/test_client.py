@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from conftest import PATIENCE, PROGRAMS
+from conftest import PATIENCE, PROGRAMS, needs_mpf
 
 import mpf
 
@@ -49,7 +49,7 @@ def test_requests_may_be_outstanding(doubler: mpf.Server) -> None:
 
 
 def test_an_absent_server_is_not_connected() -> None:
-    with mpf.Client("nobody", timeout=PATIENCE) as client, pytest.raises(mpf.NotConnected, match="nobody"):
+    with mpf.Client("nobody") as client, pytest.raises(mpf.NotConnected, match="nobody"):
         client.int32(timeout=0.01)
 
 
@@ -180,6 +180,7 @@ def test_a_cancelled_request_ends(silent: Silent) -> None:
             request.wait()
 
 
+@needs_mpf
 def test_retry_sends_a_request_that_was_never_taken_to_the_next_server() -> None:
     first = mpf.Server("again")
     with mpf.Client("again", timeout=PATIENCE) as client:
@@ -216,7 +217,7 @@ def test_a_full_queue_refuses_the_next_request(silent: Silent) -> None:
 
 
 def test_a_message_that_is_too_large_is_refused_with_the_limit() -> None:
-    with mpf.Server("small", max_message_bytes=1000).start(), mpf.Client("small", timeout=PATIENCE) as client:
+    with mpf.Server("small", max_message_bytes=1000).start(), mpf.Client("small") as client:
         with pytest.raises(mpf.TooLarge, match="the limit is 1000"):
             client.float64_array(range(1000), timeout=PATIENCE)
 
@@ -249,7 +250,7 @@ def test_a_subscription_iterates_over_all_replies(doubler: mpf.Server) -> None:
     def count(request: mpf.Float64) -> Iterator[float]:
         yield from map(float, range(int(request.value)))
 
-    with mpf.Client("doubler", timeout=PATIENCE) as client, client.subscribe(mpf.Float64(5.0)) as replies:
+    with mpf.Client("doubler") as client, client.subscribe(mpf.Float64(5.0)) as replies:
         values = [next(replies).value for _ in range(5)]
 
     assert values == [0.0, 1.0, 2.0, 3.0, 4.0]
@@ -341,7 +342,7 @@ def test_a_subscription_that_the_server_refuses_ends(silent: Silent) -> None:
 
 
 def test_ctrl_c_ends_a_subscription(doubler: mpf.Server) -> None:
-    with mpf.Client("doubler", timeout=PATIENCE) as client, client.subscribe(mpf.Int32()) as replies:
+    with mpf.Client("doubler") as client, client.subscribe(mpf.Int32()) as replies:
         next(replies)
         threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
         with pytest.raises(KeyboardInterrupt):

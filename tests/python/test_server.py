@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Iterator
 
 import numpy as np
 import pytest
-from conftest import PATIENCE, PROGRAMS
+from conftest import PATIENCE, PROGRAMS, needs_mpf
 
 import mpf
 
@@ -143,6 +143,7 @@ def test_a_type_without_a_handler_is_an_error(server: mpf.Server) -> None:
         call(mpf.Int32())
 
 
+@needs_mpf
 def test_a_program_of_c_plus_plus_sees_status_and_text(server: mpf.Server) -> None:
     @server.on(mpf.Int32)
     def fail(request: mpf.Int32) -> None:
