@@ -6,7 +6,8 @@
 //
 // When the interpreter exits, CPython ends threads that ask for the GIL by pthread_exit(), which
 // aborts a process in code of C++. prepareExit() runs before: from then on, a daemon thread that
-// leaves such a scope stops for good instead of asking.
+// leaves such a scope stops for good instead of asking. Functions of Python may ask for it, too, so
+// a thread is in the scope of a CallsPython while code of C++ calls them.
 //
 // Threads  any.
 #pragma once
@@ -34,6 +35,16 @@ class WithoutGil {
  private:
   PyThreadState* state_;
   bool wasInterrupted_ = false;
+};
+
+// With the GIL. prepareExit() waits for threads in such a scope; a daemon thread that enters one
+// later stops for good.
+class CallsPython {
+ public:
+  CallsPython();
+  ~CallsPython();
+  CallsPython(const CallsPython&) = delete;
+  CallsPython& operator=(const CallsPython&) = delete;
 };
 
 // Copies many bytes without the GIL.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "python/extension/messages.h"
 
+#include <array>
 #include <nanobind/stl/string.h>
 #include <string>
 #include <string_view>
@@ -63,25 +64,22 @@ PyType_Slot kBufferSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(getBuffe
                               {Py_bf_releasebuffer, reinterpret_cast<void*>(releaseBuffer<T>)},
                               {0, nullptr}};
 
-// Something of numpy, looked up at its first use. Not a static initialiser: a thread that waits for
-// it would hold the GIL, which the import needs.
-nb::handle ofNumpy(PyObject*& found, const char* name) {
-  if (found == nullptr)
-    found = nb::object(nb::module_::import_("numpy").attr(name)).release().ptr();
-  return found;
-}
-nb::handle fromBuffer() {
-  static PyObject* found = nullptr;
-  return ofNumpy(found, "frombuffer");
-}
-nb::handle asContiguousArray() {
-  static PyObject* found = nullptr;
-  return ofNumpy(found, "ascontiguousarray");
-}
+// What the module uses of numpy.
+enum class Numpy : std::uint8_t { fromBuffer, asContiguousArray, arrayEqual, int32, float64 };
+constexpr std::array kNumpyNames{"frombuffer", "ascontiguousarray", "array_equal", "int32",
+                                 "float64"};
 template <class T>
-nb::handle elementType() {
-  static PyObject* found = nullptr;
-  return ofNumpy(found, std::is_same_v<T, Int32Array> ? "int32" : "float64");
+constexpr auto kElementType = std::is_same_v<T, Int32Array> ? Numpy::int32 : Numpy::float64;
+
+// Looked up at the first use. Not a static initialiser: a thread that waits for it would hold the
+// GIL, which the import needs.
+nb::handle of(Numpy what) {
+  static std::array<PyObject*, kNumpyNames.size()> found{};
+  const auto index = static_cast<std::size_t>(what);
+  if (found[index] == nullptr)
+    found[index] =
+        nb::object(nb::module_::import_("numpy").attr(kNumpyNames[index])).release().ptr();
+  return found[index];
 }
 
 // The elements as users see them: a numpy array, bytes or a memoryview.
@@ -90,7 +88,8 @@ nb::object valueOf(nb::handle self) {
   auto& array = *nb::inst_ptr<PyArray<T>>(self);
   if (array.isEmpty) throw nb::value_error(kWasSent);
   if constexpr (CountedInElements<T>) {
-    return array.values.is_valid() ? array.values : fromBuffer()(self, elementType<T>());
+    return array.values.is_valid() ? array.values
+                                   : of(Numpy::fromBuffer)(self, of(kElementType<T>));
   } else {
     const auto view = array.values.is_valid() ? array.values : nb::borrow(self);
     if constexpr (std::is_same_v<T, Char8Array>) {
@@ -114,8 +113,12 @@ std::size_t lengthOf(const PyArray<T>& array) {
 // Sets the elements of a message that Python creates.
 template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
+  const CallsPython guard;
   if constexpr (CountedInElements<T>) {
-    array.values = asContiguousArray()(value, elementType<T>());
+    array.values = of(Numpy::asContiguousArray)(value, of(kElementType<T>));
+    if (std::is_same_v<T, Int32Array> && !array.values.is(value) &&
+        !nb::cast<bool>(of(Numpy::arrayEqual)(array.values, value)))
+      throw nb::value_error("the elements are not 32-bit integers");
     if (nb::cast<int>(array.values.attr("ndim")) != 1)
       throw nb::value_error("the elements must have one dimension");
   } else {
@@ -204,6 +207,7 @@ PyArrayClass<T> addArrayClass(nb::module_& module, const char* doc, const char* 
   type.def_prop_ro("value", &valueOf<T>, nb::for_getter(nb::sig(valueSignature)), valueDoc);
   type.def("__len__", &lengthOf<T>);
   type.def("__repr__", [](nb::handle self) {
+    const CallsPython guard;
     const auto& array = *nb::inst_ptr<PyArray<T>>(self);
     const auto value = array.isEmpty ? "sent" : nb::cast<std::string>(nb::repr(valueOf<T>(self)));
     return describe(kClassName<T>, array.fields, value);

@@ -175,6 +175,10 @@ void Requester::cancel(Exchange& exchange) { client_.cancel(exchange.id); }
 void Requester::forget(Exchange& exchange) {
   const std::lock_guard lock(mutex_);
   exchanges_.erase(exchange.id);
+  exchange.isDisconnected = true;
+  if (exchange.hasEnded()) return;
+  exchange.fate = Fate::cancelled;
+  changed_.notify_all();
 }
 
 // ---- event loops

@@ -69,7 +69,7 @@ class Requester {
   [[nodiscard]] std::uint64_t missed(const Exchange& exchange);
   // Ends a request that has no reply as `cancelled`.
   void cancel(Exchange& exchange);
-  // Drops later replies to `exchange`.
+  // Drops later replies to `exchange`, which ends as `cancelled` if it has not ended.
   void forget(Exchange& exchange);
 
   // Ends all requests as `cancelled` and all waits; exchanges need no forget() afterwards. The

@@ -89,6 +89,7 @@ class PyServer {
     isInterrupted_ = true;
     server->interrupt();
   }
+  [[nodiscard]] bool isInterrupted() const { return isInterrupted_; }
   // Whether interrupt() was called since the last call.
   bool takeInterrupt() {
     static_cast<void>(opened());
@@ -177,6 +178,7 @@ void addServer(nb::module_& module) {
       .def("interrupt", &PyServer::interrupt,
            "Ends the call of run() that is in progress, or else the next one. Any thread.")
       .def("_take_interrupt", &PyServer::takeInterrupt)
+      .def_prop_ro("_is_interrupted", &PyServer::isInterrupted)
       .def("_fileno", &PyServer::descriptor)
       .def_prop_ro("name", &PyServer::name, "The name of the server.")
       .def_prop_ro("location", &PyServer::location, "The location of the server.")

@@ -136,6 +136,10 @@ def test_elements_are_converted(client: mpf.Client) -> None:
         6.0,
         8.0,
     ]
+    assert mpf.Int32Array(np.arange(3.0)).value.tolist() == [0, 1, 2]
+    for values in ([1.5], np.array([1 << 40])):
+        with pytest.raises(ValueError, match="32-bit"):
+            mpf.Int32Array(values)
     with pytest.raises(ValueError, match="one dimension"):
         mpf.Float64Array(np.zeros((2, 2)))
 

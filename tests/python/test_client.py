@@ -49,8 +49,8 @@ def test_requests_may_be_outstanding(doubler: mpf.Server) -> None:
 
 
 def test_an_absent_server_is_not_connected() -> None:
-    with mpf.Client("nobody") as client, pytest.raises(mpf.NotConnected, match="nobody"):
-        client.int32(timeout=0.01)
+    with pytest.raises(mpf.NotConnected, match="nobody"):
+        mpf.Client("nobody").int32(timeout=0.01)
 
 
 def test_the_text_and_the_status_of_the_server_are_the_exception(doubler: mpf.Server) -> None:
@@ -178,6 +178,16 @@ def test_a_cancelled_request_ends(silent: Silent) -> None:
 
         with pytest.raises(mpf.Cancelled):
             request.wait()
+
+
+def test_a_closed_request_has_ended(silent: Silent) -> None:
+    with mpf.Client("silent", timeout=PATIENCE) as client:
+        request = client.send(mpf.Int32(), further=3)
+        request.close()
+
+        with pytest.raises(mpf.Cancelled):
+            request.wait()
+        assert request.next(PATIENCE) is None
 
 
 @needs_mpf
@@ -344,15 +354,25 @@ def test_a_subscription_that_the_server_refuses_ends(silent: Silent) -> None:
 def test_ctrl_c_ends_a_subscription(doubler: mpf.Server) -> None:
     with mpf.Client("doubler") as client, client.subscribe(mpf.Int32()) as replies:
         next(replies)
-        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
         with pytest.raises(KeyboardInterrupt):
+            threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
             next(replies)
 
 
 def test_ctrl_c_ends_a_server() -> None:
-    with mpf.Server("tested") as server:
-        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
-        server.run()
+    server = mpf.Server("tested")
+    server.on(mpf.Int32)(lambda request: 1)
+
+    def interrupt() -> None:
+        with mpf.Client("tested", timeout=PATIENCE) as client:
+            client.int32()  # it runs
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    server.run()
+    thread.join()
+    server.close()
 
 
 def test_ctrl_c_ends_a_call(silent: Silent) -> None:
@@ -368,26 +388,6 @@ def test_ctrl_c_ends_a_call(silent: Silent) -> None:
 
 
 def test_ctrl_c_ends_the_wait_for_a_connection() -> None:
-    threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
-
     with mpf.Client("nobody", timeout=PATIENCE) as client, pytest.raises(KeyboardInterrupt):
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
         client.int32(timeout=PATIENCE)
-
-
-def test_threads_share_a_client(doubler: mpf.Server) -> None:
-    results: dict[int, list[int]] = {}
-    with mpf.Client("doubler", timeout=PATIENCE) as client:
-
-        def ask(first: int) -> None:
-            numbers = range(first, first + 200)
-            results[first] = [client.int32(number, timeout=PATIENCE).value for number in numbers]
-
-        threads = [threading.Thread(target=ask, args=(1000 * number,)) for number in range(8)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-
-    assert len(results) == 8
-    for first, values in results.items():
-        assert values == [2 * number for number in range(first, first + 200)]

@@ -14,22 +14,20 @@ server that replies as in that file.
 """
 
 try:
-    import mpf._mpf
+    from mpf._mpf import (
+        Char8Array,
+        Float64,
+        Float64Array,
+        Int32,
+        Int32Array,
+        Message,
+        OutOfBand,
+        Request,
+        SerialConfig,
+        User,
+    )
 except ImportError as error:  # its cause is the reason, for example a sub-interpreter
     raise error.__cause__ or error
-
-from mpf._mpf import (
-    Char8Array,
-    Float64,
-    Float64Array,
-    Int32,
-    Int32Array,
-    Message,
-    OutOfBand,
-    Request,
-    SerialConfig,
-    User,
-)
 from mpf.aio import AsyncClient, AsyncSubscription
 from mpf.client import Client, Subscription
 from mpf.errors import (

@@ -17,7 +17,6 @@ import ctypes
 import importlib
 import importlib.util
 import json
-import math
 import multiprocessing
 import os
 import statistics
