@@ -7,6 +7,8 @@
 
 #include <mpf/errors.h>
 
+#include "python/extension/gil.h"
+
 namespace mpf::python {
 namespace {
 
@@ -14,6 +16,7 @@ nb::object classOf(const char* name) { return nb::module_::import_("mpf.errors")
 
 template <class... Argument>
 [[noreturn]] void raise(const char* name, Argument&&... arguments) {
+  const CallsPython guard;
   const auto type = classOf(name);
   const nb::object error = type(std::forward<Argument>(arguments)...);
   PyErr_SetObject(type.ptr(), error.ptr());
@@ -63,6 +66,7 @@ nb::str sentence(const std::string& server, const std::string& text) {
 }
 
 void translate(const std::exception_ptr& error, void* /*payload*/) {
+  const CallsPython guard;
   try {
     std::rethrow_exception(error);
   } catch (const std::system_error& failure) {
@@ -101,9 +105,9 @@ void raiseClosed(const char* object) {
 }
 
 void raiseInherited(const char* object) {
-  raise("Error", nb::str((std::string("the ") + object +
-                          " belongs to the parent process: create one after fork()")
-                             .c_str()));
+  PyErr_Format(PyExc_RuntimeError, "the %s belongs to the parent process: create one after fork()",
+               object);
+  throw nb::python_error();
 }
 
 void raiseReply(const std::string& server, ReplyResult result) {

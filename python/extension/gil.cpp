@@ -5,24 +5,39 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
+#include <cstring>
 #include <thread>
+
+#include <mpf/clock.h>
 
 namespace mpf::python {
 namespace {
 
 constexpr std::chrono::microseconds kLookEvery{100};
+// Functions of a program that numpy calls may wait; the exit does not wait for them longer.
+constexpr std::chrono::seconds kLongestCall{1};
+constexpr std::size_t kManyBytes = 64 * 1024;
 
 std::atomic<bool> isExiting = false;
-std::atomic<int> entering = 0;  // threads that ask for the GIL
+std::atomic<int> entering = 0;  // threads that ask for the GIL, or may ask for it
 pthread_t exitingThread;  // valid when isExiting is true
 
-void resume(PyThreadState* state) {
+// Adds this thread to `entering`. Returns false when it must not ask for the GIL any more.
+bool tryEnter() {
   // PAIR(python-exit): either prepareExit() sees this thread in `entering`, or it sees isExiting.
   entering.fetch_add(1);
-  if (isExiting.load() && pthread_equal(pthread_self(), exitingThread) == 0) {
-    entering.fetch_sub(1);
-    for (;;) ::pause();
-  }
+  if (!isExiting.load() || pthread_equal(pthread_self(), exitingThread) != 0) return true;
+  entering.fetch_sub(1);
+  return false;
+}
+
+[[noreturn]] void stop() {
+  for (;;) ::pause();
+}
+
+void resume(PyThreadState* state) {
+  if (!tryEnter()) stop();
   PyEval_RestoreThread(state);
   entering.fetch_sub(1);
 }
@@ -42,12 +57,35 @@ std::function<bool()> WithoutGil::interruption() {
   };
 }
 
+CallsPython::CallsPython() {
+  if (tryEnter()) return;
+  PyEval_SaveThread();
+  stop();
+}
+
+CallsPython::~CallsPython() { entering.fetch_sub(1); }
+
+void copyBytes(std::byte* to, std::span<const std::byte> from) {
+  if (from.empty()) return;
+  if (from.size() < kManyBytes) {
+    std::memcpy(to, from.data(), from.size());
+    return;
+  }
+  const WithoutGil unlocked;
+  std::memcpy(to, from.data(), from.size());
+}
+
+void forgetThreadsInForks() {
+  ::pthread_atfork(nullptr, nullptr, [] { entering.store(0); });
+}
+
 void prepareExit() {
   exitingThread = pthread_self();
   auto* state = PyEval_SaveThread();
   // PAIR(python-exit): no thread enters after this store.
   isExiting.store(true);
-  while (entering.load() != 0) std::this_thread::sleep_for(kLookEvery);
+  const auto patience = Deadline::after(kLongestCall);
+  while (entering.load() > 0 && !patience.hasPassed()) std::this_thread::sleep_for(kLookEvery);
   PyEval_RestoreThread(state);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "python/extension/messages.h"
 
+#include <array>
 #include <nanobind/stl/string.h>
 #include <string>
 #include <string_view>
@@ -12,8 +13,6 @@ namespace mpf::python {
 namespace {
 
 using namespace nb::literals;
-
-constexpr std::size_t kLargeBytes = 64 * 1024;
 
 // ---- elements
 
@@ -65,25 +64,22 @@ PyType_Slot kBufferSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(getBuffe
                               {Py_bf_releasebuffer, reinterpret_cast<void*>(releaseBuffer<T>)},
                               {0, nullptr}};
 
-// Something of numpy, looked up at its first use. Not a static initialiser: a thread that waits for
-// it would hold the GIL, which the import needs.
-nb::handle ofNumpy(PyObject*& found, const char* name) {
-  if (found == nullptr)
-    found = nb::object(nb::module_::import_("numpy").attr(name)).release().ptr();
-  return found;
-}
-nb::handle fromBuffer() {
-  static PyObject* found = nullptr;
-  return ofNumpy(found, "frombuffer");
-}
-nb::handle asContiguousArray() {
-  static PyObject* found = nullptr;
-  return ofNumpy(found, "ascontiguousarray");
-}
+// What the module uses of numpy.
+enum class Numpy : std::uint8_t { fromBuffer, asContiguousArray, arrayEqual, int32, float64 };
+constexpr std::array kNumpyNames{"frombuffer", "ascontiguousarray", "array_equal", "int32",
+                                 "float64"};
 template <class T>
-nb::handle elementType() {
-  static PyObject* found = nullptr;
-  return ofNumpy(found, std::is_same_v<T, Int32Array> ? "int32" : "float64");
+constexpr auto kElementType = std::is_same_v<T, Int32Array> ? Numpy::int32 : Numpy::float64;
+
+// Looked up at the first use. Not a static initialiser: a thread that waits for it would hold the
+// GIL, which the import needs.
+nb::handle of(Numpy what) {
+  static std::array<PyObject*, kNumpyNames.size()> found{};
+  const auto index = static_cast<std::size_t>(what);
+  if (found[index] == nullptr)
+    found[index] =
+        nb::object(nb::module_::import_("numpy").attr(kNumpyNames[index])).release().ptr();
+  return found[index];
 }
 
 // The elements as users see them: a numpy array, bytes or a memoryview.
@@ -92,7 +88,8 @@ nb::object valueOf(nb::handle self) {
   auto& array = *nb::inst_ptr<PyArray<T>>(self);
   if (array.isEmpty) throw nb::value_error(kWasSent);
   if constexpr (CountedInElements<T>) {
-    return array.values.is_valid() ? array.values : fromBuffer()(self, elementType<T>());
+    return array.values.is_valid() ? array.values
+                                   : of(Numpy::fromBuffer)(self, of(kElementType<T>));
   } else {
     const auto view = array.values.is_valid() ? array.values : nb::borrow(self);
     if constexpr (std::is_same_v<T, Char8Array>) {
@@ -106,17 +103,27 @@ nb::object valueOf(nb::handle self) {
   }
 }
 
+// The number of elements.
+template <class T>
+std::size_t lengthOf(const PyArray<T>& array) {
+  if (!array.values.is_valid()) return static_cast<std::size_t>(array.length);
+  return BufferView(array.values).bytes().size() / sizeof(typename T::Element);
+}
+
 // Sets the elements of a message that Python creates.
 template <class T>
 void setValues(PyArray<T>& array, nb::handle value) {
+  const CallsPython guard;
   if constexpr (CountedInElements<T>) {
-    array.values = asContiguousArray()(value, elementType<T>());
+    array.values = of(Numpy::asContiguousArray)(value, of(kElementType<T>));
+    if (std::is_same_v<T, Int32Array> && !array.values.is(value) &&
+        !nb::cast<bool>(of(Numpy::arrayEqual)(array.values, value)))
+      throw nb::value_error("the elements are not 32-bit integers");
     if (nb::cast<int>(array.values.attr("ndim")) != 1)
       throw nb::value_error("the elements must have one dimension");
-    array.length = nb::cast<Py_ssize_t>(array.values.attr("size"));
   } else {
     array.values = nb::isinstance<nb::str>(value) ? value.attr("encode")() : nb::borrow(value);
-    array.length = static_cast<Py_ssize_t>(BufferView(array.values).bytes().size());
+    static_cast<void>(lengthOf(array));  // throws unless it has a contiguous buffer
   }
 }
 
@@ -198,8 +205,9 @@ PyArrayClass<T> addArrayClass(nb::module_& module, const char* doc, const char* 
   PyArrayClass<T> type(module, kClassName<T>, nb::type_slots(kBufferSlots<T>), doc);
   addFields<PyArray<T>, T>(type);
   type.def_prop_ro("value", &valueOf<T>, nb::for_getter(nb::sig(valueSignature)), valueDoc);
-  type.def("__len__", [](const PyArray<T>& self) { return self.length; });
+  type.def("__len__", &lengthOf<T>);
   type.def("__repr__", [](nb::handle self) {
+    const CallsPython guard;
     const auto& array = *nb::inst_ptr<PyArray<T>>(self);
     const auto value = array.isEmpty ? "sent" : nb::cast<std::string>(nb::repr(valueOf<T>(self)));
     return describe(kClassName<T>, array.fields, value);
@@ -218,9 +226,10 @@ void addArray(nb::module_& module, const char* doc, const char* valueSignature,
       "__init__",
       [](PyArray<T>* self, nb::handle value, long long timeout, long long cmd, long long status,
          long long address, long long extra) {
-        new (self) PyArray<T>;
-        setValues(*self, value);
-        setStandardFields(self->fields, timeout, cmd, status, address, extra);
+        PyArray<T> array;  // nothing destroys *self after an exception
+        setValues(array, value);
+        setStandardFields(array.fields, timeout, cmd, status, address, extra);
+        new (self) PyArray<T>(std::move(array));
       },
       "value"_a = nb::make_tuple(), MPF_STANDARD_ARGUMENTS, nb::sig(initSignature));
 }
@@ -234,12 +243,13 @@ void addChar8Array(nb::module_& module) {
       [](PyArray<Char8Array>* self, nb::handle value, long long timeout, long long cmd,
          long long status, long long address, long long extra, long long retries,
          const nb::bytes& eom) {
-        new (self) PyArray<Char8Array>;
-        setValues(*self, value);
-        auto& fields = self->fields;
+        PyArray<Char8Array> array;
+        setValues(array, value);
+        auto& fields = array.fields;
         setStandardFields(fields, timeout, cmd, status, address, extra);
         fields.numberRetrys = narrow<std::int32_t>(retries, "number_retrys");
         setBytes(fields.eomString, fields.eomLen, {eom.c_str(), eom.size()}, "eom");
+        new (self) PyArray<Char8Array>(std::move(array));
       },
       "value"_a = nb::bytes("", 0), MPF_STANDARD_ARGUMENTS, "number_retrys"_a = 0,
       "eom"_a = nb::bytes("", 0),
@@ -272,8 +282,9 @@ void addUser(nb::module_& module) {
   type.def(
       "__init__",
       [](PyArray<User>* self, nb::handle value) {
-        new (self) PyArray<User>;
-        setValues(*self, value);
+        PyArray<User> array;
+        setValues(array, value);
+        new (self) PyArray<User>(std::move(array));
       },
       "value"_a = nb::bytes("", 0),
       nb::sig("def __init__(self, value: typing_extensions.Buffer = b'') -> None"));
@@ -338,16 +349,6 @@ nb::object convert(Message&& message, bool isRequest) {
 }
 
 }  // namespace
-
-void copyBytes(std::byte* to, std::span<const std::byte> from) {
-  if (from.empty()) return;
-  if (from.size() < kLargeBytes) {
-    std::memcpy(to, from.data(), from.size());
-    return;
-  }
-  const nb::gil_scoped_release release;
-  std::memcpy(to, from.data(), from.size());
-}
 
 nb::object toPython(Message&& message) { return convert(std::move(message), false); }
 nb::object requestToPython(Message&& request) { return convert(std::move(request), true); }

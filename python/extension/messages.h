@@ -18,6 +18,8 @@
 #include <mpf/message_of.h>
 #include <mpf/message_server.h>
 
+#include "python/extension/gil.h"
+
 namespace mpf::python {
 
 namespace nb = nanobind;
@@ -93,11 +95,13 @@ template <ArrayBody T>
 class PyArray final : public PyMessage {
  public:
   T fields{};  // `length` is not used
-  nb::object values;  // an object with a contiguous buffer of elements; null: they are in `handle`
+  // An object with a contiguous buffer of elements, whose size may change, for example that of a
+  // bytearray. Null: they are in `handle`.
+  nb::object values;
   bool isLoaned = false;  // writable, and may be sent without a copy
   bool isEmpty = false;  // it was sent without a copy
   std::int32_t exports = 0;  // objects of Python that refer to the elements in `handle`
-  Py_ssize_t length = 0;  // elements
+  Py_ssize_t length = 0;  // elements in `handle`
 
   Message toMessage(const Allocator& allocator) override {
     if (isLoaned && exports == 0 && !isEmpty) {
@@ -122,6 +126,7 @@ class PyArray final : public PyMessage {
     written->length = kept;
   }
   Message copied(const Allocator& allocator) const;
+  Message filled(const Allocator& allocator, std::span<const std::byte> bytes) const;
 };
 
 // A view of the buffer of an object, for one function.
@@ -143,20 +148,22 @@ class BufferView {
   Py_buffer view_{};
 };
 
-// Copies large arrays without the GIL.
-void copyBytes(std::byte* to, std::span<const std::byte> from);
-
 template <ArrayBody T>
 Message PyArray<T>::copied(const Allocator& allocator) const {
   if (isEmpty) throw nb::value_error(kWasSent);
-  auto message = allocator.array<T>(static_cast<std::size_t>(length));
-  auto* to = reinterpret_cast<std::byte*>(message.value().data());
-  if (values.is_valid()) {
-    const BufferView view(values);
-    copyBytes(to, view.bytes());
-  } else {
-    copyBytes(to, std::as_bytes(std::as_const(handle).template valueAs<T>()));
-  }
+  if (!values.is_valid())
+    return filled(allocator, std::as_bytes(std::as_const(handle).template valueAs<T>()));
+  const BufferView view(values);
+  return filled(allocator, view.bytes());
+}
+
+template <ArrayBody T>
+Message PyArray<T>::filled(const Allocator& allocator, std::span<const std::byte> bytes) const {
+  using Element = typename T::Element;
+  const auto count = bytes.size() / sizeof(Element);
+  auto message = allocator.array<T>(count);
+  copyBytes(reinterpret_cast<std::byte*>(message.value().data()),
+            bytes.first(count * sizeof(Element)));
   writeFields(message);
   return message;
 }

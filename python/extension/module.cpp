@@ -28,6 +28,7 @@ NB_MODULE(_mpf, module) {
   nanobind::set_leak_warnings(false);  // a program may end while its threads use objects
   module.doc() = "The parts of mpf that are written in C++.";
   mpf::python::countForks();
+  mpf::python::forgetThreadsInForks();
   nanobind::module_::import_("atexit").attr("register")(
       nanobind::cpp_function(&mpf::python::prepareExit));
   mpf::python::addErrors();

@@ -29,6 +29,7 @@ void Requester::close() {
     exchange->isDisconnected = true;
     if (!exchange->hasEnded()) exchange->fate = Fate::cancelled;
   }
+  exchanges_.clear();
   changed_.notify_all();
   dispatcher_.interrupt();
 }
@@ -37,6 +38,7 @@ void Requester::close() {
 
 void Requester::take(Message&& message) {
   const std::lock_guard lock(mutex_);
+  if (isClosed_) return;  // the exchanges may not exist any more
   if (const auto* connect = message.tryAs<Connect>()) {
     takeConnect(*connect);
   } else if (const auto at = exchanges_.find(message.route().requestId); at != exchanges_.end()) {
@@ -174,6 +176,10 @@ void Requester::cancel(Exchange& exchange) { client_.cancel(exchange.id); }
 void Requester::forget(Exchange& exchange) {
   const std::lock_guard lock(mutex_);
   exchanges_.erase(exchange.id);
+  exchange.isDisconnected = true;
+  if (exchange.hasEnded()) return;
+  exchange.fate = Fate::cancelled;
+  changed_.notify_all();
 }
 
 // ---- event loops

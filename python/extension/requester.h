@@ -69,10 +69,11 @@ class Requester {
   [[nodiscard]] std::uint64_t missed(const Exchange& exchange);
   // Ends a request that has no reply as `cancelled`.
   void cancel(Exchange& exchange);
-  // Drops later replies to `exchange`.
+  // Drops later replies to `exchange`, which ends as `cancelled` if it has not ended.
   void forget(Exchange& exchange);
 
-  // Ends all requests as `cancelled` and all waits. The destructor disconnects.
+  // Ends all requests as `cancelled` and all waits; exchanges need no forget() afterwards. The
+  // destructor disconnects.
   void close();
 
   // --- for event loops

@@ -52,9 +52,9 @@ class PyServer {
   // Returns false when the client has gone.
   bool reply(PyMessage& request, PyMessage& message) {
     const auto server = opened();
-    if (request.handle.route().link == 0)
-      throw nb::value_error("reply: the first argument is not a request of this server");
+    checkRequest(request);
     auto sent = message.toMessage(Allocator(*server, request.handle));
+    address(sent, request.handle);
     sent.setTimeStampNs(message.timeStampNs);
     const auto result = server->reply(std::move(sent));
     if (result == ReplyResult::sent) return true;
@@ -63,19 +63,33 @@ class PyServer {
     message.restore(std::move(sent));
     raiseReply(name_, result);
   }
-  void refuse(PyMessage& request) { opened()->refuse(std::move(request.handle)); }
+  void refuse(PyMessage& request) {
+    const auto server = opened();
+    checkRequest(request);
+    // Objects of Python may refer to the elements: `request` keeps them.
+    Message refused;
+    auto route = request.handle.route();
+    refused.setRoute(route);
+    route.keeper = nullptr;
+    request.handle.setRoute(route);
+    server->refuse(std::move(refused));
+  }
   nb::object loan(PyMessage& request, nb::handle type, std::size_t length) {
     const auto server = opened();
+    checkRequest(request);
     return python::loan(Allocator(*server, request.handle), type, length);
   }
   bool isClientConnected(const PyMessage& request) {
-    return opened()->isClientConnected(request.handle);
+    const auto server = opened();
+    checkRequest(request);
+    return server->isClientConnected(request.handle);
   }
   void interrupt() {
     const auto server = opened();
     isInterrupted_ = true;
     server->interrupt();
   }
+  [[nodiscard]] bool isInterrupted() const { return isInterrupted_; }
   // Whether interrupt() was called since the last call.
   bool takeInterrupt() {
     static_cast<void>(opened());
@@ -91,6 +105,18 @@ class PyServer {
   }
 
  private:
+  static void checkRequest(const PyMessage& request) {
+    if (request.handle.route().link == 0)
+      throw nb::value_error("the first argument is not a request that this server received");
+  }
+  // `reply` may have been loaned for another request.
+  static void address(Message& reply, const Message& request) {
+    auto route = request.route();
+    route.keeper = nullptr;
+    reply.setRoute(route);
+    reply.setClientType(request.getClientType());
+    reply.setClientExtra(request.getClientExtra());
+  }
   std::shared_ptr<MessageServer> opened() const {
     if (!server_) raiseClosed(kServer);
     if (forks_ != forkCount()) raiseInherited(kServer);
@@ -152,6 +178,7 @@ void addServer(nb::module_& module) {
       .def("interrupt", &PyServer::interrupt,
            "Ends the call of run() that is in progress, or else the next one. Any thread.")
       .def("_take_interrupt", &PyServer::takeInterrupt)
+      .def_prop_ro("_is_interrupted", &PyServer::isInterrupted)
       .def("_fileno", &PyServer::descriptor)
       .def_prop_ro("name", &PyServer::name, "The name of the server.")
       .def_prop_ro("location", &PyServer::location, "The location of the server.")

@@ -13,7 +13,7 @@ import mpf
 
 
 async def test_a_call_returns_the_reply(doubler: mpf.Server) -> None:
-    async with mpf.AsyncClient("doubler") as client:
+    async with mpf.AsyncClient("doubler", timeout=PATIENCE) as client:
         reply = await client.call(mpf.Int32(21))
 
     assert reply.value == 42
@@ -27,7 +27,7 @@ async def test_calls_run_at_the_same_time(doubler: mpf.Server) -> None:
 
 
 async def test_an_absent_server_is_not_connected() -> None:
-    async with mpf.AsyncClient("nobody") as client:
+    async with mpf.AsyncClient("nobody", timeout=PATIENCE) as client:
         with pytest.raises(mpf.NotConnected, match="nobody"):
             await client.call(mpf.Int32(), timeout=0.01)
 
@@ -68,7 +68,7 @@ Silent = tuple[mpf.Server, list[mpf.Message], asyncio.Event]
 
 
 async def test_a_call_times_out(silent: Silent) -> None:
-    async with mpf.AsyncClient("silent") as client:
+    async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
         calling = asyncio.ensure_future(client.call(mpf.Int32(), timeout=0.3))
         await silent[2].wait()
         with pytest.raises(mpf.TimedOut):
@@ -109,10 +109,26 @@ async def test_closing_ends_calls(silent: Silent) -> None:
         await calling
 
 
+async def test_calls_by_type(doubler: mpf.Server) -> None:
+    async with mpf.AsyncClient("doubler", timeout=PATIENCE) as client:
+        assert (await client.int32(2, address=3)).address == 3
+        assert (await client.float64(1.5)).value == 3.0
+        assert (await client.int32_array([1, 2])).value.tolist() == [2, 4]
+        assert (await client.float64_array([0.5])).value.tolist() == [1.0]
+        assert (await client.char8_array("ab")).text == "abab"
+
+
+async def test_a_subscription_whose_first_reply_is_late_times_out(silent: Silent) -> None:
+    async with mpf.AsyncClient("silent", timeout=PATIENCE) as client:
+        assert await client.wait_connected(PATIENCE)
+        with pytest.raises(TimeoutError):
+            await anext(client.subscribe(mpf.Int32(), timeout=0.2))
+
+
 async def test_a_subscription_iterates(doubler: mpf.Server) -> None:
     doubler.on(mpf.Float64)(lambda request: (float(n) for n in range(4)))
     values = []
-    async with mpf.AsyncClient("doubler") as client:
+    async with mpf.AsyncClient("doubler", timeout=PATIENCE) as client:
         async with client.subscribe(mpf.Float64()) as replies:
             async for reply in replies:
                 values.append(reply.value)
@@ -161,7 +177,7 @@ async def test_a_thousand_subscriptions_of_one_client() -> None:
 
 
 def test_a_client_belongs_to_one_loop(doubler: mpf.Server) -> None:
-    client = mpf.AsyncClient("doubler")
+    client = mpf.AsyncClient("doubler", timeout=PATIENCE)
 
     async def use() -> None:
         await client.call(mpf.Int32())

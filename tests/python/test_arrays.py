@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from conftest import PATIENCE
 
 import mpf
 
@@ -24,7 +25,7 @@ def echo() -> Iterator[mpf.Server]:
 
 @pytest.fixture
 def client(echo: mpf.Server) -> Iterator[mpf.Client]:
-    with mpf.Client("echo") as client:
+    with mpf.Client("echo", timeout=PATIENCE) as client:
         yield client
 
 
@@ -60,7 +61,7 @@ def test_a_received_array_is_a_view(client: mpf.Client) -> None:
 
 
 def test_a_view_outlives_message_client_and_server(echo: mpf.Server) -> None:
-    client = mpf.Client("echo")
+    client = mpf.Client("echo", timeout=PATIENCE)
     value = client.float64_array(np.arange(float(LENGTH))).value
     client.close()
     echo.close()
@@ -101,7 +102,7 @@ def test_a_loaned_array_that_is_in_use_is_copied(client: mpf.Client) -> None:
 
 
 def test_a_loaned_array_that_was_not_sent_keeps_its_elements(echo: mpf.Server) -> None:
-    client = mpf.Client("echo")
+    client = mpf.Client("echo", timeout=PATIENCE)
     loaned = client.loan(mpf.Int32Array, 10)
     loaned.value[:] = 5
     echo.close()
@@ -135,6 +136,10 @@ def test_elements_are_converted(client: mpf.Client) -> None:
         6.0,
         8.0,
     ]
+    assert mpf.Int32Array(np.arange(3.0)).value.tolist() == [0, 1, 2]
+    for values in ([1.5], np.array([1 << 40])):
+        with pytest.raises(ValueError, match="32-bit"):
+            mpf.Int32Array(values)
     with pytest.raises(ValueError, match="one dimension"):
         mpf.Float64Array(np.zeros((2, 2)))
 
@@ -151,6 +156,15 @@ def test_user_messages_carry_any_buffer(client: mpf.Client) -> None:
     assert client.call(mpf.User(b"abc")).value.tobytes() == b"abc"
     assert client.call(mpf.User(np.arange(3.0))).value.cast("d").tolist() == [0.0, 1.0, 2.0]
     assert client.call(mpf.User(bytearray(LENGTH))).value.nbytes == LENGTH
+
+
+def test_the_buffer_of_a_message_may_grow_and_shrink(client: mpf.Client) -> None:
+    buffer = bytearray(10)
+    message = mpf.User(buffer)
+    for size in (LENGTH, 3, 0):
+        buffer[:] = bytes(size)
+        assert len(message) == size
+        assert client.call(message).value.nbytes == size
 
 
 def test_many_views_make_the_sender_run_out_of_memory_and_freeing_them_helps(

@@ -29,4 +29,4 @@ def test_each_row_has_times_in_order() -> None:
     for row in ROWS:
         _, *percentiles = [float(time) for time in times[row]]
         assert 0 < percentiles[0] <= percentiles[1] <= percentiles[2]
-    assert "further replies to 100 requests at once" in done.stdout
+    assert "replies to 1000 subscriptions of one client" in done.stdout

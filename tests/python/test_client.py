@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from conftest import PATIENCE, PROGRAMS
+from conftest import PATIENCE, PROGRAMS, needs_mpf
 
 import mpf
 
@@ -28,7 +28,7 @@ def test_a_call_returns_the_reply_of_a_server_in_another_process(
 
 
 def test_a_call_by_type_sends_the_fields(doubler: mpf.Server) -> None:
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         reply = client.int32(21, cmd=2, address=3, extra=4)
 
     assert (reply.value, reply.cmd, reply.address, reply.extra) == (42, 2, 3, 4)
@@ -36,12 +36,12 @@ def test_a_call_by_type_sends_the_fields(doubler: mpf.Server) -> None:
 
 def test_a_message_can_be_sent_again(doubler: mpf.Server) -> None:
     message = mpf.Int32(value=5)
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         assert [client.call(message).value for _ in range(3)] == [10, 10, 10]
 
 
 def test_requests_may_be_outstanding(doubler: mpf.Server) -> None:
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         requests = [client.send(mpf.Int32(value=number)) for number in range(50)]
         values = [getattr(request.wait(), "value") for request in requests]
 
@@ -49,8 +49,8 @@ def test_requests_may_be_outstanding(doubler: mpf.Server) -> None:
 
 
 def test_an_absent_server_is_not_connected() -> None:
-    with mpf.Client("nobody") as client, pytest.raises(mpf.NotConnected, match="nobody"):
-        client.int32(timeout=0.01)
+    with pytest.raises(mpf.NotConnected, match="nobody"):
+        mpf.Client("nobody").int32(timeout=0.01)
 
 
 def test_the_text_and_the_status_of_the_server_are_the_exception(doubler: mpf.Server) -> None:
@@ -58,7 +58,7 @@ def test_the_text_and_the_status_of_the_server_are_the_exception(doubler: mpf.Se
     def refuse(request: mpf.Float64) -> object:
         raise mpf.StatusError("no channel 7", status=-3)
 
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         with pytest.raises(mpf.StatusError, match="doubler: status -3: no channel 7") as caught:
             client.float64(address=7)
         reply = client.call(mpf.Float64(address=7), check=False)
@@ -72,7 +72,7 @@ def test_a_reply_of_another_type_is_an_error_unless_it_is_expected(doubler: mpf.
     def other(request: mpf.Float64) -> mpf.Int32:
         return mpf.Int32(7)
 
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         with pytest.raises(mpf.UnexpectedReply, match="reply=mpf.Int32") as caught:
             client.float64()
         expected = client.call(mpf.Float64(), reply=mpf.Int32)
@@ -115,7 +115,7 @@ def silent() -> Iterator[Silent]:
 
 
 def test_a_request_that_was_taken_and_has_no_reply_times_out(silent: Silent) -> None:
-    with mpf.Client("silent") as client:
+    with mpf.Client("silent", timeout=PATIENCE) as client:
         request = client.send(mpf.Int32(), timeout=0.2)
         assert silent.came.acquire(timeout=PATIENCE)
 
@@ -127,7 +127,7 @@ def test_a_request_that_was_taken_and_has_no_reply_times_out(silent: Silent) -> 
 
 
 def test_a_request_that_the_server_refuses_is_refused(silent: Silent) -> None:
-    with mpf.Client("silent") as client:
+    with mpf.Client("silent", timeout=PATIENCE) as client:
         request = client.send(mpf.Int32(), timeout=PATIENCE)
         assert silent.came.acquire(timeout=PATIENCE)
         silent.server.refuse(silent.requests[0])
@@ -164,7 +164,7 @@ def test_a_request_that_no_server_takes_expires(
 
 def test_a_reply_may_be_asked_for_again(doubler: mpf.Server) -> None:
     doubler.on(mpf.Float64Array)(lambda request: request.value * 2)
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         request = client.send(mpf.Float64Array([1.0, 2.0]), PATIENCE)
         reply = request.wait()
         assert request.wait() is reply
@@ -172,7 +172,7 @@ def test_a_reply_may_be_asked_for_again(doubler: mpf.Server) -> None:
 
 
 def test_a_cancelled_request_ends(silent: Silent) -> None:
-    with mpf.Client("silent") as client:
+    with mpf.Client("silent", timeout=PATIENCE) as client:
         request = client.send(mpf.Int32(), timeout=PATIENCE)
         request.cancel()
 
@@ -180,9 +180,20 @@ def test_a_cancelled_request_ends(silent: Silent) -> None:
             request.wait()
 
 
+def test_a_closed_request_has_ended(silent: Silent) -> None:
+    with mpf.Client("silent", timeout=PATIENCE) as client:
+        request = client.send(mpf.Int32(), further=3)
+        request.close()
+
+        with pytest.raises(mpf.Cancelled):
+            request.wait()
+        assert request.next(PATIENCE) is None
+
+
+@needs_mpf
 def test_retry_sends_a_request_that_was_never_taken_to_the_next_server() -> None:
     first = mpf.Server("again")
-    with mpf.Client("again") as client:
+    with mpf.Client("again", timeout=PATIENCE) as client:
         replies: list[int] = []
 
         def accept() -> None:  # connects the client, and takes no request
@@ -209,7 +220,7 @@ def test_retry_sends_a_request_that_was_never_taken_to_the_next_server() -> None
 
 
 def test_a_full_queue_refuses_the_next_request(silent: Silent) -> None:
-    with mpf.Client("silent") as client, pytest.raises(mpf.QueueFull):
+    with mpf.Client("silent", timeout=PATIENCE) as client, pytest.raises(mpf.QueueFull):
         requests = [client.send(mpf.Int32(), timeout=PATIENCE)]
         while True:
             requests.append(client.send(mpf.Int32(), timeout=PATIENCE))
@@ -232,12 +243,12 @@ def test_invalid_arguments_are_named() -> None:
         mpf.Client("dac", wait="fast")
     with pytest.raises(ValueError, match="name"):
         mpf.Client("")
-    with mpf.Client("dac") as client, pytest.raises(TypeError, match="mpf.Int32"):
+    with mpf.Client("dac", timeout=PATIENCE) as client, pytest.raises(TypeError, match="mpf.Int32"):
         client.call(3)  # type: ignore[type-var]
 
 
 def test_a_closed_client_raises(doubler: mpf.Server) -> None:
-    client = mpf.Client("doubler")
+    client = mpf.Client("doubler", timeout=PATIENCE)
     client.close()
 
     with pytest.raises(mpf.Error, match="the client is closed"):
@@ -261,7 +272,7 @@ def test_a_subscription_may_have_replies_of_another_class(doubler: mpf.Server) -
     def count(request: mpf.Char8Array) -> Iterator[mpf.Float64]:
         yield from (mpf.Float64(number) for number in range(2))
 
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         with client.subscribe(mpf.Char8Array("count"), reply=mpf.Float64) as replies:
             assert [next(replies).value for _ in range(2)] == [0.0, 1.0]
         with pytest.raises(mpf.UnexpectedReply):
@@ -273,7 +284,7 @@ def test_a_subscription_counts_what_the_program_did_not_take(doubler: mpf.Server
     def count(request: mpf.Float64) -> Iterator[float]:
         yield from map(float, range(10))
 
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         replies = client.subscribe(mpf.Float64(), limit=3)
         first = next(replies).value
         client.int32()  # behind the further replies
@@ -291,7 +302,7 @@ def test_a_subscription_is_renewed_when_the_server_starts_again() -> None:
         return server.start()
 
     first = serve()
-    with mpf.Client("source") as client, client.subscribe(mpf.Int32()) as replies:
+    with mpf.Client("source", timeout=PATIENCE) as client, client.subscribe(mpf.Int32()) as replies:
         before = [next(replies).value, next(replies).value]
         first.close()
         with serve():
@@ -304,7 +315,7 @@ def test_a_subscription_without_renewal_ends_with_the_server() -> None:
     server = mpf.Server("source")
     server.on(mpf.Int32)(lambda request: 1)
     server.start()
-    with mpf.Client("source") as client:
+    with mpf.Client("source", timeout=PATIENCE) as client:
         replies = client.subscribe(mpf.Int32(), renew=False)
         next(replies)
         server.close()
@@ -313,12 +324,55 @@ def test_a_subscription_without_renewal_ends_with_the_server() -> None:
 
 
 def test_a_subscription_times_out(doubler: mpf.Server) -> None:
-    with mpf.Client("doubler") as client:
+    with mpf.Client("doubler", timeout=PATIENCE) as client:
         replies = client.subscribe(mpf.Int32(), timeout=0.05)
         next(replies)
 
         with pytest.raises(TimeoutError):
             next(replies)
+
+
+def test_a_subscription_whose_first_reply_is_late_times_out(silent: Silent) -> None:
+    with mpf.Client("silent", timeout=PATIENCE) as client, pytest.raises(TimeoutError):
+        assert client.wait_connected(PATIENCE)
+        next(client.subscribe(mpf.Int32(), timeout=0.5))
+
+
+def test_a_subscription_that_the_server_refuses_ends(silent: Silent) -> None:
+    def refuse() -> None:
+        assert silent.came.acquire(timeout=PATIENCE)
+        silent.server.refuse(silent.requests[0])
+
+    thread = threading.Thread(target=refuse)
+    thread.start()
+    with mpf.Client("silent", timeout=PATIENCE) as client, pytest.raises(mpf.Refused):
+        next(client.subscribe(mpf.Int32()))
+    thread.join()
+    assert len(silent.requests) == 1
+
+
+def test_ctrl_c_ends_a_subscription(doubler: mpf.Server) -> None:
+    with mpf.Client("doubler") as client, client.subscribe(mpf.Int32()) as replies:
+        next(replies)
+        with pytest.raises(KeyboardInterrupt):
+            threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
+            next(replies)
+
+
+def test_ctrl_c_ends_a_server() -> None:
+    server = mpf.Server("tested")
+    server.on(mpf.Int32)(lambda request: 1)
+
+    def interrupt() -> None:
+        with mpf.Client("tested", timeout=PATIENCE) as client:
+            client.int32()  # it runs
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    server.run()
+    thread.join()
+    server.close()
 
 
 def test_ctrl_c_ends_a_call(silent: Silent) -> None:
@@ -328,32 +382,12 @@ def test_ctrl_c_ends_a_call(silent: Silent) -> None:
 
     thread = threading.Thread(target=interrupt)
     thread.start()
-    with mpf.Client("silent") as client, pytest.raises(KeyboardInterrupt):
+    with mpf.Client("silent", timeout=PATIENCE) as client, pytest.raises(KeyboardInterrupt):
         client.int32(timeout=PATIENCE)
     thread.join()
 
 
 def test_ctrl_c_ends_the_wait_for_a_connection() -> None:
-    threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
-
-    with mpf.Client("nobody") as client, pytest.raises(KeyboardInterrupt):
+    with mpf.Client("nobody", timeout=PATIENCE) as client, pytest.raises(KeyboardInterrupt):
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
         client.int32(timeout=PATIENCE)
-
-
-def test_threads_share_a_client(doubler: mpf.Server) -> None:
-    results: dict[int, list[int]] = {}
-    with mpf.Client("doubler") as client:
-
-        def ask(first: int) -> None:
-            numbers = range(first, first + 200)
-            results[first] = [client.int32(number, timeout=PATIENCE).value for number in numbers]
-
-        threads = [threading.Thread(target=ask, args=(1000 * number,)) for number in range(8)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-
-    assert len(results) == 8
-    for first, values in results.items():
-        assert values == [2 * number for number in range(first, first + 200)]

@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Iterator
 
 import numpy as np
 import pytest
-from conftest import PATIENCE, PROGRAMS
+from conftest import PATIENCE, PROGRAMS, needs_mpf
 
 import mpf
 
@@ -23,7 +23,7 @@ def server() -> Iterator[mpf.Server]:
 
 
 def call(message: mpf.Message) -> object:
-    with mpf.Client("tested") as client:
+    with mpf.Client("tested", timeout=PATIENCE) as client:
         return client.call(message, PATIENCE, reply=mpf.Message)
 
 
@@ -68,7 +68,7 @@ def test_a_handler_may_reply_later_and_often(server: mpf.Server) -> None:
         kept.append(request)
         return mpf.Int32(0)
 
-    with server.start(), mpf.Client("tested") as client:
+    with server.start(), mpf.Client("tested", timeout=PATIENCE) as client:
         request = client.send(mpf.Float64(), reply=mpf.Message, further=10)
         request.wait()
         assert server.is_client_connected(kept[0])
@@ -110,7 +110,7 @@ def test_an_async_generator_sends_many_replies(server: mpf.Server) -> None:
             await asyncio.sleep(0)
             yield number
 
-    with server.start(), mpf.Client("tested") as client:
+    with server.start(), mpf.Client("tested", timeout=PATIENCE) as client:
         with client.subscribe(mpf.Int32(3)) as replies:
             assert [next(replies).value for _ in range(3)] == [0, 1, 2]
 
@@ -143,6 +143,7 @@ def test_a_type_without_a_handler_is_an_error(server: mpf.Server) -> None:
         call(mpf.Int32())
 
 
+@needs_mpf
 def test_a_program_of_c_plus_plus_sees_status_and_text(server: mpf.Server) -> None:
     @server.on(mpf.Int32)
     def fail(request: mpf.Int32) -> None:
@@ -192,9 +193,157 @@ def test_a_closed_server_raises(server: mpf.Server) -> None:
         server.run()
 
 
+@pytest.mark.parametrize("isCoroutine", [False, True])
+def test_a_handler_may_close_the_server(server: mpf.Server, isCoroutine: bool) -> None:
+    if isCoroutine:
+
+        @server.on(mpf.Int32)
+        async def end(request: mpf.Int32) -> int:
+            server.close()
+            return 5
+    else:
+
+        @server.on(mpf.Int32)
+        def end(request: mpf.Int32) -> int:
+            server.close()
+            return 5
+
+    server.start()
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        assert client.int32().value == 5
+    server.close()
+    with pytest.raises(mpf.Error, match="closed"):
+        server.start()
+
+
+def test_a_server_runs_once_at_a_time(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: 1)
+    server.start()
+    call(mpf.Int32())  # it runs
+
+    with pytest.raises(RuntimeError, match="start"):
+        server.start()
+    with pytest.raises(RuntimeError, match="runs already"):
+        server.run()
+
+
+def test_only_messages_have_handlers(server: mpf.Server) -> None:
+    with pytest.raises(TypeError, match="int"):
+        server.on(int)  # type: ignore[type-var]
+
+
+@pytest.mark.parametrize("isAsync", [False, True])
+def test_a_generator_without_end_ends_with_its_client_and_with_the_server(
+    server: mpf.Server, isAsync: bool
+) -> None:
+    ended = threading.Semaphore(0)
+    if isAsync:
+
+        @server.on(mpf.Int32)
+        async def count(request: mpf.Int32) -> AsyncIterator[int]:
+            try:
+                while True:
+                    yield 1
+            finally:
+                ended.release()
+    else:
+
+        @server.on(mpf.Int32)
+        def count(request: mpf.Int32) -> Iterator[int]:
+            try:
+                while True:
+                    yield 1
+            finally:
+                ended.release()
+
+    server.start()
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        next(client.subscribe(mpf.Int32()))
+    assert ended.acquire(timeout=PATIENCE)
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        next(client.subscribe(mpf.Int32()))
+        server.close()
+    assert ended.acquire(timeout=PATIENCE)
+
+
+def test_a_generator_without_values_refuses_the_request(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: (number for number in ()))
+    with server.start(), pytest.raises(mpf.Refused):
+        call(mpf.Int32())
+
+
+ERRORS = [Exception("\ud800"), mpf.StatusError("", status=1 << 40), mpf.StatusError("", status=0)]
+
+
+@pytest.mark.parametrize("error", ERRORS)
+def test_any_exception_reaches_the_client(server: mpf.Server, error: Exception) -> None:
+    @server.on(mpf.Int32)
+    def fail(request: mpf.Int32) -> None:
+        raise error
+
+    with server.start(), pytest.raises(mpf.StatusError) as caught:
+        call(mpf.Int32())
+    assert caught.value.status == -1
+
+
+def test_a_value_of_another_type_is_an_error_that_says_so(server: mpf.Server) -> None:
+    server.on(mpf.Int32)(lambda request: np.zeros(3))
+    with server.start(), pytest.raises(mpf.StatusError, match="ndarray.*Int32"):
+        call(mpf.Int32())
+
+
 def test_only_requests_have_replies(server: mpf.Server) -> None:
-    with pytest.raises(ValueError, match="not a request"):
-        server.reply(mpf.Int32(), mpf.Int32())
+    for act in (
+        lambda: server.reply(mpf.Int32(), mpf.Int32()),
+        lambda: server.refuse(mpf.Float64Array([1.0])),
+        lambda: server.loan(mpf.Int32(), mpf.Int32Array, 3),
+        lambda: server.is_client_connected(mpf.Int32()),
+    ):
+        with pytest.raises(ValueError, match="not a request"):
+            act()
+
+
+def sent_and_received(
+    server: mpf.Server, client: mpf.Client, value: float = 1.0
+) -> tuple[mpf.Request, mpf.Message]:
+    """A request with 100,000 elements of this value."""
+    sent: list[mpf.Request] = []
+    message = mpf.Float64Array(np.full(100_000, value))
+    sending = threading.Thread(target=lambda: sent.append(client.send(message, PATIENCE)))
+    sending.start()
+    received = server._receive(PATIENCE)
+    assert received is not None
+    sending.join()
+    return sent[0], received
+
+
+def test_a_refused_request_keeps_its_elements(server: mpf.Server) -> None:
+    with mpf.Client("tested", timeout=PATIENCE) as client:
+        sent, request = sent_and_received(server, client)
+        view = getattr(request, "value")
+        server.refuse(request)
+        for _ in range(20):  # would overwrite memory that was given back
+            other, another = sent_and_received(server, client, 2.0)
+            server.refuse(another)
+            with pytest.raises(mpf.Refused):
+                other.wait()
+
+        assert view.sum() == getattr(request, "value").sum() == 100_000
+        with pytest.raises(mpf.Refused):
+            sent.wait()
+
+
+def test_a_loaned_reply_goes_to_the_request_that_it_is_sent_to(server: mpf.Server) -> None:
+    with mpf.Client("tested", timeout=PATIENCE) as first, mpf.Client("tested") as second:
+        one, to_first = sent_and_received(server, first)
+        two, to_second = sent_and_received(server, second)
+        loaned = server.loan(to_first, mpf.Float64Array, 100_000)
+        loaned.value[:] = 3.0
+
+        assert server.reply(to_second, loaned)
+
+        assert getattr(two.wait(), "value").sum() == 300_000
+        assert one.result() is None
 
 
 def test_replies_have_time_stamps(server: mpf.Server) -> None:
@@ -204,7 +353,7 @@ def test_replies_have_time_stamps(server: mpf.Server) -> None:
         reply.time_stamp_ns = request.value
         return reply
 
-    with server.start(), mpf.Client("tested") as client:
+    with server.start(), mpf.Client("tested", timeout=PATIENCE) as client:
         assert client.int32(5).time_stamp_ns == 5
         before = time.time_ns()
         assert before <= client.int32(0).time_stamp_ns <= time.time_ns()

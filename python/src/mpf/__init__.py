@@ -13,18 +13,21 @@ and `tap()` show what happens on this host; `record()` writes it to a file, and 
 server that replies as in that file.
 """
 
-from mpf._mpf import (
-    Char8Array,
-    Float64,
-    Float64Array,
-    Int32,
-    Int32Array,
-    Message,
-    OutOfBand,
-    Request,
-    SerialConfig,
-    User,
-)
+try:
+    from mpf._mpf import (
+        Char8Array,
+        Float64,
+        Float64Array,
+        Int32,
+        Int32Array,
+        Message,
+        OutOfBand,
+        Request,
+        SerialConfig,
+        User,
+    )
+except ImportError as error:  # its cause is the reason, for example a sub-interpreter
+    raise error.__cause__ or error
 from mpf.aio import AsyncClient, AsyncSubscription
 from mpf.client import Client, Subscription
 from mpf.errors import (

@@ -11,12 +11,15 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 from types import TracebackType
-from typing import Any, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 from mpf import _mpf
-from mpf._mpf import Message, Request
+from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
 from mpf.client import LIMIT
-from mpf.errors import NoReply, NotConnected
+from mpf.errors import Error, NeverTaken, NotConnected, OutcomeUnknown
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 M = TypeVar("M", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -143,6 +146,68 @@ class AsyncClient(_mpf.BaseClient):
     ) -> AsyncSubscription[Any]:
         """As Client.subscribe(): `async for reply in client.subscribe(message)`."""
         return AsyncSubscription(self, message, reply, timeout, limit, renew)
+
+    # ---- calls by type
+
+    async def int32(
+        self,
+        value: int = 0,
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Int32:
+        """As Client.int32()."""
+        return await self.call(Int32(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    async def float64(
+        self,
+        value: float = 0.0,
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Float64:
+        """As Client.float64()."""
+        return await self.call(Float64(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    async def int32_array(
+        self,
+        value: ArrayLike = (),
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Int32Array:
+        """As Client.int32_array()."""
+        return await self.call(Int32Array(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    async def float64_array(
+        self,
+        value: ArrayLike = (),
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Float64Array:
+        """As Client.float64_array()."""
+        return await self.call(Float64Array(value, cmd=cmd, address=address, extra=extra), timeout)
+
+    async def char8_array(
+        self,
+        value: str | bytes = b"",
+        *,
+        cmd: int = 0,
+        address: int = 0,
+        extra: int = 0,
+        timeout: float | None = None,
+    ) -> Char8Array:
+        """As Client.char8_array()."""
+        return await self.call(Char8Array(value, cmd=cmd, address=address, extra=extra), timeout)
 
     # ---- the event loop
 
@@ -292,11 +357,14 @@ class AsyncSubscription(Generic[M]):
         )
         try:
             return cast(M, await client._end(self._request, limit, True))
-        except NoReply:
+        except (NeverTaken, OutcomeUnknown) as error:
             self._drop()
-            if not self._renew:
+            if not self._renew or isinstance(error, TimeoutError):
                 raise
             return None
+        except Error:
+            self._drop()
+            raise
 
     async def _further(self) -> M | None:
         limit = self._client._until(self._timeout)

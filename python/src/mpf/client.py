@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
-from mpf.errors import NoReply
+from mpf.errors import Error, NeverTaken, OutcomeUnknown
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -271,11 +271,14 @@ class Subscription(Generic[M]):
         self._request = request
         try:
             return cast(M, request.wait())
-        except NoReply:
+        except (NeverTaken, OutcomeUnknown) as error:
             self._drop()
-            if not self._renew:
+            if not self._renew or isinstance(error, TimeoutError):
                 raise
             return None
+        except Error:
+            self._drop()
+            raise
 
     def _further(self) -> M | None:
         assert self._request is not None

@@ -24,13 +24,14 @@ gets it as a StatusError; a client in C++ gets a Char8Array.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import inspect
 import logging
 import math
 import threading
 import time
-from collections.abc import AsyncIterable, Callable, Iterable
-from types import GeneratorType, TracebackType
+from collections.abc import AsyncGenerator, Callable, Generator
+from types import AsyncGeneratorType, GeneratorType, TracebackType
 from typing import Any, TypeVar, cast
 
 from mpf import _mpf
@@ -81,6 +82,8 @@ class Server(_mpf.BaseServer):
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._thread: threading.Thread | None = None
+        self._runner: int | None = None  # the thread in which run() or serve() is in progress
+        self._closesAtEnd = False
 
     def __enter__(self: Self) -> Self:
         return self
@@ -97,6 +100,8 @@ class Server(_mpf.BaseServer):
         """Makes a function or a coroutine function the handler of requests of this class.
         `mpf.Message`: of requests without a handler of their own, which are refused otherwise."""
 
+        _check_class(type)
+
         def register(handler: H) -> H:
             self._handlers[type] = handler
             return handler
@@ -111,28 +116,53 @@ class Server(_mpf.BaseServer):
                    for h in self._handlers.values()):
                 asyncio.run(self.serve())
             else:
-                self._run()
+                with self._running():
+                    self._run()
         except KeyboardInterrupt:
             pass
 
     def start(self: Self) -> Self:
         """Calls run() in a thread, which close() ends."""
         server = cast(Server, self)
+        server._fileno()  # raises if it is closed
+        if server._thread is not None:
+            raise RuntimeError(f"{server.name}: start() was called before")
         server._thread = threading.Thread(target=server.run, name=f"mpf {server.name}", daemon=True)
         server._thread.start()
         return self
 
     def close(self) -> None:
-        """Ends run(), and disconnects all clients. Requests that wait end as NeverTaken."""
-        thread = self._thread
-        if thread is not None and thread is not threading.current_thread():
+        """Ends run(), and disconnects all clients. Requests that wait end as NeverTaken. In a
+        handler: after the handler."""
+        if self._runner == threading.get_ident():
+            self._closesAtEnd = True
             self.interrupt()
-            thread.join()
+            return
+        if self._thread is not None:
+            with contextlib.suppress(Error):  # a handler may have closed it
+                self.interrupt()
+            self._thread.join()
             self._thread = None
         self._close()
 
     async def serve(self) -> None:
         """Handles requests in the running event loop until interrupt() or close()."""
+        with self._running():
+            await self._serve()
+
+    @contextlib.contextmanager
+    def _running(self) -> Generator[None]:
+        if self._runner is not None:
+            raise RuntimeError(f"{self.name}: the server runs already")
+        self._runner = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._runner = None
+            if self._closesAtEnd:
+                self._close()
+
+    async def _serve(self) -> None:
         loop = asyncio.get_running_loop()
         descriptor = self._fileno()
         readable = asyncio.Event()
@@ -154,14 +184,19 @@ class Server(_mpf.BaseServer):
     def _run(self) -> None:
         while True:
             request = self._receive(math.inf)
-            if request is None:
-                if self._take_interrupt():
-                    return
-                continue
-            try:
-                self._answer(request, self._handle(request))
-            except Exception as error:
-                self._fail(request, error)
+            if request is not None:
+                self._handle_one(request)
+            elif self._take_interrupt():
+                return
+            request = None  # frees its elements
+
+    def _handle_one(self, request: Message) -> None:
+        try:
+            self._answer(request, self._handle(request))
+        except _NoMoreReplies:
+            pass
+        except Exception as error:
+            self._fail(request, error)
 
     async def _start(self, request: Message) -> None:
         task = asyncio.ensure_future(self._serve_one(request))
@@ -174,14 +209,24 @@ class Server(_mpf.BaseServer):
             result = self._handle(request)
             if inspect.isawaitable(result):
                 result = await result
-            if isinstance(result, AsyncIterable):
-                async for value in cast(AsyncIterable[object], result):
-                    while not self._try_reply(request, value):
-                        await asyncio.sleep(_PAUSE)
+            if isinstance(result, AsyncGeneratorType):
+                await self._answer_each(request, cast(AsyncGenerator[object], result))
             else:
                 self._answer(request, result)
+        except _NoMoreReplies:
+            pass
         except Exception as error:
             self._fail(request, error)
+
+    async def _answer_each(self, request: Message, values: AsyncGenerator[object]) -> None:
+        hasReplied = False
+        async with contextlib.aclosing(values):
+            async for value in values:
+                while not self._try_reply(request, value):
+                    await asyncio.sleep(_PAUSE)
+                hasReplied = True
+        if not hasReplied:
+            self.refuse(request)
 
     def _handle(self, request: Message) -> object:
         handler = self._handlers.get(type(request)) or self._handlers.get(Message)
@@ -190,41 +235,78 @@ class Server(_mpf.BaseServer):
         return handler(request)
 
     def _answer(self, request: Message, result: object) -> None:
-        if isinstance(result, GeneratorType):
-            for value in cast(Iterable[object], result):
+        if not isinstance(result, GeneratorType):
+            self._reply_with(request, result)
+            return
+        hasReplied = False
+        with contextlib.closing(cast("Generator[object]", result)) as values:
+            for value in values:
                 while not self._try_reply(request, value):
                     time.sleep(_PAUSE)
-        else:
-            self._reply_with(request, result)
+                hasReplied = True
+        if not hasReplied:
+            self.refuse(request)
 
     def _try_reply(self, request: Message, value: object) -> bool:
         """Returns False while the client does not receive the earlier replies."""
+        if self._is_interrupted:
+            raise _NoMoreReplies
         try:
-            self._reply_with(request, value)
+            wasSent = self._reply_with(request, value)
         except QueueFull:
-            return not self.is_client_connected(request)
+            wasSent = False
+            if self.is_client_connected(request):
+                return False
+        if not wasSent:
+            raise _NoMoreReplies
         return True
 
-    def _reply_with(self, request: Message, value: object) -> None:
+    def _reply_with(self, request: Message, value: object) -> bool:
+        """Returns False when the client has gone."""
         if value is None:
-            self.reply(request, request)
-        elif isinstance(value, Message):
-            self.reply(request, value)
-        else:
-            kind = type(request)
-            self.reply(request, kind(value, **_fields_of(request)))  # type: ignore[call-arg]
+            return self.reply(request, request)
+        if isinstance(value, Message):
+            return self.reply(request, value)
+        return self.reply(request, _like(request, value))
 
     def _fail(self, request: Message, error: Exception) -> None:
         _log.error("%s: %r failed", self.name, request, exc_info=error)
         if isinstance(error, StatusError):
-            status, text = error.status or -1, error.text
+            status, text = _status_of(error), error.text
         else:
             status, text = -1, f"{type(error).__name__}: {error}"
+        fields: dict[str, Any] = {**_fields_of(request), "status": status}
         try:
-            fields: dict[str, Any] = {**_fields_of(request), "status": status}
-            self.reply(request, Char8Array(text, **fields))
+            self.reply(request, Char8Array(text.encode("utf-8", "backslashreplace"), **fields))
         except Error as failure:
             _log.error("%s: %s", self.name, failure)
+
+
+def _check_class(kind: object) -> None:
+    if not (isinstance(kind, type) and issubclass(kind, Message)):
+        raise TypeError(f"on: {kind!r} is not a class of messages, for example mpf.Int32")
+
+
+class _NoMoreReplies(Exception):
+    """The client has gone, or the server ends."""
+
+
+def _status_of(error: StatusError) -> int:
+    isStatus = error.status != 0 and -(2**31) <= error.status < 2**31
+    return error.status if isStatus else -1
+
+
+def _like(request: Message, value: object) -> Message:
+    """The request with this value."""
+    kind = cast(Callable[..., Message], type(request))
+    try:
+        return kind(value, **_fields_of(request))
+    except TypeError as error:
+        name = type(request).__name__
+        raise TypeError(
+            f"the handler returned {type(value)}, which is not the value of the reply "
+            f"to {name} requests: return a message"
+        ) from error
 
 
 def _fields_of(request: Message) -> dict[str, Any]:
