@@ -6,6 +6,7 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
+#include <new>
 #include <optional>
 #include <utility>
 
@@ -15,7 +16,7 @@
 namespace mpf::python {
 namespace {
 
-using namespace nb::literals;
+using nb::literals::operator""_a;
 
 constexpr const char* kClient = "client";
 
@@ -50,7 +51,8 @@ Connection::Connection(const std::string& backplane, std::string serverName, std
 
 Connection::~Connection() {
   // Threads of the parent may have waited in the requester: its parts cannot be destroyed here.
-  if (isInherited()) static_cast<void>(new std::shared_ptr<Requester>(std::move(requester_)));
+  if (isInherited())
+    static_cast<void>(new (std::nothrow) std::shared_ptr<Requester>(std::move(requester_)));
 }
 
 bool Connection::isInherited() const noexcept { return forks_ != forkCount(); }
@@ -138,7 +140,7 @@ nb::object PyRequest::finish(bool check) {
   if (reply_.is_valid()) return checked(connection_->server, reply_, {type_, check});
   if (deadline_.hasPassed() && exchange_.fate == Fate::outcomeUnknown)
     raiseTimedOut(connection_->server);
-  raiseFate(connection_->server, *exchange_.fate);
+  raiseFate(connection_->server, exchange_.fate.value_or(Fate::outcomeUnknown));
 }
 
 nb::object PyRequest::next(double timeout) {

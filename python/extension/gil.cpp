@@ -17,7 +17,7 @@ namespace {
 constexpr std::chrono::microseconds kLookEvery{100};
 // Functions of a program that numpy calls may wait; the exit does not wait for them longer.
 constexpr std::chrono::seconds kLongestCall{1};
-constexpr std::size_t kManyBytes = 64 * 1024;
+constexpr std::size_t kManyBytes = 65536;
 
 std::atomic<bool> isExiting = false;
 std::atomic<int> entering = 0;  // threads that ask for the GIL, or may ask for it

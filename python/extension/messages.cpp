@@ -12,7 +12,7 @@
 namespace mpf::python {
 namespace {
 
-using namespace nb::literals;
+using nb::literals::operator""_a;
 
 // ---- elements
 

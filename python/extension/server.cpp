@@ -20,7 +20,7 @@
 namespace mpf::python {
 namespace {
 
-using namespace nb::literals;
+using nb::literals::operator""_a;
 
 constexpr const char* kServer = "server";
 // A signal handler of Python runs at most this late.
