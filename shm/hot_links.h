@@ -56,7 +56,8 @@ class HotLinks {
         if (++hot.turns == kUnfencedAfter) hot.link->letPeerSendUnfenced();
         return hot.index;
       }
-      if (++hot.misses >= kCoolAfter) return cool(turn_);
+      if (++hot.misses == 1) hot.link->incoming().onEmpty();
+      if (hot.misses >= kCoolAfter) return cool(turn_);
     }
     return {};
   }

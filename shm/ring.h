@@ -21,8 +21,8 @@
 #include <mpf/detail/copy_words.h>
 
 #include "base/step.h"
+#include "shm/cpu_relax.h"
 #include "shm/layout.h"
-#include "shm/prefetch.h"
 
 namespace mpf {
 
@@ -86,7 +86,7 @@ class RingProducer {
   [[nodiscard]] bool tryPushShort(const Envelope& envelope, std::span<const std::byte> body,
                                   std::uint32_t reserve) noexcept {
     if (!hasFree(1 + reserve)) return false;
-    prefetchForWriting(&slot(pushed_ + kPrefetchedSlots));
+    if (pushed_ >= claimed_) claimLines();
     auto& first = slot(pushed_);
     write(first, envelope, 1, static_cast<std::uint32_t>(body.size()));
     if (body.size() == layout::kFirstSlotBodyBytes) [[likely]]
@@ -118,12 +118,22 @@ class RingProducer {
   }
 
  private:
-  // The producer's processor owns the line of a slot before it is written: it was asked for it this
-  // many slots ago.
-  static constexpr std::uint64_t kPrefetchedSlots = 8;
+  static constexpr std::uint64_t kClaimedLines = 8;
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
+  }
+
+  // Makes this processor the owner of the lines of the next slots, with a write to each that changes
+  // nothing. The transfers of these lines from the consumer's processor overlap; those of messages
+  // do not, because the stores of one message fill the store buffer. (prefetchw has no effect here:
+  // on AMD processors it does not take a line that others share.)
+  [[gnu::noinline]] void claimLines() noexcept {
+    claimed_ = std::min(freedSeen_ + capacity_, pushed_ + kClaimedLines);
+    for (auto position = pushed_; position < claimed_; ++position) {
+      volatile auto& field = slot(position).type;
+      field = field;
+    }
   }
 
   static void write(layout::Slot& first, const Envelope& envelope, std::uint32_t slots,
@@ -164,6 +174,7 @@ class RingProducer {
   const layout::RingControl& consumer_;
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
+  std::uint64_t claimed_ = 0;  // slots before this position were claimed
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
 };
@@ -216,16 +227,17 @@ class RingConsumer {
     }
   }
 
-  // Ends the message begun. Slots are freed in batches, and when the ring is empty.
+  // Ends the message begun. Slots are freed in batches.
   void end() noexcept {
     taken_ += slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u;
     first_ = &slot(taken_);
-    if (taken_ - freed_ >= capacity_ / kFreeFraction || !hasMessage()) {
-      freed_ = taken_;
-      // PAIR(slot-freed): we have finished reading these slots.
-      own_.freed.store(freed_, std::memory_order_release);
-      MPF_STEP(slots_freed);
-    }
+    if (taken_ - freed_ >= capacity_ / kFreeFraction) free();
+    if (taken_ >= lookAt_) lookAhead();
+  }
+  // The owner has looked for a message and found none: frees the slots that remain.
+  void onEmpty() noexcept {
+    if (taken_ != freed_) free();
+    lookAt_ = taken_ + kLookEvery;
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
@@ -235,12 +247,59 @@ class RingConsumer {
     return slots_[position & (capacity_ - 1)];
   }
 
+  static constexpr std::uint64_t kLookEvery = 16;  // slots
+  static constexpr std::uint64_t kNear = 64;
+  static constexpr std::uint64_t kDistance = 128;
+  static constexpr std::uint64_t kMaxWaitEvery = 4096;
+  static constexpr int kMaxPauses = 100;  // 1 us
+
+  void free() noexcept {
+    freed_ = taken_;
+    // PAIR(slot-freed): we have finished reading these slots.
+    own_.freed.store(freed_, std::memory_order_release);
+    MPF_STEP(slots_freed);
+  }
+
+  // In a stream of messages, keeps a distance to the producer, and asks for the next lines before
+  // they are read. A consumer close behind the producer takes lines away from it that the producer
+  // is about to write; then each message costs both sides a transfer of a line.
+  [[gnu::noinline]] void lookAhead() noexcept {
+    lookAt_ = taken_ + kLookEvery;
+    if (!isFilledUpTo(taken_ + kNear) && !tryWaitForProducer()) return;
+    for (auto position = taken_; position < lookAt_; ++position)
+      __builtin_prefetch(&slot(position));
+  }
+  [[nodiscard]] bool isFilledUpTo(std::uint64_t end) const noexcept {
+    return slot(end - 1).sequence.load(std::memory_order_relaxed) == end;
+  }
+  // Waits until the producer is kDistance ahead, as long as it fills slots. A wait in vain makes the
+  // next one rarer: the producer may be waiting for us.
+  bool tryWaitForProducer() noexcept {
+    if (taken_ < waitAt_) return false;
+    auto end = taken_ + kLookEvery;
+    while (end <= taken_ + kDistance && isFilledSoon(end)) end += kLookEvery;
+    const bool isDistant = end > taken_ + kDistance;
+    waitEvery_ = isDistant ? kLookEvery : std::min(2 * waitEvery_, kMaxWaitEvery);
+    waitAt_ = taken_ + waitEvery_;
+    return isDistant;
+  }
+  [[nodiscard]] bool isFilledSoon(std::uint64_t end) const noexcept {
+    for (int pauses = 0; !isFilledUpTo(end); ++pauses) {
+      if (pauses == kMaxPauses) return false;
+      cpuRelax();
+    }
+    return true;
+  }
+
   layout::Slot* slots_;
   std::uint64_t capacity_;
   layout::RingControl& own_;
   const layout::Slot* first_;  // slot(taken_)
   std::uint64_t taken_ = 0;  // slots
   std::uint64_t freed_ = 0;  // private copy of own_.freed
+  std::uint64_t lookAt_ = kLookEvery;  // position of the next lookAhead()
+  std::uint64_t waitAt_ = 0;  // no wait for the producer before this position
+  std::uint64_t waitEvery_ = kLookEvery;
   std::uint64_t messages_ = 0;
   std::uint8_t slotsNow_ = 0;
 };

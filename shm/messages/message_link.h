@@ -30,7 +30,10 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   // Begins the next message: copies its envelope and counts it as taken. Returns `nothing`, and
   // changes nothing, if there is no message; `invalid` if the envelope is invalid.
   Take tryBegin(Envelope& envelope) noexcept {
-    if (!link_->incoming().hasMessage()) return Take::nothing;
+    if (!link_->incoming().hasMessage()) {
+      link_->incoming().onEmpty();
+      return Take::nothing;
+    }
     envelope = link_->incoming().begin();
     const bool fitsSlot = link_->incoming().isShort() && isShort(envelope);
     return fitsSlot ? Take::message : checkLong(envelope);

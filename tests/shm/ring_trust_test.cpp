@@ -59,6 +59,7 @@ TEST_F(RingTest, FreedSlotsThatWereNeverUsedAddNoRoom) {
 TEST_F(RingTest, AFreedPositionThatDecreasesRemovesNoRoom) {
   ASSERT_TRUE(push(1));
   take();
+  consumer_.onEmpty();
   ASSERT_TRUE(producer_.hasFree(kCapacity));
 
   control_.freed.store(0, std::memory_order_relaxed);

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// Ring: a stream of messages. The producer claims lines, the consumer keeps a distance.
+#include <cstring>
+#include <thread>
+
+#include "tests/shm/ring_fixture.h"
+#include "tests/support/watchdog.h"
+
+namespace mpf::test {
+namespace {
+
+TEST_F(RingTest, TheLastSlotsAreFreedWhenTheRingIsFoundEmpty) {
+  ASSERT_TRUE(push(1));
+  take();
+  EXPECT_EQ(control_.freed.load(std::memory_order_relaxed), 0u) << "less than a batch";
+
+  consumer_.onEmpty();
+
+  EXPECT_EQ(control_.freed.load(std::memory_order_relaxed), 1u);
+}
+
+TEST_F(RingTest, AClaimOfLinesChangesNothing) {
+  constexpr std::size_t kBytes = kCapacity * sizeof(layout::Slot);
+  for (std::size_t i = 0; i < kBytes; ++i) ringBytes()[i] = static_cast<std::byte>(i * 7);
+  const Bytes before(ringBytes(), ringBytes() + kBytes);
+
+  ASSERT_TRUE(producer_.tryPushShort({}, {}, 0));
+
+  EXPECT_EQ(std::memcmp(ringBytes() + sizeof(layout::Slot), before.data() + sizeof(layout::Slot),
+                        kBytes - sizeof(layout::Slot)),
+            0);
+}
+
+// A ring that is long enough for the consumer to wait for the producer.
+TEST(RingStream, IsDeliveredInOrder) {
+  constexpr std::uint32_t kCapacity = 1024;
+  constexpr std::uint32_t kMessages = 300'000;
+  const Watchdog watchdog("a stream between two threads");
+  const auto slots = std::make_unique<layout::Slot[]>(kCapacity);
+  layout::RingControl control{};
+  RingProducer producer(slots.get(), kCapacity, control);
+  RingConsumer consumer(slots.get(), kCapacity, control);
+
+  std::thread sender([&] {
+    for (std::uint32_t i = 0; i < kMessages; ++i) {
+      while (!producer.tryPushShort({.requestId = i}, std::as_bytes(std::span(&i, 1)), 0))
+        std::this_thread::yield();
+    }
+  });
+  std::uint32_t wrong = 0;
+  for (std::uint32_t i = 0; i < kMessages; ++i) {
+    while (!consumer.hasMessage()) {
+      consumer.onEmpty();
+      std::this_thread::yield();
+    }
+    const auto envelope = consumer.begin();
+    std::uint32_t body = 0;
+    consumer.copyBody(std::as_writable_bytes(std::span(&body, 1)));
+    consumer.end();
+    if (envelope.requestId != i || body != i) ++wrong;
+  }
+  sender.join();
+
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_FALSE(consumer.hasMessage());
+}
+
+}  // namespace
+}  // namespace mpf::test
