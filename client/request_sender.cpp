@@ -82,6 +82,15 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
     return SendResult::notConnected;
   auto& link = channel_->link();
   auto* request = requests_->tryReserve(attempt.id);
+  if (request == nullptr && requests_->isFull()) {
+    // The link gets memory for the replies to as many requests as the server permits.
+    if (!link.tryAllowMore()) {
+      count(link.control().clientRefused);
+      return SendResult::noMemory;
+    }
+    requests_->allow(link.maxOutstanding());
+    request = requests_->tryReserve(attempt.id);
+  }
   if (request == nullptr) {
     count(link.control().clientRefused);
     noteFull();
@@ -106,7 +115,7 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
   requests_->add(*request, attempt.id);
   MPF_STEP(request_added);
   const auto result =
-      resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0, 0}));
+      resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0}));
   if (result != SendResult::sent) {
     auto copy = requests_->takeBack(*request);
     if (attempt.copy != nullptr) *attempt.copy = std::move(copy);
@@ -174,6 +183,7 @@ std::uint64_t RequestSender::maxMessageBytes() const noexcept {
 void RequestSender::open(std::shared_ptr<MessageLink> channel) {
   auto requests = std::make_shared<RequestTable>(channel->link().header().maxOutstanding,
                                                  requests_ ? requests_->lastId() : 0);
+  requests->allow(channel->link().maxOutstanding());
   const std::lock_guard lock(*lock_);
   requests_ = std::move(requests);
   channel_ = std::move(channel);

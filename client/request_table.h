@@ -45,6 +45,10 @@ class RequestTable {
     return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
   }
 
+  [[nodiscard]] bool isFull() const noexcept { return outstanding() >= max_; }
+  // Lets more requests be outstanding, at most as many as the constructor was told.
+  void allow(std::uint32_t max) noexcept { max_ = max; }
+
   // Outstanding requests that were not given up.
   [[nodiscard]] std::uint32_t awaited() const noexcept {
     return outstanding() - givenUp_.load(std::memory_order_relaxed);
