@@ -82,13 +82,12 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
     return SendResult::notConnected;
   auto& link = channel_->link();
   auto* request = requests_->tryReserve(attempt.id);
-  if (request == nullptr && requests_->isFull()) {
+  if (request == nullptr && requests_->maxOutstanding() < link.header().maxOutstanding) {
     // The link gets memory for the replies to as many requests as the server permits.
-    if (!link.tryAllowMore()) {
+    if (!link.tryAllowMore() || !requests_->tryAllow(link.header().maxOutstanding)) {
       count(link.control().clientRefused);
       return SendResult::noMemory;
     }
-    requests_->allow(link.maxOutstanding());
     request = requests_->tryReserve(attempt.id);
   }
   if (request == nullptr) {
@@ -181,9 +180,8 @@ std::uint64_t RequestSender::maxMessageBytes() const noexcept {
 }
 
 void RequestSender::open(std::shared_ptr<MessageLink> channel) {
-  auto requests = std::make_shared<RequestTable>(channel->link().header().maxOutstanding,
+  auto requests = std::make_shared<RequestTable>(channel->link().maxOutstanding(),
                                                  requests_ ? requests_->lastId() : 0);
-  requests->allow(channel->link().maxOutstanding());
   const std::lock_guard lock(*lock_);
   requests_ = std::move(requests);
   channel_ = std::move(channel);
