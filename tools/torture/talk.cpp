@@ -13,7 +13,7 @@ constexpr std::size_t kSeveralSlots = 9;  // elements of an array that needs sev
 constexpr std::size_t kLarge = 300;       // elements of an array that needs a chunk
 constexpr unsigned kCancelEvery = 32;
 constexpr unsigned kBurstEvery = 16;
-constexpr std::size_t kBurst = 80;  // open requests: their replies do not fit into the first ring
+constexpr std::size_t kBurst = 80;  // open requests whose replies fill the first ring
 
 }  // namespace
 
