@@ -4,7 +4,8 @@
 // A request that was given up (cancelled, expired) has had its fate, but keeps its entry until the
 // server replies to it or refuses it. The server identifies the request by the place of the entry,
 // so no other request may use this place until then. A table begins small, because most clients
-// have few requests at a time. When it grows, the entries in use stay where they are until they end.
+// have few requests at a time. When it grows, the entries in use stay where they are until they
+// end.
 //
 // Threads  tryAllow(), tryReserve(), add() and takeBack(): one thread at a time, under the client's
 //          lock. The rest: the dispatcher's thread.

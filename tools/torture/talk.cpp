@@ -39,8 +39,8 @@ void Talk::sendSome() {
   }
 }
 
-// Takes no replies meanwhile, so that the server moves to the second ring. The server takes requests
-// at its own pace, and may have died.
+// Takes no replies meanwhile, so that the server moves to the second ring. The server takes
+// requests at its own pace, and may have died.
 void Talk::sendBurst() {
   for (auto tries = 10 * kBurst; tries != 0 && open_.size() < kBurst; --tries) {
     if (!client_.isConnected()) return;
