@@ -243,7 +243,7 @@ void Binding::disconnect(const std::string& reason, Ending ending) {
   connector_.setReason(reason);
   resume();
   end_ = {ending, isConnected(),
-          ending == Ending::serverGone ? channel().link().header().replySlots : 0};
+          ending == Ending::serverGone ? channel().link().geometry().allReplySlots() : 0};
   if (!hasLeft()) setState(BindingState::ending);
   MPF_STEP(disconnecting);
   resumeEnd();

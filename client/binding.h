@@ -51,6 +51,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   }
   // When onTime() is due.
   [[nodiscard]] std::int64_t dueNs() const noexcept { return timer_.dueNs(); }
+  [[nodiscard]] std::int64_t takeReportedDueNs() noexcept { return timer_.takeReported(); }
 
   // --- dispatcher's thread ---
   void tryConnect();
@@ -128,7 +129,7 @@ class Binding : public std::enable_shared_from_this<Binding> {
   MessageClient::Callback callback_;
   // Written by the dispatcher's thread under the sender's lock; the first change is that of bind().
   std::atomic<BindingState> state_{BindingState::unbound};
-  BindingTimer timer_{parts_.timer};
+  BindingTimer timer_{parts_.timer, this};
   RequestSender sender_{state_, control(), timer_, [this] { postFullReport(); }};
   Connector connector_{parts_, timer_};
   NudgeInterval nudgeInterval_;

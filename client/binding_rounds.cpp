@@ -7,14 +7,56 @@ namespace mpf {
 
 // A client may be destroyed before the command that adds its binding runs.
 void BindingRounds::add(const std::shared_ptr<Binding>& binding) {
-  if (!binding->hasLeft()) bindings_.insert(binding);
+  if (binding->hasLeft()) return;
+  auto& member = bindings_[binding.get()];
+  member.binding = binding;
+  schedule(member, binding->takeReportedDueNs());
 }
 
 void BindingRounds::remove(const std::shared_ptr<Binding>& binding) {
-  bindings_.erase(binding);
+  if (const auto found = bindings_.find(binding.get()); found != bindings_.end()) {
+    schedule(found->second, INT64_MAX);
+    bindings_.erase(found);
+  }
   removed_.push_back(binding);
   // It may have been the last binding that waited for a server: then the watch of names can end.
   if (parts_.names.isRunning()) parts_.names.noteChange();
+}
+
+std::vector<std::weak_ptr<Binding>> BindingRounds::all() const {
+  std::vector<std::weak_ptr<Binding>> all;
+  all.reserve(bindings_.size());
+  for (const auto& [key, member] : bindings_) all.push_back(member.binding);
+  return all;
+}
+
+void BindingRounds::schedule(Member& member, std::int64_t dueNs) {
+  if (dueNs == member.scheduledNs) return;
+  if (member.scheduledNs != INT64_MAX) schedule_.erase({member.scheduledNs, member.binding.get()});
+  member.scheduledNs = INT64_MAX;
+  if (dueNs == INT64_MAX) return;
+  schedule_.emplace(dueNs, member.binding.get());
+  member.scheduledNs = dueNs;
+}
+
+// Removes the bindings that are due from the schedule, and returns them.
+std::vector<std::weak_ptr<Binding>> BindingRounds::takeDue(std::int64_t nowNs) {
+  if (const auto lowered = parts_.timer.takeLowered()) {
+    for (const auto* key : *lowered) {
+      const auto found = bindings_.find(key);
+      if (found != bindings_.end())
+        schedule(found->second, found->second.binding->takeReportedDueNs());
+    }
+  } else {
+    for (auto& [key, member] : bindings_) schedule(member, member.binding->takeReportedDueNs());
+  }
+  std::vector<std::weak_ptr<Binding>> due;
+  while (!schedule_.empty() && schedule_.begin()->first <= nowNs) {
+    auto& member = bindings_.find(schedule_.begin()->second)->second;
+    due.push_back(member.binding);
+    schedule(member, INT64_MAX);
+  }
+  return due;
 }
 
 void BindingRounds::resumeRounds() {
@@ -30,7 +72,8 @@ void BindingRounds::resumeRounds() {
     return true;
   });
   if (!waiting_.isOver()) return;
-  if (std::ranges::any_of(bindings_, [](const auto& binding) { return binding->isWaiting(); })) {
+  if (std::ranges::any_of(bindings_,
+                          [](const auto& each) { return each.second.binding->isWaiting(); })) {
     parts_.names.start();
   } else {
     parts_.names.stop();
@@ -39,14 +82,14 @@ void BindingRounds::resumeRounds() {
 
 void BindingRounds::handleDue() {
   auto& timer = parts_.timer;
-  if (due_.isOver()) {
-    timer.reset();
-    due_.begin(bindings_);
-  }
   const auto nowNs = Clock::nowNs();
   try {
+    if (due_.isOver()) {
+      timer.reset();
+      due_.begin(takeDue(nowNs));
+    }
     due_.resume([nowNs](Binding& binding) {
-      if (binding.dueNs() > nowNs) return false;
+      if (binding.dueNs() > nowNs) return false;  // a callback has run the dispatcher
       binding.onTime(nowNs);
       return true;
     });
@@ -55,7 +98,7 @@ void BindingRounds::handleDue() {
     throw;
   }
   if (!due_.isOver()) return timer.wakeAt(nowNs);  // the next step continues the round
-  for (const auto& binding : bindings_) timer.wakeAt(binding->dueNs());
+  if (!schedule_.empty()) timer.wakeAt(schedule_.begin()->first);
 }
 
 }  // namespace mpf

@@ -5,8 +5,11 @@
 // Threads  the dispatcher's thread. Callbacks may call each function.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "client/binding.h"
@@ -26,23 +29,32 @@ class BindingRounds {
   void dropRemoved() noexcept { removed_.clear(); }
 
   // A process has died: disconnects the bindings whose server it was.
-  void beginDead() { dead_.begin(bindings_); }
+  void beginDead() { dead_.begin(all()); }
   // A server may have appeared: connects the bindings that wait for one.
-  void beginWaiting() { waiting_.begin(bindings_); }
+  void beginWaiting() { waiting_.begin(all()); }
   // Continues these rounds. Returns true when one was in progress.
   bool resume() {
     if (dead_.isOver() && waiting_.isOver()) return false;
     resumeRounds();
     return true;
   }
-  // Begins or continues the round of the bindings whose timer is due.
+  // Begins or continues the round of the bindings whose timer is due. Looks at no other binding:
+  // thousands of clients may each have a timer that is due at another time.
   void handleDue();
 
  private:
+  struct Member {
+    std::shared_ptr<Binding> binding;
+    std::int64_t scheduledNs = INT64_MAX;  // its place in schedule_; INT64_MAX: none
+  };
+  [[nodiscard]] std::vector<std::weak_ptr<Binding>> all() const;
+  [[nodiscard]] std::vector<std::weak_ptr<Binding>> takeDue(std::int64_t nowNs);
+  void schedule(Member& member, std::int64_t dueNs);
   void resumeRounds();
 
   DispatcherParts& parts_;
-  std::set<std::shared_ptr<Binding>> bindings_;
+  std::map<const Binding*, Member> bindings_;
+  std::set<std::pair<std::int64_t, const Binding*>> schedule_;
   std::vector<std::shared_ptr<Binding>> removed_;
   Round<Binding> dead_;
   Round<Binding> waiting_;

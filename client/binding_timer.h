@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // BindingTimer: the time at which a binding has work to do. Its dispatcher wakes up by then.
 //
-// Threads  wakeAt() and dueNs(): any. reset(): the dispatcher's thread.
+// Threads  wakeAt() and dueNs(): any. The rest: the dispatcher's thread.
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,9 @@ namespace mpf {
 
 class BindingTimer {
  public:
-  explicit BindingTimer(DispatcherTimer& dispatcher) noexcept : dispatcher_(dispatcher) {}
+  //   owner   reported to the dispatcher when its time is lowered
+  explicit BindingTimer(DispatcherTimer& dispatcher, Binding* owner = nullptr) noexcept
+      : dispatcher_(dispatcher), owner_(owner) {}
 
   // INT64_MAX: nothing is due.
   [[nodiscard]] std::int64_t dueNs() const noexcept {
@@ -23,9 +25,19 @@ class BindingTimer {
     auto due = dueNs_.load(std::memory_order_relaxed);
     while (ns < due && !dueNs_.compare_exchange_weak(due, ns, std::memory_order_relaxed)) {
     }
-    // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read.
+    // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read, and before
+    // it is read whether the dispatcher has been told.
     doorbell::fence();
+    if (ns < due && !isReported_.exchange(true, std::memory_order_relaxed))
+      dispatcher_.reportLowered(owner_);
     dispatcher_.wakeAt(ns);
+  }
+  // The time, for a caller that reads it after a report of the dispatcher's timer.
+  [[nodiscard]] std::int64_t takeReported() noexcept {
+    isReported_.store(false, std::memory_order_relaxed);
+    // PAIR(due): a sender that lowers dueNs_ from now on reports again.
+    doorbell::fence();
+    return dueNs();
   }
   // Forgets the time: the caller handles what is due.
   void reset() noexcept {
@@ -36,7 +48,9 @@ class BindingTimer {
 
  private:
   DispatcherTimer& dispatcher_;
+  Binding* owner_;
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
+  std::atomic<bool> isReported_{false};
 };
 
 }  // namespace mpf

@@ -2,10 +2,16 @@
 // DispatcherTimer: the time at which a dispatcher must wake up to do what is due.
 //
 // Threads  any. A thread that lowers the time wakes the thread that waits, if it is another one.
+//          takeLowered(): the dispatcher's thread.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include <mpf/clock.h>
 
@@ -13,6 +19,8 @@
 #include "shm/endpoint.h"
 
 namespace mpf {
+
+class Binding;
 
 class DispatcherTimer {
  public:
@@ -39,6 +47,23 @@ class DispatcherTimer {
       endpoint_.interrupt();
   }
 
+  // The time of this binding was lowered. Before wakeAt().
+  void reportLowered(Binding* binding) noexcept try {
+    const std::lock_guard guard(mutex_);
+    lowered_.push_back(binding);
+  } catch (const std::bad_alloc&) {
+    const std::lock_guard guard(mutex_);
+    hasLost_ = true;
+  }
+  // The bindings whose time was lowered since the last call; some of them may no longer exist.
+  // nullopt: any may have been lowered, because there was no memory.
+  [[nodiscard]] std::optional<std::vector<Binding*>> takeLowered() noexcept {
+    const std::lock_guard guard(mutex_);
+    auto lowered = std::exchange(lowered_, {});
+    if (std::exchange(hasLost_, false)) return std::nullopt;
+    return lowered;
+  }
+
   // The calling thread waits until due() from now on.
   void setWaitingThread() noexcept {
     const auto me = threadNumber();
@@ -60,6 +85,9 @@ class DispatcherTimer {
   std::atomic<std::int64_t> dueNs_{INT64_MAX};
   std::atomic<std::uint64_t> waitingThread_{
       0};  // threadNumber() of the one that waits, or waited last
+  std::mutex mutex_;  // for the rest
+  std::vector<Binding*> lowered_;
+  bool hasLost_ = false;
 };
 
 }  // namespace mpf

@@ -82,6 +82,14 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
     return SendResult::notConnected;
   auto& link = channel_->link();
   auto* request = requests_->tryReserve(attempt.id);
+  if (request == nullptr && requests_->maxOutstanding() < link.header().maxOutstanding) {
+    // The link gets memory for the replies to as many requests as the server permits.
+    if (!link.tryAllowMore() || !requests_->tryAllow(link.header().maxOutstanding)) {
+      count(link.control().clientRefused);
+      return SendResult::noMemory;
+    }
+    request = requests_->tryReserve(attempt.id);
+  }
   if (request == nullptr) {
     count(link.control().clientRefused);
     noteFull();
@@ -106,7 +114,7 @@ SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
   requests_->add(*request, attempt.id);
   MPF_STEP(request_added);
   const auto result =
-      resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0, 0}));
+      resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0}));
   if (result != SendResult::sent) {
     auto copy = requests_->takeBack(*request);
     if (attempt.copy != nullptr) *attempt.copy = std::move(copy);
@@ -172,7 +180,7 @@ std::uint64_t RequestSender::maxMessageBytes() const noexcept {
 }
 
 void RequestSender::open(std::shared_ptr<MessageLink> channel) {
-  auto requests = std::make_shared<RequestTable>(channel->link().header().maxOutstanding,
+  auto requests = std::make_shared<RequestTable>(channel->link().maxOutstanding(),
                                                  requests_ ? requests_->lastId() : 0);
   const std::lock_guard lock(*lock_);
   requests_ = std::move(requests);

@@ -3,14 +3,15 @@
 //
 // A request that was given up (cancelled, expired) has had its fate, but keeps its entry until the
 // server replies to it or refuses it. The server identifies the request by the place of the entry,
-// so no other request may use this place until then.
+// so no other request may use this place until then. A table begins small, because most clients
+// have few requests at a time. When it grows, the entries in use stay where they are until they
+// end.
 //
-// Threads  tryReserve(), add() and takeBack(): one thread at a time, under the client's lock. The
-//          rest: the dispatcher's thread.
+// Threads  tryAllow(), tryReserve(), add() and takeBack(): one thread at a time, under the client's
+//          lock. The rest: the dispatcher's thread.
 #pragma once
 
 #include <atomic>
-#include <bit>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -32,18 +33,19 @@ struct Request {
 
 class RequestTable {
  public:
-  //   lastId   of the previous connection's table: a late cancel() must not match a new request
-  explicit RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId = 0)
-      : size_(std::bit_ceil(maxOutstanding)),
-        max_(maxOutstanding),
-        requests_(std::make_unique<Request[]>(size_)),
-        lastId_(lastId) {}
+  //   maxOutstanding   of now; tryAllow() raises it
+  //   lastId           of the previous connection's table: a late cancel() must not match a new
+  //                    request
+  explicit RequestTable(std::uint32_t maxOutstanding, std::uint32_t lastId = 0);
 
   [[nodiscard]] std::uint32_t lastId() const noexcept { return lastId_; }
+  [[nodiscard]] std::uint32_t maxOutstanding() const noexcept { return max_; }
 
   [[nodiscard]] std::uint32_t outstanding() const noexcept {
     return added_.load(std::memory_order_relaxed) - ended_.load(std::memory_order_relaxed);
   }
+  // Lets more requests be outstanding, once. Returns false if there is no memory.
+  [[nodiscard]] bool tryAllow(std::uint32_t maxOutstanding) noexcept;
 
   // Outstanding requests that were not given up.
   [[nodiscard]] std::uint32_t awaited() const noexcept {
@@ -54,16 +56,10 @@ class RequestTable {
   // when the maximum is outstanding or another request has the place of that id.
   Request* tryReserve(std::uint32_t& id) noexcept {
     if (outstanding() >= max_) return nullptr;
-    if (id != 0) {
-      auto& request = requests_[id & (size_ - 1)];
-      // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
-      return request.id.load(std::memory_order_acquire) == 0 ? &request : nullptr;
-    }
+    if (id != 0) return isFree(id) ? &sender_.at(id) : nullptr;
     for (;;) {
       id = ++lastId_;
-      auto& request = requests_[id & (size_ - 1)];
-      // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
-      if (id != 0 && request.id.load(std::memory_order_acquire) == 0) return &request;
+      if (id != 0 && isFree(id)) return &sender_.at(id);
     }
   }
   void add(Request& request, std::uint32_t id) noexcept {
@@ -82,9 +78,10 @@ class RequestTable {
 
   // Returns the entry of an outstanding request, or nullptr.
   Request* find(std::uint32_t id) noexcept {
-    auto& request = requests_[id & (size_ - 1)];
+    auto& request = receiver_.at(id);
     // PAIR(request-added): the fields of the entry.
-    return id != 0 && request.id.load(std::memory_order_acquire) == id ? &request : nullptr;
+    if (id != 0 && request.id.load(std::memory_order_acquire) == id) return &request;
+    return findInBoth(id);
   }
   void giveUp(Request& request) noexcept {
     request.isGivenUp = true;
@@ -101,20 +98,48 @@ class RequestTable {
 
   template <class Visit>
   void forEach(Visit&& visit) {
-    for (std::uint32_t at = 0; at < size_; ++at) {
-      // PAIR(request-added): the fields of the entry.
-      if (requests_[at].id.load(std::memory_order_acquire) != 0) visit(requests_[at]);
-    }
+    const auto visitAll = [&](const Places& places) {
+      for (std::uint32_t at = 0; at <= places.mask; ++at) {
+        // PAIR(request-added): the fields of the entry.
+        if (places.at(at).id.load(std::memory_order_acquire) != 0) visit(places.at(at));
+      }
+    };
+    visitAll(first_);
+    if (hasGrown()) visitAll(second_);
   }
 
  private:
-  std::uint32_t size_;
-  std::uint32_t max_;
-  std::unique_ptr<Request[]> requests_;
-  std::uint32_t lastId_;
+  // Entries, whose number is a power of two.
+  struct Places {
+    Request* entries = nullptr;
+    std::uint32_t mask = 0;
+    [[nodiscard]] Request& at(std::uint32_t id) const noexcept { return entries[id & mask]; }
+  };
+  [[nodiscard]] bool isFree(std::uint32_t id) noexcept {
+    // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
+    return sender_.at(id).id.load(std::memory_order_acquire) == 0 &&
+           (!hasInFirst_ || !hasPlaceInFirst(id));
+  }
+  [[nodiscard]] bool hasPlaceInFirst(std::uint32_t id) noexcept;
+  [[nodiscard]] bool hasGrown() const noexcept {
+    // PAIR(table-grown): the second table.
+    return hasGrown_.load(std::memory_order_acquire);
+  }
+  Request* findInBoth(std::uint32_t id) noexcept;
+
+  Places receiver_;  // the table in which the dispatcher's thread looks first
+  Places sender_;  // the table for new requests; under the client's lock
+  std::uint32_t max_;  // likewise
+  std::uint32_t lastId_;  // likewise
+  bool hasInFirst_ = false;  // likewise: requests may be in the first table beside those in sender_
+  std::atomic<bool> hasGrown_{false};
   std::atomic<std::uint32_t> added_{0};
   std::atomic<std::uint32_t> ended_{0};
   std::atomic<std::uint32_t> givenUp_{0};
+  std::unique_ptr<Request[]> firstEntries_;
+  std::unique_ptr<Request[]> secondEntries_;
+  Places first_;
+  Places second_;  // after hasGrown()
 };
 
 }  // namespace mpf

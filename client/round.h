@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Round: visits all bindings of a dispatcher, some in each step. Thousands of bindings may have to
+// Round: visits bindings of a dispatcher, some in each step. Thousands of bindings may have to
 // reconnect at once; messages of other clients are delivered between the steps.
 //
 // Threads  one. Callbacks may call resume() again and destroy clients.
 #pragma once
 
 #include <memory>
-#include <set>
+#include <utility>
 #include <vector>
 
 namespace mpf {
@@ -16,9 +16,9 @@ class Round {
  public:
   static constexpr int kPerStep = 8;
 
-  // Starts a round through `all`; a round in progress is dropped.
-  void begin(const std::set<std::shared_ptr<Binding>>& all) {
-    bindings_.assign(all.begin(), all.end());
+  // Starts a round through these bindings; a round in progress is dropped.
+  void begin(std::vector<std::weak_ptr<Binding>> bindings) {
+    bindings_ = std::move(bindings);
     next_ = 0;
   }
   [[nodiscard]] bool isOver() const noexcept { return next_ == bindings_.size(); }

@@ -8,7 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <deque>
+#include <list>
 #include <memory>
 #include <optional>
 
@@ -32,7 +32,7 @@ class UntakenRequests {
  public:
   [[nodiscard]] bool isEmpty() const noexcept { return requests_.empty(); }
   [[nodiscard]] UntakenRequest& front() noexcept { return requests_.front(); }
-  [[nodiscard]] const std::deque<UntakenRequest>& all() const noexcept { return requests_; }
+  [[nodiscard]] const std::list<UntakenRequest>& all() const noexcept { return requests_; }
   // Takes the copy of a request of the table, which ends then without a fate. Requests may come in
   // any order.
   void add(Request& request) {
@@ -55,7 +55,7 @@ class UntakenRequests {
   }
 
  private:
-  std::deque<UntakenRequest> requests_;
+  std::list<UntakenRequest> requests_;  // an empty deque would need 576 bytes
 };
 
 }  // namespace mpf

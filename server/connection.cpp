@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "server/connection.h"
 
+#include <bit>
 #include <mutex>
+#include <new>
 #include <utility>
 
 namespace mpf {
@@ -19,6 +21,24 @@ Connection::Pointer Connection::take() {
       return Pointer(std::exchange(freeConnections, freeConnections->nextFree));
   }
   return Pointer(new Connection);
+}
+
+// Gives requests that differ in more bits different places, up to the size at which the client must
+// use different ones.
+bool Connection::tryMakePlace(std::uint32_t requestId) noexcept try {
+  const auto size = std::bit_ceil(channel->link().header().maxOutstanding);
+  if (unanswered.size() == size) return false;
+  std::vector<std::atomic<std::uint32_t>> larger(size);
+  const std::lock_guard guard(*lock);
+  for (const auto& place : unanswered) {
+    const auto id = place.load(std::memory_order_relaxed);
+    if (id != 0) larger[id % size].store(id, std::memory_order_relaxed);
+  }
+  unanswered = std::move(larger);
+  unansweredMask = size - 1;
+  return owed(requestId).load(std::memory_order_relaxed) == 0;
+} catch (const std::bad_alloc&) {
+  return false;
 }
 
 void Connection::GiveBack::operator()(Connection* connection) const noexcept {

@@ -47,6 +47,15 @@ struct Connection {
   [[nodiscard]] std::atomic<std::uint32_t>& owed(std::uint32_t requestId) noexcept {
     return unanswered[requestId & unansweredMask];
   }
+  // Notes that a request was received. Returns false if its id is invalid: another one has the same
+  // place. Called by the server's thread, without the lock.
+  [[nodiscard]] bool tryOwe(std::uint32_t requestId) noexcept {
+    if (requestId == 0) return false;
+    if (owed(requestId).load(std::memory_order_relaxed) != 0 && !tryMakePlace(requestId))
+      return false;
+    owed(requestId).store(requestId, std::memory_order_relaxed);
+    return true;
+  }
   [[nodiscard]] bool owes(std::uint32_t requestId) noexcept {
     return requestId != 0 && owed(requestId).load(std::memory_order_relaxed) == requestId;
   }
@@ -55,12 +64,17 @@ struct Connection {
   std::shared_ptr<MessageLink> channel;  // under lock; empty: free
   std::uint32_t index = 0;  // of the link in the server's endpoint
   std::uint32_t generation = 0;  // under lock
-  // Ids of received requests without a reply, by their low bits; the size is a power of two.
+  // Ids of received requests without a reply, by their low bits; the size is a power of two. It
+  // begins small, because most clients have few requests at a time. The server's thread makes it
+  // larger under lock.
   std::vector<std::atomic<std::uint32_t>> unanswered;
   std::uint32_t unansweredMask = 0;
   std::uint32_t timedId = 0;  // the request whose service time is measured, under lock
   std::int64_t timedFromNs = 0;
   Connection* nextFree = nullptr;
+
+ private:
+  [[nodiscard]] bool tryMakePlace(std::uint32_t requestId) noexcept;
 };
 
 }  // namespace mpf

@@ -136,7 +136,6 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   auto& link = connection.channel->link();
   if (link.header().serverWindow != serverWindow_) return ReplyResult::clientGone;
   const bool first = connection.owes(route.requestId);
-  const auto maxOutstanding = link.header().maxOutstanding;
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
   envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
@@ -147,7 +146,7 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   if (stamps_ && envelope.timeNs == 0) envelope.timeNs = Clock::wallNs();
   if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
 
-  const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
+  const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
   const auto result =
       link.trySendFanOut(envelope, chunk, message.body().size(), limits, maxBorrowed_);
   if (result != LinkSend::sent) {

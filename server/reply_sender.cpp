@@ -30,7 +30,6 @@ ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) no
   auto& owed = connection.owed(requestId);
   const bool first = connection.owes(requestId);
   auto& link = connection.channel->link();
-  const auto maxOutstanding = link.header().maxOutstanding;
   Envelope envelope;
   envelope.type = static_cast<std::uint16_t>(message.getType());
   envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
@@ -42,7 +41,7 @@ ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) no
   if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
 
   auto* const keeper = first ? message.exchangeKeeper(nullptr) : nullptr;
-  const Link::Limits limits{0, first ? 0 : maxOutstanding, maxOutstanding};
+  const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
   const auto result = connection.channel->trySendLocked(envelope, message, limits);
   if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
     MPF_STEP(reply_sent);

@@ -145,12 +145,10 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
   }
   count(control.received);
   count(control.progress);
-  auto& unanswered = connection.owed(envelope.requestId);
-  if (envelope.requestId == 0 || unanswered.load(std::memory_order_relaxed) != 0) {
+  if (!connection.tryOwe(envelope.requestId)) {
     closeForProtocolError(connection);
     return false;
   }
-  unanswered.store(envelope.requestId, std::memory_order_relaxed);
   MPF_STEP(request_taken);
   if (envelope.timeNs != 0 && hasExpired(envelope)) {
     count(control.expired);

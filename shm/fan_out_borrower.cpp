@@ -10,7 +10,8 @@
 namespace mpf {
 
 std::optional<Chunk> FanOutBorrower::tryBorrow(const layout::ChunkRef& ref) try {
-  if (ref.side != layout::kFanOutSide || ref.chunk != 0) return std::nullopt;
+  if (ref.side != layout::kFanOutSide || ref.segment >= layout::kReturnsFanOut || ref.chunk != 0)
+    return std::nullopt;
   const auto free = std::ranges::find_if(
       views_, [&](const View& view) { return view.number == ref.segment && !view.isHeld; });
   auto* const view = free != views_.end() ? &*free : tryMap(ref.segment);

@@ -66,6 +66,7 @@ std::shared_ptr<FanOutChunk> FanOutPool::tryAlloc(std::size_t bytes) noexcept tr
     if (auto chunk = tryReuse(bytes)) return chunk;
     if (!tryMakeRoom(needed)) return nullptr;
     bytes_ += needed;
+    if (created_ == layout::kReturnsFanOut) return nullptr;  // no number is used twice
     number = created_++;
   }
   return tryCreate(needed, number);

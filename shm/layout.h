@@ -7,7 +7,7 @@
 //   mpf.<backplane>.s.<location>.<server>   server window   WindowControl
 //   mpf.<backplane>.c.<incarnation>         client window   WindowControl
 //   mpf.<backplane>.h.<incarnation>         hints           WindowHints
-//   mpf.<backplane>.l.<server>.<link>       link            LinkControl, two rings of slots
+//   mpf.<backplane>.l.<server>.<link>       link            LinkControl, rings of slots
 //   mpf.<backplane>.b.<link>.<side>.<n>     bulk            chunks
 //   mpf.<backplane>.p.<incarnation>.<n>     fan-out         one chunk
 //   mpf.<backplane>.w.<incarnation>         pending bind    only the header
@@ -99,7 +99,7 @@ struct SegmentHeader {
   // Geometry of rings and pools. A link has all of these values. In a server window, the limits and
   // rights are the ones that the server offers.
   std::uint32_t queueSlots;  // slots of the request ring, a power of two
-  std::uint32_t replySlots;  // slots of the reply ring, a power of two
+  std::uint32_t replySlots;  // slots of the first reply ring, a power of two
   std::uint32_t queueSize;  // requests of one client that may wait
   std::uint32_t maxOutstanding;  // requests of one client that may be unanswered
   std::uint64_t maxMessageBytes;
@@ -119,12 +119,16 @@ struct SegmentHeader {
   std::uint32_t chunkCount;
   std::uint32_t bulkSide;  // 0 the client's, 1 the server's
 
-  std::array<std::uint8_t, 200> reserved;
+  // Link only: slots of the second reply ring, a power of two; 0: the first one is enough.
+  std::uint32_t moreReplySlots;
+
+  std::array<std::uint8_t, 196> reserved;
 };
 static_assert(sizeof(SegmentHeader) == 512);
 static_assert(offsetof(SegmentHeader, backplane) == 88 && offsetof(SegmentHeader, name) == 128);
 static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
-              offsetof(SegmentHeader, chunkBytes) == 296);
+              offsetof(SegmentHeader, chunkBytes) == 296 &&
+              offsetof(SegmentHeader, moreReplySlots) == 312);
 
 // Log-linear histogram of durations [ns]: 4 buckets for each power of two, from 16 ns to 2^40 ns.
 // Written by one thread.
@@ -221,6 +225,10 @@ struct alignas(kCacheLineBytes) MoreSlot {
 };
 static_assert(sizeof(MoreSlot) == sizeof(Slot));
 
+// In Slot::sequence, beside position + 1: the message of this position is in the second ring, and
+// so are all later ones. Such a slot holds no message.
+inline constexpr std::uint64_t kContinuesInSecondRing = std::uint64_t{1} << 63;
+
 inline constexpr std::uint32_t kMaxMessageSlots = 4;
 inline constexpr std::size_t kFirstSlotBodyBytes = sizeof(Slot::body);
 // longest body in slots: 24 + 3 * 56 = 192
@@ -260,12 +268,13 @@ struct RingControl {
 inline constexpr std::uint32_t kReturnSlots = 256;
 struct ReturnRing {
   alignas(kPairBytes) Word64 returned;  // chunks returned so far
-  // segment << 32 | chunk, or kReturnsFanOut | segment; the two pools together never lend more than
+  // segment << 16 | chunk, or kReturnsFanOut | segment; the two pools together never lend more than
   // kReturnSlots
-  std::array<Word64, kReturnSlots> chunks;
+  std::array<Word32, kReturnSlots> chunks;
 };
+inline constexpr std::uint32_t kMaxChunks = 1u << 16;  // of one bulk segment
 // In ReturnRing::chunks: a chunk of the fan-out pool.
-inline constexpr std::uint64_t kReturnsFanOut = std::uint64_t{1} << 63;
+inline constexpr std::uint32_t kReturnsFanOut = 1u << 31;
 
 enum class LinkState : std::uint32_t { none = 0, open = 1, closed = 2, refused = 3 };
 
@@ -276,6 +285,8 @@ struct LinkControl {
   std::atomic<Watch> requestWatch;  // server
   std::atomic<Watch> replyWatch;  // client
   Word32 serverIndex;  // bit of this link in the server window's ready bits; server
+  // not 0: the second reply ring has memory, and maxOutstanding requests may be unanswered; client
+  Word32 hasMoreReplies;
   // The client writes these words for each message. The server seldom reads them.
   alignas(kPairBytes) RingControl replies;
   Word64 clientSent;
@@ -284,6 +295,8 @@ struct LinkControl {
   // The server writes these words for each message. The client seldom reads them.
   alignas(kPairBytes) RingControl requests;
   Word64 serverSent;
+  // 1 + the position of the first reply in the second reply ring; 0: all are in the first one
+  Word64 repliesMoved;
   ReturnRing requestChunks;  // client's pool: borrower server
   ReturnRing replyChunks;  // server's pool: borrower client
 };
@@ -291,8 +304,11 @@ inline constexpr std::size_t kLinkControlOffset = 512;
 inline constexpr std::size_t kLinkRingsOffset = kLinkControlOffset + sizeof(LinkControl);
 static_assert(kLinkRingsOffset % kPairBytes == 0);
 
-[[nodiscard]] constexpr std::size_t linkBytes(std::uint32_t queueSlots, std::uint32_t replySlots) {
-  return kLinkRingsOffset + (std::size_t{queueSlots} + replySlots) * sizeof(Slot);
+// The slots of the request ring come first, then those of the first and of the second reply ring.
+// The second one has memory only when the client has reserved it.
+[[nodiscard]] constexpr std::size_t linkBytes(std::uint32_t queueSlots, std::uint32_t replySlots,
+                                              std::uint32_t moreReplySlots) {
+  return kLinkRingsOffset + (std::size_t{queueSlots} + replySlots + moreReplySlots) * sizeof(Slot);
 }
 
 // Chunks of a bulk segment start here, each chunkBytes long.

@@ -24,6 +24,19 @@ std::uint32_t slotCount(const Segment& segment, LinkSide producer) {
   return producer == LinkSide::client ? segment.header().queueSlots : segment.header().replySlots;
 }
 
+// The second ring of a direction: only replies may have one.
+SecondRing secondRing(const Segment& segment, LinkSide producer) {
+  const auto& header = segment.header();
+  if (producer == LinkSide::client || header.moreReplySlots == 0) return {};
+  auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
+  return {slotsOf(segment, producer) + header.replySlots, header.moreReplySlots,
+          &control.hasMoreReplies, &control.repliesMoved};
+}
+
+std::size_t linkBytes(const LinkGeometry& geometry) {
+  return layout::linkBytes(geometry.queueSlots, geometry.replySlots, geometry.moreReplySlots);
+}
+
 layout::RingControl& ringControl(const Segment& segment, LinkSide producer) {
   auto& control = segment.at<layout::LinkControl>(layout::kLinkControlOffset);
   return producer == LinkSide::client ? control.requests : control.replies;
@@ -54,10 +67,11 @@ void checkGeometry(const layout::SegmentHeader& header, const std::string& name)
   const auto expected = LinkGeometry::forQueue(queueSize);
   if (header.queueSize != queueSize || header.queueSlots != expected.queueSlots ||
       header.replySlots != expected.replySlots ||
+      header.moreReplySlots != expected.moreReplySlots ||
       header.maxOutstanding != expected.maxOutstanding) {
-    throw SegmentError(fmt::format("{}: rings of {} and {} slots do not fit a queue of {} messages",
-                                   segments::path(name), header.queueSlots, header.replySlots,
-                                   header.queueSize));
+    throw SegmentError(fmt::format(
+        "{}: rings of {}, {} and {} slots do not fit a queue of {} messages", segments::path(name),
+        header.queueSlots, header.replySlots, header.moreReplySlots, header.queueSize));
   }
 }
 
@@ -66,7 +80,12 @@ void checkGeometry(const layout::SegmentHeader& header, const std::string& name)
 LinkGeometry LinkGeometry::forQueue(std::uint32_t queueSize) noexcept {
   const auto maxOutstanding = 2 * queueSize;
   const auto streamed = std::max(16u, queueSize / 8);  // replies beyond the first one of a request
-  return {ringSlotsFor(queueSize), ringSlotsFor(maxOutstanding + streamed), maxOutstanding};
+  const auto replySlots = ringSlotsFor(maxOutstanding + streamed);
+  // Most clients have few unanswered requests: they need a quarter of this.
+  constexpr std::uint32_t kLeastSlots = 64;
+  const auto first = std::max(kLeastSlots, replySlots / 4);
+  if (first >= replySlots) return {ringSlotsFor(queueSize), replySlots, 0, maxOutstanding};
+  return {ringSlotsFor(queueSize), first, replySlots, maxOutstanding};
 }
 
 Rights Link::rightsAt(const PeerWindow& server) {
@@ -83,8 +102,8 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
                                     LinkGeometry::kMaxQueueSize);
   const auto geometry = LinkGeometry::forQueue(queueSize);
   const auto rights = rightsAt(*server);
-  auto segment = Segment::create(layout::linkBytes(geometry.queueSlots, geometry.replySlots),
-                                 layout::SegmentKind::link, backplane, rights);
+  auto segment = Segment::create(linkBytes(geometry), layout::SegmentKind::link, backplane, rights,
+                                 layout::linkBytes(geometry.queueSlots, geometry.replySlots, 0));
   auto& header = segment.sharedHeader();
   header.ownerWindow = own.header().incarnation;
   header.clientWindow = own.header().incarnation;
@@ -94,6 +113,7 @@ std::unique_ptr<Link> Link::create(const std::string& backplane, const OwnWindow
   header.name = offer.name;
   header.queueSlots = geometry.queueSlots;
   header.replySlots = geometry.replySlots;
+  header.moreReplySlots = geometry.moreReplySlots;
   header.queueSize = queueSize;
   header.maxOutstanding = geometry.maxOutstanding;
   header.maxMessageBytes = offer.maxMessageBytes;
@@ -124,7 +144,7 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
   const auto& offer = own.header();
   checkGeometry(header, name);
   if (header.serverWindow != offer.incarnation || header.maxPoolBytes > offer.maxPoolBytes ||
-      segment->bytes() != layout::linkBytes(header.queueSlots, header.replySlots)) {
+      segment->bytes() != linkBytes(LinkGeometry::forQueue(header.queueSize))) {
     throw SegmentError(fmt::format(
         "{}: a link whose server, pool limit or length differs from what this server offers",
         segments::path(name)));
@@ -137,14 +157,16 @@ std::unique_ptr<Link> Link::tryOpen(const std::string& backplane, const std::str
 
 Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights)
     : segment_(std::move(segment)),
+      geometry_(LinkGeometry::forQueue(segment_.header().queueSize)),
       backplane_(backplane),
       side_(side),
       maxMessageBytes_(std::min<std::uint64_t>(segment_.header().maxMessageBytes, UINT32_MAX)),
       outWatch_(watchOf(segment_, other(side))),
       inWatch_(watchOf(segment_, side)),
-      out_(slotsOf(segment_, side), slotCount(segment_, side), ringControl(segment_, side)),
+      out_(slotsOf(segment_, side), slotCount(segment_, side), ringControl(segment_, side),
+           secondRing(segment_, side)),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
-          ringControl(segment_, other(side))),
+          ringControl(segment_, other(side)), secondRing(segment_, other(side))),
       pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user},
             segment_.header().maxPoolBytes, returnRing(segment_, side)),
       borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes,
@@ -194,23 +216,33 @@ bool Link::hasPeerEnded() const noexcept {
   return peerState() >= layout::LinkState::closed || peer_->isDead() || !peer_->hasOwner();
 }
 
+bool Link::tryAllowMore() noexcept {
+  if (maxOutstanding() == geometry_.maxOutstanding) return true;
+  if (!segment_.tryReserve()) return false;
+  MPF_STEP(second_ring_reserved);
+  // PAIR(second-ring): the memory is reserved before the server may use it.
+  control().hasMoreReplies.store(1, std::memory_order_release);
+  MPF_STEP(second_ring_allowed);
+  return true;
+}
+
 void Link::notifyPeer() noexcept {
   if (peer_) peer_->notify(peerIndex_);
 }
 
 LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
-                           Limits limits) noexcept {
+                           std::uint32_t waiting, std::uint32_t reserve) noexcept {
   envelope.bodyBytes = static_cast<std::uint32_t>(body.size());
   // Each message that the queue may still accept needs one slot. A message of several slots may use
   // only the slots beyond these.
   const auto queued = static_cast<std::uint32_t>(out_.waitingAtMost());
-  const auto queueLeft = limits.waiting > queued + 1 ? limits.waiting - queued - 1 : 0;
-  const auto needed = std::max(limits.longReserve, queueLeft);
+  const auto queueLeft = waiting > queued + 1 ? waiting - queued - 1 : 0;
+  const auto needed = std::max(side_ == LinkSide::server ? maxOutstanding() : 0, queueLeft);
   if (body.size() <= layout::kInlineBodyBytes && out_.tryPush(envelope, body, needed)) {
     afterPush();
     return LinkSend::sent;
   }
-  if (!out_.hasFree(1 + limits.reserve)) return LinkSend::full;
+  if (!out_.hasFree(1 + reserve)) return LinkSend::full;
 
   auto own = pool_.tryFind(body.data());
   const auto foreign = own ? std::nullopt : borrowed_.tryFind(body.data());
@@ -227,8 +259,7 @@ LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
   envelope.flags |= layout::kSlotChunk;
   const auto ref = own ? *own : *foreign;
   // hasFree() above has checked that it fits.
-  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve))
-    return LinkSend::full;
+  if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), reserve)) return LinkSend::full;
   afterPush();
   return inPlace ? LinkSend::sentInPlace : LinkSend::sent;
 }

@@ -45,7 +45,13 @@ struct LinkGeometry {
   static constexpr std::uint32_t kMaxQueueSize = 16384;
   std::uint32_t queueSlots;
   std::uint32_t replySlots;
+  std::uint32_t moreReplySlots;  // 0: the first reply ring is large enough
   std::uint32_t maxOutstanding;
+  // Requests that may be unanswered while the second reply ring has no memory.
+  [[nodiscard]] std::uint32_t firstOutstanding() const noexcept {
+    return moreReplySlots == 0 ? maxOutstanding : replySlots / 4;
+  }
+  [[nodiscard]] std::uint32_t allReplySlots() const noexcept { return replySlots + moreReplySlots; }
   static LinkGeometry forQueue(std::uint32_t queueSize) noexcept;
 };
 
@@ -70,6 +76,7 @@ class Link {
 
   [[nodiscard]] LinkSide side() const noexcept { return side_; }
   [[nodiscard]] const layout::SegmentHeader& header() const noexcept { return segment_.header(); }
+  [[nodiscard]] const LinkGeometry& geometry() const noexcept { return geometry_; }
   [[nodiscard]] layout::LinkControl& control() const noexcept {
     return segment_.at<layout::LinkControl>(layout::kLinkControlOffset);
   }
@@ -91,6 +98,16 @@ class Link {
   // that it has not taken yet. The client removes the names. Returns false if the client's user has
   // no right to remove them.
   [[nodiscard]] bool tryLeavePoolToClient() noexcept;
+  // Requests that may be unanswered now. The server leaves as many slots free for first replies.
+  [[nodiscard]] std::uint32_t maxOutstanding() const noexcept {
+    // PAIR(second-ring): the client has reserved the memory.
+    return control().hasMoreReplies.load(std::memory_order_acquire) == 0
+               ? geometry_.firstOutstanding()
+               : geometry_.maxOutstanding;
+  }
+  // At the client: lets geometry().maxOutstanding requests be unanswered. Returns false if there is
+  // no memory for their replies.
+  [[nodiscard]] bool tryAllowMore() noexcept;
   // Notifies the peer that it must look at this link, even if it polls the link.
   void notifyPeer() noexcept;
 
@@ -98,10 +115,9 @@ class Link {
   struct Limits {
     // highest number of messages that the peer has not taken; 0: as many as fit into the ring
     std::uint32_t waiting = 0;
-    // slots to leave free
+    // slots to leave free; a reply of several slots leaves as many free as there may be first
+    // replies, or its body goes into a chunk
     std::uint32_t reserve = 0;
-    // slots that a message of several slots must leave free; otherwise its body goes into a chunk
-    std::uint32_t longReserve = 0;
   };
   // Sends a body; sets its length and flags in the envelope. A short body is copied into slots of
   // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets
@@ -112,7 +128,8 @@ class Link {
     if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting &&
         out_.waiting() >= limits.waiting)
       return LinkSend::full;
-    if (body.size() > layout::kFirstSlotBodyBytes) return trySendLong(envelope, body, limits);
+    if (body.size() > layout::kFirstSlotBodyBytes)
+      return trySendLong(envelope, body, limits.waiting, limits.reserve);
     if (!out_.tryPushShort(envelope, body, limits.reserve)) return LinkSend::full;
     afterPush();
     return LinkSend::sent;
@@ -146,10 +163,9 @@ class Link {
   // --- receiving ---
   // The ring from which messages are taken.
   [[nodiscard]] RingConsumer& incoming() noexcept { return in_; }
-  [[nodiscard]] const RingConsumer& incoming() const noexcept { return in_; }
   // Whether there is a message or the peer has ended the link. One hint may stand for both, and the
   // owner may have handled only the message.
-  [[nodiscard]] bool hasEvents() const noexcept {
+  [[nodiscard]] bool hasEvents() noexcept {
     return in_.hasMessage() || peerState() >= layout::LinkState::closed;
   }
   // The chunk of the kSlotChunk message begun: borrowed from the peer, or one of ours that the peer
@@ -180,8 +196,9 @@ class Link {
 
   Link(Segment segment, const std::string& backplane, LinkSide side, Rights rights);
   // For a body that does not fit into the first slot. Takes copies, so that those of trySend() stay
-  // in registers.
-  LinkSend trySendLong(Envelope envelope, std::span<const std::byte> body, Limits limits) noexcept;
+  // in registers. The limits come one by one: a copy of both at once would wait for their stores.
+  LinkSend trySendLong(Envelope envelope, std::span<const std::byte> body, std::uint32_t waiting,
+                       std::uint32_t reserve) noexcept;
   void afterPush() noexcept {
     MPF_STEP(peer_checked);
     expedited_barrier::frequentSide();
@@ -193,6 +210,7 @@ class Link {
 
   ForkGuard forkGuard_;
   Segment segment_;
+  LinkGeometry geometry_;
   std::string backplane_;
   LinkSide side_;
   std::shared_ptr<PeerWindow> peer_;

@@ -123,11 +123,11 @@ void PoolOwner::collectReturned() noexcept {
     const auto packed =
         returns_->chunks[collected_ % layout::kReturnSlots].load(std::memory_order_relaxed);
     if ((packed & layout::kReturnsFanOut) != 0) {
-      loans_.takeBack(static_cast<std::uint32_t>(packed));
+      loans_.takeBack(packed & ~layout::kReturnsFanOut);
       continue;
     }
-    const layout::ChunkRef ref{static_cast<std::uint32_t>(packed >> 32),
-                               static_cast<std::uint32_t>(packed), place_.side, 0};
+    const layout::ChunkRef ref{packed / layout::kMaxChunks, packed % layout::kMaxChunks,
+                               place_.side, 0};
     if (tryReceiveBack(ref)) free(ref);
   }
 }
@@ -154,7 +154,8 @@ bool PoolBorrower::tryMap(std::uint32_t number) {
   const auto room =
       segment->bytes() - std::min<std::size_t>(segment->bytes(), layout::kBulkChunksOffset);
   if (header.chunkBytes == 0 || header.chunkBytes % layout::kCacheLineBytes != 0) return false;
-  if (header.chunkCount > room / header.chunkBytes) return false;
+  if (header.chunkCount > room / header.chunkBytes || header.chunkCount > layout::kMaxChunks)
+    return false;
   segment->closeFile();
   bytes_ += segment->bytes();
   bulks_[number] = {std::move(*segment), header.chunkBytes, header.chunkCount};
@@ -176,7 +177,7 @@ std::optional<Chunk> PoolBorrower::tryBorrow(const layout::ChunkRef& ref) try {
 void PoolBorrower::giveBack(const layout::ChunkRef& ref) noexcept {
   const auto packed = ref.side == layout::kFanOutSide
                           ? layout::kReturnsFanOut | ref.segment
-                          : std::uint64_t{ref.segment} << 32 | ref.chunk;
+                          : ref.segment * layout::kMaxChunks + ref.chunk % layout::kMaxChunks;
   returns_->chunks[returned_ % layout::kReturnSlots].store(packed, std::memory_order_relaxed);
   MPF_STEP(chunk_noted);
   // PAIR(chunk-returned): we have finished with the chunk.

@@ -6,6 +6,11 @@
 //   first slot of a message   sequence, envelope, 24 bytes of the body
 //   further slots             56 bytes of the body each
 //
+// A ring may continue in a second, larger one. The consumer gives that one memory when it needs it;
+// the producer moves there when the first ring is full, and never returns. Positions go on:
+//
+//   | first ring, full | ─ slot that says "continues" ─► | second ring |
+//
 // Threads  one thread pushes, one thread takes.
 // Crash    a producer that is killed before its release store has pushed nothing. A consumer that
 //          is killed after it counted a message as taken may or may not have acted on it.
@@ -17,6 +22,7 @@
 #include <bit>
 #include <cstring>
 #include <span>
+#include <utility>
 
 #include <mpf/detail/copy_words.h>
 
@@ -64,11 +70,23 @@ inline constexpr std::uint32_t kFreeFraction = 8;
   return std::bit_ceil(std::max(16u, messages + messages / (kFreeFraction - 1) + 1));
 }
 
+// The second ring of a direction; a direction that has only one has null pointers here.
+struct SecondRing {
+  layout::Slot* slots = nullptr;
+  std::uint32_t capacity = 0;
+  layout::Word32* hasMemory = nullptr;  // written by the consumer
+  layout::Word64* moved = nullptr;  // written by the producer: 1 + its first position
+};
+
 class RingProducer {
  public:
-  RingProducer(layout::Slot* slots, std::uint32_t capacity,
-               const layout::RingControl& consumer) noexcept
-      : slots_(slots), capacity_(capacity), consumer_(consumer) {}
+  RingProducer(layout::Slot* slots, std::uint32_t capacity, const layout::RingControl& consumer,
+               const SecondRing& second = {}) noexcept
+      : slots_(slots),
+        capacity_(capacity),
+        usable_(second.slots == nullptr ? capacity : capacity - 1),
+        consumer_(consumer),
+        second_(second) {}
 
   // Pushes `body` (at most layout::kInlineBodyBytes) and returns true. If fewer than `reserve` free
   // slots would remain, changes nothing and returns false.
@@ -111,10 +129,11 @@ class RingProducer {
   }
 
   [[nodiscard]] bool hasFree(std::uint32_t count) noexcept {
-    if (pushed_ + count - freedSeen_ <= capacity_) return true;
+    if (pushed_ + count - freedSeen_ <= usable_) return true;
     // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
     freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
-    return pushed_ + count - freedSeen_ <= capacity_;
+    if (pushed_ + count - freedSeen_ <= usable_) return true;
+    return second_.slots != nullptr && tryMove() && count <= usable_;
   }
 
  private:
@@ -124,10 +143,24 @@ class RingProducer {
     return slots_[position & (capacity_ - 1)];
   }
 
-  // Makes this processor the owner of the lines of the next slots, with a write to each that changes
-  // nothing. The transfers of these lines from the consumer's processor overlap; those of messages
-  // do not, because the stores of one message fill the store buffer. (prefetchw has no effect here:
-  // on AMD processors it does not take a line that others share.)
+  // Continues in the second ring, which is empty, if it has memory.
+  bool tryMove() noexcept {
+    // PAIR(second-ring): the consumer has reserved the memory.
+    if (second_.hasMemory->load(std::memory_order_acquire) == 0) return false;
+    auto& last = slot(pushed_);  // the one slot that is not usable
+    second_.moved->store(pushed_ + 1, std::memory_order_relaxed);
+    slots_ = std::exchange(second_.slots, nullptr);
+    capacity_ = usable_ = second_.capacity;
+    freedSeen_ = pushed_;
+    // PAIR(slot-filled): a consumer that sees this sequence continues in the second ring.
+    last.sequence.store(layout::kContinuesInSecondRing | (pushed_ + 1), std::memory_order_release);
+    MPF_STEP(ring_moved);
+    return true;
+  }
+  // Makes this processor the owner of the lines of the next slots, with a write to each that
+  // changes nothing. The transfers of these lines from the consumer's processor overlap; those of
+  // messages do not, because the stores of one message fill the store buffer. (prefetchw had no
+  // effect here: a processor did not take a line with it that it shared with another one.)
   [[gnu::noinline]] void claimLines() noexcept {
     claimed_ = std::min(freedSeen_ + capacity_, pushed_ + kClaimedLines);
     for (auto position = pushed_; position < claimed_; ++position) {
@@ -171,7 +204,9 @@ class RingProducer {
 
   layout::Slot* slots_;
   std::uint64_t capacity_;
+  std::uint64_t usable_;  // slots that may hold messages
   const layout::RingControl& consumer_;
+  SecondRing second_;  // until we have moved there
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
   std::uint64_t claimed_ = 0;  // slots before this position were claimed
@@ -181,12 +216,14 @@ class RingProducer {
 
 class RingConsumer {
  public:
-  RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own) noexcept
-      : slots_(slots), capacity_(capacity), own_(own), first_(slots) {}
+  RingConsumer(layout::Slot* slots, std::uint32_t capacity, layout::RingControl& own,
+               const SecondRing& second = {}) noexcept
+      : slots_(slots), capacity_(capacity), own_(own), second_(second), first_(slots) {}
 
-  [[nodiscard]] bool hasMessage() const noexcept {
-    // PAIR(slot-filled): the message is complete.
-    return first_->sequence.load(std::memory_order_acquire) == taken_ + 1;
+  [[nodiscard]] bool hasMessage() noexcept {
+    return sequence() == taken_ + 1 ||
+           (sequence() == (layout::kContinuesInSecondRing | (taken_ + 1)) && tryMove() &&
+            sequence() == taken_ + 1);
   }
 
   // Counts the next message as taken and copies its envelope. Call it only after hasMessage()
@@ -246,10 +283,24 @@ class RingConsumer {
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
   }
+  // Of the slot of the next message.
+  [[nodiscard]] std::uint64_t sequence() const noexcept {
+    // PAIR(slot-filled): the message is complete.
+    return first_->sequence.load(std::memory_order_acquire);
+  }
+  // Follows the producer into the second ring, unless we have not given it memory.
+  bool tryMove() noexcept {
+    if (second_.slots == nullptr || second_.hasMemory->load(std::memory_order_relaxed) == 0)
+      return false;
+    slots_ = std::exchange(second_.slots, nullptr);
+    capacity_ = second_.capacity;
+    first_ = &slot(taken_);
+    MPF_STEP(ring_followed);
+    return true;
+  }
 
   static constexpr std::uint64_t kLookEvery = 16;  // slots
-  static constexpr std::uint64_t kNear = 64;
-  static constexpr std::uint64_t kDistance = 128;
+  static constexpr std::uint64_t kNear = 64;  // slots; at most a quarter of the ring
   static constexpr std::uint64_t kMaxWaitEvery = 4096;
   static constexpr int kMaxPauses = 100;  // 1 us
 
@@ -265,20 +316,21 @@ class RingConsumer {
   // is about to write; then each message costs both sides a transfer of a line.
   [[gnu::noinline]] void lookAhead() noexcept {
     lookAt_ = taken_ + kLookEvery;
-    if (!isFilledUpTo(taken_ + kNear) && !tryWaitForProducer()) return;
+    const auto near = std::min(kNear, capacity_ / 4);
+    if (!isFilledUpTo(taken_ + near) && !tryWaitForProducer(2 * near)) return;
     for (auto position = taken_; position < lookAt_; ++position)
       __builtin_prefetch(&slot(position));
   }
   [[nodiscard]] bool isFilledUpTo(std::uint64_t end) const noexcept {
     return slot(end - 1).sequence.load(std::memory_order_relaxed) == end;
   }
-  // Waits until the producer is kDistance ahead, as long as it fills slots. A wait in vain makes the
-  // next one rarer: the producer may be waiting for us.
-  bool tryWaitForProducer() noexcept {
+  // Waits until the producer is this distance ahead, as long as it fills slots. After a wait without
+  // success, the next one is made later: the producer may be waiting for us.
+  bool tryWaitForProducer(std::uint64_t distance) noexcept {
     if (taken_ < waitAt_) return false;
     auto end = taken_ + kLookEvery;
-    while (end <= taken_ + kDistance && isFilledSoon(end)) end += kLookEvery;
-    const bool isDistant = end > taken_ + kDistance;
+    while (end <= taken_ + distance && isFilledSoon(end)) end += kLookEvery;
+    const bool isDistant = end > taken_ + distance;
     waitEvery_ = isDistant ? kLookEvery : std::min(2 * waitEvery_, kMaxWaitEvery);
     waitAt_ = taken_ + waitEvery_;
     return isDistant;
@@ -294,6 +346,7 @@ class RingConsumer {
   layout::Slot* slots_;
   std::uint64_t capacity_;
   layout::RingControl& own_;
+  SecondRing second_;  // until we have moved there
   const layout::Slot* first_;  // slot(taken_)
   std::uint64_t taken_ = 0;  // slots
   std::uint64_t freed_ = 0;  // private copy of own_.freed

@@ -149,14 +149,17 @@ void setRights(int fd, const Rights& rights) {
 }
 
 Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
-                        Rights rights) {
+                        Rights rights, std::size_t reservedBytes) {
   Segment segment;
   segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600),
                                 "create a segment in", kDirectory));
   const int fd = segment.file_.get();
   mpf::setRights(fd, rights);
-  if (const int shortage = reserve(fd, bytes); shortage != 0)
-    throwSystemError(shortage, fmt::format("reserve {} bytes in", bytes), kDirectory);
+  if (const int shortage = reserve(fd, reservedBytes); shortage != 0)
+    throwSystemError(shortage, fmt::format("reserve {} bytes in", reservedBytes), kDirectory);
+  if (reservedBytes < bytes)
+    checkCall(::ftruncate(fd, static_cast<off_t>(bytes)), "set the length of a segment in",
+              kDirectory);
   segment.mapping_ = Mapping(fd, bytes, Access::readWrite);
 
   auto& header = segment.sharedHeader();
@@ -174,6 +177,16 @@ Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::
   segment.header_ = header;
   MPF_STEP(segment_created);
   return segment;
+}
+
+bool Segment::tryReserve() const noexcept try {
+  const auto file = openByName(name_, O_RDWR);
+  std::uint64_t found = 0;
+  const auto got =
+      ::pread(file.get(), &found, sizeof found, offsetof(layout::SegmentHeader, incarnation));
+  return got == sizeof found && found == header_.incarnation && reserve(file.get(), bytes()) == 0;
+} catch (const std::bad_alloc&) {
+  return false;
 }
 
 void Segment::lockForLife() {

@@ -44,10 +44,18 @@ class Segment {
 
   Segment() = default;
 
-  // Creates a segment of `bytes` zeroes and fills in the header fields that all kinds share.
+  // Creates a segment of `bytes` zeroes and fills in the header fields that all kinds share. Only
+  // the first `reservedBytes` get memory; the others must not be accessed before tryReserve().
   //   throws  std::system_error; ENOSPC if /dev/shm does not have enough free memory
   static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
-                        Rights rights);
+                        Rights rights, std::size_t reservedBytes);
+  static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
+                        Rights rights) {
+    return create(bytes, kind, backplane, rights, bytes);
+  }
+  // Gives all bytes memory. Opens the file by its name. Returns false if /dev/shm does not have
+  // enough free memory, the process has no file descriptor left, or the name was removed.
+  [[nodiscard]] bool tryReserve() const noexcept;
 
   // Holds the owner's lock until this object is destroyed or the process ends. If a peer truncates
   // the file, the guard grows it again.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The rows of `mpf bench remote` about many clients, and about idle routers.
 #include <deque>
+#include <fmt/format.h>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -16,6 +17,7 @@ namespace mpf::bench {
 namespace {
 
 constexpr auto kAllConnected = std::chrono::seconds(120);
+constexpr auto kReply = std::chrono::seconds(60);
 constexpr auto kGrace = std::chrono::seconds(180);
 
 // Results besides the round trips, in Figures::more. The last three are bytes per client.
@@ -52,21 +54,33 @@ class Clients {
     while (clients_.size() < static_cast<std::size_t>(count)) {
       clients_.emplace_back(dispatcher_, [this](Message&& message) {
         received_ += message.getType() == MessageType::int32 ? 1u : 0u;
+        if (const auto* fate = message.tryAs<RequestFate>()) fate_ = toString(fate->fate);
       });
       clients_.back().bind(kServer, kRemoteLocation);
     }
     const auto limit = Deadline::after(kAllConnected);
     for (auto i = had; i < clients_.size(); ++i) {
       if (!clients_[i].connectWait(limit.left()))
-        throw std::runtime_error("client " + std::to_string(i) +
-                                 " is not connected: " + clients_[i].notConnectedBecause());
+        throw std::runtime_error(fmt::format("client {} of {} is not connected after {} s: {}", i,
+                                             count, kAllConnected.count(),
+                                             clients_[i].notConnectedBecause()));
     }
   }
   void roundTrip(std::size_t client) {
     const auto wanted = received_ + 1;
-    if (clients_[client].send(Int32Message({.value = 1})) != SendResult::sent)
-      throw std::runtime_error("a request could not be sent");
-    while (received_ < wanted) dispatcher_.runOnce();
+    const auto limit = Deadline::after(kReply);
+    if (const auto result = clients_[client].send(Int32Message({.value = 1}));
+        result != SendResult::sent) {
+      throw std::runtime_error(fmt::format("the request of client {} of {} was not sent: {}",
+                                           client, size(), toString(result)));
+    }
+    while (received_ < wanted) {
+      if (!fate_.empty() || limit.hasPassed())
+        throw std::runtime_error(
+            fmt::format("the request of client {} of {} got no reply: {}", client, size(),
+                        fate_.empty() ? fmt::format("none within {} s", kReply.count()) : fate_));
+      dispatcher_.runOnce(limit);
+    }
   }
   [[nodiscard]] std::size_t size() const noexcept { return clients_.size(); }
   [[nodiscard]] const Backplane& backplane() const noexcept { return dispatcher_.backplane(); }
@@ -75,6 +89,7 @@ class Clients {
   Dispatcher dispatcher_;
   std::deque<MessageClient> clients_;
   std::uint64_t received_ = 0;
+  std::string fate_;  // of a request that got no reply
 };
 
 void measureCrowd(const RunContext& context, const RouterPair& routers, Mode mode, int clients) {
@@ -87,20 +102,27 @@ void measureCrowd(const RunContext& context, const RouterPair& routers, Mode mod
 
   auto& figures = context.figures();
   const auto fromNs = Clock::nowNs();
+  context.waitsFor(fmt::format("{} clients to connect", clients));
   crowd.growTo(clients);
   figures.more[connectSeconds] = static_cast<double>(Clock::nowNs() - fromNs) / 1e9;
   // One round trip of each client, because some memory is allocated at the first one.
-  for (std::size_t i = 0; i < crowd.size(); ++i) crowd.roundTrip(i);
+  context.waitsFor(fmt::format("a reply to each of {} clients, for the first time", clients));
+  for (std::size_t i = 0; i < crowd.size(); ++i) {
+    crowd.roundTrip(i);
+    context.got(i + 1);
+  }
   const auto after = memoryOf(routers, crowd.backplane(), servers);
   for (const auto what : {clientsRouter, serversRouter, sharedMemory})
     figures.more[what] = (after[what] - before[what]) / (clients - 1);
 
+  context.waitsFor(fmt::format("a reply to each of {} clients, for the second time", clients));
   const Stopwatch watch;
   const auto begin = Stopwatch::start();
   for (std::size_t i = 0; i < crowd.size(); ++i) {
     const auto from = Stopwatch::start();
     crowd.roundTrip(i);
     figures.latency.add(watch.elapsedNs(from, Stopwatch::stop()));
+    context.got(i + 1);
   }
   figures.count = crowd.size();
   figures.perSecond =

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <new>
@@ -81,6 +82,18 @@ class Child {
   FileDescriptor fd_;
 };
 
+// Why neither process has ended in time.
+std::string lateness(const Control& control, Nanoseconds limit) {
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit).count();
+  auto text = "neither process ended within " + std::to_string(seconds) + " s";
+  const std::string what(control.waitsFor.data(),
+                         ::strnlen(control.waitsFor.data(), control.waitsFor.size() - 1));
+  if (!what.empty())
+    text += "; the requester waited for " + what + ", and had got " +
+            std::to_string(control.got.load(std::memory_order_relaxed));
+  return text;
+}
+
 // Waits until one of the two processes ends and returns its role; nullopt when neither ends in
 // time.
 std::optional<Role> waitForEnd(const Child* serverChild, const Child& requesterChild,
@@ -104,6 +117,12 @@ void RunContext::ready(std::uint16_t port) const noexcept {
   control_.port.store(port, std::memory_order_relaxed);
   // PAIR(bench-ready): the requester sees everything that the server did before.
   control_.ready.store(1, std::memory_order_release);
+}
+
+void RunContext::waitsFor(std::string_view what) const noexcept {
+  got(0);
+  control_.waitsFor.fill('\0');
+  what.copy(control_.waitsFor.data(), control_.waitsFor.size() - 1);
 }
 
 Outcome Stage::run(const Workload& workload) const {
@@ -130,7 +149,7 @@ Outcome Stage::run(const Workload& workload) const {
   Outcome outcome;
   const auto first = waitForEnd(serverChild.get(), requesterChild, Deadline::after(limit));
   if (!first) {
-    outcome.error = "neither process ended within the time limit";
+    outcome.error = lateness(control, limit);
   } else if (*first == requester) {
     outcome.error = requesterChild.ending("requester", control.errors[requester]);
     if (serverChild && workload.stopsByItself && outcome.error.empty()) {

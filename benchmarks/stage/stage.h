@@ -19,6 +19,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -79,6 +80,9 @@ struct Control {
   alignas(kLineBytes) std::atomic<std::uint64_t> consumed{0};
   alignas(kLineBytes) Figures figures;  // written by the requester
   std::array<std::array<char, 240>, 2> errors{};  // each process writes its own
+  // Written by the requester: what it waits for, and how many of them it has got.
+  std::array<char, 120> waitsFor{};
+  std::atomic<std::uint64_t> got{0};
 };
 
 // The interface between a process of a measurement and the Stage.
@@ -105,6 +109,13 @@ class RunContext {
   }
   // Called by the requester: the next request is the last one.
   void stop() const noexcept { control_.stopping.store(1, std::memory_order_relaxed); }
+
+  // Called by the requester: what it waits for from now on, for the message that it did not end in
+  // time; and how many of them it has got.
+  void waitsFor(std::string_view what) const noexcept;
+  void got(std::uint64_t count) const noexcept {
+    control_.got.store(count, std::memory_order_relaxed);
+  }
 
   // Called by the server: it has received `count` one-way messages so far.
   void consumed(std::uint64_t count) const noexcept {

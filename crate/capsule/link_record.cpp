@@ -3,7 +3,6 @@
 
 #include <unistd.h>
 
-#include <bit>
 #include <cstring>
 #include <fmt/format.h>
 #include <set>
@@ -27,10 +26,6 @@ namespace {
 
 constexpr std::size_t kMostBody = std::size_t{64} << 10;  // larger bodies are not shown
 constexpr std::size_t kMostFields = 1024;  // larger bodies are shown as text, which is shortened
-
-bool isRing(std::uint32_t slots) noexcept {
-  return std::has_single_bit(slots) && slots <= layout::kMaxRingSlots;
-}
 
 std::vector<std::byte> readChunk(const WitnessedLink& link, const RingMessage& message) {
   const auto inlined = message.inlineBody();
@@ -86,12 +81,11 @@ Tree describe(const WitnessedLink& link, const RingMessage& message) {
 
 // One ring of the link.
 struct Ring {
-  Ring(const SegmentImage& image, std::size_t offset, std::uint32_t slots,
-       const layout::RingControl& control, std::uint64_t sentSoFar)
+  Ring(std::span<const layout::Slot> slots, const layout::RingControl& control,
+       std::uint64_t sentSoFar)
       : words{value(control.freed), value(control.taken), sentSoFar},
-        view(RingView::of(image.slots(offset, slots), words, image.slots(offset, slots),
-                          words.freed)),
-        hasLost(view.end > slots) {}
+        view(RingView::of(slots, words, slots, words.freed)),
+        hasLost(view.end > slots.size()) {}
 
   [[nodiscard]] Tree summary() const {
     return {{"sent", words.sent}, {"taken", words.taken}, {"waiting", words.waiting()}};
@@ -168,16 +162,9 @@ void read(LinkRecord& record, const WitnessedLink& link, std::size_t last) {
   record.tree["serverState"] = tools::toString(value(control.serverState));
   record.tree["queueSize"] = header.queueSize;
   record.tree["refused"] = value(control.clientRefused);
-  if (!isRing(header.queueSlots) || !isRing(header.replySlots) ||
-      image.bytes().size() < layout::linkBytes(header.queueSlots, header.replySlots)) {
-    throw SegmentError(link.name + ": its rings do not fit its file");
-  }
-  const auto replies = layout::kLinkRingsOffset + header.queueSlots * sizeof(layout::Slot);
-  addMessages(record, link,
-              Ring(image, layout::kLinkRingsOffset, header.queueSlots, control.requests,
-                   value(control.clientSent)),
-              Ring(image, replies, header.replySlots, control.replies, value(control.serverSent)),
-              last);
+  if (!image.hasRings()) throw SegmentError(link.name + ": its rings do not fit its file");
+  addMessages(record, link, Ring(image.requestSlots(), control.requests, value(control.clientSent)),
+              Ring(image.replySlots(), control.replies, value(control.serverSent)), last);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ std::vector<HeldRequest> HeldRequests::takeExpired() {
   return taken;
 }
 
-std::deque<HeldRequest> HeldRequests::takeAll() {
+std::vector<HeldRequest> HeldRequests::takeAll() {
   release(bytes_);
   return std::exchange(requests_, {});
 }

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <vector>
 
 #include <mpf/clock.h>
@@ -42,7 +41,7 @@ class HeldRequests {
   [[nodiscard]] bool tryHold(HeldRequest&& request);
   // Remove and return requests, in the order in which they came.
   [[nodiscard]] std::vector<HeldRequest> takeExpired();
-  [[nodiscard]] std::deque<HeldRequest> takeAll();
+  [[nodiscard]] std::vector<HeldRequest> takeAll();
   // The earliest deadline of a held request.
   [[nodiscard]] Deadline nextDeadline() const noexcept;
 
@@ -52,7 +51,7 @@ class HeldRequests {
   std::uint32_t maxRequests_;
   std::size_t& totalBytes_;
   std::size_t bytes_ = 0;
-  std::deque<HeldRequest> requests_;
+  std::vector<HeldRequest> requests_;
 };
 
 }  // namespace mpf::router

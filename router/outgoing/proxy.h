@@ -17,7 +17,7 @@
 //          This bounds the replies that are held for a client that does not receive them.
 #pragma once
 
-#include <deque>
+#include <list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -80,7 +80,7 @@ class Proxy {
     std::uint32_t owed = 0;  // requests that have not ended
     ReplyWindow window{0};  // as sent in `open`
     bool heldQueueFull = false;  // `held` contains a connectQueueFull
-    std::deque<Held> held;  // replies for which the client has no room
+    std::list<Held> held;  // replies for which the client has no room
     std::optional<std::string> refusal;  // why the far server does not accept it
     Deadline openAgain = Deadline::never();  // after a refusal: when it may be opened again
   };

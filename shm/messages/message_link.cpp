@@ -68,7 +68,7 @@ void MessageLink::discard(Envelope envelope) noexcept {
 }
 
 LinkSend MessageLink::trySendBodyLocked(Envelope envelope, Message& message,
-                                        Link::Limits limits) noexcept {
+                                        const Link::Limits& limits) noexcept {
   const bool ours = message.lender() == this;
   const auto result = link_->trySend(envelope, message.body(), limits);
   if (result == LinkSend::sentInPlace) {

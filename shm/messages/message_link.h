@@ -90,7 +90,8 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   //   throws  ChunkUnavailable
   Message readChunk(Envelope envelope);
   // For a body outside the handle.
-  LinkSend trySendBodyLocked(Envelope envelope, Message& message, Link::Limits limits) noexcept;
+  LinkSend trySendBodyLocked(Envelope envelope, Message& message,
+                             const Link::Limits& limits) noexcept;
   void lendOne() noexcept;
   void endLending() noexcept;
 

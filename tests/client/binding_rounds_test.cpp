@@ -122,5 +122,46 @@ TEST_F(BindingRoundsTest, HandlingOfDueBindingsSetsTheTimerOfTheNext) {
   EXPECT_EQ(parts_.timer.due().ns(), binding->dueNs());
 }
 
+TEST_F(BindingRoundsTest, HandleEachBindingWhenItIsDueAndNoOther) {
+  const MessageServer server(backplane_, "dac");
+  const auto first = add();
+  const auto removed = add();
+  const auto second = add();
+  for (const auto& binding : {first, removed, second}) binding->tryConnect();
+  const auto firstNs = first->dueNs();
+  const auto removedNs = removed->dueNs();
+  const auto secondNs = second->dueNs();
+  ASSERT_LT(firstNs, secondNs);
+  rounds_.remove(removed);
+
+  rounds_.handleDue();
+  while (first->dueNs() == firstNs || second->dueNs() == secondNs) {
+    EXPECT_LE(parts_.timer.due().ns(), std::max(firstNs, secondNs));
+    rounds_.handleDue();
+  }
+
+  EXPECT_GT(first->dueNs(), firstNs) << "it rings again later";
+  EXPECT_GT(second->dueNs(), secondNs);
+  EXPECT_EQ(removed->dueNs(), removedNs);
+  rounds_.handleDue();
+  EXPECT_EQ(parts_.timer.due().ns(), std::min(first->dueNs(), second->dueNs()));
+}
+
+// Its time was lowered before the command that adds it.
+TEST_F(BindingRoundsTest, ABindingIsScheduledWhenItIsAdded) {
+  const MessageServer server(backplane_, "dac");
+  bindings_.push_back(std::make_shared<Binding>(parts_, [](Message&&) {}));
+  const auto& binding = bindings_.back();
+  binding->setServer("dac", 0);
+  binding->tryConnect();
+  rounds_.handleDue();
+  parts_.timer.reset();
+
+  rounds_.add(binding);
+  rounds_.handleDue();
+
+  EXPECT_EQ(parts_.timer.due().ns(), binding->dueNs());
+}
+
 }  // namespace
 }  // namespace mpf::test

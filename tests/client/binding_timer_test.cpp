@@ -2,6 +2,7 @@
 // BindingTimer and the DispatcherTimer that it lowers.
 #include "client/binding_timer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <thread>
 
@@ -60,6 +61,24 @@ TEST_F(BindingTimerTest, TheThreadThatWaitsDoesNotWakeItself) {
   first_.wakeAt(300);
 
   EXPECT_FALSE(endpoint_.takeLocalEvent());
+}
+
+TEST_F(BindingTimerTest, ALoweredTimeIsReportedOnceUntilItIsRead) {
+  auto* const owner = reinterpret_cast<Binding*>(&first_);  // never dereferenced
+  BindingTimer timer(dispatcher_, owner);
+  EXPECT_THAT(*dispatcher_.takeLowered(), testing::IsEmpty());
+
+  timer.wakeAt(300);
+  timer.wakeAt(200);
+
+  EXPECT_THAT(*dispatcher_.takeLowered(), testing::ElementsAre(owner));
+  timer.wakeAt(150);
+  EXPECT_THAT(*dispatcher_.takeLowered(), testing::IsEmpty()) << "the time was not read yet";
+  EXPECT_EQ(timer.takeReported(), 150);
+  timer.wakeAt(160);
+  EXPECT_THAT(*dispatcher_.takeLowered(), testing::IsEmpty()) << "not lowered";
+  timer.wakeAt(100);
+  EXPECT_THAT(*dispatcher_.takeLowered(), testing::ElementsAre(owner));
 }
 
 TEST_F(BindingTimerTest, AResetForgetsTheTime) {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "client/request_table.h"
 
+#include <atomic>
 #include <gtest/gtest.h>
+#include <set>
+#include <thread>
 #include <vector>
 
 namespace mpf::test {
@@ -108,6 +111,89 @@ TEST(RequestTable, VisitsTheOutstandingRequests) {
   table.forEach([&](Request& request) { ids.push_back(request.id.load()); });
 
   EXPECT_EQ(ids, (std::vector<std::uint32_t>{1, 3}));
+}
+
+// A table that has grown from 4 to 16 entries while requests are in it.
+class GrownTable : public testing::Test {
+ protected:
+  GrownTable() {
+    for (int i = 0; i < 4; ++i) early_.push_back(&addNew(table_));
+    EXPECT_EQ(table_.tryReserve(none_), nullptr);
+    EXPECT_TRUE(table_.tryAllow(12));
+  }
+  RequestTable table_{4};
+  std::vector<Request*> early_;
+  std::uint32_t none_ = 0;
+};
+
+TEST_F(GrownTable, HasTheRequestsOfBeforeAndNewOnes) {
+  std::vector<Request*> all = early_;
+  for (int i = 0; i < 8; ++i) all.push_back(&addNew(table_));
+
+  EXPECT_EQ(table_.tryReserve(none_), nullptr);
+  EXPECT_EQ(table_.outstanding(), 12U);
+  for (auto* request : all) EXPECT_EQ(table_.find(request->id.load()), request);
+  int visited = 0;
+  table_.forEach([&](Request&) { ++visited; });
+  EXPECT_EQ(visited, 12);
+  for (auto* request : all) table_.end(*request);
+  EXPECT_EQ(table_.outstanding(), 0U);
+}
+
+// The server identifies requests by their places among 16.
+TEST_F(GrownTable, NoTwoRequestsHaveTheSamePlace) {
+  const auto kept = early_[1]->id.load();
+  for (int i : {0, 2, 3}) table_.end(*early_[static_cast<std::size_t>(i)]);
+
+  for (int i = 0; i < 1000; ++i) {
+    auto& request = addNew(table_);
+    ASSERT_NE(request.id.load() % 16, kept % 16);
+    table_.end(request);
+    ASSERT_EQ(table_.find(kept), early_[1]);
+  }
+  std::uint32_t samePlace = kept + 16;
+  EXPECT_EQ(table_.tryReserve(samePlace), nullptr);
+  table_.end(*early_[1]);
+  EXPECT_NE(table_.tryReserve(samePlace), nullptr);
+  std::set<std::uint32_t> places;
+  for (int i = 0; i < 16; ++i) {
+    auto& request = addNew(table_);
+    places.insert(request.id.load() % 16);
+    table_.end(request);
+  }
+  EXPECT_EQ(places.size(), 16U) << "no place is lost";
+}
+
+// The dispatcher's thread looks requests up while another thread makes the table grow.
+TEST(RequestTable, GrowsWhileRequestsEnd) {
+  for (int round = 0; round < 200; ++round) {
+    RequestTable table(4);
+    std::atomic<std::uint32_t> newest{0};
+    std::thread dispatcher([&] {
+      for (std::uint32_t id = 1; id <= 100; ++id) {
+        while (newest.load() < id) std::this_thread::yield();
+        auto* request = table.find(id);
+        ASSERT_NE(request, nullptr);
+        ASSERT_EQ(request->clientType, static_cast<std::int32_t>(id));
+        table.end(*request);
+      }
+    });
+    for (std::uint32_t sent = 0; sent < 100;) {
+      std::uint32_t id = 0;
+      auto* request = table.tryReserve(id);
+      if (request == nullptr) {
+        ASSERT_TRUE(sent <= 20 || table.tryAllow(64));
+        std::this_thread::yield();
+        continue;
+      }
+      request->clientType = static_cast<std::int32_t>(id);
+      table.add(*request, id);
+      newest.store(id);
+      ++sent;
+    }
+    dispatcher.join();
+    ASSERT_EQ(table.outstanding(), 0U);
+  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "client/round.h"
 
 #include <gtest/gtest.h>
+#include <set>
 
 namespace mpf::test {
 namespace {
@@ -27,7 +28,7 @@ bool visit(int& visits) {
 }
 
 TEST_F(RoundTest, VisitsEachBindingOnceInSteps) {
-  round_.begin(all_);
+  round_.begin({all_.begin(), all_.end()});
 
   round_.resume(visit);
   EXPECT_EQ(visits(), Round<int>::kPerStep);
@@ -40,7 +41,7 @@ TEST_F(RoundTest, VisitsEachBindingOnceInSteps) {
 }
 
 TEST_F(RoundTest, BindingsWithoutWorkDoNotCount) {
-  round_.begin(all_);
+  round_.begin({all_.begin(), all_.end()});
 
   round_.resume([](int& visits) {
     ++visits;
@@ -52,7 +53,7 @@ TEST_F(RoundTest, BindingsWithoutWorkDoNotCount) {
 }
 
 TEST_F(RoundTest, SkipsBindingsThatWereDestroyed) {
-  round_.begin(all_);
+  round_.begin({all_.begin(), all_.end()});
   while (all_.size() > 1) all_.erase(all_.begin());
 
   round_.resume(visit);
@@ -62,7 +63,7 @@ TEST_F(RoundTest, SkipsBindingsThatWereDestroyed) {
 }
 
 TEST_F(RoundTest, ContinuesAfterABindingWhoseCallbackThrew) {
-  round_.begin(all_);
+  round_.begin({all_.begin(), all_.end()});
 
   EXPECT_THROW(round_.resume([](int& visits) -> bool {
     ++visits;
@@ -75,7 +76,7 @@ TEST_F(RoundTest, ContinuesAfterABindingWhoseCallbackThrew) {
 }
 
 TEST_F(RoundTest, ACallbackMayContinueTheRound) {
-  round_.begin(all_);
+  round_.begin({all_.begin(), all_.end()});
 
   round_.resume([&](int& visits) {
     if (!round_.isOver()) round_.resume(visit);

@@ -18,7 +18,7 @@ namespace {
 std::span<const std::byte> behind(Link& link) {
   const auto* begin =
       reinterpret_cast<const std::byte*>(&link.control()) - layout::kLinkControlOffset;
-  const auto bytes = layout::linkBytes(link.header().queueSlots, link.header().replySlots);
+  const auto bytes = link.header().totalBytes;
   const auto pages = (bytes + layout::kPageBytes - 1) / layout::kPageBytes * layout::kPageBytes;
   return {begin + bytes, pages - bytes};
 }

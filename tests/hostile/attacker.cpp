@@ -89,7 +89,9 @@ void Attacker::writeSlot(Link& link) {
                              static_cast<std::uint32_t>(random_.below(300)),
                              static_cast<std::uint32_t>(random_.below(3)), 0};
   std::memcpy(slot.body.data(), &ref, sizeof ref);
-  slot.sequence.store(position_ + 1, std::memory_order_relaxed);
+  // Sometimes says that the replies continue in the second ring.
+  const auto continues = random_.oneIn(16) ? layout::kContinuesInSecondRing : 0;
+  slot.sequence.store(continues | (position_ + 1), std::memory_order_relaxed);
   position_ += random_.below(3);
   link.notifyPeer();
 }
@@ -134,9 +136,12 @@ void Attacker::goBack(Link& link) {
   auto& watch = isClient ? control.replyWatch : control.requestWatch;
   watch.store(static_cast<layout::Watch>(random_.below(4)), std::memory_order_relaxed);
   returns.chunks[random_.below(returns.chunks.size())].store(
-      random_.oneIn(2) ? layout::kReturnsFanOut | random_.below(8)
-                       : random_.below(4) << 32 | random_.below(40),
+      static_cast<std::uint32_t>(random_.oneIn(2) ? layout::kReturnsFanOut | random_.below(8)
+                                                  : random_.below(4) << 16 | random_.below(40)),
       std::memory_order_relaxed);
+  control.hasMoreReplies.store(static_cast<std::uint32_t>(random_.below(2)),
+                               std::memory_order_relaxed);
+  control.repliesMoved.store(random_.oneIn(2) ? 0 : random_.nasty(), std::memory_order_relaxed);
   returns.returned.store(random_.oneIn(4) ? random_.nasty() : random_.below(1000),
                          std::memory_order_relaxed);
   if (random_.oneIn(2)) writeSlot(link);

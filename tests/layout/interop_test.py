@@ -35,6 +35,25 @@ class OldClientOfTodaysServer(Interop):
 
         self.assertEqual({reply.flags for reply in connection.received}, {2})
 
+    def test_gets_more_replies_than_fit_into_the_first_ring(self):
+        connection = self.connected(self.client)
+        header = connection.link.header
+        numbers = []
+        for i in range(header["queueSize"]):
+            connection.send(messages.FLOAT64, messages.float64(i))
+            numbers.append(i + 1)
+        self.assertEqual(connection.link.control["hasMoreReplies"], 1)
+        while connection.link.control["serverSent"] != len(numbers):  # nothing is taken
+            os.sched_yield()
+        self.assertNotEqual(connection.link.control["repliesMoved"], 0)
+
+        run_until(lambda: len(connection.received) == len(numbers), self.client)
+
+        self.assertEqual([messages.value(one) for one in connection.received], numbers)
+        self.assertEqual(
+            self.ask(self.client, connection, messages.FLOAT64, messages.float64(7)), 8
+        )
+
     def test_is_woken_however_it_sleeps(self):
         connection = self.connected(self.client)
         for how, sleep in SLEEPS.items():

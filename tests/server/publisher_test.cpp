@@ -254,7 +254,8 @@ TEST_F(PublisherTest, InvalidReturnsOfOneClientChangeNothingForAnother) {
   std::vector<std::pair<Chunk, double>> held;
   for (int i = 0; i < 3000; ++i) {
     for (int writes = 0; writes < 4; ++writes) {
-      const auto word = random.oneIn(4) ? random.nasty() : layout::kReturnsFanOut | random.below(8);
+      const auto word = static_cast<std::uint32_t>(
+          random.oneIn(4) ? random.nasty() : layout::kReturnsFanOut | random.below(8));
       returns.chunks[random.below(returns.chunks.size())].store(word, std::memory_order_relaxed);
     }
     returns.returned.fetch_add(random.oneIn(50) ? random.nasty() : random.below(3),

@@ -43,6 +43,25 @@ class ServerCoreTest : public ShmTest {
   Link* link_ = createLink();
 };
 
+// Ids that differ only in bits above those of the first, small table of unanswered requests.
+TEST_F(ServerCoreTest, AcceptsRequestsWhoseIdsDifferInAnyBitOfTheLargestNumberOfRequests) {
+  std::vector<Message> held;
+  for (const std::uint32_t id : {1u, 17u, 2u, 33u, 18u, 129u}) {
+    sendRequest(id);
+    held.push_back(server_->receive());
+    ASSERT_TRUE(held.back()) << id;
+  }
+
+  for (auto& request : held) EXPECT_EQ(server_->replies().send(request), ReplyResult::sent);
+  sendRequest(1 + 256);
+  held.front() = server_->receive();
+  ASSERT_TRUE(held.front());
+  sendRequest(1);
+
+  EXPECT_FALSE(server_->receive());
+  EXPECT_FALSE(isConnected()) << "both requests have the same place in the largest table";
+}
+
 TEST_F(ServerCoreTest, ReturnsEachRequestOnce) {
   sendRequest(1);
   sendRequest(2);

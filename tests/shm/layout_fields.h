@@ -56,6 +56,7 @@ inline nlohmann::json layoutFields() {
                               MPF_FIELD(chunkBytes),
                               MPF_FIELD(chunkCount),
                               MPF_FIELD(bulkSide),
+                              MPF_FIELD(moreReplySlots),
                               MPF_FIELD(reserved)}}};
   }
   {
@@ -90,9 +91,10 @@ inline nlohmann::json layoutFields() {
         {"bytes", sizeof(Struct)},
         {"fields",
          {MPF_FIELD(clientState), MPF_FIELD(serverState), MPF_FIELD(requestWatch),
-          MPF_FIELD(replyWatch), MPF_FIELD(serverIndex), MPF_FIELD(replies), MPF_FIELD(clientSent),
-          MPF_FIELD(clientRefused), MPF_FIELD(clientUnanswered), MPF_FIELD(requests),
-          MPF_FIELD(serverSent), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
+          MPF_FIELD(replyWatch), MPF_FIELD(serverIndex), MPF_FIELD(hasMoreReplies),
+          MPF_FIELD(replies), MPF_FIELD(clientSent), MPF_FIELD(clientRefused),
+          MPF_FIELD(clientUnanswered), MPF_FIELD(requests), MPF_FIELD(serverSent),
+          MPF_FIELD(repliesMoved), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
   }
   {
     using Struct = RingControl;
@@ -169,9 +171,11 @@ inline nlohmann::json layoutConstants() {
           {"maxLinks", kMaxLinks},
           {"maxRingSlots", kMaxRingSlots},
           {"maxMessageSlots", kMaxMessageSlots},
+          {"continuesInSecondRing", kContinuesInSecondRing},
           {"inlineBodyBytes", kInlineBodyBytes},
           {"knocks", kKnocks},
           {"returnSlots", kReturnSlots},
+          {"returnsFanOut", kReturnsFanOut},
           {"histogramBuckets", kHistogramBuckets},
           {"routerLinesOffset", kRouterLinesOffset},
           {"routerLines", kRouterLines}};

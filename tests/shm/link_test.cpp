@@ -244,6 +244,8 @@ INSTANTIATE_TEST_SUITE_P(Invalid, Geometries,
                                          [](Header& header) { header.queueSlots *= 2; },
                                          [](Header& header) { header.replySlots = UINT32_MAX; },
                                          [](Header& header) { header.replySlots /= 2; },
+                                         [](Header& header) { header.moreReplySlots *= 2; },
+                                         [](Header& header) { header.moreReplySlots = 64; },
                                          [](Header& header) { header.maxOutstanding = UINT32_MAX; },
                                          [](Header& header) { ++header.serverWindow; },
                                          [](Header& header) { ++header.maxPoolBytes; },
@@ -251,8 +253,7 @@ INSTANTIATE_TEST_SUITE_P(Invalid, Geometries,
 
 TEST_F(LinkTest, RefusesALinkFileThatIsTooShortForItsRings) {
   const auto link = makeLink();
-  const auto bytes =
-      layout::linkBytes(link.client.header().queueSlots, link.client.header().replySlots) - 1;
+  const auto bytes = link.client.header().totalBytes - 1;
   Segment::tryOpen(link.client.name(), layout::SegmentKind::link, Segment::Access::readWrite)
       ->sharedHeader()
       .totalBytes = bytes;

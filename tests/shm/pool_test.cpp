@@ -314,7 +314,8 @@ TEST_F(PoolTest, NoChunkHasTwoHoldersIfTheBorrowerWritesInvalidData) {
         break;
       case 4:
         returns_.chunks[random.below(layout::kReturnSlots)].store(
-            random.below(8) << 32 | random.below(8), std::memory_order_relaxed);
+            static_cast<std::uint32_t>(random.below(8) << 16 | random.below(8)),
+            std::memory_order_relaxed);
         break;
       default:
         returns_.returned.store(random.nasty(), std::memory_order_relaxed);

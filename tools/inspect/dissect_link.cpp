@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <bit>
 #include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
@@ -110,21 +109,19 @@ Tree dissectMessage(const RingMessage& message, const Beside& beside, bool raw) 
 }
 
 struct RingPlace {
-  std::size_t offset;
-  std::uint32_t slots;
+  std::span<const layout::Slot> slots;
+  std::span<const layout::Slot> laterSlots;
   const layout::RingControl& control;
   const layout::RingControl& laterControl;
   layout::Watch watch;
   std::uint64_t sent;
 };
 
-Tree dissectRing(const RingPlace& place, const SegmentImage& image, const SegmentImage& later,
-                 const Beside& beside, const DissectOptions& options) {
+Tree dissectRing(const RingPlace& place, const Beside& beside, const DissectOptions& options) {
   const RingWords words{said(place.control.freed), said(place.control.taken), place.sent};
   const auto view =
-      RingView::of(image.slots(place.offset, place.slots), words,
-                   later.slots(place.offset, place.slots), said(place.laterControl.freed));
-  Tree tree{{"slots", place.slots},
+      RingView::of(place.slots, words, place.laterSlots, said(place.laterControl.freed));
+  Tree tree{{"slots", place.slots.size()},
             {"sent", words.sent},
             {"taken", words.taken},
             {"waiting", words.waiting()},
@@ -159,10 +156,6 @@ Tree dissectPool(std::uint32_t side, const layout::ReturnRing& returns, const Be
   return tree;
 }
 
-bool isRing(std::uint32_t slots) noexcept {
-  return std::has_single_bit(slots) && slots <= layout::kMaxRingSlots;
-}
-
 }  // namespace
 
 std::string hexDigits(std::span<const std::byte> bytes) {
@@ -195,14 +188,10 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
                     {"max_pool_bytes", header.maxPoolBytes}};
   const Beside beside{path, segments::text(header.backplane), header.incarnation,
                       header.serverWindow};
-  if (!isRing(header.queueSlots) || !isRing(header.replySlots)) {
+  if (!image.hasRings()) {
     tree["problem"] =
-        fmt::format("rings of {} and {} slots are invalid", header.queueSlots, header.replySlots);
-    return;
-  }
-  if (image.bytes().size() < layout::linkBytes(header.queueSlots, header.replySlots)) {
-    tree["problem"] = fmt::format("{} bytes are too few for rings of {} and {} slots",
-                                  image.bytes().size(), header.queueSlots, header.replySlots);
+        fmt::format("rings of {}, {} and {} slots do not fit a file of {} bytes", header.queueSlots,
+                    header.replySlots, header.moreReplySlots, image.bytes().size());
     return;
   }
   try {
@@ -213,15 +202,19 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
   }
   // A second copy shows which messages were overwritten while the first copy was made.
   auto again = SegmentImage::tryReadFile(path);
-  const auto& later = again && again->bytes().size() == image.bytes().size() ? *again : image;
-  const auto replies = layout::kLinkRingsOffset + header.queueSlots * sizeof(layout::Slot);
+  const bool isComparable = again && again->bytes().size() == image.bytes().size() &&
+                            again->hasRings() &&
+                            again->requestSlots().size() == image.requestSlots().size() &&
+                            again->replySlots().size() == image.replySlots().size();
+  const auto& later = isComparable ? *again : image;
   tree["requests"] =
-      dissectRing({layout::kLinkRingsOffset, header.queueSlots, control.requests,
+      dissectRing({image.requestSlots(), later.requestSlots(), control.requests,
                    later.link().requests, control.requestWatch, said(control.clientSent)},
-                  image, later, beside, options);
-  tree["replies"] = dissectRing({replies, header.replySlots, control.replies, later.link().replies,
-                                 control.replyWatch, said(control.serverSent)},
-                                image, later, beside, options);
+                  beside, options);
+  tree["replies"] =
+      dissectRing({image.replySlots(), later.replySlots(), control.replies, later.link().replies,
+                   control.replyWatch, said(control.serverSent)},
+                  beside, options);
   tree["client_pool"] = dissectPool(0, control.requestChunks, beside);
   tree["server_pool"] = dissectPool(1, control.replyChunks, beside);
 }

@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 #include <fmt/format.h>
 
 #include <mpf/file_descriptor.h>
@@ -71,6 +73,7 @@ SegmentImage SegmentImage::readOpen(int file, const std::string& path,
         fmt::format("{}: truncated, {} bytes are too few for a header", path, image.bytesRead_));
   }
   segments::check(image.header(), image.fileBytes_, kind.value_or(image.header().kind), path);
+  if (image.header().kind == layout::SegmentKind::link) image.joinReplyRings();
   return image;
 }
 
@@ -81,10 +84,49 @@ std::span<const layout::RouterLine> SegmentImage::routerLines() const noexcept {
           std::min<std::size_t>(rows, layout::kRouterLines)};
 }
 
-std::span<const layout::Slot> SegmentImage::slots(std::size_t offset,
-                                                  std::size_t count) const noexcept {
-  if (offset % sizeof(layout::Slot) != 0 || offset >= bytesRead_) return {};
-  return {&at<layout::Slot>(offset), std::min(count, (bytesRead_ - offset) / sizeof(layout::Slot))};
+bool SegmentImage::hasRings() const noexcept {
+  const auto isRing = [](std::uint32_t slots) {
+    return std::has_single_bit(slots) && slots >= 16 && slots <= layout::kMaxRingSlots;
+  };
+  const auto& known = header();
+  return isRing(known.queueSlots) && isRing(known.replySlots) &&
+         (known.moreReplySlots == 0 || isRing(known.moreReplySlots)) &&
+         bytesRead_ >= layout::linkBytes(known.queueSlots, known.replySlots, known.moreReplySlots);
+}
+
+std::span<layout::Slot> SegmentImage::slots(std::size_t first, std::size_t count) const noexcept {
+  auto* const bytes = reinterpret_cast<std::byte*>(blocks_.get()) + layout::kLinkRingsOffset;
+  return {reinterpret_cast<layout::Slot*>(bytes) + first, count};
+}
+
+std::span<const layout::Slot> SegmentImage::requestSlots() const noexcept {
+  return slots(0, header().queueSlots);
+}
+
+std::span<const layout::Slot> SegmentImage::replySlots() const noexcept {
+  const auto& known = header();
+  const bool hasMoved =
+      known.moreReplySlots != 0 && link().repliesMoved.load(std::memory_order_relaxed) != 0;
+  return hasMoved ? slots(std::size_t{known.queueSlots} + known.replySlots, known.moreReplySlots)
+                  : slots(known.queueSlots, known.replySlots);
+}
+
+// Copies the messages of the first ring to the places that their positions have in the second one.
+// A slot of the second ring that has been used keeps its message: it is newer.
+void SegmentImage::joinReplyRings() noexcept {
+  const auto& known = header();
+  const auto moved = link().repliesMoved.load(std::memory_order_relaxed);
+  if (!hasRings() || known.moreReplySlots == 0 || moved == 0) return;
+  const auto first = slots(known.queueSlots, known.replySlots);
+  const auto second = slots(std::size_t{known.queueSlots} + known.replySlots, known.moreReplySlots);
+  const layout::Slot empty{};
+  const auto end = moved - 1;
+  for (auto position = end - std::min<std::uint64_t>(end, first.size() - 1); position < end;
+       ++position) {
+    auto* const to = static_cast<void*>(&second[position % second.size()]);
+    if (std::memcmp(to, static_cast<const void*>(&empty), sizeof empty) != 0) continue;
+    std::memcpy(to, static_cast<const void*>(&first[position % first.size()]), sizeof empty);
+  }
 }
 
 }  // namespace mpf::tools

@@ -23,7 +23,7 @@ class SegmentImage {
   // The largest segment of any kind, not counting the chunks of a pool: a link with the longest
   // rings.
   static constexpr std::size_t kMostBytes =
-      layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots);
+      layout::linkBytes(layout::kMaxRingSlots, layout::kMaxRingSlots, layout::kMaxRingSlots);
 
   // Up to `bytes` of the segment; bytes behind the end of the file are zero. nullopt when no
   // segment of that name exists (any more).
@@ -55,9 +55,12 @@ class SegmentImage {
   }
   // The rows of a router, as far as the copy contains them.
   [[nodiscard]] std::span<const layout::RouterLine> routerLines() const noexcept;
-  // The slots of a link that begin at `offset`, as far as the copy contains them.
-  [[nodiscard]] std::span<const layout::Slot> slots(std::size_t offset,
-                                                    std::size_t count) const noexcept;
+  // Whether the lengths of the rings of a link are valid, and the copy contains all of them.
+  [[nodiscard]] bool hasRings() const noexcept;
+  // The rings of a link that has them. Replies that continue in the second ring appear as one ring,
+  // with those of the first one that the second one has not overwritten.
+  [[nodiscard]] std::span<const layout::Slot> requestSlots() const noexcept;
+  [[nodiscard]] std::span<const layout::Slot> replySlots() const noexcept;
   // The bytes that were read.
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
     return {reinterpret_cast<const std::byte*>(blocks_.get()), bytesRead_};
@@ -65,6 +68,9 @@ class SegmentImage {
   [[nodiscard]] std::uint64_t fileBytes() const noexcept { return fileBytes_; }
 
  private:
+  // Slots of a link, of all rings together.
+  [[nodiscard]] std::span<layout::Slot> slots(std::size_t first, std::size_t count) const noexcept;
+  void joinReplyRings() noexcept;
   // Reads up to `bytes` of a file; nullopt when it does not exist. Without `kind`, any kind will
   // do.
   static std::optional<SegmentImage> tryLoad(const std::string& path,

@@ -44,7 +44,9 @@ std::unique_ptr<LinkFollower> LinkFollower::tryOpen(const std::string& backplane
     return std::has_single_bit(slots) && slots >= 16 && slots <= layout::kMaxRingSlots;
   };
   if (!isRing(header.queueSlots) || !isRing(header.replySlots) ||
-      segment->bytes() < layout::linkBytes(header.queueSlots, header.replySlots)) {
+      (header.moreReplySlots != 0 && !isRing(header.moreReplySlots)) ||
+      segment->bytes() <
+          layout::linkBytes(header.queueSlots, header.replySlots, header.moreReplySlots)) {
     throw SegmentError(segments::path(name) + ": not a link: its rings do not fit its file");
   }
   return std::unique_ptr<LinkFollower>(new LinkFollower(backplane, std::move(*segment), from));
@@ -61,13 +63,15 @@ LinkFollower::Side LinkFollower::begin(Direction direction, FollowFrom from) con
   const auto& control = controlOf(segment_);
   const bool isRequest = direction == Direction::request;
   const auto* slots = &segment_.at<layout::Slot>(layout::kLinkRingsOffset);
+  const auto* replies = slots + header().queueSlots;
   const auto& sent = isRequest ? control.clientSent : control.serverSent;
   for (int tries = 1;; ++tries) {
     const auto before = from == FollowFrom::first ? 0 : sent.load(std::memory_order_relaxed);
-    const Side side{isRequest
-                        ? RingFollower(slots, header().queueSlots, from)
-                        : RingFollower(slots + header().queueSlots, header().replySlots, from),
-                    sent, isRequest ? control.requests : control.replies, before};
+    const Side side{
+        isRequest ? RingFollower({slots, header().queueSlots}, {}, from)
+                  : RingFollower({replies, header().replySlots},
+                                 {replies + header().replySlots, header().moreReplySlots}, from),
+        sent, isRequest ? control.requests : control.replies, before};
     // The counter and the position of the follower must belong together. If messages keep arriving,
     // they agree only approximately.
     if (from == FollowFrom::first || sent.load(std::memory_order_relaxed) == before ||

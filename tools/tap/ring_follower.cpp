@@ -10,9 +10,9 @@ constexpr std::uint64_t kMost = std::uint64_t{1} << 62;  // no ring can reach th
 
 }  // namespace
 
-RingFollower::RingFollower(const layout::Slot* slots, std::uint32_t capacity,
+RingFollower::RingFollower(std::span<const layout::Slot> ring, std::span<const layout::Slot> second,
                            FollowFrom from) noexcept
-    : slots_(slots), capacity_(capacity) {
+    : slots_(ring.data()), capacity_(ring.size()), second_(second) {
   if (from == FollowFrom::newest) goBehindNewest();
 }
 
@@ -22,19 +22,39 @@ bool RingFollower::isPossible(std::uint64_t sequence, std::uint64_t position) co
   return sequence <= kMost && ((sequence - 1 - position) & (capacity_ - 1)) == 0;
 }
 
+// Whether the message of this position, and all later ones, are in the second ring.
+bool RingFollower::continuesAt(std::uint64_t position) const noexcept {
+  // PAIR(slot-filled): the producer has moved before it filled a slot of the second ring.
+  const auto sequence = slot(position).sequence.load(std::memory_order_acquire);
+  return !second_.empty() && sequence == (layout::kContinuesInSecondRing | (position + 1));
+}
+
+void RingFollower::moveTo(std::uint64_t position) noexcept {
+  slots_ = second_.data();
+  capacity_ = second_.size();
+  second_ = {};
+  position_ = position;
+}
+
 // The newest message is the one in the slot with the highest sequence number.
 void RingFollower::goBehindNewest() noexcept {
   std::uint64_t newest = 0;
   std::uint8_t slots = 1;
   for (std::uint64_t index = 0; index < capacity_; ++index) {
+    const auto continued =
+        slots_[index].sequence.load(std::memory_order_relaxed) & ~layout::kContinuesInSecondRing;
+    if (isPossible(continued, index) && continuesAt(continued - 1)) {
+      moveTo(continued - 1);
+      return goBehindNewest();
+    }
     // PAIR(slot-filled): the message is complete.
     const auto sequence = slots_[index].sequence.load(std::memory_order_acquire);
     if (sequence <= newest || !isPossible(sequence, index)) continue;
     newest = sequence;
     slots = slots_[index].slots;
   }
-  position_ =
-      newest == 0 ? 0 : newest - 1 + std::clamp<std::uint32_t>(slots, 1, layout::kMaxMessageSlots);
+  if (newest != 0)
+    position_ = newest - 1 + std::clamp<std::uint32_t>(slots, 1, layout::kMaxMessageSlots);
 }
 
 // Whether the producer is more than half a ring ahead. Of any kMaxMessageSlots successive slots
@@ -50,6 +70,7 @@ bool RingFollower::isOverrun() const noexcept {
 }
 
 RingFollower::Next RingFollower::tryNext(RingCopy& copy) noexcept {
+  if (continuesAt(position_)) moveTo(position_);
   // PAIR(slot-filled): the message is complete.
   const bool filled = slot(position_).sequence.load(std::memory_order_acquire) == position_ + 1;
   const auto slots = slot(position_).slots;

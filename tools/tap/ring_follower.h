@@ -4,6 +4,8 @@
 //
 //   | half of the ring: safe to read | half: the producer may be overwriting it |
 //
+// It follows the producer into the second ring, if there is one.
+//
 // A message stays in the ring until the producer reuses its slots. The follower copies it and then
 // reads the position of the producer: if that is less than half a ring ahead, the copy is
 // consistent. Otherwise the follower continues behind the newest message and reports an overrun.
@@ -39,8 +41,9 @@ enum class FollowFrom {
 
 class RingFollower {
  public:
-  // `capacity` is a power of two, at least 16.
-  RingFollower(const layout::Slot* slots, std::uint32_t capacity, FollowFrom from) noexcept;
+  // `capacity` is a power of two, at least 16, and so is that of the second ring, if there is one.
+  RingFollower(std::span<const layout::Slot> ring, std::span<const layout::Slot> second,
+               FollowFrom from) noexcept;
 
   enum class Next { nothing, message, overrun };
   // `overrun`: the producer was too fast; the next call continues behind the newest message.
@@ -52,11 +55,14 @@ class RingFollower {
   }
   [[nodiscard]] bool isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept;
   [[nodiscard]] bool isOverrun() const noexcept;
+  [[nodiscard]] bool continuesAt(std::uint64_t position) const noexcept;
+  void moveTo(std::uint64_t position) noexcept;
   void goBehindNewest() noexcept;
   bool tryCopy(std::uint32_t slots, RingCopy& copy) const noexcept;
 
   const layout::Slot* slots_;
   std::uint64_t capacity_;
+  std::span<const layout::Slot> second_;  // until the follower has moved there
   std::uint64_t position_ = 0;  // where the next message begins
 };
 

@@ -140,8 +140,8 @@ void TapSession::reportMissed(Followed& followed) {
 void TapSession::drain(Followed& followed) {
   // Reads at most as many messages as fit into the rings: more were sent after this call began, and
   // a client that keeps sending must not delay the end.
-  std::size_t left =
-      followed.follower->header().queueSlots + std::size_t{followed.follower->header().replySlots};
+  const auto& header = followed.follower->header();
+  std::size_t left = std::size_t{header.queueSlots} + header.replySlots + header.moreReplySlots;
   while (left != 0 && take(followed))
     left -= std::min(left, std::max<std::size_t>(batch_.size(), 1));
   reportMissed(followed);

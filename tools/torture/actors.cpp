@@ -100,8 +100,9 @@ int playVisitor(const Cast& cast) {
              ofFleeting.replies.load() >= kStay;
     });
     if (cast.sabotage == Sabotage::halfMessage) publishHalfMessage(cast.backplane);
-    fleeting.sendDie();
+    bool isDying = false;
     runUntil(dispatcher, [&] {
+      isDying = isDying || fleeting.trySendDie();
       board.open.store(steady.open() + fleeting.open());
       return ofFleeting.disconnects.load() != 0 && board.open.load() == 0;
     });

@@ -23,7 +23,7 @@ constexpr std::uint32_t kPublishEvery = 2;  // every second of these is publishe
 Echo::Echo(const Backplane& backplane, const std::string& name, World& world, WaitMode waitMode)
     : world_(world),
       server_(backplane, name,
-              {.location = 0, .queueSize = 16, .waitMode = waitMode, .maxBorrowed = 64}) {}
+              {.location = 0, .queueSize = 40, .waitMode = waitMode, .maxBorrowed = 64}) {}
 
 void Echo::run(const Board& board, bool byDescriptor) {
   pollfd descriptor{byDescriptor ? server_.descriptor() : -1, POLLIN, 0};

@@ -40,7 +40,8 @@ void forEachOwnLink(const std::string& backplane, Visit&& visit) {
 void leaveLink(const std::string& backplane) {
   std::uint64_t owner = 0;
   forEachOwnLink(backplane, [&](const Segment& link) { owner = link.header().ownerWindow; });
-  auto link = Segment::create(layout::linkBytes(16, 16), layout::SegmentKind::link, backplane, {});
+  auto link =
+      Segment::create(layout::linkBytes(16, 16, 0), layout::SegmentKind::link, backplane, {});
   link.sharedHeader().ownerWindow = owner;
   static_cast<void>(link.tryPublish(
       SegmentName::link(backplane, segments::newIncarnation(), link.header().incarnation)));

@@ -2,6 +2,7 @@
 #include "tools/torture/talk.h"
 
 #include <fmt/format.h>
+#include <thread>
 #include <utility>
 
 namespace mpf::torture {
@@ -11,6 +12,8 @@ constexpr std::size_t kOpen = 6;          // most requests without an end
 constexpr std::size_t kSeveralSlots = 9;  // elements of an array that needs several slots
 constexpr std::size_t kLarge = 300;       // elements of an array that needs a chunk
 constexpr unsigned kCancelEvery = 32;
+constexpr unsigned kBurstEvery = 16;
+constexpr std::size_t kBurst = 80;  // open requests whose replies fill the first ring
 
 }  // namespace
 
@@ -31,7 +34,17 @@ Talk::Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::stri
 }
 
 void Talk::sendSome() {
+  if (random_() % kBurstEvery == 0) sendBurst();
   while (open_.size() < kOpen && sendOne()) {
+  }
+}
+
+// Takes no replies meanwhile, so that the server moves to the second ring. The server takes
+// requests at its own pace, and may have died.
+void Talk::sendBurst() {
+  for (auto tries = 10 * kBurst; tries != 0 && open_.size() < kBurst; --tries) {
+    if (!client_.isConnected()) return;
+    if (!sendOne()) std::this_thread::yield();
   }
 }
 
@@ -79,13 +92,14 @@ bool Talk::sendOne() {
   return true;
 }
 
-void Talk::sendDie() {
+bool Talk::trySendDie() {
   std::uint32_t id = 0;
   const auto value = world_.nextValue();
   Int32Message request(
       {.cmd = static_cast<std::int32_t>(Request::die), .address = answerTo(value), .value = value});
-  if (client_.send(std::move(request), Deadline::never(), &id) == SendResult::sent)
-    open_.emplace(id, value);
+  if (client_.send(std::move(request), Deadline::never(), &id) != SendResult::sent) return false;
+  open_.emplace(id, value);
+  return true;
 }
 
 void Talk::take(const Message& message) {

@@ -30,16 +30,17 @@ class Talk {
   Talk(Dispatcher& dispatcher, World& world, Talked& talked, const std::string& server,
        std::uint32_t seed);
 
-  // Sends requests until some are open, or the queue is full.
+  // Sends requests until some are open, or the queue is full; now and then more of them at once.
   void sendSome();
-  // Asks the server to kill itself.
-  void sendDie();
+  // Asks the server to kill itself. Returns false if its queue is full.
+  [[nodiscard]] bool trySendDie();
   [[nodiscard]] bool isConnected() const noexcept { return client_.isConnected(); }
   [[nodiscard]] std::size_t open() const noexcept { return open_.size(); }
   // Sabotage: the next fate is ignored.
   void loseNextFate() noexcept { losing_ = true; }
 
  private:
+  void sendBurst();
   [[nodiscard]] bool sendOne();
   [[nodiscard]] Message makeMessage(std::int32_t value);
   [[nodiscard]] Message makeArray(std::int32_t value, std::size_t length, bool inPool);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 #include <stdexcept>
+#include <string>
 
 namespace mpf::bench {
 namespace {
@@ -49,6 +50,22 @@ TEST(Stage, ReportsWhatTheRequesterThrew) {
   workload.requester = [](const RunContext&) { throw std::runtime_error("no such device"); };
 
   EXPECT_EQ(smallStage().run(workload).error, "requester: no such device");
+}
+
+// With a limit that doubles until the requester gets so far within it.
+TEST(Stage, SaysWhatTheRequesterWaitedForWhenItDoesNotEnd) {
+  Workload workload;
+  workload.requester = [](const RunContext& context) {
+    context.waitsFor("7 replies");
+    context.got(3);
+    for (;;) ::pause();
+  };
+  std::string error;
+  for (workload.grace = std::chrono::milliseconds(1); !error.ends_with("3"); workload.grace *= 2)
+    error = smallStage().run(workload).error;
+
+  EXPECT_TRUE(error.starts_with("neither process ended within ")) << error;
+  EXPECT_TRUE(error.ends_with(" s; the requester waited for 7 replies, and had got 3")) << error;
 }
 
 TEST(Stage, NamesTheSignalThatKilledTheServer) {

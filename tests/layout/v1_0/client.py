@@ -23,6 +23,8 @@ class Connection:
         size = 1 << (self.link.header["maxOutstanding"] - 1).bit_length()
         if len(self.unanswered) >= self.link.header["maxOutstanding"] or self.link.out.waiting() >= self.link.header["queueSize"]:
             raise link.Full
+        if len(self.unanswered) >= self.link.may_be_unanswered():
+            self.link.allow_more()
         # The server knows an unanswered request by its place in a table of that size.
         new = (i for i in itertools.count(self.last_id + 1) if all((i - other) % size for other in self.unanswered))
         self.last_id = next(new)

@@ -36,24 +36,49 @@ class Message:
 
 
 class Ring:
-    """Slots, and what their consumer says of them."""
+    """Slots, and what their consumer says of them. `link` is the LinkControl of a ring that may continue in a second one of `more` slots."""
 
-    def __init__(self, layout, start, slots, control):
+    def __init__(self, layout, start, slots, control, link=None, more=0):
         self.layout, self.start, self.slots, self.control = layout, start, slots, control
+        self.link, self.more = link, more
         self.position = self.messages = 0
+
+    def move(self):
+        """To the second ring, which lies behind the first one."""
+        self.start += self.slots * self.layout.size_of("Slot")
+        self.slots, self.more = self.more, 0
 
     def slot(self, position, name="Slot"):
         return memory.View(self.layout, name, self.start + position % self.slots * self.layout.size_of("Slot"))
 
 
 class Producer(Ring):
+    moved_at = 0
+
     def waiting(self):
         return self.messages - self.control["taken"]
 
+    def has_free(self, count):
+        """One slot of a ring that may continue in a second one stays free, for the word that it does."""
+        freed = max(self.control["freed"], self.moved_at)
+        return self.position + count <= freed + self.slots - (1 if self.more else 0)
+
+    def make_room(self, count):
+        if self.has_free(count):
+            return
+        if not self.more or not self.link["hasMoreReplies"]:
+            raise Full
+        last = self.slot(self.position)
+        self.move()
+        self.moved_at = self.position
+        self.link["repliesMoved"] = self.position + 1
+        last["sequence"] = self.position + 1 | self.layout.constants["continuesInSecondRing"]
+        if not self.has_free(count):
+            raise Full
+
     def push(self, message, body, body_bytes):
         parts = [body[:FIRST_BYTES]] + [body[at : at + MORE_BYTES] for at in range(FIRST_BYTES, len(body), MORE_BYTES)]
-        if self.position + len(parts) > self.control["freed"] + self.slots:
-            raise Full
+        self.make_room(len(parts))
         slot = self.slot(self.position)
         slot["slots"], slot["bodyBytes"], slot["sentTick"] = len(parts), body_bytes, 0
         for field in ENVELOPE:
@@ -68,7 +93,11 @@ class Producer(Ring):
 
 class Consumer(Ring):
     def has_message(self):
-        return self.slot(self.position)["sequence"] == self.position + 1
+        sequence = self.slot(self.position)["sequence"]
+        if self.more and self.link["hasMoreReplies"] and sequence == self.position + 1 | self.layout.constants["continuesInSecondRing"]:
+            self.move()
+            return self.has_message()
+        return sequence == self.position + 1
 
     def take(self):
         """A message without its body if that is in a chunk, and how long the body is."""
@@ -100,8 +129,9 @@ class Link:
         rings = segment.start + layout.constants["linkRingsOffset"]
         starts = (rings, rings + slots[0] * layout.size_of("Slot"))
         other = 1 - side
-        self.out = Producer(layout, starts[side], slots[side], self.control.inner(RINGS[side]))
-        self.into = Consumer(layout, starts[other], slots[other], self.control.inner(RINGS[other]))
+        second = ((), (self.control, header["moreReplySlots"]))  # of replies only
+        self.out = Producer(layout, starts[side], slots[side], self.control.inner(RINGS[side]), *second[side])
+        self.into = Consumer(layout, starts[other], slots[other], self.control.inner(RINGS[other]), *second[other])
         owners = (header["clientWindow"], header["serverWindow"])
         place = (layout, backplane, self.incarnation)
         self.pool = pool.Pool(*place, side, owners[side], self.control.inner(RETURNS[side]))
@@ -115,6 +145,17 @@ class Link:
 
     def peer_state(self):
         return self.control[STATES[1 - self.side]]
+
+    def may_be_unanswered(self):
+        """Requests, at present."""
+        is_short = self.header["moreReplySlots"] and not self.control["hasMoreReplies"]
+        return self.header["replySlots"] // 4 if is_short else self.header["maxOutstanding"]
+
+    def allow_more(self):
+        """For a client: memory for the second ring of replies."""
+        if not self.control["hasMoreReplies"]:
+            self.segment.reserve()
+            self.control["hasMoreReplies"] = 1
 
     def has_news(self):
         return self.into.has_message() or self.peer_state() != self.state_seen
@@ -176,13 +217,16 @@ def create(layout, backplane, own, index, peer, **fields):
     """A new link of ours to a server, not yet accepted."""
     offer, queue_size = peer.header, peer.control["queueSize"]
     outstanding = 2 * queue_size
-    queue_slots, reply_slots = ring_slots(queue_size), ring_slots(outstanding + max(16, queue_size // 8))
-    size = layout.constants["linkRingsOffset"] + (queue_slots + reply_slots) * layout.size_of("Slot")
+    queue_slots, all_replies = ring_slots(queue_size), ring_slots(outstanding + max(16, queue_size // 8))
+    reply_slots = min(all_replies, max(64, all_replies // 4))
+    more_slots = 0 if reply_slots == all_replies else all_replies
+    first = layout.constants["linkRingsOffset"] + (queue_slots + reply_slots) * layout.size_of("Slot")
     segment = memory.create(
         layout,
         "link",
-        size,
+        first + more_slots * layout.size_of("Slot"),
         backplane,
+        memory_bytes=first,
         ownerWindow=own.incarnation,
         clientWindow=own.incarnation,
         clientIndex=index,
@@ -190,6 +234,7 @@ def create(layout, backplane, own, index, peer, **fields):
         name=offer["name"].encode(),
         queueSlots=queue_slots,
         replySlots=reply_slots,
+        moreReplySlots=more_slots,
         queueSize=queue_size,
         maxOutstanding=outstanding,
         ringBytesOffset=layout.constants["linkControlOffset"],

@@ -85,15 +85,19 @@ class Segment:
             os.close(directory)
         self.name = name
 
+    def reserve(self):
+        os.posix_fallocate(self.fd, 0, self.bytes)
+
     def close(self):
         libc.munmap(self.start, self.bytes)
         os.close(self.fd)
 
 
-def create(layout, kind, size, backplane, **fields):
-    """A segment without a name, its header filled in; `fields` are added to it."""
+def create(layout, kind, size, backplane, memory_bytes=None, **fields):
+    """A segment without a name, its header filled in; `fields` are added to it. Only its first bytes may have memory."""
     fd = os.open(reader.DIRECTORY, os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, 0o600)
-    os.posix_fallocate(fd, 0, size)
+    os.posix_fallocate(fd, 0, memory_bytes or size)
+    os.truncate(fd, size)
     segment = Segment(layout, fd, size, writable=True)
     incarnation = secrets.randbits(64) or 1
     fields = {

@@ -62,7 +62,7 @@ class Pool(Chunks):
         """What the peer has returned."""
         while self.collected < self.returns["returned"]:
             packed = self.returns["chunks", self.collected % self.layout.constants["returnSlots"]]
-            self.give_back((self.side, packed >> 32, packed & 0xFFFFFFFF))
+            self.give_back((self.side, packed >> 16, packed & 0xFFFF))
             self.collected += 1
 
     def give_back(self, chunk):
@@ -88,6 +88,6 @@ class Borrowed(Chunks):
         return super().read(chunk, size)
 
     def give_back(self, chunk):
-        self.returns["chunks", self.returned % self.layout.constants["returnSlots"]] = chunk[1] << 32 | chunk[2]
+        self.returns["chunks", self.returned % self.layout.constants["returnSlots"]] = chunk[1] << 16 | chunk[2]
         self.returned += 1
         self.returns["returned"] = self.returned

@@ -219,15 +219,16 @@ class Backplane:
                 return bulk.data[start : start + size]
         return None
 
-    def messages(self, link, first_slot, slots, control):
+    def messages(self, link, first_slot, slots, control, more, moved):
         """Messages in a ring from `freed` on: taken ones that were not handed back, and those that wait."""
         layout, found, position = self.layout, [], control["freed"]
         slot_bytes = layout.size_of("Slot")
 
         def place(at):
-            return layout.constants["linkRingsOffset"] + (first_slot + at % slots) * slot_bytes
+            first, count = (first_slot + slots, more) if moved and at >= moved - 1 else (first_slot, slots)
+            return layout.constants["linkRingsOffset"] + (first + at % count) * slot_bytes
 
-        while len(found) < slots:
+        while len(found) < slots + more:
             slot = layout.read(link.data, "Slot", place(position))
             if slot["sequence"] != position + 1:
                 return found
@@ -243,9 +244,9 @@ class Backplane:
             position += count
         return found
 
-    def ring(self, link, first_slot, slots, control, sent):
+    def ring(self, link, first_slot, slots, control, sent, more=0, moved=0):
         waiting = max(0, sent - control["taken"])
-        messages = self.messages(link, first_slot, slots, control)
+        messages = self.messages(link, first_slot, slots, control, more, moved)
         return control | {"sent": sent, "waiting": waiting, "waitingMessages": messages[len(messages) - waiting :] if waiting else []}
 
     def link(self, segment):
@@ -257,7 +258,8 @@ class Backplane:
         result["file"] = segment.name
         result["clientAlive"], result["serverAlive"] = self.lives(header["clientWindow"]), self.lives(header["serverWindow"])
         result["requests"] = self.ring(segment, 0, header["queueSlots"], control["requests"], control["clientSent"])
-        result["replies"] = self.ring(segment, header["queueSlots"], header["replySlots"], control["replies"], control["serverSent"])
+        second = (header["moreReplySlots"], control["repliesMoved"])
+        result["replies"] = self.ring(segment, header["queueSlots"], header["replySlots"], control["replies"], control["serverSent"], *second)
         return result
 
     def other(self, segment):

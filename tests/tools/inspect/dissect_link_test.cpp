@@ -78,6 +78,27 @@ TEST_F(DissectLinkTest, HasTheLastMessagesOfBothRings) {
   EXPECT_EQ(replies.at(0).at("message").at("value"), 6);
 }
 
+// Replies that the client has not taken: some in the first ring, the others in the second one.
+TEST_F(DissectLinkTest, HasTheRepliesOfBothRingsInOneRow) {
+  connect(100);
+  constexpr int kReplies = 80;
+  for (int value = 0; value < kReplies; ++value) sendValue(value);
+  handle(kReplies);
+  ASSERT_NE(openLink().at<layout::LinkControl>(layout::kLinkControlOffset).repliesMoved, 0u);
+
+  const auto link = dissect({.last = 1000});
+
+  EXPECT_EQ(link.at("replies").at("waiting"), kReplies);
+  const auto& replies = link.at("replies").at("messages");
+  ASSERT_EQ(replies.size(), static_cast<std::size_t>(kReplies));
+  for (int value = 0; value < kReplies; ++value) {
+    EXPECT_EQ(replies.at(value).at("state"), "waiting");
+    EXPECT_EQ(replies.at(value).at("message").at("value"), value + 1);
+  }
+  takeReplies(kReplies);
+  EXPECT_EQ(dissect().at("replies").at("waiting"), 0);
+}
+
 TEST_F(DissectLinkTest, ReadsABodyFromItsPool) {
   connect();
   sendArray(1.5);
@@ -173,11 +194,12 @@ TEST_F(DissectLinkTest, RingsThatAreImpossibleAreAProblem) {
   const auto slots = header.queueSlots;
 
   header.queueSlots = slots + 1;
-  EXPECT_EQ(dissect().at("problem"), "rings of " + std::to_string(slots + 1) + " and " +
-                                         std::to_string(header.replySlots) + " slots are invalid");
+  EXPECT_EQ(dissect().at("problem"),
+            fmt::format("rings of {}, {} and {} slots do not fit a file of {} bytes", slots + 1,
+                        header.replySlots, header.moreReplySlots, header.totalBytes));
   EXPECT_FALSE(dissect().contains("requests"));
   header.queueSlots = layout::kMaxRingSlots;
-  EXPECT_THAT(dissect().at("problem").get<std::string>(), HasSubstr(" bytes are too few for "));
+  EXPECT_THAT(dissect().at("problem").get<std::string>(), HasSubstr(" do not fit a file of "));
   header.queueSlots = slots;
   header.backplane = {'.', '.', '/', 'x'};
   EXPECT_THAT(dissect().at("problem").get<std::string>(), HasSubstr("\"../x\""));

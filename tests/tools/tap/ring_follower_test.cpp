@@ -16,7 +16,9 @@ using Next = tools::RingFollower::Next;
 
 class RingFollowerTest : public RingTest {
  protected:
-  RingFollower follow(FollowFrom from = FollowFrom::newest) { return {ring_, kCapacity, from}; }
+  RingFollower follow(FollowFrom from = FollowFrom::newest) {
+    return {{ring_, kCapacity}, {}, from};
+  }
   void cross(std::uint64_t ordinal, std::size_t bodyBytes = 8) {
     ASSERT_TRUE(push(ordinal, bodyBytes));
     EXPECT_EQ(take(), pattern(ordinal, bodyBytes));
@@ -42,6 +44,81 @@ TEST_F(RingFollowerTest, ReadsMessagesOfEverySizeInOrder) {
     expectNext(follower, ordinal, bytes);
     expectNothing(follower);
   }
+}
+
+// A ring that continues in a second one.
+class SecondRingFollowerTest : public testing::Test {
+ protected:
+  static constexpr std::uint32_t kFirst = 16;
+  static constexpr std::uint32_t kSecond = 64;
+
+  RingFollower follow(FollowFrom from) {
+    const std::span<const layout::Slot> all(slots_);
+    return {all.first(kFirst), all.last(kSecond), from};
+  }
+  void push(std::uint64_t ordinal) {
+    ASSERT_TRUE(producer_.tryPush(
+        {.bodyBytes = 8, .requestId = static_cast<std::uint32_t>(ordinal)}, pattern(ordinal, 8)));
+  }
+  // Fills the first ring and some slots of the second one.
+  void pushIntoBoth() {
+    for (; pushed_ < kFirst - 1; ++pushed_) push(pushed_);
+    hasMemory_ = 1;
+    for (; pushed_ < kFirst + 10; ++pushed_) push(pushed_);
+    ASSERT_EQ(moved_, kFirst);
+  }
+  static void expectNext(RingFollower& follower, std::uint64_t ordinal) {
+    RingCopy copy;
+    ASSERT_EQ(follower.tryNext(copy), Next::message);
+    EXPECT_EQ(copy.envelope.requestId, ordinal);
+    EXPECT_EQ(Bytes(copy.body().begin(), copy.body().end()), pattern(ordinal, 8));
+  }
+
+  std::vector<layout::Slot> slots_{kFirst + kSecond};
+  layout::RingControl control_{};
+  layout::Word32 hasMemory_{0};
+  layout::Word64 moved_{0};
+  RingProducer producer_{
+      slots_.data(), kFirst, control_, {slots_.data() + kFirst, kSecond, &hasMemory_, &moved_}};
+  std::uint64_t pushed_ = 0;
+};
+
+TEST_F(SecondRingFollowerTest, FollowsTheProducerFromMessageToMessage) {
+  auto follower = follow(FollowFrom::first);
+  push(pushed_++);
+  expectNext(follower, 0);
+
+  pushIntoBoth();
+
+  // The first ring was read too late: the producer is more than half of it ahead.
+  RingCopy copy;
+  EXPECT_EQ(follower.tryNext(copy), Next::overrun);
+  EXPECT_EQ(follower.tryNext(copy), Next::nothing);
+  push(pushed_);
+  expectNext(follower, pushed_);
+}
+
+TEST_F(SecondRingFollowerTest, ReadsWhatTheFirstRingHoldsBeforeItMoves) {
+  for (; pushed_ < kFirst - 2; ++pushed_) push(pushed_);
+  auto follower = follow(FollowFrom::newest);
+  push(pushed_++);
+  hasMemory_ = 1;
+  push(pushed_++);
+  push(pushed_++);
+  ASSERT_EQ(moved_, kFirst);
+
+  for (const auto ordinal : {pushed_ - 3, pushed_ - 2, pushed_ - 1}) expectNext(follower, ordinal);
+}
+
+TEST_F(SecondRingFollowerTest, BeginsBehindTheNewestMessageOfTheSecondRing) {
+  pushIntoBoth();
+
+  auto follower = follow(FollowFrom::newest);
+
+  RingCopy copy;
+  EXPECT_EQ(follower.tryNext(copy), Next::nothing);
+  push(pushed_);
+  expectNext(follower, pushed_);
 }
 
 TEST_F(RingFollowerTest, ReadsMessagesBeforeAndAfterTheyAreTaken) {

@@ -158,7 +158,7 @@ TEST(EchoProcess, KillsItselfWhenAClientAsksForIt) {
   Talk talk(dispatcher, *world, talked, "server", 1);
   while (!talk.isConnected()) dispatcher.runOnce(Deadline::after(std::chrono::milliseconds(1)));
 
-  talk.sendDie();
+  ASSERT_TRUE(talk.trySendDie());
 
   while (!processes.hasEnded(server)) processes.handleEvents(std::chrono::hours(1));
   const auto status = processes.takeStatus(server);

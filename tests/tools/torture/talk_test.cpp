@@ -148,7 +148,7 @@ TEST_F(TalkWithServer, TheSabotageOfALostFateLeavesARequestOpen) {
 TEST_F(TalkWithServer, AsksItsServerToKillItself) {
   connect();
 
-  talk_.sendDie();
+  ASSERT_TRUE(talk_.trySendDie());
 
   const auto request = server_->receive();
   ASSERT_NE(request.tryAs<Int32>(), nullptr);
