@@ -11,9 +11,6 @@
 namespace mpf {
 namespace {
 
-// The pause before requests are sent again that found no room at the server.
-constexpr std::int64_t kSendUntakenAfterNs = 1'000'000;
-
 Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
                     std::int32_t clientExtra) {
   RequestFateMessage message({.fate = fate, .requestId = requestId});
@@ -21,21 +18,6 @@ Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
   message.setClientExtra(clientExtra);
   message.setRoute({0, requestId, kEndsRequest, nullptr});
   return message;
-}
-
-constexpr bool isControl(MessageType type) noexcept {
-  return type == MessageType::connect || type == MessageType::requestFate;
-}
-
-// A server may send a ConnectMessage only to report a full queue behind it (a router does), not as
-// a reply; and a fate only as the reply to the request that it names.
-bool mayServerSend(const Message& message, const Request* request) noexcept {
-  if (const auto* connect = message.tryAs<Connect>())
-    return request == nullptr && connect->status == ConnectStatus::connectQueueFull;
-  if (message.getType() != MessageType::requestFate) return true;
-  const auto* fate = message.tryAs<RequestFate>();
-  return fate != nullptr && request != nullptr &&
-         fate->requestId == request->id.load(std::memory_order_relaxed);
 }
 
 }  // namespace
@@ -66,26 +48,6 @@ void Binding::tryConnect() try {
   // No memory, no permission, a window of another version: report the reason and try again later.
   connector_.setReason(error.what());
   connector_.retryLater();
-}
-
-// A change of state that comes with messages has a hint of its own, or is found when the endpoint
-// stops polling the link.
-bool Binding::takeSome(int most) {
-  int taken = 0;
-  while (taken < most && tryTakeMessage()) ++taken;
-  return taken != 0 || (isLinked() && !isPaused_ && onLinkState());
-}
-
-// Returns false when there is no message.
-bool Binding::tryTakeMessage() {
-  if (!isLinked() || isPaused_) return false;
-  Envelope envelope;
-  const auto take = channel().tryBegin(envelope);
-  if (take == MessageLink::Take::nothing) return false;
-  if (take == MessageLink::Take::message && tryDeliverReply(envelope)) return true;
-  count(control().protocolErrors);
-  disconnect("the server sent invalid data", Ending::protocolError);
-  return true;
 }
 
 // Acts on a change of the state of the link. Returns false when there was none.
@@ -123,83 +85,6 @@ void Binding::onAccepted(Link& link) {
   deliverConnect(ConnectStatus::connectYes);
 }
 
-// Returns false on a protocol error; then it has delivered nothing.
-bool Binding::tryDeliverReply(const Envelope& envelope) {
-  count(control().received);
-  auto& requests = *sender_.requests();
-  Request* request = nullptr;
-  if ((envelope.flags & layout::kSlotFirstReply) != 0) {
-    request = requests.find(envelope.requestId);
-    if (request == nullptr || request->isGivenUp) {
-      channel().discard(envelope);
-      if (request != nullptr) requests.end(*request);
-      return true;
-    }
-  }
-  Message message;
-  if (const auto finish = channel().tryFinish(envelope, message);
-      finish != MessageLink::Finish::message) {
-    if (finish == MessageLink::Finish::invalid) return false;
-    if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
-    return true;
-  }
-  if (isControl(message.getType())) {
-    const auto control = prepareControl(message, request);
-    if (control != Control::deliver) return control == Control::keep;
-  }
-  if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
-    noteTimes(envelope, request);
-  const auto missed = Message::missedFlags(message.getMissed());
-  message.setRoute(
-      {0, envelope.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
-  message.setTimeStampNs(envelope.timeNs);
-  if (request != nullptr) {
-    requests.end(*request);
-    MPF_STEP(request_ended);
-    channel().link().control().clientUnanswered.store(requests.awaited(),
-                                                      std::memory_order_relaxed);
-  }
-  deliver(std::move(message));
-  return true;
-}
-
-// A ConnectMessage or a fate that the server has sent. `keep`: the request was kept, to be sent
-// again.
-Binding::Control Binding::prepareControl(Message& message, Request* request) {
-  if (!mayServerSend(message, request)) return Control::invalid;
-  if (auto* connect = message.tryAs<Connect>()) connect->incarnation = connector_.incarnation();
-  const auto* fate = message.tryAs<RequestFate>();
-  if (fate == nullptr) return Control::deliver;
-  // A router reports that the server behind it has not taken the request.
-  if (fate->fate == Fate::neverTaken && sender_.tryKeep(*request)) {
-    timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
-    return Control::keep;
-  }
-  // The server sends fates without the marks of the client.
-  message.setClientType(request->clientType);
-  message.setClientExtra(request->clientExtra);
-  return Control::deliver;
-}
-
-void Binding::noteTimes(Envelope envelope, const Request* request) noexcept {
-  auto& endpoint = parts_.endpoint;
-  const auto nowNs = Clock::nowNs();
-  if (request != nullptr && request->sentNs != 0)
-    record(endpoint.control().serviceNs, nowNs - request->sentNs);
-  if (envelope.sentTick == 0) return;
-  const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
-  record(endpoint.control().queueWaitNs, waitedNs);
-  if (endpoint.slept()) endpoint.noteWake(waitedNs);
-}
-
-// The callback may throw: callers have finished all other work on the message before.
-void Binding::deliver(Message&& message) try {
-  if (!hasLeft()) callback_(std::move(message));
-} catch (...) {
-  parts_.errors.note(connector_.server(), connector_.location());
-  throw;
-}
-
 void Binding::deliverConnect(ConnectStatus status) {
   deliver(ConnectMessage({.status = status, .incarnation = connector_.incarnation()}));
 }
@@ -230,12 +115,9 @@ bool Binding::hasDeadPeer() const noexcept {
 // Delivers the messages that the server sent before it closed the link or died. A server that is
 // still alive could send without end, so at most one ring of messages is delivered.
 void Binding::deliverRemaining(const MessageLink* ended) {
-  Envelope envelope;
   while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
     --end_.remainingSlots;
-    if (channel().tryBegin(envelope) == MessageLink::Take::message && tryDeliverReply(envelope))
-      continue;
-    end_.remainingSlots = 0;
+    if (takeOne() != Taken::message) end_.remainingSlots = 0;
   }
 }
 

@@ -83,6 +83,9 @@ class Binding : public std::enable_shared_from_this<Binding> {
   [[nodiscard]] bool hasDeadPeer() const noexcept;
 
  private:
+  // The pause before requests are sent again that found no room at the server.
+  static constexpr std::int64_t kSendUntakenAfterNs = 1'000'000;
+
   // What disconnect() delivers.
   struct End {
     Ending ending{};
@@ -104,7 +107,9 @@ class Binding : public std::enable_shared_from_this<Binding> {
     return parts_.endpoint.control();
   }
 
-  bool tryTakeMessage();
+  enum class Taken { nothing, message, invalid };
+  // Takes the next message of the link and delivers it. After `invalid`, the caller disconnects.
+  Taken takeOne();
   bool onLinkState();
   void onAccepted(Link& link);
   bool tryDeliverReply(const Envelope& envelope);

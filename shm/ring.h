@@ -324,8 +324,8 @@ class RingConsumer {
   [[nodiscard]] bool isFilledUpTo(std::uint64_t end) const noexcept {
     return slot(end - 1).sequence.load(std::memory_order_relaxed) == end;
   }
-  // Waits until the producer is this distance ahead, as long as it fills slots. After a wait without
-  // success, the next one is made later: the producer may be waiting for us.
+  // Waits until the producer is this distance ahead, as long as it fills slots. After each failure
+  // the next wait is made later: the producer may be waiting for us.
   bool tryWaitForProducer(std::uint64_t distance) noexcept {
     if (taken_ < waitAt_) return false;
     auto end = taken_ + kLookEvery;

@@ -33,8 +33,7 @@
 // Trust    a peer may write anything to a body in shared memory, at any time. adopt(), copyOf() and
 //          copyInline() check the body once and store its array length; tryAs(), valueAs() and
 //          MessageOf::setLength() use only the stored length.
-// Source   manual, "Message", "Overview". Free lists, toBuffer() and fromBuffer() have no
-//          counterpart: bodies have the form of <mpf/message_types.h> everywhere on a host.
+// Source   manual, "Message", "Overview". Free lists, toBuffer() and fromBuffer() are not needed.
 #pragma once
 
 #include <algorithm>
@@ -382,11 +381,10 @@ class Message {
     state_.length = 0;
     state_.sound = false;
   }
-  // Reports a request that has had no reply, and returns an out-of-line body to its lender.
   void giveBack() noexcept {
     if (state_.route.keeper != nullptr || state_.isOutside()) giveBackOwned();
   }
-  // Apart from giveBack(), which then costs two comparisons at each place.
+  // Reports a request that has had no reply, and returns a body to its lender.
   [[gnu::noinline]] void giveBackOwned() noexcept {
     if (state_.route.keeper != nullptr) state_.route.keeper->abandoned(state_.route);
     // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): as above
