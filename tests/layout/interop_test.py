@@ -129,7 +129,9 @@ class OldClientOfTodaysServer(Interop):
             chunk = connection.received[-1].chunk
             ways.add(chunk and chunk[0])
 
-        self.assertEqual(ways, {None, 0, 1})
+        self.assertEqual(ways, {None, 0, 1, 2})
+        published = [name for name in self.names() if ".p." in name]
+        self.assertEqual(len(published), 1, "each was returned before the next one")
         self.assertEqual(
             self.ask(self.client, connection, messages.FLOAT64, messages.float64(1)), 2
         )
@@ -225,7 +227,7 @@ class TodaysClientOfAnOldServer(Interop):
         run_until(lambda: self.server.ends == {}, self.server)  # the client has left
 
     def test_gets_arrays_back_in_slots_in_its_own_chunks_and_in_the_servers(self):
-        for length, count in ((10, 1), (1000, 4)):
+        for length, count in ((10, 1), (1000, 12)):
             sent = list(range(length))
             words = (
                 "float64Array",
@@ -237,6 +239,13 @@ class TodaysClientOfAnOldServer(Interop):
             )
             answer = json.loads(self.call(*words, parties=[self.server]))
             self.assertEqual([reply["value"] for reply in answer["replies"]], [sent] * count)
+        self.assertEqual(self.server.published, 3)
+        self.assertEqual(len(self.published_files()), 1, "it returned each before the next one")
+        run_until(lambda: self.server.ends == {}, self.server)  # the client has left
+        self.assertEqual(self.server.fan_out.retired, set(), "it had returned all of them")
+
+    def published_files(self):
+        return [name for name in self.names() if f".p.{self.server.window.incarnation:x}." in name]
 
     def test_shares_it_with_an_old_client(self):
         party = self.old_client()
