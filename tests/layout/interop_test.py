@@ -247,6 +247,23 @@ class TodaysClientOfAnOldServer(Interop):
     def published_files(self):
         return [name for name in self.names() if f".p.{self.server.window.incarnation:x}." in name]
 
+    def test_has_more_replies_than_fit_into_the_first_ring(self):
+        """For an old client, which understands them from today's server, too."""
+        self.server.close()
+        self.server = self.old_server(queueSize=100)
+        party = self.old_client()
+        connection = self.connected(party, self.server)
+        numbers = []
+        for i in range(60):  # of two slots each
+            connection.send(messages.FLOAT64, messages.float64(i))
+            numbers.append(i + 1)
+        self.server.work()  # answers all; nothing is taken
+        self.assertNotEqual(connection.link.control["repliesMoved"], 0)
+
+        run_until(lambda: len(connection.received) == len(numbers), party)
+
+        self.assertEqual([messages.value(one) for one in connection.received], numbers)
+
     def test_shares_it_with_an_old_client(self):
         party = self.old_client()
         crowd = self.crowd(3, party, self.server)
