@@ -134,7 +134,8 @@ Outcome socketConnectTime(const Stage& stage, const std::string& name) {
   return stage.run(workload);
 }
 
-Outcome memoryPerLink(const Stage& stage, const std::string& backplane) {
+// Of links over which each client has sent this number of requests at once.
+Outcome memoryPerLink(const Stage& stage, const std::string& backplane, int requests) {
   Workload workload;
   workload.server = [=](const RunContext& context) {
     raiseDescriptorLimit();
@@ -148,9 +149,19 @@ Outcome memoryPerLink(const Stage& stage, const std::string& backplane) {
     constexpr int kLinks = 100;
     Dispatcher dispatcher(Backplane::attach(backplane));
     std::deque<MessageClient> clients;
-    connectOrThrow(clients.emplace_back(dispatcher, ignore));
+    int replies = 0;
+    const auto count = [&](Message&& message) { replies += message.tryAs<Int32>() != nullptr; };
+    connectOrThrow(clients.emplace_back(dispatcher, count));
     const auto one = occupiedBytes(dispatcher.backplane());
-    for (int i = 0; i < kLinks; ++i) connectOrThrow(clients.emplace_back(dispatcher, ignore));
+    for (int i = 0; i < kLinks; ++i) {
+      auto& client = clients.emplace_back(dispatcher, count);
+      connectOrThrow(client);
+      replies = 0;
+      for (int sent = 0; sent < requests;) {
+        if (client.send(Int32Message({.value = 1})) == SendResult::sent) ++sent;
+      }
+      while (replies != requests) dispatcher.runOnce();
+    }
     context.figures().value = (occupiedBytes(dispatcher.backplane()) - one) / kLinks;
   };
   return runAndClean(stage, backplane, workload);
@@ -286,12 +297,15 @@ std::vector<Measurement> scaleMeasurements(const std::string& runName) {
   };
   rows.push_back(std::move(socket));
 
-  auto memory = scaleRow("Shared memory of one link", kMpf, Mode::adaptive, 0);
-  memory.unit = "bytes";
-  memory.run = [name = runName + "-memory"](const Stage& stage) {
-    return memoryPerLink(stage, name);
-  };
-  rows.push_back(std::move(memory));
+  for (const int requests : {1, 100}) {
+    auto memory = scaleRow("Shared memory of one link",
+                           "MPF, " + std::to_string(requests) + " at a time", Mode::adaptive, 0);
+    memory.unit = "bytes";
+    memory.run = [name = runName + "-memory", requests](const Stage& stage) {
+      return memoryPerLink(stage, name, requests);
+    };
+    rows.push_back(std::move(memory));
+  }
 
   auto cpu = scaleRow("CPU of 100 idle processes", kMpf, Mode::adaptive, 0);
   cpu.unit = "% of one CPU";

@@ -131,8 +131,7 @@ class Interop(unittest.TestCase):
         return program
 
     def todays_server(self):
-        # Clients of layout 1.1 and older do not understand published messages.
-        program = Program(VICTIM, "serve-replies", self.backplane)
+        program = Program(VICTIM, "serve", self.backplane)
         self.addCleanup(lambda: program.process.returncode is None and program.end())
         self.assertEqual(program.line(), "open")
         first = self.old_client()

@@ -129,7 +129,9 @@ class OldClientOfTodaysServer(Interop):
             chunk = connection.received[-1].chunk
             ways.add(chunk and chunk[0])
 
-        self.assertEqual(ways, {None, 0, 1})
+        self.assertEqual(ways, {None, 0, 1, 2})
+        published = [name for name in self.names() if ".p." in name]
+        self.assertEqual(len(published), 1, "each was returned before the next one")
         self.assertEqual(
             self.ask(self.client, connection, messages.FLOAT64, messages.float64(1)), 2
         )
@@ -225,7 +227,7 @@ class TodaysClientOfAnOldServer(Interop):
         run_until(lambda: self.server.ends == {}, self.server)  # the client has left
 
     def test_gets_arrays_back_in_slots_in_its_own_chunks_and_in_the_servers(self):
-        for length, count in ((10, 1), (1000, 4)):
+        for length, count in ((10, 1), (1000, 12)):
             sent = list(range(length))
             words = (
                 "float64Array",
@@ -237,6 +239,30 @@ class TodaysClientOfAnOldServer(Interop):
             )
             answer = json.loads(self.call(*words, parties=[self.server]))
             self.assertEqual([reply["value"] for reply in answer["replies"]], [sent] * count)
+        self.assertEqual(self.server.published, 3)
+        self.assertEqual(len(self.published_files()), 1, "it returned each before the next one")
+        run_until(lambda: self.server.ends == {}, self.server)  # the client has left
+        self.assertEqual(self.server.fan_out.retired, set(), "it had returned all of them")
+
+    def published_files(self):
+        return [name for name in self.names() if f".p.{self.server.window.incarnation:x}." in name]
+
+    def test_has_more_replies_than_fit_into_the_first_ring(self):
+        """For an old client, which understands them from today's server, too."""
+        self.server.close()
+        self.server = self.old_server(queueSize=100)
+        party = self.old_client()
+        connection = self.connected(party, self.server)
+        numbers = []
+        for i in range(60):  # of two slots each
+            connection.send(messages.FLOAT64, messages.float64(i))
+            numbers.append(i + 1)
+        self.server.work()  # answers all; nothing is taken
+        self.assertNotEqual(connection.link.control["repliesMoved"], 0)
+
+        run_until(lambda: len(connection.received) == len(numbers), party)
+
+        self.assertEqual([messages.value(one) for one in connection.received], numbers)
 
     def test_shares_it_with_an_old_client(self):
         party = self.old_client()

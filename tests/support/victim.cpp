@@ -38,12 +38,9 @@ void say(fmt::format_string<Values...> format, Values&&... values) {
   std::fflush(stdout);
 }
 
-enum class Publishes { no, some };
-
 // Echoes. Keeps every seventh Int32, which drops the one kept before, and answers some arrays with
-// new arrays, which it may publish.
-int serve(const mpf::Backplane& backplane, mpf::ServerOptions options,
-          Publishes publishes = Publishes::some) {
+// new arrays, some of which it publishes.
+int serve(const mpf::Backplane& backplane, mpf::ServerOptions options) {
   options.queueSize = 32;
   options.maxBorrowed = 64;
   mpf::MessageServer server(backplane, "echo", options);
@@ -58,7 +55,7 @@ int serve(const mpf::Backplane& backplane, mpf::ServerOptions options,
   });
   server.on<mpf::Float64Array>([&](mpf::Float64ArrayMessage&& request) {
     if (++requests % 3 != 0) return static_cast<void>(server.reply(std::move(request)));
-    if (publishes == Publishes::some && requests % 2 == 0)
+    if (requests % 2 == 0)
       return static_cast<void>(
           server.publish(server.allocShared<mpf::Float64Array>(3000), request));
     auto reply = server.allocReplyMessage<mpf::Float64Array>(request, 3000);
@@ -224,7 +221,6 @@ int play(const std::vector<std::string>& arguments) {
   const auto role = argument(1);
   const auto backplane = mpf::Backplane::attach(argument(2));
   if (role == "serve") return serve(backplane, {});
-  if (role == "serve-replies") return serve(backplane, {}, Publishes::no);
   if (role == "serve-block") return serve(backplane, {.waitMode = mpf::WaitMode::block});
   if (role == "count") return count(backplane, argument(3), {});
   if (role == "flood") return flood(backplane);
@@ -235,7 +231,7 @@ int play(const std::vector<std::string>& arguments) {
   if (role == "lease") return lease(backplane, argument(3));
   if (role == "crowd") return crowd(backplane, std::stoi(argument(3)));
   std::fprintf(stderr,
-               "role \"%s\": use serve, serve-replies, serve-block, count, flood, listen, ask, "
+               "role \"%s\": use serve, serve-block, count, flood, listen, ask, "
                "lease or crowd\n",
                role.c_str());
   return 2;

@@ -33,6 +33,7 @@ class Message:
     clientExtra: int = 0
     deadlineNs: int = 0
     chunk: object = None  # (side, segment, chunk) that the body lies in
+    missed: int = 0  # messages of this request that were dropped before a published one
 
 
 class Ring:
@@ -108,7 +109,7 @@ class Consumer(Ring):
         size, count = slot["bodyBytes"], slot["slots"]
         if message.flags & CHUNK:
             ref = memory.View(self.layout, "ChunkRef", slot.address("body"))
-            message.chunk = (ref["side"], ref["segment"], ref["chunk"])
+            message.chunk, message.missed = (ref["side"], ref["segment"], ref["chunk"]), ref["missed"]
         else:
             parts = [ctypes.string_at(slot.address("body"), FIRST_BYTES)]
             more = (self.slot(self.position + i, "MoreSlot") for i in range(1, count))
@@ -135,7 +136,7 @@ class Link:
         owners = (header["clientWindow"], header["serverWindow"])
         place = (layout, backplane, self.incarnation)
         self.pool = pool.Pool(*place, side, owners[side], self.control.inner(RETURNS[side]))
-        self.borrowed = pool.Borrowed(*place, other, self.control.inner(RETURNS[other]))
+        self.borrowed = pool.Borrowed(*place, other, self.control.inner(RETURNS[other]), server_window=header["serverWindow"])
         self.peer_index = header["clientIndex"]  # a client learns its server's later
         self.state_seen = NONE
 
@@ -178,7 +179,7 @@ class Link:
             message.chunk = self.pool.lend(body)
         if message.chunk is not None:
             side, segment, chunk = message.chunk
-            body = b"".join(part.to_bytes(4, "little") for part in (segment, chunk, side, 0))
+            body = b"".join(part.to_bytes(4, "little") for part in (segment, chunk, side, message.missed))
             message.flags |= CHUNK
         self.out.push(message, body, size)
         self.control[SENT[self.side]] = self.out.messages

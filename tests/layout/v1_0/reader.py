@@ -120,7 +120,7 @@ class Segment:
 
 def parse_name(name):
     """(kind's letter, the rest in parts) of a file name, None if it is not of this grammar."""
-    match = re.fullmatch(r"mpf\.([A-Za-z0-9_-]{1,39})\.([scflbhw])\.(.+)", name)
+    match = re.fullmatch(r"mpf\.([A-Za-z0-9_-]{1,39})\.([scflbhwp])\.(.+)", name)
     if not match:
         return None
     letter, parts = match[2], match[3].split(".")
@@ -128,6 +128,7 @@ def parse_name(name):
         "s": [r"-?\d+", r"(?:[A-Za-z0-9_\[\]-]|%[0-9A-F]{2})+"],
         "l": ["[0-9a-f]{1,16}"] * 2,
         "b": ["[0-9a-f]{1,16}", "[01]", r"\d+"],
+        "p": ["[0-9a-f]{1,16}", r"\d+"],
     }
     shape = shapes.get(letter, ["[0-9a-f]{1,16}"])
     if len(parts) != len(shape) or not all(re.fullmatch(one, part) for one, part in zip(shape, parts)):
@@ -212,7 +213,9 @@ class Backplane:
         """The memory of a chunk: (bytes, capacity), None when there is no such chunk."""
         ref = self.layout.read(body, "ChunkRef", 0)
         name = f"mpf.{self.name}.b.{link.header['incarnation']:x}.{ref['side']}.{ref['segment']}"
-        for bulk in self.of("bulk"):
+        if ref["side"] == 2:
+            name = f"mpf.{self.name}.p.{link.header['serverWindow']:x}.{ref['segment']}"
+        for bulk in self.of("bulk", "fanOut"):
             size, count = bulk.header["chunkBytes"], bulk.header["chunkCount"]
             start = self.layout.constants["bulkChunksOffset"] + ref["chunk"] * size
             if bulk.name == name and ref["chunk"] < count and start + size <= len(bulk.data):

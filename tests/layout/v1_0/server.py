@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Server of layout 1.0. It echoes, and adds 1 to a Float64."""
+"""Server of layout 1.0. It echoes, and adds 1 to a Float64. Some arrays it publishes."""
 import math
 import os
 import sys
@@ -9,8 +9,10 @@ import link
 import memory
 import messages
 import party
+import pool
 import reader
 
+MOST_PUBLISHED = 4  # chunks that one client may hold
 OFFER = {"queueSize": 32, "maxMessageBytes": 1 << 24, "maxPoolBytes": 1 << 26}
 
 
@@ -22,6 +24,7 @@ class End:
 class Server(party.Party):
     def __init__(self, layout, backplane, name, location=0, **fields):
         super().__init__(layout, backplane, (name, location), name=name.encode(), location=location, **OFFER | fields)
+        self.fan_out, self.published = pool.FanOut(layout, backplane, self.window.incarnation), 0
         self.answered, self.limit = 0, math.inf  # requests; it takes no more than the limit
 
     def has_news(self):
@@ -78,11 +81,32 @@ class Server(party.Party):
             request.body = messages.float64(messages.value(request) + 1)
         elif request.type == messages.FLOAT64_ARRAY and self.answered % 2 and request.chunk:
             end.done(request)  # a reply of our own
-            request.chunk = None
+            request.chunk = self.publish(end, request.body) if self.answered % 4 == 3 else None
         request.flags = link.FIRST_REPLY
         end.send(request)
         self.window.control.count("sent")
         self.answered += 1
+
+    def publish(self, end, body):
+        """The chunk of a body that many clients could read; None if this client holds too many."""
+        end.pool.collect()
+        if len(end.pool.published) >= MOST_PUBLISHED:
+            return None
+        number = self.fan_out.claim(body, {n for other in self.ends.values() for n in other.link.pool.published})
+        end.pool.published.append(number)
+        self.published += 1
+        return pool.FAN_OUT, number, 0
+
+    def drop(self, end):
+        its_pool, is_alive = end.link.pool, end.link.peer.segment.is_locked()
+        its_pool.collect()
+        if is_alive or end.link.peer_state() == link.CLOSED:
+            self.fan_out.retire(its_pool.published)
+        super().drop(end)
+
+    def close(self):
+        super().close()
+        self.fan_out.close()
 
     def nudge(self):
         """Clients ring again by themselves; what dead ones left is removed."""
