@@ -13,8 +13,8 @@ namespace mpf {
 namespace {
 
 constexpr std::uint32_t kClockEvery = 64;  // spins between readings of the clock
-// spins between calls of sched_yield(), for peers that share the processor
-constexpr std::uint32_t kYieldEvery = 1u << 14;
+// spins between scans of all links; WaitMode::spin then also gives up the processor once
+constexpr std::uint32_t kScanEvery = 1u << 14;
 constexpr std::uint32_t kScanAllEvery = 1024;  // looks at the hints between scans of all links
 // with at most this number of links, a scan of all links costs next to nothing
 constexpr std::size_t kFewLinks = 64;
@@ -146,7 +146,9 @@ bool Endpoint::wait(Deadline deadline) noexcept {
 bool Endpoint::spin(Deadline deadline) noexcept {
   if (hasEvents()) return true;
   if (mode_ == WaitMode::block) return false;
-  const auto budgetNs = mode_ == WaitMode::spin ? INT64_MAX : spinBudget_.ns();
+  const auto isAdaptive = mode_ == WaitMode::adaptive;
+  const auto budgetNs = isAdaptive ? spinBudget_.take() : INT64_MAX;
+  if (budgetNs == 0) return false;
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
     cpuRelax();
@@ -155,9 +157,14 @@ bool Endpoint::spin(Deadline deadline) noexcept {
     const auto nowNs = Clock::nowNs();
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
-    if (spins % kYieldEvery != 0) continue;
+    if (isAdaptive) {
+      // The peer, or the router on the way to it, may need this processor.
+      ::sched_yield();
+      spinBudget_.noteYield(Clock::nowNs() - nowNs);
+    }
+    if (spins % kScanEvery != 0) continue;
     tryScanAllLinks();
-    ::sched_yield();
+    if (!isAdaptive) ::sched_yield();
   }
 }
 

@@ -40,5 +40,38 @@ TEST(SpinBudget, HalvesWithEachLongSleepUntilOneIsShort) {
   EXPECT_EQ(budget.ns(), full);
 }
 
+// The number of waits that sleep at once.
+int countSkips(SpinBudget& budget) {
+  int skips = 0;
+  while (budget.take() == 0) ++skips;
+  return skips;
+}
+
+TEST(SpinBudget, DoesNotPollForSomeWaitsWhenOthersUseTheProcessor) {
+  SpinBudget budget;
+
+  budget.noteYield(2'000'000);
+
+  const auto first = countSkips(budget);
+  EXPECT_GT(first, 0);
+  EXPECT_EQ(budget.take(), budget.ns()) << "then it tries again";
+  for (int i = 0; i < 20; ++i) budget.noteYield(2'000'000);
+  EXPECT_GT(countSkips(budget), 100 * first) << "and less and less often";
+}
+
+TEST(SpinBudget, PollsAgainWhenYieldsAreShort) {
+  SpinBudget budget;
+  budget.noteYield(2'000'000);
+  const auto first = countSkips(budget);
+  for (int i = 0; i < 20; ++i) budget.noteYield(2'000'000);
+  countSkips(budget);
+
+  for (int i = 0; i < 2000; ++i) budget.noteYield(100);
+
+  EXPECT_EQ(countSkips(budget), 0);
+  budget.noteYield(2'000'000);
+  EXPECT_EQ(countSkips(budget), first);
+}
+
 }  // namespace
 }  // namespace mpf::test
