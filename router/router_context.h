@@ -12,6 +12,7 @@
 
 #include "router/config/router_config.h"
 #include "router/incoming/server_monitors.h"
+#include "router/polling.h"
 #include "router/statistics.h"
 #include "router/transport/tls.h"
 #include "schema/router.capnp.h"
@@ -30,6 +31,11 @@ struct RouterContext {
   RouterConfig config;            // replaced by a reload
   std::shared_ptr<Tls> tls;       // nullptr: no connection uses TLS
   std::uint64_t incarnation = 0;  // distinguishes restarts of this router
+  Polling* polling = nullptr;     // nullptr: the router sleeps at once
+
+  void noteTraffic() const {
+    if (polling != nullptr) polling->noteTraffic();
+  }
 };
 
 // Sets the socket options of a TCP connection, before TLS.

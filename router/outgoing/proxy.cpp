@@ -127,10 +127,16 @@ void Proxy::forward(Message request) {
   ++owed_;
   if (client.refusal)
     return endRequest(found->second, route.requestId, Fate::refused, *client.refusal);
+  const auto takeBefore = server_.takeBefore();
+  if (takeBefore.isNever() && PlainItem::canCarry(request))
+    return connection_.line().send(PlainItem{.isRequest = true,
+                                             .client = found->second,
+                                             .requestId = route.requestId,
+                                             .message = std::move(request)});
   connection_.line().send(Carried{.isRequest = true,
                                   .client = found->second,
                                   .requestId = route.requestId,
-                                  .takeBefore = server_.takeBefore(),
+                                  .takeBefore = takeBefore,
                                   .message = std::move(request)});
 }
 
@@ -165,22 +171,37 @@ void Proxy::ended(Client& client) noexcept {
   --owed_;
 }
 
-void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
-  const auto found = clients_.find(number);
-  // The client has disconnected, or drain() has ended its requests.
-  if (found == clients_.end() || isDraining()) return;
-  auto& client = found->second;
-  const bool isOwed = awaits(client, reply.getRequestId());
-  if (reply.getIsFirst() != isOwed) {
-    throw ProtocolError(FarewellCode::PROTOCOL,
-                        fmt::format("a {} reply to request {} of client {}, which {}",
-                                    reply.getIsFirst() ? "first" : "later", reply.getRequestId(),
-                                    number, isOwed ? "has had no first reply" : "is not pending"));
+// Throws ProtocolError if the peer must not send this reply now.
+void Proxy::checkReply(std::uint32_t number, const Client& client, std::uint32_t requestId,
+                       bool isFirst) const {
+  const bool isOwed = awaits(client, requestId);
+  if (isFirst != isOwed) {
+    throw ProtocolError(
+        FarewellCode::PROTOCOL,
+        fmt::format("a {} reply to request {} of client {}, which {}", isFirst ? "first" : "later",
+                    requestId, number, isOwed ? "has had no first reply" : "is not pending"));
   }
   if (client.window.isUsedUp())
     throw ProtocolError(FarewellCode::LIMIT,
                         fmt::format("a reply to client {} beyond its window of {} bytes", number,
                                     client.window.bytes()));
+}
+
+void Proxy::reply(PlainItem& item) {
+  const auto found = clients_.find(item.client);
+  if (found == clients_.end() || isDraining()) return;
+  auto& client = found->second;
+  checkReply(item.client, client, item.requestId, item.isFirst);
+  client.window.received(windowBytesOf(item.message));
+  deliver(item.client, client, item.requestId, std::move(item.message));
+}
+
+void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
+  const auto found = clients_.find(number);
+  // The client has disconnected, or drain() has ended its requests.
+  if (found == clients_.end() || isDraining()) return;
+  auto& client = found->second;
+  checkReply(number, client, reply.getRequestId(), reply.getIsFirst());
   ConversionError error;
   auto message = tryFromWire(
       reply.getMessage(), {static_cast<std::size_t>(connection_.line().limits().maxMessageBytes)},

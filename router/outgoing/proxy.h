@@ -58,6 +58,7 @@ class Proxy {
   [[nodiscard]] bool hasMore() const noexcept { return state_ == State::ready; }
   // Hand an item of the far server to client `number`.
   void reply(std::uint32_t number, wire::Reply::Reader reply);
+  void reply(PlainItem& item);
   void endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why);
   void queueFull(std::uint32_t number);
   void refuse(std::uint32_t number, const std::string& why);
@@ -90,6 +91,8 @@ class Proxy {
   void close(std::uint32_t number);
   void loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why);
   void forward(Message request);
+  void checkReply(std::uint32_t number, const Client& client, std::uint32_t requestId,
+                  bool isFirst) const;
   void deliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message&& message);
   bool tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message& message);
   void giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes);
