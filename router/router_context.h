@@ -33,8 +33,15 @@ struct RouterContext {
   std::uint64_t incarnation = 0;  // distinguishes restarts of this router
   Polling* polling = nullptr;     // nullptr: the router sleeps at once
 
+  // As the functions of Polling.
   void noteTraffic() const {
     if (polling != nullptr) polling->noteTraffic();
+  }
+  void poll(Polled& window) const {
+    if (polling != nullptr) polling->add(window);
+  }
+  void endPolling(Polled& window) const noexcept {
+    if (polling != nullptr) polling->remove(window);
   }
 };
 

@@ -215,6 +215,7 @@ bool Endpoint::tryScanAllLinks() noexcept {
 }
 
 bool Endpoint::arm() noexcept {
+  if (isPolled_) return true;
   doorbell::drainFifo(window_.fifo());
   announce(layout::SleepState::onDescriptor);
   tryScanAllLinks();

@@ -48,7 +48,7 @@ void FarClients::add(const FarClient::Terms& terms, const ServerName& server) {
 }
 
 void FarClients::startDispatcher() {
-  dispatcher_ = std::make_unique<Dispatcher>(
+  dispatcher_ = std::make_unique<RelayDispatcher>(
       context_.backplane, DispatcherOptions{WaitMode::block, "router " + line_.peer().router});
   readable_ =
       std::make_unique<Readable>(context_.port, dispatcher_->descriptor(), [this] { run(); });
@@ -107,6 +107,11 @@ void FarClients::run() {
   dropped_.clear();
   if (!isDrained && line_.hasRoom()) return timer_.setAt(Deadline::after(Nanoseconds(0)));
   scheduleRun();
+}
+
+void FarClients::onTraffic() {
+  if (dispatcher_) context_.poll(*this);
+  else context_.noteTraffic();
 }
 
 // Runs the dispatcher also when one of its deadlines is due.

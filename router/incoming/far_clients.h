@@ -15,18 +15,21 @@
 #include <unordered_map>
 #include <vector>
 
+#include "client/relay_dispatcher.h"
 #include "router/alarm.h"
 #include "router/incoming/far_client.h"
 #include "router/outgoing/pending_binds.h"
+#include "router/polling.h"
 #include "router/readable.h"
 #include "router/router_context.h"
 
 namespace mpf::router {
 
-class FarClients {
+class FarClients final : private Polled {
  public:
   // `context`, `line` and `record` outlive this object.
   FarClients(RouterContext& context, Line& line, PeerRecord& record, FarClient::Events events);
+  ~FarClients() { context_.endPolling(*this); }
 
   // The peer opens a client of this number.
   //   throws  ProtocolError
@@ -48,8 +51,12 @@ class FarClients {
 
   // Receives messages of the servers while the line has room.
   void run();
+  // Bytes have arrived or are sent: messages of the servers will follow.
+  void onTraffic();
 
  private:
+  void poll() override { run(); }
+  void setPolled(bool isPolled) override { dispatcher_->setPolled(isPolled); }
   void startDispatcher();
   void scheduleRun();
   void countClients() noexcept;
@@ -59,7 +66,7 @@ class FarClients {
   PeerRecord& record_;
   FarClient::Events events_;
   std::size_t heldBytes_ = 0;  // of the requests that all clients hold
-  std::unique_ptr<Dispatcher> dispatcher_;  // created with the first client
+  std::unique_ptr<RelayDispatcher> dispatcher_;  // created with the first client
   std::unique_ptr<Readable> readable_;
   std::unordered_map<std::uint32_t, std::unique_ptr<FarClient>> clients_;
   std::uint32_t lastClient_ = 0;

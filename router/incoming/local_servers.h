@@ -42,6 +42,7 @@ class LocalServers {
   void handle(PlainItem& item);
   // Receives messages of the servers while the line has room.
   void run() { clients_.run(); }
+  void onTraffic() { clients_.onTraffic(); }
   // A reply cannot be sent, for the reason `why`; the server has handled its request. Fills in what
   // is sent instead.
   void loseReply(const Carried& reply, const std::string& why, wire::Item::Builder instead);

@@ -27,7 +27,7 @@ Line::Events ServerRouter::lineEvents() {
       .onItem = [this](wire::Item::Reader item) { servers_.handle(item); },
       .onPlain = [this](PlainItem& item) { servers_.handle(item); },
       .onRoom = [this] { servers_.run(); },
-      .onTraffic = [this] { context_.noteTraffic(); },
+      .onTraffic = [this] { servers_.onTraffic(); },
       .onUnsendable = [this](
                           const Carried& reply, const std::string& why,
                           wire::Item::Builder instead) { servers_.loseReply(reply, why, instead); },

@@ -47,6 +47,7 @@ Proxy::Proxy(RouterContext& context, RemoteConnection& connection, const ServerN
 }
 
 Proxy::~Proxy() {
+  context_.endPolling(*this);
   for (const auto& [number, client] : clients_) connection_.removeClient(number);
 }
 
@@ -96,16 +97,19 @@ void Proxy::onClient(std::uint64_t local, bool isThere) {
 
 bool Proxy::pump(int most) {
   if (isDraining()) return false;
+  state_ = State::ready;
+  bool hasTaken = false;
   for (; most != 0 && connection_.line().hasRoom(); --most) {
     auto request = server_.receive();
     if (!request) {
       state_ = State::idle;
-      return false;
+      break;
     }
+    hasTaken = true;
     forward(std::move(request));
   }
-  state_ = State::ready;
-  return true;
+  if (hasTaken) context_.poll(*this);
+  return hasMore();
 }
 
 void Proxy::forward(Message request) {

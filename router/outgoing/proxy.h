@@ -29,6 +29,7 @@
 #include "router/outgoing/pending_binds.h"
 #include "router/outgoing/remote_connection.h"
 #include "router/outgoing/reply_window.h"
+#include "router/polling.h"
 #include "router/readable.h"
 #include "router/router_context.h"
 #include "router/transport/line.h"
@@ -36,7 +37,7 @@
 
 namespace mpf::router {
 
-class Proxy {
+class Proxy final : private Polled {
  public:
   // The far server, as the peer describes it.
   struct Offer {
@@ -85,6 +86,8 @@ class Proxy {
     std::optional<std::string> refusal;  // why the far server does not accept it
     Deadline openAgain = Deadline::never();  // after a refusal: when it may be opened again
   };
+  void poll() override { onReadable(); }
+  void setPolled(bool isPolled) override { server_.setPolled(isPolled); }
   void onReadable();
   void onClient(std::uint64_t local, bool isThere);
   bool tryOpen(std::uint64_t local);
