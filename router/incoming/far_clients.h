@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "client/relay_dispatcher.h"
@@ -59,7 +60,8 @@ class FarClients final : private Polled {
   void setPolled(bool isPolled) override { dispatcher_->setPolled(isPolled); }
   void startDispatcher();
   void scheduleRun();
-  void countClients() noexcept;
+  // Clients were added or removed.
+  void noteClients() noexcept;
 
   RouterContext& context_;
   Line& line_;
@@ -69,6 +71,8 @@ class FarClients final : private Polled {
   std::unique_ptr<RelayDispatcher> dispatcher_;  // created with the first client
   std::unique_ptr<Readable> readable_;
   std::unordered_map<std::uint32_t, std::unique_ptr<FarClient>> clients_;
+  // The client of the last item, so that a run of them costs one look-up.
+  mutable std::pair<std::uint32_t, FarClient*> recent_{};
   std::uint32_t lastClient_ = 0;
   std::vector<std::unique_ptr<FarClient>> dropped_;  // destroyed by the next run()
   Alarm timer_;

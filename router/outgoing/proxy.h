@@ -78,6 +78,7 @@ class Proxy final : private Polled {
     Message message;
   };
   struct Client {
+    std::uint32_t number = 0;
     std::uint64_t local = 0;  // its number in MessageServer
     std::uint32_t owed = 0;  // requests that have not ended
     ReplyWindow window{0};  // as sent in `open`
@@ -94,11 +95,14 @@ class Proxy final : private Polled {
   void close(std::uint32_t number);
   void loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why);
   void forward(Message request);
-  void checkReply(std::uint32_t number, const Client& client, std::uint32_t requestId,
-                  bool isFirst) const;
-  void deliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message&& message);
-  bool tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message& message);
-  void giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes);
+  Client* tryFindSender(std::uint64_t local);
+  Client* tryFindOrOpen(std::uint64_t local);
+  Client* tryFind(std::uint32_t number);
+  bool checkReply(const Client& client, std::uint32_t requestId, bool isFirst) const;
+  // `isOwed`: the message ends the request.
+  void deliver(Client& client, std::uint32_t requestId, Message&& message, bool isOwed);
+  bool tryDeliver(Client& client, std::uint32_t requestId, Message& message, bool isOwed);
+  void giveCredit(Client& client, std::uint64_t bytes);
   [[nodiscard]] bool awaits(const Client& client, std::uint32_t requestId) const noexcept;
   void end(std::uint32_t number, std::uint32_t requestId, Fate fate);
   void ended(Client& client) noexcept;
@@ -111,6 +115,7 @@ class Proxy final : private Polled {
   std::unordered_map<std::uint32_t, Client> clients_;  // by number
   // Numbers of the local clients; 0: the peer has accepted no more clients.
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
+  Client* recent_ = nullptr;  // of the last message: a run of messages costs one look-up
   Log log_;
   std::uint64_t owed_ = 0;
   State state_ = State::ready;

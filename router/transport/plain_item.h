@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// PlainItem: a request without a deadline or a reply, with a message of fixed size, outside a frame.
-// PlainFrame: reads the plain items of a frame in place. PlainRun: builds a frame of plain items.
+// PlainItem: a request without a deadline, or a reply, with a message of fixed size.
+// PlainFrame: reads the plain items of a frame in place.
+// PlainRun: builds a frame of plain items.
 //
 //   frame of a PlainRun = | segment table | Frame | list of items | item 0 | item 1 | ...
 //                                                                   item = | Request or Reply
@@ -12,7 +13,7 @@
 // recognise is left to Cap'n Proto's own reader.
 //
 // Threads  one thread uses an object; the templates are shared by all threads.
-// Trust    a frame may have any bytes. Each pointer is checked against the end of the frame, and each
+// Trust    a frame may have any bytes. Each pointer is checked against the end of the frame, and an
 //          item costs a bounded number of steps, however many pointers lead to the same words.
 #pragma once
 

@@ -5,8 +5,8 @@
 //
 // While frames are being written, items for the next ones gather in the queue. Plain items are
 // converted at once, and follow each other in a PlainRun, which becomes a frame of its own. Any
-// other message that waits stays in the shared memory of its sender, and is converted when its frame
-// is built.
+// other message that waits stays in the shared memory of its sender, and is converted when its
+// frame is built.
 //
 // Threads  one.
 #pragma once

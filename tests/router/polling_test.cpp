@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Polling: the event loop stays awake after traffic, and sleeps when there is none.
+// Polling: the event loop stays awake after traffic, and sleeps later.
 #include "router/polling.h"
 
 #include <gtest/gtest.h>
