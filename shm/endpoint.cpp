@@ -12,7 +12,7 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kClockEvery = 64;  // spins between readings of the clock
+constexpr std::uint32_t kClockEvery = 32;  // spins between readings of the clock
 // spins between scans of all links; WaitMode::spin then also gives up the processor once
 constexpr std::uint32_t kScanEvery = 1u << 14;
 constexpr std::uint32_t kScanAllEvery = 1024;  // looks at the hints between scans of all links

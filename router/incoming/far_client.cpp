@@ -124,10 +124,7 @@ void FarClient::onMessage(Message&& message) {
   window_ -= windowBytesOf(message);
   if (window_ <= 0 && state_ != State::draining) client_->pause();
   if (PlainItem::canCarry(message))
-    return shared_.line.send(PlainItem{.isFirst = isFirst,
-                                       .client = terms_.number,
-                                       .requestId = requestId,
-                                       .message = std::move(message)});
+    return shared_.line.send(PlainOutgoing{false, isFirst, terms_.number, requestId, message});
   shared_.line.send(Carried{.isFirst = isFirst,
                             .client = terms_.number,
                             .requestId = requestId,

@@ -145,10 +145,7 @@ void Proxy::forward(Message request) {
     return endRequest(client->number, requestId, Fate::refused, *client->refusal);
   const auto takeBefore = server_.takeBefore();
   if (takeBefore.isNever() && PlainItem::canCarry(request))
-    return connection_.line().send(PlainItem{.isRequest = true,
-                                             .client = client->number,
-                                             .requestId = requestId,
-                                             .message = std::move(request)});
+    return connection_.line().send(PlainOutgoing{true, false, client->number, requestId, request});
   connection_.line().send(Carried{.isRequest = true,
                                   .client = client->number,
                                   .requestId = requestId,

@@ -243,7 +243,7 @@ void Line::send(Carried carried) {
   else enqueue(std::move(carried));
 }
 
-void Line::send(const PlainItem& item) {
+void Line::send(const PlainOutgoing& item) {
   if (isEnding()) queue_.reject(item);
   else enqueue(item);
 }

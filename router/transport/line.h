@@ -82,7 +82,7 @@ class Line {
   void send(Note note);
   // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
-  void send(const PlainItem& item);
+  void send(const PlainOutgoing& item);
   [[nodiscard]] bool hasRoom() const noexcept { return state_ == State::open && queue_.hasRoom(); }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
   [[nodiscard]] bool hasGreeted() const noexcept { return peer_.hasArrived(); }

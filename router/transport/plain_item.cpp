@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "router/transport/plain_item.h"
 
+#include <algorithm>
 #include <capnp/message.h>
 #include <cstring>
 #include <span>
@@ -218,6 +219,7 @@ Template makeTemplate(bool isRequest) {
   const auto body = envelope + places.envelope.dataWords + places.envelope.pointers;
   Template made;
   made.words.resize(body + type.dataWords);
+  KJ_REQUIRE(made.words.size() <= PlainRun::kMaxItemWords);
   made.envelope = envelope * kWordBytes;
   made.body = body * kWordBytes;
   const auto point = [&](std::size_t at, std::size_t to, std::size_t data, std::size_t pointers) {
@@ -313,19 +315,22 @@ bool PlainFrame::tryRead(std::uint32_t index, PlainItem& item) const noexcept {
 
 // ---- PlainRun
 
+PlainRun::PlainRun() : payload_(kMaxWords + kMaxItemWords) {}
+
 void PlainRun::clear() noexcept {
-  payload_.clear();
+  payloadWords_ = 0;
   head_.clear();
   items_.clear();
 }
 
-void PlainRun::append(const PlainItem& item) {
+void PlainRun::append(const PlainOutgoing& item) {
   const auto& places = Places::get();
   const auto& carrier = places.carrierOf(item.isRequest);
-  const auto at = payload_.size();
+  const auto at = payloadWords_;
   withPlainType(item.message.getType(), [&]<class T>(std::type_identity<T>) {
     const auto& form = templateOf<T>(item.isRequest);
-    payload_.insert(payload_.end(), form.words.begin(), form.words.end());
+    std::ranges::copy(form.words, payload_.begin() + static_cast<std::ptrdiff_t>(at));
+    payloadWords_ += form.words.size();
     kj::ArrayPtr<kj::byte> bytes{reinterpret_cast<kj::byte*>(payload_.data() + at),
                                  form.words.size() * kWordBytes};
     storeLittle(bytes, carrier.client, item.client);
@@ -350,7 +355,7 @@ void PlainRun::buildHead() {
   const auto payloadAt = listAt + 1 + listWords;
   constexpr std::size_t kTable = 1;
   head_.assign(kTable + payloadAt, 0);
-  head_[0] = toLittle(std::uint64_t{payloadAt + payload_.size()} << 32);  // one segment
+  head_[0] = toLittle(std::uint64_t{payloadAt + payloadWords_} << 32);  // one segment
   auto* const words = head_.data() + kTable;
   words[0] = toLittle(structPointer(0, places.frame.dataWords, places.frame.pointers));
   const auto itemsAt = 1 + places.frame.dataWords + places.items;

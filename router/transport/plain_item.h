@@ -29,6 +29,15 @@
 
 namespace mpf::router {
 
+// A plain item that is sent. Its message satisfies PlainItem::canCarry().
+struct PlainOutgoing {
+  bool isRequest;
+  bool isFirst;  // of a reply: it ends the request
+  std::uint32_t client;
+  std::uint32_t requestId;
+  const Message& message;
+};
+
 struct PlainItem {
   bool isRequest = false;
   bool isFirst = false;  // of a reply: it ends the request
@@ -38,6 +47,9 @@ struct PlainItem {
 
   // Whether `message` has a form that a plain item can have.
   [[nodiscard]] static bool canCarry(const Message& message) noexcept;
+  operator PlainOutgoing() const noexcept {
+    return {isRequest, isFirst, client, requestId, message};
+  }
 };
 
 class PlainFrame {
@@ -62,17 +74,23 @@ class PlainRun {
  public:
   // A longer run becomes several frames.
   static constexpr std::size_t kMaxBytes = std::size_t{32} << 10;
+  static constexpr std::size_t kMaxItemWords = 16;  // of an item, without its place in the list
 
+  PlainRun();
   void clear() noexcept;
-  [[nodiscard]] bool isFull() const noexcept { return payload_.size() >= kMaxWords; }
+  [[nodiscard]] bool isFull() const noexcept { return payloadWords_ >= kMaxWords; }
   [[nodiscard]] std::size_t size() const noexcept { return items_.size(); }
-  // Appends an item; its message must satisfy PlainItem::canCarry().
-  void append(const PlainItem& item);
+  // Appends an item. The run must not be full.
+  void append(const PlainOutgoing& item);
 
   // Completes the frame: its bytes are head() followed by payload().
   void buildHead();
-  [[nodiscard]] kj::ArrayPtr<const kj::byte> head() const noexcept { return bytesOf(head_); }
-  [[nodiscard]] kj::ArrayPtr<const kj::byte> payload() const noexcept { return bytesOf(payload_); }
+  [[nodiscard]] kj::ArrayPtr<const kj::byte> head() const noexcept {
+    return bytesOf(head_, head_.size());
+  }
+  [[nodiscard]] kj::ArrayPtr<const kj::byte> payload() const noexcept {
+    return bytesOf(payload_, payloadWords_);
+  }
 
   struct Sent {
     bool isRequest;
@@ -86,11 +104,12 @@ class PlainRun {
   using Words = std::vector<std::uint64_t>;
   static constexpr std::size_t kMaxWords = kMaxBytes / sizeof(capnp::word) / 2;
 
-  static kj::ArrayPtr<const kj::byte> bytesOf(const Words& words) noexcept {
-    return {reinterpret_cast<const kj::byte*>(words.data()), words.size() * sizeof(capnp::word)};
+  static kj::ArrayPtr<const kj::byte> bytesOf(const Words& words, std::size_t count) noexcept {
+    return {reinterpret_cast<const kj::byte*>(words.data()), count * sizeof(capnp::word)};
   }
 
-  Words payload_;
+  Words payload_;  // has room for all items of a full run
+  std::size_t payloadWords_ = 0;  // of these, words in use
   Words head_;
   std::vector<Sent> items_;
 };

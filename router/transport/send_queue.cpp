@@ -69,7 +69,7 @@ void SendQueue::push(Carried carried) {
   countWaiting();
 }
 
-void SendQueue::push(const PlainItem& item) {
+void SendQueue::push(const PlainOutgoing& item) {
   auto* last = queue_.empty() ? nullptr : std::get_if<Run>(&queue_.back());
   if (last == nullptr || (*last)->isFull()) {
     queue_.emplace_back(takeSpareRun());
@@ -91,7 +91,7 @@ void SendQueue::reject(Carried carried) {
   if (carried.isRequest) rejectedRequests_.push_back(std::move(carried));
 }
 
-void SendQueue::reject(const PlainItem& item) {
+void SendQueue::reject(const PlainOutgoing& item) {
   reject(Carried{.isRequest = item.isRequest,
                  .client = item.client,
                  .requestId = item.requestId,

@@ -53,10 +53,10 @@ class SendQueue {
   // Append an item, also when hasRoom() is false.
   void push(Note note, NoteKind kind);
   void push(Carried carried);
-  void push(const PlainItem& item);
+  void push(const PlainOutgoing& item);
   // Does not send a message. If it is a request, takeUnsentRequests() returns it.
   void reject(Carried carried);
-  void reject(const PlainItem& item);
+  void reject(const PlainOutgoing& item);
 
   [[nodiscard]] bool hasRoom() const noexcept {
     return messages_ < queueSize_ && notes_ < kMaxNotes;
