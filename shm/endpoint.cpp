@@ -146,9 +146,9 @@ bool Endpoint::wait(Deadline deadline) noexcept {
 bool Endpoint::spin(Deadline deadline) noexcept {
   if (hasEvents()) return true;
   if (mode_ == WaitMode::block) return false;
-  const auto isAdaptive = mode_ == WaitMode::adaptive;
-  const auto budgetNs = isAdaptive ? spinBudget_.take() : INT64_MAX;
-  if (budgetNs == 0) return false;
+  const bool isAdaptive = mode_ == WaitMode::adaptive;
+  const auto budgetNs = isAdaptive ? spinBudget_.ns() : INT64_MAX;
+  const bool yields = isAdaptive && spinBudget_.takeYielding();
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
     cpuRelax();
@@ -157,8 +157,7 @@ bool Endpoint::spin(Deadline deadline) noexcept {
     const auto nowNs = Clock::nowNs();
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
-    if (isAdaptive) {
-      // The peer, or the router on the way to it, may need this processor.
+    if (yields) {
       ::sched_yield();
       spinBudget_.noteYield(Clock::nowNs() - nowNs);
     }

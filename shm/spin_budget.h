@@ -2,8 +2,9 @@
 // SpinBudget: how long an endpoint with WaitMode::adaptive polls before it sleeps: about twice the
 // duration of a wake-up, and half as long after each long sleep, until a sleep is short again.
 //
-// An endpoint that polls gives up its processor now and then. If others then use the processor for
-// long, polling only delays them and this process: the next waits sleep at once.
+// A wait that polls gives its processor up now and then: the peer, or the router on the way to it,
+// may need it. If others then use the processor for long, they are not the peer: the next waits
+// keep the processor while they poll, as a message may come within their time slice.
 //
 // Threads  one owner thread.
 // Trust    the durations of wake-ups come from peers: each counts as one millisecond at most.
@@ -17,18 +18,18 @@ namespace mpf {
 class SpinBudget {
  public:
   [[nodiscard]] std::int64_t ns() const noexcept { return (2 * wakeNs_) >> halvings_; }
-  // Begins a wait. Returns for how long it may poll; 0: not at all.
-  [[nodiscard]] std::int64_t take() noexcept {
-    if (skips_ == 0) return ns();
-    --skips_;
-    return 0;
+  // Begins a wait. Returns whether it gives its processor up.
+  [[nodiscard]] bool takeYielding() noexcept {
+    if (keeps_ == 0) return true;
+    --keeps_;
+    return false;
   }
-  // A wait has given up its processor for this duration.
+  // A wait has given its processor up for this duration.
   void noteYield(std::int64_t ns) noexcept {
     if (ns < kLongYieldNs) {
-      lastSkips_ -= std::min(lastSkips_, 1u);
+      lastKeeps_ -= (lastKeeps_ + kForgetting - 1) / kForgetting;
     } else {
-      skips_ = lastSkips_ = std::min(2 * lastSkips_ + kFirstSkips, kMaxSkips);
+      keeps_ = lastKeeps_ = std::min(2 * lastKeeps_ + kFirstKeeps, kMaxKeeps);
     }
   }
   // Updates the estimated duration of a wake-up with a measured one.
@@ -42,13 +43,14 @@ class SpinBudget {
 
  private:
   static constexpr std::int64_t kLongYieldNs = 1'000'000;
-  static constexpr std::uint32_t kFirstSkips = 8;
-  static constexpr std::uint32_t kMaxSkips = 1024;
+  static constexpr std::uint32_t kFirstKeeps = 8;
+  static constexpr std::uint32_t kMaxKeeps = 1u << 14;
+  static constexpr std::uint32_t kForgetting = 64;
 
   std::int64_t wakeNs_ = 10'000;  // estimated duration of a wake-up
   std::uint32_t halvings_ = 0;
-  std::uint32_t skips_ = 0;  // waits that will sleep at once
-  std::uint32_t lastSkips_ = 0;  // after the last long yield
+  std::uint32_t keeps_ = 0;  // waits that will keep the processor
+  std::uint32_t lastKeeps_ = 0;  // after the last long yield
 };
 
 }  // namespace mpf
