@@ -52,7 +52,7 @@ class FarClients final : private Polled {
 
   // Receives messages of the servers while the line has room.
   void run();
-  // Bytes have arrived or are sent: messages of the servers will follow.
+  // A frame has arrived, or frames are sent: messages of the servers may follow.
   void onTraffic();
 
  private:

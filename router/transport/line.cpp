@@ -91,7 +91,6 @@ kj::Promise<void> Line::readLoop() {
         count(record_->bytesReceived, bytes);
         keepAlive_.bytesReceived(bytes);
         reader_.filled(bytes);
-        if (events_.onTraffic) events_.onTraffic();
         return handleReceived(bytes == most);
       });
 }
@@ -174,6 +173,7 @@ bool Line::tryNextFrame() {
   if (frame == nullptr) return false;
   keepAlive_.frameReceived(Clock::nowNs());
   count(record_->framesReceived);
+  if (events_.onTraffic) events_.onTraffic();
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
   plain_.reset();
@@ -266,10 +266,10 @@ kj::Promise<void> Line::writeAll() {
     else if (state_ == State::dropping) finish({farewell_});
     return kj::READY_NOW;
   }
-  if (events_.onTraffic) events_.onTraffic();
   const SendQueue::FrameLimits limits{.items = hasGreeted() ? SIZE_MAX : 1,  // the greeting, alone
                                       .bytes = limits_.bufferBytes,
                                       .messageBytes = maxMessageBytes()};
+  if (events_.onTraffic) events_.onTraffic();
   return stream_->write(queue_.buildFrames(limits, events_.onUnsendable)).then([this] {
     if (resumeReading_) {
       // The peer is alive: it reads, while its own items are not read here.

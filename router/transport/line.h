@@ -60,7 +60,8 @@ class Line {
     std::function<void(PlainItem& item)> onPlain{};
     // hasRoom() may have become true.
     std::function<void()> onRoom;
-    // Bytes have arrived or are sent. May be empty.
+    // A frame has arrived, or frames are sent; not for each part of a long frame, because a router
+    // that polls for these reads many small ones. May be empty.
     std::function<void()> onTraffic{};
     // A message cannot be sent. If it is a request, it has not been handled.
     SendQueue::OnUnsendable onUnsendable;
