@@ -22,6 +22,7 @@ constexpr auto kPendingBindsAgain = std::chrono::seconds(1);  // when not all co
 
 Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& log)
     : statistics_(Backplane::attach(config.backplane), config.name),
+      polling_(io.unixEventPort),
       context_{.port = io.unixEventPort,
                .network = io.provider->getNetwork(),
                .timer = io.provider->getTimer(),
@@ -31,7 +32,8 @@ Router::Router(kj::AsyncIoContext& io, const RouterConfig& config, const Log& lo
                .monitors = monitors_,
                .config = config,
                .tls = nullptr,
-               .incarnation = segments::newIncarnation()},
+               .incarnation = segments::newIncarnation(),
+               .polling = &polling_},
       monitors_(context_.backplane, io.unixEventPort, [this] { lookAtServers(); }),
       pendingBinds_(context_.backplane),
       bell_(io.unixEventPort, [this] { lookAtPendingBinds(); }),

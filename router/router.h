@@ -64,6 +64,7 @@ class Router final : private kj::TaskSet::ErrorHandler {
   };
 
   Statistics statistics_;
+  Polling polling_;
   RouterContext context_;
   ServerMonitors monitors_;
   PendingBinds pendingBinds_;

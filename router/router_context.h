@@ -12,6 +12,7 @@
 
 #include "router/config/router_config.h"
 #include "router/incoming/server_monitors.h"
+#include "router/polling.h"
 #include "router/statistics.h"
 #include "router/transport/tls.h"
 #include "schema/router.capnp.h"
@@ -30,6 +31,18 @@ struct RouterContext {
   RouterConfig config;            // replaced by a reload
   std::shared_ptr<Tls> tls;       // nullptr: no connection uses TLS
   std::uint64_t incarnation = 0;  // distinguishes restarts of this router
+  Polling* polling = nullptr;     // nullptr: the router sleeps at once
+
+  // As the functions of Polling.
+  void noteTraffic() const {
+    if (polling != nullptr) polling->noteTraffic();
+  }
+  void poll(Polled& window) const {
+    if (polling != nullptr) polling->add(window);
+  }
+  void endPolling(Polled& window) const noexcept {
+    if (polling != nullptr) polling->remove(window);
+  }
 };
 
 // Sets the socket options of a TCP connection, before TLS.

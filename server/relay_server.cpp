@@ -8,6 +8,7 @@ namespace mpf {
 void RelayServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
   core_->connections().onClient(std::move(callback));
 }
+void RelayServer::setPolled(bool isPolled) noexcept { core_->setPolled(isPolled); }
 Deadline RelayServer::takeBefore() const noexcept { return core_->takeBefore(); }
 ReplyResult RelayServer::replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message) {
   message.setRoute(core_->connections().routeTo(client, requestId));

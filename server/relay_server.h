@@ -23,6 +23,10 @@ class RelayServer : public MessageServer {
   // As reply(), to a request whose handle no longer exists. The caller has kept the results of
   // clientOf(request) and request.route().requestId.
   ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
+  // As long as `isPolled` is true, the caller calls receive() all the time, and the descriptor does
+  // not become readable for requests. After a change to false, call receive() until it returns an
+  // empty handle.
+  void setPolled(bool isPolled) noexcept;
   // Whether that request still has no reply.
   [[nodiscard]] bool owes(std::uint64_t client, std::uint32_t requestId) const noexcept;
   // The requests of a client that were received and still have no reply.

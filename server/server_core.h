@@ -53,6 +53,8 @@ class ServerCore {
   void endHandling() noexcept { progress_.end(); }
   [[nodiscard]] Deadline takeBefore() const noexcept { return takeBefore_; }
   int descriptor();
+  // As Endpoint::setPolled().
+  void setPolled(bool isPolled) noexcept { endpoint_.setPolled(isPolled); }
   // Keeps the descriptor readable, for requests that were not received yet.
   void keepReadable() noexcept;
   void countAlarm() noexcept { endpoint_.control().alarms.fetch_add(1, std::memory_order_relaxed); }

@@ -12,9 +12,9 @@
 namespace mpf {
 namespace {
 
-constexpr std::uint32_t kClockEvery = 64;  // spins between readings of the clock
-// spins between calls of sched_yield(), for peers that share the processor
-constexpr std::uint32_t kYieldEvery = 1u << 14;
+constexpr std::uint32_t kClockEvery = 32;  // spins between readings of the clock
+// spins between scans of all links; WaitMode::spin then also gives up the processor once
+constexpr std::uint32_t kScanEvery = 1u << 14;
 constexpr std::uint32_t kScanAllEvery = 1024;  // looks at the hints between scans of all links
 // with at most this number of links, a scan of all links costs next to nothing
 constexpr std::size_t kFewLinks = 64;
@@ -146,7 +146,9 @@ bool Endpoint::wait(Deadline deadline) noexcept {
 bool Endpoint::spin(Deadline deadline) noexcept {
   if (hasEvents()) return true;
   if (mode_ == WaitMode::block) return false;
-  const auto budgetNs = mode_ == WaitMode::spin ? INT64_MAX : spinBudget_.ns();
+  const bool isAdaptive = mode_ == WaitMode::adaptive;
+  const auto budgetNs = isAdaptive ? spinBudget_.ns() : INT64_MAX;
+  const bool yields = isAdaptive && spinBudget_.takeYielding();
   std::int64_t startNs = 0;
   for (std::uint32_t spins = 1;; ++spins) {
     cpuRelax();
@@ -155,9 +157,13 @@ bool Endpoint::spin(Deadline deadline) noexcept {
     const auto nowNs = Clock::nowNs();
     if (startNs == 0) startNs = nowNs;
     if (nowNs >= deadline.ns() || nowNs - startNs >= budgetNs) return false;
-    if (spins % kYieldEvery != 0) continue;
+    if (yields) {
+      ::sched_yield();
+      spinBudget_.noteYield(Clock::nowNs() - nowNs);
+    }
+    if (spins % kScanEvery != 0) continue;
     tryScanAllLinks();
-    ::sched_yield();
+    if (!isAdaptive) ::sched_yield();
   }
 }
 
@@ -208,6 +214,7 @@ bool Endpoint::tryScanAllLinks() noexcept {
 }
 
 bool Endpoint::arm() noexcept {
+  if (isPolled_) return true;
   doorbell::drainFifo(window_.fifo());
   announce(layout::SleepState::onDescriptor);
   tryScanAllLinks();

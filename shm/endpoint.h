@@ -91,6 +91,9 @@ class Endpoint {
   [[nodiscard]] int descriptor() const noexcept { return window_.fifo().get(); }
   bool arm() noexcept;
   void disarm() noexcept;
+  // While the owner polls next() and hasControlEvents(), arm() announces no sleep and returns true:
+  // peers need not wake the owner, and the descriptor does not become readable.
+  void setPolled(bool isPolled) noexcept { isPolled_ = isPolled; }
   // Makes the descriptor readable again: the caller has not handled all events.
   void keepReadable() noexcept { window_.ring(); }
 
@@ -138,6 +141,7 @@ class Endpoint {
   std::atomic<std::uint32_t> localEvent_{0};
   std::atomic<bool> peerDied_{false};
   bool armed_ = false;
+  bool isPolled_ = false;
   std::uint64_t sleepNumber_ = 0;  // number of the last sleep that was announced
   bool slept_ = false;
   SpinBudget spinBudget_;

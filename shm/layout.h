@@ -332,7 +332,7 @@ struct RouterLine {
   Word64 queueFull;
   Word64 messagesSent;
   Word64 messagesReceived;
-  Word64 framesSent;  // each one write
+  Word64 framesSent;  // a write may have several
   Word64 framesReceived;
   Word64 bytesSent;
   Word64 bytesReceived;

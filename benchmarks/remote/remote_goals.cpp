@@ -30,8 +30,11 @@ void addGoals(GoalSheet& goals, const std::string& place) {
   const auto messages = [&](const std::string& name) {
     return timesTcp(goals, goals.find(place + kMessages, "MPF remote, " + name));
   };
-  goals.atLeast(place + ": no buffer, x raw TCP, at least", messages("no buffer"), 0.5);
-  goals.atLeast(place + ": 100 buffered, x raw TCP, at least", messages("100 buffered"), 1.0);
+  goals.atLeast(place + ": no buffer, x raw TCP, at least", messages("no buffer"), 0.8);
+  goals.atLeast(place + ": 100 buffered, x raw TCP, at least", messages("100 buffered"), 0.6);
+  if (const auto* row = goals.find(place + kMessages, "MPF remote, 1000 buffered"))
+    goals.atLeast(place + ": 1000 buffered, million a second, at least",
+                  row->figures.perSecond / 1e6, 2);
   for (const auto* array : {"Float64Array", "Int32Array"}) {
     for (const auto* way : {", one at a time", ", 4 in flight"})
       arraysAtLeast(goals, place, std::string(array) + way);

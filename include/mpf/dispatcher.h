@@ -84,6 +84,7 @@ class Dispatcher {
  private:
   friend class MessageClient;
   friend class Binding;
+  friend class RelayDispatcher;
   class Impl;
   std::shared_ptr<Impl> impl_;
 };

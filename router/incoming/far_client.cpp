@@ -22,9 +22,24 @@ FarClient::FarClient(const Shared& shared, const Terms& terms, Events events)
 
 // ---- to the server
 
+namespace {
+
+void checkId(std::uint32_t requestId) {
+  if (requestId == 0) throw ProtocolError(FarewellCode::PROTOCOL, "requestId 0");
+}
+
+}  // namespace
+
+void FarClient::request(PlainItem& item) {
+  checkId(item.requestId);
+  if (state_ == State::gaveUp) return endRequest(item.requestId, fateAfterGiveUp_, giveUpReason_);
+  if (isConnected()) return send(item.requestId, item.message, Deadline::never());
+  hold({item.requestId, Deadline::never(), std::move(item.message)});
+}
+
 void FarClient::request(wire::Request::Reader request) {
   const auto id = request.getRequestId();
-  if (id == 0) throw ProtocolError(FarewellCode::PROTOCOL, "requestId 0");
+  checkId(id);
   if (state_ == State::gaveUp) return endRequest(id, fateAfterGiveUp_, giveUpReason_);
   ConversionError error;
   auto message = tryFromWire(
@@ -46,16 +61,19 @@ void FarClient::request(wire::Request::Reader request) {
 
 void FarClient::send(HeldRequest request) {
   if (!isConnected()) return hold(std::move(request));
-  const auto id = request.requestId;
-  const auto result = client_->sendAs(id, std::move(request.message), request.takeBefore);
+  send(request.requestId, request.message, request.takeBefore);
+}
+
+void FarClient::send(std::uint32_t requestId, Message& message, Deadline takeBefore) {
+  const auto result = client_->sendAs(requestId, std::move(message), takeBefore);
   if (result == SendResult::sent) return;
   std::string why = toString(result);
   if (result == SendResult::tooLarge) {
     // A message that was not sent is unchanged.
-    const auto bytes = request.message.body().size();  // NOLINT(bugprone-use-after-move)
+    const auto bytes = message.body().size();  // NOLINT(bugprone-use-after-move)
     why += fmt::format(": {} bytes, the limit is {}", bytes, client_->maxMessageBytes());
   }
-  endRequest(id, Fate::refused, why);
+  endRequest(requestId, Fate::refused, why);
 }
 
 // Holds a request until the server accepts this client.
@@ -105,6 +123,8 @@ void FarClient::onMessage(Message&& message) {
                    : void();
   window_ -= windowBytesOf(message);
   if (window_ <= 0 && state_ != State::draining) client_->pause();
+  if (PlainItem::canCarry(message))
+    return shared_.line.send(PlainOutgoing{false, isFirst, terms_.number, requestId, message});
   shared_.line.send(Carried{.isFirst = isFirst,
                             .client = terms_.number,
                             .requestId = requestId,

@@ -61,7 +61,9 @@ class FarClient {
   FarClient& operator=(const FarClient&) = delete;
 
   void bind(const std::string& server, std::int32_t location) { client_->bind(server, location); }
+  //   throws  ProtocolError
   void request(wire::Request::Reader request);
+  void request(PlainItem& item);
   void credit(std::uint32_t bytes);
   // The server is gone: receives the messages that it had sent, regardless of the window, and then
   // the disconnect.
@@ -86,6 +88,7 @@ class FarClient {
   void onConnect(const Connect& connect);
   void accept();
   void send(HeldRequest request);
+  void send(std::uint32_t requestId, Message& message, Deadline takeBefore);
   void hold(HeldRequest request);
   void expire();
   void sendQueueFull();

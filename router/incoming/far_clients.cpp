@@ -43,12 +43,12 @@ void FarClients::add(const FarClient::Terms& terms, const ServerName& server) {
       FarClient::Shared{context_.timer, *dispatcher_, line_, record_, heldBytes_}, terms, events_);
   client->bind(server.server, server.location);
   clients_[terms.number] = std::move(client);
-  countClients();
+  noteClients();
   scheduleRun();
 }
 
 void FarClients::startDispatcher() {
-  dispatcher_ = std::make_unique<Dispatcher>(
+  dispatcher_ = std::make_unique<RelayDispatcher>(
       context_.backplane, DispatcherOptions{WaitMode::block, "router " + line_.peer().router});
   readable_ =
       std::make_unique<Readable>(context_.port, dispatcher_->descriptor(), [this] { run(); });
@@ -61,18 +61,21 @@ FarClient* FarClients::find(std::uint32_t number) const {
 }
 
 FarClient* FarClients::tryFind(std::uint32_t number) const noexcept {
+  if (recent_.second != nullptr && recent_.first == number) return recent_.second;
   const auto found = clients_.find(number);
-  return found == clients_.end() ? nullptr : found->second.get();
+  if (found == clients_.end()) return nullptr;
+  recent_ = {number, found->second.get()};
+  return recent_.second;
 }
 
 void FarClients::remove(std::uint32_t number) {
   clients_.erase(number);
-  countClients();
+  noteClients();
 }
 
 void FarClients::removeAllOf(std::uint32_t binding) {
   std::erase_if(clients_, [&](const auto& each) { return each.second->binding() == binding; });
-  countClients();
+  noteClients();
 }
 
 void FarClients::dropAllOf(std::uint32_t binding) {
@@ -84,7 +87,7 @@ void FarClients::dropAllOf(std::uint32_t binding) {
     dropped_.push_back(std::move(each->second));
     each = clients_.erase(each);
   }
-  countClients();
+  noteClients();
 }
 
 void FarClients::forEachOf(std::uint32_t binding,
@@ -94,7 +97,8 @@ void FarClients::forEachOf(std::uint32_t binding,
   }
 }
 
-void FarClients::countClients() noexcept {
+void FarClients::noteClients() noexcept {
+  recent_ = {};
   record_->clients.store(clients_.size(), std::memory_order_relaxed);
 }
 
@@ -107,6 +111,11 @@ void FarClients::run() {
   dropped_.clear();
   if (!isDrained && line_.hasRoom()) return timer_.setAt(Deadline::after(Nanoseconds(0)));
   scheduleRun();
+}
+
+void FarClients::onTraffic() {
+  if (dispatcher_) context_.poll(*this);
+  else context_.noteTraffic();
 }
 
 // Runs the dispatcher also when one of its deadlines is due.

@@ -13,20 +13,24 @@
 #include <functional>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
+#include "client/relay_dispatcher.h"
 #include "router/alarm.h"
 #include "router/incoming/far_client.h"
 #include "router/outgoing/pending_binds.h"
+#include "router/polling.h"
 #include "router/readable.h"
 #include "router/router_context.h"
 
 namespace mpf::router {
 
-class FarClients {
+class FarClients final : private Polled {
  public:
   // `context`, `line` and `record` outlive this object.
   FarClients(RouterContext& context, Line& line, PeerRecord& record, FarClient::Events events);
+  ~FarClients() { context_.endPolling(*this); }
 
   // The peer opens a client of this number.
   //   throws  ProtocolError
@@ -48,20 +52,27 @@ class FarClients {
 
   // Receives messages of the servers while the line has room.
   void run();
+  // A frame has arrived, or frames are sent: messages of the servers may follow.
+  void onTraffic();
 
  private:
+  void poll() override { run(); }
+  void setPolled(bool isPolled) override { dispatcher_->setPolled(isPolled); }
   void startDispatcher();
   void scheduleRun();
-  void countClients() noexcept;
+  // Clients were added or removed.
+  void noteClients() noexcept;
 
   RouterContext& context_;
   Line& line_;
   PeerRecord& record_;
   FarClient::Events events_;
   std::size_t heldBytes_ = 0;  // of the requests that all clients hold
-  std::unique_ptr<Dispatcher> dispatcher_;  // created with the first client
+  std::unique_ptr<RelayDispatcher> dispatcher_;  // created with the first client
   std::unique_ptr<Readable> readable_;
   std::unordered_map<std::uint32_t, std::unique_ptr<FarClient>> clients_;
+  // The client of the last item, so that a run of them costs one look-up.
+  mutable std::pair<std::uint32_t, FarClient*> recent_{};
   std::uint32_t lastClient_ = 0;
   std::vector<std::unique_ptr<FarClient>> dropped_;  // destroyed by the next run()
   Alarm timer_;

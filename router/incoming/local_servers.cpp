@@ -18,6 +18,10 @@ namespace {
 constexpr std::size_t kMaxBindings = 4096;  // per connection
 constexpr std::chrono::seconds kLookEvery{1};
 
+[[noreturn]] void refuseServersItem() {
+  throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a server router sends");
+}
+
 bool isServerName(kj::StringPtr text) try {
   SegmentName::checkServer({text.begin(), text.size()});
   return true;
@@ -65,10 +69,16 @@ void LocalServers::handle(wire::Item::Reader item) {
     case wire::Item::REPLY:
     case wire::Item::FATE:
     case wire::Item::QUEUE_FULL:
-      throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a server router sends");
+      refuseServersItem();
     default:  // an item that only a newer peer defines
       return;
   }
+}
+
+void LocalServers::handle(PlainItem& item) {
+  if (!item.isRequest) refuseServersItem();
+  if (auto* client = clients_.find(item.client)) client->request(item);
+  else endWithoutClient(item.client, item.requestId);
 }
 
 // ---- bindings
@@ -242,10 +252,14 @@ void LocalServers::refuseClient(std::uint32_t number, const std::string& why) {
 void LocalServers::onRequest(wire::Request::Reader request) {
   const auto number = request.getClient();
   if (auto* client = clients_.find(number)) return client->request(request);
-  line_.send([number, id = request.getRequestId()](wire::Item::Builder answer) {
+  endWithoutClient(number, request.getRequestId());
+}
+
+void LocalServers::endWithoutClient(std::uint32_t client, std::uint32_t requestId) {
+  line_.send([client, requestId](wire::Item::Builder answer) {
     auto end = answer.initFate();
-    end.setClient(number);
-    end.setRequestId(id);
+    end.setClient(client);
+    end.setRequestId(requestId);
     end.setFate(wire::Fate::NEVER_TAKEN);
     end.setReason("the server is gone");
   });

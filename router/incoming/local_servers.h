@@ -39,8 +39,10 @@ class LocalServers {
   // Handles an item of the peer.
   //   throws  ProtocolError
   void handle(wire::Item::Reader item);
+  void handle(PlainItem& item);
   // Receives messages of the servers while the line has room.
   void run() { clients_.run(); }
+  void onTraffic() { clients_.onTraffic(); }
   // A reply cannot be sent, for the reason `why`; the server has handled its request. Fills in what
   // is sent instead.
   void loseReply(const Carried& reply, const std::string& why, wire::Item::Builder instead);
@@ -68,6 +70,7 @@ class LocalServers {
   void onUnbind(std::uint32_t number);
   void onOpen(wire::Open::Reader open);
   void onRequest(wire::Request::Reader request);
+  void endWithoutClient(std::uint32_t client, std::uint32_t requestId);
   void onClose(std::uint32_t number);
   void refuseBind(std::uint32_t number, const std::string& why);
   void refuseClient(std::uint32_t number, const std::string& why);

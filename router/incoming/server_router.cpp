@@ -25,7 +25,9 @@ Line::Events ServerRouter::lineEvents() {
   return {
       .onGreeting = [this](const PeerGreeting& greeting) { onGreeting(greeting); },
       .onItem = [this](wire::Item::Reader item) { servers_.handle(item); },
+      .onPlain = [this](PlainItem& item) { servers_.handle(item); },
       .onRoom = [this] { servers_.run(); },
+      .onTraffic = [this] { servers_.onTraffic(); },
       .onUnsendable = [this](
                           const Carried& reply, const std::string& why,
                           wire::Item::Builder instead) { servers_.loseReply(reply, why, instead); },

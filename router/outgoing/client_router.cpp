@@ -71,7 +71,9 @@ kj::Promise<LineEnd> ClientRouter::runLine(kj::Own<kj::AsyncIoStream> stream) {
       Line::Events{
           .onGreeting = [this](const PeerGreeting& greeting) { onGreeting(greeting); },
           .onItem = [this](wire::Item::Reader item) { servers_.handle(item); },
+          .onPlain = [this](PlainItem& item) { servers_.handle(item); },
           .onRoom = [this] { servers_.pump(); },
+          .onTraffic = [this] { context_.noteTraffic(); },
           .onUnsendable = [this](const Carried& request, const std::string& why,
                                  wire::Item::Builder) { servers_.refuse(request, why); },
       });

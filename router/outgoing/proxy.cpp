@@ -47,6 +47,7 @@ Proxy::Proxy(RouterContext& context, RemoteConnection& connection, const ServerN
 }
 
 Proxy::~Proxy() {
+  context_.endPolling(*this);
   for (const auto& [number, client] : clients_) connection_.removeClient(number);
 }
 
@@ -65,6 +66,7 @@ bool Proxy::tryOpen(std::uint64_t local) {
   if (!number) return false;
   const auto window = context_.config.limits.windowBytes;
   auto& client = clients_[*number];
+  client.number = *number;
   client.local = local;
   client.window = ReplyWindow(window);
   connection_.line().send([number = *number, binding = offer_.binding,
@@ -79,6 +81,7 @@ bool Proxy::tryOpen(std::uint64_t local) {
 }
 
 void Proxy::close(std::uint32_t number) {
+  recent_ = nullptr;
   owed_ -= clients_.at(number).owed;
   clients_.erase(number);
   connection_.removeClient(number);
@@ -96,41 +99,57 @@ void Proxy::onClient(std::uint64_t local, bool isThere) {
 
 bool Proxy::pump(int most) {
   if (isDraining()) return false;
+  state_ = State::ready;
+  bool hasTaken = false;
   for (; most != 0 && connection_.line().hasRoom(); --most) {
     auto request = server_.receive();
     if (!request) {
       state_ = State::idle;
-      return false;
+      break;
     }
+    hasTaken = true;
     forward(std::move(request));
   }
-  state_ = State::ready;
-  return true;
+  if (hasTaken) context_.poll(*this);
+  return hasMore();
 }
 
-void Proxy::forward(Message request) {
-  const auto found = numbers_.find(server_.clientOf(request));
-  if (found == numbers_.end()) return;  // its client has disconnected
+// Returns nullptr when the client has disconnected or the peer accepts no more clients.
+Proxy::Client* Proxy::tryFindSender(std::uint64_t local) {
+  if (recent_ == nullptr || recent_->local != local || recent_->refusal)
+    recent_ = tryFindOrOpen(local);
+  return recent_;
+}
+
+Proxy::Client* Proxy::tryFindOrOpen(std::uint64_t local) {
+  const auto found = numbers_.find(local);
+  if (found == numbers_.end()) return nullptr;
   if (const auto known = clients_.find(found->second);
       known != clients_.end() && known->second.owed == 0 && known->second.openAgain.hasPassed()) {
     close(found->second);
     found->second = 0;
   }
-  // Destroying the handle refuses the request.
-  if (found->second == 0 && !tryOpen(found->first)) return;
+  if (found->second == 0 && !tryOpen(local)) return nullptr;
+  return &clients_.at(found->second);
+}
+
+void Proxy::forward(Message request) {
+  auto* const client = tryFindSender(server_.clientOf(request));
+  if (client == nullptr) return;  // destroying the handle refuses the request
   // From here on, the far server or this class ends the request, not the destructor of its handle.
-  auto route = request.route();
-  route.keeper = nullptr;
-  request.setRoute(route);
-  auto& client = clients_.at(found->second);
-  ++client.owed;
+  request.exchangeKeeper(nullptr);
+  const auto requestId = request.route().requestId;
+  ++client->owed;
   ++owed_;
-  if (client.refusal)
-    return endRequest(found->second, route.requestId, Fate::refused, *client.refusal);
+  if (client->refusal)
+    return endRequest(client->number, requestId, Fate::refused, *client->refusal);
+  const auto takeBefore = server_.takeBefore();
+  if (takeBefore.isNever() && PlainItem::canCarry(request))
+    return connection_.line().send(PlainOutgoing{true, false, client->number, requestId, request});
   connection_.line().send(Carried{.isRequest = true,
-                                  .client = found->second,
-                                  .requestId = route.requestId,
-                                  .takeBefore = server_.takeBefore(),
+                                  .client = client->number,
+                                  .requestId = requestId,
+                                  .takeBefore = takeBefore,
                                   .message = std::move(request)});
 }
 
@@ -165,22 +184,43 @@ void Proxy::ended(Client& client) noexcept {
   --owed_;
 }
 
+Proxy::Client* Proxy::tryFind(std::uint32_t number) {
+  if (recent_ != nullptr && recent_->number == number) return recent_;
+  const auto found = clients_.find(number);
+  return found == clients_.end() ? nullptr : recent_ = &found->second;
+}
+
+// Returns whether the reply ends its request.
+//   throws  ProtocolError: the peer must not send it now
+bool Proxy::checkReply(const Client& client, std::uint32_t requestId, bool isFirst) const {
+  const bool isOwed = awaits(client, requestId);
+  if (isFirst != isOwed) {
+    throw ProtocolError(FarewellCode::PROTOCOL,
+                        fmt::format("a {} reply to request {} of client {}, which {}",
+                                    isFirst ? "first" : "later", requestId, client.number,
+                                    isOwed ? "has had no first reply" : "is not pending"));
+  }
+  if (client.window.isUsedUp())
+    throw ProtocolError(FarewellCode::LIMIT,
+                        fmt::format("a reply to client {} beyond its window of {} bytes",
+                                    client.number, client.window.bytes()));
+  return isOwed;
+}
+
+void Proxy::reply(PlainItem& item) {
+  auto* const client = tryFind(item.client);
+  if (client == nullptr || isDraining()) return;
+  const bool isOwed = checkReply(*client, item.requestId, item.isFirst);
+  client->window.received(windowBytesOf(item.message));
+  deliver(*client, item.requestId, std::move(item.message), isOwed);
+}
+
 void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
   const auto found = clients_.find(number);
   // The client has disconnected, or drain() has ended its requests.
   if (found == clients_.end() || isDraining()) return;
   auto& client = found->second;
-  const bool isOwed = awaits(client, reply.getRequestId());
-  if (reply.getIsFirst() != isOwed) {
-    throw ProtocolError(FarewellCode::PROTOCOL,
-                        fmt::format("a {} reply to request {} of client {}, which {}",
-                                    reply.getIsFirst() ? "first" : "later", reply.getRequestId(),
-                                    number, isOwed ? "has had no first reply" : "is not pending"));
-  }
-  if (client.window.isUsedUp())
-    throw ProtocolError(FarewellCode::LIMIT,
-                        fmt::format("a reply to client {} beyond its window of {} bytes", number,
-                                    client.window.bytes()));
+  const bool isOwed = checkReply(client, reply.getRequestId(), reply.getIsFirst());
   ConversionError error;
   auto message = tryFromWire(
       reply.getMessage(), {static_cast<std::size_t>(connection_.line().limits().maxMessageBytes)},
@@ -194,7 +234,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
     return loseReply(number, reply, error.text);
   }
   client.window.received(windowBytesOf(*message));
-  deliver(number, client, reply.getRequestId(), std::move(*message));
+  deliver(client, reply.getRequestId(), std::move(*message), isOwed);
 }
 
 // The server has handled the request, but its reply cannot be delivered.
@@ -202,7 +242,7 @@ void Proxy::loseReply(std::uint32_t number, wire::Reply::Reader reply, const std
   log_.warn("{} at location {}: a reply is lost: {}", name_.server, name_.location, why);
   if (reply.getIsFirst()) endRequest(number, reply.getRequestId(), Fate::outcomeUnknown, why);
   // At least as many bytes as the reply took from the window.
-  giveCredit(number, clients_.at(number),
+  giveCredit(clients_.at(number),
              kWindowBytesBeside + reply.getMessage().totalSize().wordCount * sizeof(capnp::word));
 }
 
@@ -216,8 +256,8 @@ void Proxy::endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate,
 void Proxy::end(std::uint32_t number, std::uint32_t requestId, Fate fate) {
   const auto found = clients_.find(number);
   if (found == clients_.end() || !awaits(found->second, requestId)) return;
-  deliver(number, found->second, requestId,
-          RequestFateMessage({.fate = fate, .requestId = requestId}));
+  deliver(found->second, requestId, RequestFateMessage({.fate = fate, .requestId = requestId}),
+          true);
 }
 
 void Proxy::queueFull(std::uint32_t number) {
@@ -225,7 +265,7 @@ void Proxy::queueFull(std::uint32_t number) {
   const auto found = clients_.find(number);
   if (found == clients_.end() || found->second.heldQueueFull) return;
   found->second.heldQueueFull = true;
-  deliver(number, found->second, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull}));
+  deliver(found->second, 0, ConnectMessage({.status = ConnectStatus::connectQueueFull}), false);
 }
 
 void Proxy::refuse(std::uint32_t number, const std::string& why) {
@@ -238,18 +278,15 @@ void Proxy::refuse(std::uint32_t number, const std::string& why) {
 }
 
 // Keeps the order: a message is queued behind those that are held.
-void Proxy::deliver(std::uint32_t number, Client& client, std::uint32_t requestId,
-                    Message&& message) {
-  if (client.held.empty() && tryDeliver(number, client, requestId, message)) return;
+void Proxy::deliver(Client& client, std::uint32_t requestId, Message&& message, bool isOwed) {
+  if (client.held.empty() && tryDeliver(client, requestId, message, isOwed)) return;
   client.held.push_back({requestId, std::move(message)});
   retryAfter_ = kFirstRetry;
   retry_.setAt(Deadline::after(retryAfter_));
 }
 
 // Returns false when the client has no room for the message now.
-bool Proxy::tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId,
-                       Message& message) {
-  const bool isOwed = server_.owes(client.local, requestId);
+bool Proxy::tryDeliver(Client& client, std::uint32_t requestId, Message& message, bool isOwed) {
   const bool isConnectMessage = message.getType() == MessageType::connect;
   const bool isOurs = isConnectMessage || message.getType() == MessageType::requestFate;
   const auto bytes = windowBytesOf(message);
@@ -271,14 +308,14 @@ bool Proxy::tryDeliver(std::uint32_t number, Client& client, std::uint32_t reque
   }
   if (isOwed) ended(client);
   if (isConnectMessage) client.heldQueueFull = false;
-  if (!isOurs) giveCredit(number, client, bytes);
+  if (!isOurs) giveCredit(client, bytes);
   return true;
 }
 
-void Proxy::giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes) {
+void Proxy::giveCredit(Client& client, std::uint64_t bytes) {
   const auto credit = client.window.taken(bytes);
   if (credit == 0) return;
-  connection_.line().send([number, credit](wire::Item::Builder item) {
+  connection_.line().send([number = client.number, credit](wire::Item::Builder item) {
     auto to = item.initCredit();
     to.setClient(number);
     to.setBytes(credit);
@@ -287,8 +324,9 @@ void Proxy::giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes
 
 void Proxy::retryHeld() {
   for (auto& [number, client] : clients_) {
-    while (!client.held.empty() &&
-           tryDeliver(number, client, client.held.front().requestId, client.held.front().message)) {
+    while (!client.held.empty()) {
+      auto& [requestId, message] = client.held.front();
+      if (!tryDeliver(client, requestId, message, server_.owes(client.local, requestId))) break;
       client.held.pop_front();
     }
   }

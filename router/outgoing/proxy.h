@@ -29,6 +29,7 @@
 #include "router/outgoing/pending_binds.h"
 #include "router/outgoing/remote_connection.h"
 #include "router/outgoing/reply_window.h"
+#include "router/polling.h"
 #include "router/readable.h"
 #include "router/router_context.h"
 #include "router/transport/line.h"
@@ -36,7 +37,7 @@
 
 namespace mpf::router {
 
-class Proxy {
+class Proxy final : private Polled {
  public:
   // The far server, as the peer describes it.
   struct Offer {
@@ -58,6 +59,7 @@ class Proxy {
   [[nodiscard]] bool hasMore() const noexcept { return state_ == State::ready; }
   // Hand an item of the far server to client `number`.
   void reply(std::uint32_t number, wire::Reply::Reader reply);
+  void reply(PlainItem& item);
   void endRequest(std::uint32_t number, std::uint32_t requestId, Fate fate, const std::string& why);
   void queueFull(std::uint32_t number);
   void refuse(std::uint32_t number, const std::string& why);
@@ -76,6 +78,7 @@ class Proxy {
     Message message;
   };
   struct Client {
+    std::uint32_t number = 0;
     std::uint64_t local = 0;  // its number in MessageServer
     std::uint32_t owed = 0;  // requests that have not ended
     ReplyWindow window{0};  // as sent in `open`
@@ -84,15 +87,22 @@ class Proxy {
     std::optional<std::string> refusal;  // why the far server does not accept it
     Deadline openAgain = Deadline::never();  // after a refusal: when it may be opened again
   };
+  void poll() override { onReadable(); }
+  void setPolled(bool isPolled) override { server_.setPolled(isPolled); }
   void onReadable();
   void onClient(std::uint64_t local, bool isThere);
   bool tryOpen(std::uint64_t local);
   void close(std::uint32_t number);
   void loseReply(std::uint32_t number, wire::Reply::Reader reply, const std::string& why);
   void forward(Message request);
-  void deliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message&& message);
-  bool tryDeliver(std::uint32_t number, Client& client, std::uint32_t requestId, Message& message);
-  void giveCredit(std::uint32_t number, Client& client, std::uint64_t bytes);
+  Client* tryFindSender(std::uint64_t local);
+  Client* tryFindOrOpen(std::uint64_t local);
+  Client* tryFind(std::uint32_t number);
+  bool checkReply(const Client& client, std::uint32_t requestId, bool isFirst) const;
+  // `isOwed`: the message ends the request.
+  void deliver(Client& client, std::uint32_t requestId, Message&& message, bool isOwed);
+  bool tryDeliver(Client& client, std::uint32_t requestId, Message& message, bool isOwed);
+  void giveCredit(Client& client, std::uint64_t bytes);
   [[nodiscard]] bool awaits(const Client& client, std::uint32_t requestId) const noexcept;
   void end(std::uint32_t number, std::uint32_t requestId, Fate fate);
   void ended(Client& client) noexcept;
@@ -105,6 +115,7 @@ class Proxy {
   std::unordered_map<std::uint32_t, Client> clients_;  // by number
   // Numbers of the local clients; 0: the peer has accepted no more clients.
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;
+  Client* recent_ = nullptr;  // of the last message: a run of messages costs one look-up
   Log log_;
   std::uint64_t owed_ = 0;
   State state_ = State::ready;

@@ -37,6 +37,7 @@ std::optional<std::uint32_t> RemoteConnection::tryAddClient(Proxy& proxy) {
 
 void RemoteConnection::removeClient(std::uint32_t number) {
   clients_.erase(number);
+  recent_ = {};
   countClients();
   onRemove_();
 }
@@ -46,8 +47,11 @@ void RemoteConnection::countClients() noexcept {
 }
 
 Proxy* RemoteConnection::proxyOf(std::uint32_t client) const {
+  if (recent_.second != nullptr && recent_.first == client) return recent_.second;
   const auto found = clients_.find(client);
-  return found == clients_.end() ? nullptr : found->second;
+  if (found == clients_.end()) return nullptr;
+  recent_ = *found;
+  return found->second;
 }
 
 Proxy* RemoteConnection::openedProxyOf(std::uint32_t client) const {

@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 
 #include "router/statistics.h"
 #include "router/transport/line.h"
@@ -50,6 +51,8 @@ class RemoteConnection {
   std::string address_;
   std::function<void()> onRemove_;
   std::unordered_map<std::uint32_t, Proxy*> clients_;
+  // The client of the last item, so that a run of them costs one look-up.
+  mutable std::pair<std::uint32_t, Proxy*> recent_{};
   std::uint32_t lastClient_ = 0;
   bool maxClientsLogged_ = false;
 };

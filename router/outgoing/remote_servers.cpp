@@ -17,6 +17,10 @@ constexpr int kTurn = 16;  // requests of one server before those of the next se
 constexpr int kMaxTurns = 256;  // turns before the event loop runs its other tasks
 constexpr std::chrono::seconds kSweepEvery{1};  // while isPending() is true for a server
 
+[[noreturn]] void refuseClientsItem() {
+  throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a client router sends");
+}
+
 // A fate that only a newer peer defines becomes outcomeUnknown, which promises nothing.
 Fate fateOf(wire::Fate fate) noexcept {
   return fate <= wire::Fate::CANCELLED ? static_cast<Fate>(fate) : Fate::outcomeUnknown;
@@ -254,10 +258,18 @@ void RemoteServers::handle(wire::Item::Reader item) {
     case wire::Item::CLOSE:
     case wire::Item::REQUEST:
     case wire::Item::CREDIT:
-      throw ProtocolError(FarewellCode::PROTOCOL, "an item that only a client router sends");
+      refuseClientsItem();
     default:  // an item that only a newer peer defines
       return;
   }
+}
+
+void RemoteServers::handle(PlainItem& item) {
+  if (item.isRequest) refuseClientsItem();
+  auto* proxy = connection_->openedProxyOf(item.client);
+  if (proxy == nullptr) return;
+  proxy->reply(item);
+  if (proxy->isDone()) sweep();
 }
 
 void RemoteServers::onFate(wire::RequestEnd::Reader fate) {

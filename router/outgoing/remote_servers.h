@@ -42,6 +42,7 @@ class RemoteServers {
   // Handles an item of the peer. Items for a client that has disconnected are ignored.
   //   throws  ProtocolError
   void handle(wire::Item::Reader item);
+  void handle(PlainItem& item);
   // Takes requests of the local clients while the line has room.
   void pump();
   // A request cannot be sent, for the reason `why`.

@@ -2,7 +2,6 @@
 #include "router/transport/line.h"
 
 #include <algorithm>
-#include <capnp/serialize-async.h>
 #include <fmt/format.h>
 #include <utility>
 
@@ -160,7 +159,8 @@ bool Line::handleSome() {
       items_.reset();
       continue;
     }
-    handle((*items_)[nextItem_++]);
+    const auto at = nextItem_++;
+    if (!tryHandlePlain(at)) handle((*items_)[at]);
     if (discardsInput()) return true;
   }
   return false;
@@ -173,8 +173,20 @@ bool Line::tryNextFrame() {
   if (frame == nullptr) return false;
   keepAlive_.frameReceived(Clock::nowNs());
   count(record_->framesReceived);
+  if (events_.onTraffic) events_.onTraffic();
   items_ = frame->getRoot<wire::Frame>().getItems();
   nextItem_ = 0;
+  plain_.reset();
+  if (frame->getSegment(1) == nullptr) plain_ = PlainFrame::tryOpen(frame->getSegment(0));
+  return true;
+}
+
+// Returns false, and has done nothing, when the item is not plain.
+bool Line::tryHandlePlain(capnp::uint index) {
+  if (!plain_ || state_ != State::open || !events_.onPlain) return false;
+  if (!plain_->tryRead(index, plainItem_)) return false;
+  count(record_->messagesReceived);
+  events_.onPlain(plainItem_);
   return true;
 }
 
@@ -231,6 +243,11 @@ void Line::send(Carried carried) {
   else enqueue(std::move(carried));
 }
 
+void Line::send(const PlainOutgoing& item) {
+  if (isEnding()) queue_.reject(item);
+  else enqueue(item);
+}
+
 // Writes after all tasks that are ready now, so that what they send shares the frame.
 template <class... Outgoing>
 void Line::enqueue(Outgoing&&... outgoing) {
@@ -252,17 +269,17 @@ kj::Promise<void> Line::writeAll() {
   const SendQueue::FrameLimits limits{.items = hasGreeted() ? SIZE_MAX : 1,  // the greeting, alone
                                       .bytes = limits_.bufferBytes,
                                       .messageBytes = maxMessageBytes()};
-  return capnp::writeMessage(*stream_, queue_.buildFrame(limits, events_.onUnsendable))
-      .then([this] {
-        if (resumeReading_) {
-          // The peer is alive: it reads, while its own items are not read here.
-          keepAlive_.received(Clock::nowNs());
-          if (!queue_.hasMaxAnswers()) std::exchange(resumeReading_, nullptr)->fulfill();
-        }
-        if (!isEnding()) events_.onRoom();
-        queue_.frameWritten();  // now the queue may be idle, and the next item starts a write
-        return writeAll();
-      });
+  if (events_.onTraffic) events_.onTraffic();
+  return stream_->write(queue_.buildFrames(limits, events_.onUnsendable)).then([this] {
+    if (resumeReading_) {
+      // The peer is alive: it reads, while its own items are not read here.
+      keepAlive_.received(Clock::nowNs());
+      if (!queue_.hasMaxAnswers()) std::exchange(resumeReading_, nullptr)->fulfill();
+    }
+    if (!isEnding()) events_.onRoom();
+    queue_.framesWritten();  // now the queue may be idle, and the next item starts a write
+    return writeAll();
+  });
 }
 
 // Keeps reading for a while: the peer may have sent a farewell with the reason.

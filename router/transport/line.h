@@ -2,8 +2,8 @@
 // Line: one connection to another router. It reads the peer's frames and hands on their items,
 // writes the frames of its SendQueue, and ends the connection with a farewell.
 //
-//   stream ─► FrameReader ─► items ─► Events::onItem
-//   send() ─► SendQueue ─► a frame of all that waits, up to Limits::bufferBytes ─► stream
+//   stream ─► FrameReader ─► items ─► Events::onItem, plain items ─► Events::onPlain
+//   send() ─► SendQueue ─► frames of all that waits, up to Limits::bufferBytes ─► stream
 //
 // States:
 //   greeting ─ the peer's greeting ─► open
@@ -35,6 +35,7 @@
 #include "router/transport/frame_reader.h"
 #include "router/transport/keep_alive.h"
 #include "router/transport/peer_greeting.h"
+#include "router/transport/plain_item.h"
 #include "router/transport/send_queue.h"
 
 namespace mpf::router {
@@ -54,8 +55,14 @@ class Line {
     std::function<void(const PeerGreeting& greeting)> onGreeting;
     // A later item that is not a ping, pong or farewell has arrived. May throw ProtocolError.
     std::function<void(wire::Item::Reader item)> onItem;
+    // As onItem, for requests and replies that are plain; empty: they go to onItem, too. The
+    // message of `item` may be moved away.
+    std::function<void(PlainItem& item)> onPlain{};
     // hasRoom() may have become true.
     std::function<void()> onRoom;
+    // A frame has arrived, or frames are sent; not for each part of a long frame, because a router
+    // that polls for these reads many small ones. May be empty.
+    std::function<void()> onTraffic{};
     // A message cannot be sent. If it is a request, it has not been handled.
     SendQueue::OnUnsendable onUnsendable;
   };
@@ -76,6 +83,7 @@ class Line {
   void send(Note note);
   // Queues a message, even without room. A caller that can wait checks hasRoom() first.
   void send(Carried carried);
+  void send(const PlainOutgoing& item);
   [[nodiscard]] bool hasRoom() const noexcept { return state_ == State::open && queue_.hasRoom(); }
   [[nodiscard]] const PeerGreeting& peer() const noexcept { return peer_; }
   [[nodiscard]] bool hasGreeted() const noexcept { return peer_.hasArrived(); }
@@ -111,6 +119,7 @@ class Line {
   kj::Promise<void> whenAnswersAreSent();
   bool handleSome();
   bool tryNextFrame();
+  bool tryHandlePlain(capnp::uint index);
   void handle(wire::Item::Reader item);
   void takeGreeting(wire::Greeting::Reader greeting);
   [[nodiscard]] std::string closedReason() const;
@@ -134,6 +143,8 @@ class Line {
   FrameReader reader_;
   std::optional<capnp::List<wire::Item>::Reader> items_;  // of the frame that is being handled
   capnp::uint nextItem_ = 0;
+  std::optional<PlainFrame> plain_;  // the same frame
+  PlainItem plainItem_;
   SendQueue queue_;
   // Notes that are sent while items of the peer are handled are answers.
   SendQueue::NoteKind noteKind_ = SendQueue::NoteKind::own;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "schema/conversion.h"
+#include "schema/wire_places.h"
 #include "shm/histogram.h"
 
 namespace mpf::router {
@@ -16,6 +17,7 @@ constexpr std::size_t kItemBytes = 256;  // upper estimate for an item without i
 // Memory that is kept for the next frame.
 constexpr std::size_t kLeastScratch = std::size_t{16} << 10;
 constexpr std::size_t kKeptScratch = std::size_t{4} << 20;
+constexpr std::size_t kSpareRuns = 4;
 
 // Returns false when the message cannot be converted, for the reason in `error`.
 bool tryFillRequest(wire::Request::Builder request, Carried& carried,
@@ -57,6 +59,7 @@ SendQueue::SendQueue(std::uint32_t queueSize, PeerRecord& record)
 
 void SendQueue::push(Note note, NoteKind kind) {
   queue_.emplace_back(KindedNote{kind, std::move(note)});
+  ++notes_;
   if (kind == NoteKind::answer) ++answers_;
 }
 
@@ -66,8 +69,33 @@ void SendQueue::push(Carried carried) {
   countWaiting();
 }
 
+void SendQueue::push(const PlainOutgoing& item) {
+  auto* last = queue_.empty() ? nullptr : std::get_if<Run>(&queue_.back());
+  if (last == nullptr || (*last)->isFull()) {
+    queue_.emplace_back(takeSpareRun());
+    last = std::get_if<Run>(&queue_.back());
+  }
+  (*last)->append(item);
+  ++messages_;
+  countWaiting();
+}
+
+SendQueue::Run SendQueue::takeSpareRun() {
+  if (spareRuns_.empty()) return std::make_unique<PlainRun>();
+  auto run = std::move(spareRuns_.back());
+  spareRuns_.pop_back();
+  return run;
+}
+
 void SendQueue::reject(Carried carried) {
   if (carried.isRequest) rejectedRequests_.push_back(std::move(carried));
+}
+
+void SendQueue::reject(const PlainOutgoing& item) {
+  reject(Carried{.isRequest = item.isRequest,
+                 .client = item.client,
+                 .requestId = item.requestId,
+                 .message = {}});
 }
 
 void SendQueue::countWaiting() noexcept {
@@ -77,6 +105,7 @@ void SendQueue::countWaiting() noexcept {
 SendQueue::FrameSize SendQueue::sizeOfNextFrame(const FrameLimits& limits) const {
   FrameSize size{0, 0};
   for (const auto& outgoing : queue_) {
+    if (std::holds_alternative<Run>(outgoing)) break;
     const auto* carried = std::get_if<Carried>(&outgoing);
     const auto bytes = kItemBytes + (carried != nullptr ? carried->message.body().size() : 0);
     if (size.items != 0 && size.bytes + bytes > limits.bytes) break;
@@ -95,10 +124,41 @@ void SendQueue::makeScratch(std::size_t bytes) {
   std::memset(scratch_.asBytes().begin(), 0, scratch_.asBytes().size());
 }
 
-capnp::MessageBuilder& SendQueue::buildFrame(const FrameLimits& limits,
-                                             const OnUnsendable& onUnsendable) {
+SendQueue::Pieces SendQueue::buildFrames(const FrameLimits& limits,
+                                         const OnUnsendable& onUnsendable) {
+  framesWritten();
+  std::size_t bytes = 0;
+  do {
+    if (std::holds_alternative<Run>(queue_.front())) {
+      bytes += buildPlainFrame();
+    } else if (frame_.get() == nullptr) {
+      bytes += buildOtherFrame(limits, onUnsendable);
+    } else {
+      break;  // its memory is in use
+    }
+  } while (!queue_.empty() && limits.items == SIZE_MAX && bytes < limits.bytes);
+  countWaiting();
+  count(record_->bytesSent, bytes);
+  return {pieces_.data(), pieces_.size()};
+}
+
+std::size_t SendQueue::buildPlainFrame() {
+  auto run = std::move(std::get<Run>(queue_.front()));
+  queue_.pop_front();
+  run->buildHead();
+  messages_ -= run->size();
+  count(record_->messagesSent, run->size());
+  count(record_->framesSent);
+  const auto bytes = run->head().size() + run->payload().size();
+  pieces_.push_back(run->head());
+  pieces_.push_back(run->payload());
+  runs_.push_back(std::move(run));
+  return bytes;
+}
+
+std::size_t SendQueue::buildOtherFrame(const FrameLimits& limits,
+                                       const OnUnsendable& onUnsendable) {
   const auto [items, bytes] = sizeOfNextFrame(limits);
-  frameWritten();
   makeScratch(bytes);
   frame_ = kj::heap<capnp::MallocMessageBuilder>(scratch_.asPtr());
   auto list = frame_->initRoot<wire::Frame>().initItems(static_cast<capnp::uint>(items));
@@ -106,6 +166,7 @@ capnp::MessageBuilder& SendQueue::buildFrame(const FrameLimits& limits,
     auto outgoing = std::move(queue_.front());
     queue_.pop_front();
     if (auto* note = std::get_if<KindedNote>(&outgoing)) {
+      --notes_;
       if (note->kind == NoteKind::answer) --answers_;
       note->fill(list[at]);
     } else {
@@ -114,10 +175,34 @@ capnp::MessageBuilder& SendQueue::buildFrame(const FrameLimits& limits,
       count(record_->messagesSent);
     }
   }
-  countWaiting();
   count(record_->framesSent);
-  count(record_->bytesSent, frame_->sizeInWords() * sizeof(capnp::word));
-  return *frame_;
+  addPieces(*frame_);
+  return frame_->sizeInWords() * sizeof(capnp::word);
+}
+
+// The stream framing of Cap'n Proto.
+void SendQueue::addPieces(capnp::MallocMessageBuilder& frame) {
+  const auto segments = frame.getSegmentsForOutput();
+  table_.assign((segments.size() / 2 + 1) * 2, 0);
+  const auto table = kj::arrayPtr(table_.data(), table_.size()).asBytes();
+  storeLittle(table, 0, static_cast<std::uint32_t>(segments.size() - 1));
+  for (std::size_t at = 0; at < segments.size(); ++at) {
+    storeLittle(table, sizeof(std::uint32_t) * (at + 1),
+                static_cast<std::uint32_t>(segments[at].size()));
+  }
+  pieces_.push_back(table);
+  for (const auto segment : segments) pieces_.push_back(segment.asBytes());
+}
+
+void SendQueue::framesWritten() {
+  pieces_.clear();
+  frame_ = nullptr;
+  for (auto& run : runs_) {
+    if (spareRuns_.size() == kSpareRuns) break;
+    run->clear();
+    spareRuns_.push_back(std::move(run));
+  }
+  runs_.clear();
 }
 
 std::vector<Carried> SendQueue::takeUnsentRequests() {
@@ -125,9 +210,16 @@ std::vector<Carried> SendQueue::takeUnsentRequests() {
   for (auto& outgoing : queue_) {
     auto* carried = std::get_if<Carried>(&outgoing);
     if (carried != nullptr && carried->isRequest) requests.push_back(std::move(*carried));
+    const auto* run = std::get_if<Run>(&outgoing);
+    if (run == nullptr) continue;
+    for (const auto& item : (*run)->items()) {
+      if (item.isRequest)
+        requests.push_back(
+            {.isRequest = true, .client = item.client, .requestId = item.requestId, .message = {}});
+    }
   }
   queue_.clear();
-  messages_ = answers_ = 0;
+  messages_ = notes_ = answers_ = 0;
   std::ranges::move(std::exchange(rejectedRequests_, {}), std::back_inserter(requests));
   return requests;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // SendQueue: the items that wait to be sent over one connection, and the frames built from them.
 //
-//   push() ─► queue ─► buildFrame(): as many items as fit ─► the caller writes it ─► frameWritten()
+//   push() ─► queue ─► buildFrames(): as many as fit ─► the caller writes them ─► framesWritten()
 //
-// While a frame is being written, items for the next one gather in the queue. A waiting message
-// stays in the shared memory of its sender, and is converted when its frame is built.
+// While frames are being written, items for the next ones gather in the queue. Plain items are
+// converted at once, and follow each other in a PlainRun, which becomes a frame of its own. Any
+// other message that waits stays in the shared memory of its sender, and is converted when its
+// frame is built.
 //
 // Threads  one.
 #pragma once
@@ -14,12 +16,14 @@
 #include <functional>
 #include <kj/array.h>
 #include <kj/memory.h>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "router/statistics.h"
 #include "router/transport/carried.h"
+#include "router/transport/plain_item.h"
 #include "schema/router.capnp.h"
 
 namespace mpf::router {
@@ -37,8 +41,8 @@ class SendQueue {
   using OnUnsendable = std::function<void(const Carried& carried, const std::string& why,
                                           wire::Item::Builder instead)>;
   struct FrameLimits {
-    std::size_t items = SIZE_MAX;
-    std::size_t bytes = 0;  // a single item may be longer
+    std::size_t items = SIZE_MAX;  // if there are no plain items
+    std::size_t bytes = 0;  // a single item, or the last frame of several, may be longer
     std::uint64_t messageBytes = 0;  // longer messages are unsendable
   };
   static constexpr std::size_t kMaxNotes = 4096;
@@ -49,25 +53,28 @@ class SendQueue {
   // Append an item, also when hasRoom() is false.
   void push(Note note, NoteKind kind);
   void push(Carried carried);
+  void push(const PlainOutgoing& item);
   // Does not send a message. If it is a request, takeUnsentRequests() returns it.
   void reject(Carried carried);
+  void reject(const PlainOutgoing& item);
 
   [[nodiscard]] bool hasRoom() const noexcept {
-    return messages_ < queueSize_ && queue_.size() - messages_ < kMaxNotes;
+    return messages_ < queueSize_ && notes_ < kMaxNotes;
   }
   // Whether so many answers wait that no more items of the peer should be handled.
   [[nodiscard]] bool hasMaxAnswers() const noexcept { return answers_ >= kMaxNotes; }
   [[nodiscard]] bool isEmpty() const noexcept { return queue_.empty(); }
   // Whether no item waits and no frame is being written.
-  [[nodiscard]] bool isIdle() const noexcept { return isEmpty() && frame_.get() == nullptr; }
+  [[nodiscard]] bool isIdle() const noexcept { return isEmpty() && pieces_.empty(); }
 
-  // Moves at least one item, and as many as the limits allow, into a frame. The frame is valid
-  // until frameWritten(). The queue must not be empty.
-  [[nodiscard]] capnp::MessageBuilder& buildFrame(const FrameLimits& limits,
-                                                  const OnUnsendable& onUnsendable);
-  void frameWritten() { frame_ = nullptr; }
+  // Moves at least one item, and as many as the limits allow, into frames. Returns the bytes of the
+  // frames in pieces, which are valid until framesWritten(). The queue must not be empty.
+  using Pieces = kj::ArrayPtr<const kj::ArrayPtr<const kj::byte>>;
+  [[nodiscard]] Pieces buildFrames(const FrameLimits& limits, const OnUnsendable& onUnsendable);
+  void framesWritten();
 
-  // Empties the queue, and returns its requests and those that were rejected.
+  // Empties the queue, and returns its requests and those that were rejected. Those that were plain
+  // have no message any more.
   [[nodiscard]] std::vector<Carried> takeUnsentRequests();
 
  private:
@@ -75,12 +82,17 @@ class SendQueue {
     NoteKind kind;
     Note fill;
   };
-  using Outgoing = std::variant<KindedNote, Carried>;
+  using Run = std::unique_ptr<PlainRun>;
+  using Outgoing = std::variant<KindedNote, Carried, Run>;
   struct FrameSize {
     std::size_t items;
     std::size_t bytes;  // an estimate
   };
   [[nodiscard]] FrameSize sizeOfNextFrame(const FrameLimits& limits) const;
+  std::size_t buildPlainFrame();
+  std::size_t buildOtherFrame(const FrameLimits& limits, const OnUnsendable& onUnsendable);
+  void addPieces(capnp::MallocMessageBuilder& frame);
+  [[nodiscard]] Run takeSpareRun();
   void makeScratch(std::size_t bytes);
   void countWaiting() noexcept;
 
@@ -88,10 +100,16 @@ class SendQueue {
   PeerRecord& record_;
   std::deque<Outgoing> queue_;
   std::size_t messages_ = 0;  // in queue_
-  std::size_t answers_ = 0;  // in queue_
+  std::size_t notes_ = 0;  // in queue_
+  std::size_t answers_ = 0;  // of these, answers
   std::vector<Carried> rejectedRequests_;
   kj::Array<capnp::word> scratch_;  // memory for frames, kept from frame to frame
+  // What is being written: at most one frame of other items.
   kj::Own<capnp::MallocMessageBuilder> frame_;
+  std::vector<std::uint32_t> table_;  // its segment table
+  std::vector<Run> runs_;
+  std::vector<kj::ArrayPtr<const kj::byte>> pieces_;
+  std::vector<Run> spareRuns_;
 };
 
 }  // namespace mpf::router

@@ -3,12 +3,14 @@
 // parts in which the rest arrives.
 #include <algorithm>
 #include <capnp/message.h>
+#include <cstdlib>
 #include <cstring>
 #include <kj/exception.h>
 #include <stdexcept>
 
 #include "router/transport/frame_reader.h"
 #include "router/transport/kj_text.h"
+#include "router/transport/plain_item.h"
 #include "schema/conversion.h"
 #include "tests/fuzz/fuzzer.h"
 #include "tests/fuzz/talk.h"
@@ -53,6 +55,29 @@ void look(wire::Item::Reader item) {
   }
 }
 
+// An item that is read in place has what Cap'n Proto's reader finds.
+void compare(const router::PlainItem& plain, wire::Item::Reader item) {
+  ConversionError error;
+  const auto envelope =
+      plain.isRequest ? item.getRequest().getMessage() : item.getReply().getMessage();
+  const auto message = tryFromWire(envelope, {kMaxMessageBytes}, error);
+  const bool isSame = message && message->getType() == plain.message.getType() &&
+                      std::ranges::equal(message->body(), plain.message.body()) &&
+                      plain.requestId == (plain.isRequest ? item.getRequest().getRequestId()
+                                                          : item.getReply().getRequestId());
+  if (!isSame) std::abort();
+}
+
+void lookAtPlainItems(capnp::MessageReader& frame, capnp::List<wire::Item>::Reader items) {
+  if (frame.getSegment(1) != nullptr) return;
+  const auto plain = router::PlainFrame::tryOpen(frame.getSegment(0));
+  if (!plain) return;
+  for (capnp::uint at = 0; at < items.size(); ++at) {
+    router::PlainItem item;
+    if (plain->tryRead(at, item)) compare(item, items[at]);
+  }
+}
+
 }  // namespace
 
 void play(std::span<const std::uint8_t> input) try {
@@ -66,7 +91,9 @@ void play(std::span<const std::uint8_t> input) try {
     reader.filled(bytes.size());
     rest = rest.subspan(bytes.size());
     while (auto* frame = reader.tryNext()) {
-      for (const auto item : frame->getRoot<wire::Frame>().getItems()) look(item);
+      const auto items = frame->getRoot<wire::Frame>().getItems();
+      lookAtPlainItems(*frame, items);
+      for (const auto item : items) look(item);
     }
   }
 } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): ends the connection

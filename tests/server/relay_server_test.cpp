@@ -2,6 +2,11 @@
 // What a router needs of a server that acts on behalf of another server.
 #include "server/relay_server.h"
 
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+
 #include "tests/client/relay_fixture.h"
 
 namespace mpf::test {
@@ -25,6 +30,34 @@ TEST_F(RelayTest, AServerReportsClientsThatConnectAndDisconnect) {
   while (comings_.size() != 3) EXPECT_FALSE(server_->receive());
   EXPECT_EQ(comings_[1].second, true);
   EXPECT_EQ(comings_[2], std::pair(comings_[1].first, false));
+}
+
+bool isReadable(int fd) {
+  pollfd poll{fd, POLLIN, 0};
+  return ::poll(&poll, 1, 0) == 1;
+}
+
+TEST_F(RelayTest, AServerThatIsPolledNeedsNoWakeUp) {
+  auto& server = startWatched();
+  const auto fd = server.descriptor();
+  bindByHand();
+  server.setPolled(true);
+  EXPECT_FALSE(server.receive());
+  // What made it readable before it was polled.
+  std::array<char, 64> bytes{};
+  while (::read(fd, bytes.data(), bytes.size()) > 0) {
+  }
+
+  ASSERT_EQ(client_.send(Int32Message({.value = 3})), SendResult::sent);
+
+  EXPECT_FALSE(isReadable(fd));
+  EXPECT_EQ(server.reply(server.receive()), ReplyResult::sent);
+  static_cast<void>(next());
+  server.setPolled(false);
+  EXPECT_FALSE(server.receive());
+  ASSERT_EQ(client_.send(Int32Message({.value = 3})), SendResult::sent);
+  EXPECT_TRUE(isReadable(fd));
+  EXPECT_EQ(server.reply(server.receive()), ReplyResult::sent);
 }
 
 TEST_F(RelayTest, AReplyByNumbersReachesItsRequest) {

@@ -321,6 +321,41 @@ TEST_F(EndpointTest, DescriptorIsReadableWhenAMessageArrives) {
   server.endpoint.disarm();
 }
 
+TEST_F(EndpointTest, AnEndpointThatIsPolledNeedsNoWakeUp) {
+  End server(backplane_, "server");
+  End client(backplane_, "");
+  const auto link = connect(client, server);
+  const auto isReadable = [&] {
+    pollfd poll{server.endpoint.descriptor(), POLLIN, 0};
+    return ::poll(&poll, 1, 0) == 1;
+  };
+  const auto take = [&] {
+    ASSERT_EQ(server.endpoint.next(), link.serverIndex);
+    EXPECT_EQ(server.tryTake(link.serverIndex), 7u);
+    while (server.endpoint.next()) {
+    }
+  };
+  while (server.endpoint.next()) {
+  }
+  server.endpoint.setPolled(true);
+  EXPECT_TRUE(server.endpoint.arm());
+
+  ASSERT_EQ(send(link.client, 7), LinkSend::sent);
+
+  EXPECT_FALSE(isReadable());
+  EXPECT_TRUE(server.endpoint.arm()) << "whatever has arrived";
+  take();
+  EXPECT_EQ(server.endpoint.control().sleeping.load(), layout::SleepState::awake);
+  ASSERT_EQ(send(link.client, 7), LinkSend::sent);
+  server.endpoint.setPolled(false);
+  EXPECT_FALSE(server.endpoint.arm()) << "there is a message already";
+  take();
+  ASSERT_TRUE(server.endpoint.arm());
+  ASSERT_EQ(send(link.client, 7), LinkSend::sent);
+  EXPECT_TRUE(isReadable());
+  server.endpoint.disarm();
+}
+
 TEST_F(EndpointTest, ThousandsOfTurnsInAnEventLoopLoseNoWakeUps) {
   constexpr std::uint32_t kTurns = 5000;
   End server(backplane_, "server");

@@ -73,11 +73,15 @@ TEST(RemoteGoals, AreShownOnlyForRowsThatWereTaken) {
   EXPECT_THAT(remoteGoals({messages("no buffer", 0.5)}), Not(HasSubstr("100 buffered")));
 }
 
-TEST(RemoteGoals, RequireHalfOfRawTcpAndAllOfItWhenBuffered) {
-  EXPECT_THAT(remoteGoals({messages("no buffer", 0.51)}), HasSubstr("0.50      0.51  reached"));
-  EXPECT_THAT(remoteGoals({messages("no buffer", 0.49)}), HasSubstr("0.50      0.49  MISSED"));
-  EXPECT_THAT(remoteGoals({messages("100 buffered", 1.01)}), HasSubstr("1.00      1.01  reached"));
-  EXPECT_THAT(remoteGoals({messages("100 buffered", 0.99)}), HasSubstr("1.00      0.99  MISSED"));
+TEST(RemoteGoals, RequireAShareOfRawTcpAndAMessageRate) {
+  EXPECT_THAT(remoteGoals({messages("no buffer", 0.81)}), HasSubstr("0.80      0.81  reached"));
+  EXPECT_THAT(remoteGoals({messages("no buffer", 0.79)}), HasSubstr("0.80      0.79  MISSED"));
+  EXPECT_THAT(remoteGoals({messages("100 buffered", 0.61)}), HasSubstr("0.60      0.61  reached"));
+  EXPECT_THAT(remoteGoals({messages("100 buffered", 0.59)}), HasSubstr("0.60      0.59  MISSED"));
+  auto many = messages("1000 buffered", 0.1);
+  EXPECT_THAT(remoteGoals({many}), HasSubstr("2.00      0.02  MISSED"));
+  many.figures.perSecond = 2.01e6;
+  EXPECT_THAT(remoteGoals({many}), HasSubstr("2.00      2.01  reached"));
 }
 
 TEST(RemoteGoals, RequireAGibibytePerSecondOrFourFifthsOfRawTcp) {

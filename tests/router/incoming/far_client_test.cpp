@@ -21,6 +21,7 @@ class FarClientTest : public RouterPartsTest {
   ~FarClientTest() noexcept override = default;
 
   void SetUp() override {
+    onPlain_ = [this](router::PlainItem& item) { client_->request(item); };
     startGreeted();
     onItem_ = [this](wire::Item::Reader item) {
       if (item.isRequest()) client_->request(item.getRequest());

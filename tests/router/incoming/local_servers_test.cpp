@@ -20,6 +20,7 @@ class LocalServersTest : public RouterPartsTest {
  protected:
   void SetUp() override {
     context_.config.serve = {{.location = 1, .local = 0}};
+    onPlain_ = [this](router::PlainItem& item) { servers_->handle(item); };
     startGreeted();
     servers_.emplace(context_, *line_, record_, "", "10.0.0.7:40000");
     onItem_ = [this](wire::Item::Reader item) { servers_->handle(item); };

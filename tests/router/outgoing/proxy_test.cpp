@@ -20,6 +20,7 @@ class ProxyTest : public RouterPartsTest {
 
   void SetUp() override {
     context_.config.limits.windowBytes = kWindowBytes;
+    onPlain_ = [this](router::PlainItem& item) { proxy_->reply(item); };
     startGreeted();
     connection_.emplace(*line_, record_, context_.log, "far:9900", [] {});
     proxy_.emplace(context_, *connection_, router::ServerName{1, "echo"},

@@ -19,6 +19,7 @@ using testing::StartsWith;
 class RemoteServersTest : public RouterPartsTest {
  protected:
   void SetUp() override {
+    onPlain_ = [this](router::PlainItem& item) { servers_->handle(item); };
     startGreeted();
     servers_.emplace(context_, remote_, record_, context_.log);
     onItem_ = [this](wire::Item::Reader item) { servers_->handle(item); };

@@ -126,6 +126,7 @@ class LineTest : public testing::Test {
                   if (onItem_) onItem_(item);
                   said_.push_back(router::toStd(kj::str(item)));
                 },
+            .onPlain = onPlain_,
             .onRoom =
                 [this] {
                   if (onRoom_) onRoom_();
@@ -154,6 +155,7 @@ class LineTest : public testing::Test {
   std::string end_;                // why the line ended; empty: it has not
   bool sent_ = false;              // the bytes of beginToSend() have been read
   std::function<void(wire::Item::Reader)> onItem_;
+  std::function<void(router::PlainItem&)> onPlain_;  // set it before start()
   std::function<void()> onRoom_;
 
  private:

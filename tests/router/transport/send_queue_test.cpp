@@ -27,17 +27,23 @@ class SendQueueTest : public testing::Test {
  protected:
   static constexpr std::uint32_t kQueueSize = 3;
 
-  // Builds a frame, and returns its items as text.
-  std::vector<std::string> frame(std::size_t items = SIZE_MAX) {
-    auto& message = queue_.buildFrame(
+  // Builds the frames of one write, and returns their items as text.
+  std::vector<std::string> frames(std::size_t items = SIZE_MAX) {
+    const auto pieces = queue_.buildFrames(
         {.items = items, .bytes = 4096, .messageBytes = 1000},
         [&](const Carried& carried, const std::string& why, wire::Item::Builder instead) {
           unsendable_.push_back(std::to_string(carried.requestId) + ": " + why);
           instead.setClose(99);
         });
     std::vector<std::string> texts;
-    for (const auto item : message.getRoot<wire::Frame>().asReader().getItems())
-      texts.push_back(toStd(kj::str(item)));
+    kj::Vector<kj::byte> bytes;
+    for (const auto piece : pieces) bytes.addAll(piece);
+    kj::ArrayInputStream stream(bytes);
+    while (stream.tryGetReadBuffer().size() != 0) {
+      capnp::InputStreamMessageReader frame(stream);
+      for (const auto item : frame.getRoot<wire::Frame>().getItems())
+        texts.push_back(toStd(kj::str(item)));
+    }
     return texts;
   }
   static SendQueue::Note close(std::uint32_t number) {
@@ -52,6 +58,14 @@ class SendQueueTest : public testing::Test {
     return {.isRequest = true, .client = 1, .requestId = id, .message = std::move(message)};
   }
 
+  static PlainItem plain(std::uint32_t id, bool isRequest = true) {
+    return {.isRequest = isRequest,
+            .isFirst = !isRequest,
+            .client = 1,
+            .requestId = id,
+            .message = Int32Message({.value = 5})};
+  }
+
   layout::RouterLine row_{};
   PeerRecord record_{row_};
   SendQueue queue_{kQueueSize, record_};
@@ -63,11 +77,59 @@ TEST_F(SendQueueTest, PutsAllThatWaitsIntoOneFrameInItsOrder) {
   queue_.push(request(2));
   queue_.push(close(3), NoteKind::answer);
 
-  EXPECT_THAT(frame(), ElementsAre("(close = 1)", HasSubstr("requestId = 2"), "(close = 3)"));
+  EXPECT_THAT(frames(), ElementsAre("(close = 1)", HasSubstr("requestId = 2"), "(close = 3)"));
   EXPECT_TRUE(queue_.isEmpty());
   EXPECT_EQ(row_.messagesSent, 1u);
   EXPECT_EQ(row_.framesSent, 1u);
   EXPECT_GT(row_.bytesSent, 0u);
+}
+
+TEST_F(SendQueueTest, KeepsTheOrderOfPlainItemsAndOthers) {
+  queue_.push(plain(1));
+  queue_.push(plain(2));
+  queue_.push(request(3));
+  queue_.push(plain(4));
+
+  EXPECT_THAT(frames(), ElementsAre(HasSubstr("requestId = 1"), HasSubstr("requestId = 2"),
+                                    HasSubstr("requestId = 3"), HasSubstr("requestId = 4")));
+  EXPECT_EQ(row_.messagesSent, 4u);
+  EXPECT_EQ(row_.framesSent, 3u);
+  EXPECT_EQ(row_.inQueue, 0u);
+}
+
+TEST_F(SendQueueTest, AWriteHasOneFrameOfOtherItems) {
+  queue_.push(close(1), NoteKind::own);
+  queue_.push(plain(2));
+  queue_.push(close(3), NoteKind::own);
+
+  EXPECT_THAT(frames(), ElementsAre("(close = 1)", HasSubstr("requestId = 2")));
+  EXPECT_THAT(frames(), ElementsAre("(close = 3)"));
+}
+
+TEST_F(SendQueueTest, DividesALongRunOfPlainItems) {
+  constexpr std::uint32_t kItems = 10'000;
+  for (std::uint32_t id = 1; id <= kItems; ++id) queue_.push(plain(id));
+
+  std::vector<std::string> all;
+  while (!queue_.isEmpty()) {
+    const auto some = frames();
+    EXPECT_LE(row_.bytesSent / row_.framesSent, PlainRun::kMaxBytes);
+    all.insert(all.end(), some.begin(), some.end());
+  }
+
+  ASSERT_THAT(all, SizeIs(kItems));
+  for (std::uint32_t id = 1; id <= kItems; ++id)
+    ASSERT_THAT(all[id - 1], HasSubstr("requestId = " + std::to_string(id) + ","));
+}
+
+// The memory of a run is used again.
+TEST_F(SendQueueTest, RunsDoNotMix) {
+  for (std::uint32_t round = 1; round <= 10; ++round) {
+    queue_.push(plain(2 * round));
+    queue_.push(plain(2 * round + 1, false));
+
+    EXPECT_THAT(frames(), ElementsAre(HasSubstr("request = "), HasSubstr("reply = ")));
+  }
 }
 
 TEST_F(SendQueueTest, IsIdleWhenItsLastFrameIsWritten) {
@@ -75,9 +137,9 @@ TEST_F(SendQueueTest, IsIdleWhenItsLastFrameIsWritten) {
 
   queue_.push(close(1), NoteKind::own);
   EXPECT_FALSE(queue_.isIdle());
-  frame();
+  frames();
   EXPECT_FALSE(queue_.isIdle()) << "the frame is being written";
-  queue_.frameWritten();
+  queue_.framesWritten();
 
   EXPECT_TRUE(queue_.isIdle());
 }
@@ -85,29 +147,30 @@ TEST_F(SendQueueTest, IsIdleWhenItsLastFrameIsWritten) {
 TEST_F(SendQueueTest, AFrameIsLimitedInItemsAndBytes) {
   for (std::uint32_t id = 1; id <= 6; ++id) queue_.push(array(id, 900));
 
-  EXPECT_THAT(frame(1), SizeIs(1));
-  EXPECT_THAT(frame(), SizeIs(3)) << "4096 bytes";
-  EXPECT_THAT(frame(), SizeIs(2));
+  EXPECT_THAT(frames(1), SizeIs(1));
+  EXPECT_THAT(frames(), SizeIs(3)) << "4096 bytes";
+  EXPECT_THAT(frames(), SizeIs(2));
 }
 
 // One frame after the other uses the same memory, which must be zero at the start.
 TEST_F(SendQueueTest, FramesDoNotMix) {
   queue_.push(array(1, 900));
-  frame();
+  frames();
   queue_.push(close(2), NoteKind::own);
 
-  EXPECT_THAT(frame(), ElementsAre("(close = 2)"));
+  EXPECT_THAT(frames(), ElementsAre("(close = 2)"));
 }
 
 TEST_F(SendQueueTest, HasNoRoomWhileTooManyMessagesWait) {
   for (std::uint32_t id = 1; id <= kQueueSize; ++id) {
     EXPECT_TRUE(queue_.hasRoom());
-    queue_.push(request(id));
+    if (id % 2 == 0) queue_.push(plain(id));
+    else queue_.push(request(id));
   }
   EXPECT_FALSE(queue_.hasRoom());
   EXPECT_EQ(row_.inQueue, kQueueSize);
 
-  frame(1);
+  frames(1);
 
   EXPECT_TRUE(queue_.hasRoom());
   EXPECT_EQ(row_.inQueue, kQueueSize - 1);
@@ -127,7 +190,7 @@ TEST_F(SendQueueTest, CountsAnswersUntilTheyAreInAFrame) {
   for (std::size_t i = 0; i < SendQueue::kMaxNotes; ++i) queue_.push(close(1), NoteKind::answer);
   EXPECT_TRUE(queue_.hasMaxAnswers());
 
-  frame(1);
+  frames(1);
 
   EXPECT_FALSE(queue_.hasMaxAnswers());
 }
@@ -136,24 +199,31 @@ TEST_F(SendQueueTest, ReportsAMessageThatCannotBeSentAndSendsAnotherItem) {
   queue_.push(array(7, 1001));
   queue_.push(request(8));
 
-  EXPECT_THAT(frame(), ElementsAre("(close = 99)", HasSubstr("requestId = 8")));
+  EXPECT_THAT(frames(), ElementsAre("(close = 99)", HasSubstr("requestId = 8")));
   EXPECT_THAT(unsendable_, ElementsAre(HasSubstr("7: ")));
 }
 
 TEST_F(SendQueueTest, ReturnsTheRequestsThatAreInNoFrame) {
   queue_.push(request(1));
-  frame();
+  frames();
   queue_.push(request(2));
   queue_.push(close(1), NoteKind::own);
   queue_.push(Carried{.requestId = 3, .message = Int32Message({.value = 0})});  // a reply
   queue_.reject(request(4));
   queue_.reject(Carried{.requestId = 5, .message = Int32Message({.value = 0})});
+  queue_.push(plain(6));
+  queue_.push(plain(7, false));
+  queue_.reject(plain(8));
+  queue_.reject(plain(9, false));
 
   const auto unsent = queue_.takeUnsentRequests();
 
-  ASSERT_THAT(unsent, SizeIs(2));
-  EXPECT_EQ(unsent[0].requestId, 2u);
-  EXPECT_EQ(unsent[1].requestId, 4u);
+  std::vector<std::uint32_t> ids;
+  for (const auto& request : unsent) {
+    EXPECT_EQ(request.client, 1u);
+    ids.push_back(request.requestId);
+  }
+  EXPECT_THAT(ids, ElementsAre(2, 6, 4, 8));
   EXPECT_TRUE(queue_.isEmpty());
   EXPECT_THAT(queue_.takeUnsentRequests(), IsEmpty());
 }

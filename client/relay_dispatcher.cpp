@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT
+#include "client/relay_dispatcher.h"
+
+#include "client/dispatcher_impl.h"
+
+namespace mpf {
+
+void RelayDispatcher::setPolled(bool isPolled) noexcept { impl_->endpoint().setPolled(isPolled); }
+
+}  // namespace mpf

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// PollBudget: for how long a router polls after traffic, before it sleeps.
+//
+// A wait of at least kMaxNs quarters the time, a shorter one doubles it, up to kMaxNs. As long as
+// less than two of three waits are short, as with single requests in long intervals, polling costs
+// next to nothing.
+//
+// Threads  one.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+namespace mpf::router {
+
+class PollBudget {
+ public:
+  // Longer than most round trips on a local network, including two wake-ups.
+  static constexpr std::int64_t kMaxNs = 100'000;
+
+  [[nodiscard]] std::int64_t ns() const noexcept { return kMaxNs >> halvings_; }
+  // The time between two bursts of traffic.
+  void noteWait(std::int64_t ns) noexcept {
+    halvings_ =
+        ns < kMaxNs ? halvings_ - std::min(halvings_, 1u) : std::min(halvings_ + 2, kMaxHalvings);
+  }
+
+ private:
+  static constexpr std::uint32_t kMaxHalvings = 6;
+
+  std::uint32_t halvings_ = 0;
+};
+
+}  // namespace mpf::router

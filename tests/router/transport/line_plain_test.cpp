@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+// Line: plain items, between others, in parts, and at the end of a connection.
+#include "tests/router/transport/line_fixture.h"
+
+namespace mpf::test {
+namespace {
+
+using router::PlainItem;
+using router::PlainRun;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class LinePlainTest : public LineTest {
+ protected:
+  void SetUp() override {
+    onPlain_ = [this](PlainItem& item) {
+      said_.push_back("plain " + std::to_string(item.requestId));
+    };
+  }
+  static PlainItem plain(std::uint32_t id) {
+    return {.isRequest = true, .client = 1, .requestId = id, .message = Int32Message({.value = 1})};
+  }
+  static Bytes plainFrame(std::uint32_t first, std::uint32_t items) {
+    PlainRun run;
+    for (std::uint32_t id = first; id < first + items; ++id) run.append(plain(id));
+    run.buildHead();
+    Bytes bytes(run.head().begin(), run.head().end());
+    bytes.insert(bytes.end(), run.payload().begin(), run.payload().end());
+    return bytes;
+  }
+  static Fill request(std::uint32_t id, std::uint64_t withinNs) {
+    return [id, withinNs](wire::Item::Builder item) {
+      auto request = item.initRequest();
+      request.setRequestId(id);
+      request.setTakeWithinNs(withinNs);
+      request.initMessage().initInt32();
+    };
+  }
+};
+
+TEST_F(LinePlainTest, KeepsTheOrderOfPlainItemsAndOthers) {
+  startGreeted();
+
+  send(frameOf({request(1, 0), request(2, 99), [](wire::Item::Builder item) { item.setClose(3); },
+                request(4, 0)}));
+
+  EXPECT_THAT(said_, ElementsAre("plain 1", HasSubstr("requestId = 2"), "(close = 3)", "plain 4"));
+  EXPECT_EQ(row_.messagesReceived, 3u);
+}
+
+TEST_F(LinePlainTest, FramesMayArriveInAnyTwoParts) {
+  const auto bytes = joined({plainFrame(1, 2), plainFrame(3, 1), plainFrame(4, 2)});
+  for (std::size_t cut = 1; cut < bytes.size(); cut += 5) {
+    startGreeted();
+
+    const auto middle = bytes.begin() + static_cast<std::ptrdiff_t>(cut);
+    send(Bytes(bytes.begin(), middle));
+    send(Bytes(middle, bytes.end()));
+
+    ASSERT_THAT(said_, ElementsAre("plain 1", "plain 2", "plain 3", "plain 4", "plain 5"))
+        << "cut after " << cut << " bytes";
+    restart();
+  }
+}
+
+TEST_F(LinePlainTest, HandlesNothingOfAFrameThatEndsEarly) {
+  startGreeted();
+  auto bytes = joined({plainFrame(1, 2), plainFrame(3, 100)});
+  bytes.resize(bytes.size() - 8);
+
+  send(bytes);
+  close();
+
+  EXPECT_THAT(said_, ElementsAre("plain 1", "plain 2"));
+  EXPECT_EQ(end_, "the peer closed the connection");
+}
+
+TEST_F(LinePlainTest, HandlesNothingBehindAProtocolError) {
+  onPlain_ = [this](PlainItem& item) {
+    if (item.requestId == 3) throw ProtocolError(FarewellCode::LIMIT, "too many");
+    said_.push_back("plain " + std::to_string(item.requestId));
+  };
+  startGreeted();
+
+  send(plainFrame(1, 5));
+
+  EXPECT_THAT(farewell(), AllOf(HasSubstr("code = limit"), HasSubstr("too many")));
+  EXPECT_THAT(said_, ElementsAre("plain 1", "plain 2"));
+}
+
+TEST_F(LinePlainTest, IsNoGreeting) {
+  start();
+  EXPECT_THAT(receive(), ElementsAre(HasSubstr("greeting = ")));
+
+  send(plainFrame(1, 1));
+
+  EXPECT_THAT(farewell(), HasSubstr("the first item is not a greeting"));
+  EXPECT_THAT(said_, IsEmpty());
+}
+
+TEST_F(LinePlainTest, GoesToTheUsualFunctionWithoutOneOfItsOwn) {
+  onPlain_ = nullptr;
+  startGreeted();
+
+  send(plainFrame(7, 1));
+
+  EXPECT_THAT(said_, ElementsAre(HasSubstr("requestId = 7")));
+}
+
+TEST_F(LinePlainTest, SendsRunsBetweenOtherItemsInOrder) {
+  startGreeted();
+  line_->send(plain(1));
+  settle();  // it is being written
+
+  line_->send(plain(2));
+  line_->send([](wire::Item::Builder item) { item.setClose(3); });
+  for (std::uint32_t id = 4; id <= 1000; ++id) line_->send(plain(id));
+
+  EXPECT_THAT(receive(), ElementsAre(HasSubstr("requestId = 1,")));
+  EXPECT_THAT(receive(), ElementsAre(HasSubstr("requestId = 2,")));
+  EXPECT_THAT(receive(), ElementsAre("(close = 3)"));
+  for (std::uint32_t id = 4; id <= 1000;) {
+    for (const auto& item : receive())
+      ASSERT_THAT(item, HasSubstr("requestId = " + std::to_string(id++) + ","));
+  }
+}
+
+TEST_F(LinePlainTest, ReturnsRequestsThatWereNeverWritten) {
+  startGreeted();
+  line_->send(plain(1));
+  settle();  // it is being written, and may arrive
+  line_->send(plain(2));
+  line_->send(LineTest::request(3));
+  line_->send(plain(4));
+
+  peer_ = nullptr;
+  settle();
+  line_->send(plain(5));
+
+  std::vector<std::uint32_t> ids;
+  for (const auto& request : line_->takeUnsentRequests()) ids.push_back(request.requestId);
+  EXPECT_THAT(ids, ElementsAre(2, 3, 4, 5));
+}
+
+TEST_F(LinePlainTest, HasNoRoomWhileItsQueueIsFull) {
+  limits_.queueSize = 3;
+  startGreeted();
+  line_->send(plain(1));
+  settle();  // it is being written
+  for (std::uint32_t id = 2; id <= 4; ++id) {
+    EXPECT_TRUE(line_->hasRoom());
+    line_->send(plain(id));
+  }
+
+  EXPECT_FALSE(line_->hasRoom());
+  EXPECT_THAT(receive(), SizeIs(1));
+  EXPECT_TRUE(line_->hasRoom());
+}
+
+}  // namespace
+}  // namespace mpf::test
