@@ -38,6 +38,10 @@ class Binding : public std::enable_shared_from_this<Binding> {
                   Retry retry = Retry::never) noexcept {
     return sender_.send(message, takeBefore, requestId, retry);
   }
+  SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
+                    std::span<std::uint32_t> requestIds) noexcept {
+    return sender_.sendMany(messages, takeBefore, requestIds);
+  }
   BodyBytes allocate(std::size_t bytes) { return sender_.allocate(bytes); }
   [[nodiscard]] bool isConnected() const noexcept { return state() == BindingState::connected; }
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept { return sender_.maxMessageBytes(); }

@@ -67,6 +67,12 @@ SendResult MessageClient::send(Message&& message, Deadline takeBefore, std::uint
   return result;
 }
 
+SentMany MessageClient::sendMany(std::span<Message> messages, Deadline takeBefore,
+                                 std::span<std::uint32_t> requestIds) noexcept {
+  if (isInherited()) return {0, SendResult::notConnected};
+  return binding_->sendMany(messages, takeBefore, requestIds);
+}
+
 BodyBytes MessageClient::allocate(std::size_t bytes) { return binding_->allocate(bytes); }
 
 void MessageClient::cancel(std::uint32_t requestId) {

@@ -26,6 +26,11 @@ SendResult resultOf(LinkSend sent) noexcept {
   return SendResult::noMemory;
 }
 
+// 0: none
+std::int64_t nsOf(Deadline takeBefore) noexcept {
+  return takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1);
+}
+
 std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
   return std::make_unique<Message>(message.duplicate());
 } catch (const std::bad_alloc&) {
@@ -37,8 +42,7 @@ std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
 SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
                                Retry retry) noexcept {
   if (!message) return SendResult::empty;
-  Attempt attempt{message, takeBefore.isNever() ? 0 : std::max<std::int64_t>(takeBefore.ns(), 1),
-                  requestId};
+  Attempt attempt{message, nsOf(takeBefore), requestId};
   const auto result = retry == Retry::never ? send(attempt) : sendWithCopy(attempt);
   if (result == SendResult::sent) requestId = attempt.id;
   return result;
@@ -61,12 +65,40 @@ SendResult RequestSender::send(Attempt& attempt) noexcept {
   return SendResult::sent;
 }
 
+SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefore,
+                                 std::span<std::uint32_t> requestIds) noexcept {
+  SentMany sent;
+  bool startsNudging = false;
+  {
+    const std::lock_guard lock(*lock_);
+    if (!untaken_.isEmpty()) return {0, refuseBehindUntaken()};
+    if (state_.load(std::memory_order_relaxed) != BindingState::connected)
+      return {0, SendResult::notConnected};
+    const Link::Batch batch(channel_->link());
+    for (; sent.count < messages.size(); ++sent.count) {
+      auto& message = messages[sent.count];
+      Attempt attempt{message, nsOf(takeBefore), 0};
+      sent.result = message ? trySendLocked(attempt) : SendResult::empty;
+      if (sent.result != SendResult::sent) break;
+      startsNudging = startsNudging || attempt.startsNudging;
+      if (sent.count < requestIds.size()) requestIds[sent.count] = attempt.id;
+    }
+  }
+  for (auto& message : messages.first(sent.count)) message.reset();
+  if (sent.count != 0) setTimers(startsNudging, nsOf(takeBefore));
+  return sent;
+}
+
 // Without the lock.
 void RequestSender::onSent(const Attempt& attempt) noexcept {
   attempt.message.reset();
+  setTimers(attempt.startsNudging, attempt.deadlineNs);
+}
+
+void RequestSender::setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept {
   MPF_STEP(request_sent);
-  if (attempt.startsNudging) timer_.wakeAt(Clock::nowNs() + NudgeInterval::kFirstNs);
-  if (attempt.deadlineNs != 0) timer_.wakeAt(attempt.deadlineNs);
+  if (startsNudging) timer_.wakeAt(Clock::nowNs() + NudgeInterval::kFirstNs);
+  if (deadlineNs != 0) timer_.wakeAt(deadlineNs);
 }
 
 SendResult RequestSender::refuseBehindUntaken() noexcept {

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 
 #include <mpf/message_client.h>
 
@@ -38,6 +39,9 @@ class RequestSender {
   //   retry       as MessageClient::send()
   SendResult send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
                   Retry retry) noexcept;
+  // As MessageClient::sendMany().
+  SentMany sendMany(std::span<Message> messages, Deadline takeBefore,
+                    std::span<std::uint32_t> requestIds) noexcept;
   BodyBytes allocate(std::size_t bytes);
   [[nodiscard]] std::uint64_t maxMessageBytes() const noexcept;
   [[nodiscard]] const std::shared_ptr<BiasedLock>& lock() const noexcept { return lock_; }
@@ -79,6 +83,7 @@ class RequestSender {
   SendResult sendWithCopy(Attempt& attempt) noexcept;
   SendResult trySendLocked(Attempt& attempt) noexcept;
   void onSent(const Attempt& attempt) noexcept;
+  void setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept;
   SendResult refuseBehindUntaken() noexcept;
   void noteFull() noexcept;
 

@@ -44,6 +44,10 @@ bool MessageServer::isClientConnected(const Message& request) const noexcept {
   return Connections::isConnected(request.route());
 }
 ReplyResult MessageServer::reply(Message&& message) { return core_->replies().send(message); }
+
+RepliedMany MessageServer::replyMany(std::span<Message> replies) noexcept {
+  return core_->replies().sendMany(replies);
+}
 void MessageServer::refuse(Message&& request) { const Message dropped = std::move(request); }
 BodyBytes MessageServer::allocate(const Message& request, std::size_t bytes) {
   return ReplySender::allocate(request.route(), bytes);

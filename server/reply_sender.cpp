@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "server/reply_sender.h"
 
+#include <algorithm>
 #include <memory>
 #include <mutex>
 
@@ -22,6 +23,40 @@ ReplyResult ReplySender::send(Message& message) noexcept {
   }
   if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
   return result;
+}
+
+RepliedMany ReplySender::sendMany(std::span<Message> messages) noexcept {
+  RepliedMany sent;
+  while (sent.count < messages.size() && sent.result == ReplyResult::sent) {
+    auto rest = messages.subspan(sent.count);
+    const auto route = rest.front().route();
+    const auto differs = [&](const Message& message) {
+      return message.route().link != route.link || message.route().flags != route.flags;
+    };
+    const auto end = std::find_if(rest.begin(), rest.end(), differs);
+    const auto run = sendRun(rest.first(static_cast<std::size_t>(end - rest.begin())));
+    for (auto& message : rest.first(run.count)) message.reset();
+    sent = {sent.count + run.count, run.result};
+  }
+  return sent;
+}
+
+// Replies to one client. The caller empties those that are counted, without the lock.
+RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
+  const auto& route = messages.front().route();
+  if (route.link == 0 || forkGuard_.isInherited()) return {messages.size(), ReplyResult::sent};
+  auto& connection = Connection::of(route);
+  const std::lock_guard lock(*connection.lock);
+  if (!connection.isOpenFor(route)) return {messages.size(), ReplyResult::sent};
+  const Link::Batch batch(connection.channel->link());
+  RepliedMany sent;
+  for (; sent.count < messages.size(); ++sent.count) {
+    auto& message = messages[sent.count];
+    if (!message) continue;
+    sent.result = sendLocked(connection, message);
+    if (sent.result != ReplyResult::sent) break;
+  }
+  return sent;
 }
 
 ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) noexcept {

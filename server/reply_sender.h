@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include <mpf/message_server.h>
 
@@ -25,6 +26,8 @@ class ReplySender {
 
   // MessageServer::reply().
   ReplyResult send(Message& message) noexcept;
+  // MessageServer::replyMany().
+  RepliedMany sendMany(std::span<Message> messages) noexcept;
   // Ends a request of `connection` with a fate.
   void sendFate(Connection& connection, Envelope request, Fate fate) noexcept;
   // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
@@ -35,6 +38,7 @@ class ReplySender {
 
  private:
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
+  RepliedMany sendRun(std::span<Message> messages) noexcept;
 
   ForkGuard forkGuard_;
   layout::WindowControl& control_;

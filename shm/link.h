@@ -134,6 +134,21 @@ class Link {
     afterPush();
     return LinkSend::sent;
   }
+  // While it exists, messages are sent without a notice to the peer; at its end, one notice stands
+  // for all of them.
+  class Batch {
+   public:
+    explicit Batch(Link& link) noexcept : link_(link) { link_.isInBatch_ = true; }
+    ~Batch() {
+      link_.isInBatch_ = false;
+      link_.afterPush();
+    }
+    Batch(const Batch&) = delete;
+    Batch& operator=(const Batch&) = delete;
+
+   private:
+    Link& link_;
+  };
   // At the server: sends a body of `bytes` bytes that lies in a chunk of the fan-out pool. Returns
   // `full` if the client holds `maxBorrowed` chunks of this pool, and `noMemory` if `chunk` is
   // null; then the message counts as missed by its request.
@@ -200,6 +215,7 @@ class Link {
   LinkSend trySendLong(Envelope envelope, std::span<const std::byte> body, std::uint32_t waiting,
                        std::uint32_t reserve) noexcept;
   void afterPush() noexcept {
+    if (isInBatch_) return;
     MPF_STEP(peer_checked);
     expedited_barrier::frequentSide();
     if (outWatch_.load(std::memory_order_relaxed) != layout::Watch::polledUnfenced)
@@ -219,6 +235,7 @@ class Link {
   const std::atomic<layout::Watch>& outWatch_;  // the peer's
   std::atomic<layout::Watch>& inWatch_;
   bool isUnfenced_ = false;  // the peer may send without a fence
+  bool isInBatch_ = false;  // the end of the batch notifies the peer
   RingProducer out_;
   RingConsumer in_;
   PoolOwner pool_;

@@ -6,7 +6,9 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <array>
 #include <optional>
+#include <span>
 #include <stdexcept>
 
 #include <mpf/message_client.h>
@@ -91,16 +93,9 @@ class MpfPeer final : public Peer {
         throw std::runtime_error("no request from the client");
       request = server.receive();
     }
-    for (std::int32_t value = 0; resume();) {
-      for (int i = 0; i < 64; ++i) {
-        auto reply = server.allocReplyMessage<Int32>(request);
-        reply->value = ++value;
-        for (auto result = ReplyResult::queueFull; result != ReplyResult::sent;) {
-          result = server.reply(std::move(reply));
-          if (result == ReplyResult::queueFull) cpuRelax();
-          if (result == ReplyResult::clientGone) throw std::runtime_error("the client is gone");
-        }
-      }
+    while (resume()) {
+      if (places_.inBatches) sendBatch(server, request);
+      else sendOneByOne(server, request);
     }
   }
 
@@ -111,6 +106,31 @@ class MpfPeer final : public Peer {
   }
 
  private:
+  static constexpr std::size_t kBatch = 64;
+
+  void sendOneByOne(MessageServer& server, const Message& request) {
+    for (std::size_t i = 0; i < kBatch; ++i) {
+      auto reply = server.allocReplyMessage<Int32>(request);
+      reply->value = ++value_;
+      for (auto result = ReplyResult::queueFull; result != ReplyResult::sent;) {
+        result = server.reply(std::move(reply));
+        if (result == ReplyResult::queueFull) cpuRelax();
+        if (result == ReplyResult::clientGone) throw std::runtime_error("the client is gone");
+      }
+    }
+  }
+  void sendBatch(MessageServer& server, const Message& request) {
+    for (auto& message : batch_) {
+      auto reply = server.allocReplyMessage<Int32>(request);
+      reply->value = ++value_;
+      message = std::move(reply);
+    }
+    for (std::span<Message> rest = batch_; !rest.empty();) {
+      rest = rest.subspan(server.replyMany(rest).count);
+      if (!rest.empty()) cpuRelax();
+    }
+    if (!server.isClientConnected(request)) throw std::runtime_error("the client is gone");
+  }
   [[nodiscard]] ServerOptions optionsOfServer() const {
     auto options = serverOptions(options_.mode);
     options.location = places_.location;
@@ -137,6 +157,8 @@ class MpfPeer final : public Peer {
   std::optional<MessageClient> client_;
   std::uint64_t received_ = 0;
   std::uint64_t awaited_ = 0;
+  std::int32_t value_ = 0;
+  std::array<Message, kBatch> batch_;
 };
 
 }  // namespace
@@ -200,6 +222,18 @@ PeerFamily mpfPeer() {
         options, {.serverBackplane = options.name, .clientBackplane = options.name});
   };
   family.oneWay = true;
+  return family;
+}
+
+PeerFamily mpfBatchPeer() {
+  PeerFamily family;
+  family.name = std::string(kMpf) + ", 64 at a time";
+  family.modes = {Mode::spin, Mode::adaptive, Mode::block};
+  family.make = [](const PeerOptions& options) {
+    return makeMpfPeer<Char8Array>(
+        options,
+        {.serverBackplane = options.name, .clientBackplane = options.name, .inBatches = true});
+  };
   return family;
 }
 

@@ -151,8 +151,11 @@ std::vector<Measurement> peerMeasurements(const std::string& runName) {
       }
     }
   }
-  for (const auto& family : all) {
-    if (!family.oneWay && family.skipped.empty()) continue;
+  auto oneWayFamilies = all;
+  std::erase_if(oneWayFamilies,
+                [](const auto& family) { return !family.oneWay && family.skipped.empty(); });
+  oneWayFamilies.insert(oneWayFamilies.begin() + 1, mpfBatchPeer());
+  for (const auto& family : oneWayFamilies) {
     for (const auto mode : modesOf(family)) {
       auto row = asker.row(family, "One way, 4 B", mode, 4, false);
       row.floorName = kRing;

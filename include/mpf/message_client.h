@@ -21,9 +21,11 @@
 //          of its parent: they refuse with an error. The child creates its own.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include <mpf/clock.h>
@@ -44,6 +46,12 @@ enum class SendResult {
 };
 // The result in words, for messages to people.
 [[nodiscard]] const char* toString(SendResult result) noexcept;
+
+// The result of MessageClient::sendMany().
+struct SentMany {
+  std::size_t count = 0;  // messages that were sent
+  SendResult result = SendResult::sent;  // why the next one was not; `sent` when all were
+};
 
 // Which requests a client sends again by itself.
 enum class Retry {
@@ -89,6 +97,15 @@ class MessageClient {
   [[nodiscard]] SendResult send(Message&& message, Deadline takeBefore = Deadline::never(),
                                 std::uint32_t* requestId = nullptr,
                                 Retry retry = Retry::never) noexcept;
+
+  // Sends the messages in order, until one is not sent. Costs less than send() for each: the server
+  // is woken once at most. Messages that were sent are empty then; the others are unchanged. Never
+  // waits, and never sends again by itself.
+  //   takeBefore  as send(), for each message
+  //   requestIds  out: the numbers of the requests that were sent; may be shorter, and is then
+  //               filled as far as it goes
+  SentMany sendMany(std::span<Message> messages, Deadline takeBefore = Deadline::never(),
+                    std::span<std::uint32_t> requestIds = {}) noexcept;
 
   // Allocates an array message of n elements in the memory that is shared with the server, or on
   // the heap when there is no connection or the shared memory is full. Sending the former copies

@@ -71,6 +71,12 @@ enum class ReplyResult {
 // The result in words, for messages to people.
 [[nodiscard]] const char* toString(ReplyResult result) noexcept;
 
+// The result of MessageServer::replyMany().
+struct RepliedMany {
+  std::size_t count = 0;  // replies that were sent, or whose client is gone
+  ReplyResult result = ReplyResult::sent;  // why the next one was not sent; `sent` when all were
+};
+
 class MessageServer {
  public:
   // Publishes the server under `name`: clients can connect as soon as this object receives, and
@@ -134,6 +140,11 @@ class MessageServer {
   // it unchanged. The first reply ends the request. Further replies are refused with queueFull when
   // the client does not receive them. Any thread; never waits.
   ReplyResult reply(Message&& message);
+  // Sends replies in order, as reply() does, until one is not sent for another reason than
+  // clientGone. Costs less than reply() for each: a client is woken once at most for the replies to
+  // it that follow one another. Replies that were counted are empty then; the others are unchanged.
+  // Any thread; never waits.
+  RepliedMany replyMany(std::span<Message> replies) noexcept;
   // Ends a request without a reply: its client gets the fate `refused`.
   void refuse(Message&& request);
 

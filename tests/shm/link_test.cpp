@@ -194,6 +194,24 @@ TEST_F(LinkTest, SetsTheReadyBitWhileTheReceiverDoesNotPoll) {
   take(link.server);
 }
 
+TEST_F(LinkTest, ABatchSetsTheReadyBitAtItsEnd) {
+  const auto link = makeLink();
+  auto& hints = server_->endpoint.window().hints();
+  const auto takeBits = [&] { return hints.readyBits[0].exchange(0, std::memory_order_relaxed); };
+  takeBits();
+  {
+    const Link::Batch batch(link.client);
+
+    ASSERT_EQ(sendBody(link.client, filled(1)), LinkSend::sent);
+    ASSERT_EQ(sendBody(link.client, filled(100)), LinkSend::sent);
+    EXPECT_EQ(takeBits(), 0u);
+  }
+
+  EXPECT_EQ(takeBits(), std::uint64_t{1} << link.serverIndex);
+  take(link.server);
+  take(link.server);
+}
+
 TEST_F(LinkTest, TimesEveryMessageToASleepingPeerAndOneIn64ToAPollingOne) {
   const auto link = makeLink();
   Link::execute(link.server.unwatch());
