@@ -4,6 +4,7 @@
 // Threads  wakeAt() and dueNs(): any. The rest: the dispatcher's thread.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 
@@ -28,8 +29,12 @@ class BindingTimer {
     // PAIR(due): dueNs_ of this binding is stored before that of the dispatcher is read, and before
     // it is read whether the dispatcher has been told.
     doorbell::fence();
-    if (ns < due && !isReported_.exchange(true, std::memory_order_relaxed))
+    if (ns < due && !isReported_.exchange(true, std::memory_order_relaxed)) {
       dispatcher_.reportLowered(owner_);
+      // Another thread may have lowered the time further and relied on this report, and the
+      // dispatcher may have looked for reports before this one.
+      ns = std::min(ns, dueNs());
+    }
     dispatcher_.wakeAt(ns);
   }
   // The time, for a caller that reads it after a report of the dispatcher's timer.

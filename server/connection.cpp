@@ -24,12 +24,13 @@ Connection::Pointer Connection::take() {
 }
 
 // Gives requests that differ in more bits different places, up to the size at which the client must
-// use different ones.
+// use different ones. The client may have received a reply that another thread is still sending
+// under the lock: then the place becomes free.
 bool Connection::tryMakePlace(std::uint32_t requestId) noexcept try {
   const auto size = std::bit_ceil(channel->link().header().maxOutstanding);
-  if (unanswered.size() == size) return false;
-  std::vector<std::atomic<std::uint32_t>> larger(size);
+  std::vector<std::atomic<std::uint32_t>> larger(unanswered.size() == size ? 0 : size);
   const std::lock_guard guard(*lock);
+  if (larger.empty()) return owed(requestId).load(std::memory_order_relaxed) == 0;
   for (const auto& place : unanswered) {
     const auto id = place.load(std::memory_order_relaxed);
     if (id != 0) larger[id % size].store(id, std::memory_order_relaxed);

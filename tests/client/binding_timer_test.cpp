@@ -2,6 +2,8 @@
 // BindingTimer and the DispatcherTimer that it lowers.
 #include "client/binding_timer.h"
 
+#include <algorithm>
+#include <atomic>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <thread>
@@ -79,6 +81,57 @@ TEST_F(BindingTimerTest, ALoweredTimeIsReportedOnceUntilItIsRead) {
   EXPECT_THAT(*dispatcher_.takeLowered(), testing::IsEmpty()) << "not lowered";
   timer.wakeAt(100);
   EXPECT_THAT(*dispatcher_.takeLowered(), testing::ElementsAre(owner));
+}
+
+// The thread that reports may be slower than another one that lowers the time further and relies on
+// the report.
+TEST_F(BindingTimerTest, NoTimeIsLostWhileAnotherThreadReports) {
+  constexpr int kRounds = 2000;
+  constexpr std::int64_t kNowNs = 750;
+  auto* const owner = reinterpret_cast<Binding*>(&first_);  // never dereferenced
+  BindingTimer timer(dispatcher_, owner);
+  std::int64_t scheduledNs = INT64_MAX;
+  const auto handleDue = [&] {
+    if (dispatcher_.due().ns() > kNowNs) return;
+    dispatcher_.reset();
+    const auto lowered = *dispatcher_.takeLowered();
+    if (std::ranges::find(lowered, owner) != lowered.end()) scheduledNs = timer.takeReported();
+  };
+  std::atomic<int> round{0};
+  std::atomic<int> done{0};
+  const auto lowerInEachRound = [&](std::int64_t ns) {
+    for (int next = 1; next <= kRounds; ++next) {
+      while (round.load() != next) std::this_thread::yield();
+      timer.wakeAt(ns);
+      ++done;
+    }
+  };
+  std::thread others([&] {  // a report has to wait for theirs
+    while (round.load() != kRounds) dispatcher_.reportLowered(nullptr);
+  });
+  std::thread later(lowerInEachRound, 1000);
+  std::thread earlier(lowerInEachRound, 500);
+  int lost = 0;
+  while (round.load() != kRounds) {
+    timer.reset();
+    dispatcher_.reset();
+    static_cast<void>(dispatcher_.takeLowered());
+    static_cast<void>(timer.takeReported());
+    scheduledNs = INT64_MAX;
+    done = 0;
+    ++round;
+    while (done.load() != 2) {
+      handleDue();
+      std::this_thread::yield();
+    }
+    handleDue();
+    if (scheduledNs != 500) ++lost;
+  }
+  others.join();
+  later.join();
+  earlier.join();
+
+  EXPECT_EQ(lost, 0);
 }
 
 TEST_F(BindingTimerTest, AResetForgetsTheTime) {

@@ -2,9 +2,13 @@
 // Connections: clients that connect, disconnect and die, and the numbers of clients and requests.
 #include "server/connections.h"
 
+#include <atomic>
+#include <bit>
 #include <gmock/gmock.h>
+#include <mutex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -113,6 +117,34 @@ TEST_F(ConnectionsTest, ExceptionsOfTheCallbackAreThrownLaterInTheirOrder) {
   EXPECT_EQ(textOf(), "on");
   EXPECT_EQ(textOf(), "off");
   EXPECT_FALSE(connections_.hasThrown());
+}
+
+// The client has the reply already, and uses the place for its next request.
+TEST_F(ConnectionsTest, ARequestWaitsForTheReplyThatMakesItsPlaceFree) {
+  auto& link = createLink();
+  auto& connection = accept(link);
+  const auto places = std::bit_ceil(link.header().maxOutstanding);
+  ASSERT_TRUE(connection.tryOwe(1));
+  while (connection.unanswered.size() != places)
+    ASSERT_TRUE(connection.tryOwe(1 + static_cast<std::uint32_t>(connection.unanswered.size())));
+  std::atomic<bool> isReplying{false};
+  std::atomic<bool> isNext{false};
+  std::thread replying([&] {
+    const std::lock_guard guard(*connection.lock);
+    isReplying = true;
+    while (!isNext) std::this_thread::yield();
+    for (int i = 0; i < 1000; ++i) std::this_thread::yield();
+    connection.owed(1).store(0, std::memory_order_relaxed);
+  });
+  while (!isReplying) std::this_thread::yield();
+
+  isNext = true;
+  const bool isOwed = connection.tryOwe(1 + places);
+
+  replying.join();
+  EXPECT_TRUE(isOwed);
+  EXPECT_TRUE(connection.owes(1 + places));
+  EXPECT_FALSE(connection.tryOwe(1)) << "not free now";
 }
 
 TEST_F(ConnectionsTest, CloseAllEndsEachConnection) {
