@@ -90,6 +90,7 @@ TEST_F(SecondRingTest, HasRoomForItsOwnMessagesBesideThoseOfTheFirst) {
   EXPECT_EQ(pair_.moved.load(), before + 1);
   for (std::uint64_t ordinal = 0; ordinal < before + more; ++ordinal) pair_.takeAndExpect(ordinal);
   EXPECT_FALSE(pair_.consumer.hasMessage());
+  pair_.consumer.onEmpty();
   EXPECT_EQ(pair_.fill(before + more), kSecond) << "all slots are free again";
 }
 

@@ -36,6 +36,7 @@ class Traffic {
       static_cast<void>(client_.send(Int32Message({.value = i})));
       while (replies_ <= i) turn();
     }
+    turn();  // each side finds its ring empty, and frees all slots
     fillQueue();
   }
   void serve() {
