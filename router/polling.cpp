@@ -4,6 +4,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <kj/common.h>
 #include <utility>
 
 #include <mpf/clock.h>
@@ -21,12 +22,12 @@ void Polling::noteTraffic() {
   if (idleTurns_ >= kTurnsOfWait || !isPolling_) budget_.noteWait(nowNs - lastTrafficNs_);
   lastTrafficNs_ = nowNs;
   idleTurns_ = 0;
-  if (std::exchange(isPolling_, true)) return;
-  tasks_.add(kj::evalLast([this] { return loop(); }));
+  if (!std::exchange(isPolling_, true)) tasks_.add(nextTurn());
 }
 
 void Polling::add(Polled& window) {
   noteTraffic();
+  if (isReplacing_) return;  // the last look at a window: from now on it wakes the event loop
   if (!windows_.empty() && windows_.back() == &window) return;
   if (const auto found = std::ranges::find(windows_, &window); found != windows_.end()) {
     std::rotate(found, found + 1, windows_.end());
@@ -35,6 +36,8 @@ void Polling::add(Polled& window) {
   if (windows_.size() == kMaxWindows) {
     auto& oldest = *windows_.front();
     windows_.erase(windows_.begin());
+    isReplacing_ = true;
+    KJ_DEFER(isReplacing_ = false);
     drop(oldest);
   }
   windows_.push_back(&window);
@@ -48,6 +51,12 @@ void Polling::drop(Polled& window) {
   window.poll();
 }
 
+// The event loop first runs all tasks that are ready, and looks at its descriptors. A task of
+// evalLast() would run before older ones of evalLast(): those that write to the lines.
+kj::Promise<void> Polling::nextTurn() {
+  return port_.getTimer().afterDelay(0 * kj::NANOSECONDS).then([this] { return loop(); });
+}
+
 kj::Promise<void> Polling::loop() {
   if (Clock::nowNs() - lastTrafficNs_ >= budget_.ns()) {
     end();
@@ -55,19 +64,19 @@ kj::Promise<void> Polling::loop() {
   }
   ++idleTurns_;
   ::sched_yield();
-  // Of the tasks of evalLast(), the loop runs the newest one first. So the next turn is created
-  // before the calls below create tasks that write to the lines, which must run before it.
-  auto next = kj::evalLast([this] { return loop(); }).eagerlyEvaluate(nullptr);
   // A window may be added or removed by the call.
   for (std::size_t at = 0; at < windows_.size(); ++at) windows_[at]->poll();
-  port_.poll();
-  return next;
+  return nextTurn();
 }
 
-// The last look at the windows may start to poll them again.
+// The last look at the windows may start to poll them again, or remove others.
 void Polling::end() {
   isPolling_ = false;
-  for (auto* window : std::exchange(windows_, {})) drop(*window);
+  for (auto left = windows_.size(); left != 0 && !windows_.empty(); --left) {
+    auto& window = *windows_.front();
+    windows_.erase(windows_.begin());
+    drop(window);
+  }
 }
 
 }  // namespace mpf::router

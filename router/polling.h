@@ -48,6 +48,7 @@ class Polling {
   [[nodiscard]] bool isPolling() const noexcept { return isPolling_; }
 
  private:
+  kj::Promise<void> nextTurn();
   kj::Promise<void> loop();
   void end();
   static void drop(Polled& window);
@@ -57,6 +58,7 @@ class Polling {
   std::int64_t lastTrafficNs_ = 0;
   std::uint32_t idleTurns_ = 0;  // of the loop, since the last traffic
   bool isPolling_ = false;
+  bool isReplacing_ = false;  // a window has its last look
   std::vector<Polled*> windows_;  // the one added last is at the end
   FatalTasks tasks_;
 };

@@ -2,9 +2,12 @@
 // Polling: the event loop stays awake after traffic, and sleeps later.
 #include "router/polling.h"
 
+#include <algorithm>
 #include <array>
 #include <gtest/gtest.h>
 #include <kj/async-io.h>
+#include <memory>
+#include <vector>
 
 #include "tests/support/watchdog.h"
 
@@ -52,6 +55,27 @@ TEST_F(PollingTest, HandlesEventsOfDescriptors) {
   EXPECT_EQ(byte, 'x');
 }
 
+// As the write of a message that led to the traffic.
+TEST_F(PollingTest, RunsTheTasksThatWaitedWhenItBegan) {
+  struct Busy final : router::Polled {
+    explicit Busy(Polling& of) : polling(of) {}
+    void poll() override {
+      if (++polls < 1000) polling.noteTraffic();
+    }
+    void setPolled(bool) override {}
+    Polling& polling;
+    int polls = 0;
+  };
+  Busy busy(polling_);
+  int pollsBefore = -1;
+  auto write = kj::evalLast([&] { pollsBefore = busy.polls; }).eagerlyEvaluate(nullptr);
+
+  polling_.add(busy);
+  while (polling_.isPolling()) wait();
+
+  EXPECT_EQ(pollsBefore, 0);
+}
+
 struct Window final : router::Polled {
   void poll() override {
     ++polls;
@@ -90,6 +114,49 @@ TEST_F(PollingTest, PollsTheWindowsThatWereBusyLast) {
   EXPECT_EQ(windows[1].pollsSinceChange, 1);
   for (std::size_t at = 2; at < windows.size(); ++at) EXPECT_TRUE(windows[at].isPolled);
   while (polling_.isPolling()) wait();
+}
+
+// The last look at a window that is replaced finds messages.
+TEST_F(PollingTest, PollsNoMoreThanItsMaximum) {
+  struct Busy final : router::Polled {
+    explicit Busy(Polling& of) : polling(of) {}
+    void poll() override { polling.add(*this); }
+    void setPolled(bool polled) override { isPolled = polled; }
+    Polling& polling;
+    bool isPolled = false;
+  };
+  std::vector<std::unique_ptr<Busy>> windows;
+  for (std::size_t i = 0; i < 2 * Polling::kMaxWindows; ++i) {
+    windows.push_back(std::make_unique<Busy>(polling_));
+    polling_.add(*windows.back());
+  }
+
+  EXPECT_EQ(std::ranges::count_if(windows, [](const auto& each) { return each->isPolled; }),
+            static_cast<std::ptrdiff_t>(Polling::kMaxWindows));
+  EXPECT_TRUE(windows.back()->isPolled);
+  for (const auto& window : windows) polling_.remove(*window);
+}
+
+// The last look at one window leads to the end of another one.
+TEST_F(PollingTest, ForgetsAWindowThatIsDestroyedWhilePollingEnds) {
+  struct Killer final : router::Polled {
+    Killer(Polling& of, Window& other) : polling(of), victim(other) {}
+    void poll() override {
+      if (!isPolled) polling.remove(victim);
+    }
+    void setPolled(bool polled) override { isPolled = polled; }
+    Polling& polling;
+    Window& victim;
+    bool isPolled = false;
+  };
+  Window window;
+  Killer killer(polling_, window);
+  polling_.add(killer);
+  polling_.add(window);
+
+  while (polling_.isPolling()) wait();
+
+  EXPECT_TRUE(window.isPolled) << "it is not touched after remove()";
 }
 
 TEST_F(PollingTest, ForgetsAWindowThatIsDestroyed) {
