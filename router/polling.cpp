@@ -51,8 +51,8 @@ void Polling::drop(Polled& window) {
   window.poll();
 }
 
-// The event loop first runs all tasks that are ready, and looks at its descriptors. With evalLast(),
-// a turn would run before the older tasks of evalLast(): those that write to the lines.
+// The event loop first runs all tasks that are ready, and looks at its descriptors. A task of
+// evalLast() would run before older ones of evalLast(): those that write to the lines.
 kj::Promise<void> Polling::nextTurn() {
   return port_.getTimer().afterDelay(0 * kj::NANOSECONDS).then([this] { return loop(); });
 }
