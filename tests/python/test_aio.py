@@ -156,8 +156,8 @@ async def test_a_subscription_is_renewed(doubler: mpf.Server) -> None:
 
 async def test_a_thousand_subscriptions_of_one_client() -> None:
     sources = []
-    # room for a thousand replies beyond the first ones
-    with mpf.Server("source", queue_size=2000) as server:
+    # room for a thousand replies of two slots beyond the first ones
+    with mpf.Server("source", queue_size=4000) as server:
 
         @server.on(mpf.Float64)
         def keep(request: mpf.Float64) -> mpf.Float64:
