@@ -98,8 +98,8 @@ class MessageClient {
                                 std::uint32_t* requestId = nullptr,
                                 Retry retry = Retry::never) noexcept;
 
-  // Sends the messages in order, until one is not sent. Costs less than send() for each: the server
-  // is woken once at most. Messages that were sent are empty then; the others are unchanged. Never
+  // Sends the messages in order, until one is not sent. A server that sleeps is woken once at most
+  // for all of them. Messages that were sent are empty then; the others are unchanged. Never
   // waits, and never sends again by itself.
   //   takeBefore  as send(), for each message
   //   requestIds  out: the numbers of the requests that were sent; may be shorter, and is then

@@ -141,8 +141,8 @@ class MessageServer {
   // the client does not receive them. Any thread; never waits.
   ReplyResult reply(Message&& message);
   // Sends replies in order, as reply() does, until one is not sent for another reason than
-  // clientGone. Costs less than reply() for each: a client is woken once at most for the replies to
-  // it that follow one another. Replies that were counted are empty then; the others are unchanged.
+  // clientGone. A client that sleeps is woken once at most for the replies to it that follow one
+  // another. Replies that were counted are empty then; the others are unchanged.
   // Any thread; never waits.
   RepliedMany replyMany(std::span<Message> replies) noexcept;
   // Ends a request without a reply: its client gets the fate `refused`.
