@@ -302,7 +302,7 @@ class RingConsumer {
   static constexpr std::uint64_t kLookEvery = 16;  // slots
   static constexpr std::uint64_t kNear = 64;  // slots; at most a quarter of the ring
   static constexpr std::uint64_t kMaxWaitEvery = 4096;
-  static constexpr int kMaxPauses = 100;  // 1 us
+  static constexpr int kMaxPauses = 100;
 
   void free() noexcept {
     freed_ = taken_;
