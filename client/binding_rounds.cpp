@@ -10,7 +10,9 @@ void BindingRounds::add(const std::shared_ptr<Binding>& binding) {
   if (binding->hasLeft()) return;
   auto& member = bindings_[binding.get()];
   member.binding = binding;
+  const bool wasComplete = std::exchange(isComplete_, false);
   schedule(member, binding->takeReportedDueNs());
+  isComplete_ = wasComplete;
 }
 
 void BindingRounds::remove(const std::shared_ptr<Binding>& binding) {
@@ -39,9 +41,11 @@ void BindingRounds::schedule(Member& member, std::int64_t dueNs) {
   member.scheduledNs = dueNs;
 }
 
-// Removes the bindings that are due from the schedule, and returns them.
+// Removes the bindings that are due from the schedule, and returns them. When it throws for lack of
+// memory, it has forgotten some; the next call looks at every binding.
 std::vector<std::weak_ptr<Binding>> BindingRounds::takeDue(std::int64_t nowNs) {
-  if (const auto lowered = parts_.timer.takeLowered()) {
+  const auto lowered = parts_.timer.takeLowered();
+  if (std::exchange(isComplete_, false) && lowered) {
     for (const auto* key : *lowered) {
       const auto found = bindings_.find(key);
       if (found != bindings_.end())
@@ -56,6 +60,7 @@ std::vector<std::weak_ptr<Binding>> BindingRounds::takeDue(std::int64_t nowNs) {
     due.push_back(member.binding);
     schedule(member, INT64_MAX);
   }
+  isComplete_ = true;
   return due;
 }
 

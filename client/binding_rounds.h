@@ -55,6 +55,7 @@ class BindingRounds {
   DispatcherParts& parts_;
   std::map<const Binding*, Member> bindings_;
   std::set<std::pair<std::int64_t, const Binding*>> schedule_;
+  bool isComplete_ = true;  // false: a binding may lack its place in schedule_
   std::vector<std::shared_ptr<Binding>> removed_;
   Round<Binding> dead_;
   Round<Binding> waiting_;

@@ -1,14 +1,36 @@
 // SPDX-License-Identifier: MIT
+// This file replaces operator new with one that can fail.
 #include "client/binding_rounds.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <gtest/gtest.h>
 #include <memory>
+#include <new>
 #include <vector>
 
 #include <mpf/message_server.h>
 
 #include "tests/client/binding_parts_fixture.h"
+
+namespace {
+
+constexpr int kUnlimited = -1;
+thread_local int allocationsLeft = kUnlimited;  // of this thread
+
+}  // namespace
+
+void* operator new(std::size_t bytes) {
+  if (allocationsLeft == 0) throw std::bad_alloc();
+  if (allocationsLeft != kUnlimited) --allocationsLeft;
+  if (auto* memory = std::malloc(std::max<std::size_t>(bytes, 1))) return memory;
+  throw std::bad_alloc();
+}
+void* operator new(std::size_t bytes, const std::nothrow_t& /*tag*/) noexcept {
+  return allocationsLeft == 0 ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t /*bytes*/) noexcept { std::free(memory); }
 
 namespace mpf::test {
 namespace {
@@ -32,6 +54,32 @@ class BindingRoundsTest : public BindingPartsTest {
   }
   [[nodiscard]] std::ptrdiff_t waiting() const {
     return std::ranges::count_if(bindings_, [](const auto& each) { return each->isWaiting(); });
+  }
+
+  static void connect(Binding& binding, MessageServer& server) {
+    binding.tryConnect();
+    while (!binding.isConnected()) {
+      EXPECT_FALSE(server.receive());
+      binding.takeSome(1);
+    }
+  }
+  // Sends a request whose time has passed: the timer of the binding is due.
+  static void sendExpired(Binding& binding) {
+    Message request = Int32Message();
+    std::uint32_t id = 0;
+    ASSERT_EQ(binding.send(request, Deadline::atNs(1), id), SendResult::sent);
+  }
+  // Calls handleDue() with memory for this number of allocations. Returns false when it throws.
+  bool tryHandleDue(int allocations) {
+    allocationsLeft = allocations;
+    try {
+      rounds_.handleDue();
+    } catch (const std::bad_alloc&) {
+      allocationsLeft = kUnlimited;
+      return false;
+    }
+    allocationsLeft = kUnlimited;
+    return true;
   }
 
   std::vector<std::shared_ptr<Binding>> bindings_;
@@ -161,6 +209,52 @@ TEST_F(BindingRoundsTest, ABindingIsScheduledWhenItIsAdded) {
   rounds_.handleDue();
 
   EXPECT_EQ(parts_.timer.due().ns(), binding->dueNs());
+}
+
+// Memory runs out at one allocation after the other. The requests of all bindings expire all the
+// same, when there is memory again.
+TEST_F(BindingRoundsTest, AShortageOfMemoryLosesNoTimer) {
+  constexpr int kBindings = 3;
+  MessageServer server(backplane_, "dac");
+  int fates = 0;
+  for (int i = 0; i < kBindings; ++i) {
+    bindings_.push_back(std::make_shared<Binding>(parts_, [&fates](const Message& message) {
+      if (message.tryAs<RequestFate>() != nullptr) ++fates;
+    }));
+    bindings_.back()->setServer("dac", 0);
+    rounds_.add(bindings_.back());
+    connect(*bindings_.back(), server);
+  }
+
+  int shortages = 0;
+  for (bool isShort = true; isShort; ++shortages) {
+    for (const auto& binding : bindings_) sendExpired(*binding);
+    isShort = !tryHandleDue(shortages);
+    while (parts_.timer.isDue()) rounds_.handleDue();
+    ASSERT_EQ(fates, kBindings * (shortages + 1)) << "after " << shortages << " allocations";
+    EXPECT_FALSE(server.receive()) << "it drops requests that have expired";
+  }
+  EXPECT_GT(shortages, kBindings) << "each place in the schedule needs memory";
+}
+
+TEST_F(BindingRoundsTest, ABindingThatIsAddedWithoutMemoryKeepsItsTimer) {
+  MessageServer server(backplane_, "dac");
+  bool hasExpired = false;
+  const auto binding = std::make_shared<Binding>(parts_, [&hasExpired](const Message& message) {
+    if (message.tryAs<RequestFate>() != nullptr) hasExpired = true;
+  });
+  bindings_.push_back(binding);
+  binding->setServer("dac", 0);
+  connect(*binding, server);
+  rounds_.handleDue();
+  sendExpired(*binding);
+  allocationsLeft = 1;  // for the binding itself
+
+  EXPECT_THROW(rounds_.add(binding), std::bad_alloc);
+
+  allocationsLeft = kUnlimited;
+  while (parts_.timer.isDue()) rounds_.handleDue();
+  EXPECT_TRUE(hasExpired);
 }
 
 }  // namespace
