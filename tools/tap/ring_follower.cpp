@@ -16,10 +16,17 @@ RingFollower::RingFollower(std::span<const layout::Slot> ring, std::span<const l
   if (from == FollowFrom::newest) goBehindNewest();
 }
 
-// Whether a sequence number can belong to the slot of `position`. Others are invalid data, and must
-// not make the follower look for newer messages.
+// Whether a sequence number can belong to the slot of `position`. Others, among them the 0 of an
+// empty slot, must not make the follower look for newer messages.
 bool RingFollower::isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept {
-  return sequence <= kMost && ((sequence - 1 - position) & (capacity_ - 1)) == 0;
+  return sequence - 1 < kMost && ((sequence - 1 - position) & (capacity_ - 1)) == 0;
+}
+
+// Whether the message of this position is complete.
+bool RingFollower::isFilled(std::uint64_t position) const noexcept {
+  // PAIR(slot-filled): the message is complete.
+  const auto sequence = slot(position).sequence.load(std::memory_order_acquire);
+  return sequence == position + 1 && isPossible(sequence, position);
 }
 
 // Whether the message of this position, and all later ones, are in the second ring.
@@ -71,8 +78,7 @@ bool RingFollower::isOverrun() const noexcept {
 
 RingFollower::Next RingFollower::tryNext(RingCopy& copy) noexcept {
   if (continuesAt(position_)) moveTo(position_);
-  // PAIR(slot-filled): the message is complete.
-  const bool filled = slot(position_).sequence.load(std::memory_order_acquire) == position_ + 1;
+  const bool filled = isFilled(position_);
   const auto slots = slot(position_).slots;
   const bool whole = filled && tryCopy(slots, copy);
   // PAIR(slot-filled): the message is copied first, and then the producer's position is read.

@@ -54,6 +54,7 @@ class RingFollower {
     return slots_[position & (capacity_ - 1)];
   }
   [[nodiscard]] bool isPossible(std::uint64_t sequence, std::uint64_t position) const noexcept;
+  [[nodiscard]] bool isFilled(std::uint64_t position) const noexcept;
   [[nodiscard]] bool isOverrun() const noexcept;
   [[nodiscard]] bool continuesAt(std::uint64_t position) const noexcept;
   void moveTo(std::uint64_t position) noexcept;

@@ -121,6 +121,22 @@ TEST_F(SecondRingFollowerTest, BeginsBehindTheNewestMessageOfTheSecondRing) {
   expectNext(follower, pushed_);
 }
 
+// A slot of the first ring says that the messages continue at a position that none can have. The
+// follower reads on where the messages are.
+TEST_F(SecondRingFollowerTest, IgnoresAMoveToAnImpossiblePosition) {
+  constexpr auto kBeyondAll = (std::uint64_t{1} << 62) + kFirst;
+  for (const auto sequence : {std::uint64_t{0}, kBeyondAll}) {
+    slots_[kFirst - 1].sequence = layout::kContinuesInSecondRing | sequence;
+    auto follower = follow(FollowFrom::newest);
+    RingCopy copy;
+    EXPECT_EQ(follower.tryNext(copy), Next::nothing);
+
+    push(pushed_);
+
+    expectNext(follower, pushed_++);
+  }
+}
+
 TEST_F(RingFollowerTest, ReadsMessagesBeforeAndAfterTheyAreTaken) {
   auto follower = follow();
   ASSERT_TRUE(push(1));
@@ -198,6 +214,18 @@ TEST_F(RingFollowerTest, IgnoresASequenceThatDoesNotFitItsSlot) {
     RingCopy copy;
     if (follower.tryNext(copy) == Next::overrun) expectNothing(follower);
   }
+}
+
+// The newest message has the highest position, and the slot behind it contains invalid data, which
+// must not cause endless overruns either.
+TEST_F(RingFollowerTest, ReadsNothingBehindTheHighestPosition) {
+  constexpr auto kHighest = (std::uint64_t{1} << 62) - 1;
+  ring_[kHighest % kCapacity].sequence = kHighest + 1;
+  ring_[(kHighest + 1) % kCapacity].sequence = kHighest + 2;
+
+  auto follower = follow();
+
+  expectNothing(follower);
 }
 
 TEST_F(RingFollowerTest, SurvivesRandomBytes) {
