@@ -6,19 +6,17 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
-#include <new>
 #include <optional>
 #include <utility>
 
 #include "python/extension/errors.h"
+#include "python/extension/gil.h"
 #include "python/extension/options.h"
 
 namespace mpf::python {
 namespace {
 
 using nb::literals::operator""_a;
-
-constexpr const char* kClient = "client";
 
 Retry retryOf(bool retry) { return retry ? Retry::neverTaken : Retry::never; }
 
@@ -40,69 +38,6 @@ nb::object expectedType(nb::handle request, nb::object wanted) {
 
 }  // namespace
 
-// ---- Connection
-
-Connection::Connection(const std::string& backplane, std::string serverName, std::int32_t location,
-                       WaitMode waitMode)
-    : server(std::move(serverName)),
-      forks_(forkCount()),
-      requester_(
-          std::make_shared<Requester>(Backplane::attach(backplane), server, location, waitMode)) {}
-
-Connection::~Connection() {
-  // Threads of the parent may have waited in the requester: its parts cannot be destroyed here.
-  if (isInherited())
-    static_cast<void>(new (std::nothrow) std::shared_ptr<Requester>(std::move(requester_)));
-}
-
-bool Connection::isInherited() const noexcept { return forks_ != forkCount(); }
-
-void Connection::close() {
-  if (!requester_ || isInherited()) return;
-  requester_->close();
-  requester_.reset();
-}
-
-std::shared_ptr<Requester> Connection::requester() const {
-  if (!requester_) raiseClosed(kClient);
-  if (isInherited()) raiseInherited(kClient);
-  return requester_;
-}
-
-void Connection::connect(Requester& requester, Deadline deadline) {
-  if (requester.client().isConnected()) return;
-  bool wasInterrupted = false;
-  {
-    WithoutGil unlocked;
-    requester.connect(deadline, unlocked.interruption());
-    wasInterrupted = unlocked.wasInterrupted();
-  }
-  if (wasInterrupted) throw nb::python_error();
-}
-
-void Connection::send(PyMessage& message, Exchange& exchange, Deadline deadline,
-                      Deadline connectBefore, Retry retry) {
-  for (;;) {
-    const auto requester = this->requester();
-    connect(*requester, connectBefore);
-    auto& client = requester->client();
-    auto sent = message.toMessage(Allocator(client));
-    const auto result = requester->send(std::move(sent), exchange, deadline, retry);
-    if (result == SendResult::sent) return;
-    // NOLINTNEXTLINE(bugprone-use-after-move): a message that was not sent is unchanged
-    const auto bytes = sent.body().size();
-    message.restore(std::move(sent));
-    // The server may have stopped since.
-    if (result == SendResult::notConnected && !connectBefore.hasPassed()) continue;
-    if (result == SendResult::notConnected)
-      raiseNotSent(server, result, client.notConnectedBecause());
-    raiseNotSent(server, result,
-                 result == SendResult::tooLarge ? std::to_string(bytes) + " bytes, the limit is " +
-                                                      std::to_string(client.maxMessageBytes())
-                                                : std::string());
-  }
-}
-
 // ---- PyRequest
 
 PyRequest::PyRequest(std::shared_ptr<Connection> connection, Deadline deadline, nb::object type,
@@ -115,6 +50,15 @@ PyRequest::~PyRequest() { close(); }
 
 void PyRequest::send(PyMessage& message, Retry retry, bool waits) {
   connection_->send(message, exchange_, deadline_, waits ? deadline_ : Deadline::atNs(0), retry);
+}
+
+std::size_t PyRequest::sendMany(std::span<PyMessage* const> messages,
+                                std::span<const std::shared_ptr<PyRequest>> requests) {
+  if (requests.empty()) return 0;
+  std::vector<Exchange*> exchanges;
+  for (const auto& request : requests) exchanges.push_back(&request->exchange_);
+  const auto& first = *requests.front();
+  return first.connection_->sendMany(messages, exchanges, first.deadline_);
 }
 
 nb::object PyRequest::wait(bool check) {
@@ -203,6 +147,21 @@ class PyClient {
                                                expectedType(message, std::move(reply)), further);
     request->send(messageOf(message), retryOf(retry), waits);
     return request;
+  }
+  // `messages` is a list that nobody else changes.
+  std::vector<std::shared_ptr<PyRequest>> sendMany(const nb::list& messages,
+                                                   std::optional<double> timeout,
+                                                   const nb::object& reply, std::size_t further) {
+    const auto end = deadline(timeout);
+    std::vector<PyMessage*> objects;
+    std::vector<std::shared_ptr<PyRequest>> requests;
+    for (const nb::handle message : messages) {
+      objects.push_back(&messageOf(message));
+      requests.push_back(
+          std::make_shared<PyRequest>(connection_, end, expectedType(message, reply), further));
+    }
+    requests.resize(PyRequest::sendMany(objects, requests));
+    return requests;
   }
   bool waitConnected(std::optional<double> timeout) {
     bool isConnected = false;
@@ -321,6 +280,10 @@ void addClient(nb::module_& module) {
            nb::sig("def _send(self, message: Message, timeout: float | None = None, *, reply: "
                    "type[Message] | None = None, retry: bool = False, further: int = 0, waits: "
                    "bool = True) -> Request"))
+      .def("_send_many", &PyClient::sendMany, "messages"_a, "timeout"_a = nb::none(), nb::kw_only(),
+           "reply"_a = nb::none(), "further"_a = 0,
+           nb::sig("def _send_many(self, messages: list[Message], timeout: float | None = None, *, "
+                   "reply: type[Message] | None = None, further: int = 0) -> list[Request]"))
       .def("_wait_connected", &PyClient::waitConnected, "timeout"_a = nb::none())
       .def("loan", &PyClient::loan, "type"_a, "length"_a,
            nb::sig("def loan(self, type: type[_Array], length: int) -> _Array"),

@@ -6,41 +6,14 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
-#include "python/extension/gil.h"
+#include "python/extension/connection.h"
 #include "python/extension/messages.h"
 #include "python/extension/requester.h"
 
 namespace mpf::python {
-
-// The connection that a client and its requests share.
-struct Connection {
-  Connection(const std::string& backplane, std::string serverName, std::int32_t location,
-             WaitMode waitMode);
-  ~Connection();
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-
-  [[nodiscard]] bool isInherited() const noexcept;
-  [[nodiscard]] bool isClosed() const noexcept { return !requester_; }
-  // Calls in progress end as Requester::close() says; later ones throw.
-  void close();
-  // The requester, for one call. Throws nb::python_error when it is closed, and in a child process.
-  [[nodiscard]] std::shared_ptr<Requester> requester() const;
-  // Sends `message`; waits for the connection until `connectBefore`.
-  //   throws  nb::python_error: NotSent, and what a signal handler raised
-  void send(PyMessage& message, Exchange& exchange, Deadline deadline, Deadline connectBefore,
-            Retry retry);
-
-  const std::string server;
-
- private:
-  static void connect(Requester& requester, Deadline deadline);
-  const int forks_;  // of this process, when it was made
-  // Null: closed. The GIL guards it; the last call that uses the requester destroys it.
-  std::shared_ptr<Requester> requester_;
-};
 
 // What a caller accepts as the reply.
 struct Expected {
@@ -60,6 +33,10 @@ class PyRequest {
   PyRequest& operator=(const PyRequest&) = delete;
 
   void send(PyMessage& message, Retry retry, bool waits);
+  // Sends messages[i] as requests[i]. Returns how many were sent; the other requests are not used.
+  //   requests  of one connection, with one deadline
+  static std::size_t sendMany(std::span<PyMessage* const> messages,
+                              std::span<const std::shared_ptr<PyRequest>> requests);
   // Waits for the reply, the same object at each call.
   nb::object wait(bool check);
   // The same without waiting; None while the request has not ended.

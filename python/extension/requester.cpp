@@ -156,6 +156,18 @@ SendResult Requester::send(Message&& message, Exchange& exchange, Deadline takeB
   return result;
 }
 
+SentMany Requester::sendMany(std::span<Message> messages, std::span<Exchange* const> exchanges,
+                             Deadline takeBefore) {
+  std::vector<std::uint32_t> ids(messages.size());
+  const std::lock_guard lock(mutex_);  // as in send()
+  const auto sent = client_.sendMany(messages, takeBefore, ids);
+  for (std::size_t i = 0; i < sent.count; ++i) {
+    exchanges[i]->id = ids[i];
+    exchanges_.insert_or_assign(ids[i], exchanges[i]);
+  }
+  return sent;
+}
+
 bool Requester::hasEnded(const Exchange& exchange) {
   const std::lock_guard lock(mutex_);
   return exchange.hasEnded();

@@ -17,6 +17,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -56,6 +57,10 @@ class Requester {
   bool connect(Deadline deadline, const IsInterrupted& isInterrupted);
   // Sends `message` as the request of `exchange`, which must live until forget().
   SendResult send(Message&& message, Exchange& exchange, Deadline takeBefore, Retry retry);
+  // Sends messages[i] as the request of *exchanges[i], as MessageClient::sendMany(). The exchanges
+  // of those that were sent must live until forget().
+  SentMany sendMany(std::span<Message> messages, std::span<Exchange* const> exchanges,
+                    Deadline takeBefore);
   // Waits until `exchange` has ended. After the deadline it ends as `expired` or `outcomeUnknown`,
   // after an interruption as `cancelled`.
   void waitForEnd(Exchange& exchange, Deadline deadline, const IsInterrupted& isInterrupted);

@@ -25,6 +25,7 @@ with mpf.Client("dac") as client:
     loaned = client.loan(mpf.Float64Array, 5)
     loaned.value[:] = 0.5
     client.call(loaned, retry=True)
+    requests: list[mpf.Request] = client.send_many(mpf.Int32(i) for i in range(3))
 """
 WRONG = """
 import mpf

@@ -8,7 +8,7 @@ Ctrl-C ends it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
 
@@ -111,6 +111,25 @@ class Client(_mpf.BaseClient):
         The other arguments and the exceptions are those of call().
         """
         return self._send(message, timeout, reply=reply, retry=retry, further=further)
+
+    def send_many(
+        self,
+        messages: Iterable[Message],
+        timeout: float | None = None,
+        *,
+        reply: type[Message] | None = None,
+        further: int = 0,
+    ) -> list[Request]:
+        """Sends requests in order, until one cannot be sent, and returns those that were sent. A
+        server that sleeps is woken once at most for all of them.
+
+        The list is shorter than `messages` if for example the queue of the server is full: send the
+        rest again. If not even the first request was sent, this raises the reason, as send() does.
+        Messages that were not sent are unchanged, loaned arrays too.
+
+        The arguments are those of send(), for each request. None is sent again by itself.
+        """
+        return self._send_many(list(messages), timeout, reply=reply, further=further)
 
     @overload
     def subscribe(
