@@ -26,20 +26,22 @@ namespace nb = nanobind;
 
 inline constexpr const char* kWasSent = "the message was sent: its memory belongs to the receiver";
 
-// Where messages are allocated: for a client, or for a reply of a server.
+// Where messages are allocated: for a client, for a reply of a server, or for all of its clients.
 class Allocator {
  public:
   explicit Allocator(MessageClient& client) : client_(&client) {}
+  explicit Allocator(MessageServer& server) : server_(&server) {}
   Allocator(MessageServer& server, const Message& request) : server_(&server), request_(&request) {}
 
   template <ScalarBody T>
   [[nodiscard]] MessageOf<T> scalar() const {
-    return server_ != nullptr ? server_->allocReplyMessage<T>(*request_) : MessageOf<T>();
+    return request_ != nullptr ? server_->allocReplyMessage<T>(*request_) : MessageOf<T>();
   }
   template <ArrayBody T>
   [[nodiscard]] MessageOf<T> array(std::size_t length) const {
-    return server_ != nullptr ? server_->allocReplyMessage<T>(*request_, length)
-                              : client_->alloc<T>(length);
+    if (client_ != nullptr) return client_->alloc<T>(length);
+    return request_ != nullptr ? server_->allocReplyMessage<T>(*request_, length)
+                               : server_->allocShared<T>(length);
   }
 
  private:

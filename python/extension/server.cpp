@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "python/extension/errors.h"
 #include "python/extension/gil.h"
@@ -30,12 +31,13 @@ class PyServer {
  public:
   PyServer(const std::string& name, std::optional<std::int32_t> location,
            const std::string& backplane, int queueSize, std::uint64_t maxMessageBytes,
-           const std::string& wait)
+           int maxBorrowed, const std::string& wait)
       : name_(name), forks_(forkCount()) {
     ServerOptions options{.queueSize = queueSize,
                           .maxMessageBytes = maxMessageBytes,
                           .waitMode = waitModeOf(wait),
-                          .stampsReplies = true};
+                          .stampsReplies = true,
+                          .maxBorrowed = maxBorrowed};
     if (location) options.location = *location;
     server_ = std::make_shared<MessageServer>(Backplane::attach(backplane), name, options);
   }
@@ -63,6 +65,31 @@ class PyServer {
     message.restore(std::move(sent));
     raiseReply(name_, result);
   }
+  // Returns, for each request, whether its client is connected.
+  nb::list publish(PyMessage& message, const nb::list& requests) {
+    const auto server = opened();
+    std::vector<Message> addresses;
+    for (const nb::handle one : requests) {
+      const PyMessage* request = nullptr;
+      if (!nb::try_cast(one, request) || request == nullptr) throw nb::type_error(kNoRequest);
+      checkRequest(*request);
+      // publish() uses only the route and the marks of the client, and a reply has them, too.
+      addresses.push_back(server->allocReplyMessage<Int32>(request->handle));
+    }
+    auto shared = message.toMessage(Allocator(*server));
+    shared.setTimeStampNs(message.timeStampNs);
+    std::vector<ReplyResult> results(addresses.size());
+    server->publish(shared, addresses, results);
+    nb::list connected;
+    for (const auto result : results) {
+      if (result == ReplyResult::tooLarge) {
+        message.restore(std::move(shared));
+        raiseReply(name_, result);
+      }
+      connected.append(result != ReplyResult::clientGone);
+    }
+    return connected;
+  }
   void refuse(PyMessage& request) {
     const auto server = opened();
     checkRequest(request);
@@ -78,6 +105,10 @@ class PyServer {
     const auto server = opened();
     checkRequest(request);
     return python::loan(Allocator(*server, request.handle), type, length);
+  }
+  nb::object loanShared(nb::handle type, std::size_t length) {
+    const auto server = opened();
+    return python::loan(Allocator(*server), type, length);
   }
   bool isClientConnected(const PyMessage& request) {
     const auto server = opened();
@@ -105,9 +136,9 @@ class PyServer {
   }
 
  private:
+  static constexpr const char* kNoRequest = "not a request that this server received";
   static void checkRequest(const PyMessage& request) {
-    if (request.handle.route().link == 0)
-      throw nb::value_error("the first argument is not a request that this server received");
+    if (request.handle.route().link == 0) throw nb::value_error(kNoRequest);
   }
   // `reply` may have been loaned for another request.
   static void address(Message& reply, const Message& request) {
@@ -157,10 +188,10 @@ void addServer(nb::module_& module) {
   nb::class_<PyServer>(module, "BaseServer", nb::is_weak_referenceable(),
                        "What mpf.Server is made of.")
       .def(nb::init<const std::string&, std::optional<std::int32_t>, const std::string&, int,
-                    std::uint64_t, const std::string&>(),
+                    std::uint64_t, int, const std::string&>(),
            "name"_a, "location"_a = nb::none(), nb::kw_only(), "backplane"_a = "",
            "queue_size"_a = 100, "max_message_bytes"_a = std::uint64_t{64} << 20,
-           "wait"_a = "adaptive")
+           "max_borrowed"_a = 4, "wait"_a = "adaptive")
       .def("_receive", &PyServer::receive, "timeout"_a,
            nb::sig("def _receive(self, timeout: float) -> Message | None"))
       .def("reply", &PyServer::reply, "request"_a, "message"_a,
@@ -173,6 +204,11 @@ void addServer(nb::module_& module) {
       .def("loan", &PyServer::loan, "request"_a, "type"_a, "length"_a,
            nb::sig("def loan(self, request: Message, type: type[_Array], length: int) -> _Array"),
            "As Client.loan(), for a reply to `request`.")
+      .def("_publish", &PyServer::publish, "message"_a, "requests"_a,
+           nb::sig("def _publish(self, message: Message, requests: list[Message]) -> list[bool]"))
+      .def("loan_shared", &PyServer::loanShared, "type"_a, "length"_a,
+           nb::sig("def loan_shared(self, type: type[_Array], length: int) -> _Array"),
+           "As loan(), for publish(): in memory that all clients read.")
       .def("is_client_connected", &PyServer::isClientConnected, "request"_a,
            "Whether the client of `request` is connected and alive.")
       .def("interrupt", &PyServer::interrupt,

@@ -26,6 +26,11 @@ with mpf.Client("dac") as client:
     loaned.value[:] = 0.5
     client.call(loaned, retry=True)
     requests: list[mpf.Request] = client.send_many(mpf.Int32(i) for i in range(3))
+
+server = mpf.Server("camera")
+subscribers: list[mpf.Int32] = []
+image = server.loan_shared(mpf.Float64Array, 5)
+gone: list[mpf.Int32] = server.publish(image, subscribers)
 """
 WRONG = """
 import mpf

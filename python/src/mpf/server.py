@@ -30,7 +30,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import AsyncGenerator, Callable, Generator
+from collections.abc import AsyncGenerator, Callable, Generator, Iterable
 from types import AsyncGeneratorType, GeneratorType, TracebackType
 from typing import Any, TypeVar, cast
 
@@ -55,6 +55,7 @@ class Server(_mpf.BaseServer):
     backplane: the name of the backplane; by default MPF_BACKPLANE, or "default".
     queue_size: requests of one client that may wait, 1 to 16384.
     max_message_bytes: the largest request and reply [bytes].
+    max_borrowed: published messages that one client may hold, 1 to 64; see publish().
     wait: "adaptive", "spin" or "block", as for a client.
 
     Raises NameInUse if another process serves this name, OSError if there is no memory in /dev/shm,
@@ -69,6 +70,7 @@ class Server(_mpf.BaseServer):
         backplane: str = "",
         queue_size: int = 100,
         max_message_bytes: int = 64 << 20,
+        max_borrowed: int = 4,
         wait: str = "adaptive",
     ) -> None:
         super().__init__(
@@ -77,6 +79,7 @@ class Server(_mpf.BaseServer):
             backplane=backplane,
             queue_size=queue_size,
             max_message_bytes=max_message_bytes,
+            max_borrowed=max_borrowed,
             wait=wait,
         )
         self._handlers: dict[type[Message], Callable[[Any], object]] = {}
@@ -144,6 +147,22 @@ class Server(_mpf.BaseServer):
             self._thread.join()
             self._thread = None
         self._close()
+
+    def publish(self, message: Message, requests: Iterable[M]) -> list[M]:
+        """Sends `message` to the clients of all these requests, which read the same memory: for any
+        number of clients, the elements are copied once. An array that loan_shared() returned is not
+        copied at all, unless an array of numpy still refers to it; it is empty then.
+
+        The first reply to a request ends it; any number may follow. Any thread; never waits.
+
+        A client that holds `max_borrowed` published messages misses further ones until it frees
+        one; Request.missed and Subscription.missed count them. No other client is affected.
+
+        Returns the requests whose clients have gone. Raises TooLarge.
+        """
+        all_ = list(requests)
+        connected = self._publish(message, cast("list[Message]", all_))
+        return [request for request, has_client in zip(all_, connected) if not has_client]
 
     async def serve(self) -> None:
         """Handles requests in the running event loop until interrupt() or close()."""
