@@ -22,7 +22,8 @@ bool RunnerLock::tryAcquireTemporarily() noexcept {
 }
 
 void RunnerLock::noteRunner() {
-  if (bias_.isOfAnotherThread()) endOtherBias();
+  // A bias that an earlier attempt has disabled ends only when its owner leaves.
+  if (bias_.isOfAnotherThread() || bias_.isInside()) endOtherBias();
   bias_.noteEntry();
   if (lastRunner_.load(std::memory_order_relaxed) != threadNumber()) noteLastRunner();
 }

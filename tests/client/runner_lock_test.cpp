@@ -93,8 +93,10 @@ TEST(RunnerLock, RefusesASecondRunnerBesideALoneOne) {
 
   inAnotherThread([&] {
     EXPECT_FALSE(lock.isMine());
-    EXPECT_THROW(lock.acquire(wakeNobody), std::logic_error);
-    EXPECT_FALSE(lock.tryAcquireTemporarily());
+    for (int tries = 0; tries < 3; ++tries) {
+      EXPECT_THROW(lock.acquire(wakeNobody), std::logic_error);
+      EXPECT_FALSE(lock.tryAcquireTemporarily());
+    }
   });
 
   EXPECT_TRUE(lock.isMine());
