@@ -1,16 +1,33 @@
 // SPDX-License-Identifier: MIT
+// This file replaces sched_yield(), which a thread calls that waits for a lock, with a function
+// that counts.
 #include "base/biased_lock.h"
 
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
 #include <gtest/gtest.h>
 #include <mutex>
-#include <semaphore>
 #include <thread>
 #include <vector>
+
+namespace {
+
+thread_local std::atomic<int>* yieldsOfThisThread = nullptr;
+
+}  // namespace
+
+extern "C" int sched_yield() noexcept {
+  if (yieldsOfThisThread != nullptr) ++*yieldsOfThisThread;
+  return static_cast<int>(::syscall(SYS_sched_yield));
+}
 
 namespace mpf {
 namespace {
 
 constexpr int kManyEntries = 100'000;
+constexpr int kSomeYields = 10;
 
 // Threads take turns at being the only user, and then all use the lock at once.
 TEST(BiasedLockTest, AdmitsOneThreadAtATime) {
@@ -40,20 +57,25 @@ TEST(BiasedLockTest, AnotherThreadWaitsForTheOwner) {
     const std::lock_guard guard(lock);
   }
   bool isHeld = true;
-  std::binary_semaphore hasStarted{0};
+  std::atomic<int> yields{0};  // of the other thread
+  std::atomic<bool> hasEntered{false};
   std::thread other;
   {
     const std::lock_guard guard(lock);
     other = std::thread([&] {
-      hasStarted.release();
+      yieldsOfThisThread = &yields;
       const std::lock_guard mine(lock);
+      hasEntered = true;
       EXPECT_FALSE(isHeld);
     });
-    hasStarted.acquire();
-    for (int i = 0; i < 1000; ++i) std::this_thread::yield();
+
+    while (yields < kSomeYields && !hasEntered) std::this_thread::yield();
+
+    EXPECT_FALSE(hasEntered);
     isHeld = false;
   }
   other.join();
+  EXPECT_TRUE(hasEntered);
 }
 
 }  // namespace
