@@ -76,7 +76,8 @@ class Bias {
   static constexpr std::uint32_t kEntries = 256;
 
   [[nodiscard]] bool isOwner() const noexcept {
-    return owner_.load(std::memory_order_relaxed) == threadNumber();
+    const auto me = threadNumberOrZero();
+    return me != 0 && owner_.load(std::memory_order_relaxed) == me;
   }
   // isInside_ has one writer, so no second thread becomes the owner.
   [[nodiscard]] bool mayEnable() const noexcept {

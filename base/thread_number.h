@@ -10,12 +10,18 @@
 
 namespace mpf {
 
+namespace detail {
+inline constinit thread_local std::uint64_t ownThreadNumber = 0;
+}
+
 // An even number that no other thread of this process has or had; never 0.
 inline std::uint64_t threadNumber() noexcept {
   static constinit std::atomic<std::uint64_t> last{0};
-  static constinit thread_local std::uint64_t number = 0;
+  auto& number = detail::ownThreadNumber;
   if (number == 0) number = last.fetch_add(2, std::memory_order_relaxed) + 2;
   return number;
 }
+// As threadNumber(), but 0 if this thread has not asked for its number yet.
+inline std::uint64_t threadNumberOrZero() noexcept { return detail::ownThreadNumber; }
 
 }  // namespace mpf

@@ -19,5 +19,19 @@ TEST(ThreadNumberTest, EachThreadHasANumberOfItsOwnAlsoAfterOthersHaveEnded) {
   for (const auto number : numbers) EXPECT_TRUE(number != 0 && number % 2 == 0) << number;
 }
 
+TEST(ThreadNumberTest, IsZeroUntilTheThreadHasAskedForIt) {
+  std::uint64_t before = 1;
+  std::uint64_t number = 0;
+  std::uint64_t after = 0;
+  std::thread([&] {
+    before = threadNumberOrZero();
+    number = threadNumber();
+    after = threadNumberOrZero();
+  }).join();
+
+  EXPECT_EQ(before, 0u);
+  EXPECT_EQ(after, number);
+}
+
 }  // namespace
 }  // namespace mpf
