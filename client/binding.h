@@ -116,10 +116,17 @@ class Binding : public std::enable_shared_from_this<Binding> {
   Taken takeOne();
   bool onLinkState();
   void onAccepted(Link& link);
-  bool tryDeliverReply(const Envelope& envelope);
+  struct Times {
+    std::uint32_t sentTick;
+    std::int64_t timeNs;
+  };
+  Taken takeLong(BodyFields fields, RequestMarks marks, Times times, Request* request);
+  void dropReply(BodyFields fields, Request* request);
+  bool tryDeliver(Message&& message, std::uint32_t sentTick, Request* request);
+  void endRequest(Request& request);
   enum class Control { deliver, keep, invalid };
   Control prepareControl(Message& message, Request* request);
-  void noteTimes(Envelope envelope, const Request* request) noexcept;
+  void noteTimes(std::uint32_t sentTick, const Request* request) noexcept;
   void deliver(Message&& message);
   void deliverConnect(ConnectStatus status);
   void deliverFate(Request& request, Fate fate);

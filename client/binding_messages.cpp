@@ -38,52 +38,74 @@ bool Binding::takeSome(int most) {
   return taken != 0 || (isLinked() && !isPaused_ && onLinkState());
 }
 
-// Returns false on a protocol error; then it has delivered nothing.
-[[gnu::always_inline]] inline bool Binding::tryDeliverReply(const Envelope& envelope) {
+Binding::Taken Binding::takeOne() {
+  auto& channel = this->channel();
+  Envelope envelope;
+  const auto take = channel.tryBegin(envelope);
+  if (take == MessageLink::Take::nothing) return Taken::nothing;
+  if (take == MessageLink::Take::invalid) return Taken::invalid;
   count(control().received);
-  auto& requests = *sender_.requests();
   Request* request = nullptr;
   if ((envelope.flags & layout::kSlotFirstReply) != 0) {
-    request = requests.find(envelope.requestId);
+    request = sender_.requests()->find(envelope.requestId);
     if (request == nullptr || request->isGivenUp) {
-      channel().discard(envelope);
-      if (request != nullptr) requests.end(*request);
-      return true;
+      dropReply(envelope.body(), request);
+      return Taken::message;
     }
   }
-  Message message;
-  if (const auto finish = channel().tryFinish(envelope, message);
-      finish != MessageLink::Finish::message) {
-    if (finish == MessageLink::Finish::invalid) return false;
-    if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
-    return true;
+  if (!MessageLink::isShort(envelope.body())) {
+    return takeLong(envelope.body(), envelope.marks(), {envelope.sentTick, envelope.timeNs},
+                    request);
   }
+  const Route route{0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr};
+  auto message = channel.finishShort(envelope, route, envelope.timeNs);
+  return tryDeliver(std::move(message), envelope.sentTick, request) ? Taken::message
+                                                                    : Taken::invalid;
+}
+
+Binding::Taken Binding::takeLong(BodyFields fields, RequestMarks marks, Times times,
+                                 Request* request) {
+  Message message;
+  switch (channel().tryFinishLong(fields, marks, message)) {
+    case MessageLink::Finish::invalid:
+      return Taken::invalid;
+    case MessageLink::Finish::unavailable:
+      if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
+      return Taken::message;
+    case MessageLink::Finish::message:
+      break;
+  }
+  const auto missed = Message::missedFlags(message.getMissed());
+  message.setRoute({0, marks.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
+  message.setTimeStampNs(times.timeNs);
+  return tryDeliver(std::move(message), times.sentTick, request) ? Taken::message : Taken::invalid;
+}
+
+// A reply to a request that has had its fate.
+void Binding::dropReply(BodyFields fields, Request* request) {
+  channel().discard(fields);
+  if (request != nullptr) sender_.requests()->end(*request);
+}
+
+// Delivers a message, which ends `request` unless it is null. Returns false on a protocol error;
+// then it has delivered nothing.
+[[gnu::always_inline]] inline bool Binding::tryDeliver(Message&& message, std::uint32_t sentTick,
+                                                       Request* request) {
   if (isControl(message.getType())) {
     const auto control = prepareControl(message, request);
     if (control != Control::deliver) return control == Control::keep;
   }
-  if (envelope.sentTick != 0 || (request != nullptr && request->sentNs != 0))
-    noteTimes(envelope, request);
-  const auto missed = Message::missedFlags(message.getMissed());
-  message.setRoute(
-      {0, envelope.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
-  message.setTimeStampNs(envelope.timeNs);
-  if (request != nullptr) {
-    requests.end(*request);
-    MPF_STEP(request_ended);
-    channel().link().control().clientUnanswered.store(requests.awaited(),
-                                                      std::memory_order_relaxed);
-  }
+  if (sentTick != 0 || (request != nullptr && request->sentNs != 0)) noteTimes(sentTick, request);
+  if (request != nullptr) endRequest(*request);
   deliver(std::move(message));
   return true;
 }
 
-Binding::Taken Binding::takeOne() {
-  Envelope envelope;
-  const auto take = channel().tryBegin(envelope);
-  if (take == MessageLink::Take::nothing) return Taken::nothing;
-  return take == MessageLink::Take::message && tryDeliverReply(envelope) ? Taken::message
-                                                                         : Taken::invalid;
+inline void Binding::endRequest(Request& request) {
+  auto& requests = *sender_.requests();
+  requests.end(request);
+  MPF_STEP(request_ended);
+  channel().link().control().clientUnanswered.store(requests.awaited(), std::memory_order_relaxed);
 }
 
 // A ConnectMessage or a fate that the server has sent. `keep`: the request was kept, to be sent
@@ -104,13 +126,13 @@ Binding::Control Binding::prepareControl(Message& message, Request* request) {
   return Control::deliver;
 }
 
-void Binding::noteTimes(Envelope envelope, const Request* request) noexcept {
+void Binding::noteTimes(std::uint32_t sentTick, const Request* request) noexcept {
   auto& endpoint = parts_.endpoint;
   const auto nowNs = Clock::nowNs();
   if (request != nullptr && request->sentNs != 0)
     record(endpoint.control().serviceNs, nowNs - request->sentNs);
-  if (envelope.sentTick == 0) return;
-  const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
+  if (sentTick == 0) return;
+  const auto waitedNs = Tick::nsSince(sentTick, nowNs);
   record(endpoint.control().queueWaitNs, waitedNs);
   if (endpoint.slept()) endpoint.noteWake(waitedNs);
 }

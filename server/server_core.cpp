@@ -12,7 +12,7 @@
 namespace mpf {
 namespace {
 
-// More than the number of links, so that receive() looks at each link.
+// Of one receive(): more than the number of links, so that it looks at each link.
 constexpr std::uint32_t kMaxLooks = 2 * layout::kMaxLinks;
 
 int checkedQueueSize(int size) {
@@ -95,44 +95,21 @@ void ServerCore::handleControlEvents() {
   if (endpoint_.takeLocalEvent() && endpoint_.takePeerDeath()) connections_.closeDead();
 }
 
-Message ServerCore::receive() {
-  endpoint_.forkGuard().check("MessageServer");
-  Message message;
-  // Limited, because faulty clients may set hints without end, and receive() must return.
-  for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
-    if (endpoint_.hasControlEvents()) handleControlEvents();
-    if (connections_.hasThrown()) throwNext();
-    const auto index = endpoint_.next();
-    if (index && take(*connections_.all()[*index], message)) return message;
-    if (!index && (!hasDescriptor_ || endpoint_.arm())) {
-      endHandling();
-      return message;
-    }
+inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestId, Times times,
+                                  const Message& message) noexcept {
+  if (times.sentTick != 0) {
+    noteTimes(connection, requestId, times.sentTick);
+  } else if (progress_.isSlow()) {
+    progress_.note(Clock::nowNs());
   }
-  endHandling();
-  keepReadable();
-  return message;
+  progress_.begin(message);
+  takeBefore_ = times.deadlineNs == 0 ? Deadline::never() : Deadline::atNs(times.deadlineNs);
 }
 
-void ServerCore::keepReadable() noexcept {
-  if (hasDescriptor_) endpoint_.keepReadable();
-}
-
-void ServerCore::throwNext() {
-  // More exceptions or requests may wait: the next wait() returns immediately.
-  endpoint_.interrupt();
-  connections_.throwNext();
-}
-
-void ServerCore::closeForProtocolError(Connection& connection) noexcept {
-  count(endpoint_.control().protocolErrors);
-  connections_.close(connection);
-}
-
-bool ServerCore::take(Connection& connection, Message& message) noexcept {
+[[gnu::always_inline]] inline bool ServerCore::tryBegin(Connection& connection,
+                                                        Envelope& envelope) noexcept {
   if (!connection.channel) return false;
   auto& control = endpoint_.control();
-  Envelope envelope;
   switch (connection.channel->tryBegin(envelope)) {
     case MessageLink::Take::nothing:
       connections_.closeIfClientDid(connection);
@@ -150,49 +127,98 @@ bool ServerCore::take(Connection& connection, Message& message) noexcept {
     return false;
   }
   MPF_STEP(request_taken);
-  if (envelope.timeNs != 0 && hasExpired(envelope)) {
-    count(control.expired);
-    connection.channel->discard(envelope);
-    replies_.sendFate(connection, envelope, Fate::expired);
-    return false;
-  }
-  switch (connection.channel->tryFinish(envelope, message)) {
-    case MessageLink::Finish::invalid:
-      closeForProtocolError(connection);
-      return false;
-    case MessageLink::Finish::unavailable:
-      count(control.refused);
-      replies_.sendFate(connection, envelope, Fate::refused);
-      return false;
-    case MessageLink::Finish::message:
-      break;
-  }
-  if (envelope.sentTick != 0) {
-    noteTimes(connection, envelope);
-  } else if (progress_.isSlow()) {
-    progress_.note(Clock::nowNs());
-  }
-  progress_.begin(message);
-  message.setRoute(connection.routeOf(envelope.requestId, &keeper_));
-  takeBefore_ = envelope.timeNs == 0 ? Deadline::never() : Deadline::atNs(envelope.timeNs);
-  return true;
+  if (envelope.timeNs == 0 || !hasPassed(envelope.timeNs)) return true;
+  count(control.expired);
+  connection.channel->discard(envelope.body());
+  replies_.sendFate(connection, envelope.marks(), Fate::expired);
+  return false;
 }
 
-bool ServerCore::hasExpired(Envelope envelope) noexcept {
+[[gnu::always_inline]] inline Message ServerCore::finishShort(Connection& connection,
+                                                              const Envelope& envelope) noexcept {
+  auto message = connection.channel->finishShort(
+      envelope, connection.routeOf(envelope.requestId, &keeper_), 0);
+  noteTaken(connection, envelope.requestId, {envelope.sentTick, envelope.timeNs}, message);
+  return message;
+}
+
+// Returns an empty handle if the body cannot be read.
+Message ServerCore::finishLong(Connection& connection, BodyFields fields, RequestMarks marks,
+                               Times times) noexcept {
+  Message message;
+  switch (connection.channel->tryFinishLong(fields, marks, message)) {
+    case MessageLink::Finish::invalid:
+      closeForProtocolError(connection);
+      break;
+    case MessageLink::Finish::unavailable:
+      count(endpoint_.control().refused);
+      replies_.sendFate(connection, marks, Fate::refused);
+      break;
+    case MessageLink::Finish::message:
+      message.setRoute(connection.routeOf(marks.requestId, &keeper_));
+      noteTaken(connection, marks.requestId, times, message);
+      break;
+  }
+  return message;
+}
+
+Message ServerCore::receive() {
+  endpoint_.forkGuard().check("MessageServer");
+  // Limited, because faulty clients may set hints without end, and receive() must return.
+  for (std::uint32_t looks = 0; looks < kMaxLooks; ++looks) {
+    if (endpoint_.hasControlEvents()) handleControlEvents();
+    if (connections_.hasThrown()) throwNext();
+    const auto index = endpoint_.next();
+    if (!index) {
+      if (hasDescriptor_ && !endpoint_.arm()) continue;
+      endHandling();
+      return {};
+    }
+    auto& connection = *connections_.all()[*index];
+    Envelope envelope;
+    if (!tryBegin(connection, envelope)) continue;
+    // Each of these makes the message in the memory of the caller.
+    if (MessageLink::isShort(envelope.body())) return finishShort(connection, envelope);
+    if (auto message = finishLong(connection, envelope.body(), envelope.marks(),
+                                  {envelope.sentTick, envelope.timeNs}))
+      return message;
+  }
+  endHandling();
+  keepReadable();
+  return {};
+}
+
+void ServerCore::keepReadable() noexcept {
+  if (hasDescriptor_) endpoint_.keepReadable();
+}
+
+void ServerCore::throwNext() {
+  // More exceptions or requests may wait: the next wait() returns immediately.
+  endpoint_.interrupt();
+  connections_.throwNext();
+}
+
+void ServerCore::closeForProtocolError(Connection& connection) noexcept {
+  count(endpoint_.control().protocolErrors);
+  connections_.close(connection);
+}
+
+bool ServerCore::hasPassed(std::int64_t deadlineNs) noexcept {
   // PAIR(taken-before-clock): the client sees that the server counted the request as taken, or the
   // server sees that the deadline has passed.
   doorbell::fence();
-  return Clock::nowNs() >= envelope.timeNs;
+  return Clock::nowNs() >= deadlineNs;
 }
 
-void ServerCore::noteTimes(Connection& connection, Envelope envelope) noexcept {
+void ServerCore::noteTimes(Connection& connection, std::uint32_t requestId,
+                           std::uint32_t sentTick) noexcept {
   const auto nowNs = Clock::nowNs();
-  const auto waitedNs = Tick::nsSince(envelope.sentTick, nowNs);
+  const auto waitedNs = Tick::nsSince(sentTick, nowNs);
   record(endpoint_.control().queueWaitNs, waitedNs);
   if (endpoint_.slept()) endpoint_.noteWake(waitedNs);
   progress_.note(nowNs);
   const std::lock_guard lock(*connection.lock);
-  connection.timedId = envelope.requestId;
+  connection.timedId = requestId;
   connection.timedFromNs = nowNs;
 }
 

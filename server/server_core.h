@@ -68,10 +68,19 @@ class ServerCore {
  private:
   void handleControlEvents();
   void throwNext();
-  bool take(Connection& connection, Message& message) noexcept;
+  bool tryBegin(Connection& connection, Envelope& envelope) noexcept;
+  Message finishShort(Connection& connection, const Envelope& envelope) noexcept;
+  struct Times {
+    std::uint32_t sentTick;
+    std::int64_t deadlineNs;
+  };
+  Message finishLong(Connection& connection, BodyFields fields, RequestMarks marks,
+                     Times times) noexcept;
+  void noteTaken(Connection& connection, std::uint32_t requestId, Times times,
+                 const Message& message) noexcept;
   void closeForProtocolError(Connection& connection) noexcept;
-  bool hasExpired(Envelope envelope) noexcept;
-  void noteTimes(Connection& connection, Envelope envelope) noexcept;
+  static bool hasPassed(std::int64_t deadlineNs) noexcept;
+  void noteTimes(Connection& connection, std::uint32_t requestId, std::uint32_t sentTick) noexcept;
 
   std::string name_;
   std::int32_t location_;

@@ -265,8 +265,7 @@ LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
 }
 
 LinkSend Link::trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
-                             std::size_t bytes, const Limits& limits,
-                             std::uint32_t maxBorrowed) noexcept {
+                             std::size_t bytes, Limits limits, std::uint32_t maxBorrowed) noexcept {
   if (bytes > maxMessageBytes()) return LinkSend::tooLarge;
   auto& loans = pool_.loans();
   const auto id = envelope.requestId;
@@ -316,13 +315,13 @@ void Link::release(const std::byte* data) noexcept {
   }
 }
 
-std::optional<Chunk> Link::tryChunk(Envelope envelope) {
+std::optional<Chunk> Link::tryChunk(std::uint32_t bodyBytes) {
   layout::ChunkRef ref{};
   if (in_.inlineCapacity() == 0) return std::nullopt;
   in_.copyBody(std::as_writable_bytes(std::span(&ref, 1)));
   auto chunk =
       ref.side == static_cast<std::uint32_t>(side_) ? pool_.tryReceiveBack(ref) : tryBorrow(ref);
-  if (!chunk || envelope.bodyBytes > chunk->capacity) return std::nullopt;
+  if (!chunk || bodyBytes > chunk->capacity) return std::nullopt;
   return chunk;
 }
 

@@ -121,9 +121,10 @@ class Link {
   };
   // Sends a body; sets its length and flags in the envelope. A short body is copied into slots of
   // the ring. If a longer body is in a chunk already (our own or a borrowed one), the peer gets
-  // this chunk; otherwise the body is copied into a new chunk.
-  LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
-                   const Limits& limits) noexcept {
+  // this chunk; otherwise the body is copied into a new chunk. Inline, so that the envelope stays
+  // in registers.
+  [[gnu::always_inline]] LinkSend trySend(const Envelope& envelope, std::span<const std::byte> body,
+                                          Limits limits) noexcept {
     if (body.size() > maxMessageBytes_) return LinkSend::tooLarge;
     if (limits.waiting != 0 && out_.waitingAtMost() >= limits.waiting &&
         out_.waiting() >= limits.waiting)
@@ -138,23 +139,25 @@ class Link {
   // for all of them.
   class Batch {
    public:
-    explicit Batch(Link& link) noexcept : link_(link) { link_.isInBatch_ = true; }
+    explicit Batch(Link& link) noexcept : link_(link), sentBefore_(link.out_.messages()) {
+      link_.isInBatch_ = true;
+    }
     ~Batch() {
       link_.isInBatch_ = false;
-      link_.afterPush();
+      if (link_.out_.messages() != sentBefore_) link_.afterPush();
     }
     Batch(const Batch&) = delete;
     Batch& operator=(const Batch&) = delete;
 
    private:
     Link& link_;
+    const std::uint64_t sentBefore_;
   };
   // At the server: sends a body of `bytes` bytes that lies in a chunk of the fan-out pool. Returns
   // `full` if the client holds `maxBorrowed` chunks of this pool, and `noMemory` if `chunk` is
   // null; then the message counts as missed by its request.
   LinkSend trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
-                         std::size_t bytes, const Limits& limits,
-                         std::uint32_t maxBorrowed) noexcept;
+                         std::size_t bytes, Limits limits, std::uint32_t maxBorrowed) noexcept;
   // At the server: takes what the client has returned of both pools.
   void collectReturned() noexcept { pool_.collectReturned(); }
   // At the server: the client reads no chunk any more if it was killed; otherwise it may.
@@ -186,7 +189,7 @@ class Link {
   // The chunk of the kSlotChunk message begun: borrowed from the peer, or one of ours that the peer
   // returns in a message. nullopt if the reference is invalid.
   //   throws  ChunkUnavailable: the chunk cannot be mapped; it has been returned to the peer
-  std::optional<Chunk> tryChunk(Envelope envelope);
+  std::optional<Chunk> tryChunk(std::uint32_t bodyBytes);
 
   // Announces that we poll this link: the peer need not set our ready bit.
   void watch() noexcept;

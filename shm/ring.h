@@ -20,6 +20,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstring>
 #include <span>
 #include <utility>
@@ -28,32 +29,10 @@
 
 #include "base/step.h"
 #include "shm/cpu_relax.h"
+#include "shm/envelope.h"
 #include "shm/layout.h"
 
 namespace mpf {
-
-// CLOCK_MONOTONIC in units of 16 ns, low 32 bits, never 0: fits into a slot and spans a minute.
-struct Tick {
-  [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept {
-    return static_cast<std::uint32_t>(ns >> 4) | 1u;
-  }
-  [[nodiscard]] static std::int64_t nsSince(std::uint32_t tick, std::int64_t nowNs) noexcept {
-    return static_cast<std::int64_t>(of(nowNs) - tick) * 16;
-  }
-};
-
-// The fields that are sent with a body. The ring does not interpret `type`, `clientType` or
-// `clientExtra`.
-struct Envelope {
-  std::uint16_t type{};
-  std::uint8_t flags{};  // layout::kSlot...
-  std::uint32_t bodyBytes{};
-  std::uint32_t requestId{};
-  std::int32_t clientType{};
-  std::int32_t clientExtra{};
-  std::uint32_t sentTick{};
-  std::int64_t timeNs{};  // requests: the deadline; replies: the time stamp; 0: none
-};
 
 [[nodiscard]] constexpr std::uint32_t slotsFor(std::size_t inlineBytes) noexcept {
   if (inlineBytes <= layout::kFirstSlotBodyBytes) return 1;
@@ -101,8 +80,10 @@ class RingProducer {
     return true;
   }
   // As tryPush(), for a body of at most layout::kFirstSlotBodyBytes; ignores envelope.bodyBytes.
-  [[nodiscard]] bool tryPushShort(const Envelope& envelope, std::span<const std::byte> body,
-                                  std::uint32_t reserve) noexcept {
+  // Inline, so that the envelope stays in registers.
+  [[nodiscard, gnu::always_inline]] bool tryPushShort(const Envelope& envelope,
+                                                      std::span<const std::byte> body,
+                                                      std::uint32_t reserve) noexcept {
     if (!hasFree(1 + reserve)) return false;
     if (pushed_ >= claimed_) claimLines();
     auto& first = slot(pushed_);
@@ -129,20 +110,23 @@ class RingProducer {
   }
 
   [[nodiscard]] bool hasFree(std::uint32_t count) noexcept {
-    if (pushed_ + count - freedSeen_ <= usable_) return true;
-    // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
-    freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
-    if (pushed_ + count - freedSeen_ <= usable_) return true;
-    return second_.slots != nullptr && tryMove() && count <= usable_;
+    return pushed_ + count - freedSeen_ <= usable_ || hasFreed(count);
   }
 
  private:
-  static constexpr std::uint64_t kClaimedLines = 8;
+  static constexpr std::uint64_t kClaimedLines = 16;
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
   }
 
+  // Whether the consumer has freed enough since we looked last, or there is room elsewhere.
+  [[gnu::noinline]] bool hasFreed(std::uint32_t count) noexcept {
+    // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
+    freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
+    if (pushed_ + count - freedSeen_ <= usable_) return true;
+    return second_.slots != nullptr && tryMove() && count <= usable_;
+  }
   // Continues in the second ring, which is empty, if it has memory.
   bool tryMove() noexcept {
     // PAIR(second-ring): the consumer has reserved the memory.
@@ -169,16 +153,19 @@ class RingProducer {
     }
   }
 
+  // In words of 64 bits, because the number of stores limits the rate of messages.
   static void write(layout::Slot& first, const Envelope& envelope, std::uint32_t slots,
                     std::uint32_t bodyBytes) noexcept {
-    first.type = envelope.type;
-    first.slots = static_cast<std::uint8_t>(slots);
-    first.flags = envelope.flags;
-    first.bodyBytes = bodyBytes;
-    first.requestId = envelope.requestId;
-    first.clientType = envelope.clientType;
-    first.clientExtra = envelope.clientExtra;
-    first.sentTick = envelope.sentTick;
+    using detail::joined;
+    const auto put = [&](std::size_t offset, std::uint64_t word) {
+      std::memcpy(reinterpret_cast<std::byte*>(&first) + offset, &word, sizeof word);
+    };
+    put(offsetof(layout::Slot, type),
+        joined(joined(envelope.type, static_cast<std::uint8_t>(slots), envelope.flags), bodyBytes));
+    put(offsetof(layout::Slot, requestId),
+        joined(envelope.requestId, static_cast<std::uint32_t>(envelope.clientType)));
+    put(offsetof(layout::Slot, clientExtra),
+        joined(static_cast<std::uint32_t>(envelope.clientExtra), envelope.sentTick));
     first.deadlineNs = envelope.timeNs;
   }
   void publish(layout::Slot& first, std::uint32_t slots) noexcept {
@@ -247,9 +234,8 @@ class RingConsumer {
     return layout::kFirstSlotBodyBytes + (slotsNow_ - 1u) * sizeof(layout::MoreSlot::body);
   }
 
-  void copyFirst(std::span<std::byte, layout::kFirstSlotBodyBytes> body) const noexcept {
-    detail::copyWords<layout::kFirstSlotBodyBytes>(body.data(), first_->body.data());
-  }
+  // The body bytes in the first slot of the message begun.
+  [[nodiscard]] FirstBody firstBody() const noexcept { return FirstBody::of(first_->body.data()); }
   // Copies the body of the message begun. `body` must not be longer than inlineCapacity().
   void copyBody(std::span<std::byte> body) const noexcept {
     const auto& first = *first_;
@@ -266,11 +252,10 @@ class RingConsumer {
 
   // Ends the message begun. Slots are freed in batches.
   void end() noexcept {
-    taken_ += slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u;
-    first_ = &slot(taken_);
-    if (taken_ - freed_ >= capacity_ / kFreeFraction) free();
-    if (taken_ >= lookAt_) lookAhead();
+    end(slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u);
   }
+  // The same if isShort().
+  void endShort() noexcept { end(1); }
   // The owner has looked for a message and found none: frees the slots that remain.
   void onEmpty() noexcept {
     if (taken_ != freed_) free();
@@ -297,6 +282,13 @@ class RingConsumer {
     first_ = &slot(taken_);
     MPF_STEP(ring_followed);
     return true;
+  }
+
+  void end(std::uint32_t slots) noexcept {
+    taken_ += slots;
+    first_ = &slot(taken_);
+    if (taken_ - freed_ >= capacity_ / kFreeFraction) free();
+    if (taken_ >= lookAt_) lookAhead();
   }
 
   static constexpr std::uint64_t kLookEvery = 16;  // slots

@@ -47,38 +47,10 @@
 #include <mpf/detail/copy_words.h>
 #include <mpf/message_body.h>
 #include <mpf/message_layout.h>
+#include <mpf/message_route.h>
 #include <mpf/message_types.h>
 
 namespace mpf {
-
-struct Route;
-// Receives a call when the handle of a request is destroyed without a reply. It must outlive every
-// handle whose route names it. MessageServer has one, which ends the request as `refused`; programs
-// need none of their own.
-class RouteKeeper {
- public:
-  // Runs on the thread that destroys the handle, so calls may run at the same time. `route` is
-  // valid during the call.
-  virtual void abandoned(const Route& route) noexcept = 0;
-
- protected:
-  ~RouteKeeper() = default;
-};
-
-// A bit of Route::flags, in messages that a client received: the message ended its request. Further
-// replies, and messages that belong to no request, do not have it.
-inline constexpr std::uint32_t kEndsRequest = 1;
-
-// Where a reply to this message goes. Transports write and read it; servers do not interpret it,
-// and MessageServer::allocReplyMessage() copies it into a reply. It is valid in this process only,
-// and is not sent to the peer.
-struct Route {
-  std::uint64_t link{};  // the connection of the client; 0 in messages that a client received
-  std::uint32_t requestId{};  // the client's number of the request; 0: of no request
-  // at a client: kEndsRequest, and Message::getMissed(); at a server: for the transport only
-  std::uint32_t flags{};
-  RouteKeeper* keeper = nullptr;  // of requests that have had no reply; not owned
-};
 
 class Message {
  public:
@@ -218,19 +190,31 @@ class Message {
     message.state_.type = type;
     message.state_.inlineSize = static_cast<std::uint8_t>(std::min(bytes.size(), kInlineBytes));
     if (!bytes.empty()) std::memcpy(message.data(), bytes.data(), message.state_.inlineSize);
-    message.check();
+    message.checkInline();
     return message;
   }
-  // As copyInline(), without a copy: resets this handle, then `fill` receives a span of its
-  // kInlineBytes bytes and writes the first `size` of them. `fill` must not throw. `size` must be
-  // at most kInlineBytes, which is not checked.
+  // What a transport knows of a message besides its type and body.
+  struct Attributes {
+    Route route{};
+    std::int32_t clientType = 0;
+    std::int32_t clientExtra = 0;
+    std::int64_t timeStampNs = 0;
+  };
+  // As copyInline(), without a copy, and with the attributes: resets this handle, then `fill`
+  // receives a span of its kInlineBytes bytes and writes the first `size` of them. `fill` must not
+  // throw. `size` must be at most kInlineBytes, which is not checked.
   template <class Fill>
-  void assignInline(MessageType type, std::size_t size, Fill&& fill) noexcept {
+  void assignInline(MessageType type, std::size_t size, const Attributes& attributes,
+                    Fill&& fill) noexcept {
     reset();
     state_.type = type;
     state_.inlineSize = static_cast<std::uint8_t>(size);
+    state_.route = attributes.route;
+    state_.clientType = attributes.clientType;
+    state_.clientExtra = attributes.clientExtra;
+    state_.timeStampNs = attributes.timeStampNs;
     fill(std::span<std::byte, kInlineBytes>(state_.at.inside));
-    check();
+    checkInline();
   }
   // Empties the handle: returns the body to its lender, and reports a request that has had no reply
   // to its RouteKeeper. Keeps clientType, clientExtra and the route, without its keeper.
@@ -329,10 +313,10 @@ class Message {
     Where at;
     Route route{};
     std::int64_t timeStampNs = 0;
-    // Of an array: the checked number of elements. A peer cannot write here.
-    std::uint32_t length = 0;
     std::int32_t clientType = 0;
     std::int32_t clientExtra = 0;
+    // Of an array: the checked number of elements. A peer cannot write here.
+    std::uint32_t length = 0;
     MessageType type = MessageType::none;
     std::uint8_t inlineSize = 0;  // kOutside: the body is out of line
     bool sound = false;  // the result of check()
@@ -349,9 +333,9 @@ class Message {
       detail::copyField(route.flags, other.route.flags);
       detail::copyField(route.keeper, other.route.keeper);
       detail::copyField(timeStampNs, other.timeStampNs);
-      detail::copyField(length, other.length);
       detail::copyField(clientType, other.clientType);
       detail::copyField(clientExtra, other.clientExtra);
+      detail::copyField(length, other.length);
       detail::copyField(type, other.type);
       detail::copyField(inlineSize, other.inlineSize);
       detail::copyField(sound, other.sound);
@@ -361,14 +345,26 @@ class Message {
 
   // Sets `sound`, and `length` of a valid array.
   void check() noexcept {
+    if (!state_.isOutside()) return checkInline();
     const auto& layout = layoutOf(state_.type);
-    const std::byte* const bytes = data();
-    state_.sound = layout.headerBytes != 0 && size() >= layout.headerBytes &&
-                   reinterpret_cast<std::uintptr_t>(bytes) % 8 == 0;
+    const auto& body = state_.at.body;
+    state_.sound = layout.headerBytes != 0 && body.size >= layout.headerBytes &&
+                   reinterpret_cast<std::uintptr_t>(body.data) % 8 == 0;
     if (!state_.sound || layout.elementBytes == 0) return;
     // Read once: a peer may change it between two reads.
-    const std::uint32_t length =
-        *reinterpret_cast<const volatile std::uint32_t*>(bytes + layout.lengthOffset);
+    checkLength(layout,
+                *reinterpret_cast<const volatile std::uint32_t*>(body.data + layout.lengthOffset));
+  }
+  // The same for a body inside the handle.
+  void checkInline() noexcept {
+    const auto& layout = layoutOf(state_.type);
+    state_.sound = layout.headerBytes != 0 && state_.inlineSize >= layout.headerBytes;
+    if (!state_.sound || layout.elementBytes == 0) return;
+    std::uint32_t length = 0;
+    std::memcpy(&length, state_.at.inside.data() + layout.lengthOffset, sizeof length);
+    checkLength(layout, length);
+  }
+  void checkLength(const BodyLayout& layout, std::uint32_t length) noexcept {
     state_.sound = length <= (size() - layout.headerBytes) / layout.elementBytes;
     if (state_.sound) state_.length = length;
   }

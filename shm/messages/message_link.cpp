@@ -7,26 +7,37 @@
 
 namespace mpf {
 
-MessageLink::Take MessageLink::checkLong(Envelope envelope) const noexcept {
+MessageLink::Take MessageLink::checkLong(BodyFields body) const noexcept {
+  // A short body has one slot: tryBegin() has looked.
+  if (isShort(body) || !hasType(body)) return Take::invalid;
   const auto room = link_->incoming().inlineCapacity();
-  const bool isChunk = (envelope.flags & layout::kSlotChunk) != 0;
-  return room != 0 && envelope.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room)
-             ? Take::message
-             : Take::invalid;
+  const bool isChunk = (body.flags & layout::kSlotChunk) != 0;
+  return room != 0 && body.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room) ? Take::message
+                                                                                    : Take::invalid;
 }
 
-MessageLink::Finish MessageLink::readBody(Envelope envelope, Message& message) noexcept try {
-  const auto type = static_cast<MessageType>(envelope.type);
+MessageLink::Finish MessageLink::tryFinishLong(BodyFields fields, RequestMarks marks,
+                                               Message& message) noexcept {
+  const auto finish = readBody(fields, message);
+  link_->incoming().end();
+  if (!message) return finish == Finish::message ? Finish::invalid : finish;
+  message.setClientType(marks.clientType);
+  message.setClientExtra(marks.clientExtra);
+  return finish;
+}
+
+MessageLink::Finish MessageLink::readBody(BodyFields fields, Message& message) noexcept try {
+  const auto type = static_cast<MessageType>(fields.type);
   message.reset();
-  if ((envelope.flags & layout::kSlotChunk) != 0) {
-    message = readChunk(envelope);
-  } else if (envelope.bodyBytes <= Message::kInlineBytes) {
-    message.assignInline(type, envelope.bodyBytes, [&](auto body) {
-      link_->incoming().copyBody(body.first(envelope.bodyBytes));
+  if ((fields.flags & layout::kSlotChunk) != 0) {
+    message = readChunk(fields);
+  } else if (fields.bodyBytes <= Message::kInlineBytes) {
+    message.assignInline(type, fields.bodyBytes, {}, [&](auto body) {
+      link_->incoming().copyBody(body.first(fields.bodyBytes));
     });
   } else {
     auto body = allocateHeapBody(layout::kInlineBodyBytes);
-    body.size = envelope.bodyBytes;
+    body.size = fields.bodyBytes;
     link_->incoming().copyBody({body.data, body.size});
     message = Message::adopt(type, body);
   }
@@ -37,11 +48,11 @@ MessageLink::Finish MessageLink::readBody(Envelope envelope, Message& message) n
   return Finish::unavailable;
 }
 
-Message MessageLink::readChunk(Envelope envelope) {
+Message MessageLink::readChunk(BodyFields fields) {
   std::optional<Chunk> chunk;
   {
     const std::lock_guard guard(*lock_);
-    chunk = link_->tryChunk(envelope);
+    chunk = link_->tryChunk(fields.bodyBytes);
     if (!chunk) return {};
     lendOne();
   }
@@ -49,17 +60,17 @@ Message MessageLink::readChunk(Envelope envelope) {
   // The program may have written to the last message in this mapping. Without the lock, because
   // this takes longer than anything else.
   if (isFanOut) private_pages::drop(chunk->data, chunk->capacity);
-  auto message = Message::adopt(static_cast<MessageType>(envelope.type),
-                                {chunk->data, envelope.bodyBytes, chunk->capacity, this});
+  auto message = Message::adopt(static_cast<MessageType>(fields.type),
+                                {chunk->data, fields.bodyBytes, chunk->capacity, this});
   if (isFanOut) message.setRoute({0, 0, Message::missedFlags(chunk->ref.missed), nullptr});
   return message;
 }
 
-void MessageLink::discard(Envelope envelope) noexcept {
+void MessageLink::discard(BodyFields body) noexcept {
   try {
-    if ((envelope.flags & layout::kSlotChunk) != 0) {
+    if ((body.flags & layout::kSlotChunk) != 0) {
       const std::lock_guard guard(*lock_);
-      if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+      if (const auto chunk = link_->tryChunk(body.bodyBytes)) link_->release(chunk->data);
     }
     // NOLINTNEXTLINE(bugprone-empty-catch): tryChunk() has returned the chunk to the peer
   } catch (const ChunkUnavailable&) {
@@ -67,8 +78,8 @@ void MessageLink::discard(Envelope envelope) noexcept {
   link_->incoming().end();
 }
 
-LinkSend MessageLink::trySendBodyLocked(Envelope envelope, Message& message,
-                                        const Link::Limits& limits) noexcept {
+LinkSend MessageLink::trySendLongLocked(Envelope envelope, Message& message,
+                                        Link::Limits limits) noexcept {
   const bool ours = message.lender() == this;
   const auto result = link_->trySend(envelope, message.body(), limits);
   if (result == LinkSend::sentInPlace) {

@@ -8,6 +8,7 @@
 // Trust    a body that does not fit its envelope is invalid data; the owner then closes the link.
 #pragma once
 
+#include <cstring>
 #include <memory>
 #include <optional>
 
@@ -35,39 +36,44 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
       return Take::nothing;
     }
     envelope = link_->incoming().begin();
-    const bool fitsSlot = link_->incoming().isShort() && isShort(envelope);
-    return fitsSlot ? Take::message : checkLong(envelope);
+    const bool fitsSlot = link_->incoming().isShort() && isShort(envelope.body());
+    return fitsSlot && hasType(envelope.body()) ? Take::message : checkLong(envelope.body());
+  }
+  // Whether the body fits into one slot.
+  [[nodiscard]] static bool isShort(BodyFields body) noexcept {
+    return (body.flags & layout::kSlotChunk) == 0 && body.bodyBytes <= layout::kFirstSlotBodyBytes;
+  }
+  // Returns the message begun, whose body isShort(), and frees its slot. Sets route and time stamp,
+  // too: so the compiler writes each field of the message once.
+  [[nodiscard]] Message finishShort(const Envelope& envelope, const Route& route,
+                                    std::int64_t timeStampNs) noexcept {
+    auto& ring = link_->incoming();
+    const auto body = ring.firstBody();
+    Message message;
+    message.assignInline(static_cast<MessageType>(envelope.type), envelope.bodyBytes,
+                         {route, envelope.clientType, envelope.clientExtra, timeStampNs},
+                         [&](auto bytes) { body.copyTo(bytes.data()); });
+    ring.endShort();
+    return message;
   }
   // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
   // has ended or memory is short; the message is lost, but the link is sound.
   enum class Finish { message, invalid, unavailable };
-  // Moves the body of the message begun into `message`, and frees the slots. `message` is empty
-  // unless the result is `message`.
-  [[nodiscard]] Finish tryFinish(const Envelope& envelope, Message& message) noexcept {
-    auto finish = Finish::message;
-    if (isShort(envelope)) {
-      message.assignInline(
-          static_cast<MessageType>(envelope.type), envelope.bodyBytes, [&](auto body) {
-            link_->incoming().copyFirst(body.template first<layout::kFirstSlotBodyBytes>());
-          });
-    } else {
-      finish = readBody(envelope, message);
-    }
-    link_->incoming().end();
-    if (!message) return finish == Finish::message ? Finish::invalid : finish;
-    message.setClientType(envelope.clientType);
-    message.setClientExtra(envelope.clientExtra);
-    return finish;
-  }
+  // Moves any other body of the message begun into `message`, and frees the slots. `message` is
+  // empty unless the result is `message`.
+  [[nodiscard]] Finish tryFinishLong(BodyFields fields, RequestMarks marks,
+                                     Message& message) noexcept;
   // Ends the message begun without reading its body; returns its chunk, if it has one.
-  void discard(Envelope envelope) noexcept;
+  void discard(BodyFields body) noexcept;
 
   // Sends `message`. The caller holds lock(). After a successful send, `message` has no body of
   // this link; the caller destroys it after it has released the lock, because the return of a body
   // of another link may need that lock. If the message was not sent, `message` is unchanged.
-  LinkSend trySendLocked(const Envelope& envelope, Message& message,
-                         const Link::Limits& limits) noexcept {
-    if (!message.isInline()) return trySendBodyLocked(envelope, message, limits);
+  // Inline, so that the envelope stays in registers.
+  [[gnu::always_inline]] LinkSend trySendLocked(const Envelope& envelope, Message& message,
+                                                Link::Limits limits) noexcept {
+    if (!message.isInline() || message.body().size() > layout::kFirstSlotBodyBytes)
+      return trySendLongLocked(envelope, message, limits);
     return link_->trySend(envelope, message.body(), limits);
   }
 
@@ -78,20 +84,16 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   void takeBack(std::byte* data, std::size_t capacity) noexcept override;
 
  private:
-  // Whether the body fits into one slot.
-  [[nodiscard]] static bool isShort(const Envelope& envelope) noexcept {
-    return (envelope.flags & layout::kSlotChunk) == 0 &&
-           envelope.bodyBytes <= layout::kFirstSlotBodyBytes;
+  [[nodiscard]] static bool hasType(BodyFields body) noexcept {
+    return body.type != static_cast<std::uint16_t>(MessageType::none);
   }
-  [[nodiscard]] Take checkLong(Envelope envelope) const noexcept;
-  // For a message that does not fit into one slot.
-  Finish readBody(Envelope envelope, Message& message) noexcept;
+  [[nodiscard]] Take checkLong(BodyFields body) const noexcept;
+  Finish readBody(BodyFields fields, Message& message) noexcept;
   // For a body in a chunk; an empty handle if there is no such chunk.
   //   throws  ChunkUnavailable
-  Message readChunk(Envelope envelope);
-  // For a body outside the handle.
-  LinkSend trySendBodyLocked(Envelope envelope, Message& message,
-                             const Link::Limits& limits) noexcept;
+  Message readChunk(BodyFields fields);
+  // For a message that does not fit into one slot.
+  LinkSend trySendLongLocked(Envelope envelope, Message& message, Link::Limits limits) noexcept;
   void lendOne() noexcept;
   void endLending() noexcept;
 

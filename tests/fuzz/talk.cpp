@@ -69,18 +69,26 @@ void Talk::turn(std::uint64_t value) {
   link.notifyPeer();
 }
 
+bool Talk::tryFinish(const Envelope& envelope, Message& message) {
+  if (!MessageLink::isShort(envelope.body())) {
+    return channel_->tryFinishLong(envelope.body(), envelope.marks(), message) ==
+           MessageLink::Finish::message;
+  }
+  message = channel_->finishShort(envelope, {}, 0);
+  return true;
+}
+
 // Returns false when no message waits, or when invalid data ends the talk.
 bool Talk::tryTakeOne(std::uint64_t choice) {
   Envelope envelope;
   const auto take = channel_->tryBegin(envelope);
   if (take == MessageLink::Take::nothing) return false;
   if (take == MessageLink::Take::message && choice % 4 == 3) {
-    channel_->discard(envelope);
+    channel_->discard(envelope.body());
     return true;
   }
   Message message;
-  isOver_ = take == MessageLink::Take::invalid ||
-            channel_->tryFinish(envelope, message) != MessageLink::Finish::message;
+  isOver_ = take == MessageLink::Take::invalid || !tryFinish(envelope, message);
   if (isOver_) return false;
   lookAt(message);
   if (choice % 4 == 0) sendBack(envelope, message);

@@ -28,6 +28,7 @@ class Talk {
 
  private:
   bool tryTakeOne(std::uint64_t choice);
+  bool tryFinish(const Envelope& envelope, Message& message);
   void sendBack(Envelope envelope, Message& message);
   void publish(std::uint64_t value);
 

@@ -120,7 +120,7 @@ class Peer {
     if (!frees) return;
     if ((envelope.flags & layout::kSlotChunk) != 0) {
       try {
-        if (const auto chunk = link_->tryChunk(envelope)) link_->release(chunk->data);
+        if (const auto chunk = link_->tryChunk(envelope.bodyBytes)) link_->release(chunk->data);
       } catch (const ChunkUnavailable&) {  // NOLINT(bugprone-empty-catch): its server has ended
       }
     }

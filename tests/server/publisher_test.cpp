@@ -46,7 +46,7 @@ class PublisherTest : public ServerPartsTest {
   // The chunk of the next message that the client receives.
   static Chunk borrow(Link& link) {
     const auto envelope = link.incoming().begin();
-    const auto chunk = link.tryChunk(envelope);
+    const auto chunk = link.tryChunk(envelope.bodyBytes);
     link.incoming().end();
     EXPECT_TRUE(chunk);
     return chunk.value_or(Chunk{});
@@ -85,7 +85,7 @@ TEST_F(PublisherTest, EachClientReadsTheSameChunkAndGetsTheMarksOfItsOwnRequest)
     EXPECT_EQ(envelope.clientExtra, subscriber->request.getClientExtra());
     EXPECT_EQ(envelope.timeNs, 77);
     EXPECT_NE(envelope.flags & layout::kSlotFirstReply, 0);
-    const auto chunk = subscriber->link.tryChunk(envelope);
+    const auto chunk = subscriber->link.tryChunk(envelope.bodyBytes);
     ASSERT_TRUE(chunk);
     EXPECT_EQ(elementOf(*chunk), 1.5);
     EXPECT_EQ(chunk->ref.side, layout::kFanOutSide);

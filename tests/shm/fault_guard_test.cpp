@@ -184,12 +184,12 @@ TEST_F(FaultGuard, ATruncatedLinkAndTruncatedChunksAreLost) {
   ASSERT_EQ(send(link.client, 1, 5000), LinkSend::sent);
   ASSERT_TRUE(link.server.incoming().hasMessage());
   const auto envelope = link.server.incoming().begin();
-  const auto chunk = link.server.tryChunk(envelope);
+  const auto chunk = link.server.tryChunk(envelope.bodyBytes);
   ASSERT_TRUE(chunk);
   cut(SegmentName::bulk(name(), link.client.header().incarnation, 0, 0));
 
   EXPECT_EQ(chunk->data[0], std::byte{0});
-  EXPECT_FALSE(link.server.tryChunk(envelope)) << "its chunks can no longer be read";
+  EXPECT_FALSE(link.server.tryChunk(envelope.bodyBytes)) << "its chunks can no longer be read";
   link.server.release(chunk->data);
   link.server.incoming().end();
 

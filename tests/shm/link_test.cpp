@@ -46,7 +46,7 @@ class LinkTest : public ShmTest {
     std::vector<std::byte> body(envelope.bodyBytes);
     if ((envelope.flags & layout::kSlotChunk) == 0) {
       link.incoming().copyBody(body);
-    } else if (const auto chunk = link.tryChunk(envelope)) {
+    } else if (const auto chunk = link.tryChunk(envelope.bodyBytes)) {
       std::memcpy(body.data(), chunk->data, body.size());
       link.release(chunk->data);
     } else {
@@ -90,12 +90,12 @@ TEST_F(LinkTest, AChunkIsReadInPlaceAndSentBackUnchanged) {
   built.data[4999] = std::byte{7};
 
   ASSERT_EQ(sendBody(link.client, {built.data, 5000}), LinkSend::sentInPlace);
-  const auto borrowed = link.server.tryChunk(link.server.incoming().begin());
+  const auto borrowed = link.server.tryChunk(link.server.incoming().begin().bodyBytes);
   link.server.incoming().end();
   ASSERT_TRUE(borrowed);
   EXPECT_EQ(borrowed->data[4999], std::byte{7});
   ASSERT_EQ(sendBody(link.server, {borrowed->data, 5000}), LinkSend::sentInPlace);
-  const auto back = link.client.tryChunk(link.client.incoming().begin());
+  const auto back = link.client.tryChunk(link.client.incoming().begin().bodyBytes);
   link.client.incoming().end();
 
   ASSERT_TRUE(back);
@@ -285,7 +285,7 @@ TEST_F(LinkTest, RefusesALinkFileThatIsTooShortForItsRings) {
 // The chunk of a message; nullopt also if it is unavailable because the peer has overwritten its
 // state with "closed".
 std::optional<Chunk> chunkOf(Link& link, const Envelope& envelope) try {
-  return link.tryChunk(envelope);
+  return link.tryChunk(envelope.bodyBytes);
 } catch (const ChunkUnavailable&) {
   return std::nullopt;
 }

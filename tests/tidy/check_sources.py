@@ -25,8 +25,7 @@ MAY_INCLUDE = {
     "drivers": ["base"],
     # A router is a server to local clients, and a client to local servers.
     "router": ["schema", "shm", "client", "server", "server/programs"],
-    # Sources that were written for the original MPF.
-    "classic/messages": ["schema"],
+    "classic/messages": ["schema"],  # sources that were written for the original MPF
     "classic": ["classic/messages", "client", "server", "drivers"],
     "epics": ["client", "classic/messages"],
     "python": ["client", "server"],
@@ -45,6 +44,7 @@ PUBLIC_HEADERS = {
     "schema": [
         "message_types.h",
         "message_layout.h",
+        "message_route.h",
         "message_body.h",
         "message.h",
         "message_of.h",

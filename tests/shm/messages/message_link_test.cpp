@@ -46,9 +46,16 @@ class MessageLinkTest : public ShmTest {
   Message take() {
     Envelope envelope;
     EXPECT_EQ(server_->tryBegin(envelope), MessageLink::Take::message);
+    if (MessageLink::isShort(envelope.body())) return server_->finishShort(envelope, {}, 0);
     Message message;
-    finish_ = server_->tryFinish(envelope, message);
+    finish_ = server_->tryFinishLong(envelope.body(), envelope.marks(), message);
     return message;
+  }
+  // The slot of the first request.
+  layout::Slot& firstSlot() {
+    auto* const segment =
+        reinterpret_cast<std::byte*>(&server_->link().control()) - layout::kLinkControlOffset;
+    return *reinterpret_cast<layout::Slot*>(segment + layout::kLinkRingsOffset);
   }
   void TearDown() override {
     client_.reset();
@@ -119,23 +126,28 @@ TEST_F(MessageLinkTest, ADiscardedMessageReturnsItsChunk) {
     Envelope envelope;
     ASSERT_EQ(server_->tryBegin(envelope), MessageLink::Take::message);
 
-    server_->discard(envelope);
+    server_->discard(envelope.body());
   }
 }
 
-TEST_F(MessageLinkTest, ABodyThatIsLongerThanItsSlotsIsInvalid) {
+class InvalidEnvelopes : public MessageLinkTest,
+                         public testing::WithParamInterface<void (*)(layout::Slot&)> {};
+
+TEST_P(InvalidEnvelopes, AreRefused) {
   auto message = Message(Int32Message({.value = 1}));
   ASSERT_EQ(send(message), LinkSend::sent);
-  auto& link = server_->link();
-  auto* const slots =
-      reinterpret_cast<layout::Slot*>(reinterpret_cast<std::byte*>(&link.control()) -
-                                      layout::kLinkControlOffset + layout::kLinkRingsOffset);
-  slots[0].bodyBytes = 1000;
-
+  GetParam()(firstSlot());
   Envelope envelope;
 
   EXPECT_EQ(server_->tryBegin(envelope), MessageLink::Take::invalid);
 }
+INSTANTIATE_TEST_SUITE_P(OfEachKind, InvalidEnvelopes,
+                         testing::Values([](layout::Slot& slot) { slot.bodyBytes = 1000; },
+                                         [](layout::Slot& slot) { slot.slots = 2; },
+                                         [](layout::Slot& slot) {
+                                           slot.slots = layout::kMaxMessageSlots + 1;
+                                         },
+                                         [](layout::Slot& slot) { slot.type = 0; }));
 
 TEST_F(MessageLinkTest, ABodyOfAnotherTypeThanItsSizeIsAMessageThatIsNotSound) {
   Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::float64)};

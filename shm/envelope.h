@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Envelope: the fields that a ring carries beside the body of a message, and the parts of them that
+// functions need. The parts are small, so that they are passed in registers.
+//
+// Threads  plain data.
+// Trust    copies of what a peer has written: any value.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "shm/layout.h"
+
+namespace mpf {
+
+// CLOCK_MONOTONIC in units of 16 ns, low 32 bits, never 0: fits into a slot and spans a minute.
+struct Tick {
+  [[nodiscard]] static std::uint32_t of(std::int64_t ns) noexcept {
+    return static_cast<std::uint32_t>(ns >> 4) | 1u;
+  }
+  [[nodiscard]] static std::int64_t nsSince(std::uint32_t tick, std::int64_t nowNs) noexcept {
+    return static_cast<std::int64_t>(of(nowNs) - tick) * 16;
+  }
+};
+
+// How to read the body of a message.
+struct BodyFields {
+  std::uint16_t type{};
+  std::uint8_t flags{};  // layout::kSlot...
+  std::uint32_t bodyBytes{};
+};
+
+// What a reply has from its request.
+struct RequestMarks {
+  std::uint32_t requestId{};
+  std::int32_t clientType{};
+  std::int32_t clientExtra{};
+};
+
+// The fields that are sent with a body. The ring does not interpret `type`, `clientType` or
+// `clientExtra`.
+struct Envelope {
+  std::uint16_t type{};
+  std::uint8_t flags{};  // layout::kSlot...
+  std::uint32_t bodyBytes{};
+  std::uint32_t requestId{};
+  std::int32_t clientType{};
+  std::int32_t clientExtra{};
+  std::uint32_t sentTick{};
+  std::int64_t timeNs{};  // requests: the deadline; replies: the time stamp; 0: none
+
+  [[nodiscard]] BodyFields body() const noexcept { return {type, flags, bodyBytes}; }
+  [[nodiscard]] RequestMarks marks() const noexcept { return {requestId, clientType, clientExtra}; }
+};
+
+// A copy of the body bytes in a first slot, in words that the compiler keeps in registers.
+struct FirstBody {
+  std::uint64_t first, second, third;
+
+  [[nodiscard]] static FirstBody of(const std::byte* bytes) noexcept {
+    const auto word = [&](int at) {
+      std::uint64_t value = 0;
+      std::memcpy(&value, bytes + at * sizeof value, sizeof value);
+      return value;
+    };
+    return {word(0), word(1), word(2)};
+  }
+  void copyTo(std::byte* bytes) const noexcept {
+    std::memcpy(bytes, &first, sizeof first);
+    std::memcpy(bytes + sizeof first, &second, sizeof second);
+    std::memcpy(bytes + 2 * sizeof first, &third, sizeof third);
+  }
+};
+static_assert(sizeof(FirstBody) == layout::kFirstSlotBodyBytes);
+
+}  // namespace mpf
