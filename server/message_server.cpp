@@ -61,14 +61,6 @@ std::size_t MessageServer::publish(const Message& message, std::span<const Messa
 }
 int MessageServer::descriptor() { return core_->descriptor(); }
 
-void MessageServer::address(Message& reply, const Message& request) noexcept {
-  auto route = request.route();
-  route.keeper = nullptr;
-  reply.setRoute(route);
-  reply.setClientType(request.getClientType());
-  reply.setClientExtra(request.getClientExtra());
-}
-
 void MessageServer::setHandler(MessageType type, std::function<void(Message&&)> handler) {
   handlers_[type] = std::move(handler);
 }

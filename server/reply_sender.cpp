@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "server/reply_sender.h"
 
-#include <algorithm>
 #include <memory>
 #include <mutex>
 
@@ -19,7 +18,7 @@ ReplyResult ReplySender::send(Message& message) noexcept {
   ReplyResult result{};
   {
     const std::lock_guard lock(*connection.lock);
-    result = sendLocked(connection, message);
+    result = sendOneLocked(connection, message);
   }
   if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
   return result;
@@ -28,74 +27,95 @@ ReplyResult ReplySender::send(Message& message) noexcept {
 RepliedMany ReplySender::sendMany(std::span<Message> messages) noexcept {
   RepliedMany sent;
   while (sent.count < messages.size() && sent.result == ReplyResult::sent) {
-    auto rest = messages.subspan(sent.count);
-    const auto route = rest.front().route();
-    const auto differs = [&](const Message& message) {
-      return message.route().link != route.link || message.route().flags != route.flags;
-    };
-    const auto end = std::find_if(rest.begin(), rest.end(), differs);
-    const auto run = sendRun(rest.first(static_cast<std::size_t>(end - rest.begin())));
+    const auto rest = messages.subspan(sent.count);
+    auto run = sendRun(rest);
+    if (run.result == ReplyResult::clientGone) run = {1, ReplyResult::sent};
     for (auto& message : rest.first(run.count)) message.reset();
     sent = {sent.count + run.count, run.result};
   }
   return sent;
 }
 
-// Replies to one client. The caller empties those that are counted, without the lock.
+// Sends those of the first messages that go to the same client; the caller empties the messages
+// that are counted, without the lock. The result is `clientGone` only if none was sent.
 RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto& route = messages.front().route();
-  if (route.link == 0 || forkGuard_.isInherited()) return {messages.size(), ReplyResult::sent};
+  if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
   auto& connection = Connection::of(route);
   const std::lock_guard lock(*connection.lock);
-  if (!connection.isOpenFor(route)) return {messages.size(), ReplyResult::sent};
+  if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   const Link::Batch batch(connection.channel->link());
   RepliedMany sent;
-  for (; sent.count < messages.size(); ++sent.count) {
-    auto& message = messages[sent.count];
-    if (!message) continue;
-    sent.result = sendLocked(connection, message);
+  const auto client = route.link;
+  for (auto& message : messages) {
+    if (message.route().link != client || !connection.isOpenFor(message.route())) break;
+    if (message) sent.result = sendLocked(connection, message);
     if (sent.result != ReplyResult::sent) break;
+    ++sent.count;
   }
+  noteSent(connection);
   return sent;
 }
 
-ReplyResult ReplySender::sendLocked(Connection& connection, Message& message) noexcept {
+[[gnu::always_inline]] inline ReplyResult ReplySender::sendOneLocked(Connection& connection,
+                                                                     Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
-  const auto requestId = message.route().requestId;
-  auto& owed = connection.owed(requestId);
-  const bool first = connection.owes(requestId);
-  auto& link = connection.channel->link();
-  Envelope envelope;
-  envelope.type = static_cast<std::uint16_t>(message.getType());
-  envelope.flags = first ? layout::kSlotFirstReply : std::uint8_t{0};
-  envelope.requestId = requestId;
-  envelope.clientType = message.getClientType();
-  envelope.clientExtra = message.getClientExtra();
-  envelope.timeNs = message.getTimeStampNs();
-  if (stamps_ && envelope.timeNs == 0) envelope.timeNs = Clock::wallNs();
-  if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
+  const auto result = sendLocked(connection, message);
+  noteSent(connection);
+  return result;
+}
 
-  auto* const keeper = first ? message.exchangeKeeper(nullptr) : nullptr;
-  const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
-  const auto result = connection.channel->trySendLocked(envelope, message, limits);
-  if (result == LinkSend::sent || result == LinkSend::sentInPlace) {
-    MPF_STEP(reply_sent);
-    if (first) owed.store(0, std::memory_order_relaxed);
-    count(control_.sent);
-    link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-    if (requestId == connection.timedId && first) {
-      record(control_.serviceNs, Clock::nowNs() - connection.timedFromNs);
-      connection.timedId = 0;
-    }
-    return ReplyResult::sent;
-  }
-  if (first) message.exchangeKeeper(keeper);
+[[gnu::always_inline]] inline ReplyResult ReplySender::sendLocked(Connection& connection,
+                                                                  Message& message) noexcept {
+  auto& link = connection.channel->link();
+  // First, because the call of the clock would make the rest wait in memory.
+  const auto sentTick = link.shouldSampleTime() ? Tick::of(Clock::nowNs()) : 0;
+  const auto requestId = message.route().requestId;
+  const bool isFirst = connection.owes(requestId);
+  const auto timeNs = message.getTimeStampNs();
+  const Envelope envelope{
+      .type = static_cast<std::uint16_t>(message.getType()),
+      .flags = isFirst ? layout::kSlotFirstReply : std::uint8_t{0},
+      .requestId = requestId,
+      .clientType = message.getClientType(),
+      .clientExtra = message.getClientExtra(),
+      .sentTick = sentTick,
+      .timeNs = stamps_ && timeNs == 0 ? Clock::wallNs() : timeNs,
+  };
+  const auto reserve = isFirst ? 0 : link.maxOutstanding();
+  const auto result = connection.channel->trySendLocked(envelope, message, {0, reserve});
+  if (result != LinkSend::sent && result != LinkSend::sentInPlace) return noteRefused(result);
+  MPF_STEP(reply_sent);
+  if (isFirst) noteReplied(connection, message);
+  return ReplyResult::sent;
+}
+
+// Counts the messages that were sent since the last call.
+inline void ReplySender::noteSent(Connection& connection) noexcept {
+  auto& link = connection.channel->link();
+  auto& sent = link.control().serverSent;
+  const auto now = link.outgoing().messages();
+  count(control_.sent, now - sent.load(std::memory_order_relaxed));
+  sent.store(now, std::memory_order_relaxed);
+}
+
+// After the first reply to a request.
+void ReplySender::noteReplied(Connection& connection, Message& message) noexcept {
+  static_cast<void>(message.exchangeKeeper(nullptr));
+  const auto requestId = message.route().requestId;
+  connection.owed(requestId).store(0, std::memory_order_relaxed);
+  if (requestId != connection.timedId) return;
+  record(control_.serviceNs, Clock::nowNs() - connection.timedFromNs);
+  connection.timedId = 0;
+}
+
+ReplyResult ReplySender::noteRefused(LinkSend result) noexcept {
   count(control_.replyQueueFull);
   if (result == LinkSend::full) return ReplyResult::queueFull;
   return result == LinkSend::tooLarge ? ReplyResult::tooLarge : ReplyResult::noMemory;
 }
 
-void ReplySender::sendFate(Connection& connection, Envelope request, Fate fate) noexcept {
+void ReplySender::sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept {
   RequestFateMessage message({.fate = fate, .requestId = request.requestId});
   message.setClientType(request.clientType);
   message.setClientExtra(request.clientExtra);
@@ -107,9 +127,9 @@ void ReplySender::refuseAbandoned(const Route& route) noexcept {
   auto& connection = Connection::of(route);
   const std::lock_guard lock(*connection.lock);
   if (!connection.isOpenFor(route) || !connection.owes(route.requestId)) return;
-  RequestFateMessage message({.fate = Fate::refused, .requestId = route.requestId});
+  Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
   message.setRoute(connection.routeOf(route.requestId, nullptr));
-  if (sendLocked(connection, message) == ReplyResult::sent) count(control_.refused);
+  if (sendOneLocked(connection, message) == ReplyResult::sent) count(control_.refused);
 }
 
 BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {

@@ -29,7 +29,7 @@ class ReplySender {
   // MessageServer::replyMany().
   RepliedMany sendMany(std::span<Message> messages) noexcept;
   // Ends a request of `connection` with a fate.
-  void sendFate(Connection& connection, Envelope request, Fate fate) noexcept;
+  void sendFate(Connection& connection, RequestMarks request, Fate fate) noexcept;
   // Ends a request whose handle was destroyed without a reply, with the fate `refused`.
   void refuseAbandoned(const Route& route) noexcept;
   // Allocates a body in the memory that is shared with the client of `route`, or on the heap.
@@ -37,8 +37,13 @@ class ReplySender {
   static BodyBytes allocate(const Route& route, std::size_t bytes);
 
  private:
-  ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
   RepliedMany sendRun(std::span<Message> messages) noexcept;
+  ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
+  // The caller calls noteSent() after it has sent one or more messages.
+  ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
+  void noteSent(Connection& connection) noexcept;
+  void noteReplied(Connection& connection, Message& message) noexcept;
+  ReplyResult noteRefused(LinkSend result) noexcept;
 
   ForkGuard forkGuard_;
   layout::WindowControl& control_;

@@ -248,7 +248,12 @@ class MessageServer {
   void callHandler(const std::function<void(Message&&)>& handler, Message&& request);
   BodyBytes allocate(const Message& request, std::size_t bytes);
   BodyBytes allocateShared(std::size_t bytes);
-  static void address(Message& reply, const Message& request) noexcept;
+  static void address(Message& reply, const Message& request) noexcept {
+    const auto& route = request.route();
+    reply.setRoute({route.link, route.requestId, route.flags, nullptr});
+    reply.setClientType(request.getClientType());
+    reply.setClientExtra(request.getClientExtra());
+  }
   std::unique_ptr<class ServerCore> core_;
   std::map<MessageType, std::function<void(Message&&)>> handlers_;
 };
