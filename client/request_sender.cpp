@@ -39,34 +39,117 @@ std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
 
 }  // namespace
 
-SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
-                               Retry retry) noexcept {
-  if (!message) return SendResult::empty;
-  Attempt attempt{message, nsOf(takeBefore), requestId};
-  const auto result = retry == Retry::never ? send(attempt) : sendWithCopy(attempt);
-  if (result == SendResult::sent) requestId = attempt.id;
+// Reserves an entry for a new request, or refuses the request: returns nullptr and the reason.
+Request* RequestSender::tryReserveMore(std::uint32_t& id, SendResult& refusal) noexcept {
+  auto& link = channel_->link();
+  if (requests_->maxOutstanding() < link.header().maxOutstanding) {
+    // The link gets memory for the replies to as many requests as the server permits.
+    if (!link.tryAllowMore() || !requests_->tryAllow(link.header().maxOutstanding)) {
+      count(link.control().clientRefused);
+      refusal = SendResult::noMemory;
+      return nullptr;
+    }
+    if (auto* const request = requests_->tryReserve(id)) return request;
+  }
+  count(link.control().clientRefused);
+  noteFull();
+  refusal = SendResult::tooManyOutstanding;
+  return nullptr;
+}
+
+// The caller sets isNudging_ and calls setTimers() after it has sent one or more messages.
+[[gnu::always_inline]] inline SendResult RequestSender::trySendLocked(
+    Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+    std::unique_ptr<Message>* copy) noexcept {
+  if (state_.load(std::memory_order_relaxed) != BindingState::connected)
+    return SendResult::notConnected;
+  auto& link = channel_->link();
+  // First, because the call of the clock would make the rest wait in memory.
+  const auto sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
+  auto id = requestId;
+  auto* request = requests_->tryReserve(id);
+  if (request == nullptr) {
+    auto refusal = SendResult::sent;
+    request = tryReserveMore(id, refusal);
+    if (request == nullptr) return refusal;
+  }
+  const Envelope envelope{
+      .type = static_cast<std::uint16_t>(message.getType()),
+      .requestId = id,
+      .clientType = message.getClientType(),
+      .clientExtra = message.getClientExtra(),
+      .sentTick = sentNs != 0 ? Tick::of(sentNs) : 0,
+      .timeNs = deadlineNs,
+  };
+  request->clientType = envelope.clientType;
+  request->clientExtra = envelope.clientExtra;
+  request->ordinal = link.outgoing().messages() + 1;
+  request->deadlineNs = deadlineNs;
+  request->sentNs = sentNs;
+  if (copy != nullptr) request->copy = std::move(*copy);
+  // Added before the message is sent, because the dispatcher may receive the reply before
+  // trySendLocked() of the channel returns.
+  requests_->add(*request, id);
+  MPF_STEP(request_added);
+  const auto sent = channel_->trySendLocked(envelope, message, {link.header().queueSize, 0});
+  if (sent != LinkSend::sent && sent != LinkSend::sentInPlace)
+    return takeBack(*request, resultOf(sent), copy);
+  requestId = id;
+  isFullReported_ = false;
+  link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
+  link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
+  return SendResult::sent;
+}
+
+// After a request was added but not sent.
+SendResult RequestSender::takeBack(Request& request, SendResult result,
+                                   std::unique_ptr<Message>* copy) noexcept {
+  auto message = requests_->takeBack(request);
+  if (copy != nullptr) *copy = std::move(message);
+  count(channel_->link().control().clientRefused);
+  if (result == SendResult::queueFull) noteFull();
   return result;
 }
 
-SendResult RequestSender::sendWithCopy(Attempt& attempt) noexcept {
-  auto copy = tryCopy(attempt.message);
-  if (!copy) return SendResult::noMemory;
-  attempt.copy = &copy;
-  return send(attempt);
+SendResult RequestSender::refuseBehindUntaken() noexcept {
+  if (state_.load(std::memory_order_relaxed) != BindingState::connected)
+    return SendResult::notConnected;
+  noteFull();
+  return SendResult::queueFull;
 }
 
-SendResult RequestSender::send(Attempt& attempt) noexcept {
+SendResult RequestSender::send(Message& message, Deadline takeBefore, std::uint32_t& requestId,
+                               Retry retry) noexcept {
+  if (!message) return SendResult::empty;
+  if (retry != Retry::never) return sendWithCopy(message, nsOf(takeBefore), requestId);
+  return send(message, nsOf(takeBefore), requestId, nullptr, Turn::last);
+}
+
+SendResult RequestSender::sendWithCopy(Message& message, std::int64_t deadlineNs,
+                                       std::uint32_t& requestId) noexcept {
+  auto copy = tryCopy(message);
+  return copy ? send(message, deadlineNs, requestId, &copy, Turn::last) : SendResult::noMemory;
+}
+
+SendResult RequestSender::send(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+                               std::unique_ptr<Message>* copy, Turn turn) noexcept {
+  bool startsNudging = false;
   {
     const std::lock_guard lock(*lock_);
-    const auto result = untaken_.isEmpty() ? trySendLocked(attempt) : refuseBehindUntaken();
+    if (turn == Turn::last && !untaken_.isEmpty()) return refuseBehindUntaken();
+    const auto result = trySendLocked(message, deadlineNs, requestId, copy);
     if (result != SendResult::sent) return result;
+    if (turn == Turn::firstUntaken) untaken_.removeFront();
+    startsNudging = !std::exchange(isNudging_, true);
   }
-  onSent(attempt);
+  message.reset();
+  setTimers(startsNudging, deadlineNs);
   return SendResult::sent;
 }
 
 SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefore,
                                  std::span<std::uint32_t> requestIds) noexcept {
+  const auto deadlineNs = nsOf(takeBefore);
   SentMany sent;
   bool startsNudging = false;
   {
@@ -77,88 +160,23 @@ SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefor
     const Link::Batch batch(channel_->link());
     for (; sent.count < messages.size(); ++sent.count) {
       auto& message = messages[sent.count];
-      Attempt attempt{message, nsOf(takeBefore), 0};
-      sent.result = message ? trySendLocked(attempt) : SendResult::empty;
+      std::uint32_t id = 0;
+      sent.result = message ? trySendLocked(message, deadlineNs, id, nullptr) : SendResult::empty;
       if (sent.result != SendResult::sent) break;
-      startsNudging = startsNudging || attempt.startsNudging;
-      if (sent.count < requestIds.size()) requestIds[sent.count] = attempt.id;
+      if (sent.count < requestIds.size()) requestIds[sent.count] = id;
     }
+    if (sent.count != 0) startsNudging = !std::exchange(isNudging_, true);
   }
   for (auto& message : messages.first(sent.count)) message.reset();
-  if (sent.count != 0) setTimers(startsNudging, nsOf(takeBefore));
+  if (sent.count != 0) setTimers(startsNudging, deadlineNs);
   return sent;
 }
 
-// Without the lock.
-void RequestSender::onSent(const Attempt& attempt) noexcept {
-  attempt.message.reset();
-  setTimers(attempt.startsNudging, attempt.deadlineNs);
-}
-
-void RequestSender::setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept {
+// Without the lock, after messages were sent.
+inline void RequestSender::setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept {
   MPF_STEP(request_sent);
   if (startsNudging) timer_.wakeAt(Clock::nowNs() + NudgeInterval::kFirstNs);
   if (deadlineNs != 0) timer_.wakeAt(deadlineNs);
-}
-
-SendResult RequestSender::refuseBehindUntaken() noexcept {
-  if (state_.load(std::memory_order_relaxed) != BindingState::connected)
-    return SendResult::notConnected;
-  noteFull();
-  return SendResult::queueFull;
-}
-
-// After a successful send, the caller calls onSent().
-SendResult RequestSender::trySendLocked(Attempt& attempt) noexcept {
-  if (state_.load(std::memory_order_relaxed) != BindingState::connected)
-    return SendResult::notConnected;
-  auto& link = channel_->link();
-  auto* request = requests_->tryReserve(attempt.id);
-  if (request == nullptr && requests_->maxOutstanding() < link.header().maxOutstanding) {
-    // The link gets memory for the replies to as many requests as the server permits.
-    if (!link.tryAllowMore() || !requests_->tryAllow(link.header().maxOutstanding)) {
-      count(link.control().clientRefused);
-      return SendResult::noMemory;
-    }
-    request = requests_->tryReserve(attempt.id);
-  }
-  if (request == nullptr) {
-    count(link.control().clientRefused);
-    noteFull();
-    return SendResult::tooManyOutstanding;
-  }
-  const auto& message = attempt.message;
-  Envelope envelope;
-  envelope.type = static_cast<std::uint16_t>(message.getType());
-  envelope.requestId = attempt.id;
-  envelope.clientType = message.getClientType();
-  envelope.clientExtra = message.getClientExtra();
-  envelope.timeNs = attempt.deadlineNs;
-  request->clientType = envelope.clientType;
-  request->clientExtra = envelope.clientExtra;
-  request->ordinal = link.outgoing().messages() + 1;
-  request->deadlineNs = envelope.timeNs;
-  request->sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
-  if (attempt.copy != nullptr) request->copy = std::move(*attempt.copy);
-  if (request->sentNs != 0) envelope.sentTick = Tick::of(request->sentNs);
-  // Added before the message is sent, because the dispatcher may receive the reply before
-  // trySendLocked() of the channel returns.
-  requests_->add(*request, attempt.id);
-  MPF_STEP(request_added);
-  const auto result =
-      resultOf(channel_->trySendLocked(envelope, attempt.message, {link.header().queueSize, 0}));
-  if (result != SendResult::sent) {
-    auto copy = requests_->takeBack(*request);
-    if (attempt.copy != nullptr) *attempt.copy = std::move(copy);
-    count(link.control().clientRefused);
-    if (result == SendResult::queueFull) noteFull();
-    return result;
-  }
-  isFullReported_ = false;
-  attempt.startsNudging = !std::exchange(isNudging_, true);
-  link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-  link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
-  return result;
 }
 
 bool RequestSender::tryKeep(Request& request) {
@@ -174,15 +192,8 @@ bool RequestSender::tryKeep(Request& request) {
 SendResult RequestSender::trySendUntaken() {
   auto message = untaken_.front().message->duplicate();
   auto& next = untaken_.front();
-  Attempt attempt{message, next.deadlineNs, next.id, &next.message};
-  {
-    const std::lock_guard lock(*lock_);
-    const auto result = trySendLocked(attempt);
-    if (result != SendResult::sent) return result;
-    untaken_.removeFront();
-  }
-  onSent(attempt);
-  return SendResult::sent;
+  auto id = next.id;
+  return send(message, next.deadlineNs, id, &next.message, Turn::firstUntaken);
 }
 
 // Counts each refusal, and reports a series of them once, in its place among the other messages.

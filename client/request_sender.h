@@ -72,17 +72,17 @@ class RequestSender {
   bool tryEndNudging() noexcept;
 
  private:
-  struct Attempt {
-    Message& message;
-    std::int64_t deadlineNs;
-    std::uint32_t id;  // in: 0 for a new one
-    std::unique_ptr<Message>* copy = nullptr;  // moved from when the request is sent
-    bool startsNudging = false;
-  };
-  SendResult send(Attempt& attempt) noexcept;
-  SendResult sendWithCopy(Attempt& attempt) noexcept;
-  SendResult trySendLocked(Attempt& attempt) noexcept;
-  void onSent(const Attempt& attempt) noexcept;
+  // requestId   in: 0 for a new one; out: the id of a request that was sent
+  // copy        nullptr, or a copy to keep until the request is taken; moved from if it was sent
+  enum class Turn { last, firstUntaken };
+  SendResult send(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+                  std::unique_ptr<Message>* copy, Turn turn) noexcept;
+  SendResult trySendLocked(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
+                           std::unique_ptr<Message>* copy) noexcept;
+  SendResult sendWithCopy(Message& message, std::int64_t deadlineNs,
+                          std::uint32_t& requestId) noexcept;
+  Request* tryReserveMore(std::uint32_t& id, SendResult& refusal) noexcept;
+  SendResult takeBack(Request& request, SendResult result, std::unique_ptr<Message>* copy) noexcept;
   void setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept;
   SendResult refuseBehindUntaken() noexcept;
   void noteFull() noexcept;
