@@ -114,7 +114,7 @@ class RingProducer {
   }
 
  private:
-  static constexpr std::uint64_t kClaimedLines = 16;
+  static constexpr std::uint64_t kClaimedLines = 8;
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
