@@ -44,7 +44,9 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   auto& connection = Connection::of(route);
   const std::lock_guard lock(*connection.lock);
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
-  const Link::Batch batch(connection.channel->link());
+  auto& link = connection.channel->link();
+  const Link::Batch batch(link);
+  const auto sentBefore = link.outgoing().messages();
   RepliedMany sent;
   const auto client = route.link;
   for (auto& message : messages) {
@@ -53,15 +55,17 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
   }
-  noteSent(connection);
+  noteSent(link, sentBefore);
   return sent;
 }
 
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendOneLocked(Connection& connection,
                                                                      Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
+  auto& link = connection.channel->link();
+  const auto sentBefore = link.outgoing().messages();
   const auto result = sendLocked(connection, message);
-  noteSent(connection);
+  noteSent(link, sentBefore);
   return result;
 }
 
@@ -90,13 +94,10 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   return ReplyResult::sent;
 }
 
-// Counts the messages that were sent since the last call.
-inline void ReplySender::noteSent(Connection& connection) noexcept {
-  auto& link = connection.channel->link();
-  auto& sent = link.control().serverSent;
-  const auto now = link.outgoing().messages();
-  count(control_.sent, now - sent.load(std::memory_order_relaxed));
-  sent.store(now, std::memory_order_relaxed);
+inline void ReplySender::noteSent(Link& link, std::uint64_t sentBefore) noexcept {
+  const auto sent = link.outgoing().messages();
+  count(control_.sent, sent - sentBefore);
+  link.control().serverSent.store(sent, std::memory_order_relaxed);
 }
 
 // After the first reply to a request.

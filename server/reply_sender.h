@@ -41,7 +41,8 @@ class ReplySender {
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
   // The caller calls noteSent() after it has sent one or more messages.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
-  void noteSent(Connection& connection) noexcept;
+  //   sentBefore   number of messages that the link had sent before
+  void noteSent(Link& link, std::uint64_t sentBefore) noexcept;
   void noteReplied(Connection& connection, Message& message) noexcept;
   ReplyResult noteRefused(LinkSend result) noexcept;
 

@@ -50,6 +50,16 @@ TEST_F(ReplySenderTest, TheFirstReplyEndsTheRequest) {
   EXPECT_EQ(valueOf(control().sent), 2u);
 }
 
+TEST_F(ReplySenderTest, CountsItsRepliesWhateverTheClientWrites) {
+  auto reply = replyTo(owe(connection_, 3));
+  link_.control().serverSent.store(1000, std::memory_order_relaxed);
+
+  EXPECT_EQ(replies_.send(reply), ReplyResult::sent);
+
+  EXPECT_EQ(valueOf(control().sent), 1u);
+  EXPECT_EQ(valueOf(link_.control().serverSent), 1u);
+}
+
 TEST_F(ReplySenderTest, AReplyToAClientThatHasDisconnectedIsDropped) {
   auto reply = replyTo(owe(connection_, 3));
   connections_.close(connection_);
