@@ -64,7 +64,7 @@ Request* RequestSender::tryReserveMore(std::uint32_t& id, SendResult& refusal) n
   if (state_.load(std::memory_order_relaxed) != BindingState::connected)
     return SendResult::notConnected;
   auto& link = channel_->link();
-  // First, because the call of the clock would make the rest wait in memory.
+  // First: values that were computed before a call would have to be saved on the stack.
   const auto sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
   auto id = requestId;
   auto* request = requests_->tryReserve(id);

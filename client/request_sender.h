@@ -72,9 +72,10 @@ class RequestSender {
   bool tryEndNudging() noexcept;
 
  private:
-  // requestId   in: 0 for a new one; out: the id of a request that was sent
-  // copy        nullptr, or a copy to keep until the request is taken; moved from if it was sent
+  // last: behind the requests that were kept; firstUntaken: the first one of those.
   enum class Turn { last, firstUntaken };
+  //   requestId   in: 0 for a new one; out: the id of a request that was sent
+  //   copy        nullptr, or a copy to keep until the request is taken; moved from if it was sent
   SendResult send(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,
                   std::unique_ptr<Message>* copy, Turn turn) noexcept;
   SendResult trySendLocked(Message& message, std::int64_t deadlineNs, std::uint32_t& requestId,

@@ -55,24 +55,23 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
     if (sent.result != ReplyResult::sent) break;
     ++sent.count;
   }
-  noteSent(link, sentBefore);
+  if (const auto number = link.outgoing().messages() - sentBefore; number != 0)
+    count(control_.sent, number);
   return sent;
 }
 
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendOneLocked(Connection& connection,
                                                                      Message& message) noexcept {
   if (!connection.isOpenFor(message.route())) return ReplyResult::clientGone;
-  auto& link = connection.channel->link();
-  const auto sentBefore = link.outgoing().messages();
   const auto result = sendLocked(connection, message);
-  noteSent(link, sentBefore);
+  if (result == ReplyResult::sent) count(control_.sent);
   return result;
 }
 
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendLocked(Connection& connection,
                                                                   Message& message) noexcept {
   auto& link = connection.channel->link();
-  // First, because the call of the clock would make the rest wait in memory.
+  // First: values that were computed before a call would have to be saved on the stack.
   const auto sentTick = link.shouldSampleTime() ? Tick::of(Clock::nowNs()) : 0;
   const auto requestId = message.route().requestId;
   const bool isFirst = connection.owes(requestId);
@@ -90,14 +89,9 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto result = connection.channel->trySendLocked(envelope, message, {0, reserve});
   if (result != LinkSend::sent && result != LinkSend::sentInPlace) return noteRefused(result);
   MPF_STEP(reply_sent);
+  link.control().serverSent.store(link.outgoing().messages(), std::memory_order_relaxed);
   if (isFirst) noteReplied(connection, message);
   return ReplyResult::sent;
-}
-
-inline void ReplySender::noteSent(Link& link, std::uint64_t sentBefore) noexcept {
-  const auto sent = link.outgoing().messages();
-  count(control_.sent, sent - sentBefore);
-  link.control().serverSent.store(sent, std::memory_order_relaxed);
 }
 
 // After the first reply to a request.

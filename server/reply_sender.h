@@ -39,10 +39,8 @@ class ReplySender {
  private:
   RepliedMany sendRun(std::span<Message> messages) noexcept;
   ReplyResult sendOneLocked(Connection& connection, Message& message) noexcept;
-  // The caller calls noteSent() after it has sent one or more messages.
+  // The caller counts what was sent in `control_`.
   ReplyResult sendLocked(Connection& connection, Message& message) noexcept;
-  //   sentBefore   number of messages that the link had sent before
-  void noteSent(Link& link, std::uint64_t sentBefore) noexcept;
   void noteReplied(Connection& connection, Message& message) noexcept;
   ReplyResult noteRefused(LinkSend result) noexcept;
 

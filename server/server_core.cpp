@@ -12,7 +12,7 @@
 namespace mpf {
 namespace {
 
-// Of one receive(): more than the number of links, so that it looks at each link.
+// One receive() looks at more links than there are, so that it reaches each of them.
 constexpr std::uint32_t kMaxLooks = 2 * layout::kMaxLinks;
 
 int checkedQueueSize(int size) {
@@ -177,7 +177,7 @@ Message ServerCore::receive() {
     auto& connection = *connections_.all()[*index];
     Envelope envelope;
     if (!tryBegin(connection, envelope)) continue;
-    // Each of these makes the message in the memory of the caller.
+    // The message is made in the memory of the caller.
     if (MessageLink::isShort(envelope.body())) return finishShort(connection, envelope);
     if (auto message = finishLong(connection, envelope.body(), envelope.marks(),
                                   {envelope.sentTick, envelope.timeNs}))

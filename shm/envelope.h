@@ -24,14 +24,14 @@ struct Tick {
   }
 };
 
-// How to read the body of a message.
+// The part of an envelope that says how to read the body.
 struct BodyFields {
   std::uint16_t type{};
   std::uint8_t flags{};  // layout::kSlot...
   std::uint32_t bodyBytes{};
 };
 
-// What a reply has from its request.
+// The part of an envelope that a reply copies from its request.
 struct RequestMarks {
   std::uint32_t requestId{};
   std::int32_t clientType{};
@@ -62,6 +62,7 @@ struct FirstBody {
     const auto word = [&](int at) {
       std::uint64_t value = 0;
       std::memcpy(&value, bytes + at * sizeof value, sizeof value);
+      asm("" : "+r"(value));  // read once: a peer may change the bytes
       return value;
     };
     return {word(0), word(1), word(2)};

@@ -160,6 +160,10 @@ class RingProducer {
     const auto put = [&](std::size_t offset, std::uint64_t word) {
       std::memcpy(reinterpret_cast<std::byte*>(&first) + offset, &word, sizeof word);
     };
+    static_assert(offsetof(layout::Slot, type) == 8 && offsetof(layout::Slot, slots) == 10 &&
+                  offsetof(layout::Slot, flags) == 11 && offsetof(layout::Slot, bodyBytes) == 12 &&
+                  offsetof(layout::Slot, clientType) == offsetof(layout::Slot, requestId) + 4 &&
+                  offsetof(layout::Slot, sentTick) == offsetof(layout::Slot, clientExtra) + 4);
     put(offsetof(layout::Slot, type),
         joined(joined(envelope.type, static_cast<std::uint8_t>(slots), envelope.flags), bodyBytes));
     put(offsetof(layout::Slot, requestId),
@@ -226,7 +230,7 @@ class RingConsumer {
             first.clientType, first.clientExtra, first.sentTick,  first.deadlineNs};
   }
   // Whether the message begun has one slot.
-  [[nodiscard]] bool isShort() const noexcept { return slotsNow_ == 1; }
+  [[nodiscard]] bool hasOneSlot() const noexcept { return slotsNow_ == 1; }
 
   // Body bytes in the slots of the message begun; 0 if its number of slots is invalid.
   [[nodiscard]] std::size_t inlineCapacity() const noexcept {
@@ -254,8 +258,8 @@ class RingConsumer {
   void end() noexcept {
     end(slotsNow_ >= 1 && slotsNow_ <= layout::kMaxMessageSlots ? slotsNow_ : 1u);
   }
-  // The same if isShort().
-  void endShort() noexcept { end(1); }
+  // The same if hasOneSlot().
+  void endOneSlot() noexcept { end(1); }
   // The owner has looked for a message and found none: frees the slots that remain.
   void onEmpty() noexcept {
     if (taken_ != freed_) free();

@@ -200,9 +200,9 @@ class Message {
     std::int32_t clientExtra = 0;
     std::int64_t timeStampNs = 0;
   };
-  // As copyInline(), without a copy, and with the attributes: resets this handle, then `fill`
-  // receives a span of its kInlineBytes bytes and writes the first `size` of them. `fill` must not
-  // throw. `size` must be at most kInlineBytes, which is not checked.
+  // Resets this handle and makes it a message with these attributes: `fill` receives a span of its
+  // kInlineBytes bytes and writes the first `size` of them, then the body is checked: isSound() is
+  // the result. `fill` must not throw. `size` must be at most kInlineBytes, which is not checked.
   template <class Fill>
   void assignInline(MessageType type, std::size_t size, const Attributes& attributes,
                     Fill&& fill) noexcept {

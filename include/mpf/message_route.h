@@ -6,7 +6,7 @@
 //
 // Threads  a Route is plain data. RouteKeeper says which thread calls it.
 // Throws   nothing.
-// Trust    a Route is never read from a peer.
+// Trust    `link` and `keeper` never come from a peer; the rest may have any value.
 #pragma once
 
 #include <cstdint>

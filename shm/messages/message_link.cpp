@@ -8,7 +8,7 @@
 namespace mpf {
 
 MessageLink::Take MessageLink::checkLong(BodyFields body) const noexcept {
-  // A short body has one slot: tryBegin() has looked.
+  // tryBegin() itself accepts a short body with a type in one slot.
   if (isShort(body) || !hasType(body)) return Take::invalid;
   const auto room = link_->incoming().inlineCapacity();
   const bool isChunk = (body.flags & layout::kSlotChunk) != 0;

@@ -36,15 +36,15 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
       return Take::nothing;
     }
     envelope = link_->incoming().begin();
-    const bool fitsSlot = link_->incoming().isShort() && isShort(envelope.body());
+    const bool fitsSlot = link_->incoming().hasOneSlot() && isShort(envelope.body());
     return fitsSlot && hasType(envelope.body()) ? Take::message : checkLong(envelope.body());
   }
   // Whether the body fits into one slot.
   [[nodiscard]] static bool isShort(BodyFields body) noexcept {
     return (body.flags & layout::kSlotChunk) == 0 && body.bodyBytes <= layout::kFirstSlotBodyBytes;
   }
-  // Returns the message begun, whose body isShort(), and frees its slot. Sets route and time stamp,
-  // too: so the compiler writes each field of the message once.
+  // Returns the message begun, whose body isShort(), and frees its slot. Takes route and time stamp
+  // because a later change would write these fields twice.
   [[nodiscard]] Message finishShort(const Envelope& envelope, const Route& route,
                                     std::int64_t timeStampNs) noexcept {
     auto& ring = link_->incoming();
@@ -53,7 +53,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
     message.assignInline(static_cast<MessageType>(envelope.type), envelope.bodyBytes,
                          {route, envelope.clientType, envelope.clientExtra, timeStampNs},
                          [&](auto bytes) { body.copyTo(bytes.data()); });
-    ring.endShort();
+    ring.endOneSlot();
     return message;
   }
   // `invalid`: the body is invalid. `unavailable`: the body cannot be mapped, because its owner
