@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "tests/drivers/serial/line_collector.h"
 #include "tests/drivers/serial/terminal_server.h"
@@ -102,8 +103,9 @@ TEST_F(TcpSerialPortTest, ReportsWhyItCannotBeOpened) {
 
   EXPECT_THAT(whyNot({.address = server_.address()}),
               HasSubstr("connect to " + server_.address().toString() + ": Connection refused"));
-  EXPECT_THAT(whyNot({.address = {"no-such-host.invalid", "1"}}),
-              HasSubstr("resolve no-such-host.invalid:1"));
+  // A label of more than 63 characters is no name, so no name server is asked.
+  const std::string noName(64, 'a');
+  EXPECT_THAT(whyNot({.address = {noName, "1"}}), HasSubstr("resolve " + noName + ":1"));
 }
 
 // The accept queue is full, so the kernel does not answer.
