@@ -68,6 +68,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   return result;
 }
 
+// Inline, so that the envelope stays in registers.
 [[gnu::always_inline]] inline ReplyResult ReplySender::sendLocked(Connection& connection,
                                                                   Message& message) noexcept {
   auto& link = connection.channel->link();

@@ -11,8 +11,8 @@
 // A message is copied right after its fields were written one by one. A memcpy of constant length
 // uses loads that are as wide as the processor has; such a load cannot be served from several
 // narrower stores that are still in the store buffer, so it waits for them: about 5 ns a message.
-// Stores are as wide as possible: a processor completes about one in each cycle, so their number
-// limits the rate of small messages.
+// Stores are as wide as possible, because their number limits the rate of small messages: see
+// docs/decisions/0031-few-stores.md.
 //
 // Threads  as memcpy: `to` belongs to the caller.
 // Trust    `from` may be shared memory that a peer overwrites: the copy then has any contents.
