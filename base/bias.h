@@ -74,20 +74,20 @@ class Bias {
 
  private:
   static constexpr std::uint32_t kEntries = 256;
+  static constexpr std::uint64_t kNoThread = 1;  // numbers of threads are even
 
   [[nodiscard]] bool isOwner() const noexcept {
-    const auto me = threadNumberOrZero();
-    return me != 0 && owner_.load(std::memory_order_relaxed) == me;
+    return owner_.load(std::memory_order_relaxed) == threadNumberOrZero();
   }
   // isInside_ has one writer, so no second thread becomes the owner.
   [[nodiscard]] bool mayEnable() const noexcept {
-    return (owner_.load(std::memory_order_relaxed) == 0 || isOwner()) &&
+    return (owner_.load(std::memory_order_relaxed) == kNoThread || isOwner()) &&
            expedited_barrier::tryRegister();
   }
 
   std::atomic<bool> isEnabled_{false};
   std::atomic<bool> isInside_{false};  // written by the owner
-  std::atomic<std::uint64_t> owner_{0};  // written once
+  std::atomic<std::uint64_t> owner_{kNoThread};  // written once
   std::uint64_t lastThread_ = 0;  // of the last entry by the real lock
   std::uint32_t entries_ = 0;  // of that thread in a row
 };

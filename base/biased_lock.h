@@ -15,7 +15,7 @@ class BiasedLock {
   void lock() noexcept {
     if (!bias_.tryEnter()) lockReal();
   }
-  void unlock() noexcept {
+  [[gnu::always_inline]] void unlock() noexcept {
     if (bias_.isMine()) bias_.leave();
     else real_.unlock();
   }

@@ -11,8 +11,9 @@
 namespace mpf {
 
 namespace detail {
-inline constinit thread_local std::uint64_t ownThreadNumber = 0;
-}
+// In a shared library that a program loads late, too, reading the number costs no function call.
+[[gnu::tls_model("initial-exec")]] inline constinit thread_local std::uint64_t ownThreadNumber = 0;
+}  // namespace detail
 
 // An even number that no other thread of this process has or had; never 0.
 inline std::uint64_t threadNumber() noexcept {

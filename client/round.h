@@ -21,15 +21,15 @@ class Round {
     bindings_ = std::move(bindings);
     next_ = 0;
   }
-  [[nodiscard]] bool isOver() const noexcept { return next_ == bindings_.size(); }
+  [[nodiscard]] bool isOver() const noexcept { return bindings_.empty(); }
   // Calls `act` for one binding after the other until it has returned true for kPerStep of them.
   template <class Act>
   void resume(const Act& act) {
-    for (int acted = 0; acted < kPerStep && !isOver();) {
+    for (int acted = 0; acted < kPerStep && next_ < bindings_.size();) {
       const auto binding = bindings_[next_++].lock();
       if (binding && act(*binding)) ++acted;
     }
-    if (isOver()) begin({});  // release the references
+    if (next_ >= bindings_.size()) begin({});  // release the references
   }
 
  private:

@@ -13,6 +13,8 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
 # Fields of messages are stored one by one and loaded soon afterwards. A vector load of several
 # fields would have to wait until their stores have reached the cache.
 add_compile_options(-fno-tree-slp-vectorize)
+# Code for shared libraries, too, calls the functions of its own source file directly.
+add_compile_options(-fno-semantic-interposition)
 add_compile_options("SHELL:-iquote ${CMAKE_SOURCE_DIR}"
   "SHELL:-iquote ${CMAKE_BINARY_DIR}/generated")
 
