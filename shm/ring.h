@@ -41,7 +41,8 @@ namespace mpf {
                                         sizeof(layout::MoreSlot::body));
 }
 
-// The consumer frees slots when it has taken 1/kFreeFraction of the ring or the ring is empty.
+// The consumer frees slots when it has taken kMaxBatch or 1/kFreeFraction of the ring, or when the
+// ring is empty.
 inline constexpr std::uint32_t kFreeFraction = 8;
 
 // Number of slots of a ring in which `messages` messages of one slot always fit.
@@ -114,7 +115,11 @@ class RingProducer {
   }
 
  private:
-  static constexpr std::uint64_t kClaimedLines = 8;
+  // Lines that are claimed at once. In a stream, many: its consumer keeps a distance. Otherwise
+  // few: the consumer may be about to read a slot that waits for the transfers of these lines.
+  static constexpr std::uint64_t kFewestClaimed = 8;
+  static constexpr std::uint64_t kMostClaimed = 32;
+  static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
@@ -124,6 +129,7 @@ class RingProducer {
   [[gnu::noinline]] bool hasFreed(std::uint32_t count) noexcept {
     // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
     freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
+    claim_ = pushed_ - freedSeen_ >= kFarAhead ? kMostClaimed : kFewestClaimed;
     if (pushed_ + count - freedSeen_ <= usable_) return true;
     return second_.slots != nullptr && tryMove() && count <= usable_;
   }
@@ -146,7 +152,7 @@ class RingProducer {
   // messages do not, because the stores of one message fill the store buffer. (prefetchw had no
   // effect here: a processor did not take a line with it that it shared with another one.)
   [[gnu::noinline]] void claimLines() noexcept {
-    claimed_ = std::min(freedSeen_ + capacity_, pushed_ + kClaimedLines);
+    claimed_ = std::min(freedSeen_ + capacity_, pushed_ + claim_);
     for (auto position = pushed_; position < claimed_; ++position) {
       volatile auto& field = slot(position).type;
       field = field;
@@ -200,6 +206,7 @@ class RingProducer {
   SecondRing second_;  // until we have moved there
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
+  std::uint64_t claim_ = kFewestClaimed;  // lines that are claimed at once
   std::uint64_t claimed_ = 0;  // slots before this position were claimed
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
@@ -212,9 +219,9 @@ class RingConsumer {
       : slots_(slots), capacity_(capacity), own_(own), second_(second), first_(slots) {}
 
   [[nodiscard]] bool hasMessage() noexcept {
-    return sequence() == taken_ + 1 ||
-           (sequence() == (layout::kContinuesInSecondRing | (taken_ + 1)) && tryMove() &&
-            sequence() == taken_ + 1);
+    const auto seen = sequence();
+    return seen == taken_ + 1 || (seen == (layout::kContinuesInSecondRing | (taken_ + 1)) &&
+                                  tryMove() && sequence() == taken_ + 1);
   }
 
   // Counts the next message as taken and copies its envelope. Call it only after hasMessage()
@@ -263,7 +270,7 @@ class RingConsumer {
   // The owner has looked for a message and found none: frees the slots that remain.
   void onEmpty() noexcept {
     if (taken_ != freed_) free();
-    lookAt_ = taken_ + kLookEvery;
+    batchEnd_ = taken_ + batch_;
   }
 
   [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
@@ -283,6 +290,7 @@ class RingConsumer {
       return false;
     slots_ = std::exchange(second_.slots, nullptr);
     capacity_ = second_.capacity;
+    batch_ = batchOf(capacity_);
     first_ = &slot(taken_);
     MPF_STEP(ring_followed);
     return true;
@@ -291,11 +299,18 @@ class RingConsumer {
   void end(std::uint32_t slots) noexcept {
     taken_ += slots;
     first_ = &slot(taken_);
-    if (taken_ - freed_ >= capacity_ / kFreeFraction) free();
-    if (taken_ >= lookAt_) lookAhead();
+    if (taken_ >= batchEnd_) endBatch();
+  }
+  [[gnu::noinline]] void endBatch() noexcept {
+    free();
+    batchEnd_ = taken_ + batch_;
+    lookAhead();
   }
 
-  static constexpr std::uint64_t kLookEvery = 16;  // slots
+  static constexpr std::uint64_t kMaxBatch = 16;  // slots
+  static constexpr std::uint64_t batchOf(std::uint64_t capacity) noexcept {
+    return std::min(kMaxBatch, capacity / kFreeFraction);
+  }
   static constexpr std::uint64_t kNear = 64;  // slots; at most a quarter of the ring
   static constexpr std::uint64_t kMaxWaitEvery = 4096;
   static constexpr int kMaxPauses = 100;
@@ -310,11 +325,10 @@ class RingConsumer {
   // In a stream of messages, keeps a distance to the producer, and asks for the next lines before
   // they are read. A consumer close behind the producer takes lines away from it that the producer
   // is about to write; then each message costs both sides a transfer of a line.
-  [[gnu::noinline]] void lookAhead() noexcept {
-    lookAt_ = taken_ + kLookEvery;
+  void lookAhead() noexcept {
     const auto near = std::min(kNear, capacity_ / 4);
     if (!isFilledUpTo(taken_ + near) && !tryWaitForProducer(2 * near)) return;
-    for (auto position = taken_; position < lookAt_; ++position)
+    for (auto position = taken_; position < batchEnd_; ++position)
       __builtin_prefetch(&slot(position));
   }
   [[nodiscard]] bool isFilledUpTo(std::uint64_t end) const noexcept {
@@ -324,10 +338,10 @@ class RingConsumer {
   // the next wait is made later: the producer may be waiting for us.
   bool tryWaitForProducer(std::uint64_t distance) noexcept {
     if (taken_ < waitAt_) return false;
-    auto end = taken_ + kLookEvery;
-    while (end <= taken_ + distance && isFilledSoon(end)) end += kLookEvery;
+    auto end = taken_ + batch_;
+    while (end <= taken_ + distance && isFilledSoon(end)) end += batch_;
     const bool isDistant = end > taken_ + distance;
-    waitEvery_ = isDistant ? kLookEvery : std::min(2 * waitEvery_, kMaxWaitEvery);
+    waitEvery_ = isDistant ? batch_ : std::min(2 * waitEvery_, kMaxWaitEvery);
     waitAt_ = taken_ + waitEvery_;
     return isDistant;
   }
@@ -346,9 +360,10 @@ class RingConsumer {
   const layout::Slot* first_;  // slot(taken_)
   std::uint64_t taken_ = 0;  // slots
   std::uint64_t freed_ = 0;  // private copy of own_.freed
-  std::uint64_t lookAt_ = kLookEvery;  // position of the next lookAhead()
+  std::uint64_t batch_ = batchOf(capacity_);  // slots that are freed at once
+  std::uint64_t batchEnd_ = batch_;
   std::uint64_t waitAt_ = 0;  // no wait for the producer before this position
-  std::uint64_t waitEvery_ = kLookEvery;
+  std::uint64_t waitEvery_ = batch_;
   std::uint64_t messages_ = 0;
   std::uint8_t slotsNow_ = 0;
 };
