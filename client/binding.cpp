@@ -112,15 +112,6 @@ bool Binding::hasDeadPeer() const noexcept {
   return isLinked() && channel().link().peer()->isDead();
 }
 
-// Delivers the messages that the server sent before it closed the link or died. A server that is
-// still alive could send without end, so at most one ring of messages is delivered.
-void Binding::deliverRemaining(const MessageLink* ended) {
-  while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
-    --end_.remainingSlots;
-    if (takeOne() != Taken::message) end_.remainingSlots = 0;
-  }
-}
-
 void Binding::disconnect(const std::string& reason, Ending ending) {
   connector_.setReason(reason);
   resume();

@@ -111,16 +111,16 @@ class Binding : public std::enable_shared_from_this<Binding> {
     return parts_.endpoint.control();
   }
 
-  enum class Taken { nothing, message, invalid };
-  // Takes the next message of the link and delivers it. After `invalid`, the caller disconnects.
-  Taken takeOne();
+  // Takes the next message of the link and delivers it. Returns false if it is invalid; then the
+  // caller disconnects.
+  bool tryTakeOne();
   bool onLinkState();
   void onAccepted(Link& link);
   struct Times {
     std::uint32_t sentTick;
     std::int64_t timeNs;
   };
-  Taken takeLong(BodyFields fields, RequestMarks marks, Times times, Request* request);
+  bool tryTakeLong(BodyFields fields, RequestMarks marks, Times times, Request* request);
   void dropReply(BodyFields fields, Request* request);
   bool tryDeliver(Message&& message, std::uint32_t sentTick, Request* request);
   void endRequest(Request& request);

@@ -28,57 +28,60 @@ bool mayServerSend(const Message& message, const Request* request) noexcept {
 // stops polling the link.
 bool Binding::takeSome(int most) {
   int taken = 0;
-  for (; taken < most && isLinked() && !isPaused_; ++taken) {
-    const auto result = takeOne();
-    if (result == Taken::nothing) break;
-    if (result == Taken::message) continue;
+  for (; taken < most && isLinked() && !isPaused_ && channel().hasMessage(); ++taken) {
+    if (tryTakeOne()) continue;
     count(control().protocolErrors);
     disconnect("the server sent invalid data", Ending::protocolError);
   }
   return taken != 0 || (isLinked() && !isPaused_ && onLinkState());
 }
 
-Binding::Taken Binding::takeOne() {
+// Delivers the messages that the server sent before it closed the link or died. A server that is
+// still alive could send without end, so at most one ring of messages is delivered.
+void Binding::deliverRemaining(const MessageLink* ended) {
+  while (sender_.channel().get() == ended && end_.remainingSlots != 0) {
+    --end_.remainingSlots;
+    if (!channel().hasMessage() || !tryTakeOne()) end_.remainingSlots = 0;
+  }
+}
+
+[[gnu::always_inline]] inline bool Binding::tryTakeOne() {
   auto& channel = this->channel();
   Envelope envelope;
-  const auto take = channel.tryBegin(envelope);
-  if (take == MessageLink::Take::nothing) return Taken::nothing;
-  if (take == MessageLink::Take::invalid) return Taken::invalid;
+  if (!channel.tryBegin(envelope)) return false;
   count(control().received);
   Request* request = nullptr;
   if ((envelope.flags & layout::kSlotFirstReply) != 0) {
     request = sender_.requests()->find(envelope.requestId);
     if (request == nullptr || request->isGivenUp) {
       dropReply(envelope.body(), request);
-      return Taken::message;
+      return true;
     }
   }
   if (!MessageLink::isShort(envelope.body())) {
-    return takeLong(envelope.body(), envelope.marks(), {envelope.sentTick, envelope.timeNs},
-                    request);
+    return tryTakeLong(envelope.body(), envelope.marks(), {envelope.sentTick, envelope.timeNs},
+                       request);
   }
   const Route route{0, envelope.requestId, request != nullptr ? kEndsRequest : 0, nullptr};
   auto message = channel.finishShort(envelope, route, envelope.timeNs);
-  return tryDeliver(std::move(message), envelope.sentTick, request) ? Taken::message
-                                                                    : Taken::invalid;
+  return tryDeliver(std::move(message), envelope.sentTick, request);
 }
 
-Binding::Taken Binding::takeLong(BodyFields fields, RequestMarks marks, Times times,
-                                 Request* request) {
+bool Binding::tryTakeLong(BodyFields fields, RequestMarks marks, Times times, Request* request) {
   Message message;
   switch (channel().tryFinishLong(fields, marks, message)) {
     case MessageLink::Finish::invalid:
-      return Taken::invalid;
+      return false;
     case MessageLink::Finish::unavailable:
       if (request != nullptr) deliverFate(*request, Fate::outcomeUnknown);
-      return Taken::message;
+      return true;
     case MessageLink::Finish::message:
       break;
   }
   const auto missed = Message::missedFlags(message.getMissed());
   message.setRoute({0, marks.requestId, missed | (request != nullptr ? kEndsRequest : 0), nullptr});
   message.setTimeStampNs(times.timeNs);
-  return tryDeliver(std::move(message), times.sentTick, request) ? Taken::message : Taken::invalid;
+  return tryDeliver(std::move(message), times.sentTick, request);
 }
 
 // A reply to a request that has had its fate.

@@ -39,22 +39,19 @@ std::unique_ptr<Message> tryCopy(const Message& message) noexcept try {
 
 }  // namespace
 
-// Reserves an entry for a new request, or refuses the request: returns nullptr and the reason.
-Request* RequestSender::tryReserveMore(std::uint32_t& id, SendResult& refusal) noexcept {
+// Lets more requests be outstanding, once, and returns `sent`; or counts and returns a refusal.
+SendResult RequestSender::tryAllowMore() noexcept {
   auto& link = channel_->link();
-  if (requests_->maxOutstanding() < link.header().maxOutstanding) {
+  const auto most = link.header().maxOutstanding;
+  if (requests_->maxOutstanding() < most) {
     // The link gets memory for the replies to as many requests as the server permits.
-    if (!link.tryAllowMore() || !requests_->tryAllow(link.header().maxOutstanding)) {
-      count(link.control().clientRefused);
-      refusal = SendResult::noMemory;
-      return nullptr;
-    }
-    if (auto* const request = requests_->tryReserve(id)) return request;
+    if (link.tryAllowMore() && requests_->tryAllow(most)) return SendResult::sent;
+    count(link.control().clientRefused);
+    return SendResult::noMemory;
   }
   count(link.control().clientRefused);
   noteFull();
-  refusal = SendResult::tooManyOutstanding;
-  return nullptr;
+  return SendResult::tooManyOutstanding;
 }
 
 // The caller sets isNudging_ and calls setTimers() after it has sent one or more messages.
@@ -67,11 +64,9 @@ Request* RequestSender::tryReserveMore(std::uint32_t& id, SendResult& refusal) n
   // First: values that were computed before a call would have to be saved on the stack.
   const auto sentNs = link.shouldSampleTime() ? Clock::nowNs() : 0;
   auto id = requestId;
-  auto* request = requests_->tryReserve(id);
-  if (request == nullptr) {
-    auto refusal = SendResult::sent;
-    request = tryReserveMore(id, refusal);
-    if (request == nullptr) return refusal;
+  Request* request = nullptr;
+  while ((request = requests_->tryReserve(id)) == nullptr) {
+    if (const auto refusal = tryAllowMore(); refusal != SendResult::sent) return refusal;
   }
   const Envelope envelope{
       .type = static_cast<std::uint16_t>(message.getType()),

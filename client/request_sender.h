@@ -82,7 +82,7 @@ class RequestSender {
                            std::unique_ptr<Message>* copy) noexcept;
   SendResult sendWithCopy(Message& message, std::int64_t deadlineNs,
                           std::uint32_t& requestId) noexcept;
-  Request* tryReserveMore(std::uint32_t& id, SendResult& refusal) noexcept;
+  SendResult tryAllowMore() noexcept;
   SendResult takeBack(Request& request, SendResult result, std::unique_ptr<Message>* copy) noexcept;
   void setTimers(bool startsNudging, std::int64_t deadlineNs) noexcept;
   SendResult refuseBehindUntaken() noexcept;

@@ -56,10 +56,11 @@ class RequestTable {
   // when the maximum is outstanding or another request has the place of that id.
   Request* tryReserve(std::uint32_t& id) noexcept {
     if (outstanding() >= max_) return nullptr;
-    if (id != 0) return isFree(id) ? &sender_.at(id) : nullptr;
+    if (id != 0) return tryPlace(id);
     for (;;) {
       id = ++lastId_;
-      if (id != 0 && isFree(id)) return &sender_.at(id);
+      if (id == 0) continue;
+      if (auto* const request = tryPlace(id)) return request;
     }
   }
   void add(Request& request, std::uint32_t id) noexcept {
@@ -88,9 +89,7 @@ class RequestTable {
     givenUp_.store(givenUp_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
   void end(Request& request) noexcept {
-    if (std::exchange(request.isGivenUp, false))
-      givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
-    request.copy.reset();
+    if (request.isGivenUp || request.copy) drop(request);
     ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     // PAIR(request-ended): this thread no longer uses the entry.
     request.id.store(0, std::memory_order_release);
@@ -115,10 +114,13 @@ class RequestTable {
     std::uint32_t mask = 0;
     [[nodiscard]] Request& at(std::uint32_t id) const noexcept { return entries[id & mask]; }
   };
-  [[nodiscard]] bool isFree(std::uint32_t id) noexcept {
+  // The place of `id`, or nullptr if another request has it.
+  [[nodiscard]] Request* tryPlace(std::uint32_t id) noexcept {
+    auto& request = sender_.at(id);
     // PAIR(request-ended): the dispatcher's thread no longer uses the entry.
-    return sender_.at(id).id.load(std::memory_order_acquire) == 0 &&
-           (!hasInFirst_ || !hasPlaceInFirst(id));
+    const bool isFree =
+        request.id.load(std::memory_order_acquire) == 0 && (!hasInFirst_ || !hasPlaceInFirst(id));
+    return isFree ? &request : nullptr;
   }
   [[nodiscard]] bool hasPlaceInFirst(std::uint32_t id) noexcept;
   [[nodiscard]] bool hasGrown() const noexcept {
@@ -126,6 +128,7 @@ class RequestTable {
     return hasGrown_.load(std::memory_order_acquire);
   }
   Request* findInBoth(std::uint32_t id) noexcept;
+  void drop(Request& request) noexcept;
 
   Places receiver_;  // the table in which the dispatcher's thread looks first
   Places sender_;  // the table for new requests; under the client's lock

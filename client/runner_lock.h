@@ -31,6 +31,10 @@ class RunnerLock {
            (owner_.load(std::memory_order_relaxed) & ~kTemporary) == threadNumber();
   }
 
+  // Makes the calling thread the runner, if it has been the only one for a while and does not run
+  // the dispatcher already. Cheap.
+  [[nodiscard]] bool tryEnter() noexcept { return !bias_.isInside() && bias_.tryEnter(); }
+
   // Makes the calling thread, which does not own the lock, the runner.
   //   wakeOwner  makes a temporary owner call isRunnerWaiting()
   //   throws     std::logic_error when another thread is the runner
@@ -45,7 +49,7 @@ class RunnerLock {
 
   // False when another thread owns the lock or waits in acquire().
   [[nodiscard]] bool tryAcquireTemporarily() noexcept;
-  void release() noexcept {
+  [[gnu::always_inline]] void release() noexcept {
     if (bias_.isMine()) bias_.leave();
     else releaseReal();
   }

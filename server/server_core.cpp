@@ -109,17 +109,15 @@ inline void ServerCore::noteTaken(Connection& connection, std::uint32_t requestI
 [[gnu::always_inline]] inline bool ServerCore::tryBegin(Connection& connection,
                                                         Envelope& envelope) noexcept {
   if (!connection.channel) return false;
-  auto& control = endpoint_.control();
-  switch (connection.channel->tryBegin(envelope)) {
-    case MessageLink::Take::nothing:
-      connections_.closeIfClientDid(connection);
-      return false;
-    case MessageLink::Take::invalid:
-      closeForProtocolError(connection);
-      return false;
-    case MessageLink::Take::message:
-      break;
+  if (!connection.channel->hasMessage()) {
+    connections_.closeIfClientDid(connection);
+    return false;
   }
+  if (!connection.channel->tryBegin(envelope)) {
+    closeForProtocolError(connection);
+    return false;
+  }
+  auto& control = endpoint_.control();
   count(control.received);
   count(control.progress);
   if (!connection.tryOwe(envelope.requestId)) {

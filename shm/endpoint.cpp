@@ -113,8 +113,7 @@ MaybeIndex Endpoint::nextReady() noexcept {
   return *index;
 }
 
-bool Endpoint::takeLocalEvent() noexcept {
-  if (localEvent_.load(std::memory_order_relaxed) == 0) return false;
+bool Endpoint::takeLocalEventNow() noexcept {
   // PAIR(local-event): sees everything that happened before interrupt().
   return localEvent_.exchange(0, std::memory_order_acquire) != 0;
 }

@@ -76,7 +76,9 @@ class Endpoint {
   // Clients that ask to be accepted.
   [[nodiscard]] Knocks& knocks() noexcept { return knocks_; }
   // True after an event in this process: a peer died, a server appeared, interrupt() was called.
-  bool takeLocalEvent() noexcept;
+  bool takeLocalEvent() noexcept {
+    return localEvent_.load(std::memory_order_relaxed) != 0 && takeLocalEventNow();
+  }
   // After takeLocalEvent() returned true: whether a peer died. Its links have peer()->isDead().
   bool takePeerDeath() noexcept { return peerDied_.exchange(false, std::memory_order_relaxed); }
 
@@ -112,6 +114,7 @@ class Endpoint {
     return sinceHints_ >= kHintsEvery ||
            (sinceHints_ >= HotLinks::kCapacity && hot_.size() == HotLinks::kCapacity);
   }
+  bool takeLocalEventNow() noexcept;
   MaybeIndex nextAfterHints() noexcept;
   MaybeIndex nextReady() noexcept;
   MaybeIndex nextCold() noexcept;

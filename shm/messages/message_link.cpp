@@ -7,13 +7,12 @@
 
 namespace mpf {
 
-MessageLink::Take MessageLink::checkLong(BodyFields body) const noexcept {
-  // tryBegin() itself accepts a short body with a type in one slot.
-  if (isShort(body) || !hasType(body)) return Take::invalid;
+// tryBegin() itself accepts a short body with a type in one slot.
+bool MessageLink::isValidLong(BodyFields body) const noexcept {
+  if (isShort(body) || !hasType(body)) return false;
   const auto room = link_->incoming().inlineCapacity();
   const bool isChunk = (body.flags & layout::kSlotChunk) != 0;
-  return room != 0 && body.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room) ? Take::message
-                                                                                    : Take::invalid;
+  return room != 0 && body.bodyBytes <= (isChunk ? link_->maxMessageBytes() : room);
 }
 
 MessageLink::Finish MessageLink::tryFinishLong(BodyFields fields, RequestMarks marks,

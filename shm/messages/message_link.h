@@ -27,17 +27,18 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] Link& link() noexcept { return *link_; }
   [[nodiscard]] BiasedLock& lock() noexcept { return *lock_; }
 
-  enum class Take { nothing, message, invalid };
-  // Begins the next message: copies its envelope and counts it as taken. Returns `nothing`, and
-  // changes nothing, if there is no message; `invalid` if the envelope is invalid.
-  Take tryBegin(Envelope& envelope) noexcept {
-    if (!link_->incoming().hasMessage()) {
-      link_->incoming().onEmpty();
-      return Take::nothing;
-    }
+  // Whether there is a message to begin. If not, frees the slots of all that were taken.
+  [[nodiscard]] bool hasMessage() noexcept {
+    if (link_->incoming().hasMessage()) return true;
+    link_->incoming().onEmpty();
+    return false;
+  }
+  // Begins the next message, after hasMessage(): copies its envelope and counts it as taken.
+  // Returns false if the envelope is invalid.
+  [[nodiscard]] bool tryBegin(Envelope& envelope) noexcept {
     envelope = link_->incoming().begin();
     const bool fitsSlot = link_->incoming().hasOneSlot() && isShort(envelope.body());
-    return fitsSlot && hasType(envelope.body()) ? Take::message : checkLong(envelope.body());
+    return (fitsSlot && hasType(envelope.body())) || isValidLong(envelope.body());
   }
   // Whether the body fits into one slot.
   [[nodiscard]] static bool isShort(BodyFields body) noexcept {
@@ -87,7 +88,7 @@ class MessageLink final : public BodyLender, public std::enable_shared_from_this
   [[nodiscard]] static bool hasType(BodyFields body) noexcept {
     return body.type != static_cast<std::uint16_t>(MessageType::none);
   }
-  [[nodiscard]] Take checkLong(BodyFields body) const noexcept;
+  [[nodiscard]] bool isValidLong(BodyFields body) const noexcept;
   Finish readBody(BodyFields fields, Message& message) noexcept;
   // For a body in a chunk; an empty handle if there is no such chunk.
   //   throws  ChunkUnavailable

@@ -80,15 +80,15 @@ bool Talk::tryFinish(const Envelope& envelope, Message& message) {
 
 // Returns false when no message waits, or when invalid data ends the talk.
 bool Talk::tryTakeOne(std::uint64_t choice) {
+  if (!channel_->hasMessage()) return false;
   Envelope envelope;
-  const auto take = channel_->tryBegin(envelope);
-  if (take == MessageLink::Take::nothing) return false;
-  if (take == MessageLink::Take::message && choice % 4 == 3) {
+  const bool isValid = channel_->tryBegin(envelope);
+  if (isValid && choice % 4 == 3) {
     channel_->discard(envelope.body());
     return true;
   }
   Message message;
-  isOver_ = take == MessageLink::Take::invalid || !tryFinish(envelope, message);
+  isOver_ = !isValid || !tryFinish(envelope, message);
   if (isOver_) return false;
   lookAt(message);
   if (choice % 4 == 0) sendBack(envelope, message);
