@@ -26,7 +26,7 @@ namespace mpf {
 class Bias {
  public:
   // True when the bias is enabled for the calling thread, which is inside until leave().
-  [[nodiscard]] bool tryEnter() noexcept {
+  [[nodiscard, gnu::always_inline]] bool tryEnter() noexcept {
     // PAIR(bias-disabled): sees what the other thread did before it disabled the bias.
     if (!isEnabled_.load(std::memory_order_acquire) || !isOwner()) return false;
     isInside_.store(true, std::memory_order_relaxed);
@@ -40,7 +40,7 @@ class Bias {
     isInside_.store(false, std::memory_order_release);
   }
   // Whether the calling thread is inside.
-  [[nodiscard]] bool isMine() const noexcept {
+  [[nodiscard, gnu::always_inline]] bool isMine() const noexcept {
     return isOwner() && isInside_.load(std::memory_order_relaxed);
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // BiasedLock: a SpinLock that costs a thread no locked instruction as long as this thread alone
-// uses it.
+// uses it. A Guard holds it.
 //
 // Threads  any. As for SpinLock: held for a few tens of instructions, and not in shared memory.
 #pragma once
@@ -12,16 +12,27 @@ namespace mpf {
 
 class BiasedLock {
  public:
-  void lock() noexcept {
-    if (!bias_.tryEnter()) lockReal();
-  }
-  [[gnu::always_inline]] void unlock() noexcept {
-    if (bias_.isMine()) bias_.leave();
-    else real_.unlock();
-  }
+  // Holds the lock until the end of the scope. Inline, because it is on the path of each message.
+  class Guard {
+   public:
+    [[gnu::always_inline]] explicit Guard(BiasedLock& lock) noexcept
+        : lock_(lock), isInside_(lock.bias_.tryEnter()) {
+      if (!isInside_) lock.lockReal();
+    }
+    [[gnu::always_inline]] ~Guard() {
+      if (isInside_) lock_.bias_.leave();
+      else lock_.real_.unlock();
+    }
+    Guard(const Guard&) = delete;
+    Guard& operator=(const Guard&) = delete;
+
+   private:
+    BiasedLock& lock_;
+    const bool isInside_;  // has entered by the bias
+  };
 
  private:
-  // Not inline, so that lock() is.
+  // Not inline, so that Guard is.
   [[gnu::noinline]] void lockReal() noexcept {
     real_.lock();
     if (!bias_.disable()) SpinLock::waitUntil([this] { return !bias_.isInside(); });

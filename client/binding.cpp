@@ -23,7 +23,7 @@ Message fateMessage(Fate fate, std::uint32_t requestId, std::int32_t clientType,
 }  // namespace
 
 void Binding::setState(BindingState state) noexcept {
-  const std::lock_guard lock(*sender_.lock());
+  const BiasedLock::Guard lock(*sender_.lock());
   state_.store(state, std::memory_order_relaxed);
 }
 
@@ -100,6 +100,7 @@ void Binding::deliverFate(Request& request, Fate fate) {
     sender_.requests()->end(request);
   }
   MPF_STEP(fate_given);
+  if (sender_.channel()) showAnswered();
   deliver(std::move(message));
 }
 

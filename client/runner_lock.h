@@ -113,7 +113,7 @@ class RunnerLock {
 class RunnerGuard {
  public:
   explicit RunnerGuard(RunnerLock* lock) noexcept : lock_(lock) {}
-  ~RunnerGuard() {
+  [[gnu::always_inline]] ~RunnerGuard() {
     if (lock_ != nullptr) lock_->release();
   }
   RunnerGuard(const RunnerGuard&) = delete;

@@ -29,7 +29,7 @@ Connection::Pointer Connection::take() {
 bool Connection::tryMakePlace(std::uint32_t requestId) noexcept try {
   const auto size = std::bit_ceil(channel->link().header().maxOutstanding);
   std::vector<std::atomic<std::uint32_t>> larger(unanswered.size() == size ? 0 : size);
-  const std::lock_guard guard(*lock);
+  const BiasedLock::Guard guard(*lock);
   if (larger.empty()) return owed(requestId).load(std::memory_order_relaxed) == 0;
   for (const auto& place : unanswered) {
     const auto id = place.load(std::memory_order_relaxed);

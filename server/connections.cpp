@@ -22,7 +22,7 @@ constexpr std::chrono::microseconds kDrainPoll{500};
 
 // Whether the client holds messages of the fan-out pool, or has not received them.
 bool isBorrowing(Connection& connection) noexcept {
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   auto& link = connection.channel->link();
   link.collectReturned();
   return link.borrowedFanOut() != 0;
@@ -53,7 +53,7 @@ Connection& Connections::add(std::uint32_t index, std::unique_ptr<Link> link) tr
   auto channel = std::make_shared<MessageLink>(std::move(link), connection.lock);
   byLink_[incarnation] = &connection;
   {
-    const std::lock_guard lock(*connection.lock);
+    const BiasedLock::Guard lock(*connection.lock);
     connection.index = index;
     connection.timedId = 0;
     connection.unanswered = std::move(unanswered);
@@ -82,7 +82,7 @@ void Connections::close(Connection& connection) noexcept {
   const auto client = connection.client();
   std::shared_ptr<MessageLink> channel;
   {
-    const std::lock_guard lock(*connection.lock);
+    const BiasedLock::Guard lock(*connection.lock);
     channel = std::move(connection.channel);
     connection.channel.reset();
     ++connection.generation;
@@ -151,14 +151,14 @@ void Connections::closeAll() noexcept {
 std::uint64_t Connections::clientOf(const Route& request) noexcept {
   if (request.link == 0) return 0;
   auto& connection = Connection::of(request);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   return connection.isOpenFor(request) ? connection.client() : 0;
 }
 
 bool Connections::isConnected(const Route& request) noexcept {
   if (request.link == 0) return false;
   auto& connection = Connection::of(request);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(request)) return false;
   const auto& link = connection.channel->link();
   return link.peerState() == layout::LinkState::open && !link.peer()->isDead();
@@ -175,7 +175,7 @@ bool Connections::owes(std::uint64_t client, std::uint32_t requestId) const noex
   const auto route = routeTo(client, requestId);
   if (route.link == 0) return false;
   auto& connection = Connection::of(route);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   return connection.isOpenFor(route) && connection.owes(requestId);
 }
 
@@ -184,7 +184,7 @@ std::vector<std::uint32_t> Connections::owed(std::uint64_t client) const {
   std::vector<std::uint32_t> ids;
   if (route.link == 0) return ids;
   auto& connection = Connection::of(route);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route)) return ids;
   for (const auto& place : connection.unanswered) {
     if (const auto id = place.load(std::memory_order_relaxed); id != 0) ids.push_back(id);

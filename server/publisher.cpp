@@ -124,7 +124,7 @@ ReplyResult Publisher::send(const Message& message, const Message& request,
   if (!message || request.route().link == 0 || forkGuard_.isInherited())
     return ReplyResult::clientGone;
   auto& connection = Connection::of(request.route());
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   return sendLocked(connection, message, request, chunk);
 }
 
@@ -186,7 +186,7 @@ void Publisher::collectReturned() noexcept try {
     }
   }
   for (const auto& link : links) {
-    const std::lock_guard lock(link->lock());
+    const BiasedLock::Guard lock(link->lock());
     link->link().collectReturned();
   }
   // NOLINTNEXTLINE(bugprone-empty-catch): the caller finds no free chunk

@@ -17,7 +17,7 @@ ReplyResult ReplySender::send(Message& message) noexcept {
   auto& connection = Connection::of(message.route());
   ReplyResult result{};
   {
-    const std::lock_guard lock(*connection.lock);
+    const BiasedLock::Guard lock(*connection.lock);
     result = sendOneLocked(connection, message);
   }
   if (result == ReplyResult::sent || result == ReplyResult::clientGone) message.reset();
@@ -42,7 +42,7 @@ RepliedMany ReplySender::sendRun(std::span<Message> messages) noexcept {
   const auto& route = messages.front().route();
   if (route.link == 0 || forkGuard_.isInherited()) return {0, ReplyResult::clientGone};
   auto& connection = Connection::of(route);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route)) return {0, ReplyResult::clientGone};
   auto& link = connection.channel->link();
   const Link::Batch batch(link);
@@ -121,7 +121,7 @@ void ReplySender::sendFate(Connection& connection, RequestMarks request, Fate fa
 
 void ReplySender::refuseAbandoned(const Route& route) noexcept {
   auto& connection = Connection::of(route);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   if (!connection.isOpenFor(route) || !connection.owes(route.requestId)) return;
   Message message = RequestFateMessage({.fate = Fate::refused, .requestId = route.requestId});
   message.setRoute(connection.routeOf(route.requestId, nullptr));
@@ -132,7 +132,7 @@ BodyBytes ReplySender::allocate(const Route& route, std::size_t bytes) {
   std::shared_ptr<MessageLink> channel;
   if (route.link != 0) {
     auto& connection = Connection::of(route);
-    const std::lock_guard lock(*connection.lock);
+    const BiasedLock::Guard lock(*connection.lock);
     if (connection.isOpenFor(route)) channel = connection.channel;
   }
   return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);

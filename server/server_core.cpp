@@ -215,7 +215,7 @@ void ServerCore::noteTimes(Connection& connection, std::uint32_t requestId,
   record(endpoint_.control().queueWaitNs, waitedNs);
   if (endpoint_.slept()) endpoint_.noteWake(waitedNs);
   progress_.note(nowNs);
-  const std::lock_guard lock(*connection.lock);
+  const BiasedLock::Guard lock(*connection.lock);
   connection.timedId = requestId;
   connection.timedFromNs = nowNs;
 }
@@ -226,7 +226,7 @@ ServerCore::Counts ServerCore::counts() const {
                 control.received.load(std::memory_order_relaxed), 0,
                 control.sent.load(std::memory_order_relaxed)};
   for (const auto& connection : connections_.all()) {
-    const std::lock_guard lock(*connection->lock);
+    const BiasedLock::Guard lock(*connection->lock);
     if (!connection->channel) continue;
     const auto& link = connection->channel->link().control();
     const auto sent = link.clientSent.load(std::memory_order_relaxed);

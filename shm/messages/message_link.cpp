@@ -50,7 +50,7 @@ MessageLink::Finish MessageLink::readBody(BodyFields fields, Message& message) n
 Message MessageLink::readChunk(BodyFields fields) {
   std::optional<Chunk> chunk;
   {
-    const std::lock_guard guard(*lock_);
+    const BiasedLock::Guard guard(*lock_);
     chunk = link_->tryChunk(fields.bodyBytes);
     if (!chunk) return {};
     lendOne();
@@ -68,7 +68,7 @@ Message MessageLink::readChunk(BodyFields fields) {
 void MessageLink::discard(BodyFields body) noexcept {
   try {
     if ((body.flags & layout::kSlotChunk) != 0) {
-      const std::lock_guard guard(*lock_);
+      const BiasedLock::Guard guard(*lock_);
       if (const auto chunk = link_->tryChunk(body.bodyBytes)) link_->release(chunk->data);
     }
     // NOLINTNEXTLINE(bugprone-empty-catch): tryChunk() has returned the chunk to the peer
@@ -96,7 +96,7 @@ LinkSend MessageLink::trySendLongLocked(Envelope envelope, Message& message,
 
 BodyBytes MessageLink::allocate(std::size_t bytes) {
   {
-    const std::lock_guard guard(*lock_);
+    const BiasedLock::Guard guard(*lock_);
     if (bytes > layout::kInlineBodyBytes) {
       if (const auto chunk = link_->tryAlloc(bytes)) {
         lendOne();
@@ -110,7 +110,7 @@ BodyBytes MessageLink::allocate(std::size_t bytes) {
 void MessageLink::takeBack(std::byte* data, std::size_t) noexcept {
   std::shared_ptr<MessageLink> last;  // destroyed after the guard; may destroy this object
   const auto lock = lock_;
-  const std::lock_guard guard(*lock);
+  const BiasedLock::Guard guard(*lock);
   link_->release(data);
   if (lent_ == 1) last = self_;
   endLending();

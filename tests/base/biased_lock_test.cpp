@@ -35,7 +35,7 @@ TEST(BiasedLockTest, AdmitsOneThreadAtATime) {
   int count = 0;  // not atomic: the lock protects it
   const auto work = [&](int times) {
     for (int i = 0; i < times; ++i) {
-      const std::lock_guard guard(lock);
+      const BiasedLock::Guard guard(lock);
       ++count;
     }
   };
@@ -54,17 +54,17 @@ TEST(BiasedLockTest, AdmitsOneThreadAtATime) {
 TEST(BiasedLockTest, AnotherThreadWaitsForTheOwner) {
   BiasedLock lock;
   for (int i = 0; i < kManyEntries; ++i) {
-    const std::lock_guard guard(lock);
+    const BiasedLock::Guard guard(lock);
   }
   bool isHeld = true;
   std::atomic<int> yields{0};  // of the other thread
   std::atomic<bool> hasEntered{false};
   std::thread other;
   {
-    const std::lock_guard guard(lock);
+    const BiasedLock::Guard guard(lock);
     other = std::thread([&] {
       yieldsOfThisThread = &yields;
-      const std::lock_guard mine(lock);
+      const BiasedLock::Guard mine(lock);
       hasEntered = true;
       EXPECT_FALSE(isHeld);
     });

@@ -29,7 +29,7 @@ LinkSend sendArray(MessageLink& link, std::uint32_t requestId, std::size_t bytes
   Message message =
       Char8ArrayMessage::inBuffer(link.allocate(Char8ArrayMessage::bytesFor(bytes)), bytes);
   Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()), .requestId = requestId};
-  const std::lock_guard lock(link.lock());
+  const BiasedLock::Guard lock(link.lock());
   return link.trySendLocked(envelope, message, {});
 }
 
@@ -104,7 +104,7 @@ void Talk::publish(std::uint64_t value) {
   Envelope envelope{.type = static_cast<std::uint16_t>(MessageType::char8Array),
                     .requestId = static_cast<std::uint32_t>(value % 4)};
   {
-    const std::lock_guard lock(channel_->lock());
+    const BiasedLock::Guard lock(channel_->lock());
     static_cast<void>(channel_->link().trySendFanOut(envelope, chunk, bytes, {}, kMaxBorrowed));
   }
   if (chunk) chunk->drop();
@@ -112,7 +112,7 @@ void Talk::publish(std::uint64_t value) {
 
 void Talk::sendBack(Envelope envelope, Message& message) {
   envelope.flags = layout::kSlotFirstReply;
-  const std::lock_guard lock(channel_->lock());
+  const BiasedLock::Guard lock(channel_->lock());
   static_cast<void>(channel_->trySendLocked(envelope, message, {}));
 }
 

@@ -6,7 +6,7 @@
 //   other   real lock ─ enabled = 0 ─ barrier in all threads ─ wait until inside = 0 ─ ...
 //
 //   MODELS  base/bias.h: tryEnter leave noteEntry disable isInside
-//   MODELS  base/biased_lock.h: lock unlock
+//   MODELS  base/biased_lock.h: Guard lockReal
 //   HOLDS   at most one thread is inside at a time, however often the bias is disabled and enabled
 //           again
 //   HOLDS   a thread that is inside sees what the other one did there

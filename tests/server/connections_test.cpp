@@ -130,7 +130,7 @@ TEST_F(ConnectionsTest, ARequestWaitsForTheReplyThatMakesItsPlaceFree) {
   std::atomic<bool> isReplying{false};
   std::atomic<bool> isNext{false};
   std::thread replying([&] {
-    const std::lock_guard guard(*connection.lock);
+    const BiasedLock::Guard guard(*connection.lock);
     isReplying = true;
     while (!isNext) std::this_thread::yield();
     for (int i = 0; i < 1000; ++i) std::this_thread::yield();

@@ -39,7 +39,7 @@ class MessageLinkTest : public ShmTest {
   LinkSend send(Message& message) {
     Envelope envelope{.type = static_cast<std::uint16_t>(message.getType()),
                       .clientType = message.getClientType()};
-    const std::lock_guard guard(client_->lock());
+    const BiasedLock::Guard guard(client_->lock());
     return client_->trySendLocked(envelope, message, {});
   }
   // The next message that the server receives; an empty handle if it is invalid.
