@@ -124,6 +124,11 @@ class Binding : public std::enable_shared_from_this<Binding> {
   void dropReply(BodyFields fields, Request* request);
   bool tryDeliver(Message&& message, std::uint32_t sentTick, Request* request);
   void endRequest(Request& request);
+  // Tells tools how many requests have had a reply or a fate.
+  void showAnswered() noexcept {
+    channel().link().control().clientAnswered.store(sender_.requests()->answered(),
+                                                    std::memory_order_relaxed);
+  }
   enum class Control { deliver, keep, invalid };
   Control prepareControl(Message& message, Request* request);
   void noteTimes(std::uint32_t sentTick, const Request* request) noexcept;

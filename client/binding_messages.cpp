@@ -45,6 +45,7 @@ void Binding::deliverRemaining(const MessageLink* ended) {
   }
 }
 
+// Inline, so that takeSome() is one function up to the callback.
 [[gnu::always_inline]] inline bool Binding::tryTakeOne() {
   auto& channel = this->channel();
   Envelope envelope;
@@ -105,10 +106,9 @@ void Binding::dropReply(BodyFields fields, Request* request) {
 }
 
 inline void Binding::endRequest(Request& request) {
-  auto& requests = *sender_.requests();
-  requests.end(request);
+  sender_.requests()->end(request);
   MPF_STEP(request_ended);
-  channel().link().control().clientUnanswered.store(requests.awaited(), std::memory_order_relaxed);
+  showAnswered();
 }
 
 // A ConnectMessage or a fate that the server has sent. `keep`: the request was kept, to be sent
@@ -120,6 +120,7 @@ Binding::Control Binding::prepareControl(Message& message, Request* request) {
   if (fate == nullptr) return Control::deliver;
   // A router reports that the server behind it has not taken the request.
   if (fate->fate == Fate::neverTaken && sender_.tryKeep(*request)) {
+    showAnswered();
     timer_.wakeAt(Clock::nowNs() + kSendUntakenAfterNs);
     return Control::keep;
   }

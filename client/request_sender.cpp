@@ -92,7 +92,6 @@ SendResult RequestSender::tryAllowMore() noexcept {
   requestId = id;
   isFullReported_ = false;
   link.control().clientSent.store(link.outgoing().messages(), std::memory_order_relaxed);
-  link.control().clientUnanswered.store(requests_->awaited(), std::memory_order_relaxed);
   return SendResult::sent;
 }
 
@@ -130,7 +129,7 @@ SendResult RequestSender::send(Message& message, std::int64_t deadlineNs, std::u
                                std::unique_ptr<Message>* copy, Turn turn) noexcept {
   bool startsNudging = false;
   {
-    const std::lock_guard lock(*lock_);
+    const BiasedLock::Guard lock(*lock_);
     if (turn == Turn::last && !untaken_.isEmpty()) return refuseBehindUntaken();
     const auto result = trySendLocked(message, deadlineNs, requestId, copy);
     if (result != SendResult::sent) return result;
@@ -148,7 +147,7 @@ SentMany RequestSender::sendMany(std::span<Message> messages, Deadline takeBefor
   SentMany sent;
   bool startsNudging = false;
   {
-    const std::lock_guard lock(*lock_);
+    const BiasedLock::Guard lock(*lock_);
     if (!untaken_.isEmpty()) return {0, refuseBehindUntaken()};
     if (state_.load(std::memory_order_relaxed) != BindingState::connected)
       return {0, SendResult::notConnected};
@@ -177,7 +176,7 @@ inline void RequestSender::setTimers(bool startsNudging, std::int64_t deadlineNs
 bool RequestSender::tryKeep(Request& request) {
   if (!request.copy || request.isGivenUp) return false;
   {
-    const std::lock_guard lock(*lock_);
+    const BiasedLock::Guard lock(*lock_);
     untaken_.add(request);
   }
   requests_->end(request);
@@ -204,14 +203,14 @@ void RequestSender::noteFull() noexcept try {
 BodyBytes RequestSender::allocate(std::size_t bytes) {
   std::shared_ptr<MessageLink> channel;
   {
-    const std::lock_guard lock(*lock_);
+    const BiasedLock::Guard lock(*lock_);
     channel = channel_;
   }
   return channel ? channel->allocate(bytes) : allocateHeapBody(bytes);
 }
 
 std::uint64_t RequestSender::maxMessageBytes() const noexcept {
-  const std::lock_guard lock(*lock_);
+  const BiasedLock::Guard lock(*lock_);
   return state_.load(std::memory_order_relaxed) == BindingState::connected
              ? channel_->link().maxMessageBytes()
              : 0;
@@ -220,7 +219,7 @@ std::uint64_t RequestSender::maxMessageBytes() const noexcept {
 void RequestSender::open(std::shared_ptr<MessageLink> channel) {
   auto requests = std::make_shared<RequestTable>(channel->link().maxOutstanding(),
                                                  requests_ ? requests_->lastId() : 0);
-  const std::lock_guard lock(*lock_);
+  const BiasedLock::Guard lock(*lock_);
   requests_ = std::move(requests);
   channel_ = std::move(channel);
   isFullReported_ = false;
@@ -228,17 +227,17 @@ void RequestSender::open(std::shared_ptr<MessageLink> channel) {
 }
 
 void RequestSender::close() noexcept {
-  const std::lock_guard lock(*lock_);
+  const BiasedLock::Guard lock(*lock_);
   channel_.reset();
 }
 
 bool RequestSender::isTaken(const Request& request) const noexcept {
-  const std::lock_guard lock(*lock_);
+  const BiasedLock::Guard lock(*lock_);
   return channel_->link().outgoing().isTaken(request.ordinal);
 }
 
 bool RequestSender::tryEndNudging() noexcept {
-  const std::lock_guard lock(*lock_);
+  const BiasedLock::Guard lock(*lock_);
   if (requests_->awaited() != 0) return false;
   isNudging_ = false;
   return true;

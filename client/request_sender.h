@@ -65,7 +65,7 @@ class RequestSender {
   [[nodiscard]] const UntakenRequests& untaken() const noexcept { return untaken_; }
   template <class Predicate>
   std::optional<UntakenRequest> takeUntaken(Predicate&& isWanted) {
-    const std::lock_guard lock(*lock_);
+    const BiasedLock::Guard lock(*lock_);
     return untaken_.take(std::forward<Predicate>(isWanted));
   }
   // Returns true when no reply is outstanding; the next send() then starts the nudging again.

@@ -51,11 +51,7 @@ Request* RequestTable::findInBoth(std::uint32_t id) noexcept {
   return nullptr;
 }
 
-// Of a request that ends: that it was given up, and its copy.
-void RequestTable::drop(Request& request) noexcept {
-  if (std::exchange(request.isGivenUp, false))
-    givenUp_.store(givenUp_.load(std::memory_order_relaxed) - 1, std::memory_order_relaxed);
-  request.copy.reset();
-}
+// Not inline, so that end() is.
+void RequestTable::dropCopy(Request& request) noexcept { request.copy.reset(); }
 
 }  // namespace mpf

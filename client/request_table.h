@@ -24,10 +24,10 @@ struct Request {
   std::atomic<std::uint32_t> id{0};  // 0: free
   std::int32_t clientType = 0;
   std::int32_t clientExtra = 0;
+  bool isGivenUp = false;  // used by the dispatcher's thread only
   std::uint64_t ordinal = 0;  // number of its message on the link
   std::int64_t deadlineNs = 0;
   std::int64_t sentNs = 0;  // of a timed request; else 0
-  bool isGivenUp = false;  // used by the dispatcher's thread only
   std::unique_ptr<Message> copy{};  // to be sent again if no server takes the request; else null
 };
 
@@ -47,9 +47,13 @@ class RequestTable {
   // Lets more requests be outstanding, once. Returns false if there is no memory.
   [[nodiscard]] bool tryAllow(std::uint32_t maxOutstanding) noexcept;
 
+  // Requests that ended or were given up so far.
+  [[nodiscard]] std::uint64_t answered() const noexcept {
+    return answered_.load(std::memory_order_relaxed);
+  }
   // Outstanding requests that were not given up.
   [[nodiscard]] std::uint32_t awaited() const noexcept {
-    return outstanding() - givenUp_.load(std::memory_order_relaxed);
+    return added_.load(std::memory_order_relaxed) - static_cast<std::uint32_t>(answered());
   }
 
   // Returns a free entry, not yet added, for the given id, or for a new id when it is 0; nullptr
@@ -86,10 +90,12 @@ class RequestTable {
   }
   void giveUp(Request& request) noexcept {
     request.isGivenUp = true;
-    givenUp_.store(givenUp_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    noteAnswered();
   }
-  void end(Request& request) noexcept {
-    if (request.isGivenUp || request.copy) drop(request);
+  // Inline, because it is on the path of each reply.
+  [[gnu::always_inline]] void end(Request& request) noexcept {
+    if (!std::exchange(request.isGivenUp, false)) noteAnswered();
+    if (request.copy) dropCopy(request);
     ended_.store(ended_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     // PAIR(request-ended): this thread no longer uses the entry.
     request.id.store(0, std::memory_order_release);
@@ -128,7 +134,8 @@ class RequestTable {
     return hasGrown_.load(std::memory_order_acquire);
   }
   Request* findInBoth(std::uint32_t id) noexcept;
-  void drop(Request& request) noexcept;
+  void noteAnswered() noexcept { answered_.store(answered() + 1, std::memory_order_relaxed); }
+  static void dropCopy(Request& request) noexcept;
 
   Places receiver_;  // the table in which the dispatcher's thread looks first
   Places sender_;  // the table for new requests; under the client's lock
@@ -138,7 +145,7 @@ class RequestTable {
   std::atomic<bool> hasGrown_{false};
   std::atomic<std::uint32_t> added_{0};
   std::atomic<std::uint32_t> ended_{0};
-  std::atomic<std::uint32_t> givenUp_{0};
+  std::atomic<std::uint64_t> answered_{0};
   std::unique_ptr<Request[]> firstEntries_;
   std::unique_ptr<Request[]> secondEntries_;
   Places first_;

@@ -113,11 +113,6 @@ MaybeIndex Endpoint::nextReady() noexcept {
   return *index;
 }
 
-bool Endpoint::takeLocalEventNow() noexcept {
-  // PAIR(local-event): sees everything that happened before interrupt().
-  return localEvent_.exchange(0, std::memory_order_acquire) != 0;
-}
-
 void Endpoint::interrupt() noexcept {
   // PAIR(local-event): stored after the event.
   localEvent_.store(1, std::memory_order_release);

@@ -77,7 +77,9 @@ class Endpoint {
   [[nodiscard]] Knocks& knocks() noexcept { return knocks_; }
   // True after an event in this process: a peer died, a server appeared, interrupt() was called.
   bool takeLocalEvent() noexcept {
-    return localEvent_.load(std::memory_order_relaxed) != 0 && takeLocalEventNow();
+    // PAIR(local-event): sees everything that happened before interrupt().
+    return localEvent_.load(std::memory_order_relaxed) != 0 &&
+           localEvent_.exchange(0, std::memory_order_acquire) != 0;
   }
   // After takeLocalEvent() returned true: whether a peer died. Its links have peer()->isDead().
   bool takePeerDeath() noexcept { return peerDied_.exchange(false, std::memory_order_relaxed); }
@@ -114,7 +116,6 @@ class Endpoint {
     return sinceHints_ >= kHintsEvery ||
            (sinceHints_ >= HotLinks::kCapacity && hot_.size() == HotLinks::kCapacity);
   }
-  bool takeLocalEventNow() noexcept;
   MaybeIndex nextAfterHints() noexcept;
   MaybeIndex nextReady() noexcept;
   MaybeIndex nextCold() noexcept;

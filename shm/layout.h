@@ -291,7 +291,7 @@ struct LinkControl {
   alignas(kPairBytes) RingControl replies;
   Word64 clientSent;
   Word64 clientRefused;  // sends refused: queue full, too many unanswered, too large, no memory
-  Word64 clientUnanswered;  // requests without a reply or fate
+  Word64 clientAnswered;  // requests that have had a reply or a fate
   // The server writes these words for each message. The client seldom reads them.
   alignas(kPairBytes) RingControl requests;
   Word64 serverSent;

@@ -217,7 +217,7 @@ class Link {
   // in registers. The limits come one by one: a copy of both at once would wait for their stores.
   LinkSend trySendLong(Envelope envelope, std::span<const std::byte> body, std::uint32_t waiting,
                        std::uint32_t reserve) noexcept;
-  void afterPush() noexcept {
+  [[gnu::always_inline]] void afterPush() noexcept {
     if (isInBatch_) return;
     MPF_STEP(peer_checked);
     expedited_barrier::frequentSide();

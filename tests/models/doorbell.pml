@@ -5,7 +5,8 @@
 //   owner  announce ─ fence ─ look again ─ sleep
 //   peer   message ─ fence ─ announced? ─ bell, wake
 //
-//   MODELS  shm/endpoint.cpp: sleep announce hasEvents interrupt takeLocalEvent arm disarm
+//   MODELS  shm/endpoint.cpp: sleep announce hasEvents interrupt arm disarm
+//   MODELS  shm/endpoint.h: takeLocalEvent
 //   MODELS  shm/window.cpp: wakeIfAsleep ring
 //   MODELS  shm/doorbell.cpp: sleep ring tryRingFifo drainFifo
 //   HOLDS   no wake-up is lost: the owner does not sleep forever while a message or a reported

@@ -93,7 +93,7 @@ inline nlohmann::json layoutFields() {
          {MPF_FIELD(clientState), MPF_FIELD(serverState), MPF_FIELD(requestWatch),
           MPF_FIELD(replyWatch), MPF_FIELD(serverIndex), MPF_FIELD(hasMoreReplies),
           MPF_FIELD(replies), MPF_FIELD(clientSent), MPF_FIELD(clientRefused),
-          MPF_FIELD(clientUnanswered), MPF_FIELD(requests), MPF_FIELD(serverSent),
+          MPF_FIELD(clientAnswered), MPF_FIELD(requests), MPF_FIELD(serverSent),
           MPF_FIELD(repliesMoved), MPF_FIELD(requestChunks), MPF_FIELD(replyChunks)}}};
   }
   {

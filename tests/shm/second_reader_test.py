@@ -194,7 +194,7 @@ class Reader(unittest.TestCase):
             serverAlive=True,
         )
         self.check_fields(
-            link, clientRefused=1, clientUnanswered=waiting, queueSize=expected["queueSize"]
+            link, clientRefused=1, clientAnswered=served, queueSize=expected["queueSize"]
         )
         self.check_fields(
             link["requests"], sent=expected["sent"], taken=served, freed=served, waiting=waiting

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
@@ -170,6 +171,7 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
                  const DissectOptions& options) {
   const auto& header = image.header();
   const auto& control = image.link();
+  const auto sent = said(control.clientSent);
   tree["server"] = segments::text(header.name);
   tree["location"] = header.location;
   tree["server_side"] = {{"window", hex(header.serverWindow)},
@@ -179,9 +181,9 @@ void dissectLink(Tree& tree, const SegmentImage& image, const std::string& path,
   tree["client_side"] = {{"window", hex(header.clientWindow)},
                          {"state", toString(said(control.clientState))},
                          {"index", header.clientIndex},
-                         {"sent", said(control.clientSent)},
+                         {"sent", sent},
                          {"refused", said(control.clientRefused)},
-                         {"unanswered", said(control.clientUnanswered)}};
+                         {"unanswered", sent - std::min(sent, said(control.clientAnswered))}};
   tree["limits"] = {{"queue_size", header.queueSize},
                     {"max_outstanding", header.maxOutstanding},
                     {"max_message_bytes", header.maxMessageBytes},

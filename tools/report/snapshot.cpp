@@ -180,7 +180,8 @@ class SnapshotReader {
     view.requests = {value(control.clientSent), value(control.requests.taken)};
     view.replies = {value(control.serverSent), value(control.replies.taken)};
     view.refused = value(control.clientRefused);
-    view.unanswered = value(control.clientUnanswered);
+    const auto answered = value(control.clientAnswered);
+    view.unanswered = view.requests.sent - std::min(view.requests.sent, answered);
     view.bytes = image->fileBytes();
     links_.push_back(std::move(view));
   }

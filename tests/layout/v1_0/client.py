@@ -30,7 +30,6 @@ class Connection:
         self.last_id = next(new)
         self.link.send(link.Message(kind, body, requestId=self.last_id, **envelope))
         self.unanswered.add(self.last_id)
-        self.link.control["clientUnanswered"] = len(self.unanswered)
         return self.last_id
 
 
@@ -64,7 +63,7 @@ class Client(party.Party):
             self.window.control.count("received")
             if message.flags & link.FIRST_REPLY:
                 connection.unanswered.discard(message.requestId)
-                end.control["clientUnanswered"] = len(connection.unanswered)
+                end.control["clientAnswered"] += 1
             connection.received.append(message)
         if end.state_seen in (link.CLOSED, link.REFUSED):
             connection.is_closed = True

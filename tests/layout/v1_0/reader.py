@@ -257,7 +257,7 @@ class Backplane:
         control = self.layout.read(segment.data, "LinkControl", header["ringBytesOffset"])
         keys = ("name", "location", "queueSlots", "replySlots", "queueSize", "maxOutstanding", "clientIndex")
         result = {key: header[key] for key in keys}
-        result |= {key: control[key] for key in ("clientState", "serverState", "serverIndex", "requestWatch", "replyWatch", "clientRefused", "clientUnanswered")}
+        result |= {key: control[key] for key in ("clientState", "serverState", "serverIndex", "requestWatch", "replyWatch", "clientRefused", "clientAnswered")}
         result["file"] = segment.name
         result["clientAlive"], result["serverAlive"] = self.lives(header["clientWindow"]), self.lives(header["serverWindow"])
         result["requests"] = self.ring(segment, 0, header["queueSlots"], control["requests"], control["clientSent"])

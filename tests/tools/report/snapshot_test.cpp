@@ -110,6 +110,29 @@ TEST_F(SnapshotTest, AddsALinkToBothOfItsWindows) {
   EXPECT_EQ(snapshot.servers.front().sent, 2U);
 }
 
+// A cancelled request has had its fate, although the server still has to reply to it.
+TEST_F(SnapshotTest, CountsTheRequestsWithoutAReplyOrAFate) {
+  MessageServer server(backplane_, "dac");
+  server.on<Int32>([](Int32&) {});
+  Clients clients(backplane_);
+  auto& client = clients.connect(server);
+  std::uint32_t cancelled = 0;
+  ASSERT_EQ(client.send(Int32Message(), Deadline::never(), &cancelled), SendResult::sent);
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(client.send(Int32Message()), SendResult::sent);
+  const auto unanswered = [this] { return take().clients.front().links.front().unanswered; };
+  EXPECT_EQ(unanswered(), 4U);
+
+  client.cancel(cancelled);
+  while (unanswered() == 4U) clients.runOnce();
+  EXPECT_EQ(unanswered(), 3U);
+
+  for (int i = 0; i < 2; ++i) {  // replies to the cancelled one and to another one
+    while (!server.handleOne()) continue;
+  }
+  while (unanswered() == 3U) clients.runOnce();
+  EXPECT_EQ(unanswered(), 2U);
+}
+
 TEST_F(SnapshotTest, CountsThePoolsInTheMemoryOfALink) {
   MessageServer server(backplane_, "dac");
   Clients clients(backplane_);
