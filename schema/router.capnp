@@ -124,6 +124,9 @@ struct Reply {
   requestId @1 :UInt32;
   isFirst @2 :Bool;  # ends the request; each request ends in exactly one reply or fate
   message @3 :Message.Envelope;
+  missed @4 :UInt32;
+  # further replies to this request that were dropped since the last reply that was sent to it,
+  # because they were not taken fast enough
 }
 
 struct RequestEnd {

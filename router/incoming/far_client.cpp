@@ -117,10 +117,9 @@ void FarClient::onMessage(Message&& message) {
   const auto requestId = message.route().requestId;
   if (const auto* fate = message.tryAs<RequestFate>()) return endRequest(requestId, fate->fate, {});
   // Replies arrive while the window is used up only when the server is gone. They are dropped.
-  if (window_ <= 0)
-    return isFirst ? endRequest(requestId, Fate::outcomeUnknown,
-                                "the server ended before its replies were received")
-                   : void();
+  if (window_ <= 0) return drop(requestId, isFirst, message.getMissed());
+  const auto missed = takeDropped(requestId) + message.getMissed();
+  message.setRoute({0, requestId, Message::missedFlags(missed), nullptr});
   window_ -= windowBytesOf(message);
   if (window_ <= 0 && state_ != State::draining) client_->pause();
   if (PlainItem::canCarry(message))
@@ -129,6 +128,23 @@ void FarClient::onMessage(Message&& message) {
                             .client = terms_.number,
                             .requestId = requestId,
                             .message = std::move(message)});
+}
+
+//   missed  further replies that the server has dropped before this one
+void FarClient::drop(std::uint32_t requestId, bool isFirst, std::uint32_t missed) {
+  if (isFirst)
+    return endRequest(requestId, Fate::outcomeUnknown,
+                      "the server ended before its replies were received");
+  if (requestId != 0) dropped_.push_back({requestId, takeDropped(requestId) + missed + 1});
+}
+
+// Returns how many further replies to a request were dropped since the last call for it.
+std::uint32_t FarClient::takeDropped(std::uint32_t requestId) {
+  const auto dropped = std::ranges::find(dropped_, requestId, &Dropped::requestId);
+  if (dropped == dropped_.end()) return 0;
+  const auto count = dropped->count;
+  dropped_.erase(dropped);
+  return count;
 }
 
 void FarClient::onConnect(const Connect& connect) {

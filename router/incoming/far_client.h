@@ -18,6 +18,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <mpf/message_client.h>
 
@@ -85,6 +86,8 @@ class FarClient {
     gaveUp,  // requests end with fateAfterGiveUp_
   };
   void onMessage(Message&& message);
+  void drop(std::uint32_t requestId, bool isFirst, std::uint32_t missed);
+  [[nodiscard]] std::uint32_t takeDropped(std::uint32_t requestId);
   void onConnect(const Connect& connect);
   void accept();
   void send(HeldRequest request);
@@ -104,6 +107,11 @@ class FarClient {
   std::string giveUpReason_;
   HeldRequests held_;
   bool queueFullSent_ = false;  // in this run of refused requests
+  struct Dropped {
+    std::uint32_t requestId;
+    std::uint32_t count;
+  };
+  std::vector<Dropped> dropped_;  // further replies of which the far client has not been told
   Alarm expiry_;
   std::unique_ptr<RelayClient> client_;  // nullptr after giveUp()
 };

@@ -20,7 +20,7 @@ struct Carried {
   std::uint32_t client = 0;
   std::uint32_t requestId = 0;
   Deadline takeBefore = Deadline::never();  // of a request
-  Message message;
+  Message message;  // of a reply: its getMissed() is sent, too
 };
 
 // The bytes that a reply takes from its client's window (router.capnp, Credit): those of its

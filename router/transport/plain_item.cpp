@@ -75,6 +75,7 @@ struct CarrierPlaces {
   std::size_t client, requestId;
   std::size_t takeWithin = 0;  // of a request
   std::size_t isFirst = 0;  // of a reply: its bit
+  std::size_t missed = 0;  // of a reply
   std::size_t message;
 };
 
@@ -108,6 +109,7 @@ struct Places {
   Places() {
     request.takeWithin = StructPlaces::of<wire::Request>().of("takeWithinNs", 8);
     reply.isFirst = StructPlaces::of<wire::Reply>().bitOf("isFirst");
+    reply.missed = StructPlaces::of<wire::Reply>().of("missed", 4);
   }
   static CarrierPlaces carrier(const StructPlaces& of) {
     return {.dataWords = of.dataWords,
@@ -292,10 +294,12 @@ bool PlainFrame::tryRead(std::uint32_t index, PlainItem& item) const noexcept {
   const auto envelope = follow(words_, from.pointers + carrier.message, places.envelope.dataWords,
                                places.envelope.pointers);
   if (!envelope) return false;
+  std::uint32_t missed = 0;
   if (item.isRequest) {
     if (loadLittle<std::uint64_t>(from.data, carrier.takeWithin) != 0) return false;
   } else {
     item.isFirst = (from.data[carrier.isFirst / 8] >> (carrier.isFirst % 8) & 1) != 0;
+    missed = loadLittle<std::uint32_t>(from.data, carrier.missed);
   }
   item.client = loadLittle<std::uint32_t>(from.data, carrier.client);
   item.requestId = loadLittle<std::uint32_t>(from.data, carrier.requestId);
@@ -307,6 +311,7 @@ bool PlainFrame::tryRead(std::uint32_t index, PlainItem& item) const noexcept {
         return tryTake<T>(words_, envelope, item.message);
       });
   if (!isPlain) return false;
+  item.message.setRoute({0, 0, Message::missedFlags(missed), nullptr});
   item.message.setClientType(loadLittle<std::int32_t>(envelope.data, places.clientType));
   item.message.setClientExtra(loadLittle<std::int32_t>(envelope.data, places.clientExtra));
   item.message.setTimeStampNs(loadLittle<std::int64_t>(envelope.data, places.timeStamp));
@@ -335,8 +340,11 @@ void PlainRun::append(const PlainOutgoing& item) {
                                  form.words.size() * kWordBytes};
     storeLittle(bytes, carrier.client, item.client);
     storeLittle(bytes, carrier.requestId, item.requestId);
-    if (!item.isRequest && item.isFirst)
-      bytes[carrier.isFirst / 8] |= static_cast<kj::byte>(1u << (carrier.isFirst % 8));
+    if (!item.isRequest) {
+      if (item.isFirst)
+        bytes[carrier.isFirst / 8] |= static_cast<kj::byte>(1u << (carrier.isFirst % 8));
+      storeLittle(bytes, carrier.missed, item.message.getMissed());
+    }
     storeLittle(bytes, form.envelope + places.clientType, item.message.getClientType());
     storeLittle(bytes, form.envelope + places.clientExtra, item.message.getClientExtra());
     storeLittle(bytes, form.envelope + places.timeStamp, item.message.getTimeStampNs());

@@ -35,7 +35,7 @@ struct PlainOutgoing {
   bool isFirst;  // of a reply: it ends the request
   std::uint32_t client;
   std::uint32_t requestId;
-  const Message& message;
+  const Message& message;  // of a reply: its getMissed() is sent, too
 };
 
 struct PlainItem {

@@ -36,6 +36,7 @@ bool tryFillReply(wire::Reply::Builder reply, Carried& carried, const Conversion
   reply.setClient(carried.client);
   reply.setRequestId(carried.requestId);
   reply.setIsFirst(carried.isFirst);
+  reply.setMissed(carried.message.getMissed());
   return tryToWire(carried.message, reply.initMessage(), limits, error);
 }
 

@@ -90,7 +90,8 @@ struct Reply {
   requestId @1 :UInt32;
   isFirst @2 :Bool;
   message @3 :Envelope;
-  tookNs @4 :UInt64;  # new
+  missed @4 :UInt32;
+  tookNs @5 :UInt64;  # new
 }
 
 struct Envelope {

@@ -40,12 +40,24 @@ class FarClientTest : public RouterPartsTest {
                                       .onRefused = [](FarClient&, const std::string&) {}});
     client_->bind("echo", 0);
   }
-  // A client whose window has room for one reply, and a server that has sent two.
-  void sendTwoReplies() {
-    server_.emplace(backplane_, "echo");
+  // A server, and a client of it with a window of `bytes`.
+  void connectToServer(std::uint32_t bytes, const ServerOptions& options = {}) {
+    server_.emplace(backplane_, "echo", options);
     const auto monitor = monitors_.of({0, "echo"});
     ASSERT_TRUE(monitor->look());
-    makeClient({.number = 1, .incarnation = monitor->incarnation(), .queueSize = 4, .window = 1});
+    makeClient(
+        {.number = 1, .incarnation = monitor->incarnation(), .queueSize = 4, .window = bytes});
+  }
+  // Sends request 5, which the server receives.
+  Message sendRequest() {
+    sendItems({test::request(1, 5)});
+    Message request;
+    runUntil([&] { return static_cast<bool>(request = server_->receive()); });
+    return request;
+  }
+  // A client whose window has room for one reply, and a server that has sent two.
+  void sendTwoReplies() {
+    connectToServer(1);
     sendItems({test::request(1, 5), test::request(1, 6)});
     for (int replies = 0; replies < 2;) {
       runUntil([&] { return server_->waitForMessage(Deadline::after(Nanoseconds(0))); });
@@ -129,6 +141,41 @@ TEST_F(FarClientTest, RepliesBeyondTheWindowAreOutcomeUnknownWhenTheServerIsGone
               AllOf(StartsWith("(fate = (client = 1, requestId = 6"), HasSubstr("outcomeUnknown")));
   runUntil([this] { return disconnects_ == 1; });
   EXPECT_FALSE(client_->isConnected());
+}
+
+// The test does not let the client run while the server publishes.
+TEST_F(FarClientTest, ReportsHowManyPublishedMessagesTheServerHasDropped) {
+  connectToServer(4096, {.maxBorrowed = 1});
+  const auto request = sendRequest();
+  const auto publish = [&] { return server_->publish(Int32Message(), request); };
+  EXPECT_EQ(publish(), ReplyResult::sent);
+  for (int dropped = 0; dropped < 3; ++dropped) EXPECT_EQ(publish(), ReplyResult::queueFull);
+  EXPECT_THAT(nextItem(), HasSubstr("missed = 0"));
+
+  EXPECT_EQ(publish(), ReplyResult::sent);
+
+  EXPECT_THAT(nextItem(),
+              AllOf(StartsWith("(reply = (client = 1, requestId = 5"), HasSubstr("missed = 3")));
+}
+
+// Replies beyond the window of a server that is gone; then there is credit again.
+TEST_F(FarClientTest, ReportsHowManyFurtherRepliesItHasDropped) {
+  connectToServer(1);
+  auto request = sendRequest();
+  const auto furtherReply = [reply = request.duplicate()] { return reply.duplicate(); };
+  EXPECT_EQ(server_->reply(std::move(request)), ReplyResult::sent);
+  EXPECT_THAT(nextItem(), HasSubstr("isFirst = true"));
+  client_->onServerGone();
+  for (int dropped = 0; dropped < 2; ++dropped)
+    EXPECT_EQ(server_->reply(furtherReply()), ReplyResult::sent);
+  dispatcher_.runPending();
+  sendItems({test::credit(1, 64)});
+  expectNoItem();
+
+  EXPECT_EQ(server_->reply(furtherReply()), ReplyResult::sent);
+
+  EXPECT_THAT(nextItem(),
+              AllOf(StartsWith("(reply = (client = 1, requestId = 5"), HasSubstr("missed = 2")));
 }
 
 }  // namespace

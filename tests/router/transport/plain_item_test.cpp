@@ -44,7 +44,8 @@ std::string describe(bool isRequest, bool isFirst, std::uint32_t client, std::ui
   text += std::to_string(client) + '.' + std::to_string(requestId) + " type " +
           std::to_string(static_cast<int>(message.getType())) + ' ' +
           std::to_string(message.getClientType()) + ' ' + std::to_string(message.getClientExtra()) +
-          ' ' + std::to_string(message.getTimeStampNs()) + ':';
+          ' ' + std::to_string(message.getTimeStampNs()) + " missed " +
+          std::to_string(message.getMissed()) + ':';
   for (const auto byte : message.body()) text += ' ' + std::to_string(static_cast<int>(byte));
   return text;
 }
@@ -64,7 +65,8 @@ std::string describe(wire::Item::Reader item) {
   }
   if (!item.isReply()) return "";
   const auto reply = item.getReply();
-  const auto message = tryFromWire(reply.getMessage(), {}, error);
+  auto message = tryFromWire(reply.getMessage(), {}, error);
+  if (message) message->setRoute({0, 0, Message::missedFlags(reply.getMissed()), nullptr});
   return message ? describe(false, reply.getIsFirst(), reply.getClient(), reply.getRequestId(),
                             *message)
                  : "";
@@ -145,6 +147,7 @@ std::vector<PlainItem> everyItem() {
   for (int kind = 0; kind < 3; ++kind) {
     for (auto& message : everyPlainMessage()) {
       const auto id = static_cast<std::uint32_t>(items.size());
+      if (kind != 0) message.setRoute({0, 0, Message::missedFlags(id), nullptr});
       items.push_back({.isRequest = kind == 0,
                        .isFirst = kind == 1,
                        .client = UINT32_MAX - id,

@@ -97,6 +97,15 @@ TEST_F(SendQueueTest, KeepsTheOrderOfPlainItemsAndOthers) {
   EXPECT_EQ(row_.inQueue, 0u);
 }
 
+TEST_F(SendQueueTest, ARepliesMissedMessagesAreSentWithIt) {
+  auto reply = plain(1, false);
+  reply.message.setRoute({0, 0, Message::missedFlags(7), nullptr});
+  queue_.push(reply);
+  queue_.push(Carried{.client = 1, .requestId = 1, .message = std::move(reply.message)});
+
+  EXPECT_THAT(frames(), ElementsAre(HasSubstr("missed = 7"), HasSubstr("missed = 7")));
+}
+
 TEST_F(SendQueueTest, AWriteHasOneFrameOfOtherItems) {
   queue_.push(close(1), NoteKind::own);
   queue_.push(plain(2));
