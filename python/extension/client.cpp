@@ -49,16 +49,17 @@ PyRequest::PyRequest(std::shared_ptr<Connection> connection, Deadline deadline, 
 PyRequest::~PyRequest() { close(); }
 
 void PyRequest::send(PyMessage& message, Retry retry, bool waits) {
-  connection_->send(message, exchange_, deadline_, waits ? deadline_ : Deadline::atNs(0), retry);
+  connection_->send(message, exchange_, deadline_, connectBefore(waits), retry);
 }
 
 std::size_t PyRequest::sendMany(std::span<PyMessage* const> messages,
-                                std::span<const std::shared_ptr<PyRequest>> requests) {
+                                std::span<const std::shared_ptr<PyRequest>> requests, bool waits) {
   if (requests.empty()) return 0;
   std::vector<Exchange*> exchanges;
   for (const auto& request : requests) exchanges.push_back(&request->exchange_);
   const auto& first = *requests.front();
-  return first.connection_->sendMany(messages, exchanges, first.deadline_);
+  return first.connection_->sendMany(messages, exchanges, first.deadline_,
+                                     first.connectBefore(waits));
 }
 
 nb::object PyRequest::wait(bool check) {
@@ -80,7 +81,7 @@ nb::object PyRequest::result(bool check) {
 
 // The exchange has ended.
 nb::object PyRequest::finish(bool check) {
-  if (exchange_.reply) reply_ = toPython(std::move(exchange_.reply));
+  if (exchange_.reply) reply_ = toPython(Message(std::move(exchange_.reply)));
   if (reply_.is_valid()) return checked(connection_->server, reply_, {type_, check});
   if (deadline_.hasPassed() && exchange_.fate == Fate::outcomeUnknown)
     raiseTimedOut(connection_->server);
@@ -151,7 +152,8 @@ class PyClient {
   // `messages` is a list that nobody else changes.
   std::vector<std::shared_ptr<PyRequest>> sendMany(const nb::list& messages,
                                                    std::optional<double> timeout,
-                                                   const nb::object& reply, std::size_t further) {
+                                                   const nb::object& reply, std::size_t further,
+                                                   bool waits) {
     const auto end = deadline(timeout);
     std::vector<PyMessage*> objects;
     std::vector<std::shared_ptr<PyRequest>> requests;
@@ -160,7 +162,7 @@ class PyClient {
       requests.push_back(
           std::make_shared<PyRequest>(connection_, end, expectedType(message, reply), further));
     }
-    requests.resize(PyRequest::sendMany(objects, requests));
+    requests.resize(PyRequest::sendMany(objects, requests, waits));
     return requests;
   }
   bool waitConnected(std::optional<double> timeout) {
@@ -281,9 +283,10 @@ void addClient(nb::module_& module) {
                    "type[Message] | None = None, retry: bool = False, further: int = 0, waits: "
                    "bool = True) -> Request"))
       .def("_send_many", &PyClient::sendMany, "messages"_a, "timeout"_a = nb::none(), nb::kw_only(),
-           "reply"_a = nb::none(), "further"_a = 0,
+           "reply"_a = nb::none(), "further"_a = 0, "waits"_a = true,
            nb::sig("def _send_many(self, messages: list[Message], timeout: float | None = None, *, "
-                   "reply: type[Message] | None = None, further: int = 0) -> list[Request]"))
+                   "reply: type[Message] | None = None, further: int = 0, waits: bool = True) -> "
+                   "list[Request]"))
       .def("_wait_connected", &PyClient::waitConnected, "timeout"_a = nb::none())
       .def("loan", &PyClient::loan, "type"_a, "length"_a,
            nb::sig("def loan(self, type: type[_Array], length: int) -> _Array"),

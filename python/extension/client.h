@@ -36,7 +36,7 @@ class PyRequest {
   // Sends messages[i] as requests[i]. Returns how many were sent; the other requests are not used.
   //   requests  of one connection, with one deadline
   static std::size_t sendMany(std::span<PyMessage* const> messages,
-                              std::span<const std::shared_ptr<PyRequest>> requests);
+                              std::span<const std::shared_ptr<PyRequest>> requests, bool waits);
   // Waits for the reply, the same object at each call.
   nb::object wait(bool check);
   // The same without waiting; None while the request has not ended.
@@ -52,6 +52,10 @@ class PyRequest {
 
  private:
   nb::object finish(bool check);
+  // Until when sending waits for the connection.
+  [[nodiscard]] Deadline connectBefore(bool waits) const noexcept {
+    return waits ? deadline_ : Deadline::atNs(0);
+  }
 
   const std::shared_ptr<Connection> connection_;
   Deadline deadline_;

@@ -102,16 +102,17 @@ void Connection::send(PyMessage& message, Exchange& exchange, Deadline deadline,
 }
 
 std::size_t Connection::sendMany(std::span<PyMessage* const> messages,
-                                 std::span<Exchange* const> exchanges, Deadline deadline) {
+                                 std::span<Exchange* const> exchanges, Deadline deadline,
+                                 Deadline connectBefore) {
   if (messages.empty()) return 0;
   for (;;) {
     const auto requester = this->requester();
-    connect(*requester, deadline);
+    connect(*requester, connectBefore);
     auto& client = requester->client();
     OutgoingMessages outgoing(messages, Allocator(client));
     const auto sent = requester->sendMany(outgoing.messages(), exchanges, deadline);
     if (sent.count != 0) return sent.count;
-    raiseUnlessLost(client, sent.result, outgoing.messages().front().body().size(), deadline);
+    raiseUnlessLost(client, sent.result, outgoing.messages().front().body().size(), connectBefore);
   }
 }
 

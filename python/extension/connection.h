@@ -33,11 +33,10 @@ struct Connection {
   //   throws  nb::python_error: NotSent, and what a signal handler raised
   void send(PyMessage& message, Exchange& exchange, Deadline deadline, Deadline connectBefore,
             Retry retry);
-  // The same for several messages, in order, until one is not sent; waits for the connection until
-  // `deadline`. Returns how many were sent.
+  // The same for several messages, in order, until one is not sent. Returns how many were sent.
   //   throws  as send(), when none was sent; all messages are unchanged then
   std::size_t sendMany(std::span<PyMessage* const> messages, std::span<Exchange* const> exchanges,
-                       Deadline deadline);
+                       Deadline deadline, Deadline connectBefore);
 
   const std::string server;
 

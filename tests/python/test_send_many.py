@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""mpf.Client.send_many(): order, full queues, what stays when a message is not sent."""
+"""send_many() of Client and AsyncClient: order, full queues, messages that are not sent."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 
 import pytest
@@ -77,3 +78,85 @@ def test_many_requests_have_the_options_of_one(doubler: mpf.Server) -> None:
         replies = [(request.wait(), request.next(PATIENCE)) for request in requests]
 
     assert [[getattr(reply, "value") for reply in pair] for pair in replies] == [[1, 2]] * 2
+
+
+async def test_a_coroutine_sends_many_requests_in_order(doubler: mpf.Server) -> None:
+    async with mpf.AsyncClient("doubler", timeout=PATIENCE) as client:
+        requests = await client.send_many(mpf.Int32(number) for number in range(50))
+        replies = await asyncio.gather(*(request.wait() for request in requests))
+        results = [request.result() for request in requests]
+
+    assert [getattr(reply, "value") for reply in replies] == [2 * number for number in range(50)]
+    assert results == replies
+
+
+async def connect(client: mpf.AsyncClient, server: mpf.Server) -> None:
+    """Connects to a server that does not run."""
+    connecting = asyncio.ensure_future(client.wait_connected())
+    while not connecting.done():
+        server._receive(0)
+        await asyncio.sleep(0)
+
+
+async def test_a_coroutine_sends_many_requests_as_far_as_there_is_room(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, _ = short
+    messages = [mpf.Int32(number) for number in range(8)]
+    async with mpf.AsyncClient("short", timeout=PATIENCE) as client:
+        await connect(client, server)
+
+        requests = await client.send_many(messages)
+        with pytest.raises(mpf.QueueFull):
+            await client.send_many(messages[5:])
+
+        assert len(requests) == 5
+        assert [request.result() for request in requests] == [None] * 5
+        server.start()
+        assert [getattr(await request.wait(), "value") for request in requests] == list(range(5))
+
+
+async def test_a_coroutine_waits_for_the_connection_before_it_sends_many() -> None:
+    async with mpf.AsyncClient("late", timeout=PATIENCE) as client:
+        with pytest.raises(mpf.NotConnected, match="late"):
+            await client.send_many([mpf.Int32()], timeout=0.01)
+        sending = asyncio.ensure_future(client.send_many([mpf.Int32(1), mpf.Int32(2)]))
+        await asyncio.sleep(0)
+        with mpf.Server("late") as server:
+            server.on(mpf.Int32)(lambda request: request.value + 1)
+            server.start()
+            values = [getattr(await request.wait(), "value") for request in await sending]
+
+    assert values == [2, 3]
+
+
+async def test_a_coroutine_receives_further_replies_to_many_requests(doubler: mpf.Server) -> None:
+    doubler.on(mpf.Float64)(lambda request: (mpf.Int32(number) for number in (1, 2)))
+    async with mpf.AsyncClient("doubler", timeout=PATIENCE) as client:
+        requests = await client.send_many([mpf.Float64()] * 2, reply=mpf.Int32, further=1)
+        replies = [(await request.wait(), await request.next(PATIENCE)) for request in requests]
+
+        assert await requests[0].next(0) is None
+    assert [[getattr(reply, "value") for reply in pair] for pair in replies] == [[1, 2]] * 2
+
+
+async def test_cancelling_the_wait_for_one_of_many_requests_cancels_this_request(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, _ = short
+    async with mpf.AsyncClient("short", timeout=PATIENCE) as client:
+        await connect(client, server)
+        first, second = await client.send_many([mpf.Int32(1), mpf.Int32(2)])
+        waiting = asyncio.ensure_future(first.wait())
+        await asyncio.sleep(0)
+
+        waiting.cancel()
+
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+        with pytest.raises(mpf.Cancelled):
+            first.result()
+        assert second.result() is None
+        second.cancel()
+        with pytest.raises(mpf.Cancelled):
+            await second.wait()

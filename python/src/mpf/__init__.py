@@ -28,7 +28,8 @@ try:
     )
 except ImportError as error:  # its cause is the reason, for example a sub-interpreter
     raise error.__cause__ or error
-from mpf.aio import AsyncClient, AsyncSubscription
+from mpf.aio import AsyncClient
+from mpf.aio_requests import AsyncRequest, AsyncSubscription
 from mpf.client import Client, Subscription
 from mpf.errors import (
     Cancelled,
@@ -55,6 +56,7 @@ from mpf.server import Server
 
 __all__ = [
     "AsyncClient",
+    "AsyncRequest",
     "AsyncSubscription",
     "Cancelled",
     "Char8Array",

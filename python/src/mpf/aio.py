@@ -9,20 +9,22 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
+from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mpf import _mpf
 from mpf._mpf import Char8Array, Float64, Float64Array, Int32, Int32Array, Message, Request
+from mpf.aio_requests import AsyncRequest, AsyncSubscription
 from mpf.client import LIMIT
-from mpf.errors import Error, NeverTaken, NotConnected, OutcomeUnknown
+from mpf.errors import NotConnected
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 M = TypeVar("M", bound=Message)
 R = TypeVar("R", bound=Message)
+S = TypeVar("S")
 Self = TypeVar("Self")
 
 _CONNECTION = 0  # stands for the connection among the numbers of requests
@@ -120,6 +122,22 @@ class AsyncClient(_mpf.BaseClient):
             return await self._end(request, limit, check)
         finally:
             request.close()  # cancels the request if it has not ended
+
+    async def send_many(
+        self,
+        messages: Iterable[Message],
+        timeout: float | None = None,
+        *,
+        reply: type[Message] | None = None,
+        further: int = 0,
+    ) -> list[AsyncRequest]:
+        """As Client.send_many(): returns the requests that were sent, without waiting for their
+        replies.
+        """
+        limit = self._until(timeout)
+        many = list(messages)
+        sent = await self._sent(self._send_many, many, limit, reply=reply, further=further)
+        return [AsyncRequest(self, request, limit) for request in sent]
 
     @overload
     def subscribe(
@@ -275,114 +293,27 @@ class AsyncClient(_mpf.BaseClient):
     # ---- requests
 
     async def _start(self, message: Message, limit: float, **options: Any) -> Request:
+        return await self._sent(self._send, message, limit, **options)
+
+    async def _sent(self, send: Callable[..., S], what: Any, limit: float, **options: Any) -> S:
+        """Calls `send` with these arguments as soon as the client is connected."""
         loop = self._attach()
         while True:
             left = limit - loop.time()
             try:
-                request = self._send(message, max(left, 0.0), waits=False, **options)
+                sent = send(what, max(left, 0.0), waits=False, **options)
             except NotConnected:
                 if left <= 0 or not await self.wait_connected(left):
                     raise
             else:
                 self._set_timer()
-                return request
+                return sent
 
     async def _end(self, request: Request, limit: float, check: bool) -> Message:
         while (reply := request.result(check=check)) is None:
             if not await self._changed(request.id, limit):
                 return request.wait(check=check)  # raises: its time has passed
         return reply
-
-
-class AsyncSubscription(Generic[M]):
-    """The replies to one request; AsyncClient.subscribe() creates it."""
-
-    def __init__(
-        self,
-        client: AsyncClient,
-        message: Message,
-        reply: type[Message] | None,
-        timeout: float,
-        limit: int,
-        renew: bool,
-    ) -> None:
-        self._client = client
-        self._message = message
-        self._reply = reply
-        self._timeout = timeout
-        self._limit = limit
-        self._renew = renew
-        self._request: Request | None = None
-        self._missed = 0
-        self._isClosed = False
-
-    async def __aenter__(self: Self) -> Self:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def __aiter__(self) -> AsyncIterator[M]:
-        return self
-
-    async def __anext__(self) -> M:
-        while not self._isClosed:
-            message = await (self._first() if self._request is None else self._further())
-            if message is not None:
-                return message
-            if not self._renew:
-                self.close()
-        raise StopAsyncIteration
-
-    @property
-    def missed(self) -> int:
-        """The number of replies that were dropped because the program did not take others."""
-        return self._missed + (self._request.missed if self._request else 0)
-
-    def close(self) -> None:
-        """Ends the iteration, and drops later replies. The server is not told."""
-        self._drop()
-        self._isClosed = True
-
-    async def _first(self) -> M | None:
-        client = self._client
-        limit = client._until(self._timeout)
-        self._request = await client._start(
-            self._message, limit, reply=self._reply, further=self._limit
-        )
-        try:
-            return cast(M, await client._end(self._request, limit, True))
-        except (NeverTaken, OutcomeUnknown) as error:
-            self._drop()
-            if not self._renew or isinstance(error, TimeoutError):
-                raise
-            return None
-        except Error:
-            self._drop()
-            raise
-
-    async def _further(self) -> M | None:
-        limit = self._client._until(self._timeout)
-        while self._request is not None:
-            message = self._request.take_next()
-            if message is not None:
-                return cast(M, message)
-            if not self._request.connected:
-                self._drop()
-            elif not await self._client._changed(self._request.id, limit):
-                raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
-        return None
-
-    def _drop(self) -> None:
-        if self._request is not None:
-            self._missed += self._request.missed
-            self._request.close()
-            self._request = None
 
 
 def _finish(future: asyncio.Future[None]) -> None:

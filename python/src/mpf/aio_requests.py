@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""AsyncRequest, AsyncSubscription: requests of an AsyncClient that were sent."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from types import TracebackType
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
+
+from mpf._mpf import Message, Request
+from mpf.errors import Error, NeverTaken, OutcomeUnknown
+
+if TYPE_CHECKING:
+    from mpf.aio import AsyncClient
+
+M = TypeVar("M", bound=Message)
+Self = TypeVar("Self")
+
+
+class AsyncRequest:
+    """A request that was sent: AsyncClient.send_many() returns it."""
+
+    def __init__(self, client: AsyncClient, request: Request, limit: float) -> None:
+        self._client = client
+        self._request = request
+        self._limit = limit
+
+    async def wait(self, *, check: bool = True) -> Message:
+        """As Request.wait(). Cancelling it cancels the request."""
+        try:
+            return await self._client._end(self._request, self._limit, check)
+        except asyncio.CancelledError:
+            self.close()
+            raise
+
+    async def next(self, timeout: float) -> Message | None:
+        """Waits [s] for a further reply. None after that time and when the connection has ended."""
+        limit = self._client._until(timeout)
+        while (message := self._request.take_next()) is None:
+            if not self.connected or not await self._client._changed(self.id, limit):
+                return None
+        return message
+
+    def result(self, *, check: bool = True) -> Message | None:
+        """As wait(), without waiting: None while the request has not ended."""
+        return self._request.result(check=check)
+
+    def cancel(self) -> None:
+        """Ends the request as Cancelled, unless it has ended. The server may act on it."""
+        self._request.cancel()
+
+    def close(self) -> None:
+        """Cancels the request, and drops further replies."""
+        self._request.close()
+
+    @property
+    def id(self) -> int:
+        """The number of the request in its client."""
+        return self._request.id
+
+    @property
+    def missed(self) -> int:
+        """The number of further replies that were dropped."""
+        return self._request.missed
+
+    @property
+    def connected(self) -> bool:
+        """False when the connection of the request has ended: no further reply will come."""
+        return self._request.connected
+
+
+class AsyncSubscription(Generic[M]):
+    """The replies to one request; AsyncClient.subscribe() creates it."""
+
+    def __init__(
+        self,
+        client: AsyncClient,
+        message: Message,
+        reply: type[Message] | None,
+        timeout: float,
+        limit: int,
+        renew: bool,
+    ) -> None:
+        self._client = client
+        self._message = message
+        self._reply = reply
+        self._timeout = timeout
+        self._limit = limit
+        self._renew = renew
+        self._request: Request | None = None
+        self._missed = 0
+        self._isClosed = False
+
+    async def __aenter__(self: Self) -> Self:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __aiter__(self) -> AsyncIterator[M]:
+        return self
+
+    async def __anext__(self) -> M:
+        while not self._isClosed:
+            message = await (self._first() if self._request is None else self._further())
+            if message is not None:
+                return message
+            if not self._renew:
+                self.close()
+        raise StopAsyncIteration
+
+    @property
+    def missed(self) -> int:
+        """The number of replies that were dropped because the program did not take others."""
+        return self._missed + (self._request.missed if self._request else 0)
+
+    def close(self) -> None:
+        """Ends the iteration, and drops later replies. The server is not told."""
+        self._drop()
+        self._isClosed = True
+
+    async def _first(self) -> M | None:
+        client = self._client
+        limit = client._until(self._timeout)
+        self._request = await client._start(
+            self._message, limit, reply=self._reply, further=self._limit
+        )
+        try:
+            return cast(M, await client._end(self._request, limit, True))
+        except (NeverTaken, OutcomeUnknown) as error:
+            self._drop()
+            if not self._renew or isinstance(error, TimeoutError):
+                raise
+            return None
+        except Error:
+            self._drop()
+            raise
+
+    async def _further(self) -> M | None:
+        limit = self._client._until(self._timeout)
+        while self._request is not None:
+            message = self._request.take_next()
+            if message is not None:
+                return cast(M, message)
+            if not self._request.connected:
+                self._drop()
+            elif not await self._client._changed(self._request.id, limit):
+                raise TimeoutError(f"{self._client.server}: no reply within {self._timeout} s")
+        return None
+
+    def _drop(self) -> None:
+        if self._request is not None:
+            self._missed += self._request.missed
+            self._request.close()
+            self._request = None
