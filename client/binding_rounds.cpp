@@ -5,13 +5,17 @@
 
 namespace mpf {
 
-// A client may be destroyed before the command that adds its binding runs.
-void BindingRounds::add(const std::shared_ptr<Binding>& binding) {
-  if (binding->hasLeft()) return;
-  auto& member = bindings_[binding.get()];
-  member.binding = binding;
+BindingRounds::Place::Place(std::shared_ptr<Binding> binding) {
+  Members members;
+  const auto* const key = binding.get();
+  member_ = members.extract(members.try_emplace(key, Member{std::move(binding)}).first);
+}
+
+void BindingRounds::add(Place&& place) {
+  if (place.member_.mapped().binding->hasLeft()) return;
+  auto& member = bindings_.insert(std::move(place.member_)).position->second;
   const bool wasComplete = std::exchange(isComplete_, false);
-  schedule(member, binding->takeReportedDueNs());
+  schedule(member, member.binding->takeReportedDueNs());
   isComplete_ = wasComplete;
 }
 

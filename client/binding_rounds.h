@@ -22,7 +22,12 @@ class BindingRounds {
  public:
   explicit BindingRounds(DispatcherParts& parts) noexcept : parts_(parts) {}
 
-  void add(const std::shared_ptr<Binding>& binding);
+  // Memory for a binding. Any thread.
+  class Place;
+  // Does nothing when the binding has left: a client may be destroyed before the command that adds
+  // its binding runs.
+  //   throws  std::bad_alloc: the binding is added, and the next step handles its timer
+  void add(Place&& place);
   // The binding stays alive until dropRemoved().
   void remove(const std::shared_ptr<Binding>& binding);
   // No callback of a removed binding is in progress.
@@ -47,19 +52,30 @@ class BindingRounds {
     std::shared_ptr<Binding> binding;
     std::int64_t scheduledNs = INT64_MAX;  // its place in schedule_; INT64_MAX: none
   };
+  using Members = std::map<const Binding*, Member>;
   [[nodiscard]] std::vector<std::weak_ptr<Binding>> all() const;
   [[nodiscard]] std::vector<std::weak_ptr<Binding>> takeDue(std::int64_t nowNs);
   void schedule(Member& member, std::int64_t dueNs);
   void resumeRounds();
 
   DispatcherParts& parts_;
-  std::map<const Binding*, Member> bindings_;
+  Members bindings_;
   std::set<std::pair<std::int64_t, const Binding*>> schedule_;
   bool isComplete_ = true;  // false: a binding may lack its place in schedule_
   std::vector<std::shared_ptr<Binding>> removed_;
   Round<Binding> dead_;
   Round<Binding> waiting_;
   Round<Binding> due_;
+};
+
+class BindingRounds::Place {
+ public:
+  //   throws  std::bad_alloc
+  explicit Place(std::shared_ptr<Binding> binding);
+
+ private:
+  friend BindingRounds;
+  Members::node_type member_;
 };
 
 }  // namespace mpf

@@ -39,9 +39,10 @@ MessageClient::MessageClient(std::shared_ptr<Dispatcher> shared, Callback callba
 MessageClient::MessageClient(Dispatcher& dispatcher, Callback callback)
     : dispatcher_(dispatcher.impl_),
       binding_(std::make_shared<Binding>(dispatcher_->parts(), std::move(callback))) {
-  dispatcher_->commands().runOrPost([dispatcher = dispatcher_.get(), binding = binding_] {
-    dispatcher->bindings().add(binding);
-  });
+  // The command may run later on another thread, which could report a shortage of memory to nobody.
+  const auto place = std::make_shared<BindingRounds::Place>(binding_);
+  dispatcher_->commands().runOrPost(
+      [dispatcher = dispatcher_.get(), place] { dispatcher->bindings().add(std::move(*place)); });
 }
 
 MessageClient::~MessageClient() {

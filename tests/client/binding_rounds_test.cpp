@@ -49,7 +49,7 @@ class BindingRoundsTest : public BindingPartsTest {
   // Adds a binding that waits for nothing.
   std::shared_ptr<Binding> addUnbound() {
     bindings_.push_back(std::make_shared<Binding>(parts_, [](Message&&) {}));
-    rounds_.add(bindings_.back());
+    rounds_.add(BindingRounds::Place(bindings_.back()));
     return bindings_.back();
   }
   [[nodiscard]] std::ptrdiff_t waiting() const {
@@ -153,7 +153,7 @@ TEST_F(BindingRoundsTest, DoNotKeepABindingThatHasLeft) {
   auto binding = std::make_shared<Binding>(parts_, [](Message&&) {});
   binding->leave();
 
-  rounds_.add(binding);
+  rounds_.add(BindingRounds::Place(binding));
 
   EXPECT_EQ(binding.use_count(), 1);
 }
@@ -205,7 +205,7 @@ TEST_F(BindingRoundsTest, ABindingIsScheduledWhenItIsAdded) {
   rounds_.handleDue();
   parts_.timer.reset();
 
-  rounds_.add(binding);
+  rounds_.add(BindingRounds::Place(binding));
   rounds_.handleDue();
 
   EXPECT_EQ(parts_.timer.due().ns(), binding->dueNs());
@@ -222,7 +222,7 @@ TEST_F(BindingRoundsTest, AShortageOfMemoryLosesNoTimer) {
       if (message.tryAs<RequestFate>() != nullptr) ++fates;
     }));
     bindings_.back()->setServer("dac", 0);
-    rounds_.add(bindings_.back());
+    rounds_.add(BindingRounds::Place(bindings_.back()));
     connect(*bindings_.back(), server);
   }
 
@@ -237,6 +237,25 @@ TEST_F(BindingRoundsTest, AShortageOfMemoryLosesNoTimer) {
   EXPECT_GT(shortages, kBindings) << "each place in the schedule needs memory";
 }
 
+// The thread that adds a binding has no caller that it could tell.
+TEST_F(BindingRoundsTest, AShortageOfMemoryIsAnErrorBeforeABindingIsAdded) {
+  bindings_.push_back(std::make_shared<Binding>(parts_, [](Message&&) {}));
+  allocationsLeft = 0;
+  EXPECT_THROW(BindingRounds::Place(bindings_.back()), std::bad_alloc);
+  allocationsLeft = kUnlimited;
+  BindingRounds::Place place(bindings_.back());
+
+  allocationsLeft = 0;
+  rounds_.add(std::move(place));
+  allocationsLeft = kUnlimited;
+
+  const MessageServer server(backplane_, "dac");
+  bindings_.back()->setServer("dac", 0);
+  rounds_.beginWaiting();
+  EXPECT_TRUE(rounds_.resume());
+  EXPECT_FALSE(bindings_.back()->isWaiting()) << "it was added";
+}
+
 TEST_F(BindingRoundsTest, ABindingThatIsAddedWithoutMemoryKeepsItsTimer) {
   MessageServer server(backplane_, "dac");
   bool hasExpired = false;
@@ -248,9 +267,10 @@ TEST_F(BindingRoundsTest, ABindingThatIsAddedWithoutMemoryKeepsItsTimer) {
   connect(*binding, server);
   rounds_.handleDue();
   sendExpired(*binding);
-  allocationsLeft = 1;  // for the binding itself
+  BindingRounds::Place place(binding);
+  allocationsLeft = 0;
 
-  EXPECT_THROW(rounds_.add(binding), std::bad_alloc);
+  EXPECT_THROW(rounds_.add(std::move(place)), std::bad_alloc);
 
   allocationsLeft = kUnlimited;
   while (parts_.timer.isDue()) rounds_.handleDue();
