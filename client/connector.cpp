@@ -59,6 +59,7 @@ void Connector::setReason(const std::string& reason) {
 
 void Connector::notifyConnected() {
   const std::lock_guard lock(mutex_);
+  const auto former = std::exchange(reason_, {});  // frees its memory
   connected_.notify_all();
 }
 
@@ -178,23 +179,23 @@ void Connector::publishPendingBind() {
   parts_.names.start();
   if (pendingBind_) return;
   auto& endpoint = parts_.endpoint;
-  auto pendingBind =
+  auto pendingBind = std::make_unique<Segment>(
       Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::pendingBind,
-                      endpoint.backplane().name(), {0644, ~std::uint32_t{0}});
-  auto& header = pendingBind.sharedHeader();
+                      endpoint.backplane().name(), {0644, ~std::uint32_t{0}}));
+  auto& header = pendingBind->sharedHeader();
   header.ownerWindow = endpoint.window().header().incarnation;
   header.location = location_;
   server_.copy(header.name.data(), header.name.size() - 1);
-  static_cast<void>(pendingBind.tryPublish(
+  static_cast<void>(pendingBind->tryPublish(
       SegmentName::keyed(endpoint.backplane().name(), NameKind::pendingBind, header.incarnation)));
   MPF_STEP(pending_bind_named);
-  pendingBind.closeFile();
+  pendingBind->closeFile();
   pendingBind_ = std::move(pendingBind);
 }
 
 void Connector::cancelPendingBind() {
-  if (pendingBind_) segments::remove(pendingBind_.name());
-  pendingBind_ = {};
+  if (pendingBind_) segments::remove(pendingBind_->name());
+  pendingBind_.reset();
 }
 
 }  // namespace mpf

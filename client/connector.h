@@ -73,10 +73,12 @@ class Connector {
   std::int32_t location_ = 0;  // likewise
   std::uint32_t index_ = 0;
   std::uint64_t incarnation_ = 0;
-  Segment pendingBind_;
+  std::unique_ptr<Segment> pendingBind_;  // while the client waits for a server
   mutable std::mutex mutex_;
   std::condition_variable connected_;
-  std::string reason_ = "not bound to a server yet";  // under mutex_
+  std::string reason_ = "not bound to a server yet";  // under mutex_; empty while connected
 };
+// A router has one for each remote client.
+static_assert(sizeof(Connector) <= 192);
 
 }  // namespace mpf

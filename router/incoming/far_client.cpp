@@ -9,16 +9,17 @@
 
 namespace mpf::router {
 
-FarClient::FarClient(const Shared& shared, const Terms& terms, Events events)
+FarClient::FarClient(const Shared& shared, const Terms& terms)
     : shared_(shared),
       terms_(terms),
-      events_(std::move(events)),
-      window_(std::max<std::int64_t>(terms.window, 1)),
-      fullWindow_(window_),
+      window_(fullWindow()),
       held_(terms.queueSize, shared.heldBytes),
-      expiry_(shared.timer, [this] { expire(); }),
-      client_(std::make_unique<RelayClient>(
-          shared.dispatcher, [this](Message&& message) { onMessage(std::move(message)); })) {}
+      client_(std::in_place, shared.dispatcher,
+              [this](Message&& message) { onMessage(std::move(message)); }) {}
+
+std::int64_t FarClient::fullWindow() const noexcept {
+  return std::max<std::int64_t>(terms_.window, 1);
+}
 
 // ---- to the server
 
@@ -86,13 +87,19 @@ void FarClient::hold(HeldRequest request) {
     return;
   }
   queueFullSent_ = false;
-  expiry_.setAt(takeBefore);
+  expireAt(takeBefore);
 }
 
 // Ends the held requests whose deadline has passed, and sets the timer for the next deadline.
 void FarClient::expire() {
   for (const auto& request : held_.takeExpired()) endRequest(request.requestId, Fate::expired, {});
-  expiry_.setAt(held_.nextDeadline());
+  expireAt(held_.nextDeadline());
+}
+
+void FarClient::expireAt(Deadline deadline) {
+  if (deadline.isNever()) return;
+  if (!expiry_) expiry_ = std::make_unique<Alarm>(shared_.timer, [this] { expire(); });
+  expiry_->setAt(deadline);
 }
 
 // The client may be paused because its window is used up.
@@ -158,19 +165,19 @@ void FarClient::onConnect(const Connect& connect) {
     case ConnectStatus::connectRefused: {
       const auto why = client_->notConnectedBecause();
       giveUp(Fate::refused, why);
-      return events_.onRefused(*this, why);
+      return shared_.events.onRefused(*this, why);
     }
     case ConnectStatus::connectNo:
       if (!isConnected()) return;
       state_ = State::waiting;
-      return events_.onDisconnected(*this);
+      return shared_.events.onDisconnected(*this);
   }
 }
 
 // The server has accepted the client: sends what was held.
 void FarClient::accept() {
   state_ = State::connected;
-  events_.onConnected(*this);
+  shared_.events.onConnected(*this);
   for (auto& request : held_.takeAll()) send(std::move(request));
 }
 
@@ -191,7 +198,7 @@ void FarClient::endRequest(std::uint32_t requestId, Fate fate, const std::string
 }
 
 void FarClient::credit(std::uint32_t bytes) {
-  window_ = std::min(window_ + bytes, fullWindow_);
+  window_ = std::min(window_ + bytes, fullWindow());
   if (window_ > 0 && client_) client_->resume();
 }
 

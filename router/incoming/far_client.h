@@ -17,6 +17,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,14 +33,6 @@ namespace mpf::router {
 
 class FarClient {
  public:
-  // The objects that the clients of a connection share. They outlive the clients.
-  struct Shared {
-    kj::Timer& timer;
-    Dispatcher& dispatcher;
-    Line& line;
-    PeerRecord& record;
-    std::size_t& heldBytes;  // of the requests that all clients hold
-  };
   // What a client reports to the object that made it.
   struct Events {
     // The server has accepted it.
@@ -50,6 +43,15 @@ class FarClient {
     // The server does not accept it, for the reason `why`. As for onDisconnected.
     std::function<void(FarClient& client, const std::string& why)> onRefused;
   };
+  // What the clients of a connection share.
+  struct Shared {
+    kj::Timer& timer;
+    Dispatcher& dispatcher;
+    Line& line;
+    PeerRecord& record;
+    std::size_t& heldBytes;  // of the requests that all clients hold
+    const Events& events;
+  };
   struct Terms {
     std::uint32_t number = 0;
     std::uint32_t binding = 0;
@@ -57,7 +59,8 @@ class FarClient {
     std::uint32_t queueSize = 0;  // of the server
     std::uint32_t window = 0;  // bytes of replies that may be on their way
   };
-  FarClient(const Shared& shared, const Terms& terms, Events events);
+  // `shared` and what it refers to outlive this object.
+  FarClient(const Shared& shared, const Terms& terms);
   FarClient(const FarClient&) = delete;
   FarClient& operator=(const FarClient&) = delete;
 
@@ -94,26 +97,29 @@ class FarClient {
   void send(std::uint32_t requestId, Message& message, Deadline takeBefore);
   void hold(HeldRequest request);
   void expire();
+  void expireAt(Deadline deadline);
+  [[nodiscard]] std::int64_t fullWindow() const noexcept;
   void sendQueueFull();
   void endRequest(std::uint32_t requestId, Fate fate, const std::string& why);
 
-  Shared shared_;
-  Terms terms_;
-  Events events_;
-  State state_ = State::waiting;
-  std::int64_t window_;  // bytes of replies that may be sent before the next credit
-  std::int64_t fullWindow_;
-  Fate fateAfterGiveUp_{};
-  std::string giveUpReason_;
-  HeldRequests held_;
-  bool queueFullSent_ = false;  // in this run of refused requests
   struct Dropped {
     std::uint32_t requestId;
     std::uint32_t count;
   };
+
+  const Shared& shared_;
+  Terms terms_;
+  State state_ = State::waiting;
+  Fate fateAfterGiveUp_{};
+  bool queueFullSent_ = false;  // in this run of refused requests
+  std::int64_t window_;  // bytes of replies that may be sent before the next credit
+  std::string giveUpReason_;
+  HeldRequests held_;
   std::vector<Dropped> dropped_;  // further replies of which the far client has not been told
-  Alarm expiry_;
-  std::unique_ptr<RelayClient> client_;  // nullptr after giveUp()
+  std::unique_ptr<Alarm> expiry_;  // once a request with a deadline was held
+  std::optional<RelayClient> client_;  // empty after giveUp()
 };
+// A router has one for each remote client.
+static_assert(sizeof(FarClient) <= 224);
 
 }  // namespace mpf::router

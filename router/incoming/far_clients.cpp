@@ -38,9 +38,8 @@ void FarClients::open(std::uint32_t number) {
 }
 
 void FarClients::add(const FarClient::Terms& terms, const ServerName& server) {
-  if (!dispatcher_) startDispatcher();
-  auto client = std::make_unique<FarClient>(
-      FarClient::Shared{context_.timer, *dispatcher_, line_, record_, heldBytes_}, terms, events_);
+  if (!shared_) startDispatcher();
+  auto client = std::make_unique<FarClient>(*shared_, terms);
   client->bind(server.server, server.location);
   clients_[terms.number] = std::move(client);
   noteClients();
@@ -52,6 +51,7 @@ void FarClients::startDispatcher() {
       context_.backplane, DispatcherOptions{WaitMode::block, "router " + line_.peer().router});
   readable_ =
       std::make_unique<Readable>(context_.port, dispatcher_->descriptor(), [this] { run(); });
+  shared_.emplace(context_.timer, *dispatcher_, line_, record_, heldBytes_, events_);
 }
 
 FarClient* FarClients::find(std::uint32_t number) const {

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -70,6 +71,7 @@ class FarClients final : private Polled {
   std::size_t heldBytes_ = 0;  // of the requests that all clients hold
   std::unique_ptr<RelayDispatcher> dispatcher_;  // created with the first client
   std::unique_ptr<Readable> readable_;
+  std::optional<FarClient::Shared> shared_;  // likewise; outlives the clients
   std::unordered_map<std::uint32_t, std::unique_ptr<FarClient>> clients_;
   // The client of the last item, so that a run of them costs one look-up.
   mutable std::pair<std::uint32_t, FarClient*> recent_{};

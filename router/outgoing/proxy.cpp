@@ -125,7 +125,8 @@ Proxy::Client* Proxy::tryFindOrOpen(std::uint64_t local) {
   const auto found = numbers_.find(local);
   if (found == numbers_.end()) return nullptr;
   if (const auto known = clients_.find(found->second);
-      known != clients_.end() && known->second.owed == 0 && known->second.openAgain.hasPassed()) {
+      known != clients_.end() && known->second.owed == 0 && known->second.refusal &&
+      known->second.refusal->openAgain.hasPassed()) {
     close(found->second);
     found->second = 0;
   }
@@ -142,7 +143,7 @@ void Proxy::forward(Message request) {
   ++client->owed;
   ++owed_;
   if (client->refusal)
-    return endRequest(client->number, requestId, Fate::refused, *client->refusal);
+    return endRequest(client->number, requestId, Fate::refused, client->refusal->why);
   const auto takeBefore = server_.takeBefore();
   if (takeBefore.isNever() && PlainItem::canCarry(request))
     return connection_.line().send(PlainOutgoing{true, false, client->number, requestId, request});
@@ -271,10 +272,10 @@ void Proxy::queueFull(std::uint32_t number) {
 void Proxy::refuse(std::uint32_t number, const std::string& why) {
   const auto found = clients_.find(number);
   if (found == clients_.end()) return;
-  if (!found->second.refusal)
+  auto& refusal = found->second.refusal;
+  if (!refusal)
     log_.warn("{} at location {} refuses a client: {}", name_.server, name_.location, why);
-  found->second.refusal = why;
-  found->second.openAgain = Deadline::after(kOpenAgain);
+  refusal = std::make_unique<Refusal>(why, Deadline::after(kOpenAgain));
 }
 
 // Keeps the order: a message is queued behind those that are held.

@@ -19,7 +19,6 @@
 
 #include <list>
 #include <memory>
-#include <optional>
 #include <string>
 #include <unordered_map>
 
@@ -77,6 +76,10 @@ class Proxy final : private Polled {
     std::uint32_t requestId;
     Message message;
   };
+  struct Refusal {
+    std::string why;
+    Deadline openAgain;  // when the client may be opened again
+  };
   struct Client {
     std::uint32_t number = 0;
     std::uint64_t local = 0;  // its number in MessageServer
@@ -84,8 +87,7 @@ class Proxy final : private Polled {
     ReplyWindow window{0};  // as sent in `open`
     bool heldQueueFull = false;  // `held` contains a connectQueueFull
     std::list<Held> held;  // replies for which the client has no room
-    std::optional<std::string> refusal;  // why the far server does not accept it
-    Deadline openAgain = Deadline::never();  // after a refusal: when it may be opened again
+    std::unique_ptr<Refusal> refusal;  // if the far server does not accept it
   };
   void poll() override { onReadable(); }
   void setPolled(bool isPolled) override { server_.setPolled(isPolled); }

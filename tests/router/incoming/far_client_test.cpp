@@ -33,11 +33,8 @@ class FarClientTest : public RouterPartsTest {
     RouterPartsTest::TearDown();
   }
   void makeClient(const FarClient::Terms& terms) {
-    client_.emplace(FarClient::Shared{context_.timer, dispatcher_, *line_, record_, heldBytes_},
-                    terms,
-                    FarClient::Events{.onConnected = [](FarClient&) {},
-                                      .onDisconnected = [this](FarClient&) { ++disconnects_; },
-                                      .onRefused = [](FarClient&, const std::string&) {}});
+    shared_.emplace(context_.timer, dispatcher_, *line_, record_, heldBytes_, events_);
+    client_.emplace(*shared_, terms);
     client_->bind("echo", 0);
   }
   // A server, and a client of it with a window of `bytes`.
@@ -81,6 +78,10 @@ class FarClientTest : public RouterPartsTest {
                                    [this] { dispatcher_.runPending(); }};
   std::size_t heldBytes_ = 0;
   int disconnects_ = 0;
+  const FarClient::Events events_{.onConnected = [](FarClient&) {},
+                                  .onDisconnected = [this](FarClient&) { ++disconnects_; },
+                                  .onRefused = [](FarClient&, const std::string&) {}};
+  std::optional<FarClient::Shared> shared_;
   std::optional<MessageServer> server_;
   std::optional<FarClient> client_;
 };
