@@ -111,7 +111,7 @@ std::size_t Publisher::publish(const Message& message, std::span<const Message> 
   const auto chunk = isShared ? bodies_->tryFind(message.body().data()) : tryCopy(message.body());
   std::size_t sent = 0;
   for (std::size_t i = 0; i < requests.size(); ++i) {
-    const auto result = send(message, requests[i], chunk);
+    const auto result = send(message, requests[i], chunk, kOwnCount);
     if (result == ReplyResult::sent) ++sent;
     if (i < results.size()) results[i] = result;
   }
@@ -119,18 +119,26 @@ std::size_t Publisher::publish(const Message& message, std::span<const Message> 
   return sent;
 }
 
+ReplyResult Publisher::relay(const Message& message, std::uint32_t missed) noexcept {
+  const auto chunk = tryCopy(message.body());
+  const auto result = send(message, message, chunk, missed);
+  if (chunk) chunk->drop();
+  return result;
+}
+
 ReplyResult Publisher::send(const Message& message, const Message& request,
-                            const std::shared_ptr<FanOutChunk>& chunk) noexcept {
+                            const std::shared_ptr<FanOutChunk>& chunk,
+                            std::uint32_t missed) noexcept {
   if (!message || request.route().link == 0 || forkGuard_.isInherited())
     return ReplyResult::clientGone;
   auto& connection = Connection::of(request.route());
   const BiasedLock::Guard lock(*connection.lock);
-  return sendLocked(connection, message, request, chunk);
+  return sendLocked(connection, message, request, chunk, missed);
 }
 
 ReplyResult Publisher::sendLocked(Connection& connection, const Message& message,
-                                  const Message& request,
-                                  const std::shared_ptr<FanOutChunk>& chunk) noexcept {
+                                  const Message& request, const std::shared_ptr<FanOutChunk>& chunk,
+                                  std::uint32_t missed) noexcept {
   const auto route = request.route();
   if (!connection.isOpenFor(route)) return ReplyResult::clientGone;
   auto& link = connection.channel->link();
@@ -147,8 +155,11 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
   if (link.shouldSampleTime()) envelope.sentTick = Tick::of(Clock::nowNs());
 
   const Link::Limits limits{0, first ? 0 : link.maxOutstanding()};
+  const auto bytes = message.body().size();
   const auto result =
-      link.trySendFanOut(envelope, chunk, message.body().size(), limits, maxBorrowed_);
+      missed == kOwnCount
+          ? link.trySendFanOut(envelope, chunk, bytes, limits, maxBorrowed_)
+          : link.tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed_, missed);
   if (result != LinkSend::sent) {
     count(control_.replyQueueFull);
     return resultOf(result);

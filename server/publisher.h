@@ -52,14 +52,20 @@ class Publisher {
   // MessageServer::publish().
   std::size_t publish(const Message& message, std::span<const Message> requests,
                       std::span<ReplyResult> results) noexcept;
+  // Sends one message on its route, and tells its client how many messages of the request were
+  // dropped before it.
+  ReplyResult relay(const Message& message, std::uint32_t missed) noexcept;
 
  private:
+  // As the missed messages that publish() counts itself.
+  static constexpr std::uint32_t kOwnCount = UINT32_MAX;
+
   std::shared_ptr<FanOutChunk> tryAlloc(std::size_t bytes) noexcept;
   std::shared_ptr<FanOutChunk> tryCopy(std::span<const std::byte> body) noexcept;
   ReplyResult send(const Message& message, const Message& request,
-                   const std::shared_ptr<FanOutChunk>& chunk) noexcept;
+                   const std::shared_ptr<FanOutChunk>& chunk, std::uint32_t missed) noexcept;
   ReplyResult sendLocked(Connection& connection, const Message& message, const Message& request,
-                         const std::shared_ptr<FanOutChunk>& chunk) noexcept;
+                         const std::shared_ptr<FanOutChunk>& chunk, std::uint32_t missed) noexcept;
   void noteBorrower(const std::shared_ptr<MessageLink>& channel) noexcept;
   void collectReturned() noexcept;
 

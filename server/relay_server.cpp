@@ -11,8 +11,16 @@ void RelayServer::onClient(std::function<void(std::uint64_t, bool)> callback) {
 void RelayServer::setPolled(bool isPolled) noexcept { core_->setPolled(isPolled); }
 Deadline RelayServer::takeBefore() const noexcept { return core_->takeBefore(); }
 ReplyResult RelayServer::replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message) {
+  const auto own = message.route();
+  const auto missed = message.getMissed();
   message.setRoute(core_->connections().routeTo(client, requestId));
-  return core_->replies().send(message);
+  if (missed != 0 && core_->publisher().relay(message, missed) == ReplyResult::sent) {
+    message.reset();
+    return ReplyResult::sent;
+  }
+  const auto result = core_->replies().send(message);
+  if (message) message.setRoute(own);
+  return result;
 }
 bool RelayServer::owes(std::uint64_t client, std::uint32_t requestId) const noexcept {
   return core_->connections().owes(client, requestId);

@@ -266,25 +266,29 @@ LinkSend Link::trySendLong(Envelope envelope, std::span<const std::byte> body,
 
 LinkSend Link::trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
                              std::size_t bytes, Limits limits, std::uint32_t maxBorrowed) noexcept {
-  if (bytes > maxMessageBytes()) return LinkSend::tooLarge;
   auto& loans = pool_.loans();
   const auto id = envelope.requestId;
+  const auto result = tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed, loans.missed(id));
+  if (result == LinkSend::sent) loans.forgetMissed(id);
+  else if (result != LinkSend::tooLarge) loans.noteMissed(id);
+  return result;
+}
+
+LinkSend Link::tryRelayFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+                              std::size_t bytes, Limits limits, std::uint32_t maxBorrowed,
+                              std::uint32_t missed) noexcept {
+  if (bytes > maxMessageBytes()) return LinkSend::tooLarge;
+  auto& loans = pool_.loans();
   pool_.collectReturned();
-  if (loans.count() >= maxBorrowed || !pool_.canLend() || !out_.hasFree(1 + limits.reserve)) {
-    loans.noteMissed(id);
+  if (loans.count() >= maxBorrowed || !pool_.canLend() || !out_.hasFree(1 + limits.reserve))
     return LinkSend::full;
-  }
-  if (!chunk || !loans.tryLend(chunk)) {
-    loans.noteMissed(id);
-    return LinkSend::noMemory;
-  }
+  if (!chunk || !loans.tryLend(chunk)) return LinkSend::noMemory;
   envelope.bodyBytes = static_cast<std::uint32_t>(bytes);
   envelope.flags |= layout::kSlotChunk;
-  const layout::ChunkRef ref{chunk->number(), 0, layout::kFanOutSide, loans.missed(id)};
+  const layout::ChunkRef ref{chunk->number(), 0, layout::kFanOutSide, missed};
   // hasFree() above has checked that it fits.
   if (!out_.tryPush(envelope, std::as_bytes(std::span(&ref, 1)), limits.reserve))
     return LinkSend::full;
-  loans.forgetMissed(id);
   afterPush();
   return LinkSend::sent;
 }

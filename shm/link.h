@@ -158,6 +158,11 @@ class Link {
   // null; then the message counts as missed by its request.
   LinkSend trySendFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
                          std::size_t bytes, Limits limits, std::uint32_t maxBorrowed) noexcept;
+  // As trySendFanOut(), for a message of another server: the client is told that `missed` messages
+  // of the request were dropped. Does not count a message that is not sent.
+  LinkSend tryRelayFanOut(Envelope envelope, const std::shared_ptr<FanOutChunk>& chunk,
+                          std::size_t bytes, Limits limits, std::uint32_t maxBorrowed,
+                          std::uint32_t missed) noexcept;
   // At the server: takes what the client has returned of both pools.
   void collectReturned() noexcept { pool_.collectReturned(); }
   // At the server: the client reads no chunk any more if it was killed; otherwise it may.

@@ -14,6 +14,7 @@ constexpr std::chrono::milliseconds kFirstRetry{1};
 constexpr std::chrono::milliseconds kLastRetry{50};
 constexpr int kAtOnce = 1024;  // requests before the event loop runs its other tasks
 constexpr std::chrono::seconds kOpenAgain{1};  // pause after a refusal
+constexpr int kMaxBorrowed = 64;  // the highest value
 
 ServerOptions optionsFor(const RouterContext& context, const ServerName& name,
                          const Proxy::Offer& offer, std::uint64_t maxMessageBytes) {
@@ -25,6 +26,7 @@ ServerOptions optionsFor(const RouterContext& context, const ServerName& name,
       std::min(maxOffered + kMostBesideElements, std::max(maxMessageBytes, kMostBesideElements));
   options.waitMode = WaitMode::block;
   options.rights = context.config.rights;
+  options.maxBorrowed = kMaxBorrowed;
   return options;
 }
 
@@ -234,6 +236,7 @@ void Proxy::reply(std::uint32_t number, wire::Reply::Reader reply) {
     }
     return loseReply(number, reply, error.text);
   }
+  message->setRoute({0, 0, Message::missedFlags(reply.getMissed()), nullptr});
   client.window.received(windowBytesOf(*message));
   deliver(client, reply.getRequestId(), std::move(*message), isOwed);
 }

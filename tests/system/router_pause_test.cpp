@@ -64,6 +64,37 @@ TEST_F(RouterPauseTest, AStoppedLocalRouterConnectsAgain) {
   expectAnswer();
 }
 
+// The far router returns a published message when it has put it into a frame.
+TEST_F(RouterPauseTest, AClientIsToldHowManyPublishedMessagesItMissed) {
+  startAll(kPatient);
+  send(1);
+  const auto subscriber = nextRequest();
+  const auto publish = [&](std::int32_t number) {
+    auto image = server_->allocShared<Int32Array>(1000);
+    std::ranges::fill(image.value(), number);
+    return server_->publish(image, subscriber);
+  };
+  EXPECT_EQ(publish(0), ReplyResult::sent);
+  EXPECT_EQ(next().getMissed(), 0u);
+
+  routers_.farRouter().stop();
+  std::int32_t sent = 0;
+  while (publish(++sent) == ReplyResult::sent) {
+  }
+  for (int dropped = 1; dropped < 10; ++dropped) EXPECT_EQ(publish(-1), ReplyResult::queueFull);
+  routers_.farRouter().resume();
+  for (std::int32_t number = 1; number < sent; ++number) {
+    const auto image = next();
+    EXPECT_EQ(image.valueAs<Int32Array>()[0], number);
+    EXPECT_EQ(image.getMissed(), 0u);
+  }
+  EXPECT_EQ(publish(sent), ReplyResult::sent);
+
+  const auto image = next();
+  EXPECT_EQ(image.valueAs<Int32Array>()[0], sent);
+  EXPECT_EQ(image.getMissed(), 10u);
+}
+
 TEST_F(RouterPauseTest, RoutersStoppedForLessThanTheDeadTimeLoseNothing) {
   startAll(kPatient);
   serveOnceEach();

@@ -85,5 +85,28 @@ TEST_F(ProxyTest, RepliesAreHeldInOrderUntilTheClientHasRoom) {
   }
 }
 
+// Also the numbers of replies that are held.
+TEST_F(ProxyTest, TheClientIsToldHowManyMessagesItMissed) {
+  constexpr std::uint32_t kReplies = 200;
+  const auto id = sendRequest();
+  std::vector<Fill> replies;
+  for (std::uint32_t i = 0; i < kReplies; ++i) {
+    replies.push_back([=](wire::Item::Builder item) {
+      test::reply(1, id, i == 0, static_cast<std::int32_t>(i))(item);
+      item.getReply().setMissed(i % 8 == 1 ? 7u : 0u);
+    });
+  }
+
+  send(frameOf(replies));
+  runClientUntil([this] { return caller_->messages.size() == kReplies; });
+
+  for (std::uint32_t i = 0; i < kReplies; ++i) {
+    const auto reply = caller_->take();
+    ASSERT_NE(reply.tryAs<Int32>(), nullptr);
+    ASSERT_EQ(reply.tryAs<Int32>()->value, static_cast<std::int32_t>(i));
+    ASSERT_EQ(reply.getMissed(), i % 8 == 1 ? 7u : 0u);
+  }
+}
+
 }  // namespace
 }  // namespace mpf::test
