@@ -180,7 +180,7 @@ void Connector::publishPendingBind() {
   if (pendingBind_) return;
   auto& endpoint = parts_.endpoint;
   auto pendingBind = std::make_unique<Segment>(
-      Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::pendingBind,
+      Segment::create(layout::kHeaderBytes, layout::SegmentKind::pendingBind,
                       endpoint.backplane().name(), {0644, ~std::uint32_t{0}}));
   auto& header = pendingBind->sharedHeader();
   header.ownerWindow = endpoint.window().header().incarnation;

@@ -12,7 +12,7 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
+#include <string_view>
 #include <vector>
 
 #include "shm/layout.h"
@@ -25,8 +25,9 @@ class FanOutBorrower {
  public:
   static constexpr std::size_t kMaxMappings = 256;
 
-  FanOutBorrower(std::string backplane, std::uint64_t serverWindow)
-      : backplane_(std::move(backplane)), serverWindow_(serverWindow) {}
+  //   backplane   its text outlives this object
+  FanOutBorrower(std::string_view backplane, std::uint64_t serverWindow)
+      : backplane_(backplane), serverWindow_(serverWindow) {}
 
   // Maps a chunk that the server sent; nullopt if there is no such chunk.
   //   throws  std::system_error, std::bad_alloc: no free descriptor or no memory to map it
@@ -44,7 +45,7 @@ class FanOutBorrower {
   View* tryMap(std::uint32_t number);
   void unmapUnused() noexcept;
 
-  std::string backplane_;
+  std::string_view backplane_;
   std::uint64_t serverWindow_;
   std::vector<View> views_;
 };

@@ -72,7 +72,9 @@ enum class SegmentKind : std::uint32_t {
   fanOut = 8
 };
 
-// First 512 bytes of every segment. Written before the segment gets its name; constant afterwards.
+// Start of every segment. Written before the segment gets its name; constant afterwards. The bytes
+// up to kHeaderBytes are reserved; they are not in this structure, because processes keep copies.
+inline constexpr std::size_t kHeaderBytes = 512;
 struct SegmentHeader {
   std::uint64_t magic;
   std::uint16_t layoutMajor;
@@ -121,10 +123,8 @@ struct SegmentHeader {
 
   // Link only: slots of the second reply ring, a power of two; 0: the first one is enough.
   std::uint32_t moreReplySlots;
-
-  std::array<std::uint8_t, 196> reserved;
 };
-static_assert(sizeof(SegmentHeader) == 512);
+static_assert(sizeof(SegmentHeader) == 320);
 static_assert(offsetof(SegmentHeader, backplane) == 88 && offsetof(SegmentHeader, name) == 128);
 static_assert(offsetof(SegmentHeader, queueSlots) == 224 &&
               offsetof(SegmentHeader, chunkBytes) == 296 &&
@@ -187,6 +187,7 @@ inline constexpr std::size_t kWindowBytes = kWindowControlOffset + sizeof(Window
 // reason costs a wake-up, never a message.
 struct WindowHints {
   SegmentHeader header;
+  std::array<std::uint8_t, kHeaderBytes - sizeof(SegmentHeader)> reserved;
   alignas(kPairBytes) Word32 bell;  // changes with every ring; the futex that the owner sleeps on
   alignas(kPairBytes) Word32 knocked;  // changes with every knock
   Word32 rescan;  // not 0: a knock was overwritten; the owner must search for new links by name

@@ -56,7 +56,7 @@ LinkSide other(LinkSide side) {
   return side == LinkSide::client ? LinkSide::server : LinkSide::client;
 }
 
-PoolPlace poolPlace(const Segment& segment, const std::string& backplane, LinkSide side) {
+PoolPlace poolPlace(const Segment& segment, std::string_view backplane, LinkSide side) {
   const auto& header = segment.header();
   return {backplane, header.incarnation, static_cast<std::uint32_t>(side),
           side == LinkSide::client ? header.clientWindow : header.serverWindow};
@@ -167,11 +167,11 @@ Link::Link(Segment segment, const std::string& backplane, LinkSide side, Rights 
            secondRing(segment_, side)),
       in_(slotsOf(segment_, other(side)), slotCount(segment_, other(side)),
           ringControl(segment_, other(side)), secondRing(segment_, other(side))),
-      pool_(poolPlace(segment_, backplane, side), {rights.mode & 0666, rights.group, rights.user},
+      pool_(poolPlace(segment_, backplane_, side), {rights.mode & 0666, rights.group, rights.user},
             segment_.header().maxPoolBytes, returnRing(segment_, side)),
-      borrowed_(poolPlace(segment_, backplane, other(side)), segment_.header().maxPoolBytes,
+      borrowed_(poolPlace(segment_, backplane_, other(side)), segment_.header().maxPoolBytes,
                 returnRing(segment_, other(side))),
-      fanOut_(backplane, segment_.header().serverWindow) {}
+      fanOut_(backplane_, segment_.header().serverWindow) {}
 
 Link::~Link() {
   if (side_ == LinkSide::client && !forkGuard_.isInherited()) segments::remove(segment_.name());

@@ -199,7 +199,7 @@ std::optional<layout::ChunkRef> PoolBorrower::tryFind(const std::byte* data) con
   return std::nullopt;
 }
 
-void removeBulk(const std::string& backplane, std::uint64_t link) {
+void removeBulk(std::string_view backplane, std::uint64_t link) {
   for (std::uint32_t side = 0; side < 2; ++side) {
     std::uint32_t count = 0;
     while (segments::exists(SegmentName::bulk(backplane, link, side, count))) ++count;

@@ -16,7 +16,7 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
+#include <string_view>
 #include <vector>
 
 #include "shm/fan_out_loans.h"
@@ -34,7 +34,7 @@ struct Chunk {
 
 // Identifies the pool of one side of a link.
 struct PoolPlace {
-  std::string backplane;
+  std::string_view backplane;  // its text outlives the pool: there may be many thousands of pools
   std::uint64_t link{};
   std::uint32_t side{};
   std::uint64_t ownerWindow{};
@@ -127,6 +127,6 @@ class PoolBorrower {
 // Removes the bulk segments of both sides of a link. Removes the last ones first, as their owner
 // does: a process that is killed in between leaves no gap in the numbers. Segments after a gap
 // would not be found.
-void removeBulk(const std::string& backplane, std::uint64_t link);
+void removeBulk(std::string_view backplane, std::uint64_t link);
 
 }  // namespace mpf

@@ -83,7 +83,8 @@ FileDescriptor openChecked(const std::string& name, layout::SegmentKind kind, in
   auto file = openRegular(name, flags, fileBytes);
   if (!file) return {};
   const auto path = segments::path(name);
-  if (::pread(file.get(), &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) {
+  if (fileBytes < layout::kHeaderBytes ||
+      ::pread(file.get(), &header, sizeof header, 0) != static_cast<ssize_t>(sizeof header)) {
     throw SegmentError(
         fmt::format("{}: truncated, {} bytes are too few for a header", path, fileBytes));
   }
@@ -148,7 +149,7 @@ void setRights(int fd, const Rights& rights) {
   checkCall(::fchmod(fd, rights.mode), "set the mode of a segment");
 }
 
-Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
+Segment Segment::create(std::size_t bytes, layout::SegmentKind kind, std::string_view backplane,
                         Rights rights, std::size_t reservedBytes) {
   Segment segment;
   segment.file_.reset(checkCall(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600),
@@ -267,7 +268,7 @@ void check(const layout::SegmentHeader& header, std::size_t fileBytes, layout::S
                                    static_cast<std::uint32_t>(header.kind),
                                    static_cast<std::uint32_t>(kind)));
   }
-  if (header.totalBytes < sizeof(layout::SegmentHeader) || fileBytes < header.totalBytes) {
+  if (header.totalBytes < layout::kHeaderBytes || fileBytes < header.totalBytes) {
     throw SegmentError(
         fmt::format("{}: truncated, {} bytes of {}", path, fileBytes, header.totalBytes));
   }

@@ -20,6 +20,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -47,9 +48,9 @@ class Segment {
   // Creates a segment of `bytes` zeroes and fills in the header fields that all kinds share. Only
   // the first `reservedBytes` get memory; the others must not be accessed before tryReserve().
   //   throws  std::system_error; ENOSPC if /dev/shm does not have enough free memory
-  static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
+  static Segment create(std::size_t bytes, layout::SegmentKind kind, std::string_view backplane,
                         Rights rights, std::size_t reservedBytes);
-  static Segment create(std::size_t bytes, layout::SegmentKind kind, const std::string& backplane,
+  static Segment create(std::size_t bytes, layout::SegmentKind kind, std::string_view backplane,
                         Rights rights) {
     return create(bytes, kind, backplane, rights, bytes);
   }

@@ -29,7 +29,7 @@ FileDescriptor openSegment(const std::string& name) {
 std::optional<SegmentHeader> headerOf(const FileDescriptor& file, const std::string& name,
                                       SegmentKind kind) try {
   if (!file) return std::nullopt;
-  return SegmentImage::readOpen(file.get(), segments::path(name), kind, sizeof(SegmentHeader))
+  return SegmentImage::readOpen(file.get(), segments::path(name), kind, layout::kHeaderBytes)
       .header();
 } catch (const std::exception&) {
   return std::nullopt;

@@ -241,7 +241,7 @@ TEST_F(FaultGuard, OverwrittenHintsAreRemovedWhenTheirOwnerIsDead) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
     std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header),
-                sizeof(layout::SegmentHeader), std::byte{0xa5});
+                layout::kHeaderBytes, std::byte{0xa5});
     self.stay();
   });
   EXPECT_THAT(backplane_.removeDead(), testing::IsEmpty());

@@ -20,7 +20,8 @@ inline nlohmann::json layoutFields() {
   nlohmann::json all;
   {
     using Struct = SegmentHeader;
-    all["SegmentHeader"] = {{"bytes", sizeof(Struct)},
+    constexpr auto kReserved = offsetof(Struct, moreReplySlots) + sizeof(Struct::moreReplySlots);
+    all["SegmentHeader"] = {{"bytes", kHeaderBytes},
                             {"fields",
                              {MPF_FIELD(magic),
                               MPF_FIELD(layoutMajor),
@@ -57,7 +58,7 @@ inline nlohmann::json layoutFields() {
                               MPF_FIELD(chunkCount),
                               MPF_FIELD(bulkSide),
                               MPF_FIELD(moreReplySlots),
-                              MPF_FIELD(reserved)}}};
+                              {"reserved", {kReserved, kHeaderBytes - kReserved}}}}};
   }
   {
     using Struct = WindowControl;
@@ -79,11 +80,15 @@ inline nlohmann::json layoutFields() {
   }
   {
     using Struct = WindowHints;
-    all["WindowHints"] = {
-        {"bytes", sizeof(Struct)},
-        {"fields",
-         {MPF_FIELD(header), MPF_FIELD(bell), MPF_FIELD(knocked), MPF_FIELD(rescan),
-          MPF_FIELD(knocks), MPF_FIELD(readyWords), MPF_FIELD(readyBits)}}};
+    all["WindowHints"] = {{"bytes", sizeof(Struct)},
+                          {"fields",
+                           {{"header", {0, kHeaderBytes}},
+                            MPF_FIELD(bell),
+                            MPF_FIELD(knocked),
+                            MPF_FIELD(rescan),
+                            MPF_FIELD(knocks),
+                            MPF_FIELD(readyWords),
+                            MPF_FIELD(readyBits)}}};
   }
   {
     using Struct = LinkControl;

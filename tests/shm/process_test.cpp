@@ -22,7 +22,7 @@ class ProcessTest : public testing::Test {
 
   // A header that this process and a child share.
   layout::SegmentHeader& header_ =
-      *new (::mmap(nullptr, sizeof(layout::SegmentHeader), PROT_READ | PROT_WRITE,
+      *new (::mmap(nullptr, layout::kHeaderBytes, PROT_READ | PROT_WRITE,
                    MAP_SHARED | MAP_ANONYMOUS, -1, 0)) layout::SegmentHeader{};
 };
 

@@ -75,7 +75,7 @@ TEST_F(SegmentRefusal, NamesBothLengthsOfATruncatedFile) {
   ASSERT_EQ(::truncate(path_.c_str(), 4095), 0);
   EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("truncated, 4095 bytes of 4096")));
 
-  ASSERT_EQ(::truncate(path_.c_str(), sizeof(SegmentHeader) - 1), 0);
+  ASSERT_EQ(::truncate(path_.c_str(), layout::kHeaderBytes - 1), 0);
   EXPECT_THAT(refusal(), AllOf(HasSubstr(path_), HasSubstr("511 bytes are too few")));
 
   ASSERT_EQ(::truncate(path_.c_str(), 0), 0);
@@ -83,7 +83,7 @@ TEST_F(SegmentRefusal, NamesBothLengthsOfATruncatedFile) {
 }
 
 TEST_F(SegmentRefusal, RefusesAnImpossibleLength) {
-  header().totalBytes = sizeof(SegmentHeader) - 1;
+  header().totalBytes = layout::kHeaderBytes - 1;
   EXPECT_THAT(refusal(), HasSubstr("truncated, 4096 bytes of 511"));
 
   header().totalBytes = UINT64_MAX;

@@ -62,13 +62,13 @@ SegmentImage SegmentImage::readOpen(int file, const std::string& path,
       std::max({layout::kWindowBytes, layout::kLinkRingsOffset, sizeof(layout::WindowHints)});
   const auto found = kindOf(file);
   const bool isPool = found == layout::SegmentKind::bulk || found == layout::SegmentKind::fanOut;
-  const auto most = kind || !isPool ? bytes : sizeof(layout::SegmentHeader);
+  const auto most = kind || !isPool ? bytes : layout::kHeaderBytes;
   const auto wanted = std::min<std::uint64_t>(most, image.fileBytes_);
   image.blocks_ = std::make_unique<Block[]>(
       (std::max<std::size_t>(wanted, kLeast) + sizeof(Block) - 1) / sizeof(Block));
   image.bytesRead_ = static_cast<std::size_t>(
       checkCall(::pread(file, image.blocks_.get(), wanted, 0), "read", path));
-  if (image.bytesRead_ < sizeof(layout::SegmentHeader)) {
+  if (image.bytesRead_ < layout::kHeaderBytes) {
     throw SegmentError(
         fmt::format("{}: truncated, {} bytes are too few for a header", path, image.bytesRead_));
   }

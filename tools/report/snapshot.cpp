@@ -97,14 +97,12 @@ class SnapshotReader {
       case NameKind::pendingBind:
         return pendingBind(name);
       case NameKind::bulk:
-        if (const auto image =
-                read(name, layout::SegmentKind::bulk, sizeof(layout::SegmentHeader))) {
+        if (const auto image = read(name, layout::SegmentKind::bulk, layout::kHeaderBytes)) {
           bulkBytes_[parsed.incarnation] += image->fileBytes();
         }
         return;
       case NameKind::fanOut:
-        if (const auto image =
-                read(name, layout::SegmentKind::fanOut, sizeof(layout::SegmentHeader))) {
+        if (const auto image = read(name, layout::SegmentKind::fanOut, layout::kHeaderBytes)) {
           fanOutBytes_[parsed.incarnation] += image->fileBytes();
         }
         return;
@@ -187,7 +185,7 @@ class SnapshotReader {
   }
 
   void pendingBind(const std::string& name) {
-    const auto image = read(name, layout::SegmentKind::pendingBind, sizeof(layout::SegmentHeader));
+    const auto image = read(name, layout::SegmentKind::pendingBind, layout::kHeaderBytes);
     if (!image) return;
     snapshot_.pendingBinds.push_back({image->header().ownerWindow,
                                       segments::text(image->header().name),

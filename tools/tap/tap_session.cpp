@@ -20,7 +20,7 @@ TappedLink describe(const std::string& backplane, const layout::SegmentHeader& h
   link.location = header.location;
   const auto name = SegmentName::keyed(backplane, NameKind::clientWindow, header.clientWindow);
   const auto client =
-      SegmentImage::tryRead(name, layout::SegmentKind::clientWindow, sizeof(layout::SegmentHeader));
+      SegmentImage::tryRead(name, layout::SegmentKind::clientWindow, layout::kHeaderBytes);
   if (!client) return link;
   link.client = segments::rawText(client->header().name);
   if (link.client.empty()) link.client = segments::rawText(client->header().program);
@@ -51,8 +51,8 @@ bool TapSession::isWanted(const std::string& name) const {
 // links that were removed.
 void TapSession::lookAtNames(FollowFrom from) {
   lookAgain_ = Deadline::after(kLookEvery);
-  const auto image = SegmentImage::tryRead(window_, layout::SegmentKind::serverWindow,
-                                           sizeof(layout::SegmentHeader));
+  const auto image =
+      SegmentImage::tryRead(window_, layout::SegmentKind::serverWindow, layout::kHeaderBytes);
   incarnation_ = image ? image->header().incarnation : 0;
   const auto names = segments::list(SegmentName::prefix(selection_.backplane));
   dropEnded({names.begin(), names.end()});

@@ -63,7 +63,7 @@ TEST_F(SegmentImageTest, StaysWhenTheSegmentIsRemoved) {
 // Other versions may have shorter windows: the missing bytes are zero.
 TEST_F(SegmentImageTest, BytesBehindTheEndOfTheFileAreZero) {
   auto segment =
-      Segment::create(sizeof(layout::SegmentHeader), layout::SegmentKind::serverWindow, name(), {});
+      Segment::create(layout::kHeaderBytes, layout::SegmentKind::serverWindow, name(), {});
   ASSERT_TRUE(segment.tryPublish(serverName()));
 
   const auto image = read();
