@@ -115,8 +115,7 @@ void Attacker::writeHints() {
 void Attacker::writeHeader() {
   auto& memory = any();
   const auto word = random_.nasty();
-  std::memcpy(memory.data() + random_.below(layout::kHeaderBytes / 8) * 8, &word,
-              sizeof word);
+  std::memcpy(memory.data() + random_.below(layout::kHeaderBytes / 8) * 8, &word, sizeof word);
 }
 
 void Attacker::cut() {

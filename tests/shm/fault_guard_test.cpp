@@ -240,8 +240,8 @@ TEST_F(FaultGuard, PassesOtherFaultsToThePreviousHandler) {
 TEST_F(FaultGuard, OverwrittenHintsAreRemovedWhenTheirOwnerIsDead) {
   Child child([&](Child::Self& self) {
     const auto server = makeServer();
-    std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header),
-                layout::kHeaderBytes, std::byte{0xa5});
+    std::fill_n(reinterpret_cast<std::byte*>(&server->hints().header), layout::kHeaderBytes,
+                std::byte{0xa5});
     self.stay();
   });
   EXPECT_THAT(backplane_.removeDead(), testing::IsEmpty());

@@ -57,8 +57,7 @@ TEST_F(SegmentTest, IsZeroedAndItsHeaderNamesItsCreatorTimeAndKind) {
   EXPECT_EQ(header.backplane.data(), name());
   EXPECT_STREQ(header.program.data(), "shm_test");
   EXPECT_EQ(segment.bytes(), layout::kPageBytes);
-  EXPECT_TRUE(std::all_of(segment.data() + layout::kHeaderBytes,
-                          segment.data() + segment.bytes(),
+  EXPECT_TRUE(std::all_of(segment.data() + layout::kHeaderBytes, segment.data() + segment.bytes(),
                           [](std::byte byte) { return byte == std::byte{0}; }));
 }
 
