@@ -106,7 +106,8 @@ TEST_F(DeathAtSteps, EachCapsuleShowsTheRequest) {
   RecordProperty("handling", handling);
   std::printf("%zu steps, %d deaths, %d of them while the request was in work\n", steps.size(),
               deaths, handling);
-  EXPECT_GT(steps.size(), 3U);
+  // At the steps behind these, the client may see the reply before the server dies.
+  EXPECT_THAT(steps, testing::IsSupersetOf({"message_counted", "request_taken", "slot_written"}));
   EXPECT_GT(handling, 0);
 }
 
