@@ -8,6 +8,7 @@ import ctypes
 import gc
 import os
 import secrets
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +23,11 @@ PATIENCE = 120.0
 PROGRAMS = Path(os.environ["MPF_TEST_PROGRAMS"])
 HAS_MPF = (PROGRAMS / "mpf").exists()  # builds with a sanitizer lack it
 needs_mpf = pytest.mark.skipif(not HAS_MPF, reason="the program mpf was not built")
+
+
+def pytest_sessionstart() -> None:
+    """Ctrl-C interrupts, also where the caller ignores it, as a shell does for background jobs."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
