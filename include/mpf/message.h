@@ -101,8 +101,8 @@ class Message {
 
   // In messages that a client received: how many messages to the same request the server has
   // dropped since the last one that it published (MessageServer::publish()), because this client
-  // had not destroyed, or not received, enough of the earlier ones; at most 2^24 - 1. With a server
-  // on another host, it includes what the routers have dropped. 0 for all other messages.
+  // had not destroyed, or not received, enough of the earlier ones; at most 2^24 - 1. 0 for all
+  // other messages. With a server on another host, the router of that host adds what it drops.
   [[nodiscard]] std::uint32_t getMissed() const noexcept {
     return state_.route.link == 0 ? state_.route.flags >> kMissedShift : 0;
   }

@@ -98,6 +98,22 @@ async def connect(client: mpf.AsyncClient, server: mpf.Server) -> None:
         await asyncio.sleep(0)
 
 
+async def test_closing_a_request_ends_the_wait_of_another_task(
+    short: tuple[mpf.Server, mpf.Client],
+) -> None:
+    server, _ = short
+    async with mpf.AsyncClient("short", timeout=float("inf")) as client:
+        await connect(client, server)
+        (request,) = await client.send_many([mpf.Int32()])
+        waiting = asyncio.ensure_future(request.wait())
+        await asyncio.sleep(0)
+
+        request.close()
+
+        with pytest.raises(mpf.Cancelled):
+            await asyncio.wait_for(waiting, PATIENCE)
+
+
 async def test_a_coroutine_sends_many_requests_as_far_as_there_is_room(
     short: tuple[mpf.Server, mpf.Client],
 ) -> None:

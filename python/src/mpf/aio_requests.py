@@ -51,8 +51,9 @@ class AsyncRequest:
         self._request.cancel()
 
     def close(self) -> None:
-        """Cancels the request, and drops further replies."""
+        """Cancels the request, drops further replies, and ends each wait for it."""
         self._request.close()
+        self._client._wake(self.id)
 
     @property
     def id(self) -> int:
