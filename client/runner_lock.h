@@ -31,8 +31,8 @@ class RunnerLock {
            (owner_.load(std::memory_order_relaxed) & ~kTemporary) == threadNumber();
   }
 
-  // Makes the calling thread the runner, if it has been the only one for a while and does not run
-  // the dispatcher already. Cheap.
+  // Makes the calling thread the runner, if it has been the only one for a while and is not inside
+  // by its bias already. Cheap. A thread that has the lock in another way may enter, too.
   [[nodiscard]] bool tryEnter() noexcept { return !bias_.isInside() && bias_.tryEnter(); }
 
   // Makes the calling thread, which does not own the lock, the runner.

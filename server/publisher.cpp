@@ -113,6 +113,7 @@ std::size_t Publisher::publish(const Message& message, std::span<const Message> 
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const auto result = send(message, requests[i], chunk, kOwnCount);
     if (result == ReplyResult::sent) ++sent;
+    else if (result != ReplyResult::clientGone) count(control_.replyQueueFull);
     if (i < results.size()) results[i] = result;
   }
   if (chunk && !isShared) chunk->drop();
@@ -160,10 +161,7 @@ ReplyResult Publisher::sendLocked(Connection& connection, const Message& message
       missed == kOwnCount
           ? link.trySendFanOut(envelope, chunk, bytes, limits, maxBorrowed_)
           : link.tryRelayFanOut(envelope, chunk, bytes, limits, maxBorrowed_, missed);
-  if (result != LinkSend::sent) {
-    count(control_.replyQueueFull);
-    return resultOf(result);
-  }
+  if (result != LinkSend::sent) return resultOf(result);
   MPF_STEP(reply_sent);
   if (first) connection.owed(route.requestId).store(0, std::memory_order_relaxed);
   count(control_.sent);

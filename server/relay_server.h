@@ -22,8 +22,8 @@ class RelayServer : public MessageServer {
   [[nodiscard]] Deadline takeBefore() const noexcept;
   // As reply(), to a request whose handle no longer exists. The caller has kept the results of
   // clientOf(request) and request.route().requestId. The client gets the getMissed() of `message`,
-  // a received message, unless it holds ServerOptions::maxBorrowed such messages. A message that is
-  // not sent keeps the number.
+  // a received message, unless it holds ServerOptions::maxBorrowed such messages or there is no
+  // memory for a copy. A message that is not sent keeps the number.
   ReplyResult replyTo(std::uint64_t client, std::uint32_t requestId, Message&& message);
   // As long as `isPolled` is true, the caller calls receive() all the time, and the descriptor does
   // not become readable for requests. After a change to false, call receive() until it returns an

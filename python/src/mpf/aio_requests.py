@@ -27,7 +27,7 @@ class AsyncRequest:
         self._limit = limit
 
     async def wait(self, *, check: bool = True) -> Message:
-        """As Request.wait(). Cancelling it cancels the request."""
+        """As Request.wait(). Cancelling it closes the request."""
         try:
             return await self._client._end(self._request, self._limit, check)
         except asyncio.CancelledError:
