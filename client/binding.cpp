@@ -2,7 +2,6 @@
 #include "client/binding.h"
 
 #include <fmt/format.h>
-#include <mutex>
 
 #include "base/step.h"
 #include "shm/histogram.h"

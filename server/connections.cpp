@@ -5,7 +5,6 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
-#include <mutex>
 #include <new>
 #include <thread>
 #include <utility>

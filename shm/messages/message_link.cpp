@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "shm/messages/message_link.h"
 
-#include <mutex>
-
 #include "shm/private_pages.h"
 
 namespace mpf {

@@ -8,7 +8,6 @@
 
 #include <atomic>
 #include <gtest/gtest.h>
-#include <mutex>
 #include <thread>
 #include <vector>
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "epics/callback_queue.h"
 
-#include <mutex>
 #include <semaphore>
 #include <string>
 

@@ -2,7 +2,6 @@
 #include "tests/fuzz/talk.h"
 
 #include <capnp/message.h>
-#include <mutex>
 #include <sanitizer/asan_interface.h>
 
 #include <mpf/message_of.h>

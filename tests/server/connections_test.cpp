@@ -5,7 +5,6 @@
 #include <atomic>
 #include <bit>
 #include <gmock/gmock.h>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <memory>
-#include <mutex>
 #include <optional>
 
 #include <mpf/message_of.h>
