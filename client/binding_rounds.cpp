@@ -19,12 +19,11 @@ void BindingRounds::add(Place&& place) {
   isComplete_ = wasComplete;
 }
 
-void BindingRounds::remove(const std::shared_ptr<Binding>& binding) {
-  if (const auto found = bindings_.find(binding.get()); found != bindings_.end()) {
+void BindingRounds::remove(const Binding& binding) noexcept {
+  if (const auto found = bindings_.find(&binding); found != bindings_.end()) {
     schedule(found->second, INT64_MAX);
-    bindings_.erase(found);
+    removed_.insert(bindings_.extract(found));
   }
-  removed_.push_back(binding);
   // It may have been the last binding that waited for a server: then the watch of names can end.
   if (parts_.names.isRunning()) parts_.names.noteChange();
 }

@@ -28,10 +28,12 @@ class BindingRounds {
   // its binding runs.
   //   throws  std::bad_alloc: the binding is added, and the next step handles its timer
   void add(Place&& place);
-  // The binding stays alive until dropRemoved().
-  void remove(const std::shared_ptr<Binding>& binding);
+  // A binding that was added stays alive until dropRemoved().
+  void remove(const Binding& binding) noexcept;
   // No callback of a removed binding is in progress.
-  void dropRemoved() noexcept { removed_.clear(); }
+  void dropRemoved() noexcept {
+    if (!removed_.empty()) removed_.clear();
+  }
 
   // A process has died: disconnects the bindings whose server it was.
   void beginDead() { dead_.begin(all()); }
@@ -62,7 +64,7 @@ class BindingRounds {
   Members bindings_;
   std::set<std::pair<std::int64_t, const Binding*>> schedule_;
   bool isComplete_ = true;  // false: a binding may lack its place in schedule_
-  std::vector<std::shared_ptr<Binding>> removed_;
+  Members removed_;
   Round<Binding> dead_;
   Round<Binding> waiting_;
   Round<Binding> due_;

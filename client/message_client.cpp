@@ -49,7 +49,7 @@ MessageClient::~MessageClient() {
   if (isInherited()) return;
   dispatcher_->runOrPostAndWait([&] {
     binding_->leave();
-    dispatcher_->bindings().remove(binding_);
+    dispatcher_->bindings().remove(*binding_);
   });
 }
 

@@ -129,7 +129,7 @@ TEST_F(BindingRoundsTest, EndTheWatchAfterTheLastWaitingBindingIsRemoved) {
   rounds_.resume();
   static_cast<void>(parts_.names.takeChange());
 
-  rounds_.remove(binding);
+  rounds_.remove(*binding);
 
   EXPECT_TRUE(parts_.names.takeChange()) << "the next step looks whether a binding waits";
   rounds_.beginWaiting();
@@ -139,7 +139,7 @@ TEST_F(BindingRoundsTest, EndTheWatchAfterTheLastWaitingBindingIsRemoved) {
 
 TEST_F(BindingRoundsTest, KeepARemovedBindingUntilItIsDropped) {
   const std::weak_ptr<Binding> binding = add();
-  rounds_.remove(binding.lock());
+  rounds_.remove(*binding.lock());
   bindings_.clear();
   EXPECT_FALSE(binding.expired());
 
@@ -180,7 +180,7 @@ TEST_F(BindingRoundsTest, HandleEachBindingWhenItIsDueAndNoOther) {
   const auto removedNs = removed->dueNs();
   const auto secondNs = second->dueNs();
   ASSERT_LT(firstNs, secondNs);
-  rounds_.remove(removed);
+  rounds_.remove(*removed);
 
   rounds_.handleDue();
   while (first->dueNs() == firstNs || second->dueNs() == secondNs) {
