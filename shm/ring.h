@@ -116,10 +116,12 @@ class RingProducer {
 
  private:
   // Lines that are claimed at once. In a stream, many: its consumer keeps a distance. Otherwise
-  // few: the consumer may be about to read a slot that waits for the transfers of these lines.
-  static constexpr std::uint64_t kFewestClaimed = 8;
-  static constexpr std::uint64_t kMostClaimed = 32;
-  static constexpr std::uint64_t kFarAhead = 64;  // slots ahead of the consumer
+  // few: the consumer may be about to read a slot that waits for the transfers of these lines. None
+  // when the consumer has taken everything: it polls the next slot and takes its line back at once.
+  [[nodiscard]] std::uint64_t linesToClaim() noexcept {
+    if (waiting() == 0) return 0;
+    return pushed_ - freedSeen_ < 64 ? 8 : 32;
+  }
 
   layout::Slot& slot(std::uint64_t position) const noexcept {
     return slots_[position & (capacity_ - 1)];
@@ -129,7 +131,7 @@ class RingProducer {
   [[gnu::noinline]] bool hasFreed(std::uint32_t count) noexcept {
     // PAIR(slot-freed): the consumer has finished reading the slots that we are about to overwrite.
     freedSeen_ = std::clamp(consumer_.freed.load(std::memory_order_acquire), freedSeen_, pushed_);
-    claim_ = pushed_ - freedSeen_ >= kFarAhead ? kMostClaimed : kFewestClaimed;
+    claim_ = linesToClaim();
     if (pushed_ + count - freedSeen_ <= usable_) return true;
     return second_.slots != nullptr && tryMove() && count <= usable_;
   }
@@ -152,7 +154,9 @@ class RingProducer {
   // messages do not, because the stores of one message fill the store buffer. (prefetchw had no
   // effect here: a processor did not take a line with it that it shared with another one.)
   [[gnu::noinline]] void claimLines() noexcept {
-    claimed_ = std::min(freedSeen_ + capacity_, pushed_ + claim_);
+    const auto end = freedSeen_ + capacity_;
+    claimed_ = claim_ == 0 ? end : std::min(end, pushed_ + claim_);
+    if (claim_ == 0) return;
     for (auto position = pushed_; position < claimed_; ++position) {
       volatile auto& field = slot(position).type;
       field = field;
@@ -206,7 +210,7 @@ class RingProducer {
   SecondRing second_;  // until we have moved there
   std::uint64_t pushed_ = 0;  // slots
   std::uint64_t freedSeen_ = 0;  // private copy of consumer_.freed
-  std::uint64_t claim_ = kFewestClaimed;  // lines that are claimed at once
+  std::uint64_t claim_ = 0;  // lines that are claimed at once
   std::uint64_t claimed_ = 0;  // slots before this position were claimed
   std::uint64_t messages_ = 0;
   std::uint64_t takenSeen_ = 0;  // private copy of consumer_.taken
